@@ -1,0 +1,1 @@
+//! Scenes, sample preparation, the run loop and the history.

@@ -1,0 +1,2 @@
+//! The `dem-run` command.
+fn main() {}
