@@ -2,7 +2,7 @@
 
 mod gauss_seidel;
 
-pub use gauss_seidel::{GaussSeidel, GaussSeidelSettings};
+pub use gauss_seidel::{GaussSeidel, GaussSeidelSettings, sweep};
 
 use crate::dim::Dim;
 use crate::problem::ContactProblem;

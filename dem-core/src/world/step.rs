@@ -119,6 +119,14 @@ impl<D: Dim> World<D> {
         Ok(report)
     }
 
+    /// The contact problem that the next step would start from, for export and for benchmarks. The world does not move.
+    pub fn contact_problem(&mut self) -> ContactProblem<D> {
+        let h = self.settings.step;
+        let (mid, motion) = (self.midpoint(h), self.free_motion(h));
+        let touches = self.detect(&mid, &motion, h);
+        self.assemble(&touches, &motion, self.applied_impulse(h), h).0
+    }
+
     /// Half a step in position at the old velocities.
     fn midpoint(&self, h: f64) -> Midpoint<D> {
         let drift = |x: &D::Vector, v: &D::Vector| *x + *v * (0.5 * h);
