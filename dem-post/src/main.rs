@@ -1,0 +1,2 @@
+//! The `dem-post` command.
+fn main() {}

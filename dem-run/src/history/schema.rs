@@ -1,0 +1,122 @@
+//! Names, versions and chunk sizes of the layout; the layout itself stands in the module's documentation.
+
+use hdf5::H5Type;
+
+use super::codes::{Coded, ModeCode};
+use super::{Rupture, RuptureMode};
+
+/// Version of the layout. It grows with every change that an older reader would misread.
+pub const SCHEMA_VERSION: u32 = 1;
+
+/// The program's name as `/h5md/creator` records it.
+pub(super) const CREATOR: &str = "dem-run";
+
+/// Paths in the file.
+pub(super) mod path {
+    pub const COMMIT: &str = "commit";
+    pub const COMMIT_CONTACTS: &str = "commit_rows/contacts";
+    pub const COMMIT_EVENTS: &str = "commit_rows/events";
+    pub const COMMIT_STEPS: &str = "commit_rows/steps";
+    pub const GRAINS: &str = "particles/grains";
+    pub const WALLS: &str = "walls";
+    pub const CONTACTS: &str = "contacts";
+    pub const BONDS: &str = "bonds";
+    pub const RUPTURE: &str = "events/rupture";
+    pub const OBSERVABLES: &str = "observables";
+    pub const PARAMETERS: &str = "parameters";
+    pub const SCENE: &str = "parameters/scene";
+}
+
+/// Bytes across one row of a chunk, about 500 doubles.
+const CHUNK_ROW: usize = 4000;
+/// Bytes of a chunk, about 16 such rows.
+const CHUNK: usize = 16 * CHUNK_ROW;
+
+/// The chunk of a dataset that grows by whole frames: `[rows, first extents of one frame…]`.
+///
+/// A frame of a large sample is split so that 16 frames fill a chunk; a small sample puts more frames in one.
+pub(super) fn frame_chunk(item: usize, row: &[usize]) -> Vec<usize> {
+    let inner: usize = row.iter().skip(1).product::<usize>().max(1);
+    let across = row
+        .first()
+        .map_or(1, |&n| n.min((CHUNK_ROW / (inner * item)).max(1)));
+    let rows = (CHUNK / (across * inner * item)).clamp(16, 256);
+    let mut chunk = vec![rows];
+    chunk.extend(row);
+    if let Some(first) = chunk.get_mut(1) {
+        *first = across;
+    }
+    chunk
+}
+
+/// The chunk of a dataset that grows by about `rows` rows every 16 frames.
+pub(super) fn row_chunk(rows: usize, item: usize, row: &[usize]) -> Vec<usize> {
+    let width: usize = row.iter().product::<usize>().max(1) * item;
+    let mut chunk = vec![rows.clamp(64, (4 * CHUNK / width).max(64))];
+    chunk.extend(row);
+    chunk
+}
+
+/// A rupture as the file holds it: scalars only (pandas refuses arrays), the padding a member of its own (its bytes
+/// would otherwise be whatever the memory held, and two runs would differ).
+#[derive(Clone, Copy, Debug, H5Type)]
+#[repr(C)]
+pub(super) struct RuptureRow {
+    step: i64,
+    time: f64,
+    x: f64,
+    y: f64,
+    z: f64,
+    rn: f64,
+    rt: f64,
+    m: f64,
+    energy: f64,
+    round: i32,
+    bond: i32,
+    i: i32,
+    j: i32,
+    mode: ModeCode,
+    pad: i32,
+}
+
+impl From<&Rupture> for RuptureRow {
+    fn from(r: &Rupture) -> Self {
+        let ([x, y, z], [i, j]) = (r.point, r.pair);
+        Self {
+            step: r.step,
+            time: r.time,
+            x,
+            y,
+            z,
+            rn: r.normal_force,
+            rt: r.tangential_force,
+            m: r.moment,
+            energy: r.energy,
+            round: r.round,
+            bond: r.bond,
+            i,
+            j,
+            mode: r.mode.code(),
+            pad: 0,
+        }
+    }
+}
+
+impl RuptureRow {
+    /// The event, `None` if its mode is no known one.
+    pub(super) fn event(&self) -> Option<Rupture> {
+        Some(Rupture {
+            step: self.step,
+            time: self.time,
+            point: [self.x, self.y, self.z],
+            normal_force: self.rn,
+            tangential_force: self.rt,
+            moment: self.m,
+            energy: self.energy,
+            round: self.round,
+            bond: self.bond,
+            pair: [self.i, self.j],
+            mode: RuptureMode::from_code(self.mode)?,
+        })
+    }
+}

@@ -1,0 +1,137 @@
+//! A dataset that grows by rows, and the small helpers that make and fill HDF5 objects.
+
+use hdf5::types::VarLenUnicode;
+use hdf5::{Dataset, Extent, Group, H5Type, Hyperslab, Location, SimpleExtents, SliceOrIndex};
+use ndarray::ArrayViewD;
+
+use super::schema::{frame_chunk, row_chunk};
+
+/// How a table is chunked.
+#[derive(Clone, Copy)]
+pub(super) enum Growth {
+    /// One row per frame.
+    Frames,
+    /// Many rows per frame; this many in a chunk.
+    Rows(usize),
+}
+
+/// A dataset whose first extent grows; `row` is the shape of the others.
+pub(super) struct Table {
+    dataset: Dataset,
+    rows: usize,
+    row: Vec<usize>,
+}
+
+impl Table {
+    /// Creates an empty table of rows of shape `row`; `unit` is empty for plain numbers.
+    pub fn create<T: H5Type>(
+        group: &Group,
+        name: &str,
+        unit: &str,
+        row: &[usize],
+        growth: Growth,
+    ) -> hdf5::Result<Self> {
+        let item = size_of::<T>();
+        let chunk = match growth {
+            Growth::Frames => frame_chunk(item, row),
+            Growth::Rows(rows) => row_chunk(rows, item, row),
+        };
+        let mut extents = vec![Extent::resizable(0)];
+        extents.extend(row.iter().map(|&n| Extent::fixed(n)));
+        // the cache holds one band of chunks, or every frame would evict and reload partly filled ones
+        let band = row.first().map_or(1, |&n| n.div_ceil(chunk[1]));
+        let bytes = chunk.iter().product::<usize>() * item * band;
+        let dataset = group
+            .new_dataset::<T>()
+            .shape(SimpleExtents::from(extents))
+            .chunk(chunk)
+            .chunk_cache(521.max(10 * band + 1), bytes + (1 << 16), 0.75)
+            .obj_track_times(false)
+            .create(name)?;
+        set_unit(&dataset, unit)?;
+        Ok(Self {
+            dataset,
+            rows: 0,
+            row: row.to_vec(),
+        })
+    }
+
+    /// Numbers in one row.
+    pub fn width(&self) -> usize {
+        self.row.iter().product()
+    }
+
+    /// Rows so far.
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Appends whole rows.
+    pub fn append<T: H5Type>(&mut self, values: &[T]) -> hdf5::Result<()> {
+        let more = values.len() / self.width();
+        if more == 0 {
+            return Ok(());
+        }
+        let end = self.rows + more;
+        let shape = |first| -> Vec<usize> {
+            std::iter::once(first)
+                .chain(self.row.iter().copied())
+                .collect()
+        };
+        self.dataset.resize(shape(end))?;
+        let view = ArrayViewD::from_shape(shape(more), values)
+            .map_err(|error| hdf5::Error::Internal(error.to_string()))?;
+        self.dataset
+            .write_slice(view, rows(self.rows, end, &self.row))?;
+        self.rows = end;
+        Ok(())
+    }
+}
+
+/// Selects rows `start..end`, each of shape `row`.
+pub(super) fn rows(start: usize, end: usize, row: &[usize]) -> Hyperslab {
+    let slices: Vec<SliceOrIndex> = std::iter::once(start..end)
+        .chain(row.iter().map(|&n| 0..n))
+        .map(SliceOrIndex::from)
+        .collect();
+    Hyperslab::from(slices)
+}
+
+/// Creates a fixed dataset of shape `shape` with its values.
+pub(super) fn fixed<T: H5Type>(
+    group: &Group,
+    name: &str,
+    unit: &str,
+    shape: &[usize],
+    values: &[T],
+) -> hdf5::Result<()> {
+    let view = ArrayViewD::from_shape(shape.to_vec(), values)
+        .map_err(|error| hdf5::Error::Internal(error.to_string()))?;
+    let dataset = group
+        .new_dataset_builder()
+        .with_data(view)
+        .obj_track_times(false)
+        .create(name)?;
+    set_unit(&dataset, unit)
+}
+
+/// Text as HDF5 stores it; a NUL, which HDF5 cannot hold, becomes a blank.
+pub(super) fn text(value: &str) -> VarLenUnicode {
+    value.replace('\0', " ").parse().unwrap_or_default()
+}
+
+/// Gives `location` a text attribute.
+pub(super) fn text_attribute(location: &Location, name: &str, value: &str) -> hdf5::Result<()> {
+    location
+        .new_attr::<VarLenUnicode>()
+        .create(name)?
+        .write_scalar(&text(value))
+}
+
+fn set_unit(dataset: &Dataset, unit: &str) -> hdf5::Result<()> {
+    if unit.is_empty() {
+        Ok(())
+    } else {
+        text_attribute(dataset, "unit", unit)
+    }
+}
