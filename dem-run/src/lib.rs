@@ -1,1 +1,3 @@
 //! Scenes, sample preparation, the run loop and the history.
+
+pub mod scene;
