@@ -45,9 +45,11 @@
 //! compression while running: it costs more than the run (`dem-post pack` compresses afterwards).
 
 mod codes;
+mod create;
 mod error;
 mod reader;
 mod schema;
+mod source;
 mod table;
 #[cfg(test)]
 mod tests;
