@@ -106,7 +106,9 @@ codes! {
     /// A circle in 2D.
     Circle = 1 "CIRCLE",
     /// An endless cylinder in 3D.
-    Cylinder = 2 "CYLINDER"
+    Cylinder = 2 "CYLINDER",
+    /// A sphere in 3D.
+    Sphere = 3 "SPHERE"
 }
 
 codes! {

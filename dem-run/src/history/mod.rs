@@ -14,8 +14,9 @@
 //!     angle                {step, time, value[T,N]}, 2D only                                 rad, if rotation
 //!     orientation          {step, time, value[T,N,4]}, 3D only, quaternions w x y z          if rotation
 //!     id, radius, mass, inertia [N]
-//! /walls/                  name, kind (enum PLANE, CIRCLE, CYLINDER), drive (enum FIXED, VELOCITY, FORCE) [W]
-//!     normal [W,D]         plane: unit normal towards the grains; cylinder: unit axis; circle: 0
+//! /walls/                  name, kind [W]       enum PLANE, CIRCLE, CYLINDER, SPHERE
+//!     drive [W]            enum FIXED, VELOCITY, FORCE
+//!     normal [W,D]         plane: unit normal towards the grains; cylinder: unit axis; else 0
 //!     radius [W]           m; 0 for planes, negative where the grains are inside
 //!     direction [W,D]      unit direction of the drive; 0 for fixed walls
 //!     position, velocity   {step, time, value[T,W,D]}: a point of the plane, the centre      m, m/s
@@ -45,9 +46,11 @@
 //! compression while running: it costs more than the run (`dem-post pack` compresses afterwards).
 
 mod codes;
+mod create;
 mod error;
 mod reader;
 mod schema;
+mod source;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -100,7 +103,7 @@ pub struct Wall {
     pub name: String,
     /// Its shape.
     pub kind: WallKind,
-    /// Plane: unit normal towards the grains; cylinder: unit axis; circle: zero.
+    /// Plane: unit normal towards the grains; cylinder: unit axis; else zero.
     pub normal: [f64; 3],
     /// Radius, m: 0 for a plane, negative where the grains are inside.
     pub radius: f64,

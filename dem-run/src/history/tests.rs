@@ -492,12 +492,10 @@ fn read_all(path: &Path) -> Result<usize> {
     h.walls()?;
     h.bonds()?;
     for k in 0..h.frames() {
-        (
-            h.grain_state(k)?,
-            h.wall_state(k)?,
-            h.contacts(k)?,
-            h.bond_status(k)?,
-        );
+        h.grain_state(k)?;
+        h.wall_state(k)?;
+        h.contacts(k)?;
+        h.bond_status(k)?;
     }
     h.ruptures()?;
     for name in h.observable_names()? {
