@@ -129,6 +129,12 @@ impl<D: Dim> World<D> {
         }
     }
 
+    /// Take another solver from the next step on.
+    pub fn set_solver(&mut self, solver: SolverSettings) {
+        self.settings.solver = solver;
+        self.solver = solver.build();
+    }
+
     /// Number of bonds that hold.
     pub fn intact_bonds(&self) -> usize {
         self.bonds.iter().filter(|b| b.status == BondStatus::Intact).count()
