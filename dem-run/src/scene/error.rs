@@ -85,7 +85,8 @@ pub enum Origin {
 
 impl Problem {
     /// A problem without a nearest name or a known origin.
-    pub(super) fn new(
+    #[must_use]
+    pub fn new(
         path: impl Into<String>,
         found: impl Into<String>,
         allowed: impl Into<String>,
@@ -100,7 +101,8 @@ impl Problem {
     }
 
     /// The same with the valid name nearest to the wrong one.
-    pub(super) fn with_nearest(self, nearest: Option<String>) -> Self {
+    #[must_use]
+    pub fn with_nearest(self, nearest: Option<String>) -> Self {
         Self { nearest, ..self }
     }
 
