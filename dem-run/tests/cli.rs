@@ -153,7 +153,10 @@ fn schema_prints_a_json_schema_of_scenes() {
     // the copy that the scenes in configs name
     let copy = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/scene.schema.json");
     let copy = std::fs::read_to_string(copy).expect("docs/scene.schema.json");
-    assert!(copy == stdout, "docs/scene.schema.json is old: dem-run schema > docs/scene.schema.json");
+    assert!(
+        copy == stdout,
+        "docs/scene.schema.json is old: dem-run schema > docs/scene.schema.json"
+    );
     assert!(
         schema["properties"]["thickness"]["description"]
             .as_str()

@@ -381,6 +381,7 @@ fn an_assignment_to_a_path_that_does_not_exist_is_refused() {
             Some("materials.restitution.grain_grain"),
         ),
         ("nonsense=1", "nonsense", None),
+        ("", "", None),
         ("time.step.x=1", "time.step.x", None),
         ("sample.grains.2.radius=1", "sample.grains.2", None),
         ("sample.grains.one.radius=1", "sample.grains.one", None),
