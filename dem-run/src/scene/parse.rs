@@ -343,7 +343,7 @@ fn overflow(path: &str, literal: &str) -> Problem {
     Problem::new(
         path,
         shorten(literal),
-        "a finite number, of magnitude at most 1.8e308",
+        "a finite number, of magnitude at most 1e60",
     )
 }
 
