@@ -85,7 +85,8 @@ pub enum Origin {
 
 impl Problem {
     /// A problem without a nearest name or a known origin.
-    pub(super) fn new(
+    #[must_use]
+    pub fn new(
         path: impl Into<String>,
         found: impl Into<String>,
         allowed: impl Into<String>,
@@ -100,7 +101,8 @@ impl Problem {
     }
 
     /// The same with the valid name nearest to the wrong one.
-    pub(super) fn with_nearest(self, nearest: Option<String>) -> Self {
+    #[must_use]
+    pub fn with_nearest(self, nearest: Option<String>) -> Self {
         Self { nearest, ..self }
     }
 
@@ -115,26 +117,40 @@ impl Problem {
 
 impl fmt::Display for Problem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(if self.path.is_empty() {
-            "the scene"
-        } else {
-            &self.path
-        })?;
+        match self.path.as_str() {
+            "" => f.write_str("the scene")?,
+            path => f.write_str(&cut(path, 200))?,
+        }
         match &self.origin {
             Some(Origin::Text { line, column }) => write!(f, " (line {line}, column {column})")?,
-            Some(Origin::Set(assignment)) => write!(f, " (--set {assignment})")?,
+            Some(Origin::Set(assignment)) => write!(f, " (--set {})", shorten(assignment))?,
             None => {}
         }
-        write!(
-            f,
-            "\n      found    {}\n      allowed  {}",
-            self.found, self.allowed
-        )?;
+        write!(f, "\n      found    {}", cut(&self.found, 200))?;
+        write!(f, "\n      allowed  {}", cut(&self.allowed, 1000))?;
         match &self.nearest {
-            Some(nearest) => write!(f, "\n      nearest  {nearest}"),
+            Some(nearest) => write!(f, "\n      nearest  {}", cut(nearest, 200)),
             None => Ok(()),
         }
     }
+}
+
+/// At most 80 characters of a text, fit to be printed.
+pub(super) fn shorten(text: &str) -> String {
+    cut(text, 80)
+}
+
+/// At most `limit` characters of a text, fit to be printed.
+fn cut(text: &str, limit: usize) -> String {
+    match text.char_indices().nth(limit) {
+        None => text.chars().map(printable).collect(),
+        Some((end, _)) => text[..end].chars().map(printable).chain(['…']).collect(),
+    }
+}
+
+/// A blank for what would move the cursor of a terminal.
+pub(super) fn printable(c: char) -> char {
+    if c.is_control() { ' ' } else { c }
 }
 
 /// All problems under one heading.
@@ -153,6 +169,15 @@ fn render(name: &str, problems: &[Problem]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn long_texts_are_cut_and_terminals_left_alone() {
+        assert_eq!(shorten("a\u{1b}[31m\n"), "a [31m ");
+        assert_eq!(shorten(&"é".repeat(80)), "é".repeat(80));
+        assert_eq!(shorten(&"é".repeat(81)), "é".repeat(80) + "…");
+        let problem = Problem::new("x\n".repeat(1000), "y".repeat(1000), "z");
+        assert!(problem.to_string().chars().count() < 450);
+    }
 
     #[test]
     fn a_problem_says_where_what_stood_there_what_is_allowed_and_the_nearest_name() {

@@ -9,7 +9,7 @@ use jsonc_parser::{CollectOptions, ParseOptions, parse_to_ast};
 use serde_json::{Map, Number, Value};
 use serde_path_to_error::Segment;
 
-use super::error::{Origin, Problem, SceneError};
+use super::error::{Origin, Problem, SceneError, printable, shorten};
 use super::model::Scene;
 use super::suggest::nearest;
 
@@ -92,7 +92,12 @@ fn syntax(name: &str, text: &str, line: usize, column: usize, message: &str) -> 
     let content = text.lines().nth(line.saturating_sub(1)).unwrap_or_default();
     // a window around the place, for lines without end
     let start = column.saturating_sub(60);
-    let window: String = content.chars().skip(start).take(100).collect();
+    let window: String = content
+        .chars()
+        .skip(start)
+        .take(100)
+        .map(printable)
+        .collect();
     let rest: String = content.chars().skip(column.saturating_sub(1)).collect();
     let excerpt = format!(
         "  {window}\n  {}^",
@@ -338,7 +343,7 @@ fn overflow(path: &str, literal: &str) -> Problem {
     Problem::new(
         path,
         shorten(literal),
-        "a finite number, of magnitude at most 1.8e308",
+        "a finite number, of magnitude at most 1e60",
     )
 }
 
@@ -425,13 +430,4 @@ fn plain_type(expected: &str) -> String {
             None => other.to_string(),
         },
     }
-}
-
-/// At most 80 characters of a text.
-pub(super) fn shorten(text: &str) -> String {
-    if text.chars().count() <= 80 {
-        return text.to_string();
-    }
-    let start: String = text.chars().take(77).collect();
-    format!("{start}…")
 }

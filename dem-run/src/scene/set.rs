@@ -7,8 +7,8 @@ use std::collections::BTreeSet;
 
 use serde_json::{Map, Value};
 
-use super::error::{Origin, Problem};
-use super::parse::{self, Document, join, shorten};
+use super::error::{Origin, Problem, shorten};
+use super::parse::{self, Document, join};
 use super::schema::Form;
 use super::suggest::nearest;
 
@@ -34,7 +34,7 @@ fn assign(document: &mut Document, assignment: &str) -> Result<(), Problem> {
     let Some((path, literal)) = assignment.split_once('=') else {
         return Err(Problem::new(
             "",
-            shorten(assignment),
+            quoted(assignment),
             "path=value, as in bonds.strength=5",
         ));
     };
@@ -72,7 +72,7 @@ fn read_value(path: &str, literal: &str) -> Result<(Value, Overflows), Problem> 
     }
     Err(Problem::new(
         path,
-        shorten(literal),
+        quoted(literal),
         "a JSON value: a number, true, \"text\", [ … ] or { … }, or a bare word",
     ))
 }
@@ -140,11 +140,7 @@ fn step(
                 length - 1
             ),
         };
-        return Err(Problem::new(
-            below,
-            format!("\"{}\"", shorten(key)),
-            allowed,
-        ));
+        return Err(Problem::new(below, quoted(key), allowed));
     }
     Err(unknown(above, key, forms.iter().flat_map(Form::names)))
 }
@@ -175,6 +171,10 @@ fn unknown<'a>(above: &str, key: &str, names: impl Iterator<Item = &'a str>) -> 
         allowed,
     )
     .with_nearest(suggestion)
+}
+
+fn quoted(text: &str) -> String {
+    format!("\"{}\"", shorten(text))
 }
 
 fn list(names: &BTreeSet<&str>) -> String {

@@ -70,49 +70,52 @@ fn a_name_that_is_given_twice_is_refused_wherever_it_stands() {
     assert!(error.problems()[0].found.contains("line 4"), "{error}");
 }
 
+/// What of [`FLAT`] is replaced by what; where, and the nearest name.
+const UNKNOWN_NAMES: &[(&str, &str, &str, Option<&str>)] = &[
+    ("\"gravity\"", "\"gravty\"", "gravty", Some("gravity")),
+    (
+        "\"gap_tolerance\"",
+        "\"gap-tolerance\"",
+        "bonds.gap-tolerance",
+        Some("gap_tolerance"),
+    ),
+    (
+        "\"force_rate\"",
+        "\"forse_rate\"",
+        "walls.top.forse_rate",
+        Some("force_rate"),
+    ),
+    (
+        "\"plane\": { \"normal\": [0, -1]",
+        "\"plain\": { \"normal\": [0, -1]",
+        "walls.top.shape.plain",
+        Some("plane"),
+    ),
+    (
+        "\"seated\"",
+        "\"seatd\"",
+        "walls.top.shape.plane.place.seatd",
+        Some("seated"),
+    ),
+    (
+        "\"first_break\"",
+        "\"first-break\"",
+        "stop.wall_travel.after.first-break",
+        Some("first_break"),
+    ),
+    ("\"spin\"", "\"colour\"", "sample.grains.0.colour", None),
+    (
+        "\"center\": [0, 9]",
+        "\"centre\": [0, 9]",
+        "walls.roller.shape.circle.centre",
+        Some("center"),
+    ),
+    ("\"thickness\"", "\"$scheme\"", "$scheme", Some("$schema")),
+];
+
 #[test]
 fn an_unknown_name_gets_the_nearest_one_and_its_line() {
-    for (from, to, path, nearest) in [
-        ("\"gravity\"", "\"gravty\"", "gravty", Some("gravity")),
-        (
-            "\"gap_tolerance\"",
-            "\"gap-tolerance\"",
-            "bonds.gap-tolerance",
-            Some("gap_tolerance"),
-        ),
-        (
-            "\"force_rate\"",
-            "\"forse_rate\"",
-            "walls.top.forse_rate",
-            Some("force_rate"),
-        ),
-        (
-            "\"plane\": { \"normal\": [0, -1]",
-            "\"plain\": { \"normal\": [0, -1]",
-            "walls.top.shape.plain",
-            Some("plane"),
-        ),
-        (
-            "\"seated\"",
-            "\"seatd\"",
-            "walls.top.shape.plane.place.seatd",
-            Some("seated"),
-        ),
-        (
-            "\"first_break\"",
-            "\"first-break\"",
-            "stop.wall_travel.after.first-break",
-            Some("first_break"),
-        ),
-        ("\"spin\"", "\"colour\"", "sample.grains.0.colour", None),
-        (
-            "\"center\": [0, 9]",
-            "\"centre\": [0, 9]",
-            "walls.roller.shape.circle.centre",
-            Some("center"),
-        ),
-        ("\"thickness\"", "\"$scheme\"", "$scheme", Some("$schema")),
-    ] {
+    for (from, to, path, nearest) in UNKNOWN_NAMES.iter().copied() {
         assert!(FLAT.contains(from), "{from}");
         let problem = only(read(&FLAT.replacen(from, to, 1), &[]));
         assert_eq!(
@@ -144,81 +147,84 @@ fn an_unknown_name_says_which_names_there_are() {
     );
 }
 
+/// What of [`FLAT`] is replaced by what; where, what was found, and what is allowed.
+const WRONG_TYPES: &[(&str, &str, &str, &str, &str)] = &[
+    (
+        "\"density\": 2500",
+        "\"density\": \"heavy\"",
+        "materials.density",
+        "string \"heavy\"",
+        "a number",
+    ),
+    (
+        "\"dimension\": 2",
+        "\"dimension\": -2",
+        "dimension",
+        "-2",
+        "a whole number, at least 0",
+    ),
+    (
+        "\"dimension\": 2",
+        "\"dimension\": 2.5",
+        "dimension",
+        "2.5",
+        "a whole number, at least 0",
+    ),
+    (
+        "\"fixed\": [0]",
+        "\"fixed\": 0",
+        "grains.fixed",
+        "0",
+        "an array",
+    ),
+    ("[0, -9.81]", "[0, true]", "gravity.1", "true", "a number"),
+    (
+        "{ \"step\": 1e-4, \"end\": 0.5 }",
+        "7",
+        "time",
+        "7",
+        "an object",
+    ),
+    (
+        "{ \"constant\": -1 }",
+        "-1",
+        "walls.roller.velocity",
+        "-1",
+        "by its name",
+    ),
+    (
+        "{ \"constant\": -1 }",
+        "{ \"ramp\": 1 }",
+        "walls.roller.velocity.ramp",
+        "1",
+        "an object",
+    ),
+    (
+        "{ \"constant\": -1 }",
+        "{ \"table\": [[1, 2], [3]] }",
+        "walls.roller.velocity.table.1",
+        "1",
+        "2 values",
+    ),
+    (
+        "{ \"constant\": -1 }",
+        "{ \"constant\": -1, \"table\": [] }",
+        "walls.roller.velocity",
+        "map",
+        "one name",
+    ),
+    (
+        "\"every_steps\": 10",
+        "\"every_steps\": null",
+        "output",
+        "neither",
+        "exactly one",
+    ),
+];
+
 #[test]
 fn a_wrong_type_says_what_stood_there_and_what_is_allowed() {
-    for (from, to, path, found, allowed) in [
-        (
-            "\"density\": 2500",
-            "\"density\": \"heavy\"",
-            "materials.density",
-            "string \"heavy\"",
-            "a number",
-        ),
-        (
-            "\"dimension\": 2",
-            "\"dimension\": -2",
-            "dimension",
-            "-2",
-            "a whole number, at least 0",
-        ),
-        (
-            "\"dimension\": 2",
-            "\"dimension\": 2.5",
-            "dimension",
-            "2.5",
-            "a whole number, at least 0",
-        ),
-        (
-            "\"fixed\": [0]",
-            "\"fixed\": 0",
-            "grains.fixed",
-            "0",
-            "an array",
-        ),
-        ("[0, -9.81]", "[0, true]", "gravity.1", "true", "a number"),
-        (
-            "{ \"step\": 1e-4, \"end\": 0.5 }",
-            "7",
-            "time",
-            "7",
-            "an object",
-        ),
-        (
-            "{ \"constant\": -1 }",
-            "-1",
-            "walls.roller.velocity",
-            "-1",
-            "by its name",
-        ),
-        (
-            "{ \"constant\": -1 }",
-            "{ \"ramp\": 1 }",
-            "walls.roller.velocity.ramp",
-            "1",
-            "an object",
-        ),
-        (
-            "{ \"constant\": -1 }",
-            "{ \"table\": [[1, 2], [3]] }",
-            "walls.roller.velocity.table.1",
-            "1",
-            "2 values",
-        ),
-        (
-            "{ \"constant\": -1 }",
-            "{ \"constant\": -1, \"table\": [] }",
-            "walls.roller.velocity",
-            "map",
-            "one name",
-        ),
-        (
-            "\"every_steps\": 10",
-            "\"every_steps\": null",
-            "output",
-            "neither",
-            "exactly one",
-        ),
-    ] {
+    for (from, to, path, found, allowed) in WRONG_TYPES.iter().copied() {
         assert!(FLAT.contains(from), "{from}");
         let problem = only(read(&FLAT.replacen(from, to, 1), &[]));
         assert_eq!(problem.path, path, "{problem}");
@@ -288,28 +294,26 @@ fn numbers_that_overflow_are_wrong_values_like_others() {
     .expect("right");
 }
 
+/// Assignments to all kinds of places in [`FLAT`].
+const EVERYWHERE: &[&str] = &[
+    "bonds.strength=5",
+    "walls.top.force_rate=1e2",
+    "sample.grains.0.radius=5e-4",
+    "materials.restitution.grain_grain=0.5",
+    "rupture=end_of_step",
+    "solver.kind.gauss_seidel.local=predictor_corrector",
+    "solver.kind.gauss_seidel.max_sweeps=7",
+    "stop.broken_fraction=0.5",
+    "bonds.moment=false",
+    "walls.roller.velocity={\"ramp\": {\"rate\": 2}}",
+    "grains.loads.0.force.1=3",
+    "gravity=null",
+    "title=a few words",
+];
+
 #[test]
 fn assignments_reach_every_part_of_a_scene() {
-    let scene = read(
-        FLAT,
-        &[
-            "bonds.strength=5",
-            "walls.top.force_rate=1e2",
-            "sample.grains.0.radius=5e-4",
-            "materials.restitution.grain_grain=0.5",
-            "rupture=end_of_step",
-            "solver.kind.gauss_seidel.local=predictor_corrector",
-            "solver.kind.gauss_seidel.max_sweeps=7",
-            "stop.broken_fraction=0.5",
-            "bonds.moment=false",
-            "walls.roller.velocity={\"ramp\": {\"rate\": 2}}",
-            "grains.loads.0.force.1=3",
-            "gravity=null",
-            "title=a few words",
-            "walls.top.mass.kg=1",
-        ][..13],
-    )
-    .expect("all paths exist");
+    let scene = read(FLAT, EVERYWHERE).expect("all paths exist");
     assert_eq!(
         scene.bonds.as_ref().and_then(|bonds| bonds.strength),
         Some(5.0)
@@ -381,6 +385,7 @@ fn an_assignment_to_a_path_that_does_not_exist_is_refused() {
             Some("materials.restitution.grain_grain"),
         ),
         ("nonsense=1", "nonsense", None),
+        ("", "", None),
         ("time.step.x=1", "time.step.x", None),
         ("sample.grains.2.radius=1", "sample.grains.2", None),
         ("sample.grains.one.radius=1", "sample.grains.one", None),
