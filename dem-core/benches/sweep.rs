@@ -7,7 +7,6 @@ mod common;
 
 use common::{floor, grain, settings, world};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use dem_core::bond::Strength;
 use dem_core::contact::LocalSolve;
 use dem_core::dim::D2;
 use dem_core::problem::ContactProblem;
@@ -28,7 +27,7 @@ fn lattice(rows: usize, columns: usize, bonded: bool) -> ContactProblem<D2> {
     set.gravity = common::down::<D2>(9.81);
     let mut w = world(disks, vec![floor(0.2)], set);
     if bonded {
-        w.form_bonds(1e-6, Strength::Force(100.0), 0.3);
+        w.form_bonds(1e-6, |_| 100.0, 0.3);
     }
     w.contact_problem()
 }

@@ -43,15 +43,6 @@ impl Bond {
     }
 }
 
-/// How strong bonds are.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Strength {
-    /// The same force for all (N).
-    Force(f64),
-    /// A stress (Pa) on the mean diameter times the thickness (2D), or on the disk of the mean diameter (3D).
-    Stress(f64),
-}
-
 /// What happens to bonds at their limit after an accepted solve.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Rupture {

@@ -123,6 +123,8 @@ pub trait Dim: Copy + Debug + Default + Send + Sync + 'static {
     fn spin_rows(frame: &Self::Frame, spin: Self::Spin) -> Self::Tangent;
     /// Transpose of [`Dim::spin_rows`]: the torque that does the work of tangential rows.
     fn spin_rows_transposed(frame: &Self::Frame, rows: Self::Tangent) -> Self::Spin;
+    /// Components of a torque about the tangents of a frame; in 2D the torque itself.
+    fn about_tangents(frame: &Self::Frame, torque: Self::Spin) -> Self::Tangent;
     /// The torque x × f of a force with lever x.
     fn torque(lever: Self::Vector, force: Self::Vector) -> Self::Spin;
     /// The orientation of a body that has not turned.
@@ -191,6 +193,9 @@ impl Dim for D2 {
     fn spin_rows_transposed(_: &Self::Frame, rows: Self::Tangent) -> Self::Spin {
         rows
     }
+    fn about_tangents(_: &Self::Frame, torque: Self::Spin) -> Self::Tangent {
+        torque
+    }
     fn torque(x: Self::Vector, f: Self::Vector) -> Self::Spin {
         [x[0] * f[1] - x[1] * f[0]].into()
     }
@@ -257,6 +262,9 @@ impl Dim for D3 {
     #[inline(always)]
     fn spin_rows_transposed(f: &Self::Frame, rows: Self::Tangent) -> Self::Spin {
         f.t[1] * rows[0] - f.t[0] * rows[1]
+    }
+    fn about_tangents(f: &Self::Frame, torque: Self::Spin) -> Self::Tangent {
+        [Vect::dot(&f.t[0], &torque), Vect::dot(&f.t[1], &torque)].into()
     }
     fn torque(x: Self::Vector, f: Self::Vector) -> Self::Spin {
         x.cross(&f)

@@ -105,7 +105,7 @@ fn a_bonded_row_slides_v2_over_2_mu_g() {
         g
     });
     let mut w = world(row.collect(), vec![floor(mu)], set);
-    w.form_bonds(1e-6, dem_core::bond::Strength::Force(1e6), 0.3);
+    w.form_bonds(1e-6, |_| 1e6, 0.3);
     while w.grains.velocity[0][0] > 1e-9 {
         w.step().unwrap();
         assert!(w.time < 1.0);

@@ -14,7 +14,7 @@ pub use step::{StepError, StepReport};
 pub use touch::{Break, Counts, Touch, TouchStatus};
 
 use crate::body::{Grains, Load, Wall};
-use crate::bond::{Bond, BondStatus, Rupture, Strength};
+use crate::bond::{Bond, BondStatus, Rupture};
 use crate::contact::BondFlow;
 use crate::detection::{Candidates, pairs_within};
 use crate::dim::{Dim, Vect};
@@ -107,21 +107,18 @@ impl<D: Dim> World<D> {
         world
     }
 
-    /// Bond every pair of grains whose gap is at most `gap_tolerance` (–) times its mean diameter, with friction `friction`.
+    /// Bond every pair of grains whose gap is at most `gap_tolerance` (–) times its mean diameter, with friction `friction`;
+    /// `strength` gives the tensile strength (N) for a mean diameter (m), and zero means no bond.
     ///
-    /// A strength of zero means no bonds. Pairs of two fixed grains are left out: nothing can strain their bond.
-    pub fn form_bonds(&mut self, gap_tolerance: f64, strength: Strength, friction: f64) {
+    /// Pairs of two fixed grains are left out: nothing can strain their bond.
+    pub fn form_bonds(&mut self, gap_tolerance: f64, strength: impl Fn(f64) -> f64, friction: f64) {
         let diameter = 2.0 * self.grains.radius.iter().copied().fold(0.0, f64::max);
         let pairs = pairs_within(&self.grains, &self.grains.position, gap_tolerance * diameter);
         for pair in pairs {
             let [i, j] = pair.map(|k| k as usize);
             let mean_diameter = self.grains.radius[i] + self.grains.radius[j];
             let rest_gap = (self.grains.position[i] - self.grains.position[j]).norm() - mean_diameter;
-            let strength = match strength {
-                Strength::Force(force) => force,
-                Strength::Stress(stress) if D::N == 2 => stress * mean_diameter * self.settings.thickness,
-                Strength::Stress(stress) => stress * D2_DISK * mean_diameter * mean_diameter,
-            };
+            let strength = strength(mean_diameter);
             let held = self.grains.fixed[i] && self.grains.fixed[j];
             if rest_gap <= gap_tolerance * mean_diameter && strength > 0.0 && !held {
                 self.bonds.push(Bond { pair, rest_gap, mean_diameter, strength, friction, status: BondStatus::Intact });
@@ -153,6 +150,3 @@ impl<D: Dim> World<D> {
         self.ledger.kinetic = 0.0;
     }
 }
-
-/// Area of a disk over the square of its diameter.
-const D2_DISK: f64 = std::f64::consts::FRAC_PI_4;

@@ -66,7 +66,7 @@ pub fn bonded_pair(r_coh: f64, force: [f64; 2], torque: f64) -> World<D2> {
     let list: Grains<D2> = [fixed, grain(&[2e-3, 0.0], 1e-3)].into_iter().collect();
     let load = Load { grain: 1, force: force.into(), torque: [torque].into(), factor: Arc::new(|t| t) };
     let mut world = World::new(list, Vec::new(), vec![load], settings(1e-4));
-    world.form_bonds(1e-6, dem_core::bond::Strength::Force(r_coh), 0.3);
+    world.form_bonds(1e-6, |_| r_coh, 0.3);
     world
 }
 
