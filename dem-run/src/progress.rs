@@ -138,11 +138,11 @@ impl Progress {
     /// Tells something that the user should know, a line of its own, whatever the mode unless it is quiet.
     pub fn note(&mut self, text: &str) {
         match &mut self.sink {
-            Sink::Bar(bar) => bar.suspend(|| eprintln!("{text}")),
+            Sink::Bar(bar) => bar.suspend(|| line(&mut std::io::stderr(), text)),
             Sink::Plain(out) => line(out, text),
             Sink::Json(out) => json_line(out, &Event::Note { message: text }),
             Sink::None if self.quiet => {}
-            Sink::None => eprintln!("{text}"),
+            Sink::None => line(&mut std::io::stderr(), text),
         }
     }
 

@@ -1,6 +1,7 @@
 //! Ctrl-C and SIGTERM: the first asks the run to end after the frame in hand, the second ends it at once.
 
 use std::ffi::c_int;
+use std::io::Write;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -35,7 +36,11 @@ pub fn install() -> Result<Interrupt, ctrlc::Error> {
         if shared.request() {
             exit_at_once();
         }
-        eprintln!("\nending after the frame in hand; once more to end at once");
+        // eprintln! would end this thread, and with it the second signal, where stderr is closed
+        let _ = writeln!(
+            std::io::stderr(),
+            "\nending after the frame in hand; once more to end at once"
+        );
     })?;
     Ok(interrupt)
 }
