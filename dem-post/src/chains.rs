@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::map::{Key, Link, Panel, Sample, draw};
 use crate::moments;
-use crate::output::{Folder, PostError, Result, Text, number};
+use crate::output::{Folder, PostError, Result, Text, number, short};
 use crate::plot::{Chart, Drawing, Style, colour};
 use crate::row;
 
@@ -16,8 +16,9 @@ use crate::row;
 const CARRIES: f64 = 1e-9;
 /// Width of a line that carries ⟨f⟩, and the greatest width, units of the drawing.
 const WIDTH: (f64, f64) = (1.3, 8.0);
-/// Width of a bin of f/⟨f⟩.
+/// Width of a bin of |f|/⟨f⟩, and the least number of forces in one.
 const BIN: f64 = 0.25;
+const LEAST: usize = 5;
 /// Colours of the weak network, compression and tension.
 const PALE: [&str; 2] = ["#9cc9e3", "#f0b27a"];
 
@@ -145,26 +146,28 @@ pub fn statistics(forces: &[f64]) -> Statistics {
     }
 }
 
-/// Density of |f|/⟨f⟩ over bins of width 1/4, as (middle, density); its integral is 1. Empty bins are left out.
+/// Density of |f|/⟨f⟩, as (middle of the bin, density); its integral is 1.
+///
+/// Bins are 1/4 wide; where fewer than five forces fall into one, it is widened until that many do.
 pub fn distribution(forces: &[f64], mean: f64) -> Vec<(f64, f64)> {
-    let ratios: Vec<f64> = carried(forces)
-        .iter()
-        .map(|f| f / mean)
-        .filter(|ratio| ratio.is_finite())
-        .collect();
-    let mut counts: Vec<usize> = vec![];
-    for ratio in &ratios {
-        let bin = (ratio / BIN) as usize;
-        if counts.len() <= bin {
-            counts.resize(bin + 1, 0);
+    let mut ratios: Vec<f64> = carried(forces).iter().map(|f| f / mean).collect();
+    ratios.sort_by(f64::total_cmp);
+    let all = ratios.len() as f64;
+    let mut density = vec![];
+    let mut low = 0.0;
+    let mut rest = ratios.as_slice();
+    while let Some(last) = rest.last() {
+        let enough = rest[rest.len().min(LEAST) - 1];
+        let mut high = low + BIN * ((enough - low) / BIN).floor() + BIN;
+        // what would be left over is too little for a bin of its own
+        if rest.len() - rest.partition_point(|&ratio| ratio < high) < LEAST {
+            high = low + BIN * ((last - low) / BIN).floor() + BIN;
         }
-        counts[bin] += 1;
+        let count = rest.partition_point(|&ratio| ratio < high);
+        density.push((0.5 * (low + high), count as f64 / (all * (high - low))));
+        (low, rest) = (high, &rest[count..]);
     }
-    let density = |count: usize| count as f64 / (ratios.len() as f64 * BIN);
-    let middles = counts.iter().enumerate().filter(|(_, count)| **count > 0);
-    middles
-        .map(|(bin, &count)| ((bin as f64 + 0.5) * BIN, density(count)))
-        .collect()
+    density
 }
 
 impl Report {
@@ -256,11 +259,11 @@ pub fn write(history: &History, report: &Report, folder: &mut Folder) -> Result<
 
 fn distribution_chart(report: &Report) -> Chart {
     let mut chart = Chart::new("normal force over its mean, |f|/⟨f⟩", "probability density");
-    chart.log_y = true;
+    (chart.log_y, chart.set_off) = (true, true);
     for (k, network) in report.networks.iter().enumerate() {
         let colour = colour::CYCLE[k % colour::CYCLE.len()];
         let label = format!("t = {} s", number(network.time));
-        chart = chart.curve(&label, colour, Style::Line, network.distribution.clone());
+        chart = chart.curve(&label, colour, Style::Marked, network.distribution.clone());
     }
     chart
 }
@@ -362,7 +365,13 @@ mod tests {
             .map(|k| f64::from(k) * if k % 3 == 0 { -0.1 } else { 0.1 })
             .collect();
         let density = distribution(&forces, statistics(&forces).mean);
-        let sum: f64 = density.iter().map(|(_, density)| density * BIN).sum();
+        let mut low = 0.0;
+        let mut sum = 0.0;
+        for (middle, density) in &density {
+            let width = 2.0 * (middle - low);
+            sum += density * width;
+            low += width;
+        }
         assert!((sum - 1.0).abs() < 1e-12);
         // uniform magnitudes: |f|/⟨f⟩ is uniform on 0…2, with density 1/2
         assert!(
@@ -371,6 +380,16 @@ mod tests {
                 .all(|(_, density)| (density - 0.5).abs() < 0.03),
             "{density:?}"
         );
+    }
+
+    #[test]
+    fn bins_of_the_tail_are_widened() {
+        // nineteen forces of 1 and one of 21: mean 2
+        let mut forces = vec![1.0; 19];
+        forces.push(21.0);
+        let density = distribution(&forces, statistics(&forces).mean);
+        assert_eq!(density.len(), 1);
+        assert_eq!(density[0].0, 0.5 * 10.75);
     }
 
     #[test]

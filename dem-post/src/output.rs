@@ -223,14 +223,23 @@ pub fn print(text: &str) -> Result<()> {
 
 /// A number for people: four digits, and a power of ten where it is very large or small.
 pub fn number(value: f64) -> String {
+    digits(value, 4)
+}
+
+/// A number for captions: three digits.
+pub fn short(value: f64) -> String {
+    digits(value, 3)
+}
+
+fn digits(value: f64, digits: i32) -> String {
     let magnitude = value.abs();
     if value == 0.0 {
         return "0".into();
     }
     if !(1e-3..1e6).contains(&magnitude) {
-        return format!("{value:.3e}");
+        return format!("{value:.*e}", digits as usize - 1);
     }
-    let decimals = (3 - magnitude.log10().floor() as i32).clamp(0, 6) as usize;
+    let decimals = (digits - 1 - magnitude.log10().floor() as i32).max(0) as usize;
     let text = format!("{value:.decimals$}");
     if text.contains('.') {
         text.trim_end_matches('0').trim_end_matches('.').into()

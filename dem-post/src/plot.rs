@@ -3,9 +3,10 @@
 //! Every drawing comes out as SVG and as PNG from the same scene; the PNG is drawn with a font that the crate carries,
 //! so that it looks the same on every machine.
 
+use std::sync::Arc;
+
 use kuva::PngBackend;
 use kuva::backend::svg::SvgBackend;
-use kuva::plot::legend::LegendPosition;
 use kuva::plot::{LinePlot, ScatterPlot};
 use kuva::render::annotations::ReferenceLine;
 use kuva::render::figure::Figure;
@@ -37,6 +38,12 @@ pub mod colour {
 const PNG_SCALE: f32 = 2.5;
 /// Width and height of one chart, in units of a drawing.
 const CHART: (f64, f64) = (640.0, 460.0);
+/// Room around the cells of a figure, and between them.
+const PADDING: f64 = 6.0;
+const SPACING: f64 = 20.0;
+/// Room above the axes, which takes the legend, and below.
+const ABOVE: f64 = 44.0;
+const BELOW: f64 = 62.0;
 /// Points that one curve keeps: more than the pixels of its width, so none that shows is lost.
 const CURVE_POINTS: usize = 4000;
 
@@ -65,12 +72,10 @@ impl Drawing {
 pub enum Style {
     /// Joined points.
     Line,
-    /// Joined points, dashed.
-    Dashed,
     /// A value that holds until the next point.
     Steps,
-    /// Dots alone.
-    Dots,
+    /// Joined points, each with a dot.
+    Marked,
 }
 
 /// A named curve.
@@ -92,8 +97,12 @@ pub struct Chart {
     pub x: String,
     /// Title of the vertical axis, with its unit.
     pub y: String,
+    /// Whether the horizontal axis is logarithmic.
+    pub log_x: bool,
     /// Whether the vertical axis is logarithmic.
     pub log_y: bool,
+    /// Whether the horizontal axis begins a little before the first value, so that what rises there can be seen.
+    pub set_off: bool,
     /// Whether values on the vertical axis are counts.
     pub counts: bool,
     /// The curves.
@@ -131,83 +140,170 @@ impl Chart {
         self
     }
 
-    /// Draws the charts side by side.
+    /// Draws the charts side by side, each with its legend above it.
     pub fn draw(charts: Vec<Self>) -> Drawing {
         let columns = charts.len();
+        let legends: Vec<Vec<(String, &'static str, Style)>> =
+            charts.iter().map(Self::legend).collect();
         let (plots, layouts) = charts.into_iter().map(Self::build).unzip();
         let figure = Figure::new(1, columns)
             .with_plots(plots)
             .with_layouts(layouts)
             .with_cell_size(CHART.0, CHART.1)
-            .with_spacing(24.0);
+            .with_spacing(SPACING)
+            .with_padding(PADDING);
         let figure = if columns > 1 {
             figure.with_labels_lowercase()
         } else {
             figure
         };
-        Drawing(figure.render())
+        let mut canvas = Canvas(figure.render());
+        for (k, legend) in legends.iter().enumerate() {
+            let left = PADDING + k as f64 * (CHART.0 + SPACING);
+            draw_legend(
+                &mut canvas,
+                legend,
+                (left + 0.55 * CHART.0, PADDING + 0.5 * ABOVE),
+            );
+        }
+        canvas.finish()
+    }
+
+    /// Name, colour and style of each curve; a chart of one curve needs no legend.
+    fn legend(&self) -> Vec<(String, &'static str, Style)> {
+        let entry = |curve: &Curve| (curve.label.clone(), curve.colour, curve.style);
+        if self.curves.len() < 2 {
+            vec![]
+        } else {
+            self.curves.iter().map(entry).collect()
+        }
     }
 
     fn build(mut self) -> (Vec<Plot>, Layout) {
         for curve in &mut self.curves {
-            let visible =
-                |&(x, y): &(f64, f64)| x.is_finite() && y.is_finite() && (!self.log_y || y > 0.0);
+            let visible = |&(x, y): &(f64, f64)| {
+                x.is_finite()
+                    && y.is_finite()
+                    && (!self.log_x || x > 0.0)
+                    && (!self.log_y || y > 0.0)
+            };
             curve.points.retain(visible);
             thin(&mut curve.points);
         }
-        let plots: Vec<Plot> = self.curves.iter().map(Curve::plot).collect();
+        let plots: Vec<Plot> = self.curves.iter().flat_map(Curve::plots).collect();
         let mut layout = Layout::auto_from_plots(&plots)
-            .with_x_label(self.x)
-            .with_y_label(self.y)
-            .with_legend_position(LegendPosition::OutsideTopCenter)
-            .with_legend_box(false)
+            .with_x_label(&self.x)
+            .with_y_label(&self.y)
             .with_label_size(15)
             .with_tick_size(13)
             .with_body_size(13)
+            .with_force_margins_y(ABOVE, BELOW)
             .with_box_axes();
-        if self.log_y {
-            layout = layout.with_log_y();
-        }
-        if self.counts {
-            layout = layout.with_y_tick_format(TickFormat::Integer);
-        }
+        layout.show_legend = false;
+        layout = self.scale_axes(layout);
         for (value, label) in self.levels {
-            layout = layout.with_reference_line(
-                ReferenceLine::horizontal(value)
-                    .with_color(colour::GREY)
-                    .with_label(label),
-            );
+            let line = ReferenceLine::horizontal(value)
+                .with_color(colour::GREY)
+                .with_label(label);
+            layout = layout.with_reference_line(line);
         }
         for (value, label) in self.moments {
-            layout = layout.with_reference_line(
-                ReferenceLine::vertical(value)
-                    .with_color(colour::GREY)
-                    .with_label(label),
-            );
+            let line = ReferenceLine::vertical(value)
+                .with_color(colour::GREY)
+                .with_label(label);
+            layout = layout.with_reference_line(line);
         }
         (plots, layout)
+    }
+
+    /// Axes that end where the values end, with ticks that suit them.
+    fn scale_axes(&self, mut layout: Layout) -> Layout {
+        let values = || self.curves.iter().flat_map(|curve| &curve.points);
+        let low = values().map(|p| p.0).fold(f64::INFINITY, f64::min);
+        let high = values().map(|p| p.0).fold(f64::NEG_INFINITY, f64::max);
+        let powers = || TickFormat::Custom(Arc::new(power_of_ten));
+        if self.log_x {
+            layout = layout.with_log_x().with_x_tick_format(powers());
+        } else if low < high {
+            let off = if self.set_off {
+                0.03 * (high - low)
+            } else {
+                0.0
+            };
+            layout = layout
+                .with_x_axis_min(low - off)
+                .with_x_axis_max(high + off);
+        }
+        if self.log_y {
+            let low = values().map(|p| p.1).fold(f64::INFINITY, f64::min);
+            let high = values().map(|p| p.1).fold(0.0, f64::max);
+            layout = layout.with_log_y().with_y_tick_format(powers());
+            if low <= high {
+                layout = layout
+                    .with_y_axis_min(0.6 * low)
+                    .with_y_axis_max(1.6 * high);
+            }
+        } else if self.counts {
+            layout = layout.with_y_tick_format(TickFormat::Integer);
+        }
+        layout
+    }
+}
+
+/// A tick of a logarithmic axis: powers of ten as such, others as numbers.
+fn power_of_ten(value: f64) -> String {
+    let exponent = value.log10();
+    if (exponent - exponent.round()).abs() > 1e-6 || (-0.5..1.5).contains(&exponent) {
+        return format!("{value}");
+    }
+    let raise = |digit: char| match digit {
+        '-' => '⁻',
+        '1' => '¹',
+        '2' => '²',
+        '3' => '³',
+        digit => char::from_u32(0x2070 + digit.to_digit(10).unwrap_or(0)).unwrap_or(digit),
+    };
+    format!(
+        "10{}",
+        format!("{exponent:.0}")
+            .chars()
+            .map(raise)
+            .collect::<String>()
+    )
+}
+
+/// The names of the curves in one row around `middle`.
+fn draw_legend(canvas: &mut Canvas, legend: &[(String, &'static str, Style)], middle: (f64, f64)) {
+    let width = |text: &str| 52.0 + 7.8 * text.chars().count() as f64;
+    let total: f64 = legend.iter().map(|(text, ..)| width(text)).sum();
+    let (mut x, y) = (middle.0 - 0.5 * total, middle.1);
+    for (text, colour, style) in legend {
+        canvas.line((x, y), (x + 26.0, y), colour, 2.2);
+        if *style == Style::Marked {
+            canvas.disk((x + 13.0, y), 3.5, colour, colour, 0.5);
+        }
+        canvas.text((x + 33.0, y + 5.0), text, 14, Anchor::Start);
+        x += width(text);
     }
 }
 
 impl Curve {
-    fn plot(&self) -> Plot {
-        let points = self.points.iter().copied();
-        if self.style == Style::Dots {
-            let dots = ScatterPlot::new()
-                .with_data(points)
-                .with_color(self.colour)
-                .with_size(3.5);
-            return dots.with_legend(self.label.as_str()).into();
-        }
+    fn plots(&self) -> Vec<Plot> {
+        let points = || self.points.iter().copied();
         let line = LinePlot::new()
-            .with_data(points)
+            .with_data(points())
             .with_color(self.colour)
-            .with_stroke_width(2.0);
-        let line = line.with_legend(self.label.as_str());
+            .with_stroke_width(1.8);
         match self.style {
-            Style::Dashed => line.with_dashed().into(),
-            Style::Steps => line.with_step().into(),
-            Style::Line | Style::Dots => line.into(),
+            Style::Line => vec![line.into()],
+            Style::Steps => vec![line.with_step().into()],
+            Style::Marked => {
+                let dots = ScatterPlot::new()
+                    .with_data(points())
+                    .with_color(self.colour)
+                    .with_size(3.5);
+                vec![line.with_stroke_width(1.2).into(), dots.into()]
+            }
         }
     }
 }
@@ -325,5 +421,33 @@ impl Canvas {
     /// The drawing.
     pub fn finish(self) -> Drawing {
         Drawing(self.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_powers_of_ten() {
+        for (value, text) in [
+            (1e-4, "10⁻⁴"),
+            (1e3, "10³"),
+            (0.1, "0.1"),
+            (1.0, "1"),
+            (2e-5, "0.00002"),
+        ] {
+            assert_eq!(power_of_ten(value), text);
+        }
+    }
+
+    #[test]
+    fn a_thinned_curve_keeps_its_peak_and_its_ends() {
+        let mut points: Vec<(f64, f64)> = (0..100_000).map(|k| (f64::from(k), 0.0)).collect();
+        points[54_321].1 = 7.0;
+        thin(&mut points);
+        assert!(points.len() <= CURVE_POINTS);
+        assert!(points.contains(&(54_321.0, 7.0)));
+        assert_eq!((points[0].0, points[points.len() - 1].0), (0.0, 99_999.0));
     }
 }

@@ -7,6 +7,8 @@
 //! **Size of the sample.** Height H along the drive and cross-section A across it are those of the box around all
 //! grains at the first frame; in 2D, A is the width times the scene's `thickness`.
 //!
+//! The applied force is the prescribed one, or, where the motion is prescribed, what it takes against the grains.
+//!
 //! **Collapse load** (under an ever-growing force there is no peak): the applied force at the last step before the
 //! strain fitted to the grains exceeds 1e-4; also reported at 1e-3.
 
@@ -15,7 +17,7 @@ use std::path::Path;
 use dem_run::history::{History, Series, Wall, WallDrive};
 use serde::Serialize;
 
-use crate::output::{Folder, PostError, Result, cell, facts, quantity};
+use crate::output::{Folder, PostError, Result, cell, facts, quantity, short};
 use crate::plot::{Chart, Style, colour};
 
 /// Strains that define the collapse.
@@ -24,6 +26,8 @@ const COLLAPSE: [f64; 2] = [1e-4, 1e-3];
 const BROKEN: f64 = 0.05;
 /// A maximum is a peak if the load falls at least this share below it afterwards.
 const PEAK_DROP: f64 = 0.05;
+/// Least strain that the logarithmic axis shows.
+const LEAST_STRAIN: f64 = 1e-9;
 
 /// The numbers that the analysis ends with. `None`: it did not happen, or was not recorded.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -96,49 +100,45 @@ pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
     let walls = history.walls()?;
     let k = driven(history.path(), &walls, wall)?;
     let direction = walls[k].direction;
+    let size = |&d: &usize| direction[d].abs();
     let axis = (0..history.dimension())
-        .max_by(|&a, &b| direction[a].abs().total_cmp(&direction[b].abs()))
+        .max_by(|a, b| size(a).total_cmp(&size(b)))
         .unwrap_or(0);
     let position = required(history, "wall_position")?;
-    let applied = required(history, "applied_force")?;
-    let load = component(history, &applied, &[k], "applied_force")?;
-    let force = history.observable("wall_force")?;
-
-    let along = |series: &Series, name| -> Result<Vec<f64>> {
-        let mut sum = vec![0.0; series.step.len()];
-        for d in 0..history.dimension() {
-            let values = component(history, series, &[k, d], name)?;
-            sum.iter_mut()
-                .zip(values)
-                .for_each(|(sum, value)| *sum += direction[d] * value);
-        }
-        Ok(sum)
-    };
-    let place = along(&position, "wall_position")?;
-    // the way is counted in the sense of the greatest force
-    let sense = load
-        .iter()
-        .copied()
-        .max_by(|a, b| a.abs().total_cmp(&b.abs()))
-        .unwrap_or(1.0)
-        .signum();
     let start = start_of(history, k, &direction)?;
-    let reaction = force
-        .map(|series| along(&series, "wall_force"))
-        .transpose()?
-        .unwrap_or_default();
+    let way: Vec<f64> = along(history, &position, k, &direction, "wall_position")?
+        .iter()
+        .map(|x| x - start)
+        .collect();
+    let reaction = match history.observable("wall_force")? {
+        Some(series) => along(history, &series, k, &direction, "wall_force")?,
+        None => vec![],
+    };
+    // the load is counted in the sense of the prescribed force, or of the prescribed motion
+    let load = match walls[k].drive {
+        WallDrive::Force => component(
+            history,
+            &required(history, "applied_force")?,
+            &[k],
+            "applied_force",
+        )?,
+        _ => required(history, "wall_force").map(|_| reaction.iter().map(|f| -f).collect())?,
+    };
+    let sense = sense(if walls[k].drive == WallDrive::Force {
+        &load
+    } else {
+        &way
+    });
     let tensor = |name: &str| -> Result<Vec<f64>> {
         let series = history.observable(name)?;
-        series
-            .map(|series| component(history, &series, &[axis, axis], name))
-            .transpose()
-            .map(Option::unwrap_or_default)
+        series.map_or_else(
+            || Ok(vec![]),
+            |series| component(history, &series, &[axis, axis], name),
+        )
     };
     let (sample, push) = sample_size(history, k, axis, sense * direction[axis])?;
     let mut report = Report {
-        step: position.step.clone(),
-        time: position.time.clone(),
-        displacement: place.iter().map(|x| sense * (x - start)).collect(),
+        displacement: way.iter().map(|x| sense * x).collect(),
         load: load.iter().map(|f| sense * f).collect(),
         // the grains push back
         reaction: reaction.iter().map(|f| -sense * f).collect(),
@@ -154,10 +154,42 @@ pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
             area: sample[1],
             ..Summary::default()
         },
+        step: position.step,
+        time: position.time,
     };
-    let strengths = history.bonds()?.strength;
-    report.summarise(&strengths, history.observable("solver_residual")?);
+    report.summarise(
+        &history.bonds()?.strength,
+        history.observable("solver_residual")?,
+    );
     Ok(report)
+}
+
+/// The sign of the value of greatest magnitude.
+fn sense(values: &[f64]) -> f64 {
+    values
+        .iter()
+        .copied()
+        .max_by(|a, b| a.abs().total_cmp(&b.abs()))
+        .unwrap_or(1.0)
+        .signum()
+}
+
+/// The component along `direction` of a vector that is observed for each wall.
+fn along(
+    history: &History,
+    series: &Series,
+    wall: usize,
+    direction: &[f64; 3],
+    name: &str,
+) -> Result<Vec<f64>> {
+    let mut sum = vec![0.0; series.step.len()];
+    for d in 0..history.dimension() {
+        let values = component(history, series, &[wall, d], name)?;
+        sum.iter_mut()
+            .zip(values)
+            .for_each(|(sum, value)| *sum += direction[d] * value);
+    }
+    Ok(sum)
 }
 
 /// The time at which the sample collapses, s: the last step before the fitted strain exceeds 1e-4. `None` where nothing
@@ -459,7 +491,9 @@ pub fn write(report: &Report, folder: &mut Folder) -> Result<()> {
         "force-displacement",
         &Chart::draw(vec![force_displacement(report)]),
     )?;
-    folder.draw("stress-strain", &Chart::draw(vec![stress_strain(report)]))
+    let mut charts = vec![stress_strain(report)];
+    charts.extend(onset(report));
+    folder.draw("stress-strain", &Chart::draw(charts))
 }
 
 fn pairs(x: &[f64], x_scale: f64, y: &[f64], y_scale: f64) -> Vec<(f64, f64)> {
@@ -471,6 +505,7 @@ fn pairs(x: &[f64], x_scale: f64, y: &[f64], y_scale: f64) -> Vec<(f64, f64)> {
 
 fn force_displacement(report: &Report) -> Chart {
     let mut chart = Chart::new("displacement of the wall (mm)", "force (N)");
+    chart.set_off = true;
     if !report.reaction.is_empty() {
         let points = pairs(&report.displacement, 1e3, &report.reaction, 1.0);
         chart = chart.curve(
@@ -483,13 +518,47 @@ fn force_displacement(report: &Report) -> Chart {
     let points = pairs(&report.displacement, 1e3, &report.load, 1.0);
     chart = chart.curve("applied force", colour::BLUE, Style::Line, points);
     if let Some(load) = report.summary.collapse_load {
-        chart.levels.push((load, format!("collapse {load:.1} N")));
+        chart
+            .levels
+            .push((load, format!("collapse {} N", short(load))));
     }
     chart
 }
 
+/// The load over the logarithm of the fitted strain, which shows how little the sample gives way before it collapses.
+fn onset(report: &Report) -> Option<Chart> {
+    let visible = |&(strain, _): &(f64, f64)| strain >= LEAST_STRAIN;
+    let points: Vec<(f64, f64)> = report
+        .strain
+        .iter()
+        .map(|e| e.abs())
+        .zip(report.load.iter().copied())
+        .filter(visible)
+        .collect();
+    if points.len() < 2 {
+        return None;
+    }
+    let mut chart = Chart::new(
+        "magnitude of the axial strain, from the particles",
+        "applied force (N)",
+    );
+    chart = chart.curve("applied force", colour::BLUE, Style::Line, points);
+    chart.log_x = true;
+    chart.moments = COLLAPSE
+        .iter()
+        .map(|&strain| (strain, String::new()))
+        .collect();
+    if let Some(load) = report.summary.collapse_load {
+        chart
+            .levels
+            .push((load, format!("collapse {} N", short(load))));
+    }
+    Some(chart)
+}
+
 fn stress_strain(report: &Report) -> Chart {
     let mut chart = Chart::new("axial strain (%)", "axial stress (kPa)");
+    chart.set_off = true;
     let wall_strain = 1e2 / report.summary.height;
     let wall_stress = 1e-3 / report.summary.area;
     if !report.reaction.is_empty() {
@@ -508,7 +577,7 @@ fn stress_strain(report: &Report) -> Chart {
     if let Some(load) = report.summary.collapse_load {
         chart.levels.push((
             load * wall_stress,
-            format!("collapse {:.1} kPa", load * wall_stress),
+            format!("collapse {} kPa", short(load * wall_stress)),
         ));
     }
     chart
