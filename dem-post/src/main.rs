@@ -1,2 +1,75 @@
 //! The `dem-post` command.
-fn main() {}
+
+use std::process::ExitCode;
+
+use clap::Parser;
+use dem_post::cli::{Cli, Command};
+use dem_post::output::{Folder, PostError, Result, print};
+use dem_post::{chains, cracks, info, stress_strain};
+use dem_run::history::History;
+use serde::Serialize;
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    match run(&cli) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("dem-post: {error}");
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+fn run(cli: &Cli) -> Result<()> {
+    match &cli.command {
+        Command::Info { history } => {
+            let report = info::read(&History::open(history)?)?;
+            report_on(cli, &report, || report.table(), None)
+        }
+        Command::Cracks(moments) => {
+            let history = History::open(&moments.files.history)?;
+            let report = cracks::read(&history)?;
+            let mut folder =
+                Folder::create(moments.files.output.as_deref(), &moments.files.history)?;
+            cracks::write(&history, &report, &moments.times, &mut folder)?;
+            report_on(cli, &report, || report.table(), Some(&folder))
+        }
+        Command::Chains(moments) => {
+            let history = History::open(&moments.files.history)?;
+            let report = chains::read(&history, &moments.times)?;
+            let mut folder =
+                Folder::create(moments.files.output.as_deref(), &moments.files.history)?;
+            chains::write(&history, &report, &mut folder)?;
+            report_on(cli, &report, || report.table(), Some(&folder))
+        }
+        Command::StressStrain { files, wall } => {
+            let history = History::open(&files.history)?;
+            let report = stress_strain::read(&history, wall.as_deref())?;
+            let mut folder = Folder::create(files.output.as_deref(), &files.history)?;
+            stress_strain::write(&report, &mut folder)?;
+            report_on(cli, &report.summary, || report.table(), Some(&folder))
+        }
+    }
+}
+
+/// Results on stdout, as a table or as JSON; the files that were written on stderr.
+fn report_on(
+    cli: &Cli,
+    report: &impl Serialize,
+    table: impl Fn() -> String,
+    folder: Option<&Folder>,
+) -> Result<()> {
+    if cli.json {
+        let json = serde_json::to_string_pretty(report)
+            .map_err(|error| PostError::Usage(error.to_string()))?;
+        print(&(json + "\n"))?;
+    } else {
+        print(&table())?;
+    }
+    if !cli.quiet {
+        for path in folder.map_or(&[][..], Folder::written) {
+            eprintln!("wrote {}", path.display());
+        }
+    }
+    Ok(())
+}

@@ -424,13 +424,12 @@ impl History {
             .file
             .group(path::OBSERVABLES)
             .map_err(while_reading(&self.source.path, path::OBSERVABLES))?;
-        let names = group
+        let mut names = group
             .member_names()
             .map_err(while_reading(&self.source.path, path::OBSERVABLES))?;
-        Ok(names
-            .into_iter()
-            .filter(|name| group.link_exists(&format!("{name}/value")))
-            .collect())
+        names.retain(|name| group.link_exists(&format!("{name}/value")));
+        names.sort_unstable();
+        Ok(names)
     }
 
     /// One observable over the whole run, `None` if it was not recorded.

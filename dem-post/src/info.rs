@@ -1,0 +1,280 @@
+//! What a history holds, in about twenty lines.
+
+use dem_run::history::{History, RuptureMode, Series, WallDrive};
+use serde::Serialize;
+
+use crate::cracks::Modes;
+use crate::output::{Result, facts, number, quantity};
+
+/// What a history holds.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Report {
+    /// The file.
+    pub file: String,
+    /// Its length, bytes.
+    pub bytes: u64,
+    /// Whether it was never closed.
+    pub open_ended: bool,
+    /// Program, build, host and start of the run.
+    pub origin: String,
+    /// Dimension.
+    pub dimension: usize,
+    /// Seed.
+    pub seed: u64,
+    /// Number of grains.
+    pub grains: usize,
+    /// Least and greatest diameter, m.
+    pub diameters: [f64; 2],
+    /// Mass of all grains, kg.
+    pub mass: f64,
+    /// The walls: name, shape and drive.
+    pub walls: Vec<[String; 3]>,
+    /// Bonds at the start.
+    pub bonds: usize,
+    /// Least and greatest cohesion, N.
+    pub cohesion: Option<[f64; 2]>,
+    /// Bonds that broke.
+    pub broken: Modes,
+    /// Number of frames.
+    pub frames: usize,
+    /// First and last step and time (s) of the frames.
+    pub first: Option<(i64, f64)>,
+    /// See `first`.
+    pub last: Option<(i64, f64)>,
+    /// Number of observed steps.
+    pub observed: usize,
+    /// Contacts at the last frame.
+    pub contacts: Option<usize>,
+    /// Greatest residual, and the time at which it occurred (s).
+    pub worst_residual: Option<(f64, f64)>,
+    /// Mean and greatest number of iterations.
+    pub iterations: Option<[f64; 2]>,
+    /// Greatest penetration, m.
+    pub penetration: Option<f64>,
+    /// Work from outside, J.
+    pub external_work: Option<f64>,
+    /// Kinetic energy at the end, J.
+    pub kinetic_energy: Option<f64>,
+    /// Energy dissipated by friction, J.
+    pub friction: Option<f64>,
+    /// What the energy ledger leaves over, J.
+    pub energy_remainder: Option<f64>,
+    /// Names of everything observed.
+    pub observables: Vec<String>,
+}
+
+/// Reads what a history holds.
+///
+/// # Errors
+/// Those of reading it.
+pub fn read(history: &History) -> Result<Report> {
+    let (parameters, grains, bonds) = (history.parameters()?, history.grains()?, history.bonds()?);
+    let revision = if parameters.git_revision.is_empty() {
+        "unknown"
+    } else {
+        &parameters.git_revision
+    };
+    let range = |values: &[f64]| {
+        values
+            .iter()
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &v| {
+                [low.min(v), high.max(v)]
+            })
+    };
+    let mut broken = Modes::default();
+    history
+        .ruptures()?
+        .iter()
+        .for_each(|rupture| broken.add(rupture.mode));
+    let frames = history.frames();
+    let moment = |frame: usize| (history.steps()[frame], history.times()[frame]);
+    let drive = |drive| match drive {
+        WallDrive::Fixed => "fixed",
+        WallDrive::Velocity => "driven by a velocity",
+        WallDrive::Force => "driven by a force",
+    };
+    let mut report = Report {
+        file: history.path().display().to_string(),
+        bytes: history.length(),
+        open_ended: history.open_ended(),
+        origin: format!(
+            "dem-run {} (git {revision}, {}) on {}, {}",
+            parameters.version, parameters.build, parameters.host, parameters.start
+        ),
+        dimension: history.dimension(),
+        seed: parameters.seed,
+        grains: grains.radius.len(),
+        diameters: range(&grains.radius).map(|r| 2.0 * r),
+        mass: grains.mass.iter().sum(),
+        walls: history
+            .walls()?
+            .iter()
+            .map(|wall| {
+                [
+                    wall.name.clone(),
+                    wall.kind.label().to_lowercase(),
+                    drive(wall.drive).into(),
+                ]
+            })
+            .collect(),
+        bonds: bonds.len(),
+        cohesion: (!bonds.is_empty()).then(|| range(&bonds.strength)),
+        broken,
+        frames,
+        first: (frames > 0).then(|| moment(0)),
+        last: (frames > 0).then(|| moment(frames - 1)),
+        observed: history.observed_steps(),
+        contacts: if frames > 0 {
+            Some(history.contacts(frames - 1)?.len())
+        } else {
+            None
+        },
+        observables: history.observable_names()?,
+        ..Report::default()
+    };
+    report.read_observables(history)?;
+    Ok(report)
+}
+
+impl Report {
+    fn read_observables(&mut self, history: &History) -> Result<()> {
+        let last = |name: &str| -> Result<Option<f64>> {
+            Ok(history
+                .observable(name)?
+                .and_then(|series| series.value.last().copied()))
+        };
+        let greatest = |series: Series| -> Option<(f64, f64)> {
+            series
+                .value
+                .into_iter()
+                .zip(series.time)
+                .max_by(|a, b| a.0.total_cmp(&b.0))
+        };
+        self.worst_residual = history.observable("solver_residual")?.and_then(greatest);
+        self.penetration = history
+            .observable("penetration")?
+            .and_then(greatest)
+            .map(|(depth, _)| depth);
+        self.iterations = history.observable("solver_iterations")?.and_then(|series| {
+            let mean = series.value.iter().sum::<f64>() / series.value.len() as f64;
+            greatest(series).map(|(most, _)| [mean, most])
+        });
+        self.external_work = last("external_work")?;
+        self.kinetic_energy = last("kinetic_energy")?;
+        self.friction = last("dissipation_friction")?;
+        self.energy_remainder = last("energy_remainder")?;
+        Ok(())
+    }
+
+    /// The report as lines.
+    pub fn table(&self) -> String {
+        let state = if self.open_ended {
+            "not closed: the run goes on or was stopped"
+        } else {
+            "closed"
+        };
+        let [least, most] = self.diameters.map(|d| number(1e3 * d));
+        let mut lines = vec![
+            (
+                "file",
+                format!("{} ({:.1} MB, {state})", self.file, self.bytes as f64 / 1e6),
+            ),
+            ("written by", self.origin.clone()),
+            (
+                "dimension, seed",
+                format!("{}, {}", self.dimension, self.seed),
+            ),
+            (
+                "grains",
+                format!(
+                    "{}, diameters {least} to {most} mm, {} kg in all",
+                    self.grains,
+                    number(self.mass)
+                ),
+            ),
+        ];
+        if self.walls.is_empty() {
+            lines.push(("walls", "none".into()));
+        }
+        for [name, kind, drive] in &self.walls {
+            lines.push(("wall", format!("{name}: {kind}, {drive}")));
+        }
+        lines.push(("bonds", self.bond_line()));
+        lines.extend([
+            ("time", self.time_line()),
+            (
+                "observed",
+                format!("{} steps of {}", self.observed, self.observables.join(", ")),
+            ),
+            (
+                "contacts",
+                self.contacts
+                    .map_or_else(|| "–".into(), |n| format!("{n} at the last frame")),
+            ),
+            (
+                "worst residual",
+                self.worst_residual.map_or_else(
+                    || "–".into(),
+                    |(r, t)| format!("{} at {} s", number(r), number(t)),
+                ),
+            ),
+            (
+                "iterations",
+                self.iterations.map_or_else(
+                    || "–".into(),
+                    |[mean, most]| format!("{mean:.1} a step, at most {most:.0}"),
+                ),
+            ),
+            ("worst penetration", quantity(self.penetration, "m")),
+            ("work from outside", quantity(self.external_work, "J")),
+            ("kinetic energy", quantity(self.kinetic_energy, "J")),
+            ("lost to friction", quantity(self.friction, "J")),
+            ("energy left over", quantity(self.energy_remainder, "J")),
+        ]);
+        let hint = if self.bonds > 0 {
+            "cracks|chains|stress-strain"
+        } else {
+            "chains|stress-strain"
+        };
+        lines.push(("look further", format!("dem-post {hint} {}", self.file)));
+        facts(&lines)
+    }
+
+    fn bond_line(&self) -> String {
+        let Some([least, most]) = self.cohesion else {
+            return "none".into();
+        };
+        let range = if least == most {
+            number(least)
+        } else {
+            format!("{} to {}", number(least), number(most))
+        };
+        let [tension, shear, rolling] =
+            [self.broken.tension, self.broken.shear, self.broken.rolling];
+        let [t, s, r] = [
+            RuptureMode::Tension,
+            RuptureMode::Shear,
+            RuptureMode::Rolling,
+        ]
+        .map(RuptureMode::label);
+        format!(
+            "{}, cohesion {range} N; {} broken: {tension} {t}, {shear} {s}, {rolling} {r}",
+            self.bonds,
+            self.broken.total()
+        )
+    }
+
+    fn time_line(&self) -> String {
+        match (self.first, self.last) {
+            (Some(first), Some(last)) => format!(
+                "{} to {} s, steps {} to {}, {} frames",
+                number(first.1),
+                number(last.1),
+                first.0,
+                last.0,
+                self.frames
+            ),
+            _ => "no frame".into(),
+        }
+    }
+}

@@ -1,0 +1,453 @@
+//! Drawing: charts of curves, and a canvas for maps. The only module that knows the plotting crate (kuva).
+//!
+//! Every drawing comes out as SVG and as PNG from the same scene; the PNG is drawn with a font that the crate carries,
+//! so that it looks the same on every machine.
+
+use std::sync::Arc;
+
+use kuva::PngBackend;
+use kuva::backend::svg::SvgBackend;
+use kuva::plot::{LinePlot, ScatterPlot};
+use kuva::render::annotations::ReferenceLine;
+use kuva::render::figure::Figure;
+use kuva::render::layout::{Layout, TickFormat};
+use kuva::render::plots::Plot;
+use kuva::render::render::{Primitive, Scene, TextAnchor};
+
+/// Colours that stay apart for colour-blind readers and in print (Okabe & Ito).
+pub mod colour {
+    /// Black.
+    pub const BLACK: &str = "#000000";
+    /// Grey of secondary marks.
+    pub const GREY: &str = "#7f7f7f";
+    /// Blue: compression, first curve.
+    pub const BLUE: &str = "#0072b2";
+    /// Vermillion: tension, second curve.
+    pub const VERMILLION: &str = "#d55e00";
+    /// Bluish green: third curve.
+    pub const GREEN: &str = "#009e73";
+    /// Reddish purple: fourth curve.
+    pub const PURPLE: &str = "#cc79a7";
+    /// Orange: fifth curve.
+    pub const ORANGE: &str = "#e69f00";
+    /// One colour for each curve of a family.
+    pub const CYCLE: [&str; 5] = [BLUE, VERMILLION, GREEN, PURPLE, ORANGE];
+}
+
+/// Pixels of the PNG per unit of length of a drawing.
+const PNG_SCALE: f32 = 2.5;
+/// Width and height of one chart, in units of a drawing.
+const CHART: (f64, f64) = (640.0, 460.0);
+/// Room around the cells of a figure, and between them.
+const PADDING: f64 = 6.0;
+const SPACING: f64 = 20.0;
+/// Room above the axes, which takes the legend, and below.
+const ABOVE: f64 = 44.0;
+const BELOW: f64 = 62.0;
+/// Points that one curve keeps: more than the pixels of its width, so none that shows is lost.
+const CURVE_POINTS: usize = 4000;
+
+/// A finished drawing.
+pub struct Drawing(Scene);
+
+impl Drawing {
+    /// The drawing as SVG.
+    pub fn svg(&self) -> String {
+        SvgBackend::new().render_scene(&self.0)
+    }
+
+    /// The drawing as PNG.
+    ///
+    /// # Errors
+    /// The plotting crate's message.
+    pub fn png(&self) -> Result<Vec<u8>, String> {
+        PngBackend::new()
+            .with_scale(PNG_SCALE)
+            .render_scene(&self.0)
+    }
+}
+
+/// How a curve is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Style {
+    /// Joined points.
+    Line,
+    /// A value that holds until the next point.
+    Steps,
+    /// Joined points, each with a dot.
+    Marked,
+}
+
+/// A named curve.
+pub struct Curve {
+    /// Its name in the legend.
+    pub label: String,
+    /// Points (x, y); those that are not finite, or not positive on a logarithmic axis, are left out.
+    pub points: Vec<(f64, f64)>,
+    /// How it is drawn.
+    pub style: Style,
+    /// Its colour.
+    pub colour: &'static str,
+}
+
+/// A chart of curves.
+#[derive(Default)]
+pub struct Chart {
+    /// Title of the horizontal axis, with its unit.
+    pub x: String,
+    /// Title of the vertical axis, with its unit.
+    pub y: String,
+    /// Whether the horizontal axis is logarithmic.
+    pub log_x: bool,
+    /// Whether the vertical axis is logarithmic.
+    pub log_y: bool,
+    /// Whether the horizontal axis begins a little before the first value, so that what rises there can be seen.
+    pub set_off: bool,
+    /// Whether values on the vertical axis are counts.
+    pub counts: bool,
+    /// The curves.
+    pub curves: Vec<Curve>,
+    /// Marked values of y, with what they are.
+    pub levels: Vec<(f64, String)>,
+    /// Marked values of x, with what they are.
+    pub moments: Vec<(f64, String)>,
+}
+
+impl Chart {
+    /// A chart with titles of its axes.
+    pub fn new(x: &str, y: &str) -> Self {
+        Self {
+            x: x.into(),
+            y: y.into(),
+            ..Self::default()
+        }
+    }
+
+    /// Adds a curve.
+    pub fn curve(
+        mut self,
+        label: &str,
+        colour: &'static str,
+        style: Style,
+        points: Vec<(f64, f64)>,
+    ) -> Self {
+        self.curves.push(Curve {
+            label: label.into(),
+            points,
+            style,
+            colour,
+        });
+        self
+    }
+
+    /// Draws the charts side by side, each with its legend above it.
+    pub fn draw(charts: Vec<Self>) -> Drawing {
+        let columns = charts.len();
+        let legends: Vec<Vec<(String, &'static str, Style)>> =
+            charts.iter().map(Self::legend).collect();
+        let (plots, layouts) = charts.into_iter().map(Self::build).unzip();
+        let figure = Figure::new(1, columns)
+            .with_plots(plots)
+            .with_layouts(layouts)
+            .with_cell_size(CHART.0, CHART.1)
+            .with_spacing(SPACING)
+            .with_padding(PADDING);
+        let figure = if columns > 1 {
+            figure.with_labels_lowercase()
+        } else {
+            figure
+        };
+        let mut canvas = Canvas(figure.render());
+        for (k, legend) in legends.iter().enumerate() {
+            let left = PADDING + k as f64 * (CHART.0 + SPACING);
+            draw_legend(
+                &mut canvas,
+                legend,
+                (left + 0.55 * CHART.0, PADDING + 0.5 * ABOVE),
+            );
+        }
+        canvas.finish()
+    }
+
+    /// Name, colour and style of each curve; a chart of one curve needs no legend.
+    fn legend(&self) -> Vec<(String, &'static str, Style)> {
+        let entry = |curve: &Curve| (curve.label.clone(), curve.colour, curve.style);
+        if self.curves.len() < 2 {
+            vec![]
+        } else {
+            self.curves.iter().map(entry).collect()
+        }
+    }
+
+    fn build(mut self) -> (Vec<Plot>, Layout) {
+        for curve in &mut self.curves {
+            let visible = |&(x, y): &(f64, f64)| {
+                x.is_finite()
+                    && y.is_finite()
+                    && (!self.log_x || x > 0.0)
+                    && (!self.log_y || y > 0.0)
+            };
+            curve.points.retain(visible);
+            thin(&mut curve.points);
+        }
+        let plots: Vec<Plot> = self.curves.iter().flat_map(Curve::plots).collect();
+        let mut layout = Layout::auto_from_plots(&plots)
+            .with_x_label(&self.x)
+            .with_y_label(&self.y)
+            .with_label_size(15)
+            .with_tick_size(13)
+            .with_body_size(13)
+            .with_force_margins_y(ABOVE, BELOW)
+            .with_box_axes();
+        layout.show_legend = false;
+        layout = self.scale_axes(layout);
+        for (value, label) in self.levels {
+            let line = ReferenceLine::horizontal(value)
+                .with_color(colour::GREY)
+                .with_label(label);
+            layout = layout.with_reference_line(line);
+        }
+        for (value, label) in self.moments {
+            let line = ReferenceLine::vertical(value)
+                .with_color(colour::GREY)
+                .with_label(label);
+            layout = layout.with_reference_line(line);
+        }
+        (plots, layout)
+    }
+
+    /// Axes that end where the values end, with ticks that suit them.
+    fn scale_axes(&self, mut layout: Layout) -> Layout {
+        let values = || self.curves.iter().flat_map(|curve| &curve.points);
+        let low = values().map(|p| p.0).fold(f64::INFINITY, f64::min);
+        let high = values().map(|p| p.0).fold(f64::NEG_INFINITY, f64::max);
+        let powers = || TickFormat::Custom(Arc::new(power_of_ten));
+        if self.log_x {
+            layout = layout.with_log_x().with_x_tick_format(powers());
+        } else if low < high {
+            let off = if self.set_off {
+                0.03 * (high - low)
+            } else {
+                0.0
+            };
+            layout = layout
+                .with_x_axis_min(low - off)
+                .with_x_axis_max(high + off);
+        }
+        if self.log_y {
+            let low = values().map(|p| p.1).fold(f64::INFINITY, f64::min);
+            let high = values().map(|p| p.1).fold(0.0, f64::max);
+            layout = layout.with_log_y().with_y_tick_format(powers());
+            if low <= high {
+                layout = layout
+                    .with_y_axis_min(0.6 * low)
+                    .with_y_axis_max(1.6 * high);
+            }
+        } else if self.counts {
+            layout = layout.with_y_tick_format(TickFormat::Integer);
+        }
+        layout
+    }
+}
+
+/// A tick of a logarithmic axis: powers of ten as such, others as numbers.
+fn power_of_ten(value: f64) -> String {
+    let exponent = value.log10();
+    if (exponent - exponent.round()).abs() > 1e-6 || (-0.5..1.5).contains(&exponent) {
+        return format!("{value}");
+    }
+    let raise = |digit: char| match digit {
+        '-' => '⁻',
+        '1' => '¹',
+        '2' => '²',
+        '3' => '³',
+        digit => char::from_u32(0x2070 + digit.to_digit(10).unwrap_or(0)).unwrap_or(digit),
+    };
+    format!(
+        "10{}",
+        format!("{exponent:.0}")
+            .chars()
+            .map(raise)
+            .collect::<String>()
+    )
+}
+
+/// The names of the curves in one row around `middle`.
+fn draw_legend(canvas: &mut Canvas, legend: &[(String, &'static str, Style)], middle: (f64, f64)) {
+    let width = |text: &str| 52.0 + 7.8 * text.chars().count() as f64;
+    let total: f64 = legend.iter().map(|(text, ..)| width(text)).sum();
+    let (mut x, y) = (middle.0 - 0.5 * total, middle.1);
+    for (text, colour, style) in legend {
+        canvas.line((x, y), (x + 26.0, y), colour, 2.2);
+        if *style == Style::Marked {
+            canvas.disk((x + 13.0, y), 3.5, colour, colour, 0.5);
+        }
+        canvas.text((x + 33.0, y + 5.0), text, 14, Anchor::Start);
+        x += width(text);
+    }
+}
+
+impl Curve {
+    fn plots(&self) -> Vec<Plot> {
+        let points = || self.points.iter().copied();
+        let line = LinePlot::new()
+            .with_data(points())
+            .with_color(self.colour)
+            .with_stroke_width(1.8);
+        match self.style {
+            Style::Line => vec![line.into()],
+            Style::Steps => vec![line.with_step().into()],
+            Style::Marked => {
+                let dots = ScatterPlot::new()
+                    .with_data(points())
+                    .with_color(self.colour)
+                    .with_size(3.5);
+                vec![line.with_stroke_width(1.2).into(), dots.into()]
+            }
+        }
+    }
+}
+
+/// Keeps of a long curve the first, lowest, highest and last point of each stretch, so that no peak is lost.
+fn thin(points: &mut Vec<(f64, f64)>) {
+    if points.len() <= CURVE_POINTS {
+        return;
+    }
+    let stretch = points.len().div_ceil(CURVE_POINTS / 4);
+    let mut kept = Vec::with_capacity(CURVE_POINTS);
+    for part in points.chunks(stretch) {
+        let by = |a: &&(f64, f64), b: &&(f64, f64)| a.1.total_cmp(&b.1);
+        let low = part
+            .iter()
+            .enumerate()
+            .min_by(|a, b| by(&a.1, &b.1))
+            .map_or(0, |(k, _)| k);
+        let high = part
+            .iter()
+            .enumerate()
+            .max_by(|a, b| by(&a.1, &b.1))
+            .map_or(0, |(k, _)| k);
+        let mut picks = [0, low, high, part.len() - 1];
+        picks.sort_unstable();
+        kept.extend(
+            picks
+                .iter()
+                .enumerate()
+                .filter(|&(n, k)| n == 0 || picks[n - 1] != *k)
+                .map(|(_, &k)| part[k]),
+        );
+    }
+    *points = kept;
+}
+
+/// Where a text stands relative to its point.
+#[derive(Clone, Copy, Debug)]
+pub enum Anchor {
+    /// It begins there.
+    Start,
+    /// Its middle is there.
+    Middle,
+    /// It ends there.
+    End,
+}
+
+/// A sheet to draw on; lengths in units of the drawing, y downwards.
+pub struct Canvas(Scene);
+
+impl Canvas {
+    /// An empty white sheet.
+    pub fn new(width: f64, height: f64) -> Self {
+        Self(Scene::new(width, height))
+    }
+
+    /// A disk with an outline.
+    pub fn disk(&mut self, centre: (f64, f64), radius: f64, fill: &str, outline: &str, width: f64) {
+        self.0.add(Primitive::Circle {
+            cx: centre.0,
+            cy: centre.1,
+            r: radius,
+            fill: fill.into(),
+            fill_opacity: None,
+            stroke: Some(outline.into()),
+            stroke_width: Some(width),
+        });
+    }
+
+    /// A straight line.
+    pub fn line(&mut self, from: (f64, f64), to: (f64, f64), colour: &str, width: f64) {
+        self.0.add(Primitive::Line {
+            x1: from.0,
+            y1: from.1,
+            x2: to.0,
+            y2: to.1,
+            stroke: colour.into(),
+            stroke_width: width,
+            stroke_dasharray: None,
+        });
+    }
+
+    /// A filled rectangle.
+    pub fn rectangle(&mut self, corner: (f64, f64), size: (f64, f64), fill: &str) {
+        self.0.add(Primitive::Rect {
+            x: corner.0,
+            y: corner.1,
+            width: size.0,
+            height: size.1,
+            fill: fill.into(),
+            stroke: None,
+            stroke_width: None,
+            opacity: None,
+        });
+    }
+
+    /// A line of text; `at` is on its base line.
+    pub fn text(&mut self, at: (f64, f64), text: &str, size: u32, anchor: Anchor) {
+        self.0.add(Primitive::Text {
+            x: at.0,
+            y: at.1,
+            content: text.into(),
+            size,
+            anchor: match anchor {
+                Anchor::Start => TextAnchor::Start,
+                Anchor::Middle => TextAnchor::Middle,
+                Anchor::End => TextAnchor::End,
+            },
+            rotate: None,
+            bold: false,
+            color: None,
+        });
+    }
+
+    /// The drawing.
+    pub fn finish(self) -> Drawing {
+        Drawing(self.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_powers_of_ten() {
+        for (value, text) in [
+            (1e-4, "10⁻⁴"),
+            (1e3, "10³"),
+            (0.1, "0.1"),
+            (1.0, "1"),
+            (2e-5, "0.00002"),
+        ] {
+            assert_eq!(power_of_ten(value), text);
+        }
+    }
+
+    #[test]
+    fn a_thinned_curve_keeps_its_peak_and_its_ends() {
+        let mut points: Vec<(f64, f64)> = (0..100_000).map(|k| (f64::from(k), 0.0)).collect();
+        points[54_321].1 = 7.0;
+        thin(&mut points);
+        assert!(points.len() <= CURVE_POINTS);
+        assert!(points.contains(&(54_321.0, 7.0)));
+        assert_eq!((points[0].0, points[points.len() - 1].0), (0.0, 99_999.0));
+    }
+}
