@@ -50,9 +50,12 @@ fn sweeps(c: &mut Criterion) {
             let mut problem = lattice(rows, columns, bonded);
             group.throughput(Throughput::Elements(problem.len() as u64));
             for local in [LocalSolve::Exact, LocalSolve::PredictorCorrector] {
-                group.bench_function(BenchmarkId::new(kind, format!("{local:?}")), |b| b.iter(|| sweep(black_box(&mut problem), local)));
+                group.bench_function(BenchmarkId::new(kind, format!("{local:?}")), |b| {
+                    b.iter(|| sweep(black_box(&mut problem), local))
+                });
             }
-            let bytes = std::mem::size_of_val(problem.bonded.as_slice()) + std::mem::size_of_val(problem.dry.as_slice());
+            let bytes =
+                std::mem::size_of_val(problem.bonded.as_slice()) + std::mem::size_of_val(problem.dry.as_slice());
             let words = vec![1.0f64; bytes / 8];
             group.bench_function(BenchmarkId::new(kind, "stream"), |b| b.iter(|| stream(black_box(&words))));
         }

@@ -35,12 +35,20 @@ impl<D: Dim> Candidates<D> {
         if self.grains_then.len() != grains.len() || self.walls_then.len() != walls.len() {
             return false;
         }
-        let moved = largest_move(grains, &self.grains_then) + largest_move(grains, &self.grains_then).max(largest_move(walls, &self.walls_then));
+        let moved = largest_move(grains, &self.grains_then)
+            + largest_move(grains, &self.grains_then).max(largest_move(walls, &self.walls_then));
         moved + reach <= self.skin
     }
 
     /// Build the list anew for these positions, with the given skin (m).
-    pub fn rebuild(&mut self, grains: &Grains<D>, position: &[D::Vector], walls: &[Wall<D>], wall_position: &[D::Vector], skin: f64) {
+    pub fn rebuild(
+        &mut self,
+        grains: &Grains<D>,
+        position: &[D::Vector],
+        walls: &[Wall<D>],
+        wall_position: &[D::Vector],
+        skin: f64,
+    ) {
         self.skin = skin;
         self.grains_then = position.to_vec();
         self.walls_then = wall_position.to_vec();

@@ -48,7 +48,12 @@ pub trait Law: Copy + Send + Sync + 'static {
     type B: Vect;
 
     /// A better impulse for this contact alone, from its impulse `r` (N s) and relative velocity `u` (m/s).
-    fn improve(&self, local: LocalSolve, r: Local<Self::T, Self::B>, u: Local<Self::T, Self::B>) -> Local<Self::T, Self::B>;
+    fn improve(
+        &self,
+        local: LocalSolve,
+        r: Local<Self::T, Self::B>,
+        u: Local<Self::T, Self::B>,
+    ) -> Local<Self::T, Self::B>;
 
     /// Natural map r̂ − P_K(r̂ − ũ/D) of the contact, D the largest diagonal entry of its block: zero at a solution.
     fn natural_map(&self, r: Local<Self::T, Self::B>, u: Local<Self::T, Self::B>) -> Local<Self::T, Self::B>;
@@ -71,7 +76,14 @@ pub trait Law: Copy + Send + Sync + 'static {
 ///
 /// A predictor inside the cone is its own projection; the change −γ ũ is then exact, however large the shift s is beside r.
 #[inline]
-fn predict_correct<T: Vect, B: Vect>(cone: Cone, shift: f64, non_associated: bool, gamma: f64, r: Local<T, B>, mut u: Local<T, B>) -> Local<T, B> {
+fn predict_correct<T: Vect, B: Vect>(
+    cone: Cone,
+    shift: f64,
+    non_associated: bool,
+    gamma: f64,
+    r: Local<T, B>,
+    mut u: Local<T, B>,
+) -> Local<T, B> {
     if non_associated {
         u.n += cone.mu * u.t.norm() + cone.nu * u.m.norm();
     }
@@ -234,7 +246,11 @@ impl<A: Vect> Law for Bonded<A, A> {
                     m: r.m - u.m * self.inverse_m - u.t * self.inverse_tm,
                 };
                 // nearly every bond sticks: no square root, no division
-                if self.cone.contains(&Local { n: stuck.n + self.shift, ..stuck }) { stuck } else { self.at_limit(r, u) }
+                if self.cone.contains(&Local { n: stuck.n + self.shift, ..stuck }) {
+                    stuck
+                } else {
+                    self.at_limit(r, u)
+                }
             }
             LocalSolve::PredictorCorrector => r + self.predict_correct(r, u),
         }
@@ -278,11 +294,7 @@ impl<A: Vect> Bonded<A, A> {
         let mut x = r;
         x.n += self.shift;
         // u = W x + q
-        let q = Local {
-            n: u.n - w.n * x.n,
-            t: u.t - x.t * w.t - x.m * w.tm,
-            m: u.m - x.m * w.m - x.t * w.tm,
-        };
+        let q = Local { n: u.n - w.n * x.n, t: u.t - x.t * w.t - x.m * w.tm, m: u.m - x.m * w.m - x.t * w.tm };
         let weights = Weights { n: w.n, t: w.t, m: w.m };
         let rounds = if w.tm == 0.0 { 1 } else { 200 };
         for _ in 0..rounds {

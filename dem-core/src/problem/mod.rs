@@ -113,11 +113,7 @@ impl<D: Dim> Nodes<D> {
             return Local { n, ..Local::zero() };
         }
         let turn = D::spin_rows(&link.frame, i.spin * link.lever[0] + j.spin * link.lever[1]);
-        let m = if B::LEN == 0 {
-            B::zero()
-        } else {
-            resized(D::spin_rows(&link.frame, (i.spin - j.spin) * arm))
-        };
+        let m = if B::LEN == 0 { B::zero() } else { resized(D::spin_rows(&link.frame, (i.spin - j.spin) * arm)) };
         Local { n, t: resized(t - turn), m }
     }
 

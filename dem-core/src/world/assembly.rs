@@ -1,7 +1,7 @@
 //! From bodies to the contact problem and back: detection with warm start, assembly, reading of the result.
 
-use super::touch::{Touch, TouchStatus};
 use super::World;
+use super::touch::{Touch, TouchStatus};
 use crate::bond::{Bond, BondStatus};
 use crate::contact::{Bonded, Coulomb, Frictionless, Law, Local};
 use crate::dim::{Dim, Vect, resized};
@@ -52,7 +52,13 @@ impl<D: Dim> World<D> {
     }
 
     /// A contact without reaction at the geometry of mid-step.
-    pub(super) fn new_touch(&self, mid: &Midpoint<D>, motion: &Motion<D>, pair: [u32; 2], bond: Option<u32>) -> Touch<D> {
+    pub(super) fn new_touch(
+        &self,
+        mid: &Midpoint<D>,
+        motion: &Motion<D>,
+        pair: [u32; 2],
+        bond: Option<u32>,
+    ) -> Touch<D> {
         let (gap, normal, point) = self.geometry(mid, pair);
         let [i, j] = pair.map(|k| motion.before[k as usize].0);
         Touch {
@@ -119,7 +125,14 @@ impl<D: Dim> World<D> {
     }
 
     /// Contacts that the step left out and that its velocities would close: they are added, and the step is solved again.
-    pub(super) fn missed(&mut self, mid: &Midpoint<D>, motion: &Motion<D>, touches: &[Touch<D>], nodes: &Nodes<D>, h: f64) -> Vec<Touch<D>> {
+    pub(super) fn missed(
+        &mut self,
+        mid: &Midpoint<D>,
+        motion: &Motion<D>,
+        touches: &[Touch<D>],
+        nodes: &Nodes<D>,
+        h: f64,
+    ) -> Vec<Touch<D>> {
         let fastest = nodes.all.iter().map(|n| n.velocity.dot(&n.velocity)).fold(0.0, f64::max).sqrt();
         if !self.candidates.covers(&mid.grains, &mid.walls, 2.0 * h * fastest) {
             self.candidates.rebuild(&self.grains, &mid.grains, &self.walls, &mid.walls, 3.0 * h * fastest);
@@ -187,7 +200,13 @@ impl<D: Dim> World<D> {
     }
 
     /// The contact problem of these contacts, started from their reactions, and the place of each contact in it.
-    pub(super) fn assemble(&self, touches: &[Touch<D>], motion: &Motion<D>, applied: f64, h: f64) -> (ContactProblem<D>, Places) {
+    pub(super) fn assemble(
+        &self,
+        touches: &[Touch<D>],
+        motion: &Motion<D>,
+        applied: f64,
+        h: f64,
+    ) -> (ContactProblem<D>, Places) {
         let mut problem = ContactProblem {
             nodes: self.nodes(motion),
             free: motion.free.clone(),
@@ -200,7 +219,8 @@ impl<D: Dim> World<D> {
         for (place, touch) in touches.iter().enumerate() {
             let link = self.link(touch);
             let [i, j] = link.nodes.map(|k| &problem.nodes.all[k as usize]);
-            let drive = (touch.pair[1] as usize).checked_sub(self.grains.len()).and_then(|w| self.walls[w].free_direction());
+            let drive =
+                (touch.pair[1] as usize).checked_sub(self.grains.len()).and_then(|w| self.walls[w].free_direction());
             let start = touch.reaction * h;
             if let Some(bond) = touch.bond.map(|b| &self.bonds[b as usize]) {
                 let arm = bond.mean_diameter;
@@ -215,7 +235,11 @@ impl<D: Dim> World<D> {
                     problem.dry.push(Contact { link, law: Coulomb::new(block, mu, bias), r: narrowed(start) });
                     places.dry.push(place);
                 } else {
-                    problem.frictionless.push(Contact { link, law: Frictionless::new(block, bias), r: narrowed(start) });
+                    problem.frictionless.push(Contact {
+                        link,
+                        law: Frictionless::new(block, bias),
+                        r: narrowed(start),
+                    });
                     places.frictionless.push(place);
                 }
             }

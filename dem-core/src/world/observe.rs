@@ -58,7 +58,8 @@ impl<D: Dim> World<D> {
     /// time zero (–, D × D row by row; elongation positive). Zero if the grains do not span all directions.
     pub fn strain(&self) -> Vec<f64> {
         let n = self.grains.len() as f64;
-        let mean = |points: &mut dyn Iterator<Item = D::Vector>| points.fold(D::Vector::zero(), |a, b| a + b) * (1.0 / n);
+        let mean =
+            |points: &mut dyn Iterator<Item = D::Vector>| points.fold(D::Vector::zero(), |a, b| a + b) * (1.0 / n);
         let centre = mean(&mut self.reference.iter().copied());
         let moved = |k: usize| self.grains.position[k] - self.reference[k];
         let drift = mean(&mut (0..self.grains.len()).map(moved));

@@ -4,8 +4,8 @@ use super::assembly::{Midpoint, Motion, Places, read_back};
 use super::ledger::group_losses;
 use super::touch::{Break, Touch, TouchStatus};
 use super::{Counts, World};
-use crate::bond::{BondStatus, Rupture, failure};
 use crate::body::Drive;
+use crate::bond::{BondStatus, Rupture, failure};
 use crate::contact::{Law, Local};
 use crate::dim::{Dim, Vect};
 use crate::problem::{ContactProblem, Node, Nodes};
@@ -54,7 +54,9 @@ pub enum StepError {
         iterations: u64,
     },
     /// A velocity or a reaction is not a finite number.
-    #[error("a velocity is not a finite number at t = {time:.6e} s: look for grains squeezed between bodies that cannot yield")]
+    #[error(
+        "a velocity is not a finite number at t = {time:.6e} s: look for grains squeezed between bodies that cannot yield"
+    )]
     NotFinite {
         /// Time of the last accepted state (s).
         time: f64,
@@ -205,7 +207,13 @@ impl<D: Dim> World<D> {
     }
 
     /// The bonds that the accepted solve left at their limit, as many as the scene's rule lets break in one round.
-    fn at_limit(&self, touches: &[Touch<D>], problem: &ContactProblem<D>, places: &Places, round: u32) -> Vec<Break<D>> {
+    fn at_limit(
+        &self,
+        touches: &[Touch<D>],
+        problem: &ContactProblem<D>,
+        places: &Places,
+        round: u32,
+    ) -> Vec<Break<D>> {
         let mut found: Vec<(f64, Break<D>)> = Vec::new();
         for (contact, place) in problem.bonded.iter().zip(&places.bonded) {
             let law = &contact.law;
@@ -225,7 +233,15 @@ impl<D: Dim> World<D> {
     }
 
     /// Take over the result: velocities, second half of the positions, broken bonds, reactions, books.
-    fn settle(&mut self, h: f64, mid: &Midpoint<D>, motion: &Motion<D>, problem: &ContactProblem<D>, mut touches: Vec<Touch<D>>, breaks: &[Break<D>]) {
+    fn settle(
+        &mut self,
+        h: f64,
+        mid: &Midpoint<D>,
+        motion: &Motion<D>,
+        problem: &ContactProblem<D>,
+        mut touches: Vec<Touch<D>>,
+        breaks: &[Break<D>],
+    ) {
         self.book(h, motion, problem);
         let n = self.grains.len();
         for (k, node) in problem.nodes.all[..n].iter().enumerate() {
@@ -259,7 +275,11 @@ impl<D: Dim> World<D> {
 
     /// Enter the step in the energy ledger.
     fn book(&mut self, h: f64, motion: &Motion<D>, problem: &ContactProblem<D>) {
-        let before = Nodes { all: with_velocities(&problem.nodes, &motion.before), drives: problem.nodes.drives.clone(), ..problem.nodes };
+        let before = Nodes {
+            all: with_velocities(&problem.nodes, &motion.before),
+            drives: problem.nodes.drives.clone(),
+            ..problem.nodes
+        };
         let kinetic = self.kinetic_after(&problem.nodes);
         let external = self.external_work(h, motion, problem);
         let dry = group_losses(&before, &problem.nodes, &problem.dry);
@@ -279,7 +299,8 @@ impl<D: Dim> World<D> {
         let mut sum = 0.0;
         for (k, node) in nodes.all.iter().enumerate() {
             if node.inverse_mass > 0.0 {
-                let (mass, inertia) = if k < n { (self.grains.mass[k], self.grains.inertia[k]) } else { (1.0 / node.inverse_mass, 0.0) };
+                let (mass, inertia) =
+                    if k < n { (self.grains.mass[k], self.grains.inertia[k]) } else { (1.0 / node.inverse_mass, 0.0) };
                 sum += mass * node.velocity.dot(&node.velocity) + inertia * node.spin.dot(&node.spin);
             }
         }
@@ -311,7 +332,15 @@ impl<D: Dim> World<D> {
         work
     }
 
-    fn report(&self, touches: &[Touch<D>], motion: &Motion<D>, problem: &ContactProblem<D>, done: Solves, breaks: Vec<Break<D>>, h: f64) -> StepReport<D> {
+    fn report(
+        &self,
+        touches: &[Touch<D>],
+        motion: &Motion<D>,
+        problem: &ContactProblem<D>,
+        done: Solves,
+        breaks: Vec<Break<D>>,
+        h: f64,
+    ) -> StepReport<D> {
         let mut change = 0.0;
         for (k, mass) in self.grains.mass.iter().enumerate().filter(|(k, _)| !self.grains.fixed[*k]) {
             let dv = (problem.nodes.all[k].velocity - motion.before[k].0) * *mass;

@@ -12,7 +12,12 @@ use std::sync::Arc;
 pub const DENSITY: f64 = 2500.0;
 
 pub fn solver(tolerance: f64) -> SolverSettings {
-    SolverSettings::GaussSeidel(GaussSeidelSettings { local: LocalSolve::Exact, tolerance, accept: tolerance, max_sweeps: 1_000_000 })
+    SolverSettings::GaussSeidel(GaussSeidelSettings {
+        local: LocalSolve::Exact,
+        tolerance,
+        accept: tolerance,
+        max_sweeps: 1_000_000,
+    })
 }
 
 pub fn settings<D: Dim>(step: f64) -> Settings<D> {
