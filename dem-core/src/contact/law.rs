@@ -69,6 +69,16 @@ pub trait Law: Copy + Send + Sync + 'static {
         0.0
     }
 
+    /// What is added to the normal velocity before the law (m/s).
+    fn bias(&self) -> f64 {
+        0.0
+    }
+
+    /// Whether the flow is normal to the cone, so that the law derives from a convex potential.
+    fn associated(&self) -> bool {
+        true
+    }
+
     /// Length that scales moments and relative spins: the mean diameter of a bonded pair (m).
     fn arm(&self) -> f64 {
         0.0
@@ -134,6 +144,10 @@ impl Law for Frictionless {
         self.inverse
     }
 
+    fn bias(&self) -> f64 {
+        self.bias
+    }
+
     fn cone(&self) -> Cone {
         Cone { mu: 0.0, nu: 0.0 }
     }
@@ -186,6 +200,14 @@ impl<T: Vect> Law for Coulomb<T> {
     #[inline(always)]
     fn gamma(&self) -> f64 {
         self.inverse_n.min(self.inverse_t)
+    }
+
+    fn bias(&self) -> f64 {
+        self.bias
+    }
+
+    fn associated(&self) -> bool {
+        false
     }
 
     #[inline(always)]
@@ -279,6 +301,10 @@ impl<A: Vect> Law for Bonded<A, A> {
 
     fn cone(&self) -> Cone {
         self.cone
+    }
+
+    fn associated(&self) -> bool {
+        self.flow == BondFlow::Associated
     }
 
     #[inline(always)]
