@@ -279,7 +279,7 @@ fn network_map(history: &History, report: &Report) -> Result<Drawing> {
         panels.push(Panel {
             caption: vec![
                 format!("t = {} s", number(network.time)),
-                format!("⟨f⟩ = {} N", number(s.mean)),
+                format!("⟨f⟩ = {} N", short(s.mean)),
             ],
             links: links(
                 &network.contacts,

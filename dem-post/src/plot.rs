@@ -72,6 +72,8 @@ impl Drawing {
 pub enum Style {
     /// Joined points.
     Line,
+    /// Joined points by a wide line, for a curve that another one covers.
+    Wide,
     /// A value that holds until the next point.
     Steps,
     /// Joined points, each with a dot.
@@ -278,7 +280,12 @@ fn draw_legend(canvas: &mut Canvas, legend: &[(String, &'static str, Style)], mi
     let total: f64 = legend.iter().map(|(text, ..)| width(text)).sum();
     let (mut x, y) = (middle.0 - 0.5 * total, middle.1);
     for (text, colour, style) in legend {
-        canvas.line((x, y), (x + 26.0, y), colour, 2.2);
+        canvas.line(
+            (x, y),
+            (x + 26.0, y),
+            colour,
+            if *style == Style::Wide { 5.0 } else { 2.2 },
+        );
         if *style == Style::Marked {
             canvas.disk((x + 13.0, y), 3.5, colour, colour, 0.5);
         }
@@ -296,6 +303,7 @@ impl Curve {
             .with_stroke_width(1.8);
         match self.style {
             Style::Line => vec![line.into()],
+            Style::Wide => vec![line.with_stroke_width(5.0).into()],
             Style::Steps => vec![line.with_step().into()],
             Style::Marked => {
                 let dots = ScatterPlot::new()
@@ -433,7 +441,7 @@ mod tests {
         for (value, text) in [
             (1e-4, "10⁻⁴"),
             (1e3, "10³"),
-            (0.1, "0.1"),
+            (0.1, "10⁻¹"),
             (1.0, "1"),
             (2e-5, "0.00002"),
         ] {

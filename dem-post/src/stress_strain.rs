@@ -510,8 +510,8 @@ fn force_displacement(report: &Report) -> Chart {
         let points = pairs(&report.displacement, 1e3, &report.reaction, 1.0);
         chart = chart.curve(
             "reaction of the grains",
-            colour::VERMILLION,
-            Style::Line,
+            colour::ORANGE,
+            Style::Wide,
             points,
         );
     }
@@ -568,7 +568,7 @@ fn stress_strain(report: &Report) -> Chart {
             &report.reaction,
             wall_stress,
         );
-        chart = chart.curve("from the walls", colour::VERMILLION, Style::Line, points);
+        chart = chart.curve("from the walls", colour::ORANGE, Style::Wide, points);
     }
     let points = pairs(&report.strain, 1e2, &report.stress, 1e-3);
     if !points.is_empty() {
