@@ -88,11 +88,6 @@ pub fn read(history: &History) -> Result<Report> {
         .for_each(|rupture| broken.add(rupture.mode));
     let frames = history.frames();
     let moment = |frame: usize| (history.steps()[frame], history.times()[frame]);
-    let drive = |drive| match drive {
-        WallDrive::Fixed => "fixed",
-        WallDrive::Velocity => "driven by a velocity",
-        WallDrive::Force => "driven by a force",
-    };
     let mut report = Report {
         file: history.path().display().to_string(),
         bytes: history.length(),
@@ -106,17 +101,7 @@ pub fn read(history: &History) -> Result<Report> {
         grains: grains.radius.len(),
         diameters: range(&grains.radius).map(|r| 2.0 * r),
         mass: grains.mass.iter().sum(),
-        walls: history
-            .walls()?
-            .iter()
-            .map(|wall| {
-                [
-                    wall.name.clone(),
-                    wall.kind.label().to_lowercase(),
-                    drive(wall.drive).into(),
-                ]
-            })
-            .collect(),
+        walls: walls(history)?,
         bonds: bonds.len(),
         cohesion: (!bonds.is_empty()).then(|| range(&bonds.strength)),
         broken,
@@ -134,6 +119,24 @@ pub fn read(history: &History) -> Result<Report> {
     };
     report.read_observables(history)?;
     Ok(report)
+}
+
+/// Name, shape and drive of each wall.
+fn walls(history: &History) -> Result<Vec<[String; 3]>> {
+    let drive = |drive| match drive {
+        WallDrive::Fixed => "fixed",
+        WallDrive::Velocity => "driven by a velocity",
+        WallDrive::Force => "driven by a force",
+    };
+    let walls = history.walls()?;
+    let words = walls.iter().map(|wall| {
+        [
+            wall.name.clone(),
+            wall.kind.label().to_lowercase(),
+            drive(wall.drive).into(),
+        ]
+    });
+    Ok(words.collect())
 }
 
 impl Report {
@@ -206,6 +209,20 @@ impl Report {
                 "observed",
                 format!("{} steps of {}", self.observed, self.observables.join(", ")),
             ),
+        ]);
+        lines.extend(self.measure_lines());
+        let hint = if self.bonds > 0 {
+            "cracks|chains|stress-strain"
+        } else {
+            "chains|stress-strain"
+        };
+        lines.push(("look further", format!("dem-post {hint} {}", self.file)));
+        facts(&lines)
+    }
+
+    /// What was measured, one line each.
+    fn measure_lines(&self) -> Vec<(&'static str, String)> {
+        vec![
             (
                 "contacts",
                 self.contacts
@@ -230,14 +247,7 @@ impl Report {
             ("kinetic energy", quantity(self.kinetic_energy, "J")),
             ("lost to friction", quantity(self.friction, "J")),
             ("energy left over", quantity(self.energy_remainder, "J")),
-        ]);
-        let hint = if self.bonds > 0 {
-            "cracks|chains|stress-strain"
-        } else {
-            "chains|stress-strain"
-        };
-        lines.push(("look further", format!("dem-post {hint} {}", self.file)));
-        facts(&lines)
+        ]
     }
 
     fn bond_line(&self) -> String {

@@ -17,6 +17,7 @@ use std::path::Path;
 use dem_run::history::{History, Series, Wall, WallDrive};
 use serde::Serialize;
 
+use crate::collapse::{last_step_below, peak, work};
 use crate::output::{Folder, PostError, Result, cell, facts, quantity, short};
 use crate::plot::{Chart, Style, colour};
 
@@ -24,8 +25,6 @@ use crate::plot::{Chart, Style, colour};
 const COLLAPSE: [f64; 2] = [1e-4, 1e-3];
 /// Share of broken bonds whose load is reported.
 const BROKEN: f64 = 0.05;
-/// A maximum is a peak if the load falls at least this share below it afterwards.
-const PEAK_DROP: f64 = 0.05;
 /// Least strain that the logarithmic axis shows.
 const LEAST_STRAIN: f64 = 1e-9;
 
@@ -104,31 +103,7 @@ pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
     let axis = (0..history.dimension())
         .max_by(|a, b| size(a).total_cmp(&size(b)))
         .unwrap_or(0);
-    let position = required(history, "wall_position")?;
-    let start = start_of(history, k, &direction)?;
-    let way: Vec<f64> = along(history, &position, k, &direction, "wall_position")?
-        .iter()
-        .map(|x| x - start)
-        .collect();
-    let reaction = match history.observable("wall_force")? {
-        Some(series) => along(history, &series, k, &direction, "wall_force")?,
-        None => vec![],
-    };
-    // the load is counted in the sense of the prescribed force, or of the prescribed motion
-    let load = match walls[k].drive {
-        WallDrive::Force => component(
-            history,
-            &required(history, "applied_force")?,
-            &[k],
-            "applied_force",
-        )?,
-        _ => required(history, "wall_force").map(|_| reaction.iter().map(|f| -f).collect())?,
-    };
-    let sense = sense(if walls[k].drive == WallDrive::Force {
-        &load
-    } else {
-        &way
-    });
+    let motion = motion(history, &walls[k], k)?;
     let tensor = |name: &str| -> Result<Vec<f64>> {
         let series = history.observable(name)?;
         series.map_or_else(
@@ -136,12 +111,12 @@ pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
             |series| component(history, &series, &[axis, axis], name),
         )
     };
-    let (sample, push) = sample_size(history, k, axis, sense * direction[axis])?;
+    let (sample, push) = sample_size(history, k, axis, motion.sense * direction[axis])?;
     let mut report = Report {
-        displacement: way.iter().map(|x| sense * x).collect(),
-        load: load.iter().map(|f| sense * f).collect(),
+        displacement: motion.way.iter().map(|x| motion.sense * x).collect(),
+        load: motion.load.iter().map(|f| motion.sense * f).collect(),
         // the grains push back
-        reaction: reaction.iter().map(|f| -sense * f).collect(),
+        reaction: motion.reaction.iter().map(|f| -motion.sense * f).collect(),
         strain: tensor("strain")?.iter().map(|e| -push * e).collect(),
         stress: tensor("stress")?.iter().map(|s| push * s).collect(),
         broken: history
@@ -154,14 +129,65 @@ pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
             area: sample[1],
             ..Summary::default()
         },
-        step: position.step,
-        time: position.time,
+        step: motion.step,
+        time: motion.time,
     };
     report.summarise(
         &history.bonds()?.strength,
         history.observable("solver_residual")?,
     );
     Ok(report)
+}
+
+/// What the driven wall does, along its direction and with the signs of that direction.
+struct Motion {
+    step: Vec<i64>,
+    time: Vec<f64>,
+    /// Displacement since the first frame, m.
+    way: Vec<f64>,
+    /// Force of the grains on the wall, N; empty if not recorded.
+    reaction: Vec<f64>,
+    /// Force on the wall from outside, N.
+    load: Vec<f64>,
+    /// The sign that makes the load positive.
+    sense: f64,
+}
+
+fn motion(history: &History, wall: &Wall, k: usize) -> Result<Motion> {
+    let direction = &wall.direction;
+    let position = required(history, "wall_position")?;
+    let start = start_of(history, k, direction)?;
+    let way: Vec<f64> = along(history, &position, k, direction, "wall_position")?
+        .iter()
+        .map(|x| x - start)
+        .collect();
+    let reaction = match history.observable("wall_force")? {
+        Some(series) => along(history, &series, k, direction, "wall_force")?,
+        None => vec![],
+    };
+    // the load is counted in the sense of the prescribed force, or of the prescribed motion
+    let load = match wall.drive {
+        WallDrive::Force => component(
+            history,
+            &required(history, "applied_force")?,
+            &[k],
+            "applied_force",
+        )?,
+        _ => required(history, "wall_force").map(|_| reaction.iter().map(|f| -f).collect())?,
+    };
+    let sense = sense(if wall.drive == WallDrive::Force {
+        &load
+    } else {
+        &way
+    });
+    Ok(Motion {
+        step: position.step,
+        time: position.time,
+        way,
+        reaction,
+        load,
+        sense,
+    })
 }
 
 /// The sign of the value of greatest magnitude.
@@ -335,29 +361,6 @@ fn thickness(history: &History) -> Result<f64> {
         .and_then(serde_json::Value::as_f64)
         .filter(|t| *t > 0.0)
         .unwrap_or(1.0))
-}
-
-/// The last step before `strain` exceeds `threshold` in magnitude; `None` if it never does.
-pub fn last_step_below(strain: &[f64], threshold: f64) -> Option<usize> {
-    let above = strain.iter().position(|e| e.abs() > threshold)?;
-    Some(above.saturating_sub(1))
-}
-
-/// Where the load is greatest, if it falls by at least 5 % afterwards.
-pub fn peak(load: &[f64]) -> Option<usize> {
-    let top = (0..load.len()).max_by(|&a, &b| load[a].total_cmp(&load[b]).then(b.cmp(&a)))?;
-    let lowest = load[top..].iter().copied().fold(f64::INFINITY, f64::min);
-    (load[top] > 0.0 && lowest < (1.0 - PEAK_DROP) * load[top]).then_some(top)
-}
-
-/// Work of a force along a way, by trapezoids, J; from zero force at way zero.
-pub fn work(load: &[f64], way: &[f64]) -> f64 {
-    let (mut sum, mut last) = (0.0, (0.0, 0.0));
-    for now in load.iter().copied().zip(way.iter().copied()) {
-        sum += 0.5 * (now.0 + last.0) * (now.1 - last.1);
-        last = now;
-    }
-    sum
 }
 
 impl Report {
@@ -581,31 +584,4 @@ fn stress_strain(report: &Report) -> Chart {
         ));
     }
     chart
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn collapse_is_the_last_step_before_the_strain_exceeds_its_threshold() {
-        let strain = [0.0, 5e-5, 1e-4, -2e-4, 0.0, 2e-3];
-        assert_eq!(last_step_below(&strain, 1e-4), Some(2));
-        assert_eq!(last_step_below(&strain, 1e-3), Some(4));
-        assert_eq!(last_step_below(&strain, 1.0), None);
-        assert_eq!(last_step_below(&[1.0], 1e-4), Some(0));
-    }
-
-    #[test]
-    fn a_load_that_only_grows_has_no_peak() {
-        assert_eq!(peak(&[0.0, 1.0, 2.0]), None);
-        assert_eq!(peak(&[0.0, 2.0, 1.99]), None);
-        assert_eq!(peak(&[0.0, 2.0, 1.0, 1.5]), Some(1));
-        assert_eq!(peak(&[]), None);
-    }
-
-    #[test]
-    fn work_is_the_area_under_the_curve() {
-        assert!((work(&[1.0, 2.0, 2.0], &[1.0, 2.0, 4.0]) - (0.5 + 1.5 + 4.0)).abs() < 1e-15);
-    }
 }
