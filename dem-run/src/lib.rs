@@ -1,3 +1,14 @@
 //! Scenes, sample preparation, the run loop and the history.
 
+pub mod build;
+pub mod check;
+pub mod cli;
+pub mod collapse;
 pub mod history;
+pub mod prepare;
+pub mod progress;
+pub mod record;
+pub mod run;
+pub mod scene;
+pub mod signals;
+pub mod summary;

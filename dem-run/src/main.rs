@@ -1,2 +1,5 @@
-//! The `dem-run` command.
-fn main() {}
+//! The `dem-run` command: see [`dem_run::cli`].
+
+fn main() -> std::process::ExitCode {
+    dem_run::cli::main()
+}

@@ -1,0 +1,236 @@
+//! Bodies: rigid disks or spheres, and rigid walls.
+
+use crate::dim::{Dim, Vect};
+use std::sync::Arc;
+
+/// A prescribed function of time (s).
+pub type Schedule = Arc<dyn Fn(f64) -> f64 + Send + Sync>;
+
+/// Rigid disks (2D) or spheres (3D), one entry per grain in every list.
+#[derive(Clone, Debug)]
+pub struct Grains<D: Dim> {
+    /// Centres (m).
+    pub position: Vec<D::Vector>,
+    /// Velocities of the centres (m/s).
+    pub velocity: Vec<D::Vector>,
+    /// Angular velocities (rad/s).
+    pub spin: Vec<D::Spin>,
+    /// Angle (2D, rad) or unit quaternion w, x, y, z (3D).
+    pub orientation: Vec<D::Orientation>,
+    /// Radii (m).
+    pub radius: Vec<f64>,
+    /// Masses (kg).
+    pub mass: Vec<f64>,
+    /// Moments of inertia about the centre (kg m²).
+    pub inertia: Vec<f64>,
+    /// Whether the grain is held fixed.
+    pub fixed: Vec<bool>,
+}
+
+/// One grain, as it is added to [`Grains`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grain<D: Dim> {
+    /// Centre (m).
+    pub position: D::Vector,
+    /// Velocity of the centre (m/s).
+    pub velocity: D::Vector,
+    /// Angular velocity (rad/s).
+    pub spin: D::Spin,
+    /// Radius (m).
+    pub radius: f64,
+    /// Mass (kg).
+    pub mass: f64,
+    /// Moment of inertia about the centre (kg m²).
+    pub inertia: f64,
+    /// Whether the grain is held fixed.
+    pub fixed: bool,
+}
+
+impl<D: Dim> Grain<D> {
+    /// A homogeneous grain at rest; `surface_density` is the density (kg/m³) times the thickness (m) in 2D, the density in 3D.
+    pub fn at_rest(position: D::Vector, radius: f64, surface_density: f64) -> Self {
+        let mass = surface_density * D::volume(radius);
+        Self {
+            position,
+            velocity: D::Vector::zero(),
+            spin: D::Spin::zero(),
+            radius,
+            mass,
+            inertia: D::INERTIA_FACTOR * mass * radius * radius,
+            fixed: false,
+        }
+    }
+}
+
+impl<D: Dim> FromIterator<Grain<D>> for Grains<D> {
+    fn from_iter<I: IntoIterator<Item = Grain<D>>>(list: I) -> Self {
+        let mut grains = Self {
+            position: Vec::new(),
+            velocity: Vec::new(),
+            spin: Vec::new(),
+            orientation: Vec::new(),
+            radius: Vec::new(),
+            mass: Vec::new(),
+            inertia: Vec::new(),
+            fixed: Vec::new(),
+        };
+        list.into_iter().for_each(|grain| grains.push(grain));
+        grains
+    }
+}
+
+impl<D: Dim> Grains<D> {
+    /// Number of grains.
+    pub fn len(&self) -> usize {
+        self.position.len()
+    }
+
+    /// Whether there is no grain.
+    pub fn is_empty(&self) -> bool {
+        self.position.is_empty()
+    }
+
+    /// Add a grain.
+    pub fn push(&mut self, grain: Grain<D>) {
+        self.position.push(grain.position);
+        self.velocity.push(grain.velocity);
+        self.spin.push(grain.spin);
+        self.orientation.push(D::unturned());
+        self.radius.push(grain.radius);
+        self.mass.push(grain.mass);
+        self.inertia.push(grain.inertia);
+        self.fixed.push(grain.fixed);
+    }
+
+    /// Inverse mass (1/kg) and inverse inertia (1/(kg m²)) of grain `k`, zero for a fixed one.
+    pub fn inverse(&self, k: usize) -> (f64, f64) {
+        if self.fixed[k] { (0.0, 0.0) } else { (1.0 / self.mass[k], 1.0 / self.inertia[k]) }
+    }
+
+    /// Lowest and highest corner of the box around all grains (m).
+    pub fn bounds(&self) -> (D::Vector, D::Vector) {
+        let mut low = D::Vector::zero();
+        let mut high = D::Vector::zero();
+        for axis in 0..D::N {
+            low[axis] = f64::INFINITY;
+            high[axis] = f64::NEG_INFINITY;
+            for (x, r) in self.position.iter().zip(&self.radius) {
+                low[axis] = low[axis].min(x[axis] - r);
+                high[axis] = high[axis].max(x[axis] + r);
+            }
+        }
+        (low, high)
+    }
+}
+
+/// The surface of a wall; its place is the wall's position.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shape<D: Dim> {
+    /// A plane through the position; the grains are on the side of the unit normal.
+    Plane {
+        /// Unit normal, from the wall to the grains.
+        normal: D::Vector,
+    },
+    /// A circle (2D), a sphere (3D), or a cylinder (3D with an axis) around the position.
+    Round {
+        /// Radius (m).
+        radius: f64,
+        /// Whether the grains are inside.
+        inside: bool,
+        /// Unit axis of a cylinder.
+        axis: Option<D::Vector>,
+    },
+}
+
+impl<D: Dim> Shape<D> {
+    /// Gap (m, negative for an overlap) and unit normal towards the grain, for a grain at `offset` from the wall's position.
+    pub fn gap(&self, offset: D::Vector, radius: f64) -> (f64, D::Vector) {
+        match *self {
+            Self::Plane { normal } => (offset.dot(&normal) - radius, normal),
+            Self::Round { radius: wall, inside, axis } => {
+                let offset = axis.map_or(offset, |a| offset - a * a.dot(&offset));
+                let distance = offset.norm();
+                // a grain in the very centre touches everywhere at once: any normal serves
+                let outward = if distance > 0.0 { offset * (1.0 / distance) } else { first_axis::<D>() };
+                if inside { (wall - distance - radius, -outward) } else { (distance - wall - radius, outward) }
+            }
+        }
+    }
+}
+
+fn first_axis<D: Dim>() -> D::Vector {
+    let mut e = D::Vector::zero();
+    e[0] = 1.0;
+    e
+}
+
+/// What moves a wall.
+#[derive(Clone)]
+pub enum Drive<D: Dim> {
+    /// Nothing: it does not yield.
+    Fixed,
+    /// A prescribed speed (m/s) along a unit direction.
+    Velocity {
+        /// Unit direction.
+        direction: D::Vector,
+        /// Speed (m/s) over time (s).
+        speed: Schedule,
+    },
+    /// A prescribed force (N) along a unit direction; the wall has a mass and this one degree of freedom.
+    Force {
+        /// Unit direction.
+        direction: D::Vector,
+        /// Mass of the wall (kg).
+        mass: f64,
+        /// Force (N) over time (s).
+        force: Schedule,
+    },
+}
+
+/// A rigid wall.
+#[derive(Clone)]
+pub struct Wall<D: Dim> {
+    /// Surface.
+    pub shape: Shape<D>,
+    /// A point of the plane, or the centre (m).
+    pub position: D::Vector,
+    /// Velocity (m/s).
+    pub velocity: D::Vector,
+    /// What moves it.
+    pub drive: Drive<D>,
+    /// Friction coefficient with grains (–).
+    pub friction: f64,
+    /// Force of the grains on the wall at the last step (N).
+    pub reaction: D::Vector,
+    /// Force prescribed at the last step (N); zero for a wall that is not driven by a force.
+    pub applied: f64,
+}
+
+impl<D: Dim> Wall<D> {
+    /// A fixed wall.
+    pub fn fixed(shape: Shape<D>, position: D::Vector, friction: f64) -> Self {
+        let zero = D::Vector::zero();
+        Self { shape, position, velocity: zero, drive: Drive::Fixed, friction, reaction: zero, applied: 0.0 }
+    }
+
+    /// Direction and mass (kg) of the degree of freedom of a force-driven wall.
+    pub fn free_direction(&self) -> Option<(D::Vector, f64)> {
+        match self.drive {
+            Drive::Force { direction, mass, .. } => Some((direction, mass)),
+            _ => None,
+        }
+    }
+}
+
+/// A prescribed force and torque on one grain, both scaled by one function of time.
+#[derive(Clone)]
+pub struct Load<D: Dim> {
+    /// Index of the grain.
+    pub grain: usize,
+    /// Force (N).
+    pub force: D::Vector,
+    /// Torque (N m).
+    pub torque: D::Spin,
+    /// Factor (–) over time (s).
+    pub factor: Schedule,
+}

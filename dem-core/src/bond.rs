@@ -1,0 +1,79 @@
+//! Cohesive bonds: how they form, what they carry and when they break for good (PHYSICS §1, paper (4) and (5)).
+
+use crate::contact::{Cone, Local};
+use crate::dim::Vect;
+
+/// Relative distance to the limit at which a bond counts as being at it (–).
+pub const LIMIT: f64 = 1e-7;
+
+/// Whether a bond holds, and if not, how it failed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum BondStatus {
+    /// It holds.
+    Intact,
+    /// Broken: the shifted normal reaction vanished.
+    Tension,
+    /// Broken: the tangential reaction reached μ (r_n + r_coh).
+    Shear,
+    /// Broken: the moment reached μ a (r_n + r_coh).
+    Rolling,
+}
+
+/// A bond between two grains; it formed once and never re-forms.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bond {
+    /// The two grains, the lower index first.
+    pub pair: [u32; 2],
+    /// Gap at which it formed (m).
+    pub rest_gap: f64,
+    /// Mean diameter of the pair, a_moy (m).
+    pub mean_diameter: f64,
+    /// Tensile strength r_coh (N).
+    pub strength: f64,
+    /// Friction coefficient μ of its limits (–).
+    pub friction: f64,
+    /// Whether it holds.
+    pub status: BondStatus,
+}
+
+impl Bond {
+    /// The cone of its shifted reaction. Moments are divided by the mean diameter, so both coefficients are μ.
+    pub fn cone(&self) -> Cone {
+        Cone { mu: self.friction, nu: self.friction }
+    }
+}
+
+/// What happens to bonds at their limit after an accepted solve.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Rupture {
+    /// All break, and the same step is solved again, until none is at its limit.
+    #[default]
+    Cascade,
+    /// The one that flows fastest breaks, and the same step is solved again, until none is at its limit.
+    CascadeWorst,
+    /// All break at the end of the step.
+    EndOfStep,
+}
+
+/// The mode in which a bond fails under the reaction `r`, for a shift s = r_coh in the unit of `r`; none if it holds.
+///
+/// TENSION if r_n + s ≤ ε s; else SHEAR or ROLLING, whichever of ‖t‖ and ‖m‖ is nearer its limit (a tie is SHEAR), once it
+/// reaches (1 − ε) μ (r_n + s). Compression never breaks a bond, and one without friction fails in tension only.
+pub fn failure<T: Vect, B: Vect>(r: &Local<T, B>, shift: f64, cone: Cone) -> Option<BondStatus> {
+    let limit = r.n + shift;
+    if limit <= LIMIT * shift {
+        return Some(BondStatus::Tension);
+    }
+    if cone.mu == 0.0 {
+        return None;
+    }
+    let shear = r.t.norm() / cone.mu;
+    let rolling = r.m.norm() / cone.nu;
+    if shear.max(rolling) < (1.0 - LIMIT) * limit {
+        None
+    } else if rolling > shear {
+        Some(BondStatus::Rolling)
+    } else {
+        Some(BondStatus::Shear)
+    }
+}

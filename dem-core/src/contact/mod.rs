@@ -1,0 +1,7 @@
+//! Contacts: the cone, the laws on it, and the kinematics that ties a contact to its two nodes.
+
+pub mod cone;
+pub mod law;
+
+pub use cone::{Cone, Local, Weights};
+pub use law::{Block, BondFlow, Bonded, Coulomb, Frictionless, Law, LocalSolve};

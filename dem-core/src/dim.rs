@@ -1,0 +1,292 @@
+//! Two and three dimensions from one source.
+//!
+//! Everything above this file is written for a [`Dim`]; [`D2`] and [`D3`] say what a vector, a spin, a contact
+//! frame and an orientation are. Nothing else in the crate names a dimension.
+//!
+//! Symbols: n normal from body j to body i; t tangent(s), in 2D t = (−n_y, n_x), in 3D n = t₁ × t₂;
+//! ω spin, counter-clockwise in 2D.
+
+use nalgebra::SVector;
+use std::fmt::Debug;
+use std::ops::{Add, AddAssign, Index, IndexMut, Mul, Neg, Sub, SubAssign};
+
+/// A small vector of f64 with a fixed number of components, possibly none.
+pub trait Vect:
+    Copy
+    + Debug
+    + PartialEq
+    + Send
+    + Sync
+    + 'static
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Neg<Output = Self>
+    + Mul<f64, Output = Self>
+    + AddAssign
+    + SubAssign
+    + Index<usize, Output = f64>
+    + IndexMut<usize>
+{
+    /// Number of components.
+    const LEN: usize;
+    /// All components zero.
+    fn zero() -> Self;
+    /// Scalar product.
+    fn dot(&self, other: &Self) -> f64;
+    /// The components in order.
+    fn as_slice(&self) -> &[f64];
+    /// A vector from its components; the slice must hold exactly [`Vect::LEN`] of them.
+    fn from_slice(components: &[f64]) -> Self;
+
+    /// Euclidean norm.
+    #[inline(always)]
+    fn norm(&self) -> f64 {
+        // one component needs no square root, and keeps its bits
+        match Self::LEN {
+            0 => 0.0,
+            1 => self[0].abs(),
+            _ => self.dot(self).sqrt(),
+        }
+    }
+
+    /// The nearest vector of norm at most `limit` (projection on a ball; `limit` ≥ 0).
+    #[inline(always)]
+    fn clipped(self, limit: f64) -> Self {
+        let norm = self.norm();
+        if norm <= limit { self } else { self * (limit / norm) }
+    }
+}
+
+impl<const N: usize> Vect for SVector<f64, N> {
+    const LEN: usize = N;
+    #[inline(always)]
+    fn zero() -> Self {
+        Self::zeros()
+    }
+    #[inline(always)]
+    fn dot(&self, other: &Self) -> f64 {
+        let mut sum = 0.0;
+        for k in 0..N {
+            sum += self[k] * other[k];
+        }
+        sum
+    }
+    fn as_slice(&self) -> &[f64] {
+        self.data.as_slice()
+    }
+    fn from_slice(components: &[f64]) -> Self {
+        Self::from_column_slice(components)
+    }
+}
+
+/// The rows that a contact lacks: no storage, no instruction.
+pub type V0 = SVector<f64, 0>;
+
+/// The rows of `rows` that a group of type `B` has: all, or none; missing ones are zero.
+#[inline(always)]
+pub fn resized<A: Vect, B: Vect>(rows: A) -> B {
+    let mut out = B::zero();
+    for k in 0..A::LEN.min(B::LEN) {
+        out[k] = rows[k];
+    }
+    out
+}
+
+/// A dimension of space, as the contact problem sees it.
+pub trait Dim: Copy + Debug + Default + Send + Sync + 'static {
+    /// Number of space dimensions.
+    const N: usize;
+    /// Position, velocity, force.
+    type Vector: Vect;
+    /// Angular velocity, torque: one component in 2D, three in 3D.
+    type Spin: Vect;
+    /// Tangential rows of a contact, and as many bending rows of a bond.
+    type Tangent: Vect;
+    /// Orthonormal frame (n, t…) of a contact.
+    type Frame: Copy + Debug + PartialEq + Send + Sync + 'static;
+    /// Orientation of a body: an angle (rad) in 2D, a unit quaternion w, x, y, z in 3D.
+    type Orientation: Vect;
+
+    /// The frame of a unit normal.
+    fn frame(normal: Self::Vector) -> Self::Frame;
+    /// The frame of a unit normal that turned least from `old`; it keeps tangential reactions meaningful between steps.
+    fn transported(old: &Self::Frame, normal: Self::Vector) -> Self::Frame;
+    /// The normal of a frame.
+    fn normal(frame: &Self::Frame) -> Self::Vector;
+    /// First tangent of a frame.
+    fn tangent(frame: &Self::Frame) -> Self::Vector;
+    /// Normal and tangential components of a vector.
+    fn split(frame: &Self::Frame, vector: Self::Vector) -> (f64, Self::Tangent);
+    /// The vector with the given normal and tangential components; transpose of [`Dim::split`].
+    fn compose(frame: &Self::Frame, normal: f64, tangential: Self::Tangent) -> Self::Vector;
+    /// Tangential components of ω × n. In 2D this is ω itself.
+    fn spin_rows(frame: &Self::Frame, spin: Self::Spin) -> Self::Tangent;
+    /// Transpose of [`Dim::spin_rows`]: the torque that does the work of tangential rows.
+    fn spin_rows_transposed(frame: &Self::Frame, rows: Self::Tangent) -> Self::Spin;
+    /// Components of a torque about the tangents of a frame; in 2D the torque itself.
+    fn about_tangents(frame: &Self::Frame, torque: Self::Spin) -> Self::Tangent;
+    /// The torque x × f of a force with lever x.
+    fn torque(lever: Self::Vector, force: Self::Vector) -> Self::Spin;
+    /// The orientation of a body that has not turned.
+    fn unturned() -> Self::Orientation;
+    /// The orientation after turning by the rotation vector `turn` (rad).
+    fn turned(orientation: Self::Orientation, turn: Self::Spin) -> Self::Orientation;
+    /// Area (2D) or volume (3D) of a disk or sphere, m² or m³.
+    fn volume(radius: f64) -> f64;
+    /// Moment of inertia over m R²: 1/2 for a disk, 2/5 for a sphere.
+    const INERTIA_FACTOR: f64;
+}
+
+/// The plane: disks, one spin.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct D2;
+
+/// Space: spheres, three spins.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct D3;
+
+/// Frame of a contact in space: n = t₁ × t₂.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Frame3 {
+    n: SVector<f64, 3>,
+    t: [SVector<f64, 3>; 2],
+}
+
+impl Dim for D2 {
+    const N: usize = 2;
+    const INERTIA_FACTOR: f64 = 0.5;
+    type Vector = SVector<f64, 2>;
+    type Spin = SVector<f64, 1>;
+    type Tangent = SVector<f64, 1>;
+    type Frame = SVector<f64, 2>;
+    type Orientation = SVector<f64, 1>;
+
+    #[inline(always)]
+    fn frame(normal: Self::Vector) -> Self::Frame {
+        normal
+    }
+    #[inline(always)]
+    fn transported(_: &Self::Frame, normal: Self::Vector) -> Self::Frame {
+        normal
+    }
+    #[inline(always)]
+    fn normal(frame: &Self::Frame) -> Self::Vector {
+        *frame
+    }
+    #[inline(always)]
+    fn tangent(n: &Self::Frame) -> Self::Vector {
+        [-n[1], n[0]].into()
+    }
+    #[inline(always)]
+    fn split(n: &Self::Frame, v: Self::Vector) -> (f64, Self::Tangent) {
+        (n[0] * v[0] + n[1] * v[1], [n[0] * v[1] - n[1] * v[0]].into())
+    }
+    #[inline(always)]
+    fn compose(n: &Self::Frame, normal: f64, t: Self::Tangent) -> Self::Vector {
+        [normal * n[0] - t[0] * n[1], normal * n[1] + t[0] * n[0]].into()
+    }
+    #[inline(always)]
+    fn spin_rows(_: &Self::Frame, spin: Self::Spin) -> Self::Tangent {
+        spin
+    }
+    #[inline(always)]
+    fn spin_rows_transposed(_: &Self::Frame, rows: Self::Tangent) -> Self::Spin {
+        rows
+    }
+    fn about_tangents(_: &Self::Frame, torque: Self::Spin) -> Self::Tangent {
+        torque
+    }
+    fn torque(x: Self::Vector, f: Self::Vector) -> Self::Spin {
+        [x[0] * f[1] - x[1] * f[0]].into()
+    }
+    fn unturned() -> Self::Orientation {
+        [0.0].into()
+    }
+    #[inline]
+    fn turned(orientation: Self::Orientation, turn: Self::Spin) -> Self::Orientation {
+        orientation + turn
+    }
+    fn volume(radius: f64) -> f64 {
+        std::f64::consts::PI * radius * radius
+    }
+}
+
+impl Dim for D3 {
+    const N: usize = 3;
+    const INERTIA_FACTOR: f64 = 0.4;
+    type Vector = SVector<f64, 3>;
+    type Spin = SVector<f64, 3>;
+    type Tangent = SVector<f64, 2>;
+    type Frame = Frame3;
+    type Orientation = SVector<f64, 4>;
+
+    /// Branch-light orthonormal basis: Duff et al., *Building an orthonormal basis, revisited*, JCGT 6(1), 2017.
+    fn frame(n: Self::Vector) -> Self::Frame {
+        let sign = 1.0f64.copysign(n[2]);
+        let a = -1.0 / (sign + n[2]);
+        let b = n[0] * n[1] * a;
+        let t1: Self::Vector = [1.0 + sign * n[0] * n[0] * a, sign * b, -sign * n[0]].into();
+        let t2: Self::Vector = [b, sign + n[1] * n[1] * a, -n[1]].into();
+        Frame3 { n, t: [t1, t2] }
+    }
+    fn transported(old: &Self::Frame, n: Self::Vector) -> Self::Frame {
+        let flat = old.t[0] - n * n.dot(&old.t[0]);
+        let norm = flat.norm();
+        if norm < 0.5 {
+            return Self::frame(n);
+        }
+        let t1 = flat / norm;
+        Frame3 { n, t: [t1, n.cross(&t1)] }
+    }
+    #[inline(always)]
+    fn normal(frame: &Self::Frame) -> Self::Vector {
+        frame.n
+    }
+    #[inline(always)]
+    fn tangent(frame: &Self::Frame) -> Self::Vector {
+        frame.t[0]
+    }
+    #[inline(always)]
+    fn split(f: &Self::Frame, v: Self::Vector) -> (f64, Self::Tangent) {
+        (Vect::dot(&f.n, &v), [Vect::dot(&f.t[0], &v), Vect::dot(&f.t[1], &v)].into())
+    }
+    #[inline(always)]
+    fn compose(f: &Self::Frame, normal: f64, t: Self::Tangent) -> Self::Vector {
+        f.n * normal + f.t[0] * t[0] + f.t[1] * t[1]
+    }
+    // (ω × n)·t₁ = ω·(n × t₁) = ω·t₂ and (ω × n)·t₂ = ω·(n × t₂) = −ω·t₁
+    #[inline(always)]
+    fn spin_rows(f: &Self::Frame, spin: Self::Spin) -> Self::Tangent {
+        [Vect::dot(&spin, &f.t[1]), -Vect::dot(&spin, &f.t[0])].into()
+    }
+    #[inline(always)]
+    fn spin_rows_transposed(f: &Self::Frame, rows: Self::Tangent) -> Self::Spin {
+        f.t[1] * rows[0] - f.t[0] * rows[1]
+    }
+    fn about_tangents(f: &Self::Frame, torque: Self::Spin) -> Self::Tangent {
+        [Vect::dot(&f.t[0], &torque), Vect::dot(&f.t[1], &torque)].into()
+    }
+    fn torque(x: Self::Vector, f: Self::Vector) -> Self::Spin {
+        x.cross(&f)
+    }
+    fn unturned() -> Self::Orientation {
+        [1.0, 0.0, 0.0, 0.0].into()
+    }
+    fn turned(q: Self::Orientation, turn: Self::Spin) -> Self::Orientation {
+        let angle = turn.norm();
+        if angle == 0.0 {
+            return q;
+        }
+        let (s, c) = (0.5 * angle).sin_cos();
+        let p = turn * (s / angle);
+        // product (c, p) ⊗ q, then back to unit length
+        let v: Self::Vector = [q[1], q[2], q[3]].into();
+        let w = c * q[0] - Vect::dot(&p, &v);
+        let u = v * c + p * q[0] + p.cross(&v);
+        let next: Self::Orientation = [w, u[0], u[1], u[2]].into();
+        next / next.norm()
+    }
+    fn volume(radius: f64) -> f64 {
+        4.0 / 3.0 * std::f64::consts::PI * radius.powi(3)
+    }
+}

@@ -1,0 +1,104 @@
+//! Non-linear Gauss–Seidel: the method of successive equilibria (Moreau, Jean; paper §2.1).
+//!
+//! One sweep visits every contact in the order of its group and key, reads the relative velocity from the nodes,
+//! betters the contact's impulse by its law and gives the change to the nodes at once. No matrix is assembled.
+//! Information moves one neighbour a sweep, so long chains of bonds converge slowly: the residual says how far.
+
+use super::{ContactSolver, SolveReport, SolveStatus};
+use crate::contact::{Law, LocalSolve};
+use crate::dim::Dim;
+use crate::problem::residual::residual;
+use crate::problem::{ContactProblem, Group, Nodes};
+
+/// Settings of [`GaussSeidel`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GaussSeidelSettings {
+    /// How one contact is bettered.
+    pub local: LocalSolve,
+    /// Residual that the solver aims at (–).
+    pub tolerance: f64,
+    /// Largest residual that is accepted (–), at least `tolerance`.
+    pub accept: f64,
+    /// Most sweeps in one solve.
+    pub max_sweeps: u64,
+}
+
+/// Non-linear Gauss–Seidel on node velocities.
+#[derive(Clone, Copy, Debug)]
+pub struct GaussSeidel {
+    settings: GaussSeidelSettings,
+}
+
+impl GaussSeidel {
+    /// A solver with these settings.
+    pub fn new(settings: GaussSeidelSettings) -> Self {
+        Self { settings }
+    }
+
+    fn report(&self, iterations: u64, residual: f64) -> SolveReport {
+        let status = if residual <= self.settings.tolerance {
+            SolveStatus::Converged
+        } else if residual <= self.settings.accept {
+            SolveStatus::Accepted
+        } else {
+            SolveStatus::Failed
+        };
+        SolveReport { status, iterations, residual }
+    }
+}
+
+/// One visit of every contact of a group.
+#[inline]
+fn sweep_group<D: Dim, L: Law>(nodes: &mut Nodes<D>, group: &mut Group<D, L>, local: LocalSolve) {
+    for c in group {
+        let arm = c.law.arm();
+        let u = nodes.relative_velocity(&c.link, arm);
+        let r = c.law.improve(local, c.r, u);
+        nodes.apply(&c.link, arm, r - c.r);
+        c.r = r;
+    }
+}
+
+/// One sweep over all contacts: bonds, then dry contacts, then frictionless ones.
+pub fn sweep<D: Dim>(problem: &mut ContactProblem<D>, local: LocalSolve) {
+    // a constant for each call, so that the choice is made outside the loops
+    match local {
+        LocalSolve::Exact => {
+            sweep_group(&mut problem.nodes, &mut problem.bonded, LocalSolve::Exact);
+            sweep_group(&mut problem.nodes, &mut problem.dry, LocalSolve::Exact);
+            sweep_group(&mut problem.nodes, &mut problem.frictionless, LocalSolve::Exact);
+        }
+        LocalSolve::PredictorCorrector => {
+            sweep_group(&mut problem.nodes, &mut problem.bonded, LocalSolve::PredictorCorrector);
+            sweep_group(&mut problem.nodes, &mut problem.dry, LocalSolve::PredictorCorrector);
+            sweep_group(&mut problem.nodes, &mut problem.frictionless, LocalSolve::PredictorCorrector);
+        }
+    }
+}
+
+impl<D: Dim> ContactSolver<D> for GaussSeidel {
+    fn solve(&mut self, problem: &mut ContactProblem<D>) -> SolveReport {
+        problem.velocities_from_reactions();
+        let mut error = residual(problem);
+        let mut sweeps = 0;
+        while error > self.settings.tolerance && sweeps < self.settings.max_sweeps {
+            // the residual costs about a sweep: look at it ever more rarely, at most every 64 sweeps
+            let burst = (1 + sweeps / 4).min(64).min(self.settings.max_sweeps - sweeps);
+            for _ in 0..burst {
+                sweep(problem, self.settings.local);
+            }
+            sweeps += burst;
+            error = residual(problem);
+            if error <= self.settings.tolerance {
+                // what counts is the error of the impulses, without the rounding of the sweeps' increments
+                problem.velocities_from_reactions();
+                error = residual(problem);
+            }
+        }
+        if sweeps >= self.settings.max_sweeps {
+            problem.velocities_from_reactions();
+            error = residual(problem);
+        }
+        self.report(sweeps, error)
+    }
+}

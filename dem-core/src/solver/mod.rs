@@ -1,0 +1,52 @@
+//! Solvers of the contact problem, behind one trait and one enum of settings.
+
+mod gauss_seidel;
+
+pub use gauss_seidel::{GaussSeidel, GaussSeidelSettings, sweep};
+
+use crate::dim::Dim;
+use crate::problem::ContactProblem;
+
+/// How a solve ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SolveStatus {
+    /// The residual reached the tolerance.
+    Converged,
+    /// The tolerance was missed, the bound for acceptance was met.
+    Accepted,
+    /// Neither was met: the result must not be used.
+    Failed,
+}
+
+/// What a solve did.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SolveReport {
+    /// How it ended.
+    pub status: SolveStatus,
+    /// Iterations (sweeps of Gauss–Seidel).
+    pub iterations: u64,
+    /// Residual reached (–), see [`crate::problem::residual`].
+    pub residual: f64,
+}
+
+/// A method that solves a contact problem from the impulses it holds as a start.
+pub trait ContactSolver<D: Dim>: Send {
+    /// Better the impulses and node velocities of `problem` until the tolerance, or a limit, is reached.
+    fn solve(&mut self, problem: &mut ContactProblem<D>) -> SolveReport;
+}
+
+/// The choice of a solver and its settings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SolverSettings {
+    /// Non-linear Gauss–Seidel, the paper's method of successive equilibria.
+    GaussSeidel(GaussSeidelSettings),
+}
+
+impl SolverSettings {
+    /// The solver with these settings.
+    pub fn build<D: Dim>(&self) -> Box<dyn ContactSolver<D>> {
+        match *self {
+            Self::GaussSeidel(settings) => Box::new(GaussSeidel::new(settings)),
+        }
+    }
+}

@@ -1,0 +1,279 @@
+//! From bodies to the contact problem and back: detection with warm start, assembly, reading of the result.
+
+use super::World;
+use super::touch::{Touch, TouchStatus};
+use crate::bond::{Bond, BondStatus};
+use crate::contact::{Bonded, Coulomb, Frictionless, Law, Local};
+use crate::dim::{Dim, Vect, resized};
+use crate::problem::{Contact, ContactProblem, Group, Link, Node, Nodes};
+
+/// The configuration at mid-step, where contacts are looked for.
+pub(super) struct Midpoint<D: Dim> {
+    pub grains: Vec<D::Vector>,
+    pub walls: Vec<D::Vector>,
+}
+
+/// Node velocities before the step (m/s, rad/s) and their free values, grains first.
+pub(super) struct Motion<D: Dim> {
+    pub before: Vec<(D::Vector, D::Spin)>,
+    pub free: Vec<(D::Vector, D::Spin)>,
+}
+
+/// Place of each contact of the step in the groups of the problem.
+#[derive(Default)]
+pub(super) struct Places {
+    pub bonded: Vec<usize>,
+    pub dry: Vec<usize>,
+    pub frictionless: Vec<usize>,
+}
+
+impl<D: Dim> World<D> {
+    /// Whether a node yields to nothing.
+    fn immovable(&self, node: usize) -> bool {
+        match node.checked_sub(self.grains.len()) {
+            None => self.grains.fixed[node],
+            Some(wall) => self.walls[wall].free_direction().is_none(),
+        }
+    }
+
+    /// Gap, normal and contact point of a pair at mid-step; the point is mid-gap, the same for both bodies.
+    fn geometry(&self, mid: &Midpoint<D>, pair: [u32; 2]) -> (f64, D::Vector, D::Vector) {
+        let [i, j] = pair.map(|k| k as usize);
+        let (x, r) = (mid.grains[i], self.grains.radius[i]);
+        let (gap, normal) = match j.checked_sub(self.grains.len()) {
+            None => {
+                let apart = x - mid.grains[j];
+                let distance = apart.norm();
+                (distance - r - self.grains.radius[j], apart * (1.0 / distance))
+            }
+            Some(wall) => self.walls[wall].shape.gap(x - mid.walls[wall], r),
+        };
+        (gap, normal, x - normal * (r + 0.5 * gap))
+    }
+
+    /// A contact without reaction at the geometry of mid-step.
+    pub(super) fn new_touch(
+        &self,
+        mid: &Midpoint<D>,
+        motion: &Motion<D>,
+        pair: [u32; 2],
+        bond: Option<u32>,
+    ) -> Touch<D> {
+        let (gap, normal, point) = self.geometry(mid, pair);
+        let [i, j] = pair.map(|k| motion.before[k as usize].0);
+        Touch {
+            pair,
+            frame: D::frame(normal),
+            point,
+            gap,
+            bond,
+            reaction: Local::zero(),
+            status: if bond.is_some() { TouchStatus::Bonded } else { TouchStatus::Open },
+            approach: (i - j).dot(&normal),
+        }
+    }
+
+    /// All contacts of the step, sorted by pair, with the reactions of the last step as a start.
+    pub(super) fn detect(&mut self, mid: &Midpoint<D>, motion: &Motion<D>, h: f64) -> Vec<Touch<D>> {
+        self.refresh_candidates(mid, motion, h);
+        let mut touches: Vec<Touch<D>> = Vec::with_capacity(self.touches.len() + 16);
+        let intact = |b: &Bond| b.status == BondStatus::Intact;
+        for (k, bond) in self.bonds.iter().enumerate().filter(|(_, b)| intact(b)) {
+            touches.push(self.new_touch(mid, motion, bond.pair, Some(k as u32)));
+        }
+        let mut bonded = self.bonds.iter().filter(|b| intact(b)).map(|b| b.pair).peekable();
+        for &pair in &self.candidates.pairs {
+            while bonded.next_if(|p| *p < pair).is_some() {}
+            if bonded.peek() == Some(&pair) || pair.iter().all(|k| self.immovable(*k as usize)) {
+                continue;
+            }
+            let touch = self.new_touch(mid, motion, pair, None);
+            let approach = pair.map(|k| motion.free[k as usize].0);
+            let closing = -(approach[0] - approach[1]).dot(&D::normal(&touch.frame));
+            let near = 1e-3 * self.grains.radius[pair[0] as usize];
+            if touch.gap <= near + 2.0 * h * closing.max(0.0) {
+                touches.push(touch);
+            }
+        }
+        touches.sort_by_key(|t| t.pair);
+        self.recall_reactions(&mut touches);
+        touches
+    }
+
+    /// Carry the reactions of the last step over, in the frame that turned with the contact.
+    fn recall_reactions(&self, touches: &mut [Touch<D>]) {
+        let mut old = self.touches.iter().peekable();
+        for touch in touches {
+            while old.next_if(|o| o.pair < touch.pair).is_some() {}
+            if let Some(o) = old.peek().filter(|o| o.pair == touch.pair && o.bond == touch.bond) {
+                touch.frame = D::transported(&o.frame, D::normal(&touch.frame));
+                touch.reaction = o.reaction;
+            }
+        }
+    }
+
+    /// Make the list of candidates valid for this step.
+    fn refresh_candidates(&mut self, mid: &Midpoint<D>, motion: &Motion<D>, h: f64) {
+        let fastest = motion.free.iter().map(|(v, _)| v.dot(v)).fold(0.0, f64::max).sqrt();
+        let smallest = self.grains.radius.iter().copied().fold(f64::INFINITY, f64::min);
+        let largest = self.grains.radius.iter().copied().fold(0.0, f64::max);
+        let reach = 1e-3 * largest + 4.0 * h * fastest;
+        if !self.candidates.covers(&mid.grains, &mid.walls, reach) {
+            let skin = 1.5 * reach + 0.3 * smallest;
+            self.candidates.rebuild(&self.grains, &mid.grains, &self.walls, &mid.walls, skin);
+        }
+    }
+
+    /// Contacts that the step left out and that its velocities would close: they are added, and the step is solved again.
+    pub(super) fn missed(
+        &mut self,
+        mid: &Midpoint<D>,
+        motion: &Motion<D>,
+        touches: &[Touch<D>],
+        nodes: &Nodes<D>,
+        h: f64,
+    ) -> Vec<Touch<D>> {
+        let fastest = nodes.all.iter().map(|n| n.velocity.dot(&n.velocity)).fold(0.0, f64::max).sqrt();
+        if !self.candidates.covers(&mid.grains, &mid.walls, 2.0 * h * fastest) {
+            self.candidates.rebuild(&self.grains, &mid.grains, &self.walls, &mid.walls, 3.0 * h * fastest);
+        }
+        let mut present = touches.iter().peekable();
+        let mut missed = Vec::new();
+        for &pair in &self.candidates.pairs {
+            while present.next_if(|t| t.pair < pair).is_some() {}
+            if present.peek().is_some_and(|t| t.pair == pair) || pair.iter().all(|k| self.immovable(*k as usize)) {
+                continue;
+            }
+            let touch = self.new_touch(mid, motion, pair, None);
+            let [i, j] = pair.map(|k| nodes.all[k as usize].velocity);
+            if touch.gap + h * (i - j).dot(&D::normal(&touch.frame)) < 0.0 && self.restitution_of(pair) == 0.0 {
+                missed.push(touch);
+            }
+        }
+        missed
+    }
+
+    /// Restitution coefficient of a pair (–).
+    fn restitution_of(&self, pair: [u32; 2]) -> f64 {
+        match &self.settings.restitution {
+            None => 0.0,
+            Some(e) if (pair[1] as usize) < self.grains.len() => e.grain_grain,
+            Some(e) => e.grain_wall,
+        }
+    }
+
+    /// What is added to the normal velocity of a dry contact before Signorini's law (m/s); none if it cannot act in this step.
+    fn bias(&self, touch: &Touch<D>, h: f64) -> Option<f64> {
+        let e = self.restitution_of(touch.pair);
+        if e == 0.0 {
+            let gap = if self.settings.expel_overlaps { touch.gap } else { touch.gap.max(0.0) };
+            return Some(gap / h);
+        }
+        let slow = self.settings.restitution.is_some_and(|r| touch.approach.abs() < r.threshold_speed);
+        (touch.gap <= 0.0).then_some(if slow { 0.0 } else { e * touch.approach })
+    }
+
+    /// Friction coefficient of a dry contact (–).
+    fn friction_of(&self, pair: [u32; 2]) -> f64 {
+        match (pair[1] as usize).checked_sub(self.grains.len()) {
+            None => self.settings.friction,
+            Some(wall) => self.walls[wall].friction,
+        }
+    }
+
+    /// The nodes of the problem at their free velocities.
+    fn nodes(&self, motion: &Motion<D>) -> Nodes<D> {
+        let grains = self.grains.len();
+        let node = |k: usize| {
+            let (velocity, spin) = motion.free[k];
+            let (inverse_mass, inverse_inertia) = match k.checked_sub(grains) {
+                None => self.grains.inverse(k),
+                Some(wall) => (self.walls[wall].free_direction().map_or(0.0, |(_, mass)| 1.0 / mass), 0.0),
+            };
+            Node { velocity, spin, inverse_mass, inverse_inertia }
+        };
+        Nodes {
+            all: (0..grains + self.walls.len()).map(node).collect(),
+            grains,
+            drives: self.walls.iter().map(|w| w.free_direction().map_or(D::Vector::zero(), |(d, _)| d)).collect(),
+        }
+    }
+
+    /// The contact problem of these contacts, started from their reactions, and the place of each contact in it.
+    pub(super) fn assemble(
+        &self,
+        touches: &[Touch<D>],
+        motion: &Motion<D>,
+        applied: f64,
+        h: f64,
+    ) -> (ContactProblem<D>, Places) {
+        let mut problem = ContactProblem {
+            nodes: self.nodes(motion),
+            free: motion.free.clone(),
+            bonded: Vec::new(),
+            dry: Vec::new(),
+            frictionless: Vec::new(),
+            applied,
+        };
+        let mut places = Places::default();
+        for (place, touch) in touches.iter().enumerate() {
+            let link = self.link(touch);
+            let [i, j] = link.nodes.map(|k| &problem.nodes.all[k as usize]);
+            let drive =
+                (touch.pair[1] as usize).checked_sub(self.grains.len()).and_then(|w| self.walls[w].free_direction());
+            let start = touch.reaction * h;
+            if let Some(bond) = touch.bond.map(|b| &self.bonds[b as usize]) {
+                let arm = bond.mean_diameter;
+                let block = link.block(i, j, arm, None);
+                let law = Bonded::new(block, arm, h * bond.strength, bond.cone(), self.settings.bond_flow);
+                problem.bonded.push(Contact { link, law, r: Local { m: start.m * (1.0 / arm), ..start } });
+                places.bonded.push(place);
+            } else if let Some(bias) = self.bias(touch, h) {
+                let block = link.block(i, j, 0.0, drive.map(|(d, _)| d));
+                let mu = self.friction_of(touch.pair);
+                if mu > 0.0 {
+                    problem.dry.push(Contact { link, law: Coulomb::new(block, mu, bias), r: narrowed(start) });
+                    places.dry.push(place);
+                } else {
+                    problem.frictionless.push(Contact {
+                        link,
+                        law: Frictionless::new(block, bias),
+                        r: narrowed(start),
+                    });
+                    places.frictionless.push(place);
+                }
+            }
+        }
+        (problem, places)
+    }
+
+    fn link(&self, touch: &Touch<D>) -> Link<D> {
+        let radius = |k: u32| self.grains.radius.get(k as usize).map_or(0.0, |r| r + 0.5 * touch.gap);
+        Link { nodes: touch.pair, frame: touch.frame, lever: touch.pair.map(radius) }
+    }
+}
+
+/// The rows that a smaller group has.
+fn narrowed<D: Vect, T: Vect, B: Vect>(r: Local<D, D>) -> Local<T, B> {
+    Local { n: r.n, t: resized(r.t), m: resized(r.m) }
+}
+
+/// Write the impulses of a group back to the contacts as forces.
+pub(super) fn read_back<D: Dim, L: Law>(touches: &mut [Touch<D>], group: &Group<D, L>, places: &[usize], h: f64) {
+    for (contact, place) in group.iter().zip(places) {
+        let touch = &mut touches[*place];
+        let arm = contact.law.arm();
+        let r = contact.r;
+        let (t, m): (D::Tangent, D::Tangent) = (resized(r.t), resized(r.m));
+        touch.reaction = Local { n: r.n / h, t: t * (1.0 / h), m: m * (arm / h) };
+        touch.status = if touch.bond.is_some() {
+            TouchStatus::Bonded
+        } else if r.n == 0.0 {
+            TouchStatus::Open
+        } else if r.t.norm() >= (1.0 - 1e-9) * contact.law.cone().mu * r.n {
+            TouchStatus::Slip
+        } else {
+            TouchStatus::Stick
+        };
+    }
+}

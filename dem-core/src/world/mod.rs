@@ -1,0 +1,152 @@
+//! The world: grains, walls, bonds and time, and the step that carries them on.
+//!
+//! [`World::step`] reads as the scheme of Moreau and Jean (PHYSICS §1): half a step in position, detection, free
+//! velocity, contact problem with its rupture cascade, half a step.
+
+mod assembly;
+mod ledger;
+mod observe;
+mod step;
+mod touch;
+
+pub use ledger::{Ledger, Momentum};
+pub use step::{StepError, StepReport};
+pub use touch::{Break, Counts, Touch, TouchStatus};
+
+use crate::body::{Grains, Load, Wall};
+use crate::bond::{Bond, BondStatus, Rupture};
+use crate::contact::BondFlow;
+use crate::detection::{Candidates, pairs_within};
+use crate::dim::{Dim, Vect};
+use crate::solver::{ContactSolver, SolverSettings};
+
+/// Restitution of the dry contacts.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Restitution {
+    /// Coefficient between grains (–), 0 to 1.
+    pub grain_grain: f64,
+    /// Coefficient between a grain and a wall (–), 0 to 1.
+    pub grain_wall: f64,
+    /// Normal speed (m/s) below which the coefficient is taken as zero.
+    pub threshold_speed: f64,
+}
+
+/// What holds for the whole of a run.
+#[derive(Clone, Debug)]
+pub struct Settings<D: Dim> {
+    /// Time step h (s).
+    pub step: f64,
+    /// Acceleration of gravity (m/s²), if there is any.
+    pub gravity: Option<D::Vector>,
+    /// Friction coefficient between grains (–).
+    pub friction: f64,
+    /// Restitution, if there is any.
+    pub restitution: Option<Restitution>,
+    /// What a bond at its limit does within the solve.
+    pub bond_flow: BondFlow,
+    /// What happens to bonds at their limit.
+    pub rupture: Rupture,
+    /// Solver of the contact problem.
+    pub solver: SolverSettings,
+    /// How often a step whose solve was not accepted may be halved.
+    pub max_halvings: u32,
+    /// Thickness of the sample (m) in 2D, 1 in 3D: it turns areas into volumes.
+    pub thickness: f64,
+    /// Push overlaps apart within one step instead of only keeping them from growing. Energy is gained: for preparation, where
+    /// velocities are thrown away.
+    pub expel_overlaps: bool,
+}
+
+/// Grains, walls, bonds and time.
+pub struct World<D: Dim> {
+    /// The grains.
+    pub grains: Grains<D>,
+    /// The walls.
+    pub walls: Vec<Wall<D>>,
+    /// The bonds that ever formed, sorted by pair; broken ones stay in the list.
+    pub bonds: Vec<Bond>,
+    /// Prescribed forces and torques.
+    pub loads: Vec<Load<D>>,
+    /// Settings of the run.
+    pub settings: Settings<D>,
+    /// Time (s).
+    pub time: f64,
+    /// Number of accepted steps.
+    pub steps: u64,
+    /// Contacts of the last accepted step, sorted by pair, with their reactions.
+    pub touches: Vec<Touch<D>>,
+    /// Energy since the start.
+    pub ledger: Ledger,
+    candidates: Candidates<D>,
+    solver: Box<dyn ContactSolver<D>>,
+    reference: Vec<D::Vector>,
+    volume: f64,
+}
+
+impl<D: Dim> World<D> {
+    /// A world at time zero, without bonds.
+    pub fn new(grains: Grains<D>, walls: Vec<Wall<D>>, loads: Vec<Load<D>>, settings: Settings<D>) -> Self {
+        let (low, high) = grains.bounds();
+        let volume = (0..D::N).map(|axis| high[axis] - low[axis]).product::<f64>() * settings.thickness;
+        let mut world = Self {
+            reference: grains.position.clone(),
+            volume,
+            solver: settings.solver.build(),
+            candidates: Candidates::default(),
+            touches: Vec::new(),
+            bonds: Vec::new(),
+            ledger: Ledger::default(),
+            time: 0.0,
+            steps: 0,
+            grains,
+            walls,
+            loads,
+            settings,
+        };
+        world.ledger.kinetic = world.kinetic_energy();
+        world
+    }
+
+    /// Bond every pair of grains whose gap is at most `gap_tolerance` (–) times its mean diameter, with friction `friction`;
+    /// `strength` gives the tensile strength (N) for a mean diameter (m), and zero means no bond.
+    ///
+    /// Pairs of two fixed grains are left out: nothing can strain their bond.
+    pub fn form_bonds(&mut self, gap_tolerance: f64, strength: impl Fn(f64) -> f64, friction: f64) {
+        let diameter = 2.0 * self.grains.radius.iter().copied().fold(0.0, f64::max);
+        let pairs = pairs_within(&self.grains, &self.grains.position, gap_tolerance * diameter);
+        for pair in pairs {
+            let [i, j] = pair.map(|k| k as usize);
+            let mean_diameter = self.grains.radius[i] + self.grains.radius[j];
+            let rest_gap = (self.grains.position[i] - self.grains.position[j]).norm() - mean_diameter;
+            let strength = strength(mean_diameter);
+            let held = self.grains.fixed[i] && self.grains.fixed[j];
+            if rest_gap <= gap_tolerance * mean_diameter && strength > 0.0 && !held {
+                self.bonds.push(Bond { pair, rest_gap, mean_diameter, strength, friction, status: BondStatus::Intact });
+            }
+        }
+    }
+
+    /// Take another solver from the next step on.
+    pub fn set_solver(&mut self, solver: SolverSettings) {
+        self.settings.solver = solver;
+        self.solver = solver.build();
+    }
+
+    /// Number of bonds that hold.
+    pub fn intact_bonds(&self) -> usize {
+        self.bonds.iter().filter(|b| b.status == BondStatus::Intact).count()
+    }
+
+    /// Volume of the box around the sample at time zero (m³), the reference of the stress.
+    pub fn reference_volume(&self) -> f64 {
+        self.volume
+    }
+
+    /// Bring every grain and wall to rest and forget nothing else: a quasi-static preparation steps from rest to rest.
+    pub fn stop_motion(&mut self) {
+        self.grains.velocity.iter_mut().for_each(|v| *v = D::Vector::zero());
+        self.grains.spin.iter_mut().for_each(|w| *w = D::Spin::zero());
+        self.walls.iter_mut().for_each(|w| w.velocity = D::Vector::zero());
+        self.ledger.kinetic = 0.0;
+    }
+}

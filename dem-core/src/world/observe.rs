@@ -1,0 +1,87 @@
+//! What is measured on a world: kinetic energy, momentum, mean stress and strain.
+
+use super::{Momentum, Touch, World};
+use crate::dim::{Dim, Vect};
+
+impl<D: Dim> World<D> {
+    /// Kinetic energy of grains and force-driven walls (J).
+    pub fn kinetic_energy(&self) -> f64 {
+        let g = &self.grains;
+        let mut sum = 0.0;
+        for k in (0..g.len()).filter(|k| !g.fixed[*k]) {
+            sum += g.mass[k] * g.velocity[k].dot(&g.velocity[k]) + g.inertia[k] * g.spin[k].dot(&g.spin[k]);
+        }
+        for wall in &self.walls {
+            if let Some((_, mass)) = wall.free_direction() {
+                sum += mass * wall.velocity.dot(&wall.velocity);
+            }
+        }
+        0.5 * sum
+    }
+
+    /// Linear and angular momentum of the grains.
+    pub fn momentum(&self) -> Momentum<D> {
+        let g = &self.grains;
+        let mut sum = Momentum { linear: D::Vector::zero(), angular: D::Spin::zero() };
+        for k in (0..g.len()).filter(|k| !g.fixed[*k]) {
+            let linear = g.velocity[k] * g.mass[k];
+            sum.linear += linear;
+            sum.angular += D::torque(g.position[k], linear) + g.spin[k] * g.inertia[k];
+        }
+        sum
+    }
+
+    /// Mean stress σ = (1/V) Σ ℓ ⊗ f over the contacts of the last step (Pa, D × D row by row; compression positive), after
+    /// Love and Weber. ℓ joins the centres, or at a wall the contact point to the centre; V is the box around the sample at time zero.
+    pub fn stress(&self) -> Vec<f64> {
+        let mut sum = vec![0.0; D::N * D::N];
+        for touch in &self.touches {
+            let force = D::compose(&touch.frame, touch.reaction.n, touch.reaction.t);
+            let branch = self.branch(touch);
+            for row in 0..D::N {
+                for col in 0..D::N {
+                    sum[row * D::N + col] += branch[row] * force[col];
+                }
+            }
+        }
+        sum.iter_mut().for_each(|s| *s /= self.volume);
+        sum
+    }
+
+    fn branch(&self, touch: &Touch<D>) -> D::Vector {
+        let [i, j] = touch.pair.map(|k| k as usize);
+        let radius = self.grains.radius[i] + self.grains.radius.get(j).map_or(-0.5 * touch.gap, |r| *r);
+        D::normal(&touch.frame) * (radius + touch.gap)
+    }
+
+    /// Strain of the sample: the displacement gradient E of the affine fit u ≈ a + E x to the displacements of all grains since
+    /// time zero (–, D × D row by row; elongation positive). Zero if the grains do not span all directions.
+    pub fn strain(&self) -> Vec<f64> {
+        let n = self.grains.len() as f64;
+        let mean =
+            |points: &mut dyn Iterator<Item = D::Vector>| points.fold(D::Vector::zero(), |a, b| a + b) * (1.0 / n);
+        let centre = mean(&mut self.reference.iter().copied());
+        let moved = |k: usize| self.grains.position[k] - self.reference[k];
+        let drift = mean(&mut (0..self.grains.len()).map(moved));
+        // normal equations E S = U, S = Σ x xᵀ, U = Σ u xᵀ
+        let mut s = nalgebra::DMatrix::<f64>::zeros(D::N, D::N);
+        let mut u = nalgebra::DMatrix::<f64>::zeros(D::N, D::N);
+        for k in 0..self.grains.len() {
+            let (x, d) = (self.reference[k] - centre, moved(k) - drift);
+            for row in 0..D::N {
+                for col in 0..D::N {
+                    s[(row, col)] += x[row] * x[col];
+                    u[(row, col)] += d[row] * x[col];
+                }
+            }
+        }
+        let spread = s.trace();
+        match s.cholesky() {
+            Some(factor) if factor.l().diagonal().iter().all(|d| d * d > 1e-12 * spread) => {
+                // S is symmetric: E = (S⁻¹ Uᵀ)ᵀ, whose column-major storage of the transpose is E row by row
+                factor.solve(&u.transpose()).as_slice().to_vec()
+            }
+            _ => vec![0.0; D::N * D::N],
+        }
+    }
+}

@@ -1,0 +1,443 @@
+//! One time step: the scheme of Moreau and Jean with θ = 1/2, its rupture cascade, and what is done when a solve fails.
+
+use super::assembly::{Midpoint, Motion, Places, read_back};
+use super::ledger::group_losses;
+use super::touch::{Break, Touch, TouchStatus};
+use super::{Counts, World};
+use crate::body::Drive;
+use crate::bond::{BondStatus, Rupture, failure};
+use crate::contact::{Law, Local};
+use crate::dim::{Dim, Vect};
+use crate::problem::{ContactProblem, Node, Nodes};
+use crate::solver::{SolveReport, SolveStatus};
+use thiserror::Error;
+
+/// What one step did.
+#[derive(Clone, Debug)]
+pub struct StepReport<D: Dim> {
+    /// Time at its end (s).
+    pub time: f64,
+    /// How the worst of its solves ended; never `Failed`.
+    pub status: SolveStatus,
+    /// Iterations of all its solves.
+    pub iterations: u64,
+    /// Largest residual of its accepted solves (–).
+    pub residual: f64,
+    /// ‖M (v⁺ − v⁻)/h‖ / ‖F_ext‖ over the grains that are free to move (–): in a static scene a false acceleration force over the load. Zero
+    /// without load.
+    pub load_error: f64,
+    /// Contacts by what they did.
+    pub counts: Counts,
+    /// Bonds that broke, in the order of the cascade's rounds.
+    pub breaks: Vec<Break<D>>,
+    /// Deepest overlap of a dry contact at mid-step (m).
+    pub penetration: f64,
+    /// Number of solves that were not accepted and made the step shorter.
+    pub rejected: u32,
+}
+
+/// Why a step could not be made. The world stands as it did after the last accepted step.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+pub enum StepError {
+    /// No solve was accepted, down to the shortest step that the settings allow.
+    #[error(
+        "no convergence at t = {time:.6e} s: residual {residual:.2e} after {iterations} iterations, with the step cut to {step:.2e} s"
+    )]
+    NotAccepted {
+        /// Time of the last accepted state (s).
+        time: f64,
+        /// The shortest step tried (s).
+        step: f64,
+        /// Residual of its solve (–).
+        residual: f64,
+        /// Iterations of its solve.
+        iterations: u64,
+    },
+    /// A velocity or a reaction is not a finite number.
+    #[error(
+        "a velocity is not a finite number at t = {time:.6e} s: look for grains squeezed between bodies that cannot yield"
+    )]
+    NotFinite {
+        /// Time of the last accepted state (s).
+        time: f64,
+    },
+}
+
+impl<D: Dim> World<D> {
+    /// Carry the world on by one time step.
+    pub fn step(&mut self) -> Result<StepReport<D>, StepError> {
+        let mut report = self.advance(self.settings.step, 0)?;
+        self.steps += 1;
+        // a product, not a sum: the clock does not drift
+        self.time = self.steps as f64 * self.settings.step;
+        report.time = self.time;
+        Ok(report)
+    }
+
+    /// One step of length `h`, or two of half that length if its solve is not accepted.
+    fn advance(&mut self, h: f64, halvings: u32) -> Result<StepReport<D>, StepError> {
+        match self.attempt(h) {
+            Err(StepError::NotAccepted { .. }) if halvings < self.settings.max_halvings => {
+                let first = self.advance(0.5 * h, halvings + 1)?;
+                let second = self.advance(0.5 * h, halvings + 1)?;
+                Ok(first.followed_by(second))
+            }
+            outcome => outcome,
+        }
+    }
+
+    /// One step of length `h`. An error leaves the world as it was.
+    fn attempt(&mut self, h: f64) -> Result<StepReport<D>, StepError> {
+        let mid = self.midpoint(h);
+        let motion = self.free_motion(h);
+        let applied = self.applied_impulse(h);
+        let mut touches = self.detect(&mid, &motion, h);
+        let mut done = Solves::default();
+        let mut breaks: Vec<Break<D>> = Vec::new();
+        let problem = loop {
+            let (mut problem, places) = self.assemble(&touches, &motion, applied, h);
+            let solve = self.solver.solve(&mut problem);
+            done.add(solve);
+            self.refuse_unaccepted(solve, &problem, h)?;
+            write_reactions(&mut touches, &problem, &places, h);
+            let missed = self.missed(&mid, &motion, &touches, &problem.nodes, h);
+            if !missed.is_empty() {
+                touches.extend(missed);
+                touches.sort_by_key(|t| t.pair);
+                continue;
+            }
+            let failed = self.at_limit(&touches, &problem, &places, breaks.last().map_or(0, |b| b.round + 1));
+            let again = !failed.is_empty() && self.settings.rupture != Rupture::EndOfStep;
+            if again {
+                forget_bonds(&mut touches, &failed);
+            }
+            breaks.extend(failed);
+            if !again {
+                break problem;
+            }
+        };
+        let report = self.report(&touches, &motion, &problem, done, breaks, h);
+        self.settle(h, &mid, &motion, &problem, touches, &report.breaks);
+        Ok(report)
+    }
+
+    /// The contact problem that the next step would start from, for export and for benchmarks. The world does not move.
+    pub fn contact_problem(&mut self) -> ContactProblem<D> {
+        let h = self.settings.step;
+        let (mid, motion) = (self.midpoint(h), self.free_motion(h));
+        let touches = self.detect(&mid, &motion, h);
+        self.assemble(&touches, &motion, self.applied_impulse(h), h).0
+    }
+
+    /// Half a step in position at the old velocities.
+    fn midpoint(&self, h: f64) -> Midpoint<D> {
+        let drift = |x: &D::Vector, v: &D::Vector| *x + *v * (0.5 * h);
+        Midpoint {
+            grains: self.grains.position.iter().zip(&self.grains.velocity).map(|(x, v)| drift(x, v)).collect(),
+            walls: self.walls.iter().map(|w| drift(&w.position, &w.velocity)).collect(),
+        }
+    }
+
+    /// Prescribed force on each grain (N) at the middle of a step of length `h`, and torque (N m).
+    fn external_forces(&self, h: f64) -> Vec<(D::Vector, D::Spin)> {
+        let gravity = self.settings.gravity.unwrap_or(D::Vector::zero());
+        let mut forces: Vec<_> = self.grains.mass.iter().map(|m| (gravity * *m, D::Spin::zero())).collect();
+        for load in &self.loads {
+            let factor = (load.factor)(self.time + 0.5 * h);
+            forces[load.grain].0 += load.force * factor;
+            forces[load.grain].1 += load.torque * factor;
+        }
+        forces
+    }
+
+    /// Velocities before the step and the free velocities v_f = v + h M⁻¹ F_ext; walls follow the grains.
+    fn free_motion(&self, h: f64) -> Motion<D> {
+        let g = &self.grains;
+        let mut before: Vec<_> = g.velocity.iter().copied().zip(g.spin.iter().copied()).collect();
+        let mut free = before.clone();
+        if self.settings.gravity.is_some() || !self.loads.is_empty() {
+            for (k, (force, torque)) in self.external_forces(h).into_iter().enumerate() {
+                let (inverse_mass, inverse_inertia) = g.inverse(k);
+                free[k].0 += force * (h * inverse_mass);
+                free[k].1 += torque * (h * inverse_inertia);
+            }
+        }
+        for wall in &self.walls {
+            let still = D::Spin::zero();
+            before.push((wall.velocity, still));
+            free.push(match &wall.drive {
+                Drive::Fixed => (D::Vector::zero(), still),
+                Drive::Velocity { direction, speed } => (*direction * speed(self.time + h), still),
+                Drive::Force { direction, mass, force } => {
+                    (wall.velocity + *direction * (h * force(self.time + 0.5 * h) / mass), still)
+                }
+            });
+        }
+        Motion { before, free }
+    }
+
+    /// ‖h F_ext‖ over all bodies that can move (N s).
+    fn applied_impulse(&self, h: f64) -> f64 {
+        let mut sum = 0.0;
+        if self.settings.gravity.is_some() || !self.loads.is_empty() {
+            for (k, (force, _)) in self.external_forces(h).into_iter().enumerate() {
+                if !self.grains.fixed[k] {
+                    sum += force.dot(&force);
+                }
+            }
+        }
+        for wall in &self.walls {
+            if let Drive::Force { force, .. } = &wall.drive {
+                sum += force(self.time + 0.5 * h).powi(2);
+            }
+        }
+        h * f64::sqrt(sum)
+    }
+
+    fn refuse_unaccepted(&self, solve: SolveReport, problem: &ContactProblem<D>, h: f64) -> Result<(), StepError> {
+        let finite = |v: &[f64]| v.iter().all(|c| c.is_finite());
+        if !problem.nodes.all.iter().all(|n| finite(n.velocity.as_slice()) && finite(n.spin.as_slice())) {
+            return Err(StepError::NotFinite { time: self.time });
+        }
+        if solve.status == SolveStatus::Failed {
+            let SolveReport { residual, iterations, .. } = solve;
+            return Err(StepError::NotAccepted { time: self.time, step: h, residual, iterations });
+        }
+        Ok(())
+    }
+
+    /// The bonds that the accepted solve left at their limit, as many as the scene's rule lets break in one round.
+    fn at_limit(
+        &self,
+        touches: &[Touch<D>],
+        problem: &ContactProblem<D>,
+        places: &Places,
+        round: u32,
+    ) -> Vec<Break<D>> {
+        let mut found: Vec<(f64, Break<D>)> = Vec::new();
+        for (contact, place) in problem.bonded.iter().zip(&places.bonded) {
+            let law = &contact.law;
+            let Some(mode) = failure(&contact.r, law.shift(), law.cone()) else { continue };
+            let touch = &touches[*place];
+            let u = problem.nodes.relative_velocity::<D::Tangent, D::Tangent>(&contact.link, law.arm());
+            let bond = touch.bond.unwrap_or(u32::MAX);
+            let (point, reaction) = (touch.point, touch.reaction);
+            found.push((u.dot(&u), Break { bond, pair: touch.pair, mode, round, point, reaction, energy: 0.0 }));
+        }
+        if self.settings.rupture == Rupture::CascadeWorst {
+            let worst = found.iter().map(|(flow, _)| *flow).fold(f64::NEG_INFINITY, f64::max);
+            let first = found.iter().position(|(flow, _)| *flow == worst);
+            return first.map(|k| found[k].1).into_iter().collect();
+        }
+        found.into_iter().map(|(_, failed)| failed).collect()
+    }
+
+    /// Take over the result: velocities, second half of the positions, broken bonds, reactions, books.
+    fn settle(
+        &mut self,
+        h: f64,
+        mid: &Midpoint<D>,
+        motion: &Motion<D>,
+        problem: &ContactProblem<D>,
+        mut touches: Vec<Touch<D>>,
+        breaks: &[Break<D>],
+    ) {
+        self.book(h, motion, problem);
+        let n = self.grains.len();
+        for (k, node) in problem.nodes.all[..n].iter().enumerate() {
+            let mean_spin = (self.grains.spin[k] + node.spin) * (0.5 * h);
+            self.grains.position[k] = mid.grains[k] + node.velocity * (0.5 * h);
+            self.grains.orientation[k] = D::turned(self.grains.orientation[k], mean_spin);
+            self.grains.velocity[k] = node.velocity;
+            self.grains.spin[k] = node.spin;
+        }
+        for (w, wall) in self.walls.iter_mut().enumerate() {
+            wall.velocity = problem.nodes.all[n + w].velocity;
+            wall.position = mid.walls[w] + wall.velocity * (0.5 * h);
+            wall.applied = if let Drive::Force { force, .. } = &wall.drive { force(self.time + 0.5 * h) } else { 0.0 };
+            wall.reaction = D::Vector::zero();
+        }
+        for touch in &touches {
+            if let Some(wall) = (touch.pair[1] as usize).checked_sub(n) {
+                self.walls[wall].reaction -= D::compose(&touch.frame, touch.reaction.n, touch.reaction.t);
+            }
+        }
+        for failed in breaks {
+            self.bonds[failed.bond as usize].status = failed.mode;
+        }
+        // bonds that break at the end of the step keep the reaction of the step for the record, not for the next start
+        let bonds = &self.bonds;
+        let holds = |t: &Touch<D>| t.bond.is_none_or(|b| bonds[b as usize].status == BondStatus::Intact);
+        touches.iter_mut().filter(|t| !holds(t)).for_each(|t| t.status = TouchStatus::Bonded);
+        self.touches = touches;
+        self.time += h;
+    }
+
+    /// Enter the step in the energy ledger.
+    fn book(&mut self, h: f64, motion: &Motion<D>, problem: &ContactProblem<D>) {
+        let before = Nodes {
+            all: with_velocities(&problem.nodes, &motion.before),
+            drives: problem.nodes.drives.clone(),
+            ..problem.nodes
+        };
+        let kinetic = self.kinetic_after(&problem.nodes);
+        let external = self.external_work(h, motion, problem);
+        let dry = group_losses(&before, &problem.nodes, &problem.dry);
+        let smooth = group_losses(&before, &problem.nodes, &problem.frictionless);
+        let bonds: f64 = group_losses(&before, &problem.nodes, &problem.bonded).iter().sum();
+        let ledger = &mut self.ledger;
+        ledger.remainder += external - (kinetic - ledger.kinetic) - dry[0] - smooth[0] - dry[1] - bonds;
+        ledger.kinetic = kinetic;
+        ledger.external_work += external;
+        ledger.impact += dry[0] + smooth[0];
+        ledger.friction += dry[1];
+        ledger.bonds += bonds;
+    }
+
+    fn kinetic_after(&self, nodes: &Nodes<D>) -> f64 {
+        let n = self.grains.len();
+        let mut sum = 0.0;
+        for (k, node) in nodes.all.iter().enumerate() {
+            if node.inverse_mass > 0.0 {
+                let (mass, inertia) =
+                    if k < n { (self.grains.mass[k], self.grains.inertia[k]) } else { (1.0 / node.inverse_mass, 0.0) };
+                sum += mass * node.velocity.dot(&node.velocity) + inertia * node.spin.dot(&node.spin);
+            }
+        }
+        0.5 * sum
+    }
+
+    /// Work of gravity, loads and drives in the step (J): force times mean velocity; a wall with prescribed velocity does the
+    /// work of its reaction.
+    fn external_work(&self, h: f64, motion: &Motion<D>, problem: &ContactProblem<D>) -> f64 {
+        let mean = |k: usize| (motion.before[k].0 + problem.nodes.all[k].velocity) * 0.5;
+        let mut work = 0.0;
+        if self.settings.gravity.is_some() || !self.loads.is_empty() {
+            for (k, (force, torque)) in self.external_forces(h).iter().enumerate() {
+                if !self.grains.fixed[k] {
+                    let spin = (motion.before[k].1 + problem.nodes.all[k].spin) * 0.5;
+                    work += h * (force.dot(&mean(k)) + torque.dot(&spin));
+                }
+            }
+        }
+        let n = self.grains.len();
+        let pushes = wall_impulses(problem, self.walls.len());
+        for (w, wall) in self.walls.iter().enumerate() {
+            work += match &wall.drive {
+                Drive::Fixed => 0.0,
+                Drive::Velocity { .. } => -pushes[w].dot(&mean(n + w)),
+                Drive::Force { direction, force, .. } => h * force(self.time + 0.5 * h) * direction.dot(&mean(n + w)),
+            };
+        }
+        work
+    }
+
+    fn report(
+        &self,
+        touches: &[Touch<D>],
+        motion: &Motion<D>,
+        problem: &ContactProblem<D>,
+        done: Solves,
+        breaks: Vec<Break<D>>,
+        h: f64,
+    ) -> StepReport<D> {
+        let mut change = 0.0;
+        for (k, mass) in self.grains.mass.iter().enumerate().filter(|(k, _)| !self.grains.fixed[*k]) {
+            let dv = (problem.nodes.all[k].velocity - motion.before[k].0) * *mass;
+            change += dv.dot(&dv);
+        }
+        let dry = touches.iter().filter(|t| t.bond.is_none());
+        StepReport {
+            time: self.time + h,
+            status: done.status(),
+            iterations: done.iterations,
+            residual: done.residual,
+            load_error: if problem.applied > 0.0 { change.sqrt() / problem.applied } else { 0.0 },
+            counts: Counts::of(touches),
+            breaks,
+            penetration: dry.map(|t| -t.gap).fold(0.0, f64::max),
+            rejected: 0,
+        }
+    }
+}
+
+/// The same nodes with other velocities.
+fn with_velocities<D: Dim>(nodes: &Nodes<D>, velocities: &[(D::Vector, D::Spin)]) -> Vec<Node<D>> {
+    nodes.all.iter().zip(velocities).map(|(node, &(velocity, spin))| Node { velocity, spin, ..*node }).collect()
+}
+
+/// Impulse of the grains on each wall (N s).
+fn wall_impulses<D: Dim>(problem: &ContactProblem<D>, walls: usize) -> Vec<D::Vector> {
+    let mut sums = vec![D::Vector::zero(); walls];
+    let first = problem.nodes.grains;
+    let mut add = |pair: [u32; 2], impulse: D::Vector| {
+        if let Some(wall) = (pair[1] as usize).checked_sub(first) {
+            sums[wall] -= impulse;
+        }
+    };
+    problem.dry.iter().for_each(|c| add(c.link.nodes, D::compose(&c.link.frame, c.r.n, c.r.t)));
+    problem.frictionless.iter().for_each(|c| add(c.link.nodes, D::compose(&c.link.frame, c.r.n, D::Tangent::zero())));
+    sums
+}
+
+/// Write the impulses of the problem back to the contacts of the step, as forces.
+fn write_reactions<D: Dim>(touches: &mut [Touch<D>], problem: &ContactProblem<D>, places: &Places, h: f64) {
+    for touch in touches.iter_mut() {
+        touch.reaction = Local::zero();
+        touch.status = TouchStatus::Open;
+    }
+    read_back(touches, &problem.bonded, &places.bonded, h);
+    read_back(touches, &problem.dry, &places.dry, h);
+    read_back(touches, &problem.frictionless, &places.frictionless, h);
+}
+
+/// Turn the contacts of broken bonds into dry ones that start without reaction.
+fn forget_bonds<D: Dim>(touches: &mut [Touch<D>], broken: &[Break<D>]) {
+    for failed in broken {
+        if let Ok(place) = touches.binary_search_by_key(&failed.pair, |t| t.pair) {
+            touches[place].bond = None;
+            touches[place].reaction = Local::zero();
+            touches[place].status = TouchStatus::Open;
+        }
+    }
+}
+
+/// The solves of one step taken together.
+#[derive(Clone, Copy, Default)]
+struct Solves {
+    iterations: u64,
+    residual: f64,
+    missed_aim: bool,
+}
+
+impl Solves {
+    fn add(&mut self, solve: SolveReport) {
+        self.iterations += solve.iterations;
+        self.residual = self.residual.max(solve.residual);
+        self.missed_aim |= solve.status != SolveStatus::Converged;
+    }
+
+    fn status(&self) -> SolveStatus {
+        if self.missed_aim { SolveStatus::Accepted } else { SolveStatus::Converged }
+    }
+}
+
+impl<D: Dim> StepReport<D> {
+    /// Two half steps as one.
+    fn followed_by(self, second: Self) -> Self {
+        let mut breaks = self.breaks;
+        let rounds = breaks.last().map_or(0, |b| b.round + 1);
+        breaks.extend(second.breaks.into_iter().map(|b| Break { round: b.round + rounds, ..b }));
+        let missed = [self.status, second.status].contains(&SolveStatus::Accepted);
+        Self {
+            status: if missed { SolveStatus::Accepted } else { SolveStatus::Converged },
+            iterations: self.iterations + second.iterations,
+            residual: self.residual.max(second.residual),
+            load_error: self.load_error.max(second.load_error),
+            breaks,
+            penetration: self.penetration.max(second.penetration),
+            rejected: self.rejected + second.rejected + 1,
+            ..second
+        }
+    }
+}

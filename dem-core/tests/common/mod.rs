@@ -1,0 +1,82 @@
+//! Small worlds that the tests of this folder share.
+#![allow(dead_code)]
+
+use dem_core::body::{Drive, Grain, Grains, Load, Shape, Wall};
+use dem_core::bond::Rupture;
+use dem_core::contact::{BondFlow, LocalSolve};
+use dem_core::dim::{D2, Dim, Vect};
+use dem_core::solver::{GaussSeidelSettings, SolverSettings};
+use dem_core::world::{Settings, World};
+use std::sync::Arc;
+
+pub const DENSITY: f64 = 2500.0;
+
+pub fn solver(tolerance: f64) -> SolverSettings {
+    SolverSettings::GaussSeidel(GaussSeidelSettings {
+        local: LocalSolve::Exact,
+        tolerance,
+        accept: tolerance,
+        max_sweeps: 1_000_000,
+    })
+}
+
+pub fn settings<D: Dim>(step: f64) -> Settings<D> {
+    Settings {
+        step,
+        gravity: None,
+        friction: 0.3,
+        restitution: None,
+        bond_flow: BondFlow::Associated,
+        rupture: Rupture::Cascade,
+        solver: solver(1e-12),
+        max_halvings: 0,
+        thickness: 1.0,
+        expel_overlaps: false,
+    }
+}
+
+pub fn grain<D: Dim>(position: &[f64], radius: f64) -> Grain<D> {
+    Grain::at_rest(D::Vector::from_slice(position), radius, DENSITY)
+}
+
+pub fn world<D: Dim>(grains: Vec<Grain<D>>, walls: Vec<Wall<D>>, settings: Settings<D>) -> World<D> {
+    World::new(grains.into_iter().collect(), walls, Vec::new(), settings)
+}
+
+/// A floor through the origin, normal to the last axis.
+pub fn floor<D: Dim>(friction: f64) -> Wall<D> {
+    let mut normal = D::Vector::zero();
+    normal[D::N - 1] = 1.0;
+    Wall::fixed(Shape::Plane { normal }, D::Vector::zero(), friction)
+}
+
+/// Gravity (m/s²) along the last axis.
+pub fn down<D: Dim>(g: f64) -> Option<D::Vector> {
+    let mut v = D::Vector::zero();
+    v[D::N - 1] = -g;
+    Some(v)
+}
+
+pub fn run<D: Dim>(world: &mut World<D>, steps: usize) {
+    for _ in 0..steps {
+        world.step().expect("an accepted step");
+    }
+}
+
+/// Two bonded disks of radius 1 mm along x, the first held fixed, the second under a growing force and torque:
+/// `force` (N) and `torque` (N m) are rates per second. The bond has strength `r_coh`.
+pub fn bonded_pair(r_coh: f64, force: [f64; 2], torque: f64) -> World<D2> {
+    let mut fixed = grain::<D2>(&[0.0, 0.0], 1e-3);
+    fixed.fixed = true;
+    let list: Grains<D2> = [fixed, grain(&[2e-3, 0.0], 1e-3)].into_iter().collect();
+    let load = Load { grain: 1, force: force.into(), torque: [torque].into(), factor: Arc::new(|t| t) };
+    let mut world = World::new(list, Vec::new(), vec![load], settings(1e-4));
+    world.form_bonds(1e-6, |_| r_coh, 0.3);
+    world
+}
+
+pub fn force_driven<D: Dim>(normal: D::Vector, position: D::Vector, mass: f64, force: f64) -> Wall<D> {
+    let mut wall = Wall::fixed(Shape::Plane { normal }, position, 0.2);
+    wall.drive = Drive::Force { direction: normal, mass, force: Arc::new(move |_| force) };
+    wall
+}

@@ -1,0 +1,250 @@
+//! From a scene to a world: sample, walls, loads, bonds, settings.
+
+use crate::prepare::{self, Ball, PrepareError, Watch};
+use crate::run::RunError;
+use crate::scene::{self, Drive as SceneDrive, Place, Sample, Scene, SolverKind, WallMass};
+use dem_core::body::{Drive, Grain, Grains, Load, Schedule, Shape, Wall};
+use dem_core::bond::Rupture;
+use dem_core::contact::{BondFlow, LocalSolve};
+use dem_core::detection::pairs_within;
+use dem_core::dim::{Dim, Vect};
+use dem_core::solver::{GaussSeidelSettings, SolverSettings};
+use dem_core::world::{Restitution, Settings, World};
+use std::path::Path;
+use std::sync::Arc;
+
+/// A world at time zero, and what is told about its sample.
+pub struct Built<D: Dim> {
+    /// The world.
+    pub world: World<D>,
+    /// Solid fraction of a random sample in its box (–).
+    pub solid_fraction: Option<f64>,
+}
+
+/// Overlap with a wall, in radii, that still counts as touching: decimal coordinates are not exact.
+const TOUCHING: f64 = 1e-6;
+
+/// Prepare the sample of a scene and put the world together. `watch` is told how far the preparation is.
+pub fn build<D: Dim>(scene: &Scene, watch: Watch) -> Result<Built<D>, RunError> {
+    let (grains, solid_fraction) = grains::<D>(scene, watch)?;
+    let walls = scene.walls.iter().map(|(name, wall)| build_wall(scene, name, wall, &grains)).collect::<Result<_, _>>()?;
+    let loads = loads(scene);
+    let mut world = World::new(grains, walls, loads, settings(scene));
+    if let Some(bonds) = &scene.bonds {
+        let strength = |mean_diameter| bonds.cohesion(scene.dimension, mean_diameter, scene.thickness());
+        world.form_bonds(bonds.gap_tolerance, strength, bonds.friction.unwrap_or(scene.materials.friction.grain_grain));
+    }
+    Ok(Built { world, solid_fraction })
+}
+
+/// The grains of a scene, and the solid fraction of a random packing.
+fn grains<D: Dim>(scene: &Scene, watch: Watch) -> Result<(Grains<D>, Option<f64>), RunError> {
+    let density = scene.materials.density * scene.thickness();
+    let at_rest = |balls: Vec<Ball<D>>| balls.into_iter().map(|(x, r)| Grain::at_rest(x, r, density)).collect::<Grains<D>>();
+    let (mut grains, fraction) = match &scene.sample {
+        Sample::Random(random) => {
+            let packing = prepare::pack::<D>(random, scene.seed, watch).map_err(preparation_error)?;
+            (at_rest(packing.balls), Some(packing.solid_fraction))
+        }
+        Sample::Lattice(lattice) => (at_rest(prepare::lattice::<D>(lattice)), None),
+        Sample::File(file) => (at_rest(read_sample::<D>(&file.path)?), None),
+        Sample::Grains(list) => (list.iter().map(|spec| listed(spec, scene)).collect(), None),
+    };
+    for &k in scene.grains.iter().flat_map(|g| &g.fixed) {
+        let count = grains.len();
+        *grains.fixed.get_mut(k).ok_or_else(|| missing_grain("grains.fixed", k, count))? = true;
+    }
+    for load in scene.grains.iter().flat_map(|g| &g.loads) {
+        if load.grain >= grains.len() {
+            return Err(missing_grain("grains.loads", load.grain, grains.len()));
+        }
+    }
+    refuse_coincident(&grains)?;
+    Ok((grains, fraction))
+}
+
+fn preparation_error(error: PrepareError) -> RunError {
+    match error {
+        PrepareError::Interrupted => RunError::Interrupted,
+        PrepareError::Step(step) => RunError::NoConvergence(format!("the sample was not packed: {step}")),
+        other => RunError::Sample(other.to_string()),
+    }
+}
+
+fn missing_grain(place: &str, grain: usize, count: usize) -> RunError {
+    RunError::Sample(format!("{place}: there is no grain {grain}; the sample has {count}, counted from 0"))
+}
+
+fn listed<D: Dim>(spec: &scene::GrainSpec, scene: &Scene) -> Grain<D> {
+    let density = spec.density.unwrap_or(scene.materials.density) * scene.thickness();
+    let mut grain = Grain::<D>::at_rest(D::Vector::from_slice(&spec.center), spec.radius, density);
+    if let Some(mass) = spec.mass {
+        grain.mass = mass;
+        grain.inertia = D::INERTIA_FACTOR * mass * spec.radius * spec.radius;
+    }
+    grain.inertia = spec.inertia.unwrap_or(grain.inertia);
+    if let Some(velocity) = &spec.velocity {
+        grain.velocity = D::Vector::from_slice(velocity);
+    }
+    if let Some(spin) = &spec.spin {
+        grain.spin = D::Spin::from_slice(spin);
+    }
+    grain
+}
+
+/// Two grains at one place have no normal between them.
+fn refuse_coincident<D: Dim>(grains: &Grains<D>) -> Result<(), RunError> {
+    for [i, j] in pairs_within(grains, &grains.position, 0.0) {
+        let apart = (grains.position[i as usize] - grains.position[j as usize]).norm();
+        let smaller = grains.radius[i as usize].min(grains.radius[j as usize]);
+        if apart <= TOUCHING * smaller {
+            return Err(RunError::Sample(format!("sample: the centres of grains {i} and {j} coincide; move one of them")));
+        }
+    }
+    Ok(())
+}
+
+/// Grains from a CSV file with the header `x,y,radius` or `x,y,z,radius` (m).
+fn read_sample<D: Dim>(path: &Path) -> Result<Vec<Ball<D>>, RunError> {
+    let shown = path.display();
+    let header: &[&str] = if D::N == 2 { &["x", "y", "radius"] } else { &["x", "y", "z", "radius"] };
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .from_path(path)
+        .map_err(|e| RunError::InputOutput(format!("sample.file.path: {shown} cannot be read: {e}")))?;
+    let wrong = |line: u64, what: String| RunError::Sample(format!("{shown}, line {line}: {what}"));
+    let found = reader.headers().map_err(|e| wrong(1, e.to_string()))?.clone();
+    if found.iter().ne(header.iter().copied()) {
+        let found: Vec<_> = found.iter().collect();
+        return Err(wrong(1, format!("the header is {}, it must be {}", found.join(","), header.join(","))));
+    }
+    let mut balls = Vec::new();
+    for row in reader.records() {
+        let row = row.map_err(|e| wrong(e.position().map_or(0, csv::Position::line), e.to_string()))?;
+        let line = row.position().map_or(0, csv::Position::line);
+        let number = |(field, name): (&str, &&str)| match field.parse::<f64>() {
+            Ok(x) if x.is_finite() => Ok(x),
+            _ => Err(wrong(line, format!("{name} is {field:?}, it must be a finite number (m)"))),
+        };
+        let numbers: Vec<f64> = row.iter().zip(header).map(number).collect::<Result<_, _>>()?;
+        if numbers[D::N] <= 0.0 {
+            return Err(wrong(line, format!("radius is {}, it must be above zero", numbers[D::N])));
+        }
+        balls.push((D::Vector::from_slice(&numbers[..D::N]), numbers[D::N]));
+    }
+    if balls.is_empty() {
+        return Err(wrong(1, "there are no grains in the file".into()));
+    }
+    Ok(balls)
+}
+
+/// Write the grains as a CSV file that [`scene::SampleFile`] reads back bit for bit.
+pub fn write_sample<D: Dim>(grains: &Grains<D>, path: &Path) -> Result<(), csv::Error> {
+    let mut writer = csv::Writer::from_path(path)?;
+    writer.write_record(if D::N == 2 { &["x", "y", "radius"][..] } else { &["x", "y", "z", "radius"] })?;
+    for (x, r) in grains.position.iter().zip(&grains.radius) {
+        writer.write_record(x.as_slice().iter().chain([r]).map(f64::to_string))?;
+    }
+    writer.flush()?;
+    Ok(())
+}
+
+fn unit<D: Dim>(components: &[f64]) -> D::Vector {
+    let v = D::Vector::from_slice(components);
+    v * (1.0 / v.norm())
+}
+
+fn schedule(function: scene::Function) -> Schedule {
+    Arc::new(move |t| function.at(t))
+}
+
+fn build_wall<D: Dim>(scene: &Scene, name: &str, wall: &scene::Wall, grains: &Grains<D>) -> Result<Wall<D>, RunError> {
+    let round = |radius: f64, inside: bool, axis: Option<D::Vector>| Shape::Round { radius, inside, axis };
+    let (shape, position) = match &wall.shape {
+        scene::Shape::Plane(plane) => {
+            let normal = unit::<D>(&plane.normal);
+            let position = match &plane.place {
+                Place::At(point) => D::Vector::from_slice(point),
+                Place::Seated => {
+                    let lowest = |(x, r): (&D::Vector, &f64)| x.dot(&normal) - r;
+                    normal * grains.position.iter().zip(&grains.radius).map(lowest).fold(f64::INFINITY, f64::min)
+                }
+            };
+            (Shape::Plane { normal }, position)
+        }
+        scene::Shape::Circle(c) => (round(c.radius, c.inside, None), D::Vector::from_slice(&c.center)),
+        scene::Shape::Sphere(s) => (round(s.radius, s.inside, None), D::Vector::from_slice(&s.center)),
+        scene::Shape::Cylinder(c) => (round(c.radius, c.inside, Some(unit::<D>(&c.axis))), D::Vector::from_slice(&c.center)),
+    };
+    let friction = wall.friction.unwrap_or(scene.materials.friction.grain_wall);
+    let mut built = Wall::fixed(shape, position, friction);
+    let direction = wall.drive_direction().map_or(D::Vector::zero(), unit::<D>);
+    built.drive = match wall.drive() {
+        SceneDrive::Fixed => Drive::Fixed,
+        SceneDrive::Velocity(speed) => Drive::Velocity { direction, speed: schedule(speed) },
+        SceneDrive::Force(force) => {
+            let mass = match wall.mass {
+                Some(WallMass::Kg(mass)) => mass,
+                _ => grains.mass.iter().sum(),
+            };
+            Drive::Force { direction, mass, force: schedule(force) }
+        }
+    };
+    for (k, (x, r)) in grains.position.iter().zip(&grains.radius).enumerate() {
+        let gap = shape.gap(*x - position, *r).0;
+        if gap < -TOUCHING * r {
+            return Err(RunError::Sample(format!(
+                "walls.{name}: the wall overlaps grain {k} by {:.3e} m; move the wall, or give a plane \"place\": \"seated\"",
+                -gap
+            )));
+        }
+    }
+    Ok(built)
+}
+
+fn loads<D: Dim>(scene: &Scene) -> Vec<Load<D>> {
+    let load = |load: &scene::Load| Load {
+        grain: load.grain,
+        force: load.force.as_deref().map_or(D::Vector::zero(), D::Vector::from_slice),
+        torque: load.torque.as_deref().map_or(D::Spin::zero(), D::Spin::from_slice),
+        factor: schedule(load.time.clone()),
+    };
+    scene.grains.iter().flat_map(|g| &g.loads).map(load).collect()
+}
+
+fn settings<D: Dim>(scene: &Scene) -> Settings<D> {
+    let restitution = &scene.materials.restitution;
+    let bouncing = restitution.grain_grain > 0.0 || restitution.grain_wall > 0.0;
+    let SolverKind::GaussSeidel(gs) = &scene.solver.kind;
+    Settings {
+        step: scene.time.step,
+        gravity: scene.gravity.as_deref().map(D::Vector::from_slice).filter(|g| g.norm() > 0.0),
+        friction: scene.materials.friction.grain_grain,
+        restitution: bouncing.then_some(Restitution {
+            grain_grain: restitution.grain_grain,
+            grain_wall: restitution.grain_wall,
+            threshold_speed: restitution.threshold_speed,
+        }),
+        bond_flow: match scene.bonds.as_ref().map(|b| b.flow) {
+            Some(scene::Flow::Bipotential) => BondFlow::Bipotential,
+            _ => BondFlow::Associated,
+        },
+        rupture: match scene.rupture {
+            scene::Rupture::Cascade => Rupture::Cascade,
+            scene::Rupture::CascadeWorst => Rupture::CascadeWorst,
+            scene::Rupture::EndOfStep => Rupture::EndOfStep,
+        },
+        solver: SolverSettings::GaussSeidel(GaussSeidelSettings {
+            local: match gs.local {
+                scene::LocalSolve::Exact => LocalSolve::Exact,
+                scene::LocalSolve::PredictorCorrector => LocalSolve::PredictorCorrector,
+            },
+            tolerance: scene.solver.tolerance,
+            accept: scene.solver.accept(),
+            max_sweeps: gs.max_sweeps,
+        }),
+        max_halvings: scene.solver.max_step_halvings,
+        thickness: if D::N == 2 { scene.thickness() } else { 1.0 },
+        expel_overlaps: false,
+    }
+}

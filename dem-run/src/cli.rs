@@ -1,0 +1,234 @@
+//! The `dem-run` command line: results on stdout, everything else on stderr.
+//!
+//! Exit codes: 0 done, 2 wrong usage or scene, 3 no convergence, 4 input/output, 130 interrupted.
+
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand};
+
+use crate::check::Check;
+use crate::progress::ProgressMode;
+use crate::run::{self, RunError, RunOptions};
+use crate::scene::{self, Scene, SceneError, schema};
+
+/// Simulates cemented grains by non-smooth contact dynamics.
+#[derive(Debug, Parser)]
+#[command(name = "dem-run", version, about, arg_required_else_help = true, after_help = EXIT_CODES)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+const EXIT_CODES: &str = "\
+Exit codes: 0 done, 2 wrong usage or scene, 3 no convergence, 4 input/output, 130 interrupted.
+
+Example:
+  dem-run run configs/compression.json --set bonds.strength=5";
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Run a scene and write its history.
+    #[command(after_help = RUN_EXAMPLE)]
+    Run(RunArgs),
+    /// Check a scene without running it; tell grains, walls, steps, frames and disk space.
+    #[command(after_help = CHECK_EXAMPLE)]
+    Check(CheckArgs),
+    /// Print the JSON Schema of scenes, for editors.
+    #[command(after_help = SCHEMA_EXAMPLE)]
+    Schema,
+}
+
+const RUN_EXAMPLE: &str = "\
+Ctrl-C ends the run after the frame in hand; a second one ends it at once.
+
+Example:
+  dem-run run configs/compression.json -o weak.h5 --set bonds.strength=5 --set walls.top.force_rate=100";
+
+const CHECK_EXAMPLE: &str = "\
+All wrong values are told at once, each with its place, what stood there and what is allowed.
+
+Example:
+  dem-run check configs/compression.json --set time.step=5e-5";
+
+const SCHEMA_EXAMPLE: &str = "\
+Editors that know JSON Schema complete and explain a scene that names it:
+  { \"$schema\": \"../docs/scene.schema.json\", … }
+
+Example:
+  dem-run schema > docs/scene.schema.json";
+
+/// The scene of a command.
+#[derive(Debug, Args)]
+struct SceneArgs {
+    /// Scene: a JSON file with comments.
+    scene: PathBuf,
+    /// Put VALUE at PATH in the scene, as in bonds.strength=5; VALUE is JSON or a bare word. May be repeated.
+    #[arg(long = "set", value_name = "PATH=VALUE")]
+    set: Vec<String>,
+}
+
+#[derive(Debug, Args)]
+struct RunArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// History to write [default: the scene's name with .h5, in the current folder].
+    #[arg(short, long, value_name = "FILE.h5")]
+    output: Option<PathBuf>,
+    /// Overwrite files that exist.
+    #[arg(long)]
+    force: bool,
+    /// Number of threads; the result does not depend on it [default: all].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+    /// How progress is shown on stderr.
+    #[arg(long, value_enum, default_value_t)]
+    progress: ProgressMode,
+    /// Show nothing on stderr but errors.
+    #[arg(short, long)]
+    quiet: bool,
+    /// Print the summary as JSON.
+    #[arg(long)]
+    json: bool,
+    /// Write the prepared sample, to be read back as a sample file.
+    #[arg(long, value_name = "FILE.csv")]
+    write_sample: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+struct CheckArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Print JSON: the run, or what is wrong with the scene.
+    #[arg(long)]
+    json: bool,
+}
+
+/// The command: reads the arguments, runs, and gives the exit code.
+#[must_use]
+pub fn main() -> ExitCode {
+    let result = match Cli::parse().command {
+        Command::Run(args) => run(args),
+        Command::Check(args) => check(&args),
+        Command::Schema => print(&format!("{:#}", schema::json_schema())),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            // with stderr closed there is nobody to tell
+            let _ = writeln!(std::io::stderr(), "error: {error}");
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+impl SceneArgs {
+    fn load(&self) -> Result<Scene, SceneError> {
+        scene::load(&self.scene, &self.set)
+    }
+}
+
+fn run(args: RunArgs) -> Result<(), RunError> {
+    let scene = args.scene.load()?;
+    let options = RunOptions {
+        output: args
+            .output
+            .unwrap_or_else(|| default_output(&args.scene.scene)),
+        overwrite: args.force,
+        threads: args.threads.map(usize::from),
+        progress: args.progress,
+        quiet: args.quiet,
+        json: args.json,
+        write_sample: args.write_sample,
+    };
+    writable(&options.output, "-o FILE.h5", options.overwrite)?;
+    if let Some(sample) = &options.write_sample {
+        writable(sample, "--write-sample FILE.csv", options.overwrite)?;
+    }
+    run::run(&scene, &options)
+}
+
+fn check(args: &CheckArgs) -> Result<(), RunError> {
+    let scene = match args.scene.load() {
+        Err(error @ SceneError::Wrong { .. }) if args.json => {
+            print(&format!(
+                "{:#}",
+                serde_json::json!({ "problems": error.problems() })
+            ))?;
+            return Err(error.into());
+        }
+        result => result?,
+    };
+    let check = Check::new(&scene)?;
+    if check.disk_is_too_small() {
+        let _ = writeln!(
+            std::io::stderr(),
+            "warning: the history will not fit on the disk of the current folder"
+        );
+    }
+    match args.json {
+        true => print(&format!("{:#}", serde_json::json!(check))),
+        false => print(&check.to_string()),
+    }
+}
+
+/// `<scene stem>.h5` in the current folder.
+fn default_output(scene: &Path) -> PathBuf {
+    let mut name = scene.file_stem().unwrap_or_default().to_os_string();
+    name.push(".h5");
+    name.into()
+}
+
+/// Refuses, before any work is done, a file that exists or whose folder does not.
+fn writable(path: &Path, option: &str, overwrite: bool) -> Result<(), RunError> {
+    let shown = path.display();
+    if path.is_dir() {
+        return Err(RunError::InputOutput(format!(
+            "{shown} is a folder: name a file with {option}"
+        )));
+    }
+    if path.exists() && !overwrite {
+        let remedy = format!("--force overwrites it, {option} names another");
+        return Err(RunError::InputOutput(format!("{shown} exists: {remedy}")));
+    }
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => {
+            let folder = folder.display();
+            Err(RunError::InputOutput(format!(
+                "{shown} cannot be written: there is no folder {folder}; make it first"
+            )))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Writes a result to stdout. A reader that has seen enough (`| head`) is no error.
+fn print(text: &str) -> Result<(), RunError> {
+    match writeln!(std::io::stdout(), "{text}") {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(RunError::InputOutput(format!(
+            "stdout cannot be written: {error}"
+        ))),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        use clap::CommandFactory;
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn the_default_output_is_the_scene_s_name_in_the_current_folder() {
+        assert_eq!(
+            default_output(Path::new("configs/compression.json")),
+            Path::new("compression.h5")
+        );
+        assert_eq!(default_output(Path::new("a.b.json")), Path::new("a.b.h5"));
+    }
+}

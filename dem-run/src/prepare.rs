@@ -1,0 +1,252 @@
+//! Sample preparation: where the grains are before the run starts.
+//!
+//! A random sample is packed without friction by steps from rest to rest. Each step solves
+//! min ½‖v − h g‖²_M subject to gap + h Hᵀv ≥ 0 with the contact solver of the run, moves the grains by h v and forgets
+//! the velocity: a sequence of linearised packings that ends where nothing can move. The last steps are solved under
+//! so little thrust that grains which carry the load touch to rounding, walls included. Time has no meaning here (h = 1), so the
+//! packing of a sample scales exactly with its lengths.
+
+use crate::scene::{Diameters, Lattice, Preparation, RandomSample};
+use dem_core::body::{Drive, Grain, Grains, Shape, Wall};
+use dem_core::bond::Rupture;
+use dem_core::contact::{BondFlow, LocalSolve};
+use dem_core::dim::{Dim, Vect};
+use dem_core::solver::{GaussSeidelSettings, SolverSettings};
+use dem_core::world::{Settings, StepError, World};
+use rand::seq::SliceRandom;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use std::sync::Arc;
+use thiserror::Error;
+
+/// A grain's centre and radius (m).
+pub type Ball<D> = (<D as Dim>::Vector, f64);
+
+/// Why a sample could not be prepared.
+#[derive(Debug, Error)]
+pub enum PrepareError {
+    /// The packing ended looser than the scene asks for.
+    #[error(
+        "sample.random.preparation: the packing reached a solid fraction of {reached:.4}, the scene asks for {wanted}: \
+         lower solid_fraction, or change seed, width or count"
+    )]
+    TooLoose {
+        /// Solid fraction reached (–).
+        reached: f64,
+        /// Solid fraction asked for (–).
+        wanted: f64,
+    },
+    /// The box is too narrow.
+    #[error("sample.random.width: the box ({width} m) is narrower than the largest grain ({diameter} m)")]
+    TooNarrow {
+        /// Width or depth of the box (m).
+        width: f64,
+        /// Largest diameter (m).
+        diameter: f64,
+    },
+    /// A step of the packing was not solved.
+    #[error("the packing of the sample failed: {0}")]
+    Step(#[from] StepError),
+    /// The interruption that the caller asked for.
+    #[error("interrupted while the sample was packed")]
+    Interrupted,
+}
+
+/// A prepared random packing.
+#[derive(Clone, Debug)]
+pub struct Packing<D: Dim> {
+    /// The grains.
+    pub balls: Vec<Ball<D>>,
+    /// Volume of the grains over volume of the box between the walls (–).
+    pub solid_fraction: f64,
+}
+
+/// Told how far the packing is (0 to 1); false stops it.
+pub type Watch<'a> = &'a mut dyn FnMut(f64) -> bool;
+
+/// Most steps of one packing.
+const MOST_STEPS: usize = 20_000;
+/// Thrust at the start and at the end: what a free body would move in a step, in mean radii.
+const THRUST: (f64, f64) = (0.5, 1e-11);
+
+/// Grains on a regular lattice, the lowest corner of whose box is the origin.
+pub fn lattice<D: Dim>(lattice: &Lattice) -> Vec<Ball<D>> {
+    let r = 0.5 * lattice.diameter();
+    let mut balls = Vec::new();
+    let mut add = |x: [f64; 3]| balls.push((D::Vector::from_slice(&x[..D::N]), r));
+    match *lattice {
+        Lattice::Hexagonal { rows, columns, .. } => {
+            for row in 0..rows {
+                for column in 0..columns - row % 2 {
+                    let x = r * (1.0 + 2.0 * column as f64 + (row % 2) as f64);
+                    add([x, r * (1.0 + 3f64.sqrt() * row as f64), 0.0]);
+                }
+            }
+        }
+        Lattice::Square { rows, columns, .. } => {
+            for row in 0..rows {
+                (0..columns).for_each(|column| add([r * (1.0 + 2.0 * column as f64), r * (1.0 + 2.0 * row as f64), 0.0]));
+            }
+        }
+        Lattice::Cubic { counts: [nx, ny, nz], .. } => {
+            let at = |k: usize| r * (1.0 + 2.0 * k as f64);
+            for z in 0..nz {
+                for y in 0..ny {
+                    (0..nx).for_each(|x| add([at(x), at(y), at(z)]));
+                }
+            }
+        }
+    }
+    balls
+}
+
+fn draw_radii(diameters: &Diameters, count: usize, rng: &mut Pcg64) -> Vec<f64> {
+    let total: f64 = if let Diameters::Table(rows) = diameters { rows.iter().map(|r| r[1]).sum() } else { 0.0 };
+    let mut draw = || match diameters {
+        Diameters::Constant(d) => *d,
+        Diameters::Uniform(range) => range.min + (range.max - range.min) * rng.random::<f64>(),
+        Diameters::Table(rows) => {
+            let mut left = total * rng.random::<f64>();
+            let pick = rows.iter().find(|row| {
+                left -= row[1];
+                left < 0.0
+            });
+            pick.or(rows.last()).map_or(0.0, |row| row[0])
+        }
+    };
+    (0..count).map(|_| 0.5 * draw()).collect()
+}
+
+/// A random packing in a box that starts at the origin, `width` wide and (in 3D) `depth` deep; the last axis is up.
+pub fn pack<D: Dim>(sample: &RandomSample, seed: u64, watch: Watch) -> Result<Packing<D>, PrepareError> {
+    let mut rng = Pcg64::seed_from_u64(seed);
+    let mut radii = draw_radii(&sample.diameter, sample.count, &mut rng);
+    radii.shuffle(&mut rng);
+    let largest = 2.0 * radii.iter().copied().fold(0.0, f64::max);
+    let sides = [sample.width, sample.depth.unwrap_or(sample.width)];
+    for side in &sides[..D::N - 1] {
+        if *side < largest {
+            return Err(PrepareError::TooNarrow { width: *side, diameter: largest });
+        }
+    }
+    let (grains, top) = scatter::<D>(&radii, &sides, &mut rng);
+    let (wanted, from_top) = match &sample.preparation {
+        Preparation::Compaction(c) => (c.solid_fraction, true),
+        Preparation::Deposition(d) => (d.solid_fraction, false),
+    };
+    let mut world = packing_world(grains, &sides, top, from_top);
+    settle(&mut world, from_top, watch)?;
+    let balls: Vec<Ball<D>> = world.grains.position.iter().copied().zip(world.grains.radius.iter().copied()).collect();
+    let height = balls.iter().map(|(x, r)| x[D::N - 1] + r).fold(0.0, f64::max);
+    let box_volume = sides[..D::N - 1].iter().product::<f64>() * height;
+    let solid_fraction = balls.iter().map(|(_, r)| D::volume(*r)).sum::<f64>() / box_volume;
+    if solid_fraction < wanted {
+        return Err(PrepareError::TooLoose { reached: solid_fraction, wanted });
+    }
+    Ok(Packing { balls, solid_fraction })
+}
+
+/// Grains on a loose grid with random offsets, and the height above them all.
+fn scatter<D: Dim>(radii: &[f64], sides: &[f64; 2], rng: &mut Pcg64) -> (Grains<D>, f64) {
+    let largest = 2.0 * radii.iter().copied().fold(0.0, f64::max);
+    let across: Vec<usize> = sides[..D::N - 1].iter().map(|side| ((side / (1.05 * largest)) as usize).max(1)).collect();
+    let layer: usize = across.iter().product();
+    let spacing: Vec<f64> = across.iter().zip(sides).map(|(n, side)| side / *n as f64).collect();
+    let rise = 1.05 * largest;
+    let place = |(k, r): (usize, &f64)| {
+        let mut x = D::Vector::zero();
+        let mut rest = k % layer;
+        for axis in 0..D::N - 1 {
+            let slack = spacing[axis] - 2.0 * r;
+            x[axis] = (rest % across[axis]) as f64 * spacing[axis] + r + slack * rng.random::<f64>();
+            rest /= across[axis];
+        }
+        x[D::N - 1] = (k / layer) as f64 * rise + r + (rise - 2.0 * r) * rng.random::<f64>();
+        Grain::at_rest(x, *r, 1.0)
+    };
+    let grains: Grains<D> = radii.iter().enumerate().map(place).collect();
+    let top = radii.len().div_ceil(layer) as f64 * rise;
+    (grains, top)
+}
+
+/// A frictionless box: floor and sides fixed, and either a lid that is pressed down or gravity.
+fn packing_world<D: Dim>(grains: Grains<D>, sides: &[f64; 2], top: f64, from_top: bool) -> World<D> {
+    let unit = |axis: usize, sign: f64| {
+        let mut e = D::Vector::zero();
+        e[axis] = sign;
+        e
+    };
+    let up = D::N - 1;
+    let mut walls = vec![Wall::fixed(Shape::Plane { normal: unit(up, 1.0) }, D::Vector::zero(), 0.0)];
+    for axis in 0..up {
+        walls.push(Wall::fixed(Shape::Plane { normal: unit(axis, 1.0) }, D::Vector::zero(), 0.0));
+        walls.push(Wall::fixed(Shape::Plane { normal: unit(axis, -1.0) }, unit(axis, sides[axis]), 0.0));
+    }
+    if from_top {
+        walls.push(Wall::fixed(Shape::Plane { normal: unit(up, -1.0) }, unit(up, top), 0.0));
+    }
+    let settings = Settings {
+        step: 1.0,
+        gravity: None,
+        friction: 0.0,
+        restitution: None,
+        bond_flow: BondFlow::Associated,
+        rupture: Rupture::Cascade,
+        solver: solver(),
+        max_halvings: 0,
+        thickness: 1.0,
+        expel_overlaps: true,
+    };
+    World::new(grains, walls, Vec::new(), settings)
+}
+
+fn solver() -> SolverSettings {
+    // a step that is solved less finely than asked is only a worse packing: the next one goes on from it
+    SolverSettings::GaussSeidel(GaussSeidelSettings { local: LocalSolve::Exact, tolerance: 1e-4, accept: f64::INFINITY, max_sweeps: 5_000 })
+}
+
+/// Push with the lid, or with gravity where there is none, so hard that a free body would move by `travel` (m).
+fn push<D: Dim>(world: &mut World<D>, from_top: bool, travel: f64) {
+    let mut down = D::Vector::zero();
+    down[D::N - 1] = -1.0;
+    if from_top {
+        // the lid is as heavy as the sample
+        let mass: f64 = world.grains.mass.iter().sum();
+        let force = mass * travel;
+        if let Some(lid) = world.walls.last_mut() {
+            lid.drive = Drive::Force { direction: down, mass, force: Arc::new(move |_| force) };
+        }
+    } else {
+        world.settings.gravity = Some(down * travel);
+    }
+}
+
+/// Step from rest to rest until nothing moves.
+///
+/// The error of a step is a fraction of its thrust. Where the packing resists, the thrust is lowered, in the end to
+/// nearly nothing: a jammed packing is one for any thrust, and its contacts close to rounding.
+fn settle<D: Dim>(world: &mut World<D>, from_top: bool, watch: Watch) -> Result<(), PrepareError> {
+    let mean = world.grains.radius.iter().sum::<f64>() / world.grains.len() as f64;
+    let mut thrust = THRUST.0;
+    for _ in 0..MOST_STEPS {
+        push(world, from_top, thrust * mean);
+        world.stop_motion();
+        world.step()?;
+        // h = 1: a velocity is a displacement a step
+        let moved = if from_top {
+            world.walls.last().map_or(0.0, |lid| lid.velocity.norm())
+        } else {
+            world.grains.velocity.iter().map(Vect::norm).sum::<f64>() / world.grains.len() as f64
+        };
+        let share = moved / (thrust * mean);
+        thrust *= if share < 0.1 { 0.7 } else { 1.0 };
+        if thrust < THRUST.1 {
+            return Ok(());
+        }
+        let done = (THRUST.0 / thrust).ln() / (THRUST.0 / THRUST.1).ln();
+        if !watch(done) {
+            return Err(PrepareError::Interrupted);
+        }
+    }
+    Ok(())
+}

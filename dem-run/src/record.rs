@@ -1,0 +1,253 @@
+//! From a world to its history: the layout, the frames, the rupture events and the observables of every step.
+
+use crate::history::{
+    self, BondStatus, ContactRows, ContactStatus, Frame, GrainState, Layout, Observable, Parameters, Rupture, RuptureMode, WallDrive,
+    WallKind, WallState, Writer,
+};
+use crate::scene::Scene;
+use dem_core::body::{Drive, Shape, Wall};
+use dem_core::bond;
+use dem_core::dim::{Dim, Vect};
+use dem_core::world::{Break, StepReport, TouchStatus, World};
+use std::path::Path;
+
+/// The value of an observable after a step.
+type Measure<D> = fn(&World<D>, &StepReport<D>, &mut Vec<f64>);
+
+/// Writes a world to its history.
+pub struct Recorder<D: Dim> {
+    writer: Writer,
+    measures: Vec<Measure<D>>,
+    rotation: bool,
+    tangents: bool,
+    row: Vec<f64>,
+    contacts: ContactRows,
+}
+
+impl<D: Dim> Recorder<D> {
+    /// Create the history of a world at `path`.
+    pub fn create(path: &Path, overwrite: bool, scene: &Scene, names: &[String], world: &World<D>) -> history::Result<Self> {
+        let bonded = !world.bonds.is_empty();
+        let friction = world.settings.friction > 0.0 || world.walls.iter().any(|w| w.friction > 0.0);
+        // without friction, bonds and torques nothing ever turns, unless it turns from the start
+        let turning = world.grains.spin.iter().any(|w| w.norm() > 0.0) || world.loads.iter().any(|l| l.torque.norm() > 0.0);
+        let rotation = friction || bonded || turning;
+        let (observables, measures) = observables(world).into_iter().unzip();
+        let layout = Layout {
+            dimension: D::N,
+            rotation,
+            friction,
+            grains: history::Grains {
+                id: (0..world.grains.len() as i32).collect(),
+                radius: world.grains.radius.clone(),
+                mass: world.grains.mass.clone(),
+                inertia: world.grains.inertia.clone(),
+            },
+            walls: world.walls.iter().zip(names).map(|(wall, name)| describe_wall(wall, name)).collect(),
+            bonds: describe_bonds(world),
+            observables,
+            parameters: parameters(scene),
+        };
+        let writer = Writer::create(path, &layout, overwrite)?;
+        let tangents = friction || bonded;
+        Ok(Self { writer, measures, rotation, tangents, row: Vec::new(), contacts: ContactRows::default() })
+    }
+
+    /// Record what every step records: observables and broken bonds.
+    pub fn step(&mut self, world: &World<D>, report: &StepReport<D>) -> history::Result<()> {
+        self.row.clear();
+        for measure in &self.measures {
+            measure(world, report, &mut self.row);
+        }
+        let step = world.steps as i64;
+        self.writer.observe(step, report.time, &self.row)?;
+        for failed in &report.breaks {
+            self.writer.rupture(&rupture(failed, step, report.time))?;
+        }
+        Ok(())
+    }
+
+    /// Record a frame: the whole state.
+    pub fn frame(&mut self, world: &World<D>) -> history::Result<()> {
+        let flat = |vectors: &[D::Vector]| vectors.iter().flat_map(|v| v.as_slice()).copied().collect::<Vec<f64>>();
+        let g = &world.grains;
+        let turn = |rows: Vec<f64>| if self.rotation { rows } else { Vec::new() };
+        let grains = GrainState {
+            position: flat(&g.position),
+            velocity: flat(&g.velocity),
+            angular_velocity: turn(g.spin.iter().flat_map(|w| w.as_slice()).copied().collect()),
+            orientation: turn(g.orientation.iter().flat_map(|q| q.as_slice()).copied().collect()),
+        };
+        let per_wall = |pick: fn(&Wall<D>) -> D::Vector| flat(&world.walls.iter().map(pick).collect::<Vec<_>>());
+        let walls = WallState {
+            position: per_wall(|w| w.position),
+            velocity: per_wall(|w| w.velocity),
+            force: per_wall(|w| w.reaction),
+        };
+        self.fill_contacts(world);
+        let bonds: Vec<BondStatus> = world.bonds.iter().map(|b| bond_status(b.status)).collect();
+        let (step, time) = (world.steps as i64, world.time);
+        self.writer.frame(&Frame { step, time, grains: &grains, walls: &walls, contacts: &self.contacts, bonds: &bonds })
+    }
+
+    /// Close the history.
+    pub fn finish(self) -> history::Result<()> {
+        self.writer.finish()
+    }
+
+    fn fill_contacts(&mut self, world: &World<D>) {
+        let rows = &mut self.contacts;
+        rows.clear();
+        let grains = world.grains.len() as i32;
+        let bonded = !world.bonds.is_empty();
+        for touch in &world.touches {
+            let [i, j] = touch.pair.map(|k| k as i32);
+            rows.pair.push([i, if j < grains { j } else { grains - 1 - j }]);
+            rows.point.extend_from_slice(touch.point.as_slice());
+            rows.normal.extend_from_slice(D::normal(&touch.frame).as_slice());
+            rows.reaction.push(touch.reaction.n);
+            if self.tangents {
+                rows.reaction.extend_from_slice(touch.reaction.t.as_slice());
+                if D::N == 3 {
+                    rows.tangent.extend_from_slice(D::tangent(&touch.frame).as_slice());
+                }
+            }
+            if bonded {
+                // the rows of the solver are the components of m × n; those of the file are moments about the tangents
+                let moment = D::spin_rows_transposed(&touch.frame, touch.reaction.m);
+                rows.moment.extend(D::about_tangents(&touch.frame, moment).as_slice());
+                rows.bond.push(touch.bond.map_or(-1, |b| b as i32));
+            }
+            rows.gap.push(touch.gap);
+            rows.status.push(match touch.status {
+                TouchStatus::Open => ContactStatus::Open,
+                TouchStatus::Stick => ContactStatus::Stick,
+                TouchStatus::Slip => ContactStatus::Slip,
+                TouchStatus::Bonded => ContactStatus::Bonded,
+            });
+        }
+    }
+}
+
+fn bond_status(status: bond::BondStatus) -> BondStatus {
+    match status {
+        bond::BondStatus::Intact => BondStatus::Intact,
+        bond::BondStatus::Tension => BondStatus::Tension,
+        bond::BondStatus::Shear => BondStatus::Shear,
+        bond::BondStatus::Rolling => BondStatus::Rolling,
+    }
+}
+
+fn rupture<D: Dim>(failed: &Break<D>, step: i64, time: f64) -> Rupture {
+    Rupture {
+        step,
+        time,
+        point: padded::<D>(failed.point),
+        normal_force: failed.reaction.n,
+        tangential_force: failed.reaction.t.norm(),
+        moment: failed.reaction.m.norm(),
+        energy: failed.energy,
+        round: failed.round as i32,
+        bond: failed.bond as i32,
+        pair: failed.pair.map(|k| k as i32),
+        mode: match failed.mode {
+            bond::BondStatus::Shear => RuptureMode::Shear,
+            bond::BondStatus::Rolling => RuptureMode::Rolling,
+            _ => RuptureMode::Tension,
+        },
+    }
+}
+
+fn padded<D: Dim>(v: D::Vector) -> [f64; 3] {
+    let mut out = [0.0; 3];
+    out[..D::N].copy_from_slice(v.as_slice());
+    out
+}
+
+fn describe_wall<D: Dim>(wall: &Wall<D>, name: &str) -> history::Wall {
+    let zero = D::Vector::zero();
+    let (kind, normal, radius) = match wall.shape {
+        Shape::Plane { normal } => (WallKind::Plane, normal, 0.0),
+        Shape::Round { radius, inside, axis } => {
+            let kind = match axis {
+                Some(_) => WallKind::Cylinder,
+                None if D::N == 2 => WallKind::Circle,
+                None => WallKind::Sphere,
+            };
+            (kind, axis.unwrap_or(zero), if inside { -radius } else { radius })
+        }
+    };
+    let (drive, direction) = match wall.drive {
+        Drive::Fixed => (WallDrive::Fixed, zero),
+        Drive::Velocity { direction, .. } => (WallDrive::Velocity, direction),
+        Drive::Force { direction, .. } => (WallDrive::Force, direction),
+    };
+    history::Wall { name: name.into(), kind, normal: padded::<D>(normal), radius, drive, direction: padded::<D>(direction) }
+}
+
+fn describe_bonds<D: Dim>(world: &World<D>) -> history::Bonds {
+    let bonds = &world.bonds;
+    history::Bonds {
+        pair: bonds.iter().map(|b| b.pair.map(|k| k as i32)).collect(),
+        rest_gap: bonds.iter().map(|b| b.rest_gap).collect(),
+        strength: bonds.iter().map(|b| b.strength).collect(),
+        friction: bonds.iter().map(|b| b.friction).collect(),
+        mean_diameter: bonds.iter().map(|b| b.mean_diameter).collect(),
+    }
+}
+
+fn parameters(scene: &Scene) -> Parameters {
+    Parameters {
+        scene: scene.to_json().unwrap_or_default(),
+        seed: scene.seed,
+        version: env!("CARGO_PKG_VERSION").into(),
+        git_revision: option_env!("DEM_GIT_REVISION").unwrap_or_default().into(),
+        build: env!("DEM_BUILD").into(),
+        host: rustix::system::uname().nodename().to_string_lossy().into_owned(),
+        start: humantime::format_rfc3339_seconds(std::time::SystemTime::now()).to_string(),
+    }
+}
+
+/// The force that drives a wall (N): the one prescribed, or what the drive needs to keep its velocity.
+pub fn applied_force<D: Dim>(wall: &Wall<D>) -> f64 {
+    match wall.drive {
+        Drive::Fixed => 0.0,
+        Drive::Velocity { direction, .. } => -direction.dot(&wall.reaction),
+        Drive::Force { .. } => wall.applied,
+    }
+}
+
+/// What is measured at every step, in order. What the world lacks is not measured.
+fn observables<D: Dim>(world: &World<D>) -> Vec<(Observable, Measure<D>)> {
+    let (d, spins, walls) = (D::N, D::Spin::LEN, world.walls.len());
+    let scalar: &[usize] = &[];
+    let mut list: Vec<(Observable, Measure<D>)> = Vec::new();
+    let mut add = |name: &str, unit: &str, shape: &[usize], measure: Measure<D>| {
+        list.push((Observable::new(name, unit, shape), measure));
+    };
+    add("kinetic_energy", "J", scalar, |w, _, out| out.push(w.ledger.kinetic));
+    add("external_work", "J", scalar, |w, _, out| out.push(w.ledger.external_work));
+    add("dissipation_impact", "J", scalar, |w, _, out| out.push(w.ledger.impact));
+    add("dissipation_friction", "J", scalar, |w, _, out| out.push(w.ledger.friction));
+    add("energy_remainder", "J", scalar, |w, _, out| out.push(w.ledger.remainder));
+    add("momentum", "kg m s-1", &[d], |w, _, out| out.extend(w.momentum().linear.as_slice()));
+    add("angular_momentum", "kg m2 s-1", &[spins], |w, _, out| out.extend(w.momentum().angular.as_slice()));
+    add("solver_residual", "", scalar, |_, r, out| out.push(r.residual));
+    add("solver_load_error", "", scalar, |_, r, out| out.push(r.load_error));
+    add("solver_iterations", "", scalar, |_, r, out| out.push(r.iterations as f64));
+    add("solver_rejected", "", scalar, |_, r, out| out.push(f64::from(r.rejected)));
+    add("penetration", "m", scalar, |_, r, out| out.push(r.penetration));
+    add("stress", "Pa", &[d, d], |w, _, out| out.extend(w.stress()));
+    add("strain", "", &[d, d], |w, _, out| out.extend(w.strain()));
+    if !world.bonds.is_empty() {
+        add("bond_remainder", "J", scalar, |w, _, out| out.push(w.ledger.bonds));
+        add("bonds_broken", "", scalar, |w, _, out| out.push((w.bonds.len() - w.intact_bonds()) as f64));
+    }
+    if walls > 0 {
+        add("wall_position", "m", &[walls, d], |w, _, out| w.walls.iter().for_each(|x| out.extend(x.position.as_slice())));
+        add("wall_force", "N", &[walls, d], |w, _, out| w.walls.iter().for_each(|x| out.extend(x.reaction.as_slice())));
+        add("applied_force", "N", &[walls], |w, _, out| out.extend(w.walls.iter().map(applied_force)));
+    }
+    add("cpu_time", "s", scalar, |_, _, out| out.push(crate::run::cpu_time()));
+    list
+}

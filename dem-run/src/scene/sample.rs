@@ -1,0 +1,275 @@
+//! The grains that a scene starts with: random, on a lattice, from a file, or listed in place.
+
+use std::path::PathBuf;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Where the grains come from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Sample {
+    /// Grains of random size at random places, packed before the run starts.
+    Random(RandomSample),
+    /// Equal grains on a regular lattice, touching.
+    Lattice(Lattice),
+    /// Grains read from a table.
+    File(SampleFile),
+    /// Grains listed one by one, for small scenes.
+    Grains(Vec<GrainSpec>),
+}
+
+/// A random packing in a box.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RandomSample {
+    /// Number of grains.
+    pub count: usize,
+    /// Distribution of the diameters (m).
+    pub diameter: Diameters,
+    /// Width of the box, along x (m).
+    pub width: f64,
+    /// Depth of the box, along y, in 3D only (m).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth: Option<f64>,
+    /// How the packing is made.
+    pub preparation: Preparation,
+}
+
+/// A distribution of diameters.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Diameters {
+    /// All grains have this diameter (m).
+    Constant(f64),
+    /// Uniform between two diameters.
+    Uniform(UniformRange),
+    /// Pairs `[diameter in m, weight]`: each grain has one of these diameters, with a chance proportional to its weight.
+    Table(Vec<[f64; 2]>),
+}
+
+impl Diameters {
+    /// The largest diameter that the distribution can give (m).
+    #[must_use]
+    pub fn max(&self) -> f64 {
+        match self {
+            Self::Constant(diameter) => *diameter,
+            Self::Uniform(range) => range.max,
+            Self::Table(rows) => rows
+                .iter()
+                .filter(|row| row[1] > 0.0)
+                .map(|row| row[0])
+                .fold(0.0, f64::max),
+        }
+    }
+}
+
+/// The two ends of a uniform distribution.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct UniformRange {
+    /// Smallest diameter (m).
+    pub min: f64,
+    /// Largest diameter (m).
+    pub max: f64,
+}
+
+/// How a random packing is made. Both ways are frictionless, so that the packing is dense.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Preparation {
+    /// Compaction between walls.
+    Compaction(Compaction),
+    /// Deposition under gravity.
+    Deposition(Deposition),
+}
+
+/// Compaction between walls.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Compaction {
+    /// Solid fraction to reach at least: volume of the grains over volume of the box (0 to 1).
+    pub solid_fraction: f64,
+}
+
+/// Deposition under gravity.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Deposition {
+    /// Gravity during the preparation, downwards (m/s²).
+    #[serde(default = "earth_gravity")]
+    pub gravity: f64,
+    /// Solid fraction to reach at least: volume of the grains over volume of the box (0 to 1).
+    pub solid_fraction: f64,
+}
+
+fn earth_gravity() -> f64 {
+    9.81
+}
+
+/// Equal grains on a regular lattice, each touching its neighbours.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Lattice {
+    /// 2D, close packed: rows of `columns` and `columns` − 1 disks in turn.
+    Hexagonal {
+        /// Diameter of the disks (m).
+        diameter: f64,
+        /// Number of rows, along y.
+        rows: usize,
+        /// Number of disks in the first row, along x.
+        columns: usize,
+    },
+    /// 2D: `rows` rows of `columns` disks.
+    Square {
+        /// Diameter of the disks (m).
+        diameter: f64,
+        /// Number of rows, along y.
+        rows: usize,
+        /// Number of disks in a row, along x.
+        columns: usize,
+    },
+    /// 3D: spheres along x, y and z.
+    Cubic {
+        /// Diameter of the spheres (m).
+        diameter: f64,
+        /// Number of spheres along x, y and z.
+        counts: [usize; 3],
+    },
+}
+
+impl Lattice {
+    /// Diameter of the grains (m).
+    #[must_use]
+    pub fn diameter(&self) -> f64 {
+        match self {
+            Self::Hexagonal { diameter, .. }
+            | Self::Square { diameter, .. }
+            | Self::Cubic { diameter, .. } => *diameter,
+        }
+    }
+
+    /// Number of grains; `None` where it overflows.
+    #[must_use]
+    pub fn count(&self) -> Option<usize> {
+        match self {
+            // every second row is one disk shorter
+            Self::Hexagonal { rows, columns, .. } => {
+                rows.checked_mul(*columns)?.checked_sub(rows / 2)
+            }
+            Self::Square { rows, columns, .. } => rows.checked_mul(*columns),
+            Self::Cubic { counts, .. } => counts[0].checked_mul(counts[1])?.checked_mul(counts[2]),
+        }
+    }
+}
+
+/// A table of grains.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SampleFile {
+    /// CSV file with the header `x,y,radius` (2D) or `x,y,z,radius` (3D), all in m, sought beside the scene.
+    pub path: PathBuf,
+}
+
+/// One grain.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GrainSpec {
+    /// Centre: one number for each dimension (m).
+    pub center: Vec<f64>,
+    /// Radius (m).
+    pub radius: f64,
+    /// Velocity at the start: one number for each dimension (m/s); zero where it is absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub velocity: Option<Vec<f64>>,
+    /// Angular velocity at the start: `[w]` in 2D, counter-clockwise, `[wx, wy, wz]` in 3D (rad/s); zero where it is absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spin: Option<Vec<f64>>,
+    /// Density instead of the material's (kg/m³).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub density: Option<f64>,
+    /// Mass instead of density times volume (kg).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mass: Option<f64>,
+    /// Moment of inertia about the centre instead of mR²/2 (disk) or 2mR²/5 (sphere) (kg m²).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub inertia: Option<f64>,
+}
+
+impl Sample {
+    /// Number of grains, where it is known without reading a file.
+    #[must_use]
+    pub fn count(&self) -> Option<usize> {
+        match self {
+            Self::Random(random) => Some(random.count),
+            Self::Lattice(lattice) => lattice.count(),
+            Self::File(_) => None,
+            Self::Grains(grains) => Some(grains.len()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn twenty_rows_of_210_and_209_disks_are_4190() {
+        assert_eq!(
+            Lattice::Hexagonal {
+                diameter: 4e-3,
+                rows: 20,
+                columns: 210
+            }
+            .count(),
+            Some(4190)
+        );
+        assert_eq!(
+            Lattice::Hexagonal {
+                diameter: 4e-3,
+                rows: 3,
+                columns: 1
+            }
+            .count(),
+            Some(2)
+        );
+    }
+
+    #[test]
+    fn other_lattices_count_their_grains_and_overflow_is_none() {
+        assert_eq!(
+            Lattice::Square {
+                diameter: 1.0,
+                rows: 50,
+                columns: 1
+            }
+            .count(),
+            Some(50)
+        );
+        assert_eq!(
+            Lattice::Cubic {
+                diameter: 1.0,
+                counts: [2, 3, 4]
+            }
+            .count(),
+            Some(24)
+        );
+        assert_eq!(
+            Lattice::Cubic {
+                diameter: 1.0,
+                counts: [usize::MAX, 3, 4]
+            }
+            .count(),
+            None
+        );
+    }
+
+    #[test]
+    fn the_largest_diameter_ignores_weights_of_zero() {
+        assert_eq!(Diameters::Table(vec![[1e-3, 1.0], [9e-3, 0.0]]).max(), 1e-3);
+        assert_eq!(
+            Diameters::Uniform(UniformRange { min: 1.0, max: 2.0 }).max(),
+            2.0
+        );
+    }
+}

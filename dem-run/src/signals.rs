@@ -1,0 +1,129 @@
+//! Ctrl-C and SIGTERM: the first asks the run to end after the frame in hand, the second ends it at once.
+
+use std::ffi::c_int;
+use std::io::Write;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Exit code of a run that was interrupted.
+pub const INTERRUPTED: u8 = 130;
+
+/// Whether the run has been asked to end. Clones share one answer.
+#[derive(Debug, Clone, Default)]
+pub struct Interrupt(Arc<AtomicBool>);
+
+impl Interrupt {
+    /// Whether the run has been asked to end.
+    #[must_use]
+    pub fn requested(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+
+    /// Asks the run to end; returns whether that had been asked before.
+    pub fn request(&self) -> bool {
+        self.0.swap(true, Ordering::Relaxed)
+    }
+}
+
+/// Handles Ctrl-C, SIGTERM and SIGHUP from now on.
+///
+/// # Errors
+/// The system refuses, or a handler is in place already: a process has one.
+pub fn install() -> Result<Interrupt, ctrlc::Error> {
+    let interrupt = Interrupt::default();
+    let shared = interrupt.clone();
+    ctrlc::set_handler(move || {
+        if shared.request() {
+            exit_at_once();
+        }
+        // eprintln! would end this thread, and with it the second signal, where stderr is closed
+        let _ = writeln!(
+            std::io::stderr(),
+            "\nending after the frame in hand; once more to end at once"
+        );
+    })?;
+    Ok(interrupt)
+}
+
+unsafe extern "C" {
+    /// Ends the process without running what stands ready for its end (ISO C `_Exit`, POSIX `_exit`).
+    safe fn _exit(status: c_int) -> !;
+}
+
+/// The handler runs in a thread of its own, while the run may be inside the HDF5 library, whose
+/// clean-up at a regular exit would then meet it half-way: so no clean-up.
+fn exit_at_once() -> ! {
+    _exit(c_int::from(INTERRUPTED))
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use std::io::{BufRead, BufReader};
+    use std::process::{Command, Stdio};
+    use std::time::{Duration, Instant};
+
+    use super::*;
+
+    #[test]
+    fn a_request_is_seen_by_all_clones() {
+        let interrupt = Interrupt::default();
+        let clone = interrupt.clone();
+        assert!(!clone.requested());
+        assert!(!interrupt.request());
+        assert!(clone.requested());
+        assert!(clone.request());
+    }
+
+    /// The process that is interrupted by the test below: not a test of its own.
+    #[test]
+    #[ignore = "run by the_second_signal_ends_the_process"]
+    fn interrupted_process() {
+        let interrupt = install().expect("handler");
+        println!("\nready");
+        let start = Instant::now();
+        while start.elapsed() < Duration::from_secs(20) {
+            if interrupt.requested() {
+                println!("asked to end");
+                std::thread::sleep(Duration::from_secs(20));
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+
+    #[test]
+    fn the_second_signal_ends_the_process() {
+        for signal in ["-TERM", "-INT"] {
+            let mut child = Command::new(std::env::current_exe().expect("this program"))
+                .args([
+                    "signals::tests::interrupted_process",
+                    "--exact",
+                    "--ignored",
+                    "--nocapture",
+                ])
+                .stdout(Stdio::piped())
+                .stderr(Stdio::null())
+                .spawn()
+                .expect("start");
+            let mut lines = BufReader::new(child.stdout.take().expect("stdout")).lines();
+            let mut wait_for = |word: &str| lines.any(|line| line.expect("line").contains(word));
+            let send = |id: u32| {
+                let status = Command::new("kill")
+                    .args([signal, &id.to_string()])
+                    .status();
+                assert!(status.expect("kill").success());
+            };
+            assert!(wait_for("ready"));
+            send(child.id());
+            assert!(wait_for("asked to end"));
+            assert!(
+                child.try_wait().expect("status").is_none(),
+                "ended by the first signal"
+            );
+            send(child.id());
+            assert_eq!(
+                child.wait().expect("status").code(),
+                Some(i32::from(INTERRUPTED))
+            );
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! What a run tells at its end, on stdout.
+
+use crate::collapse::{Failure, STRAINS};
+use serde::Serialize;
+use std::fmt;
+use std::path::PathBuf;
+
+/// Why a run ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Ending {
+    /// The end of the scene's time.
+    Time,
+    /// The wall has moved far enough.
+    WallTravel,
+    /// Enough bonds have broken.
+    BrokenFraction,
+    /// Ctrl-C or SIGTERM.
+    Interrupted,
+    /// A step was not solved.
+    NoConvergence,
+}
+
+/// The result of a run.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Summary {
+    /// The history.
+    pub history: PathBuf,
+    /// Why it ended.
+    pub ending: Ending,
+    /// Steps made.
+    pub steps: u64,
+    /// Simulated time (s).
+    pub time: f64,
+    /// Grains.
+    pub grains: usize,
+    /// Solid fraction of a random sample in its box (–).
+    pub solid_fraction: Option<f64>,
+    /// Bonds at the start.
+    pub bonds: usize,
+    /// Bonds broken in tension, shear and rolling.
+    pub broken: [usize; 3],
+    /// Loads at which the sample failed (N).
+    pub failure: Failure,
+    /// Tolerance of the solver (–).
+    pub tolerance: f64,
+    /// Largest residual of an accepted solve (–).
+    pub worst_residual: f64,
+    /// Sweeps of all solves.
+    pub sweeps: u64,
+    /// Steps that were accepted and missed the tolerance.
+    pub missed_tolerance: u64,
+    /// Solves that were not accepted: their steps were halved.
+    pub rejected: u64,
+    /// Deepest overlap (m).
+    pub penetration: f64,
+    /// Mean diameter of the grains (m).
+    pub mean_diameter: f64,
+    /// Work of forces and drives (J).
+    pub external_work: f64,
+    /// Energy that the books do not account for (J).
+    pub energy_remainder: f64,
+    /// Energy lost in intact bonds, which rigid bonds should not lose (J).
+    pub bond_remainder: f64,
+    /// Processor time of the whole program (s).
+    pub cpu_time: f64,
+}
+
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let ending = match self.ending {
+            Ending::Time => "the end of its time",
+            Ending::WallTravel => "the wall has moved as far as the scene lets it",
+            Ending::BrokenFraction => "as many bonds broken as the scene lets break",
+            Ending::Interrupted => "interrupted",
+            Ending::NoConvergence => "a step was not solved",
+        };
+        writeln!(f, "ended            t = {:.6} s after {} steps: {ending}", self.time, self.steps)?;
+        match self.solid_fraction {
+            Some(fraction) => writeln!(f, "sample           {} grains, solid fraction {fraction:.4}", self.grains)?,
+            None => writeln!(f, "sample           {} grains", self.grains)?,
+        }
+        if self.bonds > 0 {
+            self.write_bonds(f)?;
+        }
+        writeln!(
+            f,
+            "solver           {:.1} sweeps a step, worst residual {:.2e} (tolerance {:.0e}), {} steps missed it, {} solves not accepted",
+            self.sweeps as f64 / self.steps.max(1) as f64,
+            self.worst_residual,
+            self.tolerance,
+            self.missed_tolerance,
+            self.rejected
+        )?;
+        writeln!(f, "penetration      {:.2e} m, {:.1e} mean diameters", self.penetration, self.penetration / self.mean_diameter)?;
+        writeln!(f, "external work    {:.4e} J", self.external_work)?;
+        writeln!(f, "energy remainder {:.2e} J", self.energy_remainder)?;
+        if self.bonds > 0 {
+            writeln!(f, "bond remainder   {:.2e} J, the work of intact bonds: it should be zero", self.bond_remainder)?;
+        }
+        writeln!(f, "CPU time         {:.1} s", self.cpu_time)?;
+        let file = self.history.display();
+        writeln!(f, "history          {file}\n\nlook at it with")?;
+        writeln!(f, "  dem-post info {file}")?;
+        if self.bonds > 0 {
+            writeln!(f, "  dem-post cracks {file}")?;
+        }
+        write!(f, "  dem-post chains {file}\n  dem-post stress-strain {file}")
+    }
+}
+
+impl Summary {
+    fn write_bonds(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let broken: usize = self.broken.iter().sum();
+        let [tension, shear, rolling] = self.broken;
+        writeln!(
+            f,
+            "bonds            {}, broken {broken} ({:.1} %): tension {tension}, shear {shear}, rolling {rolling}",
+            self.bonds,
+            100.0 * broken as f64 / self.bonds as f64
+        )?;
+        let load = |load: Option<f64>| load.map_or("none".into(), |n| format!("{n:.4} N"));
+        writeln!(f, "first break      {}", load(self.failure.first_break))?;
+        for (collapse, strain) in self.failure.collapse.into_iter().zip(STRAINS) {
+            writeln!(f, "collapse load    {} (strain {strain:.0e})", load(collapse))?;
+        }
+        writeln!(f, "5 % broken       {}", load(self.failure.broken_share))
+    }
+}
