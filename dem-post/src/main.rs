@@ -29,16 +29,14 @@ fn run(cli: &Cli) -> Result<()> {
         Command::Cracks(moments) => {
             let history = History::open(&moments.files.history)?;
             let report = cracks::read(&history)?;
-            let mut folder =
-                Folder::create(moments.files.output.as_deref(), &moments.files.history)?;
+            let mut folder = Folder::create(moments.files.output.as_deref(), &moments.files.history)?;
             cracks::write(&history, &report, &moments.times, &mut folder)?;
             report_on(cli, &report, || report.table(), Some(&folder))
         }
         Command::Chains(moments) => {
             let history = History::open(&moments.files.history)?;
             let report = chains::read(&history, &moments.times)?;
-            let mut folder =
-                Folder::create(moments.files.output.as_deref(), &moments.files.history)?;
+            let mut folder = Folder::create(moments.files.output.as_deref(), &moments.files.history)?;
             chains::write(&history, &report, &mut folder)?;
             report_on(cli, &report, || report.table(), Some(&folder))
         }
@@ -53,15 +51,9 @@ fn run(cli: &Cli) -> Result<()> {
 }
 
 /// Results on stdout, as a table or as JSON; the files that were written on stderr.
-fn report_on(
-    cli: &Cli,
-    report: &impl Serialize,
-    table: impl Fn() -> String,
-    folder: Option<&Folder>,
-) -> Result<()> {
+fn report_on(cli: &Cli, report: &impl Serialize, table: impl Fn() -> String, folder: Option<&Folder>) -> Result<()> {
     if cli.json {
-        let json = serde_json::to_string_pretty(report)
-            .map_err(|error| PostError::Usage(error.to_string()))?;
+        let json = serde_json::to_string_pretty(report).map_err(|error| PostError::Usage(error.to_string()))?;
         print(&(json + "\n"))?;
     } else {
         print(&table())?;

@@ -15,26 +15,14 @@ fn layout(dimension: usize) -> Layout {
         normal: [0.0, sign, 0.0],
         radius: 0.0,
         drive,
-        direction: if drive == WallDrive::Fixed {
-            [0.0; 3]
-        } else {
-            [0.0, sign, 0.0]
-        },
+        direction: if drive == WallDrive::Fixed { [0.0; 3] } else { [0.0, sign, 0.0] },
     };
     let d = dimension;
     Layout {
         dimension,
         friction: true,
-        grains: Grains {
-            id: vec![0, 1, 2, 3],
-            radius: vec![1e-3; 4],
-            mass: vec![1.0; 4],
-            inertia: vec![1.0; 4],
-        },
-        walls: vec![
-            wall("bottom", 1.0, WallDrive::Fixed),
-            wall("top", -1.0, WallDrive::Force),
-        ],
+        grains: Grains { id: vec![0, 1, 2, 3], radius: vec![1e-3; 4], mass: vec![1.0; 4], inertia: vec![1.0; 4] },
+        walls: vec![wall("bottom", 1.0, WallDrive::Fixed), wall("top", -1.0, WallDrive::Force)],
         bonds: Bonds {
             pair: vec![[0, 1], [1, 2], [2, 3], [3, 0]],
             rest_gap: vec![0.0; 4],
@@ -50,10 +38,7 @@ fn layout(dimension: usize) -> Layout {
             Observable::new("stress", "Pa", &[d, d]),
             Observable::new("bonds_broken", "", &[]),
         ],
-        parameters: Parameters {
-            scene: "{\"thickness\": 0.5}".into(),
-            ..Parameters::default()
-        },
+        parameters: Parameters { scene: "{\"thickness\": 0.5}".into(), ..Parameters::default() },
         ..Layout::default()
     }
 }
@@ -82,9 +67,7 @@ fn write(path: &Path, l: &Layout) {
         let top = 4e-3 * (1.0 + strain);
         for (at, bond, mode) in [(30, 0, RuptureMode::Shear), (60, 1, RuptureMode::Tension)] {
             if step == at && bonded {
-                writer
-                    .rupture(&rupture(step, time, bond, l.bonds.pair[bond], mode))
-                    .unwrap();
+                writer.rupture(&rupture(step, time, bond, l.bonds.pair[bond], mode)).unwrap();
             }
         }
         let broken = f64::from(u8::from(step >= 30) + u8::from(step >= 60));
@@ -128,12 +111,7 @@ fn rupture(step: i64, time: f64, bond: usize, pair: [i32; 2], mode: RuptureMode)
 fn frame(writer: &mut Writer, l: &Layout, step: i64, top: f64) {
     let (d, w, load) = (l.dimension, l.walls.len(), step as f64);
     let centre = |x: f64, y: f64| if d == 2 { vec![x, y] } else { vec![x, y, 0.0] };
-    let places = [
-        centre(1e-3, 1e-3),
-        centre(3e-3, 1e-3),
-        centre(3e-3, top - 1e-3),
-        centre(1e-3, top - 1e-3),
-    ];
+    let places = [centre(1e-3, 1e-3), centre(3e-3, 1e-3), centre(3e-3, top - 1e-3), centre(1e-3, top - 1e-3)];
     let still = |count: usize| vec![0.0; count * d];
     let mut pair = vec![[3, 0], [2, 1]];
     if w > 0 {
@@ -150,11 +128,7 @@ fn frame(writer: &mut Writer, l: &Layout, step: i64, top: f64) {
         normal: still(m),
         tangent: if d == 3 { still(m) } else { vec![] },
         reaction,
-        moment: if bonded {
-            vec![0.0; m * (d - 1)]
-        } else {
-            vec![]
-        },
+        moment: if bonded { vec![0.0; m * (d - 1)] } else { vec![] },
         gap: vec![0.0; m],
         status: vec![ContactStatus::Stick; m],
         bond: if bonded { vec![-1; m] } else { vec![] },
@@ -166,32 +140,11 @@ fn frame(writer: &mut Writer, l: &Layout, step: i64, top: f64) {
             bonds[bond] = status;
         }
     }
-    let grains = GrainState {
-        position: places.concat(),
-        velocity: still(4),
-        ..GrainState::default()
-    };
-    let position = if w > 0 {
-        [vector(d, 0.0), vector(d, top)].concat()
-    } else {
-        vec![]
-    };
-    let walls = WallState {
-        position,
-        velocity: still(w),
-        force: still(w),
-    };
+    let grains = GrainState { position: places.concat(), velocity: still(4), ..GrainState::default() };
+    let position = if w > 0 { [vector(d, 0.0), vector(d, top)].concat() } else { vec![] };
+    let walls = WallState { position, velocity: still(w), force: still(w) };
     let time = step as f64 * 1e-3;
-    writer
-        .frame(&Frame {
-            step,
-            time,
-            grains: &grains,
-            walls: &walls,
-            contacts: &contacts,
-            bonds: &bonds,
-        })
-        .unwrap();
+    writer.frame(&Frame { step, time, grains: &grains, walls: &walls, contacts: &contacts, bonds: &bonds }).unwrap();
 }
 
 fn sample(l: &Layout) -> (tempfile::TempDir, PathBuf) {
@@ -205,21 +158,11 @@ fn sample(l: &Layout) -> (tempfile::TempDir, PathBuf) {
 fn dem_post(history: &Path, arguments: &[&str]) -> Output {
     let (folder, name) = (history.parent().unwrap(), history.file_name().unwrap());
     let mut command = Command::new(env!("CARGO_BIN_EXE_dem-post"));
-    command
-        .current_dir(folder)
-        .arg(arguments[0])
-        .arg(name)
-        .args(&arguments[1..])
-        .output()
-        .unwrap()
+    command.current_dir(folder).arg(arguments[0]).arg(name).args(&arguments[1..]).output().unwrap()
 }
 
 fn json(output: &Output) -> serde_json::Value {
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
@@ -237,60 +180,24 @@ fn every_command_writes_what_it_promises() {
     for dimension in [2, 3] {
         let (folder, path) = sample(&layout(dimension));
         for (command, files) in [
-            (
-                "cracks",
-                &[
-                    "ruptures.csv",
-                    "broken.csv",
-                    "fragments.csv",
-                    "broken",
-                    "fragments",
-                    "decohesion",
-                ][..],
-            ),
-            (
-                "chains",
-                &["forces.csv", "distribution.csv", "chains", "distribution"],
-            ),
-            (
-                "stress-strain",
-                &["stress-strain.csv", "force-displacement", "stress-strain"],
-            ),
+            ("cracks", &["ruptures.csv", "broken.csv", "fragments.csv", "broken", "fragments", "decohesion"][..]),
+            ("chains", &["forces.csv", "distribution.csv", "chains", "distribution"]),
+            ("stress-strain", &["stress-strain.csv", "force-displacement", "stress-strain"]),
         ] {
             let output = dem_post(&path, &[command]);
-            assert!(
-                output.status.success(),
-                "{}",
-                String::from_utf8_lossy(&output.stderr)
-            );
+            assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
             assert!(!output.stdout.is_empty());
-            let read =
-                |name: String| std::fs::read(folder.path().join("run-post").join(name)).unwrap();
+            let read = |name: String| std::fs::read(folder.path().join("run-post").join(name)).unwrap();
             for file in files {
                 if file.ends_with(".csv") {
-                    assert!(
-                        read(file.to_string())
-                            .iter()
-                            .filter(|&&b| b == b'\n')
-                            .count()
-                            > 1,
-                        "{file}"
-                    );
+                    assert!(read(file.to_string()).iter().filter(|&&b| b == b'\n').count() > 1, "{file}");
                 } else {
                     assert!(read(format!("{file}.png")).starts_with(b"\x89PNG"));
-                    assert!(
-                        String::from_utf8(read(format!("{file}.svg")))
-                            .unwrap()
-                            .starts_with("<svg")
-                    );
+                    assert!(String::from_utf8(read(format!("{file}.svg"))).unwrap().starts_with("<svg"));
                 }
             }
         }
-        let lines = dem_post(&path, &["info"])
-            .stdout
-            .iter()
-            .filter(|&&b| b == b'\n')
-            .count();
+        let lines = dem_post(&path, &["info"]).stdout.iter().filter(|&&b| b == b'\n').count();
         assert!((15..=22).contains(&lines), "{lines} lines");
     }
 }
@@ -303,10 +210,7 @@ fn collapse_is_read_off_the_curve() {
     let found = json(&output);
     let number = |name: &str| found[name].as_f64().unwrap();
     // the strain first exceeds 1e-4 at step 41, and 1e-3 at step 42
-    assert_eq!(
-        (number("collapse_load"), number("collapse_load_1e3")),
-        (40.0, 41.0)
-    );
+    assert_eq!((number("collapse_load"), number("collapse_load_1e3")), (40.0, 41.0));
     assert_eq!(number("collapse_over_cohesion"), 4.0);
     // 5 % of four bonds have broken with the first
     assert_eq!(number("load_at_5_percent_broken"), 30.0);
@@ -316,11 +220,7 @@ fn collapse_is_read_off_the_curve() {
     // 60 steps of 4e-6 m under a mean load of 70 N
     assert!((number("work") - 60.0 * 4e-6 * 70.0).abs() < 1e-9);
     assert!((number("final_strain") - 0.06).abs() < 1e-12);
-    assert!(
-        path.with_file_name("here")
-            .join("stress-strain.csv")
-            .exists()
-    );
+    assert!(path.with_file_name("here").join("stress-strain.csv").exists());
 }
 
 #[test]
@@ -336,14 +236,8 @@ fn a_wall_that_moves_needs_no_prescribed_force() {
 #[test]
 fn cracks_count_bonds_and_pieces() {
     let (_folder, path) = sample(&layout(2));
-    let found = json(&dem_post(
-        &path,
-        &["cracks", "--json", "--times", "0.03,0.1"],
-    ));
-    assert_eq!(
-        found["broken"],
-        serde_json::json!({"tension": 1, "shear": 1, "rolling": 0})
-    );
+    let found = json(&dem_post(&path, &["cracks", "--json", "--times", "0.03,0.1"]));
+    assert_eq!(found["broken"], serde_json::json!({"tension": 1, "shear": 1, "rolling": 0}));
     assert_eq!(found["first_break"], 0.03);
     // two bonds of a ring leave two pieces: 1 alone, and 2–3–0
     let last = found["fragments"].as_array().unwrap().last().unwrap();
@@ -356,14 +250,7 @@ fn chains_tell_compression_from_tension() {
     let (_folder, path) = sample(&layout(2));
     let found = json(&dem_post(&path, &["chains", "--json", "--times", "0.1"]));
     let network = &found["networks"][0];
-    assert_eq!(
-        (
-            &network["contacts"],
-            &network["in_tension"],
-            &network["strong"]
-        ),
-        (&4.into(), &3.into(), &1.into())
-    );
+    assert_eq!((&network["contacts"], &network["in_tension"], &network["strong"]), (&4.into(), &3.into(), &1.into()));
     assert_eq!(network["mean"], 62.5);
 }
 
@@ -373,24 +260,13 @@ fn what_a_scene_lacks_is_named() {
     loose.bonds = Bonds::default();
     let (_folder, path) = sample(&loose);
     refused(&dem_post(&path, &["cracks"]), 2, &["run.h5", "bonds"]);
-    let free = Layout {
-        walls: vec![],
-        observables: vec![],
-        ..layout(2)
-    };
+    let free = Layout { walls: vec![], observables: vec![], ..layout(2) };
     let (folder, path) = sample(&free);
     refused(&dem_post(&path, &["stress-strain"]), 2, &["driven wall"]);
-    refused(
-        &dem_post(&path, &["chains", "--times", "0"]),
-        2,
-        &["no contact carries a force"],
-    );
+    refused(&dem_post(&path, &["chains", "--times", "0"]), 2, &["no contact carries a force"]);
     // nothing was left behind
     assert!(!folder.path().join("run-post").exists());
-    let unobserved = Layout {
-        observables: vec![],
-        ..layout(2)
-    };
+    let unobserved = Layout { observables: vec![], ..layout(2) };
     let (_folder, path) = sample(&unobserved);
     refused(&dem_post(&path, &["stress-strain"]), 2, &["wall_position"]);
     assert!(dem_post(&path, &["cracks"]).status.success());
@@ -402,22 +278,10 @@ fn wrong_arguments_are_refused() {
     let (_folder, path) = sample(&layout(2));
     for times in ["7", "-1", "nan"] {
         let times = format!("--times={times}");
-        refused(
-            &dem_post(&path, &["cracks", &times]),
-            2,
-            &["--times", "0 s to 0.1 s"],
-        );
+        refused(&dem_post(&path, &["cracks", &times]), 2, &["--times", "0 s to 0.1 s"]);
     }
-    refused(
-        &dem_post(&path, &["stress-strain", "--wall", "bottom"]),
-        2,
-        &["top"],
-    );
-    refused(
-        &dem_post(&path, &["cracks", "--tims", "1"]),
-        2,
-        &["--times"],
-    );
+    refused(&dem_post(&path, &["stress-strain", "--wall", "bottom"]), 2, &["top"]);
+    refused(&dem_post(&path, &["cracks", "--tims", "1"]), 2, &["--times"]);
 }
 
 #[test]
@@ -432,31 +296,11 @@ fn wrong_files_are_refused() {
     let foreign = folder.path().join("foreign.h5");
     hdf5::File::create(&foreign).unwrap();
     for command in ["info", "cracks", "chains", "stress-strain"] {
-        refused(
-            &dem_post(&folder.path().join("none.h5"), &[command]),
-            4,
-            &["none.h5", "does not exist"],
-        );
-        refused(
-            &dem_post(&file("text.h5", b"x,y\n"), &[command]),
-            4,
-            &["text.h5", "not an HDF5 file"],
-        );
-        refused(
-            &dem_post(&file("cut.h5", &bytes[..bytes.len() / 2]), &[command]),
-            4,
-            &["cut.h5", "truncated"],
-        );
-        refused(
-            &dem_post(&foreign, &[command]),
-            4,
-            &["foreign.h5", "not a history"],
-        );
+        refused(&dem_post(&folder.path().join("none.h5"), &[command]), 4, &["none.h5", "does not exist"]);
+        refused(&dem_post(&file("text.h5", b"x,y\n"), &[command]), 4, &["text.h5", "not an HDF5 file"]);
+        refused(&dem_post(&file("cut.h5", &bytes[..bytes.len() / 2]), &[command]), 4, &["cut.h5", "truncated"]);
+        refused(&dem_post(&foreign, &[command]), 4, &["foreign.h5", "not a history"]);
     }
     let output = file("taken", b"");
-    refused(
-        &dem_post(&path, &["cracks", "-o", output.to_str().unwrap()]),
-        4,
-        &["taken"],
-    );
+    refused(&dem_post(&path, &["cracks", "-o", output.to_str().unwrap()]), 4, &["taken"]);
 }
