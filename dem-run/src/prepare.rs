@@ -85,8 +85,7 @@ pub fn lattice<D: Dim>(lattice: &Lattice) -> Vec<Ball<D>> {
         }
         Lattice::Square { rows, columns, .. } => {
             for row in 0..rows {
-                (0..columns)
-                    .for_each(|column| add([r * (1.0 + 2.0 * column as f64), r * (1.0 + 2.0 * row as f64), 0.0]));
+                (0..columns).for_each(|column| add([r * (1.0 + 2.0 * column as f64), r * (1.0 + 2.0 * row as f64), 0.0]));
             }
         }
         Lattice::Cubic { counts: [nx, ny, nz], .. } => {
@@ -203,12 +202,7 @@ fn packing_world<D: Dim>(grains: Grains<D>, sides: &[f64; 2], top: f64, from_top
 
 fn solver() -> SolverSettings {
     // a step that is solved less finely than asked is only a worse packing: the next one goes on from it
-    SolverSettings::GaussSeidel(GaussSeidelSettings {
-        local: LocalSolve::Exact,
-        tolerance: 1e-4,
-        accept: f64::INFINITY,
-        max_sweeps: 5_000,
-    })
+    SolverSettings::GaussSeidel(GaussSeidelSettings { local: LocalSolve::Exact, tolerance: 1e-4, accept: f64::INFINITY, max_sweeps: 5_000 })
 }
 
 /// Push with the lid, or with gravity where there is none, so hard that a free body would move by `travel` (m).

@@ -92,12 +92,7 @@ impl fmt::Display for Summary {
             self.missed_tolerance,
             self.rejected
         )?;
-        writeln!(
-            f,
-            "penetration      {:.2e} m, {:.1e} mean diameters",
-            self.penetration,
-            self.penetration / self.mean_diameter
-        )?;
+        writeln!(f, "penetration      {:.2e} m, {:.1e} mean diameters", self.penetration, self.penetration / self.mean_diameter)?;
         writeln!(f, "external work    {:.4e} J", self.external_work)?;
         writeln!(f, "energy remainder {:.2e} J", self.energy_remainder)?;
         if self.bonds > 0 {

@@ -282,7 +282,11 @@ impl Time {
     pub fn steps(&self) -> u64 {
         let ratio = self.end / self.step;
         let whole = ratio.round();
-        if (ratio - whole).abs() <= 1e-9 * whole { whole as u64 } else { ratio.ceil() as u64 }
+        if (ratio - whole).abs() <= 1e-9 * whole {
+            whole as u64
+        } else {
+            ratio.ceil() as u64
+        }
     }
 }
 
@@ -294,7 +298,9 @@ impl Bonds {
         match (self.strength, self.stress) {
             (Some(strength), _) => strength,
             (None, Some(stress)) if dimension == 2 => stress * mean_diameter * thickness,
-            (None, Some(stress)) => stress * std::f64::consts::PI * mean_diameter * mean_diameter / 4.0,
+            (None, Some(stress)) => {
+                stress * std::f64::consts::PI * mean_diameter * mean_diameter / 4.0
+            }
             (None, None) => 0.0,
         }
     }
@@ -306,10 +312,38 @@ mod tests {
 
     #[test]
     fn steps_are_whole_where_the_ratio_is_whole_to_rounding() {
-        assert_eq!(Time { step: 1e-4, end: 0.5 }.steps(), 5000);
-        assert_eq!(Time { step: 0.1, end: 0.3 }.steps(), 3);
-        assert_eq!(Time { step: 0.1, end: 0.31 }.steps(), 4);
-        assert_eq!(Time { step: 0.1, end: 0.0 }.steps(), 0);
+        assert_eq!(
+            Time {
+                step: 1e-4,
+                end: 0.5
+            }
+            .steps(),
+            5000
+        );
+        assert_eq!(
+            Time {
+                step: 0.1,
+                end: 0.3
+            }
+            .steps(),
+            3
+        );
+        assert_eq!(
+            Time {
+                step: 0.1,
+                end: 0.31
+            }
+            .steps(),
+            4
+        );
+        assert_eq!(
+            Time {
+                step: 0.1,
+                end: 0.0
+            }
+            .steps(),
+            0
+        );
     }
 
     #[test]
@@ -324,6 +358,14 @@ mod tests {
         };
         assert!((bonds.cohesion(2, 4e-3, 0.01) - 40.0).abs() < 1e-12);
         assert!((bonds.cohesion(3, 4e-3, 0.01) - 4.0 * std::f64::consts::PI).abs() < 1e-12);
-        assert_eq!(Bonds { strength: Some(5.0), stress: None, ..bonds }.cohesion(2, 4e-3, 0.01), 5.0);
+        assert_eq!(
+            Bonds {
+                strength: Some(5.0),
+                stress: None,
+                ..bonds
+            }
+            .cohesion(2, 4e-3, 0.01),
+            5.0
+        );
     }
 }
