@@ -60,7 +60,7 @@ pub struct Moments {
     /// The files.
     #[command(flatten)]
     pub files: Files,
-    /// Times of the maps, s, as in 0.1,0.15 [default: first break, collapse, end].
+    /// Times of the maps, s, as in 0.1,0.15 [default: first break, 5 % broken, end].
     #[arg(long, value_name = "T,…", value_delimiter = ',')]
     pub times: Vec<f64>,
 }

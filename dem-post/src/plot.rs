@@ -70,12 +70,14 @@ impl Drawing {
 pub enum Style {
     /// Joined points.
     Line,
-    /// Joined points by a wide line, for a curve that another one covers.
-    Wide,
+    /// Joined points by a thin line, for what scatters.
+    Thin,
     /// A value that holds until the next point.
     Steps,
     /// Joined points, each with a dot.
     Marked,
+    /// A dashed level in the legend.
+    Level,
 }
 
 /// A named curve.
@@ -107,10 +109,10 @@ pub struct Chart {
     pub counts: bool,
     /// The curves.
     pub curves: Vec<Curve>,
-    /// Marked values of y, with what they are.
+    /// Marked values of y, with what they are for the legend.
     pub levels: Vec<(f64, String)>,
-    /// Marked values of x, with what they are.
-    pub moments: Vec<(f64, String)>,
+    /// Marked values of x.
+    pub moments: Vec<f64>,
 }
 
 impl Chart {
@@ -145,10 +147,12 @@ impl Chart {
         canvas.finish()
     }
 
-    /// Name, colour and style of each curve; a chart of one curve needs no legend.
+    /// Name, colour and style of each curve and each marked level; what stands alone needs no name.
     fn legend(&self) -> Vec<(String, &'static str, Style)> {
-        let entry = |curve: &Curve| (curve.label.clone(), curve.colour, curve.style);
-        if self.curves.len() < 2 { vec![] } else { self.curves.iter().map(entry).collect() }
+        let curves = self.curves.iter().map(|curve| (curve.label.clone(), curve.colour, curve.style));
+        let levels = self.levels.iter().map(|(_, label)| (label.clone(), colour::GREY, Style::Level));
+        let entries: Vec<_> = curves.chain(levels).collect();
+        if entries.len() < 2 { vec![] } else { entries }
     }
 
     fn build(mut self) -> (Vec<Plot>, Layout) {
@@ -170,13 +174,11 @@ impl Chart {
             .with_box_axes();
         layout.show_legend = false;
         layout = self.scale_axes(layout);
-        for (value, label) in self.levels {
-            let line = ReferenceLine::horizontal(value).with_color(colour::GREY).with_label(label);
-            layout = layout.with_reference_line(line);
+        for (value, _) in self.levels {
+            layout = layout.with_reference_line(ReferenceLine::horizontal(value).with_color(colour::GREY));
         }
-        for (value, label) in self.moments {
-            let line = ReferenceLine::vertical(value).with_color(colour::GREY).with_label(label);
-            layout = layout.with_reference_line(line);
+        for value in self.moments {
+            layout = layout.with_reference_line(ReferenceLine::vertical(value).with_color(colour::GREY));
         }
         (plots, layout)
     }
@@ -225,11 +227,18 @@ fn power_of_ten(value: f64) -> String {
 
 /// The names of the curves in one row around `middle`.
 fn draw_legend(canvas: &mut Canvas, legend: &[(String, &'static str, Style)], middle: (f64, f64)) {
-    let width = |text: &str| 52.0 + 7.8 * text.chars().count() as f64;
+    let width = |text: &str| 50.0 + 7.8 * text.chars().count() as f64;
     let total: f64 = legend.iter().map(|(text, ..)| width(text)).sum();
     let (mut x, y) = (middle.0 - 0.5 * total, middle.1);
     for (text, colour, style) in legend {
-        canvas.line((x, y), (x + 26.0, y), colour, if *style == Style::Wide { 5.0 } else { 2.2 });
+        match style {
+            Style::Level => {
+                for dash in [0.0, 7.0, 14.0, 21.0] {
+                    canvas.line((x + dash, y), (x + dash + 4.0, y), colour, 1.4);
+                }
+            }
+            _ => canvas.line((x, y), (x + 26.0, y), colour, 2.2),
+        }
         if *style == Style::Marked {
             canvas.disk((x + 13.0, y), 3.5, colour, colour, 0.5);
         }
@@ -243,8 +252,8 @@ impl Curve {
         let points = || self.points.iter().copied();
         let line = LinePlot::new().with_data(points()).with_color(self.colour).with_stroke_width(1.8);
         match self.style {
-            Style::Line => vec![line.into()],
-            Style::Wide => vec![line.with_stroke_width(5.0).into()],
+            Style::Line | Style::Level => vec![line.into()],
+            Style::Thin => vec![line.with_stroke_width(1.0).into()],
             Style::Steps => vec![line.with_step().into()],
             Style::Marked => {
                 let dots = ScatterPlot::new().with_data(points()).with_color(self.colour).with_size(3.5);

@@ -170,19 +170,6 @@ fn along(history: &History, series: &Series, wall: usize, direction: &[f64; 3], 
     Ok(sum)
 }
 
-/// The time at which the sample collapses, s: the last step before the fitted strain exceeds 1e-4. `None` where nothing
-/// is driven, or nothing collapses.
-///
-/// # Errors
-/// Those of reading the history.
-pub fn collapse_time(history: &History) -> Result<Option<f64>> {
-    match read(history, None) {
-        Ok(report) => Ok(report.summary.collapse_time),
-        Err(PostError::Lacking { .. } | PostError::Usage(_)) => Ok(None),
-        Err(error) => Err(error),
-    }
-}
-
 fn lacking(path: &Path, what: String) -> PostError {
     PostError::Lacking { path: path.into(), what }
 }
@@ -369,12 +356,12 @@ fn force_displacement(report: &Report) -> Chart {
     chart.set_off = true;
     if !report.reaction.is_empty() {
         let points = pairs(&report.displacement, 1e3, &report.reaction, 1.0);
-        chart = chart.curve("reaction of the grains", colour::ORANGE, Style::Wide, points);
+        chart = chart.curve("reaction of the grains", colour::ORANGE, Style::Thin, points);
     }
     let points = pairs(&report.displacement, 1e3, &report.load, 1.0);
     chart = chart.curve("applied force", colour::BLUE, Style::Line, points);
     if let Some(load) = report.summary.collapse_load {
-        chart.levels.push((load, format!("collapse {} N", short(load))));
+        chart.levels.push((load, format!("at strain 10⁻⁴: {} N", short(load))));
     }
     chart
 }
@@ -390,9 +377,9 @@ fn onset(report: &Report) -> Option<Chart> {
     let mut chart = Chart::new("magnitude of the axial strain, from the particles", "applied force (N)");
     chart = chart.curve("applied force", colour::BLUE, Style::Line, points);
     chart.log_x = true;
-    chart.moments = COLLAPSE.iter().map(|&strain| (strain, String::new())).collect();
+    chart.moments = COLLAPSE.to_vec();
     if let Some(load) = report.summary.collapse_load {
-        chart.levels.push((load, format!("collapse {} N", short(load))));
+        chart.levels.push((load, format!("at strain 10⁻⁴: {} N", short(load))));
     }
     Some(chart)
 }
@@ -404,14 +391,14 @@ fn stress_strain(report: &Report) -> Chart {
     let wall_stress = 1e-3 / report.summary.area;
     if !report.reaction.is_empty() {
         let points = pairs(&report.displacement, wall_strain, &report.reaction, wall_stress);
-        chart = chart.curve("from the walls", colour::ORANGE, Style::Wide, points);
+        chart = chart.curve("from walls", colour::ORANGE, Style::Thin, points);
     }
     let points = pairs(&report.strain, 1e2, &report.stress, 1e-3);
     if !points.is_empty() {
-        chart = chart.curve("from the particles", colour::BLUE, Style::Line, points);
+        chart = chart.curve("from particles", colour::BLUE, Style::Thin, points);
     }
     if let Some(load) = report.summary.collapse_load {
-        chart.levels.push((load * wall_stress, format!("collapse {} kPa", short(load * wall_stress))));
+        chart.levels.push((load * wall_stress, format!("at strain 10⁻⁴: {} kPa", short(load * wall_stress))));
     }
     chart
 }
