@@ -22,7 +22,7 @@ pub struct Sample {
     dimension: usize,
     axes: [usize; 2],
     /// Corners of what may be shown, m: the first frame and as much again around it.
-    limits: [[f64; 2]; 2],
+    limits: Box2,
 }
 
 /// One moment.
@@ -87,19 +87,43 @@ impl Sample {
     }
 
     /// The box around the grains within `limits`, `[low, high]`, m.
-    fn bounds(&self, state: &GrainState, limits: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
-        let mut found = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
-        for (grain, radius) in self.radius.iter().enumerate() {
+    fn bounds(&self, state: &GrainState, limits: Box2) -> Box2 {
+        let mut found = EMPTY;
+        for (grain, &radius) in self.radius.iter().enumerate() {
             let centre = self.centre(state, grain);
             if (0..2).all(|k| (limits[0][k]..=limits[1][k]).contains(&centre[k])) {
-                for k in 0..2 {
-                    found[0][k] = found[0][k].min(centre[k] - radius);
-                    found[1][k] = found[1][k].max(centre[k] + radius);
-                }
+                found = union(found, around(centre, radius));
             }
         }
         found
     }
+
+    /// The box around what a panel shows: its grains, and of its round walls what is near.
+    fn extent(&self, panel: &Panel) -> Box2 {
+        let mut found = self.bounds(&panel.grains, self.limits);
+        for (wall, position) in self.walls.iter().zip(panel.walls.position.chunks(self.dimension)) {
+            if wall.kind != WallKind::Plane {
+                let [low, high] = around(self.flat(position), wall.radius.abs());
+                let near = |k: usize, x: f64| x.clamp(self.limits[0][k], self.limits[1][k]);
+                found = union(found, [[near(0, low[0]), near(1, low[1])], [near(0, high[0]), near(1, high[1])]]);
+            }
+        }
+        found
+    }
+}
+
+/// Lower and upper corner of a box, m.
+type Box2 = [[f64; 2]; 2];
+
+/// The box that holds nothing.
+const EMPTY: Box2 = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
+
+fn around(centre: [f64; 2], radius: f64) -> Box2 {
+    [centre.map(|x| x - radius), centre.map(|x| x + radius)]
+}
+
+fn union([l, h]: Box2, [low, high]: Box2) -> Box2 {
+    [[l[0].min(low[0]), l[1].min(low[1])], [h[0].max(high[0]), h[1].max(high[1])]]
 }
 
 /// From metres to units of the drawing, for one panel.
@@ -127,10 +151,7 @@ impl Frame {
 
 /// Draws the panels side by side on one scale, with a scale bar and the legend below.
 pub fn draw(sample: &Sample, panels: &[Panel], legend: &[Key]) -> Drawing {
-    let bounds = panels.iter().map(|panel| sample.bounds(&panel.grains, sample.limits));
-    let [low, high] = bounds.fold([[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]], |[low, high], [l, h]| {
-        [[low[0].min(l[0]), low[1].min(l[1])], [high[0].max(h[0]), high[1].max(h[1])]]
-    });
+    let [low, high] = panels.iter().fold(EMPTY, |all, panel| union(all, sample.extent(panel)));
     // room for the hatching of walls
     let extent = [high[0] - low[0], high[1] - low[1]];
     let scale = ((PANEL.0 - 4.0 * HATCH) / extent[0]).min((PANEL.1 - 4.0 * HATCH) / extent[1]);
@@ -159,6 +180,7 @@ fn draw_panel(canvas: &mut Canvas, sample: &Sample, panel: &Panel, frame: &Frame
         let at = (frame.corner.0 + 0.5 * frame.size.0, 17.0 + 18.0 * line as f64);
         canvas.text(at, text, 14, Anchor::Middle);
     }
+    canvas.clip(frame.corner, frame.size);
     for (wall, position) in sample.walls.iter().zip(panel.walls.position.chunks(sample.dimension)) {
         draw_wall(canvas, sample, wall, position, frame);
     }
@@ -180,6 +202,7 @@ fn draw_panel(canvas: &mut Canvas, sample: &Sample, panel: &Panel, frame: &Frame
             canvas.line(ends[0], ends[1], link.colour, link.width);
         }
     }
+    canvas.end_clip();
 }
 
 fn draw_wall(canvas: &mut Canvas, sample: &Sample, wall: &Wall, position: &[f64], frame: &Frame) {

@@ -301,6 +301,22 @@ impl Canvas {
         Self(Scene::new(width, height))
     }
 
+    /// Shows of what is drawn until [`Canvas::end_clip`] only what lies in a rectangle.
+    pub fn clip(&mut self, corner: (f64, f64), size: (f64, f64)) {
+        self.0.add(Primitive::ClipStart {
+            x: corner.0,
+            y: corner.1,
+            width: size.0,
+            height: size.1,
+            id: format!("panel-{}", self.0.elements.len()),
+        });
+    }
+
+    /// Ends what [`Canvas::clip`] began.
+    pub fn end_clip(&mut self) {
+        self.0.add(Primitive::ClipEnd);
+    }
+
     /// A disk with an outline.
     pub fn disk(&mut self, centre: (f64, f64), radius: f64, fill: &str, outline: &str, width: f64) {
         self.0.add(Primitive::Circle {
