@@ -1,5 +1,6 @@
 //! The `dem-post` command.
 
+use std::io::Write;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -14,7 +15,7 @@ fn main() -> ExitCode {
     match run(&cli) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("dem-post: {error}");
+            note(&format!("dem-post: {error}"));
             ExitCode::from(error.exit_code())
         }
     }
@@ -60,8 +61,13 @@ fn report_on(cli: &Cli, report: &impl Serialize, table: impl Fn() -> String, fol
     }
     if !cli.quiet {
         for path in folder.map_or(&[][..], Folder::written) {
-            eprintln!("wrote {}", path.display());
+            note(&format!("wrote {}", path.display()));
         }
     }
     Ok(())
+}
+
+/// A line on stderr; one that nobody reads is no error.
+fn note(line: &str) {
+    let _ = writeln!(std::io::stderr(), "{line}");
 }
