@@ -78,9 +78,7 @@ pub fn read(history: &History, times: &[f64]) -> Result<Report> {
     let mut networks = vec![];
     for frame in moments::chosen(history, times)? {
         let contacts = history.contacts(frame)?;
-        let forces: Vec<f64> = (0..contacts.len())
-            .map(|c| contacts.normal_force(c))
-            .collect();
+        let forces: Vec<f64> = (0..contacts.len()).map(|c| contacts.normal_force(c)).collect();
         let statistics = statistics(&forces);
         networks.push(Network {
             frame,
@@ -91,22 +89,10 @@ pub fn read(history: &History, times: &[f64]) -> Result<Report> {
             contacts,
         });
     }
-    if networks
-        .iter()
-        .all(|network| network.statistics.contacts == 0)
-    {
-        let moments: Vec<String> = networks
-            .iter()
-            .map(|network| format!("{} s", number(network.time)))
-            .collect();
-        let what = format!(
-            "no contact carries a force at {}: choose other moments by --times",
-            moments.join(", ")
-        );
-        return Err(PostError::Lacking {
-            path: history.path().into(),
-            what,
-        });
+    if networks.iter().all(|network| network.statistics.contacts == 0) {
+        let moments: Vec<String> = networks.iter().map(|network| format!("{} s", number(network.time))).collect();
+        let what = format!("no contact carries a force at {}: choose other moments by --times", moments.join(", "));
+        return Err(PostError::Lacking { path: history.path().into(), what });
     }
     Ok(Report { networks })
 }
@@ -114,11 +100,7 @@ pub fn read(history: &History, times: &[f64]) -> Result<Report> {
 /// Magnitudes of the forces that count.
 fn carried(forces: &[f64]) -> Vec<f64> {
     let greatest = forces.iter().fold(0.0f64, |max, f| max.max(f.abs()));
-    forces
-        .iter()
-        .map(|f| f.abs())
-        .filter(|&f| f > CARRIES * greatest)
-        .collect()
+    forces.iter().map(|f| f.abs()).filter(|&f| f > CARRIES * greatest).collect()
 }
 
 /// What `forces` (N, positive in compression) are like; all zero where none is.
@@ -225,36 +207,16 @@ pub fn write(history: &History, report: &Report, folder: &mut Folder) -> Result<
             let ratio = if mean > 0.0 { force.abs() / mean } else { 0.0 };
             let [i, j] = contacts.pair[c];
             let (tangential, status) = (contacts.tangential_force(c), contacts.status[c].label());
-            row![
-                network.step,
-                network.time,
-                i,
-                j,
-                force,
-                tangential,
-                ratio,
-                u8::from(ratio > 1.0),
-                status
-            ]
+            row![network.step, network.time, i, j, force, tangential, ratio, u8::from(ratio > 1.0), status]
         })
     });
     folder.table("forces", &head, rows)?;
     let rows = report.networks.iter().flat_map(|network| {
-        network
-            .distribution
-            .iter()
-            .map(|(ratio, density)| row![network.step, network.time, ratio, density])
+        network.distribution.iter().map(|(ratio, density)| row![network.step, network.time, ratio, density])
     });
-    folder.table(
-        "distribution",
-        &["step", "time_s", "ratio_to_mean", "density"],
-        rows,
-    )?;
+    folder.table("distribution", &["step", "time_s", "ratio_to_mean", "density"], rows)?;
     folder.draw("chains", &network_map(history, report)?)?;
-    folder.draw(
-        "distribution",
-        &Chart::draw(vec![distribution_chart(report)]),
-    )
+    folder.draw("distribution", &Chart::draw(vec![distribution_chart(report)]))
 }
 
 fn distribution_chart(report: &Report) -> Chart {
@@ -277,16 +239,8 @@ fn network_map(history: &History, report: &Report) -> Result<Drawing> {
         let state = history.grain_state(network.frame)?;
         let s = network.statistics;
         panels.push(Panel {
-            caption: vec![
-                format!("t = {} s", number(network.time)),
-                format!("⟨f⟩ = {} N", number(s.mean)),
-            ],
-            links: links(
-                &network.contacts,
-                &state.position,
-                s.mean,
-                history.dimension(),
-            ),
+            caption: vec![format!("t = {} s", number(network.time)), format!("⟨f⟩ = {} N", short(s.mean))],
+            links: links(&network.contacts, &state.position, s.mean, history.dimension()),
             grains: state,
             walls: history.wall_state(network.frame)?,
             fills: vec!["#f4f4f4"; grains],
@@ -305,31 +259,17 @@ fn network_map(history: &History, report: &Report) -> Result<Drawing> {
 /// The lines of a network, the strongest last, so that they lie on top.
 fn links(contacts: &ContactRows, position: &[f64], mean: f64, d: usize) -> Vec<Link> {
     let centre = |grain: i32| position[grain as usize * d..(grain as usize + 1) * d].to_vec();
-    let mut order: Vec<usize> = (0..contacts.len())
-        .filter(|&c| contacts.normal_force(c).abs() > CARRIES * mean)
-        .collect();
-    order.sort_by(|&a, &b| {
-        contacts
-            .normal_force(a)
-            .abs()
-            .total_cmp(&contacts.normal_force(b).abs())
-    });
+    let mut order: Vec<usize> =
+        (0..contacts.len()).filter(|&c| contacts.normal_force(c).abs() > CARRIES * mean).collect();
+    order.sort_by(|&a, &b| contacts.normal_force(a).abs().total_cmp(&contacts.normal_force(b).abs()));
     let link = |c: usize| {
         let ([i, j], force) = (contacts.pair[c], contacts.normal_force(c));
         let (ratio, tension) = (force.abs() / mean, usize::from(force < 0.0));
         Link {
             from: centre(i),
-            to: if j < 0 {
-                contacts.point[c * d..(c + 1) * d].to_vec()
-            } else {
-                centre(j)
-            },
+            to: if j < 0 { contacts.point[c * d..(c + 1) * d].to_vec() } else { centre(j) },
             width: (WIDTH.0 * ratio).min(WIDTH.1),
-            colour: if ratio > 1.0 {
-                [colour::BLUE, colour::VERMILLION][tension]
-            } else {
-                PALE[tension]
-            },
+            colour: if ratio > 1.0 { [colour::BLUE, colour::VERMILLION][tension] } else { PALE[tension] },
         }
     };
     order.into_iter().map(link).collect()
@@ -344,10 +284,7 @@ mod tests {
         // |f| = 1, 1, 2, 4: mean 2, strong is the 4 alone; the zero and the rounding error carry nothing
         let s = statistics(&[1.0, -1.0, 2.0, -4.0, 0.0, 1e-12]);
         assert_eq!((s.contacts, s.in_tension, s.strong), (4, 2, 1));
-        assert_eq!(
-            (s.mean, s.greatest_compression, s.greatest_tension),
-            (2.0, 2.0, 4.0)
-        );
+        assert_eq!((s.mean, s.greatest_compression, s.greatest_tension), (2.0, 2.0, 4.0));
         assert_eq!(s.strong_share, 0.5);
         assert!((s.spread - 1.5f64.sqrt() / 2.0).abs() < 1e-15);
     }
@@ -361,9 +298,7 @@ mod tests {
 
     #[test]
     fn the_distribution_integrates_to_one() {
-        let forces: Vec<f64> = (1..200)
-            .map(|k| f64::from(k) * if k % 3 == 0 { -0.1 } else { 0.1 })
-            .collect();
+        let forces: Vec<f64> = (1..200).map(|k| f64::from(k) * if k % 3 == 0 { -0.1 } else { 0.1 }).collect();
         let density = distribution(&forces, statistics(&forces).mean);
         let mut low = 0.0;
         let mut sum = 0.0;
@@ -374,12 +309,7 @@ mod tests {
         }
         assert!((sum - 1.0).abs() < 1e-12);
         // uniform magnitudes: |f|/⟨f⟩ is uniform on 0…2, with density 1/2
-        assert!(
-            density
-                .iter()
-                .all(|(_, density)| (density - 0.5).abs() < 0.03),
-            "{density:?}"
-        );
+        assert!(density.iter().all(|(_, density)| (density - 0.5).abs() < 0.03), "{density:?}");
     }
 
     #[test]
@@ -402,13 +332,7 @@ mod tests {
         };
         let lines = links(&contacts, &[0.0, 0.0, 1.0, 0.0], 2.0, 2);
         // the stronger one comes last
-        assert_eq!(
-            (lines[0].from.as_slice(), lines[0].to.as_slice()),
-            (&[1.0, 0.0][..], &[1.0, -0.5][..])
-        );
-        assert_eq!(
-            (lines[1].to.as_slice(), lines[1].colour),
-            (&[1.0, 0.0][..], colour::VERMILLION)
-        );
+        assert_eq!((lines[0].from.as_slice(), lines[0].to.as_slice()), (&[1.0, 0.0][..], &[1.0, -0.5][..]));
+        assert_eq!((lines[1].to.as_slice(), lines[1].colour), (&[1.0, 0.0][..], colour::VERMILLION));
     }
 }

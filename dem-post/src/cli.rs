@@ -6,7 +6,7 @@ use clap::{Args, Parser, Subcommand};
 
 /// Looks at the histories that `dem-run run` writes.
 #[derive(Debug, Parser)]
-#[command(name = "dem-post", version, about, propagate_version = true)]
+#[command(name = "dem-post", version, propagate_version = true)]
 pub struct Cli {
     /// What to look at.
     #[command(subcommand)]
@@ -49,7 +49,7 @@ pub struct Files {
     /// The history.
     #[arg(value_name = "FILE.h5")]
     pub history: PathBuf,
-    /// Folder for the results, created if need be [default: <stem of FILE.h5>-post].
+    /// Folder for the results, created if need be [default: FILE-post].
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
 }
@@ -60,7 +60,7 @@ pub struct Moments {
     /// The files.
     #[command(flatten)]
     pub files: Files,
-    /// Times of the maps, s, as in 0.1,0.15 [default: first break, collapse, end].
+    /// Times of the maps, s, as in 0.1,0.15 [default: first break, 5 % broken, end].
     #[arg(long, value_name = "T,…", value_delimiter = ',')]
     pub times: Vec<f64>,
 }

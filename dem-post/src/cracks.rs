@@ -108,10 +108,7 @@ pub fn read(history: &History) -> Result<Report> {
     let bonds = history.bonds()?;
     if bonds.is_empty() {
         let what = "cracks need bonds, and this scene has none: add `bonds` to the scene".into();
-        return Err(PostError::Lacking {
-            path: history.path().into(),
-            what,
-        });
+        return Err(PostError::Lacking { path: history.path().into(), what });
     }
     let ruptures = history.ruptures()?;
     let mut broken = Modes::default();
@@ -120,20 +117,14 @@ pub fn read(history: &History) -> Result<Report> {
     let mut pieces = vec![];
     for (frame, (&step, &time)) in history.steps().iter().zip(history.times()).enumerate() {
         let fragments = fragments(&mass, &bonds, &history.bond_status(frame)?);
-        pieces.push(Pieces {
-            step,
-            time,
-            fragments,
-        });
+        pieces.push(Pieces { step, time, fragments });
     }
     let five = (bonds.len() as f64 * 0.05).ceil() as usize;
     Ok(Report {
         bonds: bonds.len(),
         broken,
         first_break: ruptures.first().map(|rupture| rupture.time),
-        time_of_5_percent: ruptures
-            .get(five.saturating_sub(1))
-            .map(|rupture| rupture.time),
+        time_of_5_percent: ruptures.get(five.saturating_sub(1)).map(|rupture| rupture.time),
         events: ruptures.iter().map(Event::from).collect(),
         fragments: pieces,
     })
@@ -162,10 +153,7 @@ pub fn broken_over_time(events: &[Event]) -> Vec<(f64, [usize; 3])> {
     let mut curve: Vec<(f64, [usize; 3])> = vec![];
     let mut count = [0; 3];
     for event in events {
-        let mode = RuptureMode::ALL
-            .iter()
-            .position(|mode| mode.label() == event.mode)
-            .unwrap_or(0);
+        let mode = RuptureMode::ALL.iter().position(|mode| mode.label() == event.mode).unwrap_or(0);
         count[mode] += 1;
         match curve.last_mut() {
             Some((time, counts)) if *time == event.time => *counts = count,
@@ -190,31 +178,21 @@ impl Report {
             ("5 % broken", quantity(self.time_of_5_percent, "s")),
             (
                 "fragments at the end",
-                last.map_or_else(
-                    || "–".into(),
-                    |f| format!("{} ({} single grains)", f.count, f.singles),
-                ),
+                last.map_or_else(|| "–".into(), |f| format!("{} ({} single grains)", f.count, f.singles)),
             ),
             (
                 "largest fragment",
                 last.map_or_else(
                     || "–".into(),
-                    |f| {
-                        format!(
-                            "{} grains, {:.1} % of the mass",
-                            f.largest,
-                            100.0 * f.largest_mass_fraction
-                        )
-                    },
+                    |f| format!("{} grains, {:.1} % of the mass", f.largest, 100.0 * f.largest_mass_fraction),
                 ),
             ),
         ]);
         if self.events.is_empty() {
             return out;
         }
-        let mut table = Text::new(&[
-            "time (s)", "step", "round", "bond", "grains", "mode", "r_n (N)", "r_t (N)", "m (N m)",
-        ]);
+        let mut table =
+            Text::new(&["time (s)", "step", "round", "bond", "grains", "mode", "r_n (N)", "r_t (N)", "m (N m)"]);
         for e in self.events.iter().take(SHOWN) {
             let grains = format!("{}–{}", e.grains[0], e.grains[1]);
             table.row(vec![
@@ -247,43 +225,20 @@ pub fn write(history: &History, report: &Report, times: &[f64], folder: &mut Fol
     let frames = moments::chosen(history, times)?;
     write_ruptures(report, folder)?;
     let curve = broken_over_time(&report.events);
-    let rows = curve
-        .iter()
-        .map(|(time, n)| row![time, n[0], n[1], n[2], n.iter().sum::<usize>()]);
-    folder.table(
-        "broken",
-        &["time_s", "tension", "shear", "rolling", "total"],
-        rows,
-    )?;
+    let rows = curve.iter().map(|(time, n)| row![time, n[0], n[1], n[2], n.iter().sum::<usize>()]);
+    folder.table("broken", &["time_s", "tension", "shear", "rolling", "total"], rows)?;
     let rows = report.fragments.iter().map(|pieces| {
         let f = pieces.fragments;
-        row![
-            pieces.step,
-            pieces.time,
-            f.count,
-            f.singles,
-            f.largest,
-            f.largest_mass_fraction
-        ]
+        row![pieces.step, pieces.time, f.count, f.singles, f.largest, f.largest_mass_fraction]
     });
     folder.table(
         "fragments",
-        &[
-            "step",
-            "time_s",
-            "fragments",
-            "single_grains",
-            "largest_grains",
-            "largest_mass_fraction",
-        ],
+        &["step", "time_s", "fragments", "single_grains", "largest_grains", "largest_mass_fraction"],
         rows,
     )?;
     let end = history.times().last().copied().unwrap_or(0.0);
     folder.draw("broken", &Chart::draw(vec![broken_chart(&curve, end)]))?;
-    folder.draw(
-        "fragments",
-        &Chart::draw(fragment_charts(&report.fragments)),
-    )?;
+    folder.draw("fragments", &Chart::draw(fragment_charts(&report.fragments)))?;
     folder.draw("decohesion", &decohesion(history, &frames)?)
 }
 
@@ -329,18 +284,10 @@ fn broken_chart(curve: &[(f64, [usize; 3])], end: f64) -> Chart {
     let points = |count: &dyn Fn(&[usize; 3]) -> usize| -> Vec<(f64, f64)> {
         let last = curve.last().map_or(0, |(_, n)| count(n));
         let inner = curve.iter().map(|(time, n)| (*time, count(n) as f64));
-        std::iter::once((0.0, 0.0))
-            .chain(inner)
-            .chain([(end, last as f64)])
-            .collect()
+        std::iter::once((0.0, 0.0)).chain(inner).chain([(end, last as f64)]).collect()
     };
     let mut chart = Chart::new("time (s)", "broken bonds")
-        .curve(
-            "all",
-            colour::BLACK,
-            Style::Steps,
-            points(&|n| n.iter().sum()),
-        )
+        .curve("all", colour::BLACK, Style::Steps, points(&|n| n.iter().sum()))
         .curve("tension", colour::BLUE, Style::Steps, points(&|n| n[0]))
         .curve("shear", colour::VERMILLION, Style::Steps, points(&|n| n[1]))
         .curve("rolling", colour::GREEN, Style::Steps, points(&|n| n[2]));
@@ -349,25 +296,10 @@ fn broken_chart(curve: &[(f64, [usize; 3])], end: f64) -> Chart {
 }
 
 fn fragment_charts(pieces: &[Pieces]) -> Vec<Chart> {
-    let points = |value: &dyn Fn(&Fragments) -> f64| {
-        pieces
-            .iter()
-            .map(|p| (p.time, value(&p.fragments)))
-            .collect()
-    };
+    let points = |value: &dyn Fn(&Fragments) -> f64| pieces.iter().map(|p| (p.time, value(&p.fragments))).collect();
     let mut number = Chart::new("time (s)", "number of fragments")
-        .curve(
-            "all",
-            colour::BLACK,
-            Style::Steps,
-            points(&|f| f.count as f64),
-        )
-        .curve(
-            "single grains",
-            colour::VERMILLION,
-            Style::Steps,
-            points(&|f| f.singles as f64),
-        );
+        .curve("all", colour::BLACK, Style::Steps, points(&|f| f.count as f64))
+        .curve("single grains", colour::VERMILLION, Style::Steps, points(&|f| f.singles as f64));
     number.counts = true;
     let largest = Chart::new("time (s)", "largest fragment (% of the mass)").curve(
         "largest fragment",
@@ -388,12 +320,7 @@ fn decohesion(history: &History, frames: &[usize]) -> Result<Drawing> {
         let grains = history.grain_state(frame)?;
         let mut fills = vec![BONDED; history.grains()?.radius.len()];
         let mut broken = 0;
-        for ([i, j], _) in bonds
-            .pair
-            .iter()
-            .zip(&status)
-            .filter(|(_, status)| **status != BondStatus::Intact)
-        {
+        for ([i, j], _) in bonds.pair.iter().zip(&status).filter(|(_, status)| **status != BondStatus::Intact) {
             (fills[*i as usize], fills[*j as usize]) = (RELEASED, RELEASED);
             broken += 1;
         }
@@ -439,14 +366,8 @@ mod tests {
 
     #[test]
     fn ruptures_of_one_time_are_one_point_of_the_curve() {
-        let events = [
-            event(1.0, RuptureMode::Tension),
-            event(1.0, RuptureMode::Rolling),
-            event(2.0, RuptureMode::Shear),
-        ];
-        assert_eq!(
-            broken_over_time(&events),
-            [(1.0, [1, 0, 1]), (2.0, [1, 1, 1])]
-        );
+        let events =
+            [event(1.0, RuptureMode::Tension), event(1.0, RuptureMode::Rolling), event(2.0, RuptureMode::Shear)];
+        assert_eq!(broken_over_time(&events), [(1.0, [1, 0, 1]), (2.0, [1, 1, 1])]);
     }
 }

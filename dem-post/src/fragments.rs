@@ -22,12 +22,7 @@ pub struct Fragments {
 /// `status` has one entry per bond; bonds must name grains within `mass`.
 pub fn fragments(mass: &[f64], bonds: &Bonds, status: &[BondStatus]) -> Fragments {
     let mut pieces = UnionFind::<usize>::new(mass.len());
-    for ([i, j], _) in bonds
-        .pair
-        .iter()
-        .zip(status)
-        .filter(|(_, status)| **status == BondStatus::Intact)
-    {
+    for ([i, j], _) in bonds.pair.iter().zip(status).filter(|(_, status)| **status == BondStatus::Intact) {
         pieces.union(*i as usize, *j as usize);
     }
     let (mut grains, mut masses) = (vec![0usize; mass.len()], vec![0.0; mass.len()]);
@@ -52,10 +47,7 @@ mod tests {
 
     /// A chain 0–1–2–3, a pair 4–5 and a lone grain 6.
     fn bonds() -> Bonds {
-        Bonds {
-            pair: vec![[0, 1], [2, 1], [2, 3], [4, 5]],
-            ..Bonds::default()
-        }
+        Bonds { pair: vec![[0, 1], [2, 1], [2, 3], [4, 5]], ..Bonds::default() }
     }
 
     #[test]
@@ -63,12 +55,7 @@ mod tests {
         let mass = [1.0, 1.0, 1.0, 1.0, 10.0, 10.0, 1.0];
         let found = fragments(&mass, &bonds(), &[BondStatus::Intact; 4]);
         // the largest piece by grains is the chain, the heaviest is the pair
-        let expected = Fragments {
-            count: 3,
-            singles: 1,
-            largest: 4,
-            largest_mass_fraction: 0.8,
-        };
+        let expected = Fragments { count: 3, singles: 1, largest: 4, largest_mass_fraction: 0.8 };
         assert_eq!(found, expected);
     }
 
@@ -77,12 +64,7 @@ mod tests {
         let mut status = [BondStatus::Intact; 4];
         (status[1], status[3]) = (BondStatus::Shear, BondStatus::Rolling);
         let found = fragments(&[1.0; 7], &bonds(), &status);
-        let expected = Fragments {
-            count: 5,
-            singles: 3,
-            largest: 2,
-            largest_mass_fraction: 2.0 / 7.0,
-        };
+        let expected = Fragments { count: 5, singles: 3, largest: 2, largest_mass_fraction: 2.0 / 7.0 };
         assert_eq!(found, expected);
     }
 }

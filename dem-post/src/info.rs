@@ -69,30 +69,14 @@ pub struct Report {
 /// Those of reading it.
 pub fn read(history: &History) -> Result<Report> {
     let (parameters, grains, bonds) = (history.parameters()?, history.grains()?, history.bonds()?);
-    let revision = if parameters.git_revision.is_empty() {
-        "unknown"
-    } else {
-        &parameters.git_revision
-    };
+    let revision = if parameters.git_revision.is_empty() { "unknown" } else { &parameters.git_revision };
     let range = |values: &[f64]| {
-        values
-            .iter()
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &v| {
-                [low.min(v), high.max(v)]
-            })
+        values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &v| [low.min(v), high.max(v)])
     };
     let mut broken = Modes::default();
-    history
-        .ruptures()?
-        .iter()
-        .for_each(|rupture| broken.add(rupture.mode));
+    history.ruptures()?.iter().for_each(|rupture| broken.add(rupture.mode));
     let frames = history.frames();
     let moment = |frame: usize| (history.steps()[frame], history.times()[frame]);
-    let drive = |drive| match drive {
-        WallDrive::Fixed => "fixed",
-        WallDrive::Velocity => "driven by a velocity",
-        WallDrive::Force => "driven by a force",
-    };
     let mut report = Report {
         file: history.path().display().to_string(),
         bytes: history.length(),
@@ -106,17 +90,7 @@ pub fn read(history: &History) -> Result<Report> {
         grains: grains.radius.len(),
         diameters: range(&grains.radius).map(|r| 2.0 * r),
         mass: grains.mass.iter().sum(),
-        walls: history
-            .walls()?
-            .iter()
-            .map(|wall| {
-                [
-                    wall.name.clone(),
-                    wall.kind.label().to_lowercase(),
-                    drive(wall.drive).into(),
-                ]
-            })
-            .collect(),
+        walls: walls(history)?,
         bonds: bonds.len(),
         cohesion: (!bonds.is_empty()).then(|| range(&bonds.strength)),
         broken,
@@ -124,11 +98,7 @@ pub fn read(history: &History) -> Result<Report> {
         first: (frames > 0).then(|| moment(0)),
         last: (frames > 0).then(|| moment(frames - 1)),
         observed: history.observed_steps(),
-        contacts: if frames > 0 {
-            Some(history.contacts(frames - 1)?.len())
-        } else {
-            None
-        },
+        contacts: if frames > 0 { Some(history.contacts(frames - 1)?.len()) } else { None },
         observables: history.observable_names()?,
         ..Report::default()
     };
@@ -136,25 +106,29 @@ pub fn read(history: &History) -> Result<Report> {
     Ok(report)
 }
 
+/// Name, shape and drive of each wall.
+fn walls(history: &History) -> Result<Vec<[String; 3]>> {
+    let drive = |drive| match drive {
+        WallDrive::Fixed => "fixed",
+        WallDrive::Velocity => "driven by a velocity",
+        WallDrive::Force => "driven by a force",
+    };
+    let walls = history.walls()?;
+    let words =
+        walls.iter().map(|wall| [wall.name.clone(), wall.kind.label().to_lowercase(), drive(wall.drive).into()]);
+    Ok(words.collect())
+}
+
 impl Report {
     fn read_observables(&mut self, history: &History) -> Result<()> {
         let last = |name: &str| -> Result<Option<f64>> {
-            Ok(history
-                .observable(name)?
-                .and_then(|series| series.value.last().copied()))
+            Ok(history.observable(name)?.and_then(|series| series.value.last().copied()))
         };
         let greatest = |series: Series| -> Option<(f64, f64)> {
-            series
-                .value
-                .into_iter()
-                .zip(series.time)
-                .max_by(|a, b| a.0.total_cmp(&b.0))
+            series.value.into_iter().zip(series.time).max_by(|a, b| a.0.total_cmp(&b.0))
         };
         self.worst_residual = history.observable("solver_residual")?.and_then(greatest);
-        self.penetration = history
-            .observable("penetration")?
-            .and_then(greatest)
-            .map(|(depth, _)| depth);
+        self.penetration = history.observable("penetration")?.and_then(greatest).map(|(depth, _)| depth);
         self.iterations = history.observable("solver_iterations")?.and_then(|series| {
             let mean = series.value.iter().sum::<f64>() / series.value.len() as f64;
             greatest(series).map(|(most, _)| [mean, most])
@@ -168,30 +142,13 @@ impl Report {
 
     /// The report as lines.
     pub fn table(&self) -> String {
-        let state = if self.open_ended {
-            "not closed: the run goes on or was stopped"
-        } else {
-            "closed"
-        };
+        let state = if self.open_ended { "not closed: the run goes on or was stopped" } else { "closed" };
         let [least, most] = self.diameters.map(|d| number(1e3 * d));
         let mut lines = vec![
-            (
-                "file",
-                format!("{} ({:.1} MB, {state})", self.file, self.bytes as f64 / 1e6),
-            ),
+            ("file", format!("{} ({:.1} MB, {state})", self.file, self.bytes as f64 / 1e6)),
             ("written by", self.origin.clone()),
-            (
-                "dimension, seed",
-                format!("{}, {}", self.dimension, self.seed),
-            ),
-            (
-                "grains",
-                format!(
-                    "{}, diameters {least} to {most} mm, {} kg in all",
-                    self.grains,
-                    number(self.mass)
-                ),
-            ),
+            ("dimension, seed", format!("{}, {}", self.dimension, self.seed)),
+            ("grains", format!("{}, diameters {least} to {most} mm, {} kg in all", self.grains, number(self.mass))),
         ];
         if self.walls.is_empty() {
             lines.push(("walls", "none".into()));
@@ -202,61 +159,42 @@ impl Report {
         lines.push(("bonds", self.bond_line()));
         lines.extend([
             ("time", self.time_line()),
-            (
-                "observed",
-                format!("{} steps of {}", self.observed, self.observables.join(", ")),
-            ),
-            (
-                "contacts",
-                self.contacts
-                    .map_or_else(|| "–".into(), |n| format!("{n} at the last frame")),
-            ),
+            ("observed", format!("{} steps of {}", self.observed, self.observables.join(", "))),
+        ]);
+        lines.extend(self.measure_lines());
+        let hint = if self.bonds > 0 { "cracks|chains|stress-strain" } else { "chains|stress-strain" };
+        lines.push(("look further", format!("dem-post {hint} {}", self.file)));
+        facts(&lines)
+    }
+
+    /// What was measured, one line each.
+    fn measure_lines(&self) -> Vec<(&'static str, String)> {
+        vec![
+            ("contacts", self.contacts.map_or_else(|| "–".into(), |n| format!("{n} at the last frame"))),
             (
                 "worst residual",
-                self.worst_residual.map_or_else(
-                    || "–".into(),
-                    |(r, t)| format!("{} at {} s", number(r), number(t)),
-                ),
+                self.worst_residual.map_or_else(|| "–".into(), |(r, t)| format!("{} at {} s", number(r), number(t))),
             ),
             (
                 "iterations",
-                self.iterations.map_or_else(
-                    || "–".into(),
-                    |[mean, most]| format!("{mean:.1} a step, at most {most:.0}"),
-                ),
+                self.iterations
+                    .map_or_else(|| "–".into(), |[mean, most]| format!("{mean:.1} a step, at most {most:.0}")),
             ),
             ("worst penetration", quantity(self.penetration, "m")),
             ("work from outside", quantity(self.external_work, "J")),
             ("kinetic energy", quantity(self.kinetic_energy, "J")),
             ("lost to friction", quantity(self.friction, "J")),
             ("energy left over", quantity(self.energy_remainder, "J")),
-        ]);
-        let hint = if self.bonds > 0 {
-            "cracks|chains|stress-strain"
-        } else {
-            "chains|stress-strain"
-        };
-        lines.push(("look further", format!("dem-post {hint} {}", self.file)));
-        facts(&lines)
+        ]
     }
 
     fn bond_line(&self) -> String {
         let Some([least, most]) = self.cohesion else {
             return "none".into();
         };
-        let range = if least == most {
-            number(least)
-        } else {
-            format!("{} to {}", number(least), number(most))
-        };
-        let [tension, shear, rolling] =
-            [self.broken.tension, self.broken.shear, self.broken.rolling];
-        let [t, s, r] = [
-            RuptureMode::Tension,
-            RuptureMode::Shear,
-            RuptureMode::Rolling,
-        ]
-        .map(RuptureMode::label);
+        let range = if least == most { number(least) } else { format!("{} to {}", number(least), number(most)) };
+        let [tension, shear, rolling] = [self.broken.tension, self.broken.shear, self.broken.rolling];
+        let [t, s, r] = [RuptureMode::Tension, RuptureMode::Shear, RuptureMode::Rolling].map(RuptureMode::label);
         format!(
             "{}, cohesion {range} N; {} broken: {tension} {t}, {shear} {s}, {rolling} {r}",
             self.bonds,

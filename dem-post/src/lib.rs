@@ -5,6 +5,7 @@
 
 pub mod chains;
 pub mod cli;
+pub mod collapse;
 pub mod cracks;
 pub mod fragments;
 pub mod info;

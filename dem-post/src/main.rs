@@ -1,5 +1,6 @@
 //! The `dem-post` command.
 
+use std::io::Write;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -14,7 +15,7 @@ fn main() -> ExitCode {
     match run(&cli) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("dem-post: {error}");
+            note(&format!("dem-post: {error}"));
             ExitCode::from(error.exit_code())
         }
     }
@@ -29,16 +30,14 @@ fn run(cli: &Cli) -> Result<()> {
         Command::Cracks(moments) => {
             let history = History::open(&moments.files.history)?;
             let report = cracks::read(&history)?;
-            let mut folder =
-                Folder::create(moments.files.output.as_deref(), &moments.files.history)?;
+            let mut folder = Folder::create(moments.files.output.as_deref(), &moments.files.history)?;
             cracks::write(&history, &report, &moments.times, &mut folder)?;
             report_on(cli, &report, || report.table(), Some(&folder))
         }
         Command::Chains(moments) => {
             let history = History::open(&moments.files.history)?;
             let report = chains::read(&history, &moments.times)?;
-            let mut folder =
-                Folder::create(moments.files.output.as_deref(), &moments.files.history)?;
+            let mut folder = Folder::create(moments.files.output.as_deref(), &moments.files.history)?;
             chains::write(&history, &report, &mut folder)?;
             report_on(cli, &report, || report.table(), Some(&folder))
         }
@@ -53,23 +52,22 @@ fn run(cli: &Cli) -> Result<()> {
 }
 
 /// Results on stdout, as a table or as JSON; the files that were written on stderr.
-fn report_on(
-    cli: &Cli,
-    report: &impl Serialize,
-    table: impl Fn() -> String,
-    folder: Option<&Folder>,
-) -> Result<()> {
+fn report_on(cli: &Cli, report: &impl Serialize, table: impl Fn() -> String, folder: Option<&Folder>) -> Result<()> {
     if cli.json {
-        let json = serde_json::to_string_pretty(report)
-            .map_err(|error| PostError::Usage(error.to_string()))?;
+        let json = serde_json::to_string_pretty(report).map_err(|error| PostError::Usage(error.to_string()))?;
         print(&(json + "\n"))?;
     } else {
         print(&table())?;
     }
     if !cli.quiet {
         for path in folder.map_or(&[][..], Folder::written) {
-            eprintln!("wrote {}", path.display());
+            note(&format!("wrote {}", path.display()));
         }
     }
     Ok(())
+}
+
+/// A line on stderr; one that nobody reads is no error.
+fn note(line: &str) {
+    let _ = writeln!(std::io::stderr(), "{line}");
 }

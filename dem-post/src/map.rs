@@ -22,7 +22,7 @@ pub struct Sample {
     dimension: usize,
     axes: [usize; 2],
     /// Corners of what may be shown, m: the first frame and as much again around it.
-    limits: [[f64; 2]; 2],
+    limits: Box2,
 }
 
 /// One moment.
@@ -70,20 +70,11 @@ impl Sample {
     pub fn read(history: &History) -> Result<Self> {
         let Grains { radius, .. } = history.grains()?;
         let (walls, dimension) = (history.walls()?, history.dimension());
-        let mut sample = Self {
-            radius,
-            walls,
-            dimension,
-            axes: [0, dimension - 1],
-            limits: [[0.0; 2]; 2],
-        };
+        let mut sample = Self { radius, walls, dimension, axes: [0, dimension - 1], limits: [[0.0; 2]; 2] };
         let first = history.grain_state(0)?;
         let [low, high] = sample.bounds(&first, [[f64::NEG_INFINITY; 2], [f64::INFINITY; 2]]);
         let spread = |k: usize| 0.5 * (high[k] - low[k]);
-        sample.limits = [
-            [low[0] - spread(0), low[1] - spread(1)],
-            [high[0] + spread(0), high[1] + spread(1)],
-        ];
+        sample.limits = [[low[0] - spread(0), low[1] - spread(1)], [high[0] + spread(0), high[1] + spread(1)]];
         Ok(sample)
     }
 
@@ -96,19 +87,43 @@ impl Sample {
     }
 
     /// The box around the grains within `limits`, `[low, high]`, m.
-    fn bounds(&self, state: &GrainState, limits: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
-        let mut found = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
-        for (grain, radius) in self.radius.iter().enumerate() {
+    fn bounds(&self, state: &GrainState, limits: Box2) -> Box2 {
+        let mut found = EMPTY;
+        for (grain, &radius) in self.radius.iter().enumerate() {
             let centre = self.centre(state, grain);
             if (0..2).all(|k| (limits[0][k]..=limits[1][k]).contains(&centre[k])) {
-                for k in 0..2 {
-                    found[0][k] = found[0][k].min(centre[k] - radius);
-                    found[1][k] = found[1][k].max(centre[k] + radius);
-                }
+                found = union(found, around(centre, radius));
             }
         }
         found
     }
+
+    /// The box around what a panel shows: its grains, and of its round walls what is near.
+    fn extent(&self, panel: &Panel) -> Box2 {
+        let mut found = self.bounds(&panel.grains, self.limits);
+        for (wall, position) in self.walls.iter().zip(panel.walls.position.chunks(self.dimension)) {
+            if wall.kind != WallKind::Plane {
+                let [low, high] = around(self.flat(position), wall.radius.abs());
+                let near = |k: usize, x: f64| x.clamp(self.limits[0][k], self.limits[1][k]);
+                found = union(found, [[near(0, low[0]), near(1, low[1])], [near(0, high[0]), near(1, high[1])]]);
+            }
+        }
+        found
+    }
+}
+
+/// Lower and upper corner of a box, m.
+type Box2 = [[f64; 2]; 2];
+
+/// The box that holds nothing.
+const EMPTY: Box2 = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
+
+fn around(centre: [f64; 2], radius: f64) -> Box2 {
+    [centre.map(|x| x - radius), centre.map(|x| x + radius)]
+}
+
+fn union([l, h]: Box2, [low, high]: Box2) -> Box2 {
+    [[l[0].min(low[0]), l[1].min(low[1])], [h[0].max(high[0]), h[1].max(high[1])]]
 }
 
 /// From metres to units of the drawing, for one panel.
@@ -136,26 +151,12 @@ impl Frame {
 
 /// Draws the panels side by side on one scale, with a scale bar and the legend below.
 pub fn draw(sample: &Sample, panels: &[Panel], legend: &[Key]) -> Drawing {
-    let bounds = panels
-        .iter()
-        .map(|panel| sample.bounds(&panel.grains, sample.limits));
-    let [low, high] = bounds.fold(
-        [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]],
-        |[low, high], [l, h]| {
-            [
-                [low[0].min(l[0]), low[1].min(l[1])],
-                [high[0].max(h[0]), high[1].max(h[1])],
-            ]
-        },
-    );
+    let [low, high] = panels.iter().fold(EMPTY, |all, panel| union(all, sample.extent(panel)));
     // room for the hatching of walls
     let extent = [high[0] - low[0], high[1] - low[1]];
     let scale = ((PANEL.0 - 4.0 * HATCH) / extent[0]).min((PANEL.1 - 4.0 * HATCH) / extent[1]);
     let low = low.map(|x| x - 2.0 * HATCH / scale);
-    let size = (
-        extent[0] * scale + 4.0 * HATCH,
-        extent[1] * scale + 4.0 * HATCH,
-    );
+    let size = (extent[0] * scale + 4.0 * HATCH, extent[1] * scale + 4.0 * HATCH);
     let columns = panels.len() as f64;
     let width = (columns * (size.0 + MARGIN) + MARGIN).max(420.0);
     let rows = legend_rows(legend, width);
@@ -164,43 +165,23 @@ pub fn draw(sample: &Sample, panels: &[Panel], legend: &[Key]) -> Drawing {
     let mut canvas = Canvas::new(width, height);
     for (k, panel) in panels.iter().enumerate() {
         let corner = (left + k as f64 * (size.0 + MARGIN), CAPTION);
-        draw_panel(
-            &mut canvas,
-            sample,
-            panel,
-            &Frame {
-                low,
-                scale,
-                corner,
-                size,
-            },
-        );
+        draw_panel(&mut canvas, sample, panel, &Frame { low, scale, corner, size });
     }
     let base = CAPTION + size.1 + 0.7 * LEGEND;
     scale_bar(&mut canvas, (left, base), scale, size.0);
     for (k, row) in rows.iter().enumerate() {
-        draw_legend(
-            &mut canvas,
-            row,
-            (0.5 * width, base + LEGEND * (k as f64 + 1.0)),
-        );
+        draw_legend(&mut canvas, row, (0.5 * width, base + LEGEND * (k as f64 + 1.0)));
     }
     canvas.finish()
 }
 
 fn draw_panel(canvas: &mut Canvas, sample: &Sample, panel: &Panel, frame: &Frame) {
     for (line, text) in panel.caption.iter().enumerate() {
-        let at = (
-            frame.corner.0 + 0.5 * frame.size.0,
-            17.0 + 18.0 * line as f64,
-        );
+        let at = (frame.corner.0 + 0.5 * frame.size.0, 17.0 + 18.0 * line as f64);
         canvas.text(at, text, 14, Anchor::Middle);
     }
-    for (wall, position) in sample
-        .walls
-        .iter()
-        .zip(panel.walls.position.chunks(sample.dimension))
-    {
+    canvas.clip(frame.corner, frame.size);
+    for (wall, position) in sample.walls.iter().zip(panel.walls.position.chunks(sample.dimension)) {
         draw_wall(canvas, sample, wall, position, frame);
     }
     let mut order: Vec<usize> = (0..sample.radius.len()).collect();
@@ -210,10 +191,7 @@ fn draw_panel(canvas: &mut Canvas, sample: &Sample, panel: &Panel, frame: &Frame
         order.sort_by(|&a, &b| depth(b).total_cmp(&depth(a)));
     }
     for grain in order {
-        let (at, radius) = (
-            frame.at(sample.centre(&panel.grains, grain)),
-            sample.radius[grain] * frame.scale,
-        );
+        let (at, radius) = (frame.at(sample.centre(&panel.grains, grain)), sample.radius[grain] * frame.scale);
         if frame.shows(at, 0.0) {
             canvas.disk(at, radius - 0.3, panel.fills[grain], panel.outline, 0.6);
         }
@@ -224,6 +202,7 @@ fn draw_panel(canvas: &mut Canvas, sample: &Sample, panel: &Panel, frame: &Frame
             canvas.line(ends[0], ends[1], link.colour, link.width);
         }
     }
+    canvas.end_clip();
 }
 
 fn draw_wall(canvas: &mut Canvas, sample: &Sample, wall: &Wall, position: &[f64], frame: &Frame) {
@@ -245,30 +224,20 @@ fn draw_wall(canvas: &mut Canvas, sample: &Sample, wall: &Wall, position: &[f64]
 fn draw_plane(canvas: &mut Canvas, point: [f64; 2], normal: [f64; 2], frame: &Frame) {
     let length = normal[0].hypot(normal[1]);
     // on the sheet y points down
-    let (n, t) = (
-        (normal[0] / length, -normal[1] / length),
-        (normal[1] / length, normal[0] / length),
-    );
+    let (n, t) = ((normal[0] / length, -normal[1] / length), (normal[1] / length, normal[0] / length));
     let centre = frame.at(point);
     let at = |s: f64| (centre.0 + s * t.0, centre.1 + s * t.1);
-    let reach = 2.0 * (frame.size.0 + frame.size.1)
-        + (centre.0 - frame.corner.0).abs()
-        + (centre.1 - frame.corner.1).abs();
+    let reach =
+        2.0 * (frame.size.0 + frame.size.1) + (centre.0 - frame.corner.0).abs() + (centre.1 - frame.corner.1).abs();
     let steps = (reach / HATCH) as i64;
-    let inside: Vec<f64> = (-steps..=steps)
-        .map(|k| k as f64 * HATCH)
-        .filter(|&s| frame.shows(at(s), 0.0))
-        .collect();
+    let inside: Vec<f64> = (-steps..=steps).map(|k| k as f64 * HATCH).filter(|&s| frame.shows(at(s), 0.0)).collect();
     let (Some(&first), Some(&last)) = (inside.first(), inside.last()) else {
         return;
     };
     canvas.line(at(first), at(last), colour::BLACK, 1.8);
     for s in inside {
         let from = at(s);
-        let to = (
-            from.0 - HATCH * (n.0 + t.0) * 0.8,
-            from.1 - HATCH * (n.1 + t.1) * 0.8,
-        );
+        let to = (from.0 - HATCH * (n.0 + t.0) * 0.8, from.1 - HATCH * (n.1 + t.1) * 0.8);
         canvas.line(from, to, colour::GREY, 0.8);
     }
 }
@@ -277,11 +246,7 @@ fn draw_plane(canvas: &mut Canvas, point: [f64; 2], normal: [f64; 2], frame: &Fr
 fn scale_bar(canvas: &mut Canvas, (x, y): (f64, f64), scale: f64, width: f64) {
     let longest = width / 3.0 / scale;
     let power = 10f64.powf(longest.log10().floor());
-    let length = [5.0, 2.0, 1.0]
-        .into_iter()
-        .map(|m| m * power)
-        .find(|l| *l <= longest)
-        .unwrap_or(power);
+    let length = [5.0, 2.0, 1.0].into_iter().map(|m| m * power).find(|l| *l <= longest).unwrap_or(power);
     let (from, to) = (x + 2.0 * HATCH, x + 2.0 * HATCH + length * scale);
     canvas.line((from, y), (to, y), colour::BLACK, 2.0);
     for end in [from, to] {

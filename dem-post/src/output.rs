@@ -62,14 +62,8 @@ impl Folder {
     /// [`PostError::Write`].
     pub fn create(given: Option<&Path>, history: &Path) -> Result<Self> {
         let path = given.map_or_else(|| default_folder(history), PathBuf::from);
-        fs::create_dir_all(&path).map_err(|error| PostError::Write {
-            path: path.clone(),
-            why: error.to_string(),
-        })?;
-        Ok(Self {
-            path,
-            written: vec![],
-        })
+        fs::create_dir_all(&path).map_err(|error| PostError::Write { path: path.clone(), why: error.to_string() })?;
+        Ok(Self { path, written: vec![] })
     }
 
     /// The files written so far.
@@ -83,10 +77,7 @@ impl Folder {
     /// [`PostError::Write`].
     pub fn write(&mut self, name: &str, content: &[u8]) -> Result<()> {
         let path = self.path.join(name);
-        fs::write(&path, content).map_err(|error| PostError::Write {
-            path: path.clone(),
-            why: error.to_string(),
-        })?;
+        fs::write(&path, content).map_err(|error| PostError::Write { path: path.clone(), why: error.to_string() })?;
         self.written.push(path);
         Ok(())
     }
@@ -98,10 +89,7 @@ impl Folder {
     pub fn draw(&mut self, name: &str, drawing: &Drawing) -> Result<()> {
         self.write(&format!("{name}.svg"), drawing.svg().as_bytes())?;
         let file = format!("{name}.png");
-        let png = drawing.png().map_err(|why| PostError::Write {
-            path: self.path.join(&file),
-            why,
-        })?;
+        let png = drawing.png().map_err(|why| PostError::Write { path: self.path.join(&file), why })?;
         self.write(&file, &png)
     }
 
@@ -109,29 +97,15 @@ impl Folder {
     ///
     /// # Errors
     /// [`PostError::Write`].
-    pub fn table(
-        &mut self,
-        name: &str,
-        head: &[&str],
-        rows: impl Iterator<Item = Vec<String>>,
-    ) -> Result<()> {
+    pub fn table(&mut self, name: &str, head: &[&str], rows: impl Iterator<Item = Vec<String>>) -> Result<()> {
         let file = format!("{name}.csv");
-        let failed = |why: String| PostError::Write {
-            path: self.path.join(&file),
-            why,
-        };
+        let failed = |why: String| PostError::Write { path: self.path.join(&file), why };
         let mut writer = csv::Writer::from_writer(vec![]);
-        writer
-            .write_record(head)
-            .map_err(|error| failed(error.to_string()))?;
+        writer.write_record(head).map_err(|error| failed(error.to_string()))?;
         for row in rows {
-            writer
-                .write_record(row)
-                .map_err(|error| failed(error.to_string()))?;
+            writer.write_record(row).map_err(|error| failed(error.to_string()))?;
         }
-        let content = writer
-            .into_inner()
-            .map_err(|error| failed(error.to_string()))?;
+        let content = writer.into_inner().map_err(|error| failed(error.to_string()))?;
         self.write(&file, &content)
     }
 }
@@ -157,9 +131,7 @@ pub struct Text {
 impl Text {
     /// A table with a head.
     pub fn new(head: &[&str]) -> Self {
-        Self {
-            rows: vec![head.iter().map(ToString::to_string).collect()],
-        }
+        Self { rows: vec![head.iter().map(ToString::to_string).collect()] }
     }
 
     /// Adds a row.
@@ -171,13 +143,7 @@ impl Text {
     pub fn lines(&self) -> String {
         let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
         let cell = |row: &[String], c: usize| row.get(c).cloned().unwrap_or_default();
-        let width = |c: usize| {
-            self.rows
-                .iter()
-                .map(|row| cell(row, c).chars().count())
-                .max()
-                .unwrap_or(0)
-        };
+        let width = |c: usize| self.rows.iter().map(|row| cell(row, c).chars().count()).max().unwrap_or(0);
         let widths: Vec<usize> = (0..columns).map(width).collect();
         let line = |row: &Vec<String>| {
             let mut line = String::new();
@@ -196,15 +162,8 @@ impl Text {
 
 /// A list of names and values, one a line.
 pub fn facts(facts: &[(&str, String)]) -> String {
-    let width = facts
-        .iter()
-        .map(|(name, _)| name.chars().count())
-        .max()
-        .unwrap_or(0);
-    facts
-        .iter()
-        .map(|(name, value)| format!("{name:<width$}  {value}\n"))
-        .collect()
+    let width = facts.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
+    facts.iter().map(|(name, value)| format!("{name:<width$}  {value}\n")).collect()
 }
 
 /// Prints results on stdout. A reader that closes the pipe early is no error.
@@ -213,10 +172,9 @@ pub fn facts(facts: &[(&str, String)]) -> String {
 /// [`PostError::Write`].
 pub fn print(text: &str) -> Result<()> {
     match std::io::stdout().lock().write_all(text.as_bytes()) {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(PostError::Write {
-            path: "standard output".into(),
-            why: error.to_string(),
-        }),
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(PostError::Write { path: "standard output".into(), why: error.to_string() })
+        }
         _ => Ok(()),
     }
 }
@@ -241,11 +199,7 @@ fn digits(value: f64, digits: i32) -> String {
     }
     let decimals = (digits - 1 - magnitude.log10().floor() as i32).max(0) as usize;
     let text = format!("{value:.decimals$}");
-    if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.').into()
-    } else {
-        text
-    }
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
 }
 
 /// A number with its unit, or a dash where there is none.
@@ -254,11 +208,7 @@ pub fn quantity(value: Option<impl Into<f64>>, unit: &str) -> String {
 }
 
 fn with_unit(number: impl Display, unit: &str) -> String {
-    if unit.is_empty() {
-        number.to_string()
-    } else {
-        format!("{number} {unit}")
-    }
+    if unit.is_empty() { number.to_string() } else { format!("{number} {unit}") }
 }
 
 /// An optional number as a cell of a CSV file: empty where there is none.
@@ -294,9 +244,6 @@ mod tests {
 
     #[test]
     fn a_folder_is_named_after_its_history() {
-        assert_eq!(
-            default_folder(Path::new("runs/compression.h5")),
-            Path::new("compression-post")
-        );
+        assert_eq!(default_folder(Path::new("runs/compression.h5")), Path::new("compression-post"));
     }
 }

@@ -61,9 +61,7 @@ impl Drawing {
     /// # Errors
     /// The plotting crate's message.
     pub fn png(&self) -> Result<Vec<u8>, String> {
-        PngBackend::new()
-            .with_scale(PNG_SCALE)
-            .render_scene(&self.0)
+        PngBackend::new().with_scale(PNG_SCALE).render_scene(&self.0)
     }
 }
 
@@ -72,10 +70,14 @@ impl Drawing {
 pub enum Style {
     /// Joined points.
     Line,
+    /// Joined points by a thin line, for what scatters.
+    Thin,
     /// A value that holds until the next point.
     Steps,
     /// Joined points, each with a dot.
     Marked,
+    /// A dashed level in the legend.
+    Level,
 }
 
 /// A named curve.
@@ -107,44 +109,28 @@ pub struct Chart {
     pub counts: bool,
     /// The curves.
     pub curves: Vec<Curve>,
-    /// Marked values of y, with what they are.
+    /// Marked values of y, with what they are for the legend.
     pub levels: Vec<(f64, String)>,
-    /// Marked values of x, with what they are.
-    pub moments: Vec<(f64, String)>,
+    /// Marked values of x.
+    pub moments: Vec<f64>,
 }
 
 impl Chart {
     /// A chart with titles of its axes.
     pub fn new(x: &str, y: &str) -> Self {
-        Self {
-            x: x.into(),
-            y: y.into(),
-            ..Self::default()
-        }
+        Self { x: x.into(), y: y.into(), ..Self::default() }
     }
 
     /// Adds a curve.
-    pub fn curve(
-        mut self,
-        label: &str,
-        colour: &'static str,
-        style: Style,
-        points: Vec<(f64, f64)>,
-    ) -> Self {
-        self.curves.push(Curve {
-            label: label.into(),
-            points,
-            style,
-            colour,
-        });
+    pub fn curve(mut self, label: &str, colour: &'static str, style: Style, points: Vec<(f64, f64)>) -> Self {
+        self.curves.push(Curve { label: label.into(), points, style, colour });
         self
     }
 
     /// Draws the charts side by side, each with its legend above it.
     pub fn draw(charts: Vec<Self>) -> Drawing {
         let columns = charts.len();
-        let legends: Vec<Vec<(String, &'static str, Style)>> =
-            charts.iter().map(Self::legend).collect();
+        let legends: Vec<Vec<(String, &'static str, Style)>> = charts.iter().map(Self::legend).collect();
         let (plots, layouts) = charts.into_iter().map(Self::build).unzip();
         let figure = Figure::new(1, columns)
             .with_plots(plots)
@@ -152,40 +138,27 @@ impl Chart {
             .with_cell_size(CHART.0, CHART.1)
             .with_spacing(SPACING)
             .with_padding(PADDING);
-        let figure = if columns > 1 {
-            figure.with_labels_lowercase()
-        } else {
-            figure
-        };
+        let figure = if columns > 1 { figure.with_labels_lowercase() } else { figure };
         let mut canvas = Canvas(figure.render());
         for (k, legend) in legends.iter().enumerate() {
             let left = PADDING + k as f64 * (CHART.0 + SPACING);
-            draw_legend(
-                &mut canvas,
-                legend,
-                (left + 0.55 * CHART.0, PADDING + 0.5 * ABOVE),
-            );
+            draw_legend(&mut canvas, legend, (left + 0.55 * CHART.0, PADDING + 0.5 * ABOVE));
         }
         canvas.finish()
     }
 
-    /// Name, colour and style of each curve; a chart of one curve needs no legend.
+    /// Name, colour and style of each curve and each marked level; what stands alone needs no name.
     fn legend(&self) -> Vec<(String, &'static str, Style)> {
-        let entry = |curve: &Curve| (curve.label.clone(), curve.colour, curve.style);
-        if self.curves.len() < 2 {
-            vec![]
-        } else {
-            self.curves.iter().map(entry).collect()
-        }
+        let curves = self.curves.iter().map(|curve| (curve.label.clone(), curve.colour, curve.style));
+        let levels = self.levels.iter().map(|(_, label)| (label.clone(), colour::GREY, Style::Level));
+        let entries: Vec<_> = curves.chain(levels).collect();
+        if entries.len() < 2 { vec![] } else { entries }
     }
 
     fn build(mut self) -> (Vec<Plot>, Layout) {
         for curve in &mut self.curves {
             let visible = |&(x, y): &(f64, f64)| {
-                x.is_finite()
-                    && y.is_finite()
-                    && (!self.log_x || x > 0.0)
-                    && (!self.log_y || y > 0.0)
+                x.is_finite() && y.is_finite() && (!self.log_x || x > 0.0) && (!self.log_y || y > 0.0)
             };
             curve.points.retain(visible);
             thin(&mut curve.points);
@@ -201,17 +174,11 @@ impl Chart {
             .with_box_axes();
         layout.show_legend = false;
         layout = self.scale_axes(layout);
-        for (value, label) in self.levels {
-            let line = ReferenceLine::horizontal(value)
-                .with_color(colour::GREY)
-                .with_label(label);
-            layout = layout.with_reference_line(line);
+        for (value, _) in self.levels {
+            layout = layout.with_reference_line(ReferenceLine::horizontal(value).with_color(colour::GREY));
         }
-        for (value, label) in self.moments {
-            let line = ReferenceLine::vertical(value)
-                .with_color(colour::GREY)
-                .with_label(label);
-            layout = layout.with_reference_line(line);
+        for value in self.moments {
+            layout = layout.with_reference_line(ReferenceLine::vertical(value).with_color(colour::GREY));
         }
         (plots, layout)
     }
@@ -225,23 +192,15 @@ impl Chart {
         if self.log_x {
             layout = layout.with_log_x().with_x_tick_format(powers());
         } else if low < high {
-            let off = if self.set_off {
-                0.03 * (high - low)
-            } else {
-                0.0
-            };
-            layout = layout
-                .with_x_axis_min(low - off)
-                .with_x_axis_max(high + off);
+            let off = if self.set_off { 0.03 * (high - low) } else { 0.0 };
+            layout = layout.with_x_axis_min(low - off).with_x_axis_max(high + off);
         }
         if self.log_y {
             let low = values().map(|p| p.1).fold(f64::INFINITY, f64::min);
             let high = values().map(|p| p.1).fold(0.0, f64::max);
             layout = layout.with_log_y().with_y_tick_format(powers());
             if low <= high {
-                layout = layout
-                    .with_y_axis_min(0.6 * low)
-                    .with_y_axis_max(1.6 * high);
+                layout = layout.with_y_axis_min(0.6 * low).with_y_axis_max(1.6 * high);
             }
         } else if self.counts {
             layout = layout.with_y_tick_format(TickFormat::Integer);
@@ -263,22 +222,23 @@ fn power_of_ten(value: f64) -> String {
         '3' => '³',
         digit => char::from_u32(0x2070 + digit.to_digit(10).unwrap_or(0)).unwrap_or(digit),
     };
-    format!(
-        "10{}",
-        format!("{exponent:.0}")
-            .chars()
-            .map(raise)
-            .collect::<String>()
-    )
+    format!("10{}", format!("{exponent:.0}").chars().map(raise).collect::<String>())
 }
 
 /// The names of the curves in one row around `middle`.
 fn draw_legend(canvas: &mut Canvas, legend: &[(String, &'static str, Style)], middle: (f64, f64)) {
-    let width = |text: &str| 52.0 + 7.8 * text.chars().count() as f64;
+    let width = |text: &str| 50.0 + 7.8 * text.chars().count() as f64;
     let total: f64 = legend.iter().map(|(text, ..)| width(text)).sum();
     let (mut x, y) = (middle.0 - 0.5 * total, middle.1);
     for (text, colour, style) in legend {
-        canvas.line((x, y), (x + 26.0, y), colour, 2.2);
+        match style {
+            Style::Level => {
+                for dash in [0.0, 7.0, 14.0, 21.0] {
+                    canvas.line((x + dash, y), (x + dash + 4.0, y), colour, 1.4);
+                }
+            }
+            _ => canvas.line((x, y), (x + 26.0, y), colour, 2.2),
+        }
         if *style == Style::Marked {
             canvas.disk((x + 13.0, y), 3.5, colour, colour, 0.5);
         }
@@ -290,18 +250,13 @@ fn draw_legend(canvas: &mut Canvas, legend: &[(String, &'static str, Style)], mi
 impl Curve {
     fn plots(&self) -> Vec<Plot> {
         let points = || self.points.iter().copied();
-        let line = LinePlot::new()
-            .with_data(points())
-            .with_color(self.colour)
-            .with_stroke_width(1.8);
+        let line = LinePlot::new().with_data(points()).with_color(self.colour).with_stroke_width(1.8);
         match self.style {
-            Style::Line => vec![line.into()],
+            Style::Line | Style::Level => vec![line.into()],
+            Style::Thin => vec![line.with_stroke_width(1.0).into()],
             Style::Steps => vec![line.with_step().into()],
             Style::Marked => {
-                let dots = ScatterPlot::new()
-                    .with_data(points())
-                    .with_color(self.colour)
-                    .with_size(3.5);
+                let dots = ScatterPlot::new().with_data(points()).with_color(self.colour).with_size(3.5);
                 vec![line.with_stroke_width(1.2).into(), dots.into()]
             }
         }
@@ -317,25 +272,11 @@ fn thin(points: &mut Vec<(f64, f64)>) {
     let mut kept = Vec::with_capacity(CURVE_POINTS);
     for part in points.chunks(stretch) {
         let by = |a: &&(f64, f64), b: &&(f64, f64)| a.1.total_cmp(&b.1);
-        let low = part
-            .iter()
-            .enumerate()
-            .min_by(|a, b| by(&a.1, &b.1))
-            .map_or(0, |(k, _)| k);
-        let high = part
-            .iter()
-            .enumerate()
-            .max_by(|a, b| by(&a.1, &b.1))
-            .map_or(0, |(k, _)| k);
+        let low = part.iter().enumerate().min_by(|a, b| by(&a.1, &b.1)).map_or(0, |(k, _)| k);
+        let high = part.iter().enumerate().max_by(|a, b| by(&a.1, &b.1)).map_or(0, |(k, _)| k);
         let mut picks = [0, low, high, part.len() - 1];
         picks.sort_unstable();
-        kept.extend(
-            picks
-                .iter()
-                .enumerate()
-                .filter(|&(n, k)| n == 0 || picks[n - 1] != *k)
-                .map(|(_, &k)| part[k]),
-        );
+        kept.extend(picks.iter().enumerate().filter(|&(n, k)| n == 0 || picks[n - 1] != *k).map(|(_, &k)| part[k]));
     }
     *points = kept;
 }
@@ -358,6 +299,22 @@ impl Canvas {
     /// An empty white sheet.
     pub fn new(width: f64, height: f64) -> Self {
         Self(Scene::new(width, height))
+    }
+
+    /// Shows of what is drawn until [`Canvas::end_clip`] only what lies in a rectangle.
+    pub fn clip(&mut self, corner: (f64, f64), size: (f64, f64)) {
+        self.0.add(Primitive::ClipStart {
+            x: corner.0,
+            y: corner.1,
+            width: size.0,
+            height: size.1,
+            id: format!("panel-{}", self.0.elements.len()),
+        });
+    }
+
+    /// Ends what [`Canvas::clip`] began.
+    pub fn end_clip(&mut self) {
+        self.0.add(Primitive::ClipEnd);
     }
 
     /// A disk with an outline.
@@ -430,13 +387,7 @@ mod tests {
 
     #[test]
     fn ticks_are_powers_of_ten() {
-        for (value, text) in [
-            (1e-4, "10⁻⁴"),
-            (1e3, "10³"),
-            (0.1, "0.1"),
-            (1.0, "1"),
-            (2e-5, "0.00002"),
-        ] {
+        for (value, text) in [(1e-4, "10⁻⁴"), (1e3, "10³"), (0.1, "10⁻¹"), (1.0, "1"), (2e-5, "0.00002")] {
             assert_eq!(power_of_ten(value), text);
         }
     }

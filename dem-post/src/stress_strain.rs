@@ -17,6 +17,7 @@ use std::path::Path;
 use dem_run::history::{History, Series, Wall, WallDrive};
 use serde::Serialize;
 
+use crate::collapse::{last_step_below, peak, work};
 use crate::output::{Folder, PostError, Result, cell, facts, quantity, short};
 use crate::plot::{Chart, Style, colour};
 
@@ -24,8 +25,6 @@ use crate::plot::{Chart, Style, colour};
 const COLLAPSE: [f64; 2] = [1e-4, 1e-3];
 /// Share of broken bonds whose load is reported.
 const BROKEN: f64 = 0.05;
-/// A maximum is a peak if the load falls at least this share below it afterwards.
-const PEAK_DROP: f64 = 0.05;
 /// Least strain that the logarithmic axis shows.
 const LEAST_STRAIN: f64 = 1e-9;
 
@@ -101,156 +100,104 @@ pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
     let k = driven(history.path(), &walls, wall)?;
     let direction = walls[k].direction;
     let size = |&d: &usize| direction[d].abs();
-    let axis = (0..history.dimension())
-        .max_by(|a, b| size(a).total_cmp(&size(b)))
-        .unwrap_or(0);
+    let axis = (0..history.dimension()).max_by(|a, b| size(a).total_cmp(&size(b))).unwrap_or(0);
+    let motion = motion(history, &walls[k], k)?;
+    let tensor = |name: &str| -> Result<Vec<f64>> {
+        let series = history.observable(name)?;
+        series.map_or_else(|| Ok(vec![]), |series| component(history, &series, &[axis, axis], name))
+    };
+    let (sample, push) = sample_size(history, k, axis, motion.sense * direction[axis])?;
+    let mut report = Report {
+        displacement: motion.way.iter().map(|x| motion.sense * x).collect(),
+        load: motion.load.iter().map(|f| motion.sense * f).collect(),
+        // the grains push back
+        reaction: motion.reaction.iter().map(|f| -motion.sense * f).collect(),
+        strain: tensor("strain")?.iter().map(|e| -push * e).collect(),
+        stress: tensor("stress")?.iter().map(|s| push * s).collect(),
+        broken: history.observable("bonds_broken")?.map(|series| series.value).unwrap_or_default(),
+        summary: Summary { wall: walls[k].name.clone(), height: sample[0], area: sample[1], ..Summary::default() },
+        step: motion.step,
+        time: motion.time,
+    };
+    report.summarise(&history.bonds()?.strength, history.observable("solver_residual")?);
+    Ok(report)
+}
+
+/// What the driven wall does, along its direction and with the signs of that direction.
+struct Motion {
+    step: Vec<i64>,
+    time: Vec<f64>,
+    /// Displacement since the first frame, m.
+    way: Vec<f64>,
+    /// Force of the grains on the wall, N; empty if not recorded.
+    reaction: Vec<f64>,
+    /// Force on the wall from outside, N.
+    load: Vec<f64>,
+    /// The sign that makes the load positive.
+    sense: f64,
+}
+
+fn motion(history: &History, wall: &Wall, k: usize) -> Result<Motion> {
+    let direction = &wall.direction;
     let position = required(history, "wall_position")?;
-    let start = start_of(history, k, &direction)?;
-    let way: Vec<f64> = along(history, &position, k, &direction, "wall_position")?
-        .iter()
-        .map(|x| x - start)
-        .collect();
+    let start = start_of(history, k, direction)?;
+    let way: Vec<f64> = along(history, &position, k, direction, "wall_position")?.iter().map(|x| x - start).collect();
     let reaction = match history.observable("wall_force")? {
-        Some(series) => along(history, &series, k, &direction, "wall_force")?,
+        Some(series) => along(history, &series, k, direction, "wall_force")?,
         None => vec![],
     };
     // the load is counted in the sense of the prescribed force, or of the prescribed motion
-    let load = match walls[k].drive {
-        WallDrive::Force => component(
-            history,
-            &required(history, "applied_force")?,
-            &[k],
-            "applied_force",
-        )?,
+    let load = match wall.drive {
+        WallDrive::Force => component(history, &required(history, "applied_force")?, &[k], "applied_force")?,
         _ => required(history, "wall_force").map(|_| reaction.iter().map(|f| -f).collect())?,
     };
-    let sense = sense(if walls[k].drive == WallDrive::Force {
-        &load
-    } else {
-        &way
-    });
-    let tensor = |name: &str| -> Result<Vec<f64>> {
-        let series = history.observable(name)?;
-        series.map_or_else(
-            || Ok(vec![]),
-            |series| component(history, &series, &[axis, axis], name),
-        )
-    };
-    let (sample, push) = sample_size(history, k, axis, sense * direction[axis])?;
-    let mut report = Report {
-        displacement: way.iter().map(|x| sense * x).collect(),
-        load: load.iter().map(|f| sense * f).collect(),
-        // the grains push back
-        reaction: reaction.iter().map(|f| -sense * f).collect(),
-        strain: tensor("strain")?.iter().map(|e| -push * e).collect(),
-        stress: tensor("stress")?.iter().map(|s| push * s).collect(),
-        broken: history
-            .observable("bonds_broken")?
-            .map(|series| series.value)
-            .unwrap_or_default(),
-        summary: Summary {
-            wall: walls[k].name.clone(),
-            height: sample[0],
-            area: sample[1],
-            ..Summary::default()
-        },
-        step: position.step,
-        time: position.time,
-    };
-    report.summarise(
-        &history.bonds()?.strength,
-        history.observable("solver_residual")?,
-    );
-    Ok(report)
+    let sense = sense(if wall.drive == WallDrive::Force { &load } else { &way });
+    Ok(Motion { step: position.step, time: position.time, way, reaction, load, sense })
 }
 
 /// The sign of the value of greatest magnitude.
 fn sense(values: &[f64]) -> f64 {
-    values
-        .iter()
-        .copied()
-        .max_by(|a, b| a.abs().total_cmp(&b.abs()))
-        .unwrap_or(1.0)
-        .signum()
+    values.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(1.0).signum()
 }
 
 /// The component along `direction` of a vector that is observed for each wall.
-fn along(
-    history: &History,
-    series: &Series,
-    wall: usize,
-    direction: &[f64; 3],
-    name: &str,
-) -> Result<Vec<f64>> {
+fn along(history: &History, series: &Series, wall: usize, direction: &[f64; 3], name: &str) -> Result<Vec<f64>> {
     let mut sum = vec![0.0; series.step.len()];
     for d in 0..history.dimension() {
         let values = component(history, series, &[wall, d], name)?;
-        sum.iter_mut()
-            .zip(values)
-            .for_each(|(sum, value)| *sum += direction[d] * value);
+        sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += direction[d] * value);
     }
     Ok(sum)
 }
 
-/// The time at which the sample collapses, s: the last step before the fitted strain exceeds 1e-4. `None` where nothing
-/// is driven, or nothing collapses.
-///
-/// # Errors
-/// Those of reading the history.
-pub fn collapse_time(history: &History) -> Result<Option<f64>> {
-    match read(history, None) {
-        Ok(report) => Ok(report.summary.collapse_time),
-        Err(PostError::Lacking { .. } | PostError::Usage(_)) => Ok(None),
-        Err(error) => Err(error),
-    }
-}
-
 fn lacking(path: &Path, what: String) -> PostError {
-    PostError::Lacking {
-        path: path.into(),
-        what,
-    }
+    PostError::Lacking { path: path.into(), what }
 }
 
 /// The driven wall: the one named, or the only one.
 fn driven(path: &Path, walls: &[Wall], name: Option<&str>) -> Result<usize> {
-    let moving: Vec<usize> = (0..walls.len())
-        .filter(|&k| walls[k].drive != WallDrive::Fixed)
-        .collect();
-    let names = || {
-        moving
-            .iter()
-            .map(|&k| walls[k].name.as_str())
-            .collect::<Vec<_>>()
-            .join(", ")
-    };
+    let moving: Vec<usize> = (0..walls.len()).filter(|&k| walls[k].drive != WallDrive::Fixed).collect();
+    let names = || moving.iter().map(|&k| walls[k].name.as_str()).collect::<Vec<_>>().join(", ");
     match (name, moving.as_slice()) {
         (_, []) => {
             let what = "stress and strain need a driven wall, and this scene has none: \
                         give one of its walls a velocity or a force";
             Err(lacking(path, what.into()))
         }
-        (Some(name), moving) => moving
-            .iter()
-            .copied()
-            .find(|&k| walls[k].name == name)
-            .ok_or_else(|| {
-                PostError::Usage(format!(
-                    "--wall {name}: no driven wall has this name; there is {}",
-                    names()
-                ))
-            }),
+        (Some(name), moving) => moving.iter().copied().find(|&k| walls[k].name == name).ok_or_else(|| {
+            PostError::Usage(format!("--wall {name}: no driven wall has this name; there is {}", names()))
+        }),
         (None, [k]) => Ok(*k),
-        (None, _) => Err(PostError::Usage(format!(
-            "several walls are driven: choose one by --wall: {}",
-            names()
-        ))),
+        (None, _) => Err(PostError::Usage(format!("several walls are driven: choose one by --wall: {}", names()))),
     }
 }
 
 fn required(history: &History, name: &str) -> Result<Series> {
     history.observable(name)?.filter(|series| !series.step.is_empty()).ok_or_else(|| {
-        lacking(history.path(), format!("it has no steps of /observables/{name}: run the scene again with walls observed"))
+        lacking(
+            history.path(),
+            format!("it has no steps of /observables/{name}: run the scene again with walls observed"),
+        )
     })
 }
 
@@ -258,10 +205,7 @@ fn component(history: &History, series: &Series, index: &[usize], name: &str) ->
     series.component(index).ok_or_else(|| {
         lacking(
             history.path(),
-            format!(
-                "/observables/{name} has shape {:?}, which has no entry {index:?}",
-                series.shape
-            ),
+            format!("/observables/{name} has shape {:?}, which has no entry {index:?}", series.shape),
         )
     })
 }
@@ -270,19 +214,10 @@ fn component(history: &History, series: &Series, index: &[usize], name: &str) ->
 fn start_of(history: &History, k: usize, direction: &[f64; 3]) -> Result<f64> {
     let d = history.dimension();
     if history.frames() == 0 {
-        return Err(lacking(
-            history.path(),
-            "it holds no frame yet: wait for the run to write one".into(),
-        ));
+        return Err(lacking(history.path(), "it holds no frame yet: wait for the run to write one".into()));
     }
     let position = history.wall_state(0)?.position;
-    Ok(position
-        .get(k * d..(k + 1) * d)
-        .into_iter()
-        .flatten()
-        .zip(direction)
-        .map(|(x, n)| x * n)
-        .sum())
+    Ok(position.get(k * d..(k + 1) * d).into_iter().flatten().zip(direction).map(|(x, n)| x * n).sum())
 }
 
 /// Height and cross-section of the sample at the first frame (m, m²), and whether the load pushes (1) or pulls (−1).
@@ -293,10 +228,7 @@ fn sample_size(history: &History, wall: usize, axis: usize, drive: f64) -> Resul
     let mut middle = 0.0;
     for k in 0..d {
         let edge = |sign: f64| {
-            let reach = radius
-                .iter()
-                .zip(position.chunks(d))
-                .map(|(r, x)| sign * x[k] + r);
+            let reach = radius.iter().zip(position.chunks(d)).map(|(r, x)| sign * x[k] + r);
             sign * reach.fold(f64::NEG_INFINITY, f64::max)
         };
         let (low, high) = (edge(-1.0), edge(1.0));
@@ -305,24 +237,11 @@ fn sample_size(history: &History, wall: usize, axis: usize, drive: f64) -> Resul
             middle = 0.5 * (low + high);
         }
     }
-    let place = history
-        .wall_state(0)?
-        .position
-        .get(wall * d + axis)
-        .copied()
-        .unwrap_or(middle);
+    let place = history.wall_state(0)?.position.get(wall * d + axis).copied().unwrap_or(middle);
     let across: f64 = (0..d).filter(|&k| k != axis).map(|k| extents[k]).product();
-    let area = if d == 2 {
-        across * thickness(history)?
-    } else {
-        across
-    };
+    let area = if d == 2 { across * thickness(history)? } else { across };
     // a wall above that moves down pushes, one that moves up pulls
-    let push = if drive * (place - middle) > 0.0 {
-        -1.0
-    } else {
-        1.0
-    };
+    let push = if drive * (place - middle) > 0.0 { -1.0 } else { 1.0 };
     Ok(([extents[axis], area], push))
 }
 
@@ -330,50 +249,17 @@ fn sample_size(history: &History, wall: usize, axis: usize, drive: f64) -> Resul
 fn thickness(history: &History) -> Result<f64> {
     let scene = history.parameters()?.scene;
     let scene: serde_json::Value = serde_json::from_str(&scene).unwrap_or_default();
-    Ok(scene
-        .get("thickness")
-        .and_then(serde_json::Value::as_f64)
-        .filter(|t| *t > 0.0)
-        .unwrap_or(1.0))
-}
-
-/// The last step before `strain` exceeds `threshold` in magnitude; `None` if it never does.
-pub fn last_step_below(strain: &[f64], threshold: f64) -> Option<usize> {
-    let above = strain.iter().position(|e| e.abs() > threshold)?;
-    Some(above.saturating_sub(1))
-}
-
-/// Where the load is greatest, if it falls by at least 5 % afterwards.
-pub fn peak(load: &[f64]) -> Option<usize> {
-    let top = (0..load.len()).max_by(|&a, &b| load[a].total_cmp(&load[b]).then(b.cmp(&a)))?;
-    let lowest = load[top..].iter().copied().fold(f64::INFINITY, f64::min);
-    (load[top] > 0.0 && lowest < (1.0 - PEAK_DROP) * load[top]).then_some(top)
-}
-
-/// Work of a force along a way, by trapezoids, J; from zero force at way zero.
-pub fn work(load: &[f64], way: &[f64]) -> f64 {
-    let (mut sum, mut last) = (0.0, (0.0, 0.0));
-    for now in load.iter().copied().zip(way.iter().copied()) {
-        sum += 0.5 * (now.0 + last.0) * (now.1 - last.1);
-        last = now;
-    }
-    sum
+    Ok(scene.get("thickness").and_then(serde_json::Value::as_f64).filter(|t| *t > 0.0).unwrap_or(1.0))
 }
 
 impl Report {
     fn summarise(&mut self, strengths: &[f64], residual: Option<Series>) {
         let at = |step: Option<usize>| step.and_then(|k| self.load.get(k).copied());
-        let [collapse, collapse_1e3] =
-            COLLAPSE.map(|threshold| last_step_below(&self.strain, threshold));
+        let [collapse, collapse_1e3] = COLLAPSE.map(|threshold| last_step_below(&self.strain, threshold));
         let limit = BROKEN * strengths.len() as f64;
-        let five = if strengths.is_empty() {
-            None
-        } else {
-            self.broken.iter().position(|&n| n >= limit)
-        };
+        let five = if strengths.is_empty() { None } else { self.broken.iter().position(|&n| n >= limit) };
         let top = peak(&self.load);
-        let cohesion =
-            (!strengths.is_empty()).then(|| strengths.iter().sum::<f64>() / strengths.len() as f64);
+        let cohesion = (!strengths.is_empty()).then(|| strengths.iter().sum::<f64>() / strengths.len() as f64);
         let maximum = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
         let summary = Summary {
             wall: std::mem::take(&mut self.summary.wall),
@@ -391,9 +277,7 @@ impl Report {
             work: work(&self.load, &self.displacement),
             bonds_broken: self.broken.last().copied(),
             cohesion,
-            collapse_over_cohesion: at(collapse)
-                .zip(cohesion)
-                .map(|(load, cohesion)| load / cohesion),
+            collapse_over_cohesion: at(collapse).zip(cohesion).map(|(load, cohesion)| load / cohesion),
             worst_residual: residual.map(|series| maximum(&series.value)),
         };
         self.summary = summary;
@@ -402,49 +286,19 @@ impl Report {
     /// The summary as a table.
     pub fn table(&self) -> String {
         let s = &self.summary;
-        let bonds = s
-            .bonds_broken
-            .map_or_else(|| "–".into(), |n| format!("{n:.0}"));
+        let bonds = s.bonds_broken.map_or_else(|| "–".into(), |n| format!("{n:.0}"));
         facts(&[
             ("driven wall", s.wall.clone()),
-            (
-                "sample",
-                format!(
-                    "{} high, section {}",
-                    quantity(Some(s.height), "m"),
-                    quantity(Some(s.area), "m²")
-                ),
-            ),
-            (
-                "collapse load (strain 1e-4)",
-                quantity(s.collapse_load, "N"),
-            ),
-            (
-                "collapse load (strain 1e-3)",
-                quantity(s.collapse_load_1e3, "N"),
-            ),
-            (
-                "load with 5 % of bonds broken",
-                quantity(s.load_at_5_percent_broken, "N"),
-            ),
-            (
-                "collapse load / cohesion",
-                quantity(s.collapse_over_cohesion, ""),
-            ),
+            ("sample", format!("{} high, section {}", quantity(Some(s.height), "m"), quantity(Some(s.area), "m²"))),
+            ("collapse load (strain 1e-4)", quantity(s.collapse_load, "N")),
+            ("collapse load (strain 1e-3)", quantity(s.collapse_load_1e3, "N")),
+            ("load with 5 % of bonds broken", quantity(s.load_at_5_percent_broken, "N")),
+            ("collapse load / cohesion", quantity(s.collapse_over_cohesion, "")),
             ("collapse at", quantity(s.collapse_time, "s")),
-            (
-                "peak load",
-                s.peak_load.map_or_else(
-                    || "none: the load never falls".into(),
-                    |f| quantity(Some(f), "N"),
-                ),
-            ),
+            ("peak load", s.peak_load.map_or_else(|| "none: the load never falls".into(), |f| quantity(Some(f), "N"))),
             ("strain at the peak", quantity(s.peak_strain, "")),
             ("greatest load", quantity(Some(s.greatest_load), "N")),
-            (
-                "displacement at the end",
-                quantity(Some(s.final_displacement), "m"),
-            ),
+            ("displacement at the end", quantity(Some(s.final_displacement), "m")),
             ("strain at the end", quantity(s.final_strain, "")),
             ("work of the wall", quantity(Some(s.work), "J")),
             ("bonds broken", bonds),
@@ -487,20 +341,14 @@ pub fn write(report: &Report, folder: &mut Folder) -> Result<()> {
         ]
     });
     folder.table("stress-strain", &head, rows)?;
-    folder.draw(
-        "force-displacement",
-        &Chart::draw(vec![force_displacement(report)]),
-    )?;
+    folder.draw("force-displacement", &Chart::draw(vec![force_displacement(report)]))?;
     let mut charts = vec![stress_strain(report)];
     charts.extend(onset(report));
     folder.draw("stress-strain", &Chart::draw(charts))
 }
 
 fn pairs(x: &[f64], x_scale: f64, y: &[f64], y_scale: f64) -> Vec<(f64, f64)> {
-    x.iter()
-        .zip(y)
-        .map(|(x, y)| (x * x_scale, y * y_scale))
-        .collect()
+    x.iter().zip(y).map(|(x, y)| (x * x_scale, y * y_scale)).collect()
 }
 
 fn force_displacement(report: &Report) -> Chart {
@@ -508,19 +356,12 @@ fn force_displacement(report: &Report) -> Chart {
     chart.set_off = true;
     if !report.reaction.is_empty() {
         let points = pairs(&report.displacement, 1e3, &report.reaction, 1.0);
-        chart = chart.curve(
-            "reaction of the grains",
-            colour::VERMILLION,
-            Style::Line,
-            points,
-        );
+        chart = chart.curve("reaction of the grains", colour::ORANGE, Style::Thin, points);
     }
     let points = pairs(&report.displacement, 1e3, &report.load, 1.0);
     chart = chart.curve("applied force", colour::BLUE, Style::Line, points);
     if let Some(load) = report.summary.collapse_load {
-        chart
-            .levels
-            .push((load, format!("collapse {} N", short(load))));
+        chart.levels.push((load, format!("at strain 10⁻⁴: {} N", short(load))));
     }
     chart
 }
@@ -528,30 +369,17 @@ fn force_displacement(report: &Report) -> Chart {
 /// The load over the logarithm of the fitted strain, which shows how little the sample gives way before it collapses.
 fn onset(report: &Report) -> Option<Chart> {
     let visible = |&(strain, _): &(f64, f64)| strain >= LEAST_STRAIN;
-    let points: Vec<(f64, f64)> = report
-        .strain
-        .iter()
-        .map(|e| e.abs())
-        .zip(report.load.iter().copied())
-        .filter(visible)
-        .collect();
+    let points: Vec<(f64, f64)> =
+        report.strain.iter().map(|e| e.abs()).zip(report.load.iter().copied()).filter(visible).collect();
     if points.len() < 2 {
         return None;
     }
-    let mut chart = Chart::new(
-        "magnitude of the axial strain, from the particles",
-        "applied force (N)",
-    );
+    let mut chart = Chart::new("magnitude of the axial strain, from the particles", "applied force (N)");
     chart = chart.curve("applied force", colour::BLUE, Style::Line, points);
     chart.log_x = true;
-    chart.moments = COLLAPSE
-        .iter()
-        .map(|&strain| (strain, String::new()))
-        .collect();
+    chart.moments = COLLAPSE.to_vec();
     if let Some(load) = report.summary.collapse_load {
-        chart
-            .levels
-            .push((load, format!("collapse {} N", short(load))));
+        chart.levels.push((load, format!("at strain 10⁻⁴: {} N", short(load))));
     }
     Some(chart)
 }
@@ -562,50 +390,15 @@ fn stress_strain(report: &Report) -> Chart {
     let wall_strain = 1e2 / report.summary.height;
     let wall_stress = 1e-3 / report.summary.area;
     if !report.reaction.is_empty() {
-        let points = pairs(
-            &report.displacement,
-            wall_strain,
-            &report.reaction,
-            wall_stress,
-        );
-        chart = chart.curve("from the walls", colour::VERMILLION, Style::Line, points);
+        let points = pairs(&report.displacement, wall_strain, &report.reaction, wall_stress);
+        chart = chart.curve("from walls", colour::ORANGE, Style::Thin, points);
     }
     let points = pairs(&report.strain, 1e2, &report.stress, 1e-3);
     if !points.is_empty() {
-        chart = chart.curve("from the particles", colour::BLUE, Style::Line, points);
+        chart = chart.curve("from particles", colour::BLUE, Style::Thin, points);
     }
     if let Some(load) = report.summary.collapse_load {
-        chart.levels.push((
-            load * wall_stress,
-            format!("collapse {} kPa", short(load * wall_stress)),
-        ));
+        chart.levels.push((load * wall_stress, format!("at strain 10⁻⁴: {} kPa", short(load * wall_stress))));
     }
     chart
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn collapse_is_the_last_step_before_the_strain_exceeds_its_threshold() {
-        let strain = [0.0, 5e-5, 1e-4, -2e-4, 0.0, 2e-3];
-        assert_eq!(last_step_below(&strain, 1e-4), Some(2));
-        assert_eq!(last_step_below(&strain, 1e-3), Some(4));
-        assert_eq!(last_step_below(&strain, 1.0), None);
-        assert_eq!(last_step_below(&[1.0], 1e-4), Some(0));
-    }
-
-    #[test]
-    fn a_load_that_only_grows_has_no_peak() {
-        assert_eq!(peak(&[0.0, 1.0, 2.0]), None);
-        assert_eq!(peak(&[0.0, 2.0, 1.99]), None);
-        assert_eq!(peak(&[0.0, 2.0, 1.0, 1.5]), Some(1));
-        assert_eq!(peak(&[]), None);
-    }
-
-    #[test]
-    fn work_is_the_area_under_the_curve() {
-        assert!((work(&[1.0, 2.0, 2.0], &[1.0, 2.0, 4.0]) - (0.5 + 1.5 + 4.0)).abs() < 1e-15);
-    }
 }

@@ -58,12 +58,25 @@ pub trait Law: Copy + Send + Sync + 'static {
     /// Natural map r̂ − P_K(r̂ − ũ/D) of the contact, D the largest diagonal entry of its block: zero at a solution.
     fn natural_map(&self, r: Local<Self::T, Self::B>, u: Local<Self::T, Self::B>) -> Local<Self::T, Self::B>;
 
+    /// 1/D: the inverse of the largest diagonal entry of the block (kg).
+    fn gamma(&self) -> f64;
+
     /// The cone that holds the shifted reaction.
     fn cone(&self) -> Cone;
 
     /// The shift s of the normal reaction (N s).
     fn shift(&self) -> f64 {
         0.0
+    }
+
+    /// What is added to the normal velocity before the law (m/s).
+    fn bias(&self) -> f64 {
+        0.0
+    }
+
+    /// Whether the flow is normal to the cone, so that the law derives from a convex potential.
+    fn associated(&self) -> bool {
+        true
     }
 
     /// Length that scales moments and relative spins: the mean diameter of a bonded pair (m).
@@ -127,6 +140,14 @@ impl Law for Frictionless {
         r - self.improve(LocalSolve::Exact, r, u)
     }
 
+    fn gamma(&self) -> f64 {
+        self.inverse
+    }
+
+    fn bias(&self) -> f64 {
+        self.bias
+    }
+
     fn cone(&self) -> Cone {
         Cone { mu: 0.0, nu: 0.0 }
     }
@@ -149,8 +170,7 @@ impl<T: Vect> Coulomb<T> {
     }
 
     fn predict_correct(&self, r: Local<T, V0>, u: Local<T, V0>) -> Local<T, V0> {
-        let gamma = self.inverse_n.min(self.inverse_t);
-        predict_correct(Cone { mu: self.mu, nu: 0.0 }, 0.0, true, gamma, r, u)
+        predict_correct(Cone { mu: self.mu, nu: 0.0 }, 0.0, true, self.gamma(), r, u)
     }
 }
 
@@ -175,6 +195,19 @@ impl<T: Vect> Law for Coulomb<T> {
     fn natural_map(&self, r: Local<T, V0>, mut u: Local<T, V0>) -> Local<T, V0> {
         u.n += self.bias;
         self.predict_correct(r, u) * -1.0
+    }
+
+    #[inline(always)]
+    fn gamma(&self) -> f64 {
+        self.inverse_n.min(self.inverse_t)
+    }
+
+    fn bias(&self) -> f64 {
+        self.bias
+    }
+
+    fn associated(&self) -> bool {
+        false
     }
 
     #[inline(always)]
@@ -261,8 +294,17 @@ impl<A: Vect> Law for Bonded<A, A> {
         self.predict_correct(r, u) * -1.0
     }
 
+    fn gamma(&self) -> f64 {
+        let block = self.block();
+        1.0 / block.n.max(block.t).max(block.m)
+    }
+
     fn cone(&self) -> Cone {
         self.cone
+    }
+
+    fn associated(&self) -> bool {
+        self.flow == BondFlow::Associated
     }
 
     #[inline(always)]
@@ -278,9 +320,7 @@ impl<A: Vect> Law for Bonded<A, A> {
 
 impl<A: Vect> Bonded<A, A> {
     fn predict_correct(&self, r: Local<A, A>, u: Local<A, A>) -> Local<A, A> {
-        let block = self.block();
-        let gamma = 1.0 / block.n.max(block.t).max(block.m);
-        predict_correct(self.cone, self.shift, self.flow == BondFlow::Bipotential, gamma, r, u)
+        predict_correct(self.cone, self.shift, self.flow == BondFlow::Bipotential, self.gamma(), r, u)
     }
 
     /// Local solve on the boundary of the cone.

@@ -43,7 +43,7 @@ impl GaussSeidel {
         } else {
             SolveStatus::Failed
         };
-        SolveReport { status, iterations, residual }
+        SolveReport { status, iterations, residual, load_error: None }
     }
 }
 

@@ -1,8 +1,10 @@
 //! Solvers of the contact problem, behind one trait and one enum of settings.
 
 mod gauss_seidel;
+mod newton;
 
 pub use gauss_seidel::{GaussSeidel, GaussSeidelSettings, sweep};
+pub use newton::{Newton, NewtonSettings, Start, StiffnessRatio};
 
 use crate::dim::Dim;
 use crate::problem::ContactProblem;
@@ -27,6 +29,8 @@ pub struct SolveReport {
     pub iterations: u64,
     /// Residual reached (–), see [`crate::problem::residual`].
     pub residual: f64,
+    /// Load error (–), by the solvers that can tell it.
+    pub load_error: Option<f64>,
 }
 
 /// A method that solves a contact problem from the impulses it holds as a start.
@@ -40,6 +44,8 @@ pub trait ContactSolver<D: Dim>: Send {
 pub enum SolverSettings {
     /// Non-linear Gauss–Seidel, the paper's method of successive equilibria.
     GaussSeidel(GaussSeidelSettings),
+    /// Augmented-Lagrangian semismooth Newton with a sparse factorisation.
+    Newton(NewtonSettings),
 }
 
 impl SolverSettings {
@@ -47,6 +53,7 @@ impl SolverSettings {
     pub fn build<D: Dim>(&self) -> Box<dyn ContactSolver<D>> {
         match *self {
             Self::GaussSeidel(settings) => Box::new(GaussSeidel::new(settings)),
+            Self::Newton(settings) => Box::new(Newton::new(settings)),
         }
     }
 }

@@ -352,7 +352,7 @@ impl<D: Dim> World<D> {
             status: done.status(),
             iterations: done.iterations,
             residual: done.residual,
-            load_error: if problem.applied > 0.0 { change.sqrt() / problem.applied } else { 0.0 },
+            load_error: done.load_error.unwrap_or(if problem.applied > 0.0 { change.sqrt() / problem.applied } else { 0.0 }),
             counts: Counts::of(touches),
             breaks,
             penetration: dry.map(|t| -t.gap).fold(0.0, f64::max),
@@ -407,6 +407,7 @@ fn forget_bonds<D: Dim>(touches: &mut [Touch<D>], broken: &[Break<D>]) {
 struct Solves {
     iterations: u64,
     residual: f64,
+    load_error: Option<f64>,
     missed_aim: bool,
 }
 
@@ -414,6 +415,7 @@ impl Solves {
     fn add(&mut self, solve: SolveReport) {
         self.iterations += solve.iterations;
         self.residual = self.residual.max(solve.residual);
+        self.load_error = solve.load_error.map(|e| self.load_error.map_or(e, |worst: f64| worst.max(e)));
         self.missed_aim |= solve.status != SolveStatus::Converged;
     }
 

@@ -18,11 +18,7 @@ pub(super) struct Column {
 
 impl Column {
     pub fn check(&self, frame: &Frame, rows: usize) -> Result<()> {
-        check_length(
-            self.place,
-            (self.take)(frame).len(),
-            rows * self.table.width(),
-        )
+        check_length(self.place, (self.take)(frame).len(), rows * self.table.width())
     }
 
     pub fn append(&mut self, frame: &Frame) -> hdf5::Result<()> {
@@ -102,12 +98,7 @@ impl Observables {
 }
 
 impl Commit {
-    pub fn rows(
-        &mut self,
-        contacts: usize,
-        steps: usize,
-        events: Option<&Table>,
-    ) -> hdf5::Result<()> {
+    pub fn rows(&mut self, contacts: usize, steps: usize, events: Option<&Table>) -> hdf5::Result<()> {
         self.contacts.append(&[contacts as u64])?;
         self.steps.append(&[steps as u64])?;
         match (&mut self.events, events) {
@@ -118,23 +109,13 @@ impl Commit {
 }
 
 pub(super) fn check_length(place: &str, found: usize, expected: usize) -> Result<()> {
-    if found == expected {
-        Ok(())
-    } else {
-        Err(HistoryError::Shape {
-            place: place.into(),
-            found,
-            expected,
-        })
-    }
+    if found == expected { Ok(()) } else { Err(HistoryError::Shape { place: place.into(), found, expected }) }
 }
 
 pub(super) fn write_identity(file: &File, layout: &Layout) -> hdf5::Result<()> {
     let run = &layout.parameters;
     let h5md = file.create_group("h5md")?;
-    h5md.new_attr_builder()
-        .with_data(&[1i32, 1])
-        .create("version")?;
+    h5md.new_attr_builder().with_data(&[1i32, 1]).create("version")?;
     let author = h5md.create_group("author")?;
     text_attribute(&author, "name", CREATOR)?;
     let creator = h5md.create_group("creator")?;
@@ -142,14 +123,8 @@ pub(super) fn write_identity(file: &File, layout: &Layout) -> hdf5::Result<()> {
     text_attribute(&creator, "version", &run.version)?;
 
     let parameters = file.create_group(path::PARAMETERS)?;
-    parameters
-        .new_attr::<u32>()
-        .create("schema_version")?
-        .write_scalar(&SCHEMA_VERSION)?;
-    parameters
-        .new_attr::<u64>()
-        .create("seed")?
-        .write_scalar(&run.seed)?;
+    parameters.new_attr::<u32>().create("schema_version")?.write_scalar(&SCHEMA_VERSION)?;
+    parameters.new_attr::<u64>().create("seed")?.write_scalar(&run.seed)?;
     for (name, value) in [
         ("version", &run.version),
         ("git_revision", &run.git_revision),
@@ -159,22 +134,15 @@ pub(super) fn write_identity(file: &File, layout: &Layout) -> hdf5::Result<()> {
     ] {
         text_attribute(&parameters, name, value)?;
     }
-    let scene = file
-        .new_dataset::<VarLenUnicode>()
-        .obj_track_times(false)
-        .create(path::SCENE)?;
+    let scene = file.new_dataset::<VarLenUnicode>().obj_track_times(false).create(path::SCENE)?;
     scene.write_scalar(&text(&run.scene))
 }
 
 pub(super) fn grains(file: &File, layout: &Layout) -> hdf5::Result<Group> {
     let group = file.create_group("particles")?.create_group("grains")?;
     let cell = group.create_group("box")?;
-    cell.new_attr::<i32>()
-        .create("dimension")?
-        .write_scalar(&(layout.dimension as i32))?;
-    cell.new_attr_builder()
-        .with_data(&vec![text("none"); layout.dimension])
-        .create("boundary")?;
+    cell.new_attr::<i32>().create("dimension")?.write_scalar(&(layout.dimension as i32))?;
+    cell.new_attr_builder().with_data(&vec![text("none"); layout.dimension]).create("boundary")?;
     let grains = &layout.grains;
     let n = [grains.id.len()];
     fixed(&group, "id", "", &n, &grains.id)?;
@@ -198,54 +166,25 @@ fn link_times(group: &Group) -> hdf5::Result<()> {
     Ok(())
 }
 
-pub(super) fn grain_columns(
-    grains: &Group,
-    motion: &Group,
-    layout: &Layout,
-) -> hdf5::Result<Vec<Column>> {
+pub(super) fn grain_columns(grains: &Group, motion: &Group, layout: &Layout) -> hdf5::Result<Vec<Column>> {
     let (n, d) = (layout.grains.id.len(), layout.dimension);
     let column = |place, group: &Group, unit, row: &[usize], take| -> hdf5::Result<Column> {
-        Ok(Column {
-            place,
-            table: Table::create::<f64>(group, "value", unit, row, Growth::Frames)?,
-            take,
-        })
+        Ok(Column { place, table: Table::create::<f64>(group, "value", unit, row, Growth::Frames)?, take })
     };
     let mut columns = vec![
-        column("particles/grains/position", motion, "m", &[n, d], |f| {
-            &f.grains.position
-        })?,
-        column(
-            "particles/grains/velocity",
-            &element(grains, "velocity")?,
-            "m s-1",
-            &[n, d],
-            |f| &f.grains.velocity,
-        )?,
+        column("particles/grains/position", motion, "m", &[n, d], |f| &f.grains.position)?,
+        column("particles/grains/velocity", &element(grains, "velocity")?, "m s-1", &[n, d], |f| &f.grains.velocity)?,
     ];
     if layout.rotation {
         let spins: &[usize] = if d == 2 { &[n] } else { &[n, 3] };
         let spin = element(grains, "angular_velocity")?;
-        columns.push(column(
-            "particles/grains/angular_velocity",
-            &spin,
-            "rad s-1",
-            spins,
-            |f| &f.grains.angular_velocity,
-        )?);
-        let (name, unit, row): (_, _, &[usize]) = if d == 2 {
-            ("angle", "rad", &[n])
-        } else {
-            ("orientation", "", &[n, 4])
-        };
+        columns.push(column("particles/grains/angular_velocity", &spin, "rad s-1", spins, |f| {
+            &f.grains.angular_velocity
+        })?);
+        let (name, unit, row): (_, _, &[usize]) =
+            if d == 2 { ("angle", "rad", &[n]) } else { ("orientation", "", &[n, 4]) };
         let group = element(grains, name)?;
-        columns.push(column(
-            "particles/grains/orientation",
-            &group,
-            unit,
-            row,
-            |f| &f.grains.orientation,
-        )?);
+        columns.push(column("particles/grains/orientation", &group, unit, row, |f| &f.grains.orientation)?);
     }
     Ok(columns)
 }
@@ -254,10 +193,7 @@ pub(super) fn wall_columns(file: &File, layout: &Layout) -> hdf5::Result<Vec<Col
     let (walls, d) = (&layout.walls, layout.dimension);
     let (w, group) = (walls.len(), file.create_group(path::WALLS)?);
     let vectors = |take: fn(&Wall) -> &[f64; 3]| -> Vec<f64> {
-        walls
-            .iter()
-            .flat_map(|wall| take(wall)[..d].iter().copied())
-            .collect()
+        walls.iter().flat_map(|wall| take(wall)[..d].iter().copied()).collect()
     };
     let names: Vec<VarLenUnicode> = walls.iter().map(|wall| text(&wall.name)).collect();
     fixed(&group, "name", "", &[w], &names)?;
@@ -266,24 +202,12 @@ pub(super) fn wall_columns(file: &File, layout: &Layout) -> hdf5::Result<Vec<Col
     let drives: Vec<WallDriveCode> = walls.iter().map(|wall| wall.drive.code()).collect();
     fixed(&group, "drive", "", &[w], &drives)?;
     fixed(&group, "normal", "", &[w, d], &vectors(|wall| &wall.normal))?;
-    fixed(
-        &group,
-        "direction",
-        "",
-        &[w, d],
-        &vectors(|wall| &wall.direction),
-    )?;
+    fixed(&group, "direction", "", &[w, d], &vectors(|wall| &wall.direction))?;
     let radii: Vec<f64> = walls.iter().map(|wall| wall.radius).collect();
     fixed(&group, "radius", "m", &[w], &radii)?;
 
     let column = |place, name, unit, take| -> hdf5::Result<Column> {
-        let table = Table::create::<f64>(
-            &element(&group, name)?,
-            "value",
-            unit,
-            &[w, d],
-            Growth::Frames,
-        )?;
+        let table = Table::create::<f64>(&element(&group, name)?, "value", unit, &[w, d], Growth::Frames)?;
         Ok(Column { place, table, take })
     };
     Ok(vec![
@@ -300,13 +224,7 @@ pub(super) fn bonds(file: &File, bonds: &Bonds) -> hdf5::Result<Table> {
     fixed(&group, "strength", "N", &[b], &bonds.strength)?;
     fixed(&group, "friction", "", &[b], &bonds.friction)?;
     fixed(&group, "mean_diameter", "m", &[b], &bonds.mean_diameter)?;
-    Table::create::<BondCode>(
-        &element(&group, "status")?,
-        "value",
-        "",
-        &[b],
-        Growth::Frames,
-    )
+    Table::create::<BondCode>(&element(&group, "status")?, "value", "", &[b], Growth::Frames)
 }
 
 pub(super) fn contacts(file: &File, layout: &Layout) -> hdf5::Result<ContactTables> {
@@ -316,52 +234,32 @@ pub(super) fn contacts(file: &File, layout: &Layout) -> hdf5::Result<ContactTabl
     // a dense packing has two to three contacts a grain
     let growth = Growth::Rows(16 * 3 * layout.grains.id.len());
     let column = |place, name, unit, row: &[usize], take| -> hdf5::Result<Column> {
-        Ok(Column {
-            place,
-            table: Table::create::<f64>(&group, name, unit, row, growth)?,
-            take,
-        })
+        Ok(Column { place, table: Table::create::<f64>(&group, name, unit, row, growth)?, take })
     };
     // a bond has tangential rows whatever its friction
     let tangential = layout.friction || bonded;
     let reaction_rows = if tangential { d } else { 1 };
     let mut columns = vec![
         column("contacts/point", "point", "m", &[d], |f| &f.contacts.point)?,
-        column("contacts/normal", "normal", "", &[d], |f| {
-            &f.contacts.normal
-        })?,
-        column(
-            "contacts/reaction",
-            "reaction",
-            "N",
-            &[reaction_rows],
-            |f| &f.contacts.reaction,
-        )?,
+        column("contacts/normal", "normal", "", &[d], |f| &f.contacts.normal)?,
+        column("contacts/reaction", "reaction", "N", &[reaction_rows], |f| &f.contacts.reaction)?,
         column("contacts/gap", "gap", "m", &[], |f| &f.contacts.gap)?,
     ];
     let reaction = group.dataset("reaction")?;
     text_attribute(&reaction, "frame", "local")?;
     if d == 3 && tangential {
-        columns.push(column("contacts/tangent", "tangent", "", &[d], |f| {
-            &f.contacts.tangent
-        })?);
+        columns.push(column("contacts/tangent", "tangent", "", &[d], |f| &f.contacts.tangent)?);
     }
     if bonded {
         let row: &[usize] = if d == 2 { &[] } else { &[2] };
-        columns.push(column("contacts/moment", "moment", "N m", row, |f| {
-            &f.contacts.moment
-        })?);
+        columns.push(column("contacts/moment", "moment", "N m", row, |f| &f.contacts.moment)?);
     }
     Ok(ContactTables {
         start: Table::create::<u64>(&group, "start", "", &[], Growth::Frames)?,
         count: Table::create::<u32>(&group, "count", "", &[], Growth::Frames)?,
         pair: Table::create::<i32>(&group, "pair", "", &[2], growth)?,
         status: Table::create::<ContactCode>(&group, "status", "", &[], growth)?,
-        bond: if bonded {
-            Some(Table::create::<i32>(&group, "bond", "", &[], growth)?)
-        } else {
-            None
-        },
+        bond: if bonded { Some(Table::create::<i32>(&group, "bond", "", &[], growth)?) } else { None },
         columns,
     })
 }
@@ -377,29 +275,13 @@ pub(super) fn observables(file: &File, observables: &[Observable]) -> hdf5::Resu
         for name in ["step", "time"] {
             group.link_hard(&format!("/{}/{name}", path::OBSERVABLES), name)?;
         }
-        values.push(Table::create::<f64>(
-            &group,
-            "value",
-            &observable.unit,
-            &observable.shape,
-            growth,
-        )?);
+        values.push(Table::create::<f64>(&group, "value", &observable.unit, &observable.shape, growth)?);
     }
-    Ok(Observables {
-        step,
-        time,
-        blocks: vec![Vec::new(); values.len()],
-        values,
-        steps: vec![],
-        times: vec![],
-    })
+    Ok(Observables { step, time, blocks: vec![Vec::new(); values.len()], values, steps: vec![], times: vec![] })
 }
 
 pub(super) fn commit(file: &File, bonded: bool) -> hdf5::Result<Commit> {
-    let frames = file
-        .new_dataset::<u64>()
-        .obj_track_times(false)
-        .create(path::COMMIT)?;
+    let frames = file.new_dataset::<u64>().obj_track_times(false).create(path::COMMIT)?;
     frames.write_scalar(&0u64)?;
     let group = file.create_group("commit_rows")?;
     let table = |name| Table::create::<u64>(&group, name, "", &[], Growth::Frames);

@@ -113,30 +113,23 @@ pub type Result<T> = std::result::Result<T, HistoryError>;
 
 /// HDF5's error as one short line.
 pub(super) fn reason(error: &hdf5::Error) -> String {
-    match error.stack() {
+    let text = match error.stack() {
         // the innermost record is the cause, the outermost only says which call failed
-        Some(stack) => stack.last().map_or_else(
-            || "unknown HDF5 error".into(),
-            |frame| frame.desc().to_string(),
-        ),
+        Some(stack) => stack.last().map_or_else(|| "unknown HDF5 error".into(), |frame| frame.desc().to_string()),
         None => error.to_string(),
-    }
+    };
+    // of a failed system call HDF5 tells everything, the time and the address of the buffer too
+    let system = text.split_once("error message = '").and_then(|(_, rest)| rest.split_once('\''));
+    system.map_or_else(|| text.clone(), |(message, _)| message.into())
 }
 
 /// Turns HDF5's errors while writing into [`HistoryError::Write`].
 pub(super) fn while_writing(path: &Path) -> impl Fn(hdf5::Error) -> HistoryError + '_ {
-    move |error| HistoryError::Write {
-        path: path.into(),
-        why: reason(&error),
-    }
+    move |error| HistoryError::Write { path: path.into(), why: reason(&error) }
 }
 
 /// Turns HDF5's errors while reading `place` into [`HistoryError::Damaged`].
 pub(super) fn while_reading(path: &Path, place: &str) -> impl Fn(hdf5::Error) -> HistoryError {
     let (path, place) = (path.to_path_buf(), place.to_string());
-    move |error| HistoryError::Damaged {
-        path: path.clone(),
-        place: place.clone(),
-        why: reason(&error),
-    }
+    move |error| HistoryError::Damaged { path: path.clone(), place: place.clone(), why: reason(&error) }
 }

@@ -154,11 +154,7 @@ pub struct Observable {
 impl Observable {
     /// An observable from its name, unit and shape.
     pub fn new(name: &str, unit: &str, shape: &[usize]) -> Self {
-        Self {
-            name: name.into(),
-            unit: unit.into(),
-            shape: shape.into(),
-        }
+        Self { name: name.into(), unit: unit.into(), shape: shape.into() }
     }
 
     /// Numbers in one value.
@@ -265,14 +261,9 @@ impl ContactRows {
     /// Removes all rows and keeps the memory.
     pub fn clear(&mut self) {
         self.pair.clear();
-        for column in [
-            &mut self.point,
-            &mut self.normal,
-            &mut self.tangent,
-            &mut self.reaction,
-            &mut self.moment,
-            &mut self.gap,
-        ] {
+        for column in
+            [&mut self.point, &mut self.normal, &mut self.tangent, &mut self.reaction, &mut self.moment, &mut self.gap]
+        {
             column.clear();
         }
         self.status.clear();
@@ -281,11 +272,7 @@ impl ContactRows {
 
     /// Rows of the reaction of one contact: 1 without friction, else D.
     pub fn reaction_rows(&self) -> usize {
-        if self.is_empty() {
-            0
-        } else {
-            self.reaction.len() / self.len()
-        }
+        if self.is_empty() { 0 } else { self.reaction.len() / self.len() }
     }
 
     /// Normal force of contact `c`, N; positive in compression.
@@ -296,11 +283,7 @@ impl ContactRows {
     /// Magnitude of the tangential force of contact `c`, N.
     pub fn tangential_force(&self, c: usize) -> f64 {
         let rows = self.reaction_rows();
-        self.reaction[c * rows + 1..(c + 1) * rows]
-            .iter()
-            .map(|r| r * r)
-            .sum::<f64>()
-            .sqrt()
+        self.reaction[c * rows + 1..(c + 1) * rows].iter().map(|r| r * r).sum::<f64>().sqrt()
     }
 }
 

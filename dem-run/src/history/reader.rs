@@ -48,17 +48,9 @@ impl Series {
         if index.len() != self.shape.len() || index.iter().zip(&self.shape).any(|(i, n)| i >= n) {
             return None;
         }
-        let offset = index
-            .iter()
-            .zip(&self.shape)
-            .fold(0, |offset, (i, n)| offset * n + i);
+        let offset = index.iter().zip(&self.shape).fold(0, |offset, (i, n)| offset * n + i);
         let width = self.shape.iter().product();
-        Some(
-            self.value
-                .chunks_exact(width)
-                .map(|value| value[offset])
-                .collect(),
-        )
+        Some(self.value.chunks_exact(width).map(|value| value[offset]).collect())
     }
 }
 
@@ -71,16 +63,8 @@ impl History {
     pub fn open(path: &Path) -> Result<Self> {
         hdf5::silence_errors(true);
         let source = Source::open(path)?;
-        let mut history = Self {
-            source,
-            dimension: 0,
-            grains: 0,
-            walls: 0,
-            steps: vec![],
-            times: vec![],
-            events: 0,
-            observed: 0,
-        };
+        let mut history =
+            Self { source, dimension: 0, grains: 0, walls: 0, steps: vec![], times: vec![], events: 0, observed: 0 };
         history.read_commit()?;
         Ok(history)
     }
@@ -88,44 +72,21 @@ impl History {
     fn read_commit(&mut self) -> Result<()> {
         // first the commit: what is read after it is at least as new
         let frames = self.source.scalar::<u64>(path::COMMIT)? as usize;
-        self.dimension = self
-            .source
-            .attribute::<i32>(&format!("{}/box", path::GRAINS), "dimension")?
-            as usize;
+        self.dimension = self.source.attribute::<i32>(&format!("{}/box", path::GRAINS), "dimension")? as usize;
         if !(2..=3).contains(&self.dimension) {
-            return Err(self
-                .source
-                .damaged("particles/grains/box", "the dimension is neither 2 nor 3"));
+            return Err(self.source.damaged("particles/grains/box", "the dimension is neither 2 nor 3"));
         }
         self.grains = self.source.count(&format!("{}/id", path::GRAINS))?;
-        self.walls = if self.source.has(path::WALLS) {
-            self.source.count(&format!("{}/name", path::WALLS))?
-        } else {
-            0
-        };
-        self.steps = self
-            .source
-            .read(&format!("{}/position/step", path::GRAINS), 0..frames)?
-            .1;
-        self.times = self
-            .source
-            .read(&format!("{}/position/time", path::GRAINS), 0..frames)?
-            .1;
+        self.walls =
+            if self.source.has(path::WALLS) { self.source.count(&format!("{}/name", path::WALLS))? } else { 0 };
+        self.steps = self.source.read(&format!("{}/position/step", path::GRAINS), 0..frames)?.1;
+        self.times = self.source.read(&format!("{}/position/time", path::GRAINS), 0..frames)?.1;
         let last = frames.saturating_sub(1)..frames;
         let complete = |place: &str| -> Result<usize> {
-            Ok(self
-                .source
-                .read::<u64>(place, last.clone())?
-                .1
-                .first()
-                .map_or(0, |&rows| rows as usize))
+            Ok(self.source.read::<u64>(place, last.clone())?.1.first().map_or(0, |&rows| rows as usize))
         };
         let observed = complete(path::COMMIT_STEPS)?;
-        let events = if self.source.has(path::RUPTURE) {
-            complete(path::COMMIT_EVENTS)?
-        } else {
-            0
-        };
+        let events = if self.source.has(path::RUPTURE) { complete(path::COMMIT_EVENTS)? } else { 0 };
         (self.observed, self.events) = (observed, events);
         Ok(())
     }
@@ -181,18 +142,10 @@ impl History {
     /// # Errors
     /// [`HistoryError::Damaged`].
     pub fn parameters(&self) -> Result<Parameters> {
-        let text = |name| {
-            Ok::<_, HistoryError>(
-                self.source
-                    .attribute::<VarLenUnicode>(path::PARAMETERS, name)?
-                    .to_string(),
-            )
-        };
+        let text =
+            |name| Ok::<_, HistoryError>(self.source.attribute::<VarLenUnicode>(path::PARAMETERS, name)?.to_string());
         Ok(Parameters {
-            scene: self
-                .source
-                .scalar::<VarLenUnicode>(path::SCENE)?
-                .to_string(),
+            scene: self.source.scalar::<VarLenUnicode>(path::SCENE)?.to_string(),
             seed: self.source.attribute(path::PARAMETERS, "seed")?,
             version: text("version")?,
             git_revision: text("git_revision")?,
@@ -208,16 +161,8 @@ impl History {
     /// [`HistoryError::Damaged`].
     pub fn grains(&self) -> Result<Grains> {
         let id: Vec<i32> = self.source.whole(&format!("{}/id", path::GRAINS), 1)?;
-        let column = |name: &str| {
-            self.source
-                .column(&format!("{}/{name}", path::GRAINS), self.grains)
-        };
-        Ok(Grains {
-            radius: column("radius")?,
-            mass: column("mass")?,
-            inertia: column("inertia")?,
-            id,
-        })
+        let column = |name: &str| self.source.column(&format!("{}/{name}", path::GRAINS), self.grains);
+        Ok(Grains { radius: column("radius")?, mass: column("mass")?, inertia: column("inertia")?, id })
     }
 
     /// The walls; empty for a scene without any.
@@ -231,16 +176,8 @@ impl History {
         let place = |name: &str| format!("{}/{name}", path::WALLS);
         let names: Vec<VarLenUnicode> = self.source.whole(&place("name"), 1)?;
         let (w, d) = (self.walls, self.dimension);
-        let kinds = self.source.coded(
-            &place("kind"),
-            self.source.whole::<WallKindCode>(&place("kind"), 1)?,
-            w,
-        )?;
-        let drives = self.source.coded(
-            &place("drive"),
-            self.source.whole::<WallDriveCode>(&place("drive"), 1)?,
-            w,
-        )?;
+        let kinds = self.source.coded(&place("kind"), self.source.whole::<WallKindCode>(&place("kind"), 1)?, w)?;
+        let drives = self.source.coded(&place("drive"), self.source.whole::<WallDriveCode>(&place("drive"), 1)?, w)?;
         let normals = self.source.column(&place("normal"), w * d)?;
         let directions = self.source.column(&place("direction"), w * d)?;
         let radii = self.source.column(&place("radius"), w)?;
@@ -270,14 +207,8 @@ impl History {
         }
         let place = |name: &str| format!("{}/{name}", path::BONDS);
         let pair = pairs(&self.source.whole::<i32>(&place("pair"), 2)?);
-        if pair
-            .as_flattened()
-            .iter()
-            .any(|grain| !(0..self.grains as i32).contains(grain))
-        {
-            return Err(self
-                .source
-                .damaged(&place("pair"), "a bond names a grain that is not there"));
+        if pair.as_flattened().iter().any(|grain| !(0..self.grains as i32).contains(grain)) {
+            return Err(self.source.damaged(&place("pair"), "a bond names a grain that is not there"));
         }
         let column = |name: &str| self.source.column(&place(name), pair.len());
         Ok(Bonds {
@@ -294,15 +225,9 @@ impl History {
     /// # Errors
     /// [`HistoryError::NoFrame`], [`HistoryError::Damaged`].
     pub fn grain_state(&self, frame: usize) -> Result<GrainState> {
-        let orientation = if self.dimension == 2 {
-            "angle"
-        } else {
-            "orientation"
-        };
+        let orientation = if self.dimension == 2 { "angle" } else { "orientation" };
         let (n, d) = (self.grains, self.dimension);
-        let column = |name: &str, width| {
-            self.frame_values(frame, &format!("{}/{name}", path::GRAINS), n * width)
-        };
+        let column = |name: &str, width| self.frame_values(frame, &format!("{}/{name}", path::GRAINS), n * width);
         Ok(GrainState {
             position: column("position", d)?,
             velocity: column("velocity", d)?,
@@ -316,18 +241,9 @@ impl History {
     /// # Errors
     /// [`HistoryError::NoFrame`], [`HistoryError::Damaged`].
     pub fn wall_state(&self, frame: usize) -> Result<WallState> {
-        let column = |name: &str| {
-            self.frame_values(
-                frame,
-                &format!("{}/{name}", path::WALLS),
-                self.walls * self.dimension,
-            )
-        };
-        Ok(WallState {
-            position: column("position")?,
-            velocity: column("velocity")?,
-            force: column("force")?,
-        })
+        let column =
+            |name: &str| self.frame_values(frame, &format!("{}/{name}", path::WALLS), self.walls * self.dimension);
+        Ok(WallState { position: column("position")?, velocity: column("velocity")?, force: column("force")? })
     }
 
     /// The state of each bond at frame `frame`; empty for a scene without any.
@@ -360,22 +276,14 @@ impl History {
             }
             let (row, values) = self.source.read::<f64>(&place(name), range.clone())?;
             if !widths.contains(&row.iter().product()) {
-                return Err(self
-                    .source
-                    .damaged(&place(name), "its rows have another length"));
+                return Err(self.source.damaged(&place(name), "its rows have another length"));
             }
             Ok(values)
         };
         let d = self.dimension;
-        let codes = self
-            .source
-            .read::<ContactCode>(&place("status"), range.clone())?
-            .1;
-        let bond = if self.source.has(&place("bond")) {
-            self.source.read(&place("bond"), range.clone())?.1
-        } else {
-            vec![]
-        };
+        let codes = self.source.read::<ContactCode>(&place("status"), range.clone())?.1;
+        let bond =
+            if self.source.has(&place("bond")) { self.source.read(&place("bond"), range.clone())?.1 } else { vec![] };
         Ok(ContactRows {
             pair: self.contact_pairs(range.clone())?,
             point: column("point", &[d])?,
@@ -397,19 +305,11 @@ impl History {
         if !self.source.has(path::RUPTURE) {
             return Ok(vec![]);
         }
-        let found = self
-            .source
-            .dataset(path::RUPTURE)?
-            .dtype()
-            .and_then(|dtype| dtype.to_descriptor());
-        if found.map_err(while_reading(&self.source.path, path::RUPTURE))?
-            != RuptureRow::type_descriptor()
-        {
+        let found = self.source.dataset(path::RUPTURE)?.dtype().and_then(|dtype| dtype.to_descriptor());
+        if found.map_err(while_reading(&self.source.path, path::RUPTURE))? != RuptureRow::type_descriptor() {
             return Err(self.source.damaged(path::RUPTURE, "its members are others"));
         }
-        let (_, events) = self
-            .source
-            .read::<RuptureRow>(path::RUPTURE, 0..self.events)?;
+        let (_, events) = self.source.read::<RuptureRow>(path::RUPTURE, 0..self.events)?;
         let known: Option<Vec<Rupture>> = events.iter().map(RuptureRow::event).collect();
         known.ok_or_else(|| self.source.damaged(path::RUPTURE, "a mode that is none"))
     }
@@ -419,14 +319,9 @@ impl History {
     /// # Errors
     /// [`HistoryError::Damaged`].
     pub fn observable_names(&self) -> Result<Vec<String>> {
-        let group = self
-            .source
-            .file
-            .group(path::OBSERVABLES)
-            .map_err(while_reading(&self.source.path, path::OBSERVABLES))?;
-        let mut names = group
-            .member_names()
-            .map_err(while_reading(&self.source.path, path::OBSERVABLES))?;
+        let group =
+            self.source.file.group(path::OBSERVABLES).map_err(while_reading(&self.source.path, path::OBSERVABLES))?;
+        let mut names = group.member_names().map_err(while_reading(&self.source.path, path::OBSERVABLES))?;
         names.retain(|name| group.link_exists(&format!("{name}/value")));
         names.sort_unstable();
         Ok(names)
@@ -438,35 +333,20 @@ impl History {
     /// [`HistoryError::Damaged`].
     pub fn observable(&self, name: &str) -> Result<Option<Series>> {
         let place = format!("{}/{name}/value", path::OBSERVABLES);
-        if name.contains('/')
-            || !self.source.has(&format!("{}/{name}", path::OBSERVABLES))
-            || !self.source.has(&place)
+        if name.contains('/') || !self.source.has(&format!("{}/{name}", path::OBSERVABLES)) || !self.source.has(&place)
         {
             return Ok(None);
         }
         let (shape, value) = self.source.read(&place, 0..self.observed)?;
         let unit = match self.source.dataset(&place)?.attr("unit") {
-            Ok(unit) => unit
-                .read_scalar::<VarLenUnicode>()
-                .map_err(while_reading(&self.source.path, &place))?
-                .to_string(),
+            Ok(unit) => {
+                unit.read_scalar::<VarLenUnicode>().map_err(while_reading(&self.source.path, &place))?.to_string()
+            }
             Err(_) => String::new(),
         };
-        let step = self
-            .source
-            .read(&format!("{}/step", path::OBSERVABLES), 0..self.observed)?
-            .1;
-        let time = self
-            .source
-            .read(&format!("{}/time", path::OBSERVABLES), 0..self.observed)?
-            .1;
-        Ok(Some(Series {
-            unit,
-            shape,
-            step,
-            time,
-            value,
-        }))
+        let step = self.source.read(&format!("{}/step", path::OBSERVABLES), 0..self.observed)?.1;
+        let time = self.source.read(&format!("{}/time", path::OBSERVABLES), 0..self.observed)?.1;
+        Ok(Some(Series { unit, shape, step, time, value }))
     }
 }
 
@@ -476,11 +356,7 @@ impl History {
         if frame < self.frames() {
             return Ok(());
         }
-        Err(HistoryError::NoFrame {
-            path: self.source.path.clone(),
-            frame,
-            frames: self.frames(),
-        })
+        Err(HistoryError::NoFrame { path: self.source.path.clone(), frame, frames: self.frames() })
     }
 
     /// What H5MD element `place` holds at one frame, `expected` numbers; empty if it is absent.
@@ -489,14 +365,9 @@ impl History {
         if expected == 0 || !self.source.has(place) {
             return Ok(vec![]);
         }
-        let (_, values) = self
-            .source
-            .read(&format!("{place}/value"), frame..frame + 1)?;
+        let (_, values) = self.source.read(&format!("{place}/value"), frame..frame + 1)?;
         if values.len() != expected {
-            return Err(self.source.damaged(
-                place,
-                &format!("it has {} values instead of {expected}", values.len()),
-            ));
+            return Err(self.source.damaged(place, &format!("it has {} values instead of {expected}", values.len())));
         }
         Ok(values)
     }
@@ -505,21 +376,13 @@ impl History {
     fn contact_rows(&self, frame: usize) -> Result<Range<usize>> {
         let number = |place: &str| -> Result<u64> {
             let (_, values) = self.source.read::<u64>(place, frame..frame + 1)?;
-            values
-                .first()
-                .copied()
-                .ok_or_else(|| self.source.damaged(place, "its rows are empty"))
+            values.first().copied().ok_or_else(|| self.source.damaged(place, "its rows are empty"))
         };
         let count = format!("{}/count", path::CONTACTS);
-        let (start, rows) = (
-            number(&format!("{}/start", path::CONTACTS))?,
-            number(&count)?,
-        );
+        let (start, rows) = (number(&format!("{}/start", path::CONTACTS))?, number(&count)?);
         match start.checked_add(rows) {
             Some(end) if end <= number(path::COMMIT_CONTACTS)? => Ok(start as usize..end as usize),
-            _ => Err(self
-                .source
-                .damaged(&count, "it points beyond the complete rows")),
+            _ => Err(self.source.damaged(&count, "it points beyond the complete rows")),
         }
     }
 
@@ -531,9 +394,7 @@ impl History {
         let pairs = pairs(&flat);
         let known = |&[i, j]: &[i32; 2]| (0..grains).contains(&i) && (-walls..grains).contains(&j);
         if row != [2] || !pairs.iter().all(known) {
-            return Err(self
-                .source
-                .damaged(&place, "a contact names a body that is not there"));
+            return Err(self.source.damaged(&place, "a contact names a body that is not there"));
         }
         Ok(pairs)
     }

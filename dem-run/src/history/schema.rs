@@ -37,9 +37,7 @@ const CHUNK: usize = 16 * CHUNK_ROW;
 /// A frame of a large sample is split so that 16 frames fill a chunk; a small sample puts more frames in one.
 pub(super) fn frame_chunk(item: usize, row: &[usize]) -> Vec<usize> {
     let inner: usize = row.iter().skip(1).product::<usize>().max(1);
-    let across = row
-        .first()
-        .map_or(1, |&n| n.min((CHUNK_ROW / (inner * item)).max(1)));
+    let across = row.first().map_or(1, |&n| n.min((CHUNK_ROW / (inner * item)).max(1)));
     let rows = (CHUNK / (across * inner * item)).clamp(16, 256);
     let mut chunk = vec![rows];
     chunk.extend(row);

@@ -30,20 +30,11 @@ impl Source {
         let (length, open_ended) = check_superblock(path)?;
         let file = open_file(path, open_ended)?;
         check_identity(path, &file)?;
-        Ok(Self {
-            path: path.into(),
-            file,
-            length,
-            open_ended,
-        })
+        Ok(Self { path: path.into(), file, length, open_ended })
     }
 
     pub fn damaged(&self, place: &str, why: &str) -> HistoryError {
-        HistoryError::Damaged {
-            path: self.path.clone(),
-            place: place.into(),
-            why: why.into(),
-        }
+        HistoryError::Damaged { path: self.path.clone(), place: place.into(), why: why.into() }
     }
 
     pub fn has(&self, place: &str) -> bool {
@@ -51,43 +42,26 @@ impl Source {
     }
 
     pub fn dataset(&self, place: &str) -> Result<Dataset> {
-        self.file
-            .dataset(place)
-            .map_err(while_reading(&self.path, place))
+        self.file.dataset(place).map_err(while_reading(&self.path, place))
     }
 
     /// Rows `range` of a dataset, with the shape of one row.
-    pub fn read<T: H5Type>(
-        &self,
-        place: &str,
-        range: Range<usize>,
-    ) -> Result<(Vec<usize>, Vec<T>)> {
+    pub fn read<T: H5Type>(&self, place: &str, range: Range<usize>) -> Result<(Vec<usize>, Vec<T>)> {
         let dataset = self.dataset(place)?;
-        let shape = dataset
-            .get_shape()
-            .map_err(while_reading(&self.path, place))?;
+        let shape = dataset.get_shape().map_err(while_reading(&self.path, place))?;
         let Some((&count, row)) = shape.split_first() else {
             return Err(self.damaged(place, "it is a single value"));
         };
         if count < range.end {
-            return Err(self.damaged(
-                place,
-                &format!("it has {count} rows, and {} are promised", range.end),
-            ));
+            return Err(self.damaged(place, &format!("it has {count} rows, and {} are promised", range.end)));
         }
         // a forged shape must not ask for more memory than the file can fill
-        let bytes = row
-            .iter()
-            .fold((range.len() * size_of::<T>()) as u64, |b, &n| {
-                b.saturating_mul(n as u64)
-            });
+        let bytes = row.iter().fold((range.len() * size_of::<T>()) as u64, |b, &n| b.saturating_mul(n as u64));
         if bytes > self.length.saturating_mul(GREATEST_COMPRESSION) {
             return Err(self.damaged(place, "it claims to be larger than the file"));
         }
         let selection = rows(range.start, range.end, row);
-        let values = dataset
-            .read_slice::<T, _, ndarray::IxDyn>(selection)
-            .map_err(while_reading(&self.path, place))?;
+        let values = dataset.read_slice::<T, _, ndarray::IxDyn>(selection).map_err(while_reading(&self.path, place))?;
         Ok((row.to_vec(), values.into_raw_vec_and_offset().0))
     }
 
@@ -104,34 +78,21 @@ impl Source {
     pub fn column(&self, place: &str, expected: usize) -> Result<Vec<f64>> {
         let values = self.read::<f64>(place, 0..self.count(place)?)?.1;
         if values.len() != expected {
-            return Err(self.damaged(
-                place,
-                &format!("it has {} values instead of {expected}", values.len()),
-            ));
+            return Err(self.damaged(place, &format!("it has {} values instead of {expected}", values.len())));
         }
         Ok(values)
     }
 
     pub fn scalar<T: H5Type>(&self, place: &str) -> Result<T> {
-        self.dataset(place)?
-            .read_scalar()
-            .map_err(while_reading(&self.path, place))
+        self.dataset(place)?.read_scalar().map_err(while_reading(&self.path, place))
     }
 
     pub fn attribute<T: H5Type>(&self, place: &str, name: &str) -> Result<T> {
-        let read = self
-            .file
-            .group(place)
-            .and_then(|group| group.attr(name)?.read_scalar());
+        let read = self.file.group(place).and_then(|group| group.attr(name)?.read_scalar());
         read.map_err(while_reading(&self.path, &format!("{place}@{name}")))
     }
 
-    pub fn coded<C: Coded>(
-        &self,
-        place: &str,
-        codes: Vec<C::Code>,
-        expected: usize,
-    ) -> Result<Vec<C>> {
+    pub fn coded<C: Coded>(&self, place: &str, codes: Vec<C::Code>, expected: usize) -> Result<Vec<C>> {
         let known: Option<Vec<C>> = codes.into_iter().map(C::from_code).collect();
         match known {
             Some(values) if values.len() == expected => Ok(values),
@@ -142,10 +103,7 @@ impl Source {
 
     /// The number of rows of a dataset.
     pub fn count(&self, place: &str) -> Result<usize> {
-        let shape = self
-            .dataset(place)?
-            .get_shape()
-            .map_err(while_reading(&self.path, place))?;
+        let shape = self.dataset(place)?.get_shape().map_err(while_reading(&self.path, place))?;
         Ok(shape.first().copied().unwrap_or(0))
     }
 }
@@ -154,36 +112,23 @@ impl Source {
 ///
 /// HDF5 itself reads zeros beyond the end of a file that was never closed, so the end is checked here.
 fn check_superblock(path: &Path) -> Result<(u64, bool)> {
-    let io = |source| HistoryError::Io {
-        path: path.into(),
-        doing: "read",
-        source,
-    };
+    let io = |source| HistoryError::Io { path: path.into(), doing: "read", source };
     let metadata = fs::metadata(path).map_err(|error| match error.kind() {
         std::io::ErrorKind::NotFound => HistoryError::Missing { path: path.into() },
         _ => io(error),
     })?;
     if metadata.is_dir() {
-        return Err(io(std::io::Error::new(
-            std::io::ErrorKind::IsADirectory,
-            "it is a folder, give the .h5 file",
-        )));
+        return Err(io(std::io::Error::new(std::io::ErrorKind::IsADirectory, "it is a folder, give the .h5 file")));
     }
     let mut head = Vec::new();
-    fs::File::open(path)
-        .and_then(|file| file.take(48).read_to_end(&mut head))
-        .map_err(io)?;
+    fs::File::open(path).and_then(|file| file.take(48).read_to_end(&mut head)).map_err(io)?;
     const SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
     let found = metadata.len();
     if !head.starts_with(&SIGNATURE[..head.len().min(8)]) || head.is_empty() {
         return Err(HistoryError::NotHdf5 { path: path.into() });
     }
     if head.len() < 48 {
-        return Err(HistoryError::Truncated {
-            path: path.into(),
-            found,
-            expected: 48,
-        });
+        return Err(HistoryError::Truncated { path: path.into(), found, expected: 48 });
     }
     // only version 3 is ours; HDF5 judges the others
     let (version, sizes, flags) = (head[8], head[9], head[11]);
@@ -192,75 +137,38 @@ fn check_superblock(path: &Path) -> Result<(u64, bool)> {
     }
     let expected = u64::from_le_bytes(head[28..36].try_into().unwrap_or_default());
     if found < expected {
-        return Err(HistoryError::Truncated {
-            path: path.into(),
-            found,
-            expected,
-        });
+        return Err(HistoryError::Truncated { path: path.into(), found, expected });
     }
     Ok((found, flags != 0))
 }
 
 fn open_file(path: &Path, open_ended: bool) -> Result<File> {
-    let mode = if open_ended {
-        OpenMode::ReadSWMR
-    } else {
-        OpenMode::Read
-    };
+    let mode = if open_ended { OpenMode::ReadSWMR } else { OpenMode::Read };
     File::open_as(path, mode).map_err(|error| {
         let why = reason(&error);
         if error.contains_minor(hdf5::MinorErrorCode::NotHdf5) {
             return HistoryError::NotHdf5 { path: path.into() };
         }
-        HistoryError::Damaged {
-            path: path.into(),
-            place: String::new(),
-            why,
-        }
+        HistoryError::Damaged { path: path.into(), place: String::new(), why }
     })
 }
 
 fn check_identity(path: &Path, file: &File) -> Result<()> {
-    let foreign = |why: String| HistoryError::Foreign {
-        path: path.into(),
-        why,
-    };
+    let foreign = |why: String| HistoryError::Foreign { path: path.into(), why };
     let group = |name: &str| {
-        if file.link_exists(name) {
-            file.group(name).ok()
-        } else {
-            None
-        }
+        if file.link_exists(name) { file.group(name).ok() } else { None }
     };
     let creator = group("h5md")
         .filter(|h5md| h5md.link_exists("creator"))
-        .and_then(|h5md| {
-            h5md.group("creator")
-                .ok()?
-                .attr("name")
-                .ok()?
-                .read_scalar::<VarLenUnicode>()
-                .ok()
-        });
-    let version = group(path::PARAMETERS).and_then(|parameters| {
-        parameters
-            .attr("schema_version")
-            .ok()?
-            .read_scalar::<u32>()
-            .ok()
-    });
+        .and_then(|h5md| h5md.group("creator").ok()?.attr("name").ok()?.read_scalar::<VarLenUnicode>().ok());
+    let version = group(path::PARAMETERS)
+        .and_then(|parameters| parameters.attr("schema_version").ok()?.read_scalar::<u32>().ok());
     match (creator, version) {
-        (Some(name), _) if name.as_str() != CREATOR => {
-            Err(foreign(format!("it was written by {name:?}")))
+        (Some(name), _) if name.as_str() != CREATOR => Err(foreign(format!("it was written by {name:?}"))),
+        (Some(_), Some(found)) if found > SCHEMA_VERSION => {
+            Err(HistoryError::Newer { path: path.into(), found, known: SCHEMA_VERSION })
         }
-        (Some(_), Some(found)) if found > SCHEMA_VERSION => Err(HistoryError::Newer {
-            path: path.into(),
-            found,
-            known: SCHEMA_VERSION,
-        }),
         (Some(_), Some(_)) => Ok(()),
-        _ => Err(foreign(
-            "it has no /h5md/creator or no /parameters schema_version".into(),
-        )),
+        _ => Err(foreign("it has no /h5md/creator or no /parameters schema_version".into())),
     }
 }

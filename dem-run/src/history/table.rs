@@ -49,11 +49,7 @@ impl Table {
             .obj_track_times(false)
             .create(name)?;
         set_unit(&dataset, unit)?;
-        Ok(Self {
-            dataset,
-            rows: 0,
-            row: row.to_vec(),
-        })
+        Ok(Self { dataset, rows: 0, row: row.to_vec() })
     }
 
     /// Numbers in one row.
@@ -73,16 +69,11 @@ impl Table {
             return Ok(());
         }
         let end = self.rows + more;
-        let shape = |first| -> Vec<usize> {
-            std::iter::once(first)
-                .chain(self.row.iter().copied())
-                .collect()
-        };
+        let shape = |first| -> Vec<usize> { std::iter::once(first).chain(self.row.iter().copied()).collect() };
         self.dataset.resize(shape(end))?;
-        let view = ArrayViewD::from_shape(shape(more), values)
-            .map_err(|error| hdf5::Error::Internal(error.to_string()))?;
-        self.dataset
-            .write_slice(view, rows(self.rows, end, &self.row))?;
+        let view =
+            ArrayViewD::from_shape(shape(more), values).map_err(|error| hdf5::Error::Internal(error.to_string()))?;
+        self.dataset.write_slice(view, rows(self.rows, end, &self.row))?;
         self.rows = end;
         Ok(())
     }
@@ -90,10 +81,8 @@ impl Table {
 
 /// Selects rows `start..end`, each of shape `row`.
 pub(super) fn rows(start: usize, end: usize, row: &[usize]) -> Hyperslab {
-    let slices: Vec<SliceOrIndex> = std::iter::once(start..end)
-        .chain(row.iter().map(|&n| 0..n))
-        .map(SliceOrIndex::from)
-        .collect();
+    let slices: Vec<SliceOrIndex> =
+        std::iter::once(start..end).chain(row.iter().map(|&n| 0..n)).map(SliceOrIndex::from).collect();
     Hyperslab::from(slices)
 }
 
@@ -105,13 +94,9 @@ pub(super) fn fixed<T: H5Type>(
     shape: &[usize],
     values: &[T],
 ) -> hdf5::Result<()> {
-    let view = ArrayViewD::from_shape(shape.to_vec(), values)
-        .map_err(|error| hdf5::Error::Internal(error.to_string()))?;
-    let dataset = group
-        .new_dataset_builder()
-        .with_data(view)
-        .obj_track_times(false)
-        .create(name)?;
+    let view =
+        ArrayViewD::from_shape(shape.to_vec(), values).map_err(|error| hdf5::Error::Internal(error.to_string()))?;
+    let dataset = group.new_dataset_builder().with_data(view).obj_track_times(false).create(name)?;
     set_unit(&dataset, unit)
 }
 
@@ -122,16 +107,9 @@ pub(super) fn text(value: &str) -> VarLenUnicode {
 
 /// Gives `location` a text attribute.
 pub(super) fn text_attribute(location: &Location, name: &str, value: &str) -> hdf5::Result<()> {
-    location
-        .new_attr::<VarLenUnicode>()
-        .create(name)?
-        .write_scalar(&text(value))
+    location.new_attr::<VarLenUnicode>().create(name)?.write_scalar(&text(value))
 }
 
 fn set_unit(dataset: &Dataset, unit: &str) -> hdf5::Result<()> {
-    if unit.is_empty() {
-        Ok(())
-    } else {
-        text_attribute(dataset, "unit", unit)
-    }
+    if unit.is_empty() { Ok(()) } else { text_attribute(dataset, "unit", unit) }
 }

@@ -57,12 +57,7 @@ fn full(dimension: usize) -> Layout {
 fn bare() -> Layout {
     Layout {
         dimension: 2,
-        grains: Grains {
-            id: vec![0],
-            radius: vec![1.0],
-            mass: vec![1.0],
-            inertia: vec![1.0],
-        },
+        grains: Grains { id: vec![0], radius: vec![1.0], mass: vec![1.0], inertia: vec![1.0] },
         ..Layout::default()
     }
 }
@@ -98,15 +93,7 @@ fn sample(l: &Layout, k: usize) -> Sample {
             force: numbers(w * d, 6e3 + s),
         },
         contacts: ContactRows {
-            pair: (0..m)
-                .map(|c| {
-                    if c == 2 {
-                        [2, -2]
-                    } else {
-                        [c as i32 % n as i32, 0]
-                    }
-                })
-                .collect(),
+            pair: (0..m).map(|c| if c == 2 { [2, -2] } else { [c as i32 % n as i32, 0] }).collect(),
             point: numbers(m * d, 7e3 + s),
             normal: numbers(m * d, 8e3 + s),
             tangent: numbers(if d == 3 && tangential { m * 3 } else { 0 }, 9e3 + s),
@@ -114,15 +101,9 @@ fn sample(l: &Layout, k: usize) -> Sample {
             moment: numbers(if bonded { m * (d - 1) } else { 0 }, 11e3 + s),
             gap: numbers(m, 12e3 + s),
             status: (0..m).map(|c| ContactStatus::ALL[c % 4]).collect(),
-            bond: if bonded {
-                (0..m as i32).map(|c| c - 1).collect()
-            } else {
-                vec![]
-            },
+            bond: if bonded { (0..m as i32).map(|c| c - 1).collect() } else { vec![] },
         },
-        bonds: (0..l.bonds.len())
-            .map(|b| BondStatus::ALL[(b + k) % 4])
-            .collect(),
+        bonds: (0..l.bonds.len()).map(|b| BondStatus::ALL[(b + k) % 4]).collect(),
     }
 }
 
@@ -146,14 +127,7 @@ fn write_frame(writer: &mut Writer, l: &Layout, k: usize) {
     let s = sample(l, k);
     let (step, time) = (10 * k as i64, 0.1 * k as f64);
     writer
-        .frame(&Frame {
-            step,
-            time,
-            grains: &s.grains,
-            walls: &s.walls,
-            contacts: &s.contacts,
-            bonds: &s.bonds,
-        })
+        .frame(&Frame { step, time, grains: &s.grains, walls: &s.walls, contacts: &s.contacts, bonds: &s.bonds })
         .unwrap();
 }
 
@@ -163,13 +137,7 @@ fn write(path: &Path, l: &Layout, frames: usize) -> Writer {
     let width: usize = l.observables.iter().map(Observable::width).sum();
     for k in 0..frames {
         for step in 10 * k..10 * (k + 1) {
-            writer
-                .observe(
-                    step as i64,
-                    0.01 * step as f64,
-                    &numbers(width, step as f64),
-                )
-                .unwrap();
+            writer.observe(step as i64, 0.01 * step as f64, &numbers(width, step as f64)).unwrap();
         }
         if !l.bonds.is_empty() {
             writer.rupture(&rupture(k)).unwrap();
@@ -188,24 +156,14 @@ fn check(path: &Path, l: &Layout, frames: usize) {
     assert_eq!(h.walls().unwrap(), l.walls);
     for k in 0..frames {
         let s = sample(l, k);
-        assert_eq!(
-            (h.steps()[k], h.times()[k]),
-            (10 * k as i64, 0.1 * k as f64)
-        );
+        assert_eq!((h.steps()[k], h.times()[k]), (10 * k as i64, 0.1 * k as f64));
         assert_eq!(h.grain_state(k).unwrap(), s.grains);
         assert_eq!(h.wall_state(k).unwrap(), s.walls);
         assert_eq!(h.contacts(k).unwrap(), s.contacts);
         assert_eq!(h.bond_status(k).unwrap(), s.bonds);
     }
-    assert!(matches!(
-        h.contacts(frames),
-        Err(HistoryError::NoFrame { .. })
-    ));
-    let events: Vec<Rupture> = if l.bonds.is_empty() {
-        vec![]
-    } else {
-        (0..frames).map(rupture).collect()
-    };
+    assert!(matches!(h.contacts(frames), Err(HistoryError::NoFrame { .. })));
+    let events: Vec<Rupture> = if l.bonds.is_empty() { vec![] } else { (0..frames).map(rupture).collect() };
     assert_eq!(h.ruptures().unwrap(), events);
     let mut offset = 0;
     for o in &l.observables {
@@ -214,10 +172,7 @@ fn check(path: &Path, l: &Layout, frames: usize) {
         assert_eq!(series.step, (0..10 * frames as i64).collect::<Vec<_>>());
         for (step, value) in series.value.chunks(o.width()).enumerate() {
             let width: usize = l.observables.iter().map(Observable::width).sum();
-            assert_eq!(
-                value,
-                &numbers(width, step as f64)[offset..offset + o.width()]
-            );
+            assert_eq!(value, &numbers(width, step as f64)[offset..offset + o.width()]);
         }
         offset += o.width();
     }
@@ -240,17 +195,8 @@ fn open_error(path: &Path) -> HistoryError {
 #[test]
 fn what_is_written_is_read() {
     // 300 frames cross the blocks of observables and the chunks of frames
-    let bonds_without_friction = Layout {
-        friction: false,
-        ..full(3)
-    };
-    for (layout, frames) in [
-        (full(2), 300),
-        (full(3), 40),
-        (bare(), 3),
-        (full(2), 0),
-        (bonds_without_friction, 2),
-    ] {
+    let bonds_without_friction = Layout { friction: false, ..full(3) };
+    for (layout, frames) in [(full(2), 300), (full(3), 40), (bare(), 3), (full(2), 0), (bonds_without_friction, 2)] {
         let (_folder, path) = folder();
         write(&path, &layout, frames).finish().unwrap();
         check(&path, &layout, frames);
@@ -262,14 +208,7 @@ fn what_a_scene_lacks_is_absent() {
     let (_folder, path) = folder();
     write(&path, &bare(), 2).finish().unwrap();
     let file = hdf5::File::open(&path).unwrap();
-    for absent in [
-        "walls",
-        "bonds",
-        "events",
-        "contacts/moment",
-        "contacts/bond",
-        "commit_rows/events",
-    ] {
+    for absent in ["walls", "bonds", "events", "contacts/moment", "contacts/bond", "commit_rows/events"] {
         assert!(!file.link_exists(absent), "{absent}");
     }
     assert!(!file.group("particles/grains").unwrap().link_exists("angle"));
@@ -292,23 +231,11 @@ fn units_and_enums_stand_in_the_file() {
     };
     assert_eq!(unit("particles/grains/velocity/value"), "m s-1");
     assert_eq!(unit("observables/stress/value"), "Pa");
-    let descriptor = file
-        .dataset("bonds/status/value")
-        .unwrap()
-        .dtype()
-        .unwrap()
-        .to_descriptor()
-        .unwrap();
-    assert!(
-        format!("{descriptor:?}").contains("ROLLING"),
-        "{descriptor:?}"
-    );
+    let descriptor = file.dataset("bonds/status/value").unwrap().dtype().unwrap().to_descriptor().unwrap();
+    assert!(format!("{descriptor:?}").contains("ROLLING"), "{descriptor:?}");
     // shared times are one dataset under many names
     let token = |place: &str| format!("{:?}", file.loc_info_by_name(place).unwrap().token);
-    assert_eq!(
-        token("walls/force/time"),
-        token("particles/grains/position/time")
-    );
+    assert_eq!(token("walls/force/time"), token("particles/grains/position/time"));
 }
 
 #[test]
@@ -343,22 +270,13 @@ fn an_existing_file_is_replaced_only_when_asked() {
     // a layout that contradicts itself does no harm, even with leave to overwrite
     let mut wrong = full(2);
     wrong.bonds.strength.pop();
-    assert!(matches!(
-        Writer::create(&path, &wrong, true),
-        Err(HistoryError::Shape { .. })
-    ));
+    assert!(matches!(Writer::create(&path, &wrong, true), Err(HistoryError::Shape { .. })));
     // nor does one that HDF5 refuses half-way
     wrong = full(2);
     wrong.observables.push(wrong.observables[0].clone());
-    assert!(matches!(
-        Writer::create(&path, &wrong, true),
-        Err(HistoryError::Write { .. })
-    ));
+    assert!(matches!(Writer::create(&path, &wrong, true), Err(HistoryError::Write { .. })));
     assert_eq!(fs::read(&path).unwrap(), b"mine");
-    Writer::create(&path, &full(2), true)
-        .unwrap()
-        .finish()
-        .unwrap();
+    Writer::create(&path, &full(2), true).unwrap().finish().unwrap();
     check(&path, &full(2), 0);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
 }
@@ -366,16 +284,10 @@ fn an_existing_file_is_replaced_only_when_asked() {
 #[test]
 fn a_file_that_cannot_be_made_is_named() {
     let (folder, _) = folder();
-    for path in [
-        folder.path().join("no/such/run.h5"),
-        folder.path().to_path_buf(),
-    ] {
+    for path in [folder.path().join("no/such/run.h5"), folder.path().to_path_buf()] {
         let error = Writer::create(&path, &full(2), true).err().unwrap();
         assert!(matches!(error, HistoryError::Io { .. }));
-        assert!(
-            error.to_string().contains(&*path.to_string_lossy()),
-            "{error}"
-        );
+        assert!(error.to_string().contains(&*path.to_string_lossy()), "{error}");
     }
 }
 
@@ -386,22 +298,9 @@ fn arrays_of_another_length_are_refused_whole() {
     let mut writer = Writer::create(&path, &layout, false).unwrap();
     let mut s = sample(&layout, 3);
     s.contacts.gap.pop();
-    let frame = Frame {
-        step: 0,
-        time: 0.0,
-        grains: &s.grains,
-        walls: &s.walls,
-        contacts: &s.contacts,
-        bonds: &s.bonds,
-    };
-    assert!(matches!(
-        writer.frame(&frame),
-        Err(HistoryError::Shape {
-            found: 2,
-            expected: 3,
-            ..
-        })
-    ));
+    let frame =
+        Frame { step: 0, time: 0.0, grains: &s.grains, walls: &s.walls, contacts: &s.contacts, bonds: &s.bonds };
+    assert!(matches!(writer.frame(&frame), Err(HistoryError::Shape { found: 2, expected: 3, .. })));
     assert!(writer.observe(0, 0.0, &[1.0]).is_err());
     assert_eq!(writer.frames(), 0);
 }
@@ -413,10 +312,7 @@ fn foreign_files_are_told_apart() {
     assert!(matches!(open_error(folder.path()), HistoryError::Io { .. }));
     for content in ["", "x,y,radius\n1,2,3\n", "\u{89}"] {
         fs::write(&path, content).unwrap();
-        assert!(
-            matches!(open_error(&path), HistoryError::NotHdf5 { .. }),
-            "{content}"
-        );
+        assert!(matches!(open_error(&path), HistoryError::NotHdf5 { .. }), "{content}");
     }
     let file = hdf5::File::create(&path).unwrap();
     file.new_dataset::<f64>().create("commit").unwrap();
@@ -424,18 +320,11 @@ fn foreign_files_are_told_apart() {
     let error = open_error(&path);
     assert!(matches!(error, HistoryError::Foreign { .. }), "{error}");
     let file = hdf5::File::create(&path).unwrap();
-    let creator = file
-        .create_group("h5md")
-        .unwrap()
-        .create_group("creator")
-        .unwrap();
+    let creator = file.create_group("h5md").unwrap().create_group("creator").unwrap();
     table::text_attribute(&creator, "name", "espresso").unwrap();
     drop(file);
     let error = open_error(&path);
-    assert!(
-        matches!(error, HistoryError::Foreign { .. }) && error.to_string().contains("espresso"),
-        "{error}"
-    );
+    assert!(matches!(error, HistoryError::Foreign { .. }) && error.to_string().contains("espresso"), "{error}");
 }
 
 #[test]
@@ -443,18 +332,10 @@ fn a_newer_schema_is_refused() {
     let (_folder, path) = folder();
     write(&path, &full(2), 1).finish().unwrap();
     let file = hdf5::File::open_rw(&path).unwrap();
-    file.group("parameters")
-        .unwrap()
-        .attr("schema_version")
-        .unwrap()
-        .write_scalar(&(SCHEMA_VERSION + 1))
-        .unwrap();
+    file.group("parameters").unwrap().attr("schema_version").unwrap().write_scalar(&(SCHEMA_VERSION + 1)).unwrap();
     drop(file);
     let error = open_error(&path);
-    assert!(
-        matches!(error, HistoryError::Newer { found, .. } if found == SCHEMA_VERSION + 1),
-        "{error}"
-    );
+    assert!(matches!(error, HistoryError::Newer { found, .. } if found == SCHEMA_VERSION + 1), "{error}");
 }
 
 #[test]
@@ -463,23 +344,13 @@ fn values_that_name_nothing_are_refused() {
     write(&path, &full(2), 4).finish().unwrap();
     let file = hdf5::File::open_rw(&path).unwrap();
     let pair = file.dataset("contacts/pair").unwrap();
-    pair.write_slice(ndarray::arr1(&[99i32]).view(), ndarray::s![5..6, 0])
-        .unwrap();
-    file.dataset("bonds/status/value")
-        .unwrap()
-        .write(ndarray::arr2(&[[codes::BondCode(77); 2]; 4]).view())
-        .unwrap();
-    file.dataset("contacts/count")
-        .unwrap()
-        .write(&[0u32, 1, 2, u32::MAX])
-        .unwrap();
+    pair.write_slice(ndarray::arr1(&[99i32]).view(), ndarray::s![5..6, 0]).unwrap();
+    file.dataset("bonds/status/value").unwrap().write(ndarray::arr2(&[[codes::BondCode(77); 2]; 4]).view()).unwrap();
+    file.dataset("contacts/count").unwrap().write(&[0u32, 1, 2, u32::MAX]).unwrap();
     drop((pair, file));
     let h = History::open(&path).unwrap();
     assert!(h.contacts(2).is_ok());
-    for (error, place) in [
-        (h.contacts(3).err(), "contacts/count"),
-        (h.bond_status(0).err(), "bonds/status"),
-    ] {
+    for (error, place) in [(h.contacts(3).err(), "contacts/count"), (h.bond_status(0).err(), "bonds/status")] {
         assert!(error.unwrap().to_string().contains(place));
     }
 }
@@ -507,10 +378,7 @@ fn read_all(path: &Path) -> Result<usize> {
 #[test]
 fn a_truncated_file_is_refused_wherever_it_is_cut() {
     let (folder, path) = folder();
-    let (finished, open) = (
-        folder.path().join("finished.h5"),
-        folder.path().join("open.h5"),
-    );
+    let (finished, open) = (folder.path().join("finished.h5"), folder.path().join("open.h5"));
     let writer = write(&path, &full(2), 6);
     fs::copy(&path, &open).unwrap();
     writer.finish().unwrap();
@@ -518,9 +386,7 @@ fn a_truncated_file_is_refused_wherever_it_is_cut() {
     for whole in [&finished, &open] {
         assert_eq!(read_all(whole).unwrap(), 6);
         let bytes = fs::read(whole).unwrap();
-        let cuts = (0..64)
-            .chain((64..bytes.len()).step_by(997))
-            .chain(bytes.len() - 64..bytes.len());
+        let cuts = (0..64).chain((64..bytes.len()).step_by(997)).chain(bytes.len() - 64..bytes.len());
         for cut in cuts {
             fs::write(&path, &bytes[..cut]).unwrap();
             match read_all(&path) {
@@ -541,9 +407,7 @@ fn a_file_with_wrong_bytes_never_makes_the_reader_panic() {
     let bytes = fs::read(&path).unwrap();
     let mut state = 1u64;
     for _ in 0..400 {
-        state = state
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         let mut wrong = bytes.clone();
         wrong[(state >> 33) as usize % bytes.len()] ^= (state >> 25) as u8 | 1;
         fs::write(&path, &wrong).unwrap();

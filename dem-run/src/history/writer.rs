@@ -59,22 +59,12 @@ impl Writer {
             return Err(HistoryError::Exists { path: path.into() });
         }
         let part = partial(path)?;
-        let io = |doing| {
-            move |source| HistoryError::Io {
-                path: path.into(),
-                doing,
-                source,
-            }
-        };
+        let io = |doing| move |source| HistoryError::Io { path: path.into(), doing, source };
         // HDF5 would not say why; the operating system does
         std::fs::File::create(&part).map_err(io("create"))?;
         let made = Self::build(path, &part, layout)
             .map_err(while_writing(path))
-            .and_then(|writer| {
-                std::fs::rename(&part, path)
-                    .map_err(io("replace"))
-                    .map(|()| writer)
-            });
+            .and_then(|writer| std::fs::rename(&part, path).map_err(io("replace")).map(|()| writer));
         if made.is_err() {
             // the first error is the one to report
             let _ = std::fs::remove_file(&part);
@@ -83,9 +73,7 @@ impl Writer {
     }
 
     fn build(path: &Path, part: &Path, layout: &Layout) -> hdf5::Result<Self> {
-        let file = File::with_options()
-            .with_fapl(|fapl| fapl.libver_v110())
-            .create(part)?;
+        let file = File::with_options().with_fapl(|fapl| fapl.libver_v110()).create(part)?;
         create::write_identity(&file, layout)?;
         let grains = create::grains(&file, layout)?;
         let motion = grains.create_group("position")?;
@@ -96,21 +84,11 @@ impl Writer {
             frame_columns.extend(create::wall_columns(&file, layout)?);
         }
         let bonded = !layout.bonds.is_empty();
-        let bond_status = if bonded {
-            Some(create::bonds(&file, &layout.bonds)?)
-        } else {
-            None
-        };
+        let bond_status = if bonded { Some(create::bonds(&file, &layout.bonds)?) } else { None };
         let contacts = create::contacts(&file, layout)?;
         let ruptures = if bonded {
             let events = file.create_group("events")?;
-            Some(Table::create::<RuptureRow>(
-                &events,
-                "rupture",
-                "",
-                &[],
-                Growth::Rows(128),
-            )?)
+            Some(Table::create::<RuptureRow>(&events, "rupture", "", &[], Growth::Rows(128))?)
         } else {
             None
         };
@@ -162,11 +140,7 @@ impl Writer {
     /// [`HistoryError::Shape`] where the layout has no bonds; [`HistoryError::Write`] where the disk refuses.
     pub fn rupture(&mut self, rupture: &Rupture) -> Result<()> {
         if self.ruptures.is_none() {
-            return Err(HistoryError::Shape {
-                place: path::RUPTURE.into(),
-                found: 1,
-                expected: 0,
-            });
+            return Err(HistoryError::Shape { place: path::RUPTURE.into(), found: 1, expected: 0 });
         }
         self.rupture_block.push(rupture.into());
         if self.rupture_block.len() >= BLOCK {
@@ -196,11 +170,7 @@ impl Writer {
     /// [`HistoryError::Write`] where the disk refuses.
     pub fn finish(mut self) -> Result<()> {
         let path = self.path.clone();
-        let flushed = self
-            .observables
-            .append()
-            .and_then(|()| self.append_ruptures())
-            .and_then(|()| self.file.flush());
+        let flushed = self.observables.append().and_then(|()| self.append_ruptures()).and_then(|()| self.file.flush());
         flushed.map_err(while_writing(&path))
     }
 
@@ -233,16 +203,10 @@ impl Writer {
         self.contacts.append(frame)?;
         self.observables.append()?;
         self.append_ruptures()?;
-        self.commit.rows(
-            self.contacts.pair.rows(),
-            self.observables.step.rows(),
-            self.ruptures.as_ref(),
-        )?;
+        self.commit.rows(self.contacts.pair.rows(), self.observables.step.rows(), self.ruptures.as_ref())?;
         // the data must stand on disk before the commit that vouches for it
         self.file.flush()?;
-        self.commit
-            .frames
-            .write_scalar(&(self.step.rows() as u64))?;
+        self.commit.frames.write_scalar(&(self.step.rows() as u64))?;
         self.commit.frames.flush()
     }
 
@@ -272,11 +236,7 @@ fn check_layout(layout: &Layout) -> Result<()> {
         check_length(place, column.len(), bonds.len())?;
     }
     for observable in &layout.observables {
-        check_length(
-            &format!("observables/{}", observable.name),
-            observable.width(),
-            observable.width().max(1),
-        )?;
+        check_length(&format!("observables/{}", observable.name), observable.width(), observable.width().max(1))?;
     }
     Ok(())
 }
@@ -284,19 +244,8 @@ fn check_layout(layout: &Layout) -> Result<()> {
 /// The name under which the file is made: in the same folder, so that the move is atomic.
 fn partial(path: &Path) -> Result<PathBuf> {
     let Some(name) = path.file_name().filter(|_| !path.is_dir()) else {
-        let source = std::io::Error::new(
-            std::io::ErrorKind::IsADirectory,
-            "it is a folder, give a file name",
-        );
-        return Err(HistoryError::Io {
-            path: path.into(),
-            doing: "create",
-            source,
-        });
+        let source = std::io::Error::new(std::io::ErrorKind::IsADirectory, "it is a folder, give a file name");
+        return Err(HistoryError::Io { path: path.into(), doing: "create", source });
     };
-    Ok(path.with_file_name(format!(
-        ".{}.{}.part",
-        name.to_string_lossy(),
-        std::process::id()
-    )))
+    Ok(path.with_file_name(format!(".{}.{}.part", name.to_string_lossy(), std::process::id())))
 }

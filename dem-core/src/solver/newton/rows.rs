@@ -1,0 +1,298 @@
+//! The contact problem as rows over scaled unknowns, free of dimension.
+//!
+//! Unknowns are y = M^{1/2} v of the nodes that can move, so the mass matrix is the identity and any ratio of masses is
+//! as good as another. Each contact keeps the coefficients of its rows, u = Hᵀ v = Σ h y + u₀, where u₀ comes from
+//! nodes whose velocity is given.
+
+use crate::contact::{Cone, Law, Local, Weights};
+use crate::dim::{Dim, Vect};
+use crate::problem::{Contact, ContactProblem, Link, Nodes, Visitor};
+use nalgebra::{SMatrix, SVector};
+
+/// Rows of one contact, padded to the most that any has: n, two tangential, two bending.
+pub(super) type Padded = Local<SVector<f64, 2>, SVector<f64, 2>>;
+/// The derivative of padded rows, in the order n, t, m.
+pub(super) type Operator = SMatrix<f64, 5, 5>;
+
+/// One contact.
+#[derive(Clone, Debug)]
+pub(super) struct Row {
+    /// First unknown of the two nodes, and how many each has (zero for one that cannot move).
+    pub at: [usize; 2],
+    pub count: [usize; 2],
+    /// Where its coefficients start; row by row, `count[0] + count[1]` each.
+    pub start: usize,
+    /// Places in a padded vector of the rows that the contact has.
+    pub rows: &'static [usize],
+    pub cone: Cone,
+    pub associated: bool,
+    /// Shift of the normal reaction (N s) and bias of the normal velocity (m/s).
+    pub shift: f64,
+    /// Relative velocity that comes from given velocities, with the bias (m/s).
+    pub given: Padded,
+    /// 1/ρ of n, t and m.
+    pub weights: Weights,
+    /// Multiplier: the shifted reaction r̂ (N s).
+    pub multiplier: Padded,
+}
+
+/// All contacts of a problem.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Rows {
+    pub list: Vec<Row>,
+    pub coefficients: Vec<f64>,
+    /// Number of unknowns.
+    pub unknowns: usize,
+    /// Free velocities in the scaled unknowns.
+    pub free: Vec<f64>,
+}
+
+/// First unknown of each node, and the scale 1/√m of its translations and 1/√I of its spins.
+struct Unknowns {
+    first: Vec<usize>,
+    total: usize,
+}
+
+/// Relative compliance of the rows: 1/k over that of the normal row, from stiffness settings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StiffnessRatio {
+    /// Tangential stiffness over the normal one (–).
+    pub tangential: f64,
+    /// Bending stiffness over the normal one times the square of the mean diameter (–).
+    pub rolling: f64,
+}
+
+struct Flatten<'a, D: Dim> {
+    rows: Rows,
+    unknowns: &'a Unknowns,
+    ratio: StiffnessRatio,
+    normal: Vec<f64>,
+    problem: &'a ContactProblem<D>,
+    /// The nodes with the velocities that are given, and zero for those that are unknown.
+    still: Nodes<D>,
+}
+
+const FRICTIONLESS: &[usize] = &[0];
+const DRY_2D: &[usize] = &[0, 1];
+const DRY_3D: &[usize] = &[0, 1, 2];
+const BOND_2D: &[usize] = &[0, 1, 3];
+const BOND_3D: &[usize] = &[0, 1, 2, 3, 4];
+
+fn places(tangents: usize, bends: usize) -> &'static [usize] {
+    match (tangents, bends) {
+        (0, _) => FRICTIONLESS,
+        (1, 0) => DRY_2D,
+        (_, 0) => DRY_3D,
+        (1, _) => BOND_2D,
+        _ => BOND_3D,
+    }
+}
+
+/// The rows of a contact, padded with zeros.
+pub(super) fn padded<T: Vect, B: Vect>(r: Local<T, B>) -> Padded {
+    Local { n: r.n, t: crate::dim::resized(r.t), m: crate::dim::resized(r.m) }
+}
+
+impl Unknowns {
+    fn of<D: Dim>(nodes: &Nodes<D>) -> Self {
+        let mut first = Vec::with_capacity(nodes.all.len());
+        let mut total = 0;
+        for (k, node) in nodes.all.iter().enumerate() {
+            first.push(total);
+            total += degrees(nodes, k, node.inverse_mass > 0.0);
+        }
+        Self { first, total }
+    }
+}
+
+fn degrees<D: Dim>(nodes: &Nodes<D>, k: usize, moves: bool) -> usize {
+    match (moves, k < nodes.grains) {
+        (false, _) => 0,
+        (true, true) => D::N + D::Spin::LEN,
+        (true, false) => 1,
+    }
+}
+
+impl Rows {
+    /// The rows of a problem whose normal rows have ρ = κ / (mean of the normal entries of W), scaled to the stiffness
+    /// of each pair (in 3D a cylinder of the mean diameter, so ρ grows with it; in 2D all are alike).
+    pub fn of<D: Dim>(problem: &ContactProblem<D>, kappa: f64, ratio: StiffnessRatio) -> Self {
+        let unknowns = Unknowns::of(&problem.nodes);
+        let mut free = vec![0.0; unknowns.total];
+        for (k, (v, w)) in problem.free.iter().enumerate() {
+            write_scaled(&problem.nodes, &unknowns, k, v, w, &mut free);
+        }
+        let rows = Rows { unknowns: unknowns.total, free, ..Rows::default() };
+        let mut still = problem.nodes.clone();
+        for (node, free) in still.all.iter_mut().zip(&problem.free) {
+            let moves = node.inverse_mass > 0.0;
+            (node.velocity, node.spin) = if moves { (D::Vector::zero(), D::Spin::zero()) } else { *free };
+        }
+        let mut flatten = Flatten { rows, unknowns: &unknowns, ratio, normal: Vec::new(), problem, still };
+        problem.visit(&mut flatten);
+        let Flatten { mut rows, normal, .. } = flatten;
+        let mean = |sum: f64| sum / normal.len().max(1) as f64;
+        let soft = mean(rows.list.iter().map(|r| r.weights.n).sum());
+        let scale = mean(normal.iter().sum()) / (soft * kappa);
+        for row in &mut rows.list {
+            let w = &mut row.weights;
+            (w.n, w.t, w.m) = (w.n * scale, w.t * scale, w.m * scale);
+        }
+        rows
+    }
+
+    /// Relative velocity of contact `row`, bias included.
+    #[inline]
+    pub fn velocity(&self, row: &Row, y: &[f64]) -> Padded {
+        row.given + self.pulled(row, y)
+    }
+
+    /// H̃ᵀ y for one contact.
+    #[inline]
+    pub fn pulled(&self, row: &Row, y: &[f64]) -> Padded {
+        let mut u = Padded::zero();
+        let width = row.count[0] + row.count[1];
+        for (k, place) in row.rows.iter().enumerate() {
+            let h = &self.coefficients[row.start + k * width..][..width];
+            let (a, b) = h.split_at(row.count[0]);
+            let sum = |h: &[f64], at: usize| h.iter().zip(&y[at..]).map(|(h, y)| h * y).sum::<f64>();
+            *entry(&mut u, *place) += sum(a, row.at[0]) + sum(b, row.at[1]);
+        }
+        u
+    }
+
+    /// y += H̃ r for one contact.
+    #[inline]
+    pub fn apply(&self, row: &Row, r: &Padded, y: &mut [f64]) {
+        let width = row.count[0] + row.count[1];
+        for (k, place) in row.rows.iter().enumerate() {
+            let h = &self.coefficients[row.start + k * width..][..width];
+            let value = *entry(&mut r.clone(), *place);
+            let (a, b) = h.split_at(row.count[0]);
+            for (h, y) in a.iter().zip(&mut y[row.at[0]..]) {
+                *y += h * value;
+            }
+            for (h, y) in b.iter().zip(&mut y[row.at[1]..]) {
+                *y += h * value;
+            }
+        }
+    }
+}
+
+/// A row of a padded vector by its place.
+#[inline]
+pub(super) fn entry(r: &mut Padded, place: usize) -> &mut f64 {
+    match place {
+        0 => &mut r.n,
+        1 | 2 => &mut r.t[place - 1],
+        _ => &mut r.m[place - 3],
+    }
+}
+
+/// The rows of a padded vector in order.
+#[inline]
+pub(super) fn in_order(r: &Padded) -> SVector<f64, 5> {
+    [r.n, r.t[0], r.t[1], r.m[0], r.m[1]].into()
+}
+
+/// A padded vector from its rows in order.
+#[inline]
+pub(super) fn from_order(v: &SVector<f64, 5>) -> Padded {
+    Local { n: v[0], t: [v[1], v[2]].into(), m: [v[3], v[4]].into() }
+}
+
+fn write_scaled<D: Dim>(nodes: &Nodes<D>, unknowns: &Unknowns, k: usize, v: &D::Vector, w: &D::Spin, out: &mut [f64]) {
+    let node = &nodes.all[k];
+    if node.inverse_mass == 0.0 {
+        return;
+    }
+    let first = unknowns.first[k];
+    let mass = 1.0 / node.inverse_mass.sqrt();
+    if k >= nodes.grains {
+        out[first] = mass * v.dot(&nodes.drives[k - nodes.grains]);
+        return;
+    }
+    for axis in 0..D::N {
+        out[first + axis] = mass * v[axis];
+    }
+    for axis in 0..D::Spin::LEN {
+        out[first + D::N + axis] = w[axis] / node.inverse_inertia.sqrt();
+    }
+}
+
+impl<D: Dim> Flatten<'_, D> {
+    /// Append the coefficients of one node's unknowns, row after row, into `table` (rows × unknowns of the pair).
+    fn node(&self, link: &Link<D>, arm: f64, side: usize, tangents: usize, bends: usize, table: &mut [[f64; 12]; 5], at: usize) -> usize {
+        let k = link.nodes[side] as usize;
+        let nodes = &self.problem.nodes;
+        let node = &nodes.all[k];
+        if node.inverse_mass == 0.0 {
+            return 0;
+        }
+        let sign = if side == 0 { 1.0 } else { -1.0 };
+        let mut put = |column: usize, n: f64, t: D::Tangent, m: D::Tangent, scale: f64| {
+            table[0][column] = n * scale;
+            for c in 0..tangents {
+                table[1 + c][column] = t[c] * scale;
+            }
+            for c in 0..bends {
+                table[1 + tangents + c][column] = m[c] * scale;
+            }
+        };
+        let zero = D::Tangent::zero();
+        if k >= nodes.grains {
+            let (n, t) = D::split(&link.frame, nodes.drives[k - nodes.grains]);
+            put(at, -n, -t, zero, node.inverse_mass.sqrt());
+            return 1;
+        }
+        for axis in 0..D::N {
+            let mut e = D::Vector::zero();
+            e[axis] = sign;
+            let (n, t) = D::split(&link.frame, e);
+            put(at + axis, n, t, zero, node.inverse_mass.sqrt());
+        }
+        for axis in 0..D::Spin::LEN {
+            let mut e = D::Spin::zero();
+            e[axis] = 1.0;
+            let turn = D::spin_rows(&link.frame, e);
+            put(at + D::N + axis, 0.0, turn * -link.lever[side], turn * (sign * arm), node.inverse_inertia.sqrt());
+        }
+        D::N + D::Spin::LEN
+    }
+}
+
+impl<D: Dim> Visitor<D> for Flatten<'_, D> {
+    fn visit<L: Law>(&mut self, _: &Nodes<D>, c: &Contact<D, L>) {
+        let (tangents, bends) = (L::T::LEN, L::B::LEN);
+        let rows = places(tangents, bends);
+        let arm = c.law.arm();
+        let mut table = [[0.0; 12]; 5];
+        let first = self.node(&c.link, arm, 0, tangents, bends, &mut table, 0);
+        let second = self.node(&c.link, arm, 1, tangents, bends, &mut table, first);
+        let start = self.rows.coefficients.len();
+        for row in &table[..rows.len()] {
+            self.rows.coefficients.extend_from_slice(&row[..first + second]);
+        }
+        // what the given velocities of nodes that cannot move do
+        let mut given: Padded = padded(self.still.relative_velocity::<L::T, L::B>(&c.link, arm));
+        given.n += c.law.bias();
+        let normal: f64 = table[0][..first + second].iter().map(|h| h * h).sum();
+        self.normal.push(normal);
+        let size = c.link.lever[0] + if c.link.lever[1] > 0.0 { c.link.lever[1] } else { c.link.lever[0] };
+        let soft = size.powi(2 - D::N as i32);
+        let mut multiplier = padded(c.r);
+        multiplier.n += c.law.shift();
+        self.rows.list.push(Row {
+            at: c.link.nodes.map(|k| self.unknowns.first[k as usize]),
+            count: [first, second],
+            start,
+            rows,
+            cone: c.law.cone(),
+            associated: c.law.associated(),
+            shift: c.law.shift(),
+            given,
+            weights: Weights { n: soft, t: soft / self.ratio.tangential, m: soft / self.ratio.rolling },
+            multiplier,
+        });
+    }
+}

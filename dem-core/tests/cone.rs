@@ -1,0 +1,97 @@
+//! The cone and the laws on it, at random points: projection by its defining inequalities, local solves by the law they solve.
+
+use dem_core::contact::{Block, BondFlow, Bonded, Cone, Coulomb, Law, Local, LocalSolve, Weights};
+use dem_core::dim::{V0, Vect};
+use nalgebra::SVector;
+use proptest::prelude::*;
+
+fn vect<const N: usize>() -> impl Strategy<Value = SVector<f64, N>> {
+    prop::array::uniform(-1.0..1.0f64).prop_map(SVector::from)
+}
+
+fn local<T: Vect, B: Vect>(t: impl Strategy<Value = T>, m: impl Strategy<Value = B>) -> impl Strategy<Value = Local<T, B>> {
+    (-1.0..1.0f64, t, m).prop_map(|(n, t, m)| Local { n, t, m })
+}
+
+fn cone() -> impl Strategy<Value = Cone> {
+    (0.0..3.0f64, 0.0..3.0f64).prop_map(|(mu, nu)| Cone { mu, nu })
+}
+
+/// How far `x` is outside K, relative to its size.
+fn outside<T: Vect, B: Vect>(k: Cone, x: &Local<T, B>) -> f64 {
+    (-x.n).max(x.t.norm() - k.mu * x.n).max(x.m.norm() - k.nu * x.n)
+}
+
+/// How far `y` is outside the polar cone { n ≤ −μ‖t‖ − ν‖m‖ }.
+fn outside_polar<T: Vect, B: Vect>(k: Cone, y: &Local<T, B>) -> f64 {
+    y.n + k.mu * y.t.norm() + k.nu * y.m.norm()
+}
+
+/// Moreau: p = P_K(x) if and only if p ∈ K, x − p ∈ K°, p ⊥ x − p.
+fn is_projection<T: Vect, B: Vect>(k: Cone, x: Local<T, B>) {
+    let p = k.project(x);
+    let rest = x - p;
+    assert!(outside(k, &p) <= 1e-13, "{p:?} is outside the cone");
+    assert!(outside_polar(k, &rest) <= 1e-12, "{rest:?} is outside the polar");
+    assert!(p.dot(&rest).abs() <= 1e-12, "not orthogonal: {}", p.dot(&rest));
+}
+
+proptest! {
+    #[test]
+    fn projection_in_2d(k in cone(), x in local(vect::<1>(), vect::<1>())) { is_projection(k, x) }
+
+    #[test]
+    fn projection_in_3d(k in cone(), x in local(vect::<2>(), vect::<2>())) { is_projection(k, x) }
+
+    #[test]
+    fn projection_without_bending(k in cone(), x in local(vect::<2>(), Just(V0::zeros()))) { is_projection(k, x) }
+
+    /// The minimiser of ½ Σ w r² + q·r over K: r ∈ K, w r + q ∈ K*, r ⊥ w r + q.
+    #[test]
+    fn minimisation(k in cone(), q in local(vect::<2>(), vect::<2>()), n in 0.1..10.0f64, t in 0.1..10.0f64, m in 0.1..10.0f64) {
+        let r = k.minimise(Weights { n, t, m }, q);
+        let u = Local { n: n * r.n + q.n, t: r.t * t + q.t, m: r.m * m + q.m };
+        prop_assert!(outside(k, &r) <= 1e-12);
+        prop_assert!(outside_polar(k, &(u * -1.0)) <= 1e-11);
+        prop_assert!(r.dot(&u).abs() <= 1e-11);
+    }
+
+    /// The exact local solve of a dry contact satisfies the bipotential's fixed point, and its steps lead there.
+    #[test]
+    fn dry_local_solves_agree(mu in 0.0..2.0f64, n in 0.3..3.0f64, t in 0.3..3.0f64, q in local(vect::<2>(), Just(V0::zeros()))) {
+        let block = Block { n, t, m: 1.0, tm: 0.0 };
+        let velocity = |r: Local<SVector<f64, 2>, V0>| Local { n: n * r.n + q.n, t: r.t * t + q.t, m: r.m };
+        agree(Coulomb::<SVector<f64, 2>>::new(block, mu, 0.0), velocity);
+    }
+
+    /// The same for bonds of either flow, with t and m coupled as for grains of different size.
+    #[test]
+    fn bonded_local_solves_agree(
+        k in (0.05..1.5f64, 0.05..1.5f64).prop_map(|(mu, nu)| Cone { mu, nu }),
+        n in 0.3..3.0f64, t in 0.3..3.0f64, m in 0.3..3.0f64, share in -0.7..0.7f64, shift in 0.0..1.0f64, bipotential: bool,
+        q in local(vect::<2>(), vect::<2>()),
+    ) {
+        let tm = share * (t * m).sqrt();
+        let flow = if bipotential { BondFlow::Bipotential } else { BondFlow::Associated };
+        let block = Block { n, t, m, tm };
+        let velocity = |r: Local<SVector<f64, 2>, SVector<f64, 2>>| Local { n: n * r.n + q.n, t: r.t * t + r.m * tm + q.t, m: r.m * m + r.t * tm + q.m };
+        agree(Bonded::new(block, 1.0, shift, k, flow), velocity);
+    }
+}
+
+/// Iterate both local solves of a contact alone to their fixed points, and compare.
+fn agree<L: Law>(law: L, velocity: impl Fn(Local<L::T, L::B>) -> Local<L::T, L::B>) {
+    let solve = |local, rounds| {
+        let mut r = Local::zero();
+        for _ in 0..rounds {
+            r = law.improve(local, r, velocity(r));
+        }
+        r
+    };
+    let exact = solve(LocalSolve::Exact, 3);
+    let map = law.natural_map(exact, velocity(exact));
+    assert!(map.dot(&map).sqrt() <= 1e-11, "the exact solve leaves the residual {map:?}");
+    let stepped = solve(LocalSolve::PredictorCorrector, 20_000);
+    let apart = exact - stepped;
+    assert!(apart.dot(&apart).sqrt() <= 1e-8 * (1.0 + exact.dot(&exact).sqrt()), "{exact:?} against {stepped:?}");
+}

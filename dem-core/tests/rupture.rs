@@ -1,0 +1,162 @@
+//! Bonds: thresholds, cascades, what a broken bond is, and what a failed solve must not do.
+
+mod common;
+
+use common::{grain, settings, world};
+use dem_core::body::{Grains, Load};
+use dem_core::bond::{BondStatus, Rupture};
+use dem_core::dim::{D2, D3, Dim, Vect};
+use dem_core::solver::{GaussSeidelSettings, SolverSettings};
+use dem_core::world::{Break, StepError, World};
+use std::sync::Arc;
+
+const R_COH: f64 = 10.0;
+const MU: f64 = 0.3;
+/// Mean diameter of the pair (m).
+const A: f64 = 2e-3;
+
+/// A bonded pair along the first axis, its first grain fixed, under a constant force and torque on the second.
+fn pair<D: Dim>(force: &[f64], torque: &[f64]) -> World<D> {
+    let mut second = vec![0.0; D::N];
+    second[0] = A;
+    let mut fixed = grain::<D>(&vec![0.0; D::N], 0.5 * A);
+    fixed.fixed = true;
+    let grains: Grains<D> = [fixed, grain(&second, 0.5 * A)].into_iter().collect();
+    let load = Load { grain: 1, force: D::Vector::from_slice(force), torque: D::Spin::from_slice(torque), factor: Arc::new(|_| 1.0) };
+    let mut w = World::new(grains, Vec::new(), vec![load], settings(1e-4));
+    w.form_bonds(1e-6, |_| R_COH, MU);
+    w
+}
+
+fn first_break<D: Dim>(mut w: World<D>) -> Option<Break<D>> {
+    w.step().unwrap().breaks.first().copied()
+}
+
+#[test]
+fn thresholds_are_met_within_1e_6() {
+    let near = 1e-6;
+    for normal in [-R_COH * 0.5, 0.0, 3.0 * R_COH] {
+        let limit = normal + R_COH;
+        // pure pull; the normal reaction is minus the pull
+        // shear: the force at the centre has the lever A/2, and a torque takes its moment from the bond
+        // rolling: a torque alone
+        for (share, breaks) in [(1.0 - near, None), (1.0 + near, Some(()))] {
+            let tension = first_break(pair::<D2>(&[R_COH * share, 0.0], &[0.0]));
+            assert_eq!(tension.map(|b| b.mode), breaks.map(|_| BondStatus::Tension));
+            let shear = MU * limit * share;
+            let found = first_break(pair::<D2>(&[-normal, shear], &[-shear * 0.5 * A]));
+            assert_eq!(found.map(|b| b.mode), breaks.map(|_| BondStatus::Shear), "normal {normal}");
+            let moment = MU * A * limit * share;
+            let found = first_break(pair::<D2>(&[-normal, 0.0], &[moment]));
+            assert_eq!(found.map(|b| b.mode), breaks.map(|_| BondStatus::Rolling), "normal {normal}");
+            let found = first_break(pair::<D3>(&[-normal, 0.0, 0.0], &[0.0, moment, 0.0]));
+            assert_eq!(found.map(|b| b.mode), breaks.map(|_| BondStatus::Rolling), "3D, normal {normal}");
+        }
+    }
+}
+
+#[test]
+fn compression_a_million_times_the_cohesion_breaks_nothing() {
+    assert!(first_break(pair::<D2>(&[-1e6 * R_COH, 0.0], &[0.0])).is_none());
+    assert!(first_break(pair::<D3>(&[-1e6 * R_COH, 0.0, 0.0], &[0.0; 3])).is_none());
+}
+
+/// Two grains that meet at an angle, spinning, bonded or not.
+fn colliding() -> Vec<dem_core::body::Grain<D2>> {
+    let (mut a, mut b) = (grain::<D2>(&[0.0, 0.0], 1e-3), grain::<D2>(&[2e-3, 0.0], 1e-3));
+    (a.velocity, b.velocity) = ([0.3, 0.1].into(), [-0.4, 0.0].into());
+    (a.spin, b.spin) = ([400.0].into(), [900.0].into());
+    vec![a, b]
+}
+
+#[test]
+fn a_broken_pair_is_bit_for_bit_a_pair_that_was_never_bonded() {
+    let mut never = world(colliding(), vec![], settings(1e-4));
+    let mut broken = world(colliding(), vec![], settings(1e-4));
+    broken.form_bonds(1e-6, |_| R_COH, MU);
+    broken.bonds[0].status = BondStatus::Shear;
+    for _ in 0..50 {
+        never.step().unwrap();
+        broken.step().unwrap();
+        for k in 0..2 {
+            assert_eq!(never.grains.position[k].as_slice(), broken.grains.position[k].as_slice());
+            assert_eq!(never.grains.velocity[k].as_slice(), broken.grains.velocity[k].as_slice());
+            assert_eq!(never.grains.spin[k], broken.grains.spin[k]);
+        }
+    }
+}
+
+#[test]
+fn a_bond_that_breaks_in_a_step_acts_in_it_as_if_it_had_never_been() {
+    // far too weak for the impact: it breaks in the first step, and the cascade solves that step without it
+    let mut never = world(colliding(), vec![], settings(1e-4));
+    let mut bonded = world(colliding(), vec![], settings(1e-4));
+    bonded.form_bonds(1e-6, |_| 1e-3, MU);
+    never.step().unwrap();
+    assert_eq!(bonded.step().unwrap().breaks.len(), 1);
+    assert_eq!(never.grains.velocity[0].as_slice(), bonded.grains.velocity[0].as_slice());
+    assert_eq!(never.grains.spin, bonded.grains.spin);
+}
+
+/// A row of bonded grains, pulled at its free end.
+fn chain(rule: Rupture) -> World<D2> {
+    let mut row: Vec<_> = (0..5).map(|k| grain::<D2>(&[A * k as f64, 0.0], 0.5 * A)).collect();
+    row[0].fixed = true;
+    let mut set = settings(1e-4);
+    set.rupture = rule;
+    let load = Load { grain: 4, force: [20.0, 0.0].into(), torque: [0.0].into(), factor: Arc::new(|_| 1.0) };
+    let mut w = World::new(row.into_iter().collect(), Vec::new(), vec![load], set);
+    w.form_bonds(1e-6, |_| R_COH, MU);
+    w
+}
+
+#[test]
+fn the_rules_of_rupture_differ_as_they_say() {
+    // all four bonds carry the same 20 N at once
+    let all = chain(Rupture::Cascade).step().unwrap().breaks;
+    assert_eq!(all.iter().map(|b| b.round).collect::<Vec<_>>(), [0; 4]);
+    // one break unloads the others
+    let worst = chain(Rupture::CascadeWorst).step().unwrap().breaks;
+    assert_eq!(worst.len(), 1);
+    let mut late = chain(Rupture::EndOfStep);
+    let end = late.step().unwrap().breaks;
+    assert_eq!(end.len(), 4);
+    // within the step the bonds pulled at their limit: the free end was held back by r_coh
+    let expected = 1e-4 * (20.0 - R_COH) / late.grains.mass[4];
+    assert!((late.grains.velocity[4][0] / expected - 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn bonds_never_form_again() {
+    let mut w = pair::<D2>(&[20.0, 0.0], &[0.0]);
+    assert_eq!(w.step().unwrap().breaks.len(), 1);
+    w.loads[0].force = [-20.0, 0.0].into();
+    for _ in 0..200 {
+        assert!(w.step().unwrap().breaks.is_empty());
+    }
+    assert_eq!(w.bonds[0].status, BondStatus::Tension);
+    assert_eq!(w.intact_bonds(), 0);
+    // pressed together again: a dry contact
+    assert!(w.touches[0].reaction.n > 0.0 && w.touches[0].bond.is_none());
+}
+
+#[test]
+fn an_unaccepted_solve_breaks_no_bond_and_moves_no_body() {
+    let mut set = settings(1e-4);
+    let one_sweep = GaussSeidelSettings { local: Default::default(), tolerance: 1e-14, accept: 1e-14, max_sweeps: 1 };
+    set.solver = SolverSettings::GaussSeidel(one_sweep);
+    set.max_halvings = 2;
+    let mut row: Vec<_> = (0..20).map(|k| grain::<D2>(&[A * k as f64, 0.0], 0.5 * A)).collect();
+    row[0].fixed = true;
+    let load = Load { grain: 19, force: [30.0, 1.0].into(), torque: [0.0].into(), factor: Arc::new(|_| 1.0) };
+    let mut w = World::new(row.into_iter().collect(), Vec::new(), vec![load], set);
+    w.form_bonds(1e-6, |_| R_COH, MU);
+    let before = (w.grains.clone(), w.bonds.clone(), w.ledger, w.time, w.steps);
+    let error = w.step().unwrap_err();
+    assert!(matches!(error, StepError::NotAccepted { step, .. } if step == 0.25e-4), "{error}");
+    assert_eq!(before.0.position, w.grains.position);
+    assert_eq!(before.0.velocity, w.grains.velocity);
+    assert_eq!(before.1, w.bonds);
+    assert_eq!((before.2, before.3, before.4), (w.ledger, w.time, w.steps));
+    assert!(w.touches.is_empty());
+}

@@ -1,0 +1,306 @@
+//! The commands on small histories whose answers are known.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use dem_run::history::*;
+
+const STEPS: i64 = 100;
+
+/// A square of four bonded grains of radius 1 mm between two walls.
+fn layout(dimension: usize) -> Layout {
+    let wall = |name: &str, sign: f64, drive| Wall {
+        name: name.into(),
+        kind: WallKind::Plane,
+        normal: [0.0, sign, 0.0],
+        radius: 0.0,
+        drive,
+        direction: if drive == WallDrive::Fixed { [0.0; 3] } else { [0.0, sign, 0.0] },
+    };
+    let d = dimension;
+    Layout {
+        dimension,
+        friction: true,
+        grains: Grains { id: vec![0, 1, 2, 3], radius: vec![1e-3; 4], mass: vec![1.0; 4], inertia: vec![1.0; 4] },
+        walls: vec![wall("bottom", 1.0, WallDrive::Fixed), wall("top", -1.0, WallDrive::Force)],
+        bonds: Bonds {
+            pair: vec![[0, 1], [1, 2], [2, 3], [3, 0]],
+            rest_gap: vec![0.0; 4],
+            strength: vec![10.0; 4],
+            friction: vec![0.3; 4],
+            mean_diameter: vec![2e-3; 4],
+        },
+        observables: vec![
+            Observable::new("wall_position", "m", &[2, d]),
+            Observable::new("wall_force", "N", &[2, d]),
+            Observable::new("applied_force", "N", &[2]),
+            Observable::new("strain", "", &[d, d]),
+            Observable::new("stress", "Pa", &[d, d]),
+            Observable::new("bonds_broken", "", &[]),
+        ],
+        parameters: Parameters { scene: "{\"thickness\": 0.5}".into(), ..Parameters::default() },
+        ..Layout::default()
+    }
+}
+
+/// Puts a 2D vector or a diagonal tensor into `d` dimensions.
+fn vector(d: usize, y: f64) -> Vec<f64> {
+    let mut v = vec![0.0; d];
+    v[1] = y;
+    v
+}
+
+fn tensor(d: usize, yy: f64) -> Vec<f64> {
+    let mut t = vec![0.0; d * d];
+    t[d + 1] = yy;
+    t
+}
+
+/// Load 1 N a step up to 100 N; the sample gives way by 1e-3 of its height a step from step 41 on; bond 0 breaks at
+/// step 30 and bond 1 at step 60.
+fn write(path: &Path, l: &Layout) {
+    let (d, walled, bonded) = (l.dimension, !l.walls.is_empty(), !l.bonds.is_empty());
+    let mut writer = Writer::create(path, l, false).unwrap();
+    for step in 0..=STEPS {
+        let (time, load) = (step as f64 * 1e-3, step as f64);
+        let strain = -1e-3 * (step - 40).max(0) as f64;
+        let top = 4e-3 * (1.0 + strain);
+        for (at, bond, mode) in [(30, 0, RuptureMode::Shear), (60, 1, RuptureMode::Tension)] {
+            if step == at && bonded {
+                writer.rupture(&rupture(step, time, bond, l.bonds.pair[bond], mode)).unwrap();
+            }
+        }
+        let broken = f64::from(u8::from(step >= 30) + u8::from(step >= 60));
+        let values = [
+            vector(d, 0.0),
+            vector(d, top),
+            vector(d, -load),
+            vector(d, load),
+            vec![0.0, load],
+            tensor(d, strain),
+            tensor(d, load / 2e-3),
+            vec![broken],
+        ];
+        if !l.observables.is_empty() {
+            writer.observe(step, time, &values.concat()).unwrap();
+        }
+        if step % 10 == 0 {
+            frame(&mut writer, l, step, top);
+        }
+    }
+    assert!(walled || l.observables.is_empty());
+    writer.finish().unwrap();
+}
+
+fn rupture(step: i64, time: f64, bond: usize, pair: [i32; 2], mode: RuptureMode) -> Rupture {
+    Rupture {
+        step,
+        time,
+        point: [1e-3, 2e-3, 0.0],
+        normal_force: -1.0,
+        tangential_force: 3.0,
+        moment: 0.0,
+        energy: 0.0,
+        round: 0,
+        bond: bond as i32,
+        pair,
+        mode,
+    }
+}
+
+fn frame(writer: &mut Writer, l: &Layout, step: i64, top: f64) {
+    let (d, w, load) = (l.dimension, l.walls.len(), step as f64);
+    let centre = |x: f64, y: f64| if d == 2 { vec![x, y] } else { vec![x, y, 0.0] };
+    let places = [centre(1e-3, 1e-3), centre(3e-3, 1e-3), centre(3e-3, top - 1e-3), centre(1e-3, top - 1e-3)];
+    let still = |count: usize| vec![0.0; count * d];
+    let mut pair = vec![[3, 0], [2, 1]];
+    if w > 0 {
+        pair.extend([[0, -1], [3, -2]]);
+    }
+    let m = pair.len();
+    let mut reaction = still(m);
+    for c in 0..m {
+        reaction[c * d] = if c == 0 { load } else { -0.5 * load };
+    }
+    let bonded = !l.bonds.is_empty();
+    let contacts = ContactRows {
+        point: still(m),
+        normal: still(m),
+        tangent: if d == 3 { still(m) } else { vec![] },
+        reaction,
+        moment: if bonded { vec![0.0; m * (d - 1)] } else { vec![] },
+        gap: vec![0.0; m],
+        status: vec![ContactStatus::Stick; m],
+        bond: if bonded { vec![-1; m] } else { vec![] },
+        pair,
+    };
+    let mut bonds = vec![BondStatus::Intact; l.bonds.len()];
+    for (at, bond, status) in [(30, 0, BondStatus::Shear), (60, 1, BondStatus::Tension)] {
+        if bonded && step >= at {
+            bonds[bond] = status;
+        }
+    }
+    let grains = GrainState { position: places.concat(), velocity: still(4), ..GrainState::default() };
+    let position = if w > 0 { [vector(d, 0.0), vector(d, top)].concat() } else { vec![] };
+    let walls = WallState { position, velocity: still(w), force: still(w) };
+    let time = step as f64 * 1e-3;
+    writer.frame(&Frame { step, time, grains: &grains, walls: &walls, contacts: &contacts, bonds: &bonds }).unwrap();
+}
+
+fn sample(l: &Layout) -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.h5");
+    write(&path, l);
+    (folder, path)
+}
+
+/// Runs `dem-post` in the folder of the history.
+fn dem_post(history: &Path, arguments: &[&str]) -> Output {
+    let (folder, name) = (history.parent().unwrap(), history.file_name().unwrap());
+    let mut command = Command::new(env!("CARGO_BIN_EXE_dem-post"));
+    command.current_dir(folder).arg(arguments[0]).arg(name).args(&arguments[1..]).output().unwrap()
+}
+
+fn json(output: &Output) -> serde_json::Value {
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn refused(output: &Output, code: i32, words: &[&str]) {
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(code), "{message}");
+    assert!(output.stdout.is_empty());
+    for word in words {
+        assert!(message.contains(word), "{message:?} lacks {word:?}");
+    }
+}
+
+#[test]
+fn every_command_writes_what_it_promises() {
+    for dimension in [2, 3] {
+        let (folder, path) = sample(&layout(dimension));
+        for (command, files) in [
+            ("cracks", &["ruptures.csv", "broken.csv", "fragments.csv", "broken", "fragments", "decohesion"][..]),
+            ("chains", &["forces.csv", "distribution.csv", "chains", "distribution"]),
+            ("stress-strain", &["stress-strain.csv", "force-displacement", "stress-strain"]),
+        ] {
+            let output = dem_post(&path, &[command]);
+            assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+            assert!(!output.stdout.is_empty());
+            let read = |name: String| std::fs::read(folder.path().join("run-post").join(name)).unwrap();
+            for file in files {
+                if file.ends_with(".csv") {
+                    assert!(read(file.to_string()).iter().filter(|&&b| b == b'\n').count() > 1, "{file}");
+                } else {
+                    assert!(read(format!("{file}.png")).starts_with(b"\x89PNG"));
+                    assert!(String::from_utf8(read(format!("{file}.svg"))).unwrap().starts_with("<svg"));
+                }
+            }
+        }
+        let lines = dem_post(&path, &["info"]).stdout.iter().filter(|&&b| b == b'\n').count();
+        assert!((15..=22).contains(&lines), "{lines} lines");
+    }
+}
+
+#[test]
+fn collapse_is_read_off_the_curve() {
+    let (_folder, path) = sample(&layout(2));
+    let output = dem_post(&path, &["stress-strain", "--json", "--quiet", "-o", "here"]);
+    assert!(output.stderr.is_empty());
+    let found = json(&output);
+    let number = |name: &str| found[name].as_f64().unwrap();
+    // the strain first exceeds 1e-4 at step 41, and 1e-3 at step 42
+    assert_eq!((number("collapse_load"), number("collapse_load_1e3")), (40.0, 41.0));
+    assert_eq!(number("collapse_over_cohesion"), 4.0);
+    // 5 % of four bonds have broken with the first
+    assert_eq!(number("load_at_5_percent_broken"), 30.0);
+    assert!(found["peak_load"].is_null());
+    assert!((number("height") - 4e-3).abs() < 1e-12);
+    assert!((number("area") - 4e-3 * 0.5).abs() < 1e-12);
+    // 60 steps of 4e-6 m under a mean load of 70 N
+    assert!((number("work") - 60.0 * 4e-6 * 70.0).abs() < 1e-9);
+    assert!((number("final_strain") - 0.06).abs() < 1e-12);
+    assert!(path.with_file_name("here").join("stress-strain.csv").exists());
+}
+
+#[test]
+fn a_wall_that_moves_needs_no_prescribed_force() {
+    let mut moved = layout(2);
+    moved.walls[1].drive = WallDrive::Velocity;
+    let (_folder, path) = sample(&moved);
+    let found = json(&dem_post(&path, &["stress-strain", "--json"]));
+    assert_eq!(found["collapse_load"], 40.0);
+    assert!(found["final_displacement"].as_f64().unwrap() > 0.0);
+}
+
+#[test]
+fn cracks_count_bonds_and_pieces() {
+    let (_folder, path) = sample(&layout(2));
+    let found = json(&dem_post(&path, &["cracks", "--json", "--times", "0.03,0.1"]));
+    assert_eq!(found["broken"], serde_json::json!({"tension": 1, "shear": 1, "rolling": 0}));
+    assert_eq!(found["first_break"], 0.03);
+    // two bonds of a ring leave two pieces: 1 alone, and 2–3–0
+    let last = found["fragments"].as_array().unwrap().last().unwrap();
+    assert_eq!((&last["count"], &last["largest"]), (&2.into(), &3.into()));
+    assert_eq!(last["largest_mass_fraction"], 0.75);
+}
+
+#[test]
+fn chains_tell_compression_from_tension() {
+    let (_folder, path) = sample(&layout(2));
+    let found = json(&dem_post(&path, &["chains", "--json", "--times", "0.1"]));
+    let network = &found["networks"][0];
+    assert_eq!((&network["contacts"], &network["in_tension"], &network["strong"]), (&4.into(), &3.into(), &1.into()));
+    assert_eq!(network["mean"], 62.5);
+}
+
+#[test]
+fn what_a_scene_lacks_is_named() {
+    let mut loose = layout(2);
+    loose.bonds = Bonds::default();
+    let (_folder, path) = sample(&loose);
+    refused(&dem_post(&path, &["cracks"]), 2, &["run.h5", "bonds"]);
+    let free = Layout { walls: vec![], observables: vec![], ..layout(2) };
+    let (folder, path) = sample(&free);
+    refused(&dem_post(&path, &["stress-strain"]), 2, &["driven wall"]);
+    refused(&dem_post(&path, &["chains", "--times", "0"]), 2, &["no contact carries a force"]);
+    // nothing was left behind
+    assert!(!folder.path().join("run-post").exists());
+    let unobserved = Layout { observables: vec![], ..layout(2) };
+    let (_folder, path) = sample(&unobserved);
+    refused(&dem_post(&path, &["stress-strain"]), 2, &["wall_position"]);
+    assert!(dem_post(&path, &["cracks"]).status.success());
+    assert!(dem_post(&path, &["info"]).status.success());
+}
+
+#[test]
+fn wrong_arguments_are_refused() {
+    let (_folder, path) = sample(&layout(2));
+    for times in ["7", "-1", "nan"] {
+        let times = format!("--times={times}");
+        refused(&dem_post(&path, &["cracks", &times]), 2, &["--times", "0 s to 0.1 s"]);
+    }
+    refused(&dem_post(&path, &["stress-strain", "--wall", "bottom"]), 2, &["top"]);
+    refused(&dem_post(&path, &["cracks", "--tims", "1"]), 2, &["--times"]);
+}
+
+#[test]
+fn wrong_files_are_refused() {
+    let (folder, path) = sample(&layout(2));
+    let bytes = std::fs::read(&path).unwrap();
+    let file = |name: &str, content: &[u8]| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, content).unwrap();
+        path
+    };
+    let foreign = folder.path().join("foreign.h5");
+    hdf5::File::create(&foreign).unwrap();
+    for command in ["info", "cracks", "chains", "stress-strain"] {
+        refused(&dem_post(&folder.path().join("none.h5"), &[command]), 4, &["none.h5", "does not exist"]);
+        refused(&dem_post(&file("text.h5", b"x,y\n"), &[command]), 4, &["text.h5", "not an HDF5 file"]);
+        refused(&dem_post(&file("cut.h5", &bytes[..bytes.len() / 2]), &[command]), 4, &["cut.h5", "truncated"]);
+        refused(&dem_post(&foreign, &[command]), 4, &["foreign.h5", "not a history"]);
+    }
+    let output = file("taken", b"");
+    refused(&dem_post(&path, &["cracks", "-o", output.to_str().unwrap()]), 4, &["taken"]);
+}
