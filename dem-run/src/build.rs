@@ -8,7 +8,7 @@ use dem_core::bond::Rupture;
 use dem_core::contact::{BondFlow, LocalSolve};
 use dem_core::detection::pairs_within;
 use dem_core::dim::{Dim, Vect};
-use dem_core::solver::{GaussSeidelSettings, SolverSettings};
+use dem_core::solver::{GaussSeidelSettings, NewtonSettings, SolverSettings, Start, StiffnessRatio};
 use dem_core::world::{Restitution, Settings, World};
 use std::path::Path;
 use std::sync::Arc;
@@ -215,7 +215,6 @@ fn loads<D: Dim>(scene: &Scene) -> Vec<Load<D>> {
 fn settings<D: Dim>(scene: &Scene) -> Settings<D> {
     let restitution = &scene.materials.restitution;
     let bouncing = restitution.grain_grain > 0.0 || restitution.grain_wall > 0.0;
-    let SolverKind::GaussSeidel(gs) = &scene.solver.kind;
     Settings {
         step: scene.time.step,
         gravity: scene.gravity.as_deref().map(D::Vector::from_slice).filter(|g| g.norm() > 0.0),
@@ -234,17 +233,35 @@ fn settings<D: Dim>(scene: &Scene) -> Settings<D> {
             scene::Rupture::CascadeWorst => Rupture::CascadeWorst,
             scene::Rupture::EndOfStep => Rupture::EndOfStep,
         },
-        solver: SolverSettings::GaussSeidel(GaussSeidelSettings {
+        solver: solver(&scene.solver),
+        max_halvings: scene.solver.max_step_halvings,
+        thickness: if D::N == 2 { scene.thickness() } else { 1.0 },
+        expel_overlaps: false,
+    }
+}
+
+fn solver(solver: &scene::Solver) -> SolverSettings {
+    let (tolerance, accept) = (solver.tolerance, solver.accept());
+    match &solver.kind {
+        SolverKind::GaussSeidel(gs) => SolverSettings::GaussSeidel(GaussSeidelSettings {
             local: match gs.local {
                 scene::LocalSolve::Exact => LocalSolve::Exact,
                 scene::LocalSolve::PredictorCorrector => LocalSolve::PredictorCorrector,
             },
-            tolerance: scene.solver.tolerance,
-            accept: scene.solver.accept(),
+            tolerance,
+            accept,
             max_sweeps: gs.max_sweeps,
         }),
-        max_halvings: scene.solver.max_step_halvings,
-        thickness: if D::N == 2 { scene.thickness() } else { 1.0 },
-        expel_overlaps: false,
+        SolverKind::Newton(newton) => SolverSettings::Newton(NewtonSettings {
+            tolerance,
+            accept,
+            load_tolerance: newton.load_tolerance,
+            start: match newton.start {
+                scene::Start::StiffLimit => Start::StiffLimit,
+                scene::Start::LastStep => Start::LastStep,
+            },
+            stiffness: StiffnessRatio { tangential: newton.tangential_stiffness, rolling: newton.rolling_stiffness },
+            max_iterations: newton.max_iterations,
+        }),
     }
 }

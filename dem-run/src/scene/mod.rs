@@ -39,7 +39,7 @@ pub use sample::{
     Compaction, Deposition, Diameters, GrainSpec, Lattice, Preparation, RandomSample, Sample,
     SampleFile, UniformRange,
 };
-pub use solver::{GaussSeidel, LocalSolve, Solver, SolverKind};
+pub use solver::{GaussSeidel, LocalSolve, Newton, Solver, SolverKind, Start};
 pub use validate::validate;
 pub use wall::{Circle, Cylinder, Drive, Place, Plane, Shape, Sphere, Wall, WallMass};
 

@@ -112,9 +112,6 @@ pub struct Bonds {
     /// Flow of an intact bond at its limit.
     #[serde(default)]
     pub flow: Flow,
-    /// Whether a bond also carries a moment.
-    #[serde(default = "yes")]
-    pub moment: bool,
 }
 
 /// Flow of an intact bond at its limit.
@@ -228,10 +225,6 @@ pub enum TravelFrom {
 
 fn default_seed() -> u64 {
     1
-}
-
-fn yes() -> bool {
-    true
 }
 
 fn one() -> Function {
@@ -354,7 +347,6 @@ mod tests {
             gap_tolerance: 1e-3,
             friction: None,
             flow: Flow::Associated,
-            moment: true,
         };
         assert!((bonds.cohesion(2, 4e-3, 0.01) - 40.0).abs() < 1e-12);
         assert!((bonds.cohesion(3, 4e-3, 0.01) - 4.0 * std::f64::consts::PI).abs() < 1e-12);

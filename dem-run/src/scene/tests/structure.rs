@@ -304,7 +304,6 @@ const EVERYWHERE: &[&str] = &[
     "solver.kind.gauss_seidel.local=predictor_corrector",
     "solver.kind.gauss_seidel.max_sweeps=7",
     "stop.broken_fraction=0.5",
-    "bonds.moment=false",
     "walls.roller.velocity={\"ramp\": {\"rate\": 2}}",
     "grains.loads.0.force.1=3",
     "gravity=null",
@@ -318,7 +317,6 @@ fn assignments_reach_every_part_of_a_scene() {
         scene.bonds.as_ref().and_then(|bonds| bonds.strength),
         Some(5.0)
     );
-    assert_eq!(scene.bonds.as_ref().map(|bonds| bonds.moment), Some(false));
     assert_eq!(scene.walls["top"].force_rate, Some(100.0));
     assert_eq!(
         scene.walls["roller"].velocity,

@@ -229,13 +229,18 @@ fn solver(report: &mut Report, scene: &Scene) {
             "a whole number from 0 to 30",
         );
     }
-    let SolverKind::GaussSeidel(gauss_seidel) = &solver.kind;
-    if gauss_seidel.max_sweeps == 0 {
-        report.wrong(
-            "solver.kind.gauss_seidel.max_sweeps",
-            0,
-            "a whole number, at least 1",
-        );
+    let limit = match &solver.kind {
+        SolverKind::GaussSeidel(gs) => ("solver.kind.gauss_seidel.max_sweeps", gs.max_sweeps),
+        SolverKind::Newton(newton) => {
+            let path = |name: &str| format!("solver.kind.newton.{name}");
+            report.positive(path("load_tolerance"), newton.load_tolerance, "no unit");
+            report.positive(path("tangential_stiffness"), newton.tangential_stiffness, "no unit");
+            report.positive(path("rolling_stiffness"), newton.rolling_stiffness, "no unit");
+            ("solver.kind.newton.max_iterations", newton.max_iterations)
+        }
+    };
+    if limit.1 == 0 {
+        report.wrong(limit.0, 0, "a whole number, at least 1");
     }
 }
 
