@@ -1,1 +1,1 @@
-//! End-to-end tests of the commands; see `tests/`.
+//! End-to-end tests: of the commands in `tests/end_to_end`, of what Python reads in `python`.

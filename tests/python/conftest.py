@@ -1,0 +1,34 @@
+"""The programs as a user builds them, and one compression that several tests read."""
+
+import json
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="session")
+def dem_run():
+    """Runs `dem-run` with these arguments in a folder."""
+    build = [os.environ.get("CARGO", "cargo"), "build", "--release", "--locked", "-p", "dem-run", "-p", "dem-post"]
+    built = subprocess.run(
+        build + ["--message-format=json-render-diagnostics"], cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True
+    )
+    artifacts = [json.loads(line) for line in built.stdout.splitlines()]
+    program = next(a["executable"] for a in artifacts if a.get("executable") and a["target"]["name"] == "dem-run")
+
+    def run(folder, *arguments):
+        subprocess.run([program, *map(str, arguments)], cwd=folder, check=True, stdout=subprocess.DEVNULL, timeout=300)
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def compression(dem_run, tmp_path_factory):
+    """The folder of compression.h5, made as README says."""
+    folder = tmp_path_factory.mktemp("compression")
+    dem_run(folder, "run", ROOT / "configs/compression.json", "--quiet")
+    return folder

@@ -1,0 +1,156 @@
+//! The programs, a folder to run them in, and what they answered.
+
+use assert_cmd::Command;
+use dem_run::history::History;
+use serde_json::Value;
+use std::collections::HashMap;
+use std::env;
+use std::path::{Path, PathBuf};
+use std::process::Stdio;
+use std::sync::OnceLock;
+use std::time::Duration;
+use tempfile::TempDir;
+
+/// The compression scene with 60 grains: it runs in half a second.
+pub const SMALL: [&str; 8] = [
+    "--set",
+    "sample.random.count=60",
+    "--set",
+    "sample.random.width=0.014",
+    "--set",
+    "sample.random.preparation.compaction.solid_fraction=0.7",
+    "--set",
+    "walls.top.force_rate=100",
+];
+
+/// No command takes so long; one that hangs fails its test.
+const PATIENCE: Duration = Duration::from_secs(300);
+
+/// The root of the workspace.
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("a workspace around this package").to_path_buf()
+}
+
+/// The path of a scene in `configs/`.
+pub fn config(name: &str) -> String {
+    root().join("configs").join(name).to_str().expect("UTF-8").to_string()
+}
+
+/// The path of a program. Cargo knows the programs of a test's own package only, so it is asked to build these two,
+/// in release, as README does: the compression takes seconds there, and minutes in the profile of the tests.
+pub fn program(name: &str) -> &'static Path {
+    static PROGRAMS: OnceLock<HashMap<String, PathBuf>> = OnceLock::new();
+    &PROGRAMS.get_or_init(build)[name]
+}
+
+fn build() -> HashMap<String, PathBuf> {
+    let cargo = env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let output = std::process::Command::new(cargo)
+        .args(["build", "--release", "--locked", "-p", "dem-run", "-p", "dem-post"])
+        .arg("--message-format=json-render-diagnostics")
+        .current_dir(root())
+        .stderr(Stdio::inherit())
+        .output()
+        .expect("cargo");
+    assert!(output.status.success(), "the programs cannot be built");
+    let artifact = |line: &str| {
+        let message: Value = serde_json::from_str(line).ok()?;
+        let path = message["executable"].as_str()?;
+        Some((message["target"]["name"].as_str()?.to_string(), PathBuf::from(path)))
+    };
+    String::from_utf8(output.stdout).expect("UTF-8").lines().filter_map(artifact).collect()
+}
+
+/// A folder that commands run in, gone at the end of its test.
+pub struct Folder(TempDir);
+
+impl Folder {
+    pub fn new() -> Self {
+        Self(tempfile::tempdir().expect("a folder for temporary files"))
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    pub fn read(&self, name: &str) -> Vec<u8> {
+        std::fs::read(self.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+    }
+
+    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) {
+        std::fs::write(self.path(name), content).expect("write");
+    }
+
+    pub fn history(&self, name: &str) -> History {
+        History::open(&self.path(name)).expect("history")
+    }
+
+    /// The names of all that stands in the folder, sorted.
+    pub fn names(&self) -> Vec<String> {
+        let entries = std::fs::read_dir(self.0.path()).expect("read the folder");
+        let mut names: Vec<String> =
+            entries.map(|entry| entry.expect("entry").file_name().into_string().expect("UTF-8")).collect();
+        names.sort();
+        names
+    }
+
+    pub fn dem_run<S: AsRef<str>>(&self, args: &[S]) -> Outcome {
+        self.command("dem-run", args)
+    }
+
+    pub fn dem_post<S: AsRef<str>>(&self, args: &[S]) -> Outcome {
+        self.command("dem-post", args)
+    }
+
+    /// Run a scene of `configs/` with more arguments, and give its summary.
+    pub fn run_config(&self, name: &str, args: &[&str]) -> Value {
+        let scene = config(name);
+        self.dem_run(&[&["run", &scene, "--json"], args].concat()).json()
+    }
+
+    fn command<S: AsRef<str>>(&self, program: &str, args: &[S]) -> Outcome {
+        let args: Vec<&str> = args.iter().map(AsRef::as_ref).collect();
+        let mut command = Command::new(self::program(program));
+        let output = command.args(&args).current_dir(self.0.path()).timeout(PATIENCE).output().expect("start");
+        let text = |bytes| String::from_utf8(bytes).expect("UTF-8");
+        Outcome {
+            command: format!("{program} {}", args.join(" ")),
+            code: output.status.code(),
+            stdout: text(output.stdout),
+            stderr: text(output.stderr),
+        }
+    }
+}
+
+/// What a command answered.
+pub struct Outcome {
+    command: String,
+    pub code: Option<i32>,
+    pub stdout: String,
+    pub stderr: String,
+}
+
+impl Outcome {
+    /// It did its work.
+    pub fn succeeds(self) -> Self {
+        assert_eq!(self.code, Some(0), "{}: {}", self.command, self.stderr);
+        self
+    }
+
+    /// It did its work, and stdout is JSON.
+    pub fn json(self) -> Value {
+        let outcome = self.succeeds();
+        serde_json::from_str(&outcome.stdout).unwrap_or_else(|error| panic!("{}: {error}", outcome.command))
+    }
+
+    /// It ended with this code, and stderr has these parts: the place and the remedy.
+    pub fn fails(self, code: i32, parts: &[&str]) -> Self {
+        let told = format!("{}\n{}", self.command, self.stderr);
+        assert_eq!(self.code, Some(code), "{told}");
+        for part in parts {
+            assert!(self.stderr.contains(part), "{part:?} is not in the answer to {told}");
+        }
+        assert!(!self.stderr.contains("panicked"), "{told}");
+        self
+    }
+}

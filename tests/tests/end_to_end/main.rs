@@ -1,0 +1,9 @@
+//! The commands end to end, as a user runs them: release builds, scenes from `configs/`, files in a folder of their own.
+
+mod collapse;
+mod common;
+mod compression;
+mod interrupt;
+mod teaching;
+mod wrong_history;
+mod wrong_scene;

@@ -1,0 +1,142 @@
+//! Wrong scenes and wrong use of `dem-run`: exit code, place and remedy, and no file left behind.
+
+use crate::common::{Folder, SMALL, config};
+
+/// Run a scene of `configs/` with one assignment that is wrong; nothing must be left.
+fn refused(scene: &str, set: &str, code: i32, parts: &[&str]) {
+    let here = Folder::new();
+    here.dem_run(&["run", &config(scene), "--set", set]).fails(code, parts);
+    assert_eq!(here.names(), [""; 0], "{set}");
+}
+
+#[test]
+fn wrong_values_are_refused_with_their_place_and_the_remedy() {
+    for (scene, set, parts) in [
+        ("column.json", "time.stepp=1e-3", &["time.stepp", "nearest  time.step"][..]),
+        ("column.json", "material.density=1", &["material", "nearest  materials"]),
+        ("compression.json", "bonds.strenght=5", &["bonds.strenght", "nearest  bonds.strength"]),
+        ("column.json", "time.step=\"short\"", &["time.step", "found    string \"short\"", "a number"]),
+        ("column.json", "dimension=[2]", &["dimension", "allowed"]),
+        ("two-grains.json", "sample.grains.1.radius=-2e-3", &["sample.grains.1.radius", "-0.002", "> 0 (m)"]),
+        ("column.json", "time.step=NaN", &["time.step", "NaN", "a number"]),
+        ("column.json", "time.step=Infinity", &["time.step", "Infinity", "a number"]),
+        ("column.json", "time.step=1e999", &["time.step", "1e999", "a finite number"]),
+        ("column.json", "gravity=[0, -1e999]", &["gravity", "-1e999", "a finite number"]),
+        ("column.json", "time.step=0", &["time.step", "> 0 (s)"]),
+        ("column.json", "materials.friction.grain_grain=-0.1", &["materials.friction.grain_grain", "-0.1", "≥ 0"]),
+        ("two-grains.json", "sample.grains.1.center=[0, 0]", &["sample.grains.1.center", "the centre of grain 0"]),
+        // nearly: the direction between them would be noise
+        ("two-grains.json", "sample.grains.1.center=[1e-12, 0]", &["grains 0 and 1 coincide", "move one"]),
+        (
+            "column.json",
+            "walls.bottom.shape.plane.place={\"at\": [0, 1e-3]}",
+            &["walls.bottom", "overlaps grain 0 by 1.000e-3 m", "\"place\": \"seated\""],
+        ),
+        ("two-grains.json", "grains.fixed=[7]", &["grains.fixed.0", "found    7", "from 0 to 1"]),
+    ] {
+        refused(scene, set, 2, parts);
+    }
+}
+
+#[test]
+fn texts_that_are_no_scene_are_refused_at_their_line() {
+    for (text, code, parts) in [
+        (&b""[..], 2, &["line 1", "empty"][..]),
+        (b"{ \"dimension\": 2,\n  \"seed\" 1 }", 2, &["line 2, column 10", "colon"]),
+        (b"{ \"dimension\": 2,\n  \"seed\": NaN }", 2, &["line 2", "NaN", "write a finite number"]),
+        (b"{ \"dimension\": 2, \"dimension\": 2 }", 2, &["dimension", "a second time", "each name once"]),
+        (b"{}", 2, &["dimension"]),
+        (b"[]", 2, &["the scene"]),
+        // a history is not a scene
+        (b"\x89HDF\r\n\x1a\n\0\0", 4, &["scene.json", "cannot be read", "utf-8"]),
+    ] {
+        let here = Folder::new();
+        here.write("scene.json", text);
+        here.dem_run(&["run", "scene.json"]).fails(code, parts);
+        assert_eq!(here.names(), ["scene.json"]);
+    }
+}
+
+#[test]
+fn files_that_cannot_be_read_or_written_are_exit_4() {
+    let here = Folder::new();
+    let column = config("column.json");
+    here.write("column.h5", "precious");
+    for (args, parts) in [
+        (&["run", "missing.json"][..], &["missing.json", "cannot be read"][..]),
+        (&["run", "."], &["cannot be read"]),
+        (&["run", &column], &["column.h5", "exists", "--force", "-o"]),
+        (&["run", &column, "-o", "no/where.h5"], &["no/where.h5", "no folder no", "make it"]),
+        (&["run", &column, "-o", "b.h5", "--write-sample", "no/where.csv"], &["no/where.csv", "make it"]),
+        (&["run", &column, "-o", "b.h5", "--write-sample", "column.h5"], &["column.h5", "--force"]),
+        (
+            &["run", &column, "-o", "b.h5", "--set", r#"sample={"file": {"path": "none.csv"}}"#],
+            &["sample.file.path", "none.csv", "cannot be read"],
+        ),
+    ] {
+        here.dem_run(args).fails(4, parts);
+        assert_eq!(here.names(), ["column.h5"], "{args:?}");
+        assert_eq!(here.read("column.h5"), b"precious", "{args:?}");
+    }
+}
+
+#[test]
+fn force_replaces_a_file() {
+    let here = Folder::new();
+    here.write("column.h5", "old");
+    here.run_config("column.json", &["--force"]);
+    assert_eq!(here.history("column.h5").steps().last(), Some(&100));
+}
+
+#[test]
+fn a_sample_file_is_refused_at_its_line() {
+    for (table, parts) in [
+        ("x,y,radius\n0,0,1e-3\n0,nan,1e-3\n", &["sample.csv, line 3", "y", "finite number"][..]),
+        ("x,y,radius\n0,0,-1e-3\n", &["sample.csv, line 2", "radius is -0.001", "above zero"]),
+        ("x,y,radius\n0,0\n", &["sample.csv, line 2"]),
+        ("x,y,r\n0,0,1e-3\n", &["sample.csv, line 1", "x,y,radius"]),
+        ("x,y,radius\n", &["sample.csv", "no grains"]),
+        ("x,y,radius\n0,0,1e-3\n0,0,1e-3\n", &["grains 0 and 1 coincide"]),
+    ] {
+        let here = Folder::new();
+        here.write("sample.csv", table);
+        let path = here.path("sample.csv");
+        let set = format!("sample={{\"file\": {{\"path\": {path:?}}}}}");
+        here.dem_run(&["run", &config("column.json"), "--set", &set]).fails(2, parts);
+        assert_eq!(here.names(), ["sample.csv"]);
+    }
+}
+
+#[test]
+fn a_packing_looser_than_asked_is_refused() {
+    let here = Folder::new();
+    let dense = ["--set", "sample.random.preparation.compaction.solid_fraction=0.95"];
+    let scene = config("compression.json");
+    here.dem_run(&[&["run", &scene], &SMALL[..], &dense].concat())
+        .fails(2, &["sample.random.preparation", "solid fraction of 0.7", "asks for 0.95", "lower solid_fraction"]);
+    assert_eq!(here.names(), [""; 0]);
+}
+
+#[test]
+fn a_run_that_does_not_converge_is_exit_3_and_keeps_its_history() {
+    let scene = config("compression.json");
+    // a sweep finds the answer only while there is no force: at the first step, or until the force comes
+    let late = "walls.top.force={\"ramp\": {\"rate\": 100, \"start\": 5e-3}}";
+    for (force, steps) in [("walls.top.force_rate=100", 0), (late, 50)] {
+        let here = Folder::new();
+        let mut limits = vec!["--set", "solver.kind.gauss_seidel.max_sweeps=1", "--set", "solver.max_step_halvings=0"];
+        if steps > 0 {
+            limits.extend(["--set", "walls.top.force_rate=null"]);
+        }
+        limits.extend(["--set", force, "-o", "a.h5"]);
+        let outcome = here
+            .dem_run(&[&["run", &scene], &SMALL[..], &limits].concat())
+            .fails(3, &["no convergence at t =", "residual", "max_sweeps"]);
+        assert!(outcome.stdout.contains("a step was not solved"), "{}", outcome.stdout);
+        assert_eq!(here.names(), ["a.h5"]);
+        let history = here.history("a.h5");
+        assert!(!history.open_ended());
+        assert_eq!((history.steps().last(), history.observed_steps()), (Some(&(steps as i64)), steps));
+        here.dem_post(&["info", "a.h5"]).succeeds();
+    }
+}
