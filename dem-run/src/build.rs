@@ -27,7 +27,8 @@ const TOUCHING: f64 = 1e-6;
 /// Prepare the sample of a scene and put the world together. `watch` is told how far the preparation is.
 pub fn build<D: Dim>(scene: &Scene, watch: Watch) -> Result<Built<D>, RunError> {
     let (grains, solid_fraction) = grains::<D>(scene, watch)?;
-    let walls = scene.walls.iter().map(|(name, wall)| build_wall(scene, name, wall, &grains)).collect::<Result<_, _>>()?;
+    let walls =
+        scene.walls.iter().map(|(name, wall)| build_wall(scene, name, wall, &grains)).collect::<Result<_, _>>()?;
     let loads = loads(scene);
     let mut world = World::new(grains, walls, loads, settings(scene));
     if let Some(bonds) = &scene.bonds {
@@ -40,7 +41,8 @@ pub fn build<D: Dim>(scene: &Scene, watch: Watch) -> Result<Built<D>, RunError> 
 /// The grains of a scene, and the solid fraction of a random packing.
 fn grains<D: Dim>(scene: &Scene, watch: Watch) -> Result<(Grains<D>, Option<f64>), RunError> {
     let density = scene.materials.density * scene.thickness();
-    let at_rest = |balls: Vec<Ball<D>>| balls.into_iter().map(|(x, r)| Grain::at_rest(x, r, density)).collect::<Grains<D>>();
+    let at_rest =
+        |balls: Vec<Ball<D>>| balls.into_iter().map(|(x, r)| Grain::at_rest(x, r, density)).collect::<Grains<D>>();
     let (mut grains, fraction) = match &scene.sample {
         Sample::Random(random) => {
             let packing = prepare::pack::<D>(random, scene.seed, watch).map_err(preparation_error)?;
@@ -98,7 +100,9 @@ fn refuse_coincident<D: Dim>(grains: &Grains<D>) -> Result<(), RunError> {
         let apart = (grains.position[i as usize] - grains.position[j as usize]).norm();
         let smaller = grains.radius[i as usize].min(grains.radius[j as usize]);
         if apart <= TOUCHING * smaller {
-            return Err(RunError::Sample(format!("sample: the centres of grains {i} and {j} coincide; move one of them")));
+            return Err(RunError::Sample(format!(
+                "sample: the centres of grains {i} and {j} coincide; move one of them"
+            )));
         }
     }
     Ok(())
@@ -174,7 +178,9 @@ fn build_wall<D: Dim>(scene: &Scene, name: &str, wall: &scene::Wall, grains: &Gr
         }
         scene::Shape::Circle(c) => (round(c.radius, c.inside, None), D::Vector::from_slice(&c.center)),
         scene::Shape::Sphere(s) => (round(s.radius, s.inside, None), D::Vector::from_slice(&s.center)),
-        scene::Shape::Cylinder(c) => (round(c.radius, c.inside, Some(unit::<D>(&c.axis))), D::Vector::from_slice(&c.center)),
+        scene::Shape::Cylinder(c) => {
+            (round(c.radius, c.inside, Some(unit::<D>(&c.axis))), D::Vector::from_slice(&c.center))
+        }
     };
     let friction = wall.friction.unwrap_or(scene.materials.friction.grain_wall);
     let mut built = Wall::fixed(shape, position, friction);

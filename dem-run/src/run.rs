@@ -234,14 +234,20 @@ impl<'a, D: Dim> Run<'a, D> {
             }
         }
         let limit = self.scene.stop.as_ref().and_then(|s| s.broken_fraction);
-        if limit.is_some_and(|limit| !self.world.bonds.is_empty() && broken as f64 >= limit * self.world.bonds.len() as f64) {
+        if limit
+            .is_some_and(|limit| !self.world.bonds.is_empty() && broken as f64 >= limit * self.world.bonds.len() as f64)
+        {
             return Some(Ending::BrokenFraction);
         }
         interrupt.requested().then_some(Ending::Interrupted)
     }
 
     /// Write the last state, close the history and sum up. The second value is what the command ends with.
-    fn close(mut self, history: &Path, outcome: Result<Ending, RunError>) -> Result<(Summary, Result<(), RunError>), RunError> {
+    fn close(
+        mut self,
+        history: &Path,
+        outcome: Result<Ending, RunError>,
+    ) -> Result<(Summary, Result<(), RunError>), RunError> {
         let (ending, end) = match outcome {
             Ok(Ending::Interrupted) => (Ending::Interrupted, Err(RunError::Interrupted)),
             Ok(ending) => (ending, Ok(())),

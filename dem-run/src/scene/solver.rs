@@ -87,10 +87,7 @@ impl Default for Solver {
 
 impl Default for GaussSeidel {
     fn default() -> Self {
-        Self {
-            local: LocalSolve::Exact,
-            max_sweeps: 100_000,
-        }
+        Self { local: LocalSolve::Exact, max_sweeps: 100_000 }
     }
 }
 

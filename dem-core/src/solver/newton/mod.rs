@@ -132,7 +132,8 @@ impl Newton {
             rounding += h * (speed * h / (row.weights.n * row.weights.n) + r.dot(r));
             carried += h * own.dot(&own);
         }
-        let wanted = (0.1 * self.settings.load_tolerance * change.sqrt()).min(0.1 * self.settings.tolerance * carried.sqrt());
+        let wanted =
+            (0.1 * self.settings.load_tolerance * change.sqrt()).min(0.1 * self.settings.tolerance * carried.sqrt());
         wanted.max(4.0 * f64::EPSILON * rounding.sqrt())
     }
 
@@ -166,9 +167,15 @@ impl Newton {
         if !problem.bonded.iter().all(|c| finite(c.r.n)) || !problem.dry.iter().all(|c| finite(c.r.n)) {
             problem.forget_reactions();
         }
-        let settings = GaussSeidelSettings { local: LocalSolve::Exact, tolerance: tolerance.max(accept), accept, max_sweeps: MOST_SWEEPS };
+        let settings = GaussSeidelSettings {
+            local: LocalSolve::Exact,
+            tolerance: tolerance.max(accept),
+            accept,
+            max_sweeps: MOST_SWEEPS,
+        };
         let swept = GaussSeidel::new(settings).solve(problem);
-        let status = if swept.residual <= tolerance { swept.status } else { swept.status.at_best(SolveStatus::Accepted) };
+        let status =
+            if swept.residual <= tolerance { swept.status } else { swept.status.at_best(SolveStatus::Accepted) };
         SolveReport { status, iterations: iterations + swept.iterations, ..swept }
     }
 
