@@ -72,7 +72,7 @@ impl Sample {
         let (walls, dimension) = (history.walls()?, history.dimension());
         let mut sample = Self { radius, walls, dimension, axes: [0, dimension - 1], limits: [[0.0; 2]; 2] };
         let first = history.grain_state(0)?;
-        let [low, high] = sample.bounds(&first, [[f64::NEG_INFINITY; 2], [f64::INFINITY; 2]]);
+        let [low, high] = sample.bounds(&first, EVERYWHERE);
         let spread = |k: usize| 0.5 * (high[k] - low[k]);
         sample.limits = [[low[0] - spread(0), low[1] - spread(1)], [high[0] + spread(0), high[1] + spread(1)]];
         Ok(sample)
@@ -101,6 +101,10 @@ impl Sample {
     /// The box around what a panel shows: its grains, and of its round walls what is near.
     fn extent(&self, panel: &Panel) -> Box2 {
         let mut found = self.bounds(&panel.grains, self.limits);
+        if found == EMPTY {
+            // all have left together, as a disk on an incline does
+            found = self.bounds(&panel.grains, EVERYWHERE);
+        }
         for (wall, position) in self.walls.iter().zip(panel.walls.position.chunks(self.dimension)) {
             if wall.kind != WallKind::Plane {
                 let [low, high] = around(self.flat(position), wall.radius.abs());
@@ -117,6 +121,9 @@ type Box2 = [[f64; 2]; 2];
 
 /// The box that holds nothing.
 const EMPTY: Box2 = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
+
+/// The box that holds everything.
+const EVERYWHERE: Box2 = [[f64::NEG_INFINITY; 2], [f64::INFINITY; 2]];
 
 fn around(centre: [f64; 2], radius: f64) -> Box2 {
     [centre.map(|x| x - radius), centre.map(|x| x + radius)]

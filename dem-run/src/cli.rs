@@ -11,7 +11,7 @@ use clap::{Args, Parser, Subcommand};
 use crate::check::Check;
 use crate::progress::ProgressMode;
 use crate::run::{self, RunError, RunOptions};
-use crate::scene::{self, Scene, SceneError, schema};
+use crate::scene::{self, Sample, Scene, SceneError, schema};
 
 /// Simulates cemented grains by non-smooth contact dynamics.
 #[derive(Debug, Parser)]
@@ -140,6 +140,7 @@ fn run(args: RunArgs) -> Result<(), RunError> {
         json: args.json,
         write_sample: args.write_sample,
     };
+    apart(&args.scene.scene, &scene, &options)?;
     writable(&options.output, "-o FILE.h5", options.overwrite)?;
     if let Some(sample) = &options.write_sample {
         writable(sample, "--write-sample FILE.csv", options.overwrite)?;
@@ -170,6 +171,28 @@ fn default_output(scene: &Path) -> PathBuf {
     let mut name = scene.file_stem().unwrap_or_default().to_os_string();
     name.push(".h5");
     name.into()
+}
+
+/// Refuses, `--force` or not, to write over what the run reads, or two results into one file.
+fn apart(path: &Path, scene: &Scene, options: &RunOptions) -> Result<(), RunError> {
+    let same = |a: &Path, b: &Path| matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b);
+    let mut read = vec![path];
+    if let Sample::File(file) = &scene.sample {
+        read.push(&file.path);
+    }
+    for (written, option) in [(Some(&options.output), "-o"), (options.write_sample.as_ref(), "--write-sample")] {
+        let Some(written) = written else { continue };
+        if read.iter().any(|read| same(read, written)) {
+            let shown = written.display();
+            let message = format!("{option} {shown} would overwrite what the run reads: name another file");
+            return Err(RunError::InputOutput(message));
+        }
+    }
+    if options.write_sample.as_ref() == Some(&options.output) {
+        let message = "-o and --write-sample name the same file: name two".into();
+        return Err(RunError::InputOutput(message));
+    }
+    Ok(())
 }
 
 /// Refuses, before any work is done, a file that exists or whose folder does not.

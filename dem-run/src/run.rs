@@ -263,6 +263,7 @@ impl<'a, D: Dim> Run<'a, D> {
             history: history.to_path_buf(),
             ending,
             steps: world.steps,
+            driven: self.driven.is_some(),
             time: world.time,
             grains: world.grains.len(),
             solid_fraction: self.solid_fraction,

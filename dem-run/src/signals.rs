@@ -99,8 +99,9 @@ mod tests {
             let mut lines = BufReader::new(child.stdout.take().expect("stdout")).lines();
             let mut wait_for = |word: &str| lines.any(|line| line.expect("line").contains(word));
             let send = |id: u32| {
-                let status = Command::new("kill").args([signal, &id.to_string()]).status();
-                assert!(status.expect("kill").success());
+                // of the shell: the program of that name is not on every machine
+                let status = Command::new("sh").args(["-c", &format!("kill {signal} {id}")]).status();
+                assert!(status.expect("sh").success());
             };
             assert!(wait_for("ready"));
             send(child.id());

@@ -30,6 +30,9 @@ pub struct Summary {
     pub ending: Ending,
     /// Steps made.
     pub steps: u64,
+    /// Whether a wall is driven: then there is a curve of stress and strain.
+    #[serde(skip)]
+    pub driven: bool,
     /// Simulated time (s).
     pub time: f64,
     /// Grains.
@@ -110,7 +113,11 @@ impl fmt::Display for Summary {
         if self.bonds > 0 {
             writeln!(f, "  dem-post cracks {file}")?;
         }
-        write!(f, "  dem-post chains {file}\n  dem-post stress-strain {file}")
+        write!(f, "  dem-post chains {file}")?;
+        match self.driven {
+            true => write!(f, "\n  dem-post stress-strain {file}"),
+            false => Ok(()),
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! The scenes for a first look: each does what its comments say, within two seconds.
 
-use crate::common::Folder;
+use crate::common::{Folder, config};
 use dem_run::history::{History, RuptureMode, Series};
 use std::f64::consts::PI;
 
@@ -95,6 +95,20 @@ fn the_column_stands_with_its_weight_on_the_wall() {
     }
     let sweeps = observable(&history, "solver_iterations").value;
     assert!(sweeps[1] < 0.1 * sweeps[0], "{} and {} sweeps", sweeps[0], sweeps[1]);
+}
+
+#[test]
+fn the_commands_that_a_summary_names_show_something() {
+    for scene in ["column", "incline"] {
+        let here = Folder::new();
+        let outcome = here.dem_run(&["run", &config(&format!("{scene}.json"))]).succeeds();
+        let commands: Vec<&str> = outcome.stdout.lines().filter_map(|line| line.strip_prefix("  dem-post ")).collect();
+        // neither has bonds or a driven wall
+        assert_eq!(commands, [format!("info {scene}.h5"), format!("chains {scene}.h5")]);
+        for command in commands {
+            here.dem_post(&command.split(' ').collect::<Vec<_>>()).succeeds();
+        }
+    }
 }
 
 #[test]

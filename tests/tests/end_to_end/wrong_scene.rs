@@ -81,6 +81,27 @@ fn files_that_cannot_be_read_or_written_are_exit_4() {
 }
 
 #[test]
+fn even_by_force_a_run_writes_over_nothing_that_it_reads() {
+    let here = Folder::new();
+    here.write("scene.json", std::fs::read(config("column.json")).expect("scene"));
+    here.write("sample.csv", "x,y,radius\n0,2e-3,2e-3\n");
+    let path = here.path("sample.csv");
+    let set = format!("sample={{\"file\": {{\"path\": {path:?}}}}}");
+    let run = ["run", "scene.json", "--force", "--set", &set];
+    for (args, part) in [
+        (&["-o", "./scene.json"][..], "would overwrite what the run reads"),
+        (&["-o", "sample.csv"], "would overwrite what the run reads"),
+        (&["-o", "a.h5", "--write-sample", "sample.csv"], "would overwrite what the run reads"),
+        (&["-o", "a.h5", "--write-sample", "scene.json"], "would overwrite what the run reads"),
+        (&["-o", "a.h5", "--write-sample", "a.h5"], "name two"),
+    ] {
+        here.dem_run(&[&run[..], args].concat()).fails(4, &[part]);
+        assert_eq!(here.names(), ["sample.csv", "scene.json"]);
+    }
+    assert_eq!(here.read("sample.csv"), b"x,y,radius\n0,2e-3,2e-3\n");
+}
+
+#[test]
 fn force_replaces_a_file() {
     let here = Folder::new();
     here.write("column.h5", "old");
