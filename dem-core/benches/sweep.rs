@@ -54,8 +54,7 @@ fn sweeps(c: &mut Criterion) {
                     b.iter(|| sweep(black_box(&mut problem), local))
                 });
             }
-            let bytes =
-                std::mem::size_of_val(problem.bonded.as_slice()) + std::mem::size_of_val(problem.dry.as_slice());
+            let bytes = size_of_val(problem.bonded.as_slice()) + size_of_val(problem.dry.as_slice());
             let words = vec![1.0f64; bytes / 8];
             group.bench_function(BenchmarkId::new(kind, "stream"), |b| b.iter(|| stream(black_box(&words))));
         }

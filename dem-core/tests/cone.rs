@@ -9,7 +9,10 @@ fn vect<const N: usize>() -> impl Strategy<Value = SVector<f64, N>> {
     prop::array::uniform(-1.0..1.0f64).prop_map(SVector::from)
 }
 
-fn local<T: Vect, B: Vect>(t: impl Strategy<Value = T>, m: impl Strategy<Value = B>) -> impl Strategy<Value = Local<T, B>> {
+fn local<T: Vect, B: Vect>(
+    t: impl Strategy<Value = T>,
+    m: impl Strategy<Value = B>,
+) -> impl Strategy<Value = Local<T, B>> {
     (-1.0..1.0f64, t, m).prop_map(|(n, t, m)| Local { n, t, m })
 }
 

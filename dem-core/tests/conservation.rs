@@ -14,7 +14,11 @@ fn cloud<D: Dim>(seed: u64, friction: f64, restitution: f64) -> World<D> {
     let mut set = settings(1e-3);
     set.friction = friction;
     set.solver = solver(1e-11);
-    set.restitution = (restitution > 0.0).then_some(Restitution { grain_grain: restitution, grain_wall: restitution, threshold_speed: 0.0 });
+    set.restitution = (restitution > 0.0).then_some(Restitution {
+        grain_grain: restitution,
+        grain_wall: restitution,
+        threshold_speed: 0.0,
+    });
     let side: usize = if D::N == 2 { 7 } else { 4 };
     let mut grains = Vec::new();
     for k in 0..side.pow(D::N as u32) {
@@ -52,7 +56,11 @@ fn keeps_momentum<D: Dim>(bonded: bool) {
     let end = w.momentum();
     assert!((end.linear - start.linear).norm() <= 1e-13 * exchanged);
     // positions at mid-step carry the moments: the exchange is exact there, up to the drift of half a step
-    assert!((end.angular - start.angular).norm() <= 1e-12 * exchanged * 0.1, "{}", (end.angular - start.angular).norm());
+    assert!(
+        (end.angular - start.angular).norm() <= 1e-12 * exchanged * 0.1,
+        "{}",
+        (end.angular - start.angular).norm()
+    );
     assert!(w.touches.iter().any(|t| t.reaction.n > 0.0) || bonded);
 }
 
@@ -105,8 +113,13 @@ fn the_ledger_closes_under_gravity_loads_and_drives() {
     lid.velocity = [0.0, -0.1].into();
     let mut w = world(grains.collect(), vec![floor(0.2), lid], set);
     // a wall that comes in from the left at a prescribed speed
-    let mut pusher = dem_core::body::Wall::fixed(dem_core::body::Shape::Plane { normal: [1.0, 0.0].into() }, [-0.012, 0.0].into(), 0.2);
-    pusher.drive = dem_core::body::Drive::Velocity { direction: [1.0, 0.0].into(), speed: std::sync::Arc::new(|t| 0.3 * t) };
+    let mut pusher = dem_core::body::Wall::fixed(
+        dem_core::body::Shape::Plane { normal: [1.0, 0.0].into() },
+        [-0.012, 0.0].into(),
+        0.2,
+    );
+    pusher.drive =
+        dem_core::body::Drive::Velocity { direction: [1.0, 0.0].into(), speed: std::sync::Arc::new(|t| 0.3 * t) };
     w.walls.push(pusher);
     run(&mut w, 400);
     let l = w.ledger;

@@ -22,7 +22,12 @@ fn pair<D: Dim>(force: &[f64], torque: &[f64]) -> World<D> {
     let mut fixed = grain::<D>(&vec![0.0; D::N], 0.5 * A);
     fixed.fixed = true;
     let grains: Grains<D> = [fixed, grain(&second, 0.5 * A)].into_iter().collect();
-    let load = Load { grain: 1, force: D::Vector::from_slice(force), torque: D::Spin::from_slice(torque), factor: Arc::new(|_| 1.0) };
+    let load = Load {
+        grain: 1,
+        force: D::Vector::from_slice(force),
+        torque: D::Spin::from_slice(torque),
+        factor: Arc::new(|_| 1.0),
+    };
     let mut w = World::new(grains, Vec::new(), vec![load], settings(1e-4));
     w.form_bonds(1e-6, |_| R_COH, MU);
     w
@@ -159,4 +164,27 @@ fn an_unaccepted_solve_breaks_no_bond_and_moves_no_body() {
     assert_eq!(before.1, w.bonds);
     assert_eq!((before.2, before.3, before.4), (w.ledger, w.time, w.steps));
     assert!(w.touches.is_empty());
+}
+
+#[test]
+fn a_step_whose_second_half_fails_is_taken_back_whole() {
+    // the pull of the second half breaks a chain that one sweep cannot solve; the first half, without load, is easy
+    let mut set = settings(1e-4);
+    let one_sweep = GaussSeidelSettings { local: Default::default(), tolerance: 1e-14, accept: 1e-14, max_sweeps: 1 };
+    set.solver = SolverSettings::GaussSeidel(one_sweep);
+    set.max_halvings = 1;
+    let mut row: Vec<_> = (0..20).map(|k| grain::<D2>(&[A * k as f64, 0.0], 0.5 * A)).collect();
+    row.push(grain::<D2>(&[-10.0 * A, 0.0], 0.5 * A));
+    row[20].velocity = [1.0, 0.0].into();
+    row[0].fixed = true;
+    let factor = Arc::new(|t: f64| if t > 0.4e-4 { 1.0 } else { 0.0 });
+    let load = Load { grain: 19, force: [30.0, 1.0].into(), torque: [0.0].into(), factor };
+    let mut w = World::new(row.into_iter().collect(), Vec::new(), vec![load], set);
+    w.form_bonds(1e-6, |_| R_COH, MU);
+    let before = (w.grains.clone(), w.bonds.clone(), w.ledger, w.time, w.steps);
+    let error = w.step().unwrap_err();
+    // it is the second half that failed: the error names its time
+    assert!(matches!(error, StepError::NotAccepted { time, .. } if time == 0.5e-4), "{error}");
+    assert_eq!(before.0.position, w.grains.position);
+    assert_eq!((before.1, before.2, before.3, before.4), (w.bonds.clone(), w.ledger, w.time, w.steps));
 }

@@ -8,7 +8,7 @@ use dem_core::bond::Rupture;
 use dem_core::contact::{BondFlow, LocalSolve};
 use dem_core::detection::pairs_within;
 use dem_core::dim::{Dim, Vect};
-use dem_core::solver::{GaussSeidelSettings, SolverSettings};
+use dem_core::solver::{GaussSeidelSettings, NewtonSettings, SolverSettings, Start, StiffnessRatio};
 use dem_core::world::{Restitution, Settings, World};
 use std::path::Path;
 use std::sync::Arc;
@@ -27,7 +27,8 @@ const TOUCHING: f64 = 1e-6;
 /// Prepare the sample of a scene and put the world together. `watch` is told how far the preparation is.
 pub fn build<D: Dim>(scene: &Scene, watch: Watch) -> Result<Built<D>, RunError> {
     let (grains, solid_fraction) = grains::<D>(scene, watch)?;
-    let walls = scene.walls.iter().map(|(name, wall)| build_wall(scene, name, wall, &grains)).collect::<Result<_, _>>()?;
+    let walls =
+        scene.walls.iter().map(|(name, wall)| build_wall(scene, name, wall, &grains)).collect::<Result<_, _>>()?;
     let loads = loads(scene);
     let mut world = World::new(grains, walls, loads, settings(scene));
     if let Some(bonds) = &scene.bonds {
@@ -40,7 +41,8 @@ pub fn build<D: Dim>(scene: &Scene, watch: Watch) -> Result<Built<D>, RunError> 
 /// The grains of a scene, and the solid fraction of a random packing.
 fn grains<D: Dim>(scene: &Scene, watch: Watch) -> Result<(Grains<D>, Option<f64>), RunError> {
     let density = scene.materials.density * scene.thickness();
-    let at_rest = |balls: Vec<Ball<D>>| balls.into_iter().map(|(x, r)| Grain::at_rest(x, r, density)).collect::<Grains<D>>();
+    let at_rest =
+        |balls: Vec<Ball<D>>| balls.into_iter().map(|(x, r)| Grain::at_rest(x, r, density)).collect::<Grains<D>>();
     let (mut grains, fraction) = match &scene.sample {
         Sample::Random(random) => {
             let packing = prepare::pack::<D>(random, scene.seed, watch).map_err(preparation_error)?;
@@ -98,7 +100,9 @@ fn refuse_coincident<D: Dim>(grains: &Grains<D>) -> Result<(), RunError> {
         let apart = (grains.position[i as usize] - grains.position[j as usize]).norm();
         let smaller = grains.radius[i as usize].min(grains.radius[j as usize]);
         if apart <= TOUCHING * smaller {
-            return Err(RunError::Sample(format!("sample: the centres of grains {i} and {j} coincide; move one of them")));
+            return Err(RunError::Sample(format!(
+                "sample: the centres of grains {i} and {j} coincide; move one of them"
+            )));
         }
     }
     Ok(())
@@ -174,7 +178,9 @@ fn build_wall<D: Dim>(scene: &Scene, name: &str, wall: &scene::Wall, grains: &Gr
         }
         scene::Shape::Circle(c) => (round(c.radius, c.inside, None), D::Vector::from_slice(&c.center)),
         scene::Shape::Sphere(s) => (round(s.radius, s.inside, None), D::Vector::from_slice(&s.center)),
-        scene::Shape::Cylinder(c) => (round(c.radius, c.inside, Some(unit::<D>(&c.axis))), D::Vector::from_slice(&c.center)),
+        scene::Shape::Cylinder(c) => {
+            (round(c.radius, c.inside, Some(unit::<D>(&c.axis))), D::Vector::from_slice(&c.center))
+        }
     };
     let friction = wall.friction.unwrap_or(scene.materials.friction.grain_wall);
     let mut built = Wall::fixed(shape, position, friction);
@@ -215,7 +221,6 @@ fn loads<D: Dim>(scene: &Scene) -> Vec<Load<D>> {
 fn settings<D: Dim>(scene: &Scene) -> Settings<D> {
     let restitution = &scene.materials.restitution;
     let bouncing = restitution.grain_grain > 0.0 || restitution.grain_wall > 0.0;
-    let SolverKind::GaussSeidel(gs) = &scene.solver.kind;
     Settings {
         step: scene.time.step,
         gravity: scene.gravity.as_deref().map(D::Vector::from_slice).filter(|g| g.norm() > 0.0),
@@ -234,17 +239,35 @@ fn settings<D: Dim>(scene: &Scene) -> Settings<D> {
             scene::Rupture::CascadeWorst => Rupture::CascadeWorst,
             scene::Rupture::EndOfStep => Rupture::EndOfStep,
         },
-        solver: SolverSettings::GaussSeidel(GaussSeidelSettings {
+        solver: solver(&scene.solver),
+        max_halvings: scene.solver.max_step_halvings,
+        thickness: if D::N == 2 { scene.thickness() } else { 1.0 },
+        expel_overlaps: false,
+    }
+}
+
+fn solver(solver: &scene::Solver) -> SolverSettings {
+    let (tolerance, accept) = (solver.tolerance, solver.accept());
+    match &solver.kind {
+        SolverKind::GaussSeidel(gs) => SolverSettings::GaussSeidel(GaussSeidelSettings {
             local: match gs.local {
                 scene::LocalSolve::Exact => LocalSolve::Exact,
                 scene::LocalSolve::PredictorCorrector => LocalSolve::PredictorCorrector,
             },
-            tolerance: scene.solver.tolerance,
-            accept: scene.solver.accept(),
+            tolerance,
+            accept,
             max_sweeps: gs.max_sweeps,
         }),
-        max_halvings: scene.solver.max_step_halvings,
-        thickness: if D::N == 2 { scene.thickness() } else { 1.0 },
-        expel_overlaps: false,
+        SolverKind::Newton(newton) => SolverSettings::Newton(NewtonSettings {
+            tolerance,
+            accept,
+            load_tolerance: newton.load_tolerance,
+            start: match newton.start {
+                scene::Start::StiffLimit => Start::StiffLimit,
+                scene::Start::LastStep => Start::LastStep,
+            },
+            stiffness: StiffnessRatio { tangential: newton.tangential_stiffness, rolling: newton.rolling_stiffness },
+            max_iterations: newton.max_iterations,
+        }),
     }
 }

@@ -103,36 +103,13 @@ impl fmt::Display for Check {
         writeln!(f, "dimension  {}", self.dimension)?;
         writeln!(f, "grains     {} ({})", self.grains, self.sample)?;
         writeln!(f, "bonds      {}", if self.bonds { "yes" } else { "none" })?;
-        let walls: Vec<String> = self
-            .walls
-            .iter()
-            .map(|wall| format!("{} ({}, {})", wall.name, wall.shape, wall.drive))
-            .collect();
-        writeln!(
-            f,
-            "walls      {}",
-            if walls.is_empty() {
-                "none".to_string()
-            } else {
-                walls.join(", ")
-            }
-        )?;
-        writeln!(
-            f,
-            "steps      {} of {} s, to {} s",
-            self.steps, self.step, self.end
-        )?;
-        writeln!(
-            f,
-            "frames     {}, one every {} steps",
-            self.frames, self.steps_per_frame
-        )?;
+        let walls: Vec<String> =
+            self.walls.iter().map(|wall| format!("{} ({}, {})", wall.name, wall.shape, wall.drive)).collect();
+        writeln!(f, "walls      {}", if walls.is_empty() { "none".to_string() } else { walls.join(", ") })?;
+        writeln!(f, "steps      {} of {} s, to {} s", self.steps, self.step, self.end)?;
+        writeln!(f, "frames     {}, one every {} steps", self.frames, self.steps_per_frame)?;
         writeln!(f, "file       about {}", size(self.file_bytes))?;
-        write!(
-            f,
-            "free disk  {}",
-            self.free_bytes.map_or("unknown".to_string(), size)
-        )
+        write!(f, "free disk  {}", self.free_bytes.map_or("unknown".to_string(), size))
     }
 }
 
@@ -157,25 +134,14 @@ fn shape_name(shape: &Shape) -> &'static str {
 }
 
 fn has_bonds(scene: &Scene) -> bool {
-    scene
-        .bonds
-        .as_ref()
-        .is_some_and(|bonds| bonds.cohesion(scene.dimension, 1.0, 1.0) > 0.0)
+    scene.bonds.as_ref().is_some_and(|bonds| bonds.cohesion(scene.dimension, 1.0, 1.0) > 0.0)
 }
 
 /// Number of grains in a sample file: its lines after the header.
 fn count_rows(path: &Path) -> Result<usize, RunError> {
-    let unreadable = |error| {
-        RunError::InputOutput(format!(
-            "{}: the sample cannot be read: {error}",
-            path.display()
-        ))
-    };
-    let mut reader = csv::ReaderBuilder::new()
-        .comment(Some(b'#'))
-        .flexible(true)
-        .from_path(path)
-        .map_err(unreadable)?;
+    let unreadable = |error| RunError::InputOutput(format!("{}: the sample cannot be read: {error}", path.display()));
+    let mut reader =
+        csv::ReaderBuilder::new().comment(Some(b'#')).flexible(true).from_path(path).map_err(unreadable)?;
     let mut count = 0;
     let mut record = csv::ByteRecord::new();
     while reader.read_byte_record(&mut record).map_err(unreadable)? {
@@ -192,11 +158,7 @@ fn expected_bytes(scene: &Scene, grains: usize) -> u64 {
     const PER_STEP: f64 = 40.0 * NUMBER;
     /// Groups, attributes, the scene, and the first chunk of every dataset.
     const FIXED: f64 = 512e3;
-    let (d, spins, angles, tangents) = if scene.dimension == 2 {
-        (2.0, 1.0, 1.0, 0.0)
-    } else {
-        (3.0, 3.0, 4.0, 3.0)
-    };
+    let (d, spins, angles, tangents) = if scene.dimension == 2 { (2.0, 1.0, 1.0, 0.0) } else { (3.0, 3.0, 4.0, 3.0) };
     let contacts_per_grain = match scene.sample {
         Sample::Lattice(Lattice::Square { .. }) => 2.0,
         _ if scene.dimension == 2 => 2.2,
@@ -208,8 +170,7 @@ fn expected_bytes(scene: &Scene, grains: usize) -> u64 {
     let grain_rows = grains as f64 * NUMBER * (2.0 * d + spins + angles);
     // point, normal, tangent, reaction, moment, gap; the pair, the status and the bond
     let moments = if bonds > 0.0 { spins } else { 0.0 };
-    let contact_rows =
-        contacts * (NUMBER * (3.0 * d + tangents + moments + 1.0) + 2.0 * 4.0 + 1.0 + 4.0);
+    let contact_rows = contacts * (NUMBER * (3.0 * d + tangents + moments + 1.0) + 2.0 * 4.0 + 1.0 + 4.0);
     let wall_rows = scene.walls.len() as f64 * NUMBER * 3.0 * d;
     let frames = scene.frames() as f64 * (grain_rows + contact_rows + wall_rows + bonds);
     (FIXED + frames + scene.time.steps() as f64 * PER_STEP) as u64
@@ -242,9 +203,7 @@ mod tests {
     use crate::scene::load;
 
     fn config(name: &str, sets: &[&str]) -> Scene {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-            .join("../configs")
-            .join(name);
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs").join(name);
         let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
         load(&path, &sets).unwrap_or_else(|error| panic!("{error}"))
     }
@@ -252,78 +211,37 @@ mod tests {
     #[test]
     fn the_compression_run_is_told() {
         let check = Check::new(&config("compression.json", &[])).expect("check");
-        assert_eq!(
-            (check.grains, check.steps, check.frames, check.bonds),
-            (430, 5000, 501, true)
-        );
-        let top = CheckedWall {
-            name: "top".into(),
-            shape: "plane",
-            drive: "force",
-        };
+        assert_eq!((check.grains, check.steps, check.frames, check.bonds), (430, 5000, 501, true));
+        let top = CheckedWall { name: "top".into(), shape: "plane", drive: "force" };
         assert_eq!(check.walls[1], top);
         // 501 frames of 430 grains and about 950 contacts
-        assert!(
-            (30e6..90e6).contains(&(check.file_bytes as f64)),
-            "{}",
-            check.file_bytes
-        );
+        assert!((30e6..90e6).contains(&(check.file_bytes as f64)), "{}", check.file_bytes);
         assert!(check.free_bytes.is_some_and(|free| free > 0));
         let text = check.to_string();
-        for part in [
-            "grains     430 (random packing)",
-            "top (plane, force)",
-            "5000 of 0.0001 s",
-            "501, one every 10",
-        ] {
+        for part in ["grains     430 (random packing)", "top (plane, force)", "5000 of 0.0001 s", "501, one every 10"] {
             assert!(text.contains(part), "{part} in\n{text}");
         }
     }
 
     #[test]
     fn no_strength_is_no_bonds() {
-        assert!(
-            !Check::new(&config("compression.json", &["bonds.strength=0"]))
-                .expect("check")
-                .bonds
-        );
-        assert!(
-            !Check::new(&config("column.json", &[]))
-                .expect("check")
-                .bonds
-        );
+        assert!(!Check::new(&config("compression.json", &["bonds.strength=0"])).expect("check").bonds);
+        assert!(!Check::new(&config("column.json", &[])).expect("check").bonds);
     }
 
     #[test]
     fn a_full_disk_is_noticed() {
         let check = Check::new(&config("column.json", &[])).expect("check");
-        assert!(
-            !Check {
-                free_bytes: None,
-                ..check.clone()
-            }
-            .disk_is_too_small()
-        );
-        assert!(
-            Check {
-                free_bytes: Some(10),
-                ..check
-            }
-            .disk_is_too_small()
-        );
+        assert!(!Check { free_bytes: None, ..check.clone() }.disk_is_too_small());
+        assert!(Check { free_bytes: Some(10), ..check }.disk_is_too_small());
     }
 
     #[test]
     fn the_grains_of_a_sample_file_are_counted() {
         let folder = tempfile::tempdir().expect("folder");
         let path = folder.path().join("sample.csv");
-        let mut scene = config(
-            "column.json",
-            &["sample={\"file\": {\"path\": \"sample.csv\"}}"],
-        );
-        let Sample::File(file) = &mut scene.sample else {
-            panic!("not a file")
-        };
+        let mut scene = config("column.json", &["sample={\"file\": {\"path\": \"sample.csv\"}}"]);
+        let Sample::File(file) = &mut scene.sample else { panic!("not a file") };
         file.path = path.clone();
         let missing = Check::new(&scene).expect_err("no file");
         assert_eq!(missing.exit_code(), 4);

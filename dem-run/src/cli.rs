@@ -132,9 +132,7 @@ impl SceneArgs {
 fn run(args: RunArgs) -> Result<(), RunError> {
     let scene = args.scene.load()?;
     let options = RunOptions {
-        output: args
-            .output
-            .unwrap_or_else(|| default_output(&args.scene.scene)),
+        output: args.output.unwrap_or_else(|| default_output(&args.scene.scene)),
         overwrite: args.force,
         threads: args.threads.map(usize::from),
         progress: args.progress,
@@ -153,20 +151,14 @@ fn run(args: RunArgs) -> Result<(), RunError> {
 fn check(args: &CheckArgs) -> Result<(), RunError> {
     let scene = match args.scene.load() {
         Err(error @ SceneError::Wrong { .. }) if args.json => {
-            print(&format!(
-                "{:#}",
-                serde_json::json!({ "problems": error.problems() })
-            ))?;
+            print(&format!("{:#}", serde_json::json!({ "problems": error.problems() })))?;
             return Err(error.into());
         }
         result => result?,
     };
     let check = Check::new(&scene)?;
     if check.disk_is_too_small() {
-        let _ = writeln!(
-            std::io::stderr(),
-            "warning: the history will not fit on the disk of the current folder"
-        );
+        let _ = writeln!(std::io::stderr(), "warning: the history will not fit on the disk of the current folder");
     }
     match args.json {
         true => print(&format!("{:#}", serde_json::json!(check))),
@@ -207,9 +199,7 @@ fn apart(path: &Path, scene: &Scene, options: &RunOptions) -> Result<(), RunErro
 fn writable(path: &Path, option: &str, overwrite: bool) -> Result<(), RunError> {
     let shown = path.display();
     if path.is_dir() {
-        return Err(RunError::InputOutput(format!(
-            "{shown} is a folder: name a file with {option}"
-        )));
+        return Err(RunError::InputOutput(format!("{shown} is a folder: name a file with {option}")));
     }
     if path.exists() && !overwrite {
         let remedy = format!("--force overwrites it, {option} names another");
@@ -218,9 +208,7 @@ fn writable(path: &Path, option: &str, overwrite: bool) -> Result<(), RunError> 
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => {
             let folder = folder.display();
-            Err(RunError::InputOutput(format!(
-                "{shown} cannot be written: there is no folder {folder}; make it first"
-            )))
+            Err(RunError::InputOutput(format!("{shown} cannot be written: there is no folder {folder}; make it first")))
         }
         _ => Ok(()),
     }
@@ -229,9 +217,9 @@ fn writable(path: &Path, option: &str, overwrite: bool) -> Result<(), RunError> 
 /// Writes a result to stdout. A reader that has seen enough (`| head`) is no error.
 fn print(text: &str) -> Result<(), RunError> {
     match writeln!(std::io::stdout(), "{text}") {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(RunError::InputOutput(format!(
-            "stdout cannot be written: {error}"
-        ))),
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(RunError::InputOutput(format!("stdout cannot be written: {error}")))
+        }
         _ => Ok(()),
     }
 }
@@ -248,10 +236,7 @@ mod tests {
 
     #[test]
     fn the_default_output_is_the_scene_s_name_in_the_current_folder() {
-        assert_eq!(
-            default_output(Path::new("configs/compression.json")),
-            Path::new("compression.h5")
-        );
+        assert_eq!(default_output(Path::new("configs/compression.json")), Path::new("compression.h5"));
         assert_eq!(default_output(Path::new("a.b.json")), Path::new("a.b.h5"));
     }
 }

@@ -57,7 +57,8 @@ mod tests {
         for k in 0..6 {
             collapse.push(10.0 * k as f64, strains[k], broken[k], 100);
         }
-        let expected = Failure { first_break: Some(10.0), collapse: [Some(10.0), Some(30.0)], broken_share: Some(30.0) };
+        let expected =
+            Failure { first_break: Some(10.0), collapse: [Some(10.0), Some(30.0)], broken_share: Some(30.0) };
         assert_eq!(collapse.failure, expected);
     }
 }

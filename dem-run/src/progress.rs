@@ -90,16 +90,7 @@ impl Progress {
 
     fn with_sink(sink: Sink, interval: Duration, quiet: bool) -> Self {
         let (began, phase) = (Instant::now(), String::new());
-        Self {
-            sink,
-            interval,
-            began,
-            shown: None,
-            phase,
-            first: None,
-            pending: None,
-            quiet,
-        }
+        Self { sink, interval, began, shown: None, phase, first: None, pending: None, quiet }
     }
 
     /// Tells how far a phase of the preparation has come: its name, and the fraction done (0 to 1).
@@ -170,19 +161,9 @@ impl Progress {
                 bar.set_position((step.fraction() * BAR_LENGTH as f64) as u64);
                 bar.set_message(step.describe(left));
             }
-            Sink::Plain(out) => line(
-                out,
-                &format!("{:3.0} %  {}", 100.0 * step.fraction(), step.describe(left)),
-            ),
+            Sink::Plain(out) => line(out, &format!("{:3.0} %  {}", 100.0 * step.fraction(), step.describe(left))),
             Sink::Json(out) => {
-                json_line(
-                    out,
-                    &Event::Step {
-                        step: &step,
-                        elapsed: self.began.elapsed().as_secs_f64(),
-                        left,
-                    },
-                );
+                json_line(out, &Event::Step { step: &step, elapsed: self.began.elapsed().as_secs_f64(), left });
             }
             Sink::None => {}
         }
@@ -192,30 +173,18 @@ impl Progress {
     fn time_left(&self, step: &StepProgress) -> Option<f64> {
         let (start, first) = self.first?;
         let done = step.time - first;
-        (done > 0.0)
-            .then(|| start.elapsed().as_secs_f64() * ((step.end - step.time) / done).max(0.0))
+        (done > 0.0).then(|| start.elapsed().as_secs_f64() * ((step.end - step.time) / done).max(0.0))
     }
 }
 
 impl StepProgress {
     /// Fraction of the simulated time that is done (0 to 1).
     fn fraction(&self) -> f64 {
-        if self.end > 0.0 {
-            (self.time / self.end).clamp(0.0, 1.0)
-        } else {
-            0.0
-        }
+        if self.end > 0.0 { (self.time / self.end).clamp(0.0, 1.0) } else { 0.0 }
     }
 
     fn describe(&self, left: Option<f64>) -> String {
-        let Self {
-            step,
-            time,
-            end,
-            residual,
-            sweeps,
-            broken,
-        } = self;
+        let Self { step, time, end, residual, sweeps, broken } = self;
         let bonds = if *broken == 1 { "bond" } else { "bonds" };
         let left = left.map_or("?".to_string(), duration);
         format!(
@@ -297,30 +266,18 @@ mod tests {
     impl Shared {
         fn lines(&self) -> Vec<String> {
             let bytes = self.0.lock().expect("lock").clone();
-            String::from_utf8(bytes)
-                .expect("text")
-                .lines()
-                .map(String::from)
-                .collect()
+            String::from_utf8(bytes).expect("text").lines().map(String::from).collect()
         }
     }
 
     fn at(step: u64) -> StepProgress {
-        StepProgress {
-            step,
-            time: step as f64 * 0.1,
-            end: 1.0,
-            residual: 8.2e-5,
-            sweeps: 12,
-            broken: 1,
-        }
+        StepProgress { step, time: step as f64 * 0.1, end: 1.0, residual: 8.2e-5, sweeps: 12, broken: 1 }
     }
 
     #[test]
     fn plain_lines_say_where_the_run_stands() {
         let out = Shared::default();
-        let mut progress =
-            Progress::with_sink(Sink::Plain(Box::new(out.clone())), Duration::ZERO, false);
+        let mut progress = Progress::with_sink(Sink::Plain(Box::new(out.clone())), Duration::ZERO, false);
         progress.phase("compaction", 0.5);
         progress.step(&at(1));
         progress.note("a note");
@@ -339,11 +296,7 @@ mod tests {
     #[test]
     fn messages_that_are_not_due_are_left_out_but_the_last_is_shown() {
         let out = Shared::default();
-        let mut progress = Progress::with_sink(
-            Sink::Plain(Box::new(out.clone())),
-            Duration::from_secs(3600),
-            false,
-        );
+        let mut progress = Progress::with_sink(Sink::Plain(Box::new(out.clone())), Duration::from_secs(3600), false);
         progress.phase("compaction", 0.1);
         progress.phase("compaction", 0.2);
         progress.phase("seating", 0.0);
@@ -354,42 +307,22 @@ mod tests {
         progress.finish();
         progress.finish();
         assert_eq!(out.lines().len(), 3);
-        assert!(
-            out.lines()[2].starts_with("100 %  t 1.0000"),
-            "{:?}",
-            out.lines()
-        );
+        assert!(out.lines()[2].starts_with("100 %  t 1.0000"), "{:?}", out.lines());
     }
 
     #[test]
     fn json_lines_are_json() {
         let out = Shared::default();
-        let mut progress =
-            Progress::with_sink(Sink::Json(Box::new(out.clone())), Duration::ZERO, false);
+        let mut progress = Progress::with_sink(Sink::Json(Box::new(out.clone())), Duration::ZERO, false);
         progress.phase("compaction", 2.0);
-        progress.step(&StepProgress {
-            residual: f64::NAN,
-            ..at(1)
-        });
+        progress.step(&StepProgress { residual: f64::NAN, ..at(1) });
         progress.note("a \"note\"");
-        let events: Vec<serde_json::Value> = out
-            .lines()
-            .iter()
-            .map(|line| serde_json::from_str(line).expect("JSON"))
-            .collect();
-        assert_eq!(
-            events[0],
-            serde_json::json!({"event": "phase", "message": "compaction", "fraction": 1.0})
-        );
-        assert_eq!(
-            (&events[1]["event"], &events[1]["step"]),
-            (&"step".into(), &1.into())
-        );
+        let events: Vec<serde_json::Value> =
+            out.lines().iter().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+        assert_eq!(events[0], serde_json::json!({"event": "phase", "message": "compaction", "fraction": 1.0}));
+        assert_eq!((&events[1]["event"], &events[1]["step"]), (&"step".into(), &1.into()));
         assert!(events[1]["residual"].is_null() && events[1]["elapsed_s"].is_number());
-        assert_eq!(
-            events[2],
-            serde_json::json!({"event": "note", "message": "a \"note\""})
-        );
+        assert_eq!(events[2], serde_json::json!({"event": "note", "message": "a \"note\""}));
     }
 
     #[test]

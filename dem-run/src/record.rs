@@ -1,8 +1,8 @@
 //! From a world to its history: the layout, the frames, the rupture events and the observables of every step.
 
 use crate::history::{
-    self, BondStatus, ContactRows, ContactStatus, Frame, GrainState, Layout, Observable, Parameters, Rupture, RuptureMode, WallDrive,
-    WallKind, WallState, Writer,
+    self, BondStatus, ContactRows, ContactStatus, Frame, GrainState, Layout, Observable, Parameters, Rupture,
+    RuptureMode, WallDrive, WallKind, WallState, Writer,
 };
 use crate::scene::Scene;
 use dem_core::body::{Drive, Shape, Wall};
@@ -26,11 +26,18 @@ pub struct Recorder<D: Dim> {
 
 impl<D: Dim> Recorder<D> {
     /// Create the history of a world at `path`.
-    pub fn create(path: &Path, overwrite: bool, scene: &Scene, names: &[String], world: &World<D>) -> history::Result<Self> {
+    pub fn create(
+        path: &Path,
+        overwrite: bool,
+        scene: &Scene,
+        names: &[String],
+        world: &World<D>,
+    ) -> history::Result<Self> {
         let bonded = !world.bonds.is_empty();
         let friction = world.settings.friction > 0.0 || world.walls.iter().any(|w| w.friction > 0.0);
         // without friction, bonds and torques nothing ever turns, unless it turns from the start
-        let turning = world.grains.spin.iter().any(|w| w.norm() > 0.0) || world.loads.iter().any(|l| l.torque.norm() > 0.0);
+        let turning =
+            world.grains.spin.iter().any(|w| w.norm() > 0.0) || world.loads.iter().any(|l| l.torque.norm() > 0.0);
         let rotation = friction || bonded || turning;
         let (observables, measures) = observables(world).into_iter().unzip();
         let layout = Layout {
@@ -87,7 +94,14 @@ impl<D: Dim> Recorder<D> {
         self.fill_contacts(world);
         let bonds: Vec<BondStatus> = world.bonds.iter().map(|b| bond_status(b.status)).collect();
         let (step, time) = (world.steps as i64, world.time);
-        self.writer.frame(&Frame { step, time, grains: &grains, walls: &walls, contacts: &self.contacts, bonds: &bonds })
+        self.writer.frame(&Frame {
+            step,
+            time,
+            grains: &grains,
+            walls: &walls,
+            contacts: &self.contacts,
+            bonds: &bonds,
+        })
     }
 
     /// Close the history.
@@ -182,7 +196,14 @@ fn describe_wall<D: Dim>(wall: &Wall<D>, name: &str) -> history::Wall {
         Drive::Velocity { direction, .. } => (WallDrive::Velocity, direction),
         Drive::Force { direction, .. } => (WallDrive::Force, direction),
     };
-    history::Wall { name: name.into(), kind, normal: padded::<D>(normal), radius, drive, direction: padded::<D>(direction) }
+    history::Wall {
+        name: name.into(),
+        kind,
+        normal: padded::<D>(normal),
+        radius,
+        drive,
+        direction: padded::<D>(direction),
+    }
 }
 
 fn describe_bonds<D: Dim>(world: &World<D>) -> history::Bonds {
@@ -244,7 +265,9 @@ fn observables<D: Dim>(world: &World<D>) -> Vec<(Observable, Measure<D>)> {
         add("bonds_broken", "", scalar, |w, _, out| out.push((w.bonds.len() - w.intact_bonds()) as f64));
     }
     if walls > 0 {
-        add("wall_position", "m", &[walls, d], |w, _, out| w.walls.iter().for_each(|x| out.extend(x.position.as_slice())));
+        add("wall_position", "m", &[walls, d], |w, _, out| {
+            w.walls.iter().for_each(|x| out.extend(x.position.as_slice()))
+        });
         add("wall_force", "N", &[walls, d], |w, _, out| w.walls.iter().for_each(|x| out.extend(x.reaction.as_slice())));
         add("applied_force", "N", &[walls], |w, _, out| out.extend(w.walls.iter().map(applied_force)));
     }

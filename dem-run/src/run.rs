@@ -100,7 +100,7 @@ fn run_in<D: Dim>(scene: &Scene, options: &RunOptions, interrupt: &Interrupt) ->
     let names: Vec<String> = scene.walls.keys().cloned().collect();
     let recorder = Recorder::create(&options.output, options.overwrite, scene, &names, &built.world)?;
     let mut run = Run::new(scene, built, recorder);
-    let outcome = run.to_the_end(interrupt, &mut progress);
+    let outcome = run.step_on(interrupt, &mut progress);
     progress.finish();
     let (summary, outcome) = run.close(&options.output, outcome)?;
     let shown = if options.json { format!("{:#}", serde_json::json!(summary)) } else { summary.to_string() };
@@ -160,7 +160,7 @@ impl<'a, D: Dim> Run<'a, D> {
     }
 
     /// Step until the time, a stop condition, an interruption or a failure ends the run.
-    fn to_the_end(&mut self, interrupt: &Interrupt, progress: &mut Progress) -> Result<Ending, RunError> {
+    fn step_on(&mut self, interrupt: &Interrupt, progress: &mut Progress) -> Result<Ending, RunError> {
         self.recorder.frame(&self.world)?;
         let (steps, every) = (self.scene.time.steps(), self.scene.steps_per_frame());
         while self.world.steps < steps {
@@ -234,14 +234,20 @@ impl<'a, D: Dim> Run<'a, D> {
             }
         }
         let limit = self.scene.stop.as_ref().and_then(|s| s.broken_fraction);
-        if limit.is_some_and(|limit| !self.world.bonds.is_empty() && broken as f64 >= limit * self.world.bonds.len() as f64) {
+        if limit
+            .is_some_and(|limit| !self.world.bonds.is_empty() && broken as f64 >= limit * self.world.bonds.len() as f64)
+        {
             return Some(Ending::BrokenFraction);
         }
         interrupt.requested().then_some(Ending::Interrupted)
     }
 
     /// Write the last state, close the history and sum up. The second value is what the command ends with.
-    fn close(mut self, history: &Path, outcome: Result<Ending, RunError>) -> Result<(Summary, Result<(), RunError>), RunError> {
+    fn close(
+        mut self,
+        history: &Path,
+        outcome: Result<Ending, RunError>,
+    ) -> Result<(Summary, Result<(), RunError>), RunError> {
         let (ending, end) = match outcome {
             Ok(Ending::Interrupted) => (Ending::Interrupted, Err(RunError::Interrupted)),
             Ok(ending) => (ending, Ok(())),

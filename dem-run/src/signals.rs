@@ -37,10 +37,7 @@ pub fn install() -> Result<Interrupt, ctrlc::Error> {
             exit_at_once();
         }
         // eprintln! would end this thread, and with it the second signal, where stderr is closed
-        let _ = writeln!(
-            std::io::stderr(),
-            "\nending after the frame in hand; once more to end at once"
-        );
+        let _ = writeln!(std::io::stderr(), "\nending after the frame in hand; once more to end at once");
     })?;
     Ok(interrupt)
 }
@@ -94,12 +91,7 @@ mod tests {
     fn the_second_signal_ends_the_process() {
         for signal in ["-TERM", "-INT"] {
             let mut child = Command::new(std::env::current_exe().expect("this program"))
-                .args([
-                    "signals::tests::interrupted_process",
-                    "--exact",
-                    "--ignored",
-                    "--nocapture",
-                ])
+                .args(["signals::tests::interrupted_process", "--exact", "--ignored", "--nocapture"])
                 .stdout(Stdio::piped())
                 .stderr(Stdio::null())
                 .spawn()
@@ -114,15 +106,9 @@ mod tests {
             assert!(wait_for("ready"));
             send(child.id());
             assert!(wait_for("asked to end"));
-            assert!(
-                child.try_wait().expect("status").is_none(),
-                "ended by the first signal"
-            );
+            assert!(child.try_wait().expect("status").is_none(), "ended by the first signal");
             send(child.id());
-            assert_eq!(
-                child.wait().expect("status").code(),
-                Some(i32::from(INTERRUPTED))
-            );
+            assert_eq!(child.wait().expect("status").code(), Some(i32::from(INTERRUPTED)));
         }
     }
 }

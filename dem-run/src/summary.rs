@@ -95,7 +95,12 @@ impl fmt::Display for Summary {
             self.missed_tolerance,
             self.rejected
         )?;
-        writeln!(f, "penetration      {:.2e} m, {:.1e} mean diameters", self.penetration, self.penetration / self.mean_diameter)?;
+        writeln!(
+            f,
+            "penetration      {:.2e} m, {:.1e} mean diameters",
+            self.penetration,
+            self.penetration / self.mean_diameter
+        )?;
         writeln!(f, "external work    {:.4e} J", self.external_work)?;
         writeln!(f, "energy remainder {:.2e} J", self.energy_remainder)?;
         if self.bonds > 0 {
@@ -126,11 +131,18 @@ impl Summary {
             self.bonds,
             100.0 * broken as f64 / self.bonds as f64
         )?;
-        let load = |load: Option<f64>| load.map_or("none".into(), |n| format!("{n:.4} N"));
-        writeln!(f, "first break      {}", load(self.failure.first_break))?;
-        for (collapse, strain) in self.failure.collapse.into_iter().zip(STRAINS) {
-            writeln!(f, "collapse load    {} (strain {strain:.0e})", load(collapse))?;
+        let Failure { first_break, collapse, broken_share } = self.failure;
+        if broken > 0 && first_break.is_none() {
+            return writeln!(f, "                 no wall is driven: there is no applied force to tell");
         }
-        writeln!(f, "5 % broken       {}", load(self.failure.broken_share))
+        let load = |load: Option<f64>| load.map_or("none".into(), |n| format!("{n:.4} N"));
+        writeln!(f, "first break      {}", load(first_break))?;
+        for (collapse, strain) in collapse.into_iter().zip(STRAINS) {
+            // rigid grains and bonds: before the first break nothing can have moved
+            let early = collapse.is_some_and(|c| first_break.is_none_or(|b| c < b));
+            let note = if early { ", before any bond broke: the solver's own strain, not the sample's" } else { "" };
+            writeln!(f, "collapse load    {} (strain {strain:.0e}{note})", load(collapse))?;
+        }
+        writeln!(f, "5 % broken       {}", load(broken_share))
     }
 }

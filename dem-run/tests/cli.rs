@@ -6,23 +6,13 @@ use std::process::{Command, Output};
 use serde_json::Value;
 
 fn config(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../configs")
-        .join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs").join(name)
 }
 
 /// Runs the command in `folder`: exit code, stdout, stderr.
 fn dem_run(folder: &Path, args: &[&str]) -> (Option<i32>, String, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_dem-run"));
-    let Output {
-        status,
-        stdout,
-        stderr,
-    } = command
-        .args(args)
-        .current_dir(folder)
-        .output()
-        .expect("start");
+    let Output { status, stdout, stderr } = command.args(args).current_dir(folder).output().expect("start");
     let text = |bytes| String::from_utf8(bytes).expect("UTF-8");
     (status.code(), text(stdout), text(stderr))
 }
@@ -37,58 +27,30 @@ fn check_tells_what_a_run_will_be() {
     let scene = scene.to_str().expect("UTF-8");
     let (code, stdout, stderr) = dem_run(folder().path(), &["check", scene]);
     assert_eq!((code, stderr.as_str()), (Some(0), ""));
-    for part in [
-        "430 (random packing)",
-        "steps      5000",
-        "frames     501",
-        "free disk",
-    ] {
+    for part in ["430 (random packing)", "steps      5000", "frames     501", "free disk"] {
         assert!(stdout.contains(part), "{part} in\n{stdout}");
     }
-    let (code, stdout, _) = dem_run(
-        folder().path(),
-        &["check", scene, "--json", "--set", "time.end=0.1"],
-    );
+    let (code, stdout, _) = dem_run(folder().path(), &["check", scene, "--json", "--set", "time.end=0.1"]);
     let check: Value = serde_json::from_str(&stdout).expect("JSON");
-    assert_eq!(
-        (code, &check["steps"], &check["grains"]),
-        (Some(0), &1000.into(), &430.into())
-    );
+    assert_eq!((code, &check["steps"], &check["grains"]), (Some(0), &1000.into(), &430.into()));
 }
 
 #[test]
 fn a_wrong_scene_is_exit_2_and_names_every_place() {
     let scene = config("compression.json");
     let scene = scene.to_str().expect("UTF-8");
-    let wrong = [
-        "--set",
-        "time.step=0",
-        "--set",
-        "materials.friction.grain_grain=-1",
-    ];
+    let wrong = ["--set", "time.step=0", "--set", "materials.friction.grain_grain=-1"];
     for command in ["check", "run"] {
-        let (code, stdout, stderr) =
-            dem_run(folder().path(), &[&[command, scene], &wrong[..]].concat());
+        let (code, stdout, stderr) = dem_run(folder().path(), &[&[command, scene], &wrong[..]].concat());
         assert_eq!((code, stdout.as_str()), (Some(2), ""), "{stderr}");
-        for part in [
-            "compression.json",
-            "time.step (--set time.step=0)",
-            "materials.friction.grain_grain",
-            "≥ 0",
-        ] {
+        for part in ["compression.json", "time.step (--set time.step=0)", "materials.friction.grain_grain", "≥ 0"] {
             assert!(stderr.contains(part), "{part} in\n{stderr}");
         }
         assert!(!stderr.contains("panicked"), "{stderr}");
     }
-    let (code, stdout, _) = dem_run(
-        folder().path(),
-        &[&["check", "--json", scene], &wrong[..]].concat(),
-    );
+    let (code, stdout, _) = dem_run(folder().path(), &[&["check", "--json", scene], &wrong[..]].concat());
     let report: Value = serde_json::from_str(&stdout).expect("JSON");
-    assert_eq!(
-        (code, report["problems"].as_array().map(Vec::len)),
-        (Some(2), Some(2))
-    );
+    assert_eq!((code, report["problems"].as_array().map(Vec::len)), (Some(2), Some(2)));
     assert_eq!(report["problems"][1]["path"], "time.step");
 }
 
@@ -123,19 +85,13 @@ fn files_that_are_missing_or_in_the_way_are_exit_4() {
         (&["run", scene], "--force"),
         (&["run", scene, "-o", "no/such/a.h5"], "no/such"),
         (&["run", scene, "-o", "."], "folder"),
-        (
-            &["run", scene, "-o", "b.h5", "--write-sample", "sample.csv"],
-            "--write-sample",
-        ),
+        (&["run", scene, "-o", "b.h5", "--write-sample", "sample.csv"], "--write-sample"),
     ] {
         let (code, stdout, stderr) = dem_run(here.path(), args);
         assert_eq!((code, stdout.as_str()), (Some(4), ""), "{args:?}: {stderr}");
         assert!(stderr.contains(part), "{args:?}: {stderr}");
     }
-    assert_eq!(
-        std::fs::read(here.path().join("column.h5")).expect("read"),
-        b"precious"
-    );
+    assert_eq!(std::fs::read(here.path().join("column.h5")).expect("read"), b"precious");
     assert!(!here.path().join("b.h5").exists());
 }
 
@@ -144,34 +100,18 @@ fn schema_prints_a_json_schema_of_scenes() {
     let (code, stdout, stderr) = dem_run(folder().path(), &["schema"]);
     assert_eq!((code, stderr.as_str()), (Some(0), ""));
     let schema: Value = serde_json::from_str(&stdout).expect("JSON");
-    assert!(
-        schema["$schema"]
-            .as_str()
-            .is_some_and(|url| url.contains("json-schema.org"))
-    );
+    assert!(schema["$schema"].as_str().is_some_and(|url| url.contains("json-schema.org")));
     assert_eq!(schema["title"], "Scene");
     // the copy that the scenes in configs name
     let copy = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/scene.schema.json");
     let copy = std::fs::read_to_string(copy).expect("docs/scene.schema.json");
-    assert!(
-        copy == stdout,
-        "docs/scene.schema.json is old: dem-run schema > docs/scene.schema.json"
-    );
-    assert!(
-        schema["properties"]["thickness"]["description"]
-            .as_str()
-            .is_some_and(|text| text.contains("(m)"))
-    );
+    assert!(copy == stdout, "docs/scene.schema.json is old: dem-run schema > docs/scene.schema.json");
+    assert!(schema["properties"]["thickness"]["description"].as_str().is_some_and(|text| text.contains("(m)")));
 }
 
 #[test]
 fn every_command_shows_an_example() {
-    for args in [
-        &["--help"][..],
-        &["run", "--help"],
-        &["check", "--help"],
-        &["schema", "--help"],
-    ] {
+    for args in [&["--help"][..], &["run", "--help"], &["check", "--help"], &["schema", "--help"]] {
         let (code, stdout, _) = dem_run(folder().path(), args);
         assert_eq!(code, Some(0));
         assert!(stdout.contains("Example"), "{args:?}");

@@ -8,7 +8,7 @@
 //!
 //! A law offers two ways to better one contact while all others stand still. The *predictor–corrector* is one
 //! step of the line above with γ = 1 / (largest diagonal entry of the local Delassus block W), which makes it a
-//! contraction. The *exact local solve* finds the r for which the contact alone satisfies its law. Both have the
+//! contraction where the flow is associated; see docs/theory/contact-law.md. The *exact local solve* finds the r for which the contact alone satisfies its law. Both have the
 //! same fixed points.
 
 use super::cone::{Cone, Local, Weights};

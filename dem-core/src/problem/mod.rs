@@ -167,6 +167,13 @@ impl<D: Dim> ContactProblem<D> {
         self.frictionless.iter().for_each(|c| visitor.visit(&self.nodes, c));
     }
 
+    /// Set all impulses to zero.
+    pub fn forget_reactions(&mut self) {
+        self.bonded.iter_mut().for_each(|c| c.r = Local::zero());
+        self.dry.iter_mut().for_each(|c| c.r = Local::zero());
+        self.frictionless.iter_mut().for_each(|c| c.r = Local::zero());
+    }
+
     /// Set the node velocities to v_f + M⁻¹ H r, free of the rounding that a long series of increments leaves.
     pub fn velocities_from_reactions(&mut self) {
         for (node, free) in self.nodes.all.iter_mut().zip(&self.free) {

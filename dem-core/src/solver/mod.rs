@@ -20,6 +20,18 @@ pub enum SolveStatus {
     Failed,
 }
 
+impl SolveStatus {
+    /// The worse of two.
+    #[must_use]
+    pub fn at_best(self, other: Self) -> Self {
+        match (self, other) {
+            (Self::Failed, _) | (_, Self::Failed) => Self::Failed,
+            (Self::Accepted, _) | (_, Self::Accepted) => Self::Accepted,
+            _ => Self::Converged,
+        }
+    }
+}
+
 /// What a solve did.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolveReport {

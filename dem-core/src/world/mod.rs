@@ -83,6 +83,16 @@ pub struct World<D: Dim> {
     volume: f64,
 }
 
+/// What a step changes, kept while a step is tried in halves.
+struct State<D: Dim> {
+    grains: Grains<D>,
+    walls: Vec<Wall<D>>,
+    bonds: Vec<Bond>,
+    touches: Vec<Touch<D>>,
+    ledger: Ledger,
+    time: f64,
+}
+
 impl<D: Dim> World<D> {
     /// A world at time zero, without bonds.
     pub fn new(grains: Grains<D>, walls: Vec<Wall<D>>, loads: Vec<Load<D>>, settings: Settings<D>) -> Self {
@@ -130,6 +140,27 @@ impl<D: Dim> World<D> {
     pub fn set_solver(&mut self, solver: SolverSettings) {
         self.settings.solver = solver;
         self.solver = solver.build();
+    }
+
+    /// Everything that a step changes.
+    fn state(&self) -> State<D> {
+        State {
+            grains: self.grains.clone(),
+            walls: self.walls.clone(),
+            bonds: self.bonds.clone(),
+            touches: self.touches.clone(),
+            ledger: self.ledger,
+            time: self.time,
+        }
+    }
+
+    fn restore(&mut self, state: State<D>) {
+        self.grains = state.grains;
+        self.walls = state.walls;
+        self.bonds = state.bonds;
+        self.touches = state.touches;
+        self.ledger = state.ledger;
+        self.time = state.time;
     }
 
     /// Number of bonds that hold.

@@ -64,7 +64,7 @@ pub enum StepError {
 }
 
 impl<D: Dim> World<D> {
-    /// Carry the world on by one time step.
+    /// Carry the world on by one time step. An error leaves the world as it was.
     pub fn step(&mut self) -> Result<StepReport<D>, StepError> {
         let mut report = self.advance(self.settings.step, 0)?;
         self.steps += 1;
@@ -78,9 +78,16 @@ impl<D: Dim> World<D> {
     fn advance(&mut self, h: f64, halvings: u32) -> Result<StepReport<D>, StepError> {
         match self.attempt(h) {
             Err(StepError::NotAccepted { .. }) if halvings < self.settings.max_halvings => {
+                let before = self.state();
                 let first = self.advance(0.5 * h, halvings + 1)?;
-                let second = self.advance(0.5 * h, halvings + 1)?;
-                Ok(first.followed_by(second))
+                match self.advance(0.5 * h, halvings + 1) {
+                    Ok(second) => Ok(first.followed_by(second)),
+                    Err(error) => {
+                        // half a step that stands alone would be neither the old state nor the new one
+                        self.restore(before);
+                        Err(error)
+                    }
+                }
             }
             outcome => outcome,
         }
@@ -352,7 +359,11 @@ impl<D: Dim> World<D> {
             status: done.status(),
             iterations: done.iterations,
             residual: done.residual,
-            load_error: done.load_error.unwrap_or(if problem.applied > 0.0 { change.sqrt() / problem.applied } else { 0.0 }),
+            load_error: done.load_error.unwrap_or(if problem.applied > 0.0 {
+                change.sqrt() / problem.applied
+            } else {
+                0.0
+            }),
             counts: Counts::of(touches),
             breaks,
             penetration: dry.map(|t| -t.gap).fold(0.0, f64::max),

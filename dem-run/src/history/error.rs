@@ -7,8 +7,7 @@ use std::path::{Path, PathBuf};
 pub enum HistoryError {
     /// The output file stands already and overwriting was not asked for.
     #[error(
-        "{} exists already: pass --force to replace it, -o FILE to write elsewhere, \
-         or continue it with `dem-run resume {}`", .path.display(), .path.display())]
+        "{} exists already: pass --force to replace it, or -o FILE to write elsewhere", .path.display())]
     Exists {
         /// The file.
         path: PathBuf,

@@ -264,7 +264,7 @@ fn an_existing_file_is_replaced_only_when_asked() {
     fs::write(&path, "mine").unwrap();
     let error = Writer::create(&path, &full(2), false).err().unwrap();
     assert!(matches!(error, HistoryError::Exists { .. }));
-    for remedy in ["--force", "-o", "resume"] {
+    for remedy in ["--force", "-o"] {
         assert!(error.to_string().contains(remedy), "{error}");
     }
     // a layout that contradicts itself does no harm, even with leave to overwrite

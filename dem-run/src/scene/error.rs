@@ -86,18 +86,8 @@ pub enum Origin {
 impl Problem {
     /// A problem without a nearest name or a known origin.
     #[must_use]
-    pub fn new(
-        path: impl Into<String>,
-        found: impl Into<String>,
-        allowed: impl Into<String>,
-    ) -> Self {
-        Self {
-            path: path.into(),
-            found: found.into(),
-            allowed: allowed.into(),
-            nearest: None,
-            origin: None,
-        }
+    pub fn new(path: impl Into<String>, found: impl Into<String>, allowed: impl Into<String>) -> Self {
+        Self { path: path.into(), found: found.into(), allowed: allowed.into(), nearest: None, origin: None }
     }
 
     /// The same with the valid name nearest to the wrong one.
@@ -108,10 +98,7 @@ impl Problem {
 
     /// The same with its origin.
     pub(super) fn with_origin(self, origin: Origin) -> Self {
-        Self {
-            origin: Some(origin),
-            ..self
-        }
+        Self { origin: Some(origin), ..self }
     }
 }
 
@@ -185,14 +172,9 @@ mod tests {
             Problem::new("bonds.strenght", "an unknown name", "strength, stress")
                 .with_nearest(Some("strength".into()))
                 .with_origin(Origin::Text { line: 3, column: 5 }),
-            Problem::new("time.step", "0.0", "a number > 0 (s)")
-                .with_origin(Origin::Set("time.step=0".into())),
+            Problem::new("time.step", "0.0", "a number > 0 (s)").with_origin(Origin::Set("time.step=0".into())),
         ];
-        let text = SceneError::Wrong {
-            name: "a.json".into(),
-            problems,
-        }
-        .to_string();
+        let text = SceneError::Wrong { name: "a.json".into(), problems }.to_string();
         assert_eq!(
             text,
             "a.json: the scene is wrong at 2 places\

@@ -75,10 +75,7 @@ mod tests {
 
     #[test]
     fn a_ramp_is_zero_before_it_starts() {
-        let ramp = Function::Ramp(Ramp {
-            rate: 200.0,
-            start: 0.1,
-        });
+        let ramp = Function::Ramp(Ramp { rate: 200.0, start: 0.1 });
         assert_eq!(ramp.at(0.0), 0.0);
         assert_eq!(ramp.at(0.1), 0.0);
         assert_eq!(ramp.at(0.6), 100.0);
@@ -87,15 +84,8 @@ mod tests {
     #[test]
     fn a_table_is_linear_inside_and_held_outside() {
         let table = Function::Table(vec![[1.0, 10.0], [2.0, 30.0], [4.0, -10.0]]);
-        for (t, value) in [
-            (-5.0, 10.0),
-            (1.0, 10.0),
-            (1.5, 20.0),
-            (2.0, 30.0),
-            (3.0, 10.0),
-            (4.0, -10.0),
-            (9.0, -10.0),
-        ] {
+        for (t, value) in [(-5.0, 10.0), (1.0, 10.0), (1.5, 20.0), (2.0, 30.0), (3.0, 10.0), (4.0, -10.0), (9.0, -10.0)]
+        {
             assert_eq!(table.at(t), value, "at t = {t}");
         }
     }
@@ -110,13 +100,7 @@ mod tests {
     #[test]
     fn zero_functions_are_recognised() {
         assert!(Function::Constant(0.0).is_zero());
-        assert!(
-            !Function::Ramp(Ramp {
-                rate: 1.0,
-                start: 0.0
-            })
-            .is_zero()
-        );
+        assert!(!Function::Ramp(Ramp { rate: 1.0, start: 0.0 }).is_zero());
         assert!(Function::Table(vec![[0.0, 0.0], [1.0, 0.0]]).is_zero());
     }
 }

@@ -32,14 +32,13 @@ use std::path::Path;
 pub use error::{Origin, Problem, SceneError};
 pub use function::{Function, Ramp};
 pub use model::{
-    Bonds, Flow, Friction, Grains, Load, Materials, Output, Restitution, Rupture, Scene, Stop,
-    Time, TravelFrom, WallTravel,
+    Bonds, Flow, Friction, Grains, Load, Materials, Output, Restitution, Rupture, Scene, Stop, Time, TravelFrom,
+    WallTravel,
 };
 pub use sample::{
-    Compaction, Deposition, Diameters, GrainSpec, Lattice, Preparation, RandomSample, Sample,
-    SampleFile, UniformRange,
+    Compaction, Deposition, Diameters, GrainSpec, Lattice, Preparation, RandomSample, Sample, SampleFile, UniformRange,
 };
-pub use solver::{GaussSeidel, LocalSolve, Solver, SolverKind};
+pub use solver::{GaussSeidel, LocalSolve, Newton, Solver, SolverKind, Start};
 pub use validate::validate;
 pub use wall::{Circle, Cylinder, Drive, Place, Plane, Shape, Sphere, Wall, WallMass};
 
@@ -51,10 +50,7 @@ pub use wall::{Circle, Cylinder, Drive, Place, Plane, Shape, Sphere, Wall, WallM
 /// # Errors
 /// [`SceneError`]: an unreadable file, wrong syntax, wrong structure, or all wrong values.
 pub fn load(path: &Path, assignments: &[String]) -> Result<Scene, SceneError> {
-    let unreadable = |source| SceneError::Read {
-        path: path.to_path_buf(),
-        source,
-    };
+    let unreadable = |source| SceneError::Read { path: path.to_path_buf(), source };
     let bytes = std::fs::read(path).map_err(unreadable)?;
     let text = String::from_utf8(bytes)
         .map_err(|error| unreadable(std::io::Error::new(std::io::ErrorKind::InvalidData, error)))?;
@@ -75,13 +71,7 @@ pub fn load(path: &Path, assignments: &[String]) -> Result<Scene, SceneError> {
 pub fn from_text(name: &str, text: &str, assignments: &[String]) -> Result<Scene, SceneError> {
     let mut document = parse::parse(name, text)?;
     set::apply(&mut document, assignments).map_err(|problems| document.wrong(problems))?;
-    let scene = document
-        .decode()
-        .map_err(|problem| document.wrong(vec![problem]))?;
+    let scene = document.decode().map_err(|problem| document.wrong(vec![problem]))?;
     let problems = document.merge_non_finite(validate(&scene));
-    if problems.is_empty() {
-        Ok(scene)
-    } else {
-        Err(document.wrong(problems))
-    }
+    if problems.is_empty() { Ok(scene) } else { Err(document.wrong(problems)) }
 }

@@ -112,9 +112,6 @@ pub struct Bonds {
     /// Flow of an intact bond at its limit.
     #[serde(default)]
     pub flow: Flow,
-    /// Whether a bond also carries a moment.
-    #[serde(default = "yes")]
-    pub moment: bool,
 }
 
 /// Flow of an intact bond at its limit.
@@ -172,7 +169,7 @@ pub enum Rupture {
     /// All bonds at their limit break and the same step is solved again, until none breaks.
     #[default]
     Cascade,
-    /// The same, but only the bond furthest beyond its limit breaks each time.
+    /// The same, but only the bond whose grains move apart fastest breaks each time.
     CascadeWorst,
     /// Bonds at their limit break at the end of the step.
     EndOfStep,
@@ -230,10 +227,6 @@ fn default_seed() -> u64 {
     1
 }
 
-fn yes() -> bool {
-    true
-}
-
 fn one() -> Function {
     Function::Constant(1.0)
 }
@@ -282,11 +275,7 @@ impl Time {
     pub fn steps(&self) -> u64 {
         let ratio = self.end / self.step;
         let whole = ratio.round();
-        if (ratio - whole).abs() <= 1e-9 * whole {
-            whole as u64
-        } else {
-            ratio.ceil() as u64
-        }
+        if (ratio - whole).abs() <= 1e-9 * whole { whole as u64 } else { ratio.ceil() as u64 }
     }
 }
 
@@ -298,9 +287,7 @@ impl Bonds {
         match (self.strength, self.stress) {
             (Some(strength), _) => strength,
             (None, Some(stress)) if dimension == 2 => stress * mean_diameter * thickness,
-            (None, Some(stress)) => {
-                stress * std::f64::consts::PI * mean_diameter * mean_diameter / 4.0
-            }
+            (None, Some(stress)) => stress * std::f64::consts::PI * mean_diameter * mean_diameter / 4.0,
             (None, None) => 0.0,
         }
     }
@@ -312,60 +299,18 @@ mod tests {
 
     #[test]
     fn steps_are_whole_where_the_ratio_is_whole_to_rounding() {
-        assert_eq!(
-            Time {
-                step: 1e-4,
-                end: 0.5
-            }
-            .steps(),
-            5000
-        );
-        assert_eq!(
-            Time {
-                step: 0.1,
-                end: 0.3
-            }
-            .steps(),
-            3
-        );
-        assert_eq!(
-            Time {
-                step: 0.1,
-                end: 0.31
-            }
-            .steps(),
-            4
-        );
-        assert_eq!(
-            Time {
-                step: 0.1,
-                end: 0.0
-            }
-            .steps(),
-            0
-        );
+        assert_eq!(Time { step: 1e-4, end: 0.5 }.steps(), 5000);
+        assert_eq!(Time { step: 0.1, end: 0.3 }.steps(), 3);
+        assert_eq!(Time { step: 0.1, end: 0.31 }.steps(), 4);
+        assert_eq!(Time { step: 0.1, end: 0.0 }.steps(), 0);
     }
 
     #[test]
     fn a_stress_acts_on_the_section_of_the_bond() {
-        let bonds = Bonds {
-            strength: None,
-            stress: Some(1e6),
-            gap_tolerance: 1e-3,
-            friction: None,
-            flow: Flow::Associated,
-            moment: true,
-        };
+        let bonds =
+            Bonds { strength: None, stress: Some(1e6), gap_tolerance: 1e-3, friction: None, flow: Flow::Associated };
         assert!((bonds.cohesion(2, 4e-3, 0.01) - 40.0).abs() < 1e-12);
         assert!((bonds.cohesion(3, 4e-3, 0.01) - 4.0 * std::f64::consts::PI).abs() < 1e-12);
-        assert_eq!(
-            Bonds {
-                strength: Some(5.0),
-                stress: None,
-                ..bonds
-            }
-            .cohesion(2, 4e-3, 0.01),
-            5.0
-        );
+        assert_eq!(Bonds { strength: Some(5.0), stress: None, ..bonds }.cohesion(2, 4e-3, 0.01), 5.0);
     }
 }

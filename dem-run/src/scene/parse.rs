@@ -49,67 +49,27 @@ fn options() -> ParseOptions {
 pub(super) fn parse(name: &str, text: &str) -> Result<Document, SceneError> {
     // a byte order mark, as some editors write it, is not part of the text
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let parsed = parse_to_ast(text, &CollectOptions::default(), &options()).map_err(|error| {
-        syntax(
-            name,
-            text,
-            error.line_display(),
-            error.column_display(),
-            &error.kind().to_string(),
-        )
-    })?;
+    let parsed = parse_to_ast(text, &CollectOptions::default(), &options())
+        .map_err(|error| syntax(name, text, error.line_display(), error.column_display(), &error.kind().to_string()))?;
     let Some(node) = parsed.value else {
-        return Err(syntax(
-            name,
-            text,
-            1,
-            1,
-            "The text is empty: a scene is an object { … }",
-        ));
+        return Err(syntax(name, text, 1, 1, "The text is empty: a scene is an object { … }"));
     };
-    let mut walk = Walk {
-        lines: Lines::new(text),
-        origins: HashMap::new(),
-        non_finite: HashMap::new(),
-        twice: vec![],
-    };
+    let mut walk = Walk { lines: Lines::new(text), origins: HashMap::new(), non_finite: HashMap::new(), twice: vec![] };
     let root = walk.value(String::new(), &node);
     if !walk.twice.is_empty() {
-        return Err(SceneError::Wrong {
-            name: name.to_string(),
-            problems: walk.twice,
-        });
+        return Err(SceneError::Wrong { name: name.to_string(), problems: walk.twice });
     }
-    Ok(Document {
-        name: name.to_string(),
-        root,
-        origins: walk.origins,
-        non_finite: walk.non_finite,
-    })
+    Ok(Document { name: name.to_string(), root, origins: walk.origins, non_finite: walk.non_finite })
 }
 
 fn syntax(name: &str, text: &str, line: usize, column: usize, message: &str) -> SceneError {
     let content = text.lines().nth(line.saturating_sub(1)).unwrap_or_default();
     // a window around the place, for lines without end
     let start = column.saturating_sub(60);
-    let window: String = content
-        .chars()
-        .skip(start)
-        .take(100)
-        .map(printable)
-        .collect();
+    let window: String = content.chars().skip(start).take(100).map(printable).collect();
     let rest: String = content.chars().skip(column.saturating_sub(1)).collect();
-    let excerpt = format!(
-        "  {window}\n  {}^",
-        " ".repeat(column.saturating_sub(1 + start))
-    );
-    SceneError::Syntax {
-        name: name.to_string(),
-        line,
-        column,
-        message: with_remedy(message, &rest),
-        excerpt,
-    }
+    let excerpt = format!("  {window}\n  {}^", " ".repeat(column.saturating_sub(1 + start)));
+    SceneError::Syntax { name: name.to_string(), line, column, message: with_remedy(message, &rest), excerpt }
 }
 
 /// The parser's message about what starts with `rest`, with what to write instead where that is not plain.
@@ -119,27 +79,12 @@ fn with_remedy(message: &str, rest: &str) -> String {
         return "NaN and infinity are not allowed: write a finite number".to_string();
     }
     let remedies: [(ParseErrorKind, &str); 4] = [
-        (
-            ParseErrorKind::TrailingCommasNotAllowed,
-            "remove the comma before the closing bracket",
-        ),
-        (
-            ParseErrorKind::SingleQuotedStringsNotAllowed,
-            "write \"double quotes\"",
-        ),
-        (
-            ParseErrorKind::BareDecimalPointNumbersNotAllowed,
-            "write 0.5 or 5.0",
-        ),
-        (
-            ParseErrorKind::ExpectedStringObjectProperty,
-            "names stand in \"double quotes\"",
-        ),
+        (ParseErrorKind::TrailingCommasNotAllowed, "remove the comma before the closing bracket"),
+        (ParseErrorKind::SingleQuotedStringsNotAllowed, "write \"double quotes\""),
+        (ParseErrorKind::BareDecimalPointNumbersNotAllowed, "write 0.5 or 5.0"),
+        (ParseErrorKind::ExpectedStringObjectProperty, "names stand in \"double quotes\""),
     ];
-    match remedies
-        .iter()
-        .find(|(kind, _)| kind.to_string() == message)
-    {
+    match remedies.iter().find(|(kind, _)| kind.to_string() == message) {
         Some((_, remedy)) => format!("{message}: {remedy}"),
         None => message.to_string(),
     }
@@ -153,9 +98,7 @@ struct Lines<'a> {
 
 impl<'a> Lines<'a> {
     fn new(text: &'a str) -> Self {
-        let starts = std::iter::once(0)
-            .chain(text.match_indices('\n').map(|(at, _)| at + 1))
-            .collect();
+        let starts = std::iter::once(0).chain(text.match_indices('\n').map(|(at, _)| at + 1)).collect();
         Self { text, starts }
     }
 
@@ -204,11 +147,7 @@ impl Walk<'_> {
             Ok(number) => Value::Number(number),
             Err(_) => {
                 self.non_finite.insert(path, literal.to_string());
-                Value::from(if literal.starts_with('-') {
-                    f64::MIN
-                } else {
-                    f64::MAX
-                })
+                Value::from(if literal.starts_with('-') { f64::MIN } else { f64::MAX })
             }
         }
     }
@@ -224,13 +163,8 @@ impl Walk<'_> {
             let start = property.range.start;
             let below = join(path, key);
             if let Some(earlier) = first.insert(key, start) {
-                let found = format!(
-                    "the name a second time (first on line {})",
-                    self.lines.at(earlier).0
-                );
-                self.twice.push(
-                    Problem::new(below, found, "each name once").with_origin(self.origin(start)),
-                );
+                let found = format!("the name a second time (first on line {})", self.lines.at(earlier).0);
+                self.twice.push(Problem::new(below, found, "each name once").with_origin(self.origin(start)));
                 continue;
             }
             let value = self.value(below, &property.value);
@@ -242,23 +176,16 @@ impl Walk<'_> {
 
 /// The path of `key` below `path`.
 pub(super) fn join(path: &str, key: &str) -> String {
-    if path.is_empty() {
-        key.to_string()
-    } else {
-        format!("{path}.{key}")
-    }
+    if path.is_empty() { key.to_string() } else { format!("{path}.{key}") }
 }
 
 impl Document {
     /// Records that what stands at `path` comes from an assignment.
     pub(super) fn mark_set(&mut self, path: &str, assignment: &str) {
         let below = format!("{path}.");
-        self.origins
-            .retain(|key, _| key != path && !key.starts_with(&below));
-        self.non_finite
-            .retain(|key, _| key != path && !key.starts_with(&below));
-        self.origins
-            .insert(path.to_string(), Origin::Set(assignment.to_string()));
+        self.origins.retain(|key, _| key != path && !key.starts_with(&below));
+        self.non_finite.retain(|key, _| key != path && !key.starts_with(&below));
+        self.origins.insert(path.to_string(), Origin::Set(assignment.to_string()));
     }
 
     /// Records that a number at `path` overflows, written as `literal`.
@@ -289,34 +216,18 @@ impl Document {
     pub(super) fn wrong(&self, problems: Vec<Problem>) -> SceneError {
         let problems = problems
             .into_iter()
-            .map(|problem| Problem {
-                origin: problem
-                    .origin
-                    .clone()
-                    .or_else(|| self.origin(&problem.path)),
-                ..problem
-            })
+            .map(|problem| Problem { origin: problem.origin.clone().or_else(|| self.origin(&problem.path)), ..problem })
             .collect();
-        SceneError::Wrong {
-            name: self.name.clone(),
-            problems,
-        }
+        SceneError::Wrong { name: self.name.clone(), problems }
     }
 
     /// The wrong values together with the numbers that overflow, which stand for anything found at their places.
     pub(super) fn merge_non_finite(&self, problems: Vec<Problem>) -> Vec<Problem> {
-        let mut overflows: Vec<Problem> = self
-            .non_finite
-            .iter()
-            .map(|(path, literal)| overflow(path, literal))
-            .collect();
+        let mut overflows: Vec<Problem> =
+            self.non_finite.iter().map(|(path, literal)| overflow(path, literal)).collect();
         overflows.sort_by(|a, b| a.path.cmp(&b.path));
         let seen: HashSet<&String> = self.non_finite.keys().collect();
-        overflows.extend(
-            problems
-                .into_iter()
-                .filter(|problem| !seen.contains(&problem.path)),
-        );
+        overflows.extend(problems.into_iter().filter(|problem| !seen.contains(&problem.path)));
         overflows
     }
 
@@ -326,11 +237,7 @@ impl Document {
     /// The first unknown name, missing name, or wrong type.
     pub(super) fn decode(&self) -> Result<Scene, Problem> {
         serde_path_to_error::deserialize(&self.root).map_err(|error| {
-            let path = error
-                .path()
-                .iter()
-                .filter_map(segment)
-                .fold(String::new(), |path, key| join(&path, &key));
+            let path = error.path().iter().filter_map(segment).fold(String::new(), |path, key| join(&path, &key));
             match self.non_finite.get(&path) {
                 Some(literal) => overflow(&path, literal),
                 None => explain(path, &error.into_inner().to_string()),
@@ -340,11 +247,7 @@ impl Document {
 }
 
 fn overflow(path: &str, literal: &str) -> Problem {
-    Problem::new(
-        path,
-        shorten(literal),
-        "a finite number, of magnitude at most 1e60",
-    )
+    Problem::new(path, shorten(literal), "a finite number, of magnitude at most 1e60")
 }
 
 fn segment(segment: &Segment) -> Option<String> {
@@ -359,30 +262,16 @@ fn segment(segment: &Segment) -> Option<String> {
 /// Serde's message about the value at `path`, in the terms of a scene.
 fn explain(path: String, message: &str) -> Problem {
     for start in ["unknown field ", "unknown variant "] {
-        if let Some((wrong, expected)) = message
-            .strip_prefix(start)
-            .and_then(|rest| rest.split_once(", "))
-        {
+        if let Some((wrong, expected)) = message.strip_prefix(start).and_then(|rest| rest.split_once(", ")) {
             return unknown_name(path, wrong.trim_matches('`'), expected);
         }
     }
     if let Some(field) = message.strip_prefix("missing field ") {
-        return Problem::new(
-            join(&path, field.trim_matches('`')),
-            "nothing",
-            "this name is required",
-        );
+        return Problem::new(join(&path, field.trim_matches('`')), "nothing", "this name is required");
     }
     for start in ["invalid type: ", "invalid value: ", "invalid length "] {
-        if let Some((found, expected)) = message
-            .strip_prefix(start)
-            .and_then(|rest| rest.rsplit_once(", expected "))
-        {
-            let found = if start == "invalid length " {
-                format!("{found} values")
-            } else {
-                shorten(found)
-            };
+        if let Some((found, expected)) = message.strip_prefix(start).and_then(|rest| rest.rsplit_once(", expected ")) {
+            let found = if start == "invalid length " { format!("{found} values") } else { shorten(found) };
             return Problem::new(path, found, plain_type(expected));
         }
     }
@@ -395,17 +284,9 @@ fn unknown_name(path: String, wrong: &str, expected: &str) -> Problem {
     let names: Vec<&str> = expected.split('`').skip(1).step_by(2).collect();
     let inside = path.rsplit('.').next() == Some(wrong);
     let place = if inside { path } else { join(&path, wrong) };
-    let allowed = if names.is_empty() {
-        "no name here".to_string()
-    } else {
-        names.join(", ")
-    };
-    Problem::new(
-        place,
-        format!("the unknown name \"{}\"", shorten(wrong)),
-        allowed,
-    )
-    .with_nearest(nearest(wrong, names.iter().copied()))
+    let allowed = if names.is_empty() { "no name here".to_string() } else { names.join(", ") };
+    Problem::new(place, format!("the unknown name \"{}\"", shorten(wrong)), allowed)
+        .with_nearest(nearest(wrong, names.iter().copied()))
 }
 
 /// What serde expected, in the terms of JSON.
@@ -417,12 +298,8 @@ fn plain_type(expected: &str) -> String {
         "a sequence" => "an array [ … ]".to_string(),
         "a map" | "map" => "an object { … }".to_string(),
         "a string" | "path string" => "a text in \"quotes\"".to_string(),
-        "string or map" => {
-            "one of the kinds, by its name, or as an object { \"kind\": … }".to_string()
-        }
-        "map with a single key" => {
-            "an object with one name, that of the kind: { \"kind\": … }".to_string()
-        }
+        "string or map" => "one of the kinds, by its name, or as an object { \"kind\": … }".to_string(),
+        "map with a single key" => "an object with one name, that of the kind: { \"kind\": … }".to_string(),
         "unit variant" => "the name alone".to_string(),
         other => match other.strip_prefix("an array of length ") {
             Some(length) => format!("an array of {length} values"),

@@ -55,11 +55,7 @@ impl Diameters {
         match self {
             Self::Constant(diameter) => *diameter,
             Self::Uniform(range) => range.max,
-            Self::Table(rows) => rows
-                .iter()
-                .filter(|row| row[1] > 0.0)
-                .map(|row| row[0])
-                .fold(0.0, f64::max),
+            Self::Table(rows) => rows.iter().filter(|row| row[1] > 0.0).map(|row| row[0]).fold(0.0, f64::max),
         }
     }
 }
@@ -96,15 +92,8 @@ pub struct Compaction {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Deposition {
-    /// Gravity during the preparation, downwards (m/s²).
-    #[serde(default = "earth_gravity")]
-    pub gravity: f64,
     /// Solid fraction to reach at least: volume of the grains over volume of the box (0 to 1).
     pub solid_fraction: f64,
-}
-
-fn earth_gravity() -> f64 {
-    9.81
 }
 
 /// Equal grains on a regular lattice, each touching its neighbours.
@@ -143,9 +132,9 @@ impl Lattice {
     #[must_use]
     pub fn diameter(&self) -> f64 {
         match self {
-            Self::Hexagonal { diameter, .. }
-            | Self::Square { diameter, .. }
-            | Self::Cubic { diameter, .. } => *diameter,
+            Self::Hexagonal { diameter, .. } | Self::Square { diameter, .. } | Self::Cubic { diameter, .. } => {
+                *diameter
+            }
         }
     }
 
@@ -154,9 +143,7 @@ impl Lattice {
     pub fn count(&self) -> Option<usize> {
         match self {
             // every second row is one disk shorter
-            Self::Hexagonal { rows, columns, .. } => {
-                rows.checked_mul(*columns)?.checked_sub(rows / 2)
-            }
+            Self::Hexagonal { rows, columns, .. } => rows.checked_mul(*columns)?.checked_sub(rows / 2),
             Self::Square { rows, columns, .. } => rows.checked_mul(*columns),
             Self::Cubic { counts, .. } => counts[0].checked_mul(counts[1])?.checked_mul(counts[2]),
         }
@@ -215,61 +202,20 @@ mod tests {
 
     #[test]
     fn twenty_rows_of_210_and_209_disks_are_4190() {
-        assert_eq!(
-            Lattice::Hexagonal {
-                diameter: 4e-3,
-                rows: 20,
-                columns: 210
-            }
-            .count(),
-            Some(4190)
-        );
-        assert_eq!(
-            Lattice::Hexagonal {
-                diameter: 4e-3,
-                rows: 3,
-                columns: 1
-            }
-            .count(),
-            Some(2)
-        );
+        assert_eq!(Lattice::Hexagonal { diameter: 4e-3, rows: 20, columns: 210 }.count(), Some(4190));
+        assert_eq!(Lattice::Hexagonal { diameter: 4e-3, rows: 3, columns: 1 }.count(), Some(2));
     }
 
     #[test]
     fn other_lattices_count_their_grains_and_overflow_is_none() {
-        assert_eq!(
-            Lattice::Square {
-                diameter: 1.0,
-                rows: 50,
-                columns: 1
-            }
-            .count(),
-            Some(50)
-        );
-        assert_eq!(
-            Lattice::Cubic {
-                diameter: 1.0,
-                counts: [2, 3, 4]
-            }
-            .count(),
-            Some(24)
-        );
-        assert_eq!(
-            Lattice::Cubic {
-                diameter: 1.0,
-                counts: [usize::MAX, 3, 4]
-            }
-            .count(),
-            None
-        );
+        assert_eq!(Lattice::Square { diameter: 1.0, rows: 50, columns: 1 }.count(), Some(50));
+        assert_eq!(Lattice::Cubic { diameter: 1.0, counts: [2, 3, 4] }.count(), Some(24));
+        assert_eq!(Lattice::Cubic { diameter: 1.0, counts: [usize::MAX, 3, 4] }.count(), None);
     }
 
     #[test]
     fn the_largest_diameter_ignores_weights_of_zero() {
         assert_eq!(Diameters::Table(vec![[1e-3, 1.0], [9e-3, 0.0]]).max(), 1e-3);
-        assert_eq!(
-            Diameters::Uniform(UniformRange { min: 1.0, max: 2.0 }).max(),
-            2.0
-        );
+        assert_eq!(Diameters::Uniform(UniformRange { min: 1.0, max: 2.0 }).max(), 2.0);
     }
 }

@@ -32,12 +32,7 @@ impl Form {
 
     /// The names that an object of this form may have.
     pub(super) fn names(&self) -> impl Iterator<Item = &'static str> + use<> {
-        self.schema
-            .get("properties")
-            .and_then(Value::as_object)
-            .into_iter()
-            .flatten()
-            .map(|(name, _)| name.as_str())
+        self.schema.get("properties").and_then(Value::as_object).into_iter().flatten().map(|(name, _)| name.as_str())
     }
 
     /// The forms of the value under `name`.
@@ -50,10 +45,7 @@ impl Form {
 
     /// The forms of the values of a map whose names are free.
     pub(super) fn entries(&self) -> Option<Vec<Self>> {
-        let schema = self
-            .schema
-            .get("additionalProperties")
-            .filter(|schema| schema.is_object())?;
+        let schema = self.schema.get("additionalProperties").filter(|schema| schema.is_object())?;
         let mut forms = vec![];
         collect(schema, false, &mut forms);
         Some(forms)
@@ -76,12 +68,7 @@ fn collect(schema: &'static Value, kind: bool, forms: &mut Vec<Form>) {
         }
     }
     for (word, kinds) in [("oneOf", true), ("anyOf", false), ("allOf", false)] {
-        for alternative in schema
-            .get(word)
-            .and_then(Value::as_array)
-            .into_iter()
-            .flatten()
-        {
+        for alternative in schema.get(word).and_then(Value::as_array).into_iter().flatten() {
             collect(alternative, kind || kinds, forms);
         }
     }
@@ -97,33 +84,18 @@ mod tests {
     #[test]
     fn every_name_of_the_model_is_described() {
         fn check(path: &str, schema: &Value, silent: &mut Vec<String>) {
-            for (name, property) in schema
-                .get("properties")
-                .and_then(Value::as_object)
-                .into_iter()
-                .flatten()
-            {
+            for (name, property) in schema.get("properties").and_then(Value::as_object).into_iter().flatten() {
                 if property.get("description").is_none() && property.get("$ref").is_none() {
                     silent.push(format!("{path}.{name}"));
                 }
                 check(&format!("{path}.{name}"), property, silent);
             }
-            for alternative in schema
-                .get("oneOf")
-                .and_then(Value::as_array)
-                .into_iter()
-                .flatten()
-            {
+            for alternative in schema.get("oneOf").and_then(Value::as_array).into_iter().flatten() {
                 if alternative.get("description").is_none() {
                     silent.push(format!("{path}: {alternative}"));
                 }
                 // the name of a kind is described by the kind
-                for inner in alternative["properties"]
-                    .as_object()
-                    .into_iter()
-                    .flatten()
-                    .map(|(_, inner)| inner)
-                {
+                for inner in alternative["properties"].as_object().into_iter().flatten().map(|(_, inner)| inner) {
                     check(path, inner, silent);
                 }
             }
@@ -139,9 +111,7 @@ mod tests {
     #[test]
     fn units_reach_the_schema() {
         let text = json_schema().to_string();
-        for unit in [
-            "(kg/m³)", "(N/s)", "(m/s²)", "(s)", "(Pa)", "(N m)", "(rad/s)",
-        ] {
+        for unit in ["(kg/m³)", "(N/s)", "(m/s²)", "(s)", "(Pa)", "(N m)", "(rad/s)"] {
             assert!(text.contains(unit), "{unit}");
         }
     }
@@ -150,11 +120,7 @@ mod tests {
     fn forms_follow_options_and_kinds() {
         let root = Form::root();
         let bonds = root[0].property("bonds").expect("bonds");
-        assert!(
-            bonds
-                .iter()
-                .any(|form| form.names().any(|name| name == "strength"))
-        );
+        assert!(bonds.iter().any(|form| form.names().any(|name| name == "strength")));
         let sample = root[0].property("sample").expect("sample");
         assert!(sample.iter().all(|form| form.kind));
         assert_eq!(sample.len(), 4);

@@ -23,20 +23,12 @@ pub(super) fn apply(document: &mut Document, assignments: &[String]) -> Result<(
             problems.push(problem.with_origin(Origin::Set(assignment.clone())));
         }
     }
-    if problems.is_empty() {
-        Ok(())
-    } else {
-        Err(problems)
-    }
+    if problems.is_empty() { Ok(()) } else { Err(problems) }
 }
 
 fn assign(document: &mut Document, assignment: &str) -> Result<(), Problem> {
     let Some((path, literal)) = assignment.split_once('=') else {
-        return Err(Problem::new(
-            "",
-            quoted(assignment),
-            "path=value, as in bonds.strength=5",
-        ));
+        return Err(Problem::new("", quoted(assignment), "path=value, as in bonds.strength=5"));
     };
     let path = path.trim();
     check_path(&document.root, path)?;
@@ -54,27 +46,17 @@ fn read_value(path: &str, literal: &str) -> Result<(Value, Overflows), Problem> 
     if let Ok(parsed) = parse::parse("--set", literal) {
         let overflows = parsed.non_finite().iter();
         let overflows = overflows.map(|(below, text)| {
-            if below.is_empty() {
-                (path.to_string(), text.clone())
-            } else {
-                (join(path, below), text.clone())
-            }
+            if below.is_empty() { (path.to_string(), text.clone()) } else { (join(path, below), text.clone()) }
         });
         return Ok((parsed.root.clone(), overflows.collect()));
     }
     let bare = !literal.is_empty()
-        && literal
-            .chars()
-            .all(|c| c.is_alphanumeric() || "_-./ ".contains(c))
+        && literal.chars().all(|c| c.is_alphanumeric() || "_-./ ".contains(c))
         && literal.starts_with(|c: char| c.is_alphabetic() || "_./".contains(c));
     if bare {
         return Ok((Value::String(literal.to_string()), vec![]));
     }
-    Err(Problem::new(
-        path,
-        quoted(literal),
-        "a JSON value: a number, true, \"text\", [ … ] or { … }, or a bare word",
-    ))
+    Err(Problem::new(path, quoted(literal), "a JSON value: a number, true, \"text\", [ … ] or { … }, or a bare word"))
 }
 
 /// Whether `path` exists in the model and, where names are free or counted, in the tree.
@@ -91,30 +73,17 @@ fn check_path(root: &Value, path: &str) -> Result<(), Problem> {
 }
 
 /// The forms of the value under `key`, where a value of one of `forms` is expected and `node` stands.
-fn step(
-    forms: &[Form],
-    node: Option<&Value>,
-    above: &str,
-    key: &str,
-) -> Result<Vec<Form>, Problem> {
+fn step(forms: &[Form], node: Option<&Value>, above: &str, key: &str) -> Result<Vec<Form>, Problem> {
     let below = join(above, key);
     let object = node.and_then(Value::as_object);
-    if let Some((form, found)) = forms
-        .iter()
-        .find_map(|form| Some((form, form.property(key)?)))
-    {
+    if let Some((form, found)) = forms.iter().find_map(|form| Some((form, form.property(key)?))) {
         // one kind of several: the scene may stand at another, whose values this path would mix with
         if form.kind
             && let Some(other) = other_kind(node, key)
         {
-            let allowed = format!(
-                "this path only where the scene has \"{key}\"; to change the kind, set {above} as a whole"
-            );
-            return Err(Problem::new(
-                below,
-                format!("\"{other}\" in {above}"),
-                allowed,
-            ));
+            let allowed =
+                format!("this path only where the scene has \"{key}\"; to change the kind, set {above} as a whole");
+            return Err(Problem::new(below, format!("\"{other}\" in {above}"), allowed));
         }
         return Ok(found);
     }
@@ -122,11 +91,7 @@ fn step(
         if object.is_some_and(|object| object.contains_key(key)) {
             return Ok(found);
         }
-        return Err(unknown(
-            above,
-            key,
-            object.into_iter().flatten().map(|(name, _)| name.as_str()),
-        ));
+        return Err(unknown(above, key, object.into_iter().flatten().map(|(name, _)| name.as_str())));
     }
     if let Some(found) = forms.iter().find_map(Form::items) {
         let length = node.and_then(Value::as_array).map_or(0, Vec::len);
@@ -135,10 +100,7 @@ fn step(
         }
         let allowed = match length {
             0 => format!("{above} is an array without values: set it as a whole"),
-            _ => format!(
-                "a number from 0 to {}, one of the {length} values of {above}",
-                length - 1
-            ),
+            _ => format!("a number from 0 to {}, one of the {length} values of {above}", length - 1),
         };
         return Err(Problem::new(below, quoted(key), allowed));
     }
@@ -148,10 +110,7 @@ fn step(
 /// The kind that stands at `node`, if it is not `key`.
 fn other_kind(node: Option<&Value>, key: &str) -> Option<String> {
     match node? {
-        Value::Object(map) => map
-            .keys()
-            .find(|name| *name != key)
-            .map(|name| shorten(name)),
+        Value::Object(map) => map.keys().find(|name| *name != key).map(|name| shorten(name)),
         Value::String(name) => Some(shorten(name)),
         _ => None,
     }
@@ -165,12 +124,8 @@ fn unknown<'a>(above: &str, key: &str, names: impl Iterator<Item = &'a str>) -> 
         (false, above) => format!("below {above}: {}", list(&names)),
     };
     let suggestion = nearest(key, names.iter().copied()).map(|name| join(above, &name));
-    Problem::new(
-        join(above, &shorten(key)),
-        format!("the unknown name \"{}\"", shorten(key)),
-        allowed,
-    )
-    .with_nearest(suggestion)
+    Problem::new(join(above, &shorten(key)), format!("the unknown name \"{}\"", shorten(key)), allowed)
+        .with_nearest(suggestion)
 }
 
 fn quoted(text: &str) -> String {
@@ -194,11 +149,7 @@ fn store(root: &mut Value, path: &str, value: Value) {
     let mut node = root;
     for key in path.split('.') {
         node = match node {
-            Value::Array(items) => match key
-                .parse::<usize>()
-                .ok()
-                .and_then(|index| items.get_mut(index))
-            {
+            Value::Array(items) => match key.parse::<usize>().ok().and_then(|index| items.get_mut(index)) {
                 Some(item) => item,
                 None => return,
             },

@@ -24,6 +24,8 @@ pub struct Solver {
 pub enum SolverKind {
     /// Non-linear Gauss–Seidel: one contact after the other, until none changes.
     GaussSeidel(GaussSeidel),
+    /// Semismooth Newton on the augmented Lagrangian, with a sparse factorisation: all contacts at once.
+    Newton(Newton),
 }
 
 /// Non-linear Gauss–Seidel.
@@ -34,6 +36,32 @@ pub struct GaussSeidel {
     pub local: LocalSolve,
     /// Sweeps over all contacts after which a solve gives up.
     pub max_sweeps: u64,
+}
+
+/// Semismooth Newton on the augmented Lagrangian.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Newton {
+    /// Load error that the solver aims at: how far the net force on the bodies still changed, over itself.
+    pub load_tolerance: f64,
+    /// Where the reactions start from in every step.
+    pub start: Start,
+    /// Tangential stiffness over the normal one, in the metric of the stiff limit.
+    pub tangential_stiffness: f64,
+    /// Bending stiffness over the normal one times the square of the mean diameter, in the metric of the stiff limit.
+    pub rolling_stiffness: f64,
+    /// Newton iterations after which a solve gives up.
+    pub max_iterations: u64,
+}
+
+/// Where the reactions start from in every step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Start {
+    /// From zero: of all reactions that balance the load, those that stiff springs would give.
+    StiffLimit,
+    /// From the last step: the reactions keep their history.
+    LastStep,
 }
 
 /// How one contact is solved, the others held.
@@ -59,9 +87,20 @@ impl Default for Solver {
 
 impl Default for GaussSeidel {
     fn default() -> Self {
+        Self { local: LocalSolve::Exact, max_sweeps: 100_000 }
+    }
+}
+
+impl Default for Newton {
+    fn default() -> Self {
+        // a bar of width and length a: bending stiffness over the normal one is a²/12
+        let rolling_stiffness = 1.0 / 12.0;
         Self {
-            local: LocalSolve::Exact,
-            max_sweeps: 100_000,
+            load_tolerance: 1e-5,
+            start: Start::StiffLimit,
+            tangential_stiffness: 1.0,
+            rolling_stiffness,
+            max_iterations: 300,
         }
     }
 }

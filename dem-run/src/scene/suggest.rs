@@ -25,10 +25,7 @@ fn allowance(length: usize) -> usize {
 
 /// Lower case, `-` and blanks as `_`.
 fn plain(name: &str) -> Vec<char> {
-    name.chars()
-        .flat_map(char::to_lowercase)
-        .map(|c| if c == '-' || c == ' ' { '_' } else { c })
-        .collect()
+    name.chars().flat_map(char::to_lowercase).map(|c| if c == '-' || c == ' ' { '_' } else { c }).collect()
 }
 
 /// Number of insertions, deletions, substitutions and swaps of neighbours from `a` to `b`
@@ -74,10 +71,7 @@ mod tests {
         assert_eq!(nearest("strenght", names).as_deref(), Some("strength"));
         assert_eq!(nearest("gaptol", ["gap_tolerance"]), None);
         assert_eq!(nearest("colour", names), None);
-        assert_eq!(
-            nearest("gap-tolerance", names).as_deref(),
-            Some("gap_tolerance")
-        );
+        assert_eq!(nearest("gap-tolerance", names).as_deref(), Some("gap_tolerance"));
         assert_eq!(nearest(&"x".repeat(10_000), names), None);
     }
 }

@@ -156,10 +156,7 @@ mod tests {
 
     fn plane() -> Wall {
         Wall {
-            shape: Shape::Plane(Plane {
-                normal: vec![0.0, -1.0],
-                place: Place::Seated,
-            }),
+            shape: Shape::Plane(Plane { normal: vec![0.0, -1.0], place: Place::Seated }),
             friction: None,
             velocity: None,
             force: None,
@@ -171,13 +168,7 @@ mod tests {
 
     #[test]
     fn a_force_rate_is_a_ramp_from_zero() {
-        let Drive::Force(force) = (Wall {
-            force_rate: Some(200.0),
-            ..plane()
-        })
-        .drive() else {
-            panic!("no force")
-        };
+        let Drive::Force(force) = (Wall { force_rate: Some(200.0), ..plane() }).drive() else { panic!("no force") };
         assert_eq!((force.at(0.0), force.at(0.5)), (0.0, 100.0));
         assert_eq!(plane().drive(), Drive::Fixed);
     }
@@ -185,23 +176,9 @@ mod tests {
     #[test]
     fn a_plane_moves_along_its_normal_unless_told_otherwise() {
         assert_eq!(plane().drive_direction(), Some(&[0.0, -1.0][..]));
-        let tilted = Wall {
-            direction: Some(vec![1.0, 0.0]),
-            ..plane()
-        };
+        let tilted = Wall { direction: Some(vec![1.0, 0.0]), ..plane() };
         assert_eq!(tilted.drive_direction(), Some(&[1.0, 0.0][..]));
-        let circle = Shape::Circle(Circle {
-            center: vec![0.0, 0.0],
-            radius: 1.0,
-            inside: false,
-        });
-        assert_eq!(
-            Wall {
-                shape: circle,
-                ..plane()
-            }
-            .drive_direction(),
-            None
-        );
+        let circle = Shape::Circle(Circle { center: vec![0.0, 0.0], radius: 1.0, inside: false });
+        assert_eq!(Wall { shape: circle, ..plane() }.drive_direction(), None);
     }
 }

@@ -76,7 +76,8 @@ impl Pattern {
         for (at, count) in &blocks {
             entries(*at, *count, |row, col, _, _| indices.push(Pair::new(row, col)));
         }
-        let (matrix, order) = SymbolicSparseColMat::try_new_from_indices(rows.unknowns, rows.unknowns, &indices).ok()?;
+        let (matrix, order) =
+            SymbolicSparseColMat::try_new_from_indices(rows.unknowns, rows.unknowns, &indices).ok()?;
         let symbolic = SymbolicLlt::try_new(matrix.as_ref(), Side::Lower).ok()?;
         Some(Self { blocks, unknowns: rows.unknowns, matrix, order, symbolic })
     }
@@ -93,7 +94,8 @@ fn values(rows: &Rows, operators: &[Option<Operator>]) -> Vec<f64> {
         if let Some(a) = operator {
             for (k, row_place) in row.rows.iter().enumerate() {
                 for c in 0..width {
-                    pulled[k][c] = row.rows.iter().enumerate().map(|(l, place)| a[(*row_place, *place)] * h(l, c)).sum();
+                    pulled[k][c] =
+                        row.rows.iter().enumerate().map(|(l, place)| a[(*row_place, *place)] * h(l, c)).sum();
                 }
             }
         }

@@ -21,7 +21,7 @@ mod factor;
 mod krylov;
 mod rows;
 
-use super::{ContactSolver, SolveReport, SolveStatus, sweep};
+use super::{ContactSolver, GaussSeidel, GaussSeidelSettings, SolveReport, SolveStatus, sweep};
 use crate::contact::{Law, Local, LocalSolve};
 use crate::dim::{Dim, resized};
 use crate::problem::residual::residual;
@@ -72,6 +72,9 @@ const PATIENCE: u64 = 8;
 const SWEEPS: usize = 5;
 const COLD_SWEEPS: usize = 100;
 const STALL_SWEEPS: usize = 50;
+/// Stalls after which Gauss–Seidel takes over, and the most sweeps that it makes.
+const MOST_STALLS: u64 = 3;
+const MOST_SWEEPS: u64 = 100_000;
 
 /// Augmented-Lagrangian semismooth Newton.
 pub struct Newton {
@@ -129,7 +132,8 @@ impl Newton {
             rounding += h * (speed * h / (row.weights.n * row.weights.n) + r.dot(r));
             carried += h * own.dot(&own);
         }
-        let wanted = (0.1 * self.settings.load_tolerance * change.sqrt()).min(0.1 * self.settings.tolerance * carried.sqrt());
+        let wanted =
+            (0.1 * self.settings.load_tolerance * change.sqrt()).min(0.1 * self.settings.tolerance * carried.sqrt());
         wanted.max(4.0 * f64::EPSILON * rounding.sqrt())
     }
 
@@ -154,6 +158,25 @@ impl Newton {
             }
         }
         None
+    }
+
+    /// Gauss–Seidel from the impulses at hand. It cannot tell its load error.
+    fn swept_to_the_end<D: Dim>(&self, problem: &mut ContactProblem<D>, iterations: u64) -> SolveReport {
+        let NewtonSettings { tolerance, accept, .. } = self.settings;
+        let finite = |r: f64| r.is_finite();
+        if !problem.bonded.iter().all(|c| finite(c.r.n)) || !problem.dry.iter().all(|c| finite(c.r.n)) {
+            problem.forget_reactions();
+        }
+        let settings = GaussSeidelSettings {
+            local: LocalSolve::Exact,
+            tolerance: tolerance.max(accept),
+            accept,
+            max_sweeps: MOST_SWEEPS,
+        };
+        let swept = GaussSeidel::new(settings).solve(problem);
+        let status =
+            if swept.residual <= tolerance { swept.status } else { swept.status.at_best(SolveStatus::Accepted) };
+        SolveReport { status, iterations: iterations + swept.iterations, ..swept }
     }
 
     fn report(&self, iterations: u64, residual: f64, load_error: f64) -> SolveReport {
@@ -330,7 +353,7 @@ impl<D: Dim> ContactSolver<D> for Newton {
         let mut y = rows.free.clone();
         add_reactions(&rows, &guess, 1.0, &mut y);
         let mut state = Iterate::at(&rows, y);
-        let mut guessed = true;
+        let (mut guessed, mut stalls) = (true, 0);
         let (mut iterations, mut error, mut load_error) = (0, f64::INFINITY, f64::INFINITY);
         while iterations < self.settings.max_iterations {
             let (made, solved) = self.inner(&rows, &mut state, guessed.then_some(&guess[..]));
@@ -338,8 +361,12 @@ impl<D: Dim> ContactSolver<D> for Newton {
             guessed = false;
             write_back(problem, &state.reactions, &rows);
             if !solved {
-                // the active set runs in circles: sweeps from here show another
+                // the active set runs in circles: sweeps from here show another, or have to do the work alone
                 self.renew = true;
+                stalls += 1;
+                if stalls > MOST_STALLS {
+                    return self.swept_to_the_end(problem, iterations);
+                }
                 guess = swept(problem, &rows, STALL_SWEEPS);
                 guessed = true;
                 continue;

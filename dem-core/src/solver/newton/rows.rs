@@ -220,9 +220,31 @@ fn write_scaled<D: Dim>(nodes: &Nodes<D>, unknowns: &Unknowns, k: usize, v: &D::
     }
 }
 
+/// Coefficients of the rows of one contact, over the unknowns of its pair.
+struct Table {
+    rows: [[f64; 12]; 5],
+    tangents: usize,
+    bends: usize,
+    /// Columns filled so far.
+    width: usize,
+}
+
+impl Table {
+    fn add<T: Vect>(&mut self, n: f64, t: T, m: T, scale: f64) {
+        self.rows[0][self.width] = n * scale;
+        for c in 0..self.tangents {
+            self.rows[1 + c][self.width] = t[c] * scale;
+        }
+        for c in 0..self.bends {
+            self.rows[1 + self.tangents + c][self.width] = m[c] * scale;
+        }
+        self.width += 1;
+    }
+}
+
 impl<D: Dim> Flatten<'_, D> {
-    /// Append the coefficients of one node's unknowns, row after row, into `table` (rows × unknowns of the pair).
-    fn node(&self, link: &Link<D>, arm: f64, side: usize, tangents: usize, bends: usize, table: &mut [[f64; 12]; 5], at: usize) -> usize {
+    /// Add the columns of one node's unknowns to the table of a contact; returns how many.
+    fn node(&self, link: &Link<D>, arm: f64, side: usize, table: &mut Table) -> usize {
         let k = link.nodes[side] as usize;
         let nodes = &self.problem.nodes;
         let node = &nodes.all[k];
@@ -230,32 +252,23 @@ impl<D: Dim> Flatten<'_, D> {
             return 0;
         }
         let sign = if side == 0 { 1.0 } else { -1.0 };
-        let mut put = |column: usize, n: f64, t: D::Tangent, m: D::Tangent, scale: f64| {
-            table[0][column] = n * scale;
-            for c in 0..tangents {
-                table[1 + c][column] = t[c] * scale;
-            }
-            for c in 0..bends {
-                table[1 + tangents + c][column] = m[c] * scale;
-            }
-        };
         let zero = D::Tangent::zero();
         if k >= nodes.grains {
             let (n, t) = D::split(&link.frame, nodes.drives[k - nodes.grains]);
-            put(at, -n, -t, zero, node.inverse_mass.sqrt());
+            table.add(-n, -t, zero, node.inverse_mass.sqrt());
             return 1;
         }
         for axis in 0..D::N {
             let mut e = D::Vector::zero();
             e[axis] = sign;
             let (n, t) = D::split(&link.frame, e);
-            put(at + axis, n, t, zero, node.inverse_mass.sqrt());
+            table.add(n, t, zero, node.inverse_mass.sqrt());
         }
         for axis in 0..D::Spin::LEN {
             let mut e = D::Spin::zero();
             e[axis] = 1.0;
             let turn = D::spin_rows(&link.frame, e);
-            put(at + D::N + axis, 0.0, turn * -link.lever[side], turn * (sign * arm), node.inverse_inertia.sqrt());
+            table.add(0.0, turn * -link.lever[side], turn * (sign * arm), node.inverse_inertia.sqrt());
         }
         D::N + D::Spin::LEN
     }
@@ -263,20 +276,19 @@ impl<D: Dim> Flatten<'_, D> {
 
 impl<D: Dim> Visitor<D> for Flatten<'_, D> {
     fn visit<L: Law>(&mut self, _: &Nodes<D>, c: &Contact<D, L>) {
-        let (tangents, bends) = (L::T::LEN, L::B::LEN);
-        let rows = places(tangents, bends);
+        let rows = places(L::T::LEN, L::B::LEN);
         let arm = c.law.arm();
-        let mut table = [[0.0; 12]; 5];
-        let first = self.node(&c.link, arm, 0, tangents, bends, &mut table, 0);
-        let second = self.node(&c.link, arm, 1, tangents, bends, &mut table, first);
+        let mut table = Table { rows: [[0.0; 12]; 5], tangents: L::T::LEN, bends: L::B::LEN, width: 0 };
+        let first = self.node(&c.link, arm, 0, &mut table);
+        let second = self.node(&c.link, arm, 1, &mut table);
         let start = self.rows.coefficients.len();
-        for row in &table[..rows.len()] {
-            self.rows.coefficients.extend_from_slice(&row[..first + second]);
+        for row in &table.rows[..rows.len()] {
+            self.rows.coefficients.extend_from_slice(&row[..table.width]);
         }
         // what the given velocities of nodes that cannot move do
         let mut given: Padded = padded(self.still.relative_velocity::<L::T, L::B>(&c.link, arm));
         given.n += c.law.bias();
-        let normal: f64 = table[0][..first + second].iter().map(|h| h * h).sum();
+        let normal: f64 = table.rows[0][..table.width].iter().map(|h| h * h).sum();
         self.normal.push(normal);
         let size = c.link.lever[0] + if c.link.lever[1] > 0.0 { c.link.lever[1] } else { c.link.lever[0] };
         let soft = size.powi(2 - D::N as i32);

@@ -22,26 +22,11 @@ const FLAT_CASES: &[(&str, &str)] = &[
     ("sample.grains.1.density=0", "sample.grains.1.density"),
     // materials
     ("materials.density=0", "materials.density"),
-    (
-        "materials.friction.grain_grain=-0.1",
-        "materials.friction.grain_grain",
-    ),
-    (
-        "materials.friction.grain_wall=-0.1",
-        "materials.friction.grain_wall",
-    ),
-    (
-        "materials.restitution.grain_grain=1.1",
-        "materials.restitution.grain_grain",
-    ),
-    (
-        "materials.restitution.grain_wall=-0.1",
-        "materials.restitution.grain_wall",
-    ),
-    (
-        "materials.restitution.threshold_speed=-1",
-        "materials.restitution.threshold_speed",
-    ),
+    ("materials.friction.grain_grain=-0.1", "materials.friction.grain_grain"),
+    ("materials.friction.grain_wall=-0.1", "materials.friction.grain_wall"),
+    ("materials.restitution.grain_grain=1.1", "materials.restitution.grain_grain"),
+    ("materials.restitution.grain_wall=-0.1", "materials.restitution.grain_wall"),
+    ("materials.restitution.threshold_speed=-1", "materials.restitution.threshold_speed"),
     // bonds
     ("bonds.strength=-1", "bonds.strength"),
     ("bonds.strength=null", "bonds"),
@@ -55,42 +40,18 @@ const FLAT_CASES: &[(&str, &str)] = &[
     ("grains.loads.0.force=[1]", "grains.loads.0.force"),
     ("grains.loads.0.force=null", "grains.loads.0"),
     ("grains.loads.0.torque=[1, 2, 3]", "grains.loads.0.torque"),
-    (
-        "grains.loads.0.time={\"table\": []}",
-        "grains.loads.0.time.table",
-    ),
-    (
-        "grains.loads.0.time={\"table\": [[0, 1], [0, 2]]}",
-        "grains.loads.0.time.table.1.0",
-    ),
+    ("grains.loads.0.time={\"table\": []}", "grains.loads.0.time.table"),
+    ("grains.loads.0.time={\"table\": [[0, 1], [0, 2]]}", "grains.loads.0.time.table.1.0"),
     // walls
-    (
-        "walls.bottom.shape.plane.normal=[0, 0]",
-        "walls.bottom.shape.plane.normal",
-    ),
-    (
-        "walls.bottom.shape.plane.normal=[0, 1, 0]",
-        "walls.bottom.shape.plane.normal",
-    ),
-    (
-        "walls.bottom.shape.plane.place.at=[0]",
-        "walls.bottom.shape.plane.place.at",
-    ),
+    ("walls.bottom.shape.plane.normal=[0, 0]", "walls.bottom.shape.plane.normal"),
+    ("walls.bottom.shape.plane.normal=[0, 1, 0]", "walls.bottom.shape.plane.normal"),
+    ("walls.bottom.shape.plane.place.at=[0]", "walls.bottom.shape.plane.place.at"),
     ("walls.bottom.friction=-1", "walls.bottom.friction"),
     ("walls.bottom.mass=sample", "walls.bottom.mass"),
     ("walls.bottom.direction=[0, 1]", "walls.bottom.direction"),
-    (
-        "walls.roller.shape.circle.radius=0",
-        "walls.roller.shape.circle.radius",
-    ),
-    (
-        "walls.roller.shape.circle.center=[0, 0, 0]",
-        "walls.roller.shape.circle.center",
-    ),
-    (
-        "walls.roller.shape={\"sphere\": {\"center\": [0, 0], \"radius\": 1}}",
-        "walls.roller.shape.sphere",
-    ),
+    ("walls.roller.shape.circle.radius=0", "walls.roller.shape.circle.radius"),
+    ("walls.roller.shape.circle.center=[0, 0, 0]", "walls.roller.shape.circle.center"),
+    ("walls.roller.shape={\"sphere\": {\"center\": [0, 0], \"radius\": 1}}", "walls.roller.shape.sphere"),
     ("walls.roller.direction=null", "walls.roller.direction"),
     ("walls.roller.direction=[0, 0]", "walls.roller.direction"),
     ("walls.roller.mass={\"kg\": 1}", "walls.roller.mass"),
@@ -113,17 +74,11 @@ const FLAT_CASES: &[(&str, &str)] = &[
     ("solver.tolerance=1e-3", "solver.accept"),
     ("solver.accept=1e-5", "solver.accept"),
     ("solver.max_step_halvings=31", "solver.max_step_halvings"),
-    (
-        "solver.kind.gauss_seidel.max_sweeps=0",
-        "solver.kind.gauss_seidel.max_sweeps",
-    ),
+    ("solver.kind.gauss_seidel.max_sweeps=0", "solver.kind.gauss_seidel.max_sweeps"),
     // stop
     ("stop.wall_travel.wall=tpo", "stop.wall_travel.wall"),
     ("stop.wall_travel.wall=bottom", "stop.wall_travel.wall"),
-    (
-        "stop.wall_travel.fraction_of_height=0",
-        "stop.wall_travel.fraction_of_height",
-    ),
+    ("stop.wall_travel.fraction_of_height=0", "stop.wall_travel.fraction_of_height"),
     ("stop.broken_fraction=0", "stop.broken_fraction"),
     ("stop.broken_fraction=1.5", "stop.broken_fraction"),
     ("bonds=null", "stop.wall_travel.after"),
@@ -138,81 +93,34 @@ const SOLID_CASES: &[(&str, &str)] = &[
     ("sample.random.depth=null", "sample.random.depth"),
     ("sample.random.width=-1", "sample.random.width"),
     ("sample.random.width=1e-4", "sample.random.width"),
-    (
-        "sample.random.diameter.constant=0",
-        "sample.random.diameter.constant",
-    ),
-    (
-        "sample.random.diameter={\"uniform\": {\"min\": 2e-3, \"max\": 1e-3}}",
-        "sample.random.diameter.uniform.max",
-    ),
-    (
-        "sample.random.diameter={\"uniform\": {\"min\": 0, \"max\": 1e-3}}",
-        "sample.random.diameter.uniform.min",
-    ),
-    (
-        "sample.random.diameter={\"table\": []}",
-        "sample.random.diameter.table",
-    ),
-    (
-        "sample.random.diameter={\"table\": [[1e-3, 0]]}",
-        "sample.random.diameter.table",
-    ),
-    (
-        "sample.random.diameter={\"table\": [[1e-3, 1], [-1e-3, 1]]}",
-        "sample.random.diameter.table.1.0",
-    ),
-    (
-        "sample.random.diameter={\"table\": [[1e-3, 1], [1e-3, -1]]}",
-        "sample.random.diameter.table.1.1",
-    ),
-    (
-        "sample.random.preparation.deposition.solid_fraction=1",
-        "sample.random.preparation.deposition.solid_fraction",
-    ),
-    (
-        "sample.random.preparation.deposition.gravity=0",
-        "sample.random.preparation.deposition.gravity",
-    ),
+    ("sample.random.diameter.constant=0", "sample.random.diameter.constant"),
+    ("sample.random.diameter={\"uniform\": {\"min\": 2e-3, \"max\": 1e-3}}", "sample.random.diameter.uniform.max"),
+    ("sample.random.diameter={\"uniform\": {\"min\": 0, \"max\": 1e-3}}", "sample.random.diameter.uniform.min"),
+    ("sample.random.diameter={\"table\": []}", "sample.random.diameter.table"),
+    ("sample.random.diameter={\"table\": [[1e-3, 0]]}", "sample.random.diameter.table"),
+    ("sample.random.diameter={\"table\": [[1e-3, 1], [-1e-3, 1]]}", "sample.random.diameter.table.1.0"),
+    ("sample.random.diameter={\"table\": [[1e-3, 1], [1e-3, -1]]}", "sample.random.diameter.table.1.1"),
+    ("sample.random.preparation.deposition.solid_fraction=1", "sample.random.preparation.deposition.solid_fraction"),
     (
         "sample={\"lattice\": {\"hexagonal\": {\"diameter\": 1, \"rows\": 1, \"columns\": 1}}}",
         "sample.lattice.hexagonal",
     ),
-    (
-        "sample={\"lattice\": {\"cubic\": {\"diameter\": -1, \"counts\": [1, 1, 1]}}}",
-        "sample.lattice.cubic.diameter",
-    ),
-    (
-        "sample={\"lattice\": {\"cubic\": {\"diameter\": 1, \"counts\": [1, 0, 1]}}}",
-        "sample.lattice.cubic.counts.1",
-    ),
+    ("sample={\"lattice\": {\"cubic\": {\"diameter\": -1, \"counts\": [1, 1, 1]}}}", "sample.lattice.cubic.diameter"),
+    ("sample={\"lattice\": {\"cubic\": {\"diameter\": 1, \"counts\": [1, 0, 1]}}}", "sample.lattice.cubic.counts.1"),
     (
         "sample={\"lattice\": {\"cubic\": {\"diameter\": 1, \"counts\": [10000000, 100000000, 100000000]}}}",
         "sample.lattice.cubic",
     ),
     ("sample={\"file\": {\"path\": \"\"}}", "sample.file.path"),
-    (
-        "walls.drum.shape.cylinder.axis=[0, 0, 0]",
-        "walls.drum.shape.cylinder.axis",
-    ),
-    (
-        "walls.drum.shape={\"circle\": {\"center\": [0, 0, 0], \"radius\": 1}}",
-        "walls.drum.shape.circle",
-    ),
-    (
-        "walls={\"a.b\": {\"shape\": {\"plane\": {\"normal\": [0, 0, 1], \"place\": \"seated\"}}}}",
-        "walls.a.b",
-    ),
+    ("walls.drum.shape.cylinder.axis=[0, 0, 0]", "walls.drum.shape.cylinder.axis"),
+    ("walls.drum.shape={\"circle\": {\"center\": [0, 0, 0], \"radius\": 1}}", "walls.drum.shape.circle"),
+    ("walls={\"a.b\": {\"shape\": {\"plane\": {\"normal\": [0, 0, 1], \"place\": \"seated\"}}}}", "walls.a.b"),
 ];
 
 fn check(text: &str, cases: &[(&str, &str)]) {
     for (set, path) in cases {
         let error = read(text, &[set]).expect_err(set);
-        let paths: Vec<&str> = error
-            .problems()
-            .iter()
-            .map(|problem| problem.path.as_str())
-            .collect();
+        let paths: Vec<&str> = error.problems().iter().map(|problem| problem.path.as_str()).collect();
         // a change of dimension makes other places wrong too, but only it is told
         assert_eq!(paths, [*path], "{set}: {error}");
     }
@@ -243,11 +151,7 @@ fn limits_themselves_are_right() {
     ] {
         read(FLAT, &[set]).unwrap_or_else(|error| panic!("{set}: {error}"));
     }
-    read(
-        SOLID,
-        &["sample.random.width=1e-3", "sample.random.count=1"],
-    )
-    .expect("a box as wide as a grain");
+    read(SOLID, &["sample.random.width=1e-3", "sample.random.count=1"]).expect("a box as wide as a grain");
 }
 
 #[test]
@@ -255,17 +159,11 @@ fn all_wrong_values_are_told_at_once_with_their_lines() {
     let text = FLAT
         .replace("\"step\": 1e-4", "\"step\": 0")
         .replace("\"grain_grain\": 0.3", "\"grain_grain\": -0.3")
-        .replace(
-            "\"radius\": 1e-3, \"velocity\"",
-            "\"radius\": -1e-3, \"velocity\"",
-        )
+        .replace("\"radius\": 1e-3, \"velocity\"", "\"radius\": -1e-3, \"velocity\"")
         .replace("\"wall\": \"top\"", "\"wall\": \"tap\"");
     let error = read(&text, &[]).expect_err("four wrong values");
-    let seen: Vec<(&str, &str, Option<Origin>)> = error
-        .problems()
-        .iter()
-        .map(|p| (p.path.as_str(), p.found.as_str(), p.origin.clone()))
-        .collect();
+    let seen: Vec<(&str, &str, Option<Origin>)> =
+        error.problems().iter().map(|p| (p.path.as_str(), p.found.as_str(), p.origin.clone())).collect();
     let at = |line, column| Some(Origin::Text { line, column });
     assert_eq!(
         seen,
@@ -277,12 +175,7 @@ fn all_wrong_values_are_told_at_once_with_their_lines() {
         ]
     );
     assert_eq!(error.problems()[3].nearest.as_deref(), Some("top"));
-    assert!(
-        error
-            .problems()
-            .iter()
-            .all(|problem| !problem.allowed.is_empty())
-    );
+    assert!(error.problems().iter().all(|problem| !problem.allowed.is_empty()));
 }
 
 #[test]
@@ -301,15 +194,9 @@ fn nan_and_infinity_are_found_in_a_scene_that_was_made_in_code() {
         scene.solver.tolerance = bad;
         scene.materials.restitution.grain_grain = bad;
         let wall = scene.walls.get_mut("bottom").expect("a wall");
-        wall.shape = Shape::Plane(Plane {
-            normal: vec![bad, 1.0],
-            place: Place::Seated,
-        });
+        wall.shape = Shape::Plane(Plane { normal: vec![bad, 1.0], place: Place::Seated });
         let problems = validate(&scene);
-        let paths: Vec<&str> = problems
-            .iter()
-            .map(|problem| problem.path.as_str())
-            .collect();
+        let paths: Vec<&str> = problems.iter().map(|problem| problem.path.as_str()).collect();
         for path in [
             "materials.density",
             "materials.restitution.grain_grain",

@@ -22,21 +22,14 @@ const MAX_STEPS: f64 = 1e12;
 /// All wrong values of a scene, in its order; none if the scene is right.
 #[must_use]
 pub fn validate(scene: &Scene) -> Vec<Problem> {
-    let mut report = Report {
-        dimension: usize::from(scene.dimension),
-        problems: vec![],
-    };
+    let mut report = Report { dimension: usize::from(scene.dimension), problems: vec![] };
     if !matches!(scene.dimension, 2 | 3) {
         report.wrong("dimension", scene.dimension, "2 (disks) or 3 (spheres)");
         // lengths of vectors cannot be judged
         return report.problems;
     }
     match (scene.dimension, scene.thickness) {
-        (3, Some(thickness)) => report.wrong(
-            "thickness",
-            Number(thickness),
-            "nothing: spheres have no thickness",
-        ),
+        (3, Some(thickness)) => report.wrong("thickness", Number(thickness), "nothing: spheres have no thickness"),
         (_, Some(thickness)) => report.positive("thickness", thickness, "m"),
         (_, None) => {}
     }
@@ -61,65 +54,30 @@ pub fn validate(scene: &Scene) -> Vec<Problem> {
 fn materials(report: &mut Report, scene: &Scene) {
     let materials = &scene.materials;
     report.positive("materials.density", materials.density, "kg/m³");
-    report.non_negative(
-        "materials.friction.grain_grain",
-        materials.friction.grain_grain,
-        "no unit",
-    );
-    report.non_negative(
-        "materials.friction.grain_wall",
-        materials.friction.grain_wall,
-        "no unit",
-    );
-    report.fraction(
-        "materials.restitution.grain_grain",
-        materials.restitution.grain_grain,
-    );
-    report.fraction(
-        "materials.restitution.grain_wall",
-        materials.restitution.grain_wall,
-    );
-    report.non_negative(
-        "materials.restitution.threshold_speed",
-        materials.restitution.threshold_speed,
-        "m/s",
-    );
+    report.non_negative("materials.friction.grain_grain", materials.friction.grain_grain, "no unit");
+    report.non_negative("materials.friction.grain_wall", materials.friction.grain_wall, "no unit");
+    report.fraction("materials.restitution.grain_grain", materials.restitution.grain_grain);
+    report.fraction("materials.restitution.grain_wall", materials.restitution.grain_wall);
+    report.non_negative("materials.restitution.threshold_speed", materials.restitution.threshold_speed, "m/s");
 }
 
 fn bonds(report: &mut Report, bonds: &Bonds) {
     match (bonds.strength, bonds.stress) {
         (Some(strength), Some(stress)) => {
             let found = format!("strength {strength:?} N and stress {stress:?} Pa");
-            report.wrong(
-                "bonds",
-                found,
-                "one of them; `--set bonds.stress=null` takes a value away",
-            );
+            report.wrong("bonds", found, "one of them; `--set bonds.stress=null` takes a value away");
         }
-        (None, None) => report.wrong(
-            "bonds",
-            "neither strength nor stress",
-            "one of them: strength (N) or stress (Pa)",
-        ),
+        (None, None) => {
+            report.wrong("bonds", "neither strength nor stress", "one of them: strength (N) or stress (Pa)")
+        }
         _ => {}
     }
-    for (name, value, unit) in [
-        ("strength", bonds.strength, "N"),
-        ("stress", bonds.stress, "Pa"),
-    ] {
+    for (name, value, unit) in [("strength", bonds.strength, "N"), ("stress", bonds.stress, "Pa")] {
         if let Some(value) = value {
-            report.non_negative(
-                format!("bonds.{name}"),
-                value,
-                &format!("{unit}; 0 means no bonds"),
-            );
+            report.non_negative(format!("bonds.{name}"), value, &format!("{unit}; 0 means no bonds"));
         }
     }
-    report.non_negative(
-        "bonds.gap_tolerance",
-        bonds.gap_tolerance,
-        "a fraction of the mean diameter",
-    );
+    report.non_negative("bonds.gap_tolerance", bonds.gap_tolerance, "a fraction of the mean diameter");
     if let Some(friction) = bonds.friction {
         report.non_negative("bonds.friction", friction, "no unit");
     }
@@ -131,11 +89,7 @@ fn grains(report: &mut Report, scene: &Scene) {
     let count = scene.sample.count();
     let exists = |report: &mut Report, path: String, grain: usize| {
         if let Some(count) = count.filter(|count| grain >= *count && *count > 0) {
-            report.wrong(
-                path,
-                grain,
-                format!("the number of a grain, from 0 to {}", count - 1),
-            );
+            report.wrong(path, grain, format!("the number of a grain, from 0 to {}", count - 1));
         }
     };
     let mut first = HashMap::new();
@@ -173,38 +127,16 @@ fn time_and_output(report: &mut Report, scene: &Scene) {
     let steps = time.end / time.step;
     if report.problems.len() == before && steps > MAX_STEPS {
         let found = format!("{:?}, which makes {steps:.1e} steps", time.step);
-        report.wrong(
-            "time.step",
-            found,
-            format!("at most {MAX_STEPS:.0e} steps to time.end"),
-        );
+        report.wrong("time.step", found, format!("at most {MAX_STEPS:.0e} steps to time.end"));
     }
     match (scene.output.every_steps, scene.output.interval) {
-        (Some(0), None) => report.wrong(
-            "output.every_steps",
-            0,
-            "a whole number of steps, at least 1",
-        ),
+        (Some(0), None) => report.wrong("output.every_steps", 0, "a whole number of steps, at least 1"),
         (None, Some(interval)) => {
-            let allowed = format!(
-                "a finite number, at least the time step ({:?} s)",
-                time.step
-            );
-            report.range(
-                "output.interval",
-                interval,
-                interval > 0.0 && interval >= time.step,
-                allowed,
-            );
+            let allowed = format!("a finite number, at least the time step ({:?} s)", time.step);
+            report.range("output.interval", interval, interval > 0.0 && interval >= time.step, allowed);
         }
-        (Some(_), Some(_)) => {
-            report.wrong("output", "every_steps and interval", "exactly one of them")
-        }
-        (None, None) => report.wrong(
-            "output",
-            "neither every_steps nor interval",
-            "exactly one of them",
-        ),
+        (Some(_), Some(_)) => report.wrong("output", "every_steps and interval", "exactly one of them"),
+        (None, None) => report.wrong("output", "neither every_steps nor interval", "exactly one of them"),
         (Some(_), None) => {}
     }
 }
@@ -215,27 +147,24 @@ fn solver(report: &mut Report, scene: &Scene) {
     if let Some(accept) = solver.accept {
         report.positive("solver.accept", accept, "no unit");
         if accept < solver.tolerance {
-            report.wrong(
-                "solver.accept",
-                Number(accept),
-                format!("at least solver.tolerance, {:?}", solver.tolerance),
-            );
+            report.wrong("solver.accept", Number(accept), format!("at least solver.tolerance, {:?}", solver.tolerance));
         }
     }
     if solver.max_step_halvings > 30 {
-        report.wrong(
-            "solver.max_step_halvings",
-            solver.max_step_halvings,
-            "a whole number from 0 to 30",
-        );
+        report.wrong("solver.max_step_halvings", solver.max_step_halvings, "a whole number from 0 to 30");
     }
-    let SolverKind::GaussSeidel(gauss_seidel) = &solver.kind;
-    if gauss_seidel.max_sweeps == 0 {
-        report.wrong(
-            "solver.kind.gauss_seidel.max_sweeps",
-            0,
-            "a whole number, at least 1",
-        );
+    let limit = match &solver.kind {
+        SolverKind::GaussSeidel(gs) => ("solver.kind.gauss_seidel.max_sweeps", gs.max_sweeps),
+        SolverKind::Newton(newton) => {
+            let path = |name: &str| format!("solver.kind.newton.{name}");
+            report.positive(path("load_tolerance"), newton.load_tolerance, "no unit");
+            report.positive(path("tangential_stiffness"), newton.tangential_stiffness, "no unit");
+            report.positive(path("rolling_stiffness"), newton.rolling_stiffness, "no unit");
+            ("solver.kind.newton.max_iterations", newton.max_iterations)
+        }
+    };
+    if limit.1 == 0 {
+        report.wrong(limit.0, 0, "a whole number, at least 1");
     }
 }
 
@@ -250,14 +179,8 @@ fn stop(report: &mut Report, scene: &Scene) {
                     true => "a wall of the scene: it has none".to_string(),
                     false => format!("the name of a wall: {}", names.join(", ")),
                 };
-                let problem = Problem::new(
-                    "stop.wall_travel.wall",
-                    format!("\"{}\"", travel.wall),
-                    allowed,
-                );
-                report
-                    .problems
-                    .push(problem.with_nearest(nearest(&travel.wall, names)));
+                let problem = Problem::new("stop.wall_travel.wall", format!("\"{}\"", travel.wall), allowed);
+                report.problems.push(problem.with_nearest(nearest(&travel.wall, names)));
             }
             Some(wall) if wall.drive() == Drive::Fixed => {
                 report.wrong(
@@ -268,23 +191,14 @@ fn stop(report: &mut Report, scene: &Scene) {
             }
             Some(_) => {}
         }
-        report.positive(
-            "stop.wall_travel.fraction_of_height",
-            travel.fraction_of_height,
-            "no unit",
-        );
+        report.positive("stop.wall_travel.fraction_of_height", travel.fraction_of_height, "no unit");
         if travel.after == TravelFrom::FirstBreak && scene.bonds.is_none() {
             report.wrong("stop.wall_travel.after", "first_break", bonds_needed);
         }
     }
     if let Some(fraction) = stop.broken_fraction {
         let allowed = "a number above 0, at most 1";
-        report.range(
-            "stop.broken_fraction",
-            fraction,
-            fraction > 0.0 && fraction <= 1.0,
-            allowed,
-        );
+        report.range("stop.broken_fraction", fraction, fraction > 0.0 && fraction <= 1.0, allowed);
         if scene.bonds.is_none() {
             report.wrong("stop.broken_fraction", Number(fraction), bonds_needed);
         }

@@ -31,24 +31,12 @@ impl fmt::Display for Number {
 }
 
 impl Report {
-    pub(super) fn wrong(
-        &mut self,
-        path: impl Into<String>,
-        found: impl fmt::Display,
-        allowed: impl Into<String>,
-    ) {
-        self.problems
-            .push(Problem::new(path, found.to_string(), allowed));
+    pub(super) fn wrong(&mut self, path: impl Into<String>, found: impl fmt::Display, allowed: impl Into<String>) {
+        self.problems.push(Problem::new(path, found.to_string(), allowed));
     }
 
     /// A finite number for which `inside` holds; `allowed` says what that is.
-    pub(super) fn range(
-        &mut self,
-        path: impl Into<String>,
-        value: f64,
-        inside: bool,
-        allowed: impl Into<String>,
-    ) {
+    pub(super) fn range(&mut self, path: impl Into<String>, value: f64, inside: bool, allowed: impl Into<String>) {
         if inside && value.abs() <= LARGEST {
             return;
         }
@@ -61,22 +49,14 @@ impl Report {
 
     pub(super) fn positive(&mut self, path: impl Into<String>, value: f64, unit: &str) {
         let allowed = match value > 0.0 {
-            true => format!(
-                "a finite number > 0 ({unit}), at least {:.0e}",
-                1.0 / LARGEST
-            ),
+            true => format!("a finite number > 0 ({unit}), at least {:.0e}", 1.0 / LARGEST),
             false => format!("a finite number > 0 ({unit})"),
         };
         self.range(path, value, value >= 1.0 / LARGEST, allowed);
     }
 
     pub(super) fn non_negative(&mut self, path: impl Into<String>, value: f64, unit: &str) {
-        self.range(
-            path,
-            value,
-            value >= 0.0,
-            format!("a finite number ≥ 0 ({unit})"),
-        );
+        self.range(path, value, value >= 0.0, format!("a finite number ≥ 0 ({unit})"));
     }
 
     pub(super) fn finite(&mut self, path: impl Into<String>, value: f64) {
@@ -84,12 +64,7 @@ impl Report {
     }
 
     pub(super) fn fraction(&mut self, path: impl Into<String>, value: f64) {
-        self.range(
-            path,
-            value,
-            (0.0..=1.0).contains(&value),
-            "a number from 0 to 1",
-        );
+        self.range(path, value, (0.0..=1.0).contains(&value), "a number from 0 to 1");
     }
 
     fn components(&mut self, path: &str, vector: &[f64], length: usize) {
@@ -115,19 +90,10 @@ impl Report {
     /// A vector whose length is not zero.
     pub(super) fn direction(&mut self, path: &str, vector: &[f64]) {
         self.vector(path, vector);
-        let length = vector
-            .iter()
-            .fold(0.0_f64, |length, value| length.hypot(*value));
+        let length = vector.iter().fold(0.0_f64, |length, value| length.hypot(*value));
         // below this the vector cannot be normalised
-        if vector.len() == self.dimension
-            && !vector.iter().any(|value| value.is_nan())
-            && length < 1.0 / LARGEST
-        {
-            self.wrong(
-                path,
-                format!("{vector:?}"),
-                "a vector whose length is not zero",
-            );
+        if vector.len() == self.dimension && !vector.iter().any(|value| value.is_nan()) && length < 1.0 / LARGEST {
+            self.wrong(path, format!("{vector:?}"), "a vector whose length is not zero");
         }
     }
 
@@ -150,10 +116,7 @@ impl Report {
             self.finite(format!("{path}.{k}.0"), row[0]);
             self.finite(format!("{path}.{k}.1"), row[1]);
             if k > 0 && row[0] <= rows[k - 1][0] {
-                let allowed = format!(
-                    "a time after that of the row before, {:?} s",
-                    rows[k - 1][0]
-                );
+                let allowed = format!("a time after that of the row before, {:?} s", rows[k - 1][0]);
                 self.wrong(format!("{path}.{k}.0"), Number(row[0]), allowed);
             }
         }
@@ -168,11 +131,7 @@ impl Report {
 
     pub(super) fn count(&mut self, path: &str, value: usize) {
         if value == 0 || value > MAX_GRAINS {
-            self.wrong(
-                path,
-                value,
-                format!("a whole number from 1 to {MAX_GRAINS}"),
-            );
+            self.wrong(path, value, format!("a whole number from 1 to {MAX_GRAINS}"));
         }
     }
 }

@@ -13,11 +13,7 @@ pub(super) fn sample(report: &mut Report, scene: &Scene) {
         Sample::Lattice(lattice) => self::lattice(report, lattice),
         Sample::File(file) => {
             if file.path.as_os_str().is_empty() {
-                report.wrong(
-                    "sample.file.path",
-                    "an empty path",
-                    "the path of a CSV file",
-                );
+                report.wrong("sample.file.path", "an empty path", "the path of a CSV file");
             }
         }
         Sample::Grains(grains) => {
@@ -30,15 +26,8 @@ pub(super) fn sample(report: &mut Report, scene: &Scene) {
                 // adding zero makes −0 and 0 one place
                 let key: Vec<u64> = grain.center.iter().map(|x| (x + 0.0).to_bits()).collect();
                 if let Some(first) = centers.insert(key, k) {
-                    let found = format!(
-                        "{:?}, which is also the centre of grain {first}",
-                        grain.center
-                    );
-                    report.wrong(
-                        format!("sample.grains.{k}.center"),
-                        found,
-                        "a centre of its own for each grain",
-                    );
+                    let found = format!("{:?}, which is also the centre of grain {first}", grain.center);
+                    report.wrong(format!("sample.grains.{k}.center"), found, "a centre of its own for each grain");
                 }
             }
         }
@@ -52,53 +41,26 @@ fn random_sample(report: &mut Report, random: &RandomSample) {
     match (report.dimension, random.depth) {
         (2, depth) => report.absent("sample.random.depth", depth, "a box in 2D has a width only"),
         (_, Some(depth)) => report.positive("sample.random.depth", depth, "m"),
-        (_, None) => report.wrong(
-            "sample.random.depth",
-            "nothing",
-            "a finite number > 0 (m), needed in 3D",
-        ),
+        (_, None) => report.wrong("sample.random.depth", "nothing", "a finite number > 0 (m), needed in 3D"),
     }
     let largest = random.diameter.max();
-    for (path, size) in [
-        ("sample.random.width", Some(random.width)),
-        ("sample.random.depth", random.depth),
-    ] {
-        if let Some(size) =
-            size.filter(|size| *size > 0.0 && *size < largest && largest.is_finite())
-        {
-            report.wrong(
-                path,
-                Number(size),
-                format!("at least the diameter of the largest grain, {largest:?} m"),
-            );
+    for (path, size) in [("sample.random.width", Some(random.width)), ("sample.random.depth", random.depth)] {
+        if let Some(size) = size.filter(|size| *size > 0.0 && *size < largest && largest.is_finite()) {
+            report.wrong(path, Number(size), format!("at least the diameter of the largest grain, {largest:?} m"));
         }
     }
     let (path, fraction) = match &random.preparation {
         Preparation::Compaction(compaction) => ("compaction", compaction.solid_fraction),
-        Preparation::Deposition(deposition) => {
-            report.positive(
-                "sample.random.preparation.deposition.gravity",
-                deposition.gravity,
-                "m/s²",
-            );
-            ("deposition", deposition.solid_fraction)
-        }
+        Preparation::Deposition(deposition) => ("deposition", deposition.solid_fraction),
     };
     let path = format!("sample.random.preparation.{path}.solid_fraction");
-    report.range(
-        path,
-        fraction,
-        fraction > 0.0 && fraction < 1.0,
-        "a number above 0 and below 1",
-    );
+    report.range(path, fraction, fraction > 0.0 && fraction < 1.0, "a number above 0 and below 1");
 }
 
 fn diameters(report: &mut Report, diameters: &Diameters) {
     let path = "sample.random.diameter";
     match diameters {
-        Diameters::Constant(diameter) => {
-            report.positive(format!("{path}.constant"), *diameter, "m")
-        }
+        Diameters::Constant(diameter) => report.positive(format!("{path}.constant"), *diameter, "m"),
         Diameters::Uniform(range) => {
             report.positive(format!("{path}.uniform.min"), range.min, "m");
             report.positive(format!("{path}.uniform.max"), range.max, "m");
@@ -113,11 +75,7 @@ fn diameters(report: &mut Report, diameters: &Diameters) {
                 report.non_negative(format!("{path}.table.{k}.1"), row[1], "a weight");
             }
             if !rows.iter().any(|row| row[1] > 0.0) {
-                report.wrong(
-                    format!("{path}.table"),
-                    "no weight above 0",
-                    "at least one pair [diameter, weight > 0]",
-                );
+                report.wrong(format!("{path}.table"), "no weight above 0", "at least one pair [diameter, weight > 0]");
             }
         }
     }
@@ -131,17 +89,11 @@ fn lattice(report: &mut Report, lattice: &Lattice) {
     };
     let path = format!("sample.lattice.{name}");
     match (lattice, report.dimension) {
-        (Lattice::Cubic { .. }, 2) => report.wrong(
-            &path,
-            "a cubic lattice in 2D",
-            "hexagonal or square, or dimension 3",
-        ),
+        (Lattice::Cubic { .. }, 2) => {
+            report.wrong(&path, "a cubic lattice in 2D", "hexagonal or square, or dimension 3")
+        }
         (Lattice::Hexagonal { .. } | Lattice::Square { .. }, 3) => {
-            report.wrong(
-                &path,
-                format!("a {name} lattice in 3D"),
-                "cubic, or dimension 2",
-            );
+            report.wrong(&path, format!("a {name} lattice in 3D"), "cubic, or dimension 2");
         }
         _ => {}
     }
@@ -158,11 +110,7 @@ fn lattice(report: &mut Report, lattice: &Lattice) {
         }
     }
     if lattice.count().is_none_or(|count| count > MAX_GRAINS) {
-        report.wrong(
-            path,
-            "more grains than can be counted",
-            format!("at most {MAX_GRAINS} grains"),
-        );
+        report.wrong(path, "more grains than can be counted", format!("at most {MAX_GRAINS} grains"));
     }
 }
 
@@ -176,11 +124,9 @@ fn grain(report: &mut Report, index: usize, grain: &GrainSpec) {
     if let Some(spin) = &grain.spin {
         report.spin(&format!("{path}.spin"), spin);
     }
-    for (name, value, unit) in [
-        ("density", grain.density, "kg/m³"),
-        ("mass", grain.mass, "kg"),
-        ("inertia", grain.inertia, "kg m²"),
-    ] {
+    for (name, value, unit) in
+        [("density", grain.density, "kg/m³"), ("mass", grain.mass, "kg"), ("inertia", grain.inertia, "kg m²")]
+    {
         if let Some(value) = value {
             report.positive(format!("{path}.{name}"), value, unit);
         }

@@ -6,16 +6,8 @@ use crate::scene::wall::{Drive, Place, Shape, Wall, WallMass};
 /// Checks the wall `name`.
 pub(super) fn wall(report: &mut Report, name: &str, wall: &Wall) {
     let path = format!("walls.{name}");
-    if name.is_empty()
-        || !name
-            .chars()
-            .all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-')
-    {
-        report.wrong(
-            &path,
-            format!("the name \"{name}\""),
-            "a name of letters, digits, _ and -",
-        );
+    if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-') {
+        report.wrong(&path, format!("the name \"{name}\""), "a name of letters, digits, _ and -");
     }
     shape(report, &format!("{path}.shape"), &wall.shape);
     if let Some(friction) = wall.friction {
@@ -26,17 +18,9 @@ pub(super) fn wall(report: &mut Report, name: &str, wall: &Wall) {
         ("force", wall.force.is_some()),
         ("force_rate", wall.force_rate.is_some()),
     ];
-    let given: Vec<&str> = drives
-        .iter()
-        .filter(|(_, given)| *given)
-        .map(|(name, _)| *name)
-        .collect();
+    let given: Vec<&str> = drives.iter().filter(|(_, given)| *given).map(|(name, _)| *name).collect();
     if given.len() > 1 {
-        report.wrong(
-            &path,
-            given.join(" and "),
-            "one drive at most: velocity, force or force_rate",
-        );
+        report.wrong(&path, given.join(" and "), "one drive at most: velocity, force or force_rate");
     }
     for (name, function) in [("velocity", &wall.velocity), ("force", &wall.force)] {
         if let Some(function) = function {
@@ -54,40 +38,22 @@ fn mass_and_direction(report: &mut Report, path: &str, wall: &Wall) {
     let mass = format!("{path}.mass");
     match (&wall.mass, &drive) {
         (None, Drive::Force(_)) => {
-            report.wrong(
-                mass,
-                "nothing",
-                "\"sample\" or {\"kg\": …}, needed by a wall that is driven by a force",
-            );
+            report.wrong(mass, "nothing", "\"sample\" or {\"kg\": …}, needed by a wall that is driven by a force");
         }
         (Some(_), Drive::Fixed | Drive::Velocity(_)) => {
-            report.wrong(
-                mass,
-                "a mass",
-                "nothing: only a wall that is driven by a force has a mass",
-            );
+            report.wrong(mass, "a mass", "nothing: only a wall that is driven by a force has a mass");
         }
-        (Some(WallMass::Kg(kg)), Drive::Force(_)) => {
-            report.positive(format!("{mass}.kg"), *kg, "kg")
-        }
+        (Some(WallMass::Kg(kg)), Drive::Force(_)) => report.positive(format!("{mass}.kg"), *kg, "kg"),
         _ => {}
     }
     let direction = format!("{path}.direction");
     match (&wall.direction, &drive) {
         (Some(vector), Drive::Fixed) => {
-            report.wrong(
-                direction,
-                format!("{vector:?}"),
-                "nothing: a fixed wall has no direction",
-            );
+            report.wrong(direction, format!("{vector:?}"), "nothing: a fixed wall has no direction");
         }
         (Some(vector), _) => report.direction(&direction, vector),
         (None, Drive::Velocity(_) | Drive::Force(_)) if wall.drive_direction().is_none() => {
-            report.wrong(
-                direction,
-                "nothing",
-                "a vector: only a plane has a direction of its own, its normal",
-            );
+            report.wrong(direction, "nothing", "a vector: only a plane has a direction of its own, its normal");
         }
         _ => {}
     }
@@ -108,16 +74,8 @@ fn shape(report: &mut Report, path: &str, shape: &Shape) {
     };
     let path = format!("{path}.{name}");
     if dimension != report.dimension {
-        let allowed = if dimension == 2 {
-            "plane, sphere or cylinder"
-        } else {
-            "plane or circle"
-        };
-        report.wrong(
-            &path,
-            format!("a {name} in {} dimensions", report.dimension),
-            allowed,
-        );
+        let allowed = if dimension == 2 { "plane, sphere or cylinder" } else { "plane or circle" };
+        report.wrong(&path, format!("a {name} in {} dimensions", report.dimension), allowed);
         return;
     }
     let (center, radius) = match shape {
