@@ -212,7 +212,7 @@ impl Chart {
 /// A tick of a logarithmic axis: powers of ten as such, others as numbers.
 fn power_of_ten(value: f64) -> String {
     let exponent = value.log10();
-    if (exponent - exponent.round()).abs() > 1e-6 || (-1.5..1.5).contains(&exponent) {
+    if (exponent - exponent.round()).abs() > 1e-6 || (-0.5..1.5).contains(&exponent) {
         return format!("{value}");
     }
     let raise = |digit: char| match digit {
