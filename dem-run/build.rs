@@ -1,5 +1,6 @@
 //! Records where the program comes from, for `/parameters` of its histories.
 
+use std::path::Path;
 use std::process::Command;
 
 fn output(program: &str, arguments: &[&str]) -> Option<String> {
@@ -11,10 +12,17 @@ fn main() {
     let variable = |name: &str| std::env::var(name).unwrap_or_default();
     let rustc = output(&variable("RUSTC"), &["--version"]).unwrap_or_default();
     println!("cargo::rustc-env=DEM_BUILD={}, {}, {rustc}", variable("PROFILE"), variable("TARGET"));
-    if let Some(revision) = output("git", &["describe", "--always", "--dirty", "--abbrev=12"]) {
+    // without optional locks, git does not write its index here
+    let describe = ["--no-optional-locks", "describe", "--always", "--dirty", "--abbrev=12"];
+    if let Some(revision) = output("git", &describe) {
         println!("cargo::rustc-env=DEM_GIT_REVISION={revision}");
-        println!("cargo::rerun-if-changed=../.git/HEAD");
-        println!("cargo::rerun-if-changed=../.git/index");
+        // grows with every commit and checkout; the index, which every `git status` may write, would have all built again
+        if let Some(log) = output("git", &["rev-parse", "--git-path", "logs/HEAD"]).filter(|log| Path::new(log).exists()) {
+            println!("cargo::rerun-if-changed={log}");
+        }
     }
-    println!("cargo::rerun-if-changed=build.rs");
+    // what the program is made of: a change makes the revision "dirty"
+    for source in ["build.rs", "src", "Cargo.toml", "../dem-core/src", "../Cargo.lock"] {
+        println!("cargo::rerun-if-changed={source}");
+    }
 }
