@@ -17,7 +17,9 @@ fn main() {
     if let Some(revision) = output("git", &describe) {
         println!("cargo::rustc-env=DEM_GIT_REVISION={revision}");
         // grows with every commit and checkout; the index, which every `git status` may write, would have all built again
-        if let Some(log) = output("git", &["rev-parse", "--git-path", "logs/HEAD"]).filter(|log| Path::new(log).exists()) {
+        if let Some(log) =
+            output("git", &["rev-parse", "--git-path", "logs/HEAD"]).filter(|log| Path::new(log).exists())
+        {
             println!("cargo::rerun-if-changed={log}");
         }
     }
