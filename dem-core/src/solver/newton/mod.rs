@@ -68,6 +68,8 @@ const TIRED: usize = 5;
 const MOST_KRYLOV: usize = 80;
 /// Newton iterations of one inner problem before the state is smoothed by sweeps.
 const PATIENCE: u64 = 8;
+/// How often the penalty may be lowered tenfold in one solve.
+const MOST_SOFTENED: u32 = 4;
 /// Sweeps that look for the active set: at every step, from zero reactions, and where Newton stalls.
 const SWEEPS: usize = 5;
 const COLD_SWEEPS: usize = 100;
@@ -354,6 +356,7 @@ impl<D: Dim> ContactSolver<D> for Newton {
         add_reactions(&rows, &guess, 1.0, &mut y);
         let mut state = Iterate::at(&rows, y);
         let (mut guessed, mut stalls) = (true, 0);
+        let (mut last_error, mut softened) = (f64::INFINITY, 0);
         let (mut iterations, mut error, mut load_error) = (0, f64::INFINITY, f64::INFINITY);
         while iterations < self.settings.max_iterations {
             let (made, solved) = self.inner(&rows, &mut state, guessed.then_some(&guess[..]));
@@ -378,6 +381,12 @@ impl<D: Dim> ContactSolver<D> for Newton {
             if error <= self.settings.tolerance && load_error <= self.settings.load_tolerance {
                 break;
             }
+            if error > 0.5 * last_error && softened < MOST_SOFTENED {
+                // what moves fast is rounded by ρ u: a smaller ρ hears less of it, and takes more rounds
+                rows.soften(10.0);
+                softened += 1;
+            }
+            last_error = error;
             state = Iterate::at(&rows, state.y);
         }
         self.report(iterations, error, load_error)

@@ -141,6 +141,14 @@ impl Rows {
         rows
     }
 
+    /// Divide ρ of all rows by `factor`.
+    pub fn soften(&mut self, factor: f64) {
+        for row in &mut self.list {
+            let w = &mut row.weights;
+            (w.n, w.t, w.m) = (w.n * factor, w.t * factor, w.m * factor);
+        }
+    }
+
     /// Relative velocity of contact `row`, bias included.
     #[inline]
     pub fn velocity(&self, row: &Row, y: &[f64]) -> Padded {

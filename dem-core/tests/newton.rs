@@ -1,0 +1,165 @@
+//! The Newton solver against Gauss–Seidel, closed forms, and itself from other starts.
+
+mod common;
+
+use common::{down, floor, force_driven, grain, settings, solver, world};
+use dem_core::dim::{D2, D3, Dim, Vect};
+use dem_core::problem::ContactProblem;
+use dem_core::solver::{NewtonSettings, SolveStatus, SolverSettings, Start, StiffnessRatio};
+use dem_core::world::World;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+fn newton(tolerance: f64, start: Start) -> SolverSettings {
+    SolverSettings::Newton(NewtonSettings {
+        tolerance,
+        accept: tolerance,
+        load_tolerance: 1e-6,
+        start,
+        stiffness: StiffnessRatio { tangential: 1.0, rolling: 1.0 / 12.0 },
+        max_iterations: 300,
+    })
+}
+
+#[test]
+fn weight_at_the_bottom_of_a_column_of_500() {
+    let mut set = settings(1e-3);
+    set.gravity = down::<D2>(9.81);
+    set.solver = newton(1e-10, Start::StiffLimit);
+    let column: Vec<_> = (0..500).map(|k| grain::<D2>(&[0.0, 0.01 + 0.02 * k as f64], 0.01)).collect();
+    let weight: f64 = column.iter().map(|g| g.mass * 9.81).sum();
+    let mut w = world(column, vec![floor(0.2)], set);
+    for _ in 0..3 {
+        let report = w.step().unwrap();
+        assert_eq!(report.status, SolveStatus::Converged);
+        assert!((-w.walls[0].reaction[1] / weight - 1.0).abs() < 1e-6, "{}", -w.walls[0].reaction[1] / weight - 1.0);
+    }
+    // the state of the step before shows the active set
+    assert!(w.step().unwrap().iterations <= 10);
+}
+
+/// A box of bonded and dry grains with random radii, pressed from above and sheared from the side: all kinds of rows.
+fn pressed<D: Dim>(seed: u64, bonded: bool) -> World<D> {
+    let mut rng = Pcg64::seed_from_u64(seed);
+    let side: usize = if D::N == 2 { 8 } else { 4 };
+    let mut grains = Vec::new();
+    for k in 0..side.pow(D::N as u32) {
+        let mut x = vec![0.0; D::N];
+        let mut rest = k;
+        for c in &mut x {
+            *c = 0.01 + 0.02 * (rest % side) as f64;
+            rest /= side;
+        }
+        let mut g = grain::<D>(&x, 0.01 * (0.98 + 0.02 * rng.random::<f64>()));
+        g.velocity[0] = 0.05 * (rng.random::<f64>() - 0.5);
+        grains.push(g);
+    }
+    let mut set = settings(1e-3);
+    set.gravity = down::<D>(9.81);
+    let mut down = D::Vector::zero();
+    down[D::N - 1] = -1.0;
+    let lid = force_driven::<D>(down, down * (-0.02 * side as f64), 2.0, 300.0);
+    let mut w = world(grains, vec![floor(0.2), lid], set);
+    if bonded {
+        w.form_bonds(0.03, |_| 20.0, 0.3);
+        assert!(w.bonds.len() > 40);
+    }
+    w
+}
+
+fn solved<D: Dim>(problem: &ContactProblem<D>, settings: SolverSettings) -> ContactProblem<D> {
+    let mut problem = problem.clone();
+    let report = settings.build::<D>().solve(&mut problem);
+    assert_eq!(report.status, SolveStatus::Converged, "{report:?}");
+    problem
+}
+
+/// Largest difference of velocities between Newton and Gauss–Seidel at a tolerance, over the largest velocity.
+fn apart<D: Dim>(problem: &ContactProblem<D>, found: &ContactProblem<D>, tolerance: f64) -> f64 {
+    let swept = solved(problem, solver(tolerance));
+    let scale: f64 = swept.nodes.all.iter().map(|n| n.velocity.norm()).fold(0.0, f64::max);
+    let pairs = swept.nodes.all.iter().zip(&found.nodes.all);
+    pairs.map(|(a, b)| (a.velocity - b.velocity).norm()).fold(0.0, f64::max) / scale
+}
+
+#[test]
+fn velocities_agree_with_gauss_seidel() {
+    for seed in 0..4 {
+        let problem = pressed::<D2>(seed, true).contact_problem();
+        let distance = apart(&problem, &solved(&problem, newton(1e-10, Start::StiffLimit)), 1e-10);
+        assert!(distance <= 1e-6, "seed {seed}: {distance:e}");
+    }
+}
+
+#[test]
+fn gauss_seidel_approaches_newton_in_3d() {
+    // a million sweeps come to 1e-7 here: what can be seen is that they head for the same velocities
+    let problem = pressed::<D3>(0, true).contact_problem();
+    let found = solved(&problem, newton(1e-10, Start::StiffLimit));
+    let [coarse, fine] = [1e-5, 1e-7].map(|tolerance| apart(&problem, &found, tolerance));
+    assert!(fine <= 0.1 * coarse && fine <= 1e-3, "{coarse:e}, then {fine:e}");
+}
+
+#[test]
+fn dry_and_bonded_problems_reach_the_residual() {
+    for seed in 0..6 {
+        solved(&pressed::<D2>(seed, false).contact_problem(), newton(1e-10, Start::StiffLimit));
+        solved(&pressed::<D2>(seed, true).contact_problem(), newton(1e-10, Start::LastStep));
+        solved(&pressed::<D3>(seed, false).contact_problem(), newton(1e-10, Start::StiffLimit));
+    }
+}
+
+/// A hexagonal block between two plates: hyperstatic, so that reactions are many and velocities are one.
+fn block() -> World<D2> {
+    let r = 2e-3;
+    let mut disks = Vec::new();
+    for row in 0..9 {
+        for column in 0..10 - row % 2 {
+            let x = 2.0 * r * column as f64 + r * (row % 2) as f64;
+            disks.push(grain::<D2>(&[x, r + 3f64.sqrt() * r * row as f64], r));
+        }
+    }
+    let top = disks.iter().map(|d| d.position[1] + r).fold(0.0, f64::max);
+    let lid = force_driven::<D2>([0.0, -1.0].into(), [0.0, top].into(), 1.0, 50.0);
+    let mut w = world(disks, vec![floor(0.2), lid], settings(1e-4));
+    w.form_bonds(1e-6, |_| 100.0, 0.3);
+    w
+}
+
+#[test]
+fn the_stiff_limit_does_not_depend_on_the_start() {
+    let mut w = block();
+    let mut problem = w.contact_problem();
+    let first = solved(&problem, newton(1e-9, Start::StiffLimit));
+    let mut rng = Pcg64::seed_from_u64(7);
+    for contact in &mut problem.bonded {
+        contact.r.n = 1e-2 * rng.random::<f64>();
+        contact.r.t[0] = 1e-3 * (rng.random::<f64>() - 0.5);
+    }
+    let other = solved(&problem, newton(1e-9, Start::StiffLimit));
+    let kept = solved(&problem, newton(1e-9, Start::LastStep));
+    let distance = |a: &ContactProblem<D2>, b: &ContactProblem<D2>| {
+        a.bonded.iter().zip(&b.bonded).map(|(a, b)| (a.r - b.r).dot(&(a.r - b.r))).sum::<f64>().sqrt()
+    };
+    let size = first.bonded.iter().map(|c| c.r.dot(&c.r)).sum::<f64>().sqrt();
+    assert!(distance(&first, &other) <= 1e-6 * size, "{:e}", distance(&first, &other) / size);
+    // a start from other reactions keeps what of them does no work
+    assert!(distance(&first, &kept) > 1e-2 * size);
+    // of all reactions that balance the load the stiff limit has the least complementary energy
+    let energy = |p: &ContactProblem<D2>| {
+        p.bonded.iter().map(|c| c.r.n * c.r.n + c.r.t[0] * c.r.t[0] + 12.0 * c.r.m[0] * c.r.m[0]).sum::<f64>()
+    };
+    assert!(energy(&first) < energy(&kept));
+}
+
+#[test]
+fn a_rigid_block_does_not_move_before_it_breaks() {
+    let mut w = block();
+    w.set_solver(newton(1e-8, Start::StiffLimit));
+    for _ in 0..50 {
+        let report = w.step().unwrap();
+        assert!(report.breaks.is_empty() && report.load_error <= 1e-6);
+    }
+    let strain = w.strain();
+    assert!(strain.iter().all(|e| e.abs() <= 1e-9), "{strain:?}");
+}
