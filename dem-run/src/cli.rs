@@ -201,6 +201,10 @@ fn writable(path: &Path, option: &str, overwrite: bool) -> Result<(), RunError> 
     if path.is_dir() {
         return Err(RunError::InputOutput(format!("{shown} is a folder: name a file with {option}")));
     }
+    // a history comes into its place by renaming, which would put a file where a device was, /dev/null for one
+    if path.exists() && !path.is_file() {
+        return Err(RunError::InputOutput(format!("{shown} is not a regular file: name another with {option}")));
+    }
     if path.exists() && !overwrite {
         let remedy = format!("--force overwrites it, {option} names another");
         return Err(RunError::InputOutput(format!("{shown} exists: {remedy}")));

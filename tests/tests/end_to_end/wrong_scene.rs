@@ -102,6 +102,19 @@ fn even_by_force_a_run_writes_over_nothing_that_it_reads() {
 }
 
 #[test]
+fn even_by_force_a_run_replaces_nothing_but_files() {
+    use std::os::unix::fs::FileTypeExt;
+    let here = Folder::new();
+    let _listener = std::os::unix::net::UnixListener::bind(here.path("socket")).expect("socket");
+    for option in ["-o", "--write-sample"] {
+        let args = ["run", &config("column.json"), "--force", option, "socket"];
+        here.dem_run(&args).fails(4, &["socket", "not a regular file", option]);
+        assert_eq!(here.names(), ["socket"]);
+    }
+    assert!(std::fs::metadata(here.path("socket")).expect("socket").file_type().is_socket());
+}
+
+#[test]
 fn force_replaces_a_file() {
     let here = Folder::new();
     here.write("column.h5", "old");
