@@ -124,6 +124,6 @@ fn the_ledger_closes_under_gravity_loads_and_drives() {
     run(&mut w, 400);
     let l = w.ledger;
     assert!(l.external_work > 0.0 && l.impact > 0.0 && l.friction > 0.0);
-    assert!(l.remainder.abs() <= 1e-6 * l.external_work, "{l:?}");
+    assert!(l.remainder.abs() <= 1e-12 * l.external_work, "{l:?}");
     assert!((l.kinetic - w.kinetic_energy()).abs() <= 1e-12 * l.external_work);
 }

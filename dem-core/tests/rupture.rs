@@ -188,3 +188,13 @@ fn a_step_whose_second_half_fails_is_taken_back_whole() {
     assert_eq!(before.0.position, w.grains.position);
     assert_eq!((before.1, before.2, before.3, before.4), (w.bonds.clone(), w.ledger, w.time, w.steps));
 }
+
+#[test]
+fn a_force_driven_wall_on_a_fixed_grain_carries_its_force() {
+    let mut held = grain::<D2>(&[0.0, 0.01], 0.01);
+    held.fixed = true;
+    let lid = common::force_driven::<D2>([0.0, -1.0].into(), [0.0, 0.02].into(), 1.0, 10.0);
+    let mut w = world(vec![held], vec![lid], settings(1e-4));
+    w.step().unwrap();
+    assert!((w.walls[0].reaction[1] - 10.0).abs() < 1e-9, "{}", w.walls[0].reaction[1]);
+}

@@ -61,6 +61,11 @@ fn grains<D: Dim>(scene: &Scene, watch: Watch) -> Result<(Grains<D>, Option<f64>
             return Err(missing_grain("grains.loads", load.grain, grains.len()));
         }
     }
+    for k in (0..grains.len()).filter(|k| grains.fixed[*k]).collect::<Vec<_>>() {
+        // held fixed: whatever velocity the list gives it
+        grains.velocity[k] = D::Vector::zero();
+        grains.spin[k] = D::Spin::zero();
+    }
     refuse_coincident(&grains)?;
     Ok((grains, fraction))
 }
@@ -187,7 +192,10 @@ fn build_wall<D: Dim>(scene: &Scene, name: &str, wall: &scene::Wall, grains: &Gr
     let direction = wall.drive_direction().map_or(D::Vector::zero(), unit::<D>);
     built.drive = match wall.drive() {
         SceneDrive::Fixed => Drive::Fixed,
-        SceneDrive::Velocity(speed) => Drive::Velocity { direction, speed: schedule(speed) },
+        SceneDrive::Velocity(speed) => {
+            built.velocity = direction * speed.at(0.0);
+            Drive::Velocity { direction, speed: schedule(speed) }
+        }
         SceneDrive::Force(force) => {
             let mass = match wall.mass {
                 Some(WallMass::Kg(mass)) => mass,

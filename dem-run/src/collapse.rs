@@ -14,6 +14,8 @@ pub struct Failure {
     pub first_break: Option<f64>,
     /// Applied force at the last step before the axial strain exceeded each of [`STRAINS`].
     pub collapse: [Option<f64>; 2],
+    /// Whether no bond had broken by then: the strain is the solver's, not the sample's.
+    pub early: [bool; 2],
     /// Applied force at the step by whose end [`BROKEN_SHARE`] of the bonds had broken.
     pub broken_share: Option<f64>,
 }
@@ -36,9 +38,10 @@ impl Collapse {
         if bonds > 0 && broken as f64 >= BROKEN_SHARE * bonds as f64 {
             failure.broken_share.get_or_insert(load);
         }
-        for (found, limit) in failure.collapse.iter_mut().zip(STRAINS) {
-            if strain.abs() > limit {
-                found.get_or_insert(self.last_load);
+        for (k, limit) in STRAINS.into_iter().enumerate() {
+            if strain.abs() > limit && failure.collapse[k].is_none() {
+                failure.collapse[k] = Some(self.last_load);
+                failure.early[k] = broken == 0;
             }
         }
         self.last_load = load;
@@ -57,8 +60,12 @@ mod tests {
         for k in 0..6 {
             collapse.push(10.0 * k as f64, strains[k], broken[k], 100);
         }
-        let expected =
-            Failure { first_break: Some(10.0), collapse: [Some(10.0), Some(30.0)], broken_share: Some(30.0) };
+        let expected = Failure {
+            first_break: Some(10.0),
+            collapse: [Some(10.0), Some(30.0)],
+            early: [false, false],
+            broken_share: Some(30.0),
+        };
         assert_eq!(collapse.failure, expected);
     }
 }

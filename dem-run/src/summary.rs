@@ -131,15 +131,14 @@ impl Summary {
             self.bonds,
             100.0 * broken as f64 / self.bonds as f64
         )?;
-        let Failure { first_break, collapse, broken_share } = self.failure;
+        let Failure { first_break, collapse, early, broken_share } = self.failure;
         if broken > 0 && first_break.is_none() {
             return writeln!(f, "                 no wall is driven: there is no applied force to tell");
         }
         let load = |load: Option<f64>| load.map_or("none".into(), |n| format!("{n:.4} N"));
         writeln!(f, "first break      {}", load(first_break))?;
-        for (collapse, strain) in collapse.into_iter().zip(STRAINS) {
+        for ((collapse, early), strain) in collapse.into_iter().zip(early).zip(STRAINS) {
             // rigid grains and bonds: before the first break nothing can have moved
-            let early = collapse.is_some_and(|c| first_break.is_none_or(|b| c < b));
             let note = if early { ", before any bond broke: the solver's own strain, not the sample's" } else { "" };
             writeln!(f, "collapse load    {} (strain {strain:.0e}{note})", load(collapse))?;
         }

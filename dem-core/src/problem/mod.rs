@@ -62,6 +62,10 @@ impl<D: Dim> Link<D> {
             let coupling = (along * across).abs();
             block.n = i.inverse_mass + j.inverse_mass * (along * along + coupling);
             block.t = i.inverse_mass + li * li * i.inverse_inertia + j.inverse_mass * (across * across + coupling);
+            // no impulse changes a row whose bodies do not yield along it: any positive entry serves
+            let some = block.n.max(block.t);
+            block.n = if block.n == 0.0 { some } else { block.n };
+            block.t = if block.t == 0.0 { some } else { block.t };
         }
         block
     }

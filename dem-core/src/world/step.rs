@@ -44,7 +44,7 @@ pub enum StepError {
         "no convergence at t = {time:.6e} s: residual {residual:.2e} after {iterations} iterations, with the step cut to {step:.2e} s"
     )]
     NotAccepted {
-        /// Time of the last accepted state (s).
+        /// Time at which the step that failed began (s), or its half.
         time: f64,
         /// The shortest step tried (s).
         step: f64,
