@@ -1,5 +1,6 @@
 //! Scenes, sample preparation, the run loop and the history.
 
+pub mod accuracy;
 pub mod build;
 pub mod check;
 pub mod cli;

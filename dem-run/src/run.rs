@@ -3,6 +3,7 @@
 use crate::build::{Built, build, write_sample};
 use crate::course::Course;
 use crate::history::HistoryError;
+use crate::output::WriteError;
 use crate::progress::{Progress, ProgressMode, StepProgress};
 use crate::record::Recorder;
 use crate::scene::{Scene, SceneError};
@@ -50,9 +51,12 @@ pub enum RunError {
     /// The history cannot be written.
     #[error(transparent)]
     History(#[from] HistoryError),
-    /// Ctrl-C or SIGTERM.
-    #[error("interrupted: the history is complete up to the last frame")]
-    Interrupted,
+    /// A result cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// Ctrl-C or SIGTERM, and what that leaves.
+    #[error("interrupted: {0}")]
+    Interrupted(&'static str),
 }
 
 impl RunError {
@@ -60,10 +64,10 @@ impl RunError {
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Scene(SceneError::Read { .. }) | Self::InputOutput(_) | Self::History(_) => 4,
+            Self::Scene(SceneError::Read { .. }) | Self::InputOutput(_) | Self::History(_) | Self::Write(_) => 4,
             Self::Scene(_) | Self::Sample(_) => 2,
             Self::NoConvergence(_) => 3,
-            Self::Interrupted => INTERRUPTED,
+            Self::Interrupted(_) => INTERRUPTED,
         }
     }
 }
@@ -173,7 +177,9 @@ impl<'a, D: Dim> Run<'a, D> {
         outcome: Result<Ending, RunError>,
     ) -> Result<(Summary, Result<(), RunError>), RunError> {
         let (ending, end) = match outcome {
-            Ok(Ending::Interrupted) => (Ending::Interrupted, Err(RunError::Interrupted)),
+            Ok(Ending::Interrupted) => {
+                (Ending::Interrupted, Err(RunError::Interrupted("the history is complete up to the last frame")))
+            }
             Ok(ending) => (ending, Ok(())),
             Err(error @ RunError::NoConvergence(_)) => (Ending::NoConvergence, Err(error)),
             Err(error) => return Err(error),
