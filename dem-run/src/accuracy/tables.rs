@@ -23,14 +23,18 @@ pub fn text(report: &Report) -> String {
     text
 }
 
+fn counted(count: usize, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
+}
+
 fn tolerance(value: f64) -> String {
     format!("{value:e}")
 }
 
 fn head(report: &Report) -> String {
     let mut text = report.title.as_ref().map_or(String::new(), |title| format!("{title}\n"));
-    let bonds = if report.bonds > 0 { format!(", {} bonds", report.bonds) } else { String::new() };
-    text += &format!("{} grains{bonds}, time step {} s\n", report.grains, tolerance(report.step));
+    let bonds = if report.bonds > 0 { format!(", {}", counted(report.bonds, "bond")) } else { String::new() };
+    text += &format!("{}{bonds}, time step {} s\n", counted(report.grains, "grain"), tolerance(report.step));
     match report.reference.map(|k| &report.runs[k]) {
         Some(Row { way, step, outcome, .. }) => {
             text += &format!(
@@ -62,10 +66,10 @@ fn labels(report: &Report, k: usize) -> Vec<String> {
 fn work(report: &Report) -> String {
     let bonded = report.bonds > 0;
     let mut heads = row!["solver", "tolerance", "step", "CPU", "steps", "iterations", "residual", "load error"];
-    let mut units = row!["", "", "s", "s", "", "", "worst", "worst"];
+    let mut units = row!["", "", "s", "s", "", "", "worst", if bonded { "to 1st break" } else { "worst" }];
     if bonded {
         heads.push("strain".into());
-        units.push("before".into());
+        units.push("to 1st break".into());
     }
     heads.extend(row!["penetration", "energy rem.", "missed", "refused"]);
     units.extend(row!["m", "J", "steps", "solves"]);
@@ -87,8 +91,14 @@ fn work(report: &Report) -> String {
 
 fn failure(report: &Report) -> String {
     let axes = place_width(report);
-    let mut heads = row!["solver", "tolerance", "step", "1st break", "bond"];
-    let mut units = row!["", "", "s", "N", ""];
+    let mut heads = row!["solver", "tolerance", "step"];
+    let mut units = row!["", "", "s"];
+    if report.driven {
+        heads.push("1st break".into());
+        units.push("N".into());
+    }
+    heads.push(if report.driven { "bond" } else { "1st bond" }.into());
+    units.push(String::new());
     for axis in &["x", "y", "z"][..axes] {
         heads.push((*axis).into());
         units.push("mm".into());
@@ -107,7 +117,9 @@ fn failure(report: &Report) -> String {
     for (k, row) in report.runs.iter().enumerate() {
         let mut cells = labels(report, k);
         let first = row.outcome.first_break.as_ref();
-        cells.push(quantity(row.first_break()));
+        if report.driven {
+            cells.push(quantity(row.first_break()));
+        }
         cells.push(first.map_or("–".into(), |first| first.bond.to_string()));
         cells.extend((0..axes).map(|axis| first.map_or("–".into(), |first| format!("{:.2}", 1e3 * first.place[axis]))));
         cells.push(first.map_or("–".into(), |first| number(first.time)));
@@ -140,6 +152,8 @@ fn notes(report: &Report) -> String {
     let mut text = String::from("\n");
     if report.bonds > 0 {
         text += "load error and strain are those before the first break, where a rigid sample is at rest and keeps its shape\n";
+    } else {
+        text += "load error means something only where the sample should be at rest\n";
     }
     if report.runs.iter().any(|row| row.outcome.failure.early.contains(&true)) {
         text += "* before any bond broke: the solver's own strain, not the sample's\n";
@@ -163,9 +177,11 @@ fn spreads(report: &Report, indeterminacy: &Indeterminacy) -> String {
         tolerance(indeterminacy.step_factor * report.step)
     );
     let mut table = Text::default();
-    let mut heads = row!["solver", "varied", "runs", "1st break", "", "", "bonds"];
-    let mut units = row!["", "", "", "N: min", "mean", "max", ""];
+    let mut heads = row!["solver", "varied", "runs", "1st bonds"];
+    let mut units = row!["", "", "", "different"];
     if report.driven {
+        heads.extend(row!["1st break", "", ""]);
+        units.extend(row!["N: min", "mean", "max"]);
         heads.extend(row!["collapse", "", "", "collapse", "", ""]);
         units.extend(row!["N, 1e-4: min", "mean", "max", "N, 1e-3: min", "mean", "max"]);
     }
@@ -176,17 +192,16 @@ fn spreads(report: &Report, indeterminacy: &Indeterminacy) -> String {
     for spread in &indeterminacy.spreads {
         let failed = if spread.failed > 0 { format!(" + {} failed", spread.failed) } else { String::new() };
         let mut cells = row![spread.solver.name(), spread.varied.name(), format!("{}{failed}", spread.runs)];
-        cells.extend(range(spread.first_break));
         cells.push(spread.first_bonds.to_string());
         if report.driven {
+            cells.extend(range(spread.first_break));
             cells.extend(spread.collapse.into_iter().flat_map(range));
         }
         cells.push(spread.jaccard.map_or("–".into(), |j| format!("{j:.2}")));
         table.row(cells);
     }
     text += &table.lines();
-    text +=
-        "\nbonds: how many different bonds broke first; Jaccard: what two runs have in common of their broken bonds\n";
+    text += "\n1st bonds: how many different bonds broke first; Jaccard: what two runs have in common of their broken bonds\n";
     text
 }
 
@@ -205,10 +220,10 @@ fn profile(report: &Report) -> String {
         tolerance(profile.tolerance)
     );
     let mut table = Text::default();
-    let mut heads = row!["solver", "solved", "iterations", "", "CPU"];
-    let mut units = row!["", "%", "median", "max", "ms, mean"];
+    let mut heads = row!["solver", "solved", "iterations", "", "residual", "CPU"];
+    let mut units = row!["", "%", "median", "max", "median", "ms, mean"];
     for factor in &profile.factors {
-        heads.push(if heads.len() == 5 { "% within".into() } else { String::new() });
+        heads.push(if heads.len() == 6 { "% within".into() } else { String::new() });
         units.push(format!("{factor} ×"));
     }
     table.row(heads);
@@ -216,6 +231,8 @@ fn profile(report: &Report) -> String {
     for solver in &profile.solvers {
         let mut iterations: Vec<u64> = solver.costs.iter().map(|cost| cost.iterations).collect();
         iterations.sort_unstable();
+        let mut residuals: Vec<f64> = solver.costs.iter().map(|cost| cost.residual).collect();
+        residuals.sort_unstable_by(f64::total_cmp);
         let count = solver.costs.len().max(1) as f64;
         let solved = solver.costs.iter().filter(|cost| cost.solved).count() as f64;
         let cpu: f64 = solver.costs.iter().map(|cost| cost.cpu_time).sum();
@@ -224,6 +241,7 @@ fn profile(report: &Report) -> String {
             format!("{:.0}", 100.0 * solved / count),
             iterations.get(iterations.len() / 2).copied().unwrap_or(0),
             iterations.last().copied().unwrap_or(0),
+            quantity(residuals.get(residuals.len() / 2).copied()),
             short(1e3 * cpu / count)
         ];
         cells.extend(solver.shares.iter().map(|share| format!("{:.0}", 100.0 * share)));
