@@ -122,7 +122,7 @@ struct AccuracyArgs {
     #[arg(long, value_enum, value_delimiter = ',', value_name = "NAME,…", default_value = "gauss-seidel,newton")]
     solvers: Vec<SolverName>,
     /// Tolerances of the residual.
-    #[arg(long, value_delimiter = ',', value_name = "TOL,…", default_value = "1e-2,1e-4,1e-6", value_parser = positive)]
+    #[arg(long, value_delimiter = ',', value_name = "TOL,…", default_value = "1e-4,1e-6", value_parser = positive)]
     tolerances: Vec<f64>,
     /// Time steps, as factors on that of the scene.
     #[arg(long, value_delimiter = ',', value_name = "FACTOR,…", default_value = "1,0.5", value_parser = positive)]

@@ -211,7 +211,7 @@ pub enum End {
     Collapsed,
     /// The scene.
     Scene(Ending),
-    /// A step was not solved: the message.
+    /// A step was not solved, or wrongly: the message.
     Failed(String),
 }
 
@@ -332,6 +332,12 @@ impl<D: Dim> Trial<'_, D> {
                 Ok(report) => state.follow(&world, &report, &before),
                 Err(error) => break End::Failed(error.to_string()),
             }
+            if state.blown_up(&world) {
+                break End::Failed(format!(
+                    "the motion has far more energy than was put in at t = {:.6e} s: the solves that were accepted are wrong",
+                    world.time
+                ));
+            }
             if let Some(ending) = state.course.ending(&world) {
                 break End::Scene(ending);
             }
@@ -347,6 +353,8 @@ impl<D: Dim> Trial<'_, D> {
 /// A run as it goes on.
 struct Followed<D: Dim> {
     course: Course<D>,
+    /// Kinetic energy at the start (J).
+    kinetic: f64,
     cpu_time: f64,
     residuals: Vec<f64>,
     load_error: f64,
@@ -357,7 +365,8 @@ struct Followed<D: Dim> {
 impl<D: Dim> Followed<D> {
     fn new(scene: &Scene, world: &World<D>) -> Self {
         let course = Course::new(scene, world);
-        Self { course, cpu_time: 0.0, residuals: vec![], load_error: 0.0, strain: 0.0, first: None }
+        let kinetic = world.ledger.kinetic;
+        Self { course, kinetic, cpu_time: 0.0, residuals: vec![], load_error: 0.0, strain: 0.0, first: None }
     }
 
     /// Enter a step; `before` are the velocities of the grains before it.
@@ -380,6 +389,14 @@ impl<D: Dim> Followed<D> {
         }
         self.load_error = self.load_error.max(load_error(world, before));
         self.strain = world.strain().iter().fold(self.strain, |worst, e| worst.max(e.abs()));
+    }
+
+    /// Whether the kinetic energy is beyond ten times all that was put in, and that of grains that move by their radius
+    /// in every step. Such a run means nothing any more, and would look for contacts among all pairs of grains.
+    fn blown_up(&self, world: &World<D>) -> bool {
+        let (ledger, g) = (&world.ledger, &world.grains);
+        let fast = g.mass.iter().zip(&g.radius).map(|(m, r)| 0.5 * m * (r / world.settings.step).powi(2)).sum::<f64>();
+        ledger.kinetic > (10.0 * (ledger.external_work.abs() + self.kinetic)).max(fast)
     }
 
     /// The outcome, with bonds and grains by the numbers of the sample.
