@@ -456,3 +456,57 @@ pub fn thread_time() -> f64 {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
     time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::build::build;
+    use crate::scene::from_text;
+    use dem_core::dim::D2;
+
+    /// Nine cemented disks on a lattice, one of which is pulled.
+    const SCENE: &str = r#"{
+        "dimension": 2, "sample": { "lattice": { "square": { "diameter": 1e-3, "rows": 3, "columns": 3 } } },
+        "materials": { "density": 2500, "friction": { "grain_grain": 0.3, "grain_wall": 0.2 } },
+        "bonds": { "strength": 10, "gap_tolerance": 1e-3 },
+        "grains": { "fixed": [0], "loads": [{ "grain": 8, "force": [1, 0] }] },
+        "time": { "step": 1e-4, "end": 1e-3 }, "output": { "every_steps": 1 }
+    }"#;
+
+    fn sample() -> (Scene, Sample<D2>) {
+        let scene = from_text("scene", SCENE, &[]).expect("scene");
+        let built = build::<D2>(&scene, &mut |_| true).expect("world");
+        (scene, Sample::of(built))
+    }
+
+    #[test]
+    fn another_order_is_the_same_sample() {
+        let (scene, sample) = sample();
+        let (world, numbers) = sample.world(&scene, Variant::Order(3));
+        assert_ne!(world.grains.position, sample.grains.position);
+        let middle = |grains: &Grains<D2>, pair: [u32; 2]| {
+            let [i, j] = pair.map(|k| grains.position[k as usize]);
+            (i + j) * 0.5
+        };
+        for (bond, number) in world.bonds.iter().zip(&numbers) {
+            let same = &sample.bonds[*number as usize];
+            assert_eq!(middle(&world.grains, bond.pair), middle(&sample.grains, same.pair));
+        }
+        assert!(world.bonds.windows(2).all(|two| two[0].pair < two[1].pair));
+        let place = |grains: &Grains<D2>, k: usize| grains.position[k];
+        assert_eq!(place(&world.grains, world.loads[0].grain), place(&sample.grains, 8));
+        let fixed = world.grains.fixed.iter().position(|fixed| *fixed).expect("a fixed grain");
+        assert_eq!(place(&world.grains, fixed), place(&sample.grains, 0));
+    }
+
+    #[test]
+    fn a_start_reaches_the_first_problem() {
+        let (scene, sample) = sample();
+        let (mut as_given, _) = sample.world(&scene, Variant::AsGiven);
+        let (mut world, _) = sample.world(&scene, Variant::Start(1));
+        assert!(as_given.contact_problem().bonded.iter().all(|contact| contact.r.n == 0.0));
+        let started = world.contact_problem();
+        let limit = START_SHARE * 10.0 * scene.time.step;
+        assert!(started.bonded.iter().all(|contact| contact.r.n != 0.0 && contact.r.n.abs() <= limit));
+    }
+}
