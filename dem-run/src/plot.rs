@@ -211,8 +211,11 @@ impl Chart {
             layout = layout.with_x_axis_min(low - off).with_x_axis_max(high + off);
         }
         if self.log_y {
-            let low = values().map(|p| p.1).fold(f64::INFINITY, f64::min);
-            let high = values().map(|p| p.1).fold(0.0, f64::max);
+            // a level that cannot be seen tells nothing
+            let levels = self.levels.iter().map(|(value, _)| value * lift).filter(|value| *value > 0.0);
+            let shown: Vec<f64> = values().map(|p| p.1).chain(levels).collect();
+            let low = shown.iter().copied().fold(f64::INFINITY, f64::min);
+            let high = shown.iter().copied().fold(0.0, f64::max);
             let tick = move |value: f64| power_of_ten(value / lift);
             layout = layout.with_log_y().with_y_tick_format(TickFormat::Custom(Arc::new(tick)));
             if low <= high {

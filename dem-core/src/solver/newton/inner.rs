@@ -66,7 +66,18 @@ impl Newton {
                 return (iteration, true);
             }
             let Some(direction) = self.direction(rows, state, guessed, target) else { return (iteration + 1, false) };
-            if std::env::var("DBG").is_ok() { eprintln!("  inner {iteration} norm {:.3e} target {target:.1e} guessed {} trusted {} made {} floor {} wasted {} dir {:.2e}", state.norm, guessed.is_some(), self.trusted, self.factor.made, self.floor, self.wasted, direction.norm); }
+            if std::env::var("DBG").is_ok() {
+                eprintln!(
+                    "  inner {iteration} norm {:.3e} target {target:.1e} guessed {} trusted {} made {} floor {} wasted {} dir {:.2e}",
+                    state.norm,
+                    guessed.is_some(),
+                    self.trusted,
+                    self.factor.made,
+                    self.floor,
+                    self.wasted,
+                    direction.norm
+                );
+            }
             let before = direction.norm;
             advance(rows, state, &direction.step, guessed.is_some());
             if !state.norm.is_finite() {
@@ -98,13 +109,7 @@ impl Newton {
     }
 
     /// The Newton direction −J⁻¹ F, by the factor at hand or GMRES on it, renewed if it serves badly.
-    fn direction(
-        &mut self,
-        rows: &Rows,
-        state: &Iterate,
-        guess: Option<&[Padded]>,
-        target: f64,
-    ) -> Option<Direction> {
+    fn direction(&mut self, rows: &Rows, state: &Iterate, guess: Option<&[Padded]>, target: f64) -> Option<Direction> {
         let (mut right, operators) = linearise(rows, state, guess);
         right.iter_mut().for_each(|f| *f = -*f);
         let norm = norm2(&right).sqrt();
