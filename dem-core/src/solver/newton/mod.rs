@@ -72,8 +72,6 @@ const MOST_SOFTENED: u32 = 4;
 const SWEEPS: usize = 5;
 const COLD_SWEEPS: usize = 100;
 const STALL_SWEEPS: usize = 50;
-/// Stalls after which the penalty is raised step by step, and Gauss–Seidel takes over if that fails.
-const MOST_STALLS: u64 = 2;
 /// Most sweeps of Gauss–Seidel where it takes over, and the steps that its acceleration remembers.
 const MOST_SWEEPS: u64 = 200_000;
 const MEMORY: usize = 8;
@@ -202,17 +200,22 @@ impl<D: Dim> ContactSolver<D> for Newton {
         let cold = rows.list.iter().all(|row| row.multiplier.n == row.shift);
         let mut guess = swept(problem, &rows, if cold { COLD_SWEEPS } else { SWEEPS });
         let mut iterations = 0;
-        for stall in 0..=MOST_STALLS {
+        for stall in 0.. {
             let mut rows = self.started(&rows);
             if let Some(report) = self.rounds(problem, &mut rows, &mut guess, &mut iterations) {
                 self.next_rest = 1;
                 return report;
             }
+            // the active set runs in circles: sweeps from here show another, or those from nothing
             self.renew = true;
-            if stall < MOST_STALLS {
-                // the active set runs in circles: sweeps from here show another
-                guess = swept(problem, &rows, STALL_SWEEPS);
-            }
+            guess = match stall {
+                0 => swept(problem, &rows, STALL_SWEEPS),
+                1 => {
+                    problem.forget_reactions();
+                    swept(problem, &rows, COLD_SWEEPS)
+                }
+                _ => break,
+            };
         }
         if let Some(found) = self.approach(problem, &rows, &mut iterations) {
             self.next_rest = 1;
