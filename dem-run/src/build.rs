@@ -4,12 +4,13 @@ use crate::prepare::{self, Ball, PrepareError, Watch};
 use crate::run::RunError;
 use crate::scene::{self, Drive as SceneDrive, Place, Sample, Scene, SolverKind, WallMass};
 use dem_core::body::{Drive, Grain, Grains, Load, Schedule, Shape, Wall};
-use dem_core::bond::Rupture;
+use dem_core::bond::{self, Rupture};
 use dem_core::contact::{BondFlow, LocalSolve};
 use dem_core::detection::pairs_within;
 use dem_core::dim::{Dim, Vect};
 use dem_core::solver::{GaussSeidelSettings, NewtonSettings, SolverSettings, Start, StiffnessRatio};
 use dem_core::world::{Restitution, Settings, World};
+use std::f64::consts::PI;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -34,6 +35,9 @@ pub fn build<D: Dim>(scene: &Scene, watch: Watch) -> Result<Built<D>, RunError> 
     if let Some(bonds) = &scene.bonds {
         let strength = |mean_diameter| bonds.cohesion(scene.dimension, mean_diameter, scene.thickness());
         world.form_bonds(bonds.gap_tolerance, strength, bonds.friction.unwrap_or(scene.materials.friction.grain_grain));
+        if let Some(stiffness) = bonds.stiffness {
+            world.make_bonds_elastic(|a| bond_stiffness::<D>(stiffness, a, scene.thickness()));
+        }
     }
     Ok(Built { world, solid_fraction })
 }
@@ -268,16 +272,40 @@ fn solver(solver: &scene::Solver) -> SolverSettings {
             max_sweeps: gs.max_sweeps,
             acceleration: gs.acceleration,
         }),
-        SolverKind::Newton(newton) => SolverSettings::Newton(NewtonSettings {
-            tolerance,
-            accept,
-            load_tolerance: newton.load_tolerance,
-            start: match newton.start {
-                scene::Start::StiffLimit => Start::StiffLimit,
-                scene::Start::LastStep => Start::LastStep,
-            },
-            stiffness: StiffnessRatio { tangential: newton.tangential_stiffness, rolling: newton.rolling_stiffness },
-            max_iterations: newton.max_iterations,
-        }),
+        SolverKind::Newton(newton) => SolverSettings::Newton(newton_settings(newton, tolerance, accept)),
+        SolverKind::Auto(newton) => SolverSettings::Auto(newton_settings(newton, tolerance, accept)),
+    }
+}
+
+fn newton_settings(newton: &scene::Newton, tolerance: f64, accept: f64) -> NewtonSettings {
+    NewtonSettings {
+        tolerance,
+        accept,
+        load_tolerance: newton.load_tolerance,
+        start: match newton.start {
+            scene::Start::StiffLimit => Start::StiffLimit,
+            scene::Start::LastStep => Start::LastStep,
+        },
+        stiffness: StiffnessRatio { tangential: newton.tangential_stiffness, rolling: newton.rolling_stiffness },
+        max_iterations: newton.max_iterations,
+    }
+}
+
+/// Stiffness of a bond of mean diameter `a` (m). A bar of length a and width a, t thick or round, has E A/a along itself,
+/// G A/a across, E I/a in bending.
+fn bond_stiffness<D: Dim>(stiffness: scene::Stiffness, a: f64, thickness: f64) -> bond::Stiffness {
+    match stiffness {
+        scene::Stiffness::Springs(scene::Springs { normal, tangential, rolling }) => {
+            bond::Stiffness { normal, tangential, rolling }
+        }
+        scene::Stiffness::Young(scene::Young { modulus, poisson_ratio }) => {
+            let (area, second_moment) = match D::N {
+                2 => (a * thickness, thickness * a.powi(3) / 12.0),
+                _ => (0.25 * PI * a * a, PI * a.powi(4) / 64.0),
+            };
+            let normal = modulus * area / a;
+            let tangential = normal / (2.0 * (1.0 + poisson_ratio));
+            bond::Stiffness { normal, tangential, rolling: modulus * second_moment / a }
+        }
     }
 }

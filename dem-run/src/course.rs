@@ -7,7 +7,7 @@ use crate::summary::Ending;
 use dem_core::body::{Drive, Wall};
 use dem_core::bond::BondStatus;
 use dem_core::dim::{Dim, Vect};
-use dem_core::solver::SolveStatus;
+use dem_core::solver::{SolveStatus, Work};
 use dem_core::world::{StepReport, World};
 
 /// Counts of a run, and its stop conditions.
@@ -20,8 +20,8 @@ pub struct Course<D: Dim> {
     pub broken: [usize; 3],
     /// Largest residual of an accepted solve (–).
     pub worst_residual: f64,
-    /// Iterations of all solves; for Gauss–Seidel these are sweeps.
-    pub iterations: u64,
+    /// What all solves took.
+    pub work: Work,
     /// Steps that were accepted and missed the tolerance.
     pub missed_tolerance: u64,
     /// Solves that were not accepted.
@@ -49,7 +49,7 @@ impl<D: Dim> Course<D> {
             driven: world.walls.iter().position(|w| drive_direction(w).is_some()),
             broken: [0; 3],
             worst_residual: 0.0,
-            iterations: 0,
+            work: Work::default(),
             missed_tolerance: 0,
             rejected: 0,
             penetration: 0.0,
@@ -79,7 +79,7 @@ impl<D: Dim> Course<D> {
             self.broken[mode] += 1;
         }
         self.worst_residual = self.worst_residual.max(report.residual);
-        self.iterations += report.iterations;
+        self.work = self.work + report.work;
         self.missed_tolerance += u64::from(report.status == SolveStatus::Accepted);
         self.rejected += u64::from(report.rejected);
         self.penetration = self.penetration.max(report.penetration);

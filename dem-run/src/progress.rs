@@ -34,7 +34,7 @@ pub struct StepProgress {
     /// Relative residual of the last solve.
     pub residual: f64,
     /// Iterations of the last solve.
-    pub sweeps: u64,
+    pub iterations: u64,
     /// Bonds broken since the start.
     pub broken: usize,
 }
@@ -184,11 +184,11 @@ impl StepProgress {
     }
 
     fn describe(&self, left: Option<f64>) -> String {
-        let Self { step, time, end, residual, sweeps, broken } = self;
+        let Self { step, time, end, residual, iterations, broken } = self;
         let bonds = if *broken == 1 { "bond" } else { "bonds" };
         let left = left.map_or("?".to_string(), duration);
         format!(
-            "t {time:.4} of {end} s  step {step}  residual {residual:.1e} ({sweeps} sweeps)  \
+            "t {time:.4} of {end} s  step {step}  residual {residual:.1e} ({iterations} iterations)  \
              {broken} {bonds} broken  {left} left"
         )
     }
@@ -271,7 +271,7 @@ mod tests {
     }
 
     fn at(step: u64) -> StepProgress {
-        StepProgress { step, time: step as f64 * 0.1, end: 1.0, residual: 8.2e-5, sweeps: 12, broken: 1 }
+        StepProgress { step, time: step as f64 * 0.1, end: 1.0, residual: 8.2e-5, iterations: 12, broken: 1 }
     }
 
     #[test]
@@ -285,7 +285,7 @@ mod tests {
             out.lines(),
             [
                 "compaction: 50 %",
-                " 10 %  t 0.1000 of 1 s  step 1  residual 8.2e-5 (12 sweeps)  1 bond broken  ? left",
+                " 10 %  t 0.1000 of 1 s  step 1  residual 8.2e-5 (12 iterations)  1 bond broken  ? left",
                 "a note",
             ]
         );

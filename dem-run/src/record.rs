@@ -255,13 +255,21 @@ fn observables<D: Dim>(world: &World<D>) -> Vec<(Observable, Measure<D>)> {
     add("angular_momentum", "kg m2 s-1", &[spins], |w, _, out| out.extend(w.momentum().angular.as_slice()));
     add("solver_residual", "", scalar, |_, r, out| out.push(r.residual));
     add("solver_load_error", "", scalar, |_, r, out| out.push(r.load_error));
-    add("solver_iterations", "", scalar, |_, r, out| out.push(r.iterations as f64));
+    add("solver_iterations", "", scalar, |_, r, out| out.push(r.work.iterations() as f64));
+    add("solver_newton_iterations", "", scalar, |_, r, out| out.push(r.work.newton as f64));
+    add("solver_factorisations", "", scalar, |_, r, out| out.push(r.work.factorisations as f64));
     add("solver_rejected", "", scalar, |_, r, out| out.push(f64::from(r.rejected)));
     add("penetration", "m", scalar, |_, r, out| out.push(r.penetration));
     add("stress", "Pa", &[d, d], |w, _, out| out.extend(w.stress()));
     add("strain", "", &[d, d], |w, _, out| out.extend(w.strain()));
     if !world.bonds.is_empty() {
-        add("bond_remainder", "J", scalar, |w, _, out| out.push(w.ledger.bonds));
+        if world.bonds.iter().any(|b| b.stiffness.is_some()) {
+            add("elastic_energy", "J", scalar, |w, _, out| out.push(w.ledger.elastic));
+            add("dissipation_damping", "J", scalar, |w, _, out| out.push(w.ledger.damping));
+            add("fracture_energy", "J", scalar, |w, _, out| out.push(w.ledger.fracture));
+        } else {
+            add("bond_remainder", "J", scalar, |w, _, out| out.push(w.ledger.bonds));
+        }
         add("bonds_broken", "", scalar, |w, _, out| out.push((w.bonds.len() - w.intact_bonds()) as f64));
     }
     if walls > 0 {

@@ -165,7 +165,7 @@ impl<'a, D: Dim> Run<'a, D> {
             time: self.world.time,
             end: self.scene.time.end,
             residual: report.residual,
-            sweeps: report.iterations,
+            iterations: report.work.iterations(),
             broken: self.course.broken(),
         }
     }
@@ -198,11 +198,12 @@ impl<'a, D: Dim> Run<'a, D> {
             grains: world.grains.len(),
             solid_fraction: self.solid_fraction,
             bonds: world.bonds.len(),
+            elastic: world.bonds.iter().any(|b| b.stiffness.is_some()),
             broken: course.broken,
             failure: course.collapse.failure,
             tolerance: self.scene.solver.tolerance,
             worst_residual: course.worst_residual,
-            sweeps: course.iterations,
+            work: course.work,
             missed_tolerance: course.missed_tolerance,
             rejected: course.rejected,
             penetration: course.penetration,

@@ -1,6 +1,7 @@
 //! What a run tells at its end, on stdout.
 
 use crate::collapse::{Failure, STRAINS};
+use dem_core::solver::Work;
 use serde::Serialize;
 use std::fmt;
 use std::path::PathBuf;
@@ -41,6 +42,8 @@ pub struct Summary {
     pub solid_fraction: Option<f64>,
     /// Bonds at the start.
     pub bonds: usize,
+    /// Whether they are elastic: then the sample may deform before any breaks.
+    pub elastic: bool,
     /// Bonds broken in tension, shear and rolling.
     pub broken: [usize; 3],
     /// Loads at which the sample failed (N).
@@ -50,7 +53,8 @@ pub struct Summary {
     /// Largest residual of an accepted solve (–).
     pub worst_residual: f64,
     /// Sweeps of all solves.
-    pub sweeps: u64,
+    #[serde(serialize_with = "counts")]
+    pub work: Work,
     /// Steps that were accepted and missed the tolerance.
     pub missed_tolerance: u64,
     /// Solves that were not accepted: their steps were halved.
@@ -86,14 +90,19 @@ impl fmt::Display for Summary {
         if self.bonds > 0 {
             self.write_bonds(f)?;
         }
+        let Work { sweeps, newton, factorisations } = self.work;
+        let rate = |count: u64| count as f64 / self.steps.max(1) as f64;
+        let took: Vec<String> = [(newton, "Newton iterations"), (factorisations, "factorisations"), (sweeps, "sweeps")]
+            .into_iter()
+            .filter(|(count, _)| *count > 0)
+            .map(|(count, name)| format!("{:.2} {name}", rate(count)))
+            .collect();
+        let took = if took.is_empty() { "nothing to solve".into() } else { took.join(", ") + " a step" };
+        writeln!(f, "solver           {took}")?;
         writeln!(
             f,
-            "solver           {:.1} sweeps a step, worst residual {:.2e} (tolerance {:.0e}), {} steps missed it, {} solves not accepted",
-            self.sweeps as f64 / self.steps.max(1) as f64,
-            self.worst_residual,
-            self.tolerance,
-            self.missed_tolerance,
-            self.rejected
+            "accuracy         worst residual {:.2e} (tolerance {:.0e}), {} steps missed it, {} solves not accepted",
+            self.worst_residual, self.tolerance, self.missed_tolerance, self.rejected
         )?;
         writeln!(
             f,
@@ -103,7 +112,7 @@ impl fmt::Display for Summary {
         )?;
         writeln!(f, "external work    {:.4e} J", self.external_work)?;
         writeln!(f, "energy remainder {:.2e} J", self.energy_remainder)?;
-        if self.bonds > 0 {
+        if self.bonds > 0 && !self.elastic {
             writeln!(f, "bond remainder   {:.2e} J, the work of intact bonds: it should be zero", self.bond_remainder)?;
         }
         writeln!(f, "CPU time         {:.1} s", self.cpu_time)?;
@@ -139,9 +148,18 @@ impl Summary {
         writeln!(f, "first break      {}", load(first_break))?;
         for ((collapse, early), strain) in collapse.into_iter().zip(early).zip(STRAINS) {
             // rigid grains and bonds: before the first break nothing can have moved
-            let note = if early { ", before any bond broke: the solver's own strain, not the sample's" } else { "" };
+            let note = if early && !self.elastic {
+                ", before any bond broke: the solver's own strain, not the sample's"
+            } else {
+                ""
+            };
             writeln!(f, "collapse load    {} (strain {strain:.0e}{note})", load(collapse))?;
         }
         writeln!(f, "5 % broken       {}", load(broken_share))
     }
+}
+
+fn counts<S: serde::Serializer>(work: &Work, to: S) -> Result<S::Ok, S::Error> {
+    let Work { sweeps, newton, factorisations } = *work;
+    to.collect_map([("sweeps", sweeps), ("newton_iterations", newton), ("factorisations", factorisations)])
 }

@@ -6,7 +6,7 @@
 //! Anderson's acceleration of bursts of sweeps, an option, takes ten times fewer of them where bonds abound.
 
 use super::anderson::Anderson;
-use super::{ContactSolver, SolveReport, SolveStatus};
+use super::{ContactSolver, SolveReport, SolveStatus, Work};
 use crate::contact::{Law, LocalSolve};
 use crate::dim::{Dim, Vect};
 use crate::problem::residual::residual;
@@ -31,6 +31,10 @@ pub struct GaussSeidelSettings {
 const BURST: u64 = 4;
 /// Accelerated steps between two looks at the residual.
 const LOOK: u64 = 4;
+/// Plain sweeps before the acceleration begins: easy problems need no more.
+const PLAIN: u64 = 32;
+/// Steps for the acceleration to remember that serve well.
+pub(super) const MEMORY: usize = 8;
 
 /// Non-linear Gauss–Seidel on node velocities.
 #[derive(Clone, Copy, Debug)]
@@ -44,7 +48,7 @@ impl GaussSeidel {
         Self { settings }
     }
 
-    fn report(&self, iterations: u64, residual: f64) -> SolveReport {
+    fn report(&self, sweeps: u64, residual: f64) -> SolveReport {
         let status = if residual <= self.settings.tolerance {
             SolveStatus::Converged
         } else if residual <= self.settings.accept {
@@ -52,7 +56,7 @@ impl GaussSeidel {
         } else {
             SolveStatus::Failed
         };
-        SolveReport { status, iterations, residual, load_error: None }
+        SolveReport { status, work: Work { sweeps, ..Work::default() }, residual, load_error: None }
     }
 }
 
@@ -124,13 +128,13 @@ fn scatter<D: Dim>(problem: &mut ContactProblem<D>, from: &[f64]) {
 }
 
 impl GaussSeidel {
-    /// Sweeps alone; returns how many, and the residual.
-    fn plain<D: Dim>(&self, problem: &mut ContactProblem<D>) -> (u64, f64) {
+    /// At most `most` sweeps alone; returns how many, and the residual.
+    fn plain<D: Dim>(&self, problem: &mut ContactProblem<D>, most: u64) -> (u64, f64) {
         let mut error = residual(problem);
         let mut sweeps = 0;
-        while error > self.settings.tolerance && sweeps < self.settings.max_sweeps {
+        while error > self.settings.tolerance && sweeps < most {
             // the residual costs about a sweep: look at it ever more rarely, at most every 64 sweeps
-            let burst = (1 + sweeps / 4).min(64).min(self.settings.max_sweeps - sweeps);
+            let burst = (1 + sweeps / 4).min(64).min(most - sweeps);
             for _ in 0..burst {
                 sweep(problem, self.settings.local);
             }
@@ -142,24 +146,27 @@ impl GaussSeidel {
                 error = residual(problem);
             }
         }
-        if sweeps >= self.settings.max_sweeps {
+        if sweeps >= most {
             problem.velocities_from_reactions();
             error = residual(problem);
         }
         (sweeps, error)
     }
 
-    /// Bursts of sweeps, accelerated. What it ends with is the result of a burst: every impulse is in its cone.
+    /// Bursts of sweeps, accelerated, after some plain ones. What it ends with is the result of a burst: every impulse
+    /// is in its cone.
     fn accelerated<D: Dim>(&self, problem: &mut ContactProblem<D>) -> (u64, f64) {
-        let mut error = residual(problem);
-        let mut sweeps = 0;
+        let (mut sweeps, mut error) = self.plain(problem, PLAIN.min(self.settings.max_sweeps));
+        if error <= self.settings.tolerance {
+            return (sweeps, error);
+        }
         let mut memory = Anderson::new(self.settings.acceleration, gather(problem));
         while error > self.settings.tolerance && sweeps < self.settings.max_sweeps {
             for _ in 0..BURST {
                 sweep(problem, self.settings.local);
             }
             sweeps += BURST;
-            if sweeps <= LOOK * BURST || sweeps.is_multiple_of(LOOK * BURST) || sweeps >= self.settings.max_sweeps {
+            if sweeps.is_multiple_of(LOOK * BURST) || sweeps >= self.settings.max_sweeps {
                 problem.velocities_from_reactions();
                 error = residual(problem);
             }
@@ -175,8 +182,10 @@ impl GaussSeidel {
 impl<D: Dim> ContactSolver<D> for GaussSeidel {
     fn solve(&mut self, problem: &mut ContactProblem<D>) -> SolveReport {
         problem.velocities_from_reactions();
-        let (sweeps, error) =
-            if self.settings.acceleration == 0 { self.plain(problem) } else { self.accelerated(problem) };
+        let (sweeps, error) = match self.settings.acceleration {
+            0 => self.plain(problem, self.settings.max_sweeps),
+            _ => self.accelerated(problem),
+        };
         self.report(sweeps, error)
     }
 }

@@ -1,14 +1,17 @@
 //! Solvers of the contact problem, behind one trait and one enum of settings.
 
 mod anderson;
+mod auto;
 mod gauss_seidel;
 mod newton;
 
+pub use auto::Auto;
 pub use gauss_seidel::{GaussSeidel, GaussSeidelSettings, sweep};
 pub use newton::{Newton, NewtonSettings, Start, StiffnessRatio};
 
 use crate::dim::Dim;
 use crate::problem::ContactProblem;
+use std::ops::Add;
 
 /// How a solve ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,13 +36,43 @@ impl SolveStatus {
     }
 }
 
+/// What solves took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Work {
+    /// Sweeps of Gauss–Seidel that made up the solution; those that only look for an active set do not count.
+    pub sweeps: u64,
+    /// Newton iterations.
+    pub newton: u64,
+    /// Sparse factorisations.
+    pub factorisations: u64,
+}
+
+impl Work {
+    /// Sweeps and Newton iterations together.
+    #[must_use]
+    pub fn iterations(&self) -> u64 {
+        self.sweeps + self.newton
+    }
+}
+
+impl Add for Work {
+    type Output = Self;
+    fn add(self, o: Self) -> Self {
+        Self {
+            sweeps: self.sweeps + o.sweeps,
+            newton: self.newton + o.newton,
+            factorisations: self.factorisations + o.factorisations,
+        }
+    }
+}
+
 /// What a solve did.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolveReport {
     /// How it ended.
     pub status: SolveStatus,
-    /// Iterations (sweeps of Gauss–Seidel).
-    pub iterations: u64,
+    /// What it took.
+    pub work: Work,
     /// Residual reached (–), see [`crate::problem::residual`].
     pub residual: f64,
     /// Load error (–), by the solvers that can tell it.
@@ -59,6 +92,8 @@ pub enum SolverSettings {
     GaussSeidel(GaussSeidelSettings),
     /// Augmented-Lagrangian semismooth Newton with a sparse factorisation.
     Newton(NewtonSettings),
+    /// Either, by what is expected to be cheaper.
+    Auto(NewtonSettings),
 }
 
 impl SolverSettings {
@@ -67,6 +102,7 @@ impl SolverSettings {
         match *self {
             Self::GaussSeidel(settings) => Box::new(GaussSeidel::new(settings)),
             Self::Newton(settings) => Box::new(Newton::new(settings)),
+            Self::Auto(settings) => Box::new(Auto::new(settings)),
         }
     }
 }

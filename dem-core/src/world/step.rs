@@ -9,7 +9,7 @@ use crate::bond::{BondStatus, Rupture, failure};
 use crate::contact::{Law, Local};
 use crate::dim::{Dim, Vect};
 use crate::problem::{ContactProblem, Group, Node, Nodes};
-use crate::solver::{SolveReport, SolveStatus};
+use crate::solver::{SolveReport, SolveStatus, Work};
 use thiserror::Error;
 
 /// What one step did.
@@ -19,8 +19,8 @@ pub struct StepReport<D: Dim> {
     pub time: f64,
     /// How the worst of its solves ended; never `Failed`.
     pub status: SolveStatus,
-    /// Iterations of all its solves.
-    pub iterations: u64,
+    /// What all its solves took.
+    pub work: Work,
     /// Largest residual of its accepted solves (–).
     pub residual: f64,
     /// ‖M (v⁺ − v⁻)/h‖ / ‖F_ext‖ over the grains that are free to move (–): in a static scene a false acceleration force over the load. Zero
@@ -209,8 +209,8 @@ impl<D: Dim> World<D> {
             return Err(StepError::NotFinite { time: self.time });
         }
         if solve.status == SolveStatus::Failed {
-            let SolveReport { residual, iterations, .. } = solve;
-            return Err(StepError::NotAccepted { time: self.time, step: h, residual, iterations });
+            let SolveReport { residual, work, .. } = solve;
+            return Err(StepError::NotAccepted { time: self.time, step: h, residual, iterations: work.iterations() });
         }
         Ok(())
     }
@@ -385,7 +385,7 @@ impl<D: Dim> World<D> {
         StepReport {
             time: self.time + h,
             status: done.status(),
-            iterations: done.iterations,
+            work: done.work,
             residual: done.residual,
             load_error: done.load_error.unwrap_or(if problem.applied > 0.0 {
                 change.sqrt() / problem.applied
@@ -445,7 +445,7 @@ fn forget_bonds<D: Dim>(touches: &mut [Touch<D>], broken: &[Break<D>]) {
 /// The solves of one step taken together.
 #[derive(Clone, Copy, Default)]
 struct Solves {
-    iterations: u64,
+    work: Work,
     residual: f64,
     load_error: Option<f64>,
     missed_aim: bool,
@@ -453,7 +453,7 @@ struct Solves {
 
 impl Solves {
     fn add(&mut self, solve: SolveReport) {
-        self.iterations += solve.iterations;
+        self.work = self.work + solve.work;
         self.residual = self.residual.max(solve.residual);
         self.load_error = solve.load_error.map(|e| self.load_error.map_or(e, |worst: f64| worst.max(e)));
         self.missed_aim |= solve.status != SolveStatus::Converged;
@@ -473,7 +473,7 @@ impl<D: Dim> StepReport<D> {
         let missed = [self.status, second.status].contains(&SolveStatus::Accepted);
         Self {
             status: if missed { SolveStatus::Accepted } else { SolveStatus::Converged },
-            iterations: self.iterations + second.iterations,
+            work: self.work + second.work,
             residual: self.residual.max(second.residual),
             load_error: self.load_error.max(second.load_error),
             breaks,

@@ -96,7 +96,7 @@ impl Profile {
                 costs.extend(solve.map(|solve| Cost {
                     solved: solve.residual <= way.tolerance,
                     residual: solve.residual,
-                    iterations: solve.iterations,
+                    iterations: solve.work.iterations(),
                     cpu_time,
                 }));
             }

@@ -24,6 +24,8 @@ const START_SHARE: f64 = 0.1;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum SolverName {
+    /// Newton for bonds, and for dry contacts whichever is expected to be cheaper.
+    Auto,
     /// Non-linear Gauss–Seidel.
     #[value(alias = "gauss_seidel")]
     GaussSeidel,
@@ -36,6 +38,7 @@ impl SolverName {
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
+            Self::Auto => "auto",
             Self::GaussSeidel => "gauss-seidel",
             Self::Newton => "newton",
         }
@@ -43,7 +46,12 @@ impl SolverName {
 
     fn kind(self, scene: &SolverKind) -> SolverKind {
         match (self, scene) {
-            (Self::GaussSeidel, SolverKind::GaussSeidel(_)) | (Self::Newton, SolverKind::Newton(_)) => scene.clone(),
+            (Self::Auto, SolverKind::Auto(_))
+            | (Self::GaussSeidel, SolverKind::GaussSeidel(_))
+            | (Self::Newton, SolverKind::Newton(_)) => scene.clone(),
+            (Self::Auto, SolverKind::Newton(newton)) => SolverKind::Auto(newton.clone()),
+            (Self::Newton, SolverKind::Auto(newton)) => SolverKind::Newton(newton.clone()),
+            (Self::Auto, _) => SolverKind::Auto(Newton::default()),
             (Self::GaussSeidel, _) => SolverKind::GaussSeidel(GaussSeidel::default()),
             (Self::Newton, _) => SolverKind::Newton(Newton::default()),
         }
@@ -415,7 +423,7 @@ impl<D: Dim> Followed<D> {
             time: world.time,
             steps: world.steps,
             cpu_time: self.cpu_time,
-            iterations: self.course.iterations,
+            iterations: self.course.work.iterations(),
             worst_residual: self.course.worst_residual,
             median_residual: self.residuals.get(self.residuals.len() / 2).copied().unwrap_or(0.0),
             load_error: self.load_error,

@@ -32,8 +32,8 @@ use std::path::Path;
 pub use error::{Origin, Problem, SceneError};
 pub use function::{Function, Ramp};
 pub use model::{
-    Bonds, Flow, Friction, Grains, Load, Materials, Output, Restitution, Rupture, Scene, Stop, Time, TravelFrom,
-    WallTravel,
+    Bonds, Flow, Friction, Grains, Load, Materials, Output, Restitution, Rupture, Scene, Springs, Stiffness, Stop,
+    Time, TravelFrom, WallTravel, Young,
 };
 pub use sample::{
     Compaction, Deposition, Diameters, GrainSpec, Lattice, Preparation, RandomSample, Sample, SampleFile, UniformRange,

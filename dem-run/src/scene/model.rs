@@ -112,6 +112,42 @@ pub struct Bonds {
     /// Flow of an intact bond at its limit.
     #[serde(default)]
     pub flow: Flow,
+    /// Stiffness of elastic bonds; bonds are rigid where it is absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stiffness: Option<Stiffness>,
+}
+
+/// Stiffness of elastic bonds.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Stiffness {
+    /// The same springs in every bond.
+    Springs(Springs),
+    /// Bars as long as they are wide, the mean diameter of the pair: of square section across the plane's thickness in
+    /// 2D, of round section in 3D.
+    Young(Young),
+}
+
+/// Springs of a bond.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Springs {
+    /// Along the normal (N/m).
+    pub normal: f64,
+    /// Across it (N/m).
+    pub tangential: f64,
+    /// In bending (N m/rad).
+    pub rolling: f64,
+}
+
+/// Material of a bond.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Young {
+    /// Young's modulus (Pa).
+    pub modulus: f64,
+    /// Poisson's ratio, above −1 and at most 0.5.
+    pub poisson_ratio: f64,
 }
 
 /// Flow of an intact bond at its limit.
@@ -307,8 +343,14 @@ mod tests {
 
     #[test]
     fn a_stress_acts_on_the_section_of_the_bond() {
-        let bonds =
-            Bonds { strength: None, stress: Some(1e6), gap_tolerance: 1e-3, friction: None, flow: Flow::Associated };
+        let bonds = Bonds {
+            strength: None,
+            stress: Some(1e6),
+            gap_tolerance: 1e-3,
+            friction: None,
+            flow: Flow::Associated,
+            stiffness: None,
+        };
         assert!((bonds.cohesion(2, 4e-3, 0.01) - 40.0).abs() < 1e-12);
         assert!((bonds.cohesion(3, 4e-3, 0.01) - 4.0 * std::f64::consts::PI).abs() < 1e-12);
         assert_eq!(Bonds { strength: Some(5.0), stress: None, ..bonds }.cohesion(2, 4e-3, 0.01), 5.0);

@@ -3,6 +3,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// Residual that is accepted where the scene does not say.
+const ACCEPT: f64 = 1e-6;
+
 /// How the contact problem of each time step is solved.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -11,7 +14,8 @@ pub struct Solver {
     pub kind: SolverKind,
     /// Relative residual that the solver aims at.
     pub tolerance: f64,
-    /// Largest relative residual of a solve that is accepted, at least the tolerance; the tolerance where it is absent.
+    /// Largest relative residual of a solve that is accepted, at least the tolerance; where it is absent 1e-6, or the
+    /// tolerance if that is larger.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accept: Option<f64>,
     /// How many times a step whose solve was not accepted is cut in half before the run stops.
@@ -22,6 +26,8 @@ pub struct Solver {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SolverKind {
+    /// Newton for bonds, and for dry contacts whichever of Gauss–Seidel and Newton is expected to be cheaper.
+    Auto(Newton),
     /// Non-linear Gauss–Seidel: one contact after the other, until none changes.
     GaussSeidel(GaussSeidel),
     /// Semismooth Newton on the augmented Lagrangian, with a sparse factorisation: all contacts at once.
@@ -79,12 +85,7 @@ pub enum LocalSolve {
 
 impl Default for Solver {
     fn default() -> Self {
-        Self {
-            kind: SolverKind::GaussSeidel(GaussSeidel::default()),
-            tolerance: 1e-4,
-            accept: None,
-            max_step_halvings: 4,
-        }
+        Self { kind: SolverKind::Auto(Newton::default()), tolerance: 1e-8, accept: None, max_step_halvings: 4 }
     }
 }
 
@@ -112,6 +113,6 @@ impl Solver {
     /// Largest relative residual of a solve that is accepted.
     #[must_use]
     pub fn accept(&self) -> f64 {
-        self.accept.unwrap_or(self.tolerance)
+        self.accept.unwrap_or(self.tolerance.max(ACCEPT))
     }
 }

@@ -24,7 +24,8 @@ mod inner;
 mod krylov;
 mod rows;
 
-use super::{ContactSolver, GaussSeidel, GaussSeidelSettings, SolveReport, SolveStatus, sweep};
+use super::gauss_seidel::MEMORY;
+use super::{ContactSolver, GaussSeidel, GaussSeidelSettings, SolveReport, SolveStatus, Work, sweep};
 use crate::contact::{Law, Local, LocalSolve};
 use crate::dim::{Dim, Vect, resized};
 use crate::problem::residual::residual;
@@ -72,9 +73,8 @@ const MOST_SOFTENED: u32 = 4;
 const SWEEPS: usize = 5;
 const COLD_SWEEPS: usize = 100;
 const STALL_SWEEPS: usize = 50;
-/// Most sweeps of Gauss–Seidel where it takes over, and the steps that its acceleration remembers.
+/// Most sweeps of Gauss–Seidel where it takes over.
 const MOST_SWEEPS: u64 = 200_000;
-const MEMORY: usize = 8;
 /// Most solves that are left to Gauss–Seidel before Newton is tried again.
 const LONGEST_REST: u64 = 64;
 
@@ -91,6 +91,8 @@ pub struct Newton {
     /// GMRES iterations with a fresh factor, and those beyond it since.
     floor: usize,
     wasted: usize,
+    /// Factorisations before this solve.
+    made_before: u64,
     /// Solves that are left to Gauss–Seidel, and how many after the next failure.
     rest: u64,
     next_rest: u64,
@@ -107,6 +109,7 @@ impl Newton {
             distrust: 0,
             floor: 0,
             wasted: 0,
+            made_before: 0,
             rest: 0,
             next_rest: 1,
         }
@@ -130,7 +133,7 @@ impl Newton {
         let swept = GaussSeidel::new(settings).solve(problem);
         let status =
             if swept.residual <= tolerance { swept.status } else { swept.status.at_best(SolveStatus::Accepted) };
-        SolveReport { status, iterations: iterations + swept.iterations, ..swept }
+        SolveReport { status, work: swept.work + self.work(iterations), ..swept }
     }
 
     fn report(&self, iterations: u64, residual: f64, load_error: f64) -> SolveReport {
@@ -141,7 +144,12 @@ impl Newton {
         } else {
             SolveStatus::Failed
         };
-        SolveReport { status, iterations, residual, load_error: Some(load_error) }
+        SolveReport { status, work: self.work(iterations), residual, load_error: Some(load_error) }
+    }
+
+    /// The work of this solve so far.
+    fn work(&self, newton: u64) -> Work {
+        Work { sweeps: 0, newton, factorisations: self.factor.made - self.made_before }
     }
 
     /// Proximal rounds at the largest penalty, each begun with the active set of `guess`; none if an inner problem is
@@ -188,6 +196,7 @@ impl Newton {
 impl<D: Dim> ContactSolver<D> for Newton {
     fn solve(&mut self, problem: &mut ContactProblem<D>) -> SolveReport {
         problem.velocities_from_reactions();
+        self.made_before = self.factor.made;
         if self.rest > 0 {
             self.rest -= 1;
             return self.swept_to_the_end(problem, 0);

@@ -173,7 +173,7 @@ fn assignments_reach_every_part_of_a_scene() {
     assert_eq!((scene.materials.restitution.grain_grain, scene.materials.restitution.grain_wall), (0.5, 0.0));
     assert_eq!(scene.rupture, Rupture::EndOfStep);
     let local = LocalSolve::PredictorCorrector;
-    assert_eq!(scene.solver.kind, SolverKind::GaussSeidel(GaussSeidel { local, max_sweeps: 7 }));
+    assert_eq!(scene.solver.kind, SolverKind::GaussSeidel(GaussSeidel { local, max_sweeps: 7, acceleration: 0 }));
     assert_eq!(scene.grains.as_ref().and_then(|grains| grains.loads[0].force.clone()), Some(vec![1.0, 3.0]));
     assert_eq!((scene.gravity, scene.title.as_deref()), (None, Some("a few words")));
     let Sample::Grains(grains) = &scene.sample else { panic!("not grains") };

@@ -10,7 +10,7 @@ mod wall;
 use std::collections::HashMap;
 
 use super::error::Problem;
-use super::model::{Bonds, Load, Scene, TravelFrom};
+use super::model::{Bonds, Load, Scene, Stiffness, TravelFrom};
 use super::solver::SolverKind;
 use super::suggest::nearest;
 use super::wall::Drive;
@@ -80,6 +80,20 @@ fn bonds(report: &mut Report, bonds: &Bonds) {
     report.non_negative("bonds.gap_tolerance", bonds.gap_tolerance, "a fraction of the mean diameter");
     if let Some(friction) = bonds.friction {
         report.non_negative("bonds.friction", friction, "no unit");
+    }
+    match &bonds.stiffness {
+        Some(Stiffness::Springs(springs)) => {
+            let path = |name: &str| format!("bonds.stiffness.springs.{name}");
+            report.positive(path("normal"), springs.normal, "N/m");
+            report.positive(path("tangential"), springs.tangential, "N/m");
+            report.positive(path("rolling"), springs.rolling, "N m/rad");
+        }
+        Some(Stiffness::Young(young)) => {
+            report.positive("bonds.stiffness.young.modulus", young.modulus, "Pa");
+            let (path, ratio) = ("bonds.stiffness.young.poisson_ratio", young.poisson_ratio);
+            report.range(path, ratio, ratio > -1.0 && ratio <= 0.5, "a number above -1, at most 0.5".into());
+        }
+        None => {}
     }
 }
 
@@ -154,13 +168,14 @@ fn solver(report: &mut Report, scene: &Scene) {
         report.wrong("solver.max_step_halvings", solver.max_step_halvings, "a whole number from 0 to 30");
     }
     let limit = match &solver.kind {
-        SolverKind::GaussSeidel(gs) => ("solver.kind.gauss_seidel.max_sweeps", gs.max_sweeps),
-        SolverKind::Newton(newton) => {
-            let path = |name: &str| format!("solver.kind.newton.{name}");
+        SolverKind::GaussSeidel(gs) => ("solver.kind.gauss_seidel.max_sweeps".to_string(), gs.max_sweeps),
+        SolverKind::Newton(newton) | SolverKind::Auto(newton) => {
+            let kind = if matches!(solver.kind, SolverKind::Auto(_)) { "auto" } else { "newton" };
+            let path = |name: &str| format!("solver.kind.{kind}.{name}");
             report.positive(path("load_tolerance"), newton.load_tolerance, "no unit");
             report.positive(path("tangential_stiffness"), newton.tangential_stiffness, "no unit");
             report.positive(path("rolling_stiffness"), newton.rolling_stiffness, "no unit");
-            ("solver.kind.newton.max_iterations", newton.max_iterations)
+            (path("max_iterations"), newton.max_iterations)
         }
     };
     if limit.1 == 0 {
