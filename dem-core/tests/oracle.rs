@@ -12,8 +12,8 @@ use dem_core::contact::BondFlow;
 use dem_core::dim::{D2, D3, Dim};
 use dem_core::problem::ContactProblem;
 use dem_core::problem::assembled::Assembled;
-use nalgebra::{DMatrix, SymmetricEigen};
 use dem_core::solver::{NewtonSettings, SolveStatus, SolverSettings, Start, StiffnessRatio};
+use nalgebra::{DMatrix, SymmetricEigen};
 
 /// L with W = L Lᵀ, one row for each row of W.
 fn root(problem: &Assembled) -> DMatrix<f64> {
@@ -39,13 +39,16 @@ fn interior_point(problem: &Assembled) -> Vec<f64> {
     let costs: Vec<f64> = parts.q.iter().copied().chain(ones.iter().map(|_| 0.0)).collect();
     // s = −A x ∈ cone: (row, unknown, factor)
     let mut list: Vec<(usize, usize, f64)> = Vec::new();
-    let mut cones: Vec<SupportedConeT<f64>> = vec![ZeroConeT(root.ncols())];
     for k in 0..root.ncols() {
         list.push((k, n + k, 1.0));
         list.extend((0..n).map(|row| (k, row, -root[(row, k)])));
     }
-    let mut height = root.ncols();
+    // rows that a contact lacks
     let present = |unknown: usize| parts.matrix.diagonal(unknown / size)[(unknown % size) * (size + 1)] > 0.0;
+    let absent: Vec<usize> = (0..n).filter(|unknown| !present(*unknown)).collect();
+    list.extend(absent.iter().enumerate().map(|(k, unknown)| (root.ncols() + k, *unknown, 1.0)));
+    let mut height = root.ncols() + absent.len();
+    let mut cones: Vec<SupportedConeT<f64>> = vec![ZeroConeT(height)];
     for c in 0..problem.len() {
         let cone = problem.cone(c);
         list.push((height, c * size, -1.0));
@@ -75,7 +78,6 @@ fn interior_point(problem: &Assembled) -> Vec<f64> {
     let bounds = vec![0.0; height];
     let mut solver = DefaultSolver::new(&weights, &costs, &constraint, &bounds, &cones, settings).unwrap();
     solver.solve();
-    eprintln!("{:?}", solver.solution.status);
     solver.solution.x[..n].to_vec()
 }
 
@@ -95,28 +97,27 @@ fn apart<D: Dim>(mut problem: ContactProblem<D>, settings: SolverSettings) -> f6
     let mut oracle = Assembled::of(&problem);
     assert!(oracle.parts().associated.iter().all(|a| *a), "the problem is not convex");
     oracle.r = interior_point(&oracle);
+    assert!(oracle.residual() <= 1e-10, "the oracle is off: {:e}", oracle.residual());
     let expected = oracle.velocities();
     let report = settings.build::<D>().solve(&mut problem);
     assert_eq!(report.status, SolveStatus::Converged, "{report:?}");
-    let mut at = Assembled::of(&problem);
-    let found = at.velocities();
-    let energy = |p: &Assembled| { let u = p.velocities(); p.r.iter().zip(u).zip(&p.parts().q).map(|((r, u), q)| 0.5 * r * (u + q)).sum::<f64>() };
-    eprintln!("oracle residual {:e} energy {:.15e}, ours {:e} {:.15e} load {:?}", oracle.residual(), energy(&oracle), at.residual(), energy(&at), report);
-    at.r = oracle.r.clone();
+    let found = Assembled::of(&problem).velocities();
     let scale = expected.iter().fold(0.0, |most: f64, u| most.max(u.abs()));
     expected.iter().zip(found).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / scale
 }
 
 #[test]
 fn associated_bonds_agree() {
+    let flow = Some(BondFlow::Associated);
     for seed in 0..3 {
-        let flow = Some(BondFlow::Associated);
         let plane = pressed::<D2>(seed, 5, 0.0, flow).contact_problem();
         assert!(!plane.bonded.is_empty() && plane.dry.is_empty());
         for settings in [newton(), solver(1e-11)] {
             let distance = apart(plane.clone(), settings);
             assert!(distance <= 1e-7, "2D, seed {seed}, {settings:?}: {distance:e}");
         }
+    }
+    for seed in 0..2 {
         let distance = apart(pressed::<D3>(seed, 3, 0.0, flow).contact_problem(), newton());
         assert!(distance <= 1e-7, "3D, seed {seed}: {distance:e}");
     }

@@ -46,7 +46,9 @@ pub fn export(options: &ExportOptions) -> Result<(), RunError> {
     let steps = scene.time.steps();
     if !(1..=steps).contains(&options.step) {
         let (step, wrong) = (options.step, "counted from 1");
-        return Err(RunError::Usage(format!("there is no step {step} in {shown}: its scene has {steps} steps, {wrong}")));
+        return Err(RunError::Usage(format!(
+            "there is no step {step} in {shown}: its scene has {steps} steps, {wrong}"
+        )));
     }
     let (version, revision) = (env!("CARGO_PKG_VERSION"), option_env!("DEM_GIT_REVISION").unwrap_or_default());
     if !options.quiet && (parameters.version != version || parameters.git_revision != revision) {
@@ -69,7 +71,10 @@ fn export_in<D: Dim>(scene: &Scene, options: &ExportOptions, interrupt: &Interru
     while world.steps + 1 < options.step {
         let report = world.step().map_err(|error| {
             let way = format!("step {} was not reached", options.step);
-            RunError::NoConvergence(format!("{error}\n{way}; step {} is the last that can be exported", world.steps + 1))
+            RunError::NoConvergence(format!(
+                "{error}\n{way}; step {} is the last that can be exported",
+                world.steps + 1
+            ))
         })?;
         progress.step(&StepProgress {
             step: world.steps,

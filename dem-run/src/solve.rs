@@ -108,8 +108,7 @@ fn iterate(problem: &mut dem_core::problem::assembled::Assembled, options: &Solv
     match options.solver {
         Solver::GaussSeidel => {
             let max_sweeps = options.max_iterations.unwrap_or(MOST_SWEEPS);
-            let settings =
-                GaussSeidelSettings { local: LocalSolve::Exact, tolerance, accept: tolerance, max_sweeps };
+            let settings = GaussSeidelSettings { local: LocalSolve::Exact, tolerance, accept: tolerance, max_sweeps };
             gauss_seidel(problem, &settings)
         }
     }
