@@ -9,7 +9,9 @@ use dem_core::problem::ContactProblem;
 use dem_core::problem::assembled::{Assembled, AssemblyError, BlockMatrix, ContactRows, Parts};
 use dem_core::problem::residual::residual;
 use dem_core::solver::assembled::gauss_seidel;
-use dem_core::solver::{GaussSeidelSettings, SolveStatus};
+use dem_core::solver::{
+    ContactSolver, GaussSeidelSettings, Newton, NewtonSettings, SolveStatus, Start, StiffnessRatio,
+};
 
 fn settings(local: LocalSolve, tolerance: f64) -> GaussSeidelSettings {
     GaussSeidelSettings { local, tolerance, accept: tolerance, max_sweeps: 200_000 }
@@ -70,6 +72,37 @@ fn gauss_seidel_finds_the_same_velocities() {
             let distance = difference(&assembled.velocities(), &expected);
             assert!(distance <= 1e-6 * largest(&expected), "{flow:?} {local:?}: {distance:e}");
         }
+    }
+}
+
+#[test]
+fn newton_finds_the_same_velocities() {
+    for (flow, mu) in [(None, 0.3), (None, 0.0), (Some(BondFlow::Associated), 0.0)] {
+        newton_is_newton(pressed::<D2>(0, 5, mu, flow).contact_problem());
+        newton_is_newton(pressed::<D3>(0, 3, mu, flow).contact_problem());
+    }
+}
+
+/// On the matrix and on the bodies, from zero to the stiff limit.
+fn newton_is_newton<D: Dim>(mut problem: ContactProblem<D>) {
+    let settings = NewtonSettings {
+        tolerance: 1e-10,
+        accept: 1e-10,
+        load_tolerance: 1e-6,
+        start: Start::StiffLimit,
+        stiffness: StiffnessRatio { tangential: 1.0, rolling: 1.0 / 12.0 },
+        max_iterations: 300,
+    };
+    let mut assembled = Assembled::of(&problem);
+    let report = Newton::new(settings).solve_assembled(&mut assembled);
+    assert_eq!(report.status, SolveStatus::Converged, "{report:?}");
+    assert!(report.iterations <= 100, "{report:?}");
+    let report = Newton::new(settings).solve(&mut problem);
+    assert_eq!(report.status, SolveStatus::Converged, "{report:?}");
+    if assembled.parts().associated.iter().all(|a| *a) {
+        let expected = Assembled::of(&problem).velocities();
+        let distance = difference(&assembled.velocities(), &expected);
+        assert!(distance <= 1e-7 * largest(&expected), "{distance:e}");
     }
 }
 

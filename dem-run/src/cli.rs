@@ -162,7 +162,7 @@ struct SolveArgs {
     /// Residual to reach.
     #[arg(long, value_name = "T", default_value_t = 1e-8, value_parser = above_zero)]
     tolerance: f64,
-    /// Iterations after which the solver gives up [default: 100000 sweeps].
+    /// Iterations after which the solver gives up [default: 100000 sweeps, 300 Newton iterations].
     #[arg(long, value_name = "N")]
     max_iterations: Option<u64>,
     /// Write the problem with its solution, if the tolerance is reached.

@@ -5,12 +5,14 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use dem_core::contact::LocalSolve;
+use dem_core::problem::assembled::Assembled;
 use dem_core::solver::assembled::gauss_seidel;
-use dem_core::solver::{GaussSeidelSettings, SolveReport, SolveStatus};
+use dem_core::solver::{GaussSeidelSettings, Newton, NewtonSettings, SolveReport, SolveStatus, Start, StiffnessRatio};
 use serde::Serialize;
 
 use crate::fclib::Problem;
 use crate::run::{RunError, cpu_time};
+use crate::scene;
 
 /// A solver of problems from files.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum, Serialize)]
@@ -19,6 +21,8 @@ pub enum Solver {
     /// Non-linear Gauss–Seidel.
     #[default]
     GaussSeidel,
+    /// Semismooth Newton on the augmented Lagrangian, with a dense factorisation of W: for some thousand rows.
+    Newton,
 }
 
 /// What is solved, and how.
@@ -103,13 +107,26 @@ pub fn solve(options: &SolveOptions) -> Result<(), RunError> {
     Ok(())
 }
 
-fn iterate(problem: &mut dem_core::problem::assembled::Assembled, options: &SolveOptions) -> SolveReport {
+fn iterate(problem: &mut Assembled, options: &SolveOptions) -> SolveReport {
     let tolerance = options.tolerance;
     match options.solver {
         Solver::GaussSeidel => {
             let max_sweeps = options.max_iterations.unwrap_or(MOST_SWEEPS);
             let settings = GaussSeidelSettings { local: LocalSolve::Exact, tolerance, accept: tolerance, max_sweeps };
             gauss_seidel(problem, &settings)
+        }
+        Solver::Newton => {
+            let scene = scene::Newton::default();
+            let settings = NewtonSettings {
+                tolerance,
+                accept: tolerance,
+                // a file tells no load: only the residual counts
+                load_tolerance: f64::INFINITY,
+                start: Start::StiffLimit,
+                stiffness: StiffnessRatio { tangential: scene.tangential_stiffness, rolling: scene.rolling_stiffness },
+                max_iterations: options.max_iterations.unwrap_or(scene.max_iterations),
+            };
+            Newton::new(settings).solve_assembled(problem)
         }
     }
 }
@@ -125,9 +142,10 @@ impl fmt::Display for Solved {
             "contacts         {} of {} rows, {} with associated flow",
             self.contacts, self.rows, self.associated
         )?;
-        let (status, solver) = match (self.converged, self.solver) {
-            (true, Solver::GaussSeidel) => ("solved", "Gauss–Seidel"),
-            (false, Solver::GaussSeidel) => ("not solved", "Gauss–Seidel"),
+        let status = if self.converged { "solved" } else { "not solved" };
+        let solver = match self.solver {
+            Solver::GaussSeidel => "Gauss–Seidel",
+            Solver::Newton => "Newton",
         };
         writeln!(f, "status           {status} by {solver}, {} iterations", self.iterations)?;
         writeln!(f, "residual         {:.2e} (tolerance {:.0e})", self.residual, self.tolerance)?;

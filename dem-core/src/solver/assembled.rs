@@ -24,6 +24,9 @@ struct Site {
     gamma: f64,
 }
 
+/// What all local solves of a problem need, computed once.
+pub(super) struct Sites(Vec<Site>);
+
 fn in_order(r: &Padded) -> SVector<f64, 5> {
     [r.n, r.t[0], r.t[1], r.m[0], r.m[1]].into()
 }
@@ -87,15 +90,14 @@ impl Site {
 
 /// Non-linear Gauss–Seidel, from the reactions that the problem holds.
 pub fn gauss_seidel(problem: &mut Assembled, settings: &GaussSeidelSettings) -> SolveReport {
-    let scales = problem.scales();
-    let sites: Vec<Site> = (0..problem.len()).map(|c| Site::new(problem, c, scales[c])).collect();
+    let sites = Sites::of(problem);
     let mut error = problem.residual();
     let mut sweeps = 0;
     while error > settings.tolerance && sweeps < settings.max_sweeps {
         // the residual costs about a sweep: look at it ever more rarely, at most every 64 sweeps
         let burst = (1 + sweeps / 4).min(64).min(settings.max_sweeps - sweeps);
         for _ in 0..burst {
-            sweep(problem, &sites, settings.local);
+            sites.sweep(problem, settings.local);
         }
         sweeps += burst;
         error = problem.residual();
@@ -110,14 +112,22 @@ pub fn gauss_seidel(problem: &mut Assembled, settings: &GaussSeidelSettings) -> 
     SolveReport { status, iterations: sweeps, residual: error, load_error: None }
 }
 
-fn sweep(problem: &mut Assembled, sites: &[Site], local: LocalSolve) {
-    let (rows, size) = (problem.parts().rows, problem.parts().rows.count());
-    for (c, site) in sites.iter().enumerate() {
-        let (r, u) = (problem.reaction(c), problem.velocity(c));
-        let r = match local {
-            LocalSolve::Exact => site.exact(problem, c, r, u),
-            LocalSolve::PredictorCorrector => r + problem.correction(c, site.gamma, r, u),
-        };
-        rows.write(&r, &mut problem.r[c * size..(c + 1) * size]);
+impl Sites {
+    pub(super) fn of(problem: &Assembled) -> Self {
+        let scales = problem.scales().into_iter().enumerate();
+        Self(scales.map(|(c, scale)| Site::new(problem, c, scale)).collect())
+    }
+
+    /// One visit of every contact.
+    pub(super) fn sweep(&self, problem: &mut Assembled, local: LocalSolve) {
+        let (rows, size) = (problem.parts().rows, problem.parts().rows.count());
+        for (c, site) in self.0.iter().enumerate() {
+            let (r, u) = (problem.reaction(c), problem.velocity(c));
+            let r = match local {
+                LocalSolve::Exact => site.exact(problem, c, r, u),
+                LocalSolve::PredictorCorrector => r + problem.correction(c, site.gamma, r, u),
+            };
+            rows.write(&r, &mut problem.r[c * size..(c + 1) * size]);
+        }
     }
 }

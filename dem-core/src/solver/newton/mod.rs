@@ -16,20 +16,23 @@
 //! Sources: Hestenes 1969 and Powell 1969 (augmented Lagrangian); Alart & Curnier 1991; Qi & Sun 1993 (semismooth
 //! Newton); Olsen & Kamrin, arXiv 1805.07437 (the stiff limit).
 
+mod assembled;
 mod corrector;
 mod factor;
 mod krylov;
 mod rows;
+mod solvable;
 
-use super::{ContactSolver, GaussSeidel, GaussSeidelSettings, SolveReport, SolveStatus, sweep};
-use crate::contact::{Law, Local, LocalSolve};
-use crate::dim::{Dim, resized};
-use crate::problem::residual::residual;
-use crate::problem::{ContactProblem, Group};
+use super::{ContactSolver, GaussSeidelSettings, SolveReport, SolveStatus};
+use crate::contact::{Local, LocalSolve};
+use crate::dim::Dim;
+use crate::problem::ContactProblem;
+use crate::problem::assembled::Assembled;
 use corrector::{act, correct, operator};
 use factor::Factor;
 use krylov::gmres;
-use rows::{Operator, Padded, Row, Rows, padded};
+use rows::{Operator, Padded, Row, Rows};
+use solvable::Solvable;
 
 pub use rows::StiffnessRatio;
 
@@ -163,19 +166,16 @@ impl Newton {
     }
 
     /// Gauss–Seidel from the impulses at hand. It cannot tell its load error.
-    fn swept_to_the_end<D: Dim>(&self, problem: &mut ContactProblem<D>, iterations: u64) -> SolveReport {
+    fn swept_to_the_end(&self, problem: &mut impl Solvable, iterations: u64) -> SolveReport {
         let NewtonSettings { tolerance, accept, .. } = self.settings;
-        let finite = |r: f64| r.is_finite();
-        if !problem.bonded.iter().all(|c| finite(c.r.n)) || !problem.dry.iter().all(|c| finite(c.r.n)) {
-            problem.forget_reactions();
-        }
+        problem.forget_what_is_not_finite();
         let settings = GaussSeidelSettings {
             local: LocalSolve::Exact,
             tolerance: tolerance.max(accept),
             accept,
             max_sweeps: MOST_SWEEPS,
         };
-        let swept = GaussSeidel::new(settings).solve(problem);
+        let swept = problem.gauss_seidel(settings);
         let status =
             if swept.residual <= tolerance { swept.status } else { swept.status.at_best(SolveStatus::Accepted) };
         SolveReport { status, iterations: iterations + swept.iterations, ..swept }
@@ -341,14 +341,25 @@ fn root(step: impl Fn(f64) -> Iterate, slope: impl Fn(&Iterate) -> f64, start: f
 
 impl<D: Dim> ContactSolver<D> for Newton {
     fn solve(&mut self, problem: &mut ContactProblem<D>) -> SolveReport {
+        self.iterate(problem)
+    }
+}
+
+impl Newton {
+    /// Solve a problem with its matrix, from the reactions that it holds.
+    pub fn solve_assembled(&mut self, problem: &mut Assembled) -> SolveReport {
+        self.iterate(problem)
+    }
+
+    fn iterate(&mut self, problem: &mut impl Solvable) -> SolveReport {
         problem.velocities_from_reactions();
-        let mut rows = Rows::of(problem, KAPPA, self.settings.stiffness);
+        let mut rows = problem.rows(KAPPA, self.settings.stiffness);
         if rows.unknowns == 0 || rows.list.is_empty() {
-            return self.report(0, residual(problem), 0.0);
+            return self.report(0, problem.residual(), 0.0);
         }
         // the reactions that the problem brought along, bettered by some sweeps, show which contacts are active
         let cold = rows.list.iter().all(|row| row.multiplier.n == row.shift);
-        let mut guess = swept(problem, &rows, if cold { COLD_SWEEPS } else { SWEEPS });
+        let mut guess = problem.swept(&rows, if cold { COLD_SWEEPS } else { SWEEPS });
         if self.settings.start == Start::StiffLimit {
             rows.list.iter_mut().for_each(|row| row.multiplier = Local { n: row.shift, ..Local::zero() });
         }
@@ -362,7 +373,7 @@ impl<D: Dim> ContactSolver<D> for Newton {
             let (made, solved) = self.inner(&rows, &mut state, guessed.then_some(&guess[..]));
             iterations += made.max(1);
             guessed = false;
-            write_back(problem, &state.reactions, &rows);
+            problem.write_back(&state.reactions, &rows);
             if !solved {
                 // the active set runs in circles: sweeps from here show another, or have to do the work alone
                 self.renew = true;
@@ -370,14 +381,14 @@ impl<D: Dim> ContactSolver<D> for Newton {
                 if stalls > MOST_STALLS {
                     return self.swept_to_the_end(problem, iterations);
                 }
-                guess = swept(problem, &rows, STALL_SWEEPS);
+                guess = problem.swept(&rows, STALL_SWEEPS);
                 guessed = true;
                 continue;
             }
             load_error = load_change(&rows, &state);
             rows.list.iter_mut().zip(&state.reactions).for_each(|(row, r)| row.multiplier = *r);
             problem.velocities_from_reactions();
-            error = residual(problem);
+            error = problem.residual();
             if error <= self.settings.tolerance && load_error <= self.settings.load_tolerance {
                 break;
             }
@@ -404,31 +415,4 @@ fn load_change(rows: &Rows, state: &Iterate) -> f64 {
     }
     let (change, total) = (norm2(&change).sqrt(), norm2(&total).sqrt());
     if change == 0.0 { 0.0 } else { change / total }
-}
-
-/// The reactions of the problem after some sweeps of Gauss–Seidel, shifted.
-fn swept<D: Dim>(problem: &mut ContactProblem<D>, rows: &Rows, sweeps: usize) -> Vec<Padded> {
-    problem.velocities_from_reactions();
-    for _ in 0..sweeps {
-        sweep(problem, LocalSolve::Exact);
-    }
-    let mut reactions = Vec::with_capacity(rows.list.len());
-    reactions.extend(problem.bonded.iter().map(|c| padded(c.r)));
-    reactions.extend(problem.dry.iter().map(|c| padded(c.r)));
-    reactions.extend(problem.frictionless.iter().map(|c| padded(c.r)));
-    reactions.iter_mut().zip(&rows.list).for_each(|(r, row)| r.n += row.shift);
-    reactions
-}
-
-/// Write the reactions back to the problem.
-fn write_back<D: Dim>(problem: &mut ContactProblem<D>, reactions: &[Padded], rows: &Rows) {
-    fn group<D: Dim, L: Law>(group: &mut Group<D, L>, list: &[Padded], rows: &[Row]) {
-        for ((c, r), row) in group.iter_mut().zip(list).zip(rows) {
-            c.r = Local { n: r.n - row.shift, t: resized(r.t), m: resized(r.m) };
-        }
-    }
-    let (bonds, dry) = (problem.bonded.len(), problem.bonded.len() + problem.dry.len());
-    group(&mut problem.bonded, &reactions[..bonds], &rows.list[..bonds]);
-    group(&mut problem.dry, &reactions[bonds..dry], &rows.list[bonds..dry]);
-    group(&mut problem.frictionless, &reactions[dry..], &rows.list[dry..]);
 }
