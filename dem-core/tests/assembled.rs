@@ -96,7 +96,6 @@ fn newton_is_newton<D: Dim>(mut problem: ContactProblem<D>) {
     let mut assembled = Assembled::of(&problem);
     let report = Newton::new(settings).solve_assembled(&mut assembled);
     assert_eq!(report.status, SolveStatus::Converged, "{report:?}");
-    assert!(report.iterations <= 100, "{report:?}");
     let report = Newton::new(settings).solve(&mut problem);
     assert_eq!(report.status, SolveStatus::Converged, "{report:?}");
     if assembled.parts().associated.iter().all(|a| *a) {

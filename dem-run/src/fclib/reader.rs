@@ -161,14 +161,17 @@ impl Source {
                 return Err(self.wrong("fclib_local/spacedim", format!("it is {dimension}, it must be {allowed}")));
             }
         };
-        let (total, matrix) = self.matrix(rows.count())?;
+        // q before the matrix: a forged m must not ask for memory
+        let total = self.order(rows.count())?;
+        let q = self.finite("fclib_local/vectors/q", total)?;
+        let matrix = self.matrix(total, rows.count())?;
         let contacts = total / rows.count();
         let ours = self.has("cohesive_dem");
         let coefficients = |place: &str| self.finite(place, contacts);
         let parts = Parts {
             rows,
             matrix,
-            q: self.finite("fclib_local/vectors/q", total)?,
+            q,
             mu: coefficients("fclib_local/vectors/mu")?,
             nu: if rolling { coefficients("fclib_local/vectors/mu_r")? } else { vec![0.0; contacts] },
             associated: if ours {
@@ -192,8 +195,8 @@ impl Source {
         })
     }
 
-    /// The number of rows, and the matrix W in blocks of `size` rows.
-    fn matrix(&self, size: usize) -> Result<(usize, BlockMatrix), FclibError> {
+    /// The number of rows of W, of which each contact has `size`.
+    fn order(&self, size: usize) -> Result<usize, FclibError> {
         let at = |name: &str| format!("fclib_local/W/{name}");
         let (m, n) = (self.count(&at("m"))?, self.count(&at("n"))?);
         if m != n {
@@ -203,6 +206,12 @@ impl Source {
             let why = format!("it is {m}, it must be a multiple of {size} above zero: {size} rows a contact");
             return Err(self.wrong(&at("m"), why));
         }
+        Ok(m)
+    }
+
+    /// The matrix W of `m` rows, in blocks of `size`.
+    fn matrix(&self, m: usize, size: usize) -> Result<BlockMatrix, FclibError> {
+        let at = |name: &str| format!("fclib_local/W/{name}");
         let nz = self.integer(&at("nz"))?;
         let entries: Vec<(usize, usize, f64)> = match nz {
             -1 | -2 => {
@@ -228,7 +237,7 @@ impl Source {
                 i.into_iter().zip(p).zip(x).map(|((i, p), x)| (i, p, x)).collect()
             }
         };
-        Ok((m, BlockMatrix::from_entries(m / size, size, &entries)))
+        Ok(BlockMatrix::from_entries(m / size, size, &entries))
     }
 
     /// The first `count` values of a dataset that may be longer.

@@ -3,6 +3,7 @@
 mod collapse;
 mod common;
 mod compression;
+mod fclib;
 mod interrupt;
 mod teaching;
 mod wrong_history;
