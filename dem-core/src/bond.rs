@@ -1,6 +1,6 @@
 //! Cohesive bonds: how they form, what they carry and when they break for good (PHYSICS §1, paper (4) and (5)).
 
-use crate::contact::{Cone, Local};
+use crate::contact::{Cone, Local, Weights};
 use crate::dim::Vect;
 
 /// Relative distance to the limit at which a bond counts as being at it (–).
@@ -19,6 +19,17 @@ pub enum BondStatus {
     Rolling,
 }
 
+/// Stiffness of an elastic bond.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stiffness {
+    /// Normal (N/m).
+    pub normal: f64,
+    /// Tangential (N/m).
+    pub tangential: f64,
+    /// Bending (N m/rad).
+    pub rolling: f64,
+}
+
 /// A bond between two grains; it formed once and never re-forms.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bond {
@@ -32,6 +43,8 @@ pub struct Bond {
     pub strength: f64,
     /// Friction coefficient μ of its limits (–).
     pub friction: f64,
+    /// Stiffness; none for a rigid bond.
+    pub stiffness: Option<Stiffness>,
     /// Whether it holds.
     pub status: BondStatus,
 }
@@ -40,6 +53,16 @@ impl Bond {
     /// The cone of its shifted reaction. Moments are divided by the mean diameter, so both coefficients are μ.
     pub fn cone(&self) -> Cone {
         Cone { mu: self.friction, nu: self.friction }
+    }
+
+    /// Compliance of its rows over an implicit step `h` (s), 1/(k h²) (1/kg); none for a rigid bond.
+    pub fn compliance(&self, h: f64) -> Option<Weights> {
+        let a = self.mean_diameter;
+        self.stiffness.map(|k| Weights {
+            n: 1.0 / (k.normal * h * h),
+            t: 1.0 / (k.tangential * h * h),
+            m: a * a / (k.rolling * h * h),
+        })
     }
 }
 

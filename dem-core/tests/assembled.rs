@@ -14,7 +14,7 @@ use dem_core::solver::{
 };
 
 fn settings(local: LocalSolve, tolerance: f64) -> GaussSeidelSettings {
-    GaussSeidelSettings { local, tolerance, accept: tolerance, max_sweeps: 200_000 }
+    GaussSeidelSettings { local, tolerance, accept: tolerance, max_sweeps: 200_000, acceleration: 0 }
 }
 
 fn largest(x: &[f64]) -> f64 {

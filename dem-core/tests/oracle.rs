@@ -85,7 +85,7 @@ fn newton() -> SolverSettings {
     SolverSettings::Newton(NewtonSettings {
         tolerance: 1e-11,
         accept: 1e-11,
-        load_tolerance: 1e-8,
+        load_tolerance: 1e-6,
         start: Start::StiffLimit,
         stiffness: StiffnessRatio { tangential: 1.0, rolling: 1.0 / 12.0 },
         max_iterations: 300,
@@ -117,7 +117,7 @@ fn associated_bonds_agree() {
             assert!(distance <= 1e-7, "2D, seed {seed}, {settings:?}: {distance:e}");
         }
     }
-    for seed in 0..2 {
+    for seed in 0..3 {
         let distance = apart(pressed::<D3>(seed, 3, 0.0, flow).contact_problem(), newton());
         assert!(distance <= 1e-7, "3D, seed {seed}: {distance:e}");
     }

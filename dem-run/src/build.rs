@@ -265,6 +265,7 @@ fn solver(solver: &scene::Solver) -> SolverSettings {
             tolerance,
             accept,
             max_sweeps: gs.max_sweeps,
+            acceleration: gs.acceleration,
         }),
         SolverKind::Newton(newton) => SolverSettings::Newton(NewtonSettings {
             tolerance,

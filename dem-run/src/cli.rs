@@ -165,6 +165,9 @@ struct SolveArgs {
     /// Iterations after which the solver gives up [default: 100000 sweeps, 300 Newton iterations].
     #[arg(long, value_name = "N")]
     max_iterations: Option<u64>,
+    /// Steps that the acceleration of Gauss–Seidel remembers, 8 for one; 0 for plain sweeps.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    acceleration: usize,
     /// Write the problem with its solution, if the tolerance is reached.
     #[arg(short, long, value_name = "SOLVED.hdf5")]
     output: Option<PathBuf>,
@@ -269,6 +272,7 @@ fn solve(args: SolveArgs) -> Result<(), RunError> {
         solver: args.solver,
         tolerance: args.tolerance,
         max_iterations: args.max_iterations,
+        acceleration: args.acceleration,
         output: args.output,
         json: args.json,
     })

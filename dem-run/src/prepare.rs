@@ -221,6 +221,7 @@ fn solver() -> SolverSettings {
         tolerance: 1e-4,
         accept: f64::INFINITY,
         max_sweeps: 5_000,
+        acceleration: 0,
     })
 }
 

@@ -36,6 +36,8 @@ pub struct SolveOptions {
     pub tolerance: f64,
     /// Iterations after which it gives up; as many as the solver sees fit where it is absent.
     pub max_iterations: Option<u64>,
+    /// Steps that the acceleration of Gauss–Seidel remembers; 0 for plain sweeps.
+    pub acceleration: usize,
     /// Where the problem is written with its solution, if at all.
     pub output: Option<PathBuf>,
     /// Whether the result on stdout is JSON.
@@ -112,7 +114,8 @@ fn iterate(problem: &mut Assembled, options: &SolveOptions) -> SolveReport {
     match options.solver {
         Solver::GaussSeidel => {
             let max_sweeps = options.max_iterations.unwrap_or(MOST_SWEEPS);
-            let settings = GaussSeidelSettings { local: LocalSolve::Exact, tolerance, accept: tolerance, max_sweeps };
+            let (local, accept, acceleration) = (LocalSolve::Exact, tolerance, options.acceleration);
+            let settings = GaussSeidelSettings { local, tolerance, accept, max_sweeps, acceleration };
             gauss_seidel(problem, &settings)
         }
         Solver::Newton => {

@@ -78,7 +78,7 @@ pub struct Cone {
 }
 
 /// Weights of a quadratic form that is a multiple of the identity in each group of rows.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Weights {
     /// Normal row.
     pub n: f64,
@@ -86,6 +86,30 @@ pub struct Weights {
     pub t: f64,
     /// Bending rows.
     pub m: f64,
+}
+
+impl Weights {
+    /// The weighted rows of `x`.
+    #[inline(always)]
+    pub fn times<T: Vect, B: Vect>(&self, x: &Local<T, B>) -> Local<T, B> {
+        Local { n: x.n * self.n, t: x.t * self.t, m: x.m * self.m }
+    }
+}
+
+impl Add for Weights {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, o: Self) -> Self {
+        Self { n: self.n + o.n, t: self.t + o.t, m: self.m + o.m }
+    }
+}
+
+impl Mul<f64> for Weights {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, k: f64) -> Self {
+        Self { n: self.n * k, t: self.t * k, m: self.m * k }
+    }
 }
 
 impl Cone {

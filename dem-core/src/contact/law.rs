@@ -83,6 +83,16 @@ pub trait Law: Copy + Send + Sync + 'static {
     fn arm(&self) -> f64 {
         0.0
     }
+
+    /// Compliance of the rows over the step (1/kg), zero for what is rigid.
+    fn compliance(&self) -> Weights {
+        Weights::default()
+    }
+
+    /// Impulse that a compliant contact carried when the step began (N s).
+    fn carried(&self) -> Local<Self::T, Self::B> {
+        Local::zero()
+    }
 }
 
 /// Predictor and corrector on the cone, as the change of the reaction: P_K(r̂ − γ ũ) − r̂.
@@ -358,5 +368,78 @@ impl<A: Vect> Bonded<A, A> {
         }
         x.n -= self.shift;
         x
+    }
+}
+
+/// An intact bond with a stiffness: rigid but for the compliance C, u + C (r − r₀) in place of u.
+///
+/// An elastic row of stiffness k over an implicit step h has f⁺ = f − k h u⁺, which is C = 1/(k h²) for impulses and
+/// r₀ = h f the impulse that the bond carried when the step began (PHYSICS §3.5).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Elastic<T, B> {
+    bond: Bonded<T, B>,
+    compliance: Weights,
+    carried: Local<T, B>,
+}
+
+impl<T: Vect, B: Vect> Elastic<T, B> {
+    /// From the local block of the rigid bond, its compliance (1/kg), the impulse that it carried (N s), and what
+    /// [`Bonded::new`] takes.
+    pub fn new(
+        block: Block,
+        compliance: Weights,
+        carried: Local<T, B>,
+        arm: f64,
+        shift: f64,
+        cone: Cone,
+        flow: BondFlow,
+    ) -> Self {
+        let soft = Block { n: block.n + compliance.n, t: block.t + compliance.t, m: block.m + compliance.m, ..block };
+        Self { bond: Bonded::new(soft, arm, shift, cone, flow), compliance, carried }
+    }
+}
+
+impl<A: Vect> Law for Elastic<A, A> {
+    type T = A;
+    type B = A;
+
+    #[inline(always)]
+    fn improve(&self, local: LocalSolve, r: Local<A, A>, u: Local<A, A>) -> Local<A, A> {
+        self.bond.improve(local, r, u + self.compliance.times(&(r - self.carried)))
+    }
+
+    #[inline(always)]
+    fn natural_map(&self, r: Local<A, A>, u: Local<A, A>) -> Local<A, A> {
+        self.bond.natural_map(r, u + self.compliance.times(&(r - self.carried)))
+    }
+
+    fn gamma(&self) -> f64 {
+        self.bond.gamma()
+    }
+
+    fn cone(&self) -> Cone {
+        self.bond.cone
+    }
+
+    fn associated(&self) -> bool {
+        self.bond.associated()
+    }
+
+    #[inline(always)]
+    fn shift(&self) -> f64 {
+        self.bond.shift
+    }
+
+    #[inline(always)]
+    fn arm(&self) -> f64 {
+        self.bond.arm
+    }
+
+    fn compliance(&self) -> Weights {
+        self.compliance
+    }
+
+    fn carried(&self) -> Local<A, A> {
+        self.carried
     }
 }

@@ -4,4 +4,4 @@ pub mod cone;
 pub mod law;
 
 pub use cone::{Cone, Local, Weights};
-pub use law::{Block, BondFlow, Bonded, Coulomb, Frictionless, Law, LocalSolve};
+pub use law::{Block, BondFlow, Bonded, Coulomb, Elastic, Frictionless, Law, LocalSolve};

@@ -10,7 +10,7 @@
 
 use super::{Contact, ContactProblem, Link, Nodes, Visitor};
 use crate::contact::law::predict_correct;
-use crate::contact::{Cone, Law, Local};
+use crate::contact::{Cone, Law, Local, Weights};
 use crate::dim::{Dim, Vect, resized};
 use nalgebra::SVector;
 use thiserror::Error;
@@ -401,7 +401,7 @@ impl Assembled {
         let mut list = List(Vec::with_capacity(problem.len()));
         problem.visit(&mut list);
         let List(list) = list;
-        let bends = if problem.bonded.is_empty() { 0 } else { D::N - 1 };
+        let bends = if problem.bonded.is_empty() && problem.elastic.is_empty() { 0 } else { D::N - 1 };
         let rows = ContactRows { tangents: D::N - 1, bends };
         let matrix = delassus(&problem.nodes, &list, rows);
         let mut nodes = problem.nodes.clone();
@@ -415,6 +415,8 @@ impl Assembled {
             let at = c * size..(c + 1) * size;
             let mut u = item.velocity(&nodes);
             u.n += item.bias;
+            // an elastic bond: u + C (r − r₀), with C in the matrix
+            u = u - item.compliance.times(&item.carried);
             rows.write(&u, &mut q[at.clone()]);
             rows.write(&Local { n: item.r.n + item.shift, ..item.r }, &mut r[at]);
             shifts[c * size] = -item.shift;
@@ -437,6 +439,10 @@ impl Assembled {
     }
 }
 
+fn padded<T: Vect, B: Vect>(r: Local<T, B>) -> Padded {
+    Local { n: r.n, t: resized(r.t), m: resized(r.m) }
+}
+
 /// A contact whatever its law.
 struct Item<D: Dim> {
     link: Link<D>,
@@ -447,6 +453,8 @@ struct Item<D: Dim> {
     associated: bool,
     shift: f64,
     bias: f64,
+    compliance: Weights,
+    carried: Padded,
     r: Padded,
 }
 
@@ -463,7 +471,9 @@ impl<D: Dim> Visitor<D> for List<D> {
             associated: c.law.associated(),
             shift: c.law.shift(),
             bias: c.law.bias(),
-            r: Local { n: c.r.n, t: resized(c.r.t), m: resized(c.r.m) },
+            compliance: c.law.compliance(),
+            carried: padded(c.law.carried()),
+            r: padded(c.r),
         });
     }
 }
@@ -483,7 +493,7 @@ impl<D: Dim> Item<D> {
     }
 }
 
-/// W = Hᵀ M⁻¹ H, column by column.
+/// W = Hᵀ M⁻¹ H and the compliance of elastic bonds, column by column.
 fn delassus<D: Dim>(nodes: &Nodes<D>, list: &[Item<D>], rows: ContactRows) -> BlockMatrix {
     let mut nodes = nodes.clone();
     for node in &mut nodes.all {
@@ -507,7 +517,11 @@ fn delassus<D: Dim>(nodes: &Nodes<D>, list: &[Item<D>], rows: ContactRows) -> Bl
             nodes.apply(&item.link, item.arm, rows.padded(&unit[..size]));
             for &d in &near {
                 let mut u = [0.0; 5];
-                rows.write(&list[d].velocity(&nodes), &mut u[..size]);
+                let mut moved = list[d].velocity(&nodes);
+                if d == c {
+                    moved += item.compliance.times(&rows.padded(&unit[..size]));
+                }
+                rows.write(&moved, &mut u[..size]);
                 let there = (0..size).filter(|row| u[*row] != 0.0);
                 entries.extend(there.map(|row| (d * size + row, c * size + k, u[row])));
             }

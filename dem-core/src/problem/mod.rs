@@ -6,7 +6,7 @@
 pub mod assembled;
 pub mod residual;
 
-use crate::contact::{Block, Bonded, Coulomb, Frictionless, Law, Local};
+use crate::contact::{Block, Bonded, Coulomb, Elastic, Frictionless, Law, Local};
 use crate::dim::{Dim, Vect, resized};
 
 /// The velocity unknowns of one body, and what an impulse does to them.
@@ -77,8 +77,10 @@ pub type Group<D, L> = Vec<Contact<D, L>>;
 
 /// The law of a dry contact in dimension D.
 pub type Dry<D> = Coulomb<<D as Dim>::Tangent>;
-/// The law of an intact bond in dimension D.
+/// The law of an intact rigid bond in dimension D.
 pub type Bond<D> = Bonded<<D as Dim>::Tangent, <D as Dim>::Tangent>;
+/// The law of an intact elastic bond in dimension D.
+pub type ElasticBond<D> = Elastic<<D as Dim>::Tangent, <D as Dim>::Tangent>;
 
 /// The contact problem of one step.
 #[derive(Clone, Debug)]
@@ -87,8 +89,10 @@ pub struct ContactProblem<D: Dim> {
     pub nodes: Nodes<D>,
     /// Free velocities v_f (m/s) and spins (rad/s) of the nodes.
     pub free: Vec<(D::Vector, D::Spin)>,
-    /// Intact bonds.
+    /// Intact rigid bonds.
     pub bonded: Group<D, Bond<D>>,
+    /// Intact elastic bonds.
+    pub elastic: Group<D, ElasticBond<D>>,
     /// Dry contacts with friction.
     pub dry: Group<D, Dry<D>>,
     /// Contacts without friction.
@@ -150,14 +154,15 @@ impl<D: Dim> Nodes<D> {
 
 /// A fold over all contacts of a problem, whatever their rows.
 pub trait Visitor<D: Dim> {
-    /// Called once for each contact, bonded first, then dry, then frictionless, each in the order of their keys.
+    /// Called once for each contact: rigid bonds, elastic bonds, dry contacts, frictionless ones, each in the order of
+    /// their keys.
     fn visit<L: Law>(&mut self, nodes: &Nodes<D>, contact: &Contact<D, L>);
 }
 
 impl<D: Dim> ContactProblem<D> {
     /// Number of contacts.
     pub fn len(&self) -> usize {
-        self.bonded.len() + self.dry.len() + self.frictionless.len()
+        self.bonded.len() + self.elastic.len() + self.dry.len() + self.frictionless.len()
     }
 
     /// Whether there is no contact at all.
@@ -168,6 +173,7 @@ impl<D: Dim> ContactProblem<D> {
     /// Visit every contact.
     pub fn visit(&self, visitor: &mut impl Visitor<D>) {
         self.bonded.iter().for_each(|c| visitor.visit(&self.nodes, c));
+        self.elastic.iter().for_each(|c| visitor.visit(&self.nodes, c));
         self.dry.iter().for_each(|c| visitor.visit(&self.nodes, c));
         self.frictionless.iter().for_each(|c| visitor.visit(&self.nodes, c));
     }
@@ -175,6 +181,7 @@ impl<D: Dim> ContactProblem<D> {
     /// Set all impulses to zero.
     pub fn forget_reactions(&mut self) {
         self.bonded.iter_mut().for_each(|c| c.r = Local::zero());
+        self.elastic.iter_mut().for_each(|c| c.r = Local::zero());
         self.dry.iter_mut().for_each(|c| c.r = Local::zero());
         self.frictionless.iter_mut().for_each(|c| c.r = Local::zero());
     }
@@ -186,6 +193,7 @@ impl<D: Dim> ContactProblem<D> {
         }
         let nodes = &mut self.nodes;
         self.bonded.iter().for_each(|c| nodes.apply(&c.link, c.law.arm(), c.r));
+        self.elastic.iter().for_each(|c| nodes.apply(&c.link, c.law.arm(), c.r));
         self.dry.iter().for_each(|c| nodes.apply(&c.link, c.law.arm(), c.r));
         self.frictionless.iter().for_each(|c| nodes.apply(&c.link, c.law.arm(), c.r));
     }

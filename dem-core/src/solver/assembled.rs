@@ -5,6 +5,8 @@
 //! satisfies its law, and otherwise the predictor–corrector is repeated with γ = 1/(largest eigenvalue of the block),
 //! which contracts where the flow is associated.
 
+use super::anderson::Anderson;
+use super::gauss_seidel::{BURST, LOOK};
 use super::{GaussSeidelSettings, SolveReport, SolveStatus};
 use crate::contact::{Local, LocalSolve};
 use crate::dim::Vect;
@@ -91,16 +93,25 @@ impl Site {
 /// Non-linear Gauss–Seidel, from the reactions that the problem holds.
 pub fn gauss_seidel(problem: &mut Assembled, settings: &GaussSeidelSettings) -> SolveReport {
     let sites = Sites::of(problem);
+    let mut memory = (settings.acceleration > 0).then(|| Anderson::new(settings.acceleration, problem.r.clone()));
     let mut error = problem.residual();
     let mut sweeps = 0;
     while error > settings.tolerance && sweeps < settings.max_sweeps {
         // the residual costs about a sweep: look at it ever more rarely, at most every 64 sweeps
-        let burst = (1 + sweeps / 4).min(64).min(settings.max_sweeps - sweeps);
+        let plain = (1 + sweeps / 4).min(64);
+        let burst = if memory.is_some() { BURST } else { plain }.min(settings.max_sweeps - sweeps);
         for _ in 0..burst {
             sites.sweep(problem, settings.local);
         }
         sweeps += burst;
-        error = problem.residual();
+        let early = sweeps <= LOOK * BURST || sweeps.is_multiple_of(LOOK * BURST);
+        if memory.is_none() || early || sweeps >= settings.max_sweeps {
+            error = problem.residual();
+        }
+        if let Some(memory) = memory.as_mut().filter(|_| error > settings.tolerance && sweeps < settings.max_sweeps) {
+            let next = memory.next(problem.r.clone());
+            problem.r.copy_from_slice(next);
+        }
     }
     let status = if error <= settings.tolerance {
         SolveStatus::Converged

@@ -1,5 +1,6 @@
 //! Solvers of the contact problem, behind one trait and one enum of settings.
 
+mod anderson;
 pub mod assembled;
 mod gauss_seidel;
 mod newton;

@@ -3,9 +3,13 @@
 use super::World;
 use super::touch::{Touch, TouchStatus};
 use crate::bond::{Bond, BondStatus};
-use crate::contact::{Bonded, Coulomb, Frictionless, Law, Local};
+use crate::contact::{Bonded, Coulomb, Elastic, Frictionless, Law, Local};
 use crate::dim::{Dim, Vect, resized};
 use crate::problem::{Contact, ContactProblem, Group, Link, Node, Nodes};
+
+/// Gap over the radius of the grain below which a contact touches. The rounding of positions would else be a misfit of
+/// rigid contacts, to which stiff ones answer with forces.
+const TOUCHING: f64 = 1e-9;
 
 /// The configuration at mid-step, where contacts are looked for.
 pub(super) struct Midpoint<D: Dim> {
@@ -23,6 +27,7 @@ pub(super) struct Motion<D: Dim> {
 #[derive(Default)]
 pub(super) struct Places {
     pub bonded: Vec<usize>,
+    pub elastic: Vec<usize>,
     pub dry: Vec<usize>,
     pub frictionless: Vec<usize>,
 }
@@ -112,6 +117,21 @@ impl<D: Dim> World<D> {
         }
     }
 
+    /// Reactions (N, N m) that the elastic bonds carry as a step begins, by the number of the bond; empty where bonds are
+    /// rigid.
+    pub(super) fn carried(&self, touches: &[Touch<D>]) -> Vec<Local<D::Tangent, D::Tangent>> {
+        if self.bonds.iter().all(|b| b.stiffness.is_none()) {
+            return Vec::new();
+        }
+        let mut carried = vec![Local::zero(); self.bonds.len()];
+        for touch in touches {
+            if let Some(bond) = touch.bond {
+                carried[bond as usize] = touch.reaction;
+            }
+        }
+        carried
+    }
+
     /// Make the list of candidates valid for this step.
     fn refresh_candidates(&mut self, mid: &Midpoint<D>, motion: &Motion<D>, h: f64) {
         let fastest = motion.free.iter().map(|(v, _)| v.dot(v)).fold(0.0, f64::max).sqrt();
@@ -166,7 +186,8 @@ impl<D: Dim> World<D> {
     fn bias(&self, touch: &Touch<D>, h: f64) -> Option<f64> {
         let e = self.restitution_of(touch.pair);
         if e == 0.0 {
-            let gap = if self.settings.expel_overlaps { touch.gap } else { touch.gap.max(0.0) };
+            let touching = touch.gap <= TOUCHING * self.grains.radius[touch.pair[0] as usize];
+            let gap = if self.settings.expel_overlaps || !touching { touch.gap } else { 0.0 };
             return Some(gap / h);
         }
         let slow = self.settings.restitution.is_some_and(|r| touch.approach.abs() < r.threshold_speed);
@@ -204,6 +225,7 @@ impl<D: Dim> World<D> {
         &self,
         touches: &[Touch<D>],
         motion: &Motion<D>,
+        carried: &[Local<D::Tangent, D::Tangent>],
         applied: f64,
         h: f64,
     ) -> (ContactProblem<D>, Places) {
@@ -211,6 +233,7 @@ impl<D: Dim> World<D> {
             nodes: self.nodes(motion),
             free: motion.free.clone(),
             bonded: Vec::new(),
+            elastic: Vec::new(),
             dry: Vec::new(),
             frictionless: Vec::new(),
             applied,
@@ -222,12 +245,21 @@ impl<D: Dim> World<D> {
             let drive =
                 (touch.pair[1] as usize).checked_sub(self.grains.len()).and_then(|w| self.walls[w].free_direction());
             let start = touch.reaction * h;
-            if let Some(bond) = touch.bond.map(|b| &self.bonds[b as usize]) {
+            if let Some((number, bond)) = touch.bond.map(|b| (b as usize, &self.bonds[b as usize])) {
                 let arm = bond.mean_diameter;
                 let block = link.block(i, j, arm, None);
-                let law = Bonded::new(block, arm, h * bond.strength, bond.cone(), self.settings.bond_flow);
-                problem.bonded.push(Contact { link, law, r: Local { m: start.m * (1.0 / arm), ..start } });
-                places.bonded.push(place);
+                let r = over_arm(start, arm);
+                let (shift, cone, flow) = (h * bond.strength, bond.cone(), self.settings.bond_flow);
+                if let Some(compliance) = bond.compliance(h) {
+                    let carried = over_arm(carried[number] * h, arm);
+                    let law = Elastic::new(block, compliance, carried, arm, shift, cone, flow);
+                    problem.elastic.push(Contact { link, law, r });
+                    places.elastic.push(place);
+                } else {
+                    let law = Bonded::new(block, arm, shift, cone, flow);
+                    problem.bonded.push(Contact { link, law, r });
+                    places.bonded.push(place);
+                }
             } else if let Some(bias) = self.bias(touch, h) {
                 let block = link.block(i, j, 0.0, drive.map(|(d, _)| d));
                 let mu = self.friction_of(touch.pair);
@@ -251,6 +283,11 @@ impl<D: Dim> World<D> {
         let radius = |k: u32| self.grains.radius.get(k as usize).map_or(0.0, |r| r + 0.5 * touch.gap);
         Link { nodes: touch.pair, frame: touch.frame, lever: touch.pair.map(radius) }
     }
+}
+
+/// Moments over the mean diameter.
+fn over_arm<T: Vect>(r: Local<T, T>, arm: f64) -> Local<T, T> {
+    Local { m: r.m * (1.0 / arm), ..r }
 }
 
 /// The rows that a smaller group has.

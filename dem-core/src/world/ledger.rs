@@ -3,7 +3,7 @@
 //! Contact work is r·(u⁺ + u⁻)/2 by row. The sum closes by identity (kinetic energy is quadratic in v), so its remainder
 //! checks the bookkeeping, not the accuracy.
 
-use crate::contact::Law;
+use crate::contact::{Law, Local};
 use crate::dim::{Dim, Vect};
 use crate::problem::{Group, Nodes};
 
@@ -18,8 +18,14 @@ pub struct Ledger {
     pub impact: f64,
     /// Energy lost by friction.
     pub friction: f64,
-    /// Energy lost by intact bonds; rigid bonds should lose none, so it is a numerical remainder.
+    /// Energy lost by intact rigid bonds; they should lose none, so it is a numerical remainder.
     pub bonds: f64,
+    /// Energy stored in elastic bonds now, Σ ½ f²/k.
+    pub elastic: f64,
+    /// Energy that elastic bonds lost to the damping of the implicit step.
+    pub damping: f64,
+    /// Elastic energy released by bonds that broke.
+    pub fracture: f64,
     /// Work minus energy found elsewhere: rounding, if the books are right.
     pub remainder: f64,
 }
@@ -31,6 +37,11 @@ pub struct Momentum<D: Dim> {
     pub linear: D::Vector,
     /// Σ m x × v + I ω about the origin (kg m²/s).
     pub angular: D::Spin,
+}
+
+/// Elastic energy (J) of a contact under the impulse `r`: ½ r·C r, which is ½ f²/k.
+pub(super) fn elastic_energy<L: Law>(law: &L, r: &Local<L::T, L::B>) -> f64 {
+    0.5 * r.dot(&law.compliance().times(r))
 }
 
 /// Energy (J) that the rows of a group took from the bodies: −Σ r·(u⁺ + u⁻)/2 for n, t and m.

@@ -14,7 +14,7 @@ pub use step::{StepError, StepReport};
 pub use touch::{Break, Counts, Touch, TouchStatus};
 
 use crate::body::{Grains, Load, Wall};
-use crate::bond::{Bond, BondStatus, Rupture};
+use crate::bond::{Bond, BondStatus, Rupture, Stiffness};
 use crate::contact::BondFlow;
 use crate::detection::{Candidates, pairs_within};
 use crate::dim::{Dim, Vect};
@@ -131,8 +131,17 @@ impl<D: Dim> World<D> {
             let strength = strength(mean_diameter);
             let held = self.grains.fixed[i] && self.grains.fixed[j];
             if rest_gap <= gap_tolerance * mean_diameter && strength > 0.0 && !held {
-                self.bonds.push(Bond { pair, rest_gap, mean_diameter, strength, friction, status: BondStatus::Intact });
+                let status = BondStatus::Intact;
+                let stiffness = None;
+                self.bonds.push(Bond { pair, rest_gap, mean_diameter, strength, friction, stiffness, status });
             }
+        }
+    }
+
+    /// Make every bond elastic; `stiffness` gives its stiffness for a mean diameter (m).
+    pub fn make_bonds_elastic(&mut self, stiffness: impl Fn(f64) -> Stiffness) {
+        for bond in &mut self.bonds {
+            bond.stiffness = Some(stiffness(bond.mean_diameter));
         }
     }
 

@@ -1,14 +1,14 @@
 //! One time step: the scheme of Moreau and Jean with θ = 1/2, its rupture cascade, and what is done when a solve fails.
 
 use super::assembly::{Midpoint, Motion, Places, read_back};
-use super::ledger::group_losses;
+use super::ledger::{elastic_energy, group_losses};
 use super::touch::{Break, Touch, TouchStatus};
 use super::{Counts, World};
 use crate::body::Drive;
 use crate::bond::{BondStatus, Rupture, failure};
 use crate::contact::{Law, Local};
 use crate::dim::{Dim, Vect};
-use crate::problem::{ContactProblem, Node, Nodes};
+use crate::problem::{ContactProblem, Group, Node, Nodes};
 use crate::solver::{SolveReport, SolveStatus};
 use thiserror::Error;
 
@@ -99,10 +99,11 @@ impl<D: Dim> World<D> {
         let motion = self.free_motion(h);
         let applied = self.applied_impulse(h);
         let mut touches = self.detect(&mid, &motion, h);
+        let carried = self.carried(&touches);
         let mut done = Solves::default();
         let mut breaks: Vec<Break<D>> = Vec::new();
         let problem = loop {
-            let (mut problem, places) = self.assemble(&touches, &motion, applied, h);
+            let (mut problem, places) = self.assemble(&touches, &motion, &carried, applied, h);
             let solve = self.solver.solve(&mut problem);
             done.add(solve);
             self.refuse_unaccepted(solve, &problem, h)?;
@@ -133,7 +134,8 @@ impl<D: Dim> World<D> {
         let h = self.settings.step;
         let (mid, motion) = (self.midpoint(h), self.free_motion(h));
         let touches = self.detect(&mid, &motion, h);
-        self.assemble(&touches, &motion, self.applied_impulse(h), h).0
+        let carried = self.carried(&touches);
+        self.assemble(&touches, &motion, &carried, self.applied_impulse(h), h).0
     }
 
     /// Half a step in position at the old velocities.
@@ -221,22 +223,40 @@ impl<D: Dim> World<D> {
         places: &Places,
         round: u32,
     ) -> Vec<Break<D>> {
-        let mut found: Vec<(f64, Break<D>)> = Vec::new();
-        for (contact, place) in problem.bonded.iter().zip(&places.bonded) {
-            let law = &contact.law;
-            let Some(mode) = failure(&contact.r, law.shift(), law.cone()) else { continue };
-            let touch = &touches[*place];
-            let u = problem.nodes.relative_velocity::<D::Tangent, D::Tangent>(&contact.link, law.arm());
-            let bond = touch.bond.unwrap_or(u32::MAX);
-            let (point, reaction) = (touch.point, touch.reaction);
-            found.push((u.dot(&u), Break { bond, pair: touch.pair, mode, round, point, reaction, energy: 0.0 }));
-        }
+        let mut found = self.group_at_limit(touches, &problem.nodes, &problem.bonded, &places.bonded, round);
+        found.extend(self.group_at_limit(touches, &problem.nodes, &problem.elastic, &places.elastic, round));
         if self.settings.rupture == Rupture::CascadeWorst {
             let worst = found.iter().map(|(flow, _)| *flow).fold(f64::NEG_INFINITY, f64::max);
             let first = found.iter().position(|(flow, _)| *flow == worst);
             return first.map(|k| found[k].1).into_iter().collect();
         }
         found.into_iter().map(|(_, failed)| failed).collect()
+    }
+
+    /// The bonds of a group that are at their limit, each with the square of its flow.
+    fn group_at_limit<L: Law<T = D::Tangent, B = D::Tangent>>(
+        &self,
+        touches: &[Touch<D>],
+        nodes: &Nodes<D>,
+        group: &Group<D, L>,
+        places: &[usize],
+        round: u32,
+    ) -> Vec<(f64, Break<D>)> {
+        let mut found = Vec::new();
+        for (contact, place) in group.iter().zip(places) {
+            let law = &contact.law;
+            let Some(mode) = failure(&contact.r, law.shift(), law.cone()) else { continue };
+            let touch = &touches[*place];
+            let u = nodes.relative_velocity::<D::Tangent, D::Tangent>(&contact.link, law.arm());
+            let flow = u + law.compliance().times(&(contact.r - law.carried()));
+            let Some(bond) = touch.bond else { continue };
+            // what the books hold of it: of the step's beginning where the step is made without the bond
+            let stored = if self.settings.rupture == Rupture::EndOfStep { contact.r } else { law.carried() };
+            let energy = elastic_energy(law, &stored);
+            let (pair, point, reaction) = (touch.pair, touch.point, touch.reaction);
+            found.push((flow.dot(&flow), Break { bond, pair, mode, round, point, reaction, energy }));
+        }
+        found
     }
 
     /// Take over the result: velocities, second half of the positions, broken bonds, reactions, books.
@@ -249,7 +269,7 @@ impl<D: Dim> World<D> {
         mut touches: Vec<Touch<D>>,
         breaks: &[Break<D>],
     ) {
-        self.book(h, motion, problem);
+        self.book(h, motion, problem, breaks);
         let n = self.grains.len();
         for (k, node) in problem.nodes.all[..n].iter().enumerate() {
             let mean_spin = (self.grains.spin[k] + node.spin) * (0.5 * h);
@@ -281,7 +301,7 @@ impl<D: Dim> World<D> {
     }
 
     /// Enter the step in the energy ledger.
-    fn book(&mut self, h: f64, motion: &Motion<D>, problem: &ContactProblem<D>) {
+    fn book(&mut self, h: f64, motion: &Motion<D>, problem: &ContactProblem<D>, breaks: &[Break<D>]) {
         let before = Nodes {
             all: with_velocities(&problem.nodes, &motion.before),
             drives: problem.nodes.drives.clone(),
@@ -292,8 +312,16 @@ impl<D: Dim> World<D> {
         let dry = group_losses(&before, &problem.nodes, &problem.dry);
         let smooth = group_losses(&before, &problem.nodes, &problem.frictionless);
         let bonds: f64 = group_losses(&before, &problem.nodes, &problem.bonded).iter().sum();
+        let elastic: f64 = group_losses(&before, &problem.nodes, &problem.elastic).iter().sum();
+        let stored: f64 = problem.elastic.iter().map(|c| elastic_energy(&c.law, &c.r)).sum();
+        let released: f64 = breaks.iter().map(|b| b.energy).sum();
+        // bonds that break at the end of the step are still among those that store
+        let late = if self.settings.rupture == Rupture::EndOfStep { released } else { 0.0 };
         let ledger = &mut self.ledger;
-        ledger.remainder += external - (kinetic - ledger.kinetic) - dry[0] - smooth[0] - dry[1] - bonds;
+        ledger.remainder += external - (kinetic - ledger.kinetic) - dry[0] - smooth[0] - dry[1] - bonds - elastic;
+        ledger.damping += elastic - (stored - (ledger.elastic - (released - late)));
+        ledger.elastic = stored - late;
+        ledger.fracture += released;
         ledger.kinetic = kinetic;
         ledger.external_work += external;
         ledger.impact += dry[0] + smooth[0];
@@ -398,6 +426,7 @@ fn write_reactions<D: Dim>(touches: &mut [Touch<D>], problem: &ContactProblem<D>
         touch.status = TouchStatus::Open;
     }
     read_back(touches, &problem.bonded, &places.bonded, h);
+    read_back(touches, &problem.elastic, &places.elastic, h);
     read_back(touches, &problem.dry, &places.dry, h);
     read_back(touches, &problem.frictionless, &places.frictionless, h);
 }

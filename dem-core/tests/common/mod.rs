@@ -19,6 +19,7 @@ pub fn solver(tolerance: f64) -> SolverSettings {
         tolerance,
         accept: tolerance,
         max_sweeps: 1_000_000,
+        acceleration: 0,
     })
 }
 

@@ -36,6 +36,9 @@ pub struct GaussSeidel {
     pub local: LocalSolve,
     /// Sweeps over all contacts after which a solve gives up.
     pub max_sweeps: u64,
+    /// Steps that Anderson's acceleration remembers, 0 for plain sweeps; 8 takes some ten times fewer sweeps where bonds
+    /// abound.
+    pub acceleration: usize,
 }
 
 /// Semismooth Newton on the augmented Lagrangian.
@@ -87,7 +90,7 @@ impl Default for Solver {
 
 impl Default for GaussSeidel {
     fn default() -> Self {
-        Self { local: LocalSolve::Exact, max_sweeps: 100_000 }
+        Self { local: LocalSolve::Exact, max_sweeps: 100_000, acceleration: 0 }
     }
 }
 

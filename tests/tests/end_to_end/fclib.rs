@@ -185,8 +185,9 @@ fn newton(problem: &mut Assembled) -> SolveStatus {
     Newton::new(settings).solve_assembled(problem).status
 }
 
-fn swept(problem: &mut Assembled, local: LocalSolve) -> SolveStatus {
-    let settings = GaussSeidelSettings { local, tolerance: TOLERANCE, accept: TOLERANCE, max_sweeps: 100_000 };
+fn swept(problem: &mut Assembled, local: LocalSolve, acceleration: usize) -> SolveStatus {
+    let (tolerance, max_sweeps) = (TOLERANCE, 100_000);
+    let settings = GaussSeidelSettings { local, tolerance, accept: tolerance, max_sweeps, acceleration };
     gauss_seidel(problem, &settings).status
 }
 
@@ -223,12 +224,13 @@ fn the_collection_is_solved_by_every_solver() {
         let mut start = problem.assembled;
         start.r.fill(0.0);
         let mut found: Vec<Assembled> = Vec::new();
-        for solver in ["newton", "exact", "predictor-corrector"] {
+        for solver in ["newton", "exact", "predictor-corrector", "accelerated"] {
             let mut at = start.clone();
             let status = match solver {
                 "newton" => newton(&mut at),
-                "exact" => swept(&mut at, LocalSolve::Exact),
-                _ => swept(&mut at, LocalSolve::PredictorCorrector),
+                "exact" => swept(&mut at, LocalSolve::Exact, 0),
+                "accelerated" => swept(&mut at, LocalSolve::Exact, 8),
+                _ => swept(&mut at, LocalSolve::PredictorCorrector, 0),
             };
             let residual = at.residual();
             let bound = if beyond(name, solver) { 1e-6 } else { TOLERANCE };

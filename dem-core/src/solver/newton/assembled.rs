@@ -72,6 +72,12 @@ impl Solvable for Assembled {
                 given: rows.padded(&given),
                 weights,
                 multiplier: self.reaction(c),
+                // the compliance of elastic bonds is inside W and q
+                compliance: Weights::default(),
+                carried: Padded::zero(),
+                lag: None,
+                // the trace of the block
+                size: parts.matrix.diagonal(c).iter().step_by(size + 1).sum(),
             });
         }
         out.coefficients = (0..self.r.len()).flat_map(|row| columns.iter().map(move |l| l[row])).collect();

@@ -1,30 +1,28 @@
 //! The corrector of one contact in the metric 1/ρ, and its derivative.
 //!
-//! From a multiplier r̂ and a relative velocity u the corrector is r(q) with q = u − r̂/ρ: for an associated law the
-//! minimiser of ½ Σ r²/ρ + q·r over the cone, for Coulomb's law Signorini's r_n = (−ρ_n q_n)⁺ and the tangential part
-//! clipped to μ r_n (Alart & Curnier 1991). Its negative derivative A = −∂r/∂q is what a contact adds to the matrix of
-//! the Newton step; it is symmetric where the law is associated.
+//! From a multiplier r̂ and a relative velocity u the corrector is r(q) with q = u − r̂/ρ (and the carried reaction of an
+//! elastic bond, [`Row::form`]): for an associated law the minimiser of ½ Σ w r² + q·r over the cone, w = 1/ρ + C, for
+//! Coulomb's law Signorini's r_n = (−q_n/w_n)⁺ and the tangential part clipped to μ r_n (Alart & Curnier 1991). Its
+//! negative derivative A = −∂r/∂q is what a contact adds to the matrix of the Newton step; it is symmetric where the
+//! law is associated.
 
-use super::rows::{Operator, Padded, Row, from_order, in_order};
-use crate::contact::Local;
+use super::rows::{Operator, Padded, Row};
+use crate::contact::{Local, Weights};
 use crate::dim::Vect;
-use nalgebra::{SVector, Vector2};
+use nalgebra::{SMatrix, SVector, Vector2};
 
 /// The corrected reaction r̂ for the relative velocity `u`.
+#[inline]
 pub(super) fn correct(row: &Row, u: &Padded) -> Padded {
-    let q = pulled(row, u);
-    let (w, cone) = (&row.weights, &row.cone);
-    if row.associated {
-        return cone.minimise(*w, q);
+    let q = row.form(u);
+    let (w, cone) = (row.metric(), &row.cone);
+    if row.convex() {
+        // most contacts stick, and then nothing couples
+        let stuck = Local { n: -q.n / w.n, t: q.t * (-1.0 / w.t), m: q.m * (-1.0 / w.m) };
+        return if cone.contains(&stuck) { stuck } else { cone.minimise(w, q) };
     }
     let n = (-q.n / w.n).max(0.0);
     Local { n, t: (q.t * (-1.0 / w.t)).clipped(cone.mu * n), m: (q.m * (-1.0 / w.m)).clipped(cone.nu * n) }
-}
-
-/// q = u − r̂/ρ.
-fn pulled(row: &Row, u: &Padded) -> Padded {
-    let (w, r) = (&row.weights, &row.multiplier);
-    Local { n: u.n - r.n * w.n, t: u.t - r.t * w.t, m: u.m - r.m * w.m }
 }
 
 /// A = −∂r/∂q at the velocity `u`, where the corrector gave `r`; nothing where the contact is open.
@@ -34,34 +32,36 @@ pub(super) fn operator(row: &Row, u: &Padded, r: &Padded, symmetric: bool) -> Op
     if r.n <= 0.0 {
         return None;
     }
-    let q = pulled(row, u);
-    let (w, cone) = (&row.weights, &row.cone);
+    let q = row.form(u);
+    let (w, cone) = (row.metric(), &row.cone);
     let slip = limit_direction(q.t, w.t, cone.mu * r.n);
     let bend = limit_direction(q.m, w.m, cone.nu * r.n);
-    let mut a = Operator::zeros();
+    if slip.is_none() && bend.is_none() {
+        return Some(Operator::Diagonal(Weights { n: 1.0 / w.n, t: 1.0 / w.t, m: 1.0 / w.m }));
+    }
+    let mut a = SMatrix::<f64, 5, 5>::zeros();
     // a row group inside its ball follows its own stiffness; on the sphere it turns with q
     block(&mut a, 1, slip, 1.0 / w.t, cone.mu * r.n);
     block(&mut a, 3, bend, 1.0 / w.m, cone.nu * r.n);
     // the normal row drags the limits along: r = n (1, −μ q̂_t, −ν q̂_m) on the active ones
-    let mut drag = Padded { n: 1.0, t: Vector2::zeros(), m: Vector2::zeros() };
+    let mut drag = SVector::<f64, 5>::ith(0, 1.0);
     let mut stiffness = w.n;
     if let Some((direction, _)) = slip {
-        drag.t = direction * -cone.mu;
-        stiffness += if row.associated { cone.mu * cone.mu * w.t } else { 0.0 };
+        drag.fixed_rows_mut::<2>(1).copy_from(&(direction * -cone.mu));
+        stiffness += if row.convex() { cone.mu * cone.mu * w.t } else { 0.0 };
     }
     if let Some((direction, _)) = bend {
-        drag.m = direction * -cone.nu;
-        stiffness += if row.associated { cone.nu * cone.nu * w.m } else { 0.0 };
+        drag.fixed_rows_mut::<2>(3).copy_from(&(direction * -cone.nu));
+        stiffness += if row.convex() { cone.nu * cone.nu * w.m } else { 0.0 };
     }
-    let drag = in_order(&drag);
-    if row.associated {
+    if row.convex() {
         a += drag * drag.transpose() / stiffness;
     } else if symmetric {
         a[(0, 0)] += 1.0 / w.n;
     } else {
         a += drag * SVector::<f64, 5>::ith(0, 1.0).transpose() / w.n;
     }
-    Some(a)
+    Some(Operator::Full(a))
 }
 
 /// Direction and norm of a row group's q where the group is at its limit.
@@ -71,7 +71,7 @@ fn limit_direction(q: Vector2<f64>, weight: f64, limit: f64) -> Option<(Vector2<
 }
 
 /// The part of A that a row group has for a fixed limit.
-fn block(a: &mut Operator, at: usize, limited: Option<(Vector2<f64>, f64)>, stiffness: f64, limit: f64) {
+fn block(a: &mut SMatrix<f64, 5, 5>, at: usize, limited: Option<(Vector2<f64>, f64)>, stiffness: f64, limit: f64) {
     match limited {
         None => {
             a[(at, at)] += stiffness;
@@ -86,9 +86,4 @@ fn block(a: &mut Operator, at: usize, limited: Option<(Vector2<f64>, f64)>, stif
             }
         }
     }
-}
-
-/// A du for one contact.
-pub(super) fn act(a: &Operator, du: &Padded) -> Padded {
-    from_order(&(a * in_order(du)))
 }

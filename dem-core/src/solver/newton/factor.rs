@@ -117,8 +117,12 @@ fn values(rows: &Rows, operators: &[Option<Operator>]) -> Vec<f64> {
         if let Some(a) = operator {
             for (k, row_place) in row.rows.iter().enumerate() {
                 for c in 0..width {
-                    pulled[k][c] =
-                        row.rows.iter().enumerate().map(|(l, place)| a[(*row_place, *place)] * h(l, c)).sum();
+                    pulled[k][c] = match a {
+                        Operator::Diagonal(_) => a.entry(*row_place, *row_place) * h(k, c),
+                        Operator::Full(_) => {
+                            row.rows.iter().enumerate().map(|(l, place)| a.entry(*row_place, *place) * h(l, c)).sum()
+                        }
+                    };
                 }
             }
         }
@@ -145,7 +149,7 @@ fn dense(rows: &Rows, operators: &[Option<Operator>]) -> Mat<f64> {
             let Some(a) = operator else { continue };
             for (l, other) in row.rows.iter().enumerate() {
                 for c in 0..n {
-                    pulled[(c, first + k)] += a[(*place, *other)] * rows.coefficients[row.start + l * n + c];
+                    pulled[(c, first + k)] += a.entry(*place, *other) * rows.coefficients[row.start + l * n + c];
                 }
             }
         }

@@ -11,8 +11,35 @@ use nalgebra::{SMatrix, SVector};
 
 /// Rows of one contact, padded to the most that any has: n, two tangential, two bending.
 pub(super) type Padded = Local<SVector<f64, 2>, SVector<f64, 2>>;
-/// The derivative of padded rows, in the order n, t, m.
-pub(super) type Operator = SMatrix<f64, 5, 5>;
+/// The derivative of padded rows.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Operator {
+    /// Every group of rows on its own.
+    Diagonal(Weights),
+    /// In the order n, t, m.
+    Full(SMatrix<f64, 5, 5>),
+}
+
+impl Operator {
+    /// A x.
+    #[inline]
+    pub fn times(&self, x: &Padded) -> Padded {
+        match self {
+            Self::Diagonal(w) => w.times(x),
+            Self::Full(a) => from_order(&(a * in_order(x))),
+        }
+    }
+
+    /// The entry in row `r` and column `c`, in the order n, t, m.
+    #[inline]
+    pub fn entry(&self, r: usize, c: usize) -> f64 {
+        match self {
+            Self::Diagonal(_) if r != c => 0.0,
+            Self::Diagonal(w) => [w.n, w.t, w.t, w.m, w.m][r],
+            Self::Full(a) => a[(r, c)],
+        }
+    }
+}
 
 /// One contact.
 #[derive(Clone, Debug)]
@@ -34,6 +61,36 @@ pub(super) struct Row {
     pub weights: Weights,
     /// Multiplier: the shifted reaction r̂ (N s).
     pub multiplier: Padded,
+    /// Compliance of an elastic bond, zero for what is rigid.
+    pub compliance: Weights,
+    /// Shifted reaction that an elastic bond carried when the step began (N s).
+    pub carried: Padded,
+    /// What is added to u_n in place of μ‖u_t‖ where the law is taken as associated for a round.
+    pub lag: Option<f64>,
+    /// Σ h² over all coefficients: how much a unit of velocity and of reaction weigh (1/kg).
+    pub size: f64,
+}
+
+impl Row {
+    /// Weights of the corrector's quadratic form, 1/ρ + C.
+    #[inline]
+    pub fn metric(&self) -> Weights {
+        self.weights + self.compliance
+    }
+
+    /// q = u − r̂/ρ − C r̂₀, the linear form of the corrector at the velocity `u`.
+    #[inline]
+    pub fn form(&self, u: &Padded) -> Padded {
+        let mut q = *u - self.weights.times(&self.multiplier) - self.compliance.times(&self.carried);
+        q.n += self.lag.unwrap_or(0.0);
+        q
+    }
+
+    /// Whether the corrector is the gradient of a convex function.
+    #[inline]
+    pub fn convex(&self) -> bool {
+        self.associated || self.lag.is_some()
+    }
 }
 
 /// All contacts of a problem.
@@ -134,18 +191,14 @@ impl Rows {
         let mean = |sum: f64| sum / normal.len().max(1) as f64;
         let soft = mean(rows.list.iter().map(|r| r.weights.n).sum());
         let scale = mean(normal.iter().sum()) / (soft * kappa);
-        for row in &mut rows.list {
-            let w = &mut row.weights;
-            (w.n, w.t, w.m) = (w.n * scale, w.t * scale, w.m * scale);
-        }
+        rows.soften(scale);
         rows
     }
 
     /// Divide ρ of all rows by `factor`.
     pub fn soften(&mut self, factor: f64) {
         for row in &mut self.list {
-            let w = &mut row.weights;
-            (w.n, w.t, w.m) = (w.n * factor, w.t * factor, w.m * factor);
+            row.weights = row.weights * factor;
         }
     }
 
@@ -160,11 +213,12 @@ impl Rows {
     pub fn pulled(&self, row: &Row, y: &[f64]) -> Padded {
         let mut u = Padded::zero();
         let width = row.count[0] + row.count[1];
-        for (k, place) in row.rows.iter().enumerate() {
-            let h = &self.coefficients[row.start + k * width..][..width];
+        let coefficients = &self.coefficients[row.start..][..row.rows.len() * width];
+        let (first, second) = (&y[row.at[0]..][..row.count[0]], &y[row.at[1]..][..row.count[1]]);
+        for (place, h) in row.rows.iter().zip(coefficients.chunks_exact(width)) {
             let (a, b) = h.split_at(row.count[0]);
-            let sum = |h: &[f64], at: usize| h.iter().zip(&y[at..]).map(|(h, y)| h * y).sum::<f64>();
-            *entry(&mut u, *place) += sum(a, row.at[0]) + sum(b, row.at[1]);
+            let sum = |h: &[f64], y: &[f64]| h.iter().zip(y).map(|(h, y)| h * y).sum::<f64>();
+            *entry(&mut u, *place) += sum(a, first) + sum(b, second);
         }
         u
     }
@@ -173,9 +227,10 @@ impl Rows {
     #[inline]
     pub fn apply(&self, row: &Row, r: &Padded, y: &mut [f64]) {
         let width = row.count[0] + row.count[1];
-        for (k, place) in row.rows.iter().enumerate() {
-            let h = &self.coefficients[row.start + k * width..][..width];
-            let value = *entry(&mut r.clone(), *place);
+        let mut r = *r;
+        let coefficients = &self.coefficients[row.start..][..row.rows.len() * width];
+        for (place, h) in row.rows.iter().zip(coefficients.chunks_exact(width)) {
+            let value = *entry(&mut r, *place);
             let (a, b) = h.split_at(row.count[0]);
             for (h, y) in a.iter().zip(&mut y[row.at[0]..]) {
                 *y += h * value;
@@ -199,13 +254,13 @@ pub(super) fn entry(r: &mut Padded, place: usize) -> &mut f64 {
 
 /// The rows of a padded vector in order.
 #[inline]
-pub(super) fn in_order(r: &Padded) -> SVector<f64, 5> {
+fn in_order(r: &Padded) -> SVector<f64, 5> {
     [r.n, r.t[0], r.t[1], r.m[0], r.m[1]].into()
 }
 
 /// A padded vector from its rows in order.
 #[inline]
-pub(super) fn from_order(v: &SVector<f64, 5>) -> Padded {
+fn from_order(v: &SVector<f64, 5>) -> Padded {
     Local { n: v[0], t: [v[1], v[2]].into(), m: [v[3], v[4]].into() }
 }
 
@@ -300,8 +355,11 @@ impl<D: Dim> Visitor<D> for Flatten<'_, D> {
         self.normal.push(normal);
         let size = c.link.lever[0] + if c.link.lever[1] > 0.0 { c.link.lever[1] } else { c.link.lever[0] };
         let soft = size.powi(2 - D::N as i32);
-        let mut multiplier = padded(c.r);
-        multiplier.n += c.law.shift();
+        let shifted = |r| {
+            let mut r: Padded = padded(r);
+            r.n += c.law.shift();
+            r
+        };
         self.rows.list.push(Row {
             at: c.link.nodes.map(|k| self.unknowns.first[k as usize]),
             count: [first, second],
@@ -312,7 +370,11 @@ impl<D: Dim> Visitor<D> for Flatten<'_, D> {
             shift: c.law.shift(),
             given,
             weights: Weights { n: soft, t: soft / self.ratio.tangential, m: soft / self.ratio.rolling },
-            multiplier,
+            multiplier: shifted(c.r),
+            compliance: c.law.compliance(),
+            carried: shifted(c.law.carried()),
+            lag: None,
+            size: table.rows[..rows.len()].iter().flat_map(|row| &row[..table.width]).map(|h| h * h).sum(),
         });
     }
 }

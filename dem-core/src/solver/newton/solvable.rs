@@ -2,7 +2,7 @@
 
 use super::rows::{Padded, Row, Rows, StiffnessRatio, padded};
 use crate::contact::{Law, Local, LocalSolve};
-use crate::dim::{Dim, resized};
+use crate::dim::{Dim, Vect, resized};
 use crate::problem::residual::residual;
 use crate::problem::{ContactProblem, Group};
 use crate::solver::{ContactSolver, GaussSeidel, GaussSeidelSettings, SolveReport, sweep};
@@ -45,6 +45,7 @@ impl<D: Dim> Solvable for ContactProblem<D> {
         }
         let mut reactions = Vec::with_capacity(rows.list.len());
         reactions.extend(self.bonded.iter().map(|c| padded(c.r)));
+        reactions.extend(self.elastic.iter().map(|c| padded(c.r)));
         reactions.extend(self.dry.iter().map(|c| padded(c.r)));
         reactions.extend(self.frictionless.iter().map(|c| padded(c.r)));
         reactions.iter_mut().zip(&rows.list).for_each(|(r, row)| r.n += row.shift);
@@ -57,15 +58,19 @@ impl<D: Dim> Solvable for ContactProblem<D> {
                 c.r = Local { n: r.n - row.shift, t: resized(r.t), m: resized(r.m) };
             }
         }
-        let (bonds, dry) = (self.bonded.len(), self.bonded.len() + self.dry.len());
-        group(&mut self.bonded, &reactions[..bonds], &rows.list[..bonds]);
-        group(&mut self.dry, &reactions[bonds..dry], &rows.list[bonds..dry]);
+        let bonded = self.bonded.len();
+        let elastic = bonded + self.elastic.len();
+        let dry = elastic + self.dry.len();
+        group(&mut self.bonded, &reactions[..bonded], &rows.list[..bonded]);
+        group(&mut self.elastic, &reactions[bonded..elastic], &rows.list[bonded..elastic]);
+        group(&mut self.dry, &reactions[elastic..dry], &rows.list[elastic..dry]);
         group(&mut self.frictionless, &reactions[dry..], &rows.list[dry..]);
     }
 
     fn forget_what_is_not_finite(&mut self) {
-        let finite = |r: f64| r.is_finite();
-        if !self.bonded.iter().all(|c| finite(c.r.n)) || !self.dry.iter().all(|c| finite(c.r.n)) {
+        let mut sum: f64 = 0.0;
+        self.nodes.all.iter().for_each(|n| sum += n.velocity.dot(&n.velocity) + n.spin.dot(&n.spin));
+        if !sum.is_finite() {
             self.forget_reactions();
         }
     }

@@ -1,0 +1,271 @@
+//! The inner problem F(y) = 0 for fixed multipliers: state, Newton direction, line search.
+
+use super::Newton;
+use super::corrector::{correct, operator};
+use super::krylov::gmres;
+use super::rows::{Operator, Padded, Row, Rows};
+use crate::contact::Local;
+
+/// GMRES iterations beyond those of a fresh factor that a kept one may cost in all before it is renewed.
+const WASTE: usize = 20;
+/// Most GMRES iterations of one linear solve.
+const MOST_KRYLOV: usize = 80;
+
+/// State of one solve.
+pub(super) struct Iterate {
+    pub y: Vec<f64>,
+    velocities: Vec<Padded>,
+    /// The corrector's reactions at `y`, shifted.
+    pub reactions: Vec<Padded>,
+    /// F(y), and its norm.
+    gradient: Vec<f64>,
+    pub norm: f64,
+}
+
+impl Iterate {
+    /// The state at `y`.
+    pub fn at(rows: &Rows, y: Vec<f64>) -> Self {
+        let mut gradient: Vec<f64> = y.iter().zip(&rows.free).map(|(y, f)| y - f).collect();
+        let mut velocities = Vec::with_capacity(rows.list.len());
+        let mut reactions = Vec::with_capacity(rows.list.len());
+        for row in &rows.list {
+            let u = rows.velocity(row, &y);
+            let r = correct(row, &u);
+            rows.apply(row, &Local { n: row.shift - r.n, t: -r.t, m: -r.m }, &mut gradient);
+            velocities.push(u);
+            reactions.push(r);
+        }
+        let norm = norm2(&gradient).sqrt();
+        Self { y, velocities, reactions, gradient, norm }
+    }
+
+    /// The state at the velocities that the (shifted) `reactions` give.
+    pub fn from_reactions(rows: &Rows, reactions: &[Padded]) -> Self {
+        let mut y = rows.free.clone();
+        for (row, r) in rows.list.iter().zip(reactions) {
+            rows.apply(row, &Local { n: r.n - row.shift, ..*r }, &mut y);
+        }
+        Self::at(rows, y)
+    }
+}
+
+impl Newton {
+    /// Solve the inner problem for fixed multipliers from `state`, in at most `patience` iterations. `guess` are
+    /// reactions whose active set is tried first. Returns the iterations made and whether F vanished.
+    pub(super) fn inner(
+        &mut self,
+        rows: &Rows,
+        state: &mut Iterate,
+        guess: Option<&[Padded]>,
+        patience: u64,
+    ) -> (u64, bool) {
+        for iteration in 0..patience {
+            let guessed = guess.filter(|_| iteration == 0);
+            let target = self.target(rows, state);
+            if guessed.is_none() && state.norm <= target {
+                return (iteration, true);
+            }
+            let Some(direction) = self.direction(rows, state, guessed, target) else { return (iteration + 1, false) };
+            if std::env::var("DBG").is_ok() { eprintln!("  inner {iteration} norm {:.3e} target {target:.1e} guessed {} trusted {} made {} floor {} wasted {} dir {:.2e}", state.norm, guessed.is_some(), self.trusted, self.factor.made, self.floor, self.wasted, direction.norm); }
+            let before = direction.norm;
+            advance(rows, state, &direction.step, guessed.is_some());
+            if !state.norm.is_finite() {
+                return (iteration + 1, false);
+            }
+            // a factor that was trusted blindly has to earn it
+            self.trusted = self.trusted && state.norm <= (1e-2 * before).max(target);
+        }
+        (patience, state.norm <= self.target(rows, state))
+    }
+
+    /// The norm of F that is small enough: a tenth of what either tolerance allows, or what rounding leaves.
+    ///
+    /// An error of F turns up as a velocity when v is computed from the reactions. Rounding comes from ρ u, where u is a
+    /// sum of velocities, and from the shift that is added and taken away.
+    fn target(&self, rows: &Rows, state: &Iterate) -> f64 {
+        let change: f64 = state.y.iter().zip(&rows.free).map(|(y, f)| (y - f) * (y - f)).sum();
+        let (mut rounding, mut carried) = (0.0, 0.0);
+        for (row, r) in rows.list.iter().zip(&state.reactions) {
+            let speed: f64 = (0..2).map(|side| norm2(&state.y[row.at[side]..][..row.count[side]])).sum();
+            let own = Local { n: r.n - row.shift, ..*r };
+            let soft = row.metric().n;
+            rounding += row.size * (speed * row.size / (soft * soft) + r.dot(r));
+            carried += row.size * own.dot(&own);
+        }
+        let wanted =
+            (0.1 * self.settings.load_tolerance * change.sqrt()).min(0.1 * self.settings.tolerance * carried.sqrt());
+        wanted.max(4.0 * f64::EPSILON * rounding.sqrt())
+    }
+
+    /// The Newton direction −J⁻¹ F, by the factor at hand or GMRES on it, renewed if it serves badly.
+    fn direction(
+        &mut self,
+        rows: &Rows,
+        state: &Iterate,
+        guess: Option<&[Padded]>,
+        target: f64,
+    ) -> Option<Direction> {
+        let (mut right, operators) = linearise(rows, state, guess);
+        right.iter_mut().for_each(|f| *f = -*f);
+        let norm = norm2(&right).sqrt();
+        let tolerance = (0.1 * target / norm).clamp(1e-12, 1e-3);
+        let serves = !self.renew && self.factor.serves(rows.unknowns);
+        if serves && self.trusted {
+            self.factor.solve(&mut right);
+            return Some(Direction { step: right, norm });
+        }
+        for fresh in [!serves, true] {
+            if fresh && !self.factor.renew(rows, &symmetric_operators(rows, state, guess)) {
+                return None;
+            }
+            let apply = |x: &[f64], out: &mut [f64]| multiply(rows, &operators, x, out);
+            let (step, report) = gmres(&right, tolerance, MOST_KRYLOV, apply, |x| self.factor.solve(x));
+            if fresh {
+                // what even a fresh factor needs is the part that is not symmetric
+                (self.floor, self.wasted) = (report.iterations, 0);
+            }
+            self.wasted += report.iterations.saturating_sub(self.floor);
+            self.renew = self.wasted > WASTE;
+            self.trusted = report.iterations <= 1;
+            if report.residual <= tolerance || fresh {
+                return Some(Direction { step, norm });
+            }
+        }
+        None
+    }
+}
+
+/// A Newton step, and the norm of F that it is to remove.
+struct Direction {
+    step: Vec<f64>,
+    norm: f64,
+}
+
+pub(super) fn norm2(x: &[f64]) -> f64 {
+    x.iter().map(|x| x * x).sum()
+}
+
+/// The velocity at which the corrector gives the guessed reaction.
+fn guessed_velocity(row: &Row, guess: &Padded) -> Padded {
+    let mut u = row.weights.times(&row.multiplier) + row.compliance.times(&row.carried) - row.metric().times(guess);
+    u.n -= row.lag.unwrap_or(0.0);
+    u
+}
+
+/// F and A at the state; with a guess, both from the active set of the guessed reactions.
+fn linearise(rows: &Rows, state: &Iterate, guess: Option<&[Padded]>) -> (Vec<f64>, Vec<Option<Operator>>) {
+    let Some(guess) = guess else {
+        let at = rows.list.iter().zip(&state.velocities).zip(&state.reactions);
+        return (state.gradient.clone(), at.map(|((row, u), r)| operator(row, u, r, false)).collect());
+    };
+    let mut gradient: Vec<f64> = state.y.iter().zip(&rows.free).map(|(y, f)| y - f).collect();
+    let mut operators = Vec::with_capacity(rows.list.len());
+    for ((row, u), guess) in rows.list.iter().zip(&state.velocities).zip(guess) {
+        let from = guessed_velocity(row, guess);
+        let mut r = correct(row, &from);
+        let a = operator(row, &from, &r, false);
+        if let Some(a) = &a {
+            r += a.times(&(from - *u));
+        }
+        rows.apply(row, &Local { n: row.shift - r.n, t: -r.t, m: -r.m }, &mut gradient);
+        operators.push(a);
+    }
+    (gradient, operators)
+}
+
+/// The symmetric parts, for the factor.
+fn symmetric_operators(rows: &Rows, state: &Iterate, guess: Option<&[Padded]>) -> Vec<Option<Operator>> {
+    let mut operators = Vec::with_capacity(rows.list.len());
+    for (k, row) in rows.list.iter().enumerate() {
+        let (u, r) = match guess {
+            None => (state.velocities[k], state.reactions[k]),
+            Some(guess) => {
+                let u = guessed_velocity(row, &guess[k]);
+                (u, correct(row, &u))
+            }
+        };
+        operators.push(operator(row, &u, &r, true));
+    }
+    operators
+}
+
+/// out ← (I + Σ H̃ A H̃ᵀ) x.
+fn multiply(rows: &Rows, operators: &[Option<Operator>], x: &[f64], out: &mut [f64]) {
+    out.copy_from_slice(x);
+    for (row, operator) in rows.list.iter().zip(operators) {
+        if let Some(a) = operator {
+            rows.apply(row, &a.times(&rows.pulled(row, x)), out);
+        }
+    }
+}
+
+/// Move along the direction: the whole step where F shrinks enough or a guess is taken up, else the best of a few
+/// shorter ones.
+fn advance(rows: &Rows, state: &mut Iterate, direction: &[f64], whole: bool) {
+    let step = |length: f64| {
+        let y = state.y.iter().zip(direction).map(|(y, d)| y + length * d).collect();
+        Iterate::at(rows, y)
+    };
+    let slope = |at: &Iterate| at.gradient.iter().zip(direction).map(|(f, d)| f * d).sum::<f64>();
+    let convex = rows.list.iter().all(Row::convex);
+    let full = step(1.0);
+    let start = slope(state);
+    let good = if convex { slope(&full).abs() <= 0.5 * start.abs() } else { full.norm <= 0.9 * state.norm };
+    if whole || good {
+        *state = full;
+        return;
+    }
+    if convex {
+        // F·d grows along d: the minimum of the convex function is where it vanishes
+        *state = root(step, slope, start, full);
+        return;
+    }
+    let mut best = full;
+    let mut length = 1.0;
+    for _ in 0..6 {
+        length *= 0.5;
+        let next = step(length);
+        if next.norm < best.norm {
+            best = next;
+        }
+    }
+    *state = best;
+}
+
+/// Where the slope vanishes, between 0 (slope `start` < 0) and a step that may have to be prolonged: regula falsi with
+/// the Illinois rule.
+fn root(step: impl Fn(f64) -> Iterate, slope: impl Fn(&Iterate) -> f64, start: f64, full: Iterate) -> Iterate {
+    let (mut low, mut low_slope) = (0.0, start);
+    let mut high = 1.0;
+    let mut found = full;
+    let mut high_slope = slope(&found);
+    for _ in 0..10 {
+        if high_slope >= 0.0 {
+            break;
+        }
+        (low, low_slope) = (high, high_slope);
+        high *= 2.0;
+        found = step(high);
+        high_slope = slope(&found);
+    }
+    for _ in 0..20 {
+        if high_slope <= 0.0 {
+            break;
+        }
+        let length = (low * high_slope - high * low_slope) / (high_slope - low_slope);
+        let next = step(length);
+        let s = slope(&next);
+        found = next;
+        if s.abs() <= 0.1 * start.abs() {
+            break;
+        }
+        if s < 0.0 {
+            (low, low_slope) = (length, s);
+            high_slope *= 0.5;
+        } else {
+            (high, high_slope) = (length, s);
+            low_slope *= 0.5;
+        }
+    }
+    found
+}
