@@ -148,7 +148,13 @@ fn bonds_never_form_again() {
 #[test]
 fn an_unaccepted_solve_breaks_no_bond_and_moves_no_body() {
     let mut set = settings(1e-4);
-    let one_sweep = GaussSeidelSettings { local: Default::default(), tolerance: 1e-14, accept: 1e-14, max_sweeps: 1, acceleration: 0 };
+    let one_sweep = GaussSeidelSettings {
+        local: Default::default(),
+        tolerance: 1e-14,
+        accept: 1e-14,
+        max_sweeps: 1,
+        acceleration: 0,
+    };
     set.solver = SolverSettings::GaussSeidel(one_sweep);
     set.max_halvings = 2;
     let mut row: Vec<_> = (0..20).map(|k| grain::<D2>(&[A * k as f64, 0.0], 0.5 * A)).collect();
@@ -170,7 +176,13 @@ fn an_unaccepted_solve_breaks_no_bond_and_moves_no_body() {
 fn a_step_whose_second_half_fails_is_taken_back_whole() {
     // the pull of the second half breaks a chain that one sweep cannot solve; the first half, without load, is easy
     let mut set = settings(1e-4);
-    let one_sweep = GaussSeidelSettings { local: Default::default(), tolerance: 1e-14, accept: 1e-14, max_sweeps: 1, acceleration: 0 };
+    let one_sweep = GaussSeidelSettings {
+        local: Default::default(),
+        tolerance: 1e-14,
+        accept: 1e-14,
+        max_sweeps: 1,
+        acceleration: 0,
+    };
     set.solver = SolverSettings::GaussSeidel(one_sweep);
     set.max_halvings = 1;
     let mut row: Vec<_> = (0..20).map(|k| grain::<D2>(&[A * k as f64, 0.0], 0.5 * A)).collect();

@@ -216,7 +216,7 @@ pub fn write(history: &History, report: &Report, folder: &mut Folder) -> Result<
     });
     folder.table("distribution", &["step", "time_s", "ratio_to_mean", "density"], rows)?;
     folder.draw("chains", &network_map(history, report)?)?;
-    folder.draw("distribution", &Chart::draw(vec![distribution_chart(report)]))
+    Ok(folder.draw("distribution", &Chart::draw(vec![distribution_chart(report)]))?)
 }
 
 fn distribution_chart(report: &Report) -> Chart {

@@ -239,7 +239,7 @@ pub fn write(history: &History, report: &Report, times: &[f64], folder: &mut Fol
     let end = history.times().last().copied().unwrap_or(0.0);
     folder.draw("broken", &Chart::draw(vec![broken_chart(&curve, end)]))?;
     folder.draw("fragments", &Chart::draw(fragment_charts(&report.fragments)))?;
-    folder.draw("decohesion", &decohesion(history, &frames)?)
+    Ok(folder.draw("decohesion", &decohesion(history, &frames)?)?)
 }
 
 fn write_ruptures(report: &Report, folder: &mut Folder) -> Result<()> {
@@ -277,7 +277,7 @@ fn write_ruptures(report: &Report, folder: &mut Folder) -> Result<()> {
             e.energy
         ]
     });
-    folder.table("ruptures", &head, rows)
+    Ok(folder.table("ruptures", &head, rows)?)
 }
 
 fn broken_chart(curve: &[(f64, [usize; 3])], end: f64) -> Chart {

@@ -12,5 +12,6 @@ pub mod info;
 pub mod map;
 pub mod moments;
 pub mod output;
-pub mod plot;
 pub mod stress_strain;
+
+use dem_run::{plot, row};

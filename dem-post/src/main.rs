@@ -4,8 +4,8 @@ use std::io::Write;
 use std::process::ExitCode;
 
 use clap::Parser;
-use dem_post::cli::{Cli, Command};
-use dem_post::output::{Folder, PostError, Result, print};
+use dem_post::cli::{Cli, Command, Files};
+use dem_post::output::{Folder, PostError, Result, default_folder, print};
 use dem_post::{chains, cracks, info, stress_strain};
 use dem_run::history::History;
 use serde::Serialize;
@@ -30,25 +30,31 @@ fn run(cli: &Cli) -> Result<()> {
         Command::Cracks(moments) => {
             let history = History::open(&moments.files.history)?;
             let report = cracks::read(&history)?;
-            let mut folder = Folder::create(moments.files.output.as_deref(), &moments.files.history)?;
+            let mut folder = folder(&moments.files)?;
             cracks::write(&history, &report, &moments.times, &mut folder)?;
             report_on(cli, &report, || report.table(), Some(&folder))
         }
         Command::Chains(moments) => {
             let history = History::open(&moments.files.history)?;
             let report = chains::read(&history, &moments.times)?;
-            let mut folder = Folder::create(moments.files.output.as_deref(), &moments.files.history)?;
+            let mut folder = folder(&moments.files)?;
             chains::write(&history, &report, &mut folder)?;
             report_on(cli, &report, || report.table(), Some(&folder))
         }
         Command::StressStrain { files, wall } => {
             let history = History::open(&files.history)?;
             let report = stress_strain::read(&history, wall.as_deref())?;
-            let mut folder = Folder::create(files.output.as_deref(), &files.history)?;
+            let mut folder = folder(files)?;
             stress_strain::write(&report, &mut folder)?;
             report_on(cli, &report.summary, || report.table(), Some(&folder))
         }
     }
+}
+
+/// The folder for the results of an analysis.
+fn folder(files: &Files) -> Result<Folder> {
+    let path = files.output.clone().unwrap_or_else(|| default_folder(&files.history, "-post"));
+    Ok(Folder::create(path)?)
 }
 
 /// Results on stdout, as a table or as JSON; the files that were written on stderr.

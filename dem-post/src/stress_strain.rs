@@ -344,7 +344,7 @@ pub fn write(report: &Report, folder: &mut Folder) -> Result<()> {
     folder.draw("force-displacement", &Chart::draw(vec![force_displacement(report)]))?;
     let mut charts = vec![stress_strain(report)];
     charts.extend(onset(report));
-    folder.draw("stress-strain", &Chart::draw(charts))
+    Ok(folder.draw("stress-strain", &Chart::draw(charts))?)
 }
 
 fn pairs(x: &[f64], x_scale: f64, y: &[f64], y_scale: f64) -> Vec<(f64, f64)> {

@@ -72,7 +72,7 @@ fn grains<D: Dim>(scene: &Scene, watch: Watch) -> Result<(Grains<D>, Option<f64>
 
 fn preparation_error(error: PrepareError) -> RunError {
     match error {
-        PrepareError::Interrupted => RunError::Interrupted,
+        PrepareError::Interrupted => RunError::Interrupted("the sample was not packed"),
         PrepareError::Step(step) => RunError::NoConvergence(format!("the sample was not packed: {step}")),
         other => RunError::Sample(other.to_string()),
     }
@@ -226,7 +226,8 @@ fn loads<D: Dim>(scene: &Scene) -> Vec<Load<D>> {
     scene.grains.iter().flat_map(|g| &g.loads).map(load).collect()
 }
 
-fn settings<D: Dim>(scene: &Scene) -> Settings<D> {
+/// What holds for the whole of a run of `scene`.
+pub fn settings<D: Dim>(scene: &Scene) -> Settings<D> {
     let restitution = &scene.materials.restitution;
     let bouncing = restitution.grain_grain > 0.0 || restitution.grain_wall > 0.0;
     Settings {

@@ -8,8 +8,11 @@ use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
 
+use crate::accuracy::trial::SolverName;
+use crate::accuracy::{self, AccuracyOptions};
 use crate::check::Check;
 use crate::export::{self, ExportOptions};
+use crate::output::default_folder;
 use crate::progress::ProgressMode;
 use crate::run::{self, RunError, RunOptions};
 use crate::scene::{self, Sample, Scene, SceneError, schema};
@@ -43,6 +46,9 @@ enum Command {
     /// Solve a contact problem in FCLIB's format, ours or another program's.
     #[command(after_help = SOLVE_EXAMPLE)]
     Solve(SolveArgs),
+    /// Measure how accurate a scene's results are, and what more accuracy costs.
+    #[command(after_help = ACCURACY_EXAMPLE)]
+    Accuracy(AccuracyArgs),
     /// Print the JSON Schema of scenes, for editors.
     #[command(after_help = SCHEMA_EXAMPLE)]
     Schema,
@@ -59,6 +65,15 @@ All wrong values are told at once, each with its place, what stood there and wha
 
 Example:
   dem-run check configs/compression.json --set time.step=5e-5";
+
+const ACCURACY_EXAMPLE: &str = "\
+Runs the scene over solvers, tolerances and time steps, all from one sample; compares each run with the finest; then
+varies the order of the contacts and the reactions that the bonds start from, which should change nothing. Runs of a
+bonded sample end at its collapse. docs/accuracy.md says how to read the tables.
+A step that misses its tolerance is taken if its residual is at most the scene's solver.accept, and is counted.
+
+Example:
+  dem-run accuracy configs/compression.json --tolerances 1e-3,1e-5 --steps 1 --orders 2";
 
 const SCHEMA_EXAMPLE: &str = "\
 Editors that know JSON Schema complete and explain a scene that names it:
@@ -115,6 +130,56 @@ struct RunArgs {
     /// Write the prepared sample, to be read back as a sample file.
     #[arg(long, value_name = "FILE.csv")]
     write_sample: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+struct AccuracyArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Folder for the results, created if need be [default: the scene's name with -accuracy, in the current folder].
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Solvers to compare.
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "NAME,…", default_value = "gauss-seidel,newton")]
+    solvers: Vec<SolverName>,
+    /// Tolerances of the residual.
+    #[arg(long, value_delimiter = ',', value_name = "TOL,…", default_value = "1e-4,1e-6", value_parser = positive)]
+    tolerances: Vec<f64>,
+    /// Time steps, as factors on that of the scene.
+    #[arg(long, value_delimiter = ',', value_name = "FACTOR,…", default_value = "1,0.5", value_parser = positive)]
+    steps: Vec<f64>,
+    /// End of the runs (s), in place of the scene's time.end.
+    #[arg(long, value_name = "T", value_parser = positive)]
+    until: Option<f64>,
+    /// Contact orders, and as many starting reactions, that each solver is tried with; 0 for none.
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u64).range(..=10_000))]
+    orders: u64,
+    /// Go on to the scene's end where a run would end at the collapse of the sample.
+    #[arg(long)]
+    whole: bool,
+    /// Overwrite results that exist.
+    #[arg(long)]
+    force: bool,
+    /// Number of threads for the runs whose CPU time is not told; no result depends on it [default: all].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+    /// How progress is shown on stderr.
+    #[arg(long, value_enum, default_value_t)]
+    progress: ProgressMode,
+    /// Show nothing on stderr but errors.
+    #[arg(short, long)]
+    quiet: bool,
+    /// Print all that was measured as JSON, in place of the tables.
+    #[arg(long)]
+    json: bool,
+}
+
+/// A finite number above zero.
+fn positive(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
+        _ => Err("a finite number above zero is expected".into()),
+    }
 }
 
 #[derive(Debug, Args)]
@@ -194,6 +259,7 @@ pub fn main() -> ExitCode {
         Command::Check(args) => check(&args),
         Command::Export(args) => export(args),
         Command::Solve(args) => solve(args),
+        Command::Accuracy(args) => accuracy(args),
         Command::Schema => print(&format!("{:#}", schema::json_schema())),
     };
     match result {
@@ -289,6 +355,35 @@ fn not_itself(read: &Path, written: &Path) -> Result<(), RunError> {
 
 fn same_file(a: &Path, b: &Path) -> bool {
     matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+}
+
+fn accuracy(args: AccuracyArgs) -> Result<(), RunError> {
+    let mut scene = args.scene.load()?;
+    if let Some(until) = args.until {
+        scene.time.end = until;
+    }
+    let folder = args.output.unwrap_or_else(|| default_folder(&args.scene.scene, "-accuracy"));
+    let shown = folder.display();
+    if folder.exists() && !folder.is_dir() {
+        return Err(RunError::InputOutput(format!("{shown} is a file: name a folder with -o DIR")));
+    }
+    if folder.join("accuracy.json").exists() && !args.force {
+        let message = format!("{shown} holds results: --force overwrites them, -o DIR names another folder");
+        return Err(RunError::InputOutput(message));
+    }
+    let options = AccuracyOptions {
+        folder,
+        solvers: args.solvers,
+        tolerances: args.tolerances,
+        steps: args.steps,
+        orders: args.orders,
+        whole: args.whole,
+        threads: args.threads.map(usize::from),
+        progress: args.progress,
+        quiet: args.quiet,
+        json: args.json,
+    };
+    accuracy::accuracy(&scene, &options)
 }
 
 /// `<scene stem>.h5` in the current folder.

@@ -85,7 +85,7 @@ fn export_in<D: Dim>(scene: &Scene, options: &ExportOptions, interrupt: &Interru
             broken: world.bonds.len() - world.intact_bonds(),
         });
         if interrupt.requested() {
-            return Err(RunError::Interrupted);
+            return Err(RunError::Interrupted("nothing was written"));
         }
     }
     let mut contacts = world.contact_problem();

@@ -1,12 +1,16 @@
 //! Scenes, sample preparation, the run loop and the history.
 
+pub mod accuracy;
 pub mod build;
 pub mod check;
 pub mod cli;
 pub mod collapse;
+pub mod course;
 pub mod export;
 pub mod fclib;
 pub mod history;
+pub mod output;
+pub mod plot;
 pub mod prepare;
 pub mod progress;
 pub mod record;

@@ -1,18 +1,16 @@
 //! The run of a scene: prepare, step, record, sum up.
 
 use crate::build::{Built, build, write_sample};
-use crate::collapse::Collapse;
+use crate::course::Course;
 use crate::fclib::FclibError;
 use crate::history::HistoryError;
+use crate::output::WriteError;
 use crate::progress::{Progress, ProgressMode, StepProgress};
-use crate::record::{Recorder, applied_force};
-use crate::scene::{Scene, SceneError, TravelFrom};
+use crate::record::Recorder;
+use crate::scene::{Scene, SceneError};
 use crate::signals::{self, INTERRUPTED, Interrupt};
 use crate::summary::{Ending, Summary};
-use dem_core::body::{Drive, Wall};
-use dem_core::bond::BondStatus;
-use dem_core::dim::{D2, D3, Dim, Vect};
-use dem_core::solver::SolveStatus;
+use dem_core::dim::{D2, D3, Dim};
 use dem_core::world::{StepError, StepReport, World};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -60,9 +58,12 @@ pub enum RunError {
     /// What was asked for is not there.
     #[error("{0}")]
     Usage(String),
-    /// Ctrl-C or SIGTERM.
-    #[error("interrupted: the history is complete up to the last frame")]
-    Interrupted,
+    /// A result cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// Ctrl-C or SIGTERM, and what that leaves.
+    #[error("interrupted: {0}")]
+    Interrupted(&'static str),
 }
 
 impl RunError {
@@ -70,10 +71,11 @@ impl RunError {
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Scene(SceneError::Read { .. }) | Self::InputOutput(_) | Self::History(_) | Self::Problem(_) => 4,
+            Self::Scene(SceneError::Read { .. }) | Self::InputOutput(_) | Self::History(_) => 4,
+            Self::Write(_) | Self::Problem(_) => 4,
             Self::Scene(_) | Self::Sample(_) | Self::Usage(_) => 2,
             Self::NoConvergence(_) => 3,
-            Self::Interrupted => INTERRUPTED,
+            Self::Interrupted(_) => INTERRUPTED,
         }
     }
 }
@@ -126,48 +128,15 @@ struct Run<'a, D: Dim> {
     world: World<D>,
     recorder: Recorder<D>,
     solid_fraction: Option<f64>,
-    collapse: Collapse,
-    /// The wall whose force loads the sample: the first that is driven.
-    driven: Option<usize>,
-    stop: Option<TravelStop<D>>,
-    broken: [usize; 3],
-    worst_residual: f64,
-    sweeps: u64,
-    missed_tolerance: u64,
-    rejected: u64,
-    penetration: f64,
+    course: Course<D>,
     framed: bool,
-}
-
-/// The travel of a wall that ends a run.
-struct TravelStop<D: Dim> {
-    wall: usize,
-    direction: D::Vector,
-    distance: f64,
-    from: Option<D::Vector>,
 }
 
 impl<'a, D: Dim> Run<'a, D> {
     fn new(scene: &'a Scene, built: Built<D>, recorder: Recorder<D>) -> Self {
         let world = built.world;
-        let driven = world.walls.iter().position(|w| drive_direction(w).is_some());
-        let stop = travel_stop(scene, &world);
-        Self {
-            scene,
-            world,
-            recorder,
-            solid_fraction: built.solid_fraction,
-            collapse: Collapse::default(),
-            driven,
-            stop,
-            broken: [0; 3],
-            worst_residual: 0.0,
-            sweeps: 0,
-            missed_tolerance: 0,
-            rejected: 0,
-            penetration: 0.0,
-            framed: false,
-        }
+        let course = Course::new(scene, &world);
+        Self { scene, world, recorder, solid_fraction: built.solid_fraction, course, framed: false }
     }
 
     /// Step until the time, a stop condition, an interruption or a failure ends the run.
@@ -180,14 +149,17 @@ impl<'a, D: Dim> Run<'a, D> {
                 Err(error) => return self.failed(error),
             };
             self.recorder.step(&self.world, &report)?;
-            self.count(&report);
+            self.course.count(&self.world, &report);
             progress.step(&self.standing(&report));
             self.framed = self.world.steps.is_multiple_of(every);
             if self.framed {
                 self.recorder.frame(&self.world)?;
             }
-            if let Some(ending) = self.ending(interrupt) {
+            if let Some(ending) = self.course.ending(&self.world) {
                 return Ok(ending);
+            }
+            if interrupt.requested() {
+                return Ok(Ending::Interrupted);
             }
         }
         Ok(Ending::Time)
@@ -199,28 +171,6 @@ impl<'a, D: Dim> Run<'a, D> {
         )))
     }
 
-    /// Enter a step in the counts of the summary.
-    fn count(&mut self, report: &StepReport<D>) {
-        for failed in &report.breaks {
-            let mode = match failed.mode {
-                BondStatus::Shear => 1,
-                BondStatus::Rolling => 2,
-                _ => 0,
-            };
-            self.broken[mode] += 1;
-        }
-        self.worst_residual = self.worst_residual.max(report.residual);
-        self.sweeps += report.iterations;
-        self.missed_tolerance += u64::from(report.status == SolveStatus::Accepted);
-        self.rejected += u64::from(report.rejected);
-        self.penetration = self.penetration.max(report.penetration);
-        if let Some(wall) = self.driven {
-            let wall = &self.world.walls[wall];
-            let strain = axial(&self.world.strain(), drive_direction(wall).unwrap_or(D::Vector::zero()));
-            self.collapse.push(applied_force(wall), strain, self.broken.iter().sum(), self.world.bonds.len());
-        }
-    }
-
     fn standing(&self, report: &StepReport<D>) -> StepProgress {
         StepProgress {
             step: self.world.steps,
@@ -228,29 +178,8 @@ impl<'a, D: Dim> Run<'a, D> {
             end: self.scene.time.end,
             residual: report.residual,
             sweeps: report.iterations,
-            broken: self.broken.iter().sum(),
+            broken: self.course.broken(),
         }
-    }
-
-    /// Whether the run ends here, and why.
-    fn ending(&mut self, interrupt: &Interrupt) -> Option<Ending> {
-        let broken: usize = self.broken.iter().sum();
-        if let Some(stop) = &mut self.stop {
-            let position = self.world.walls[stop.wall].position;
-            if stop.from.is_none() && broken > 0 {
-                stop.from = Some(position);
-            }
-            if stop.from.is_some_and(|from| (position - from).dot(&stop.direction).abs() >= stop.distance) {
-                return Some(Ending::WallTravel);
-            }
-        }
-        let limit = self.scene.stop.as_ref().and_then(|s| s.broken_fraction);
-        if limit
-            .is_some_and(|limit| !self.world.bonds.is_empty() && broken as f64 >= limit * self.world.bonds.len() as f64)
-        {
-            return Some(Ending::BrokenFraction);
-        }
-        interrupt.requested().then_some(Ending::Interrupted)
     }
 
     /// Write the last state, close the history and sum up. The second value is what the command ends with.
@@ -260,7 +189,9 @@ impl<'a, D: Dim> Run<'a, D> {
         outcome: Result<Ending, RunError>,
     ) -> Result<(Summary, Result<(), RunError>), RunError> {
         let (ending, end) = match outcome {
-            Ok(Ending::Interrupted) => (Ending::Interrupted, Err(RunError::Interrupted)),
+            Ok(Ending::Interrupted) => {
+                (Ending::Interrupted, Err(RunError::Interrupted("the history is complete up to the last frame")))
+            }
             Ok(ending) => (ending, Ok(())),
             Err(error @ RunError::NoConvergence(_)) => (Ending::NoConvergence, Err(error)),
             Err(error) => return Err(error),
@@ -269,24 +200,24 @@ impl<'a, D: Dim> Run<'a, D> {
             self.recorder.frame(&self.world)?;
         }
         self.recorder.finish()?;
-        let world = &self.world;
+        let (world, course) = (&self.world, &self.course);
         let summary = Summary {
             history: history.to_path_buf(),
             ending,
             steps: world.steps,
-            driven: self.driven.is_some(),
+            driven: course.driven.is_some(),
             time: world.time,
             grains: world.grains.len(),
             solid_fraction: self.solid_fraction,
             bonds: world.bonds.len(),
-            broken: self.broken,
-            failure: self.collapse.failure,
+            broken: course.broken,
+            failure: course.collapse.failure,
             tolerance: self.scene.solver.tolerance,
-            worst_residual: self.worst_residual,
-            sweeps: self.sweeps,
-            missed_tolerance: self.missed_tolerance,
-            rejected: self.rejected,
-            penetration: self.penetration,
+            worst_residual: course.worst_residual,
+            sweeps: course.iterations,
+            missed_tolerance: course.missed_tolerance,
+            rejected: course.rejected,
+            penetration: course.penetration,
             mean_diameter: 2.0 * world.grains.radius.iter().sum::<f64>() / world.grains.len() as f64,
             external_work: world.ledger.external_work,
             energy_remainder: world.ledger.remainder,
@@ -295,31 +226,6 @@ impl<'a, D: Dim> Run<'a, D> {
         };
         Ok((summary, end))
     }
-}
-
-fn drive_direction<D: Dim>(wall: &Wall<D>) -> Option<D::Vector> {
-    match wall.drive {
-        Drive::Fixed => None,
-        Drive::Velocity { direction, .. } | Drive::Force { direction, .. } => Some(direction),
-    }
-}
-
-/// d·E d: the strain along a unit direction d.
-fn axial<V: Vect>(strain: &[f64], d: V) -> f64 {
-    let row = |r: usize| (0..V::LEN).map(|c| strain[r * V::LEN + c] * d[c]).sum::<f64>();
-    (0..V::LEN).map(|r| d[r] * row(r)).sum()
-}
-
-fn travel_stop<D: Dim>(scene: &Scene, world: &World<D>) -> Option<TravelStop<D>> {
-    let travel = scene.stop.as_ref()?.wall_travel.as_ref()?;
-    let wall = scene.walls.keys().position(|name| *name == travel.wall)?;
-    let direction = drive_direction(&world.walls[wall])?;
-    let along = |sign: f64| {
-        let reach = |(x, r): (&D::Vector, &f64)| sign * x.dot(&direction) + r;
-        world.grains.position.iter().zip(&world.grains.radius).map(reach).fold(f64::NEG_INFINITY, f64::max)
-    };
-    let from = (travel.after == TravelFrom::Start).then(|| world.walls[wall].position);
-    Some(TravelStop { wall, direction, distance: travel.fraction_of_height * (along(1.0) + along(-1.0)), from })
 }
 
 /// Processor time of the program so far (s).

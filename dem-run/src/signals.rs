@@ -1,4 +1,4 @@
-//! Ctrl-C and SIGTERM: the first asks the run to end after the frame in hand, the second ends it at once.
+//! Ctrl-C and SIGTERM: the first asks the command to end after the step in hand, the second ends it at once.
 
 use std::ffi::c_int;
 use std::io::Write;
@@ -37,7 +37,7 @@ pub fn install() -> Result<Interrupt, ctrlc::Error> {
             exit_at_once();
         }
         // eprintln! would end this thread, and with it the second signal, where stderr is closed
-        let _ = writeln!(std::io::stderr(), "\nending after the frame in hand; once more to end at once");
+        let _ = writeln!(std::io::stderr(), "\nending after the step in hand; once more to end at once");
     })?;
     Ok(interrupt)
 }

@@ -6,6 +6,7 @@
 mod assembly;
 mod ledger;
 mod observe;
+mod start;
 mod step;
 mod touch;
 

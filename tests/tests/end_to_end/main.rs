@@ -1,5 +1,6 @@
 //! The commands end to end, as a user runs them: release builds, scenes from `configs/`, files in a folder of their own.
 
+mod accuracy;
 mod collapse;
 mod common;
 mod compression;

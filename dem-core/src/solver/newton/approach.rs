@@ -53,7 +53,9 @@ impl Newton {
             let (made, solved) = self.inner(&rows, &mut state, None, PATIENCE);
             made_in_all += made.max(1);
             *iterations += made.max(1);
-            if std::env::var("DBG").is_ok() { eprintln!("approach level {level:e} made {made} solved {solved}"); }
+            if std::env::var("DBG").is_ok() {
+                eprintln!("approach level {level:e} made {made} solved {solved}");
+            }
             if !solved {
                 return None;
             }

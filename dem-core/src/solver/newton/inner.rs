@@ -5,9 +5,16 @@ use super::corrector::{correct, operator};
 use super::krylov::gmres;
 use super::rows::{Operator, Padded, Row, Rows};
 use crate::contact::Local;
+use crate::dim::Vect;
 
 /// GMRES iterations beyond those of a fresh factor that a kept one may cost in all before it is renewed.
 const WASTE: usize = 20;
+/// Error of a linear solve with the factor alone up to which the next is left to it.
+const TRUST: f64 = 1e-3;
+/// Linear solves by GMRES after one that the factor alone was trusted with and failed.
+const DISTRUST: usize = 100;
+/// Relative distance to a limit that counts as at it in a guess.
+const BEYOND: f64 = 1e-9;
 /// Most GMRES iterations of one linear solve.
 const MOST_KRYLOV: usize = 80;
 
@@ -66,14 +73,28 @@ impl Newton {
                 return (iteration, true);
             }
             let Some(direction) = self.direction(rows, state, guessed, target) else { return (iteration + 1, false) };
-            if std::env::var("DBG").is_ok() { eprintln!("  inner {iteration} norm {:.3e} target {target:.1e} guessed {} trusted {} made {} floor {} wasted {} dir {:.2e}", state.norm, guessed.is_some(), self.trusted, self.factor.made, self.floor, self.wasted, direction.norm); }
+            if std::env::var("DBG").is_ok() {
+                eprintln!(
+                    "  inner {iteration} norm {:.3e} target {target:.1e} guessed {} trusted {} made {} floor {} wasted {} dir {:.2e}",
+                    state.norm,
+                    guessed.is_some(),
+                    self.trusted,
+                    self.factor.made,
+                    self.floor,
+                    self.wasted,
+                    direction.norm
+                );
+            }
             let before = direction.norm;
             advance(rows, state, &direction.step, guessed.is_some());
             if !state.norm.is_finite() {
                 return (iteration + 1, false);
             }
             // a factor that was trusted blindly has to earn it
-            self.trusted = self.trusted && state.norm <= (1e-2 * before).max(target);
+            if self.trusted && state.norm > (TRUST * before).max(target) {
+                self.trusted = false;
+                self.distrust = DISTRUST;
+            }
         }
         (patience, state.norm <= self.target(rows, state))
     }
@@ -98,13 +119,7 @@ impl Newton {
     }
 
     /// The Newton direction −J⁻¹ F, by the factor at hand or GMRES on it, renewed if it serves badly.
-    fn direction(
-        &mut self,
-        rows: &Rows,
-        state: &Iterate,
-        guess: Option<&[Padded]>,
-        target: f64,
-    ) -> Option<Direction> {
+    fn direction(&mut self, rows: &Rows, state: &Iterate, guess: Option<&[Padded]>, target: f64) -> Option<Direction> {
         let (mut right, operators) = linearise(rows, state, guess);
         right.iter_mut().for_each(|f| *f = -*f);
         let norm = norm2(&right).sqrt();
@@ -126,7 +141,8 @@ impl Newton {
             }
             self.wasted += report.iterations.saturating_sub(self.floor);
             self.renew = self.wasted > WASTE;
-            self.trusted = report.iterations <= 1;
+            self.distrust = self.distrust.saturating_sub(1);
+            self.trusted = self.distrust == 0 && report.plain <= TRUST;
             if report.residual <= tolerance || fresh {
                 return Some(Direction { step, norm });
             }
@@ -145,9 +161,16 @@ pub(super) fn norm2(x: &[f64]) -> f64 {
     x.iter().map(|x| x * x).sum()
 }
 
-/// The velocity at which the corrector gives the guessed reaction.
+/// The velocity at which the corrector gives the guessed reaction. One at its limit is moved beyond it, where rounding
+/// cannot make it stick.
 fn guessed_velocity(row: &Row, guess: &Padded) -> Padded {
-    let mut u = row.weights.times(&row.multiplier) + row.compliance.times(&row.carried) - row.metric().times(guess);
+    let beyond = |limit: f64, size: f64| if size >= (1.0 - BEYOND) * limit { 1.0 + 2.0 * BEYOND } else { 1.0 };
+    let guess = Local {
+        n: guess.n,
+        t: guess.t * beyond(row.cone.mu * guess.n, Vect::norm(&guess.t)),
+        m: guess.m * beyond(row.cone.nu * guess.n, Vect::norm(&guess.m)),
+    };
+    let mut u = row.weights.times(&row.multiplier) + row.compliance.times(&row.carried) - row.metric().times(&guess);
     u.n -= row.lag.unwrap_or(0.0);
     u
 }

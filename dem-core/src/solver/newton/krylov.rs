@@ -1,12 +1,17 @@
-//! GMRES, preconditioned from the left (Saad & Schultz 1986), for a matrix that its preconditioner nearly inverts.
+//! GMRES, preconditioned from the right (Saad & Schultz 1986), for a matrix that its preconditioner nearly inverts.
+//!
+//! From the right, so that what it makes small is the residual itself: seen through the inverse of a matrix that is as
+//! badly conditioned as the penalty makes it, a large residual looks small.
 
 /// How a linear solve ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Krylov {
     /// Iterations made.
     pub iterations: usize,
-    /// Norm of the preconditioned residual over that of the right-hand side.
+    /// Norm of the residual over that of the right-hand side.
     pub residual: f64,
+    /// The same for the preconditioned right-hand side in place of the solution.
+    pub plain: f64,
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
@@ -28,22 +33,24 @@ pub(super) fn gmres(
 ) -> (Vec<f64>, Krylov) {
     let n = b.len();
     let mut first = b.to_vec();
-    precondition(&mut first);
     let norm = dot(&first, &first).sqrt();
     if norm == 0.0 {
-        return (vec![0.0; n], Krylov { iterations: 0, residual: 0.0 });
+        return (vec![0.0; n], Krylov { iterations: 0, residual: 0.0, plain: 0.0 });
     }
     first.iter_mut().for_each(|x| *x /= norm);
     let mut basis = vec![first];
+    let mut preconditioned: Vec<Vec<f64>> = Vec::new();
     // columns of the upper triangle, the Givens rotations that made it, and the rotated right-hand side
     let mut columns: Vec<Vec<f64>> = Vec::new();
     let mut rotations: Vec<(f64, f64)> = Vec::new();
     let mut rhs = vec![norm];
-    let mut residual = 1.0;
+    let (mut residual, mut plain) = (1.0, f64::INFINITY);
     while columns.len() < most && residual > tolerance {
+        let mut z = basis[columns.len()].clone();
+        precondition(&mut z);
         let mut w = vec![0.0; n];
-        apply(&basis[columns.len()], &mut w);
-        precondition(&mut w);
+        apply(&z, &mut w);
+        preconditioned.push(z);
         let mut column = Vec::with_capacity(basis.len() + 1);
         for v in &basis {
             let h = dot(v, &w);
@@ -51,6 +58,9 @@ pub(super) fn gmres(
             column.push(h);
         }
         let last = dot(&w, &w).sqrt();
+        if columns.is_empty() {
+            plain = (1.0 - column[0]).hypot(last);
+        }
         for (k, (c, s)) in rotations.iter().enumerate() {
             let (a, b) = (column[k], column[k + 1]);
             (column[k], column[k + 1]) = (c * a + s * b, c * b - s * a);
@@ -73,7 +83,7 @@ pub(super) fn gmres(
         w.iter_mut().for_each(|x| *x /= last);
         basis.push(w);
     }
-    (combine(&basis, &columns, &rhs, n), Krylov { iterations: columns.len(), residual })
+    (combine(&preconditioned, &columns, &rhs, n), Krylov { iterations: columns.len(), residual, plain })
 }
 
 /// Back substitution, and the combination of the basis.

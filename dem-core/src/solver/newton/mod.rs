@@ -91,6 +91,8 @@ pub struct Newton {
     renew: bool,
     /// Whether the factor alone gave the last direction well enough.
     trusted: bool,
+    /// Linear solves before it can be trusted again.
+    distrust: usize,
     /// GMRES iterations with a fresh factor, and those beyond it since.
     floor: usize,
     wasted: usize,
@@ -107,6 +109,7 @@ impl Newton {
             factor: Factor::default(),
             renew: true,
             trusted: false,
+            distrust: 0,
             floor: 0,
             wasted: 0,
             rest: 0,
@@ -151,7 +154,7 @@ impl Newton {
         guess: &mut Vec<Padded>,
         iterations: &mut u64,
     ) -> Option<SolveReport> {
-        let (mut last_error, mut softened) = (f64::INFINITY, 0);
+        let (mut last_error, mut last_change, mut softened) = (f64::INFINITY, 1.0, 0);
         loop {
             let mut state = Iterate::from_reactions(rows, guess);
             let (made, solved) = self.inner(rows, &mut state, Some(guess), PATIENCE);
@@ -161,7 +164,11 @@ impl Newton {
             }
             problem.write_back(&state.reactions, rows);
             problem.velocities_from_reactions();
-            let load_error = load_change(rows, &state);
+            // rounds that shorten the error by c leave c/(1 − c) of the last change
+            let change = load_change(rows, &state);
+            let shrinkage = (change / last_change).min(0.5);
+            let load_error = change * shrinkage / (1.0 - shrinkage);
+            last_change = change;
             let error = problem.residual();
             rows.list.iter_mut().zip(&state.reactions).for_each(|(row, r)| row.multiplier = *r);
             *guess = state.reactions;

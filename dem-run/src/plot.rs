@@ -44,6 +44,8 @@ const SPACING: f64 = 20.0;
 /// Room above the axes, which takes the legend, and below.
 const ABOVE: f64 = 44.0;
 const BELOW: f64 = 62.0;
+/// Distance of the rows of a legend.
+const LEGEND_ROW: f64 = 19.0;
 /// Points that one curve keeps: more than the pixels of its width, so none that shows is lost.
 const CURVE_POINTS: usize = 4000;
 
@@ -130,7 +132,7 @@ impl Chart {
     /// Draws the charts side by side, each with its legend above it.
     pub fn draw(charts: Vec<Self>) -> Drawing {
         let columns = charts.len();
-        let legends: Vec<Vec<(String, &'static str, Style)>> = charts.iter().map(Self::legend).collect();
+        let legends: Vec<Vec<Named>> = charts.iter().map(Self::legend).collect();
         let (plots, layouts) = charts.into_iter().map(Self::build).unzip();
         let figure = Figure::new(1, columns)
             .with_plots(plots)
@@ -142,13 +144,17 @@ impl Chart {
         let mut canvas = Canvas(figure.render());
         for (k, legend) in legends.iter().enumerate() {
             let left = PADDING + k as f64 * (CHART.0 + SPACING);
-            draw_legend(&mut canvas, legend, (left + 0.55 * CHART.0, PADDING + 0.5 * ABOVE));
+            let rows = legend_rows(legend);
+            for (r, row) in rows.iter().enumerate() {
+                let y = PADDING + 0.5 * ABOVE + LEGEND_ROW * (r as f64 - 0.5 * (rows.len() - 1) as f64);
+                draw_legend(&mut canvas, row, (left + 0.55 * CHART.0, y));
+            }
         }
         canvas.finish()
     }
 
     /// Name, colour and style of each curve and each marked level; what stands alone needs no name.
-    fn legend(&self) -> Vec<(String, &'static str, Style)> {
+    fn legend(&self) -> Vec<Named> {
         let curves = self.curves.iter().map(|curve| (curve.label.clone(), curve.colour, curve.style));
         let levels = self.levels.iter().map(|(_, label)| (label.clone(), colour::GREY, Style::Level));
         let entries: Vec<_> = curves.chain(levels).collect();
@@ -156,12 +162,14 @@ impl Chart {
     }
 
     fn build(mut self) -> (Vec<Plot>, Layout) {
+        let lift = self.lift();
         for curve in &mut self.curves {
             let visible = |&(x, y): &(f64, f64)| {
                 x.is_finite() && y.is_finite() && (!self.log_x || x > 0.0) && (!self.log_y || y > 0.0)
             };
             curve.points.retain(visible);
             thin(&mut curve.points);
+            curve.points.iter_mut().for_each(|point| point.1 *= lift);
         }
         let plots: Vec<Plot> = self.curves.iter().flat_map(Curve::plots).collect();
         let mut layout = Layout::auto_from_plots(&plots)
@@ -173,9 +181,9 @@ impl Chart {
             .with_force_margins_y(ABOVE, BELOW)
             .with_box_axes();
         layout.show_legend = false;
-        layout = self.scale_axes(layout);
+        layout = self.scale_axes(layout, lift);
         for (value, _) in self.levels {
-            layout = layout.with_reference_line(ReferenceLine::horizontal(value).with_color(colour::GREY));
+            layout = layout.with_reference_line(ReferenceLine::horizontal(value * lift).with_color(colour::GREY));
         }
         for value in self.moments {
             layout = layout.with_reference_line(ReferenceLine::vertical(value).with_color(colour::GREY));
@@ -183,22 +191,33 @@ impl Chart {
         (plots, layout)
     }
 
-    /// Axes that end where the values end, with ticks that suit them.
-    fn scale_axes(&self, mut layout: Layout) -> Layout {
+    /// What the values on a logarithmic vertical axis are multiplied by, a power of ten: the plotting crate draws none
+    /// below 1e-10 in its place.
+    fn lift(&self) -> f64 {
+        let values = self.curves.iter().flat_map(|curve| &curve.points).map(|p| p.1);
+        let low = values.filter(|y| self.log_y && *y > 0.0).fold(1.0, f64::min);
+        if low < 1e-9 { 10f64.powi(-low.log10().floor() as i32) } else { 1.0 }
+    }
+
+    /// Axes that end where the values end, with ticks that suit them. Values of y are multiplied by `lift`.
+    fn scale_axes(&self, mut layout: Layout, lift: f64) -> Layout {
         let values = || self.curves.iter().flat_map(|curve| &curve.points);
         let low = values().map(|p| p.0).fold(f64::INFINITY, f64::min);
         let high = values().map(|p| p.0).fold(f64::NEG_INFINITY, f64::max);
-        let powers = || TickFormat::Custom(Arc::new(power_of_ten));
         if self.log_x {
-            layout = layout.with_log_x().with_x_tick_format(powers());
+            layout = layout.with_log_x().with_x_tick_format(TickFormat::Custom(Arc::new(power_of_ten)));
         } else if low < high {
             let off = if self.set_off { 0.03 * (high - low) } else { 0.0 };
             layout = layout.with_x_axis_min(low - off).with_x_axis_max(high + off);
         }
         if self.log_y {
-            let low = values().map(|p| p.1).fold(f64::INFINITY, f64::min);
-            let high = values().map(|p| p.1).fold(0.0, f64::max);
-            layout = layout.with_log_y().with_y_tick_format(powers());
+            // a level that cannot be seen tells nothing
+            let levels = self.levels.iter().map(|(value, _)| value * lift).filter(|value| *value > 0.0);
+            let shown: Vec<f64> = values().map(|p| p.1).chain(levels).collect();
+            let low = shown.iter().copied().fold(f64::INFINITY, f64::min);
+            let high = shown.iter().copied().fold(0.0, f64::max);
+            let tick = move |value: f64| power_of_ten(value / lift);
+            layout = layout.with_log_y().with_y_tick_format(TickFormat::Custom(Arc::new(tick)));
             if low <= high {
                 layout = layout.with_y_axis_min(0.6 * low).with_y_axis_max(1.6 * high);
             }
@@ -212,9 +231,12 @@ impl Chart {
 /// A tick of a logarithmic axis: powers of ten as such, others as numbers.
 fn power_of_ten(value: f64) -> String {
     let exponent = value.log10();
-    if (exponent - exponent.round()).abs() > 1e-6 || (-0.5..1.5).contains(&exponent) {
+    let whole = (exponent - exponent.round()).abs() < 1e-6;
+    if (!whole && exponent > -6.0) || (-0.5..1.5).contains(&exponent) {
         return format!("{value}");
     }
+    let power = if whole { exponent.round() } else { exponent.floor() };
+    let factor = if whole { String::new() } else { format!("{:.0}·", value / 10f64.powf(power)) };
     let raise = |digit: char| match digit {
         '-' => '⁻',
         '1' => '¹',
@@ -222,15 +244,34 @@ fn power_of_ten(value: f64) -> String {
         '3' => '³',
         digit => char::from_u32(0x2070 + digit.to_digit(10).unwrap_or(0)).unwrap_or(digit),
     };
-    format!("10{}", format!("{exponent:.0}").chars().map(raise).collect::<String>())
+    format!("{factor}10{}", format!("{power:.0}").chars().map(raise).collect::<String>())
+}
+
+/// A name of a legend, its colour and style.
+type Named = (String, &'static str, Style);
+
+fn legend_width(legend: &[Named]) -> f64 {
+    legend.iter().map(|(text, ..)| 50.0 + 7.8 * text.chars().count() as f64).sum()
+}
+
+/// A legend in as many rows as it needs beside the letter of the chart.
+fn legend_rows(legend: &[Named]) -> Vec<&[Named]> {
+    let mut rows = vec![];
+    let mut rest = legend;
+    while !rest.is_empty() {
+        let fits = (1..=rest.len()).take_while(|n| legend_width(&rest[..*n]) <= 0.86 * CHART.0).last().unwrap_or(1);
+        let (row, left) = rest.split_at(fits);
+        rows.push(row);
+        rest = left;
+    }
+    rows
 }
 
 /// The names of the curves in one row around `middle`.
-fn draw_legend(canvas: &mut Canvas, legend: &[(String, &'static str, Style)], middle: (f64, f64)) {
-    let width = |text: &str| 50.0 + 7.8 * text.chars().count() as f64;
-    let total: f64 = legend.iter().map(|(text, ..)| width(text)).sum();
-    let (mut x, y) = (middle.0 - 0.5 * total, middle.1);
-    for (text, colour, style) in legend {
+fn draw_legend(canvas: &mut Canvas, legend: &[Named], middle: (f64, f64)) {
+    let (mut x, y) = (middle.0 - 0.5 * legend_width(legend), middle.1);
+    for entry in legend {
+        let (text, colour, style) = entry;
         match style {
             Style::Level => {
                 for dash in [0.0, 7.0, 14.0, 21.0] {
@@ -243,7 +284,7 @@ fn draw_legend(canvas: &mut Canvas, legend: &[(String, &'static str, Style)], mi
             canvas.disk((x + 13.0, y), 3.5, colour, colour, 0.5);
         }
         canvas.text((x + 33.0, y + 5.0), text, 14, Anchor::Start);
-        x += width(text);
+        x += legend_width(std::slice::from_ref(entry));
     }
 }
 
@@ -387,7 +428,9 @@ mod tests {
 
     #[test]
     fn ticks_are_powers_of_ten() {
-        for (value, text) in [(1e-4, "10⁻⁴"), (1e3, "10³"), (0.1, "10⁻¹"), (1.0, "1"), (2e-5, "0.00002")] {
+        for (value, text) in
+            [(1e-4, "10⁻⁴"), (1e3, "10³"), (0.1, "10⁻¹"), (1.0, "1"), (2e-5, "0.00002"), (2e-13, "2·10⁻¹³")]
+        {
             assert_eq!(power_of_ten(value), text);
         }
     }

@@ -1,0 +1,220 @@
+//! `dem-run accuracy`: what a scene's numbers depend on that they should not depend on.
+//!
+//! One sample is run over solvers, tolerances and time steps, and each run is compared with the finest of them
+//! ([`report`]); over contact orders and starting reactions ([`spread`]); and the contact problems of the finest run are
+//! solved by every solver ([`profile`]).
+
+mod pictures;
+pub mod profile;
+pub mod report;
+pub mod spread;
+mod tables;
+pub mod trial;
+
+use crate::build::build;
+use crate::output::Folder;
+use crate::progress::{Progress, ProgressMode};
+use crate::run::RunError;
+use crate::scene::Scene;
+use crate::signals::{self, Interrupt};
+use dem_core::dim::{D2, D3, Dim};
+use profile::Profile;
+use rayon::prelude::*;
+use report::{Asked, Indeterminacy, Report, Row, VariedRun};
+use spread::{Spread, Varied};
+use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
+use trial::{Outcome, Posed, Sample, SolverName, Trial, Variant, Way};
+
+/// Contact problems taken from a run for the profile, at most.
+const MOST_PROBLEMS: usize = 50;
+
+/// What the command is asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AccuracyOptions {
+    /// The folder for the results.
+    pub folder: PathBuf,
+    /// Solvers, in the order of the tables.
+    pub solvers: Vec<SolverName>,
+    /// Tolerances (–).
+    pub tolerances: Vec<f64>,
+    /// Time steps over that of the scene (–).
+    pub steps: Vec<f64>,
+    /// Contact orders, and starting reactions, for each solver.
+    pub orders: u64,
+    /// Whether runs go on to the scene's end.
+    pub whole: bool,
+    /// Number of threads for the runs whose CPU time is not told; as many as the machine has where it is absent.
+    pub threads: Option<usize>,
+    /// How progress is shown.
+    pub progress: ProgressMode,
+    /// Whether stderr stays silent but for errors.
+    pub quiet: bool,
+    /// Whether stdout is JSON.
+    pub json: bool,
+}
+
+/// Measure the accuracy of a scene, print the tables, and write them with their pictures.
+///
+/// # Errors
+/// [`RunError`]; what was measured before an interruption is written all the same. A run that does not converge is a row of
+/// the table, no error.
+pub fn accuracy(scene: &Scene, options: &AccuracyOptions) -> Result<(), RunError> {
+    let interrupt = signals::install().map_err(|e| RunError::InputOutput(format!("no handler for Ctrl-C: {e}")))?;
+    let mut folder = Folder::create(options.folder.clone())?;
+    let report = match scene.dimension {
+        2 => measure::<D2>(scene, options, &interrupt)?,
+        _ => measure::<D3>(scene, options, &interrupt)?,
+    };
+    let json = serde_json::to_string_pretty(&report).map_err(|e| RunError::InputOutput(e.to_string()))? + "\n";
+    folder.write("accuracy.json", json.as_bytes())?;
+    tables::write(&report, &mut folder)?;
+    pictures::draw(&report, &mut folder)?;
+    crate::output::print(&if options.json { json } else { tables::text(&report) })?;
+    if !options.quiet {
+        use std::io::Write;
+        let mut stderr = std::io::stderr();
+        folder.written().iter().for_each(|path| drop(writeln!(stderr, "wrote {}", path.display())));
+    }
+    if report.interrupted { Err(RunError::Interrupted("what was measured before is written")) } else { Ok(()) }
+}
+
+fn measure<D: Dim>(scene: &Scene, options: &AccuracyOptions, interrupt: &Interrupt) -> Result<Report, RunError> {
+    let mut progress = Progress::new(options.progress, options.quiet);
+    let built = build::<D>(scene, &mut |done| {
+        progress.phase("packing the sample", done);
+        !interrupt.requested()
+    })?;
+    let sample = Sample::of(built);
+    let asked = Asked::of(scene, options);
+    let varied = if sample.bonds.is_empty() { 0 } else { asked.solvers.len() * 2 * options.orders as usize };
+    let meter = Meter::new(progress, interrupt, asked.ways().len() + varied + 1);
+    let measuring = Measuring { scene, sample: &sample, asked: &asked, meter: &meter };
+    let mut report = Report::new(scene, &asked, sample.grains.len(), sample.bonds.len(), sample.solid_fraction);
+    let posed = measuring.runs(&mut report);
+    if varied > 0 && !interrupt.requested() {
+        let threads = rayon::ThreadPoolBuilder::new().num_threads(options.threads.unwrap_or(0)).build();
+        let threads = threads.map_err(|e| RunError::InputOutput(format!("threads cannot be started: {e}")))?;
+        report.indeterminacy = Some(threads.install(|| measuring.indeterminacy(&report.runs)));
+    }
+    if !interrupt.requested() {
+        report.profile = measuring.profile(&posed);
+    }
+    report.interrupted = interrupt.requested();
+    meter.finish();
+    Ok(report)
+}
+
+/// Shows one bar over all runs, and asks whether to go on.
+struct Meter<'a> {
+    progress: Mutex<Progress>,
+    interrupt: &'a Interrupt,
+    /// Share of each run that is done (0 to 1).
+    shares: Mutex<Vec<f64>>,
+}
+
+impl<'a> Meter<'a> {
+    fn new(progress: Progress, interrupt: &'a Interrupt, runs: usize) -> Self {
+        Self { progress: Mutex::new(progress), interrupt, shares: Mutex::new(vec![0.0; runs]) }
+    }
+
+    /// Tells that run `k`, which is one of those called `label`, has come so far; false: it shall stop.
+    fn tell(&self, k: usize, label: &str, share: f64) -> bool {
+        let done = {
+            let mut shares = self.shares.lock().unwrap_or_else(PoisonError::into_inner);
+            shares[k] = share;
+            shares.iter().sum::<f64>() / shares.len() as f64
+        };
+        self.progress.lock().unwrap_or_else(PoisonError::into_inner).phase(label, done);
+        !self.interrupt.requested()
+    }
+
+    fn finish(&self) {
+        self.progress.lock().unwrap_or_else(PoisonError::into_inner).finish();
+    }
+}
+
+/// What all measurements share.
+struct Measuring<'a, D: Dim> {
+    scene: &'a Scene,
+    sample: &'a Sample<D>,
+    asked: &'a Asked,
+    meter: &'a Meter<'a>,
+}
+
+impl<D: Dim> Measuring<'_, D> {
+    /// Run every way, and enter the rows; gives the contact problems of the reference.
+    ///
+    /// One run after the other: their CPU times are told.
+    fn runs(&self, report: &mut Report) -> Vec<Posed<D>> {
+        let ways = self.asked.ways();
+        let mut posed = vec![];
+        for (k, way) in ways.iter().enumerate() {
+            let Way { solver, tolerance, .. } = *way;
+            let scene = way.scene(self.scene);
+            let label =
+                format!("run {} of {}: {}, {tolerance:e}, {:e} s", k + 1, ways.len(), solver.name(), scene.time.step);
+            let problems = if self.asked.is_finest(way) { MOST_PROBLEMS } else { 0 };
+            let trial = Trial {
+                sample: self.sample,
+                scene: &scene,
+                variant: Variant::AsGiven,
+                whole: self.asked.whole,
+                problems,
+            };
+            let Some((outcome, problems)) = trial.run(&|share| self.meter.tell(k, &label, share)) else { break };
+            report.runs.push(Row::new(*way, scene.time.step, outcome));
+            self.meter.tell(k, &label, 1.0);
+            posed.push(problems);
+        }
+        report.compare();
+        // where no finest run came to its end, one that got on serves as well
+        let full = |k: &usize| !posed[*k].is_empty();
+        let from = report.reference.filter(full).or_else(|| (0..posed.len()).find(full));
+        from.map_or(vec![], |k| posed.swap_remove(k))
+    }
+
+    /// Run the sample of every solver in other orders and from other starts, at the finest tolerance and the longest step.
+    ///
+    /// As many at a time as there are threads; the results stand in a fixed order.
+    fn indeterminacy(&self, rows: &[Row]) -> Indeterminacy {
+        let asked = self.asked;
+        let way = |solver| Way { solver, tolerance: asked.finest_tolerance(), step_factor: asked.steps[0] };
+        let list: Vec<(SolverName, Varied, u64)> = (asked.solvers.iter())
+            .flat_map(|s| [Varied::Order, Varied::Start].map(|v| (*s, v)))
+            .flat_map(|(s, v)| (1..=asked.orders).map(move |n| (s, v, n)))
+            .collect();
+        let first = asked.ways().len();
+        let run = |(k, &(solver, varied, number)): (usize, &(SolverName, Varied, u64))| {
+            let scene = way(solver).scene(self.scene);
+            let variant = if varied == Varied::Order { Variant::Order(number) } else { Variant::Start(number) };
+            let trial = Trial { sample: self.sample, scene: &scene, variant, whole: asked.whole, problems: 0 };
+            let tell = |share: f64| self.meter.tell(first + k, "contact orders and starting reactions", share);
+            let (outcome, _) = trial.run(&tell)?;
+            tell(1.0);
+            Some(VariedRun { solver, varied, number, outcome })
+        };
+        let runs: Vec<VariedRun> = list.par_iter().enumerate().filter_map(run).collect();
+        let spread = |solver, varied| {
+            let as_given = rows.iter().find(|row| row.way == way(solver)).map(|row| &row.outcome);
+            let others = runs.iter().filter(|run| run.solver == solver && run.varied == varied).map(|run| &run.outcome);
+            Spread::of(solver, varied, &as_given.into_iter().chain(others).collect::<Vec<&Outcome>>())
+        };
+        let spreads = (asked.solvers.iter())
+            .flat_map(|s| [Varied::Order, Varied::Start].map(|varied| spread(*s, varied)))
+            .collect();
+        Indeterminacy { tolerance: asked.finest_tolerance(), step_factor: asked.steps[0], spreads, runs }
+    }
+
+    /// Solve the problems of the reference with every solver.
+    fn profile(&self, posed: &[Posed<D>]) -> Option<Profile> {
+        if posed.is_empty() {
+            return None;
+        }
+        let asked = self.asked;
+        let way = Way { solver: asked.solvers[0], tolerance: asked.finest_tolerance(), step_factor: 1.0 };
+        let last = self.meter.shares.lock().unwrap_or_else(PoisonError::into_inner).len() - 1;
+        let tell = |share: f64| self.meter.tell(last, "performance profile", share);
+        Profile::measure(posed, self.scene, &asked.solvers, &way, &tell)
+    }
+}

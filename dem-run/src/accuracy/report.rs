@@ -1,0 +1,214 @@
+//! What the command found, as it stands in `accuracy.json`.
+
+use super::AccuracyOptions;
+use super::profile::Profile;
+use super::spread::{Spread, Varied, jaccard};
+use super::trial::{Outcome, SolverName, Way};
+use crate::scene::{Drive, Scene};
+use serde::Serialize;
+
+/// What was asked for: no value twice, coarse before fine.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Asked {
+    /// Solvers.
+    pub solvers: Vec<SolverName>,
+    /// Tolerances (–), falling.
+    pub tolerances: Vec<f64>,
+    /// Time steps over that of the scene (–), falling.
+    pub steps: Vec<f64>,
+    /// Contact orders, and starting reactions, for each solver.
+    pub orders: u64,
+    /// Whether runs went on to the scene's end.
+    pub whole: bool,
+    /// End of the scene's time (s).
+    pub end: f64,
+    /// Largest residual that is accepted of a step that misses the tolerance, where that is larger than the tolerance (–).
+    pub accept: f64,
+}
+
+impl Asked {
+    /// The options in order.
+    #[must_use]
+    pub fn of(scene: &Scene, options: &AccuracyOptions) -> Self {
+        let falling = |list: &[f64]| {
+            let mut list = list.to_vec();
+            list.sort_unstable_by(|a, b| b.total_cmp(a));
+            list.dedup();
+            list
+        };
+        let mut solvers = vec![];
+        for solver in &options.solvers {
+            if !solvers.contains(solver) {
+                solvers.push(*solver);
+            }
+        }
+        Self {
+            solvers,
+            tolerances: falling(&options.tolerances),
+            steps: falling(&options.steps),
+            orders: options.orders,
+            whole: options.whole,
+            end: scene.time.end,
+            accept: scene.solver.accept(),
+        }
+    }
+
+    /// All ways to run the scene, in the order of the tables.
+    #[must_use]
+    pub fn ways(&self) -> Vec<Way> {
+        let mut ways = vec![];
+        for &solver in &self.solvers {
+            for &step_factor in &self.steps {
+                ways.extend(self.tolerances.iter().map(|&tolerance| Way { solver, tolerance, step_factor }));
+            }
+        }
+        ways
+    }
+
+    /// The lowest tolerance (–).
+    #[must_use]
+    pub fn finest_tolerance(&self) -> f64 {
+        self.tolerances.last().copied().unwrap_or_default()
+    }
+
+    /// Whether nothing is finer than this, whatever the solver.
+    #[must_use]
+    pub fn is_finest(&self, way: &Way) -> bool {
+        way.tolerance == self.finest_tolerance() && Some(&way.step_factor) == self.steps.last()
+    }
+}
+
+/// A row of the work–precision table.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Row {
+    /// How it was solved.
+    #[serde(flatten)]
+    pub way: Way,
+    /// Time step (s).
+    pub step: f64,
+    /// What came out.
+    #[serde(flatten)]
+    pub outcome: Outcome,
+    /// Jaccard index of its broken bonds and those of the reference (–).
+    pub jaccard: Option<f64>,
+    /// Collapse loads over those of the reference, less 1 (–).
+    pub collapse_deviation: [Option<f64>; 2],
+    /// Load at the first break over that of the reference, less 1 (–).
+    pub first_break_deviation: Option<f64>,
+}
+
+impl Row {
+    /// A row that is not compared yet.
+    #[must_use]
+    pub fn new(way: Way, step: f64, outcome: Outcome) -> Self {
+        Self { way, step, outcome, jaccard: None, collapse_deviation: [None; 2], first_break_deviation: None }
+    }
+
+    /// Force at the first break (N).
+    #[must_use]
+    pub fn first_break(&self) -> Option<f64> {
+        self.outcome.first_break.as_ref()?.load
+    }
+}
+
+/// Runs over what should not matter.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Indeterminacy {
+    /// Tolerance of all of them (–).
+    pub tolerance: f64,
+    /// Time step over that of the scene (–).
+    pub step_factor: f64,
+    /// How far apart they are.
+    pub spreads: Vec<Spread>,
+    /// Each of them, besides the one of the work–precision table.
+    pub runs: Vec<VariedRun>,
+}
+
+/// A run over something that should not matter.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct VariedRun {
+    /// The solver.
+    pub solver: SolverName,
+    /// What is varied.
+    pub varied: Varied,
+    /// Number for the random generator.
+    pub number: u64,
+    /// What came out.
+    #[serde(flatten)]
+    pub outcome: Outcome,
+}
+
+/// Everything that was measured.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Report {
+    /// Title of the scene.
+    pub title: Option<String>,
+    /// Grains of the sample.
+    pub grains: usize,
+    /// Bonds of the sample.
+    pub bonds: usize,
+    /// Solid fraction of a random sample (–).
+    pub solid_fraction: Option<f64>,
+    /// Whether a wall is driven: then there are loads.
+    pub driven: bool,
+    /// Time step of the scene (s).
+    pub step: f64,
+    /// What was asked for.
+    pub asked: Asked,
+    /// Whether it was interrupted, so that something is missing.
+    pub interrupted: bool,
+    /// Which of the runs the others are compared with; none if none came to its end.
+    pub reference: Option<usize>,
+    /// The work–precision table.
+    pub runs: Vec<Row>,
+    /// The indeterminacy, where it was measured.
+    pub indeterminacy: Option<Indeterminacy>,
+    /// The performance profiles, where they were measured.
+    pub profile: Option<Profile>,
+    /// The scene, as it was read.
+    pub scene: serde_json::Value,
+}
+
+impl Report {
+    /// A report without measurements.
+    #[must_use]
+    pub fn new(scene: &Scene, asked: &Asked, grains: usize, bonds: usize, solid_fraction: Option<f64>) -> Self {
+        Self {
+            title: scene.title.clone(),
+            grains,
+            bonds,
+            solid_fraction,
+            driven: scene.walls.values().any(|wall| wall.drive() != Drive::Fixed),
+            step: scene.time.step,
+            asked: asked.clone(),
+            interrupted: false,
+            reference: None,
+            runs: vec![],
+            indeterminacy: None,
+            profile: None,
+            scene: serde_json::to_value(scene).unwrap_or_default(),
+        }
+    }
+
+    /// Choose the reference and compare all runs with it.
+    ///
+    /// It is, of the runs that came to their end, one with the lowest tolerance, of these one with the shortest step, and of
+    /// these the one with the lowest median residual.
+    pub fn compare(&mut self) {
+        let key = |row: &Row| [row.way.tolerance, row.way.step_factor, row.outcome.median_residual];
+        let finer = |a: &usize, b: &usize| {
+            let (a, b) = (key(&self.runs[*a]), key(&self.runs[*b]));
+            a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])).then(a[2].total_cmp(&b[2]))
+        };
+        let ended = (0..self.runs.len()).filter(|k| self.runs[*k].outcome.error.is_none());
+        self.reference = ended.min_by(finer);
+        let Some(reference) = self.reference.map(|k| self.runs[k].clone()) else { return };
+        let deviation = |a: Option<f64>, b: Option<f64>| Some(a? / b.filter(|b| *b != 0.0)? - 1.0);
+        for row in &mut self.runs {
+            let (own, best) = (&row.outcome, &reference.outcome);
+            row.jaccard = (self.bonds > 0).then(|| jaccard(&own.broken, &best.broken));
+            row.first_break_deviation = deviation(row.first_break(), reference.first_break());
+            row.collapse_deviation = [0, 1].map(|k| deviation(own.failure.collapse[k], best.failure.collapse[k]));
+        }
+    }
+}

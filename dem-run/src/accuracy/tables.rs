@@ -1,0 +1,360 @@
+//! The report as tables: for people on stdout, and as CSV.
+
+use super::report::{Indeterminacy, Report, Row};
+use super::spread::Range;
+use super::trial::{End, Outcome};
+use crate::output::{Folder, Result, Text, cell, number, short};
+use crate::row;
+
+/// All tables, as they are printed.
+pub fn text(report: &Report) -> String {
+    let mut text = head(report);
+    text += "\nWork and precision: what each run cost, and how well it was solved\n\n";
+    text += &work(report);
+    if report.bonds > 0 {
+        text += "\nWhat the runs say of the sample\n\n";
+        text += &failure(report);
+    }
+    text += &notes(report);
+    if let Some(indeterminacy) = &report.indeterminacy {
+        text += &spreads(report, indeterminacy);
+    }
+    text += &profile(report);
+    text
+}
+
+fn counted(count: usize, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
+}
+
+fn tolerance(value: f64) -> String {
+    format!("{value:e}")
+}
+
+fn head(report: &Report) -> String {
+    let mut text = report.title.as_ref().map_or(String::new(), |title| format!("{title}\n"));
+    let bonds = if report.bonds > 0 { format!(", {}", counted(report.bonds, "bond")) } else { String::new() };
+    text += &format!("{}{bonds}, time step {} s\n", counted(report.grains, "grain"), tolerance(report.step));
+    match report.reference.map(|k| &report.runs[k]) {
+        Some(Row { way, step, outcome, .. }) => {
+            text += &format!(
+                "reference: {}, tolerance {}, step {} s; its residual: median {}, worst {}, {} of {} steps missed the tolerance",
+                way.solver.name(),
+                tolerance(way.tolerance),
+                tolerance(*step),
+                short(outcome.median_residual),
+                short(outcome.worst_residual),
+                outcome.missed_tolerance,
+                outcome.steps
+            );
+            text += &outcome
+                .false_strain
+                .map_or("\n".into(), |e| format!("; strain before the first break {}\n", short(e)));
+        }
+        None => text += "reference: none, no run came to its end\n",
+    }
+    text
+}
+
+/// Solver, tolerance and time step of a row; the reference is marked.
+fn labels(report: &Report, k: usize) -> Vec<String> {
+    let row = &report.runs[k];
+    let mark = if report.reference == Some(k) { " (ref.)" } else { "" };
+    row![format!("{}{mark}", row.way.solver.name()), tolerance(row.way.tolerance), tolerance(row.step)]
+}
+
+fn work(report: &Report) -> String {
+    let bonded = report.bonds > 0;
+    let mut heads = row!["solver", "tolerance", "step", "CPU", "steps", "iterations", "residual", "load error"];
+    let mut units = row!["", "", "s", "s", "", "", "worst", if bonded { "to 1st break" } else { "worst" }];
+    if bonded {
+        heads.push("strain".into());
+        units.push("to 1st break".into());
+    }
+    heads.extend(row!["penetration", "energy rem.", "missed", "refused"]);
+    units.extend(row!["m", "J", "steps", "solves"]);
+    let mut table = Text::default();
+    table.row(heads);
+    table.row(units);
+    for (k, row) in report.runs.iter().enumerate() {
+        let o = &row.outcome;
+        let mut cells = labels(report, k);
+        cells.extend(row![short(o.cpu_time), o.steps, o.iterations, short(o.worst_residual), short(o.load_error)]);
+        if bonded {
+            cells.push(o.false_strain.map_or("–".into(), short));
+        }
+        cells.extend(row![short(o.penetration), short(o.energy_remainder), o.missed_tolerance, o.rejected]);
+        table.row(cells);
+    }
+    table.lines()
+}
+
+fn failure(report: &Report) -> String {
+    let axes = place_width(report);
+    let mut heads = row!["solver", "tolerance", "step"];
+    let mut units = row!["", "", "s"];
+    if report.driven {
+        heads.push("1st break".into());
+        units.push("N".into());
+    }
+    heads.push(if report.driven { "bond" } else { "1st bond" }.into());
+    units.push(String::new());
+    for axis in &["x", "y", "z"][..axes] {
+        heads.push((*axis).into());
+        units.push("mm".into());
+    }
+    heads.push("time".into());
+    units.push("s".into());
+    if report.driven {
+        heads.extend(row!["collapse", "collapse"]);
+        units.extend(row!["N, 1e-4", "N, 1e-3"]);
+    }
+    heads.extend(row!["broken", "Jaccard", "ended by"]);
+    units.extend(row!["bonds", "with ref.", ""]);
+    let mut table = Text::default();
+    table.row(heads);
+    table.row(units);
+    for (k, row) in report.runs.iter().enumerate() {
+        let mut cells = labels(report, k);
+        let first = row.outcome.first_break.as_ref();
+        if report.driven {
+            cells.push(quantity(row.first_break()));
+        }
+        cells.push(first.map_or("–".into(), |first| first.bond.to_string()));
+        cells.extend((0..axes).map(|axis| first.map_or("–".into(), |first| format!("{:.2}", 1e3 * first.place[axis]))));
+        cells.push(first.map_or("–".into(), |first| number(first.time)));
+        if report.driven {
+            cells.extend([0, 1].map(|k| collapse(&row.outcome, k)));
+        }
+        cells.push(row.outcome.broken.len().to_string());
+        cells.push(row.jaccard.map_or("–".into(), |j| format!("{j:.2}")));
+        cells.push(row.outcome.ended.name().into());
+        table.row(cells);
+    }
+    table.lines()
+}
+
+fn place_width(report: &Report) -> usize {
+    report.runs.iter().find_map(|row| Some(row.outcome.first_break.as_ref()?.place.len())).unwrap_or(2)
+}
+
+fn quantity(value: Option<f64>) -> String {
+    value.map_or("–".into(), number)
+}
+
+/// A collapse load; one before the first break carries a star.
+fn collapse(outcome: &Outcome, k: usize) -> String {
+    let star = if outcome.failure.early[k] { "*" } else { "" };
+    quantity(outcome.failure.collapse[k]) + star
+}
+
+fn notes(report: &Report) -> String {
+    let mut text = String::from("\n");
+    if report.bonds > 0 {
+        text += "load error and strain are those before the first break, where a rigid sample is at rest and keeps its shape\n";
+    } else {
+        text += "load error means something only where the sample should be at rest\n";
+    }
+    if report.runs.iter().any(|row| row.outcome.failure.early.contains(&true)) {
+        text += "* before any bond broke: the solver's own strain, not the sample's\n";
+    }
+    for row in &report.runs {
+        if let End::Failed(why) = &row.outcome.ended {
+            let way = &row.way;
+            text += &format!("{}, {}, {} s: {why}\n", way.solver.name(), tolerance(way.tolerance), tolerance(row.step));
+        }
+    }
+    if report.interrupted {
+        text += "interrupted: what was not finished is missing\n";
+    }
+    if text.len() == 1 { String::new() } else { text }
+}
+
+fn spreads(report: &Report, indeterminacy: &Indeterminacy) -> String {
+    let mut text = format!(
+        "\nIndeterminacy: the same scene in other contact orders and from other starting reactions, tolerance {}, step {} s\n\n",
+        tolerance(indeterminacy.tolerance),
+        tolerance(indeterminacy.step_factor * report.step)
+    );
+    let mut table = Text::default();
+    let mut heads = row!["solver", "varied", "runs", "1st bonds"];
+    let mut units = row!["", "", "", "different"];
+    if report.driven {
+        heads.extend(row!["1st break", "", ""]);
+        units.extend(row!["N: min", "mean", "max"]);
+        heads.extend(row!["collapse", "", "", "collapse", "", ""]);
+        units.extend(row!["N, 1e-4: min", "mean", "max", "N, 1e-3: min", "mean", "max"]);
+    }
+    heads.push("Jaccard".into());
+    units.push("mean".into());
+    table.row(heads);
+    table.row(units);
+    for spread in &indeterminacy.spreads {
+        let failed = if spread.failed > 0 { format!(" + {} failed", spread.failed) } else { String::new() };
+        let mut cells = row![spread.solver.name(), spread.varied.name(), format!("{}{failed}", spread.runs)];
+        cells.push(spread.first_bonds.to_string());
+        if report.driven {
+            cells.extend(range(spread.first_break));
+            cells.extend(spread.collapse.into_iter().flat_map(range));
+        }
+        cells.push(spread.jaccard.map_or("–".into(), |j| format!("{j:.2}")));
+        table.row(cells);
+    }
+    text += &table.lines();
+    text += "\n1st bonds: how many different bonds broke first; Jaccard: what two runs have in common of their broken bonds\n";
+    text
+}
+
+fn range(range: Option<Range>) -> Vec<String> {
+    match range {
+        Some(Range { min, mean, max }) => row![number(min), number(mean), number(max)],
+        None => row!["–", "–", "–"],
+    }
+}
+
+fn profile(report: &Report) -> String {
+    let Some(profile) = &report.profile else { return String::new() };
+    let text = format!(
+        "\nPerformance profile: {} contact problems of the reference, each from the same start to a residual of {}\n\n",
+        profile.step.len(),
+        tolerance(profile.tolerance)
+    );
+    let mut table = Text::default();
+    let mut heads = row!["solver", "solved", "iterations", "", "residual", "CPU"];
+    let mut units = row!["", "%", "median", "max", "median", "ms, mean"];
+    for factor in &profile.factors {
+        heads.push(if heads.len() == 6 { "% within".into() } else { String::new() });
+        units.push(format!("{factor} ×"));
+    }
+    table.row(heads);
+    table.row(units);
+    for solver in &profile.solvers {
+        let mut iterations: Vec<u64> = solver.costs.iter().map(|cost| cost.iterations).collect();
+        iterations.sort_unstable();
+        let mut residuals: Vec<f64> = solver.costs.iter().map(|cost| cost.residual).collect();
+        residuals.sort_unstable_by(f64::total_cmp);
+        let count = solver.costs.len().max(1) as f64;
+        let solved = solver.costs.iter().filter(|cost| cost.solved).count() as f64;
+        let cpu: f64 = solver.costs.iter().map(|cost| cost.cpu_time).sum();
+        let mut cells = row![
+            solver.solver.name(),
+            format!("{:.0}", 100.0 * solved / count),
+            iterations.get(iterations.len() / 2).copied().unwrap_or(0),
+            iterations.last().copied().unwrap_or(0),
+            quantity(residuals.get(residuals.len() / 2).copied()),
+            short(1e3 * cpu / count)
+        ];
+        cells.extend(solver.shares.iter().map(|share| format!("{:.0}", 100.0 * share)));
+        table.row(cells);
+    }
+    text + &table.lines()
+}
+
+/// Write the tables as CSV: a row for each run, or for each problem and solver, with all digits.
+///
+/// # Errors
+/// A file cannot be written.
+pub fn write(report: &Report, folder: &mut Folder) -> Result<()> {
+    let mut head = vec!["solver", "tolerance", "step_factor", "step_s"];
+    head.extend(OUTCOME);
+    head.extend(["jaccard", "first_break_deviation", "collapse_1e4_deviation", "collapse_1e3_deviation", "reference"]);
+    let rows = report.runs.iter().enumerate().map(|(k, row)| {
+        let mut cells = row![row.way.solver.name(), row.way.tolerance, row.way.step_factor, row.step];
+        cells.extend(outcome(&row.outcome));
+        cells.extend([cell(row.jaccard), cell(row.first_break_deviation)]);
+        cells.extend(row.collapse_deviation.map(cell));
+        cells.push((report.reference == Some(k)).to_string());
+        cells
+    });
+    folder.table("work-precision", &head, rows)?;
+    if let Some(indeterminacy) = &report.indeterminacy {
+        let mut head = vec!["solver", "varied", "number"];
+        head.extend(OUTCOME);
+        let rows = indeterminacy.runs.iter().map(|run| {
+            let mut cells = row![run.solver.name(), run.varied.name(), run.number];
+            cells.extend(outcome(&run.outcome));
+            cells
+        });
+        folder.table("indeterminacy", &head, rows)?;
+    }
+    let Some(profile) = &report.profile else { return Ok(()) };
+    let head = ["step", "time_s", "contacts", "solver", "solved", "residual", "iterations", "cpu_s"];
+    let rows = (0..profile.step.len()).flat_map(|p| {
+        profile.solvers.iter().map(move |solver| {
+            let cost = &solver.costs[p];
+            let posed = (profile.step[p], profile.time[p], profile.contacts[p]);
+            row![
+                posed.0,
+                posed.1,
+                posed.2,
+                solver.solver.name(),
+                cost.solved,
+                cost.residual,
+                cost.iterations,
+                cost.cpu_time
+            ]
+        })
+    });
+    folder.table("profile", &head, rows)
+}
+
+/// Columns of [`outcome`].
+const OUTCOME: [&str; 25] = [
+    "ended",
+    "time_s",
+    "steps",
+    "cpu_s",
+    "iterations",
+    "worst_residual",
+    "median_residual",
+    "load_error",
+    "false_strain",
+    "missed_tolerance",
+    "rejected",
+    "penetration_m",
+    "energy_remainder_J",
+    "bond_remainder_J",
+    "first_break_N",
+    "first_break_s",
+    "first_break_bond",
+    "first_break_x_m",
+    "first_break_y_m",
+    "first_break_z_m",
+    "collapse_1e4_N",
+    "collapse_1e3_N",
+    "collapse_1e4_early",
+    "load_at_5_percent_broken_N",
+    "bonds_broken",
+];
+
+fn outcome(o: &Outcome) -> Vec<String> {
+    let first = o.first_break.as_ref();
+    let place = |axis: usize| cell(first.and_then(|first| first.place.get(axis).copied()));
+    row![
+        o.ended.name(),
+        o.time,
+        o.steps,
+        o.cpu_time,
+        o.iterations,
+        o.worst_residual,
+        o.median_residual,
+        o.load_error,
+        cell(o.false_strain),
+        o.missed_tolerance,
+        o.rejected,
+        o.penetration,
+        o.energy_remainder,
+        o.bond_remainder,
+        cell(first.and_then(|first| first.load)),
+        cell(first.map(|first| first.time)),
+        first.map_or(String::new(), |first| first.bond.to_string()),
+        place(0),
+        place(1),
+        place(2),
+        cell(o.failure.collapse[0]),
+        cell(o.failure.collapse[1]),
+        o.failure.early[0],
+        cell(o.failure.broken_share),
+        o.broken.len()
+    ]
+}

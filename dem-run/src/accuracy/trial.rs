@@ -1,0 +1,512 @@
+//! One run of the command: a scene stepped without a history, and what is read off it.
+
+use crate::build::{Built, settings};
+use crate::collapse::Failure;
+use crate::course::Course;
+use crate::record::applied_force;
+use crate::scene::{GaussSeidel, Newton, Scene, SolverKind};
+use crate::summary::Ending;
+use dem_core::body::{Grain, Grains, Load, Wall};
+use dem_core::bond::Bond;
+use dem_core::contact::Local;
+use dem_core::dim::{Dim, Vect};
+use dem_core::problem::ContactProblem;
+use dem_core::world::{StepReport, World};
+use rand::seq::SliceRandom;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use serde::{Serialize, Serializer};
+
+/// Random starting reactions of a bond, over what it can bear (–).
+const START_SHARE: f64 = 0.1;
+
+/// A solver by its name; its other settings are those of the scene where the scene has the same solver, else the defaults.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum SolverName {
+    /// Non-linear Gauss–Seidel.
+    #[value(alias = "gauss_seidel")]
+    GaussSeidel,
+    /// Semismooth Newton.
+    Newton,
+}
+
+impl SolverName {
+    /// The name as the command line has it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::GaussSeidel => "gauss-seidel",
+            Self::Newton => "newton",
+        }
+    }
+
+    fn kind(self, scene: &SolverKind) -> SolverKind {
+        match (self, scene) {
+            (Self::GaussSeidel, SolverKind::GaussSeidel(_)) | (Self::Newton, SolverKind::Newton(_)) => scene.clone(),
+            (Self::GaussSeidel, _) => SolverKind::GaussSeidel(GaussSeidel::default()),
+            (Self::Newton, _) => SolverKind::Newton(Newton::default()),
+        }
+    }
+}
+
+/// How a run is solved.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Way {
+    /// The solver.
+    pub solver: SolverName,
+    /// Its tolerance (–).
+    pub tolerance: f64,
+    /// Time step over that of the scene (–).
+    pub step_factor: f64,
+}
+
+impl Way {
+    /// The scene as it is run this way. A step that misses the tolerance is taken where the scene would accept it.
+    #[must_use]
+    pub fn scene(&self, scene: &Scene) -> Scene {
+        let mut scene = scene.clone();
+        let accept = scene.solver.accept().max(self.tolerance);
+        scene.solver.kind = self.solver.kind(&scene.solver.kind);
+        scene.solver.tolerance = self.tolerance;
+        scene.solver.accept = Some(accept);
+        scene.time.step *= self.step_factor;
+        scene
+    }
+}
+
+/// What is varied of a run whose answer should not depend on it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Variant {
+    /// Nothing.
+    AsGiven,
+    /// The order of the grains, and with it that of the contacts, by a number for the random generator.
+    Order(u64),
+    /// The reactions that the bonds start from, by a number for the random generator.
+    Start(u64),
+}
+
+/// The prepared sample that all runs start from.
+pub struct Sample<D: Dim> {
+    /// Solid fraction of a random sample (–).
+    pub solid_fraction: Option<f64>,
+    /// The bonds, all intact.
+    pub bonds: Vec<Bond>,
+    /// The grains.
+    pub grains: Grains<D>,
+    walls: Vec<Wall<D>>,
+    loads: Vec<Load<D>>,
+}
+
+impl<D: Dim> Sample<D> {
+    /// The sample of a world that has just been built.
+    #[must_use]
+    pub fn of(built: Built<D>) -> Self {
+        let World { grains, walls, loads, bonds, .. } = built.world;
+        Self { solid_fraction: built.solid_fraction, bonds, grains, walls, loads }
+    }
+
+    /// A world at time zero, and for each of its bonds the number of the same bond in the sample.
+    fn world(&self, scene: &Scene, variant: Variant) -> (World<D>, Vec<u32>) {
+        let mut world = World::new(self.grains.clone(), self.walls.clone(), self.loads.clone(), settings(scene));
+        let mut numbers: Vec<u32> = (0..self.bonds.len() as u32).collect();
+        world.bonds.clone_from(&self.bonds);
+        match variant {
+            Variant::AsGiven => {}
+            Variant::Order(seed) => (world, numbers) = self.reordered(scene, seed),
+            Variant::Start(seed) => start_anywhere(&mut world, seed),
+        }
+        (world, numbers)
+    }
+
+    /// The same world with its grains numbered in another order.
+    fn reordered(&self, scene: &Scene, seed: u64) -> (World<D>, Vec<u32>) {
+        let mut order: Vec<usize> = (0..self.grains.len()).collect();
+        order.shuffle(&mut Pcg64::seed_from_u64(seed));
+        let mut place = vec![0; order.len()];
+        order.iter().enumerate().for_each(|(new, old)| place[*old] = new);
+        let grains = order.iter().map(|old| self.grain(*old)).collect();
+        let loads = self.loads.iter().map(|load| Load { grain: place[load.grain], ..load.clone() }).collect();
+        let moved = |bond: &Bond| {
+            let mut pair = bond.pair.map(|k| place[k as usize] as u32);
+            pair.sort_unstable();
+            Bond { pair, ..*bond }
+        };
+        let mut bonds: Vec<(Bond, u32)> = self.bonds.iter().map(moved).zip(0..).collect();
+        bonds.sort_unstable_by_key(|(bond, _)| bond.pair);
+        let mut world = World::new(grains, self.walls.clone(), loads, settings(scene));
+        let numbers;
+        (world.bonds, numbers) = bonds.into_iter().unzip();
+        (world, numbers)
+    }
+
+    fn grain(&self, k: usize) -> Grain<D> {
+        let g = &self.grains;
+        Grain {
+            position: g.position[k],
+            velocity: g.velocity[k],
+            spin: g.spin[k],
+            radius: g.radius[k],
+            mass: g.mass[k],
+            inertia: g.inertia[k],
+            fixed: g.fixed[k],
+        }
+    }
+}
+
+/// Start from random reactions of the bonds, up to [`START_SHARE`] of what each bears.
+fn start_anywhere<D: Dim>(world: &mut World<D>, seed: u64) {
+    let mut random = Pcg64::seed_from_u64(seed);
+    let mut upto = |limit: f64| START_SHARE * limit * (2.0 * random.random::<f64>() - 1.0);
+    world.start_from(|bond| {
+        let (shear, arm) = (bond.friction * bond.strength, bond.mean_diameter);
+        let mut start = Local::<D::Tangent, D::Tangent>::zero();
+        start.n = upto(bond.strength);
+        for k in 0..D::Tangent::LEN {
+            start.t[k] = upto(shear);
+            start.m[k] = upto(shear * arm);
+        }
+        start
+    });
+}
+
+/// A contact problem as a run posed it at a step.
+pub struct Posed<D: Dim> {
+    /// Steps that had been made.
+    pub step: u64,
+    /// Time (s).
+    pub time: f64,
+    /// The problem, with the reactions of the last step as a start.
+    pub problem: ContactProblem<D>,
+}
+
+/// Problems taken from a run at equal distances, at most a given number: when there are too many, every other is dropped.
+struct Problems<D: Dim> {
+    list: Vec<Posed<D>>,
+    most: usize,
+    every: u64,
+}
+
+impl<D: Dim> Problems<D> {
+    fn look(&mut self, world: &mut World<D>) {
+        if self.most == 0 || !world.steps.is_multiple_of(self.every) {
+            return;
+        }
+        let problem = world.contact_problem();
+        if problem.is_empty() {
+            return;
+        }
+        self.list.push(Posed { step: world.steps, time: world.time, problem });
+        if self.list.len() > self.most {
+            self.every *= 2;
+            self.list.retain(|posed| posed.step.is_multiple_of(self.every));
+        }
+    }
+}
+
+/// What ended a run.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum End {
+    /// The strain is above 1e-3 and 5 % of the bonds are broken: the loads that are told are known.
+    Collapsed,
+    /// The scene.
+    Scene(Ending),
+    /// A step was not solved, or wrongly: the message.
+    Failed(String),
+}
+
+impl End {
+    /// In a word or two.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Collapsed => "collapse",
+            Self::Scene(Ending::Time) => "time",
+            Self::Scene(Ending::WallTravel) => "wall travel",
+            Self::Scene(Ending::BrokenFraction) => "broken fraction",
+            Self::Scene(Ending::Interrupted) => "interrupted",
+            Self::Scene(Ending::NoConvergence) | Self::Failed(_) => "NO CONVERGENCE",
+        }
+    }
+}
+
+impl Serialize for End {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(&self.name().to_lowercase().replace(' ', "_"))
+    }
+}
+
+/// The first bond that broke.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FirstBreak {
+    /// Applied force (N), where a wall is driven.
+    pub load: Option<f64>,
+    /// Time at the end of the step (s).
+    pub time: f64,
+    /// Step, counted from 1.
+    pub step: u64,
+    /// Number of the bond; of several in one step, the first of the first round.
+    pub bond: u32,
+    /// Its two grains.
+    pub pair: [u32; 2],
+    /// Where it was (m).
+    pub place: Vec<f64>,
+}
+
+/// What a run gave.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Outcome {
+    /// What ended it.
+    pub ended: End,
+    /// Why a step was not solved.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<String>,
+    /// Simulated time (s).
+    pub time: f64,
+    /// Steps made.
+    pub steps: u64,
+    /// CPU time of the steps (s).
+    pub cpu_time: f64,
+    /// Iterations of all solves: sweeps, or Newton iterations.
+    pub iterations: u64,
+    /// Largest residual of a solve (–).
+    pub worst_residual: f64,
+    /// Median over the steps of the largest residual in each (–).
+    pub median_residual: f64,
+    /// Largest load error of a step before the first break (–).
+    pub load_error: f64,
+    /// Largest component of the sample's strain before the first break (–); none without bonds.
+    pub false_strain: Option<f64>,
+    /// Steps that were accepted and missed the tolerance.
+    pub missed_tolerance: u64,
+    /// Solves that were not accepted: their steps were halved.
+    pub rejected: u64,
+    /// Deepest overlap (m).
+    pub penetration: f64,
+    /// Energy that the books do not account for (J).
+    pub energy_remainder: f64,
+    /// Energy lost in intact bonds (J).
+    pub bond_remainder: f64,
+    /// The first break.
+    pub first_break: Option<FirstBreak>,
+    /// Loads at failure (N).
+    pub failure: Failure,
+    /// Numbers of the broken bonds, sorted.
+    pub broken: Vec<u32>,
+}
+
+/// One run to be made.
+pub struct Trial<'a, D: Dim> {
+    /// The sample.
+    pub sample: &'a Sample<D>,
+    /// The scene as it is to be solved.
+    pub scene: &'a Scene,
+    /// What is varied.
+    pub variant: Variant,
+    /// Whether it goes on to the scene's end.
+    pub whole: bool,
+    /// How many contact problems are taken from it at most.
+    pub problems: usize,
+}
+
+impl<D: Dim> Trial<'_, D> {
+    /// Run. `watch` is told the share of the simulated time that is done; false stops the run, which then gives nothing.
+    pub fn run(&self, watch: &dyn Fn(f64) -> bool) -> Option<(Outcome, Vec<Posed<D>>)> {
+        let (mut world, numbers) = self.sample.world(self.scene, self.variant);
+        let mut state = Followed::new(self.scene, &world);
+        let mut problems = Problems { list: vec![], most: self.problems, every: 1 };
+        let steps = self.scene.time.steps();
+        let ended = loop {
+            if world.steps >= steps {
+                break End::Scene(Ending::Time);
+            }
+            if !watch(world.steps as f64 / steps as f64) {
+                return None;
+            }
+            problems.look(&mut world);
+            let before = world.grains.velocity.clone();
+            let began = thread_time();
+            let step = world.step();
+            state.cpu_time += thread_time() - began;
+            match step {
+                Ok(report) => state.follow(&world, &report, &before),
+                Err(error) => break End::Failed(error.to_string()),
+            }
+            if state.blown_up(&world) {
+                break End::Failed(format!(
+                    "the motion has far more energy than was put in at t = {:.6e} s: the solves that were accepted are wrong",
+                    world.time
+                ));
+            }
+            if let Some(ending) = state.course.ending(&world) {
+                break End::Scene(ending);
+            }
+            let failure = &state.course.collapse.failure;
+            if !self.whole && failure.collapse[1].is_some() && failure.broken_share.is_some() {
+                break End::Collapsed;
+            }
+        };
+        Some((state.outcome(ended, &world, &numbers, &self.sample.bonds), problems.list))
+    }
+}
+
+/// A run as it goes on.
+struct Followed<D: Dim> {
+    course: Course<D>,
+    /// Kinetic energy at the start (J).
+    kinetic: f64,
+    cpu_time: f64,
+    residuals: Vec<f64>,
+    load_error: f64,
+    strain: f64,
+    first: Option<FirstBreak>,
+}
+
+impl<D: Dim> Followed<D> {
+    fn new(scene: &Scene, world: &World<D>) -> Self {
+        let course = Course::new(scene, world);
+        let kinetic = world.ledger.kinetic;
+        Self { course, kinetic, cpu_time: 0.0, residuals: vec![], load_error: 0.0, strain: 0.0, first: None }
+    }
+
+    /// Enter a step; `before` are the velocities of the grains before it.
+    fn follow(&mut self, world: &World<D>, report: &StepReport<D>, before: &[D::Vector]) {
+        self.course.count(world, report);
+        self.residuals.push(report.residual);
+        if self.first.is_some() {
+            return;
+        }
+        if let Some(failed) = report.breaks.first() {
+            self.first = Some(FirstBreak {
+                load: self.course.load(world),
+                time: report.time,
+                step: world.steps,
+                bond: failed.bond,
+                pair: failed.pair,
+                place: failed.point.as_slice().to_vec(),
+            });
+            return;
+        }
+        self.load_error = self.load_error.max(load_error(world, before));
+        self.strain = world.strain().iter().fold(self.strain, |worst, e| worst.max(e.abs()));
+    }
+
+    /// Whether the kinetic energy is beyond ten times all that was put in, and that of grains that move by their radius
+    /// in every step. Such a run means nothing any more, and would look for contacts among all pairs of grains.
+    fn blown_up(&self, world: &World<D>) -> bool {
+        let (ledger, g) = (&world.ledger, &world.grains);
+        let fast = g.mass.iter().zip(&g.radius).map(|(m, r)| 0.5 * m * (r / world.settings.step).powi(2)).sum::<f64>();
+        ledger.kinetic > (10.0 * (ledger.external_work.abs() + self.kinetic)).max(fast)
+    }
+
+    /// The outcome, with bonds and grains by the numbers of the sample.
+    fn outcome(mut self, ended: End, world: &World<D>, numbers: &[u32], bonds: &[Bond]) -> Outcome {
+        if let Some(first) = &mut self.first {
+            first.bond = numbers[first.bond as usize];
+            first.pair = bonds[first.bond as usize].pair;
+        }
+        let holds = |k: usize| world.bonds[k].status == dem_core::bond::BondStatus::Intact;
+        let mut broken: Vec<u32> = (0..numbers.len()).filter(|k| !holds(*k)).map(|k| numbers[k]).collect();
+        broken.sort_unstable();
+        self.residuals.sort_unstable_by(f64::total_cmp);
+        Outcome {
+            error: if let End::Failed(why) = &ended { Some(why.clone()) } else { None },
+            ended,
+            time: world.time,
+            steps: world.steps,
+            cpu_time: self.cpu_time,
+            iterations: self.course.iterations,
+            worst_residual: self.course.worst_residual,
+            median_residual: self.residuals.get(self.residuals.len() / 2).copied().unwrap_or(0.0),
+            load_error: self.load_error,
+            false_strain: (!bonds.is_empty()).then_some(self.strain),
+            missed_tolerance: self.course.missed_tolerance,
+            rejected: self.course.rejected,
+            penetration: self.course.penetration,
+            energy_remainder: world.ledger.remainder,
+            bond_remainder: world.ledger.bonds,
+            first_break: self.first,
+            failure: self.course.collapse.failure,
+            broken,
+        }
+    }
+}
+
+/// The force that the accelerations of the grains in the last step stand for, over the forces on the sample (–), the
+/// same for all solvers; zero without forces.
+fn load_error<D: Dim>(world: &World<D>, before: &[D::Vector]) -> f64 {
+    let (h, g) = (world.settings.step, &world.grains);
+    let gravity = world.settings.gravity.unwrap_or(D::Vector::zero());
+    let mut forces: Vec<D::Vector> = g.mass.iter().map(|m| gravity * *m).collect();
+    for load in &world.loads {
+        forces[load.grain] += load.force * (load.factor)(world.time - 0.5 * h);
+    }
+    let (mut false_force, mut applied) = (0.0, 0.0);
+    for k in (0..g.len()).filter(|k| !g.fixed[*k]) {
+        let force = (g.velocity[k] - before[k]) * (g.mass[k] / h);
+        false_force += force.dot(&force);
+        applied += forces[k].dot(&forces[k]);
+    }
+    applied += world.walls.iter().map(|wall| applied_force(wall).powi(2)).sum::<f64>();
+    if applied > 0.0 { (false_force / applied).sqrt() } else { 0.0 }
+}
+
+/// CPU time of this thread so far (s).
+pub fn thread_time() -> f64 {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::build::build;
+    use crate::scene::from_text;
+    use dem_core::dim::D2;
+
+    /// Nine cemented disks on a lattice, one of which is pulled.
+    const SCENE: &str = r#"{
+        "dimension": 2, "sample": { "lattice": { "square": { "diameter": 1e-3, "rows": 3, "columns": 3 } } },
+        "materials": { "density": 2500, "friction": { "grain_grain": 0.3, "grain_wall": 0.2 } },
+        "bonds": { "strength": 10, "gap_tolerance": 1e-3 },
+        "grains": { "fixed": [0], "loads": [{ "grain": 8, "force": [1, 0] }] },
+        "time": { "step": 1e-4, "end": 1e-3 }, "output": { "every_steps": 1 }
+    }"#;
+
+    fn sample() -> (Scene, Sample<D2>) {
+        let scene = from_text("scene", SCENE, &[]).expect("scene");
+        let built = build::<D2>(&scene, &mut |_| true).expect("world");
+        (scene, Sample::of(built))
+    }
+
+    #[test]
+    fn another_order_is_the_same_sample() {
+        let (scene, sample) = sample();
+        let (world, numbers) = sample.world(&scene, Variant::Order(3));
+        assert_ne!(world.grains.position, sample.grains.position);
+        let middle = |grains: &Grains<D2>, pair: [u32; 2]| {
+            let [i, j] = pair.map(|k| grains.position[k as usize]);
+            (i + j) * 0.5
+        };
+        for (bond, number) in world.bonds.iter().zip(&numbers) {
+            let same = &sample.bonds[*number as usize];
+            assert_eq!(middle(&world.grains, bond.pair), middle(&sample.grains, same.pair));
+        }
+        assert!(world.bonds.windows(2).all(|two| two[0].pair < two[1].pair));
+        let place = |grains: &Grains<D2>, k: usize| grains.position[k];
+        assert_eq!(place(&world.grains, world.loads[0].grain), place(&sample.grains, 8));
+        let fixed = world.grains.fixed.iter().position(|fixed| *fixed).expect("a fixed grain");
+        assert_eq!(place(&world.grains, fixed), place(&sample.grains, 0));
+    }
+
+    #[test]
+    fn a_start_reaches_the_first_problem() {
+        let (scene, sample) = sample();
+        let (mut as_given, _) = sample.world(&scene, Variant::AsGiven);
+        let (mut world, _) = sample.world(&scene, Variant::Start(1));
+        assert!(as_given.contact_problem().bonded.iter().all(|contact| contact.r.n == 0.0));
+        let started = world.contact_problem();
+        let limit = START_SHARE * 10.0 * scene.time.step;
+        assert!(started.bonded.iter().all(|contact| contact.r.n != 0.0 && contact.r.n.abs() <= limit));
+    }
+}
