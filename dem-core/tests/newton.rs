@@ -35,7 +35,7 @@ fn weight_at_the_bottom_of_a_column_of_500() {
         assert!((-w.walls[0].reaction[1] / weight - 1.0).abs() < 1e-6, "{}", -w.walls[0].reaction[1] / weight - 1.0);
     }
     // the state of the step before shows the active set
-    assert!(w.step().unwrap().iterations <= 10);
+    assert!(w.step().unwrap().work.newton <= 10);
 }
 
 /// A box of bonded and dry grains with random radii, pressed from above and sheared from the side: all kinds of rows.

@@ -11,10 +11,12 @@ use clap::{Args, Parser, Subcommand};
 use crate::accuracy::trial::SolverName;
 use crate::accuracy::{self, AccuracyOptions};
 use crate::check::Check;
+use crate::export::{self, ExportOptions};
 use crate::output::default_folder;
 use crate::progress::ProgressMode;
 use crate::run::{self, RunError, RunOptions};
 use crate::scene::{self, Sample, Scene, SceneError, schema};
+use crate::solve::{self, SolveOptions, Solver};
 
 /// Simulates cemented grains by non-smooth contact dynamics.
 #[derive(Debug, Parser)]
@@ -38,6 +40,12 @@ enum Command {
     /// Check a scene without running it; tell grains, walls, steps, frames and disk space.
     #[command(after_help = CHECK_EXAMPLE)]
     Check(CheckArgs),
+    /// Write the contact problem of one step of a history in FCLIB's format, to be solved by other programs too.
+    #[command(after_help = EXPORT_EXAMPLE)]
+    Export(ExportArgs),
+    /// Solve a contact problem in FCLIB's format, ours or another program's.
+    #[command(after_help = SOLVE_EXAMPLE)]
+    Solve(SolveArgs),
     /// Measure how accurate a scene's results are, and what more accuracy costs.
     #[command(after_help = ACCURACY_EXAMPLE)]
     Accuracy(AccuracyArgs),
@@ -73,6 +81,19 @@ Editors that know JSON Schema complete and explain a scene that names it:
 
 Example:
   dem-run schema > docs/scene.schema.json";
+
+const EXPORT_EXAMPLE: &str = "\
+The scene in the history is run again up to the step: a sample file that it names must be in its place. The problem is
+the first that the step solves, with the solution of the scene's solver. What is in it: docs/theory/fclib.md.
+
+Example:
+  dem-run export compression.h5 --step 1800 -o problem.hdf5";
+
+const SOLVE_EXAMPLE: &str = "\
+The solver starts from the first guess in the file, or from zero. Exit code 3 where the tolerance is not reached.
+
+Example:
+  dem-run solve problem.hdf5 --tolerance 1e-8 -o solved.hdf5";
 
 /// The scene of a command.
 #[derive(Debug, Args)]
@@ -170,12 +191,74 @@ struct CheckArgs {
     json: bool,
 }
 
+#[derive(Debug, Args)]
+struct ExportArgs {
+    /// History whose scene is run again.
+    #[arg(value_name = "FILE.h5")]
+    history: PathBuf,
+    /// Step whose problem is written, counted from 1.
+    #[arg(long, value_name = "K")]
+    step: u64,
+    /// Problem to write.
+    #[arg(short, long, value_name = "PROBLEM.hdf5")]
+    output: PathBuf,
+    /// Overwrite a file that exists.
+    #[arg(long)]
+    force: bool,
+    /// Number of threads; the result does not depend on it [default: all].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+    /// How progress is shown on stderr.
+    #[arg(long, value_enum, default_value_t)]
+    progress: ProgressMode,
+    /// Show nothing on stderr but errors.
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+#[derive(Debug, Args)]
+struct SolveArgs {
+    /// Problem: a file in FCLIB's format (HDF5), with the group /fclib_local.
+    #[arg(value_name = "PROBLEM.hdf5")]
+    problem: PathBuf,
+    /// Solver.
+    #[arg(long, value_enum, default_value_t)]
+    solver: Solver,
+    /// Residual to reach.
+    #[arg(long, value_name = "T", default_value_t = 1e-8, value_parser = above_zero)]
+    tolerance: f64,
+    /// Iterations after which the solver gives up [default: 100000 sweeps, 300 Newton iterations].
+    #[arg(long, value_name = "N")]
+    max_iterations: Option<u64>,
+    /// Steps that the acceleration of Gauss–Seidel remembers, 8 for one; 0 for plain sweeps.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    acceleration: usize,
+    /// Write the problem with its solution, if the tolerance is reached.
+    #[arg(short, long, value_name = "SOLVED.hdf5")]
+    output: Option<PathBuf>,
+    /// Overwrite a file that exists.
+    #[arg(long)]
+    force: bool,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+fn above_zero(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number > 0.0 && number.is_finite() => Ok(number),
+        _ => Err("it must be a number above zero, as in 1e-8".into()),
+    }
+}
+
 /// The command: reads the arguments, runs, and gives the exit code.
 #[must_use]
 pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Run(args) => run(args),
         Command::Check(args) => check(&args),
+        Command::Export(args) => export(args),
+        Command::Solve(args) => solve(args),
         Command::Accuracy(args) => accuracy(args),
         Command::Schema => print(&format!("{:#}", schema::json_schema())),
     };
@@ -232,6 +315,48 @@ fn check(args: &CheckArgs) -> Result<(), RunError> {
     }
 }
 
+fn export(args: ExportArgs) -> Result<(), RunError> {
+    not_itself(&args.history, &args.output)?;
+    writable(&args.output, "-o PROBLEM.hdf5", args.force)?;
+    export::export(&ExportOptions {
+        history: args.history,
+        step: args.step,
+        output: args.output,
+        threads: args.threads.map(usize::from),
+        progress: args.progress,
+        quiet: args.quiet,
+    })
+}
+
+fn solve(args: SolveArgs) -> Result<(), RunError> {
+    if let Some(output) = &args.output {
+        not_itself(&args.problem, output)?;
+        writable(output, "-o SOLVED.hdf5", args.force)?;
+    }
+    solve::solve(&SolveOptions {
+        problem: args.problem,
+        solver: args.solver,
+        tolerance: args.tolerance,
+        max_iterations: args.max_iterations,
+        acceleration: args.acceleration,
+        output: args.output,
+        json: args.json,
+    })
+}
+
+/// Refuses, `--force` or not, to write over what is read.
+fn not_itself(read: &Path, written: &Path) -> Result<(), RunError> {
+    if !same_file(read, written) {
+        return Ok(());
+    }
+    let shown = written.display();
+    Err(RunError::InputOutput(format!("-o {shown} would overwrite what the command reads: name another file")))
+}
+
+fn same_file(a: &Path, b: &Path) -> bool {
+    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+}
+
 fn accuracy(args: AccuracyArgs) -> Result<(), RunError> {
     let mut scene = args.scene.load()?;
     if let Some(until) = args.until {
@@ -270,14 +395,13 @@ fn default_output(scene: &Path) -> PathBuf {
 
 /// Refuses, `--force` or not, to write over what the run reads, or two results into one file.
 fn apart(path: &Path, scene: &Scene, options: &RunOptions) -> Result<(), RunError> {
-    let same = |a: &Path, b: &Path| matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b);
     let mut read = vec![path];
     if let Sample::File(file) = &scene.sample {
         read.push(&file.path);
     }
     for (written, option) in [(Some(&options.output), "-o"), (options.write_sample.as_ref(), "--write-sample")] {
         let Some(written) = written else { continue };
-        if read.iter().any(|read| same(read, written)) {
+        if read.iter().any(|read| same_file(read, written)) {
             let shown = written.display();
             let message = format!("{option} {shown} would overwrite what the run reads: name another file");
             return Err(RunError::InputOutput(message));

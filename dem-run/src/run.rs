@@ -2,6 +2,7 @@
 
 use crate::build::{Built, build, write_sample};
 use crate::course::Course;
+use crate::fclib::FclibError;
 use crate::history::HistoryError;
 use crate::output::WriteError;
 use crate::progress::{Progress, ProgressMode, StepProgress};
@@ -51,6 +52,12 @@ pub enum RunError {
     /// The history cannot be written.
     #[error(transparent)]
     History(#[from] HistoryError),
+    /// A contact problem cannot be read or written.
+    #[error(transparent)]
+    Problem(#[from] FclibError),
+    /// What was asked for is not there.
+    #[error("{0}")]
+    Usage(String),
     /// A result cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
@@ -64,8 +71,9 @@ impl RunError {
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Scene(SceneError::Read { .. }) | Self::InputOutput(_) | Self::History(_) | Self::Write(_) => 4,
-            Self::Scene(_) | Self::Sample(_) => 2,
+            Self::Scene(SceneError::Read { .. }) | Self::InputOutput(_) | Self::History(_) => 4,
+            Self::Write(_) | Self::Problem(_) => 4,
+            Self::Scene(_) | Self::Sample(_) | Self::Usage(_) => 2,
             Self::NoConvergence(_) => 3,
             Self::Interrupted(_) => INTERRUPTED,
         }
@@ -78,14 +86,18 @@ impl RunError {
 /// [`RunError`]; a history that was begun is complete up to its last frame.
 pub fn run(scene: &Scene, options: &RunOptions) -> Result<(), RunError> {
     let interrupt = signals::install().map_err(|e| RunError::InputOutput(format!("no handler for Ctrl-C: {e}")))?;
-    if let Some(threads) = options.threads {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
-        pool.map_err(|e| RunError::InputOutput(format!("{threads} threads cannot be started: {e}")))?;
-    }
+    start_threads(options.threads)?;
     match scene.dimension {
         2 => run_in::<D2>(scene, options, &interrupt),
         _ => run_in::<D3>(scene, options, &interrupt),
     }
+}
+
+/// Starts this many threads, or leaves it to the machine.
+pub(crate) fn start_threads(threads: Option<usize>) -> Result<(), RunError> {
+    let Some(threads) = threads else { return Ok(()) };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+    pool.map_err(|e| RunError::InputOutput(format!("{threads} threads cannot be started: {e}")))
 }
 
 fn run_in<D: Dim>(scene: &Scene, options: &RunOptions, interrupt: &Interrupt) -> Result<(), RunError> {

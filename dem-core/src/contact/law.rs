@@ -99,7 +99,7 @@ pub trait Law: Copy + Send + Sync + 'static {
 ///
 /// A predictor inside the cone is its own projection; the change −γ ũ is then exact, however large the shift s is beside r.
 #[inline]
-fn predict_correct<T: Vect, B: Vect>(
+pub(crate) fn predict_correct<T: Vect, B: Vect>(
     cone: Cone,
     shift: f64,
     non_associated: bool,

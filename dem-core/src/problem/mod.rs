@@ -3,6 +3,7 @@
 //! It knows nodes (a velocity and inverse masses) and contacts, and no bodies, bonds or detection. It is
 //! matrix-free: the Delassus operator W = Hᵀ M⁻¹ H acts through the velocities of the nodes.
 
+pub mod assembled;
 pub mod residual;
 
 use crate::contact::{Block, Bonded, Coulomb, Elastic, Frictionless, Law, Local};

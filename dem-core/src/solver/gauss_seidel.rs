@@ -28,11 +28,11 @@ pub struct GaussSeidelSettings {
 }
 
 /// Sweeps between two accelerated steps.
-const BURST: u64 = 4;
+pub(super) const BURST: u64 = 4;
 /// Accelerated steps between two looks at the residual.
-const LOOK: u64 = 4;
+pub(super) const LOOK: u64 = 4;
 /// Plain sweeps before the acceleration begins: easy problems need no more.
-const PLAIN: u64 = 32;
+pub(super) const PLAIN: u64 = 32;
 /// Steps for the acceleration to remember that serve well.
 pub(super) const MEMORY: usize = 8;
 

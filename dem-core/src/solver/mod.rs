@@ -1,6 +1,7 @@
 //! Solvers of the contact problem, behind one trait and one enum of settings.
 
 mod anderson;
+pub mod assembled;
 mod auto;
 mod gauss_seidel;
 mod newton;

@@ -7,6 +7,8 @@ use dem_core::contact::{BondFlow, LocalSolve};
 use dem_core::dim::{D2, Dim, Vect};
 use dem_core::solver::{GaussSeidelSettings, SolverSettings};
 use dem_core::world::{Settings, World};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
 use std::sync::Arc;
 
 pub const DENSITY: f64 = 2500.0;
@@ -80,4 +82,29 @@ pub fn force_driven<D: Dim>(normal: D::Vector, position: D::Vector, mass: f64, f
     let mut wall = Wall::fixed(Shape::Plane { normal }, position, 0.2);
     wall.drive = Drive::Force { direction: normal, mass, force: Arc::new(move |_| force) };
     wall
+}
+
+/// A box of grains with random radii and velocities, pressed from above: with bonds, or dry.
+pub fn pressed<D: Dim>(seed: u64, side: usize, friction: f64, bonds: Option<BondFlow>) -> World<D> {
+    let mut rng = Pcg64::seed_from_u64(seed);
+    let mut grains = Vec::new();
+    for k in 0..side.pow(D::N as u32) {
+        let x: Vec<f64> = (0..D::N).map(|c| 0.01 + 0.02 * ((k / side.pow(c as u32)) % side) as f64).collect();
+        let mut g = grain::<D>(&x, 0.01 * (0.98 + 0.02 * rng.random::<f64>()));
+        g.velocity[0] = 0.05 * (rng.random::<f64>() - 0.5);
+        grains.push(g);
+    }
+    let mut set = settings(1e-3);
+    set.gravity = down::<D>(9.81);
+    set.friction = friction;
+    set.bond_flow = bonds.unwrap_or_default();
+    let mut down = D::Vector::zero();
+    down[D::N - 1] = -1.0;
+    let mut lid = force_driven::<D>(down, down * (-0.02 * side as f64), 2.0, 300.0);
+    lid.friction = friction;
+    let mut w = world(grains, vec![floor(friction), lid], set);
+    if bonds.is_some() {
+        w.form_bonds(0.03, |_| 20.0, 0.3);
+    }
+    w
 }

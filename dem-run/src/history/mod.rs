@@ -57,10 +57,12 @@ mod tests;
 mod writer;
 
 pub use codes::{BondStatus, ContactStatus, RuptureMode, WallDrive, WallKind};
+pub(crate) use error::reason;
 pub use error::{HistoryError, Result};
 pub use reader::{History, Series};
 pub use schema::SCHEMA_VERSION;
 pub use writer::Writer;
+pub(crate) use writer::partial;
 
 /// What a history will hold: everything that is known before the first step. Lengths: see each field.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -58,8 +58,8 @@ impl Writer {
         if path.exists() && !overwrite {
             return Err(HistoryError::Exists { path: path.into() });
         }
-        let part = partial(path)?;
         let io = |doing| move |source| HistoryError::Io { path: path.into(), doing, source };
+        let part = partial(path).map_err(io("create"))?;
         // HDF5 would not say why; the operating system does
         std::fs::File::create(&part).map_err(io("create"))?;
         let made = Self::build(path, &part, layout)
@@ -241,11 +241,10 @@ fn check_layout(layout: &Layout) -> Result<()> {
     Ok(())
 }
 
-/// The name under which the file is made: in the same folder, so that the move is atomic.
-fn partial(path: &Path) -> Result<PathBuf> {
+/// The name under which a file is made: in the same folder, so that the move is atomic.
+pub(crate) fn partial(path: &Path) -> std::io::Result<PathBuf> {
     let Some(name) = path.file_name().filter(|_| !path.is_dir()) else {
-        let source = std::io::Error::new(std::io::ErrorKind::IsADirectory, "it is a folder, give a file name");
-        return Err(HistoryError::Io { path: path.into(), doing: "create", source });
+        return Err(std::io::Error::new(std::io::ErrorKind::IsADirectory, "it is a folder, give a file name"));
     };
     Ok(path.with_file_name(format!(".{}.{}.part", name.to_string_lossy(), std::process::id())))
 }

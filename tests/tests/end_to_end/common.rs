@@ -36,6 +36,11 @@ pub fn config(name: &str) -> String {
     root().join("configs").join(name).to_str().expect("UTF-8").to_string()
 }
 
+/// The folder of the collection of contact problems.
+pub fn problems() -> PathBuf {
+    root().join("tests/problems")
+}
+
 /// The path of a program. Cargo knows the programs of a test's own package only, so it is asked to build these two,
 /// in release, as README does: the compression takes seconds there, and minutes in the profile of the tests.
 pub fn program(name: &str) -> &'static Path {

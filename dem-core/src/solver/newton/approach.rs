@@ -7,10 +7,8 @@
 
 use super::inner::Iterate;
 use super::rows::{Padded, Rows};
-use super::{Newton, STALL_SWEEPS, load_change, swept, write_back};
-use crate::dim::Dim;
-use crate::problem::ContactProblem;
-use crate::problem::residual::residual;
+use super::solvable::Solvable;
+use super::{Newton, STALL_SWEEPS, load_change};
 
 /// How much smaller the first penalty is, and by what it grows.
 const SOFT: f64 = 1e7;
@@ -30,14 +28,9 @@ pub(super) struct Found {
 
 impl Newton {
     /// Reactions that meet the tolerance, from those at hand; none where they do not come within the iterations.
-    pub(super) fn approach<D: Dim>(
-        &mut self,
-        problem: &mut ContactProblem<D>,
-        base: &Rows,
-        iterations: &mut u64,
-    ) -> Option<Found> {
+    pub(super) fn approach(&mut self, problem: &mut impl Solvable, base: &Rows, iterations: &mut u64) -> Option<Found> {
         let mut rows = base.clone();
-        let mut reactions = swept(problem, &rows, STALL_SWEEPS);
+        let mut reactions = problem.swept(&rows, STALL_SWEEPS);
         let mut state = Iterate::from_reactions(&rows, &reactions);
         rows.soften(SOFT);
         let (mut level, mut made_in_all, mut last_error) = (SOFT, 0, f64::INFINITY);
@@ -63,9 +56,9 @@ impl Newton {
             }
             let load_error = load_change(&rows, &state);
             reactions.clone_from(&state.reactions);
-            write_back(problem, &reactions, &rows);
+            problem.write_back(&reactions, &rows);
             problem.velocities_from_reactions();
-            let error = residual(problem);
+            let error = problem.residual();
             if error <= self.settings.tolerance {
                 let enough = load_error <= self.settings.load_tolerance || level <= 1.0;
                 if enough || made_in_all >= MOST {

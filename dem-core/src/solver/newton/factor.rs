@@ -1,19 +1,28 @@
-//! The symmetric matrix I + Σ H̃ A H̃ᵀ of a Newton step and its sparse Cholesky factor, kept as a preconditioner.
+//! The symmetric matrix I + Σ H̃ A H̃ᵀ of a Newton step and its Cholesky factor, kept as a preconditioner: sparse where
+//! rows come from pairs of bodies, dense where they come from the factor of a matrix.
 
 use super::rows::{Operator, Rows};
 use faer::prelude::Solve;
 use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
 use faer::sparse::{Argsort, Pair, SparseColMat, SymbolicSparseColMat};
-use faer::{MatMut, Side};
+use faer::{Mat, MatMut, Side};
 
 /// A factor, and the pattern that it was made for.
 #[derive(Default)]
 pub(super) struct Factor {
     pattern: Option<Pattern>,
-    numeric: Option<Llt<usize, f64>>,
+    numeric: Option<Numeric>,
     /// Numeric factorisations so far.
     pub made: u64,
 }
+
+enum Numeric {
+    Sparse(Llt<usize, f64>),
+    Dense(faer::linalg::solvers::Llt<f64>),
+}
+
+/// Most unknowns that two bodies have; a contact with more has rows from the factor of a matrix.
+const PAIR: usize = 12;
 
 struct Pattern {
     /// Blocks of the contact graph: first unknowns and counts of the two nodes of each contact.
@@ -27,12 +36,22 @@ struct Pattern {
 impl Factor {
     /// Whether there is a factor for this many unknowns.
     pub fn serves(&self, unknowns: usize) -> bool {
-        self.numeric.is_some() && self.pattern.as_ref().is_some_and(|p| p.unknowns == unknowns)
+        match &self.numeric {
+            None => false,
+            Some(Numeric::Sparse(_)) => self.pattern.as_ref().is_some_and(|p| p.unknowns == unknowns),
+            Some(Numeric::Dense(factor)) => factor.L().nrows() == unknowns,
+        }
     }
 
     /// Factorise I + Σ H̃ A H̃ᵀ for these (symmetric) operators; false if it is not positive definite to rounding.
     pub fn renew(&mut self, rows: &Rows, operators: &[Option<Operator>]) -> bool {
         self.numeric = None;
+        if rows.list.iter().any(|r| r.count[0] + r.count[1] > PAIR) {
+            self.made += 1;
+            let matrix = dense(rows, operators);
+            self.numeric = faer::linalg::solvers::Llt::new(matrix.as_ref(), Side::Lower).ok().map(Numeric::Dense);
+            return self.numeric.is_some();
+        }
         let blocks: Vec<_> = rows.list.iter().map(|r| (r.at, r.count)).collect();
         let known = self.pattern.as_ref().is_some_and(|p| p.unknowns == rows.unknowns && p.blocks == blocks);
         if !known {
@@ -44,15 +63,19 @@ impl Factor {
             return false;
         };
         self.made += 1;
-        self.numeric = Llt::try_new_with_symbolic(pattern.symbolic.clone(), matrix.as_ref(), Side::Lower).ok();
+        let factor = Llt::try_new_with_symbolic(pattern.symbolic.clone(), matrix.as_ref(), Side::Lower);
+        self.numeric = factor.ok().map(Numeric::Sparse);
         self.numeric.is_some()
     }
 
     /// x ← (L Lᵀ)⁻¹ x.
     pub fn solve(&self, x: &mut [f64]) {
-        if let Some(factor) = &self.numeric {
-            let n = x.len();
-            factor.solve_in_place(MatMut::from_column_major_slice_mut(x, n, 1));
+        let n = x.len();
+        let x = MatMut::from_column_major_slice_mut(x, n, 1);
+        match &self.numeric {
+            None => {}
+            Some(Numeric::Sparse(factor)) => factor.solve_in_place(x),
+            Some(Numeric::Dense(factor)) => factor.solve_in_place(x),
         }
     }
 }
@@ -108,4 +131,29 @@ fn values(rows: &Rows, operators: &[Option<Operator>]) -> Vec<f64> {
         });
     }
     values
+}
+
+/// The whole matrix, for rows over the same unknowns.
+fn dense(rows: &Rows, operators: &[Option<Operator>]) -> Mat<f64> {
+    let n = rows.unknowns;
+    let height: usize = rows.list.iter().map(|row| row.rows.len()).sum();
+    // H̃ᵀ of all rows, and A H̃ᵀ
+    let mut h = Mat::<f64>::zeros(n, height);
+    let mut pulled = Mat::<f64>::zeros(n, height);
+    let mut first = 0;
+    for (row, operator) in rows.list.iter().zip(operators) {
+        for (k, place) in row.rows.iter().enumerate() {
+            for c in 0..n {
+                h[(c, first + k)] = rows.coefficients[row.start + k * n + c];
+            }
+            let Some(a) = operator else { continue };
+            for (l, other) in row.rows.iter().enumerate() {
+                for c in 0..n {
+                    pulled[(c, first + k)] += a.entry(*place, *other) * rows.coefficients[row.start + l * n + c];
+                }
+            }
+        }
+        first += row.rows.len();
+    }
+    Mat::<f64>::identity(n, n) + h * pulled.transpose()
 }

@@ -18,21 +18,24 @@
 //! Newton); Olsen & Kamrin, arXiv 1805.07437 (the stiff limit).
 
 mod approach;
+mod assembled;
 mod corrector;
 mod factor;
 mod inner;
 mod krylov;
 mod rows;
+mod solvable;
 
 use super::gauss_seidel::MEMORY;
-use super::{ContactSolver, GaussSeidel, GaussSeidelSettings, SolveReport, SolveStatus, Work, sweep};
-use crate::contact::{Law, Local, LocalSolve};
-use crate::dim::{Dim, Vect, resized};
-use crate::problem::residual::residual;
-use crate::problem::{ContactProblem, Group};
+use super::{ContactSolver, GaussSeidelSettings, SolveReport, SolveStatus, Work};
+use crate::contact::{Local, LocalSolve};
+use crate::dim::Dim;
+use crate::problem::ContactProblem;
+use crate::problem::assembled::Assembled;
 use factor::Factor;
 use inner::{Iterate, norm2};
-use rows::{Padded, Row, Rows, padded};
+use rows::{Padded, Rows};
+use solvable::Solvable;
 
 pub use rows::StiffnessRatio;
 
@@ -116,13 +119,9 @@ impl Newton {
     }
 
     /// Gauss–Seidel from the impulses at hand, up to what is accepted. It cannot tell its load error.
-    fn swept_to_the_end<D: Dim>(&self, problem: &mut ContactProblem<D>, iterations: u64) -> SolveReport {
+    fn swept_to_the_end(&self, problem: &mut impl Solvable, iterations: u64) -> SolveReport {
         let NewtonSettings { tolerance, accept, .. } = self.settings;
-        let mut sum: f64 = 0.0;
-        problem.nodes.all.iter().for_each(|n| sum += n.velocity.dot(&n.velocity) + n.spin.dot(&n.spin));
-        if !sum.is_finite() {
-            problem.forget_reactions();
-        }
+        problem.forget_what_is_not_finite();
         let settings = GaussSeidelSettings {
             local: LocalSolve::Exact,
             tolerance: accept,
@@ -130,7 +129,7 @@ impl Newton {
             max_sweeps: MOST_SWEEPS,
             acceleration: MEMORY,
         };
-        let swept = GaussSeidel::new(settings).solve(problem);
+        let swept = problem.gauss_seidel(settings);
         let status =
             if swept.residual <= tolerance { swept.status } else { swept.status.at_best(SolveStatus::Accepted) };
         SolveReport { status, work: swept.work + self.work(iterations), ..swept }
@@ -154,9 +153,9 @@ impl Newton {
 
     /// Proximal rounds at the largest penalty, each begun with the active set of `guess`; none if an inner problem is
     /// not solved: the problem then holds the reactions of the last one that was.
-    fn rounds<D: Dim>(
+    fn rounds(
         &mut self,
-        problem: &mut ContactProblem<D>,
+        problem: &mut impl Solvable,
         rows: &mut Rows,
         guess: &mut Vec<Padded>,
         iterations: &mut u64,
@@ -169,14 +168,14 @@ impl Newton {
             if !solved {
                 return None;
             }
-            write_back(problem, &state.reactions, rows);
+            problem.write_back(&state.reactions, rows);
             problem.velocities_from_reactions();
             // rounds that shorten the error by c leave c/(1 − c) of the last change
             let change = load_change(rows, &state);
             let shrinkage = (change / last_change).min(0.5);
             let load_error = change * shrinkage / (1.0 - shrinkage);
             last_change = change;
-            let error = residual(problem);
+            let error = problem.residual();
             rows.list.iter_mut().zip(&state.reactions).for_each(|(row, r)| row.multiplier = *r);
             *guess = state.reactions;
             let done = error <= self.settings.tolerance && load_error <= self.settings.load_tolerance;
@@ -195,19 +194,30 @@ impl Newton {
 
 impl<D: Dim> ContactSolver<D> for Newton {
     fn solve(&mut self, problem: &mut ContactProblem<D>) -> SolveReport {
+        self.iterate(problem)
+    }
+}
+
+impl Newton {
+    /// Solve a problem with its matrix, from the reactions that it holds.
+    pub fn solve_assembled(&mut self, problem: &mut Assembled) -> SolveReport {
+        self.iterate(problem)
+    }
+
+    fn iterate(&mut self, problem: &mut impl Solvable) -> SolveReport {
         problem.velocities_from_reactions();
         self.made_before = self.factor.made;
         if self.rest > 0 {
             self.rest -= 1;
             return self.swept_to_the_end(problem, 0);
         }
-        let rows = Rows::of(problem, KAPPA, self.settings.stiffness);
+        let rows = problem.rows(KAPPA, self.settings.stiffness);
         if rows.unknowns == 0 || rows.list.is_empty() {
-            return self.report(0, residual(problem), 0.0);
+            return self.report(0, problem.residual(), 0.0);
         }
         // the reactions that the problem brought along, bettered by some sweeps, show which contacts are active
         let cold = rows.list.iter().all(|row| row.multiplier.n == row.shift);
-        let mut guess = swept(problem, &rows, if cold { COLD_SWEEPS } else { SWEEPS });
+        let mut guess = problem.swept(&rows, if cold { COLD_SWEEPS } else { SWEEPS });
         let mut iterations = 0;
         for stall in 0.. {
             let mut rows = self.started(&rows);
@@ -218,10 +228,10 @@ impl<D: Dim> ContactSolver<D> for Newton {
             // the active set runs in circles: sweeps from here show another, or those from nothing
             self.renew = true;
             guess = match stall {
-                0 => swept(problem, &rows, STALL_SWEEPS),
+                0 => problem.swept(&rows, STALL_SWEEPS),
                 1 => {
                     problem.forget_reactions();
-                    swept(problem, &rows, COLD_SWEEPS)
+                    problem.swept(&rows, COLD_SWEEPS)
                 }
                 _ => break,
             };
@@ -231,9 +241,9 @@ impl<D: Dim> ContactSolver<D> for Newton {
             guess.clone_from(&found.reactions);
             let report = self.rounds(problem, &mut self.started(&rows), &mut guess, &mut iterations);
             return report.unwrap_or_else(|| {
-                write_back(problem, &found.reactions, &rows);
+                problem.write_back(&found.reactions, &rows);
                 problem.velocities_from_reactions();
-                self.report(iterations, residual(problem), found.load_error)
+                self.report(iterations, problem.residual(), found.load_error)
             });
         }
         // steps that are alike will fail alike
@@ -265,35 +275,4 @@ fn load_change(rows: &Rows, state: &Iterate) -> f64 {
     }
     let (change, total) = (norm2(&change).sqrt(), norm2(&total).sqrt());
     if change == 0.0 { 0.0 } else { change / total }
-}
-
-/// The reactions of the problem after some sweeps of Gauss–Seidel, shifted.
-fn swept<D: Dim>(problem: &mut ContactProblem<D>, rows: &Rows, sweeps: usize) -> Vec<Padded> {
-    problem.velocities_from_reactions();
-    for _ in 0..sweeps {
-        sweep(problem, LocalSolve::Exact);
-    }
-    let mut reactions = Vec::with_capacity(rows.list.len());
-    reactions.extend(problem.bonded.iter().map(|c| padded(c.r)));
-    reactions.extend(problem.elastic.iter().map(|c| padded(c.r)));
-    reactions.extend(problem.dry.iter().map(|c| padded(c.r)));
-    reactions.extend(problem.frictionless.iter().map(|c| padded(c.r)));
-    reactions.iter_mut().zip(&rows.list).for_each(|(r, row)| r.n += row.shift);
-    reactions
-}
-
-/// Write the reactions back to the problem.
-fn write_back<D: Dim>(problem: &mut ContactProblem<D>, reactions: &[Padded], rows: &Rows) {
-    fn group<D: Dim, L: Law>(group: &mut Group<D, L>, list: &[Padded], rows: &[Row]) {
-        for ((c, r), row) in group.iter_mut().zip(list).zip(rows) {
-            c.r = Local { n: r.n - row.shift, t: resized(r.t), m: resized(r.m) };
-        }
-    }
-    let bonded = problem.bonded.len();
-    let elastic = bonded + problem.elastic.len();
-    let dry = elastic + problem.dry.len();
-    group(&mut problem.bonded, &reactions[..bonded], &rows.list[..bonded]);
-    group(&mut problem.elastic, &reactions[bonded..elastic], &rows.list[bonded..elastic]);
-    group(&mut problem.dry, &reactions[elastic..dry], &rows.list[elastic..dry]);
-    group(&mut problem.frictionless, &reactions[dry..], &rows.list[dry..]);
 }

@@ -135,7 +135,7 @@ const DRY_3D: &[usize] = &[0, 1, 2];
 const BOND_2D: &[usize] = &[0, 1, 3];
 const BOND_3D: &[usize] = &[0, 1, 2, 3, 4];
 
-fn places(tangents: usize, bends: usize) -> &'static [usize] {
+pub(super) fn places(tangents: usize, bends: usize) -> &'static [usize] {
     match (tangents, bends) {
         (0, _) => FRICTIONLESS,
         (1, 0) => DRY_2D,

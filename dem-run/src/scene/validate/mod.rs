@@ -91,7 +91,7 @@ fn bonds(report: &mut Report, bonds: &Bonds) {
         Some(Stiffness::Young(young)) => {
             report.positive("bonds.stiffness.young.modulus", young.modulus, "Pa");
             let (path, ratio) = ("bonds.stiffness.young.poisson_ratio", young.poisson_ratio);
-            report.range(path, ratio, ratio > -1.0 && ratio <= 0.5, "a number above -1, at most 0.5".into());
+            report.range(path, ratio, ratio > -1.0 && ratio <= 0.5, "a number above -1, at most 0.5".to_string());
         }
         None => {}
     }

@@ -1,0 +1,534 @@
+//! The contact problem with its matrix: u = W r̂ + q, and a cone for each contact. What other codes exchange and solve.
+//!
+//! K ∋ r̂ ⊥ ũ ∈ K*, with r̂ = r + s n: the shift of the cohesion is inside r̂ and q, so the cones all stand at the origin.
+//! All contacts have the same rows; one that has fewer by its law has zeros in W and q there, and coefficients that are
+//! zero. Moments are divided by the mean diameter of the pair and relative spins multiplied by it, so that all rows
+//! share a unit (N s, m/s) and the coefficients of t and m are plain numbers.
+//!
+//! W is made from the maps H and Hᵀ of the matrix-free problem, column by column: what a unit impulse does to the
+//! relative velocities around it. See docs/theory/fclib.md.
+
+use super::{Contact, ContactProblem, Link, Nodes, Visitor};
+use crate::contact::law::predict_correct;
+use crate::contact::{Cone, Law, Local, Weights};
+use crate::dim::{Dim, Vect, resized};
+use nalgebra::SVector;
+use thiserror::Error;
+
+/// Rows of one contact, padded to the most that any has: n, two tangential, two bending.
+pub(crate) type Padded = Local<SVector<f64, 2>, SVector<f64, 2>>;
+
+/// Relative asymmetry of W that is put down to rounding.
+const ASYMMETRY: f64 = 1e-6;
+/// Relative rounding of the natural map that counts as zero.
+const ROUNDING: f64 = 64.0 * f64::EPSILON;
+
+/// The rows that every contact of an assembled problem has, in the order n, t…, m….
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ContactRows {
+    /// Tangential rows: 1 in the plane, 2 in space.
+    pub tangents: usize,
+    /// Bending rows: none, or as many as tangential ones.
+    pub bends: usize,
+}
+
+/// A matrix of square blocks, one row and one column of them for each contact; diagonal blocks are always there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BlockMatrix {
+    size: usize,
+    /// Where the blocks of each contact's row start, and the end.
+    start: Vec<usize>,
+    /// The contact of each block's column, increasing within a row.
+    column: Vec<usize>,
+    /// The blocks, each row by row.
+    value: Vec<f64>,
+}
+
+/// What an assembled problem is made of. Lengths: C contacts of M rows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parts {
+    /// The rows of each contact.
+    pub rows: ContactRows,
+    /// W (1/kg), C × C blocks of M × M.
+    pub matrix: BlockMatrix,
+    /// q (m/s), C × M.
+    pub q: Vec<f64>,
+    /// Coefficients of the tangential rows (–), C.
+    pub mu: Vec<f64>,
+    /// Coefficients of the bending rows, moments being divided by the mean diameter (–), C.
+    pub nu: Vec<f64>,
+    /// Whether the flow of a contact is normal to its cone, C.
+    pub associated: Vec<bool>,
+    /// What r̂ is above the reaction r in the normal row (N s), C; zero where it is not known.
+    pub shift: Vec<f64>,
+    /// Euclidean norm of the applied impulses (N s), one scale of the residual; zero where it is not known.
+    pub applied: f64,
+}
+
+/// A contact problem with its matrix, and the shifted reactions that are to solve it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Assembled {
+    parts: Parts,
+    /// Shifted reactions r̂ (N s), C × M.
+    pub r: Vec<f64>,
+}
+
+/// Why parts do not make a problem.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum AssemblyError {
+    /// An array has another length.
+    #[error("{array} has {found} values instead of {expected}")]
+    Length {
+        /// The array.
+        array: &'static str,
+        /// Its length.
+        found: usize,
+        /// The length that fits W.
+        expected: usize,
+    },
+    /// A number that is not finite, or a coefficient below zero.
+    #[error("{array} is {value} at index {index}, it must be {allowed}")]
+    Value {
+        /// The array.
+        array: &'static str,
+        /// Where in it.
+        index: usize,
+        /// What stands there.
+        value: f64,
+        /// What may stand there.
+        allowed: &'static str,
+    },
+    /// W is not symmetric.
+    #[error("W is not symmetric: {entry:e} in row {row} and column {column}, {mirrored:e} in the place opposite")]
+    Asymmetric {
+        /// Row of the entry.
+        row: usize,
+        /// Its column.
+        column: usize,
+        /// The entry.
+        entry: f64,
+        /// The entry with row and column exchanged.
+        mirrored: f64,
+    },
+}
+
+impl ContactRows {
+    /// How many rows a contact has: M.
+    #[must_use]
+    pub fn count(self) -> usize {
+        1 + self.tangents + self.bends
+    }
+
+    /// The rows of one contact in a slice of M numbers.
+    #[inline]
+    pub(crate) fn padded(self, rows: &[f64]) -> Padded {
+        let mut out = Padded { n: rows[0], ..Padded::zero() };
+        for k in 0..self.tangents {
+            out.t[k] = rows[1 + k];
+        }
+        for k in 0..self.bends {
+            out.m[k] = rows[1 + self.tangents + k];
+        }
+        out
+    }
+
+    /// Write the rows of one contact to a slice of M numbers.
+    #[inline]
+    pub(crate) fn write(self, r: &Padded, rows: &mut [f64]) {
+        rows[0] = r.n;
+        rows[1..=self.tangents].copy_from_slice(&r.t.as_slice()[..self.tangents]);
+        rows[1 + self.tangents..].copy_from_slice(&r.m.as_slice()[..self.bends]);
+    }
+}
+
+impl BlockMatrix {
+    /// From entries of the full matrix, (row, column, value); those that share a place add up.
+    ///
+    /// # Panics
+    /// An entry lies outside the `contacts` × `size` rows or columns.
+    #[must_use]
+    pub fn from_entries(contacts: usize, size: usize, entries: &[(usize, usize, f64)]) -> Self {
+        let block = |entry: &(usize, usize, f64)| (entry.0 / size, entry.1 / size);
+        let mut places: Vec<(usize, usize)> = entries.iter().map(block).collect();
+        places.extend((0..contacts).map(|c| (c, c)));
+        places.sort_unstable();
+        places.dedup();
+        assert!(places.iter().all(|p| p.0 < contacts && p.1 < contacts), "an entry outside of the matrix");
+        let mut start = vec![0; contacts + 1];
+        for place in &places {
+            start[place.0 + 1] += 1;
+        }
+        for c in 0..contacts {
+            start[c + 1] += start[c];
+        }
+        let column: Vec<usize> = places.iter().map(|p| p.1).collect();
+        let mut matrix = Self { size, value: vec![0.0; column.len() * size * size], start, column };
+        for entry in entries {
+            let (row, column) = block(entry);
+            if let Some(at) = matrix.find(row, column) {
+                matrix.value[at + (entry.0 % size) * size + entry.1 % size] += entry.2;
+            }
+        }
+        matrix
+    }
+
+    /// Number of contacts.
+    #[must_use]
+    pub fn contacts(&self) -> usize {
+        self.start.len() - 1
+    }
+
+    /// Rows of a block.
+    #[must_use]
+    pub fn size(&self) -> usize {
+        self.size
+    }
+
+    /// Where the values of a block start.
+    fn find(&self, row: usize, column: usize) -> Option<usize> {
+        let columns = &self.column[self.start[row]..self.start[row + 1]];
+        let place = columns.binary_search(&column).ok()?;
+        Some((self.start[row] + place) * self.size * self.size)
+    }
+
+    /// The blocks in the row of a contact: their columns' contacts, and their values row by row.
+    pub fn row(&self, contact: usize) -> impl Iterator<Item = (usize, &[f64])> {
+        let (range, area) = (self.start[contact]..self.start[contact + 1], self.size * self.size);
+        range.map(move |k| (self.column[k], &self.value[k * area..(k + 1) * area]))
+    }
+
+    /// The diagonal block of a contact, row by row.
+    #[must_use]
+    pub fn diagonal(&self, contact: usize) -> &[f64] {
+        let at = self.find(contact, contact).unwrap_or_default();
+        &self.value[at..at + self.size * self.size]
+    }
+
+    /// Every entry that is not zero, (row, column, value), by row and column.
+    #[must_use]
+    pub fn entries(&self) -> Vec<(usize, usize, f64)> {
+        let size = self.size;
+        let mut entries = Vec::new();
+        for row in 0..self.contacts() * size {
+            for (column, block) in self.row(row / size) {
+                let line = &block[(row % size) * size..][..size];
+                let there = line.iter().enumerate().filter(|(_, w)| **w != 0.0);
+                entries.extend(there.map(|(k, w)| (row, column * size + k, *w)));
+            }
+        }
+        entries
+    }
+
+    /// Rows of one contact of the product with `x`, added to `out`.
+    #[inline]
+    pub(crate) fn multiply_row(&self, contact: usize, x: &[f64], out: &mut [f64]) {
+        let size = self.size;
+        for (column, block) in self.row(contact) {
+            let x = &x[column * size..(column + 1) * size];
+            for (out, row) in out.iter_mut().zip(block.chunks_exact(size)) {
+                *out += row.iter().zip(x).map(|(w, x)| w * x).sum::<f64>();
+            }
+        }
+    }
+
+    fn entry(&self, row: usize, column: usize) -> f64 {
+        let size = self.size;
+        self.find(row / size, column / size).map_or(0.0, |at| self.value[at + (row % size) * size + column % size])
+    }
+}
+
+impl Parts {
+    fn check(&self) -> Result<(), AssemblyError> {
+        let contacts = self.matrix.contacts();
+        let length = |array, found, expected| match found == expected {
+            true => Ok(()),
+            false => Err(AssemblyError::Length { array, found, expected }),
+        };
+        length("block of W", self.matrix.size, self.rows.count())?;
+        length("q", self.q.len(), contacts * self.rows.count())?;
+        length("mu", self.mu.len(), contacts)?;
+        length("mu_r", self.nu.len(), contacts)?;
+        length("associated", self.associated.len(), contacts)?;
+        length("shift", self.shift.len(), contacts)?;
+        let values = |array, values: &[f64], least: f64, allowed| {
+            let wrong = values.iter().position(|x| !x.is_finite() || *x < least);
+            wrong.map_or(Ok(()), |index| Err(AssemblyError::Value { array, index, value: values[index], allowed }))
+        };
+        let (finite, coefficient) = ("finite", "finite and not below zero");
+        values("W", &self.matrix.value, f64::NEG_INFINITY, finite)?;
+        values("q", &self.q, f64::NEG_INFINITY, finite)?;
+        values("mu", &self.mu, 0.0, coefficient)?;
+        values("mu_r", &self.nu, 0.0, coefficient)?;
+        values("shift", &self.shift, 0.0, coefficient)?;
+        values("applied", &[self.applied], 0.0, coefficient)?;
+        let largest = self.matrix.value.iter().fold(0.0, |most: f64, w| most.max(w.abs()));
+        for (row, column, entry) in self.matrix.entries() {
+            let mirrored = self.matrix.entry(column, row);
+            if (entry - mirrored).abs() > ASYMMETRY * largest {
+                return Err(AssemblyError::Asymmetric { row, column, entry, mirrored });
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Assembled {
+    /// A problem from its parts, with reactions that are zero.
+    ///
+    /// # Errors
+    /// [`AssemblyError`]: lengths that do not fit together, numbers that are not finite, coefficients below zero, a
+    /// matrix that is not symmetric.
+    pub fn new(parts: Parts) -> Result<Self, AssemblyError> {
+        parts.check()?;
+        Ok(Self { r: vec![0.0; parts.q.len()], parts })
+    }
+
+    /// What the problem is made of.
+    #[must_use]
+    pub fn parts(&self) -> &Parts {
+        &self.parts
+    }
+
+    /// Number of contacts C.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.parts.mu.len()
+    }
+
+    /// Whether there is no contact at all.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The relative velocities u = W r̂ + q (m/s), C × M.
+    #[must_use]
+    pub fn velocities(&self) -> Vec<f64> {
+        let (mut u, size) = (self.parts.q.clone(), self.parts.rows.count());
+        for (c, u) in u.chunks_exact_mut(size).enumerate() {
+            self.parts.matrix.multiply_row(c, &self.r, u);
+        }
+        u
+    }
+
+    /// The cone of a contact.
+    #[must_use]
+    pub fn cone(&self, contact: usize) -> Cone {
+        Cone { mu: self.parts.mu[contact], nu: self.parts.nu[contact] }
+    }
+
+    /// The shifted reaction of a contact.
+    #[inline]
+    pub(crate) fn reaction(&self, contact: usize) -> Padded {
+        let size = self.parts.rows.count();
+        self.parts.rows.padded(&self.r[contact * size..(contact + 1) * size])
+    }
+
+    /// The relative velocity of a contact.
+    #[inline]
+    pub(crate) fn velocity(&self, contact: usize) -> Padded {
+        let (rows, size) = (self.parts.rows, self.parts.rows.count());
+        let mut u = [0.0; 5];
+        u[..size].copy_from_slice(&self.parts.q[contact * size..(contact + 1) * size]);
+        self.parts.matrix.multiply_row(contact, &self.r, &mut u[..size]);
+        rows.padded(&u[..size])
+    }
+
+    /// D of each contact: the largest diagonal entry of its block (1/kg); of the others, where nothing yields to it.
+    pub(crate) fn scales(&self) -> Vec<f64> {
+        let size = self.parts.rows.count();
+        let largest = |block: &[f64]| (0..size).map(|k| block[k * size + k]).fold(0.0, f64::max);
+        let own: Vec<f64> = (0..self.len()).map(|c| largest(self.parts.matrix.diagonal(c))).collect();
+        let most = own.iter().copied().fold(0.0, f64::max);
+        let some = if most > 0.0 { most } else { 1.0 };
+        own.into_iter().map(|d| if d > 0.0 { d } else { some }).collect()
+    }
+
+    /// Natural map P_K(r̂ − γ ũ) − r̂ of a contact.
+    #[inline]
+    pub(crate) fn correction(&self, contact: usize, gamma: f64, r: Padded, u: Padded) -> Padded {
+        predict_correct(self.cone(contact), 0.0, !self.parts.associated[contact], gamma, r, u)
+    }
+
+    /// The residual of [`super::residual`], from the matrix (–).
+    ///
+    /// The reactions in its denominator are without their shift where that is known. Not a number stays not a number.
+    #[must_use]
+    pub fn residual(&self) -> f64 {
+        let (mut map, mut reaction, mut rounding) = (0.0, 0.0, 0.0);
+        for (c, d) in self.scales().into_iter().enumerate() {
+            let (r, u) = (self.reaction(c), self.velocity(c));
+            let change = self.correction(c, 1.0 / d, r, u);
+            let own = Local { n: r.n - self.parts.shift[c], ..r };
+            map += change.dot(&change);
+            reaction += own.dot(&own);
+            rounding += self.summands(c) / (d * d);
+        }
+        let scale = f64::sqrt(reaction).max(self.parts.applied);
+        if map.sqrt() <= ROUNDING * rounding.sqrt() { 0.0 } else { map.sqrt() / scale }
+    }
+
+    /// Sum of the squares of what is added up to the velocity of a contact: what that is rounded against.
+    fn summands(&self, contact: usize) -> f64 {
+        let size = self.parts.rows.count();
+        let mut sum: f64 = self.parts.q[contact * size..(contact + 1) * size].iter().map(|q| q * q).sum();
+        for (column, block) in self.parts.matrix.row(contact) {
+            let r = &self.r[column * size..(column + 1) * size];
+            for row in block.chunks_exact(size) {
+                sum += row.iter().zip(r).map(|(w, r)| (w * r) * (w * r)).sum::<f64>();
+            }
+        }
+        sum
+    }
+
+    /// The error as Siconos measures it, for comparison (–): the natural map with ρ = 1, over the largest of the norms
+    /// of q, r̂ and u. It depends on the units.
+    #[must_use]
+    pub fn siconos_error(&self) -> f64 {
+        let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let mut map = 0.0;
+        for c in 0..self.len() {
+            let change = self.correction(c, 1.0, self.reaction(c), self.velocity(c));
+            map += change.dot(&change);
+        }
+        let scale = norm(&self.parts.q).max(norm(&self.r)).max(norm(&self.velocities()));
+        if map == 0.0 { 0.0 } else { map.sqrt() / scale }
+    }
+
+    /// The problem `problem` with its matrix, in its shifted reactions, as they stand.
+    #[must_use]
+    pub fn of<D: Dim>(problem: &ContactProblem<D>) -> Self {
+        let mut list = List(Vec::with_capacity(problem.len()));
+        problem.visit(&mut list);
+        let List(list) = list;
+        let bends = if problem.bonded.is_empty() && problem.elastic.is_empty() { 0 } else { D::N - 1 };
+        let rows = ContactRows { tangents: D::N - 1, bends };
+        let matrix = delassus(&problem.nodes, &list, rows);
+        let mut nodes = problem.nodes.clone();
+        for (node, free) in nodes.all.iter_mut().zip(&problem.free) {
+            (node.velocity, node.spin) = *free;
+        }
+        let size = rows.count();
+        let (mut q, mut r) = (vec![0.0; list.len() * size], vec![0.0; list.len() * size]);
+        let mut shifts = vec![0.0; list.len() * size];
+        for (c, item) in list.iter().enumerate() {
+            let at = c * size..(c + 1) * size;
+            let mut u = item.velocity(&nodes);
+            u.n += item.bias;
+            // an elastic bond: u + C (r − r₀), with C in the matrix
+            u = u - item.compliance.times(&item.carried);
+            rows.write(&u, &mut q[at.clone()]);
+            rows.write(&Local { n: item.r.n + item.shift, ..item.r }, &mut r[at]);
+            shifts[c * size] = -item.shift;
+        }
+        // u = W (r̂ − s n) + q
+        for (c, q) in q.chunks_exact_mut(size).enumerate() {
+            matrix.multiply_row(c, &shifts, q);
+        }
+        let parts = Parts {
+            rows,
+            matrix,
+            q,
+            mu: list.iter().map(|item| item.cone.mu).collect(),
+            nu: list.iter().map(|item| item.cone.nu).collect(),
+            associated: list.iter().map(|item| item.associated).collect(),
+            shift: list.iter().map(|item| item.shift).collect(),
+            applied: problem.applied,
+        };
+        Self { parts, r }
+    }
+}
+
+fn padded<T: Vect, B: Vect>(r: Local<T, B>) -> Padded {
+    Local { n: r.n, t: resized(r.t), m: resized(r.m) }
+}
+
+/// A contact whatever its law.
+struct Item<D: Dim> {
+    link: Link<D>,
+    arm: f64,
+    tangents: usize,
+    bends: usize,
+    cone: Cone,
+    associated: bool,
+    shift: f64,
+    bias: f64,
+    compliance: Weights,
+    carried: Padded,
+    r: Padded,
+}
+
+struct List<D: Dim>(Vec<Item<D>>);
+
+impl<D: Dim> Visitor<D> for List<D> {
+    fn visit<L: Law>(&mut self, _: &Nodes<D>, c: &Contact<D, L>) {
+        self.0.push(Item {
+            link: c.link,
+            arm: c.law.arm(),
+            tangents: L::T::LEN,
+            bends: L::B::LEN,
+            cone: c.law.cone(),
+            associated: c.law.associated(),
+            shift: c.law.shift(),
+            bias: c.law.bias(),
+            compliance: c.law.compliance(),
+            carried: padded(c.law.carried()),
+            r: padded(c.r),
+        });
+    }
+}
+
+impl<D: Dim> Item<D> {
+    /// The relative velocity, zero in rows that the contact lacks.
+    fn velocity(&self, nodes: &Nodes<D>) -> Padded {
+        let u = nodes.relative_velocity::<D::Tangent, D::Tangent>(&self.link, self.arm);
+        let mut out = Padded { n: u.n, ..Padded::zero() };
+        for k in 0..self.tangents {
+            out.t[k] = u.t[k];
+        }
+        for k in 0..self.bends {
+            out.m[k] = u.m[k];
+        }
+        out
+    }
+}
+
+/// W = Hᵀ M⁻¹ H and the compliance of elastic bonds, column by column.
+fn delassus<D: Dim>(nodes: &Nodes<D>, list: &[Item<D>], rows: ContactRows) -> BlockMatrix {
+    let mut nodes = nodes.clone();
+    for node in &mut nodes.all {
+        (node.velocity, node.spin) = (D::Vector::zero(), D::Spin::zero());
+    }
+    let mut around = vec![Vec::new(); nodes.all.len()];
+    for (c, item) in list.iter().enumerate() {
+        item.link.nodes.iter().for_each(|k| around[*k as usize].push(c));
+    }
+    let yields: Vec<bool> = nodes.all.iter().map(|node| node.inverse_mass > 0.0).collect();
+    let size = rows.count();
+    let mut entries = Vec::new();
+    for (c, item) in list.iter().enumerate() {
+        let moving = item.link.nodes.iter().map(|k| *k as usize).filter(|k| yields[*k]);
+        let mut near: Vec<usize> = moving.flat_map(|k| around[k].iter().copied()).collect();
+        near.sort_unstable();
+        near.dedup();
+        for k in (0..1 + item.tangents).chain(1 + rows.tangents..1 + rows.tangents + item.bends) {
+            let mut unit = [0.0; 5];
+            unit[k] = 1.0;
+            nodes.apply(&item.link, item.arm, rows.padded(&unit[..size]));
+            for &d in &near {
+                let mut u = [0.0; 5];
+                let mut moved = list[d].velocity(&nodes);
+                if d == c {
+                    moved += item.compliance.times(&rows.padded(&unit[..size]));
+                }
+                rows.write(&moved, &mut u[..size]);
+                let there = (0..size).filter(|row| u[*row] != 0.0);
+                entries.extend(there.map(|row| (d * size + row, c * size + k, u[row])));
+            }
+            for node in item.link.nodes.map(|k| k as usize) {
+                (nodes.all[node].velocity, nodes.all[node].spin) = (D::Vector::zero(), D::Spin::zero());
+            }
+        }
+    }
+    BlockMatrix::from_entries(list.len(), size, &entries)
+}

@@ -1,0 +1,121 @@
+//! A problem with its matrix as rows over unknowns: W = L Lᵀ by a pivoted Cholesky factorisation up to the rank, so
+//! that u = L y + q and y = Lᵀ r, as if there were bodies of unit mass behind it. L is full: every contact has as many
+//! coefficients as W has rank.
+
+use super::rows::{Padded, Row, Rows, StiffnessRatio, places};
+use super::solvable::Solvable;
+use crate::contact::{LocalSolve, Weights};
+use crate::problem::assembled::{Assembled, BlockMatrix};
+use crate::solver::assembled::{Sites, gauss_seidel};
+use crate::solver::{GaussSeidelSettings, SolveReport};
+
+/// The columns of L with W = L Lᵀ, up to what rounding leaves of the diagonal.
+fn root(matrix: &BlockMatrix) -> Vec<Vec<f64>> {
+    let n = matrix.contacts() * matrix.size();
+    let mut lines = vec![Vec::new(); n];
+    for (row, column, w) in matrix.entries() {
+        lines[row].push((column, w));
+    }
+    let mut left: Vec<f64> =
+        lines.iter().enumerate().map(|(k, line)| line.iter().find(|e| e.0 == k).map_or(0.0, |e| e.1)).collect();
+    let least = n as f64 * f64::EPSILON * left.iter().copied().fold(0.0, f64::max);
+    let mut columns: Vec<Vec<f64>> = Vec::new();
+    loop {
+        let mut pivot = 0;
+        for k in 1..n {
+            pivot = if left[k] > left[pivot] { k } else { pivot };
+        }
+        if left[pivot] <= least {
+            return columns;
+        }
+        let mut column = vec![0.0; n];
+        lines[pivot].iter().for_each(|(k, w)| column[*k] = *w);
+        for other in &columns {
+            let factor = other[pivot];
+            if factor != 0.0 {
+                column.iter_mut().zip(other).for_each(|(x, l)| *x -= factor * l);
+            }
+        }
+        let scale = 1.0 / left[pivot].sqrt();
+        column.iter_mut().for_each(|x| *x *= scale);
+        left.iter_mut().zip(&column).for_each(|(left, l)| *left -= l * l);
+        // it is eliminated, whatever rounding leaves of it
+        left[pivot] = f64::NEG_INFINITY;
+        columns.push(column);
+    }
+}
+
+impl Solvable for Assembled {
+    fn rows(&self, kappa: f64, ratio: StiffnessRatio) -> Rows {
+        let parts = self.parts();
+        let (rows, size) = (parts.rows, parts.rows.count());
+        let columns = root(&parts.matrix);
+        let rank = columns.len();
+        let normal: f64 = (0..self.len()).map(|c| parts.matrix.diagonal(c)[0]).sum();
+        let soft = normal / (self.len().max(1) as f64 * kappa);
+        let weights = Weights { n: soft, t: soft / ratio.tangential, m: soft / ratio.rolling };
+        // without the shift, u = W r + q
+        let mut shifts = vec![0.0; self.r.len()];
+        (0..self.len()).for_each(|c| shifts[c * size] = parts.shift[c]);
+        let mut out = Rows { unknowns: rank, free: vec![0.0; rank], ..Rows::default() };
+        for c in 0..self.len() {
+            let mut given = parts.q[c * size..(c + 1) * size].to_vec();
+            parts.matrix.multiply_row(c, &shifts, &mut given);
+            out.list.push(Row {
+                at: [0, 0],
+                count: [rank, 0],
+                start: c * size * rank,
+                rows: places(rows.tangents, rows.bends),
+                cone: self.cone(c),
+                associated: parts.associated[c],
+                shift: parts.shift[c],
+                given: rows.padded(&given),
+                weights,
+                multiplier: self.reaction(c),
+                // the compliance of elastic bonds is inside W and q
+                compliance: Weights::default(),
+                carried: Padded::zero(),
+                lag: None,
+                // the trace of the block
+                size: parts.matrix.diagonal(c).iter().step_by(size + 1).sum(),
+            });
+        }
+        out.coefficients = (0..self.r.len()).flat_map(|row| columns.iter().map(move |l| l[row])).collect();
+        out
+    }
+
+    fn velocities_from_reactions(&mut self) {}
+
+    fn residual(&self) -> f64 {
+        self.residual()
+    }
+
+    fn swept(&mut self, _: &Rows, sweeps: usize) -> Vec<Padded> {
+        let sites = Sites::of(self);
+        for _ in 0..sweeps {
+            sites.sweep(self, LocalSolve::Exact);
+        }
+        (0..self.len()).map(|c| self.reaction(c)).collect()
+    }
+
+    fn write_back(&mut self, reactions: &[Padded], _: &Rows) {
+        let (rows, size) = (self.parts().rows, self.parts().rows.count());
+        for (r, out) in reactions.iter().zip(self.r.chunks_exact_mut(size)) {
+            rows.write(r, out);
+        }
+    }
+
+    fn forget_reactions(&mut self) {
+        self.r.fill(0.0);
+    }
+
+    fn forget_what_is_not_finite(&mut self) {
+        if !self.r.iter().all(|r| r.is_finite()) {
+            self.r.iter_mut().for_each(|r| *r = 0.0);
+        }
+    }
+
+    fn gauss_seidel(&mut self, settings: GaussSeidelSettings) -> SolveReport {
+        gauss_seidel(self, &settings)
+    }
+}

@@ -1,0 +1,87 @@
+//! What the Newton solver asks of a problem, matrix-free or with its matrix.
+
+use super::rows::{Padded, Row, Rows, StiffnessRatio, padded};
+use crate::contact::{Law, Local, LocalSolve};
+use crate::dim::{Dim, Vect, resized};
+use crate::problem::residual::residual;
+use crate::problem::{ContactProblem, Group};
+use crate::solver::{ContactSolver, GaussSeidel, GaussSeidelSettings, SolveReport, sweep};
+
+/// A problem that can be put into rows over scaled unknowns, swept and measured.
+pub(super) trait Solvable {
+    /// The problem as rows; ρ is `kappa` over the mean normal entry of W.
+    fn rows(&self, kappa: f64, ratio: StiffnessRatio) -> Rows;
+    /// Set the velocities to what the reactions make of them, free of the rounding of increments.
+    fn velocities_from_reactions(&mut self);
+    /// The residual of the reactions at hand (–).
+    fn residual(&self) -> f64;
+    /// The reactions after some sweeps of Gauss–Seidel, shifted.
+    fn swept(&mut self, rows: &Rows, sweeps: usize) -> Vec<Padded>;
+    /// Take over shifted reactions.
+    fn write_back(&mut self, reactions: &[Padded], rows: &Rows);
+    /// Set the reactions to zero.
+    fn forget_reactions(&mut self);
+    /// Set the reactions to zero if one of them is not finite.
+    fn forget_what_is_not_finite(&mut self);
+    /// Gauss–Seidel from the reactions at hand.
+    fn gauss_seidel(&mut self, settings: GaussSeidelSettings) -> SolveReport;
+}
+
+impl<D: Dim> Solvable for ContactProblem<D> {
+    fn rows(&self, kappa: f64, ratio: StiffnessRatio) -> Rows {
+        Rows::of(self, kappa, ratio)
+    }
+
+    fn velocities_from_reactions(&mut self) {
+        self.velocities_from_reactions();
+    }
+
+    fn residual(&self) -> f64 {
+        residual(self)
+    }
+
+    fn swept(&mut self, rows: &Rows, sweeps: usize) -> Vec<Padded> {
+        self.velocities_from_reactions();
+        for _ in 0..sweeps {
+            sweep(self, LocalSolve::Exact);
+        }
+        let mut reactions = Vec::with_capacity(rows.list.len());
+        reactions.extend(self.bonded.iter().map(|c| padded(c.r)));
+        reactions.extend(self.elastic.iter().map(|c| padded(c.r)));
+        reactions.extend(self.dry.iter().map(|c| padded(c.r)));
+        reactions.extend(self.frictionless.iter().map(|c| padded(c.r)));
+        reactions.iter_mut().zip(&rows.list).for_each(|(r, row)| r.n += row.shift);
+        reactions
+    }
+
+    fn write_back(&mut self, reactions: &[Padded], rows: &Rows) {
+        fn group<D: Dim, L: Law>(group: &mut Group<D, L>, list: &[Padded], rows: &[Row]) {
+            for ((c, r), row) in group.iter_mut().zip(list).zip(rows) {
+                c.r = Local { n: r.n - row.shift, t: resized(r.t), m: resized(r.m) };
+            }
+        }
+        let bonded = self.bonded.len();
+        let elastic = bonded + self.elastic.len();
+        let dry = elastic + self.dry.len();
+        group(&mut self.bonded, &reactions[..bonded], &rows.list[..bonded]);
+        group(&mut self.elastic, &reactions[bonded..elastic], &rows.list[bonded..elastic]);
+        group(&mut self.dry, &reactions[elastic..dry], &rows.list[elastic..dry]);
+        group(&mut self.frictionless, &reactions[dry..], &rows.list[dry..]);
+    }
+
+    fn forget_reactions(&mut self) {
+        self.forget_reactions();
+    }
+
+    fn forget_what_is_not_finite(&mut self) {
+        let mut sum: f64 = 0.0;
+        self.nodes.all.iter().for_each(|n| sum += n.velocity.dot(&n.velocity) + n.spin.dot(&n.spin));
+        if !sum.is_finite() {
+            self.forget_reactions();
+        }
+    }
+
+    fn gauss_seidel(&mut self, settings: GaussSeidelSettings) -> SolveReport {
+        GaussSeidel::new(settings).solve(self)
+    }
+}

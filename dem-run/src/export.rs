@@ -1,0 +1,131 @@
+//! `dem-run export`: the contact problem of one step of a history, in FCLIB's format.
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use dem_core::dim::{D2, D3, Dim};
+use dem_core::problem::assembled::Assembled;
+use dem_core::solver::SolveStatus;
+
+use crate::build::build;
+use crate::fclib::Problem;
+use crate::history::History;
+use crate::progress::{Progress, ProgressMode, StepProgress};
+use crate::run::{RunError, start_threads};
+use crate::scene::{self, Scene};
+use crate::signals::{self, Interrupt};
+
+/// What is exported, and how.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ExportOptions {
+    /// The history whose scene is run again.
+    pub history: PathBuf,
+    /// The step whose problem is written, counted from 1.
+    pub step: u64,
+    /// The file to write.
+    pub output: PathBuf,
+    /// Number of threads; as many as the machine has where it is absent.
+    pub threads: Option<usize>,
+    /// How progress is shown.
+    pub progress: ProgressMode,
+    /// Whether stderr stays silent but for errors.
+    pub quiet: bool,
+}
+
+/// Runs the scene of a history again up to a step and writes that step's problem: the first that it solves, before any
+/// bond breaks in it.
+///
+/// # Errors
+/// [`RunError`]: an unreadable history, a step that the scene does not have, a run that does not come that far.
+pub fn export(options: &ExportOptions) -> Result<(), RunError> {
+    let interrupt = signals::install().map_err(|e| RunError::InputOutput(format!("no handler for Ctrl-C: {e}")))?;
+    start_threads(options.threads)?;
+    let parameters = History::open(&options.history)?.parameters()?;
+    let shown = options.history.display();
+    let scene = scene::from_text(&format!("the scene in {shown}"), &parameters.scene, &[])?;
+    let steps = scene.time.steps();
+    if !(1..=steps).contains(&options.step) {
+        let (step, wrong) = (options.step, "counted from 1");
+        return Err(RunError::Usage(format!(
+            "there is no step {step} in {shown}: its scene has {steps} steps, {wrong}"
+        )));
+    }
+    let (version, revision) = (env!("CARGO_PKG_VERSION"), option_env!("DEM_GIT_REVISION").unwrap_or_default());
+    if !options.quiet && (parameters.version != version || parameters.git_revision != revision) {
+        let note = "it was written by another version of the program: the states of this run may differ from it";
+        let _ = writeln!(std::io::stderr(), "note: {shown}: {note}");
+    }
+    match scene.dimension {
+        2 => export_in::<D2>(&scene, options, &interrupt),
+        _ => export_in::<D3>(&scene, options, &interrupt),
+    }
+}
+
+fn export_in<D: Dim>(scene: &Scene, options: &ExportOptions, interrupt: &Interrupt) -> Result<(), RunError> {
+    let mut progress = Progress::new(options.progress, options.quiet);
+    let mut world = build::<D>(scene, &mut |done| {
+        progress.phase("packing the sample", done);
+        !interrupt.requested()
+    })?
+    .world;
+    while world.steps + 1 < options.step {
+        let report = world.step().map_err(|error| {
+            let way = format!("step {} was not reached", options.step);
+            RunError::NoConvergence(format!(
+                "{error}\n{way}; step {} is the last that can be exported",
+                world.steps + 1
+            ))
+        })?;
+        progress.step(&StepProgress {
+            step: world.steps,
+            time: world.time,
+            end: (options.step - 1) as f64 * scene.time.step,
+            residual: report.residual,
+            iterations: report.work.iterations(),
+            broken: world.bonds.len() - world.intact_bonds(),
+        });
+        if interrupt.requested() {
+            return Err(RunError::Interrupted("nothing was written"));
+        }
+    }
+    let mut contacts = world.contact_problem();
+    let assembled = Assembled::of(&contacts);
+    progress.finish();
+    if assembled.is_empty() {
+        return Err(RunError::Usage(format!("nothing touches in step {}: name a step with contacts", options.step)));
+    }
+    let solve = world.settings.solver.build::<D>().solve(&mut contacts);
+    let solved = solve.status != SolveStatus::Failed;
+    if !solved && !options.quiet {
+        let what = format!("the scene's solver left a residual of {:.2e}", solve.residual);
+        let _ = writeln!(std::io::stderr(), "note: {what}: the problem is written without a solution");
+    }
+    let (step, source) = (options.step, options.history.file_name().unwrap_or_default().to_string_lossy());
+    // what the format cannot say is in the description: it is read by people
+    let associated = assembled.parts().associated.iter().filter(|flag| **flag).count();
+    let problem = Problem {
+        title: format!("{}, step {step}", scene.title.as_deref().unwrap_or("A scene of dem-run")),
+        description: format!(
+            "Step {step} of {source}, h = {:e} s. Impulses (N s), velocities (m/s). r is the shifted reaction r + h r_coh n, \
+             which absorbs cohesion. Moments are divided by the mean diameter of their pair, relative spins multiplied by \
+             it. Rows that a contact lacks are zero. In {associated} of {} contacts (/cohesive_dem/associated) the flow \
+             is associated: r in K, u in its dual, without mu |u_t| + mu_r |u_m| in the normal velocity.",
+            scene.time.step,
+            assembled.len()
+        ),
+        math_info: "W is symmetric and positive semi-definite".into(),
+        solution: solved.then(|| Assembled::of(&contacts).r),
+        assembled,
+    };
+    problem.write(&options.output)?;
+    let shown = format!(
+        "problem          {}: {} contacts of {} rows\nlook at it with\n  dem-run solve {}",
+        options.output.display(),
+        problem.assembled.len(),
+        problem.assembled.parts().rows.count(),
+        options.output.display()
+    );
+    // a reader that has seen enough is no error
+    let _ = writeln!(std::io::stdout(), "{shown}");
+    Ok(())
+}

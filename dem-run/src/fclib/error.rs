@@ -1,0 +1,54 @@
+//! Why a problem cannot be read or written.
+
+use std::path::PathBuf;
+
+/// An error in reading or writing a problem. Its message names the file, the dataset and what is wrong.
+#[derive(Debug, thiserror::Error)]
+pub enum FclibError {
+    /// The operating system refused.
+    #[error("cannot {doing} {}: {source}", .path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What was tried, as in "read".
+        doing: &'static str,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// The file is of another format, or its end is missing.
+    #[error("{} cannot be opened as HDF5 ({why}): give a problem in FCLIB's format, as `dem-run export` writes it",
+        .path.display())]
+    NotHdf5 {
+        /// The file.
+        path: PathBuf,
+        /// HDF5's reason.
+        why: String,
+    },
+    /// An HDF5 file without a local problem.
+    #[error("{} holds no local problem of FCLIB ({why}): give a file with the group /fclib_local, as `dem-run export` \
+             writes it", .path.display())]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+        /// What is there instead.
+        why: String,
+    },
+    /// A dataset is missing, or holds what it must not.
+    #[error("{}, /{place}: {why}", .path.display())]
+    Wrong {
+        /// The file.
+        path: PathBuf,
+        /// The dataset or group.
+        place: String,
+        /// What is wrong with it.
+        why: String,
+    },
+    /// HDF5 could not write.
+    #[error("cannot write {} ({why}): is the disk full, or the folder gone?", .path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// HDF5's reason.
+        why: String,
+    },
+}

@@ -1,0 +1,46 @@
+//! Contact problems in FCLIB's format (HDF5), the exchange format of the field: `dem-run export` and `dem-run solve`.
+//!
+//! C contacts of M rows; every scalar is a dataset of one value, integers are 32 bits wide.
+//!
+//! ```text
+//! /fclib_local/
+//!     spacedim             M: 2 (n, t), 3 (n, t1, t2); with mu_r 3 (n, t, m) or 5 (n, t1, t2, m1, m2)
+//!     W/                   m, n, nzmax, nz, p, i, x: the matrix, C·M × C·M
+//!         nz = −1          by columns: p[n + 1] where each starts, i[nzmax] rows, x[nzmax] values
+//!         nz = −2          by rows: p[m + 1] where each starts, i[nzmax] columns, x[nzmax] values
+//!         nz ≥ 0           nz triplets: i[nz] rows, p[nz] columns, x[nz] values
+//!     vectors/             q [C·M]; mu [C]; mu_r [C] where there are rolling rows
+//!     info/                title, description, math_info: text
+//! /guesses/                number_of_guesses; 1, 2, …: u, r [C·M]
+//! /solution/               u, r [C·M]
+//! /cohesive_dem/           ours; other programs do not look for it
+//!     associated           i32 [C]: 1 where the flow of a contact is normal to its cone
+//!     shift                [C]: what r is above the reaction in the normal row (N s)
+//!     applied              norm of the applied impulses (N s), one scale of the residual
+//! ```
+//!
+//! FCLIB has all contacts follow Coulomb's law as the bipotential has it; that is what a file without `/cohesive_dem`
+//! means. What r, q and mu_r are for cohesive bonds: docs/theory/fclib.md.
+
+mod error;
+mod reader;
+mod writer;
+
+pub use error::FclibError;
+
+use dem_core::problem::assembled::Assembled;
+
+/// What a file of FCLIB holds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Problem {
+    /// Its title, in a line.
+    pub title: String,
+    /// What it is and where it comes from.
+    pub description: String,
+    /// What is known of its mathematics.
+    pub math_info: String,
+    /// The problem. Its reactions are the first guess of the file, or zero.
+    pub assembled: Assembled,
+    /// Reactions r̂ (N s) that solve it, if they are known.
+    pub solution: Option<Vec<f64>>,
+}

@@ -1,0 +1,158 @@
+//! `dem-run solve`: a contact problem from a file of FCLIB's format.
+
+use std::fmt;
+use std::io::Write;
+use std::path::PathBuf;
+
+use dem_core::contact::LocalSolve;
+use dem_core::problem::assembled::Assembled;
+use dem_core::solver::assembled::gauss_seidel;
+use dem_core::solver::{GaussSeidelSettings, Newton, NewtonSettings, SolveReport, SolveStatus, Start, StiffnessRatio};
+use serde::Serialize;
+
+use crate::fclib::Problem;
+use crate::run::{RunError, cpu_time};
+use crate::scene;
+
+/// A solver of problems from files.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Solver {
+    /// Non-linear Gauss–Seidel.
+    #[default]
+    GaussSeidel,
+    /// Semismooth Newton on the augmented Lagrangian, with a dense factorisation of W: for some thousand rows.
+    Newton,
+}
+
+/// What is solved, and how.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SolveOptions {
+    /// The problem.
+    pub problem: PathBuf,
+    /// The solver.
+    pub solver: Solver,
+    /// Residual that it aims at (–).
+    pub tolerance: f64,
+    /// Iterations after which it gives up; as many as the solver sees fit where it is absent.
+    pub max_iterations: Option<u64>,
+    /// Steps that the acceleration of Gauss–Seidel remembers; 0 for plain sweeps.
+    pub acceleration: usize,
+    /// Where the problem is written with its solution, if at all.
+    pub output: Option<PathBuf>,
+    /// Whether the result on stdout is JSON.
+    pub json: bool,
+}
+
+/// How a problem was solved.
+#[derive(Debug, Clone, Serialize)]
+struct Solved {
+    problem: PathBuf,
+    title: String,
+    contacts: usize,
+    rows: usize,
+    associated: usize,
+    solver: Solver,
+    converged: bool,
+    iterations: u64,
+    tolerance: f64,
+    residual: f64,
+    siconos_error: f64,
+    cpu_time: f64,
+}
+
+/// Sweeps of Gauss–Seidel after which it gives up.
+const MOST_SWEEPS: u64 = 100_000;
+
+/// Solves a problem from its first guess, or from zero, and prints how that went.
+///
+/// # Errors
+/// [`RunError`]: a file that is no problem, an output that cannot be written, [`RunError::NoConvergence`] where the
+/// tolerance was not reached.
+pub fn solve(options: &SolveOptions) -> Result<(), RunError> {
+    let mut problem = Problem::read(&options.problem)?;
+    let began = cpu_time();
+    let mut at = problem.assembled.clone();
+    let report = iterate(&mut at, options);
+    let parts = at.parts();
+    let solved = Solved {
+        problem: options.problem.clone(),
+        title: problem.title.clone(),
+        contacts: at.len(),
+        rows: parts.rows.count(),
+        associated: parts.associated.iter().filter(|flag| **flag).count(),
+        solver: options.solver,
+        converged: report.status == SolveStatus::Converged,
+        iterations: report.work.iterations(),
+        tolerance: options.tolerance,
+        residual: report.residual,
+        siconos_error: at.siconos_error(),
+        cpu_time: cpu_time() - began,
+    };
+    let shown = if options.json { format!("{:#}", serde_json::json!(solved)) } else { solved.to_string() };
+    // a reader that has seen enough is no error
+    let _ = writeln!(std::io::stdout(), "{shown}");
+    if !solved.converged {
+        return Err(RunError::NoConvergence(format!(
+            "{}: residual {:.2e} after {} iterations, and {:.0e} was asked for; a larger --max-iterations, another \
+             --solver or a larger --tolerance may help",
+            options.problem.display(),
+            solved.residual,
+            solved.iterations,
+            solved.tolerance
+        )));
+    }
+    if let Some(output) = &options.output {
+        problem.solution = Some(at.r);
+        problem.write(output)?;
+    }
+    Ok(())
+}
+
+fn iterate(problem: &mut Assembled, options: &SolveOptions) -> SolveReport {
+    let tolerance = options.tolerance;
+    match options.solver {
+        Solver::GaussSeidel => {
+            let max_sweeps = options.max_iterations.unwrap_or(MOST_SWEEPS);
+            let (local, accept, acceleration) = (LocalSolve::Exact, tolerance, options.acceleration);
+            let settings = GaussSeidelSettings { local, tolerance, accept, max_sweeps, acceleration };
+            gauss_seidel(problem, &settings)
+        }
+        Solver::Newton => {
+            let scene = scene::Newton::default();
+            let settings = NewtonSettings {
+                tolerance,
+                accept: tolerance,
+                // a file tells no load: only the residual counts
+                load_tolerance: f64::INFINITY,
+                start: Start::StiffLimit,
+                stiffness: StiffnessRatio { tangential: scene.tangential_stiffness, rolling: scene.rolling_stiffness },
+                max_iterations: options.max_iterations.unwrap_or(scene.max_iterations),
+            };
+            Newton::new(settings).solve_assembled(problem)
+        }
+    }
+}
+
+impl fmt::Display for Solved {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "problem          {}", self.problem.display())?;
+        if !self.title.is_empty() {
+            writeln!(f, "title            {}", self.title)?;
+        }
+        writeln!(
+            f,
+            "contacts         {} of {} rows, {} with associated flow",
+            self.contacts, self.rows, self.associated
+        )?;
+        let status = if self.converged { "solved" } else { "not solved" };
+        let solver = match self.solver {
+            Solver::GaussSeidel => "Gauss–Seidel",
+            Solver::Newton => "Newton",
+        };
+        writeln!(f, "status           {status} by {solver}, {} iterations", self.iterations)?;
+        writeln!(f, "residual         {:.2e} (tolerance {:.0e})", self.residual, self.tolerance)?;
+        writeln!(f, "Siconos's error  {:.2e} (natural map with ρ = 1: depends on the units)", self.siconos_error)?;
+        write!(f, "CPU time         {:.3} s", self.cpu_time)
+    }
+}
