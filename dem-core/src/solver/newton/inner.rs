@@ -73,7 +73,6 @@ impl Newton {
                 return (iteration, true);
             }
             let Some(direction) = self.direction(rows, state, guessed, target) else { return (iteration + 1, false) };
-            if std::env::var("DBG").is_ok() {
                 eprintln!(
                     "  inner {iteration} norm {:.3e} target {target:.1e} guessed {} trusted {} made {} floor {} wasted {} dir {:.2e}",
                     state.norm,
