@@ -35,12 +35,7 @@ pub(super) struct Found {
 
 impl Newton {
     /// The best reactions that are met on the way, from those at hand; none where they are not accepted.
-    pub(super) fn approach(
-        &mut self,
-        problem: &mut impl Solvable,
-        base: &Rows,
-        iterations: &mut u64,
-    ) -> Option<Found> {
+    pub(super) fn approach(&mut self, problem: &mut impl Solvable, base: &Rows, iterations: &mut u64) -> Option<Found> {
         let mut rows = base.clone();
         let mut reactions = problem.swept(&rows, STALL_SWEEPS);
         let mut state = Iterate::from_reactions(&rows, &reactions);

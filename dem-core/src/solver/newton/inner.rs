@@ -73,17 +73,6 @@ impl Newton {
                 return (iteration, true);
             }
             let Some(direction) = self.direction(rows, state, guessed, target) else { return (iteration + 1, false) };
-                eprintln!(
-                    "  inner {iteration} norm {:.3e} target {target:.1e} guessed {} trusted {} made {} floor {} wasted {} dir {:.2e}",
-                    state.norm,
-                    guessed.is_some(),
-                    self.trusted,
-                    self.factor.made,
-                    self.floor,
-                    self.wasted,
-                    direction.norm
-                );
-            }
             let before = direction.norm;
             advance(rows, state, &direction.step, guessed.is_some());
             if !state.norm.is_finite() {
