@@ -77,7 +77,11 @@ const SWEEPS: usize = 5;
 const COLD_SWEEPS: usize = 100;
 const STALL_SWEEPS: usize = 50;
 /// Most sweeps of Gauss–Seidel where it takes over.
-const MOST_SWEEPS: u64 = 200_000;
+const MOST_SWEEPS: u64 = 40_000;
+/// What a problem counts that no guess of the active set solved, less one for each that was solved so, and the count
+/// above which Gauss–Seidel is tried before the approach from afar.
+const HARD: u32 = 4;
+const MOST_HARD: u32 = 16;
 /// Most solves that are left to Gauss–Seidel before Newton is tried again.
 const LONGEST_REST: u64 = 64;
 
@@ -99,6 +103,8 @@ pub struct Newton {
     /// Solves that are left to Gauss–Seidel, and how many after the next failure.
     rest: u64,
     next_rest: u64,
+    /// How hard the last problems were.
+    hard: u32,
 }
 
 impl Newton {
@@ -115,6 +121,7 @@ impl Newton {
             made_before: 0,
             rest: 0,
             next_rest: 1,
+            hard: 0,
         }
     }
 
@@ -160,7 +167,7 @@ impl Newton {
         guess: &mut Vec<Padded>,
         iterations: &mut u64,
     ) -> Option<SolveReport> {
-        let (mut last_error, mut last_change, mut softened) = (f64::INFINITY, 1.0, 0);
+        let (mut last_error, mut last_change, mut softened, mut made_in_all) = (f64::INFINITY, 1.0, 0, 0);
         loop {
             let mut state = Iterate::from_reactions(rows, guess);
             let (made, solved) = self.inner(rows, &mut state, Some(guess), PATIENCE);
@@ -178,9 +185,13 @@ impl Newton {
             let error = problem.residual();
             rows.list.iter_mut().zip(&state.reactions).for_each(|(row, r)| row.multiplier = *r);
             *guess = state.reactions;
-            let done = error <= self.settings.tolerance && load_error <= self.settings.load_tolerance;
-            if done || *iterations >= self.settings.max_iterations {
-                return Some(self.report(*iterations, error, load_error));
+            let report = self.report(*iterations, error, load_error);
+            if report.status == SolveStatus::Converged {
+                return Some(report);
+            }
+            made_in_all += made;
+            if made_in_all >= self.settings.max_iterations {
+                return (report.status == SolveStatus::Accepted).then_some(report);
             }
             if error > 0.5 * last_error && softened < MOST_SOFTENED {
                 // what moves fast is rounded by ρ u: a smaller ρ hears less of it, and takes more rounds
@@ -207,53 +218,78 @@ impl Newton {
     fn iterate(&mut self, problem: &mut impl Solvable) -> SolveReport {
         problem.velocities_from_reactions();
         self.made_before = self.factor.made;
-        if self.rest > 0 {
+        let resting = self.rest > 0;
+        if resting {
             self.rest -= 1;
-            return self.swept_to_the_end(problem, 0);
+            let swept = self.swept_to_the_end(problem, 0);
+            if swept.status != SolveStatus::Failed {
+                return swept;
+            }
         }
         let rows = problem.rows(KAPPA, self.settings.stiffness);
         if rows.unknowns == 0 || rows.list.is_empty() {
             return self.report(0, problem.residual(), 0.0);
         }
+        let mut iterations = 0;
+        if let Some(report) = self.from_guesses(problem, &rows, &mut iterations) {
+            self.next_rest = 1;
+            self.hard = self.hard.saturating_sub(1);
+            return report;
+        }
+        self.hard = (self.hard + HARD).min(2 * MOST_HARD);
+        if self.hard > MOST_HARD && !resting {
+            // steps that are alike fail alike, and sweeps are the cheaper way then
+            let swept = self.swept_to_the_end(problem, iterations);
+            if swept.status != SolveStatus::Failed {
+                self.rest_longer();
+                return swept;
+            }
+        }
+        if let Some(report) = self.from_afar(problem, &rows, &mut iterations) {
+            return report;
+        }
+        self.rest_longer();
+        self.swept_to_the_end(problem, iterations)
+    }
+
+    /// Leave the next solves to Gauss–Seidel, twice as many as after the last failure.
+    fn rest_longer(&mut self) {
+        self.rest = self.next_rest;
+        self.next_rest = (2 * self.next_rest).min(LONGEST_REST);
+    }
+
+    /// Rounds at the largest penalty, from one active set after the other; none if all run in circles.
+    fn from_guesses(&mut self, problem: &mut impl Solvable, rows: &Rows, iterations: &mut u64) -> Option<SolveReport> {
         // the reactions that the problem brought along, bettered by some sweeps, show which contacts are active
         let cold = rows.list.iter().all(|row| row.multiplier.n == row.shift);
-        let mut guess = problem.swept(&rows, if cold { COLD_SWEEPS } else { SWEEPS });
-        let mut iterations = 0;
-        for stall in 0.. {
-            let mut rows = self.started(&rows);
-            if let Some(report) = self.rounds(problem, &mut rows, &mut guess, &mut iterations) {
-                self.next_rest = 1;
+        let mut guess = problem.swept(rows, if cold { COLD_SWEEPS } else { SWEEPS });
+        for sweeps in [STALL_SWEEPS, COLD_SWEEPS, 0] {
+            let report = self.rounds(problem, &mut self.started(rows), &mut guess, iterations);
+            if report.is_some() || sweeps == 0 {
                 return report;
             }
             // the active set runs in circles: sweeps from here show another, or those from nothing
             self.renew = true;
-            guess = match stall {
-                0 => problem.swept(&rows, STALL_SWEEPS),
-                1 => {
-                    problem.forget_reactions();
-                    problem.swept(&rows, COLD_SWEEPS)
-                }
-                _ => break,
-            };
+            if sweeps == COLD_SWEEPS {
+                problem.forget_reactions();
+            }
+            guess = problem.swept(rows, sweeps);
         }
-        if let Some(found) = self.approach(problem, &rows, &mut iterations) {
-            self.next_rest = 1;
-            guess.clone_from(&found.reactions);
-            let report = self.rounds(problem, &mut self.started(&rows), &mut guess, &mut iterations);
-            return report.unwrap_or_else(|| {
-                problem.write_back(&found.reactions, &rows);
-                problem.velocities_from_reactions();
-                self.report(iterations, problem.residual(), found.load_error)
-            });
-        }
-        // steps that are alike will fail alike
-        self.rest = self.next_rest;
-        self.next_rest = (2 * self.next_rest).min(LONGEST_REST);
-        self.swept_to_the_end(problem, iterations)
+        None
     }
-}
 
-impl Newton {
+    /// The solution that is approached from afar, as the stiff limit if its active set gives that.
+    fn from_afar(&mut self, problem: &mut impl Solvable, rows: &Rows, iterations: &mut u64) -> Option<SolveReport> {
+        let found = self.approach(problem, rows, iterations)?;
+        let mut guess = found.reactions.clone();
+        let report = self.rounds(problem, &mut self.started(rows), &mut guess, iterations);
+        Some(report.unwrap_or_else(|| {
+            problem.write_back(&found.reactions, rows);
+            problem.velocities_from_reactions();
+            self.report(*iterations, problem.residual(), found.load_error)
+        }))
+    }
+
     /// The rows with the multipliers that the reactions start from.
     fn started(&self, rows: &Rows) -> Rows {
         let mut rows = rows.clone();
