@@ -3,9 +3,9 @@
 mod common;
 
 use common::{bonded_pair, grain, pressed, settings, solver, world};
-use dem_core::body::{Grains, Load, Schedule, Shape, Wall};
+use dem_core::body::{Grain, Grains, Load, Schedule, Shape, Wall};
 use dem_core::bond::{BondStatus, Rupture, Stiffness};
-use dem_core::contact::BondFlow;
+use dem_core::contact::{BondFlow, Law, Local};
 use dem_core::dim::{D2, D3, Dim, Vect};
 use dem_core::problem::ContactProblem;
 use dem_core::solver::{GaussSeidelSettings, NewtonSettings, SolveStatus, SolverSettings, Start, StiffnessRatio};
@@ -39,7 +39,7 @@ fn springs(normal: f64, ratio: f64) -> impl Fn(f64) -> Stiffness {
     move |a| Stiffness { normal, tangential: ratio * normal, rolling: normal * a * a / 12.0 }
 }
 
-/// Growth of a vibration of angular frequency ω over a step: the implicit step turns it by atan(ωh) and not ωh.
+/// The angular frequency that steps of length h show of a vibration ω: a step turns it by atan(ωh) and not ωh.
 fn seen(omega: f64, h: f64) -> f64 {
     (omega * h).atan() / h
 }
@@ -110,9 +110,8 @@ fn wave_strip(cells: usize, ratio: f64) -> World<D2> {
         }
     }
     let top = 2.0 * R + pitch * (rows - 1) as f64;
-    let walls = [(0.0, 1.0), (top, -1.0)].map(|(y, normal)| {
-        Wall::fixed(Shape::Plane { normal: [0.0, normal].into() }, [0.0, y].into(), 0.0)
-    });
+    let walls = [(0.0, 1.0), (top, -1.0)]
+        .map(|(y, normal)| Wall::fixed(Shape::Plane { normal: [0.0, normal].into() }, [0.0, y].into(), 0.0));
     let grains: Grains<D2> = grains.into_iter().collect();
     let mut w = World::new(grains, walls.into(), loads, settings(1.0));
     w.form_bonds(1e-6, |_| UNBREAKABLE, 0.3);
@@ -123,7 +122,13 @@ fn wave_strip(cells: usize, ratio: f64) -> World<D2> {
         let along = (i[1] - j[1]).abs() < 0.1 * R;
         let edge = i[1] < 1.5 * R || i[1] > top - 1.5 * R;
         let odd = fixed && (i[0].min(j[0]) < -0.1 * R || i[0].max(j[0]) > length + 0.1 * R);
-        let factor = if along && edge { 0.5 } else if along && odd { 2.0 } else { 1.0 };
+        let factor = if along && edge {
+            0.5
+        } else if along && odd {
+            2.0
+        } else {
+            1.0
+        };
         let k = bond.stiffness.as_mut().unwrap();
         (k.normal, k.tangential, k.rolling) = (factor * k.normal, factor * k.tangential, factor * k.rolling);
     }
@@ -157,7 +162,6 @@ fn a_wave_in_the_hexagonal_lattice_has_the_lattice_s_speed() {
         });
         let across = w.grains.velocity.iter().map(|v| v[1].abs()).fold(0.0, f64::max);
         let spin = w.grains.spin.iter().map(|s| s[0].abs() * R).fold(0.0, f64::max);
-        eprintln!("ratio {ratio}: {:e} of the lattice, {:e} of long waves; {across:e} {spin:e}", found / seen(omega, w.settings.step) - 1.0, found / q / speed - 1.0);
         assert!((found / seen(omega, w.settings.step) - 1.0).abs() < 1e-3, "ratio {ratio}: {found} against {omega}");
         assert!((found / q / speed - 1.0).abs() < 0.01, "ratio {ratio}: {} m/s against {speed}", found / q);
         assert!(across < 1e-6 && spin < 1e-6, "ratio {ratio}: {across:e} m/s across, {spin:e} m/s of spin");
@@ -184,23 +188,21 @@ fn the_hexagonal_lattice_has_its_moduli() {
         let strain = [stress / young, -poisson * stress / young];
         // the forces of the strained lattice on a grain from its six neighbours; those on the cut ends are the load
         let neighbours = [(1.0, 0.0), (0.5, h32), (-0.5, h32), (-1.0, 0.0), (-0.5, -h32), (0.5, -h32)];
-        let mut world_grains = Vec::new();
+        let mut lattice = Vec::new();
         for row in 0..rows {
             for column in 0..columns - row % 2 {
                 let x = A * (column as f64 + 0.5 * (row % 2) as f64);
-                world_grains.push(grain::<D2>(&[x, h32 * A * row as f64], R));
+                lattice.push(grain::<D2>(&[x, h32 * A * row as f64], R));
             }
         }
         let mut loads: Vec<Load<D2>> = Vec::new();
-        for (k, g) in world_grains.iter().enumerate() {
+        for (k, g) in lattice.iter().enumerate() {
             let (mut force, mut torque) = ([0.0, 0.0], 0.0);
             for (nx, ny) in neighbours {
                 let place = [g.position[0] + A * nx, g.position[1] + A * ny];
                 let within = place[1] > -R && place[1] < h32 * A * (rows as f64 - 0.5);
-                let there = |o: &dem_core::body::Grain<D2>| {
-                    (o.position[0] - place[0]).hypot(o.position[1] - place[1]) < 0.1 * R
-                };
-                if within && !world_grains.iter().any(there) {
+                let there = |o: &Grain<D2>| (o.position[0] - place[0]).hypot(o.position[1] - place[1]) < 0.1 * R;
+                if within && !lattice.iter().any(there) {
                     let stretch = [A * nx * strain[0], A * ny * strain[1]];
                     let normal = K * (nx * stretch[0] + ny * stretch[1]);
                     let across = ratio * K * (-ny * stretch[0] + nx * stretch[1]);
@@ -216,15 +218,13 @@ fn the_hexagonal_lattice_has_its_moduli() {
         // a long step: 1 s is two hundred periods of the slowest vibration
         let mut set = settings(1.0);
         set.solver = newton(1e-12, 1e-12);
-        let mut w = World::new(world_grains.into_iter().collect(), vec![], loads, set);
+        let mut w = World::new(lattice.into_iter().collect(), vec![], loads, set);
         w.form_bonds(1e-6, |_| UNBREAKABLE, 0.3);
         w.make_bonds_elastic(springs(K, ratio));
         settle(&mut w);
         let found = w.strain();
-        eprintln!("ratio {ratio}: strain off by {:e} and {:e}; {found:?}", found[0] / strain[0] - 1.0, (found[3] - strain[1]) / strain[0]);
         assert!((found[0] / strain[0] - 1.0).abs() < 1e-4, "ratio {ratio}: {} against {}", found[0], strain[0]);
         assert!((found[3] - strain[1]).abs() < 1e-4 * strain[0], "ratio {ratio}: {} against {}", found[3], strain[1]);
-        // and each grain is where a uniform strain takes it
         assert!(w.kinetic_energy() < 1e-12 * w.ledger.elastic);
     }
 }
@@ -247,7 +247,6 @@ fn a_cantilever_bends_by_its_springs() {
     let yields = |j: usize| force / k.tangential + force * (A * (j as f64 + 0.5)).powi(2) / k.rolling;
     let expected: f64 = (0..count).map(yields).sum();
     let found = w.grains.position[count][1];
-    eprintln!("cantilever {:e}", found / expected - 1.0);
     assert!((found / expected - 1.0).abs() < 1e-5, "{found:e} against {expected:e}");
     assert!((w.ledger.elastic / (0.5 * force * expected) - 1.0).abs() < 1e-5);
 }
@@ -291,7 +290,6 @@ fn books<D: Dim>(seed: u64, side: usize, rupture: Rupture) {
         assert!((l.external_work - found).abs() <= 1e-9 * size, "{:e} J of {size:e}", l.external_work - found);
     }
     let l = w.ledger;
-    eprintln!("{}D {rupture:?}: {broken} of {} broken, work {:e} kinetic {:e} elastic {:e} damping {:e} fracture {:e} friction {:e} impact {:e} remainder {:e}", D::N, w.bonds.len(), l.external_work, l.kinetic, l.elastic, l.damping, l.fracture, l.friction, l.impact, l.remainder);
     assert!(broken > 5 && broken < w.bonds.len(), "{broken} broken");
     assert!(l.fracture > 0.0 && l.damping > 0.0 && l.elastic > 0.0 && l.friction != 0.0);
 }
@@ -334,8 +332,11 @@ fn never_grows<D: Dim>(periods: f64) {
     let (mut last, first) = (w.kinetic_energy(), w.kinetic_energy());
     for _ in 0..40 {
         let (before, spins, damped) = (w.grains.velocity.clone(), w.grains.spin.clone(), w.ledger.damping);
-        let old: Vec<_> = w.bonds.iter().map(|b| w.touches.iter().find(|t| t.pair == b.pair).map(|t| t.reaction)).collect();
-        assert!(w.step().unwrap().breaks.is_empty());
+        let old: Vec<_> =
+            w.bonds.iter().map(|b| w.touches.iter().find(|t| t.pair == b.pair).map(|t| t.reaction)).collect();
+        let report = w.step().unwrap();
+        assert!(report.status == SolveStatus::Converged && report.work.newton < 10, "{report:?}");
+        assert!(report.breaks.is_empty());
         let energy = w.ledger.kinetic + w.ledger.elastic;
         assert!(energy <= last * (1.0 + 1e-12), "{energy:e} after {last:e}");
         last = energy;
@@ -353,7 +354,6 @@ fn never_grows<D: Dim>(periods: f64) {
         let damping = w.ledger.damping - damped;
         assert!((damping - lost).abs() <= 1e-9 * first, "{damping:e} against {lost:e} of {first:e}");
     }
-    eprintln!("{}D, {periods} periods: {:e} of the energy left", D::N, last / first);
 }
 
 #[test]
@@ -409,7 +409,6 @@ fn a_bond_breaks_at_its_threshold_and_sets_its_energy_free() {
         assert_eq!(loaded(1.0 - 1e-6, force, torque), None, "{mode:?}");
         let (found, energy) = loaded(1.0 + 1e-6, force, torque).expect("it breaks");
         assert_eq!(found, mode);
-        eprintln!("{mode:?}: energy off by {:e}", energy - 1.0);
         assert!((energy - 1.0).abs() < 1e-4, "{mode:?}: {energy}");
     }
 }
@@ -421,7 +420,7 @@ fn solved<D: Dim>(problem: &ContactProblem<D>, settings: SolverSettings) -> Cont
     problem
 }
 
-/// A problem with history: bonds that carry forces, dry contacts with floor and lid, some broken bonds.
+/// A problem with history: bonds that carry forces, dry contacts with floor and lid.
 fn with_history<D: Dim>(side: usize) -> ContactProblem<D> {
     let mut w = pressed::<D>(3, side, 0.3, Some(BondFlow::Associated));
     w.make_bonds_elastic(springs(3e4, 0.5));
@@ -430,8 +429,8 @@ fn with_history<D: Dim>(side: usize) -> ContactProblem<D> {
         w.step().unwrap();
     }
     let problem = w.contact_problem();
-    assert!(problem.elastic.iter().any(|c| c.law != c.law) || problem.elastic.len() > 20);
-    assert!(!problem.dry.is_empty());
+    let carrying = problem.elastic.iter().filter(|c| c.law.carried().n.abs() > 0.0).count();
+    assert!(carrying > 20 && carrying == problem.elastic.len() && !problem.dry.is_empty());
     problem
 }
 
@@ -451,7 +450,6 @@ fn solvers_agree<D: Dim>(side: usize) {
     };
     for acceleration in [0, 5] {
         let distance = apart(&solved(&problem, swept(acceleration)), &found);
-        eprintln!("{}D, acceleration {acceleration}: {distance:e}", D::N);
         assert!(distance <= 1e-7, "{}D, acceleration {acceleration}: {distance:e}", D::N);
     }
 }
@@ -464,7 +462,7 @@ fn all_solvers_reach_the_same_velocities() {
 
 /// Distance of the reactions of elastic bonds, over their size.
 fn reactions_apart<D: Dim>(a: &ContactProblem<D>, b: &ContactProblem<D>) -> f64 {
-    let square = |r: dem_core::contact::Local<D::Tangent, D::Tangent>| r.dot(&r);
+    let square = |r: Local<D::Tangent, D::Tangent>| r.dot(&r);
     let size: f64 = a.elastic.iter().map(|c| square(c.r)).sum();
     (a.elastic.iter().zip(&b.elastic).map(|(a, b)| square(a.r - b.r)).sum::<f64>() / size).sqrt()
 }
@@ -482,7 +480,6 @@ fn start_does_not_matter<D: Dim>(side: usize) {
         }
         let other = solved(&problem, newton(1e-10, 1e-10));
         let distance = reactions_apart(&found, &other);
-        eprintln!("{}D, other start: reactions {distance:e}, velocities {:e}", D::N, apart(&found, &other));
         assert!(distance <= 1e-8 && apart(&found, &other) <= 1e-8, "{}D: {distance:e}", D::N);
     }
 }
@@ -528,7 +525,6 @@ fn stiff_bonds_tend_to_the_stiff_limit() {
             pairs.map(|d| d.dot(&d)).sum::<f64>().sqrt() / size
         })
         .collect();
-    eprintln!("{distances:?}");
     for pair in distances.windows(2) {
         let fall = pair[0] / pair[1];
         // a tenth each, until the rounding of the rigid solve is reached

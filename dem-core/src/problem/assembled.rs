@@ -362,7 +362,7 @@ impl Assembled {
             let own = Local { n: r.n - self.parts.shift[c], ..r };
             map += change.dot(&change);
             reaction += own.dot(&own);
-            rounding += self.summands(c) / (d * d);
+            rounding += self.summands(c) / (d * d) + self.parts.shift[c] * self.parts.shift[c];
         }
         let scale = f64::sqrt(reaction).max(self.parts.applied);
         if map.sqrt() <= ROUNDING * rounding.sqrt() { 0.0 } else { map.sqrt() / scale }

@@ -2,22 +2,23 @@
 //!
 //! residual = √Σ‖r̂ − P_K(r̂ − ũ/D)‖² / max(√Σ‖r‖², ‖h F_ext‖), with D one scalar per contact, the largest diagonal
 //! entry of its Delassus block. The cohesion's shift is not in the denominator: on a strongly bonded sample it would
-//! hide the load. A natural map that is as small as the rounding of the velocities behind it is zero: grains that part
-//! leave reactions so small that their ratio to the map says nothing.
+//! hide the load. A natural map that is as small as the rounding of the velocities or of the shift behind it is zero:
+//! grains that part, or an elastic sample that came to rest, leave reactions so small that their ratio to the map says
+//! nothing.
 
 use super::{Contact, ContactProblem, Nodes, Visitor};
 use crate::contact::Law;
 use crate::dim::{Dim, Vect};
 
 /// Relative rounding of the natural map that counts as zero.
-const ROUNDING: f64 = 64.0 * f64::EPSILON;
+pub(crate) const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
 #[derive(Default)]
 struct Sums {
     map: f64,
     reaction: f64,
-    /// Impulses that would stop the bodies of each contact: what the map is rounded against.
-    motion: f64,
+    /// Impulses that would stop the bodies of each contact, and its shift: what the map is rounded against.
+    rounded: f64,
 }
 
 impl<D: Dim> Visitor<D> for Sums {
@@ -27,11 +28,12 @@ impl<D: Dim> Visitor<D> for Sums {
         let map = c.law.natural_map(c.r, u);
         self.map += map.dot(&map);
         self.reaction += c.r.dot(&c.r);
-        let gamma = c.law.gamma();
+        let (gamma, shift) = (c.law.gamma(), c.law.shift());
+        self.rounded += shift * shift;
         for (node, lever) in c.link.nodes.iter().zip(c.link.lever) {
             let node = &nodes.all[*node as usize];
             let speed = node.velocity.dot(&node.velocity) + lever * lever * node.spin.dot(&node.spin);
-            self.motion += gamma * gamma * speed;
+            self.rounded += gamma * gamma * speed;
         }
     }
 }
@@ -41,5 +43,5 @@ pub fn residual<D: Dim>(problem: &ContactProblem<D>) -> f64 {
     let mut sums = Sums::default();
     problem.visit(&mut sums);
     let scale = sums.reaction.sqrt().max(problem.applied);
-    if sums.map.sqrt() <= ROUNDING * sums.motion.sqrt() { 0.0 } else { sums.map.sqrt() / scale }
+    if sums.map.sqrt() <= ROUNDING * sums.rounded.sqrt() { 0.0 } else { sums.map.sqrt() / scale }
 }
