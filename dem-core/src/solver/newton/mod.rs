@@ -279,13 +279,20 @@ impl Newton {
         None
     }
 
-    /// The solution that is approached from afar, as the stiff limit if its active set gives that.
+    /// The solution that is approached from afar: as the stiff limit if its active set gives that, else bettered from
+    /// where it is.
     fn from_afar(&mut self, problem: &mut impl Solvable, rows: &Rows, iterations: &mut u64) -> Option<SolveReport> {
         let found = self.approach(problem, rows, iterations)?;
         let mut guess = found.reactions.clone();
-        let report = self.rounds(problem, &mut self.started(rows), &mut guess, iterations);
+        if let Some(report) = self.rounds(problem, &mut self.started(rows), &mut guess, iterations) {
+            return Some(report);
+        }
+        let mut rows = rows.clone();
+        rows.list.iter_mut().zip(&found.reactions).for_each(|(row, r)| row.multiplier = *r);
+        guess.clone_from(&found.reactions);
+        let report = self.rounds(problem, &mut rows, &mut guess, iterations);
         Some(report.unwrap_or_else(|| {
-            problem.write_back(&found.reactions, rows);
+            problem.write_back(&found.reactions, &rows);
             problem.velocities_from_reactions();
             self.report(*iterations, problem.residual(), found.load_error)
         }))

@@ -87,7 +87,7 @@ fn the_compression_scene_says_what_the_experiment_is() {
     let scene = load(&path, &sets).expect("the scene is right");
     assert_eq!(scene.sample.count(), Some(430));
     assert_eq!((scene.time.steps(), scene.steps_per_frame(), scene.frames()), (5000, 10, 501));
-    assert_eq!((scene.solver.tolerance, scene.solver.accept()), (1e-4, 1e-4));
+    assert_eq!((scene.solver.tolerance, scene.solver.accept()), (1e-8, 1e-6));
     assert_eq!(scene.bonds.as_ref().expect("bonds").cohesion(2, 3e-3, 0.01), 5.0);
     assert_eq!(scene.walls["bottom"].drive(), Drive::Fixed);
     let Drive::Force(force) = scene.walls["top"].drive() else { panic!("the top wall is not loaded") };
