@@ -68,7 +68,7 @@ Example:
 
 const ACCURACY_EXAMPLE: &str = "\
 Runs the scene over solvers, tolerances and time steps, all from one sample; compares each run with the finest; then
-varies the order of the contacts and the reactions that the bonds start from, which should change nothing. Runs of a
+varies the order of the contacts and the reactions that rigid bonds start from, which should change nothing. Runs of a
 bonded sample end at its collapse. docs/accuracy.md says how to read the tables.
 A step that misses its tolerance is taken if its residual is at most the scene's solver.accept, and is counted.
 
@@ -151,7 +151,7 @@ struct AccuracyArgs {
     /// End of the runs (s), in place of the scene's time.end.
     #[arg(long, value_name = "T", value_parser = positive)]
     until: Option<f64>,
-    /// Contact orders, and as many starting reactions, that each solver is tried with; 0 for none.
+    /// Contact orders, and as many starting reactions of rigid bonds, that each solver is tried with; 0 for none.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u64).range(..=10_000))]
     orders: u64,
     /// Go on to the scene's end where a run would end at the collapse of the sample.

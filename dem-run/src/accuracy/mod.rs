@@ -87,10 +87,11 @@ fn measure<D: Dim>(scene: &Scene, options: &AccuracyOptions, interrupt: &Interru
     })?;
     let sample = Sample::of(built);
     let asked = Asked::of(scene, options);
-    let varied = if sample.bonds.is_empty() { 0 } else { asked.solvers.len() * 2 * options.orders as usize };
+    let kinds = if sample.bonds.is_empty() { 0 } else { Varied::of(sample.elastic()).len() };
+    let varied = asked.solvers.len() * kinds * options.orders as usize;
     let meter = Meter::new(progress, interrupt, asked.ways().len() + varied + 1);
     let measuring = Measuring { scene, sample: &sample, asked: &asked, meter: &meter };
-    let mut report = Report::new(scene, &asked, sample.grains.len(), sample.bonds.len(), sample.solid_fraction);
+    let mut report = Report::new(scene, &asked, &sample);
     let posed = measuring.runs(&mut report);
     if varied > 0 && !interrupt.requested() {
         let threads = rayon::ThreadPoolBuilder::new().num_threads(options.threads.unwrap_or(0)).build();
@@ -174,14 +175,16 @@ impl<D: Dim> Measuring<'_, D> {
         from.map_or(vec![], |k| posed.swap_remove(k))
     }
 
-    /// Run the sample of every solver in other orders and from other starts, at the finest tolerance and the longest step.
+    /// Run the sample of every solver in other orders and from other starts, where those should not matter, at the finest
+    /// tolerance and the longest step.
     ///
     /// As many at a time as there are threads; the results stand in a fixed order.
     fn indeterminacy(&self, rows: &[Row]) -> Indeterminacy {
         let asked = self.asked;
+        let kinds = Varied::of(self.sample.elastic());
         let way = |solver| Way { solver, tolerance: asked.finest_tolerance(), step_factor: asked.steps[0] };
         let list: Vec<(SolverName, Varied, u64)> = (asked.solvers.iter())
-            .flat_map(|s| [Varied::Order, Varied::Start].map(|v| (*s, v)))
+            .flat_map(|s| kinds.iter().map(|v| (*s, *v)))
             .flat_map(|(s, v)| (1..=asked.orders).map(move |n| (s, v, n)))
             .collect();
         let first = asked.ways().len();
@@ -189,7 +192,7 @@ impl<D: Dim> Measuring<'_, D> {
             let scene = way(solver).scene(self.scene);
             let variant = if varied == Varied::Order { Variant::Order(number) } else { Variant::Start(number) };
             let trial = Trial { sample: self.sample, scene: &scene, variant, whole: asked.whole, problems: 0 };
-            let tell = |share: f64| self.meter.tell(first + k, "contact orders and starting reactions", share);
+            let tell = |share: f64| self.meter.tell(first + k, "indeterminacy", share);
             let (outcome, _) = trial.run(&tell)?;
             tell(1.0);
             Some(VariedRun { solver, varied, number, outcome })
@@ -200,9 +203,7 @@ impl<D: Dim> Measuring<'_, D> {
             let others = runs.iter().filter(|run| run.solver == solver && run.varied == varied).map(|run| &run.outcome);
             Spread::of(solver, varied, &as_given.into_iter().chain(others).collect::<Vec<&Outcome>>())
         };
-        let spreads = (asked.solvers.iter())
-            .flat_map(|s| [Varied::Order, Varied::Start].map(|varied| spread(*s, varied)))
-            .collect();
+        let spreads = (asked.solvers.iter()).flat_map(|s| kinds.iter().map(|varied| spread(*s, *varied))).collect();
         Indeterminacy { tolerance: asked.finest_tolerance(), step_factor: asked.steps[0], spreads, runs }
     }
 

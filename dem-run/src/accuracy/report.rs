@@ -3,8 +3,9 @@
 use super::AccuracyOptions;
 use super::profile::Profile;
 use super::spread::{Spread, Varied, jaccard};
-use super::trial::{Outcome, SolverName, Way};
+use super::trial::{Outcome, Sample, SolverName, Way};
 use crate::scene::{Drive, Scene};
+use dem_core::dim::Dim;
 use serde::Serialize;
 
 /// What was asked for: no value twice, coarse before fine.
@@ -147,6 +148,8 @@ pub struct Report {
     pub grains: usize,
     /// Bonds of the sample.
     pub bonds: usize,
+    /// Whether they are elastic.
+    pub elastic: bool,
     /// Solid fraction of a random sample (–).
     pub solid_fraction: Option<f64>,
     /// Whether a wall is driven: then there are loads.
@@ -172,12 +175,13 @@ pub struct Report {
 impl Report {
     /// A report without measurements.
     #[must_use]
-    pub fn new(scene: &Scene, asked: &Asked, grains: usize, bonds: usize, solid_fraction: Option<f64>) -> Self {
+    pub fn new<D: Dim>(scene: &Scene, asked: &Asked, sample: &Sample<D>) -> Self {
         Self {
             title: scene.title.clone(),
-            grains,
-            bonds,
-            solid_fraction,
+            grains: sample.grains.len(),
+            bonds: sample.bonds.len(),
+            elastic: sample.elastic(),
+            solid_fraction: sample.solid_fraction,
             driven: scene.walls.values().any(|wall| wall.drive() != Drive::Fixed),
             step: scene.time.step,
             asked: asked.clone(),

@@ -35,6 +35,13 @@ pub enum Varied {
 }
 
 impl Varied {
+    /// What is varied of a bonded sample. Elastic bonds are not started: their reactions are the forces of springs, and others
+    /// would be another sample, one under stress.
+    #[must_use]
+    pub fn of(elastic: bool) -> &'static [Self] {
+        if elastic { &[Self::Order] } else { &[Self::Order, Self::Start] }
+    }
+
     /// In words.
     #[must_use]
     pub fn name(self) -> &'static str {

@@ -65,9 +65,11 @@ fn labels(report: &Report, k: usize) -> Vec<String> {
 
 fn work(report: &Report) -> String {
     let bonded = report.bonds > 0;
+    // only a rigid sample keeps its shape until a bond breaks
+    let rigid = bonded && !report.elastic;
     let mut heads = row!["solver", "tolerance", "step", "CPU", "steps", "iterations", "residual", "load error"];
     let mut units = row!["", "", "s", "s", "", "", "worst", if bonded { "to 1st break" } else { "worst" }];
-    if bonded {
+    if rigid {
         heads.push("strain".into());
         units.push("to 1st break".into());
     }
@@ -80,7 +82,7 @@ fn work(report: &Report) -> String {
         let o = &row.outcome;
         let mut cells = labels(report, k);
         cells.extend(row![short(o.cpu_time), o.steps, o.iterations, short(o.worst_residual), short(o.load_error)]);
-        if bonded {
+        if rigid {
             cells.push(o.false_strain.map_or("–".into(), short));
         }
         cells.extend(row![short(o.penetration), short(o.energy_remainder), o.missed_tolerance, o.rejected]);
@@ -150,13 +152,18 @@ fn collapse(outcome: &Outcome, k: usize) -> String {
 
 fn notes(report: &Report) -> String {
     let mut text = String::from("\n");
-    if report.bonds > 0 {
+    if report.elastic {
+        text += "load error is that before the first break: acceleration, which means something only where the load grows slowly\n";
+    } else if report.bonds > 0 {
         text += "load error and strain are those before the first break, where a rigid sample is at rest and keeps its shape\n";
     } else {
         text += "load error means something only where the sample should be at rest\n";
     }
     if report.runs.iter().any(|row| row.outcome.failure.early.contains(&true)) {
-        text += "* before any bond broke: the solver's own strain, not the sample's\n";
+        text += match report.elastic {
+            true => "* before any bond broke: what the bonds yielded, and the solver\n",
+            false => "* before any bond broke: the solver's own strain, not the sample's\n",
+        };
     }
     for row in &report.runs {
         if let End::Failed(why) = &row.outcome.ended {
@@ -172,7 +179,8 @@ fn notes(report: &Report) -> String {
 
 fn spreads(report: &Report, indeterminacy: &Indeterminacy) -> String {
     let mut text = format!(
-        "\nIndeterminacy: the same scene in other contact orders and from other starting reactions, tolerance {}, step {} s\n\n",
+        "\nIndeterminacy: the same scene in other contact orders{}, tolerance {}, step {} s\n\n",
+        if report.elastic { "" } else { " and from other starting reactions" },
         tolerance(indeterminacy.tolerance),
         tolerance(indeterminacy.step_factor * report.step)
     );

@@ -114,6 +114,12 @@ impl<D: Dim> Sample<D> {
         Self { solid_fraction: built.solid_fraction, bonds, grains, walls, loads }
     }
 
+    /// Whether the bonds have a stiffness.
+    #[must_use]
+    pub fn elastic(&self) -> bool {
+        self.bonds.iter().any(|bond| bond.stiffness.is_some())
+    }
+
     /// A world at time zero, and for each of its bonds the number of the same bond in the sample.
     fn world(&self, scene: &Scene, variant: Variant) -> (World<D>, Vec<u32>) {
         let mut world = World::new(self.grains.clone(), self.walls.clone(), self.loads.clone(), settings(scene));
@@ -283,7 +289,8 @@ pub struct Outcome {
     pub median_residual: f64,
     /// Largest load error of a step before the first break (–).
     pub load_error: f64,
-    /// Largest component of the sample's strain before the first break (–); none without bonds.
+    /// Largest component of the sample's strain before the first break (–), all of it false; none without bonds, or where they
+    /// are elastic.
     pub false_strain: Option<f64>,
     /// Steps that were accepted and missed the tolerance.
     pub missed_tolerance: u64,
@@ -427,7 +434,7 @@ impl<D: Dim> Followed<D> {
             worst_residual: self.course.worst_residual,
             median_residual: self.residuals.get(self.residuals.len() / 2).copied().unwrap_or(0.0),
             load_error: self.load_error,
-            false_strain: (!bonds.is_empty()).then_some(self.strain),
+            false_strain: (!bonds.is_empty() && bonds.iter().all(|b| b.stiffness.is_none())).then_some(self.strain),
             missed_tolerance: self.course.missed_tolerance,
             rejected: self.course.rejected,
             penetration: self.course.penetration,

@@ -4,6 +4,7 @@ mod accuracy;
 mod collapse;
 mod common;
 mod compression;
+mod elastic;
 mod fclib;
 mod interrupt;
 mod teaching;

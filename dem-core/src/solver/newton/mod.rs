@@ -32,6 +32,7 @@ use crate::contact::{Local, LocalSolve};
 use crate::dim::Dim;
 use crate::problem::ContactProblem;
 use crate::problem::assembled::Assembled;
+use crate::problem::residual::lost;
 use factor::Factor;
 use inner::{Iterate, norm2};
 use rows::{Padded, Rows};
@@ -308,14 +309,16 @@ impl Newton {
 }
 
 /// How much the net impulses on the bodies changed in the last proximal step, over themselves: with a contraction far
-/// below one, the load error of the step before.
+/// below one, the load error of the step before. One that is lost in the rounding of the shifts is none.
 fn load_change(rows: &Rows, state: &Iterate) -> f64 {
     let mut change = vec![0.0; rows.unknowns];
     let mut total = vec![0.0; rows.unknowns];
+    let mut shifts = 0.0;
     for (row, r) in rows.list.iter().zip(&state.reactions) {
         rows.apply(row, &(*r - row.multiplier), &mut change);
         rows.apply(row, &Local { n: r.n - row.shift, ..*r }, &mut total);
+        shifts += row.size * row.shift * row.shift;
     }
     let (change, total) = (norm2(&change).sqrt(), norm2(&total).sqrt());
-    if change == 0.0 { 0.0 } else { change / total }
+    if change == 0.0 || lost(change, total, shifts.sqrt()) { 0.0 } else { change / total }
 }

@@ -1,0 +1,92 @@
+//! Bonds with a stiffness, from the scene to the history.
+
+use crate::common::{Folder, SMALL, config};
+use dem_run::history::History;
+
+const SPRINGS: &str = r#"bonds.stiffness={"springs": {"normal": 1e7, "tangential": 5e6, "rolling": 5}}"#;
+const YOUNG: &str = r#"bonds.stiffness={"young": {"modulus": 1e9, "poisson_ratio": 0.2}}"#;
+
+fn values(history: &History, name: &str) -> Vec<f64> {
+    history.observable(name).expect("read").unwrap_or_else(|| panic!("no observable {name}")).value
+}
+
+#[test]
+fn an_elastic_sample_yields_breaks_and_balances_its_books() {
+    for stiffness in [SPRINGS, YOUNG] {
+        let here = Folder::new();
+        let scene = config("compression.json");
+        let args = [&["run", &scene, "-o", "a.h5"], &SMALL[..], &["--set", stiffness]].concat();
+        let told = here.dem_run(&args).succeeds().stdout;
+        // a rigid sample that strains before its first bond breaks is not solved; this one yields
+        assert!(told.contains("first break") && !told.contains("the solver's own strain"), "{told}");
+        assert!(!told.contains("bond remainder"), "{told}");
+
+        let history = here.history("a.h5");
+        assert!(history.observable("bond_remainder").expect("read").is_none());
+        let names = ["elastic_energy", "dissipation_damping", "fracture_energy"];
+        let [elastic, damping, fracture] = names.map(|name| values(&history, name));
+        let names = ["kinetic_energy", "external_work", "dissipation_impact", "dissipation_friction"];
+        let [kinetic, work, impact, friction] = names.map(|name| values(&history, name));
+        let last = work.len() - 1;
+        let most = work.iter().fold(0.0, |most: f64, w| most.max(w.abs()));
+        for k in 0..=last {
+            // the sample starts at rest
+            let found = kinetic[k] + elastic[k] + damping[k] + fracture[k] + impact[k] + friction[k];
+            assert!((work[k] - found).abs() <= 1e-9 * most, "row {k}: {found} J of {} J", work[k]);
+        }
+        assert!(elastic.iter().all(|e| *e >= 0.0) && fracture.windows(2).all(|w| w[1] >= w[0]));
+        let broken = values(&history, "bonds_broken");
+        assert!(broken[last] > 10.0 && fracture[last] > 0.0 && damping[last] > 0.0);
+        // energy is set free where bonds break, and nowhere else
+        for k in 1..=last {
+            assert_eq!(fracture[k] > fracture[k - 1], broken[k] > broken[k - 1], "row {k}");
+        }
+    }
+}
+
+#[test]
+fn a_pair_yields_by_its_spring() {
+    let here = Folder::new();
+    here.run_config("two-grains.json", &["-o", "a.h5", "--set", SPRINGS]);
+    let history = here.history("a.h5");
+    let ruptures = history.ruptures().expect("ruptures");
+    let [rupture] = ruptures[..] else { panic!("{} ruptures", ruptures.len()) };
+    // 100 N/s up to 10 N: at 0.1 s, with ½ f²/k in the spring
+    assert!((rupture.time - 0.1).abs() < 2.01e-4, "{} s", rupture.time);
+    let fracture = *values(&history, "fracture_energy").last().expect("steps");
+    assert!((fracture / (0.5 * 10.0 * 10.0 / 1e7) - 1.0).abs() < 5e-3, "{fracture} J");
+}
+
+#[test]
+fn wrong_stiffnesses_are_refused_with_their_place_and_the_remedy() {
+    for (set, parts) in [
+        (
+            r#"bonds.stiffness={"springs": {"normal": 0, "tangential": 5e6, "rolling": -5}}"#,
+            &["bonds.stiffness.springs.normal", "> 0 (N/m)", "bonds.stiffness.springs.rolling", "-5", "> 0 (N m/rad)"]
+                [..],
+        ),
+        (r#"bonds.stiffness={"young": {"modulus": -1, "poisson_ratio": 0.2}}"#, &["young.modulus", "> 0 (Pa)"]),
+        (
+            r#"bonds.stiffness={"young": {"modulus": 1e9, "poisson_ratio": 0.7}}"#,
+            &["bonds.stiffness.young.poisson_ratio", "0.7", "above -1, at most 0.5"],
+        ),
+        (r#"bonds.stiffness={"young": {"modulus": 1e9}}"#, &["young.poisson_ratio", "required"]),
+        (r#"bonds.stiffness={"youngs": {"modulus": 1e9}}"#, &["bonds.stiffness.youngs", "nearest  young"]),
+        ("bonds.stiffness=1e9", &["bonds.stiffness"]),
+    ] {
+        let here = Folder::new();
+        here.dem_run(&["run", &config("two-grains.json"), "--set", set]).fails(2, parts);
+        assert_eq!(here.names(), [""; 0], "{set}");
+    }
+}
+
+#[test]
+fn accuracy_calls_no_strain_of_elastic_bonds_false() {
+    let here = Folder::new();
+    let scene = config("compression.json");
+    let more = ["--solvers", "newton", "--tolerances", "1e-5", "--steps", "1", "--orders", "1"];
+    let args = [&["accuracy", &scene], &SMALL[..], &["--set", YOUNG], &more].concat();
+    let told = here.dem_run(&args).succeeds().stdout;
+    assert!(told.contains("contact order") && !told.contains("starting reactions"), "{told}");
+    assert!(!told.contains("keeps its shape") && !told.contains("own strain"), "{told}");
+}
