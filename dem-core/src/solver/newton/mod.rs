@@ -32,7 +32,7 @@ use crate::contact::{Local, LocalSolve};
 use crate::dim::Dim;
 use crate::problem::ContactProblem;
 use crate::problem::assembled::Assembled;
-use crate::problem::residual::ROUNDING;
+use crate::problem::residual::lost;
 use factor::Factor;
 use inner::{Iterate, norm2};
 use rows::{Padded, Rows};
@@ -309,7 +309,7 @@ impl Newton {
 }
 
 /// How much the net impulses on the bodies changed in the last proximal step, over themselves: with a contraction far
-/// below one, the load error of the step before. A change as small as the rounding of the shifts is none.
+/// below one, the load error of the step before. One that is lost in the rounding of the shifts is none.
 fn load_change(rows: &Rows, state: &Iterate) -> f64 {
     let mut change = vec![0.0; rows.unknowns];
     let mut total = vec![0.0; rows.unknowns];
@@ -320,5 +320,5 @@ fn load_change(rows: &Rows, state: &Iterate) -> f64 {
         shifts += row.size * row.shift * row.shift;
     }
     let (change, total) = (norm2(&change).sqrt(), norm2(&total).sqrt());
-    if change <= ROUNDING * shifts.sqrt() { 0.0 } else { change / total }
+    if change == 0.0 || lost(change, total, shifts.sqrt()) { 0.0 } else { change / total }
 }
