@@ -335,7 +335,7 @@ fn never_grows<D: Dim>(periods: f64) {
         let old: Vec<_> =
             w.bonds.iter().map(|b| w.touches.iter().find(|t| t.pair == b.pair).map(|t| t.reaction)).collect();
         let report = w.step().unwrap();
-        assert!(report.status == SolveStatus::Converged && report.work.newton < 10, "{report:?}");
+        assert!(report.status == SolveStatus::Converged && report.work.newton <= 15, "{report:?}");
         assert!(report.breaks.is_empty());
         let energy = w.ledger.kinetic + w.ledger.elastic;
         assert!(energy <= last * (1.0 + 1e-12), "{energy:e} after {last:e}");

@@ -12,7 +12,6 @@ use super::{Contact, ContactProblem, Link, Nodes, Visitor};
 use crate::contact::law::predict_correct;
 use crate::contact::{Cone, Law, Local, Weights};
 use crate::dim::{Dim, Vect, resized};
-use crate::problem::residual::lost;
 use nalgebra::SVector;
 use thiserror::Error;
 
@@ -356,7 +355,7 @@ impl Assembled {
     /// The reactions in its denominator are without their shift where that is known. Not a number stays not a number.
     #[must_use]
     pub fn residual(&self) -> f64 {
-        let (mut map, mut reaction, mut rounding, mut shift) = (0.0, 0.0, 0.0, 0.0);
+        let (mut map, mut reaction, mut rounding) = (0.0, 0.0, 0.0);
         for (c, d) in self.scales().into_iter().enumerate() {
             let (r, u) = (self.reaction(c), self.velocity(c));
             let change = self.correction(c, 1.0 / d, r, u);
@@ -364,11 +363,10 @@ impl Assembled {
             map += change.dot(&change);
             reaction += own.dot(&own);
             rounding += self.summands(c) / (d * d);
-            shift += self.parts.shift[c] * self.parts.shift[c];
         }
         let scale = f64::sqrt(reaction).max(self.parts.applied);
         let (map, rounding) = (f64::sqrt(map), f64::sqrt(rounding));
-        if map <= ROUNDING * rounding || lost(map, scale, f64::sqrt(shift)) { 0.0 } else { map / scale }
+        if map <= ROUNDING * rounding { 0.0 } else { map / scale }
     }
 
     /// Sum of the squares of what is added up to the velocity of a contact: what that is rounded against.

@@ -3,8 +3,7 @@
 //! residual = √Σ‖r̂ − P_K(r̂ − ũ/D)‖² / max(√Σ‖r‖², ‖h F_ext‖), with D one scalar per contact, the largest diagonal
 //! entry of its Delassus block. The cohesion's shift is not in the denominator: on a strongly bonded sample it would
 //! hide the load. A natural map that is as small as the rounding of the velocities behind it is zero: grains that part
-//! leave reactions so small that their ratio to the map says nothing. So is one as small as the rounding of the shift,
-//! where reactions and load are hardly larger: an elastic sample that came to rest.
+//! leave reactions so small that their ratio to the map says nothing.
 
 use super::{Contact, ContactProblem, Nodes, Visitor};
 use crate::contact::Law;
@@ -19,7 +18,6 @@ struct Sums {
     reaction: f64,
     /// Impulses that would stop the bodies of each contact: what the map is rounded against.
     motion: f64,
-    shift: f64,
 }
 
 impl<D: Dim> Visitor<D> for Sums {
@@ -29,8 +27,7 @@ impl<D: Dim> Visitor<D> for Sums {
         let map = c.law.natural_map(c.r, u);
         self.map += map.dot(&map);
         self.reaction += c.r.dot(&c.r);
-        let (gamma, shift) = (c.law.gamma(), c.law.shift());
-        self.shift += shift * shift;
+        let gamma = c.law.gamma();
         for (node, lever) in c.link.nodes.iter().zip(c.link.lever) {
             let node = &nodes.all[*node as usize];
             let speed = node.velocity.dot(&node.velocity) + lever * lever * node.spin.dot(&node.spin);
@@ -45,10 +42,5 @@ pub fn residual<D: Dim>(problem: &ContactProblem<D>) -> f64 {
     problem.visit(&mut sums);
     let scale = sums.reaction.sqrt().max(problem.applied);
     let map = sums.map.sqrt();
-    if map <= ROUNDING * sums.motion.sqrt() || lost(map, scale, sums.shift.sqrt()) { 0.0 } else { map / scale }
-}
-
-/// Whether an error and what it is an error of are both no more than the rounding of the cohesion's shift.
-pub(crate) fn lost(error: f64, scale: f64, shift: f64) -> bool {
-    error <= ROUNDING * shift && scale <= 10.0 * ROUNDING * shift
+    if map <= ROUNDING * sums.motion.sqrt() { 0.0 } else { map / scale }
 }

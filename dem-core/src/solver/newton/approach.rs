@@ -26,7 +26,7 @@ const MOST_FAILURES: u32 = 6;
 
 /// What was found.
 pub(super) struct Found {
-    /// Shifted reactions that are accepted.
+    /// Reactions that are accepted.
     pub reactions: Vec<Padded>,
     /// Their residual and load error (–).
     pub residual: f64,
@@ -37,7 +37,7 @@ impl Newton {
     /// The best reactions that are met on the way, from those at hand; none where they are not accepted.
     pub(super) fn approach(&mut self, problem: &mut impl Solvable, base: &Rows, iterations: &mut u64) -> Option<Found> {
         let mut rows = base.clone();
-        let mut reactions = problem.swept(&rows, STALL_SWEEPS);
+        let mut reactions = problem.swept(STALL_SWEEPS);
         let mut state = Iterate::from_reactions(&rows, &reactions);
         rows.soften(SOFT);
         let (mut level, mut share, mut failures) = (SOFT, 1.0f64, 0);
@@ -74,7 +74,7 @@ impl Newton {
             }
             let load_error = load_change(&rows, &state);
             reactions.clone_from(&state.reactions);
-            problem.write_back(&reactions, &rows);
+            problem.write_back(&reactions);
             problem.velocities_from_reactions();
             let error = problem.residual();
             let least = best.as_ref().map_or(f64::INFINITY, |b| b.residual);

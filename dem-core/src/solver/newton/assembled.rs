@@ -4,7 +4,7 @@
 
 use super::rows::{Padded, Row, Rows, StiffnessRatio, places};
 use super::solvable::Solvable;
-use crate::contact::{LocalSolve, Weights};
+use crate::contact::{Local, LocalSolve, Weights};
 use crate::problem::assembled::{Assembled, BlockMatrix};
 use crate::solver::assembled::{Sites, gauss_seidel};
 use crate::solver::{GaussSeidelSettings, SolveReport};
@@ -45,6 +45,14 @@ fn root(matrix: &BlockMatrix) -> Vec<Vec<f64>> {
     }
 }
 
+impl Assembled {
+    /// The reaction of a contact without the shift.
+    fn own_reaction(&self, c: usize) -> Padded {
+        let r = self.reaction(c);
+        Local { n: r.n - self.parts().shift[c], ..r }
+    }
+}
+
 impl Solvable for Assembled {
     fn rows(&self, kappa: f64, ratio: StiffnessRatio) -> Rows {
         let parts = self.parts();
@@ -71,7 +79,7 @@ impl Solvable for Assembled {
                 shift: parts.shift[c],
                 given: rows.padded(&given),
                 weights,
-                multiplier: self.reaction(c),
+                multiplier: self.own_reaction(c),
                 // the compliance of elastic bonds is inside W and q
                 compliance: Weights::default(),
                 carried: Padded::zero(),
@@ -90,18 +98,19 @@ impl Solvable for Assembled {
         self.residual()
     }
 
-    fn swept(&mut self, _: &Rows, sweeps: usize) -> Vec<Padded> {
+    fn swept(&mut self, sweeps: usize) -> Vec<Padded> {
         let sites = Sites::of(self);
         for _ in 0..sweeps {
             sites.sweep(self, LocalSolve::Exact);
         }
-        (0..self.len()).map(|c| self.reaction(c)).collect()
+        (0..self.len()).map(|c| self.own_reaction(c)).collect()
     }
 
-    fn write_back(&mut self, reactions: &[Padded], _: &Rows) {
+    fn write_back(&mut self, reactions: &[Padded]) {
         let (rows, size) = (self.parts().rows, self.parts().rows.count());
-        for (r, out) in reactions.iter().zip(self.r.chunks_exact_mut(size)) {
-            rows.write(r, out);
+        for (c, r) in reactions.iter().enumerate() {
+            let shifted = Local { n: r.n + self.parts().shift[c], ..*r };
+            rows.write(&shifted, &mut self.r[c * size..][..size]);
         }
     }
 

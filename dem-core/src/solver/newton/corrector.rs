@@ -11,38 +11,47 @@ use crate::contact::{Local, Weights};
 use crate::dim::Vect;
 use nalgebra::{SMatrix, SVector, Vector2};
 
-/// The corrected reaction r̂ for the relative velocity `u`.
+/// The corrected reaction for the relative velocity `u`, without the shift: a reaction that is small beside the
+/// cohesion keeps all its digits while its bond sticks.
 #[inline]
 pub(super) fn correct(row: &Row, u: &Padded) -> Padded {
-    let q = row.form(u);
-    let (w, cone) = (row.metric(), &row.cone);
-    if row.convex() {
-        // most contacts stick, and then nothing couples
-        let stuck = Local { n: -q.n / w.n, t: q.t * (-1.0 / w.t), m: q.m * (-1.0 / w.m) };
-        return if cone.contains(&stuck) { stuck } else { cone.minimise(w, q) };
+    let mut q = row.form(u);
+    let (w, cone, shift) = (row.metric(), &row.cone, row.shift);
+    // most contacts stick, and then nothing couples
+    let stuck = Local { n: -q.n / w.n, t: q.t * (-1.0 / w.t), m: q.m * (-1.0 / w.m) };
+    if cone.contains(&Local { n: stuck.n + shift, ..stuck }) {
+        return stuck;
     }
-    let n = (-q.n / w.n).max(0.0);
-    Local { n, t: (q.t * (-1.0 / w.t)).clipped(cone.mu * n), m: (q.m * (-1.0 / w.m)).clipped(cone.nu * n) }
+    let mut r = if row.convex() {
+        q.n -= w.n * shift;
+        cone.minimise(w, q)
+    } else {
+        let n = (stuck.n + shift).max(0.0);
+        Local { n, t: stuck.t.clipped(cone.mu * n), m: stuck.m.clipped(cone.nu * n) }
+    };
+    r.n -= shift;
+    r
 }
 
 /// A = −∂r/∂q at the velocity `u`, where the corrector gave `r`; nothing where the contact is open.
 ///
 /// `symmetric` leaves out how the threshold of Coulomb's law follows r_n.
 pub(super) fn operator(row: &Row, u: &Padded, r: &Padded, symmetric: bool) -> Option<Operator> {
-    if r.n <= 0.0 {
+    let limit = r.n + row.shift;
+    if limit <= 0.0 {
         return None;
     }
     let q = row.form(u);
     let (w, cone) = (row.metric(), &row.cone);
-    let slip = limit_direction(q.t, w.t, cone.mu * r.n);
-    let bend = limit_direction(q.m, w.m, cone.nu * r.n);
+    let slip = limit_direction(q.t, w.t, cone.mu * limit);
+    let bend = limit_direction(q.m, w.m, cone.nu * limit);
     if slip.is_none() && bend.is_none() {
         return Some(Operator::Diagonal(Weights { n: 1.0 / w.n, t: 1.0 / w.t, m: 1.0 / w.m }));
     }
     let mut a = SMatrix::<f64, 5, 5>::zeros();
     // a row group inside its ball follows its own stiffness; on the sphere it turns with q
-    block(&mut a, 1, slip, 1.0 / w.t, cone.mu * r.n);
-    block(&mut a, 3, bend, 1.0 / w.m, cone.nu * r.n);
+    block(&mut a, 1, slip, 1.0 / w.t, cone.mu * limit);
+    block(&mut a, 3, bend, 1.0 / w.m, cone.nu * limit);
     // the normal row drags the limits along: r = n (1, −μ q̂_t, −ν q̂_m) on the active ones
     let mut drag = SVector::<f64, 5>::ith(0, 1.0);
     let mut stiffness = w.n;

@@ -22,7 +22,7 @@ const MOST_KRYLOV: usize = 80;
 pub(super) struct Iterate {
     pub y: Vec<f64>,
     velocities: Vec<Padded>,
-    /// The corrector's reactions at `y`, shifted.
+    /// The corrector's reactions at `y`.
     pub reactions: Vec<Padded>,
     /// F(y), and its norm.
     gradient: Vec<f64>,
@@ -38,7 +38,7 @@ impl Iterate {
         for row in &rows.list {
             let u = rows.velocity(row, &y);
             let r = correct(row, &u);
-            rows.apply(row, &Local { n: row.shift - r.n, t: -r.t, m: -r.m }, &mut gradient);
+            rows.apply(row, &(r * -1.0), &mut gradient);
             velocities.push(u);
             reactions.push(r);
         }
@@ -46,11 +46,11 @@ impl Iterate {
         Self { y, velocities, reactions, gradient, norm }
     }
 
-    /// The state at the velocities that the (shifted) `reactions` give.
+    /// The state at the velocities that the `reactions` give.
     pub fn from_reactions(rows: &Rows, reactions: &[Padded]) -> Self {
         let mut y = rows.free.clone();
         for (row, r) in rows.list.iter().zip(reactions) {
-            rows.apply(row, &Local { n: r.n - row.shift, ..*r }, &mut y);
+            rows.apply(row, r, &mut y);
         }
         Self::at(rows, y)
     }
@@ -90,16 +90,15 @@ impl Newton {
     /// The norm of F that is small enough: a tenth of what either tolerance allows, or what rounding leaves.
     ///
     /// An error of F turns up as a velocity when v is computed from the reactions. Rounding comes from ρ u, where u is a
-    /// sum of velocities, and from the shift that is added and taken away.
+    /// sum of velocities.
     fn target(&self, rows: &Rows, state: &Iterate) -> f64 {
         let change: f64 = state.y.iter().zip(&rows.free).map(|(y, f)| (y - f) * (y - f)).sum();
         let (mut rounding, mut carried) = (0.0, 0.0);
         for (row, r) in rows.list.iter().zip(&state.reactions) {
             let speed: f64 = (0..2).map(|side| norm2(&state.y[row.at[side]..][..row.count[side]])).sum();
-            let own = Local { n: r.n - row.shift, ..*r };
             let soft = row.metric().n;
             rounding += row.size * (speed * row.size / (soft * soft) + r.dot(r));
-            carried += row.size * own.dot(&own);
+            carried += row.size * r.dot(r);
         }
         let wanted =
             (0.1 * self.settings.load_tolerance * change.sqrt()).min(0.1 * self.settings.tolerance * carried.sqrt());
@@ -155,8 +154,8 @@ fn guessed_velocity(row: &Row, guess: &Padded) -> Padded {
     let beyond = |limit: f64, size: f64| if size >= (1.0 - BEYOND) * limit { 1.0 + 2.0 * BEYOND } else { 1.0 };
     let guess = Local {
         n: guess.n,
-        t: guess.t * beyond(row.cone.mu * guess.n, Vect::norm(&guess.t)),
-        m: guess.m * beyond(row.cone.nu * guess.n, Vect::norm(&guess.m)),
+        t: guess.t * beyond(row.cone.mu * (guess.n + row.shift), Vect::norm(&guess.t)),
+        m: guess.m * beyond(row.cone.nu * (guess.n + row.shift), Vect::norm(&guess.m)),
     };
     let mut u = row.weights.times(&row.multiplier) + row.compliance.times(&row.carried) - row.metric().times(&guess);
     u.n -= row.lag.unwrap_or(0.0);
@@ -178,7 +177,7 @@ fn linearise(rows: &Rows, state: &Iterate, guess: Option<&[Padded]>) -> (Vec<f64
         if let Some(a) = &a {
             r += a.times(&(from - *u));
         }
-        rows.apply(row, &Local { n: row.shift - r.n, t: -r.t, m: -r.m }, &mut gradient);
+        rows.apply(row, &(r * -1.0), &mut gradient);
         operators.push(a);
     }
     (gradient, operators)

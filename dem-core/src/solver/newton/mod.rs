@@ -32,7 +32,6 @@ use crate::contact::{Local, LocalSolve};
 use crate::dim::Dim;
 use crate::problem::ContactProblem;
 use crate::problem::assembled::Assembled;
-use crate::problem::residual::lost;
 use factor::Factor;
 use inner::{Iterate, norm2};
 use rows::{Padded, Rows};
@@ -71,7 +70,7 @@ pub struct NewtonSettings {
 const KAPPA: f64 = 1e9;
 /// Newton iterations of one inner problem before the state is smoothed by sweeps.
 const PATIENCE: u64 = 8;
-/// How often the penalty may be lowered tenfold in one solve.
+/// How often the penalty may be lowered a hundredfold in one solve.
 const MOST_SOFTENED: u32 = 4;
 /// Sweeps that look for the active set: at every step, from zero reactions, and where Newton stalls.
 const SWEEPS: usize = 5;
@@ -176,7 +175,7 @@ impl Newton {
             if !solved {
                 return None;
             }
-            problem.write_back(&state.reactions, rows);
+            problem.write_back(&state.reactions);
             problem.velocities_from_reactions();
             // rounds that shorten the error by c leave c/(1 − c) of the last change
             let change = load_change(rows, &state);
@@ -196,7 +195,7 @@ impl Newton {
             }
             if error > 0.5 * last_error && softened < MOST_SOFTENED {
                 // what moves fast is rounded by ρ u: a smaller ρ hears less of it, and takes more rounds
-                rows.soften(10.0);
+                rows.soften(100.0);
                 softened += 1;
             }
             last_error = error;
@@ -232,7 +231,7 @@ impl Newton {
             return self.report(0, problem.residual(), 0.0);
         }
         let mut iterations = 0;
-        if let Some(report) = self.from_guesses(problem, &rows, &mut iterations) {
+        if let Some(report) = self.try_guesses(problem, &rows, &mut iterations) {
             self.next_rest = 1;
             self.hard = self.hard.saturating_sub(1);
             return report;
@@ -246,7 +245,7 @@ impl Newton {
                 return swept;
             }
         }
-        if let Some(report) = self.from_afar(problem, &rows, &mut iterations) {
+        if let Some(report) = self.come_from_afar(problem, &rows, &mut iterations) {
             return report;
         }
         self.rest_longer();
@@ -260,10 +259,10 @@ impl Newton {
     }
 
     /// Rounds at the largest penalty, from one active set after the other; none if all run in circles.
-    fn from_guesses(&mut self, problem: &mut impl Solvable, rows: &Rows, iterations: &mut u64) -> Option<SolveReport> {
+    fn try_guesses(&mut self, problem: &mut impl Solvable, rows: &Rows, iterations: &mut u64) -> Option<SolveReport> {
         // the reactions that the problem brought along, bettered by some sweeps, show which contacts are active
-        let cold = rows.list.iter().all(|row| row.multiplier.n == row.shift);
-        let mut guess = problem.swept(rows, if cold { COLD_SWEEPS } else { SWEEPS });
+        let cold = rows.list.iter().all(|row| row.multiplier.n == 0.0);
+        let mut guess = problem.swept(if cold { COLD_SWEEPS } else { SWEEPS });
         for sweeps in [STALL_SWEEPS, COLD_SWEEPS, 0] {
             let report = self.rounds(problem, &mut self.started(rows), &mut guess, iterations);
             if report.is_some() || sweeps == 0 {
@@ -274,14 +273,19 @@ impl Newton {
             if sweeps == COLD_SWEEPS {
                 problem.forget_reactions();
             }
-            guess = problem.swept(rows, sweeps);
+            guess = problem.swept(sweeps);
         }
         None
     }
 
     /// The solution that is approached from afar: as the stiff limit if its active set gives that, else bettered from
     /// where it is.
-    fn from_afar(&mut self, problem: &mut impl Solvable, rows: &Rows, iterations: &mut u64) -> Option<SolveReport> {
+    fn come_from_afar(
+        &mut self,
+        problem: &mut impl Solvable,
+        rows: &Rows,
+        iterations: &mut u64,
+    ) -> Option<SolveReport> {
         let found = self.approach(problem, rows, iterations)?;
         let mut guess = found.reactions.clone();
         if let Some(report) = self.rounds(problem, &mut self.started(rows), &mut guess, iterations) {
@@ -292,7 +296,7 @@ impl Newton {
         guess.clone_from(&found.reactions);
         let report = self.rounds(problem, &mut rows, &mut guess, iterations);
         Some(report.unwrap_or_else(|| {
-            problem.write_back(&found.reactions, &rows);
+            problem.write_back(&found.reactions);
             problem.velocities_from_reactions();
             self.report(*iterations, problem.residual(), found.load_error)
         }))
@@ -302,23 +306,21 @@ impl Newton {
     fn started(&self, rows: &Rows) -> Rows {
         let mut rows = rows.clone();
         if self.settings.start == Start::StiffLimit {
-            rows.list.iter_mut().for_each(|row| row.multiplier = Local { n: row.shift, ..Local::zero() });
+            rows.list.iter_mut().for_each(|row| row.multiplier = Local::zero());
         }
         rows
     }
 }
 
 /// How much the net impulses on the bodies changed in the last proximal step, over themselves: with a contraction far
-/// below one, the load error of the step before. One that is lost in the rounding of the shifts is none.
+/// below one, the load error of the step before.
 fn load_change(rows: &Rows, state: &Iterate) -> f64 {
     let mut change = vec![0.0; rows.unknowns];
     let mut total = vec![0.0; rows.unknowns];
-    let mut shifts = 0.0;
     for (row, r) in rows.list.iter().zip(&state.reactions) {
         rows.apply(row, &(*r - row.multiplier), &mut change);
-        rows.apply(row, &Local { n: r.n - row.shift, ..*r }, &mut total);
-        shifts += row.size * row.shift * row.shift;
+        rows.apply(row, r, &mut total);
     }
     let (change, total) = (norm2(&change).sqrt(), norm2(&total).sqrt());
-    if change == 0.0 || lost(change, total, shifts.sqrt()) { 0.0 } else { change / total }
+    if change == 0.0 { 0.0 } else { change / total }
 }

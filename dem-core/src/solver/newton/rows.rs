@@ -59,11 +59,11 @@ pub(super) struct Row {
     pub given: Padded,
     /// 1/ρ of n, t and m.
     pub weights: Weights,
-    /// Multiplier: the shifted reaction r̂ (N s).
+    /// Multiplier: a reaction, without the shift, which would round it (N s).
     pub multiplier: Padded,
     /// Compliance of an elastic bond, zero for what is rigid.
     pub compliance: Weights,
-    /// Shifted reaction that an elastic bond carried when the step began (N s).
+    /// Reaction that an elastic bond carried when the step began (N s).
     pub carried: Padded,
     /// What is added to u_n in place of μ‖u_t‖ where the law is taken as associated for a round.
     pub lag: Option<f64>,
@@ -78,7 +78,7 @@ impl Row {
         self.weights + self.compliance
     }
 
-    /// q = u − r̂/ρ − C r̂₀, the linear form of the corrector at the velocity `u`.
+    /// q = u − r/ρ − C r₀, the linear form of the corrector for reactions without the shift at the velocity `u`.
     #[inline]
     pub fn form(&self, u: &Padded) -> Padded {
         let mut q = *u - self.weights.times(&self.multiplier) - self.compliance.times(&self.carried);
@@ -355,11 +355,6 @@ impl<D: Dim> Visitor<D> for Flatten<'_, D> {
         self.normal.push(normal);
         let size = c.link.lever[0] + if c.link.lever[1] > 0.0 { c.link.lever[1] } else { c.link.lever[0] };
         let soft = size.powi(2 - D::N as i32);
-        let shifted = |r| {
-            let mut r: Padded = padded(r);
-            r.n += c.law.shift();
-            r
-        };
         self.rows.list.push(Row {
             at: c.link.nodes.map(|k| self.unknowns.first[k as usize]),
             count: [first, second],
@@ -370,9 +365,9 @@ impl<D: Dim> Visitor<D> for Flatten<'_, D> {
             shift: c.law.shift(),
             given,
             weights: Weights { n: soft, t: soft / self.ratio.tangential, m: soft / self.ratio.rolling },
-            multiplier: shifted(c.r),
+            multiplier: padded(c.r),
             compliance: c.law.compliance(),
-            carried: shifted(c.law.carried()),
+            carried: padded(c.law.carried()),
             lag: None,
             size: table.rows[..rows.len()].iter().flat_map(|row| &row[..table.width]).map(|h| h * h).sum(),
         });

@@ -1,6 +1,6 @@
 //! What the Newton solver asks of a problem, matrix-free or with its matrix.
 
-use super::rows::{Padded, Row, Rows, StiffnessRatio, padded};
+use super::rows::{Padded, Rows, StiffnessRatio, padded};
 use crate::contact::{Law, Local, LocalSolve};
 use crate::dim::{Dim, Vect, resized};
 use crate::problem::residual::residual;
@@ -15,10 +15,10 @@ pub(super) trait Solvable {
     fn velocities_from_reactions(&mut self);
     /// The residual of the reactions at hand (–).
     fn residual(&self) -> f64;
-    /// The reactions after some sweeps of Gauss–Seidel, shifted.
-    fn swept(&mut self, rows: &Rows, sweeps: usize) -> Vec<Padded>;
-    /// Take over shifted reactions.
-    fn write_back(&mut self, reactions: &[Padded], rows: &Rows);
+    /// The reactions after some sweeps of Gauss–Seidel.
+    fn swept(&mut self, sweeps: usize) -> Vec<Padded>;
+    /// Take over reactions.
+    fn write_back(&mut self, reactions: &[Padded]);
     /// Set the reactions to zero.
     fn forget_reactions(&mut self);
     /// Set the reactions to zero if one of them is not finite.
@@ -40,33 +40,32 @@ impl<D: Dim> Solvable for ContactProblem<D> {
         residual(self)
     }
 
-    fn swept(&mut self, rows: &Rows, sweeps: usize) -> Vec<Padded> {
+    fn swept(&mut self, sweeps: usize) -> Vec<Padded> {
         self.velocities_from_reactions();
         for _ in 0..sweeps {
             sweep(self, LocalSolve::Exact);
         }
-        let mut reactions = Vec::with_capacity(rows.list.len());
+        let mut reactions = Vec::with_capacity(self.len());
         reactions.extend(self.bonded.iter().map(|c| padded(c.r)));
         reactions.extend(self.elastic.iter().map(|c| padded(c.r)));
         reactions.extend(self.dry.iter().map(|c| padded(c.r)));
         reactions.extend(self.frictionless.iter().map(|c| padded(c.r)));
-        reactions.iter_mut().zip(&rows.list).for_each(|(r, row)| r.n += row.shift);
         reactions
     }
 
-    fn write_back(&mut self, reactions: &[Padded], rows: &Rows) {
-        fn group<D: Dim, L: Law>(group: &mut Group<D, L>, list: &[Padded], rows: &[Row]) {
-            for ((c, r), row) in group.iter_mut().zip(list).zip(rows) {
-                c.r = Local { n: r.n - row.shift, t: resized(r.t), m: resized(r.m) };
+    fn write_back(&mut self, reactions: &[Padded]) {
+        fn group<D: Dim, L: Law>(group: &mut Group<D, L>, list: &[Padded]) {
+            for (c, r) in group.iter_mut().zip(list) {
+                c.r = Local { n: r.n, t: resized(r.t), m: resized(r.m) };
             }
         }
         let bonded = self.bonded.len();
         let elastic = bonded + self.elastic.len();
         let dry = elastic + self.dry.len();
-        group(&mut self.bonded, &reactions[..bonded], &rows.list[..bonded]);
-        group(&mut self.elastic, &reactions[bonded..elastic], &rows.list[bonded..elastic]);
-        group(&mut self.dry, &reactions[elastic..dry], &rows.list[elastic..dry]);
-        group(&mut self.frictionless, &reactions[dry..], &rows.list[dry..]);
+        group(&mut self.bonded, &reactions[..bonded]);
+        group(&mut self.elastic, &reactions[bonded..elastic]);
+        group(&mut self.dry, &reactions[elastic..dry]);
+        group(&mut self.frictionless, &reactions[dry..]);
     }
 
     fn forget_reactions(&mut self) {
