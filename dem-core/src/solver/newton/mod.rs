@@ -143,7 +143,9 @@ impl Newton {
     }
 
     fn report(&self, iterations: u64, residual: f64, load_error: f64) -> SolveReport {
-        let status = if residual <= self.settings.tolerance && load_error <= self.settings.load_tolerance {
+        // a residual of zero is rounding, and rounding is all that still changes
+        let settled = load_error <= self.settings.load_tolerance || residual == 0.0;
+        let status = if residual <= self.settings.tolerance && settled {
             SolveStatus::Converged
         } else if residual <= self.settings.accept {
             SolveStatus::Accepted
@@ -190,7 +192,8 @@ impl Newton {
                 return Some(report);
             }
             made_in_all += made;
-            if made_in_all >= self.settings.max_iterations {
+            let stuck = softened == MOST_SOFTENED && error > 0.5 * last_error;
+            if stuck || made_in_all >= self.settings.max_iterations {
                 return (report.status == SolveStatus::Accepted).then_some(report);
             }
             if error > 0.5 * last_error && softened < MOST_SOFTENED {
