@@ -93,7 +93,7 @@ pub enum SolverSettings {
     GaussSeidel(GaussSeidelSettings),
     /// Augmented-Lagrangian semismooth Newton with a sparse factorisation.
     Newton(NewtonSettings),
-    /// Either, by what is expected to be cheaper.
+    /// Newton for bonds, Gauss–Seidel for dry contacts.
     Auto(NewtonSettings),
 }
 

@@ -24,7 +24,7 @@ const START_SHARE: f64 = 0.1;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum SolverName {
-    /// Newton for bonds, and for dry contacts whichever is expected to be cheaper.
+    /// Newton for bonds, Gauss–Seidel for dry contacts.
     Auto,
     /// Non-linear Gauss–Seidel.
     #[value(alias = "gauss_seidel")]

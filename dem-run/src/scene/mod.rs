@@ -71,7 +71,9 @@ pub fn load(path: &Path, assignments: &[String]) -> Result<Scene, SceneError> {
 pub fn from_text(name: &str, text: &str, assignments: &[String]) -> Result<Scene, SceneError> {
     let mut document = parse::parse(name, text)?;
     set::apply(&mut document, assignments).map_err(|problems| document.wrong(problems))?;
-    let scene = document.decode().map_err(|problem| document.wrong(vec![problem]))?;
+    let mut scene: Scene = document.decode().map_err(|problem| document.wrong(vec![problem]))?;
+    let accept = solver::default_accept(scene.solver.tolerance, scene.bonds.is_some());
+    scene.solver.accept.get_or_insert(accept);
     let problems = document.merge_non_finite(validate(&scene));
     if problems.is_empty() { Ok(scene) } else { Err(document.wrong(problems)) }
 }

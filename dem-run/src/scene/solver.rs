@@ -3,8 +3,11 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Residual that is accepted where the scene does not say.
-const ACCEPT: f64 = 1e-6;
+/// Residual that is accepted where the scene does not say: bonds break for good, and want the better one.
+#[must_use]
+pub(super) fn default_accept(tolerance: f64, bonds: bool) -> f64 {
+    tolerance.max(if bonds { 1e-6 } else { 1e-4 })
+}
 
 /// How the contact problem of each time step is solved.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -14,8 +17,8 @@ pub struct Solver {
     pub kind: SolverKind,
     /// Relative residual that the solver aims at.
     pub tolerance: f64,
-    /// Largest relative residual of a solve that is accepted, at least the tolerance; where it is absent 1e-6, or the
-    /// tolerance if that is larger.
+    /// Largest relative residual of a solve that is accepted, at least the tolerance; where it is absent 1e-6 with bonds
+    /// and 1e-4 without, or the tolerance if that is larger.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accept: Option<f64>,
     /// How many times a step whose solve was not accepted is cut in half before the run stops.
@@ -26,7 +29,7 @@ pub struct Solver {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SolverKind {
-    /// Newton for bonds, and for dry contacts whichever of Gauss–Seidel and Newton is expected to be cheaper.
+    /// Newton for bonds, Gauss–Seidel for dry contacts, and Newton where that does not do.
     Auto(Newton),
     /// Non-linear Gauss–Seidel: one contact after the other, until none changes.
     GaussSeidel(GaussSeidel),
@@ -113,6 +116,6 @@ impl Solver {
     /// Largest relative residual of a solve that is accepted.
     #[must_use]
     pub fn accept(&self) -> f64 {
-        self.accept.unwrap_or(self.tolerance.max(ACCEPT))
+        self.accept.unwrap_or(self.tolerance)
     }
 }
