@@ -117,7 +117,8 @@ fn what_is_absent_has_its_default() {
     let scene = read(SOLID, &[]).expect("SOLID");
     assert_eq!((scene.seed, scene.thickness(), scene.gravity.as_ref()), (1, 1.0, None));
     assert_eq!(scene.materials.restitution, Restitution { grain_grain: 0.0, grain_wall: 0.0, threshold_speed: 0.0 });
-    assert_eq!(scene.solver, Solver::default());
+    let solver = Solver { accept: Some(1e-4), ..Solver::default() };
+    assert_eq!(scene.solver, solver);
     assert_eq!(scene.rupture, Rupture::Cascade);
     assert_eq!(scene.steps_per_frame(), 100);
     let scene = read(FLAT, &[]).expect("FLAT");
