@@ -1,4 +1,4 @@
-//! Cohesive bonds: how they form, what they carry and when they break for good (PHYSICS §1, paper (4) and (5)).
+//! Cohesive bonds: how they form, what they carry and when they break for good (Guessasma & Fortin 2011, (4) and (5)).
 
 use crate::contact::{Cone, Local, Weights};
 use crate::dim::Vect;

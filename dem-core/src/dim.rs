@@ -115,6 +115,12 @@ pub trait Dim: Copy + Debug + Default + Send + Sync + 'static {
     fn normal(frame: &Self::Frame) -> Self::Vector;
     /// First tangent of a frame.
     fn tangent(frame: &Self::Frame) -> Self::Vector;
+    /// Numbers of a frame.
+    const FRAME: usize;
+    /// The numbers of a frame, appended to `out`: normal, then tangents.
+    fn write_frame(frame: &Self::Frame, out: &mut Vec<f64>);
+    /// The frame of these numbers; there must be exactly [`Dim::FRAME`].
+    fn read_frame(numbers: &[f64]) -> Self::Frame;
     /// Normal and tangential components of a vector.
     fn split(frame: &Self::Frame, vector: Self::Vector) -> (f64, Self::Tangent);
     /// The vector with the given normal and tangential components; transpose of [`Dim::split`].
@@ -176,6 +182,13 @@ impl Dim for D2 {
     #[inline(always)]
     fn tangent(n: &Self::Frame) -> Self::Vector {
         [-n[1], n[0]].into()
+    }
+    const FRAME: usize = 2;
+    fn write_frame(n: &Self::Frame, out: &mut Vec<f64>) {
+        out.extend_from_slice(n.as_slice());
+    }
+    fn read_frame(numbers: &[f64]) -> Self::Frame {
+        Vect::from_slice(numbers)
     }
     #[inline(always)]
     fn split(n: &Self::Frame, v: Self::Vector) -> (f64, Self::Tangent) {
@@ -245,6 +258,16 @@ impl Dim for D3 {
     #[inline(always)]
     fn tangent(frame: &Self::Frame) -> Self::Vector {
         frame.t[0]
+    }
+    const FRAME: usize = 9;
+    fn write_frame(f: &Self::Frame, out: &mut Vec<f64>) {
+        for v in [f.n, f.t[0], f.t[1]] {
+            out.extend_from_slice(v.as_slice());
+        }
+    }
+    fn read_frame(numbers: &[f64]) -> Self::Frame {
+        let vector = |k: usize| Vect::from_slice(&numbers[3 * k..3 * k + 3]);
+        Frame3 { n: vector(0), t: [vector(1), vector(2)] }
     }
     #[inline(always)]
     fn split(f: &Self::Frame, v: Self::Vector) -> (f64, Self::Tangent) {

@@ -13,5 +13,6 @@ pub mod contact;
 pub mod detection;
 pub mod dim;
 pub mod problem;
+pub mod saved;
 pub mod solver;
 pub mod world;

@@ -33,6 +33,17 @@ fn pair<D: Dim>(force: &[f64], torque: &[f64]) -> World<D> {
     w
 }
 
+/// A solver that a row of 20 grains is too much for.
+fn one_sweep() -> SolverSettings {
+    SolverSettings::GaussSeidel(GaussSeidelSettings {
+        local: Default::default(),
+        tolerance: 1e-14,
+        accept: 1e-14,
+        max_sweeps: 1,
+        acceleration: 0,
+    })
+}
+
 fn first_break<D: Dim>(mut w: World<D>) -> Option<Break<D>> {
     w.step().unwrap().breaks.first().copied()
 }
@@ -148,14 +159,7 @@ fn bonds_never_form_again() {
 #[test]
 fn an_unaccepted_solve_breaks_no_bond_and_moves_no_body() {
     let mut set = settings(1e-4);
-    let one_sweep = GaussSeidelSettings {
-        local: Default::default(),
-        tolerance: 1e-14,
-        accept: 1e-14,
-        max_sweeps: 1,
-        acceleration: 0,
-    };
-    set.solver = SolverSettings::GaussSeidel(one_sweep);
+    set.solver = one_sweep();
     set.max_halvings = 2;
     let mut row: Vec<_> = (0..20).map(|k| grain::<D2>(&[A * k as f64, 0.0], 0.5 * A)).collect();
     row[0].fixed = true;
@@ -176,14 +180,7 @@ fn an_unaccepted_solve_breaks_no_bond_and_moves_no_body() {
 fn a_step_whose_second_half_fails_is_taken_back_whole() {
     // the pull of the second half breaks a chain that one sweep cannot solve; the first half, without load, is easy
     let mut set = settings(1e-4);
-    let one_sweep = GaussSeidelSettings {
-        local: Default::default(),
-        tolerance: 1e-14,
-        accept: 1e-14,
-        max_sweeps: 1,
-        acceleration: 0,
-    };
-    set.solver = SolverSettings::GaussSeidel(one_sweep);
+    set.solver = one_sweep();
     set.max_halvings = 1;
     let mut row: Vec<_> = (0..20).map(|k| grain::<D2>(&[A * k as f64, 0.0], 0.5 * A)).collect();
     row.push(grain::<D2>(&[-10.0 * A, 0.0], 0.5 * A));

@@ -4,9 +4,11 @@
 //! rows m (moments divided by the mean diameter, relative spins multiplied by it, so all rows share a unit).
 //! A group that a contact lacks has length zero, so one formula serves frictionless, dry and bonded contacts.
 //!
-//! Source: the cone of Coulomb with rolling resistance, PHYSICS §1 (5), after Taboada, Estrada & Radjaï 2006.
+//! Source: the cone of Coulomb with rolling resistance, Guessasma & Fortin 2011 with the rolling of Taboada,
+//! Estrada & Radjaï 2006.
 
-use crate::dim::Vect;
+use crate::dim::{Vect, resized};
+use nalgebra::SVector;
 use std::ops::{Add, AddAssign, Mul, Sub};
 
 /// One value for each row of a contact: reaction (N s) or relative velocity (m/s).
@@ -34,6 +36,29 @@ impl<T: Vect, B: Vect> Local<T, B> {
     #[inline(always)]
     pub fn dot(&self, other: &Self) -> f64 {
         self.n * other.n + self.t.dot(&other.t) + self.m.dot(&other.m)
+    }
+
+    /// The same rows in groups of other lengths: those that only one of the two has are zero, or left out.
+    #[inline(always)]
+    pub(crate) fn resized<U: Vect, C: Vect>(&self) -> Local<U, C> {
+        Local { n: self.n, t: resized(self.t), m: resized(self.m) }
+    }
+}
+
+/// Rows of any contact, padded with zeros to the most that one has: n, two tangential, two bending.
+pub(crate) type Padded = Local<SVector<f64, 2>, SVector<f64, 2>>;
+
+impl Padded {
+    /// The rows in the order n, t, m.
+    #[inline]
+    pub(crate) fn in_order(&self) -> SVector<f64, 5> {
+        [self.n, self.t[0], self.t[1], self.m[0], self.m[1]].into()
+    }
+
+    /// The inverse of [`Padded::in_order`].
+    #[inline]
+    pub(crate) fn from_order(v: &SVector<f64, 5>) -> Self {
+        Self { n: v[0], t: [v[1], v[2]].into(), m: [v[3], v[4]].into() }
     }
 }
 

@@ -4,7 +4,7 @@
 //!
 //! K ∋ r̂ ⊥ ũ ∈ K*   ⇔   r̂ = P_K(r̂ − γ ũ) for any γ > 0:
 //!
-//! de Saxcé's bipotential, PHYSICS §1 (3)–(5). A bond with associated flow leaves the shift of u out.
+//! de Saxcé's bipotential, Guessasma & Fortin 2011, (3)–(5). A bond with associated flow leaves the shift of u out.
 //!
 //! A law offers two ways to better one contact while all others stand still. The *predictor–corrector* is one
 //! step of the line above with γ = 1 / (largest diagonal entry of the local Delassus block W), which makes it a
@@ -374,7 +374,7 @@ impl<A: Vect> Bonded<A, A> {
 /// An intact bond with a stiffness: rigid but for the compliance C, u + C (r − r₀) in place of u.
 ///
 /// An elastic row of stiffness k over an implicit step h has f⁺ = f − k h u⁺, which is C = 1/(k h²) for impulses and
-/// r₀ = h f the impulse that the bond carried when the step began (PHYSICS §3.5).
+/// r₀ = h f the impulse that the bond carried when the step began, see docs/theory/elastic-bonds.md.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Elastic<T, B> {
     bond: Bonded<T, B>,

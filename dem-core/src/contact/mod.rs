@@ -3,5 +3,6 @@
 pub mod cone;
 pub mod law;
 
+pub(crate) use cone::Padded;
 pub use cone::{Cone, Local, Weights};
 pub use law::{Block, BondFlow, Bonded, Coulomb, Elastic, Frictionless, Law, LocalSolve};

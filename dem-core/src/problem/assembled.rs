@@ -8,20 +8,15 @@
 //! W is made from the maps H and Hᵀ of the matrix-free problem, column by column: what a unit impulse does to the
 //! relative velocities around it. See docs/theory/fclib.md.
 
+use super::residual::relative;
 use super::{Contact, ContactProblem, Link, Nodes, Visitor};
 use crate::contact::law::predict_correct;
-use crate::contact::{Cone, Law, Local, Weights};
-use crate::dim::{Dim, Vect, resized};
-use nalgebra::SVector;
+use crate::contact::{Cone, Law, Local, Padded, Weights};
+use crate::dim::{Dim, Vect};
 use thiserror::Error;
-
-/// Rows of one contact, padded to the most that any has: n, two tangential, two bending.
-pub(crate) type Padded = Local<SVector<f64, 2>, SVector<f64, 2>>;
 
 /// Relative asymmetry of W that is put down to rounding.
 const ASYMMETRY: f64 = 1e-6;
-/// Relative rounding of the natural map that counts as zero.
-const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
 /// The rows that every contact of an assembled problem has, in the order n, t…, m….
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -355,7 +350,7 @@ impl Assembled {
     /// The reactions in its denominator are without their shift where that is known. Not a number stays not a number.
     #[must_use]
     pub fn residual(&self) -> f64 {
-        let (mut map, mut reaction, mut rounding) = (0.0, 0.0, 0.0);
+        let (mut map, mut reaction, mut rounding) = (0.0f64, 0.0, 0.0f64);
         for (c, d) in self.scales().into_iter().enumerate() {
             let (r, u) = (self.reaction(c), self.velocity(c));
             let change = self.correction(c, 1.0 / d, r, u);
@@ -365,8 +360,7 @@ impl Assembled {
             rounding += self.summands(c) / (d * d);
         }
         let scale = f64::sqrt(reaction).max(self.parts.applied);
-        let (map, rounding) = (f64::sqrt(map), f64::sqrt(rounding));
-        if map <= ROUNDING * rounding { 0.0 } else { map / scale }
+        relative(map.sqrt(), rounding.sqrt(), scale)
     }
 
     /// Sum of the squares of what is added up to the velocity of a contact: what that is rounded against.
@@ -440,10 +434,6 @@ impl Assembled {
     }
 }
 
-fn padded<T: Vect, B: Vect>(r: Local<T, B>) -> Padded {
-    Local { n: r.n, t: resized(r.t), m: resized(r.m) }
-}
-
 /// A contact whatever its law.
 struct Item<D: Dim> {
     link: Link<D>,
@@ -473,8 +463,8 @@ impl<D: Dim> Visitor<D> for List<D> {
             shift: c.law.shift(),
             bias: c.law.bias(),
             compliance: c.law.compliance(),
-            carried: padded(c.law.carried()),
-            r: padded(c.r),
+            carried: c.law.carried().resized(),
+            r: c.r.resized(),
         });
     }
 }

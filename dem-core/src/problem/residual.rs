@@ -41,6 +41,10 @@ pub fn residual<D: Dim>(problem: &ContactProblem<D>) -> f64 {
     let mut sums = Sums::default();
     problem.visit(&mut sums);
     let scale = sums.reaction.sqrt().max(problem.applied);
-    let map = sums.map.sqrt();
-    if map <= ROUNDING * sums.motion.sqrt() { 0.0 } else { map / scale }
+    relative(sums.map.sqrt(), sums.motion.sqrt(), scale)
+}
+
+/// The norm of the natural map over `scale`; zero where it is the rounding of summands of norm `rounded`.
+pub(super) fn relative(map: f64, rounded: f64, scale: f64) -> f64 {
+    if map <= ROUNDING * rounded { 0.0 } else { map / scale }
 }

@@ -5,13 +5,12 @@
 //! satisfies its law, and otherwise the predictor–corrector is repeated with γ = 1/(largest eigenvalue of the block),
 //! which contracts where the flow is associated.
 
-use super::anderson::Anderson;
-use super::gauss_seidel::{BURST, LOOK};
-use super::{GaussSeidelSettings, SolveReport, SolveStatus, Work};
-use crate::contact::{Local, LocalSolve};
+use super::gauss_seidel::{Sweepable, iterate};
+use super::{GaussSeidelSettings, SolveReport};
+use crate::contact::{LocalSolve, Padded};
 use crate::dim::Vect;
-use crate::problem::assembled::{Assembled, Padded};
-use nalgebra::{SMatrix, SVector};
+use crate::problem::assembled::Assembled;
+use nalgebra::SMatrix;
 
 /// Most repetitions of the predictor–corrector in one visit of a contact; the next sweep goes on.
 const ROUNDS: usize = 100;
@@ -28,14 +27,6 @@ struct Site {
 
 /// What all local solves of a problem need, computed once.
 pub(super) struct Sites(Vec<Site>);
-
-fn in_order(r: &Padded) -> SVector<f64, 5> {
-    [r.n, r.t[0], r.t[1], r.m[0], r.m[1]].into()
-}
-
-fn from_order(v: &SVector<f64, 5>) -> Padded {
-    Local { n: v[0], t: [v[1], v[2]].into(), m: [v[3], v[4]].into() }
-}
 
 impl Site {
     fn new(problem: &Assembled, contact: usize, scale: f64) -> Self {
@@ -64,12 +55,12 @@ impl Site {
     fn exact(&self, problem: &Assembled, contact: usize, mut r: Padded, mut u: Padded) -> Padded {
         let cone = problem.cone(contact);
         if let Some(inverse) = &self.inverse {
-            let stuck = r + from_order(&(inverse * in_order(&u))) * -1.0;
+            let stuck = r + Padded::from_order(&(inverse * u.in_order())) * -1.0;
             if cone.contains(&stuck) {
                 return stuck;
             }
         }
-        let open = u + from_order(&(self.block * in_order(&r))) * -1.0;
+        let open = u + Padded::from_order(&(self.block * r.in_order())) * -1.0;
         let pull = if problem.parts().associated[contact] {
             cone.mu * Vect::norm(&open.t) + cone.nu * Vect::norm(&open.m)
         } else {
@@ -81,7 +72,7 @@ impl Site {
         for _ in 0..ROUNDS {
             let change = problem.correction(contact, self.gamma, r, u);
             r += change;
-            u += from_order(&(self.block * in_order(&change)));
+            u += Padded::from_order(&(self.block * change.in_order()));
             if change.dot(&change) <= 1e-30 * r.dot(&r) {
                 break;
             }
@@ -93,34 +84,34 @@ impl Site {
 /// Non-linear Gauss–Seidel, from the reactions that the problem holds.
 pub fn gauss_seidel(problem: &mut Assembled, settings: &GaussSeidelSettings) -> SolveReport {
     let sites = Sites::of(problem);
-    let mut memory = (settings.acceleration > 0).then(|| Anderson::new(settings.acceleration, problem.r.clone()));
-    let mut error = problem.residual();
-    let mut sweeps = 0;
-    while error > settings.tolerance && sweeps < settings.max_sweeps {
-        // the residual costs about a sweep: look at it ever more rarely, at most every 64 sweeps
-        let plain = (1 + sweeps / 4).min(64);
-        let burst = if memory.is_some() { BURST } else { plain }.min(settings.max_sweeps - sweeps);
-        for _ in 0..burst {
-            sites.sweep(problem, settings.local);
-        }
-        sweeps += burst;
-        let early = sweeps <= LOOK * BURST || sweeps.is_multiple_of(LOOK * BURST);
-        if memory.is_none() || early || sweeps >= settings.max_sweeps {
-            error = problem.residual();
-        }
-        if let Some(memory) = memory.as_mut().filter(|_| error > settings.tolerance && sweeps < settings.max_sweeps) {
-            let next = memory.next(problem.r.clone());
-            problem.r.copy_from_slice(next);
-        }
+    iterate(&mut Visited { problem, sites: &sites }, settings)
+}
+
+/// A problem and what the visits of its contacts need.
+struct Visited<'a> {
+    problem: &'a mut Assembled,
+    sites: &'a Sites,
+}
+
+impl Sweepable for Visited<'_> {
+    fn sweep(&mut self, local: LocalSolve) {
+        self.sites.sweep(self.problem, local);
     }
-    let status = if error <= settings.tolerance {
-        SolveStatus::Converged
-    } else if error <= settings.accept {
-        SolveStatus::Accepted
-    } else {
-        SolveStatus::Failed
-    };
-    SolveReport { status, work: Work { sweeps, ..Work::default() }, residual: error, load_error: None }
+
+    /// Nothing: they are taken from W whenever they are asked for.
+    fn velocities_from_reactions(&mut self) {}
+
+    fn residual(&self) -> f64 {
+        self.problem.residual()
+    }
+
+    fn gather(&self) -> Vec<f64> {
+        self.problem.r.clone()
+    }
+
+    fn scatter(&mut self, from: &[f64]) {
+        self.problem.r.copy_from_slice(from);
+    }
 }
 
 impl Sites {

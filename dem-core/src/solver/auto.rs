@@ -8,6 +8,7 @@ use super::{ContactSolver, GaussSeidel, GaussSeidelSettings, Newton, NewtonSetti
 use crate::contact::LocalSolve;
 use crate::dim::Dim;
 use crate::problem::ContactProblem;
+use crate::saved::{Mismatch, Reader, Saved};
 
 /// Sweeps over dry contacts that aim at the tolerance, and those beyond that aim at what is accepted.
 const FINE_SWEEPS: u64 = 2_000;
@@ -49,5 +50,13 @@ impl<D: Dim> ContactSolver<D> for Auto {
         }
         let report = self.newton.solve(problem);
         SolveReport { work: fine.work + coarse.work + report.work, ..report }
+    }
+
+    fn save(&self, to: &mut Saved) {
+        self.newton.save_state(to);
+    }
+
+    fn restore(&mut self, from: &mut Reader) -> Result<(), Mismatch> {
+        self.newton.restore_state(from)
     }
 }

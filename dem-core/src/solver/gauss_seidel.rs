@@ -28,11 +28,11 @@ pub struct GaussSeidelSettings {
 }
 
 /// Sweeps between two accelerated steps.
-pub(super) const BURST: u64 = 4;
+const BURST: u64 = 4;
 /// Accelerated steps between two looks at the residual.
-pub(super) const LOOK: u64 = 4;
+const LOOK: u64 = 4;
 /// Plain sweeps before the acceleration begins: easy problems need no more.
-pub(super) const PLAIN: u64 = 32;
+const PLAIN: u64 = 32;
 /// Steps for the acceleration to remember that serve well.
 pub(super) const MEMORY: usize = 8;
 
@@ -46,17 +46,6 @@ impl GaussSeidel {
     /// A solver with these settings.
     pub fn new(settings: GaussSeidelSettings) -> Self {
         Self { settings }
-    }
-
-    fn report(&self, sweeps: u64, residual: f64) -> SolveReport {
-        let status = if residual <= self.settings.tolerance {
-            SolveStatus::Converged
-        } else if residual <= self.settings.accept {
-            SolveStatus::Accepted
-        } else {
-            SolveStatus::Failed
-        };
-        SolveReport { status, work: Work { sweeps, ..Work::default() }, residual, load_error: None }
     }
 }
 
@@ -91,101 +80,131 @@ pub fn sweep<D: Dim>(problem: &mut ContactProblem<D>, local: LocalSolve) {
     }
 }
 
-/// All impulses in one list.
-fn gather<D: Dim>(problem: &ContactProblem<D>) -> Vec<f64> {
-    fn group<D: Dim, L: Law>(group: &Group<D, L>, out: &mut Vec<f64>) {
-        for c in group {
-            out.push(c.r.n);
-            out.extend_from_slice(c.r.t.as_slice());
-            out.extend_from_slice(c.r.m.as_slice());
-        }
-    }
-    let mut out = Vec::with_capacity(problem.len() * 3);
-    group(&problem.bonded, &mut out);
-    group(&problem.elastic, &mut out);
-    group(&problem.dry, &mut out);
-    group(&problem.frictionless, &mut out);
-    out
+/// What the iteration asks of a problem, matrix-free or with its matrix.
+pub(super) trait Sweepable {
+    /// One visit of every contact.
+    fn sweep(&mut self, local: LocalSolve);
+    /// Set the velocities to what the impulses make of them, free of the rounding of the sweeps' increments.
+    fn velocities_from_reactions(&mut self);
+    /// The residual of the impulses and velocities at hand (–).
+    fn residual(&self) -> f64;
+    /// All impulses in one list.
+    fn gather(&self) -> Vec<f64>;
+    /// The inverse of [`Sweepable::gather`], and the velocities that belong to the impulses.
+    fn scatter(&mut self, from: &[f64]);
 }
 
-/// The inverse of [`gather`], and the velocities that belong to the impulses.
-fn scatter<D: Dim>(problem: &mut ContactProblem<D>, from: &[f64]) {
-    fn group<D: Dim, L: Law>(group: &mut Group<D, L>, mut from: &[f64]) -> usize {
-        let rows = 1 + L::T::LEN + L::B::LEN;
-        for c in group.iter_mut() {
-            c.r.n = from[0];
-            c.r.t = L::T::from_slice(&from[1..][..L::T::LEN]);
-            c.r.m = L::B::from_slice(&from[1 + L::T::LEN..][..L::B::LEN]);
-            from = &from[rows..];
-        }
-        rows * group.len()
+impl<D: Dim> Sweepable for ContactProblem<D> {
+    fn sweep(&mut self, local: LocalSolve) {
+        sweep(self, local);
     }
-    let bonded = group(&mut problem.bonded, from);
-    let elastic = bonded + group(&mut problem.elastic, &from[bonded..]);
-    let dry = elastic + group(&mut problem.dry, &from[elastic..]);
-    group(&mut problem.frictionless, &from[dry..]);
-    problem.velocities_from_reactions();
+
+    fn velocities_from_reactions(&mut self) {
+        self.velocities_from_reactions();
+    }
+
+    fn residual(&self) -> f64 {
+        residual(self)
+    }
+
+    fn gather(&self) -> Vec<f64> {
+        fn group<D: Dim, L: Law>(group: &Group<D, L>, out: &mut Vec<f64>) {
+            for c in group {
+                out.push(c.r.n);
+                out.extend_from_slice(c.r.t.as_slice());
+                out.extend_from_slice(c.r.m.as_slice());
+            }
+        }
+        let mut out = Vec::with_capacity(self.len() * 3);
+        group(&self.bonded, &mut out);
+        group(&self.elastic, &mut out);
+        group(&self.dry, &mut out);
+        group(&self.frictionless, &mut out);
+        out
+    }
+
+    fn scatter(&mut self, from: &[f64]) {
+        fn group<D: Dim, L: Law>(group: &mut Group<D, L>, mut from: &[f64]) -> usize {
+            let rows = 1 + L::T::LEN + L::B::LEN;
+            for c in group.iter_mut() {
+                c.r.n = from[0];
+                c.r.t = L::T::from_slice(&from[1..][..L::T::LEN]);
+                c.r.m = L::B::from_slice(&from[1 + L::T::LEN..][..L::B::LEN]);
+                from = &from[rows..];
+            }
+            rows * group.len()
+        }
+        let bonded = group(&mut self.bonded, from);
+        let elastic = bonded + group(&mut self.elastic, &from[bonded..]);
+        let dry = elastic + group(&mut self.dry, &from[elastic..]);
+        group(&mut self.frictionless, &from[dry..]);
+        self.velocities_from_reactions();
+    }
 }
 
-impl GaussSeidel {
-    /// At most `most` sweeps alone; returns how many, and the residual.
-    fn plain<D: Dim>(&self, problem: &mut ContactProblem<D>, most: u64) -> (u64, f64) {
-        let mut error = residual(problem);
-        let mut sweeps = 0;
-        while error > self.settings.tolerance && sweeps < most {
-            // the residual costs about a sweep: look at it ever more rarely, at most every 64 sweeps
-            let burst = (1 + sweeps / 4).min(64).min(most - sweeps);
-            for _ in 0..burst {
-                sweep(problem, self.settings.local);
-            }
-            sweeps += burst;
-            error = residual(problem);
-            if error <= self.settings.tolerance {
-                // what counts is the error of the impulses, without the rounding of the sweeps' increments
-                problem.velocities_from_reactions();
-                error = residual(problem);
-            }
+/// At most `most` plain sweeps; returns how many, and the residual.
+fn plain(problem: &mut impl Sweepable, settings: &GaussSeidelSettings, most: u64) -> (u64, f64) {
+    let mut error = problem.residual();
+    let mut sweeps = 0;
+    while error > settings.tolerance && sweeps < most {
+        // the residual costs about a sweep: look at it ever more rarely, at most every 64 sweeps
+        let burst = (1 + sweeps / 4).min(64).min(most - sweeps);
+        for _ in 0..burst {
+            problem.sweep(settings.local);
         }
-        if sweeps >= most {
+        sweeps += burst;
+        error = problem.residual();
+        if error <= settings.tolerance {
+            // what counts is the error of the impulses, without the rounding of the sweeps' increments
             problem.velocities_from_reactions();
-            error = residual(problem);
+            error = problem.residual();
         }
-        (sweeps, error)
     }
+    if sweeps >= most {
+        problem.velocities_from_reactions();
+        error = problem.residual();
+    }
+    (sweeps, error)
+}
 
-    /// Bursts of sweeps, accelerated, after some plain ones. What it ends with is the result of a burst: every impulse
-    /// is in its cone.
-    fn accelerated<D: Dim>(&self, problem: &mut ContactProblem<D>) -> (u64, f64) {
-        let (mut sweeps, mut error) = self.plain(problem, PLAIN.min(self.settings.max_sweeps));
-        if error <= self.settings.tolerance {
-            return (sweeps, error);
-        }
-        let mut memory = Anderson::new(self.settings.acceleration, gather(problem));
-        while error > self.settings.tolerance && sweeps < self.settings.max_sweeps {
-            for _ in 0..BURST {
-                sweep(problem, self.settings.local);
-            }
-            sweeps += BURST;
-            if sweeps.is_multiple_of(LOOK * BURST) || sweeps >= self.settings.max_sweeps {
-                problem.velocities_from_reactions();
-                error = residual(problem);
-            }
-            if error > self.settings.tolerance && sweeps < self.settings.max_sweeps {
-                let next = memory.next(gather(problem));
-                scatter(problem, next);
-            }
-        }
-        (sweeps, error)
+/// Bursts of sweeps, accelerated, after some plain ones. What it ends with is the result of a burst: every impulse is in
+/// its cone.
+fn accelerated(problem: &mut impl Sweepable, settings: &GaussSeidelSettings) -> (u64, f64) {
+    let (mut sweeps, mut error) = plain(problem, settings, PLAIN.min(settings.max_sweeps));
+    if error <= settings.tolerance {
+        return (sweeps, error);
     }
+    let mut memory = Anderson::new(settings.acceleration, problem.gather());
+    while error > settings.tolerance && sweeps < settings.max_sweeps {
+        for _ in 0..BURST {
+            problem.sweep(settings.local);
+        }
+        sweeps += BURST;
+        if sweeps.is_multiple_of(LOOK * BURST) || sweeps >= settings.max_sweeps {
+            problem.velocities_from_reactions();
+            error = problem.residual();
+        }
+        if error > settings.tolerance && sweeps < settings.max_sweeps {
+            let next = memory.next(problem.gather());
+            problem.scatter(next);
+        }
+    }
+    (sweeps, error)
+}
+
+/// The whole solve, from the impulses that the problem holds.
+pub(super) fn iterate(problem: &mut impl Sweepable, settings: &GaussSeidelSettings) -> SolveReport {
+    problem.velocities_from_reactions();
+    let (sweeps, residual) = match settings.acceleration {
+        0 => plain(problem, settings, settings.max_sweeps),
+        _ => accelerated(problem, settings),
+    };
+    let status = SolveStatus::of(residual, settings.tolerance, settings.accept);
+    SolveReport { status, work: Work { sweeps, ..Work::default() }, residual, load_error: None }
 }
 
 impl<D: Dim> ContactSolver<D> for GaussSeidel {
     fn solve(&mut self, problem: &mut ContactProblem<D>) -> SolveReport {
-        problem.velocities_from_reactions();
-        let (sweeps, error) = match self.settings.acceleration {
-            0 => self.plain(problem, self.settings.max_sweeps),
-            _ => self.accelerated(problem),
-        };
-        self.report(sweeps, error)
+        iterate(problem, &self.settings)
     }
 }

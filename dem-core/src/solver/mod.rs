@@ -12,6 +12,7 @@ pub use newton::{Newton, NewtonSettings, Start, StiffnessRatio};
 
 use crate::dim::Dim;
 use crate::problem::ContactProblem;
+use crate::saved::{Mismatch, Reader, Saved};
 use std::ops::Add;
 
 /// How a solve ended.
@@ -26,13 +27,15 @@ pub enum SolveStatus {
 }
 
 impl SolveStatus {
-    /// The worse of two.
+    /// What a residual amounts to.
     #[must_use]
-    pub fn at_best(self, other: Self) -> Self {
-        match (self, other) {
-            (Self::Failed, _) | (_, Self::Failed) => Self::Failed,
-            (Self::Accepted, _) | (_, Self::Accepted) => Self::Accepted,
-            _ => Self::Converged,
+    pub fn of(residual: f64, tolerance: f64, accept: f64) -> Self {
+        if residual <= tolerance {
+            Self::Converged
+        } else if residual <= accept {
+            Self::Accepted
+        } else {
+            Self::Failed
         }
     }
 }
@@ -84,6 +87,17 @@ pub struct SolveReport {
 pub trait ContactSolver<D: Dim>: Send {
     /// Better the impulses and node velocities of `problem` until the tolerance, or a limit, is reached.
     fn solve(&mut self, problem: &mut ContactProblem<D>) -> SolveReport;
+
+    /// Write what is kept from one solve to the next, if anything is.
+    fn save(&self, _to: &mut Saved) {}
+
+    /// Take up what [`ContactSolver::save`] wrote.
+    ///
+    /// # Errors
+    /// [`Mismatch`] where another solver, or another version of it, wrote it.
+    fn restore(&mut self, _from: &mut Reader) -> Result<(), Mismatch> {
+        Ok(())
+    }
 }
 
 /// The choice of a solver and its settings.

@@ -4,7 +4,7 @@ use super::World;
 use super::touch::{Touch, TouchStatus};
 use crate::bond::{Bond, BondStatus};
 use crate::contact::{Bonded, Coulomb, Elastic, Frictionless, Law, Local};
-use crate::dim::{Dim, Vect, resized};
+use crate::dim::{Dim, Vect};
 use crate::problem::{Contact, ContactProblem, Group, Link, Node, Nodes};
 
 /// Gap over the radius of the grain below which a contact touches. The rounding of positions would else be a misfit of
@@ -264,13 +264,13 @@ impl<D: Dim> World<D> {
                 let block = link.block(i, j, 0.0, drive.map(|(d, _)| d));
                 let mu = self.friction_of(touch.pair);
                 if mu > 0.0 {
-                    problem.dry.push(Contact { link, law: Coulomb::new(block, mu, bias), r: narrowed(start) });
+                    problem.dry.push(Contact { link, law: Coulomb::new(block, mu, bias), r: start.resized() });
                     places.dry.push(place);
                 } else {
                     problem.frictionless.push(Contact {
                         link,
                         law: Frictionless::new(block, bias),
-                        r: narrowed(start),
+                        r: start.resized(),
                     });
                     places.frictionless.push(place);
                 }
@@ -290,19 +290,13 @@ fn over_arm<T: Vect>(r: Local<T, T>, arm: f64) -> Local<T, T> {
     Local { m: r.m * (1.0 / arm), ..r }
 }
 
-/// The rows that a smaller group has.
-fn narrowed<D: Vect, T: Vect, B: Vect>(r: Local<D, D>) -> Local<T, B> {
-    Local { n: r.n, t: resized(r.t), m: resized(r.m) }
-}
-
 /// Write the impulses of a group back to the contacts as forces.
 pub(super) fn read_back<D: Dim, L: Law>(touches: &mut [Touch<D>], group: &Group<D, L>, places: &[usize], h: f64) {
     for (contact, place) in group.iter().zip(places) {
         let touch = &mut touches[*place];
         let arm = contact.law.arm();
-        let r = contact.r;
-        let (t, m): (D::Tangent, D::Tangent) = (resized(r.t), resized(r.m));
-        touch.reaction = Local { n: r.n / h, t: t * (1.0 / h), m: m * (arm / h) };
+        let r: Local<D::Tangent, D::Tangent> = contact.r.resized();
+        touch.reaction = Local { n: r.n / h, t: r.t * (1.0 / h), m: r.m * (arm / h) };
         touch.status = if touch.bond.is_some() {
             TouchStatus::Bonded
         } else if r.n == 0.0 {

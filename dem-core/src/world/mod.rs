@@ -1,12 +1,13 @@
 //! The world: grains, walls, bonds and time, and the step that carries them on.
 //!
-//! [`World::step`] reads as the scheme of Moreau and Jean (PHYSICS §1): half a step in position, detection, free
+//! [`World::step`] reads as the scheme of Moreau and Jean (Jean 1999): half a step in position, detection, free
 //! velocity, contact problem with its rupture cascade, half a step.
 
 mod assembly;
 mod ledger;
 mod observe;
 mod start;
+mod state;
 mod step;
 mod touch;
 

@@ -5,7 +5,7 @@ use super::ledger::{elastic_energy, group_losses};
 use super::touch::{Break, Touch, TouchStatus};
 use super::{Counts, World};
 use crate::body::Drive;
-use crate::bond::{BondStatus, Rupture, failure};
+use crate::bond::{Rupture, failure};
 use crate::contact::{Law, Local};
 use crate::dim::{Dim, Vect};
 use crate::problem::{ContactProblem, Group, Node, Nodes};
@@ -266,7 +266,7 @@ impl<D: Dim> World<D> {
         mid: &Midpoint<D>,
         motion: &Motion<D>,
         problem: &ContactProblem<D>,
-        mut touches: Vec<Touch<D>>,
+        touches: Vec<Touch<D>>,
         breaks: &[Break<D>],
     ) {
         self.book(h, motion, problem, breaks);
@@ -292,10 +292,6 @@ impl<D: Dim> World<D> {
         for failed in breaks {
             self.bonds[failed.bond as usize].status = failed.mode;
         }
-        // bonds that break at the end of the step keep the reaction of the step for the record, not for the next start
-        let bonds = &self.bonds;
-        let holds = |t: &Touch<D>| t.bond.is_none_or(|b| bonds[b as usize].status == BondStatus::Intact);
-        touches.iter_mut().filter(|t| !holds(t)).for_each(|t| t.status = TouchStatus::Bonded);
         self.touches = touches;
         self.time += h;
     }

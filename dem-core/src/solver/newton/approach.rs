@@ -7,9 +7,10 @@
 //! near, Newton with the friction in it is tried first, which needs no lag.
 
 use super::inner::Iterate;
-use super::rows::{Padded, Rows};
+use super::rows::Rows;
 use super::solvable::Solvable;
-use super::{Newton, STALL_SWEEPS, load_change};
+use super::{Found, Newton, STALL_SWEEPS, load_change};
+use crate::contact::Padded;
 
 /// How much smaller the first penalty is, and by what it grows.
 const SOFT: f64 = 1e7;
@@ -23,15 +24,6 @@ const NEAR: f64 = 1e-5;
 const TRY: u64 = 8;
 /// Inner problems that may fail.
 const MOST_FAILURES: u32 = 6;
-
-/// What was found.
-pub(super) struct Found {
-    /// Reactions that are accepted.
-    pub reactions: Vec<Padded>,
-    /// Their residual and load error (–).
-    pub residual: f64,
-    pub load_error: f64,
-}
 
 impl Newton {
     /// The best reactions that are met on the way, from those at hand; none where they are not accepted.

@@ -2,9 +2,9 @@
 //! that u = L y + q and y = Lᵀ r, as if there were bodies of unit mass behind it. L is full: every contact has as many
 //! coefficients as W has rank.
 
-use super::rows::{Padded, Row, Rows, StiffnessRatio, places};
+use super::rows::{Row, Rows, StiffnessRatio, places};
 use super::solvable::Solvable;
-use crate::contact::{Local, LocalSolve, Weights};
+use crate::contact::{Local, LocalSolve, Padded, Weights};
 use crate::problem::assembled::{Assembled, BlockMatrix};
 use crate::solver::assembled::{Sites, gauss_seidel};
 use crate::solver::{GaussSeidelSettings, SolveReport};
@@ -120,7 +120,7 @@ impl Solvable for Assembled {
 
     fn forget_what_is_not_finite(&mut self) {
         if !self.r.iter().all(|r| r.is_finite()) {
-            self.r.iter_mut().for_each(|r| *r = 0.0);
+            self.forget_reactions();
         }
     }
 

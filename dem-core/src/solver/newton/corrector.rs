@@ -6,8 +6,8 @@
 //! negative derivative A = −∂r/∂q is what a contact adds to the matrix of the Newton step; it is symmetric where the
 //! law is associated.
 
-use super::rows::{Operator, Padded, Row};
-use crate::contact::{Local, Weights};
+use super::rows::{Operator, Row};
+use crate::contact::{Local, Padded, Weights};
 use crate::dim::Vect;
 use nalgebra::{SMatrix, SVector, Vector2};
 

@@ -1,7 +1,8 @@
 //! The symmetric matrix I + Σ H̃ A H̃ᵀ of a Newton step and its Cholesky factor, kept as a preconditioner: sparse where
 //! rows come from pairs of bodies, dense where they come from the factor of a matrix.
 
-use super::rows::{Operator, Rows};
+use super::rows::{Operator, PAIR, Rows};
+use crate::saved::{Mismatch, Reader, Saved};
 use faer::prelude::Solve;
 use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
 use faer::sparse::{Argsort, Pair, SparseColMat, SymbolicSparseColMat};
@@ -17,17 +18,17 @@ pub(super) struct Factor {
 }
 
 enum Numeric {
-    Sparse(Llt<usize, f64>),
+    /// With the entries that it was made of.
+    Sparse(Llt<usize, f64>, Vec<f64>),
     Dense(faer::linalg::solvers::Llt<f64>),
 }
-
-/// Most unknowns that two bodies have; a contact with more has rows from the factor of a matrix.
-const PAIR: usize = 12;
 
 struct Pattern {
     /// Blocks of the contact graph: first unknowns and counts of the two nodes of each contact.
     blocks: Vec<([usize; 2], [usize; 2])>,
     unknowns: usize,
+    /// Entries of all blocks and the diagonal, those at one place counted each.
+    entries: usize,
     matrix: SymbolicSparseColMat<usize>,
     order: Argsort<usize>,
     symbolic: SymbolicLlt<usize>,
@@ -38,7 +39,7 @@ impl Factor {
     pub fn serves(&self, unknowns: usize) -> bool {
         match &self.numeric {
             None => false,
-            Some(Numeric::Sparse(_)) => self.pattern.as_ref().is_some_and(|p| p.unknowns == unknowns),
+            Some(Numeric::Sparse(..)) => self.pattern.as_ref().is_some_and(|p| p.unknowns == unknowns),
             Some(Numeric::Dense(factor)) => factor.L().nrows() == unknowns,
         }
     }
@@ -55,17 +56,55 @@ impl Factor {
         let blocks: Vec<_> = rows.list.iter().map(|r| (r.at, r.count)).collect();
         let known = self.pattern.as_ref().is_some_and(|p| p.unknowns == rows.unknowns && p.blocks == blocks);
         if !known {
-            self.pattern = Pattern::new(rows, blocks);
+            self.pattern = Pattern::new(rows.unknowns, blocks);
         }
         let Some(pattern) = &self.pattern else { return false };
-        let values = values(rows, operators);
-        let Ok(matrix) = SparseColMat::new_from_argsort(pattern.matrix.clone(), &pattern.order, &values) else {
-            return false;
-        };
-        self.made += 1;
-        let factor = Llt::try_new_with_symbolic(pattern.symbolic.clone(), matrix.as_ref(), Side::Lower);
-        self.numeric = factor.ok().map(Numeric::Sparse);
+        let factor = pattern.factorised(values(rows, operators));
+        self.made += u64::from(factor.is_some());
+        self.numeric = factor.flatten();
         self.numeric.is_some()
+    }
+
+    /// Write what the factor was made of. One of a whole matrix is not kept: it serves one solve.
+    pub fn save(&self, to: &mut Saved) {
+        let kept = match (&self.pattern, &self.numeric) {
+            (Some(pattern), Some(Numeric::Sparse(_, values))) => Some((pattern, values)),
+            _ => None,
+        };
+        to.flag(kept.is_some());
+        let Some((pattern, values)) = kept else { return };
+        to.count(pattern.unknowns);
+        to.count(pattern.blocks.len());
+        for (at, count) in &pattern.blocks {
+            at.iter().chain(count).for_each(|n| to.count(*n));
+        }
+        to.count(values.len());
+        to.reals.extend_from_slice(values);
+    }
+
+    /// The same factor, made anew of what [`Factor::save`] wrote.
+    pub fn restored(from: &mut Reader) -> Result<Self, Mismatch> {
+        let mut factor = Self::default();
+        if !from.flag()? {
+            return Ok(factor);
+        }
+        let unknowns = from.number_of()?;
+        let mut blocks = Vec::with_capacity(from.number_of()?);
+        for _ in 0..blocks.capacity() {
+            let mut pair = || Ok([from.count()?, from.count()?]);
+            let (at, count) = (pair()?, pair()?);
+            let inside = |(at, count): (&usize, &usize)| *count <= PAIR && at.saturating_add(*count) <= unknowns;
+            if !at.iter().zip(&count).all(inside) {
+                return Err(Mismatch);
+            }
+            blocks.push((at, count));
+        }
+        let count = from.number_of()?;
+        let values = from.reals(count)?.to_vec();
+        let pattern = Pattern::new(unknowns, blocks).filter(|p| p.entries == count).ok_or(Mismatch)?;
+        factor.numeric = pattern.factorised(values).flatten();
+        factor.pattern = Some(pattern);
+        if factor.numeric.is_some() { Ok(factor) } else { Err(Mismatch) }
     }
 
     /// x ← (L Lᵀ)⁻¹ x.
@@ -74,7 +113,7 @@ impl Factor {
         let x = MatMut::from_column_major_slice_mut(x, n, 1);
         match &self.numeric {
             None => {}
-            Some(Numeric::Sparse(factor)) => factor.solve_in_place(x),
+            Some(Numeric::Sparse(factor, _)) => factor.solve_in_place(x),
             Some(Numeric::Dense(factor)) => factor.solve_in_place(x),
         }
     }
@@ -94,15 +133,21 @@ fn entries(at: [usize; 2], count: [usize; 2], mut visit: impl FnMut(usize, usize
 }
 
 impl Pattern {
-    fn new(rows: &Rows, blocks: Vec<([usize; 2], [usize; 2])>) -> Option<Self> {
-        let mut indices: Vec<Pair<usize, usize>> = (0..rows.unknowns).map(|k| Pair::new(k, k)).collect();
+    fn new(unknowns: usize, blocks: Vec<([usize; 2], [usize; 2])>) -> Option<Self> {
+        let mut indices: Vec<Pair<usize, usize>> = (0..unknowns).map(|k| Pair::new(k, k)).collect();
         for (at, count) in &blocks {
             entries(*at, *count, |row, col, _, _| indices.push(Pair::new(row, col)));
         }
-        let (matrix, order) =
-            SymbolicSparseColMat::try_new_from_indices(rows.unknowns, rows.unknowns, &indices).ok()?;
+        let (matrix, order) = SymbolicSparseColMat::try_new_from_indices(unknowns, unknowns, &indices).ok()?;
         let symbolic = SymbolicLlt::try_new(matrix.as_ref(), Side::Lower).ok()?;
-        Some(Self { blocks, unknowns: rows.unknowns, matrix, order, symbolic })
+        Some(Self { blocks, unknowns, entries: indices.len(), matrix, order, symbolic })
+    }
+
+    /// The factor of the matrix with these entries; `Some(None)` if it is not positive definite to rounding.
+    fn factorised(&self, values: Vec<f64>) -> Option<Option<Numeric>> {
+        let matrix = SparseColMat::new_from_argsort(self.matrix.clone(), &self.order, &values).ok()?;
+        let factor = Llt::try_new_with_symbolic(self.symbolic.clone(), matrix.as_ref(), Side::Lower);
+        Some(factor.ok().map(|factor| Numeric::Sparse(factor, values)))
     }
 }
 
@@ -113,7 +158,7 @@ fn values(rows: &Rows, operators: &[Option<Operator>]) -> Vec<f64> {
         let width = row.count[0] + row.count[1];
         let h = |k: usize, c: usize| rows.coefficients[row.start + k * width + c];
         // A H̃ᵀ, then H̃ (A H̃ᵀ)
-        let mut pulled = [[0.0; 12]; 5];
+        let mut pulled = [[0.0; PAIR]; 5];
         if let Some(a) = operator {
             for (k, row_place) in row.rows.iter().enumerate() {
                 for c in 0..width {

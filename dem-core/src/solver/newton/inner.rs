@@ -3,8 +3,8 @@
 use super::Newton;
 use super::corrector::{correct, operator};
 use super::krylov::gmres;
-use super::rows::{Operator, Padded, Row, Rows};
-use crate::contact::Local;
+use super::rows::{Operator, Row, Rows};
+use crate::contact::{Local, Padded};
 use crate::dim::Vect;
 
 /// GMRES iterations beyond those of a fresh factor that a kept one may cost in all before it is renewed.
@@ -107,7 +107,7 @@ impl Newton {
 
     /// The Newton direction −J⁻¹ F, by the factor at hand or GMRES on it, renewed if it serves badly.
     fn direction(&mut self, rows: &Rows, state: &Iterate, guess: Option<&[Padded]>, target: f64) -> Option<Direction> {
-        let (mut right, operators) = linearise(rows, state, guess);
+        let (mut right, points) = linearise(rows, state, guess);
         right.iter_mut().for_each(|f| *f = -*f);
         let norm = norm2(&right).sqrt();
         let tolerance = (0.1 * target / norm).clamp(1e-12, 1e-3);
@@ -116,11 +116,12 @@ impl Newton {
             self.factor.solve(&mut right);
             return Some(Direction { step: right, norm });
         }
+        let exact = operators(rows, &points, false);
         for fresh in [!serves, true] {
-            if fresh && !self.factor.renew(rows, &symmetric_operators(rows, state, guess)) {
+            if fresh && !self.factor.renew(rows, &operators(rows, &points, true)) {
                 return None;
             }
-            let apply = |x: &[f64], out: &mut [f64]| multiply(rows, &operators, x, out);
+            let apply = |x: &[f64], out: &mut [f64]| multiply(rows, &exact, x, out);
             let (step, report) = gmres(&right, tolerance, MOST_KRYLOV, apply, |x| self.factor.solve(x));
             if fresh {
                 // what even a fresh factor needs is the part that is not symmetric
@@ -162,41 +163,31 @@ fn guessed_velocity(row: &Row, guess: &Padded) -> Padded {
     u
 }
 
-/// F and A at the state; with a guess, both from the active set of the guessed reactions.
-fn linearise(rows: &Rows, state: &Iterate, guess: Option<&[Padded]>) -> (Vec<f64>, Vec<Option<Operator>>) {
+/// F, and for each contact the velocity and reaction that its operator A belongs to: those of the state, or with a
+/// guess those of the guessed active set, from which F is then extrapolated.
+fn linearise(rows: &Rows, state: &Iterate, guess: Option<&[Padded]>) -> (Vec<f64>, Vec<(Padded, Padded)>) {
     let Some(guess) = guess else {
-        let at = rows.list.iter().zip(&state.velocities).zip(&state.reactions);
-        return (state.gradient.clone(), at.map(|((row, u), r)| operator(row, u, r, false)).collect());
+        let points = state.velocities.iter().copied().zip(state.reactions.iter().copied());
+        return (state.gradient.clone(), points.collect());
     };
     let mut gradient: Vec<f64> = state.y.iter().zip(&rows.free).map(|(y, f)| y - f).collect();
-    let mut operators = Vec::with_capacity(rows.list.len());
+    let mut points = Vec::with_capacity(rows.list.len());
     for ((row, u), guess) in rows.list.iter().zip(&state.velocities).zip(guess) {
         let from = guessed_velocity(row, guess);
-        let mut r = correct(row, &from);
-        let a = operator(row, &from, &r, false);
-        if let Some(a) = &a {
+        let at = correct(row, &from);
+        let mut r = at;
+        if let Some(a) = operator(row, &from, &at, false) {
             r += a.times(&(from - *u));
         }
         rows.apply(row, &(r * -1.0), &mut gradient);
-        operators.push(a);
+        points.push((from, at));
     }
-    (gradient, operators)
+    (gradient, points)
 }
 
-/// The symmetric parts, for the factor.
-fn symmetric_operators(rows: &Rows, state: &Iterate, guess: Option<&[Padded]>) -> Vec<Option<Operator>> {
-    let mut operators = Vec::with_capacity(rows.list.len());
-    for (k, row) in rows.list.iter().enumerate() {
-        let (u, r) = match guess {
-            None => (state.velocities[k], state.reactions[k]),
-            Some(guess) => {
-                let u = guessed_velocity(row, &guess[k]);
-                (u, correct(row, &u))
-            }
-        };
-        operators.push(operator(row, &u, &r, true));
-    }
-    operators
+/// A of every contact, or its symmetric part for the factor.
+fn operators(rows: &Rows, points: &[(Padded, Padded)], symmetric: bool) -> Vec<Option<Operator>> {
+    rows.list.iter().zip(points).map(|(row, (u, r))| operator(row, u, r, symmetric)).collect()
 }
 
 /// out ← (I + Σ H̃ A H̃ᵀ) x.

@@ -8,8 +8,8 @@
 //! for the slipping dry contacts. The outer iteration is r̂ ← P(r̂ − ρ (Hᵀv + b)), a proximal step of size ρ on the
 //! reactions; with a large ρ two or three suffice, and nearly always the active set of the last step still holds, so
 //! each costs one linear solve. The Cholesky factor of the symmetric part is kept over steps as the preconditioner of
-//! GMRES and renewed when that needs too many iterations. Where the active set runs in circles the solution is
-//! approached through convex problems of growing penalty, and where that fails Gauss–Seidel takes over.
+//! GMRES and renewed when that needs too many iterations. Where the active set runs in circles an interior-point method,
+//! in space convex problems of growing penalty, do without a guess of it, and where those fail Gauss–Seidel takes over.
 //!
 //! Started from zero reactions the first proximal step is the stiff limit: the reactions of least Σ r²/ρ among all
 //! that balance the load, the ones that elastic contacts with stiffnesses in the ratio of ρ would give.
@@ -22,19 +22,21 @@ mod assembled;
 mod corrector;
 mod factor;
 mod inner;
+mod interior;
 mod krylov;
 mod rows;
 mod solvable;
 
 use super::gauss_seidel::MEMORY;
 use super::{ContactSolver, GaussSeidelSettings, SolveReport, SolveStatus, Work};
-use crate::contact::{Local, LocalSolve};
+use crate::contact::{Local, LocalSolve, Padded};
 use crate::dim::Dim;
 use crate::problem::ContactProblem;
 use crate::problem::assembled::Assembled;
+use crate::saved::{Mismatch, Reader, Saved};
 use factor::Factor;
 use inner::{Iterate, norm2};
-use rows::{Padded, Rows};
+use rows::Rows;
 use solvable::Solvable;
 
 pub use rows::StiffnessRatio;
@@ -76,13 +78,10 @@ const MOST_SOFTENED: u32 = 4;
 const SWEEPS: usize = 5;
 const COLD_SWEEPS: usize = 100;
 const STALL_SWEEPS: usize = 50;
-/// Most sweeps of Gauss–Seidel where it takes over.
-const MOST_SWEEPS: u64 = 40_000;
-/// What a problem counts that no guess of the active set solved, less one for each that was solved so, and the count
-/// above which Gauss–Seidel is tried before the approach from afar.
-const HARD: u32 = 4;
-const MOST_HARD: u32 = 16;
-/// Most solves that are left to Gauss–Seidel before Newton is tried again.
+/// Most sweeps of Gauss–Seidel where it is tried first, and where nothing else is left.
+const FIRST_SWEEPS: u64 = 20_000;
+const MOST_SWEEPS: u64 = 200_000;
+/// Most solves for which something that failed is not tried again.
 const LONGEST_REST: u64 = 64;
 
 /// Augmented-Lagrangian semismooth Newton.
@@ -100,11 +99,47 @@ pub struct Newton {
     wasted: usize,
     /// Factorisations before this solve.
     made_before: u64,
-    /// Solves that are left to Gauss–Seidel, and how many after the next failure.
-    rest: u64,
-    next_rest: u64,
-    /// How hard the last problems were.
-    hard: u32,
+    /// Rests of the guess of the active set, and of the path of the softer metric.
+    rest: Rest,
+    soft_rest: Rest,
+}
+
+/// Solves for which something that failed is not tried: steps that are alike fail alike.
+#[derive(Clone, Copy)]
+struct Rest {
+    left: u64,
+    next: u64,
+}
+
+impl Rest {
+    const NONE: Self = Self { left: 0, next: 1 };
+
+    /// Whether it is time to try again; else one solve of it passes.
+    fn is_over(&mut self) -> bool {
+        let over = self.left == 0;
+        self.left = self.left.saturating_sub(1);
+        over
+    }
+
+    /// It failed again: twice as many solves as after the last failure.
+    fn lengthen(&mut self) {
+        self.left = self.next;
+        self.next = (2 * self.next).min(LONGEST_REST);
+    }
+
+    /// It served.
+    fn forget(&mut self) {
+        *self = Self::NONE;
+    }
+}
+
+/// What was found without a guess of the active set.
+struct Found {
+    /// Reactions without the shift.
+    reactions: Vec<Padded>,
+    /// Their residual and load error (–).
+    residual: f64,
+    load_error: f64,
 }
 
 impl Newton {
@@ -119,38 +154,34 @@ impl Newton {
             floor: 0,
             wasted: 0,
             made_before: 0,
-            rest: 0,
-            next_rest: 1,
-            hard: 0,
+            rest: Rest::NONE,
+            soft_rest: Rest::NONE,
         }
     }
 
     /// Gauss–Seidel from the impulses at hand, up to what is accepted. It cannot tell its load error.
-    fn swept_to_the_end(&self, problem: &mut impl Solvable, iterations: u64) -> SolveReport {
+    fn swept(&self, problem: &mut impl Solvable, rows: &Rows, iterations: u64, max_sweeps: u64) -> SolveReport {
         let NewtonSettings { tolerance, accept, .. } = self.settings;
         problem.forget_what_is_not_finite();
         let settings = GaussSeidelSettings {
             local: LocalSolve::Exact,
             tolerance: accept,
             accept,
-            max_sweeps: MOST_SWEEPS,
-            acceleration: MEMORY,
+            max_sweeps,
+            // where contacts slip the acceleration takes more sweeps than it saves
+            acceleration: if rows.mostly_dry() { 0 } else { MEMORY },
         };
         let swept = problem.gauss_seidel(settings);
-        let status =
-            if swept.residual <= tolerance { swept.status } else { swept.status.at_best(SolveStatus::Accepted) };
+        let status = SolveStatus::of(swept.residual, tolerance, accept);
         SolveReport { status, work: swept.work + self.work(iterations), ..swept }
     }
 
     fn report(&self, iterations: u64, residual: f64, load_error: f64) -> SolveReport {
         // a residual of zero is rounding, and rounding is all that still changes
         let settled = load_error <= self.settings.load_tolerance || residual == 0.0;
-        let status = if residual <= self.settings.tolerance && settled {
-            SolveStatus::Converged
-        } else if residual <= self.settings.accept {
-            SolveStatus::Accepted
-        } else {
-            SolveStatus::Failed
+        let status = match SolveStatus::of(residual, self.settings.tolerance, self.settings.accept) {
+            SolveStatus::Converged if !settled => SolveStatus::Accepted,
+            status => status,
         };
         SolveReport { status, work: self.work(iterations), residual, load_error: Some(load_error) }
     }
@@ -204,15 +235,7 @@ impl Newton {
             last_error = error;
         }
     }
-}
 
-impl<D: Dim> ContactSolver<D> for Newton {
-    fn solve(&mut self, problem: &mut ContactProblem<D>) -> SolveReport {
-        self.iterate(problem)
-    }
-}
-
-impl Newton {
     /// Solve a problem with its matrix, from the reactions that it holds.
     pub fn solve_assembled(&mut self, problem: &mut Assembled) -> SolveReport {
         self.iterate(problem)
@@ -221,88 +244,94 @@ impl Newton {
     fn iterate(&mut self, problem: &mut impl Solvable) -> SolveReport {
         problem.velocities_from_reactions();
         self.made_before = self.factor.made;
-        let resting = self.rest > 0;
-        if resting {
-            self.rest -= 1;
-            let swept = self.swept_to_the_end(problem, 0);
-            if swept.status != SolveStatus::Failed {
-                return swept;
-            }
-        }
         let rows = problem.rows(KAPPA, self.settings.stiffness);
         if rows.unknowns == 0 || rows.list.is_empty() {
             return self.report(0, problem.residual(), 0.0);
         }
         let mut iterations = 0;
-        if let Some(report) = self.try_guesses(problem, &rows, &mut iterations) {
-            self.next_rest = 1;
-            self.hard = self.hard.saturating_sub(1);
-            return report;
+        if self.rest.is_over() {
+            if let Some(report) = self.try_guess(problem, &rows, &mut iterations) {
+                self.rest.forget();
+                return report;
+            }
+            self.rest.lengthen();
         }
-        self.hard = (self.hard + HARD).min(2 * MOST_HARD);
-        if self.hard > MOST_HARD && !resting {
-            // steps that are alike fail alike, and sweeps are the cheaper way then
-            let swept = self.swept_to_the_end(problem, iterations);
+        if rows.mostly_dry() {
+            let swept = self.swept(problem, &rows, iterations, FIRST_SWEEPS);
             if swept.status != SolveStatus::Failed {
-                self.rest_longer();
                 return swept;
             }
         }
         if let Some(report) = self.come_from_afar(problem, &rows, &mut iterations) {
             return report;
         }
-        self.rest_longer();
-        self.swept_to_the_end(problem, iterations)
+        self.swept(problem, &rows, iterations, MOST_SWEEPS)
     }
 
-    /// Leave the next solves to Gauss–Seidel, twice as many as after the last failure.
-    fn rest_longer(&mut self) {
-        self.rest = self.next_rest;
-        self.next_rest = (2 * self.next_rest).min(LONGEST_REST);
-    }
-
-    /// Rounds at the largest penalty, from one active set after the other; none if all run in circles.
-    fn try_guesses(&mut self, problem: &mut impl Solvable, rows: &Rows, iterations: &mut u64) -> Option<SolveReport> {
-        // the reactions that the problem brought along, bettered by some sweeps, show which contacts are active
+    /// Rounds at the largest penalty, from the active set of the reactions that the problem brought along, bettered by
+    /// some sweeps; none if they run in circles.
+    fn try_guess(&mut self, problem: &mut impl Solvable, rows: &Rows, iterations: &mut u64) -> Option<SolveReport> {
         let cold = rows.list.iter().all(|row| row.multiplier.n == 0.0);
         let mut guess = problem.swept(if cold { COLD_SWEEPS } else { SWEEPS });
-        for sweeps in [STALL_SWEEPS, COLD_SWEEPS, 0] {
-            let report = self.rounds(problem, &mut self.started(rows), &mut guess, iterations);
-            if report.is_some() || sweeps == 0 {
-                return report;
-            }
-            // the active set runs in circles: sweeps from here show another, or those from nothing
-            self.renew = true;
-            if sweeps == COLD_SWEEPS {
-                problem.forget_reactions();
-            }
-            guess = problem.swept(sweeps);
-        }
-        None
+        let report = self.rounds(problem, &mut self.started(rows), &mut guess, iterations);
+        self.renew |= report.is_none();
+        report
     }
 
-    /// The solution that is approached from afar: as the stiff limit if its active set gives that, else bettered from
-    /// where it is.
+    /// The solution that is found without a guess: as the stiff limit if its active set gives that, else as it is.
     fn come_from_afar(
         &mut self,
         problem: &mut impl Solvable,
         rows: &Rows,
         iterations: &mut u64,
     ) -> Option<SolveReport> {
+        let started = self.started(rows);
+        if interior::serves(rows) {
+            return self.interior(problem, &started, iterations);
+        }
         let found = self.approach(problem, rows, iterations)?;
         let mut guess = found.reactions.clone();
-        if let Some(report) = self.rounds(problem, &mut self.started(rows), &mut guess, iterations) {
+        if !rows.mostly_dry()
+            && let Some(report) = self.rounds(problem, &mut started.clone(), &mut guess, iterations)
+        {
             return Some(report);
         }
-        let mut rows = rows.clone();
-        rows.list.iter_mut().zip(&found.reactions).for_each(|(row, r)| row.multiplier = *r);
-        guess.clone_from(&found.reactions);
-        let report = self.rounds(problem, &mut rows, &mut guess, iterations);
-        Some(report.unwrap_or_else(|| {
-            problem.write_back(&found.reactions);
-            problem.velocities_from_reactions();
-            self.report(*iterations, problem.residual(), found.load_error)
-        }))
+        self.taken(problem, found, *iterations)
+    }
+
+    /// The reactions that were found as they are, if they are accepted.
+    fn taken(&self, problem: &mut impl Solvable, found: Found, iterations: u64) -> Option<SolveReport> {
+        problem.write_back(&found.reactions);
+        problem.velocities_from_reactions();
+        let report = self.report(iterations, problem.residual(), found.load_error);
+        (report.status != SolveStatus::Failed).then_some(report)
+    }
+
+    /// Write what is kept from one solve to the next.
+    pub(super) fn save_state(&self, to: &mut Saved) {
+        to.flag(self.renew);
+        to.flag(self.trusted);
+        for count in [self.distrust, self.floor, self.wasted] {
+            to.count(count);
+        }
+        for rest in [self.rest, self.soft_rest] {
+            to.count(rest.left as usize);
+            to.count(rest.next as usize);
+        }
+        self.factor.save(to);
+    }
+
+    /// Take up what [`Newton::save_state`] wrote.
+    pub(super) fn restore_state(&mut self, from: &mut Reader) -> Result<(), Mismatch> {
+        (self.renew, self.trusted) = (from.flag()?, from.flag()?);
+        for count in [&mut self.distrust, &mut self.floor, &mut self.wasted] {
+            *count = from.count()?;
+        }
+        for rest in [&mut self.rest, &mut self.soft_rest] {
+            *rest = Rest { left: from.count()? as u64, next: from.count()? as u64 };
+        }
+        self.factor = Factor::restored(from)?;
+        Ok(())
     }
 
     /// The rows with the multipliers that the reactions start from.
@@ -315,14 +344,34 @@ impl Newton {
     }
 }
 
-/// How much the net impulses on the bodies changed in the last proximal step, over themselves: with a contraction far
-/// below one, the load error of the step before.
+impl<D: Dim> ContactSolver<D> for Newton {
+    fn solve(&mut self, problem: &mut ContactProblem<D>) -> SolveReport {
+        self.iterate(problem)
+    }
+
+    fn save(&self, to: &mut Saved) {
+        self.save_state(to);
+    }
+
+    fn restore(&mut self, from: &mut Reader) -> Result<(), Mismatch> {
+        self.restore_state(from)
+    }
+}
+
+/// How much the net impulses on the bodies changed in the last proximal step: with a contraction far below one, the load
+/// error of the step before.
 fn load_change(rows: &Rows, state: &Iterate) -> f64 {
+    let multipliers: Vec<Padded> = rows.list.iter().map(|row| row.multiplier).collect();
+    net_change(rows, &multipliers, &state.reactions)
+}
+
+/// By how much the net impulses on the bodies differ between two sets of reactions, over those of the second.
+fn net_change(rows: &Rows, from: &[Padded], to: &[Padded]) -> f64 {
     let mut change = vec![0.0; rows.unknowns];
     let mut total = vec![0.0; rows.unknowns];
-    for (row, r) in rows.list.iter().zip(&state.reactions) {
-        rows.apply(row, &(*r - row.multiplier), &mut change);
-        rows.apply(row, r, &mut total);
+    for ((row, from), to) in rows.list.iter().zip(from).zip(to) {
+        rows.apply(row, &(*to - *from), &mut change);
+        rows.apply(row, to, &mut total);
     }
     let (change, total) = (norm2(&change).sqrt(), norm2(&total).sqrt());
     if change == 0.0 { 0.0 } else { change / total }

@@ -4,13 +4,11 @@
 //! as good as another. Each contact keeps the coefficients of its rows, u = Hᵀ v = Σ h y + u₀, where u₀ comes from
 //! nodes whose velocity is given.
 
-use crate::contact::{Cone, Law, Local, Weights};
+use crate::contact::{Cone, Law, Padded, Weights};
 use crate::dim::{Dim, Vect};
 use crate::problem::{Contact, ContactProblem, Link, Nodes, Visitor};
-use nalgebra::{SMatrix, SVector};
+use nalgebra::SMatrix;
 
-/// Rows of one contact, padded to the most that any has: n, two tangential, two bending.
-pub(super) type Padded = Local<SVector<f64, 2>, SVector<f64, 2>>;
 /// The derivative of padded rows.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Operator {
@@ -26,7 +24,7 @@ impl Operator {
     pub fn times(&self, x: &Padded) -> Padded {
         match self {
             Self::Diagonal(w) => w.times(x),
-            Self::Full(a) => from_order(&(a * in_order(x))),
+            Self::Full(a) => Padded::from_order(&(a * x.in_order())),
         }
     }
 
@@ -41,6 +39,9 @@ impl Operator {
     }
 }
 
+/// Most unknowns that two bodies have; a contact with more has rows from the factor of a matrix.
+pub(super) const PAIR: usize = 12;
+
 /// One contact.
 #[derive(Clone, Debug)]
 pub(super) struct Row {
@@ -53,7 +54,7 @@ pub(super) struct Row {
     pub rows: &'static [usize],
     pub cone: Cone,
     pub associated: bool,
-    /// Shift of the normal reaction (N s) and bias of the normal velocity (m/s).
+    /// Shift of the normal reaction (N s).
     pub shift: f64,
     /// Relative velocity that comes from given velocities, with the bias (m/s).
     pub given: Padded,
@@ -145,11 +146,6 @@ pub(super) fn places(tangents: usize, bends: usize) -> &'static [usize] {
     }
 }
 
-/// The rows of a contact, padded with zeros.
-pub(super) fn padded<T: Vect, B: Vect>(r: Local<T, B>) -> Padded {
-    Local { n: r.n, t: crate::dim::resized(r.t), m: crate::dim::resized(r.m) }
-}
-
 impl Unknowns {
     fn of<D: Dim>(nodes: &Nodes<D>) -> Self {
         let mut first = Vec::with_capacity(nodes.all.len());
@@ -193,6 +189,11 @@ impl Rows {
         let scale = mean(normal.iter().sum()) / (soft * kappa);
         rows.soften(scale);
         rows
+    }
+
+    /// Whether most contacts follow Coulomb's law, which is not the gradient of a convex function.
+    pub fn mostly_dry(&self) -> bool {
+        2 * self.list.iter().filter(|row| !row.associated).count() > self.list.len()
     }
 
     /// Divide ρ of all rows by `factor`.
@@ -252,18 +253,6 @@ pub(super) fn entry(r: &mut Padded, place: usize) -> &mut f64 {
     }
 }
 
-/// The rows of a padded vector in order.
-#[inline]
-fn in_order(r: &Padded) -> SVector<f64, 5> {
-    [r.n, r.t[0], r.t[1], r.m[0], r.m[1]].into()
-}
-
-/// A padded vector from its rows in order.
-#[inline]
-fn from_order(v: &SVector<f64, 5>) -> Padded {
-    Local { n: v[0], t: [v[1], v[2]].into(), m: [v[3], v[4]].into() }
-}
-
 fn write_scaled<D: Dim>(nodes: &Nodes<D>, unknowns: &Unknowns, k: usize, v: &D::Vector, w: &D::Spin, out: &mut [f64]) {
     let node = &nodes.all[k];
     if node.inverse_mass == 0.0 {
@@ -285,7 +274,7 @@ fn write_scaled<D: Dim>(nodes: &Nodes<D>, unknowns: &Unknowns, k: usize, v: &D::
 
 /// Coefficients of the rows of one contact, over the unknowns of its pair.
 struct Table {
-    rows: [[f64; 12]; 5],
+    rows: [[f64; PAIR]; 5],
     tangents: usize,
     bends: usize,
     /// Columns filled so far.
@@ -341,7 +330,7 @@ impl<D: Dim> Visitor<D> for Flatten<'_, D> {
     fn visit<L: Law>(&mut self, _: &Nodes<D>, c: &Contact<D, L>) {
         let rows = places(L::T::LEN, L::B::LEN);
         let arm = c.law.arm();
-        let mut table = Table { rows: [[0.0; 12]; 5], tangents: L::T::LEN, bends: L::B::LEN, width: 0 };
+        let mut table = Table { rows: [[0.0; PAIR]; 5], tangents: L::T::LEN, bends: L::B::LEN, width: 0 };
         let first = self.node(&c.link, arm, 0, &mut table);
         let second = self.node(&c.link, arm, 1, &mut table);
         let start = self.rows.coefficients.len();
@@ -349,7 +338,7 @@ impl<D: Dim> Visitor<D> for Flatten<'_, D> {
             self.rows.coefficients.extend_from_slice(&row[..table.width]);
         }
         // what the given velocities of nodes that cannot move do
-        let mut given: Padded = padded(self.still.relative_velocity::<L::T, L::B>(&c.link, arm));
+        let mut given: Padded = self.still.relative_velocity::<L::T, L::B>(&c.link, arm).resized();
         given.n += c.law.bias();
         let normal: f64 = table.rows[0][..table.width].iter().map(|h| h * h).sum();
         self.normal.push(normal);
@@ -365,9 +354,9 @@ impl<D: Dim> Visitor<D> for Flatten<'_, D> {
             shift: c.law.shift(),
             given,
             weights: Weights { n: soft, t: soft / self.ratio.tangential, m: soft / self.ratio.rolling },
-            multiplier: padded(c.r),
+            multiplier: c.r.resized(),
             compliance: c.law.compliance(),
-            carried: padded(c.law.carried()),
+            carried: c.law.carried().resized(),
             lag: None,
             size: table.rows[..rows.len()].iter().flat_map(|row| &row[..table.width]).map(|h| h * h).sum(),
         });

@@ -1,8 +1,8 @@
 //! What the Newton solver asks of a problem, matrix-free or with its matrix.
 
-use super::rows::{Padded, Rows, StiffnessRatio, padded};
-use crate::contact::{Law, Local, LocalSolve};
-use crate::dim::{Dim, Vect, resized};
+use super::rows::{Rows, StiffnessRatio};
+use crate::contact::{Law, LocalSolve, Padded};
+use crate::dim::{Dim, Vect};
 use crate::problem::residual::residual;
 use crate::problem::{ContactProblem, Group};
 use crate::solver::{ContactSolver, GaussSeidel, GaussSeidelSettings, SolveReport, sweep};
@@ -46,17 +46,17 @@ impl<D: Dim> Solvable for ContactProblem<D> {
             sweep(self, LocalSolve::Exact);
         }
         let mut reactions = Vec::with_capacity(self.len());
-        reactions.extend(self.bonded.iter().map(|c| padded(c.r)));
-        reactions.extend(self.elastic.iter().map(|c| padded(c.r)));
-        reactions.extend(self.dry.iter().map(|c| padded(c.r)));
-        reactions.extend(self.frictionless.iter().map(|c| padded(c.r)));
+        reactions.extend(self.bonded.iter().map(|c| c.r.resized()));
+        reactions.extend(self.elastic.iter().map(|c| c.r.resized()));
+        reactions.extend(self.dry.iter().map(|c| c.r.resized()));
+        reactions.extend(self.frictionless.iter().map(|c| c.r.resized()));
         reactions
     }
 
     fn write_back(&mut self, reactions: &[Padded]) {
         fn group<D: Dim, L: Law>(group: &mut Group<D, L>, list: &[Padded]) {
             for (c, r) in group.iter_mut().zip(list) {
-                c.r = Local { n: r.n, t: resized(r.t), m: resized(r.m) };
+                c.r = r.resized();
             }
         }
         let bonded = self.bonded.len();

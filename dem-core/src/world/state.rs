@@ -1,0 +1,181 @@
+//! The state of a world as plain numbers, and the world that goes on from it.
+//!
+//! What the scene gives is not part of it: shapes and drives of walls, loads, settings. Nor is the list of candidate
+//! pairs, which may be any that covers a step.
+
+use super::{Ledger, Settings, Touch, TouchStatus, World};
+use crate::body::{Grains, Load, Wall};
+use crate::bond::{Bond, BondStatus, Stiffness};
+use crate::contact::Local;
+use crate::dim::Dim;
+use crate::saved::{Mismatch, Reader, Saved};
+
+/// The code of "no bond" where an index could stand.
+const NONE: u64 = u64::MAX;
+
+const BONDS: [BondStatus; 4] = [BondStatus::Intact, BondStatus::Tension, BondStatus::Shear, BondStatus::Rolling];
+const TOUCHES: [TouchStatus; 4] = [TouchStatus::Open, TouchStatus::Stick, TouchStatus::Slip, TouchStatus::Bonded];
+
+/// A value by its code, the place in `all`.
+fn coded<T: Copy>(all: &[T], from: &mut Reader) -> Result<T, Mismatch> {
+    all.get(from.count()?).copied().ok_or(Mismatch)
+}
+
+fn code<T: PartialEq>(all: &[T], value: &T) -> usize {
+    all.iter().position(|v| v == value).unwrap_or(all.len())
+}
+
+impl<D: Dim> Grains<D> {
+    /// Write the grains.
+    pub fn save(&self, to: &mut Saved) {
+        to.count(self.len());
+        to.vectors(&self.position);
+        to.vectors(&self.velocity);
+        to.vectors(&self.spin);
+        to.vectors(&self.orientation);
+        for column in [&self.radius, &self.mass, &self.inertia] {
+            to.reals.extend_from_slice(column);
+        }
+        self.fixed.iter().for_each(|fixed| to.flag(*fixed));
+    }
+
+    /// The grains that [`Grains::save`] wrote.
+    ///
+    /// # Errors
+    /// [`Mismatch`].
+    pub fn restored(from: &mut Reader) -> Result<Self, Mismatch> {
+        let n = from.number_of()?;
+        Ok(Self {
+            position: from.vectors(n)?,
+            velocity: from.vectors(n)?,
+            spin: from.vectors(n)?,
+            orientation: from.vectors(n)?,
+            radius: from.reals(n)?.to_vec(),
+            mass: from.reals(n)?.to_vec(),
+            inertia: from.reals(n)?.to_vec(),
+            fixed: (0..n).map(|_| from.flag()).collect::<Result<_, _>>()?,
+        })
+    }
+}
+
+impl<D: Dim> World<D> {
+    /// Write everything that changes from step to step, the grains first.
+    pub fn save(&self, to: &mut Saved) {
+        self.grains.save(to);
+        to.count(self.steps as usize);
+        to.real(self.time);
+        to.real(self.volume);
+        to.vectors(&self.reference);
+        to.count(self.walls.len());
+        for wall in &self.walls {
+            to.vectors(&[wall.position, wall.velocity, wall.reaction]);
+            to.real(wall.applied);
+        }
+        to.count(self.bonds.len());
+        self.bonds.iter().for_each(|bond| save_bond(bond, to));
+        to.count(self.touches.len());
+        self.touches.iter().for_each(|touch| save_touch(touch, to));
+        let l = &self.ledger;
+        to.reals.extend([l.kinetic, l.external_work, l.impact, l.friction, l.bonds]);
+        to.reals.extend([l.elastic, l.damping, l.fracture, l.remainder]);
+        self.solver.save(to);
+    }
+
+    /// The world whose `grains` and the rest after them [`World::save`] wrote. The walls are those of the scene; their
+    /// motion is the one that was written.
+    ///
+    /// # Errors
+    /// [`Mismatch`].
+    pub fn restored(
+        grains: Grains<D>,
+        walls: Vec<Wall<D>>,
+        loads: Vec<Load<D>>,
+        settings: Settings<D>,
+        from: &mut Reader,
+    ) -> Result<Self, Mismatch> {
+        let mut world = Self::new(grains, walls, loads, settings);
+        let n = world.grains.len();
+        world.steps = from.count()? as u64;
+        (world.time, world.volume) = (from.real()?, from.real()?);
+        world.reference = from.vectors(n)?;
+        if from.count()? != world.walls.len() {
+            return Err(Mismatch);
+        }
+        for wall in &mut world.walls {
+            (wall.position, wall.velocity, wall.reaction) = (from.vector()?, from.vector()?, from.vector()?);
+            wall.applied = from.real()?;
+        }
+        world.bonds = (0..from.number_of()?).map(|_| restored_bond(n, from)).collect::<Result<_, _>>()?;
+        let (bodies, bonds) = (n + world.walls.len(), world.bonds.len());
+        world.touches =
+            (0..from.number_of()?).map(|_| restored_touch(bodies, bonds, from)).collect::<Result<_, _>>()?;
+        let mut next = || from.real();
+        world.ledger = Ledger {
+            kinetic: next()?,
+            external_work: next()?,
+            impact: next()?,
+            friction: next()?,
+            bonds: next()?,
+            elastic: next()?,
+            damping: next()?,
+            fracture: next()?,
+            remainder: next()?,
+        };
+        world.solver.restore(from)?;
+        Ok(world)
+    }
+}
+
+fn save_pair(pair: [u32; 2], to: &mut Saved) {
+    pair.iter().for_each(|k| to.count(*k as usize));
+}
+
+fn restored_pair(bodies: usize, from: &mut Reader) -> Result<[u32; 2], Mismatch> {
+    let pair = [from.count()?, from.count()?];
+    if pair.iter().all(|k| *k < bodies) { Ok(pair.map(|k| k as u32)) } else { Err(Mismatch) }
+}
+
+fn save_bond(bond: &Bond, to: &mut Saved) {
+    save_pair(bond.pair, to);
+    to.reals.extend([bond.rest_gap, bond.mean_diameter, bond.strength, bond.friction]);
+    to.flag(bond.stiffness.is_some());
+    if let Some(Stiffness { normal, tangential, rolling }) = bond.stiffness {
+        to.reals.extend([normal, tangential, rolling]);
+    }
+    to.count(code(&BONDS, &bond.status));
+}
+
+fn restored_bond(grains: usize, from: &mut Reader) -> Result<Bond, Mismatch> {
+    let pair = restored_pair(grains, from)?;
+    let (rest_gap, mean_diameter, strength, friction) = (from.real()?, from.real()?, from.real()?, from.real()?);
+    let stiffness = match from.flag()? {
+        true => Some(Stiffness { normal: from.real()?, tangential: from.real()?, rolling: from.real()? }),
+        false => None,
+    };
+    let status = coded(&BONDS, from)?;
+    Ok(Bond { pair, rest_gap, mean_diameter, strength, friction, stiffness, status })
+}
+
+fn save_touch<D: Dim>(touch: &Touch<D>, to: &mut Saved) {
+    save_pair(touch.pair, to);
+    D::write_frame(&touch.frame, &mut to.reals);
+    to.vector(&touch.point);
+    to.counts.push(touch.bond.map_or(NONE, u64::from));
+    to.reals.extend([touch.gap, touch.approach, touch.reaction.n]);
+    to.vectors(&[touch.reaction.t, touch.reaction.m]);
+    to.count(code(&TOUCHES, &touch.status));
+}
+
+fn restored_touch<D: Dim>(bodies: usize, bonds: usize, from: &mut Reader) -> Result<Touch<D>, Mismatch> {
+    let pair = restored_pair(bodies, from)?;
+    let frame = D::read_frame(from.reals(D::FRAME)?);
+    let point = from.vector()?;
+    let bond = match from.count()? {
+        none if none as u64 == NONE => None,
+        bond if bond < bonds => Some(bond as u32),
+        _ => return Err(Mismatch),
+    };
+    let (gap, approach, n) = (from.real()?, from.real()?, from.real()?);
+    let reaction = Local { n, t: from.vector()?, m: from.vector()? };
+    Ok(Touch { pair, frame, point, gap, bond, reaction, status: coded(&TOUCHES, from)?, approach })
+}

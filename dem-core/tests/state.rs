@@ -1,0 +1,104 @@
+//! A state that is written and taken up again goes on to the bit.
+
+mod common;
+
+use common::pressed;
+use dem_core::body::Grains;
+use dem_core::bond::Stiffness;
+use dem_core::contact::BondFlow;
+use dem_core::dim::{D2, D3, Dim};
+use dem_core::saved::{Mismatch, Saved};
+use dem_core::solver::{NewtonSettings, SolverSettings, Start, StiffnessRatio};
+use dem_core::world::World;
+
+fn settings() -> NewtonSettings {
+    NewtonSettings {
+        tolerance: 1e-8,
+        accept: 1e-4,
+        load_tolerance: 1e-5,
+        start: Start::StiffLimit,
+        stiffness: StiffnessRatio { tangential: 0.5, rolling: 0.1 },
+        max_iterations: 300,
+    }
+}
+
+fn saved<D: Dim>(world: &World<D>) -> Saved {
+    let mut saved = Saved::default();
+    world.save(&mut saved);
+    saved
+}
+
+/// The world that goes on from `saved`; walls, loads and settings are those of `like`.
+fn restored<D: Dim>(saved: &Saved, like: &World<D>) -> Result<World<D>, Mismatch> {
+    let mut from = saved.read();
+    let grains = Grains::restored(&mut from)?;
+    let world = World::restored(grains, like.walls.clone(), like.loads.clone(), like.settings.clone(), &mut from)?;
+    from.end()?;
+    Ok(world)
+}
+
+fn bits(saved: &Saved) -> (Vec<u64>, &[u64]) {
+    (saved.reals.iter().map(|x| x.to_bits()).collect(), &saved.counts)
+}
+
+/// Stops a world after each of some steps, and goes on with a restored one beside it.
+fn goes_on<D: Dim>(mut world: World<D>, solver: SolverSettings) -> World<D> {
+    world.set_solver(solver);
+    let mut broken = 0;
+    for steps in [1, 2, 7, 12] {
+        common::run(&mut world, steps);
+        let state = saved(&world);
+        let mut other = restored(&state, &world).expect("the state of this world");
+        assert_eq!(bits(&saved(&other)), bits(&state), "what is restored is what was saved");
+        for _ in 0..8 {
+            let (a, b) = (world.step().expect("a step"), other.step().expect("a step"));
+            broken += a.breaks.len();
+            assert_eq!((a.work, a.residual.to_bits()), (b.work, b.residual.to_bits()));
+            assert_eq!(bits(&saved(&world)), bits(&saved(&other)), "step {}", world.steps);
+        }
+    }
+    assert!(broken == 0 || broken < world.bonds.len());
+    world
+}
+
+#[test]
+fn a_state_goes_on_to_the_bit_with_every_solver() {
+    let (newton, auto) = (SolverSettings::Newton(settings()), SolverSettings::Auto(settings()));
+    for solver in [newton, auto, common::solver(1e-6)] {
+        let world = goes_on(pressed::<D2>(3, 8, 0.3, Some(BondFlow::Associated)), solver);
+        assert!(world.intact_bonds() > 0 && world.intact_bonds() < world.bonds.len(), "some bonds broke");
+        goes_on(pressed::<D3>(3, 4, 0.3, Some(BondFlow::Associated)), solver);
+        goes_on(pressed::<D2>(5, 8, 0.3, None), solver);
+        goes_on(pressed::<D2>(5, 8, 0.0, None), solver);
+    }
+    let mut elastic = pressed::<D2>(3, 8, 0.3, Some(BondFlow::Associated));
+    elastic.make_bonds_elastic(|_| Stiffness { normal: 1e6, tangential: 4e5, rolling: 10.0 });
+    goes_on(elastic, auto);
+}
+
+#[test]
+fn numbers_that_do_not_fit_are_refused() {
+    let mut world = pressed::<D2>(3, 6, 0.3, Some(BondFlow::Associated));
+    world.set_solver(SolverSettings::Newton(settings()));
+    common::run(&mut world, 5);
+    let state = saved(&world);
+    // cut short anywhere, at either end of either list
+    for cut in 0..state.counts.len() {
+        let short = Saved { counts: state.counts[..cut].to_vec(), ..state.clone() };
+        assert!(restored(&short, &world).is_err(), "{cut} counts");
+    }
+    for cut in (0..state.reals.len()).step_by(7) {
+        let short = Saved { reals: state.reals[..cut].to_vec(), ..state.clone() };
+        assert!(restored(&short, &world).is_err(), "{cut} reals");
+    }
+    // a count that is another one must not lead to a panic or to endless memory
+    for place in 0..state.counts.len() {
+        for value in [0, 1, 5, u64::MAX, u64::MAX / 16] {
+            let mut wrong = state.clone();
+            wrong.counts[place] = value;
+            let _ = restored(&wrong, &world);
+        }
+    }
+    let walls = World::new(world.grains.clone(), Vec::new(), Vec::new(), world.settings.clone());
+    assert!(restored(&state, &walls).is_err(), "other walls");
+}
