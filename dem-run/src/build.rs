@@ -8,6 +8,7 @@ use dem_core::bond::{self, Rupture};
 use dem_core::contact::{BondFlow, LocalSolve};
 use dem_core::detection::pairs_within;
 use dem_core::dim::{Dim, Vect};
+use dem_core::saved::{Mismatch, Reader};
 use dem_core::solver::{GaussSeidelSettings, NewtonSettings, SolverSettings, Start, StiffnessRatio};
 use dem_core::world::{Restitution, Settings, World};
 use std::f64::consts::PI;
@@ -28,10 +29,15 @@ const TOUCHING: f64 = 1e-6;
 /// Prepare the sample of a scene and put the world together. `watch` is told how far the preparation is.
 pub fn build<D: Dim>(scene: &Scene, watch: Watch) -> Result<Built<D>, RunError> {
     let (grains, solid_fraction) = grains::<D>(scene, watch)?;
-    let walls =
-        scene.walls.iter().map(|(name, wall)| build_wall(scene, name, wall, &grains)).collect::<Result<_, _>>()?;
-    let loads = loads(scene);
-    let mut world = World::new(grains, walls, loads, settings(scene));
+    for load in scene.grains.iter().flat_map(|g| &g.loads) {
+        if load.grain >= grains.len() {
+            return Err(missing_grain("grains.loads", load.grain, grains.len()));
+        }
+    }
+    refuse_unseated(scene, &grains)?;
+    let walls = walls(scene, &grains);
+    refuse_overlaps(scene, &walls, &grains)?;
+    let mut world = World::new(grains, walls, loads(scene), settings(scene));
     if let Some(bonds) = &scene.bonds {
         let strength = |mean_diameter| bonds.cohesion(scene.dimension, mean_diameter, scene.thickness());
         world.form_bonds(bonds.gap_tolerance, strength, bonds.friction.unwrap_or(scene.materials.friction.grain_grain));
@@ -40,6 +46,19 @@ pub fn build<D: Dim>(scene: &Scene, watch: Watch) -> Result<Built<D>, RunError> 
         }
     }
     Ok(Built { world, solid_fraction })
+}
+
+/// The world of a scene that goes on from what was saved of it.
+///
+/// # Errors
+/// [`Mismatch`] where it was saved of another scene.
+pub fn rebuild<D: Dim>(scene: &Scene, from: &mut Reader) -> Result<World<D>, Mismatch> {
+    let grains = Grains::restored(from)?;
+    if scene.grains.iter().flat_map(|g| &g.loads).any(|load| load.grain >= grains.len()) {
+        return Err(Mismatch);
+    }
+    let walls = walls(scene, &grains);
+    World::restored(grains, walls, loads(scene), settings(scene), from)
 }
 
 /// The grains of a scene, and the solid fraction of a random packing.
@@ -59,11 +78,6 @@ fn grains<D: Dim>(scene: &Scene, watch: Watch) -> Result<(Grains<D>, Option<f64>
     for &k in scene.grains.iter().flat_map(|g| &g.fixed) {
         let count = grains.len();
         *grains.fixed.get_mut(k).ok_or_else(|| missing_grain("grains.fixed", k, count))? = true;
-    }
-    for load in scene.grains.iter().flat_map(|g| &g.loads) {
-        if load.grain >= grains.len() {
-            return Err(missing_grain("grains.loads", load.grain, grains.len()));
-        }
     }
     for k in (0..grains.len()).filter(|k| grains.fixed[*k]).collect::<Vec<_>>() {
         // held fixed: whatever velocity the list gives it
@@ -171,7 +185,11 @@ fn schedule(function: scene::Function) -> Schedule {
     Arc::new(move |t| function.at(t))
 }
 
-fn build_wall<D: Dim>(scene: &Scene, name: &str, wall: &scene::Wall, grains: &Grains<D>) -> Result<Wall<D>, RunError> {
+fn walls<D: Dim>(scene: &Scene, grains: &Grains<D>) -> Vec<Wall<D>> {
+    scene.walls.values().map(|wall| build_wall(scene, wall, grains)).collect()
+}
+
+fn build_wall<D: Dim>(scene: &Scene, wall: &scene::Wall, grains: &Grains<D>) -> Wall<D> {
     let round = |radius: f64, inside: bool, axis: Option<D::Vector>| Shape::Round { radius, inside, axis };
     let (shape, position) = match &wall.shape {
         scene::Shape::Plane(plane) => {
@@ -185,8 +203,8 @@ fn build_wall<D: Dim>(scene: &Scene, name: &str, wall: &scene::Wall, grains: &Gr
             };
             (Shape::Plane { normal }, position)
         }
-        scene::Shape::Circle(c) => (round(c.radius, c.inside, None), D::Vector::from_slice(&c.center)),
-        scene::Shape::Sphere(s) => (round(s.radius, s.inside, None), D::Vector::from_slice(&s.center)),
+        scene::Shape::Circle(c) => (round(c.radius, c.inside, None), seated(&wall.shape, &c.center, grains)),
+        scene::Shape::Sphere(s) => (round(s.radius, s.inside, None), seated(&wall.shape, &s.center, grains)),
         scene::Shape::Cylinder(c) => {
             (round(c.radius, c.inside, Some(unit::<D>(&c.axis))), D::Vector::from_slice(&c.center))
         }
@@ -208,16 +226,60 @@ fn build_wall<D: Dim>(scene: &Scene, name: &str, wall: &scene::Wall, grains: &Gr
             Drive::Force { direction, mass, force: schedule(force) }
         }
     };
-    for (k, (x, r)) in grains.position.iter().zip(&grains.radius).enumerate() {
-        let gap = shape.gap(*x - position, *r).0;
-        if gap < -TOUCHING * r {
+    built
+}
+
+/// The centre of a round wall: where it stands, or where it touches the first grain on its way.
+fn seated<D: Dim>(shape: &scene::Shape, center: &[f64], grains: &Grains<D>) -> D::Vector {
+    let center = D::Vector::from_slice(center);
+    let Some((direction, _)) = shape.seat() else { return center };
+    center + unit::<D>(direction) * seat(shape, center, grains).unwrap_or(0.0)
+}
+
+/// How far a round wall moves from `center` until it touches a grain (m); none if none is in its way.
+fn seat<D: Dim>(shape: &scene::Shape, center: D::Vector, grains: &Grains<D>) -> Option<f64> {
+    let (direction, radius) = shape.seat()?;
+    let along = unit::<D>(direction);
+    let touch = |(x, r): (&D::Vector, &f64)| {
+        let apart = *x - center;
+        let ahead = apart.dot(&along);
+        let (aside, reach) = (apart - along * ahead, radius + r);
+        let height = reach * reach - aside.dot(&aside);
+        (height > 0.0 && ahead > 0.0).then(|| ahead - height.sqrt())
+    };
+    grains.position.iter().zip(&grains.radius).filter_map(touch).min_by(f64::total_cmp)
+}
+
+/// A round wall that is to touch the sample must find it.
+fn refuse_unseated<D: Dim>(scene: &Scene, grains: &Grains<D>) -> Result<(), RunError> {
+    for (name, wall) in &scene.walls {
+        let (scene::Shape::Circle(scene::Circle { center, .. }) | scene::Shape::Sphere(scene::Sphere { center, .. })) =
+            &wall.shape
+        else {
+            continue;
+        };
+        if wall.shape.seat().is_some() && seat(&wall.shape, D::Vector::from_slice(center), grains).is_none() {
             return Err(RunError::Sample(format!(
-                "walls.{name}: the wall overlaps grain {k} by {:.3e} m; move the wall, or give a plane \"place\": \"seated\"",
-                -gap
+                "walls.{name}: no grain is in the way of the wall that is to be seated; move its centre, or turn its direction"
             )));
         }
     }
-    Ok(built)
+    Ok(())
+}
+
+fn refuse_overlaps<D: Dim>(scene: &Scene, walls: &[Wall<D>], grains: &Grains<D>) -> Result<(), RunError> {
+    for (name, wall) in scene.walls.keys().zip(walls) {
+        for (k, (x, r)) in grains.position.iter().zip(&grains.radius).enumerate() {
+            let gap = wall.shape.gap(*x - wall.position, *r).0;
+            if gap < -TOUCHING * r {
+                return Err(RunError::Sample(format!(
+                    "walls.{name}: the wall overlaps grain {k} by {:.3e} m; move the wall, or give a plane \"place\": \"seated\"",
+                    -gap
+                )));
+            }
+        }
+    }
+    Ok(())
 }
 
 fn loads<D: Dim>(scene: &Scene) -> Vec<Load<D>> {

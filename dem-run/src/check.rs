@@ -7,7 +7,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::run::RunError;
-use crate::scene::{Drive, Lattice, Sample, Scene, Shape};
+use crate::scene::{Drive, Lattice, Precision, Sample, Scene, Shape};
 
 /// What a run of a scene will be.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -158,6 +158,7 @@ fn expected_bytes(scene: &Scene, grains: usize) -> u64 {
     const PER_STEP: f64 = 40.0 * NUMBER;
     /// Groups, attributes, the scene, and the first chunk of every dataset.
     const FIXED: f64 = 512e3;
+    let real = if scene.output.precision == Precision::Single { 4.0 } else { NUMBER };
     let (d, spins, angles, tangents) = if scene.dimension == 2 { (2.0, 1.0, 1.0, 0.0) } else { (3.0, 3.0, 4.0, 3.0) };
     let contacts_per_grain = match scene.sample {
         Sample::Lattice(Lattice::Square { .. }) => 2.0,
@@ -167,29 +168,30 @@ fn expected_bytes(scene: &Scene, grains: usize) -> u64 {
     let contacts = contacts_per_grain * grains as f64;
     let bonds = if has_bonds(scene) { contacts } else { 0.0 };
     // position, velocity, angular velocity, angle
-    let grain_rows = grains as f64 * NUMBER * (2.0 * d + spins + angles);
+    let grain_rows = grains as f64 * real * (2.0 * d + spins + angles);
     // point, normal, tangent, reaction, moment, gap; the pair, the status and the bond
     let moments = if bonds > 0.0 { spins } else { 0.0 };
-    let contact_rows = contacts * (NUMBER * (3.0 * d + tangents + moments + 1.0) + 2.0 * 4.0 + 1.0 + 4.0);
-    let wall_rows = scene.walls.len() as f64 * NUMBER * 3.0 * d;
+    let forces = if scene.output.reactions { d + tangents + moments } else { 0.0 };
+    let contact_rows = contacts * (real * (2.0 * d + forces + 1.0) + 2.0 * 4.0 + 1.0 + 4.0);
+    let wall_rows = scene.walls.len() as f64 * real * 3.0 * d;
     let frames = scene.frames() as f64 * (grain_rows + contact_rows + wall_rows + bonds);
     (FIXED + frames + scene.time.steps() as f64 * PER_STEP) as u64
 }
 
 /// Free space for the user on the disk of `folder` (bytes), if the system tells.
 #[cfg(unix)]
-fn free_space(folder: &Path) -> Option<u64> {
+pub(crate) fn free_space(folder: &Path) -> Option<u64> {
     let disk = rustix::fs::statvfs(folder).ok()?;
     disk.f_bavail.checked_mul(disk.f_frsize)
 }
 
 #[cfg(not(unix))]
-fn free_space(_folder: &Path) -> Option<u64> {
+pub(crate) fn free_space(_folder: &Path) -> Option<u64> {
     None
 }
 
 /// A size as a person reads it.
-fn size(bytes: u64) -> String {
+pub(crate) fn size(bytes: u64) -> String {
     match bytes {
         0..1_000_000 => format!("{:.0} kB", bytes as f64 / 1e3),
         1_000_000..1_000_000_000 => format!("{:.1} MB", bytes as f64 / 1e6),

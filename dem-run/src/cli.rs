@@ -2,7 +2,7 @@
 //!
 //! Exit codes: 0 done, 2 wrong usage or scene, 3 no convergence, 4 input/output, 130 interrupted.
 
-use std::io::{ErrorKind, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -12,11 +12,14 @@ use crate::accuracy::trial::SolverName;
 use crate::accuracy::{self, AccuracyOptions};
 use crate::check::Check;
 use crate::export::{self, ExportOptions};
-use crate::output::default_folder;
+use crate::output::{default_folder, print_json, print_result};
 use crate::progress::ProgressMode;
-use crate::run::{self, RunError, RunOptions};
+use crate::resume::{self, ResumeOptions};
+use crate::run::{self, Execution, RunError, RunOptions};
 use crate::scene::{self, Sample, Scene, SceneError, schema};
+use crate::signals;
 use crate::solve::{self, SolveOptions, Solver};
+use crate::sweep::{self, Mode, SweepOptions};
 
 /// Simulates cemented grains by non-smooth contact dynamics.
 #[derive(Debug, Parser)]
@@ -37,6 +40,9 @@ enum Command {
     /// Run a scene and write its history.
     #[command(after_help = RUN_EXAMPLE)]
     Run(RunArgs),
+    /// Go on with a run that was interrupted or killed, or that is to end later, from its history.
+    #[command(after_help = RESUME_EXAMPLE)]
+    Resume(ResumeArgs),
     /// Check a scene without running it; tell grains, walls, steps, frames and disk space.
     #[command(after_help = CHECK_EXAMPLE)]
     Check(CheckArgs),
@@ -49,16 +55,34 @@ enum Command {
     /// Measure how accurate a scene's results are, and what more accuracy costs.
     #[command(after_help = ACCURACY_EXAMPLE)]
     Accuracy(AccuracyArgs),
+    /// Run a scene with many values: a parameter study.
+    #[command(after_help = SWEEP_EXAMPLE)]
+    Sweep(SweepArgs),
     /// Print the JSON Schema of scenes, for editors.
     #[command(after_help = SCHEMA_EXAMPLE)]
-    Schema,
+    Schema {
+        /// That of sweeps instead.
+        #[arg(long)]
+        sweep: bool,
+    },
 }
 
 const RUN_EXAMPLE: &str = "\
-Ctrl-C ends the run after the frame in hand; a second one ends it at once.
+Ctrl-C ends the run after the step in hand, a second one at once; `dem-run resume` goes on with it.
 
 Example:
   dem-run run configs/compression.json -o weak.h5 --set bonds.strength=5 --set walls.top.force_rate=100";
+
+const RESUME_EXAMPLE: &str = "\
+The run goes on from its last checkpoint (output.checkpoint_every; a run that ended, by Ctrl-C too, has one at its end), to
+the bit as if it had never stopped. What the history holds up to there is copied to a new file beside it, which then takes
+its place: that needs as much disk space again, and readers that have the file open keep the old one.
+
+A scene that differs from the one in the history is refused with the fields named; --force takes it where a run that has
+begun can change them.
+
+Example:
+  dem-run resume compression.h5 --until 0.6";
 
 const CHECK_EXAMPLE: &str = "\
 All wrong values are told at once, each with its place, what stood there and what is allowed.
@@ -70,6 +94,7 @@ const ACCURACY_EXAMPLE: &str = "\
 Runs the scene over solvers, tolerances and time steps, all from one sample; compares each run with the finest; then
 varies the order of the contacts and the reactions that rigid bonds start from, which should change nothing. Runs of a
 bonded sample end at its collapse. docs/accuracy.md says how to read the tables.
+--threads is the number for the runs whose CPU time is not told; the others have one.
 A step that misses its tolerance is taken if its residual is at most the scene's solver.accept, and is counted.
 
 Example:
@@ -81,6 +106,20 @@ Editors that know JSON Schema complete and explain a scene that names it:
 
 Example:
   dem-run schema > docs/scene.schema.json";
+
+const SWEEP_EXAMPLE: &str = "\
+A sweep file names a scene and what is varied. Fields in one object vary together; objects are combined, each with each:
+  { \"scene\": \"compression.json\",
+    \"vary\": [ { \"bonds.strength\": [5, 10], \"walls.top.force_rate\": [100, 200] },
+              { \"seed\": { \"from\": 1, \"count\": 10 } } ] }
+All runs are checked before the first starts. Each is a process of its own with one thread, and a history of its own.
+
+The same command again goes on where it stopped: runs that are done stay, those that were interrupted, killed or could not
+write are run again from their start, those that failed for good (no convergence) with --retry only. Values that are added
+to the sweep file are new runs. Exit codes 3 and 4: some runs failed, the others are done. More: docs/sweep.md.
+
+Example:
+  dem-run sweep configs/sweep-cohesion.json --jobs 4";
 
 const EXPORT_EXAMPLE: &str = "\
 The scene in the history is run again up to the step: a sample file that it names must be in its place. The problem is
@@ -105,6 +144,30 @@ struct SceneArgs {
     set: Vec<String>,
 }
 
+/// How progress is shown.
+#[derive(Debug, Args)]
+struct ShowArgs {
+    /// How progress is shown on stderr.
+    #[arg(long, value_enum, default_value_t)]
+    progress: ProgressMode,
+    /// Show nothing on stderr but errors.
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+/// What the commands that run a scene have in common.
+#[derive(Debug, Args)]
+struct MannerArgs {
+    /// Overwrite files that exist.
+    #[arg(long)]
+    force: bool,
+    /// Number of threads; the result does not depend on it [default: all].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+    #[command(flatten)]
+    show: ShowArgs,
+}
+
 #[derive(Debug, Args)]
 struct RunArgs {
     #[command(flatten)]
@@ -112,24 +175,80 @@ struct RunArgs {
     /// History to write [default: the scene's name with .h5, in the current folder].
     #[arg(short, long, value_name = "FILE.h5")]
     output: Option<PathBuf>,
-    /// Overwrite files that exist.
-    #[arg(long)]
-    force: bool,
-    /// Number of threads; the result does not depend on it [default: all].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
-    threads: Option<u16>,
-    /// How progress is shown on stderr.
-    #[arg(long, value_enum, default_value_t)]
-    progress: ProgressMode,
-    /// Show nothing on stderr but errors.
-    #[arg(short, long)]
-    quiet: bool,
+    #[command(flatten)]
+    manner: MannerArgs,
     /// Print the summary as JSON.
     #[arg(long)]
     json: bool,
     /// Write the prepared sample, to be read back as a sample file.
     #[arg(long, value_name = "FILE.csv")]
     write_sample: Option<PathBuf>,
+    /// End when the process that started this one ends: a sweep that is killed takes its runs along.
+    #[arg(long, hide = true)]
+    end_with_parent: bool,
+}
+
+#[derive(Debug, Args)]
+struct ResumeArgs {
+    /// History to go on with.
+    #[arg(value_name = "FILE.h5")]
+    history: PathBuf,
+    /// A later end of the run (s).
+    #[arg(long, value_name = "T", value_parser = positive)]
+    until: Option<f64>,
+    /// Go on with this scene in place of the one in the history.
+    #[arg(long, value_name = "SCENE")]
+    scene: Option<PathBuf>,
+    /// Put VALUE at PATH in the scene, as in stop=null; VALUE is JSON or a bare word. May be repeated.
+    #[arg(long = "set", value_name = "PATH=VALUE")]
+    set: Vec<String>,
+    /// Go on even though the scene differs.
+    #[arg(long)]
+    force: bool,
+    /// Number of threads; the result does not depend on it [default: all].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+    #[command(flatten)]
+    show: ShowArgs,
+    /// Print the summary as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Args)]
+struct SweepArgs {
+    /// Sweep: a JSON file with comments.
+    #[arg(value_name = "SWEEP.json")]
+    sweep: PathBuf,
+    /// Folder for the results, created if need be [default: the sweep's name with -sweep, in the current folder].
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Runs at a time, one thread each [default: the number of processors].
+    #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    jobs: Option<u16>,
+    /// Check every run and tell their number, steps and disk space; write nothing.
+    #[arg(long, group = "mode")]
+    check: bool,
+    /// Write the manifest, slurm.sh and Snakefile for other schedulers; run nothing.
+    #[arg(long, group = "mode")]
+    prepare: bool,
+    /// Tell what ran, failed or is left, and bring manifest.json and runs.csv up to date; run nothing.
+    #[arg(long, group = "mode")]
+    status: bool,
+    /// Carry out the run of this number alone, unless it is done: the task of a scheduler.
+    #[arg(long, group = "mode", value_name = "NUMBER")]
+    run: Option<String>,
+    /// Run again what failed for good.
+    #[arg(long)]
+    retry: bool,
+    /// Run again what was done of other scenes than the sweep gives now, and delete what it no longer gives.
+    #[arg(long)]
+    force: bool,
+    #[command(flatten)]
+    show: ShowArgs,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
 }
 
 #[derive(Debug, Args)]
@@ -157,29 +276,11 @@ struct AccuracyArgs {
     /// Go on to the scene's end where a run would end at the collapse of the sample.
     #[arg(long)]
     whole: bool,
-    /// Overwrite results that exist.
-    #[arg(long)]
-    force: bool,
-    /// Number of threads for the runs whose CPU time is not told; no result depends on it [default: all].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
-    threads: Option<u16>,
-    /// How progress is shown on stderr.
-    #[arg(long, value_enum, default_value_t)]
-    progress: ProgressMode,
-    /// Show nothing on stderr but errors.
-    #[arg(short, long)]
-    quiet: bool,
+    #[command(flatten)]
+    manner: MannerArgs,
     /// Print all that was measured as JSON, in place of the tables.
     #[arg(long)]
     json: bool,
-}
-
-/// A finite number above zero.
-fn positive(text: &str) -> Result<f64, String> {
-    match text.trim().parse::<f64>() {
-        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
-        _ => Err("a finite number above zero is expected".into()),
-    }
 }
 
 #[derive(Debug, Args)]
@@ -202,18 +303,8 @@ struct ExportArgs {
     /// Problem to write.
     #[arg(short, long, value_name = "PROBLEM.hdf5")]
     output: PathBuf,
-    /// Overwrite a file that exists.
-    #[arg(long)]
-    force: bool,
-    /// Number of threads; the result does not depend on it [default: all].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
-    threads: Option<u16>,
-    /// How progress is shown on stderr.
-    #[arg(long, value_enum, default_value_t)]
-    progress: ProgressMode,
-    /// Show nothing on stderr but errors.
-    #[arg(short, long)]
-    quiet: bool,
+    #[command(flatten)]
+    manner: MannerArgs,
 }
 
 #[derive(Debug, Args)]
@@ -225,7 +316,7 @@ struct SolveArgs {
     #[arg(long, value_enum, default_value_t)]
     solver: Solver,
     /// Residual to reach.
-    #[arg(long, value_name = "T", default_value_t = 1e-8, value_parser = above_zero)]
+    #[arg(long, value_name = "T", default_value_t = 1e-8, value_parser = positive)]
     tolerance: f64,
     /// Iterations after which the solver gives up [default: 100000 sweeps, 300 Newton iterations].
     #[arg(long, value_name = "N")]
@@ -244,10 +335,11 @@ struct SolveArgs {
     json: bool,
 }
 
-fn above_zero(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
+/// A finite number above zero.
+fn positive(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
         Ok(number) if number > 0.0 && number.is_finite() => Ok(number),
-        _ => Err("it must be a number above zero, as in 1e-8".into()),
+        _ => Err("it must be a finite number above zero, as in 1e-8".into()),
     }
 }
 
@@ -256,11 +348,16 @@ fn above_zero(text: &str) -> Result<f64, String> {
 pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Run(args) => run(args),
+        Command::Resume(args) => resume(args),
         Command::Check(args) => check(&args),
         Command::Export(args) => export(args),
         Command::Solve(args) => solve(args),
         Command::Accuracy(args) => accuracy(args),
-        Command::Schema => print(&format!("{:#}", schema::json_schema())),
+        Command::Sweep(args) => sweep(args),
+        Command::Schema { sweep } => {
+            let schema = if sweep { sweep::model::json_schema() } else { schema::json_schema() };
+            print_json(schema).map_err(RunError::from)
+        }
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -272,6 +369,12 @@ pub fn main() -> ExitCode {
     }
 }
 
+impl MannerArgs {
+    fn execution(&self) -> Execution {
+        Execution { threads: self.threads.map(usize::from), progress: self.show.progress, quiet: self.show.quiet }
+    }
+}
+
 impl SceneArgs {
     fn load(&self) -> Result<Scene, SceneError> {
         scene::load(&self.scene, &self.set)
@@ -279,13 +382,14 @@ impl SceneArgs {
 }
 
 fn run(args: RunArgs) -> Result<(), RunError> {
+    if args.end_with_parent {
+        signals::end_with_parent().map_err(|e| RunError::InputOutput(format!("the parent cannot be watched: {e}")))?;
+    }
     let scene = args.scene.load()?;
     let options = RunOptions {
         output: args.output.unwrap_or_else(|| default_output(&args.scene.scene)),
-        overwrite: args.force,
-        threads: args.threads.map(usize::from),
-        progress: args.progress,
-        quiet: args.quiet,
+        overwrite: args.manner.force,
+        execution: args.manner.execution(),
         json: args.json,
         write_sample: args.write_sample,
     };
@@ -297,10 +401,23 @@ fn run(args: RunArgs) -> Result<(), RunError> {
     run::run(&scene, &options)
 }
 
+fn resume(args: ResumeArgs) -> Result<(), RunError> {
+    let threads = args.threads.map(usize::from);
+    resume::resume(&ResumeOptions {
+        history: args.history,
+        until: args.until,
+        scene: args.scene,
+        set: args.set,
+        force: args.force,
+        execution: Execution { threads, progress: args.show.progress, quiet: args.show.quiet },
+        json: args.json,
+    })
+}
+
 fn check(args: &CheckArgs) -> Result<(), RunError> {
     let scene = match args.scene.load() {
         Err(error @ SceneError::Wrong { .. }) if args.json => {
-            print(&format!("{:#}", serde_json::json!({ "problems": error.problems() })))?;
+            print_json(&serde_json::json!({ "problems": error.problems() }))?;
             return Err(error.into());
         }
         result => result?,
@@ -309,22 +426,17 @@ fn check(args: &CheckArgs) -> Result<(), RunError> {
     if check.disk_is_too_small() {
         let _ = writeln!(std::io::stderr(), "warning: the history will not fit on the disk of the current folder");
     }
-    match args.json {
-        true => print(&format!("{:#}", serde_json::json!(check))),
-        false => print(&check.to_string()),
-    }
+    Ok(print_result(&check, args.json)?)
 }
 
 fn export(args: ExportArgs) -> Result<(), RunError> {
     not_itself(&args.history, &args.output)?;
-    writable(&args.output, "-o PROBLEM.hdf5", args.force)?;
+    writable(&args.output, "-o PROBLEM.hdf5", args.manner.force)?;
     export::export(&ExportOptions {
         history: args.history,
         step: args.step,
         output: args.output,
-        threads: args.threads.map(usize::from),
-        progress: args.progress,
-        quiet: args.quiet,
+        execution: args.manner.execution(),
     })
 }
 
@@ -367,7 +479,7 @@ fn accuracy(args: AccuracyArgs) -> Result<(), RunError> {
     if folder.exists() && !folder.is_dir() {
         return Err(RunError::InputOutput(format!("{shown} is a file: name a folder with -o DIR")));
     }
-    if folder.join("accuracy.json").exists() && !args.force {
+    if folder.join("accuracy.json").exists() && !args.manner.force {
         let message = format!("{shown} holds results: --force overwrites them, -o DIR names another folder");
         return Err(RunError::InputOutput(message));
     }
@@ -378,12 +490,31 @@ fn accuracy(args: AccuracyArgs) -> Result<(), RunError> {
         steps: args.steps,
         orders: args.orders,
         whole: args.whole,
-        threads: args.threads.map(usize::from),
-        progress: args.progress,
-        quiet: args.quiet,
+        execution: args.manner.execution(),
         json: args.json,
     };
     accuracy::accuracy(&scene, &options)
+}
+
+fn sweep(args: SweepArgs) -> Result<(), RunError> {
+    let mode = match args.run {
+        Some(number) => Mode::One(number),
+        None if args.check => Mode::Check,
+        None if args.prepare => Mode::Prepare,
+        None if args.status => Mode::Status,
+        None => Mode::All,
+    };
+    let ShowArgs { progress, quiet } = args.show;
+    sweep::sweep(&SweepOptions {
+        folder: args.output.unwrap_or_else(|| default_folder(&args.sweep, "-sweep")),
+        sweep: args.sweep,
+        mode,
+        jobs: args.jobs.map(usize::from),
+        retry: args.retry,
+        overwrite: args.force,
+        execution: Execution { threads: None, progress, quiet },
+        json: args.json,
+    })
 }
 
 /// `<scene stem>.h5` in the current folder.
@@ -432,16 +563,6 @@ fn writable(path: &Path, option: &str, overwrite: bool) -> Result<(), RunError> 
         Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => {
             let folder = folder.display();
             Err(RunError::InputOutput(format!("{shown} cannot be written: there is no folder {folder}; make it first")))
-        }
-        _ => Ok(()),
-    }
-}
-
-/// Writes a result to stdout. A reader that has seen enough (`| head`) is no error.
-fn print(text: &str) -> Result<(), RunError> {
-    match writeln!(std::io::stdout(), "{text}") {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
-            Err(RunError::InputOutput(format!("stdout cannot be written: {error}")))
         }
         _ => Ok(()),
     }

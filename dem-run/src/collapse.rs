@@ -1,5 +1,6 @@
-//! The collapse load, and the load at which a share of the bonds has broken (PHYSICS §2).
+//! The collapse load, and the load at which a share of the bonds has broken.
 
+use dem_core::saved::{Mismatch, Reader, Saved};
 use serde::Serialize;
 
 /// Axial strains (–) at which the collapse load is told.
@@ -21,7 +22,7 @@ pub struct Failure {
 }
 
 /// Follows a run step by step.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Collapse {
     /// What was found so far.
     pub failure: Failure,
@@ -46,6 +47,32 @@ impl Collapse {
         }
         self.last_load = load;
     }
+
+    /// Write what was found so far.
+    pub fn save(&self, to: &mut Saved) {
+        let Failure { first_break, collapse: [a, b], early, broken_share } = self.failure;
+        for load in [first_break, a, b, broken_share] {
+            to.flag(load.is_some());
+            to.real(load.unwrap_or(0.0));
+        }
+        early.into_iter().for_each(|early| to.flag(early));
+        to.real(self.last_load);
+    }
+
+    /// What [`Collapse::save`] wrote.
+    ///
+    /// # Errors
+    /// [`Mismatch`].
+    pub fn restored(from: &mut Reader) -> Result<Self, Mismatch> {
+        let mut load = || -> Result<Option<f64>, Mismatch> {
+            let (known, load) = (from.flag()?, from.real()?);
+            Ok(known.then_some(load))
+        };
+        let (first_break, a, b, broken_share) = (load()?, load()?, load()?, load()?);
+        let early = [from.flag()?, from.flag()?];
+        let failure = Failure { first_break, collapse: [a, b], early, broken_share };
+        Ok(Self { failure, last_load: from.real()? })
+    }
 }
 
 #[cfg(test)]
@@ -67,5 +94,8 @@ mod tests {
             broken_share: Some(30.0),
         };
         assert_eq!(collapse.failure, expected);
+        let mut saved = Saved::default();
+        collapse.save(&mut saved);
+        assert_eq!(Collapse::restored(&mut saved.read()), Ok(collapse));
     }
 }

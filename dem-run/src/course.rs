@@ -7,6 +7,7 @@ use crate::summary::Ending;
 use dem_core::body::{Drive, Wall};
 use dem_core::bond::BondStatus;
 use dem_core::dim::{Dim, Vect};
+use dem_core::saved::{Mismatch, Reader, Saved};
 use dem_core::solver::{SolveStatus, Work};
 use dem_core::world::{StepReport, World};
 
@@ -56,6 +57,43 @@ impl<D: Dim> Course<D> {
             stop: travel_stop(scene, world),
             broken_limit: scene.stop.as_ref().and_then(|s| s.broken_fraction),
         }
+    }
+
+    /// Write the course so far.
+    pub fn save(&self, to: &mut Saved) {
+        self.collapse.save(to);
+        self.broken.into_iter().for_each(|broken| to.count(broken));
+        to.reals.extend([self.worst_residual, self.penetration]);
+        let Work { sweeps, newton, factorisations } = self.work;
+        to.counts.extend([sweeps, newton, factorisations, self.missed_tolerance, self.rejected]);
+        to.flag(self.stop.is_some());
+        if let Some(stop) = &self.stop {
+            to.real(stop.distance);
+            to.flag(stop.from.is_some());
+            to.vector(&stop.from.unwrap_or(D::Vector::zero()));
+        }
+    }
+
+    /// The course that [`Course::save`] wrote, of a run of `scene` that goes on with `world`.
+    ///
+    /// # Errors
+    /// [`Mismatch`].
+    pub fn restored(scene: &Scene, world: &World<D>, from: &mut Reader) -> Result<Self, Mismatch> {
+        let mut course = Self::new(scene, world);
+        course.collapse = Collapse::restored(from)?;
+        course.broken = [from.count()?, from.count()?, from.count()?];
+        (course.worst_residual, course.penetration) = (from.real()?, from.real()?);
+        let mut count = || from.count().map(|n| n as u64);
+        course.work = Work { sweeps: count()?, newton: count()?, factorisations: count()? };
+        (course.missed_tolerance, course.rejected) = (count()?, count()?);
+        if from.flag()? {
+            let (distance, begun, place) = (from.real()?, from.flag()?, from.vector()?);
+            // a stop that the scene no longer has is forgotten
+            if let Some(stop) = &mut course.stop {
+                (stop.distance, stop.from) = (distance, begun.then_some(place));
+            }
+        }
+        Ok(course)
     }
 
     /// Bonds broken so far.

@@ -10,10 +10,11 @@ use dem_core::solver::SolveStatus;
 use crate::build::build;
 use crate::fclib::Problem;
 use crate::history::History;
-use crate::progress::{Progress, ProgressMode, StepProgress};
-use crate::run::{RunError, start_threads};
+use crate::output::print_line;
+use crate::progress::StepProgress;
+use crate::run::{Execution, RunError, handle_signals};
 use crate::scene::{self, Scene};
-use crate::signals::{self, Interrupt};
+use crate::signals::Interrupt;
 
 /// What is exported, and how.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -24,12 +25,8 @@ pub struct ExportOptions {
     pub step: u64,
     /// The file to write.
     pub output: PathBuf,
-    /// Number of threads; as many as the machine has where it is absent.
-    pub threads: Option<usize>,
-    /// How progress is shown.
-    pub progress: ProgressMode,
-    /// Whether stderr stays silent but for errors.
-    pub quiet: bool,
+    /// How the command is carried out.
+    pub execution: Execution,
 }
 
 /// Runs the scene of a history again up to a step and writes that step's problem: the first that it solves, before any
@@ -38,8 +35,8 @@ pub struct ExportOptions {
 /// # Errors
 /// [`RunError`]: an unreadable history, a step that the scene does not have, a run that does not come that far.
 pub fn export(options: &ExportOptions) -> Result<(), RunError> {
-    let interrupt = signals::install().map_err(|e| RunError::InputOutput(format!("no handler for Ctrl-C: {e}")))?;
-    start_threads(options.threads)?;
+    let interrupt = handle_signals()?;
+    options.execution.start_threads()?;
     let parameters = History::open(&options.history)?.parameters()?;
     let shown = options.history.display();
     let scene = scene::from_text(&format!("the scene in {shown}"), &parameters.scene, &[])?;
@@ -51,7 +48,7 @@ pub fn export(options: &ExportOptions) -> Result<(), RunError> {
         )));
     }
     let (version, revision) = (env!("CARGO_PKG_VERSION"), option_env!("DEM_GIT_REVISION").unwrap_or_default());
-    if !options.quiet && (parameters.version != version || parameters.git_revision != revision) {
+    if !options.execution.quiet && (parameters.version != version || parameters.git_revision != revision) {
         let note = "it was written by another version of the program: the states of this run may differ from it";
         let _ = writeln!(std::io::stderr(), "note: {shown}: {note}");
     }
@@ -62,7 +59,7 @@ pub fn export(options: &ExportOptions) -> Result<(), RunError> {
 }
 
 fn export_in<D: Dim>(scene: &Scene, options: &ExportOptions, interrupt: &Interrupt) -> Result<(), RunError> {
-    let mut progress = Progress::new(options.progress, options.quiet);
+    let mut progress = options.execution.show();
     let mut world = build::<D>(scene, &mut |done| {
         progress.phase("packing the sample", done);
         !interrupt.requested()
@@ -96,7 +93,7 @@ fn export_in<D: Dim>(scene: &Scene, options: &ExportOptions, interrupt: &Interru
     }
     let solve = world.settings.solver.build::<D>().solve(&mut contacts);
     let solved = solve.status != SolveStatus::Failed;
-    if !solved && !options.quiet {
+    if !solved && !options.execution.quiet {
         let what = format!("the scene's solver left a residual of {:.2e}", solve.residual);
         let _ = writeln!(std::io::stderr(), "note: {what}: the problem is written without a solution");
     }
@@ -125,7 +122,5 @@ fn export_in<D: Dim>(scene: &Scene, options: &ExportOptions, interrupt: &Interru
         problem.assembled.parts().rows.count(),
         options.output.display()
     );
-    // a reader that has seen enough is no error
-    let _ = writeln!(std::io::stdout(), "{shown}");
-    Ok(())
+    Ok(print_line(&shown)?)
 }

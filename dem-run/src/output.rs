@@ -5,6 +5,8 @@ use std::fs;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
+use serde::Serialize;
+
 use crate::plot::Drawing;
 
 /// A result that cannot be written.
@@ -39,6 +41,18 @@ impl Folder {
     /// The files written so far.
     pub fn written(&self) -> &[PathBuf] {
         &self.written
+    }
+
+    /// The folder itself.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The path of a file that another library writes; it counts as written.
+    pub fn place(&mut self, name: &str) -> PathBuf {
+        let path = self.path.join(name);
+        self.written.push(path.clone());
+        path
     }
 
     /// Writes a file.
@@ -149,6 +163,30 @@ pub fn print(text: &str) -> Result<()> {
         }
         _ => Ok(()),
     }
+}
+
+/// Prints a line on stdout, as [`print()`].
+///
+/// # Errors
+/// [`WriteError`].
+pub fn print_line(text: &str) -> Result<()> {
+    print(&format!("{text}\n"))
+}
+
+/// Prints JSON on stdout, as [`print()`].
+///
+/// # Errors
+/// [`WriteError`].
+pub fn print_json(value: &serde_json::Value) -> Result<()> {
+    print_line(&format!("{value:#}"))
+}
+
+/// Prints a result on stdout, for people or as JSON, as [`print()`].
+///
+/// # Errors
+/// [`WriteError`].
+pub fn print_result<T: Display + Serialize>(result: &T, json: bool) -> Result<()> {
+    if json { print_json(&serde_json::json!(result)) } else { print_line(&result.to_string()) }
 }
 
 /// A number for people: four digits, and a power of ten where it is very large or small.

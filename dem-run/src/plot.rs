@@ -46,6 +46,8 @@ const ABOVE: f64 = 44.0;
 const BELOW: f64 = 62.0;
 /// Distance of the rows of a legend.
 const LEGEND_ROW: f64 = 19.0;
+/// Counts below this have an axis up to it.
+const FEW: f64 = 5.0;
 /// Points that one curve keeps: more than the pixels of its width, so none that shows is lost.
 const CURVE_POINTS: usize = 4000;
 
@@ -58,12 +60,25 @@ impl Drawing {
         SvgBackend::new().render_scene(&self.0)
     }
 
+    /// Width and height.
+    pub fn size(&self) -> (f64, f64) {
+        (self.0.width, self.0.height)
+    }
+
     /// The drawing as PNG.
     ///
     /// # Errors
     /// The plotting crate's message.
     pub fn png(&self) -> Result<Vec<u8>, String> {
-        PngBackend::new().with_scale(PNG_SCALE).render_scene(&self.0)
+        self.png_scaled(PNG_SCALE)
+    }
+
+    /// The drawing as PNG with `scale` pixels per unit of length.
+    ///
+    /// # Errors
+    /// The plotting crate's message.
+    pub fn png_scaled(&self, scale: f32) -> Result<Vec<u8>, String> {
+        PngBackend::new().with_scale(scale).render_scene(&self.0)
     }
 }
 
@@ -78,6 +93,10 @@ pub enum Style {
     Steps,
     /// Joined points, each with a dot.
     Marked,
+    /// Dots alone.
+    Points,
+    /// Upright bars around a mean; see [`Bars`].
+    Bars,
     /// A dashed level in the legend.
     Level,
 }
@@ -94,6 +113,16 @@ pub struct Curve {
     pub colour: &'static str,
 }
 
+/// Means with a bar up and down.
+pub struct Bars {
+    /// Their name in the legend.
+    pub label: String,
+    /// Their colour.
+    pub colour: &'static str,
+    /// Place x, mean y, and how far the bar goes either way.
+    pub bars: Vec<(f64, f64, f64)>,
+}
+
 /// A chart of curves.
 #[derive(Default)]
 pub struct Chart {
@@ -105,12 +134,15 @@ pub struct Chart {
     pub log_x: bool,
     /// Whether the vertical axis is logarithmic.
     pub log_y: bool,
-    /// Whether the horizontal axis begins a little before the first value, so that what rises there can be seen.
+    /// Whether the horizontal axis begins a little before the first value and ends a little after the last, so that what
+    /// rises there can be seen.
     pub set_off: bool,
     /// Whether values on the vertical axis are counts.
     pub counts: bool,
     /// The curves.
     pub curves: Vec<Curve>,
+    /// Means with bars, over the curves.
+    pub bars: Option<Bars>,
     /// Marked values of y, with what they are for the legend.
     pub levels: Vec<(f64, String)>,
     /// Marked values of x.
@@ -131,23 +163,31 @@ impl Chart {
 
     /// Draws the charts side by side, each with its legend above it.
     pub fn draw(charts: Vec<Self>) -> Drawing {
+        Self::draw_sized(charts, CHART)
+    }
+
+    /// As [`Chart::draw`], each chart of a given width and height in units of the drawing.
+    pub fn draw_sized(charts: Vec<Self>, size: (f64, f64)) -> Drawing {
         let columns = charts.len();
         let legends: Vec<Vec<Named>> = charts.iter().map(Self::legend).collect();
-        let (plots, layouts) = charts.into_iter().map(Self::build).unzip();
+        // all begin at one height
+        let most = legends.iter().map(|legend| legend_rows(legend, size.0).len()).max().unwrap_or(0);
+        let above = ABOVE.max(LEGEND_ROW * most as f64 + 6.0);
+        let (plots, layouts) = charts.into_iter().map(|chart| chart.build(above)).unzip();
         let figure = Figure::new(1, columns)
             .with_plots(plots)
             .with_layouts(layouts)
-            .with_cell_size(CHART.0, CHART.1)
+            .with_cell_size(size.0, size.1)
             .with_spacing(SPACING)
             .with_padding(PADDING);
         let figure = if columns > 1 { figure.with_labels_lowercase() } else { figure };
         let mut canvas = Canvas(figure.render());
         for (k, legend) in legends.iter().enumerate() {
-            let left = PADDING + k as f64 * (CHART.0 + SPACING);
-            let rows = legend_rows(legend);
+            let left = PADDING + k as f64 * (size.0 + SPACING);
+            let rows = legend_rows(legend, size.0);
             for (r, row) in rows.iter().enumerate() {
-                let y = PADDING + 0.5 * ABOVE + LEGEND_ROW * (r as f64 - 0.5 * (rows.len() - 1) as f64);
-                draw_legend(&mut canvas, row, (left + 0.55 * CHART.0, y));
+                let y = PADDING + 0.5 * above + LEGEND_ROW * (r as f64 - 0.5 * (rows.len() - 1) as f64);
+                draw_legend(&mut canvas, row, (left + 0.55 * size.0, y));
             }
         }
         canvas.finish()
@@ -156,12 +196,13 @@ impl Chart {
     /// Name, colour and style of each curve and each marked level; what stands alone needs no name.
     fn legend(&self) -> Vec<Named> {
         let curves = self.curves.iter().map(|curve| (curve.label.clone(), curve.colour, curve.style));
+        let bars = self.bars.iter().map(|bars| (bars.label.clone(), bars.colour, Style::Bars));
         let levels = self.levels.iter().map(|(_, label)| (label.clone(), colour::GREY, Style::Level));
-        let entries: Vec<_> = curves.chain(levels).collect();
+        let entries: Vec<_> = curves.chain(bars).chain(levels).collect();
         if entries.len() < 2 { vec![] } else { entries }
     }
 
-    fn build(mut self) -> (Vec<Plot>, Layout) {
+    fn build(mut self, above: f64) -> (Vec<Plot>, Layout) {
         let lift = self.lift();
         for curve in &mut self.curves {
             let visible = |&(x, y): &(f64, f64)| {
@@ -171,14 +212,15 @@ impl Chart {
             thin(&mut curve.points);
             curve.points.iter_mut().for_each(|point| point.1 *= lift);
         }
-        let plots: Vec<Plot> = self.curves.iter().flat_map(Curve::plots).collect();
+        let mut plots: Vec<Plot> = self.curves.iter().flat_map(Curve::plots).collect();
+        plots.extend(self.bars.as_ref().map(|bars| bars.plot(lift, self.log_y)));
         let mut layout = Layout::auto_from_plots(&plots)
             .with_x_label(&self.x)
             .with_y_label(&self.y)
             .with_label_size(15)
             .with_tick_size(13)
             .with_body_size(13)
-            .with_force_margins_y(ABOVE, BELOW)
+            .with_force_margins_y(above, BELOW)
             .with_box_axes();
         layout.show_legend = false;
         layout = self.scale_axes(layout, lift);
@@ -206,6 +248,11 @@ impl Chart {
         let high = values().map(|p| p.0).fold(f64::NEG_INFINITY, f64::max);
         if self.log_x {
             layout = layout.with_log_x().with_x_tick_format(TickFormat::Custom(Arc::new(power_of_ten)));
+            if self.set_off && 0.0 < low && low < high {
+                // as much of the axis as below
+                let off = (high / low).powf(0.04);
+                layout = layout.with_x_axis_min(low / off).with_x_axis_max(high * off);
+            }
         } else if low < high {
             let off = if self.set_off { 0.03 * (high - low) } else { 0.0 };
             layout = layout.with_x_axis_min(low - off).with_x_axis_max(high + off);
@@ -218,11 +265,21 @@ impl Chart {
             let high = shown.iter().copied().fold(0.0, f64::max);
             let tick = move |value: f64| power_of_ten(value / lift);
             layout = layout.with_log_y().with_y_tick_format(TickFormat::Custom(Arc::new(tick)));
-            if low <= high {
+            if high > 10.0 * low {
                 layout = layout.with_y_axis_min(0.6 * low).with_y_axis_max(1.6 * high);
+            } else if low <= high {
+                // within a decade there may be no tick at all: show the whole decade
+                let decade = |x: f64| 10f64.powf(x);
+                layout =
+                    layout.with_y_axis_min(decade(low.log10().floor())).with_y_axis_max(decade(high.log10().ceil()));
             }
         } else if self.counts {
             layout = layout.with_y_tick_format(TickFormat::Integer);
+            let high = values().map(|p| p.1).fold(0.0, f64::max);
+            // on a shorter axis ticks would stand between whole numbers
+            if high < FEW {
+                layout = layout.with_y_axis_min(0.0).with_y_axis_max(FEW);
+            }
         }
         layout
     }
@@ -233,7 +290,9 @@ fn power_of_ten(value: f64) -> String {
     let exponent = value.log10();
     let whole = (exponent - exponent.round()).abs() < 1e-6;
     if (!whole && exponent > -6.0) || (-0.5..1.5).contains(&exponent) {
-        return format!("{value}");
+        // what was computed as 4.9999999e-6 is 5e-6
+        let rounded = format!("{value:.3e}").parse().unwrap_or(value);
+        return format!("{rounded}");
     }
     let power = if whole { exponent.round() } else { exponent.floor() };
     let factor = if whole { String::new() } else { format!("{:.0}·", value / 10f64.powf(power)) };
@@ -254,12 +313,12 @@ fn legend_width(legend: &[Named]) -> f64 {
     legend.iter().map(|(text, ..)| 50.0 + 7.8 * text.chars().count() as f64).sum()
 }
 
-/// A legend in as many rows as it needs beside the letter of the chart.
-fn legend_rows(legend: &[Named]) -> Vec<&[Named]> {
+/// A legend in as many rows as it needs beside the letter of a chart of width `width`.
+fn legend_rows(legend: &[Named], width: f64) -> Vec<&[Named]> {
     let mut rows = vec![];
     let mut rest = legend;
     while !rest.is_empty() {
-        let fits = (1..=rest.len()).take_while(|n| legend_width(&rest[..*n]) <= 0.86 * CHART.0).last().unwrap_or(1);
+        let fits = (1..=rest.len()).take_while(|n| legend_width(&rest[..*n]) <= 0.86 * width).last().unwrap_or(1);
         let (row, left) = rest.split_at(fits);
         rows.push(row);
         rest = left;
@@ -278,9 +337,16 @@ fn draw_legend(canvas: &mut Canvas, legend: &[Named], middle: (f64, f64)) {
                     canvas.line((x + dash, y), (x + dash + 4.0, y), colour, 1.4);
                 }
             }
+            Style::Points => {}
+            Style::Bars => {
+                canvas.line((x + 13.0, y - 6.5), (x + 13.0, y + 6.5), colour, 1.4);
+                for end in [-6.5, 6.5] {
+                    canvas.line((x + 9.0, y + end), (x + 17.0, y + end), colour, 1.4);
+                }
+            }
             _ => canvas.line((x, y), (x + 26.0, y), colour, 2.2),
         }
-        if *style == Style::Marked {
+        if matches!(style, Style::Marked | Style::Points | Style::Bars) {
             canvas.disk((x + 13.0, y), 3.5, colour, colour, 0.5);
         }
         canvas.text((x + 33.0, y + 5.0), text, 14, Anchor::Start);
@@ -293,14 +359,31 @@ impl Curve {
         let points = || self.points.iter().copied();
         let line = LinePlot::new().with_data(points()).with_color(self.colour).with_stroke_width(1.8);
         match self.style {
-            Style::Line | Style::Level => vec![line.into()],
+            Style::Line | Style::Level | Style::Bars => vec![line.into()],
             Style::Thin => vec![line.with_stroke_width(1.0).into()],
             Style::Steps => vec![line.with_step().into()],
             Style::Marked => {
                 let dots = ScatterPlot::new().with_data(points()).with_color(self.colour).with_size(3.5);
                 vec![line.with_stroke_width(1.2).into(), dots.into()]
             }
+            Style::Points => {
+                vec![ScatterPlot::new().with_data(points()).with_color(self.colour).with_size(4.0).into()]
+            }
         }
+    }
+}
+
+impl Bars {
+    fn plot(&self, lift: f64, log_y: bool) -> Plot {
+        // a bar that goes below zero cannot end on a logarithmic axis: it ends a hundredth above
+        let down = |mean: f64, half: f64| if log_y { half.min(0.99 * mean) } else { half };
+        let errors = self.bars.iter().map(|&(_, mean, half)| (lift * down(mean, half), lift * half));
+        ScatterPlot::new()
+            .with_data(self.bars.iter().map(|&(x, mean, _)| (x, lift * mean)))
+            .with_y_err_asymmetric(errors)
+            .with_color(self.colour)
+            .with_size(3.5)
+            .into()
     }
 }
 
@@ -428,9 +511,15 @@ mod tests {
 
     #[test]
     fn ticks_are_powers_of_ten() {
-        for (value, text) in
-            [(1e-4, "10⁻⁴"), (1e3, "10³"), (0.1, "10⁻¹"), (1.0, "1"), (2e-5, "0.00002"), (2e-13, "2·10⁻¹³")]
-        {
+        for (value, text) in [
+            (1e-4, "10⁻⁴"),
+            (1e3, "10³"),
+            (0.1, "10⁻¹"),
+            (1.0, "1"),
+            (2e-5, "0.00002"),
+            (4.99999996e-6, "0.000005"),
+            (2e-13, "2·10⁻¹³"),
+        ] {
             assert_eq!(power_of_ten(value), text);
         }
     }

@@ -39,6 +39,17 @@ pub struct StepProgress {
     pub broken: usize,
 }
 
+/// Where a family of runs stands.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct RunsProgress {
+    /// Runs that have ended, those that failed included.
+    pub ended: usize,
+    /// Runs that failed.
+    pub failed: usize,
+    /// All runs.
+    pub total: usize,
+}
+
 /// Shows progress. It looks at the clock, and nothing else may depend on what it sees.
 pub struct Progress {
     sink: Sink,
@@ -126,6 +137,26 @@ impl Progress {
         }
     }
 
+    /// Tells where a family of runs stands; shown when it is due, or when it is the `last`.
+    pub fn runs(&mut self, runs: &RunsProgress, last: bool) {
+        if !self.due() && !last {
+            return;
+        }
+        self.shown = Some(Instant::now());
+        let elapsed = self.began.elapsed().as_secs_f64();
+        let left = (runs.ended > 0).then(|| elapsed * (runs.total - runs.ended) as f64 / runs.ended as f64);
+        let fraction = runs.ended as f64 / runs.total.max(1) as f64;
+        match &mut self.sink {
+            Sink::Bar(bar) => {
+                bar.set_position((fraction * BAR_LENGTH as f64) as u64);
+                bar.set_message(runs.describe(left));
+            }
+            Sink::Plain(out) => line(out, &format!("{:3.0} %  {}", 100.0 * fraction, runs.describe(left))),
+            Sink::Json(out) => json_line(out, &Event::Runs { runs, elapsed, left }),
+            Sink::None => {}
+        }
+    }
+
     /// Tells something that the user should know, a line of its own, whatever the mode unless it is quiet.
     pub fn note(&mut self, text: &str) {
         match &mut self.sink {
@@ -194,6 +225,15 @@ impl StepProgress {
     }
 }
 
+impl RunsProgress {
+    fn describe(&self, left: Option<f64>) -> String {
+        let Self { ended, failed, total } = self;
+        let failed = if *failed == 0 { String::new() } else { format!(", {failed} failed") };
+        let left = left.map_or("?".to_string(), duration);
+        format!("{ended} of {total} runs{failed}  {left} left")
+    }
+}
+
 #[derive(Serialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
 enum Event<'a> {
@@ -204,6 +244,14 @@ enum Event<'a> {
     Step {
         #[serde(flatten)]
         step: &'a StepProgress,
+        #[serde(rename = "elapsed_s")]
+        elapsed: f64,
+        #[serde(rename = "left_s")]
+        left: Option<f64>,
+    },
+    Runs {
+        #[serde(flatten)]
+        runs: &'a RunsProgress,
         #[serde(rename = "elapsed_s")]
         elapsed: f64,
         #[serde(rename = "left_s")]
@@ -323,6 +371,16 @@ mod tests {
         assert_eq!((&events[1]["event"], &events[1]["step"]), (&"step".into(), &1.into()));
         assert!(events[1]["residual"].is_null() && events[1]["elapsed_s"].is_number());
         assert_eq!(events[2], serde_json::json!({"event": "note", "message": "a \"note\""}));
+    }
+
+    #[test]
+    fn a_family_of_runs_is_told_in_runs() {
+        let out = Shared::default();
+        let mut progress = Progress::with_sink(Sink::Plain(Box::new(out.clone())), Duration::from_secs(3600), false);
+        progress.runs(&RunsProgress { ended: 0, failed: 0, total: 4 }, false);
+        assert_eq!(out.lines(), [""; 0]);
+        progress.runs(&RunsProgress { ended: 4, failed: 1, total: 4 }, true);
+        assert_eq!(out.lines(), ["100 %  4 of 4 runs, 1 failed  0 s left"]);
     }
 
     #[test]

@@ -1,10 +1,10 @@
 //! From a world to its history: the layout, the frames, the rupture events and the observables of every step.
 
 use crate::history::{
-    self, BondStatus, ContactRows, ContactStatus, Frame, GrainState, Layout, Observable, Parameters, Rupture,
-    RuptureMode, WallDrive, WallKind, WallState, Writer,
+    self, Background, Batch, BondStatus, Checkpoint, ContactRows, ContactStatus, Frame, GrainState, History, Kept,
+    Layout, Observable, Parameters, Rupture, RuptureMode, WallDrive, WallKind, WallState, Writer,
 };
-use crate::scene::Scene;
+use crate::scene::{Precision, Scene};
 use dem_core::body::{Drive, Shape, Wall};
 use dem_core::bond;
 use dem_core::dim::{Dim, Vect};
@@ -16,13 +16,19 @@ type Measure<D> = fn(&World<D>, &StepReport<D>, &mut Vec<f64>);
 
 /// Writes a world to its history.
 pub struct Recorder<D: Dim> {
-    writer: Writer,
+    writer: Background,
     measures: Vec<Measure<D>>,
     rotation: bool,
     tangents: bool,
-    row: Vec<f64>,
-    contacts: ContactRows,
+    reactions: bool,
+    /// Processor time of the program before it went on with this run (s).
+    cpu_before: f64,
+    /// What is observed goes to the writer with the next frame, or when so much has gathered.
+    batch: Batch,
 }
+
+/// Steps of observables that gather before they are handed to the writer.
+const GATHERED: usize = 256;
 
 impl<D: Dim> Recorder<D> {
     /// Create the history of a world at `path`.
@@ -33,49 +39,70 @@ impl<D: Dim> Recorder<D> {
         names: &[String],
         world: &World<D>,
     ) -> history::Result<Self> {
-        let bonded = !world.bonds.is_empty();
-        let friction = world.settings.friction > 0.0 || world.walls.iter().any(|w| w.friction > 0.0);
-        // without friction, bonds and torques nothing ever turns, unless it turns from the start
-        let turning =
-            world.grains.spin.iter().any(|w| w.norm() > 0.0) || world.loads.iter().any(|l| l.torque.norm() > 0.0);
-        let rotation = friction || bonded || turning;
-        let (observables, measures) = observables(world).into_iter().unzip();
-        let layout = Layout {
-            dimension: D::N,
-            rotation,
-            friction,
-            grains: history::Grains {
-                id: (0..world.grains.len() as i32).collect(),
-                radius: world.grains.radius.clone(),
-                mass: world.grains.mass.clone(),
-                inertia: world.grains.inertia.clone(),
-            },
-            walls: world.walls.iter().zip(names).map(|(wall, name)| describe_wall(wall, name)).collect(),
-            bonds: describe_bonds(world),
-            observables,
-            parameters: parameters(scene),
-        };
+        let (layout, measures) = describe(scene, names, world, parameters(scene));
         let writer = Writer::create(path, &layout, overwrite)?;
-        let tangents = friction || bonded;
-        Ok(Self { writer, measures, rotation, tangents, row: Vec::new(), contacts: ContactRows::default() })
+        Ok(Self::new(writer, &layout, measures, 0.0))
+    }
+
+    /// Go on with `history`, in place of it: with what it held when `kept` was complete, and the world of `checkpoint`.
+    /// `cpu_before` is what the run took so far (s); `tell` hears how much of the history is copied, from 0 to 1.
+    pub fn go_on(
+        history: &History,
+        kept: Kept,
+        checkpoint: &Checkpoint,
+        scene: &Scene,
+        world: &World<D>,
+        cpu_before: f64,
+        tell: &mut dyn FnMut(f64) -> bool,
+    ) -> history::Result<Self> {
+        let names: Vec<String> = scene.walls.keys().cloned().collect();
+        let origin = Parameters { scene: scene.to_json().unwrap_or_default(), ..history.parameters()? };
+        let (layout, measures) = describe(scene, &names, world, origin);
+        // what a scene without friction has no column for, it does not get later
+        let layout = Layout { friction: history.layout()?.friction, ..layout };
+        let writer = Writer::go_on(history.path(), &layout, history, kept, checkpoint, tell)?;
+        Ok(Self::new(writer, &layout, measures, cpu_before))
+    }
+
+    fn new(writer: Writer, layout: &Layout, measures: Vec<Measure<D>>, cpu_before: f64) -> Self {
+        Self {
+            writer: Background::start(writer),
+            measures,
+            rotation: layout.rotation,
+            tangents: layout.friction || !layout.bonds.is_empty(),
+            reactions: !layout.without_reactions,
+            cpu_before,
+            batch: Batch::default(),
+        }
+    }
+
+    /// Processor time of the whole run so far (s).
+    pub fn cpu_time(&self) -> f64 {
+        self.cpu_before + crate::run::cpu_time()
     }
 
     /// Record what every step records: observables and broken bonds.
     pub fn step(&mut self, world: &World<D>, report: &StepReport<D>) -> history::Result<()> {
-        self.row.clear();
+        let mut row = Vec::new();
         for measure in &self.measures {
-            measure(world, report, &mut self.row);
+            measure(world, report, &mut row);
         }
+        row.push(self.cpu_time());
         let step = world.steps as i64;
-        self.writer.observe(step, report.time, &self.row)?;
-        for failed in &report.breaks {
-            self.writer.rupture(&rupture(failed, step, report.time))?;
-        }
-        Ok(())
+        self.batch.observations.push((step, report.time, row));
+        self.batch.ruptures.extend(report.breaks.iter().map(|failed| rupture(failed, step, report.time)));
+        if self.batch.observations.len() < GATHERED { Ok(()) } else { self.hand_over() }
     }
 
-    /// Record a frame: the whole state.
-    pub fn frame(&mut self, world: &World<D>) -> history::Result<()> {
+    /// Record the state as a frame, or a checkpoint from which the run can go on, or both.
+    pub fn record(&mut self, world: &World<D>, frame: bool, checkpoint: Option<Checkpoint>) -> history::Result<()> {
+        self.batch.frame = frame.then(|| self.frame(world));
+        self.batch.checkpoint = checkpoint;
+        self.hand_over()
+    }
+
+    /// The whole state.
+    fn frame(&self, world: &World<D>) -> Frame {
         let flat = |vectors: &[D::Vector]| vectors.iter().flat_map(|v| v.as_slice()).copied().collect::<Vec<f64>>();
         let g = &world.grains;
         let turn = |rows: Vec<f64>| if self.rotation { rows } else { Vec::new() };
@@ -91,27 +118,23 @@ impl<D: Dim> Recorder<D> {
             velocity: per_wall(|w| w.velocity),
             force: per_wall(|w| w.reaction),
         };
-        self.fill_contacts(world);
-        let bonds: Vec<BondStatus> = world.bonds.iter().map(|b| bond_status(b.status)).collect();
-        let (step, time) = (world.steps as i64, world.time);
-        self.writer.frame(&Frame {
-            step,
-            time,
-            grains: &grains,
-            walls: &walls,
-            contacts: &self.contacts,
-            bonds: &bonds,
-        })
+        let contacts = self.contacts(world);
+        let bonds = world.bonds.iter().map(|b| bond_status(b.status)).collect();
+        Frame { step: world.steps as i64, time: world.time, grains, walls, contacts, bonds }
+    }
+
+    fn hand_over(&mut self) -> history::Result<()> {
+        self.writer.write(std::mem::take(&mut self.batch))
     }
 
     /// Close the history.
-    pub fn finish(self) -> history::Result<()> {
+    pub fn finish(mut self) -> history::Result<()> {
+        self.hand_over()?;
         self.writer.finish()
     }
 
-    fn fill_contacts(&mut self, world: &World<D>) {
-        let rows = &mut self.contacts;
-        rows.clear();
+    fn contacts(&self, world: &World<D>) -> ContactRows {
+        let mut rows = ContactRows::default();
         let grains = world.grains.len() as i32;
         let bonded = !world.bonds.is_empty();
         for touch in &world.touches {
@@ -119,17 +142,21 @@ impl<D: Dim> Recorder<D> {
             rows.pair.push([i, if j < grains { j } else { grains - 1 - j }]);
             rows.point.extend_from_slice(touch.point.as_slice());
             rows.normal.extend_from_slice(D::normal(&touch.frame).as_slice());
-            rows.reaction.push(touch.reaction.n);
-            if self.tangents {
-                rows.reaction.extend_from_slice(touch.reaction.t.as_slice());
-                if D::N == 3 {
-                    rows.tangent.extend_from_slice(D::tangent(&touch.frame).as_slice());
+            if self.reactions {
+                rows.reaction.push(touch.reaction.n);
+                if self.tangents {
+                    rows.reaction.extend_from_slice(touch.reaction.t.as_slice());
+                    if D::N == 3 {
+                        rows.tangent.extend_from_slice(D::tangent(&touch.frame).as_slice());
+                    }
                 }
             }
-            if bonded {
+            if bonded && self.reactions {
                 // the rows of the solver are the components of m × n; those of the file are moments about the tangents
                 let moment = D::spin_rows_transposed(&touch.frame, touch.reaction.m);
                 rows.moment.extend(D::about_tangents(&touch.frame, moment).as_slice());
+            }
+            if bonded {
                 rows.bond.push(touch.bond.map_or(-1, |b| b as i32));
             }
             rows.gap.push(touch.gap);
@@ -140,7 +167,42 @@ impl<D: Dim> Recorder<D> {
                 TouchStatus::Bonded => ContactStatus::Bonded,
             });
         }
+        rows
     }
+}
+
+/// What the history of a world holds, and what measures its observables; the processor time, the last, is told by the
+/// recorder.
+fn describe<D: Dim>(
+    scene: &Scene,
+    names: &[String],
+    world: &World<D>,
+    parameters: Parameters,
+) -> (Layout, Vec<Measure<D>>) {
+    let bonded = !world.bonds.is_empty();
+    let friction = world.settings.friction > 0.0 || world.walls.iter().any(|w| w.friction > 0.0);
+    // without friction, bonds and torques nothing ever turns, unless it turns from the start
+    let turning = world.grains.spin.iter().any(|w| w.norm() > 0.0) || world.loads.iter().any(|l| l.torque.norm() > 0.0);
+    let (mut observables, measures): (Vec<_>, _) = observables(world).into_iter().unzip();
+    observables.push(Observable::new("cpu_time", "s", &[]));
+    let layout = Layout {
+        dimension: D::N,
+        rotation: friction || bonded || turning,
+        friction,
+        without_reactions: !scene.output.reactions,
+        single: scene.output.precision == Precision::Single,
+        grains: history::Grains {
+            id: (0..world.grains.len() as i32).collect(),
+            radius: world.grains.radius.clone(),
+            mass: world.grains.mass.clone(),
+            inertia: world.grains.inertia.clone(),
+        },
+        walls: world.walls.iter().zip(names).map(|(wall, name)| describe_wall(wall, name)).collect(),
+        bonds: describe_bonds(world),
+        observables,
+        parameters,
+    };
+    (layout, measures)
 }
 
 fn bond_status(status: bond::BondStatus) -> BondStatus {
@@ -279,6 +341,5 @@ fn observables<D: Dim>(world: &World<D>) -> Vec<(Observable, Measure<D>)> {
         add("wall_force", "N", &[walls, d], |w, _, out| w.walls.iter().for_each(|x| out.extend(x.reaction.as_slice())));
         add("applied_force", "N", &[walls], |w, _, out| out.extend(w.walls.iter().map(applied_force)));
     }
-    add("cpu_time", "s", scalar, |_, _, out| out.push(crate::run::cpu_time()));
     list
 }

@@ -1,18 +1,18 @@
 //! The run of a scene: prepare, step, record, sum up.
 
-use crate::build::{Built, build, write_sample};
+use crate::build::{build, rebuild, write_sample};
 use crate::course::Course;
 use crate::fclib::FclibError;
-use crate::history::HistoryError;
-use crate::output::WriteError;
+use crate::history::{Checkpoint, HistoryError};
+use crate::output::{WriteError, print_result};
 use crate::progress::{Progress, ProgressMode, StepProgress};
 use crate::record::Recorder;
 use crate::scene::{Scene, SceneError};
 use crate::signals::{self, INTERRUPTED, Interrupt};
 use crate::summary::{Ending, Summary};
 use dem_core::dim::{D2, D3, Dim};
+use dem_core::saved::{Mismatch, Saved};
 use dem_core::world::{StepError, StepReport, World};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// How a scene is run.
@@ -22,16 +22,38 @@ pub struct RunOptions {
     pub output: PathBuf,
     /// Whether files that exist are overwritten.
     pub overwrite: bool,
-    /// Number of threads; as many as the machine has where it is absent. The result does not depend on it.
+    /// How the command is carried out.
+    pub execution: Execution,
+    /// Whether the summary on stdout is JSON.
+    pub json: bool,
+    /// Where the prepared sample is written as CSV, if at all.
+    pub write_sample: Option<PathBuf>,
+}
+
+/// How a command is carried out. No result depends on it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Execution {
+    /// Number of threads; as many as the machine has where it is absent.
     pub threads: Option<usize>,
     /// How progress is shown.
     pub progress: ProgressMode,
     /// Whether stderr stays silent but for errors.
     pub quiet: bool,
-    /// Whether the summary on stdout is JSON.
-    pub json: bool,
-    /// Where the prepared sample is written as CSV, if at all.
-    pub write_sample: Option<PathBuf>,
+}
+
+impl Execution {
+    /// Shows progress as asked.
+    #[must_use]
+    pub fn show(&self) -> Progress {
+        Progress::new(self.progress, self.quiet)
+    }
+
+    /// Starts the threads of the whole program.
+    pub(crate) fn start_threads(&self) -> Result<(), RunError> {
+        let Some(threads) = self.threads else { return Ok(()) };
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+        pool.map_err(|e| RunError::InputOutput(format!("{threads} threads cannot be started: {e}")))
+    }
 }
 
 /// Why a run ended before its end.
@@ -61,6 +83,14 @@ pub enum RunError {
     /// A result cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
+    /// Runs of a sweep failed.
+    #[error("{message}")]
+    Runs {
+        /// The gravest exit code of theirs.
+        code: u8,
+        /// How many, and what to do.
+        message: String,
+    },
     /// Ctrl-C or SIGTERM, and what that leaves.
     #[error("interrupted: {0}")]
     Interrupted(&'static str),
@@ -75,6 +105,7 @@ impl RunError {
             Self::Write(_) | Self::Problem(_) => 4,
             Self::Scene(_) | Self::Sample(_) | Self::Usage(_) => 2,
             Self::NoConvergence(_) => 3,
+            Self::Runs { code, .. } => *code,
             Self::Interrupted(_) => INTERRUPTED,
         }
     }
@@ -85,23 +116,21 @@ impl RunError {
 /// # Errors
 /// [`RunError`]; a history that was begun is complete up to its last frame.
 pub fn run(scene: &Scene, options: &RunOptions) -> Result<(), RunError> {
-    let interrupt = signals::install().map_err(|e| RunError::InputOutput(format!("no handler for Ctrl-C: {e}")))?;
-    start_threads(options.threads)?;
+    let interrupt = handle_signals()?;
+    options.execution.start_threads()?;
     match scene.dimension {
         2 => run_in::<D2>(scene, options, &interrupt),
         _ => run_in::<D3>(scene, options, &interrupt),
     }
 }
 
-/// Starts this many threads, or leaves it to the machine.
-pub(crate) fn start_threads(threads: Option<usize>) -> Result<(), RunError> {
-    let Some(threads) = threads else { return Ok(()) };
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
-    pool.map_err(|e| RunError::InputOutput(format!("{threads} threads cannot be started: {e}")))
+/// Handles Ctrl-C and SIGTERM from now on.
+pub(crate) fn handle_signals() -> Result<Interrupt, RunError> {
+    signals::install().map_err(|e| RunError::InputOutput(format!("no handler for Ctrl-C: {e}")))
 }
 
-fn run_in<D: Dim>(scene: &Scene, options: &RunOptions, interrupt: &Interrupt) -> Result<(), RunError> {
-    let mut progress = Progress::new(options.progress, options.quiet);
+pub(crate) fn run_in<D: Dim>(scene: &Scene, options: &RunOptions, interrupt: &Interrupt) -> Result<(), RunError> {
+    let mut progress = options.execution.show();
     let built = build::<D>(scene, &mut |done| {
         progress.phase("packing the sample", done);
         !interrupt.requested()
@@ -112,50 +141,87 @@ fn run_in<D: Dim>(scene: &Scene, options: &RunOptions, interrupt: &Interrupt) ->
     }
     let names: Vec<String> = scene.walls.keys().cloned().collect();
     let recorder = Recorder::create(&options.output, options.overwrite, scene, &names, &built.world)?;
-    let mut run = Run::new(scene, built, recorder);
-    let outcome = run.step_on(interrupt, &mut progress);
-    progress.finish();
-    let (summary, outcome) = run.close(&options.output, outcome)?;
-    let shown = if options.json { format!("{:#}", serde_json::json!(summary)) } else { summary.to_string() };
-    // a reader that has seen enough is no error
-    let _ = writeln!(std::io::stdout(), "{shown}");
-    outcome
+    let course = Course::new(scene, &built.world);
+    let state = State { world: built.world, course, solid_fraction: built.solid_fraction };
+    let mut run = Run { scene, state, recorder, framed: true, kept: true };
+    let outcome = run.begin().and_then(|()| run.step_on(interrupt, &mut progress));
+    run.conclude(&options.output, outcome, options.json, progress)
+}
+
+/// What changes from step to step.
+pub(crate) struct State<D: Dim> {
+    pub world: World<D>,
+    pub course: Course<D>,
+    pub solid_fraction: Option<f64>,
+}
+
+/// The form of what [`State::save`] writes; another form has another number.
+const FORM: usize = 1;
+
+impl<D: Dim> State<D> {
+    /// The state as numbers. The processor time is not among them: two runs of a scene write the same file.
+    fn save(&self) -> Checkpoint {
+        let mut to = Saved::default();
+        to.count(FORM);
+        self.world.save(&mut to);
+        self.course.save(&mut to);
+        to.flag(self.solid_fraction.is_some());
+        to.real(self.solid_fraction.unwrap_or(0.0));
+        Checkpoint { step: self.world.steps as i64, reals: to.reals, counts: to.counts }
+    }
+
+    /// The state that [`State::save`] wrote.
+    pub fn restored(scene: &Scene, checkpoint: &Checkpoint) -> Result<Self, Mismatch> {
+        let saved = Saved { reals: checkpoint.reals.clone(), counts: checkpoint.counts.clone() };
+        let mut from = saved.read();
+        if from.count()? != FORM {
+            return Err(Mismatch);
+        }
+        let world = rebuild::<D>(scene, &mut from)?;
+        let course = Course::restored(scene, &world, &mut from)?;
+        let known = from.flag()?;
+        let solid_fraction = from.real()?;
+        from.end()?;
+        Ok(Self { world, course, solid_fraction: known.then_some(solid_fraction) })
+    }
 }
 
 /// A run between its first and its last step.
-struct Run<'a, D: Dim> {
-    scene: &'a Scene,
-    world: World<D>,
-    recorder: Recorder<D>,
-    solid_fraction: Option<f64>,
-    course: Course<D>,
-    framed: bool,
+pub(crate) struct Run<'a, D: Dim> {
+    pub scene: &'a Scene,
+    pub state: State<D>,
+    pub recorder: Recorder<D>,
+    /// Whether the last state was recorded as a frame, and as a checkpoint.
+    pub framed: bool,
+    pub kept: bool,
 }
 
-impl<'a, D: Dim> Run<'a, D> {
-    fn new(scene: &'a Scene, built: Built<D>, recorder: Recorder<D>) -> Self {
-        let world = built.world;
-        let course = Course::new(scene, &world);
-        Self { scene, world, recorder, solid_fraction: built.solid_fraction, course, framed: false }
+impl<D: Dim> Run<'_, D> {
+    /// Record the state at time zero.
+    fn begin(&mut self) -> Result<(), RunError> {
+        self.record(true, true)
     }
 
     /// Step until the time, a stop condition, an interruption or a failure ends the run.
-    fn step_on(&mut self, interrupt: &Interrupt, progress: &mut Progress) -> Result<Ending, RunError> {
-        self.recorder.frame(&self.world)?;
+    pub fn step_on(&mut self, interrupt: &Interrupt, progress: &mut Progress) -> Result<Ending, RunError> {
         let (steps, every) = (self.scene.time.steps(), self.scene.steps_per_frame());
-        while self.world.steps < steps {
-            let report = match self.world.step() {
+        while self.state.world.steps < steps {
+            let report = match self.state.world.step() {
                 Ok(report) => report,
                 Err(error) => return self.failed(error),
             };
-            self.recorder.step(&self.world, &report)?;
-            self.course.count(&self.world, &report);
+            let State { world, course, .. } = &mut self.state;
+            self.recorder.step(world, &report)?;
+            course.count(world, &report);
             progress.step(&self.standing(&report));
-            self.framed = self.world.steps.is_multiple_of(every);
+            let steps = self.state.world.steps;
+            self.framed = steps.is_multiple_of(every);
+            self.kept = steps.is_multiple_of(every * self.scene.output.checkpoint_every);
             if self.framed {
-                self.recorder.frame(&self.world)?;
+                self.record(true, self.kept)?;
             }
-            if let Some(ending) = self.course.ending(&self.world) {
+            let State { world, course, .. } = &mut self.state;
+            if let Some(ending) = course.ending(world) {
                 return Ok(ending);
             }
             if interrupt.requested() {
@@ -163,6 +229,12 @@ impl<'a, D: Dim> Run<'a, D> {
             }
         }
         Ok(Ending::Time)
+    }
+
+    /// Record the state as a frame, as a checkpoint, or as both.
+    fn record(&mut self, frame: bool, checkpoint: bool) -> Result<(), RunError> {
+        let checkpoint = checkpoint.then(|| self.state.save());
+        Ok(self.recorder.record(&self.state.world, frame, checkpoint)?)
     }
 
     fn failed(&mut self, error: StepError) -> Result<Ending, RunError> {
@@ -173,35 +245,47 @@ impl<'a, D: Dim> Run<'a, D> {
 
     fn standing(&self, report: &StepReport<D>) -> StepProgress {
         StepProgress {
-            step: self.world.steps,
-            time: self.world.time,
+            step: self.state.world.steps,
+            time: self.state.world.time,
             end: self.scene.time.end,
             residual: report.residual,
             iterations: report.work.iterations(),
-            broken: self.course.broken(),
+            broken: self.state.course.broken(),
         }
     }
 
-    /// Write the last state, close the history and sum up. The second value is what the command ends with.
-    fn close(
+    /// Write the last state, close the history at `path` and print the summary.
+    pub fn conclude(
         mut self,
-        history: &Path,
+        path: &Path,
         outcome: Result<Ending, RunError>,
-    ) -> Result<(Summary, Result<(), RunError>), RunError> {
+        json: bool,
+        mut progress: Progress,
+    ) -> Result<(), RunError> {
+        progress.finish();
         let (ending, end) = match outcome {
             Ok(Ending::Interrupted) => {
-                (Ending::Interrupted, Err(RunError::Interrupted("the history is complete up to the last frame")))
+                let way = "the history is complete up to there; `dem-run resume` goes on with it";
+                (Ending::Interrupted, Err(RunError::Interrupted(way)))
             }
             Ok(ending) => (ending, Ok(())),
             Err(error @ RunError::NoConvergence(_)) => (Ending::NoConvergence, Err(error)),
             Err(error) => return Err(error),
         };
-        if !self.framed && self.world.steps > 0 {
-            self.recorder.frame(&self.world)?;
-        }
+        self.record(!self.framed, !self.kept)?;
+        let cpu_time = self.recorder.cpu_time();
         self.recorder.finish()?;
+        let summary = self.state.summary(self.scene, path, ending, cpu_time);
+        let printed = print_result(&summary, json);
+        // why the run ended matters more than where its summary went
+        end.and(printed.map_err(RunError::from))
+    }
+}
+
+impl<D: Dim> State<D> {
+    fn summary(&self, scene: &Scene, history: &Path, ending: Ending, cpu_time: f64) -> Summary {
         let (world, course) = (&self.world, &self.course);
-        let summary = Summary {
+        Summary {
             history: history.to_path_buf(),
             ending,
             steps: world.steps,
@@ -213,7 +297,7 @@ impl<'a, D: Dim> Run<'a, D> {
             elastic: world.bonds.iter().any(|b| b.stiffness.is_some()),
             broken: course.broken,
             failure: course.collapse.failure,
-            tolerance: self.scene.solver.tolerance,
+            tolerance: scene.solver.tolerance,
             worst_residual: course.worst_residual,
             work: course.work,
             missed_tolerance: course.missed_tolerance,
@@ -223,9 +307,8 @@ impl<'a, D: Dim> Run<'a, D> {
             external_work: world.ledger.external_work,
             energy_remainder: world.ledger.remainder,
             bond_remainder: world.ledger.bonds,
-            cpu_time: cpu_time(),
-        };
-        Ok((summary, end))
+            cpu_time,
+        }
     }
 }
 

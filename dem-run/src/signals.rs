@@ -42,6 +42,16 @@ pub fn install() -> Result<Interrupt, ctrlc::Error> {
     Ok(interrupt)
 }
 
+/// Interrupts this process when the one that started it ends, where the system can (Linux).
+///
+/// # Errors
+/// The system refuses.
+pub fn end_with_parent() -> std::io::Result<()> {
+    #[cfg(target_os = "linux")]
+    rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::TERM))?;
+    Ok(())
+}
+
 unsafe extern "C" {
     /// Ends the process without running what stands ready for its end (ISO C `_Exit`, POSIX `_exit`).
     safe fn _exit(status: c_int) -> !;

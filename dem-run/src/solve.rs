@@ -1,7 +1,6 @@
 //! `dem-run solve`: a contact problem from a file of FCLIB's format.
 
 use std::fmt;
-use std::io::Write;
 use std::path::PathBuf;
 
 use dem_core::contact::LocalSolve;
@@ -11,6 +10,7 @@ use dem_core::solver::{GaussSeidelSettings, Newton, NewtonSettings, SolveReport,
 use serde::Serialize;
 
 use crate::fclib::Problem;
+use crate::output::print_result;
 use crate::run::{RunError, cpu_time};
 use crate::scene;
 
@@ -89,9 +89,7 @@ pub fn solve(options: &SolveOptions) -> Result<(), RunError> {
         siconos_error: at.siconos_error(),
         cpu_time: cpu_time() - began,
     };
-    let shown = if options.json { format!("{:#}", serde_json::json!(solved)) } else { solved.to_string() };
-    // a reader that has seen enough is no error
-    let _ = writeln!(std::io::stdout(), "{shown}");
+    let printed = print_result(&solved, options.json);
     if !solved.converged {
         return Err(RunError::NoConvergence(format!(
             "{}: residual {:.2e} after {} iterations, and {:.0e} was asked for; a larger --max-iterations, another \
@@ -106,7 +104,7 @@ pub fn solve(options: &SolveOptions) -> Result<(), RunError> {
         problem.solution = Some(at.r);
         problem.write(output)?;
     }
-    Ok(())
+    Ok(printed?)
 }
 
 fn iterate(problem: &mut Assembled, options: &SolveOptions) -> SolveReport {

@@ -119,6 +119,7 @@ impl fmt::Display for Summary {
         let file = self.history.display();
         writeln!(f, "history          {file}\n\nlook at it with")?;
         writeln!(f, "  dem-post info {file}")?;
+        writeln!(f, "  dem-post report {file}")?;
         if self.bonds > 0 {
             writeln!(f, "  dem-post cracks {file}")?;
         }

@@ -110,8 +110,18 @@ fn schema_prints_a_json_schema_of_scenes() {
 }
 
 #[test]
+fn schema_prints_a_json_schema_of_sweeps() {
+    let (code, stdout, stderr) = dem_run(folder().path(), &["schema", "--sweep"]);
+    assert_eq!((code, stderr.as_str()), (Some(0), ""));
+    let copy = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/sweep.schema.json");
+    let copy = std::fs::read_to_string(copy).expect("docs/sweep.schema.json");
+    assert!(copy == stdout, "docs/sweep.schema.json is old: dem-run schema --sweep > docs/sweep.schema.json");
+}
+
+#[test]
 fn every_command_shows_an_example() {
-    for args in [&["--help"][..], &["run", "--help"], &["check", "--help"], &["schema", "--help"]] {
+    for args in [&["--help"][..], &["run", "--help"], &["check", "--help"], &["schema", "--help"], &["sweep", "--help"]]
+    {
         let (code, stdout, _) = dem_run(folder().path(), args);
         assert_eq!(code, Some(0));
         assert!(stdout.contains("Example"), "{args:?}");

@@ -13,10 +13,10 @@ pub mod trial;
 
 use crate::build::build;
 use crate::output::Folder;
-use crate::progress::{Progress, ProgressMode};
-use crate::run::RunError;
+use crate::progress::Progress;
+use crate::run::{Execution, RunError, handle_signals};
 use crate::scene::Scene;
-use crate::signals::{self, Interrupt};
+use crate::signals::Interrupt;
 use dem_core::dim::{D2, D3, Dim};
 use profile::Profile;
 use rayon::prelude::*;
@@ -44,12 +44,8 @@ pub struct AccuracyOptions {
     pub orders: u64,
     /// Whether runs go on to the scene's end.
     pub whole: bool,
-    /// Number of threads for the runs whose CPU time is not told; as many as the machine has where it is absent.
-    pub threads: Option<usize>,
-    /// How progress is shown.
-    pub progress: ProgressMode,
-    /// Whether stderr stays silent but for errors.
-    pub quiet: bool,
+    /// How the command is carried out; the number of threads is that of the runs whose CPU time is not told.
+    pub execution: Execution,
     /// Whether stdout is JSON.
     pub json: bool,
 }
@@ -60,7 +56,7 @@ pub struct AccuracyOptions {
 /// [`RunError`]; what was measured before an interruption is written all the same. A run that does not converge is a row of
 /// the table, no error.
 pub fn accuracy(scene: &Scene, options: &AccuracyOptions) -> Result<(), RunError> {
-    let interrupt = signals::install().map_err(|e| RunError::InputOutput(format!("no handler for Ctrl-C: {e}")))?;
+    let interrupt = handle_signals()?;
     let mut folder = Folder::create(options.folder.clone())?;
     let report = match scene.dimension {
         2 => measure::<D2>(scene, options, &interrupt)?,
@@ -71,7 +67,7 @@ pub fn accuracy(scene: &Scene, options: &AccuracyOptions) -> Result<(), RunError
     tables::write(&report, &mut folder)?;
     pictures::draw(&report, &mut folder)?;
     crate::output::print(&if options.json { json } else { tables::text(&report) })?;
-    if !options.quiet {
+    if !options.execution.quiet {
         use std::io::Write;
         let mut stderr = std::io::stderr();
         folder.written().iter().for_each(|path| drop(writeln!(stderr, "wrote {}", path.display())));
@@ -80,7 +76,7 @@ pub fn accuracy(scene: &Scene, options: &AccuracyOptions) -> Result<(), RunError
 }
 
 fn measure<D: Dim>(scene: &Scene, options: &AccuracyOptions, interrupt: &Interrupt) -> Result<Report, RunError> {
-    let mut progress = Progress::new(options.progress, options.quiet);
+    let mut progress = options.execution.show();
     let built = build::<D>(scene, &mut |done| {
         progress.phase("packing the sample", done);
         !interrupt.requested()
@@ -94,7 +90,7 @@ fn measure<D: Dim>(scene: &Scene, options: &AccuracyOptions, interrupt: &Interru
     let mut report = Report::new(scene, &asked, &sample);
     let posed = measuring.runs(&mut report);
     if varied > 0 && !interrupt.requested() {
-        let threads = rayon::ThreadPoolBuilder::new().num_threads(options.threads.unwrap_or(0)).build();
+        let threads = rayon::ThreadPoolBuilder::new().num_threads(options.execution.threads.unwrap_or(0)).build();
         let threads = threads.map_err(|e| RunError::InputOutput(format!("threads cannot be started: {e}")))?;
         report.indeterminacy = Some(threads.install(|| measuring.indeterminacy(&report.runs)));
     }

@@ -4,16 +4,17 @@ use hdf5::types::VarLenUnicode;
 use hdf5::{Dataset, File, Group};
 
 use super::codes::{BondCode, Coded, ContactCode, WallDriveCode, WallKindCode};
+use super::copy::Visit;
 use super::error::{HistoryError, Result};
 use super::schema::{CREATOR, SCHEMA_VERSION, path};
-use super::table::{Growth, Table, fixed, text, text_attribute};
+use super::table::{Growth, Storage, Table, fixed, text, text_attribute};
 use super::{Bonds, Frame, Layout, Observable, Wall};
 
 /// A table of doubles and where a frame keeps its values.
 pub(super) struct Column {
     place: &'static str,
     table: Table,
-    take: for<'a> fn(&Frame<'a>) -> &'a [f64],
+    take: for<'a> fn(&'a Frame) -> &'a [f64],
 }
 
 impl Column {
@@ -23,6 +24,10 @@ impl Column {
 
     pub fn append(&mut self, frame: &Frame) -> hdf5::Result<()> {
         self.table.append((self.take)(frame))
+    }
+
+    pub fn visit(&mut self, rows: usize, visit: &mut impl Visit) -> Result<()> {
+        visit.table::<f64>(&mut self.table, rows)
     }
 }
 
@@ -53,7 +58,7 @@ pub(super) struct Commit {
 
 impl ContactTables {
     pub fn append(&mut self, frame: &Frame) -> hdf5::Result<()> {
-        let contacts = frame.contacts;
+        let contacts = &frame.contacts;
         self.start.append(&[self.pair.rows() as u64])?;
         self.count.append(&[contacts.len() as u32])?;
         self.pair.append(contacts.pair.as_flattened())?;
@@ -66,6 +71,15 @@ impl ContactTables {
             Some(bond) => bond.append(&contacts.bond),
             None => Ok(()),
         }
+    }
+
+    pub fn visit(&mut self, frames: usize, rows: usize, visit: &mut impl Visit) -> Result<()> {
+        visit.table::<u64>(&mut self.start, frames)?;
+        visit.table::<u32>(&mut self.count, frames)?;
+        visit.table::<i32>(&mut self.pair, rows)?;
+        self.columns.iter_mut().try_for_each(|column| column.visit(rows, visit))?;
+        visit.table::<ContactCode>(&mut self.status, rows)?;
+        self.bond.iter_mut().try_for_each(|bond| visit.table::<i32>(bond, rows))
     }
 }
 
@@ -95,6 +109,12 @@ impl Observables {
         }
         Ok(())
     }
+
+    pub fn visit(&mut self, rows: usize, visit: &mut impl Visit) -> Result<()> {
+        visit.table::<i64>(&mut self.step, rows)?;
+        visit.table::<f64>(&mut self.time, rows)?;
+        self.values.iter_mut().try_for_each(|table| visit.table::<f64>(table, rows))
+    }
 }
 
 impl Commit {
@@ -105,6 +125,12 @@ impl Commit {
             (Some(table), Some(events)) => table.append(&[events.rows() as u64]),
             _ => Ok(()),
         }
+    }
+
+    pub fn visit(&mut self, frames: usize, visit: &mut impl Visit) -> Result<()> {
+        visit.table::<u64>(&mut self.contacts, frames)?;
+        visit.table::<u64>(&mut self.steps, frames)?;
+        self.events.iter_mut().try_for_each(|table| visit.table::<u64>(table, frames))
     }
 }
 
@@ -166,10 +192,15 @@ fn link_times(group: &Group) -> hdf5::Result<()> {
     Ok(())
 }
 
-pub(super) fn grain_columns(grains: &Group, motion: &Group, layout: &Layout) -> hdf5::Result<Vec<Column>> {
+pub(super) fn grain_columns(
+    grains: &Group,
+    motion: &Group,
+    layout: &Layout,
+    storage: Storage,
+) -> hdf5::Result<Vec<Column>> {
     let (n, d) = (layout.grains.id.len(), layout.dimension);
     let column = |place, group: &Group, unit, row: &[usize], take| -> hdf5::Result<Column> {
-        Ok(Column { place, table: Table::create::<f64>(group, "value", unit, row, Growth::Frames)?, take })
+        Ok(Column { place, table: Table::reals(group, "value", unit, row, Growth::Frames, storage)?, take })
     };
     let mut columns = vec![
         column("particles/grains/position", motion, "m", &[n, d], |f| &f.grains.position)?,
@@ -189,7 +220,7 @@ pub(super) fn grain_columns(grains: &Group, motion: &Group, layout: &Layout) -> 
     Ok(columns)
 }
 
-pub(super) fn wall_columns(file: &File, layout: &Layout) -> hdf5::Result<Vec<Column>> {
+pub(super) fn wall_columns(file: &File, layout: &Layout, storage: Storage) -> hdf5::Result<Vec<Column>> {
     let (walls, d) = (&layout.walls, layout.dimension);
     let (w, group) = (walls.len(), file.create_group(path::WALLS)?);
     let vectors = |take: fn(&Wall) -> &[f64; 3]| -> Vec<f64> {
@@ -207,7 +238,7 @@ pub(super) fn wall_columns(file: &File, layout: &Layout) -> hdf5::Result<Vec<Col
     fixed(&group, "radius", "m", &[w], &radii)?;
 
     let column = |place, name, unit, take| -> hdf5::Result<Column> {
-        let table = Table::create::<f64>(&element(&group, name)?, "value", unit, &[w, d], Growth::Frames)?;
+        let table = Table::reals(&element(&group, name)?, "value", unit, &[w, d], Growth::Frames, storage)?;
         Ok(Column { place, table, take })
     };
     Ok(vec![
@@ -217,24 +248,24 @@ pub(super) fn wall_columns(file: &File, layout: &Layout) -> hdf5::Result<Vec<Col
     ])
 }
 
-pub(super) fn bonds(file: &File, bonds: &Bonds) -> hdf5::Result<Table> {
+pub(super) fn bonds(file: &File, bonds: &Bonds, storage: Storage) -> hdf5::Result<Table> {
     let (b, group) = (bonds.len(), file.create_group(path::BONDS)?);
     fixed(&group, "pair", "", &[b, 2], bonds.pair.as_flattened())?;
     fixed(&group, "rest_gap", "m", &[b], &bonds.rest_gap)?;
     fixed(&group, "strength", "N", &[b], &bonds.strength)?;
     fixed(&group, "friction", "", &[b], &bonds.friction)?;
     fixed(&group, "mean_diameter", "m", &[b], &bonds.mean_diameter)?;
-    Table::create::<BondCode>(&element(&group, "status")?, "value", "", &[b], Growth::Frames)
+    Table::create::<BondCode>(&element(&group, "status")?, "value", "", &[b], Growth::Frames, storage)
 }
 
-pub(super) fn contacts(file: &File, layout: &Layout) -> hdf5::Result<ContactTables> {
+pub(super) fn contacts(file: &File, layout: &Layout, storage: Storage) -> hdf5::Result<ContactTables> {
     let (d, bonded) = (layout.dimension, !layout.bonds.is_empty());
     let group = file.create_group(path::CONTACTS)?;
     link_times(&group)?;
     // a dense packing has two to three contacts a grain
     let growth = Growth::Rows(16 * 3 * layout.grains.id.len());
     let column = |place, name, unit, row: &[usize], take| -> hdf5::Result<Column> {
-        Ok(Column { place, table: Table::create::<f64>(&group, name, unit, row, growth)?, take })
+        Ok(Column { place, table: Table::reals(&group, name, unit, row, growth, storage)?, take })
     };
     // a bond has tangential rows whatever its friction
     let tangential = layout.friction || bonded;
@@ -242,49 +273,53 @@ pub(super) fn contacts(file: &File, layout: &Layout) -> hdf5::Result<ContactTabl
     let mut columns = vec![
         column("contacts/point", "point", "m", &[d], |f| &f.contacts.point)?,
         column("contacts/normal", "normal", "", &[d], |f| &f.contacts.normal)?,
-        column("contacts/reaction", "reaction", "N", &[reaction_rows], |f| &f.contacts.reaction)?,
         column("contacts/gap", "gap", "m", &[], |f| &f.contacts.gap)?,
     ];
-    let reaction = group.dataset("reaction")?;
-    text_attribute(&reaction, "frame", "local")?;
-    if d == 3 && tangential {
-        columns.push(column("contacts/tangent", "tangent", "", &[d], |f| &f.contacts.tangent)?);
+    if !layout.without_reactions {
+        columns.push(column("contacts/reaction", "reaction", "N", &[reaction_rows], |f| &f.contacts.reaction)?);
+        let reaction = group.dataset("reaction")?;
+        text_attribute(&reaction, "frame", "local")?;
+        if d == 3 && tangential {
+            columns.push(column("contacts/tangent", "tangent", "", &[d], |f| &f.contacts.tangent)?);
+        }
+        if bonded {
+            let row: &[usize] = if d == 2 { &[] } else { &[2] };
+            columns.push(column("contacts/moment", "moment", "N m", row, |f| &f.contacts.moment)?);
+        }
     }
-    if bonded {
-        let row: &[usize] = if d == 2 { &[] } else { &[2] };
-        columns.push(column("contacts/moment", "moment", "N m", row, |f| &f.contacts.moment)?);
-    }
+    let frames = Growth::Frames;
     Ok(ContactTables {
-        start: Table::create::<u64>(&group, "start", "", &[], Growth::Frames)?,
-        count: Table::create::<u32>(&group, "count", "", &[], Growth::Frames)?,
-        pair: Table::create::<i32>(&group, "pair", "", &[2], growth)?,
-        status: Table::create::<ContactCode>(&group, "status", "", &[], growth)?,
-        bond: if bonded { Some(Table::create::<i32>(&group, "bond", "", &[], growth)?) } else { None },
+        start: Table::create::<u64>(&group, "start", "", &[], frames, storage)?,
+        count: Table::create::<u32>(&group, "count", "", &[], frames, storage)?,
+        pair: Table::create::<i32>(&group, "pair", "", &[2], growth, storage)?,
+        status: Table::create::<ContactCode>(&group, "status", "", &[], growth, storage)?,
+        bond: if bonded { Some(Table::create::<i32>(&group, "bond", "", &[], growth, storage)?) } else { None },
         columns,
     })
 }
 
-pub(super) fn observables(file: &File, observables: &[Observable]) -> hdf5::Result<Observables> {
+pub(super) fn observables(file: &File, observables: &[Observable], storage: Storage) -> hdf5::Result<Observables> {
     let parent = file.create_group(path::OBSERVABLES)?;
     let growth = Growth::Rows(1024);
-    let step = Table::create::<i64>(&parent, "step", "", &[], growth)?;
-    let time = Table::create::<f64>(&parent, "time", "s", &[], growth)?;
+    let step = Table::create::<i64>(&parent, "step", "", &[], growth, storage)?;
+    let time = Table::create::<f64>(&parent, "time", "s", &[], growth, storage)?;
     let mut values = Vec::with_capacity(observables.len());
     for observable in observables {
         let group = parent.create_group(&observable.name)?;
         for name in ["step", "time"] {
             group.link_hard(&format!("/{}/{name}", path::OBSERVABLES), name)?;
         }
-        values.push(Table::create::<f64>(&group, "value", &observable.unit, &observable.shape, growth)?);
+        let (unit, shape) = (&observable.unit, &observable.shape);
+        values.push(Table::create::<f64>(&group, "value", unit, shape, growth, storage)?);
     }
     Ok(Observables { step, time, blocks: vec![Vec::new(); values.len()], values, steps: vec![], times: vec![] })
 }
 
-pub(super) fn commit(file: &File, bonded: bool) -> hdf5::Result<Commit> {
+pub(super) fn commit(file: &File, bonded: bool, storage: Storage) -> hdf5::Result<Commit> {
     let frames = file.new_dataset::<u64>().obj_track_times(false).create(path::COMMIT)?;
     frames.write_scalar(&0u64)?;
     let group = file.create_group("commit_rows")?;
-    let table = |name| Table::create::<u64>(&group, name, "", &[], Growth::Frames);
+    let table = |name| Table::create::<u64>(&group, name, "", &[], Growth::Frames, storage);
     Ok(Commit {
         frames,
         contacts: table("contacts")?,

@@ -87,6 +87,23 @@ pub enum HistoryError {
         /// The number of frames that are there.
         frames: usize,
     },
+    /// The file that is written is no longer where it was.
+    #[error("{} has been moved, deleted or replaced while it was being written", .path.display())]
+    Gone {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Another process writes the file.
+    #[error("{} is being written by process {process}: wait until it ends, or stop it", .path.display())]
+    Busy {
+        /// The file.
+        path: PathBuf,
+        /// The process.
+        process: i32,
+    },
+    /// The one who asked for it ended the work.
+    #[error("interrupted")]
+    Interrupted,
     /// HDF5 could not write.
     #[error("cannot write {} ({why}): is the disk full, or the folder gone?", .path.display())]
     Write {

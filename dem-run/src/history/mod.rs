@@ -8,6 +8,9 @@
 //! /h5md                    attribute version [1,1]; author{name}, creator{name, version}    (the H5MD convention)
 //! /commit                  u64: frames that are complete; readers trust no row beyond it
 //! /commit_rows/            contacts, events, steps: u64[T], rows complete at each frame
+//! /checkpoint/             the state from which the run goes on, in two slots that are written in turn:
+//!     index u64[2,4]       of each slot: step + 1 (0: empty), numbers of reals and counts, checksum
+//!     reals_0, counts_0, reals_1, counts_1    f64, u64: the numbers of the state, see `dem_core::saved`
 //! /particles/grains/       box{dimension, boundary}
 //!     position, velocity   {step, time, value[T,N,D]}                                        m, m/s
 //!     angular_velocity     {step, time, value[T,N] in 2D, [T,N,3] in 3D}                     rad/s, if rotation
@@ -42,12 +45,19 @@
 //! it at any time and a killed run leaves a file that opens (`h5py.File(p, "r", swmr=True)`). Each frame writes its
 //! data, flushes, then writes `/commit` and flushes that. A finished file opens with plain `h5py.File(p)`.
 //!
+//! **Precision.** With `output.precision` single the values of /particles, /walls and /contacts are f32; without
+//! `output.reactions` /contacts has no `tangent`, `reaction` and `moment`. What is fixed, observed or an event is f64.
+//!
 //! **Size of chunks.** About 16 frames × 500 values: one frame and one grain's history are both quick to read. No
 //! compression while running: it costs more than the run (`dem-post pack` compresses afterwards).
 
+mod background;
+mod checkpoint;
 mod codes;
+mod copy;
 mod create;
 mod error;
+mod lock;
 mod reader;
 mod schema;
 mod source;
@@ -56,7 +66,10 @@ mod table;
 mod tests;
 mod writer;
 
+pub use background::{Background, Batch};
+pub use checkpoint::Checkpoint;
 pub use codes::{BondStatus, ContactStatus, RuptureMode, WallDrive, WallKind};
+pub use copy::{CopyAs, Kept, copy};
 pub(crate) use error::reason;
 pub use error::{HistoryError, Result};
 pub use reader::{History, Series};
@@ -73,6 +86,10 @@ pub struct Layout {
     pub rotation: bool,
     /// Whether contacts carry tangential reactions; with bonds they always do.
     pub friction: bool,
+    /// Whether reactions and moments are left out.
+    pub without_reactions: bool,
+    /// Whether what a frame holds is stored in single precision.
+    pub single: bool,
     /// The grains, N ≥ 1.
     pub grains: Grains,
     /// The walls, W; empty for a scene without any.
@@ -185,20 +202,20 @@ pub struct Parameters {
 }
 
 /// One frame to be written. Arrays of what the layout lacks are empty.
-#[derive(Clone, Copy, Debug)]
-pub struct Frame<'a> {
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Frame {
     /// Number of the step.
     pub step: i64,
     /// Time, s.
     pub time: f64,
     /// The grains.
-    pub grains: &'a GrainState,
+    pub grains: GrainState,
     /// The walls.
-    pub walls: &'a WallState,
+    pub walls: WallState,
     /// The contacts.
-    pub contacts: &'a ContactRows,
+    pub contacts: ContactRows,
     /// The state of each bond, B.
-    pub bonds: &'a [BondStatus],
+    pub bonds: Vec<BondStatus>,
 }
 
 /// The motion of the grains at one frame, row by row.
@@ -237,7 +254,8 @@ pub struct ContactRows {
     /// First tangents, m × 3; empty without tangential reactions, and in 2D,
     /// where the tangent is (−n_y, n_x).
     pub tangent: Vec<f64>,
-    /// Reactions of j on i in the local frame (n, t…), N, m × D; m × 1 with neither friction nor bonds.
+    /// Reactions of j on i in the local frame (n, t…), N, m × D; m × 1 with neither friction nor bonds; empty where they
+    /// were not recorded.
     pub reaction: Vec<f64>,
     /// Moments of j on i, N m: m in 2D, m × 2 in 3D; empty without bonds.
     pub moment: Vec<f64>,
@@ -258,18 +276,6 @@ impl ContactRows {
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
         self.pair.is_empty()
-    }
-
-    /// Removes all rows and keeps the memory.
-    pub fn clear(&mut self) {
-        self.pair.clear();
-        for column in
-            [&mut self.point, &mut self.normal, &mut self.tangent, &mut self.reaction, &mut self.moment, &mut self.gap]
-        {
-            column.clear();
-        }
-        self.status.clear();
-        self.bond.clear();
     }
 
     /// Rows of the reaction of one contact: 1 without friction, else D.

@@ -6,11 +6,14 @@ use std::path::Path;
 use hdf5::H5Type;
 use hdf5::types::VarLenUnicode;
 
+use super::checkpoint::Checkpoint;
 use super::codes::{BondCode, BondStatus, ContactCode, WallDriveCode, WallKindCode};
+use super::copy::Kept;
 use super::error::{HistoryError, Result, while_reading};
 use super::schema::{RuptureRow, path};
 use super::source::Source;
-use super::{Bonds, ContactRows, GrainState, Grains, Parameters, Rupture, Wall, WallState};
+use super::{Bonds, ContactRows, GrainState, Grains, Layout, Observable, Parameters, Rupture, Wall, WallState};
+use super::{checkpoint, lock};
 
 /// An open history, read-only. Only complete frames are seen; a file that a run still writes, or that a killed run left,
 /// opens as well and shows what was complete when it was opened.
@@ -28,7 +31,7 @@ pub struct History {
 }
 
 /// One observable over the whole run.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Series {
     /// Its unit, empty for a number.
     pub unit: String,
@@ -81,14 +84,88 @@ impl History {
             if self.source.has(path::WALLS) { self.source.count(&format!("{}/name", path::WALLS))? } else { 0 };
         self.steps = self.source.read(&format!("{}/position/step", path::GRAINS), 0..frames)?.1;
         self.times = self.source.read(&format!("{}/position/time", path::GRAINS), 0..frames)?.1;
-        let last = frames.saturating_sub(1)..frames;
-        let complete = |place: &str| -> Result<usize> {
-            Ok(self.source.read::<u64>(place, last.clone())?.1.first().map_or(0, |&rows| rows as usize))
-        };
-        let observed = complete(path::COMMIT_STEPS)?;
-        let events = if self.source.has(path::RUPTURE) { complete(path::COMMIT_EVENTS)? } else { 0 };
-        (self.observed, self.events) = (observed, events);
+        let complete = self.complete_at(frames)?;
+        (self.observed, self.events) = (complete.steps, complete.events);
         Ok(())
+    }
+
+    /// Rows that are complete.
+    ///
+    /// # Errors
+    /// [`HistoryError::Damaged`].
+    pub fn complete(&self) -> Result<Kept> {
+        self.complete_at(self.frames())
+    }
+
+    /// Rows that were complete when `frames` frames were.
+    ///
+    /// # Errors
+    /// [`HistoryError::Damaged`].
+    pub fn complete_at(&self, frames: usize) -> Result<Kept> {
+        let rows = |place: &str| -> Result<usize> {
+            let last = frames.saturating_sub(1)..frames;
+            Ok(self.source.read::<u64>(place, last)?.1.first().map_or(0, |&rows| rows as usize))
+        };
+        let bonded = self.source.has(path::RUPTURE);
+        Ok(Kept {
+            frames,
+            contacts: rows(path::COMMIT_CONTACTS)?,
+            steps: rows(path::COMMIT_STEPS)?,
+            events: if bonded { rows(path::COMMIT_EVENTS)? } else { 0 },
+        })
+    }
+
+    /// The state from which the run goes on, as of the newest frame that has one; none in a file of a version that
+    /// wrote none, or of a run that was killed before its first.
+    ///
+    /// # Errors
+    /// [`HistoryError::Damaged`].
+    pub fn checkpoint(&self) -> Result<Option<Checkpoint>> {
+        match self.steps.last() {
+            Some(last) => checkpoint::newest(&self.source, *last),
+            None => Ok(None),
+        }
+    }
+
+    /// The process that writes the file, if one does.
+    ///
+    /// # Errors
+    /// [`HistoryError::Io`].
+    pub fn writer(&self) -> Result<Option<i32>> {
+        let path = &self.source.path;
+        lock::holder(path).map_err(|source| HistoryError::Io { path: path.clone(), doing: "read", source })
+    }
+
+    pub(super) fn source(&self) -> &Source {
+        &self.source
+    }
+
+    /// What the history holds; observables in the order of their names.
+    ///
+    /// # Errors
+    /// [`HistoryError::Damaged`].
+    pub fn layout(&self) -> Result<Layout> {
+        let contacts = |name: &str| format!("{}/{name}", path::CONTACTS);
+        let width = |place: &str| -> Result<usize> { Ok(self.source.read::<f64>(place, 0..0)?.0.iter().product()) };
+        let observable = |name: String| -> Result<Observable> {
+            let Series { unit, shape, .. } = self.observable_of(&name, 0..0)?.unwrap_or_default();
+            Ok(Observable { name, unit, shape })
+        };
+        let without_reactions = !self.source.has(&contacts("reaction"));
+        let position = self.source.dataset(&format!("{}/position/value", path::GRAINS))?;
+        let size = position.dtype().map_err(while_reading(self.path(), path::GRAINS))?.size();
+        Ok(Layout {
+            dimension: self.dimension,
+            rotation: self.source.has(&format!("{}/angular_velocity", path::GRAINS)),
+            friction: !without_reactions && width(&contacts("reaction"))? > 1,
+            without_reactions,
+            single: size == 4,
+            grains: self.grains()?,
+            walls: self.walls()?,
+            bonds: self.bonds()?,
+            observables: self.observable_names()?.into_iter().map(observable).collect::<Result<_>>()?,
+            parameters: self.parameters()?,
+        })
     }
 
     /// The file.
@@ -135,6 +212,11 @@ impl History {
     /// Number of rows of observables S.
     pub fn observed_steps(&self) -> usize {
         self.observed
+    }
+
+    /// Whether the reactions of the contacts were recorded.
+    pub fn has_reactions(&self) -> bool {
+        self.source.has(&format!("{}/reaction", path::CONTACTS))
     }
 
     /// Where the run comes from.
@@ -261,12 +343,37 @@ impl History {
         self.source.coded(&place, codes, count)
     }
 
+    /// The rows of `/contacts` that belong to frame `frame`.
+    ///
+    /// # Errors
+    /// [`HistoryError::NoFrame`], [`HistoryError::Damaged`].
+    pub fn contact_rows(&self, frame: usize) -> Result<Range<usize>> {
+        self.check_frame(frame)?;
+        let number = |place: &str| -> Result<u64> {
+            let (_, values) = self.source.read::<u64>(place, frame..frame + 1)?;
+            values.first().copied().ok_or_else(|| self.source.damaged(place, "its rows are empty"))
+        };
+        let count = format!("{}/count", path::CONTACTS);
+        let (start, rows) = (number(&format!("{}/start", path::CONTACTS))?, number(&count)?);
+        match start.checked_add(rows) {
+            Some(end) if end <= number(path::COMMIT_CONTACTS)? => Ok(start as usize..end as usize),
+            _ => Err(self.source.damaged(&count, "it points beyond the complete rows")),
+        }
+    }
+
+    /// The bodies of the contacts at frame `frame`: grains i and j as indices; j < 0 is wall −1−j.
+    ///
+    /// # Errors
+    /// [`HistoryError::NoFrame`], [`HistoryError::Damaged`].
+    pub fn contact_pairs(&self, frame: usize) -> Result<Vec<[i32; 2]>> {
+        self.pairs_in(self.contact_rows(frame)?)
+    }
+
     /// The contacts at frame `frame`.
     ///
     /// # Errors
     /// [`HistoryError::NoFrame`], [`HistoryError::Damaged`].
     pub fn contacts(&self, frame: usize) -> Result<ContactRows> {
-        self.check_frame(frame)?;
         let range = self.contact_rows(frame)?;
         let place = |name: &str| format!("{}/{name}", path::CONTACTS);
         // a column that the scene lacks is empty; the others have rows of one of the lengths allowed
@@ -285,7 +392,7 @@ impl History {
         let bond =
             if self.source.has(&place("bond")) { self.source.read(&place("bond"), range.clone())?.1 } else { vec![] };
         Ok(ContactRows {
-            pair: self.contact_pairs(range.clone())?,
+            pair: self.pairs_in(range.clone())?,
             point: column("point", &[d])?,
             normal: column("normal", &[d])?,
             tangent: column("tangent", &[d])?,
@@ -332,20 +439,25 @@ impl History {
     /// # Errors
     /// [`HistoryError::Damaged`].
     pub fn observable(&self, name: &str) -> Result<Option<Series>> {
+        self.observable_of(name, 0..self.observed)
+    }
+
+    /// One observable over a range of its rows, `None` if it was not recorded.
+    fn observable_of(&self, name: &str, rows: Range<usize>) -> Result<Option<Series>> {
         let place = format!("{}/{name}/value", path::OBSERVABLES);
         if name.contains('/') || !self.source.has(&format!("{}/{name}", path::OBSERVABLES)) || !self.source.has(&place)
         {
             return Ok(None);
         }
-        let (shape, value) = self.source.read(&place, 0..self.observed)?;
+        let (shape, value) = self.source.read(&place, rows.clone())?;
         let unit = match self.source.dataset(&place)?.attr("unit") {
             Ok(unit) => {
                 unit.read_scalar::<VarLenUnicode>().map_err(while_reading(&self.source.path, &place))?.to_string()
             }
             Err(_) => String::new(),
         };
-        let step = self.source.read(&format!("{}/step", path::OBSERVABLES), 0..self.observed)?.1;
-        let time = self.source.read(&format!("{}/time", path::OBSERVABLES), 0..self.observed)?.1;
+        let step = self.source.read(&format!("{}/step", path::OBSERVABLES), rows.clone())?.1;
+        let time = self.source.read(&format!("{}/time", path::OBSERVABLES), rows)?.1;
         Ok(Some(Series { unit, shape, step, time, value }))
     }
 }
@@ -372,22 +484,8 @@ impl History {
         Ok(values)
     }
 
-    /// The rows of `/contacts` that belong to `frame`.
-    fn contact_rows(&self, frame: usize) -> Result<Range<usize>> {
-        let number = |place: &str| -> Result<u64> {
-            let (_, values) = self.source.read::<u64>(place, frame..frame + 1)?;
-            values.first().copied().ok_or_else(|| self.source.damaged(place, "its rows are empty"))
-        };
-        let count = format!("{}/count", path::CONTACTS);
-        let (start, rows) = (number(&format!("{}/start", path::CONTACTS))?, number(&count)?);
-        match start.checked_add(rows) {
-            Some(end) if end <= number(path::COMMIT_CONTACTS)? => Ok(start as usize..end as usize),
-            _ => Err(self.source.damaged(&count, "it points beyond the complete rows")),
-        }
-    }
-
     /// Pairs of contacts, whose grains and walls must all be there.
-    fn contact_pairs(&self, range: Range<usize>) -> Result<Vec<[i32; 2]>> {
+    fn pairs_in(&self, range: Range<usize>) -> Result<Vec<[i32; 2]>> {
         let place = format!("{}/pair", path::CONTACTS);
         let (row, flat) = self.source.read::<i32>(&place, range)?;
         let (grains, walls) = (self.grains as i32, self.walls as i32);

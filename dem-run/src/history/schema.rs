@@ -13,6 +13,7 @@ pub(super) const CREATOR: &str = "dem-run";
 
 /// Paths in the file.
 pub(super) mod path {
+    pub const CHECKPOINT: &str = "checkpoint";
     pub const COMMIT: &str = "commit";
     pub const COMMIT_CONTACTS: &str = "commit_rows/contacts";
     pub const COMMIT_EVENTS: &str = "commit_rows/events";
@@ -101,6 +102,13 @@ impl From<&Rupture> for RuptureRow {
 }
 
 impl RuptureRow {
+    /// Whether two rows are alike to the bit.
+    pub(super) fn same(&self, other: &Self) -> bool {
+        let reals = |r: &Self| [r.time, r.x, r.y, r.z, r.rn, r.rt, r.m, r.energy].map(f64::to_bits);
+        let integers = |r: &Self| [r.round, r.bond, r.i, r.j, r.pad];
+        (self.step, reals(self), integers(self), self.mode) == (other.step, reals(other), integers(other), other.mode)
+    }
+
     /// The event, `None` if its mode is no known one.
     pub(super) fn event(&self) -> Option<Rupture> {
         Some(Rupture {

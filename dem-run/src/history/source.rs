@@ -135,11 +135,16 @@ fn check_superblock(path: &Path) -> Result<(u64, bool)> {
     if version != 3 || sizes != 8 {
         return Ok((found, false));
     }
-    let expected = u64::from_le_bytes(head[28..36].try_into().unwrap_or_default());
+    let expected = end_of_file(&head);
     if found < expected {
         return Err(HistoryError::Truncated { path: path.into(), found, expected });
     }
     Ok((found, flags != 0))
+}
+
+/// The end of the file that a superblock of version 3 names (bytes).
+pub(super) fn end_of_file(superblock: &[u8]) -> u64 {
+    u64::from_le_bytes(superblock[28..36].try_into().unwrap_or_default())
 }
 
 fn open_file(path: &Path, open_ended: bool) -> Result<File> {

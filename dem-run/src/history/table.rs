@@ -15,12 +15,24 @@ pub(super) enum Growth {
     Rows(usize),
 }
 
+/// How tables are stored.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Storage {
+    /// Reals of frames in single precision.
+    pub single: bool,
+    /// Compressed, with checksums; for files that are complete.
+    pub packed: bool,
+}
+
 /// A dataset whose first extent grows; `row` is the shape of the others.
 pub(super) struct Table {
     dataset: Dataset,
     rows: usize,
     row: Vec<usize>,
 }
+
+/// Level of compression: higher ones take longer and gain little.
+const DEFLATE: u8 = 4;
 
 impl Table {
     /// Creates an empty table of rows of shape `row`; `unit` is empty for plain numbers.
@@ -30,6 +42,7 @@ impl Table {
         unit: &str,
         row: &[usize],
         growth: Growth,
+        storage: Storage,
     ) -> hdf5::Result<Self> {
         let item = size_of::<T>();
         let chunk = match growth {
@@ -41,8 +54,9 @@ impl Table {
         // the cache holds one band of chunks, or every frame would evict and reload partly filled ones
         let band = row.first().map_or(1, |&n| n.div_ceil(chunk[1]));
         let bytes = chunk.iter().product::<usize>() * item * band;
-        let dataset = group
-            .new_dataset::<T>()
+        let builder = group.new_dataset::<T>();
+        let builder = if storage.packed { builder.shuffle().deflate(DEFLATE).fletcher32() } else { builder };
+        let dataset = builder
             .shape(SimpleExtents::from(extents))
             .chunk(chunk)
             .chunk_cache(521.max(10 * band + 1), bytes + (1 << 16), 0.75)
@@ -50,6 +64,46 @@ impl Table {
             .create(name)?;
         set_unit(&dataset, unit)?;
         Ok(Self { dataset, rows: 0, row: row.to_vec() })
+    }
+
+    /// A table of reals, in the precision of frames.
+    pub fn reals(
+        group: &Group,
+        name: &str,
+        unit: &str,
+        row: &[usize],
+        growth: Growth,
+        storage: Storage,
+    ) -> hdf5::Result<Self> {
+        match storage.single {
+            true => Self::create::<f32>(group, name, unit, row, growth, storage),
+            false => Self::create::<f64>(group, name, unit, row, growth, storage),
+        }
+    }
+
+    /// Where it stands in the file.
+    pub fn place(&self) -> String {
+        self.dataset.name().trim_start_matches('/').into()
+    }
+
+    /// Shape of one row.
+    pub fn row(&self) -> &[usize] {
+        &self.row
+    }
+
+    /// Bytes of one row in the file.
+    pub fn row_bytes(&self) -> usize {
+        self.width() * self.dataset.dtype().map_or(8, |dtype| dtype.size())
+    }
+
+    /// Writes `values` over the first rows, more of which are made if need be.
+    pub fn overwrite<T: H5Type>(&mut self, values: &[T]) -> hdf5::Result<()> {
+        let count = values.len() / self.width();
+        if count > self.rows {
+            self.dataset.resize(self.shape(count))?;
+            self.rows = count;
+        }
+        if count == 0 { Ok(()) } else { self.put(values, 0) }
     }
 
     /// Numbers in one row.
@@ -68,14 +122,22 @@ impl Table {
         if more == 0 {
             return Ok(());
         }
-        let end = self.rows + more;
-        let shape = |first| -> Vec<usize> { std::iter::once(first).chain(self.row.iter().copied()).collect() };
-        self.dataset.resize(shape(end))?;
-        let view =
-            ArrayViewD::from_shape(shape(more), values).map_err(|error| hdf5::Error::Internal(error.to_string()))?;
-        self.dataset.write_slice(view, rows(self.rows, end, &self.row))?;
-        self.rows = end;
+        let start = self.rows;
+        self.dataset.resize(self.shape(start + more))?;
+        self.put(values, start)?;
+        self.rows = start + more;
         Ok(())
+    }
+
+    fn shape(&self, rows: usize) -> Vec<usize> {
+        std::iter::once(rows).chain(self.row.iter().copied()).collect()
+    }
+
+    fn put<T: H5Type>(&self, values: &[T], start: usize) -> hdf5::Result<()> {
+        let count = values.len() / self.width();
+        let view = ArrayViewD::from_shape(self.shape(count), values)
+            .map_err(|error| hdf5::Error::Internal(error.to_string()))?;
+        self.dataset.write_slice(view, rows(start, start + count, &self.row))
     }
 }
 

@@ -19,6 +19,8 @@ fn full(dimension: usize) -> Layout {
         dimension,
         rotation: true,
         friction: true,
+        without_reactions: false,
+        single: false,
         grains: Grains {
             id: vec![7, 8, 9],
             radius: vec![0.1, 0.2, 0.3],
@@ -127,7 +129,7 @@ fn write_frame(writer: &mut Writer, l: &Layout, k: usize) {
     let s = sample(l, k);
     let (step, time) = (10 * k as i64, 0.1 * k as f64);
     writer
-        .frame(&Frame { step, time, grains: &s.grains, walls: &s.walls, contacts: &s.contacts, bonds: &s.bonds })
+        .frame(&Frame { step, time, grains: s.grains, walls: s.walls, contacts: s.contacts, bonds: s.bonds })
         .unwrap();
 }
 
@@ -298,8 +300,7 @@ fn arrays_of_another_length_are_refused_whole() {
     let mut writer = Writer::create(&path, &layout, false).unwrap();
     let mut s = sample(&layout, 3);
     s.contacts.gap.pop();
-    let frame =
-        Frame { step: 0, time: 0.0, grains: &s.grains, walls: &s.walls, contacts: &s.contacts, bonds: &s.bonds };
+    let frame = Frame { step: 0, time: 0.0, grains: s.grains, walls: s.walls, contacts: s.contacts, bonds: s.bonds };
     assert!(matches!(writer.frame(&frame), Err(HistoryError::Shape { found: 2, expected: 3, .. })));
     assert!(writer.observe(0, 0.0, &[1.0]).is_err());
     assert_eq!(writer.frames(), 0);
@@ -413,4 +414,88 @@ fn a_file_with_wrong_bytes_never_makes_the_reader_panic() {
         fs::write(&path, &wrong).unwrap();
         let _ = read_all(&path);
     }
+}
+
+#[test]
+fn a_packed_history_is_the_same_and_smaller() {
+    let (folder, path) = folder();
+    let packed = folder.path().join("packed.h5");
+    for layout in [full(2), full(3), Layout { single: true, without_reactions: true, ..full(3) }] {
+        let _ = fs::remove_file(&path);
+        let mut writer = Writer::create(&path, &layout, false).unwrap();
+        for k in 0..300 {
+            let mut s = sample(&layout, k);
+            if layout.without_reactions {
+                s.contacts.reaction.clear();
+                s.contacts.tangent.clear();
+                s.contacts.moment.clear();
+            }
+            let Sample { grains, walls, contacts, bonds } = s;
+            writer.frame(&Frame { step: k as i64, time: k as f64, grains, walls, contacts, bonds }).unwrap();
+        }
+        let checkpoint = Checkpoint { step: 299, reals: numbers(1000, 0.5), counts: (0..70).collect() };
+        writer.checkpoint(&Checkpoint { step: 17, ..checkpoint.clone() }).unwrap();
+        writer.checkpoint(&checkpoint).unwrap();
+        // of a file whose run was killed, too
+        std::mem::forget(writer);
+        let history = History::open(&path).unwrap();
+        let mut last = 0.0;
+        let mut tell = |done: f64| {
+            assert!(done >= last && done <= 1.0);
+            last = done;
+            true
+        };
+        let length = copy(&history, &packed, CopyAs::Packed, &mut tell).unwrap();
+        assert!(last > 0.99, "{last}");
+        let copied = History::open(&packed).unwrap();
+        assert_eq!(length, fs::metadata(&packed).unwrap().len());
+        assert!(!copied.open_ended() && history.open_ended());
+        assert_eq!(copied.layout().unwrap(), history.layout().unwrap());
+        assert_eq!(copied.checkpoint().unwrap(), Some(checkpoint));
+        assert_eq!((copied.steps(), copied.times()), (history.steps(), history.times()));
+        for frame in 0..history.frames() {
+            assert_eq!(copied.grain_state(frame).unwrap(), history.grain_state(frame).unwrap());
+            assert_eq!(copied.contacts(frame).unwrap(), history.contacts(frame).unwrap());
+            assert_eq!(copied.bond_status(frame).unwrap(), history.bond_status(frame).unwrap());
+        }
+        let plain = folder.path().join("plain.h5");
+        copy(&copied, &plain, CopyAs::Plain, &mut |_| true).unwrap();
+        assert!(length < fs::metadata(&plain).unwrap().len());
+        assert_eq!(History::open(&plain).unwrap().layout().unwrap(), history.layout().unwrap());
+    }
+}
+
+#[test]
+fn a_copy_that_is_ended_leaves_everything_as_it_was() {
+    let (folder, path) = folder();
+    drop(write(&path, &full(2), 20));
+    let before = fs::read(&path).unwrap();
+    let history = History::open(&path).unwrap();
+    let ended = copy(&history, &path, CopyAs::Packed, &mut |done| done < 0.3);
+    assert!(matches!(ended, Err(HistoryError::Interrupted)));
+    assert_eq!(fs::read(&path).unwrap(), before);
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn of_two_checkpoints_the_newest_whole_one_counts() {
+    let (_folder, path) = folder();
+    let layout = full(2);
+    let mut writer = write(&path, &layout, 4);
+    let checkpoint = |step| Checkpoint { step, reals: numbers(50, step as f64), counts: vec![step as u64; 9] };
+    for step in [0, 10, 20, 30] {
+        writer.checkpoint(&checkpoint(step)).unwrap();
+    }
+    writer.finish().unwrap();
+    let newest = || History::open(&path).unwrap().checkpoint().unwrap();
+    assert_eq!(newest(), Some(checkpoint(30)));
+    // one that was being written when the run was killed
+    let file = hdf5::File::open_rw(&path).unwrap();
+    file.dataset("checkpoint/reals_1").unwrap().write_slice(&[7.5], 3..4).unwrap();
+    drop(file);
+    assert_eq!(newest(), Some(checkpoint(20)));
+    let file = hdf5::File::open_rw(&path).unwrap();
+    file.dataset("checkpoint/counts_0").unwrap().write_slice(&[1u64], 8..9).unwrap();
+    drop(file);
+    assert_eq!(newest(), None);
 }

@@ -1,14 +1,20 @@
 //! Writing a history while the run goes on.
 
+use std::os::unix::fs::{FileExt, MetadataExt};
 use std::path::{Path, PathBuf};
 
 use hdf5::File;
 
+use super::checkpoint::{Checkpoint, Slots};
 use super::codes::{BondCode, Coded};
+use super::copy::{Bytes, Copy, Kept, Share, Visit};
 use super::create::{self, Column, Commit, ContactTables, Observables, check_length};
 use super::error::{HistoryError, Result, while_writing};
+use super::lock;
+use super::reader::History;
 use super::schema::{RuptureRow, path};
-use super::table::{Growth, Table};
+use super::source::{Source, end_of_file};
+use super::table::{Growth, Storage, Table};
 use super::{Frame, Layout, Rupture};
 
 /// Steps of observables, and ruptures, that are held in memory before they are appended.
@@ -39,8 +45,14 @@ pub struct Writer {
     rupture_block: Vec<RuptureRow>,
     observables: Observables,
     commit: Commit,
-    // last, so that it closes after every dataset
+    slots: Slots,
+    /// The open file, as the system knows it: of a file that took its name, nothing would be found.
+    identity: Option<(u64, u64)>,
+    /// The head of the file as of its last complete frame.
+    head: Head,
+    // these last: the file closes after every dataset, and the lock ends after the file is closed
     file: File,
+    lock: Option<std::fs::File>,
 }
 
 impl Writer {
@@ -53,18 +65,49 @@ impl Writer {
     /// [`HistoryError::Exists`] where `path` stands and `overwrite` is false; [`HistoryError::Io`] and
     /// [`HistoryError::Write`] where the file cannot be made; [`HistoryError::Shape`] where `layout` contradicts itself.
     pub fn create(path: &Path, layout: &Layout, overwrite: bool) -> Result<Self> {
-        hdf5::silence_errors(true);
-        check_layout(layout)?;
         if path.exists() && !overwrite {
             return Err(HistoryError::Exists { path: path.into() });
         }
+        Self::begin(path, layout, |_| Ok(()))
+    }
+
+    /// Goes on with `history` in the file at `path`, which may be its own: its rows `kept` stand, and `checkpoint` with
+    /// them; what else it holds is left out. `tell` hears how much is copied, from 0 to 1, and ends the work by false.
+    ///
+    /// # Errors
+    /// As [`Writer::create`]; [`HistoryError::Damaged`] where the history does not hold what `layout` promises. The file
+    /// is then as it was.
+    pub fn go_on(
+        path: &Path,
+        layout: &Layout,
+        history: &History,
+        kept: Kept,
+        checkpoint: &Checkpoint,
+        tell: &mut dyn FnMut(f64) -> bool,
+    ) -> Result<Self> {
+        Self::begin(path, layout, |writer| {
+            let mut share = Share::of(writer.bytes(kept)?, tell);
+            writer.take_over(history.source(), kept, &mut share)?;
+            writer.checkpoint(checkpoint)
+        })
+    }
+
+    /// Makes the file beside `path`, fills it by `fill`, turns to HDF5's single-writer mode and moves it to `path`.
+    fn begin(path: &Path, layout: &Layout, fill: impl FnOnce(&mut Self) -> Result<()>) -> Result<Self> {
         let io = |doing| move |source| HistoryError::Io { path: path.into(), doing, source };
         let part = partial(path).map_err(io("create"))?;
-        // HDF5 would not say why; the operating system does
-        std::fs::File::create(&part).map_err(io("create"))?;
-        let made = Self::build(path, &part, layout)
-            .map_err(while_writing(path))
-            .and_then(|writer| std::fs::rename(&part, path).map_err(io("replace")).map(|()| writer));
+        remove_orphans(path);
+        let made = Self::build(path, &part, layout, false).and_then(|mut writer| {
+            fill(&mut writer)?;
+            writer.flush()?;
+            // from here on no object can be created, and the file is readable at any time
+            writer.file.start_swmr().map_err(while_writing(path))?;
+            writer.lock = Some(lock::hold(&part).map_err(io("lock"))?);
+            writer.keep_head().map_err(io("read"))?;
+            writer.identity = identity(&part);
+            std::fs::rename(&part, path).map_err(io("replace"))?;
+            Ok(writer)
+        });
         if made.is_err() {
             // the first error is the one to report
             let _ = std::fs::remove_file(&part);
@@ -72,31 +115,56 @@ impl Writer {
         made
     }
 
-    fn build(path: &Path, part: &Path, layout: &Layout) -> hdf5::Result<Self> {
+    /// A file that no one reads before it is closed: compressed, with checksums, if `packed`.
+    pub(super) fn closed_copy(path: &Path, layout: &Layout, packed: bool) -> Result<Self> {
+        Self::build(path, path, layout, packed)
+    }
+
+    /// Bytes of the rows `kept` of all tables.
+    pub(super) fn bytes(&mut self, kept: Kept) -> Result<u64> {
+        let mut bytes = Bytes::default();
+        self.visit(kept, &mut bytes)?;
+        Ok(bytes.0)
+    }
+
+    /// The file `part` with everything that the layout asks for; errors name `path`.
+    fn build(path: &Path, part: &Path, layout: &Layout, packed: bool) -> Result<Self> {
+        hdf5::silence_errors(true);
+        check_layout(layout)?;
+        // HDF5 would not say why; the operating system does
+        std::fs::File::create(part).map_err(|source| HistoryError::Io {
+            path: path.into(),
+            doing: "create",
+            source,
+        })?;
+        let storage = Storage { single: layout.single, packed };
+        Self::fill(path, part, layout, storage).map_err(while_writing(path))
+    }
+
+    fn fill(path: &Path, part: &Path, layout: &Layout, storage: Storage) -> hdf5::Result<Self> {
         let file = File::with_options().with_fapl(|fapl| fapl.libver_v110()).create(part)?;
         create::write_identity(&file, layout)?;
         let grains = create::grains(&file, layout)?;
         let motion = grains.create_group("position")?;
-        let step = Table::create::<i64>(&motion, "step", "", &[], Growth::Frames)?;
-        let time = Table::create::<f64>(&motion, "time", "s", &[], Growth::Frames)?;
-        let mut frame_columns = create::grain_columns(&grains, &motion, layout)?;
+        let frames = Growth::Frames;
+        let step = Table::create::<i64>(&motion, "step", "", &[], frames, storage)?;
+        let time = Table::create::<f64>(&motion, "time", "s", &[], frames, storage)?;
+        let mut frame_columns = create::grain_columns(&grains, &motion, layout, storage)?;
         if !layout.walls.is_empty() {
-            frame_columns.extend(create::wall_columns(&file, layout)?);
+            frame_columns.extend(create::wall_columns(&file, layout, storage)?);
         }
         let bonded = !layout.bonds.is_empty();
-        let bond_status = if bonded { Some(create::bonds(&file, &layout.bonds)?) } else { None };
-        let contacts = create::contacts(&file, layout)?;
+        let bond_status = if bonded { Some(create::bonds(&file, &layout.bonds, storage)?) } else { None };
+        let contacts = create::contacts(&file, layout, storage)?;
         let ruptures = if bonded {
             let events = file.create_group("events")?;
-            Some(Table::create::<RuptureRow>(&events, "rupture", "", &[], Growth::Rows(128))?)
+            Some(Table::create::<RuptureRow>(&events, "rupture", "", &[], Growth::Rows(128), storage)?)
         } else {
             None
         };
-        let observables = create::observables(&file, &layout.observables)?;
-        let commit = create::commit(&file, bonded)?;
-        file.flush()?;
-        // from here on no object can be created, and the file is readable at any time
-        file.start_swmr()?;
+        let observables = create::observables(&file, &layout.observables, storage)?;
+        let commit = create::commit(&file, bonded, storage)?;
+        let slots = Slots::create(&file, storage)?;
         Ok(Self {
             path: path.into(),
             dimension: layout.dimension,
@@ -110,8 +178,46 @@ impl Writer {
             rupture_block: Vec::with_capacity(BLOCK),
             observables,
             commit,
+            slots,
+            identity: None,
+            head: Head::default(),
             file,
+            lock: None,
         })
+    }
+
+    /// Every table, with the number of its rows in `kept`.
+    pub(super) fn visit(&mut self, kept: Kept, visit: &mut impl Visit) -> Result<()> {
+        let frames = kept.frames;
+        visit.table::<i64>(&mut self.step, frames)?;
+        visit.table::<f64>(&mut self.time, frames)?;
+        self.frame_columns.iter_mut().try_for_each(|column| column.visit(frames, visit))?;
+        self.bond_status.iter_mut().try_for_each(|table| visit.table::<BondCode>(table, frames))?;
+        self.contacts.visit(frames, kept.contacts, visit)?;
+        self.ruptures.iter_mut().try_for_each(|table| visit.table::<RuptureRow>(table, kept.events))?;
+        self.observables.visit(kept.steps, visit)?;
+        self.commit.visit(frames, visit)
+    }
+
+    /// Takes the rows `kept` from `source` into the empty tables.
+    pub(super) fn take_over(&mut self, source: &Source, kept: Kept, share: &mut Share) -> Result<()> {
+        let path = self.path.clone();
+        self.visit(kept, &mut Copy { source, to: &path, share })?;
+        self.commit.frames.write_scalar(&(kept.frames as u64)).map_err(while_writing(&path))
+    }
+
+    /// Brings everything to the file.
+    pub(super) fn flush(&self) -> Result<()> {
+        self.file.flush().map_err(while_writing(&self.path))
+    }
+
+    /// Records the state from which the run goes on, that of the frame written last.
+    ///
+    /// # Errors
+    /// [`HistoryError::Write`] where the disk refuses.
+    pub fn checkpoint(&mut self, checkpoint: &Checkpoint) -> Result<()> {
+        let file = &self.file;
+        self.slots.write(checkpoint, || file.flush()).map_err(while_writing(&self.path))
     }
 
     /// The dimension D of the layout.
@@ -127,11 +233,16 @@ impl Writer {
     /// Appends a frame, and with it makes everything visible that was observed and that broke before.
     ///
     /// # Errors
-    /// [`HistoryError::Shape`] where an array does not fit the layout (nothing is written then);
-    /// [`HistoryError::Write`] where the disk refuses.
+    /// [`HistoryError::Shape`] where an array does not fit the layout and [`HistoryError::Gone`] where the file was taken
+    /// away (nothing is written then); [`HistoryError::Write`] where the disk refuses.
     pub fn frame(&mut self, frame: &Frame) -> Result<()> {
         self.check_frame(frame)?;
-        self.write_frame(frame).map_err(while_writing(&self.path))
+        if self.identity.is_some() && identity(&self.path) != self.identity {
+            return Err(HistoryError::Gone { path: self.path.clone() });
+        }
+        self.write_frame(frame).map_err(while_writing(&self.path))?;
+        let path = self.path.clone();
+        self.keep_head().map_err(|source| HistoryError::Io { path, doing: "read", source })
     }
 
     /// Records a bond that broke; visible with the next frame.
@@ -171,11 +282,32 @@ impl Writer {
     pub fn finish(mut self) -> Result<()> {
         let path = self.path.clone();
         let flushed = self.observables.append().and_then(|()| self.append_ruptures()).and_then(|()| self.file.flush());
+        if flushed.is_err() {
+            self.abandon();
+        }
         flushed.map_err(while_writing(&path))
     }
 
+    /// Closes the file after an error, and leaves it as it was when its last frame was complete: what HDF5 began to write
+    /// since has no place in it, and on a full disk no end.
+    pub(super) fn abandon(mut self) {
+        let (file, head) = (self.lock.take(), self.head);
+        drop(self);
+        if let Some(file) = file {
+            // there is an error to report already
+            let _ = head.put_back(&file);
+        }
+    }
+
+    fn keep_head(&mut self) -> std::io::Result<()> {
+        if let Some(file) = &self.lock {
+            self.head = Head::of(file)?;
+        }
+        Ok(())
+    }
+
     fn check_frame(&self, frame: &Frame) -> Result<()> {
-        let contacts = frame.contacts;
+        let contacts = &frame.contacts;
         let m = contacts.len();
         for column in &self.frame_columns {
             column.check(frame, 1)?;
@@ -219,6 +351,26 @@ impl Writer {
     }
 }
 
+/// The superblock of a file: version 3, as this program writes it, with the address of the file's end.
+#[derive(Clone, Copy, Default)]
+struct Head(Option<[u8; 48]>);
+
+impl Head {
+    fn of(file: &std::fs::File) -> std::io::Result<Self> {
+        let mut bytes = [0; 48];
+        file.read_exact_at(&mut bytes, 0)?;
+        Ok(Self(Some(bytes)))
+    }
+
+    /// Writes it back to a file that ends before the address that it names.
+    fn put_back(self, file: &std::fs::File) -> std::io::Result<()> {
+        match (self.0, Self::of(file)?.0) {
+            (Some(good), Some(found)) if file.metadata()?.len() < end_of_file(&found) => file.write_all_at(&good, 0),
+            _ => Ok(()),
+        }
+    }
+}
+
 fn check_layout(layout: &Layout) -> Result<()> {
     let (grains, bonds) = (&layout.grains, &layout.bonds);
     let n = grains.id.len();
@@ -239,6 +391,29 @@ fn check_layout(layout: &Layout) -> Result<()> {
         check_length(&format!("observables/{}", observable.name), observable.width(), observable.width().max(1))?;
     }
     Ok(())
+}
+
+/// The file at `path` as the system knows it: device and number.
+fn identity(path: &Path) -> Option<(u64, u64)> {
+    std::fs::metadata(path).ok().map(|file| (file.dev(), file.ino()))
+}
+
+/// Removes what processes that were killed left of files that they made beside `path`.
+fn remove_orphans(path: &Path) {
+    let Some(name) = path.file_name() else { return };
+    let folder = path.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let found = entry.file_name();
+        let process = found
+            .to_str()
+            .and_then(|found| found.strip_prefix(&format!(".{}.", name.to_string_lossy()))?.strip_suffix(".part"))
+            .and_then(|process| rustix::process::Pid::from_raw(process.parse().ok()?));
+        let gone = |process| rustix::process::test_kill_process(process) == Err(rustix::io::Errno::SRCH);
+        if process.is_some_and(gone) {
+            // one that cannot be removed does no harm
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
 }
 
 /// The name under which a file is made: in the same folder, so that the move is atomic.

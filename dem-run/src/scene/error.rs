@@ -81,6 +81,8 @@ pub enum Origin {
     },
     /// In an assignment `--set path=value`.
     Set(String),
+    /// In a sweep, at this place.
+    Sweep(Box<str>),
 }
 
 impl Problem {
@@ -111,6 +113,7 @@ impl fmt::Display for Problem {
         match &self.origin {
             Some(Origin::Text { line, column }) => write!(f, " (line {line}, column {column})")?,
             Some(Origin::Set(assignment)) => write!(f, " (--set {})", shorten(assignment))?,
+            Some(Origin::Sweep(place)) => write!(f, " ({})", shorten(place))?,
             None => {}
         }
         write!(f, "\n      found    {}", cut(&self.found, 200))?;
@@ -123,7 +126,7 @@ impl fmt::Display for Problem {
 }
 
 /// At most 80 characters of a text, fit to be printed.
-pub(super) fn shorten(text: &str) -> String {
+pub(crate) fn shorten(text: &str) -> String {
     cut(text, 80)
 }
 
@@ -143,8 +146,8 @@ pub(super) fn printable(c: char) -> char {
 /// All problems under one heading.
 fn render(name: &str, problems: &[Problem]) -> String {
     let mut text = match problems.len() {
-        1 => format!("{name}: the scene is wrong at one place"),
-        count => format!("{name}: the scene is wrong at {count} places"),
+        1 => format!("{name} is wrong at one place"),
+        count => format!("{name} is wrong at {count} places"),
     };
     for problem in problems {
         // writing to a string cannot fail
@@ -177,7 +180,7 @@ mod tests {
         let text = SceneError::Wrong { name: "a.json".into(), problems }.to_string();
         assert_eq!(
             text,
-            "a.json: the scene is wrong at 2 places\
+            "a.json is wrong at 2 places\
              \n  bonds.strenght (line 3, column 5)\
              \n      found    an unknown name\
              \n      allowed  strength, stress\

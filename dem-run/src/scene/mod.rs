@@ -12,10 +12,11 @@
 //! ([`Scene::to_json`]) and described as a JSON Schema ([`schema::json_schema`]). What they
 //! mean in the simulation is decided where the sample is built.
 
+mod difference;
 mod error;
 mod function;
 mod model;
-mod parse;
+pub(crate) mod parse;
 mod sample;
 pub mod schema;
 mod set;
@@ -27,13 +28,15 @@ mod wall;
 #[cfg(test)]
 mod tests;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+pub use difference::{Difference, differences};
+pub(crate) use error::shorten;
 pub use error::{Origin, Problem, SceneError};
 pub use function::{Function, Ramp};
 pub use model::{
-    Bonds, Flow, Friction, Grains, Load, Materials, Output, Restitution, Rupture, Scene, Springs, Stiffness, Stop,
-    Time, TravelFrom, WallTravel, Young,
+    Bonds, Flow, Friction, Grains, Load, Materials, Output, Precision, Restitution, Rupture, Scene, Springs, Stiffness,
+    Stop, Time, TravelFrom, WallTravel, Young,
 };
 pub use sample::{
     Compaction, Deposition, Diameters, GrainSpec, Lattice, Preparation, RandomSample, Sample, SampleFile, UniformRange,
@@ -50,15 +53,25 @@ pub use wall::{Circle, Cylinder, Drive, Place, Plane, Shape, Sphere, Wall, WallM
 /// # Errors
 /// [`SceneError`]: an unreadable file, wrong syntax, wrong structure, or all wrong values.
 pub fn load(path: &Path, assignments: &[String]) -> Result<Scene, SceneError> {
+    let mut document = parse::parse(&path.display().to_string(), &read(path)?)?;
+    set::apply(&mut document, assignments).map_err(|problems| document.wrong(problems))?;
+    let mut scene = finish(&document).map_err(|problems| document.wrong(problems))?;
+    join_sample(&mut scene, path);
+    Ok(scene)
+}
+
+/// The text of a file.
+fn read(path: &Path) -> Result<String, SceneError> {
     let unreadable = |source| SceneError::Read { path: path.to_path_buf(), source };
     let bytes = std::fs::read(path).map_err(unreadable)?;
-    let text = String::from_utf8(bytes)
-        .map_err(|error| unreadable(std::io::Error::new(std::io::ErrorKind::InvalidData, error)))?;
-    let mut scene = from_text(&path.display().to_string(), &text, assignments)?;
+    String::from_utf8(bytes).map_err(|error| unreadable(std::io::Error::new(std::io::ErrorKind::InvalidData, error)))
+}
+
+/// A sample file is sought beside the scene.
+fn join_sample(scene: &mut Scene, path: &Path) {
     if let (Sample::File(file), Some(folder)) = (&mut scene.sample, path.parent()) {
         file.path = folder.join(&file.path);
     }
-    Ok(scene)
 }
 
 /// Reads a scene from `text`, applies the `--set` assignments and validates the result.
@@ -71,9 +84,60 @@ pub fn load(path: &Path, assignments: &[String]) -> Result<Scene, SceneError> {
 pub fn from_text(name: &str, text: &str, assignments: &[String]) -> Result<Scene, SceneError> {
     let mut document = parse::parse(name, text)?;
     set::apply(&mut document, assignments).map_err(|problems| document.wrong(problems))?;
-    let mut scene: Scene = document.decode().map_err(|problem| document.wrong(vec![problem]))?;
+    finish(&document).map_err(|problems| document.wrong(problems))
+}
+
+/// The scene that a tree describes, or all that is wrong with it.
+fn finish(document: &parse::Document) -> Result<Scene, Vec<Problem>> {
+    let mut scene: Scene = document.decode().map_err(|problem| vec![problem])?;
     let accept = solver::default_accept(scene.solver.tolerance, scene.bonds.is_some());
     scene.solver.accept.get_or_insert(accept);
     let problems = document.merge_non_finite(validate(&scene));
-    if problems.is_empty() { Ok(scene) } else { Err(document.wrong(problems)) }
+    if problems.is_empty() { Ok(scene) } else { Err(problems) }
+}
+
+/// A scene whose values are yet to be varied.
+#[derive(Debug)]
+pub(crate) struct Base {
+    path: PathBuf,
+    document: parse::Document,
+}
+
+/// A value that a sweep puts in a scene.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Change {
+    /// Where in the scene.
+    pub path: String,
+    /// What.
+    pub value: serde_json::Value,
+    /// The place in the sweep that says so.
+    pub place: String,
+}
+
+impl Base {
+    /// Reads the text; it need not be a right scene before its values are put in.
+    pub fn read(path: &Path) -> Result<Self, SceneError> {
+        let document = parse::parse(&path.display().to_string(), &read(path)?)?;
+        Ok(Self { path: path.to_path_buf(), document })
+    }
+
+    /// The scene with these values.
+    ///
+    /// # Errors
+    /// All that is wrong with it, with the place that it was written: in the sweep or in the scene.
+    pub fn with(&self, changes: &[Change]) -> Result<Scene, Vec<Problem>> {
+        let mut document = self.document.clone();
+        for Change { path, value, place } in changes {
+            set::put(&mut document, path, value.clone(), place)
+                .map_err(|problem| vec![problem.with_origin(Origin::Sweep(place.as_str().into()))])?;
+        }
+        let located = |problem: Problem| match document.origin(&problem.path) {
+            Some(origin) => problem.with_origin(origin),
+            None => problem,
+        };
+        let mut scene =
+            finish(&document).map_err(|problems| problems.into_iter().map(located).collect::<Vec<Problem>>())?;
+        join_sample(&mut scene, &self.path);
+        Ok(scene)
+    }
 }

@@ -211,8 +211,8 @@ pub enum Rupture {
     EndOfStep,
 }
 
-/// How often the history is written: exactly one of the two.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+/// What the history holds, and how often it is written: either every_steps or interval.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Output {
     /// Number of steps from frame to frame.
@@ -221,6 +221,30 @@ pub struct Output {
     /// Time from frame to frame (s), rounded to whole steps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interval: Option<f64>,
+    /// Whether frames hold the reactions and moments of the contacts.
+    pub reactions: bool,
+    /// Precision of what frames hold. Observables and events are always double.
+    pub precision: Precision,
+    /// Number of frames from checkpoint to checkpoint. A run that is killed goes on from its last checkpoint; the last
+    /// state of one that ends is always one.
+    pub checkpoint_every: u64,
+}
+
+impl Default for Output {
+    fn default() -> Self {
+        Self { every_steps: None, interval: None, reactions: true, precision: Precision::Double, checkpoint_every: 10 }
+    }
+}
+
+/// Precision of stored numbers.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Precision {
+    /// 16 digits.
+    #[default]
+    Double,
+    /// 7 digits, half the size.
+    Single,
 }
 
 /// What ends the run before its time.

@@ -1,4 +1,4 @@
-//! From text to a JSON tree that knows its lines, and from the tree to a scene.
+//! From text to a JSON tree that knows its lines, and from the tree to what it describes: a scene, or a sweep.
 
 use std::collections::{HashMap, HashSet};
 
@@ -6,16 +6,16 @@ use jsonc_parser::ast::{Object, ObjectPropName, Value as Node};
 use jsonc_parser::common::Ranged;
 use jsonc_parser::errors::ParseErrorKind;
 use jsonc_parser::{CollectOptions, ParseOptions, parse_to_ast};
+use serde::de::DeserializeOwned;
 use serde_json::{Map, Number, Value};
 use serde_path_to_error::Segment;
 
 use super::error::{Origin, Problem, SceneError, printable, shorten};
-use super::model::Scene;
 use super::suggest::nearest;
 
-/// A scene as a JSON tree, with the places where its values were written.
-#[derive(Debug)]
-pub(super) struct Document {
+/// A JSON tree, with the places where its values were written.
+#[derive(Debug, Clone)]
+pub(crate) struct Document {
     /// Where the text comes from, for messages.
     name: String,
     /// The tree, with ±`f64::MAX` in place of numbers that overflow.
@@ -46,13 +46,13 @@ fn options() -> ParseOptions {
 ///
 /// # Errors
 /// Wrong syntax; names that are given twice in one object, all of them.
-pub(super) fn parse(name: &str, text: &str) -> Result<Document, SceneError> {
+pub(crate) fn parse(name: &str, text: &str) -> Result<Document, SceneError> {
     // a byte order mark, as some editors write it, is not part of the text
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let parsed = parse_to_ast(text, &CollectOptions::default(), &options())
         .map_err(|error| syntax(name, text, error.line_display(), error.column_display(), &error.kind().to_string()))?;
     let Some(node) = parsed.value else {
-        return Err(syntax(name, text, 1, 1, "The text is empty: a scene is an object { … }"));
+        return Err(syntax(name, text, 1, 1, "The text is empty: an object { … } is expected"));
     };
     let mut walk = Walk { lines: Lines::new(text), origins: HashMap::new(), non_finite: HashMap::new(), twice: vec![] };
     let root = walk.value(String::new(), &node);
@@ -175,17 +175,17 @@ impl Walk<'_> {
 }
 
 /// The path of `key` below `path`.
-pub(super) fn join(path: &str, key: &str) -> String {
+pub(crate) fn join(path: &str, key: &str) -> String {
     if path.is_empty() { key.to_string() } else { format!("{path}.{key}") }
 }
 
 impl Document {
-    /// Records that what stands at `path` comes from an assignment.
-    pub(super) fn mark_set(&mut self, path: &str, assignment: &str) {
+    /// Records that what stands at `path` comes from elsewhere.
+    pub(super) fn mark_set(&mut self, path: &str, origin: Origin) {
         let below = format!("{path}.");
         self.origins.retain(|key, _| key != path && !key.starts_with(&below));
         self.non_finite.retain(|key, _| key != path && !key.starts_with(&below));
-        self.origins.insert(path.to_string(), Origin::Set(assignment.to_string()));
+        self.origins.insert(path.to_string(), origin);
     }
 
     /// Records that a number at `path` overflows, written as `literal`.
@@ -199,7 +199,7 @@ impl Document {
     }
 
     /// Where the value at `path` was written, or else the nearest thing around it.
-    fn origin(&self, path: &str) -> Option<Origin> {
+    pub(super) fn origin(&self, path: &str) -> Option<Origin> {
         let mut path = path;
         loop {
             if let Some(origin) = self.origins.get(path) {
@@ -213,7 +213,7 @@ impl Document {
     }
 
     /// The error of these problems, each with the place where it was written.
-    pub(super) fn wrong(&self, problems: Vec<Problem>) -> SceneError {
+    pub(crate) fn wrong(&self, problems: Vec<Problem>) -> SceneError {
         let problems = problems
             .into_iter()
             .map(|problem| Problem { origin: problem.origin.clone().or_else(|| self.origin(&problem.path)), ..problem })
@@ -222,7 +222,7 @@ impl Document {
     }
 
     /// The wrong values together with the numbers that overflow, which stand for anything found at their places.
-    pub(super) fn merge_non_finite(&self, problems: Vec<Problem>) -> Vec<Problem> {
+    pub(crate) fn merge_non_finite(&self, problems: Vec<Problem>) -> Vec<Problem> {
         let mut overflows: Vec<Problem> =
             self.non_finite.iter().map(|(path, literal)| overflow(path, literal)).collect();
         overflows.sort_by(|a, b| a.path.cmp(&b.path));
@@ -231,11 +231,11 @@ impl Document {
         overflows
     }
 
-    /// The scene that the tree describes.
+    /// What the tree describes.
     ///
     /// # Errors
     /// The first unknown name, missing name, or wrong type.
-    pub(super) fn decode(&self) -> Result<Scene, Problem> {
+    pub(crate) fn decode<T: DeserializeOwned>(&self) -> Result<T, Problem> {
         serde_path_to_error::deserialize(&self.root).map_err(|error| {
             let path = error.path().iter().filter_map(segment).fold(String::new(), |path, key| join(&path, &key));
             match self.non_finite.get(&path) {

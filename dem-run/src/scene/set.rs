@@ -1,4 +1,4 @@
-//! `--set path=value`: one value of a scene given on the command line.
+//! `--set path=value`: one value of a scene given on the command line; and the values that a sweep varies.
 //!
 //! A path must exist in the model ([`super::schema`]), whether or not the scene gives a value
 //! there; names that are free, as those of walls, must exist in the scene.
@@ -34,8 +34,19 @@ fn assign(document: &mut Document, assignment: &str) -> Result<(), Problem> {
     check_path(&document.root, path)?;
     let (value, non_finite) = read_value(path, literal.trim())?;
     store(&mut document.root, path, value);
-    document.mark_set(path, assignment);
+    document.mark_set(path, Origin::Set(assignment.to_string()));
     document.mark_non_finite(non_finite);
+    Ok(())
+}
+
+/// Puts `value` at `path`, as the sweep has it at `place`.
+///
+/// # Errors
+/// A path that does not exist.
+pub(super) fn put(document: &mut Document, path: &str, value: Value, place: &str) -> Result<(), Problem> {
+    check_path(&document.root, path)?;
+    store(&mut document.root, path, value);
+    document.mark_set(path, Origin::Sweep(place.into()));
     Ok(())
 }
 

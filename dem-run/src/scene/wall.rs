@@ -76,6 +76,9 @@ pub struct Circle {
     /// Whether the grains are inside it, as in a drum.
     #[serde(default)]
     pub inside: bool,
+    /// Against the sample: moved from the centre in this direction, of any length, until it touches the first grain.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seated: Option<Vec<f64>>,
 }
 
 /// A spherical wall (3D).
@@ -89,6 +92,9 @@ pub struct Sphere {
     /// Whether the grains are inside it.
     #[serde(default)]
     pub inside: bool,
+    /// Against the sample: moved from the centre in this direction, of any length, until it touches the first grain.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seated: Option<Vec<f64>>,
 }
 
 /// A cylindrical wall without ends (3D).
@@ -125,6 +131,18 @@ pub enum Drive {
     Velocity(Function),
     /// Under this force along its direction (N).
     Force(Function),
+}
+
+impl Shape {
+    /// The direction in which a round wall is moved from its centre until it touches the sample, and its radius (m).
+    #[must_use]
+    pub fn seat(&self) -> Option<(&[f64], f64)> {
+        match self {
+            Self::Circle(Circle { seated: Some(direction), radius, .. })
+            | Self::Sphere(Sphere { seated: Some(direction), radius, .. }) => Some((direction, *radius)),
+            _ => None,
+        }
+    }
 }
 
 impl Wall {
@@ -178,7 +196,7 @@ mod tests {
         assert_eq!(plane().drive_direction(), Some(&[0.0, -1.0][..]));
         let tilted = Wall { direction: Some(vec![1.0, 0.0]), ..plane() };
         assert_eq!(tilted.drive_direction(), Some(&[1.0, 0.0][..]));
-        let circle = Shape::Circle(Circle { center: vec![0.0, 0.0], radius: 1.0, inside: false });
+        let circle = Shape::Circle(Circle { center: vec![0.0, 0.0], radius: 1.0, inside: false, seated: None });
         assert_eq!(Wall { shape: circle, ..plane() }.drive_direction(), None);
     }
 }

@@ -62,6 +62,8 @@ fn configs() -> Vec<PathBuf> {
     entries
         .map(|entry| entry.expect("entry").path())
         .filter(|path| path.extension().is_some_and(|extension| extension == "json"))
+        // sweeps are no scenes
+        .filter(|path| !path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("sweep-")))
         .collect()
 }
 

@@ -143,6 +143,9 @@ fn time_and_output(report: &mut Report, scene: &Scene) {
         let found = format!("{:?}, which makes {steps:.1e} steps", time.step);
         report.wrong("time.step", found, format!("at most {MAX_STEPS:.0e} steps to time.end"));
     }
+    if scene.output.checkpoint_every == 0 {
+        report.wrong("output.checkpoint_every", 0, "a whole number of frames, at least 1");
+    }
     match (scene.output.every_steps, scene.output.interval) {
         (Some(0), None) => report.wrong("output.every_steps", 0, "a whole number of steps, at least 1"),
         (None, Some(interval)) => {

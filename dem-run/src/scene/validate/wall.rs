@@ -89,4 +89,10 @@ fn shape(report: &mut Report, path: &str, shape: &Shape) {
     };
     report.vector(&format!("{path}.center"), center);
     report.positive(format!("{path}.radius"), radius, "m");
+    let inside = matches!(shape, Shape::Circle(c) if c.inside) || matches!(shape, Shape::Sphere(s) if s.inside);
+    match shape.seat() {
+        Some(_) if inside => report.wrong(format!("{path}.seated"), "a direction", "nothing: the grains are inside"),
+        Some((direction, _)) => report.direction(&format!("{path}.seated"), direction),
+        None => {}
+    }
 }

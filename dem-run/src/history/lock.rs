@@ -1,0 +1,27 @@
+//! Who writes a history. The lock is the system's record lock (POSIX `fcntl`): it ends with its process, however that
+//! ends, and does not meet the locks by which HDF5 keeps readers and writers apart.
+
+use std::fs::{File, OpenOptions};
+use std::io;
+use std::path::Path;
+
+use rustix::fs::{FlockOperation, fcntl_lock};
+use rustix::process::{Flock, FlockType, fcntl_getlk};
+
+/// Locks the file at `path` until the value is dropped. A process must not open it a second time and close it again
+/// meanwhile: that would end the lock.
+pub(super) fn hold(path: &Path) -> io::Result<File> {
+    let file = OpenOptions::new().read(true).write(true).open(path)?;
+    match fcntl_lock(&file, FlockOperation::NonBlockingLockExclusive) {
+        // a file system without locks: the run must not fail for that
+        Ok(()) | Err(rustix::io::Errno::NOLCK | rustix::io::Errno::NOTSUP | rustix::io::Errno::INVAL) => Ok(file),
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// The process that holds the lock of the file at `path`, if one does.
+pub(super) fn holder(path: &Path) -> io::Result<Option<i32>> {
+    let file = File::open(path)?;
+    let found = fcntl_getlk(&file, &Flock::from(FlockType::WriteLock)).unwrap_or(None);
+    Ok(found.map(|lock| lock.pid.map_or(0, |pid| pid.as_raw_nonzero().get())))
+}

@@ -1,0 +1,262 @@
+//! `dem-run sweep`: one scene with many values, each run a process and a history of its own.
+//!
+//! ```text
+//! sweep file ──plan──▶ scenes, all checked ──reconcile──▶ what is left ──work──▶ histories and states ──store──▶ manifest
+//! ```
+
+mod cluster;
+pub mod model;
+pub mod plan;
+mod reconcile;
+mod report;
+pub mod store;
+mod work;
+
+use std::fmt;
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use crate::check::{Check, size};
+use crate::output::{facts, print_line, print_result};
+use crate::run::{Execution, RunError, handle_signals};
+use plan::{Plan, describe};
+use reconcile::reconcile;
+use report::Standing;
+use store::{Manifest, State, Store};
+use work::{Job, carry_out};
+
+/// What is asked of a sweep.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SweepOptions {
+    /// The sweep file.
+    pub sweep: PathBuf,
+    /// The folder for the results.
+    pub folder: PathBuf,
+    /// What is done.
+    pub mode: Mode,
+    /// Runs at a time; as many as the machine has processors where it is absent.
+    pub jobs: Option<usize>,
+    /// Whether runs that failed, and would fail again, are run again.
+    pub retry: bool,
+    /// Whether results that the sweep no longer gives are given up.
+    pub overwrite: bool,
+    /// How the command is carried out; each run has one thread.
+    pub execution: Execution,
+    /// Whether stdout is JSON.
+    pub json: bool,
+}
+
+/// What is done with a sweep.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Mode {
+    /// All runs that are left are carried out.
+    All,
+    /// The sweep is checked, and nothing is written.
+    Check,
+    /// The manifest is written, and the files for other schedulers.
+    Prepare,
+    /// The states are gathered and told.
+    Status,
+    /// One run is carried out, by its number.
+    One(String),
+}
+
+/// Carries a sweep out, or one of its parts.
+///
+/// # Errors
+/// [`RunError`]: a sweep or a scene that is wrong, results in the way, files that cannot be written, an interruption,
+/// [`RunError::Runs`] where runs failed. What was done before is kept.
+pub fn sweep(options: &SweepOptions) -> Result<(), RunError> {
+    let store = Store::new(options.folder.clone());
+    if store.folder().exists() && !store.folder().is_dir() {
+        let shown = store.folder().display();
+        return Err(RunError::InputOutput(format!("{shown} is a file: name a folder with -o DIR")));
+    }
+    if options.mode == Mode::Status {
+        return status(&store, options);
+    }
+    let plan = Plan::read(&options.sweep)?;
+    match &options.mode {
+        Mode::Check => Ok(print_result(&Checked::new(&plan, options)?, options.json)?),
+        Mode::One(id) => one(&store, &plan, id, options),
+        mode => {
+            let mut manifest = reconcile(&store, &plan, options.overwrite)?;
+            store.create()?;
+            store.write(&mut manifest)?;
+            if *mode == Mode::Prepare {
+                prepare(&store, manifest, options)
+            } else {
+                all(&store, &plan, manifest, options)
+            }
+        }
+    }
+}
+
+/// Carries out all that is left.
+fn all(store: &Store, plan: &Plan, mut manifest: Manifest, options: &SweepOptions) -> Result<(), RunError> {
+    let interrupt = handle_signals()?;
+    let mut progress = options.execution.show();
+    let runs = manifest.runs.clone();
+    let left = |id: &str, digest: &str| match store.outcome(id).filter(|outcome| outcome.digest == digest) {
+        Some(outcome) if outcome.state == State::Done => !store.is_complete(id),
+        Some(outcome) => options.retry || !outcome.is_final(),
+        None => true,
+    };
+    let jobs: Vec<Job<'_>> = (runs.iter())
+        .filter(|run| left(&run.id, &run.digest))
+        .filter_map(|run| Some(Job { id: &run.id, run: plan.run(&run.digest)? }))
+        .collect();
+    if jobs.len() < runs.len() && !options.execution.quiet {
+        progress.note(&format!("{} of {} runs are left", jobs.len(), runs.len()));
+    }
+    let at_a_time = options.jobs.or_else(|| std::thread::available_parallelism().ok().map(usize::from)).unwrap_or(1);
+    let carried = match jobs.is_empty() {
+        true => Ok(()),
+        false => carry_out(store, &jobs, at_a_time, &interrupt, &mut progress, &mut || store.write(&mut manifest)),
+    };
+    // what was done is told whatever came in between
+    let written = store.write(&mut manifest);
+    let failed = failures(store, &manifest);
+    let standing = Standing { folder: options.folder.clone(), manifest };
+    let printed = print_result(&standing, options.json);
+    carried.and(written)?;
+    if interrupt.requested() {
+        return Err(RunError::Interrupted("the runs that are done are kept, and the same command does the others"));
+    }
+    printed?;
+    failed
+}
+
+/// Carries out one run of a sweep that has been prepared; touches nothing but the files of this run.
+fn one(store: &Store, plan: &Plan, id: &str, options: &SweepOptions) -> Result<(), RunError> {
+    let (sweep, folder) = (options.sweep.display(), store.folder().display());
+    let Some(manifest) = store.manifest()? else {
+        let remedy = format!("dem-run sweep {sweep} -o {folder} --prepare makes it");
+        return Err(RunError::InputOutput(format!("{folder} holds no manifest.json: {remedy}")));
+    };
+    let Some(entry) = manifest.run(id) else {
+        let last = manifest.runs.last().map_or("none", |run| &run.id);
+        return Err(RunError::Usage(format!("there is no run {id} in {folder}: the last is {last}")));
+    };
+    let Some(run) = plan.run(&entry.digest) else {
+        let what =
+            format!("run {} ({}) of {folder} is no longer what {sweep} gives", entry.id, describe(&entry.values));
+        return Err(RunError::InputOutput(format!(
+            "{what}: the sweep or its scene has changed since --prepare; do that again"
+        )));
+    };
+    let interrupt = handle_signals()?;
+    let job = Job { id: &entry.id, run };
+    carry_out(store, &[job], 1, &interrupt, &mut options.execution.show(), &mut || Ok(()))?;
+    if interrupt.requested() {
+        return Err(RunError::Interrupted("the run is left"));
+    }
+    match store.outcome(&entry.id).filter(|outcome| outcome.digest == entry.digest) {
+        None => Err(RunError::InputOutput(format!("run {} is being carried out by another process", entry.id))),
+        Some(outcome) if outcome.state == State::Failed => {
+            let why = outcome.message.clone().unwrap_or_default();
+            Err(RunError::Runs { code: exit_code(outcome.exit_code), message: format!("run {}: {why}", entry.id) })
+        }
+        Some(outcome) => match outcome.summary.filter(|_| options.json) {
+            Some(summary) => Ok(crate::output::print_json(&summary)?),
+            None => Ok(print_line(&format!("run {} is done: {folder}/{}", entry.id, entry.history))?),
+        },
+    }
+}
+
+/// Writes the files for other schedulers.
+fn prepare(store: &Store, manifest: Manifest, options: &SweepOptions) -> Result<(), RunError> {
+    let left = manifest.runs.iter().filter(|run| run.state != State::Done).count();
+    if left > 0 {
+        cluster::write(store, &options.sweep, &manifest)?;
+    }
+    let (folder, sweep) = (store.folder().display(), options.sweep.display());
+    let standing = Standing { folder: options.folder.clone(), manifest };
+    if options.json || left == 0 {
+        return Ok(print_result(&standing, options.json)?);
+    }
+    Ok(print_line(&format!(
+        "{standing}\n\ncarry it out with one of\n  sbatch {folder}/slurm.sh\n  snakemake -s {folder}/Snakefile --cores 8 \
+         --keep-going\n  dem-run sweep {sweep} -o {folder}\nsee how it stands with\n  dem-run sweep {sweep} -o {folder} \
+         --status"
+    ))?)
+}
+
+/// Gathers the states of all runs and tells them.
+fn status(store: &Store, options: &SweepOptions) -> Result<(), RunError> {
+    let Some(mut manifest) = store.manifest()? else {
+        let shown = store.folder().display();
+        return Err(RunError::InputOutput(format!(
+            "{shown} holds no manifest.json: the sweep was never started there"
+        )));
+    };
+    store.write(&mut manifest)?;
+    Ok(print_result(&Standing { folder: options.folder.clone(), manifest }, options.json)?)
+}
+
+/// The exit code that a failed run's own stands for: what is neither a wrong scene nor a lack of convergence is the
+/// machine's.
+fn exit_code(code: Option<i32>) -> u8 {
+    match code {
+        Some(2) => 2,
+        Some(3) => 3,
+        _ => 4,
+    }
+}
+
+/// The error that stands for all failed runs: the gravest of their exit codes.
+fn failures(store: &Store, manifest: &Manifest) -> Result<(), RunError> {
+    let failed: Vec<_> = manifest.runs.iter().filter(|run| run.state == State::Failed).collect();
+    let code = failed.iter().map(|run| exit_code(store.outcome(&run.id).and_then(|outcome| outcome.exit_code))).max();
+    let Some(code) = code else { return Ok(()) };
+    let message = format!(
+        "{} of {} runs failed; what each had written is in runs/NNNN.failed.h5; --retry runs them again",
+        failed.len(),
+        manifest.runs.len()
+    );
+    Err(RunError::Runs { code, message })
+}
+
+/// What a sweep will be.
+#[derive(Debug, Serialize)]
+struct Checked {
+    sweep: PathBuf,
+    scene: PathBuf,
+    runs: Vec<std::collections::BTreeMap<String, serde_json::Value>>,
+    /// Steps of all runs.
+    steps: u64,
+    /// Size of all histories, roughly (bytes).
+    file_bytes: u64,
+    free_bytes: Option<u64>,
+}
+
+impl Checked {
+    fn new(plan: &Plan, options: &SweepOptions) -> Result<Self, RunError> {
+        let (mut steps, mut file_bytes, mut free_bytes) = (0, 0u64, None);
+        for run in &plan.runs {
+            let check = Check::new(&run.scene)?;
+            steps += check.steps;
+            file_bytes = file_bytes.saturating_add(check.file_bytes);
+            free_bytes = check.free_bytes;
+        }
+        let runs = plan.runs.iter().map(|run| run.values.clone()).collect();
+        Ok(Self { sweep: options.sweep.clone(), scene: plan.scene.clone(), runs, steps, file_bytes, free_bytes })
+    }
+}
+
+impl fmt::Display for Checked {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let run = |values: Option<&_>| values.map_or(String::new(), describe);
+        let text = facts(&[
+            ("scene", self.scene.display().to_string()),
+            ("runs", self.runs.len().to_string()),
+            ("the first", run(self.runs.first())),
+            ("the last", run(self.runs.last())),
+            ("steps", format!("{} in all, unless stop conditions end runs before", self.steps)),
+            ("files", format!("about {} in all", size(self.file_bytes))),
+            ("free disk", self.free_bytes.map_or("unknown".into(), size)),
+        ]);
+        f.write_str(text.trim_end())
+    }
+}

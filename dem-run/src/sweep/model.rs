@@ -1,0 +1,156 @@
+//! What a sweep file may say.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::LazyLock;
+
+use schemars::JsonSchema;
+use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
+use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+/// A sweep: one scene, run with many values. Fields of the scene are named as `--set` names them: bonds.strength.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Sweep {
+    /// The JSON Schema that an editor checks the sweep against, as `dem-run schema --sweep` prints it.
+    #[serde(default, rename = "$schema", skip_serializing_if = "Option::is_none")]
+    pub schema: Option<String>,
+    /// What the sweep shows, in a line.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub title: Option<String>,
+    /// The scene that all runs start from: a file, sought beside the sweep.
+    pub scene: PathBuf,
+    /// Values that all runs have in place of the scene's.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub set: BTreeMap<String, Value>,
+    /// What is varied. The fields of one object vary together: the first run has the first value of each, and so on.
+    /// Several objects are combined, each with each; the last varies fastest.
+    pub vary: Vec<BTreeMap<String, Values>>,
+}
+
+/// The values that a field takes.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Values {
+    /// These, in this order; any that the field may have.
+    List(Vec<Value>),
+    /// Numbers at equal distances.
+    Range(Range),
+}
+
+/// Numbers at equal distances, rounded to 12 digits; those that are whole are written as whole numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Range {
+    /// The first number.
+    pub from: f64,
+    /// The last number; where it is absent, each number is the one before plus 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub to: Option<f64>,
+    /// How many numbers.
+    pub count: u64,
+    /// What is equal between neighbours.
+    #[serde(default)]
+    pub spacing: Spacing,
+}
+
+/// What is equal between neighbours of a range.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Spacing {
+    /// Their difference.
+    #[default]
+    Linear,
+    /// Their ratio.
+    Geometric,
+}
+
+/// A list or an object, told by its bracket: serde's own choice between the two would lose the place of an error.
+impl<'de> Deserialize<'de> for Values {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        struct ByBracket;
+        impl<'de> Visitor<'de> for ByBracket {
+            type Value = Values;
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("a list [ … ], or a range { \"from\": …, \"to\": …, \"count\": … }")
+            }
+            fn visit_seq<A: SeqAccess<'de>>(self, items: A) -> Result<Values, A::Error> {
+                Deserialize::deserialize(SeqAccessDeserializer::new(items)).map(Values::List)
+            }
+            fn visit_map<A: MapAccess<'de>>(self, entries: A) -> Result<Values, A::Error> {
+                Deserialize::deserialize(MapAccessDeserializer::new(entries)).map(Values::Range)
+            }
+        }
+        from.deserialize_any(ByBracket)
+    }
+}
+
+impl Range {
+    /// The numbers, with the last one exactly at the end.
+    #[must_use]
+    pub fn numbers(&self) -> Vec<Value> {
+        let last = self.count.saturating_sub(1);
+        let to = self.to.unwrap_or(self.from + last as f64);
+        let number = |k: u64| {
+            let share = if last == 0 { 0.0 } else { k as f64 / last as f64 };
+            match self.spacing {
+                _ if k == 0 => self.from,
+                _ if k == last => to,
+                Spacing::Linear => round(self.from + share * (to - self.from)),
+                Spacing::Geometric => round(self.from * (to / self.from).powf(share)),
+            }
+        };
+        (0..self.count).map(number).map(plain).collect()
+    }
+}
+
+/// At 12 digits, what the last bits of a power are, which depend on the machine, is out of sight.
+fn round(number: f64) -> f64 {
+    format!("{number:.11e}").parse().unwrap_or(number)
+}
+
+/// Whole numbers without a point, as fields that count want them.
+fn plain(number: f64) -> Value {
+    /// Above it, not every whole number is a double.
+    const WHOLE: f64 = 9_007_199_254_740_992.0;
+    if number.fract() == 0.0 && number.abs() <= WHOLE { Value::from(number as i64) } else { Value::from(number) }
+}
+
+static SCHEMA: LazyLock<Value> = LazyLock::new(|| schemars::schema_for!(Sweep).to_value());
+
+/// The JSON Schema of a sweep (draft 2020-12).
+#[must_use]
+pub fn json_schema() -> &'static Value {
+    &SCHEMA
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn numbers(range: &str) -> String {
+        let range: Range = serde_json::from_str(range).expect("range");
+        Value::from(range.numbers()).to_string()
+    }
+
+    #[test]
+    fn ranges_hit_their_ends_and_are_short() {
+        assert_eq!(numbers(r#"{"from": 1, "count": 4}"#), "[1,2,3,4]");
+        assert_eq!(numbers(r#"{"from": 0.1, "to": 0.5, "count": 5}"#), "[0.1,0.2,0.3,0.4,0.5]");
+        assert_eq!(numbers(r#"{"from": 3, "to": 1, "count": 3}"#), "[3,2,1]");
+        assert_eq!(numbers(r#"{"from": 1, "to": 1e3, "count": 4, "spacing": "geometric"}"#), "[1,10,100,1000]");
+        assert_eq!(numbers(r#"{"from": 7.5, "to": 7.5, "count": 1}"#), "[7.5]");
+    }
+
+    #[test]
+    fn values_are_told_by_their_bracket() {
+        let list: Values = serde_json::from_str("[1, \"a\", {}]").expect("list");
+        assert!(matches!(list, Values::List(values) if values.len() == 3));
+        let range: Values = serde_json::from_str(r#"{"from": 1, "count": 2}"#).expect("range");
+        assert!(matches!(range, Values::Range(_)));
+        let error = serde_json::from_str::<Values>("3").expect_err("a number");
+        assert!(error.to_string().contains("a list [ … ]"), "{error}");
+    }
+}
