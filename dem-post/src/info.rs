@@ -142,6 +142,18 @@ impl Report {
 
     /// The report as lines.
     pub fn table(&self) -> String {
+        let mut lines = self.facts();
+        let hint = if self.bonds > 0 {
+            "cracks|chains|velocities|stress-strain|frames|report"
+        } else {
+            "chains|velocities|stress-strain|report"
+        };
+        lines.push(("look further", format!("dem-post {hint} {}", self.file)));
+        facts(&lines)
+    }
+
+    /// Names and values, in order.
+    pub fn facts(&self) -> Vec<(&'static str, String)> {
         let state = if self.open_ended { "not closed: the run goes on or was stopped" } else { "closed" };
         let [least, most] = self.diameters.map(|d| number(1e3 * d));
         let mut lines = vec![
@@ -162,9 +174,7 @@ impl Report {
             ("observed", format!("{} steps of {}", self.observed, self.observables.join(", "))),
         ]);
         lines.extend(self.measure_lines());
-        let hint = if self.bonds > 0 { "cracks|chains|stress-strain" } else { "chains|stress-strain" };
-        lines.push(("look further", format!("dem-post {hint} {}", self.file)));
-        facts(&lines)
+        lines
     }
 
     /// What was measured, one line each.

@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 
 use dem_run::history::HistoryError;
+use dem_run::run::RunError;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 pub use dem_run::output::{Folder, Text, WriteError, cell, default_folder, facts, number, print, quantity, short};
 
@@ -23,19 +25,42 @@ pub enum PostError {
     /// An argument that makes no sense.
     #[error("{0}")]
     Usage(String),
+    /// The manifest of a sweep cannot be read.
+    #[error(transparent)]
+    Sweep(#[from] RunError),
+    /// The results are there, but not of all that was asked for.
+    #[error("{0}")]
+    Incomplete(String),
+    /// The history breaks the promises of its layout.
+    #[error("{0}")]
+    Unsound(String),
     /// A result cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
 }
 
 impl PostError {
-    /// The exit code that stands for this error: 2 for wrong usage or scene, 4 for input and output.
+    /// The exit code that stands for this error: 1 for results that lack something, 2 for wrong usage or scene, 4 for
+    /// input and output.
     pub fn exit_code(&self) -> u8 {
         match self {
+            Self::Incomplete(_) => 1,
+            Self::Sweep(error) => error.exit_code(),
             Self::Lacking { .. } | Self::Usage(_) => 2,
-            Self::History(_) | Self::Write(_) => 4,
+            Self::History(_) | Self::Unsound(_) | Self::Write(_) => 4,
         }
     }
+}
+
+/// A bar on a terminal unless `quiet`; elsewhere indicatif hides it. The template is indicatif's.
+pub(crate) fn progress(length: u64, quiet: bool, template: &str) -> ProgressBar {
+    let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+    let bar = ProgressBar::with_draw_target(Some(length), target);
+    // a template that does not parse is a bar without numbers, no reason to stop
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style);
+    }
+    bar
 }
 
 /// The result of an analysis.

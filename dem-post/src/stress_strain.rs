@@ -17,6 +17,7 @@ use std::path::Path;
 use dem_run::history::{History, Series, Wall, WallDrive};
 use serde::Serialize;
 
+use crate::chains::stress::thickness;
 use crate::collapse::{last_step_below, peak, work};
 use crate::output::{Folder, PostError, Result, cell, facts, quantity, short};
 use crate::plot::{Chart, Style, colour};
@@ -245,13 +246,6 @@ fn sample_size(history: &History, wall: usize, axis: usize, drive: f64) -> Resul
     Ok(([extents[axis], area], push))
 }
 
-/// The scene's thickness in 2D, m; 1 where it says nothing.
-fn thickness(history: &History) -> Result<f64> {
-    let scene = history.parameters()?.scene;
-    let scene: serde_json::Value = serde_json::from_str(&scene).unwrap_or_default();
-    Ok(scene.get("thickness").and_then(serde_json::Value::as_f64).filter(|t| *t > 0.0).unwrap_or(1.0))
-}
-
 impl Report {
     fn summarise(&mut self, strengths: &[f64], residual: Option<Series>) {
         let at = |step: Option<usize>| step.and_then(|k| self.load.get(k).copied());
@@ -351,7 +345,8 @@ fn pairs(x: &[f64], x_scale: f64, y: &[f64], y_scale: f64) -> Vec<(f64, f64)> {
     x.iter().zip(y).map(|(x, y)| (x * x_scale, y * y_scale)).collect()
 }
 
-fn force_displacement(report: &Report) -> Chart {
+/// Force over displacement of the wall.
+pub fn force_displacement(report: &Report) -> Chart {
     let mut chart = Chart::new("displacement of the wall (mm)", "force (N)");
     chart.set_off = true;
     if !report.reaction.is_empty() {
@@ -367,7 +362,7 @@ fn force_displacement(report: &Report) -> Chart {
 }
 
 /// The load over the logarithm of the fitted strain, which shows how little the sample gives way before it collapses.
-fn onset(report: &Report) -> Option<Chart> {
+pub fn onset(report: &Report) -> Option<Chart> {
     let visible = |&(strain, _): &(f64, f64)| strain >= LEAST_STRAIN;
     let points: Vec<(f64, f64)> =
         report.strain.iter().map(|e| e.abs()).zip(report.load.iter().copied()).filter(visible).collect();
@@ -384,7 +379,8 @@ fn onset(report: &Report) -> Option<Chart> {
     Some(chart)
 }
 
-fn stress_strain(report: &Report) -> Chart {
+/// Stress over strain.
+pub fn stress_strain(report: &Report) -> Chart {
     let mut chart = Chart::new("axial strain (%)", "axial stress (kPa)");
     chart.set_off = true;
     let wall_strain = 1e2 / report.summary.height;

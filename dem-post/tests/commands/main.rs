@@ -5,6 +5,9 @@ use std::process::{Command, Output};
 
 use dem_run::history::*;
 
+mod check;
+mod view;
+
 const STEPS: i64 = 100;
 
 /// A square of four bonded grains of radius 1 mm between two walls.
@@ -124,7 +127,7 @@ fn frame(writer: &mut Writer, l: &Layout, step: i64, top: f64) {
     }
     let bonded = !l.bonds.is_empty();
     let contacts = ContactRows {
-        point: still(m),
+        point: (0..m * d).map(|k| 1e-3 * k as f64 + 1e-6 * load).collect(),
         normal: still(m),
         tangent: if d == 3 { still(m) } else { vec![] },
         reaction,
@@ -140,11 +143,15 @@ fn frame(writer: &mut Writer, l: &Layout, step: i64, top: f64) {
             bonds[bond] = status;
         }
     }
-    let grains = GrainState { position: places.concat(), velocity: still(4), ..GrainState::default() };
+    // the upper two move down at 3 m/s
+    let velocity = [still(2), vector(d, -3.0), vector(d, -3.0)].concat();
+    let turns = |width: usize| (0..if l.rotation { 4 * width } else { 0 }).map(|k| load + k as f64).collect();
+    let (angular_velocity, orientation) = (turns(if d == 2 { 1 } else { 3 }), turns(if d == 2 { 1 } else { 4 }));
+    let grains = GrainState { position: places.concat(), velocity, angular_velocity, orientation };
     let position = if w > 0 { [vector(d, 0.0), vector(d, top)].concat() } else { vec![] };
     let walls = WallState { position, velocity: still(w), force: still(w) };
     let time = step as f64 * 1e-3;
-    writer.frame(&Frame { step, time, grains: &grains, walls: &walls, contacts: &contacts, bonds: &bonds }).unwrap();
+    writer.frame(&Frame { step, time, grains, walls, contacts, bonds }).unwrap();
 }
 
 fn sample(l: &Layout) -> (tempfile::TempDir, PathBuf) {
@@ -181,7 +188,8 @@ fn every_command_writes_what_it_promises() {
         let (folder, path) = sample(&layout(dimension));
         for (command, files) in [
             ("cracks", &["ruptures.csv", "broken.csv", "fragments.csv", "broken", "fragments", "decohesion"][..]),
-            ("chains", &["forces.csv", "distribution.csv", "chains", "distribution"]),
+            ("chains", &["forces.csv", "distribution.csv", "chains", "distribution", "force-chains"]),
+            ("velocities", &["velocities.csv", "velocities"]),
             ("stress-strain", &["stress-strain.csv", "force-displacement", "stress-strain"]),
         ] {
             let output = dem_post(&path, &[command]);
@@ -295,7 +303,7 @@ fn wrong_files_are_refused() {
     };
     let foreign = folder.path().join("foreign.h5");
     hdf5::File::create(&foreign).unwrap();
-    for command in ["info", "cracks", "chains", "stress-strain"] {
+    for command in ["info", "cracks", "chains", "velocities", "frames", "report", "stress-strain", "view"] {
         refused(&dem_post(&folder.path().join("none.h5"), &[command]), 4, &["none.h5", "does not exist"]);
         refused(&dem_post(&file("text.h5", b"x,y\n"), &[command]), 4, &["text.h5", "not an HDF5 file"]);
         refused(&dem_post(&file("cut.h5", &bytes[..bytes.len() / 2]), &[command]), 4, &["cut.h5", "truncated"]);
@@ -303,4 +311,148 @@ fn wrong_files_are_refused() {
     }
     let output = file("taken", b"");
     refused(&dem_post(&path, &["cracks", "-o", output.to_str().unwrap()]), 4, &["taken"]);
+}
+
+#[test]
+fn cracks_are_lines_with_ends_and_fronts() {
+    let (_folder, path) = sample(&layout(2));
+    let found = json(&dem_post(&path, &["cracks", "--json"]));
+    // neighbouring bonds of a ring share the void in its middle: one crack of two facets of one diameter, at right angles
+    let cracks = found["cracks"].as_array().unwrap();
+    assert_eq!(cracks.len(), 1);
+    let number = |name: &str| cracks[0][name].as_f64().unwrap();
+    assert_eq!((number("bonds"), number("path_bonds"), number("first"), number("last")), (2.0, 2.0, 0.03, 0.06));
+    assert!((number("path_length") - 4e-3).abs() < 1e-12);
+    assert!((number("tortuosity") - 2f64.sqrt()).abs() < 1e-9);
+    let fronts = found["fronts"].as_array().unwrap();
+    assert_eq!((fronts.len(), fronts[0]["front_speed"].is_null()), (2, true));
+    // from the first break on the crack only grows
+    assert!(fronts[1]["front"].as_f64() >= fronts[0]["front"].as_f64());
+    for file in ["cracks.csv", "crack-segments.csv", "crack-front.csv", "cracks.png", "crack-front.svg"] {
+        assert!(path.with_file_name("run-post").join(file).exists(), "{file}");
+    }
+    // in 3D ruptures are listed, and no lines are told
+    let (_folder, path) = sample(&layout(3));
+    let found = json(&dem_post(&path, &["cracks", "--json"]));
+    assert_eq!((found["broken"]["shear"].as_u64(), found["cracks"].as_array().unwrap().len()), (Some(1), 0));
+}
+
+#[test]
+fn velocities_are_those_of_the_frame() {
+    let (_folder, path) = sample(&layout(2));
+    let found = json(&dem_post(&path, &["velocities", "--json", "--times", "0.05"]));
+    let field = &found["fields"][0];
+    assert_eq!((&field["mean_speed"], &field["greatest_speed"]), (&1.5.into(), &3.0.into()));
+    // ½ · 2 kg · 9 m²/s²
+    assert_eq!((&field["kinetic_energy"], &field["drift"]), (&9.0.into(), &serde_json::json!([0.0, -1.5])));
+}
+
+#[test]
+fn frames_are_numbered_and_alike() {
+    let (_folder, path) = sample(&layout(2));
+    // the size of a PNG stands in its header
+    let size = |path: PathBuf| {
+        let png = std::fs::read(path).unwrap();
+        assert!(png.starts_with(b"\x89PNG"));
+        [16, 20].map(|at| u32::from_be_bytes(png[at..at + 4].try_into().unwrap()))
+    };
+    for subject in ["bonds", "forces", "speed"] {
+        let output = dem_post(&path, &["frames", "--draw", subject, "--every", "4", "-o", subject, "--quiet"]);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        assert!(output.stderr.is_empty());
+        let folder = path.with_file_name(subject);
+        // frames 0, 4, 8 of eleven, and the last
+        assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 4);
+        let sizes: Vec<_> = (0..4).map(|k| size(folder.join(format!("frame-{k:05}.png")))).collect();
+        assert!(sizes.iter().all(|size| *size == sizes[0] && size[0] % 2 == 0 && size[1] % 2 == 0), "{sizes:?}");
+    }
+    refused(&dem_post(&path, &["frames", "--every", "0"]), 2, &["--every"]);
+    refused(&dem_post(&path, &["frames", "--every", "2", "--times", "0.1"]), 2, &["--times"]);
+    let mut loose = layout(2);
+    loose.bonds = Bonds::default();
+    let (_folder, path) = sample(&loose);
+    refused(&dem_post(&path, &["frames"]), 2, &["no bonds", "--draw forces"]);
+}
+
+#[test]
+fn equal_runs_do_not_part() {
+    let (folder, path) = sample(&layout(2));
+    let other = folder.path().join("other.h5");
+    write(&other, &layout(2));
+    let found = json(&dem_post(&path, &["compare", "other.h5", "--json"]));
+    assert!(found["first_difference"].is_null() && found["parting"].is_null());
+    assert_eq!((&found["broken"], &found["gaps"].as_array().unwrap().len()), (&serde_json::json!([2, 0, 0]), &11));
+}
+
+#[test]
+fn runs_part_where_one_gives_way_more() {
+    let (folder, path) = sample(&layout(2));
+    let mut wider = layout(2);
+    // other names of the bonds, another scene; the motion is the same
+    wider.bonds.pair.reverse();
+    wider.parameters.scene = "{\"thickness\": 0.25}".into();
+    write(&folder.path().join("other.h5"), &wider);
+    let output = dem_post(&path, &["compare", "other.h5", "--json", "-o", "here"]);
+    let found = json(&output);
+    assert_eq!(found["scene"], serde_json::json!([{"path": "thickness", "a": "0.5", "b": "0.25"}]));
+    assert_eq!(found["same_sample"], false);
+    // bonds 0 and 1 are those of grains 0–1 and 1–2 there, of 3–0 and 2–3 here
+    assert_eq!(found["broken"], serde_json::json!([0, 2, 2]));
+    assert_eq!((&found["parting"]["alike"], &found["parting"]["b"]["grains"]), (&0.into(), &serde_json::json!([0, 3])));
+    for file in ["scene.csv", "distance.csv", "bonds.csv", "distance.png", "broken.png", "bonds.png", "load.png"] {
+        assert!(folder.path().join("here").join(file).exists(), "{file}");
+    }
+}
+
+#[test]
+fn runs_that_cannot_be_compared_are_refused() {
+    let (folder, path) = sample(&layout(2));
+    write(&folder.path().join("space.h5"), &layout(3));
+    refused(&dem_post(&path, &["compare", "space.h5"]), 2, &["space.h5", "2D", "3D"]);
+    refused(&dem_post(&path, &["compare", "run.h5", "--tolerance=-1"]), 2, &["--tolerance"]);
+    refused(&dem_post(&path, &["compare", "none.h5"]), 4, &["none.h5", "does not exist"]);
+    assert!(!folder.path().join("run-compare").exists());
+}
+
+#[test]
+fn a_report_needs_nothing_but_itself() {
+    let mut named = layout(2);
+    named.parameters.scene = "{\"title\": \"<b>Press & \\\"pull\\\"\", \"thickness\": 0.5}".into();
+    let unbonded = Layout { bonds: Bonds::default(), ..layout(2) };
+    let bare = Layout { walls: vec![], observables: vec![], ..layout(2) };
+    for (l, sections) in [
+        (&named, &["run", "accuracy", "load", "cracks", "chains", "velocities", "energy", "scene"][..]),
+        (&unbonded, &["run", "load", "chains", "scene"]),
+        (&bare, &["run", "cracks", "velocities", "scene"]),
+        (&layout(3), &["run", "cracks", "chains", "velocities", "scene"]),
+    ] {
+        let (_folder, path) = sample(l);
+        let output = dem_post(&path, &["report"]);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let page = std::fs::read_to_string(path.with_file_name("run-post").join("report.html")).unwrap();
+        for section in sections {
+            assert!(page.contains(&format!("<section id=\"{section}\">")), "{section}");
+        }
+        // every address is one inside the page
+        let addresses = |attribute: &str| -> Vec<String> {
+            let parts = page.split(attribute).skip(1);
+            parts.map(|rest| rest.split('"').next().unwrap().chars().take(30).collect()).collect()
+        };
+        let pictures = addresses(" src=\"");
+        assert!(
+            !pictures.is_empty() && pictures.iter().all(|address| address.starts_with("data:image/")),
+            "{pictures:?}"
+        );
+        assert!(addresses(" href=\"").iter().all(|address| address.starts_with('#')));
+        for outside in ["http:", "https:", "url(", "@import", "<script", "<link", "<iframe"] {
+            assert!(!page.contains(outside), "{outside}");
+        }
+        // a picture says what it shows, and what a scene is called is text
+        assert_eq!(addresses(" alt=\"").iter().filter(|alt| !alt.is_empty()).count(), pictures.len());
+        assert!(!page.contains("<b>Press"));
+    }
+    let (_folder, path) = sample(&unbonded);
+    assert!(dem_post(&path, &["report"]).status.success());
+    let page = std::fs::read_to_string(path.with_file_name("run-post").join("report.html")).unwrap();
+    assert!(!page.contains("<section id=\"cracks\">"));
 }

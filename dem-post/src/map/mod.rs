@@ -5,6 +5,13 @@ use dem_run::history::{GrainState, Grains, History, Wall, WallKind, WallState};
 use crate::output::Result;
 use crate::plot::{Anchor, Canvas, Drawing, colour};
 
+pub use legend::Key;
+use legend::{draw_legend, legend_rows, scale_bar};
+pub use scale::{Colour, Ramp, Scale};
+
+mod legend;
+mod scale;
+
 /// Width and greatest height of one panel, units of the drawing.
 const PANEL: (f64, f64) = (400.0, 560.0);
 /// Free space around each panel.
@@ -12,6 +19,14 @@ const MARGIN: f64 = 14.0;
 /// Height of a panel's caption, and of one row of the legend.
 const CAPTION: f64 = 44.0;
 const LEGEND: f64 = 30.0;
+/// Width of a panel where panels stand above each other: samples that are much wider than high.
+const WIDE: f64 = 860.0;
+/// Width over height of a sample from which on panels stand above each other.
+const STACKED: f64 = 1.6;
+/// Share of the sample below which a part is worth a picture of its own.
+const SMALL: f64 = 0.25;
+/// The size of a sheet is a multiple of this, so that its PNG has an even number of pixels: video encoders ask for that.
+const EVEN: f64 = 4.0;
 /// Lines of a wall's hatching: their distance and length.
 const HATCH: f64 = 7.0;
 
@@ -34,11 +49,36 @@ pub struct Panel {
     /// The walls.
     pub walls: WallState,
     /// Fill of each grain.
-    pub fills: Vec<&'static str>,
+    pub fills: Vec<Colour>,
     /// Colour of the outlines of grains.
     pub outline: &'static str,
     /// Lines on top, in the order in which they are drawn.
     pub links: Vec<Link>,
+    /// Arrows on top of all.
+    pub arrows: Vec<Arrow>,
+}
+
+/// An arrow.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Arrow {
+    /// Where it begins, m, D numbers.
+    pub from: Vec<f64>,
+    /// Where its head is, m, D numbers.
+    pub to: Vec<f64>,
+}
+
+/// The part of the plane that a drawing shows: two corners, m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View(Box2);
+
+impl View {
+    /// The part that shows nothing.
+    pub const EMPTY: Self = Self(EMPTY);
+
+    /// The smallest part that holds both.
+    pub fn join(self, other: Self) -> Self {
+        Self(union(self.0, other.0))
+    }
 }
 
 /// A line between two points of the sample.
@@ -51,15 +91,7 @@ pub struct Link {
     /// Width, units of the drawing.
     pub width: f64,
     /// Colour.
-    pub colour: &'static str,
-}
-
-/// An entry of the legend.
-pub enum Key {
-    /// A disk of this fill and outline.
-    Disk(&'static str, &'static str, String),
-    /// A line of this colour and width.
-    Line(&'static str, f64, String),
+    pub colour: Colour,
 }
 
 impl Sample {
@@ -98,14 +130,30 @@ impl Sample {
         found
     }
 
-    /// The box around what a panel shows: its grains, and of its round walls what is near.
-    fn extent(&self, panel: &Panel) -> Box2 {
-        let mut found = self.bounds(&panel.grains, self.limits);
+    /// What shows all of `states`, for drawings that must be alike.
+    pub fn view<'a>(&self, states: impl Iterator<Item = (&'a GrainState, &'a WallState)>) -> View {
+        View(states.fold(EMPTY, |all, (grains, walls)| union(all, self.extent(grains, walls))))
+    }
+
+    /// What shows `points` (m, D numbers each) and as much again around them, at least five mean diameters; `None` if
+    /// that is no small part of the sample.
+    pub fn near<'a>(&self, points: impl Iterator<Item = &'a [f64]>, all: View) -> Option<View> {
+        let [low, high] = points.fold(EMPTY, |found, point| union(found, around(self.flat(point), 0.0)));
+        let diameter = 2.0 * self.radius.iter().sum::<f64>() / self.radius.len() as f64;
+        let margin = [0, 1].map(|k| (0.5 * (high[k] - low[k])).max(2.5 * diameter));
+        let near = [[low[0] - margin[0], low[1] - margin[1]], [high[0] + margin[0], high[1] + margin[1]]];
+        let size = |[low, high]: Box2| (high[0] - low[0]) * (high[1] - low[1]);
+        (size(near) < SMALL * size(all.0)).then_some(View(near))
+    }
+
+    /// The box around the grains, and of the round walls what is near.
+    fn extent(&self, grains: &GrainState, walls: &WallState) -> Box2 {
+        let mut found = self.bounds(grains, self.limits);
         if found == EMPTY {
             // all have left together, as a disk on an incline does
-            found = self.bounds(&panel.grains, EVERYWHERE);
+            found = self.bounds(grains, EVERYWHERE);
         }
-        for (wall, position) in self.walls.iter().zip(panel.walls.position.chunks(self.dimension)) {
+        for (wall, position) in self.walls.iter().zip(walls.position.chunks(self.dimension)) {
             if wall.kind != WallKind::Plane {
                 let [low, high] = around(self.flat(position), wall.radius.abs());
                 let near = |k: usize, x: f64| x.clamp(self.limits[0][k], self.limits[1][k]);
@@ -156,25 +204,36 @@ impl Frame {
     }
 }
 
-/// Draws the panels side by side on one scale, with a scale bar and the legend below.
+/// Draws the panels on one scale, side by side or, if the sample is wide, above each other; with a scale bar and the
+/// legend below.
 pub fn draw(sample: &Sample, panels: &[Panel], legend: &[Key]) -> Drawing {
-    let [low, high] = panels.iter().fold(EMPTY, |all, panel| union(all, sample.extent(panel)));
-    // room for the hatching of walls
+    let view = sample.view(panels.iter().map(|panel| (&panel.grains, &panel.walls)));
+    draw_view(sample, view, panels, legend)
+}
+
+/// As [`draw`], of a given part of the plane.
+pub fn draw_view(sample: &Sample, View([low, high]): View, panels: &[Panel], legend: &[Key]) -> Drawing {
     let extent = [high[0] - low[0], high[1] - low[1]];
-    let scale = ((PANEL.0 - 4.0 * HATCH) / extent[0]).min((PANEL.1 - 4.0 * HATCH) / extent[1]);
+    let stacked = extent[0] > STACKED * extent[1];
+    let widest = if stacked { WIDE } else { PANEL.0 };
+    // room for the hatching of walls
+    let scale = ((widest - 4.0 * HATCH) / extent[0]).min((PANEL.1 - 4.0 * HATCH) / extent[1]);
     let low = low.map(|x| x - 2.0 * HATCH / scale);
     let size = (extent[0] * scale + 4.0 * HATCH, extent[1] * scale + 4.0 * HATCH);
-    let columns = panels.len() as f64;
-    let width = (columns * (size.0 + MARGIN) + MARGIN).max(420.0);
-    let rows = legend_rows(legend, width);
-    let height = CAPTION + size.1 + LEGEND * (rows.len() as f64 + 1.0) + MARGIN;
-    let left = 0.5 * (width - columns * (size.0 + MARGIN) + MARGIN);
-    let mut canvas = Canvas::new(width, height);
+    let (columns, lines) = if stacked { (1, panels.len()) } else { (panels.len(), 1) };
+    let even = |length: f64| (length / EVEN).ceil() * EVEN;
+    let width = even((columns as f64 * (size.0 + MARGIN) + MARGIN).max(420.0));
+    let rows = legend_rows(legend, width - 2.0 * MARGIN);
+    let below = lines as f64 * (CAPTION + size.1);
+    let mut canvas = Canvas::new(width, even(below + LEGEND * (rows.len() as f64 + 1.0) + MARGIN));
+    let left = 0.5 * (width - columns as f64 * (size.0 + MARGIN) + MARGIN);
     for (k, panel) in panels.iter().enumerate() {
-        let corner = (left + k as f64 * (size.0 + MARGIN), CAPTION);
+        let (column, line) = if stacked { (0, k) } else { (k, 0) };
+        let top = line as f64 * (CAPTION + size.1);
+        let corner = (left + column as f64 * (size.0 + MARGIN), top + CAPTION);
         draw_panel(&mut canvas, sample, panel, &Frame { low, scale, corner, size });
     }
-    let base = CAPTION + size.1 + 0.7 * LEGEND;
+    let base = below + 0.7 * LEGEND;
     scale_bar(&mut canvas, (left, base), scale, size.0);
     for (k, row) in rows.iter().enumerate() {
         draw_legend(&mut canvas, row, (0.5 * width, base + LEGEND * (k as f64 + 1.0)));
@@ -184,7 +243,7 @@ pub fn draw(sample: &Sample, panels: &[Panel], legend: &[Key]) -> Drawing {
 
 fn draw_panel(canvas: &mut Canvas, sample: &Sample, panel: &Panel, frame: &Frame) {
     for (line, text) in panel.caption.iter().enumerate() {
-        let at = (frame.corner.0 + 0.5 * frame.size.0, 17.0 + 18.0 * line as f64);
+        let at = (frame.corner.0 + 0.5 * frame.size.0, frame.corner.1 - CAPTION + 17.0 + 18.0 * line as f64);
         canvas.text(at, text, 14, Anchor::Middle);
     }
     canvas.clip(frame.corner, frame.size);
@@ -199,17 +258,44 @@ fn draw_panel(canvas: &mut Canvas, sample: &Sample, panel: &Panel, frame: &Frame
     }
     for grain in order {
         let (at, radius) = (frame.at(sample.centre(&panel.grains, grain)), sample.radius[grain] * frame.scale);
-        if frame.shows(at, 0.0) {
-            canvas.disk(at, radius - 0.3, panel.fills[grain], panel.outline, 0.6);
+        if frame.shows(at, radius) {
+            // the outline of a tiny disk must not hide its fill
+            let outline = (0.15 * radius).min(0.6);
+            canvas.disk(at, radius - 0.5 * outline, &panel.fills[grain], panel.outline, outline);
         }
     }
+    // lines between grains that are drawn tiny must not run into one another
+    let diameter = 2.0 * frame.scale * sample.radius.iter().sum::<f64>() / sample.radius.len() as f64;
+    let widest = (0.6 * diameter).max(1.0);
     for link in &panel.links {
         let ends = [&link.from, &link.to].map(|point| frame.at(sample.flat(point)));
         if ends.iter().all(|&end| frame.shows(end, 2.0)) {
-            canvas.line(ends[0], ends[1], link.colour, link.width);
+            canvas.line(ends[0], ends[1], &link.colour, link.width.min(widest));
         }
     }
+    for arrow in &panel.arrows {
+        let [from, to] = [&arrow.from, &arrow.to].map(|point| frame.at(sample.flat(point)));
+        draw_arrow(canvas, from, to);
+    }
     canvas.end_clip();
+}
+
+/// An arrow with an open head that grows with it.
+fn draw_arrow(canvas: &mut Canvas, from: (f64, f64), to: (f64, f64)) {
+    let (x, y) = (to.0 - from.0, to.1 - from.1);
+    let length = x.hypot(y);
+    // shorter than a pixel shows no direction
+    if length < 1.0 {
+        return;
+    }
+    let head = (0.35 * length).min(6.0) / length;
+    let back = |side: f64| (to.0 - head * (x - 0.5 * side * y), to.1 - head * (y + 0.5 * side * x));
+    // a white rim keeps it visible on dark grains
+    for (colour, width) in [("#ffffff", 3.0), (colour::BLACK, 1.2)] {
+        for (from, to) in [(from, to), (to, back(-1.0)), (to, back(1.0))] {
+            canvas.line(from, to, colour, width);
+        }
+    }
 }
 
 fn draw_wall(canvas: &mut Canvas, sample: &Sample, wall: &Wall, position: &[f64], frame: &Frame) {
@@ -246,90 +332,5 @@ fn draw_plane(canvas: &mut Canvas, point: [f64; 2], normal: [f64; 2], frame: &Fr
         let from = at(s);
         let to = (from.0 - HATCH * (n.0 + t.0) * 0.8, from.1 - HATCH * (n.1 + t.1) * 0.8);
         canvas.line(from, to, colour::GREY, 0.8);
-    }
-}
-
-/// A bar of a round length, at most a third of the panel.
-fn scale_bar(canvas: &mut Canvas, (x, y): (f64, f64), scale: f64, width: f64) {
-    let longest = width / 3.0 / scale;
-    let power = 10f64.powf(longest.log10().floor());
-    let length = [5.0, 2.0, 1.0].into_iter().map(|m| m * power).find(|l| *l <= longest).unwrap_or(power);
-    let (from, to) = (x + 2.0 * HATCH, x + 2.0 * HATCH + length * scale);
-    canvas.line((from, y), (to, y), colour::BLACK, 2.0);
-    for end in [from, to] {
-        canvas.line((end, y - 4.0), (end, y + 4.0), colour::BLACK, 1.2);
-    }
-    canvas.text((to + 8.0, y + 5.0), &metres(length), 14, Anchor::Start);
-}
-
-/// A round length with the unit that suits it.
-fn metres(length: f64) -> String {
-    let (value, unit) = match length {
-        l if l < 1e-3 => (l * 1e6, "µm"),
-        l if l < 1.0 => (l * 1e3, "mm"),
-        l => (l, "m"),
-    };
-    format!("{value:.0} {unit}")
-}
-
-/// Width of an entry of the legend, from the number of its characters.
-fn key_width(key: &Key) -> f64 {
-    let (Key::Disk(_, _, text) | Key::Line(_, _, text)) = key;
-    46.0 + 8.2 * text.chars().count() as f64
-}
-
-/// The legend in rows that fit `width`.
-fn legend_rows(legend: &[Key], width: f64) -> Vec<Vec<&Key>> {
-    let mut rows: Vec<Vec<&Key>> = vec![];
-    let mut used = f64::INFINITY;
-    for key in legend {
-        used += key_width(key);
-        if used > width - 2.0 * MARGIN {
-            rows.push(vec![]);
-            used = key_width(key);
-        }
-        if let Some(row) = rows.last_mut() {
-            row.push(key);
-        }
-    }
-    rows
-}
-
-fn draw_legend(canvas: &mut Canvas, row: &[&Key], (middle, y): (f64, f64)) {
-    let total: f64 = row.iter().map(|key| key_width(key)).sum();
-    let mut x = middle - 0.5 * total;
-    for key in row {
-        let text = match key {
-            Key::Disk(fill, outline, text) => {
-                canvas.disk((x + 17.0, y), 7.0, fill, outline, 1.0);
-                text
-            }
-            Key::Line(colour, width, text) => {
-                canvas.line((x + 4.0, y), (x + 28.0, y), colour, *width);
-                text
-            }
-        };
-        canvas.text((x + 34.0, y + 5.0), text, 14, Anchor::Start);
-        x += key_width(key);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn lengths_are_round() {
-        for (length, text) in [(1e-2, "10 mm"), (5e-4, "500 µm"), (2.0, "2 m")] {
-            assert_eq!(metres(length), text);
-        }
-    }
-
-    #[test]
-    fn a_legend_breaks_into_rows_that_fit() {
-        let key = || Key::Line(colour::BLUE, 1.0, "twenty characters ...".into());
-        let legend = [key(), key(), key()];
-        let rows = legend_rows(&legend, 2.0 * key_width(&legend[0]) + 2.0 * MARGIN + 1.0);
-        assert_eq!(rows.iter().map(Vec::len).collect::<Vec<_>>(), [2, 1]);
     }
 }

@@ -1,21 +1,44 @@
-//! Cracks: the bonds that broke, when, where and how; what they leave of the sample.
+//! Cracks: the bonds that broke, when, where and how; the lines they make, how these grow, and what they leave of the
+//! sample.
+//!
+//! What a crack, its path and its front are: [`paths`] and [`front`]. Lines are found in the plane only; in 3D the
+//! ruptures are listed and counted.
 
-use dem_run::history::{BondStatus, History, Rupture, RuptureMode};
+use dem_run::history::{History, Rupture, RuptureMode};
 use serde::Serialize;
 
 use crate::fragments::{Fragments, fragments};
-use crate::map::{Key, Panel, Sample, draw};
-use crate::moments;
-use crate::output::{Folder, PostError, Result, Text, facts, number, quantity};
-use crate::plot::{Chart, Drawing, Style, colour};
-use crate::row;
+use crate::output::{PostError, Result, Text, facts, number, quantity};
+
+pub use files::write;
+
+mod files;
+pub mod front;
+pub mod paths;
+pub mod pictures;
+pub mod voids;
+
+use front::{Front, Growth, fronts, growth};
+use paths::{Crack, Paths};
 
 /// Events that the table on the terminal shows; the CSV has them all.
 const SHOWN: usize = 12;
-/// Fill of grains that kept all their bonds.
-const BONDED: &str = "#8c8c8c";
-/// Fill of grains that lost a bond: white, as in the paper.
-const RELEASED: &str = "#ffffff";
+/// Cracks that it shows.
+const CRACKS: usize = 6;
+
+/// The columns of the table of cracks.
+pub const CRACK_HEAD: [&str; 10] = [
+    "crack",
+    "bonds",
+    "T/S/R",
+    "length (mm)",
+    "path (mm)",
+    "end to end (mm)",
+    "tortuosity",
+    "orientation (°)",
+    "first (s)",
+    "last (s)",
+];
 
 /// A number for each way to break.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -98,6 +121,15 @@ pub struct Report {
     pub events: Vec<Event>,
     /// The pieces, frame by frame.
     pub fragments: Vec<Pieces>,
+    /// The cracks, the longest first; empty in 3D.
+    pub cracks: Vec<Crack>,
+    /// How they grew, crack by crack.
+    pub fronts: Vec<Front>,
+    /// The cracks as they were after each round of breaks.
+    pub growth: Vec<Growth>,
+    /// The cracks with their segments.
+    #[serde(skip)]
+    pub paths: Paths,
 }
 
 /// Reads what became of the bonds.
@@ -120,6 +152,12 @@ pub fn read(history: &History) -> Result<Report> {
         pieces.push(Pieces { step, time, fragments });
     }
     let five = (bonds.len() as f64 * 0.05).ceil() as usize;
+    let paths = if history.dimension() == 2 && history.frames() > 0 {
+        let position: Vec<[f64; 2]> = history.grain_state(0)?.position.chunks(2).map(|x| [x[0], x[1]]).collect();
+        Paths::find(&position, &history.grains()?.radius, &bonds, &ruptures)
+    } else {
+        Paths::default()
+    };
     Ok(Report {
         bonds: bonds.len(),
         broken,
@@ -127,6 +165,10 @@ pub fn read(history: &History) -> Result<Report> {
         time_of_5_percent: ruptures.get(five.saturating_sub(1)).map(|rupture| rupture.time),
         events: ruptures.iter().map(Event::from).collect(),
         fragments: pieces,
+        cracks: paths.cracks.clone(),
+        fronts: fronts(&paths, &ruptures),
+        growth: growth(&paths, &ruptures),
+        paths,
     })
 }
 
@@ -188,9 +230,16 @@ impl Report {
                 ),
             ),
         ]);
-        if self.events.is_empty() {
-            return out;
+        if !self.events.is_empty() {
+            out += &format!("\n{}", self.event_table());
         }
+        if !self.cracks.is_empty() {
+            out += &format!("\n{}", self.crack_table());
+        }
+        out
+    }
+
+    fn event_table(&self) -> String {
         let mut table =
             Text::new(&["time (s)", "step", "round", "bond", "grains", "mode", "r_n (N)", "r_t (N)", "m (N m)"]);
         for e in self.events.iter().take(SHOWN) {
@@ -207,140 +256,36 @@ impl Report {
                 number(e.moment),
             ]);
         }
-        out += "\n";
-        out += &table.lines();
-        if self.events.len() > SHOWN {
-            out += &format!("… and {} more in ruptures.csv\n", self.events.len() - SHOWN);
-        }
-        out
+        let rest = self.events.len().saturating_sub(SHOWN);
+        table.lines() + &if rest > 0 { format!("… and {rest} more in ruptures.csv\n") } else { String::new() }
     }
-}
 
-/// Writes `ruptures.csv`, `broken.csv`, `fragments.csv`, and as drawings `broken`, `fragments` and `decohesion`; the map
-/// shows the moments nearest to `times` (s), or chosen ones.
-///
-/// # Errors
-/// [`PostError::Write`], and [`PostError::Usage`] for times outside the history.
-pub fn write(history: &History, report: &Report, times: &[f64], folder: &mut Folder) -> Result<()> {
-    let frames = moments::chosen(history, times)?;
-    write_ruptures(report, folder)?;
-    let curve = broken_over_time(&report.events);
-    let rows = curve.iter().map(|(time, n)| row![time, n[0], n[1], n[2], n.iter().sum::<usize>()]);
-    folder.table("broken", &["time_s", "tension", "shear", "rolling", "total"], rows)?;
-    let rows = report.fragments.iter().map(|pieces| {
-        let f = pieces.fragments;
-        row![pieces.step, pieces.time, f.count, f.singles, f.largest, f.largest_mass_fraction]
-    });
-    folder.table(
-        "fragments",
-        &["step", "time_s", "fragments", "single_grains", "largest_grains", "largest_mass_fraction"],
-        rows,
-    )?;
-    let end = history.times().last().copied().unwrap_or(0.0);
-    folder.draw("broken", &Chart::draw(vec![broken_chart(&curve, end)]))?;
-    folder.draw("fragments", &Chart::draw(fragment_charts(&report.fragments)))?;
-    Ok(folder.draw("decohesion", &decohesion(history, &frames)?)?)
-}
-
-fn write_ruptures(report: &Report, folder: &mut Folder) -> Result<()> {
-    let head = [
-        "step",
-        "time_s",
-        "round",
-        "bond",
-        "grain_i",
-        "grain_j",
-        "mode",
-        "x_m",
-        "y_m",
-        "z_m",
-        "normal_force_N",
-        "tangential_force_N",
-        "moment_Nm",
-        "energy_J",
-    ];
-    let rows = report.events.iter().map(|e| {
-        row![
-            e.step,
-            e.time,
-            e.round,
-            e.bond,
-            e.grains[0],
-            e.grains[1],
-            e.mode,
-            e.point[0],
-            e.point[1],
-            e.point[2],
-            e.normal_force,
-            e.tangential_force,
-            e.moment,
-            e.energy
-        ]
-    });
-    Ok(folder.table("ruptures", &head, rows)?)
-}
-
-fn broken_chart(curve: &[(f64, [usize; 3])], end: f64) -> Chart {
-    let points = |count: &dyn Fn(&[usize; 3]) -> usize| -> Vec<(f64, f64)> {
-        let last = curve.last().map_or(0, |(_, n)| count(n));
-        let inner = curve.iter().map(|(time, n)| (*time, count(n) as f64));
-        std::iter::once((0.0, 0.0)).chain(inner).chain([(end, last as f64)]).collect()
-    };
-    let mut chart = Chart::new("time (s)", "broken bonds")
-        .curve("all", colour::BLACK, Style::Steps, points(&|n| n.iter().sum()))
-        .curve("tension", colour::BLUE, Style::Steps, points(&|n| n[0]))
-        .curve("shear", colour::VERMILLION, Style::Steps, points(&|n| n[1]))
-        .curve("rolling", colour::GREEN, Style::Steps, points(&|n| n[2]));
-    chart.counts = true;
-    chart
-}
-
-fn fragment_charts(pieces: &[Pieces]) -> Vec<Chart> {
-    let points = |value: &dyn Fn(&Fragments) -> f64| pieces.iter().map(|p| (p.time, value(&p.fragments))).collect();
-    let mut number = Chart::new("time (s)", "number of fragments")
-        .curve("all", colour::BLACK, Style::Steps, points(&|f| f.count as f64))
-        .curve("single grains", colour::VERMILLION, Style::Steps, points(&|f| f.singles as f64));
-    number.counts = true;
-    let largest = Chart::new("time (s)", "largest fragment (% of the mass)").curve(
-        "largest fragment",
-        colour::BLUE,
-        Style::Steps,
-        points(&|f| 100.0 * f.largest_mass_fraction),
-    );
-    vec![number, largest]
-}
-
-/// The decohesion map: grains that lost a bond in white.
-fn decohesion(history: &History, frames: &[usize]) -> Result<Drawing> {
-    let bonds = history.bonds()?;
-    let sample = Sample::read(history)?;
-    let mut panels = vec![];
-    for &frame in frames {
-        let status = history.bond_status(frame)?;
-        let grains = history.grain_state(frame)?;
-        let mut fills = vec![BONDED; history.grains()?.radius.len()];
-        let mut broken = 0;
-        for ([i, j], _) in bonds.pair.iter().zip(&status).filter(|(_, status)| **status != BondStatus::Intact) {
-            (fills[*i as usize], fills[*j as usize]) = (RELEASED, RELEASED);
-            broken += 1;
-        }
-        panels.push(Panel {
-            caption: vec![
-                format!("t = {} s", number(history.times()[frame])),
-                format!("{broken} of {} bonds broken", bonds.len()),
-            ],
-            grains,
-            walls: history.wall_state(frame)?,
-            fills,
-            outline: "#404040",
-            links: vec![],
-        });
+    /// The longest cracks, one a line, as [`CRACK_HEAD`] has them.
+    pub fn crack_rows(&self) -> Vec<Vec<String>> {
+        let row = |crack: &Crack| {
+            let Modes { tension, shear, rolling } = crack.modes;
+            vec![
+                crack.number.to_string(),
+                crack.bonds.to_string(),
+                format!("{tension}/{shear}/{rolling}"),
+                number(1e3 * crack.length),
+                number(1e3 * crack.path_length),
+                number(1e3 * crack.end_to_end),
+                number(crack.tortuosity),
+                format!("{:.0}", crack.orientation),
+                number(crack.first),
+                number(crack.last),
+            ]
+        };
+        self.cracks.iter().take(CRACKS).map(row).collect()
     }
-    let legend = [
-        Key::Disk(BONDED, "#404040", "all bonds intact".into()),
-        Key::Disk(RELEASED, "#404040", "lost at least one bond".into()),
-    ];
-    Ok(draw(&sample, &panels, &legend))
+
+    fn crack_table(&self) -> String {
+        let mut table = Text::new(&CRACK_HEAD);
+        self.crack_rows().into_iter().for_each(|row| table.row(row));
+        let rest = self.cracks.len().saturating_sub(CRACKS);
+        table.lines() + &if rest > 0 { format!("… and {rest} more in cracks.csv\n") } else { String::new() }
+    }
 }
 
 #[cfg(test)]

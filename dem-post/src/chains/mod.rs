@@ -1,26 +1,43 @@
-//! Force chains: the network of contact forces, and how the forces are distributed.
+//! Force chains: the network of contact forces, how the forces are distributed, and the lines of grains that carry most.
 //!
-//! A force here is the normal component r_n of a contact, positive in compression. ⟨f⟩ is the mean of |r_n| over the
+//! **Network.** A force here is the normal component r_n of a contact, positive in compression. ⟨f⟩ is the mean of |r_n| over the
 //! contacts that carry a force; the strong network is the contacts with |r_n| > ⟨f⟩.
+//!
+//! **Chains** are lines of at least three grains: [`quasilinear`] says which.
 
 use dem_run::history::{ContactRows, History};
 use serde::Serialize;
 
-use crate::map::{Key, Link, Panel, Sample, draw};
 use crate::moments;
-use crate::output::{Folder, PostError, Result, Text, number, short};
-use crate::plot::{Chart, Drawing, Style, colour};
+use crate::output::{Folder, PostError, Result, Text, number};
+use crate::plot::Chart;
 use crate::row;
+
+pub mod pictures;
+pub mod quasilinear;
+pub mod stress;
+
+use pictures::{chain_map, distribution_chart, length_charts, network_map};
+use quasilinear::{Chains, Kind, find};
+use stress::{grain_stress, thickness};
 
 /// A contact carries a force if it has this share of the greatest.
 const CARRIES: f64 = 1e-9;
-/// Width of a line that carries ⟨f⟩, and the greatest width, units of the drawing.
-const WIDTH: (f64, f64) = (1.3, 8.0);
 /// Width of a bin of |f|/⟨f⟩, and the least number of forces in one.
 const BIN: f64 = 0.25;
 const LEAST: usize = 5;
-/// Colours of the weak network, compression and tension.
-const PALE: [&str; 2] = ["#9cc9e3", "#f0b27a"];
+
+/// The columns of the table of chains.
+pub const CHAIN_HEAD: [&str; 8] = [
+    "time (s)",
+    "chains in",
+    "number",
+    "mean length (grains)",
+    "longest",
+    "grains in chains",
+    "share of the force",
+    "mean load (kPa)",
+];
 
 /// What the forces of one moment are like.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -43,6 +60,29 @@ pub struct Statistics {
     pub spread: f64,
 }
 
+/// The chains of one kind at one moment, in numbers.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ChainFigures {
+    /// Compression or tension.
+    pub kind: Kind,
+    /// Number of chains.
+    pub count: usize,
+    /// Grains in chains.
+    pub grains: usize,
+    /// Share of all grains, 0 to 1.
+    pub grain_share: f64,
+    /// Share of the sum of normal forces of this kind that the links of chains carry, 0 to 1.
+    pub load_share: f64,
+    /// Mean number of grains of a chain; 0 without chains.
+    pub mean_length: f64,
+    /// Grains of the longest chain.
+    pub longest: usize,
+    /// Mean load of the grains whose load is positive, Pa.
+    pub mean_load: f64,
+    /// How many chains have how many grains: (grains, chains).
+    pub lengths: Vec<(usize, usize)>,
+}
+
 /// The network at one moment.
 #[derive(Clone, Debug, Serialize)]
 pub struct Network {
@@ -57,6 +97,11 @@ pub struct Network {
     pub statistics: Statistics,
     /// Density of |r_n|/⟨f⟩ in bins: (middle of the bin, density).
     pub distribution: Vec<(f64, f64)>,
+    /// The chains in compression and in tension, in numbers.
+    pub chain_figures: Vec<ChainFigures>,
+    /// These chains.
+    #[serde(skip)]
+    pub chains: Vec<Chains>,
     /// The contacts.
     #[serde(skip)]
     pub contacts: ContactRows,
@@ -73,21 +118,12 @@ pub struct Report {
 ///
 /// # Errors
 /// [`PostError::Usage`] for times outside the history; [`PostError::Lacking`] where no contact carries a force at any
-/// of them.
+/// of them, or where forces were not recorded.
 pub fn read(history: &History, times: &[f64]) -> Result<Report> {
+    require_reactions(history)?;
     let mut networks = vec![];
     for frame in moments::chosen(history, times)? {
-        let contacts = history.contacts(frame)?;
-        let forces: Vec<f64> = (0..contacts.len()).map(|c| contacts.normal_force(c)).collect();
-        let statistics = statistics(&forces);
-        networks.push(Network {
-            frame,
-            step: history.steps()[frame],
-            time: history.times()[frame],
-            statistics,
-            distribution: distribution(&forces, statistics.mean),
-            contacts,
-        });
+        networks.push(network(history, frame)?);
     }
     if networks.iter().all(|network| network.statistics.contacts == 0) {
         let moments: Vec<String> = networks.iter().map(|network| format!("{} s", number(network.time))).collect();
@@ -95,6 +131,63 @@ pub fn read(history: &History, times: &[f64]) -> Result<Report> {
         return Err(PostError::Lacking { path: history.path().into(), what });
     }
     Ok(Report { networks })
+}
+
+/// That the history holds the reactions of its contacts.
+///
+/// # Errors
+/// [`PostError::Lacking`] where its scene left them out.
+pub fn require_reactions(history: &History) -> Result<()> {
+    if history.has_reactions() {
+        return Ok(());
+    }
+    let what = "its scene left the reactions out: run it with output.reactions=true".into();
+    Err(PostError::Lacking { path: history.path().into(), what })
+}
+
+/// The network at frame `frame`.
+fn network(history: &History, frame: usize) -> Result<Network> {
+    let (contacts, d) = (history.contacts(frame)?, history.dimension());
+    let forces: Vec<f64> = (0..contacts.len()).map(|c| contacts.normal_force(c)).collect();
+    let statistics = statistics(&forces);
+    let (radius, position) = (history.grains()?.radius, history.grain_state(frame)?.position);
+    let stress = grain_stress(&contacts, &position, &radius, d, thickness(history)?);
+    let chains = [Kind::Compression, Kind::Tension].map(|kind| find(kind, &contacts, &position, &stress, d)).to_vec();
+    Ok(Network {
+        frame,
+        step: history.steps()[frame],
+        time: history.times()[frame],
+        statistics,
+        distribution: distribution(&forces, statistics.mean),
+        chain_figures: chains.iter().map(|chains| figures(chains, radius.len())).collect(),
+        chains,
+        contacts,
+    })
+}
+
+/// The chains in numbers, in a sample of `grains` grains.
+fn figures(chains: &Chains, grains: usize) -> ChainFigures {
+    let count = chains.chains.len();
+    let members: usize = chains.chains.iter().map(Vec::len).sum();
+    let mut lengths: Vec<(usize, usize)> = vec![];
+    // the longest come first
+    for chain in chains.chains.iter().rev() {
+        match lengths.last_mut() {
+            Some((length, number)) if *length == chain.len() => *number += 1,
+            _ => lengths.push((chain.len(), 1)),
+        }
+    }
+    ChainFigures {
+        kind: chains.kind,
+        count,
+        grains: members,
+        grain_share: members as f64 / grains as f64,
+        load_share: chains.share,
+        mean_length: if count > 0 { members as f64 / count as f64 } else { 0.0 },
+        longest: chains.chains.first().map_or(0, Vec::len),
+        mean_load: chains.mean,
+        lengths,
+    }
 }
 
 /// Magnitudes of the forces that count.
@@ -123,7 +216,8 @@ pub fn statistics(forces: &[f64]) -> Statistics {
         greatest_compression,
         greatest_tension,
         strong: strong.len(),
-        strong_share: strong.iter().sum::<f64>() / sum,
+        // the sum of nothing is −0.0, which would be printed so
+        strong_share: (0.0 + strong.iter().sum::<f64>()) / sum,
         spread: variance.sqrt() / mean,
     }
 }
@@ -180,11 +274,37 @@ impl Report {
                 number(s.spread),
             ]);
         }
+        table.lines() + "\n" + &self.chain_table()
+    }
+
+    /// The chains at each moment, one kind a line, as [`CHAIN_HEAD`] has them.
+    pub fn chain_rows(&self) -> Vec<Vec<String>> {
+        let rows = self.networks.iter().flat_map(|network| network.chain_figures.iter().map(|f| (network.time, f)));
+        let row = |(time, f): (f64, &ChainFigures)| {
+            vec![
+                number(time),
+                f.kind.label().into(),
+                f.count.to_string(),
+                format!("{:.1}", f.mean_length),
+                f.longest.to_string(),
+                format!("{} ({:.1} %)", f.grains, 100.0 * f.grain_share),
+                format!("{:.1} %", 100.0 * f.load_share),
+                number(1e-3 * f.mean_load),
+            ]
+        };
+        rows.map(row).collect()
+    }
+
+    fn chain_table(&self) -> String {
+        let mut table = Text::new(&CHAIN_HEAD);
+        self.chain_rows().into_iter().for_each(|row| table.row(row));
         table.lines()
     }
 }
 
-/// Writes `forces.csv`, `distribution.csv`, and as drawings `chains` and `distribution`.
+/// Writes `forces.csv`, `distribution.csv`, `force-chains.csv`, `force-chain-lengths.csv`, and as drawings `chains` (the
+/// network), `distribution`, `force-chains` and, where chains differ in length,
+/// `force-chain-lengths`.
 ///
 /// # Errors
 /// [`PostError::Write`].
@@ -216,63 +336,39 @@ pub fn write(history: &History, report: &Report, folder: &mut Folder) -> Result<
     });
     folder.table("distribution", &["step", "time_s", "ratio_to_mean", "density"], rows)?;
     folder.draw("chains", &network_map(history, report)?)?;
-    Ok(folder.draw("distribution", &Chart::draw(vec![distribution_chart(report)]))?)
-}
-
-fn distribution_chart(report: &Report) -> Chart {
-    let mut chart = Chart::new("normal force over its mean, |f|/⟨f⟩", "probability density");
-    (chart.log_y, chart.set_off) = (true, true);
-    for (k, network) in report.networks.iter().enumerate() {
-        let colour = colour::CYCLE[k % colour::CYCLE.len()];
-        let label = format!("t = {} s", number(network.time));
-        chart = chart.curve(&label, colour, Style::Marked, network.distribution.clone());
+    folder.draw("distribution", &Chart::draw(vec![distribution_chart(report)]))?;
+    write_chains(report, folder)?;
+    folder.draw("force-chains", &chain_map(history, report)?)?;
+    let charts = length_charts(report);
+    if !charts.is_empty() {
+        folder.draw("force-chain-lengths", &Chart::draw(charts))?;
     }
-    chart
+    Ok(())
 }
 
-/// The map of the network: a line for each contact between the centres, or from a centre to the point on a wall.
-fn network_map(history: &History, report: &Report) -> Result<Drawing> {
-    let sample = Sample::read(history)?;
-    let grains = history.grains()?.radius.len();
-    let mut panels = vec![];
+fn write_chains(report: &Report, folder: &mut Folder) -> Result<()> {
+    let head =
+        ["step", "time_s", "kind", "chain", "place", "grain", "load_Pa", "direction_x", "direction_y", "direction_z"];
+    let mut rows = vec![];
     for network in &report.networks {
-        let state = history.grain_state(network.frame)?;
-        let s = network.statistics;
-        panels.push(Panel {
-            caption: vec![format!("t = {} s", number(network.time)), format!("⟨f⟩ = {} N", short(s.mean))],
-            links: links(&network.contacts, &state.position, s.mean, history.dimension()),
-            grains: state,
-            walls: history.wall_state(network.frame)?,
-            fills: vec!["#f4f4f4"; grains],
-            outline: "#c4c4c4",
-        });
-    }
-    let legend = [
-        Key::Line(colour::BLUE, 3.0 * WIDTH.0, "compression, 3⟨f⟩".into()),
-        Key::Line(colour::VERMILLION, 3.0 * WIDTH.0, "tension, 3⟨f⟩".into()),
-        Key::Line(PALE[0], 0.7 * WIDTH.0, "weak compression".into()),
-        Key::Line(PALE[1], 0.7 * WIDTH.0, "weak tension".into()),
-    ];
-    Ok(draw(&sample, &panels, &legend))
-}
-
-/// The lines of a network, the strongest last, so that they lie on top.
-fn links(contacts: &ContactRows, position: &[f64], mean: f64, d: usize) -> Vec<Link> {
-    let centre = |grain: i32| position[grain as usize * d..(grain as usize + 1) * d].to_vec();
-    let mut order: Vec<usize> =
-        (0..contacts.len()).filter(|&c| contacts.normal_force(c).abs() > CARRIES * mean).collect();
-    order.sort_by(|&a, &b| contacts.normal_force(a).abs().total_cmp(&contacts.normal_force(b).abs()));
-    let link = |c: usize| {
-        let ([i, j], force) = (contacts.pair[c], contacts.normal_force(c));
-        let (ratio, tension) = (force.abs() / mean, usize::from(force < 0.0));
-        Link {
-            from: centre(i),
-            to: if j < 0 { contacts.point[c * d..(c + 1) * d].to_vec() } else { centre(j) },
-            width: (WIDTH.0 * ratio).min(WIDTH.1),
-            colour: if ratio > 1.0 { [colour::BLUE, colour::VERMILLION][tension] } else { PALE[tension] },
+        for chains in &network.chains {
+            let members =
+                chains.chains.iter().enumerate().flat_map(|(k, chain)| chain.iter().enumerate().map(move |m| (k, m)));
+            for (k, (place, &grain)) in members {
+                let (kind, load, [x, y, z]) = (chains.kind.label(), chains.load[grain], chains.direction[grain]);
+                rows.push(row![network.step, network.time, kind, k + 1, place + 1, grain, load, x, y, z]);
+            }
         }
-    };
-    order.into_iter().map(link).collect()
+    }
+    folder.table("force-chains", &head, rows.into_iter())?;
+    let rows = report.networks.iter().flat_map(|network| {
+        network.chain_figures.iter().flat_map(move |f| {
+            f.lengths
+                .iter()
+                .map(move |(grains, chains)| row![network.step, network.time, f.kind.label(), grains, chains])
+        })
+    });
+    Ok(folder.table("force-chain-lengths", &["step", "time_s", "kind", "grains", "chains"], rows)?)
 }
 
 #[cfg(test)]
@@ -320,19 +416,5 @@ mod tests {
         let density = distribution(&forces, statistics(&forces).mean);
         assert_eq!(density.len(), 1);
         assert_eq!(density[0].0, 0.5 * 10.75);
-    }
-
-    #[test]
-    fn lines_join_centres_or_end_on_the_wall() {
-        let contacts = ContactRows {
-            pair: vec![[0, 1], [1, -1]],
-            point: vec![0.5, 0.0, 1.0, -0.5],
-            reaction: vec![-3.0, 0.0, 1.0, 0.0],
-            ..ContactRows::default()
-        };
-        let lines = links(&contacts, &[0.0, 0.0, 1.0, 0.0], 2.0, 2);
-        // the stronger one comes last
-        assert_eq!((lines[0].from.as_slice(), lines[0].to.as_slice()), (&[1.0, 0.0][..], &[1.0, -0.5][..]));
-        assert_eq!((lines[1].to.as_slice(), lines[1].colour), (&[1.0, 0.0][..], colour::VERMILLION));
     }
 }

@@ -1,0 +1,174 @@
+//! The drawings of forces and chains.
+
+use dem_run::history::{ContactRows, History};
+
+use super::{CARRIES, Report};
+use crate::map::{Key, Link, Panel, Sample, draw};
+use crate::output::{Result, number, short};
+use crate::plot::{Chart, Drawing, Style, colour};
+
+/// Width of a line that carries ⟨f⟩, and the greatest width, units of the drawing.
+const WIDTH: (f64, f64) = (1.3, 8.0);
+/// Colours of the weak network, compression and tension; of grains in chains, too.
+const PALE: [&str; 2] = ["#9cc9e3", "#f0b27a"];
+/// Fill and outline of other grains.
+const GRAIN: [&str; 2] = ["#f4f4f4", "#c4c4c4"];
+/// Width of the line of a chain.
+const CHAIN: f64 = 3.0;
+
+/// The lines that a map of forces needs in its legend.
+pub fn force_legend() -> Vec<Key> {
+    vec![
+        Key::Line(colour::BLUE, 3.0 * WIDTH.0, "compression, 3⟨f⟩".into()),
+        Key::Line(colour::VERMILLION, 3.0 * WIDTH.0, "tension, 3⟨f⟩".into()),
+        Key::Line(PALE[0], 0.7 * WIDTH.0, "weak compression".into()),
+        Key::Line(PALE[1], 0.7 * WIDTH.0, "weak tension".into()),
+    ]
+}
+
+/// How many chains have at least so many grains, at each moment: a chart for each kind of
+/// which there are chains of two lengths.
+pub fn length_charts(report: &Report) -> Vec<Chart> {
+    let mut charts = vec![];
+    for (kind, label) in [(0, "chains in compression"), (1, "chains in tension")] {
+        let mut chart = Chart::new("grains, at least", label);
+        (chart.set_off, chart.log_y) = (true, true);
+        for (k, network) in report.networks.iter().enumerate() {
+            let Some(figures) = network.chain_figures.get(kind).filter(|figures| figures.count > 0) else {
+                continue;
+            };
+            let mut left = figures.count;
+            let mut points = vec![];
+            for &(grains, chains) in &figures.lengths {
+                points.push((grains as f64, left as f64));
+                left -= chains;
+            }
+            let colour = colour::CYCLE[k % colour::CYCLE.len()];
+            chart = chart.curve(&format!("t = {} s", number(network.time)), colour, Style::Marked, points);
+        }
+        // a single point is no distribution
+        if chart.curves.iter().any(|curve| curve.points.len() > 1) {
+            charts.push(chart);
+        }
+    }
+    charts
+}
+
+/// The map of the chains: their grains filled, a line through the centres.
+///
+/// # Errors
+/// Those of reading the history.
+pub fn chain_map(history: &History, report: &Report) -> Result<Drawing> {
+    let d = history.dimension();
+    let grains = history.grains()?.radius.len();
+    let mut panels = vec![];
+    for network in &report.networks {
+        let state = history.grain_state(network.frame)?;
+        let centre = |grain: usize| state.position[grain * d..(grain + 1) * d].to_vec();
+        let (mut fills, mut links) = (vec![GRAIN[0].into(); grains], vec![]);
+        for (k, chains) in network.chains.iter().enumerate() {
+            for chain in &chains.chains {
+                chain.iter().for_each(|&grain| fills[grain] = PALE[k].into());
+                let colour = [colour::BLUE, colour::VERMILLION][k];
+                links.extend(chain.windows(2).map(|pair| Link {
+                    from: centre(pair[0]),
+                    to: centre(pair[1]),
+                    width: CHAIN,
+                    colour: colour.into(),
+                }));
+            }
+        }
+        let number_of = |k: usize| network.chain_figures[k].count;
+        panels.push(Panel {
+            caption: vec![
+                format!("t = {} s", number(network.time)),
+                format!("chains: {} in compression, {} in tension", number_of(0), number_of(1)),
+            ],
+            walls: history.wall_state(network.frame)?,
+            grains: state,
+            fills,
+            outline: GRAIN[1],
+            links,
+            arrows: vec![],
+        });
+    }
+    let legend = [
+        Key::Line(colour::BLUE, CHAIN, "chain in compression".into()),
+        Key::Line(colour::VERMILLION, CHAIN, "chain in tension".into()),
+    ];
+    Ok(draw(&Sample::read(history)?, &panels, &legend))
+}
+
+/// The distributions of the forces at each moment.
+pub fn distribution_chart(report: &Report) -> Chart {
+    let mut chart = Chart::new("normal force over its mean, |f|/⟨f⟩", "probability density");
+    (chart.log_y, chart.set_off) = (true, true);
+    for (k, network) in report.networks.iter().enumerate() {
+        let colour = colour::CYCLE[k % colour::CYCLE.len()];
+        let label = format!("t = {} s", number(network.time));
+        chart = chart.curve(&label, colour, Style::Marked, network.distribution.clone());
+    }
+    chart
+}
+
+/// The map of the network: a line for each contact between the centres, or from a centre to the point on a wall.
+///
+/// # Errors
+/// Those of reading the history.
+pub fn network_map(history: &History, report: &Report) -> Result<Drawing> {
+    let sample = Sample::read(history)?;
+    let grains = history.grains()?.radius.len();
+    let mut panels = vec![];
+    for network in &report.networks {
+        let state = history.grain_state(network.frame)?;
+        let s = network.statistics;
+        panels.push(Panel {
+            caption: vec![format!("t = {} s", number(network.time)), format!("⟨f⟩ = {} N", short(s.mean))],
+            links: links(&network.contacts, &state.position, s.mean, history.dimension()),
+            grains: state,
+            walls: history.wall_state(network.frame)?,
+            fills: vec![GRAIN[0].into(); grains],
+            outline: GRAIN[1],
+            arrows: vec![],
+        });
+    }
+    Ok(draw(&sample, &panels, &force_legend()))
+}
+
+/// The lines of a network, the strongest last, so that they lie on top.
+pub fn links(contacts: &ContactRows, position: &[f64], mean: f64, d: usize) -> Vec<Link> {
+    let centre = |grain: i32| position[grain as usize * d..(grain as usize + 1) * d].to_vec();
+    let mut order: Vec<usize> =
+        (0..contacts.len()).filter(|&c| contacts.normal_force(c).abs() > CARRIES * mean).collect();
+    order.sort_by(|&a, &b| contacts.normal_force(a).abs().total_cmp(&contacts.normal_force(b).abs()));
+    let link = |c: usize| {
+        let ([i, j], force) = (contacts.pair[c], contacts.normal_force(c));
+        let (ratio, tension) = (force.abs() / mean, usize::from(force < 0.0));
+        Link {
+            from: centre(i),
+            to: if j < 0 { contacts.point[c * d..(c + 1) * d].to_vec() } else { centre(j) },
+            width: (WIDTH.0 * ratio).min(WIDTH.1),
+            colour: if ratio > 1.0 { [colour::BLUE, colour::VERMILLION][tension] } else { PALE[tension] }.into(),
+        }
+    };
+    order.into_iter().map(link).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_join_centres_or_end_on_the_wall() {
+        let contacts = ContactRows {
+            pair: vec![[0, 1], [1, -1]],
+            point: vec![0.5, 0.0, 1.0, -0.5],
+            reaction: vec![-3.0, 0.0, 1.0, 0.0],
+            ..ContactRows::default()
+        };
+        let lines = links(&contacts, &[0.0, 0.0, 1.0, 0.0], 2.0, 2);
+        // the stronger one comes last
+        assert_eq!((lines[0].from.as_slice(), lines[0].to.as_slice()), (&[1.0, 0.0][..], &[1.0, -0.5][..]));
+        assert_eq!((lines[1].to.as_slice(), &*lines[1].colour), (&[1.0, 0.0][..], colour::VERMILLION));
+    }
+}

@@ -1,0 +1,320 @@
+//! What stands in the datasets: numbers, order, and what one dataset says of another.
+
+use std::cmp::Ordering;
+use std::collections::BTreeMap;
+
+use hdf5::H5Type;
+
+use super::{Checker, Sizes};
+
+const STEP: &str = "particles/grains/position/step";
+const TIME: &str = "particles/grains/position/time";
+const STATUS: &str = "bonds/status/value";
+const RUPTURE: &str = "events/rupture";
+/// Codes of an intact bond and of a contact that is one.
+const INTACT: u8 = 0;
+const BONDED: u8 = 3;
+
+/// A rupture with its mode as the number that stands there.
+#[derive(Clone, Copy, H5Type)]
+#[repr(C)]
+struct Event {
+    step: i64,
+    time: f64,
+    x: f64,
+    y: f64,
+    z: f64,
+    rn: f64,
+    rt: f64,
+    m: f64,
+    energy: f64,
+    bond: i32,
+    i: i32,
+    j: i32,
+    mode: i32,
+}
+
+/// When and how a bond broke, by its states: the first frame that does not show it intact.
+type Broken = BTreeMap<usize, (usize, u8)>;
+
+/// Checks all that is sound by its type and shape.
+pub(super) fn check(c: &mut Checker) {
+    let steps = order(c);
+    let rows = committed(c);
+    numbers(c);
+    codes(c, "walls/kind", 4);
+    codes(c, "walls/drive", 3);
+    positive(c);
+    let pairs = bond_pairs(c);
+    let broken = states(c);
+    contacts(c, &rows, &pairs, &broken);
+    events(c, &steps, &pairs, &broken);
+}
+
+/// Steps and times grow, and those of every quantity are those of the frames. The steps of the frames.
+fn order(c: &mut Checker) -> Vec<i64> {
+    for (step, time) in [(STEP, TIME), ("observables/step", "observables/time")] {
+        grows::<i64>(c, step);
+        grows::<f64>(c, time);
+    }
+    let places: Vec<String> = c.sound.keys().cloned().collect();
+    for place in places {
+        let observed = place.starts_with("observables/");
+        let [step, time] = if observed { ["observables/step", "observables/time"] } else { [STEP, TIME] };
+        if place.ends_with("/step") && place != step {
+            alike::<i64>(c, &place, step);
+        } else if place.ends_with("/time") && place != time {
+            alike::<f64>(c, &place, time);
+        }
+    }
+    c.rows(STEP, 0..c.sizes.t).unwrap_or_default()
+}
+
+fn grows<T: H5Type + PartialOrd + Copy + std::fmt::Display>(c: &mut Checker, place: &str) {
+    let mut last: Option<T> = None;
+    c.blocks::<T>(place, |c, start, values| {
+        for (k, value) in values.iter().enumerate() {
+            if let Some(last) = last.filter(|last| value.partial_cmp(last) != Some(Ordering::Greater)) {
+                c.wrong(place, Some(start + k), format!("{value} does not come after {last}"));
+            }
+            last = Some(*value);
+        }
+    });
+}
+
+/// Whether `place` says the same as `other`, which it is as a rule, under another name.
+fn alike<T: H5Type + PartialEq>(c: &mut Checker, place: &str, other: &str) {
+    let token = |c: &Checker, place: &str| c.file.loc_info_by_name(place).map(|info| info.token).ok();
+    if token(c, place).is_some() && token(c, place) == token(c, other) {
+        let [rows, width] = c.sound[place];
+        c.bar.inc((rows * width) as u64);
+        return;
+    }
+    c.blocks::<T>(place, |c, start, values| {
+        let Some(others) = c.rows::<T>(other, start..start + values.len()) else { return };
+        if let Some(k) = values.iter().zip(&others).position(|(a, b)| a != b) {
+            c.wrong(place, Some(start + k), format!("differs from /{other}"));
+        }
+    });
+}
+
+/// Rows complete at each frame: they never become fewer, contacts follow each other without gaps. First row and number
+/// of the contacts of each frame, where they can be trusted.
+fn committed(c: &mut Checker) -> Vec<[u64; 2]> {
+    let t = c.sizes.t;
+    let mut committed = |name: &str| -> Vec<u64> {
+        let place = format!("commit_rows/{name}");
+        let rows = c.rows::<u64>(&place, 0..t).unwrap_or_default();
+        for k in 1..rows.len() {
+            if rows[k] < rows[k - 1] {
+                c.wrong(&place, Some(k), format!("{} rows after {}", rows[k], rows[k - 1]));
+            }
+        }
+        rows
+    };
+    committed("steps");
+    committed("events");
+    let complete = committed("contacts");
+    let starts = c.rows::<u64>("contacts/start", 0..t).unwrap_or_default();
+    let counts = c.rows::<u32>("contacts/count", 0..t).unwrap_or_default();
+    let (mut next, mut found) = (0, vec![]);
+    for (k, ((&start, &count), &complete)) in starts.iter().zip(&counts).zip(&complete).enumerate() {
+        let end = start.saturating_add(count.into());
+        if start != next {
+            c.wrong("contacts/start", Some(k), format!("{start}, where the frame before ends at {next}"));
+        }
+        if end != complete {
+            c.wrong("contacts/count", Some(k), format!("ends at row {end}, and {complete} rows are complete"));
+        }
+        found.push(if end <= c.sizes.m as u64 { [start, count.into()] } else { [0, 0] });
+        next = end;
+    }
+    found
+}
+
+/// Every number of every dataset of floats is finite.
+fn numbers(c: &mut Checker) {
+    let whole = |place: &str| {
+        ["step", "start", "count", "pair", "id", "bond"].contains(&place.rsplit('/').next().unwrap_or(""))
+    };
+    let places: Vec<String> = c.sound.keys().cloned().collect();
+    for place in places {
+        let coded = place == RUPTURE || place == STATUS || place.ends_with("/kind") || place.ends_with("/drive");
+        if coded || whole(&place) || place == "contacts/status" || place.starts_with("commit_rows/") {
+            continue;
+        }
+        let width = c.sound[&place][1].max(1);
+        c.blocks::<f64>(&place, |c, start, values| {
+            for (k, value) in values.iter().enumerate().filter(|(_, value)| !value.is_finite()) {
+                c.wrong(&place, Some(start + k / width), format!("{value} is no finite number"));
+            }
+        });
+    }
+}
+
+/// Every code is one of the first `many`.
+fn codes(c: &mut Checker, place: &str, many: u8) {
+    c.blocks::<u8>(place, |c, start, values| {
+        for (k, code) in values.iter().enumerate().filter(|(_, code)| **code >= many) {
+            c.wrong(place, Some(start + k), format!("code {code} names nothing"));
+        }
+    });
+}
+
+fn positive(c: &mut Checker) {
+    for name in ["radius", "mass"] {
+        let place = format!("particles/grains/{name}");
+        c.blocks::<f64>(&place, |c, start, values| {
+            for (k, value) in values.iter().enumerate().filter(|(_, value)| **value <= 0.0) {
+                c.wrong(&place, Some(start + k), format!("{value} is not positive"));
+            }
+        });
+    }
+}
+
+/// The grains of each bond.
+fn bond_pairs(c: &mut Checker) -> Vec<[i32; 2]> {
+    let Sizes { n, b, .. } = c.sizes;
+    let pairs = c.rows::<i32>("bonds/pair", 0..b).unwrap_or_default().as_chunks().0.to_vec();
+    for (k, [i, j]) in pairs.iter().enumerate() {
+        if i == j || [i, j].iter().any(|grain| !(0..n as i32).contains(*grain)) {
+            c.wrong("bonds/pair", Some(k), format!("{i}, {j} are not two of {n} grains"));
+        }
+    }
+    pairs
+}
+
+/// Bonds go from intact to one way of being broken, and stay.
+fn states(c: &mut Checker) -> Broken {
+    let b = c.sizes.b;
+    let (mut last, mut broken) = (vec![INTACT; b], Broken::new());
+    c.blocks::<u8>(STATUS, |c, start, values| {
+        for (k, row) in values.chunks_exact(b.max(1)).enumerate() {
+            for (bond, (&now, before)) in
+                row.iter().zip(&mut last).enumerate().filter(|(_, (now, last))| *now != &**last)
+            {
+                let frame = start + k;
+                if now > 3 {
+                    c.wrong(STATUS, Some(frame), format!("bond {bond}: code {now} names nothing"));
+                } else if *before != INTACT {
+                    c.wrong(STATUS, Some(frame), format!("bond {bond}: {now} after {before}, broken once and for all"));
+                } else {
+                    broken.entry(bond).or_insert((frame, now));
+                }
+                *before = now;
+            }
+        }
+    });
+    broken
+}
+
+/// Contacts name bodies and bonds that are there; one that is bonded has a bond of its grains that holds.
+fn contacts(c: &mut Checker, rows: &[[u64; 2]], pairs: &[[i32; 2]], broken: &Broken) {
+    let Sizes { n, w, .. } = c.sizes;
+    for (frame, [start, count]) in rows.iter().enumerate() {
+        let (start, end) = (*start as usize, (start + count) as usize);
+        let bodies = c.rows::<i32>("contacts/pair", start..end).unwrap_or_default();
+        let status = c.rows::<u8>("contacts/status", start..end).unwrap_or_default();
+        let bonds = c.rows::<i32>("contacts/bond", start..end).unwrap_or_default();
+        for (k, [i, j]) in bodies.as_chunks().0.iter().enumerate() {
+            if i == j || !(0..n as i32).contains(i) || !(-(w as i32)..n as i32).contains(j) {
+                let what = format!("{i}, {j} are not a grain and another, or a wall, of {n} grains and {w} walls");
+                c.wrong("contacts/pair", Some(start + k), what);
+            }
+        }
+        for (k, code) in status.iter().enumerate().filter(|(_, code)| **code > BONDED) {
+            c.wrong("contacts/status", Some(start + k), format!("code {code} names nothing"));
+        }
+        for (k, &bond) in bonds.iter().enumerate().filter(|_| !pairs.is_empty()) {
+            let what = match usize::try_from(bond).ok().map(|bond| (bond, pairs.get(bond))) {
+                None if bond == -1 => {
+                    status.get(k).filter(|code| **code == BONDED).map(|_| "-1, of a BONDED contact".into())
+                }
+                None | Some((_, None)) => Some(format!("{bond} is none of {} bonds", pairs.len())),
+                Some((bond, Some(pair))) => {
+                    let gone = broken.get(&bond).is_some_and(|(at, _)| *at <= frame);
+                    let same = bodies
+                        .get(2 * k..2 * k + 2)
+                        .is_none_or(|bodies| bodies == pair || bodies == [pair[1], pair[0]]);
+                    if gone {
+                        Some(format!("bond {bond} is broken at frame {frame}"))
+                    } else if !same {
+                        Some(format!("bond {bond} joins other grains, {} and {}", pair[0], pair[1]))
+                    } else {
+                        None
+                    }
+                }
+            };
+            if let Some(what) = what {
+                c.wrong("contacts/bond", Some(start + k), what);
+            }
+        }
+    }
+}
+
+/// Ruptures stand in the order of their steps, complete at the right frames, and each broken bond has one, at the frame
+/// where its state changes.
+fn events(c: &mut Checker, steps: &[i64], pairs: &[[i32; 2]], broken: &Broken) {
+    let complete = c.rows::<u64>("commit_rows/events", 0..c.sizes.t).unwrap_or_default();
+    if !c.is_sound(&[RUPTURE, STEP, "bonds/pair", STATUS, "commit_rows/events"]) {
+        return;
+    }
+    let (mut told, mut last): (BTreeMap<usize, usize>, _) = (BTreeMap::new(), i64::MIN);
+    c.blocks::<Event>(RUPTURE, |c, start, events| {
+        for (k, event) in events.iter().enumerate() {
+            let row = start + k;
+            if event.step < last {
+                c.wrong(RUPTURE, Some(row), format!("step {} after step {last}", event.step));
+            }
+            last = event.step;
+            let numbers = [event.time, event.x, event.y, event.z, event.rn, event.rt, event.m, event.energy];
+            if numbers.iter().any(|value| !value.is_finite()) {
+                c.wrong(RUPTURE, Some(row), "a member is no finite number");
+            }
+            let frame = steps.partition_point(|step| *step < event.step);
+            let seen = complete.partition_point(|rows| *rows <= row as u64);
+            if frame != seen {
+                c.wrong(RUPTURE, Some(row), format!("step {} is complete with frame {seen}", event.step));
+            }
+            if let Some(what) = disagreement(event, frame, pairs, broken, &mut told, row) {
+                c.wrong(RUPTURE, Some(row), what);
+            }
+        }
+    });
+    for (bond, (frame, _)) in broken.iter().filter(|(bond, _)| !told.contains_key(bond)) {
+        c.wrong(STATUS, Some(*frame), format!("bond {bond} is broken, and no event in /{RUPTURE} tells of it"));
+    }
+}
+
+/// Where an event and the states of its bond disagree.
+fn disagreement(
+    event: &Event,
+    frame: usize,
+    pairs: &[[i32; 2]],
+    broken: &Broken,
+    told: &mut BTreeMap<usize, usize>,
+    row: usize,
+) -> Option<String> {
+    if !(1..=3).contains(&event.mode) {
+        return Some(format!("mode {} names nothing", event.mode));
+    }
+    let Some((bond, pair)) = usize::try_from(event.bond).ok().and_then(|bond| Some((bond, pairs.get(bond)?))) else {
+        return Some(format!("{} is none of {} bonds", event.bond, pairs.len()));
+    };
+    if let Some(first) = told.insert(bond, row) {
+        return Some(format!("bond {bond} broke before, in row {first}"));
+    }
+    if [event.i, event.j] != *pair && [event.j, event.i] != *pair {
+        return Some(format!("bond {bond} joins other grains, {} and {}", pair[0], pair[1]));
+    }
+    match broken.get(&bond) {
+        None => Some(format!("bond {bond} is intact to the end")),
+        Some((at, _)) if *at != frame => {
+            Some(format!("bond {bond} breaks by frame {frame}, its state changes at frame {at}"))
+        }
+        Some((_, mode)) if i32::from(*mode) != event.mode => {
+            Some(format!("bond {bond} broke by mode {}, its state is {mode}", event.mode))
+        }
+        Some(_) => None,
+    }
+}

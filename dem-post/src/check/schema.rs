@@ -1,0 +1,308 @@
+//! What the layout promises of names, types, shapes and units.
+
+use dem_run::history::{BondStatus, ContactStatus, RuptureMode, WallDrive, WallKind};
+use hdf5::Attribute;
+use hdf5::types::{EnumMember, EnumType, FloatSize, IntSize, TypeDescriptor, VarLenUnicode};
+
+use super::{Checker, Sizes};
+
+const F64: TypeDescriptor = TypeDescriptor::Float(FloatSize::U8);
+const I32: TypeDescriptor = TypeDescriptor::Integer(IntSize::U4);
+const I64: TypeDescriptor = TypeDescriptor::Integer(IntSize::U8);
+const U32: TypeDescriptor = TypeDescriptor::Unsigned(IntSize::U4);
+const U64: TypeDescriptor = TypeDescriptor::Unsigned(IntSize::U8);
+const TEXT: TypeDescriptor = TypeDescriptor::VarLenUnicode;
+
+/// Members of a rupture: 64-bit integers and floats, then 32-bit integers.
+const RUPTURE: [&str; 15] =
+    ["step", "time", "x", "y", "z", "rn", "rt", "m", "energy", "round", "bond", "i", "j", "mode", "pad"];
+
+/// Checks names, types, shapes and units; what is as promised is put down as sound, to be read afterwards.
+pub(super) fn check(c: &mut Checker) {
+    identity(c);
+    commit(c);
+    grains(c);
+    if c.has("walls") {
+        walls(c);
+    }
+    if c.has("bonds") {
+        bonds(c);
+    } else if let Some(place) =
+        ["events", "commit_rows/events", "contacts/bond", "contacts/moment"].iter().find(|place| c.has(place))
+    {
+        c.wrong("bonds", None, format!("is missing, and /{place} stands"));
+    }
+    contacts(c);
+    observables(c);
+}
+
+/// The datatype of an enumeration whose codes start at `first`.
+fn codes(size: IntSize, signed: bool, first: u64, names: impl Iterator<Item = &'static str>) -> TypeDescriptor {
+    let members = names.zip(first..).map(|(name, value)| EnumMember { name: name.into(), value }).collect();
+    TypeDescriptor::Enum(EnumType { size, signed, members })
+}
+
+fn bytes(names: impl Iterator<Item = &'static str>) -> TypeDescriptor {
+    codes(IntSize::U1, false, 0, names)
+}
+
+/// A type for people.
+fn name(kind: &TypeDescriptor) -> String {
+    match kind {
+        TypeDescriptor::Enum(codes) => {
+            let names: Vec<String> = codes.members.iter().map(|m| format!("{} = {}", m.name, m.value)).collect();
+            format!("enum of {}", names.join(", "))
+        }
+        other => other.to_string(),
+    }
+}
+
+impl Checker {
+    /// Checks a dataset of `rows` complete rows (more may stand behind them), each of shape `row`.
+    fn table(&mut self, place: &str, kind: &TypeDescriptor, rows: usize, row: &[usize], unit: &str) {
+        let Some(found) = self.typed(place, kind) else { return };
+        let shape_fits = found.first().is_some_and(|&count| count >= rows) && found[1..] == *row;
+        if !shape_fits {
+            let expected: Vec<String> =
+                std::iter::once(rows).chain(row.iter().copied()).map(|n| n.to_string()).collect();
+            self.wrong(place, None, format!("has shape {found:?} in place of [{}]", expected.join(", ")));
+        }
+        self.unit(place, unit);
+        if shape_fits {
+            self.sound.insert(place.into(), [rows, row.iter().product()]);
+        }
+    }
+
+    /// The shape of a dataset, if it is there and of this type.
+    fn typed(&mut self, place: &str, kind: &TypeDescriptor) -> Option<Vec<usize>> {
+        let Some(dataset) = self.dataset(place) else {
+            self.wrong(place, None, "is missing");
+            return None;
+        };
+        match dataset.dtype().and_then(|dtype| dtype.to_descriptor()) {
+            Ok(found) if found == *kind => Some(dataset.shape()),
+            Ok(found) => {
+                self.wrong(place, None, format!("is of type {} in place of {}", name(&found), name(kind)));
+                None
+            }
+            Err(error) => {
+                self.wrong(place, None, format!("has a type that cannot be read ({error})"));
+                None
+            }
+        }
+    }
+
+    fn unit(&mut self, place: &str, expected: &str) {
+        let Some(dataset) = self.dataset(place) else { return };
+        let named = dataset.attr_names().is_ok_and(|names| names.iter().any(|name| name == "unit"));
+        let found = if named { text(dataset.attr("unit")) } else { Some(String::new()) };
+        let what = match found.as_deref() {
+            Some(found) if found == expected => return,
+            Some("") => format!("has no attribute unit, where {expected:?} is promised"),
+            Some(found) => format!("has the unit {found:?} in place of {expected:?}"),
+            None => "has an attribute unit that is no text".into(),
+        };
+        self.wrong(place, None, what);
+    }
+
+    /// Checks a quantity over time: its values, and its steps and times, which are those of the frames.
+    fn element(&mut self, place: &str, kind: &TypeDescriptor, row: &[usize], unit: &str) {
+        let t = self.sizes.t;
+        self.table(&format!("{place}/value"), kind, t, row, unit);
+        self.table(&format!("{place}/step"), &I64, t, &[], "");
+        self.table(&format!("{place}/time"), &F64, t, &[], "s");
+    }
+
+    /// Complete rows that the last frame vouches for.
+    fn complete(&mut self, place: &str) -> usize {
+        let Some(last) = self.sizes.t.checked_sub(1) else { return 0 };
+        self.rows::<u64>(place, last..last + 1).and_then(|rows| rows.first().copied()).unwrap_or(0) as usize
+    }
+
+    /// The length of a list whose length nothing else tells.
+    fn count(&mut self, place: &str) -> usize {
+        self.dataset(place).and_then(|dataset| dataset.shape().first().copied()).unwrap_or(0)
+    }
+}
+
+fn text(attribute: hdf5::Result<Attribute>) -> Option<String> {
+    attribute.and_then(|attribute| attribute.read_scalar::<VarLenUnicode>()).ok().map(|text| text.to_string())
+}
+
+fn identity(c: &mut Checker) {
+    for (group, name) in [
+        ("h5md/author", "name"),
+        ("h5md/creator", "name"),
+        ("h5md/creator", "version"),
+        ("parameters", "version"),
+        ("parameters", "git_revision"),
+        ("parameters", "build"),
+        ("parameters", "host"),
+        ("parameters", "start"),
+    ] {
+        let found = if c.has(group) { c.file.group(group).and_then(|group| group.attr(name)) } else { Err("".into()) };
+        if text(found).is_none() {
+            c.wrong(&format!("{group}@{name}"), None, "is missing, or no text");
+        }
+    }
+    let number = |c: &Checker, group: &str, name: &str| c.file.group(group).and_then(|group| group.attr(name));
+    if !number(c, "h5md", "version").is_ok_and(|version| version.read_raw::<i32>().is_ok_and(|v| v == [1, 1])) {
+        c.wrong("h5md@version", None, "is not [1, 1]");
+    }
+    if !number(c, "parameters", "seed").is_ok_and(|seed| seed.read_scalar::<u64>().is_ok()) {
+        c.wrong("parameters@seed", None, "is missing, or no number");
+    }
+    if let Some(shape) = c.typed("parameters/scene", &TEXT) {
+        let scene = c.file.dataset("parameters/scene").and_then(|scene| scene.read_scalar::<VarLenUnicode>());
+        let valid = scene.is_ok_and(|scene| serde_json::from_str::<serde_json::Value>(&scene).is_ok());
+        if !shape.is_empty() || !valid {
+            c.wrong("parameters/scene", None, "is no JSON text");
+        }
+    }
+}
+
+fn commit(c: &mut Checker) {
+    let t = c.sizes.t;
+    if c.typed("commit", &U64).is_some_and(|shape| !shape.is_empty()) {
+        c.wrong("commit", None, "is no single number");
+    }
+    for name in ["contacts", "steps"] {
+        c.table(&format!("commit_rows/{name}"), &U64, t, &[], "");
+    }
+    if c.has("bonds") {
+        c.table("commit_rows/events", &U64, t, &[], "");
+        c.sizes.e = c.complete("commit_rows/events");
+    }
+    c.sizes.m = c.complete("commit_rows/contacts");
+    c.sizes.s = c.complete("commit_rows/steps");
+}
+
+fn grains(c: &mut Checker) {
+    c.sizes.n = c.count("particles/grains/id");
+    let Sizes { d, n, .. } = c.sizes;
+    c.table("particles/grains/id", &I32, n, &[], "");
+    for (name, unit) in [("radius", "m"), ("mass", "kg"), ("inertia", "kg m2")] {
+        c.table(&format!("particles/grains/{name}"), &F64, n, &[], unit);
+    }
+    c.element("particles/grains/position", &F64, &[n, d], "m");
+    c.element("particles/grains/velocity", &F64, &[n, d], "m s-1");
+    let (spin, angle) = ("particles/grains/angular_velocity", if d == 2 { "angle" } else { "orientation" });
+    let angle = format!("particles/grains/{angle}");
+    // both or neither
+    if c.has(spin) || c.has(&angle) {
+        let (spins, angles, unit): (&[usize], &[usize], _) =
+            if d == 2 { (&[n], &[n], "rad") } else { (&[n, 3], &[n, 4], "") };
+        c.element(spin, &F64, spins, "rad s-1");
+        c.element(&angle, &F64, angles, unit);
+    }
+    let cell = c.file.group("particles/grains/box").and_then(|cell| cell.attr("boundary"));
+    if cell.is_ok_and(|boundary| boundary.shape() == [d]) {
+        return;
+    }
+    c.wrong("particles/grains/box@boundary", None, format!("is not a text for each of {d} axes"));
+}
+
+fn walls(c: &mut Checker) {
+    c.sizes.w = c.count("walls/name");
+    let Sizes { d, w, .. } = c.sizes;
+    c.table("walls/name", &TEXT, w, &[], "");
+    // texts have no numbers to be read
+    c.sound.remove("walls/name");
+    c.table("walls/kind", &bytes(WallKind::ALL.iter().map(|kind| kind.label())), w, &[], "");
+    c.table("walls/drive", &bytes(WallDrive::ALL.iter().map(|drive| drive.label())), w, &[], "");
+    c.table("walls/normal", &F64, w, &[d], "");
+    c.table("walls/direction", &F64, w, &[d], "");
+    c.table("walls/radius", &F64, w, &[], "m");
+    for (name, unit) in [("position", "m"), ("velocity", "m s-1"), ("force", "N")] {
+        c.element(&format!("walls/{name}"), &F64, &[w, d], unit);
+    }
+}
+
+fn bonds(c: &mut Checker) {
+    c.sizes.b = c.count("bonds/pair");
+    let b = c.sizes.b;
+    c.table("bonds/pair", &I32, b, &[2], "");
+    for (name, unit) in [("rest_gap", "m"), ("strength", "N"), ("friction", ""), ("mean_diameter", "m")] {
+        c.table(&format!("bonds/{name}"), &F64, b, &[], unit);
+    }
+    c.element("bonds/status", &bytes(BondStatus::ALL.iter().map(|status| status.label())), &[b], "");
+    events(c);
+}
+
+fn events(c: &mut Checker) {
+    const PLACE: &str = "events/rupture";
+    let Some(dataset) = c.dataset(PLACE) else {
+        c.wrong(PLACE, None, "is missing");
+        return;
+    };
+    let modes = codes(IntSize::U4, true, 1, RuptureMode::ALL.iter().map(|mode| mode.label()));
+    let expected = RUPTURE.iter().enumerate().map(|(k, name)| match (k, *name) {
+        (0, name) => (name.to_string(), I64),
+        (1..9, name) => (name.to_string(), F64),
+        (_, "mode") => ("mode".to_string(), modes.clone()),
+        (_, name) => (name.to_string(), I32),
+    });
+    let fits = dataset.dtype().and_then(|dtype| dtype.to_descriptor()).is_ok_and(|found| match found {
+        TypeDescriptor::Compound(found) => found.fields.into_iter().map(|field| (field.name, field.ty)).eq(expected),
+        _ => false,
+    });
+    let shape = dataset.shape();
+    if !fits {
+        c.wrong(PLACE, None, format!("is no compound of {} with their types", RUPTURE.join(", ")));
+    } else if shape.len() != 1 || shape[0] < c.sizes.e {
+        c.wrong(PLACE, None, format!("has shape {shape:?} in place of [{}]", c.sizes.e));
+    } else {
+        c.sound.insert(PLACE.into(), [c.sizes.e, RUPTURE.len()]);
+    }
+}
+
+fn contacts(c: &mut Checker) {
+    let Sizes { d, t, m, .. } = c.sizes;
+    let bonded = c.has("bonds");
+    c.table("contacts/step", &I64, t, &[], "");
+    c.table("contacts/time", &F64, t, &[], "s");
+    c.table("contacts/start", &U64, t, &[], "");
+    c.table("contacts/count", &U32, t, &[], "");
+    c.table("contacts/pair", &I32, m, &[2], "");
+    c.table("contacts/point", &F64, m, &[d], "m");
+    c.table("contacts/normal", &F64, m, &[d], "");
+    let tangential = bonded
+        || c.has("contacts/tangent")
+        || c.dataset("contacts/reaction").is_some_and(|r| {
+            // without bonds the friction decides
+            r.shape().get(1) != Some(&1)
+        });
+    c.table("contacts/reaction", &F64, m, &[if tangential { d } else { 1 }], "N");
+    let frame = c.file.dataset("contacts/reaction").and_then(|reaction| reaction.attr("frame"));
+    if text(frame).as_deref() != Some("local") {
+        c.wrong("contacts/reaction@frame", None, "is not \"local\"");
+    }
+    if tangential && d == 3 {
+        c.table("contacts/tangent", &F64, m, &[d], "");
+    }
+    if bonded {
+        c.table("contacts/moment", &F64, m, if d == 2 { &[] } else { &[2] }, "N m");
+        c.table("contacts/bond", &I32, m, &[], "");
+    }
+    c.table("contacts/gap", &F64, m, &[], "m");
+    c.table("contacts/status", &bytes(ContactStatus::ALL.iter().map(|status| status.label())), m, &[], "");
+}
+
+fn observables(c: &mut Checker) {
+    let s = c.sizes.s;
+    c.table("observables/step", &I64, s, &[], "");
+    c.table("observables/time", &F64, s, &[], "s");
+    let names = c.file.group("observables").and_then(|group| group.member_names()).unwrap_or_default();
+    for name in names.iter().filter(|name| *name != "step" && *name != "time") {
+        let place = format!("observables/{name}/value");
+        // the shape and the unit of an observable are its own
+        let Some(shape) = c.typed(&place, &F64) else { continue };
+        if shape.first().is_none_or(|&rows| rows < s) {
+            c.wrong(&place, None, format!("has shape {shape:?}, and {s} rows are promised"));
+        } else {
+            c.sound.insert(place, [s, shape[1..].iter().product()]);
+        }
+        c.table(&format!("observables/{name}/step"), &I64, s, &[], "");
+        c.table(&format!("observables/{name}/time"), &F64, s, &[], "s");
+    }
+}

@@ -1,0 +1,133 @@
+//! The front of a crack: how far it has come along its path's direction, break by break.
+//!
+//! A crack here is one of the final cracks: before its parts met they count as one already. Its places are counted from
+//! where its first bond broke, along the line between the ends of its path, positive towards the end that broke later.
+//! The **front** is the greatest place that a broken segment reaches, the **back** the least. All breaks of one step have
+//! the same time; the round of the cascade gives them an order, not a speed. So a row is a round, and a **speed** is that
+//! of the tip from the last time at which the crack grew to this one.
+//!
+//! The **growth** takes the other view: after each round, the cracks as they are then, joined only by what has broken so
+//! far. Where cracks meet, the longest grows by the whole of the other.
+
+use dem_run::history::Rupture;
+use petgraph::unionfind::UnionFind;
+use serde::Serialize;
+
+use super::paths::Paths;
+
+/// A crack after a round of breaks.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Front {
+    /// Number of the crack, from 1.
+    pub crack: usize,
+    /// Step.
+    pub step: i64,
+    /// Time, s.
+    pub time: f64,
+    /// Round of the cascade within the step.
+    pub round: i32,
+    /// Bonds broken so far.
+    pub bonds: usize,
+    /// Length of all segments so far, m.
+    pub length: f64,
+    /// Place of the rear tip, m, at most 0.
+    pub back: f64,
+    /// Place of the front tip, m, at least 0.
+    pub front: f64,
+    /// Speed of the rear tip away from the origin, m/s; in the last round of a time, from the second time on.
+    pub back_speed: Option<f64>,
+    /// Speed of the front tip away from the origin, m/s.
+    pub front_speed: Option<f64>,
+}
+
+/// The fronts of all cracks, crack by crack, in order of time and round.
+pub fn fronts(paths: &Paths, ruptures: &[Rupture]) -> Vec<Front> {
+    let mut fronts: Vec<Vec<Front>> = vec![vec![]; paths.cracks.len()];
+    for segment in &paths.segments {
+        let (crack, rupture) = (&paths.cracks[segment.crack], &ruptures[segment.event]);
+        let rows = &mut fronts[segment.crack];
+        let place = |point: [f64; 2]| {
+            (point[0] - crack.origin[0]) * crack.direction[0] + (point[1] - crack.origin[1]) * crack.direction[1]
+        };
+        let last = rows.last().copied();
+        let (bonds, length, back, front) = last.map_or((0, 0.0, 0.0, 0.0), |f| (f.bonds, f.length, f.back, f.front));
+        let row = Front {
+            crack: crack.number,
+            step: rupture.step,
+            time: rupture.time,
+            round: rupture.round,
+            bonds: bonds + 1,
+            length: length + segment.length,
+            back: segment.line.map(place).into_iter().fold(back, f64::min),
+            front: segment.line.map(place).into_iter().fold(front, f64::max),
+            back_speed: None,
+            front_speed: None,
+        };
+        if last.is_some_and(|last| (last.step, last.round) == (row.step, row.round)) {
+            rows.pop();
+        }
+        rows.push(row);
+    }
+    fronts.iter_mut().for_each(|rows| speeds(rows));
+    fronts.concat()
+}
+
+/// Fills in the speeds at the last row of each time.
+fn speeds(rows: &mut [Front]) {
+    let mut before: Option<Front> = None;
+    for k in 0..rows.len() {
+        if rows.get(k + 1).is_some_and(|next| next.time == rows[k].time) {
+            continue;
+        }
+        if let Some(before) = before {
+            let elapsed = rows[k].time - before.time;
+            rows[k].back_speed = Some((before.back - rows[k].back) / elapsed);
+            rows[k].front_speed = Some((rows[k].front - before.front) / elapsed);
+        }
+        before = Some(rows[k]);
+    }
+}
+
+/// The cracks after a round of breaks, as they are then.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Growth {
+    /// Step.
+    pub step: i64,
+    /// Time, s.
+    pub time: f64,
+    /// Round of the cascade within the step.
+    pub round: i32,
+    /// Bonds broken so far.
+    pub bonds: usize,
+    /// Number of cracks.
+    pub cracks: usize,
+    /// Length of all of them, m.
+    pub length: f64,
+    /// Length of the longest, m.
+    pub longest: f64,
+}
+
+/// The growth of all cracks, in order of time and round.
+pub fn growth(paths: &Paths, ruptures: &[Rupture]) -> Vec<Growth> {
+    let nodes = paths.segments.iter().flat_map(|segment| segment.nodes).max().map_or(0, |last| last + 1);
+    let mut joined = UnionFind::<usize>::new(nodes);
+    // of each crack at its root; zero where no segment has come yet
+    let mut lengths = vec![0.0; nodes];
+    let mut rows: Vec<Growth> = vec![];
+    let (mut cracks, mut longest, mut length) = (0usize, 0.0f64, 0.0);
+    for (k, segment) in paths.segments.iter().enumerate() {
+        let [a, b] = segment.nodes.map(|node| joined.find_mut(node));
+        cracks = cracks + 1 - usize::from(lengths[a] > 0.0) - usize::from(a != b && lengths[b] > 0.0);
+        let both = if a == b { lengths[a] } else { lengths[a] + lengths[b] } + segment.length;
+        joined.union(a, b);
+        lengths[joined.find_mut(a)] = both;
+        longest = longest.max(both);
+        length += segment.length;
+        let Rupture { step, time, round, .. } = ruptures[segment.event];
+        if rows.last().is_some_and(|last| (last.step, last.round) == (step, round)) {
+            rows.pop();
+        }
+        rows.push(Growth { step, time, round, bonds: k + 1, cracks, length, longest });
+    }
+    rows
+}

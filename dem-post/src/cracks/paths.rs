@@ -1,0 +1,264 @@
+//! Cracks as lines, in the plane: segments of broken bonds, joined through the voids between the grains.
+//!
+//! All places are those of the first frame: where the crack runs in the sample as it was cemented, whatever the pieces
+//! did afterwards.
+//!
+//! * **Segment** of a broken bond: from the middle of the void on its one side over its point of contact to the middle
+//!   of the void on its other side (the dual edge of the bond). Between equal disks on a lattice this is the facet that
+//!   their Voronoi cells share: as long as the diameter on a square lattice, diameter/√3 on a hexagonal one. Where
+//!   there is no void, at the edge of the sample, or where both sides are the same void, the segment ends half the
+//!   pair's mean diameter from the point of contact, perpendicular to the bond.
+//! * **Crack**: segments that meet in a void. Two broken bonds of one grain with an intact bond between them on either
+//!   side do not meet: the material between them holds.
+//! * **Path** of a crack: the longest of the shortest ways through it, found from end to end by two searches; exact for
+//!   cracks without loops. Branches count in the length of the crack, not in that of its path.
+//! * **Orientation**: of the line between the ends of the path, from 0° to 180°, counter-clockwise from the first axis.
+//!   **Tortuosity**: length of the path over the distance of its ends, at least 1.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use dem_run::history::{Bonds, Rupture};
+use petgraph::unionfind::UnionFind;
+use serde::Serialize;
+
+use super::Modes;
+use super::voids::Voids;
+
+/// A broken bond as a line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Segment {
+    /// Its place in the list of ruptures.
+    pub event: usize,
+    /// Its ends in the graph of cracks: voids, and after them the free ends.
+    pub(super) nodes: [usize; 2],
+    /// From the left of the bond over its point of contact to the right, m.
+    pub line: [[f64; 2]; 3],
+    /// Length, m.
+    pub length: f64,
+    /// Number of its crack, from 0.
+    pub crack: usize,
+    /// Whether it lies on the path of its crack.
+    pub on_path: bool,
+}
+
+/// A crack: broken bonds that meet.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Crack {
+    /// Its number, from 1, the longest first.
+    pub number: usize,
+    /// Its bonds.
+    pub bonds: usize,
+    /// Length of all its segments, m.
+    pub length: f64,
+    /// Bonds on its path.
+    pub path_bonds: usize,
+    /// Length along its path, m.
+    pub path_length: f64,
+    /// Distance of the ends of its path, m.
+    pub end_to_end: f64,
+    /// Direction from end to end, degrees from the first axis, 0 to 180.
+    pub orientation: f64,
+    /// Length along the path over the distance of its ends.
+    pub tortuosity: f64,
+    /// Time at which its first bond broke, s.
+    pub first: f64,
+    /// Time at which its last bond broke, s.
+    pub last: f64,
+    /// How its bonds broke.
+    pub modes: Modes,
+    /// Where the first bond broke, m.
+    pub origin: [f64; 2],
+    /// Unit vector along the path, towards the end that broke later.
+    pub direction: [f64; 2],
+}
+
+/// The cracks of a sample, and the segments in the order in which they broke.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Paths {
+    /// The cracks, the longest first.
+    pub cracks: Vec<Crack>,
+    /// The segments, in the order of the ruptures.
+    pub segments: Vec<Segment>,
+}
+
+impl Paths {
+    /// Finds the cracks that `ruptures` make in the sample whose grains had centres `position` (m) and radii `radius`
+    /// (m) when `bonds` were formed.
+    pub fn find(position: &[[f64; 2]], radius: &[f64], bonds: &Bonds, ruptures: &[Rupture]) -> Self {
+        let mut segments = segments(position, radius, bonds, ruptures);
+        let nodes = segments.iter().flat_map(|segment| segment.nodes).max().map_or(0, |last| last + 1);
+        let mut joined = UnionFind::<usize>::new(nodes);
+        segments.iter().for_each(|segment| {
+            joined.union(segment.nodes[0], segment.nodes[1]);
+        });
+        // in the order of their first bond, so that equal lengths have an order too
+        let mut groups: Vec<Vec<usize>> = vec![];
+        let mut group_of = vec![usize::MAX; nodes];
+        for (k, segment) in segments.iter().enumerate() {
+            let root = joined.find(segment.nodes[0]);
+            if group_of[root] == usize::MAX {
+                group_of[root] = groups.len();
+                groups.push(vec![]);
+            }
+            groups[group_of[root]].push(k);
+        }
+        let length = |group: &[usize]| -> f64 { group.iter().map(|&k| segments[k].length).sum() };
+        groups.sort_by(|a, b| length(b).total_cmp(&length(a)));
+        let mut cracks = vec![];
+        for (number, group) in groups.iter().enumerate() {
+            let path = longest_path(&segments, group);
+            cracks.push(crack(number + 1, &segments, group, &path, ruptures));
+            group.iter().for_each(|&k| segments[k].crack = number);
+            path.iter().for_each(|&(k, _)| segments[k].on_path = true);
+        }
+        Self { cracks, segments }
+    }
+}
+
+fn segments(position: &[[f64; 2]], radius: &[f64], bonds: &Bonds, ruptures: &[Rupture]) -> Vec<Segment> {
+    let unit = |[i, j]: [i32; 2]| {
+        let (a, b) = (position[i as usize], position[j as usize]);
+        let way = [b[0] - a[0], b[1] - a[1]];
+        let length = way[0].hypot(way[1]);
+        [way[0] / length, way[1] / length]
+    };
+    let point = |(pair, gap): (&[i32; 2], &f64)| {
+        let (e, at, reach) = (unit(*pair), position[pair[0] as usize], radius[pair[0] as usize] + 0.5 * gap);
+        [at[0] + reach * e[0], at[1] + reach * e[1]]
+    };
+    let points: Vec<[f64; 2]> = bonds.pair.iter().zip(&bonds.rest_gap).map(point).collect();
+    let voids = Voids::find(position, &bonds.pair, &points);
+    let mut free = voids.centre.len();
+    let mut segments = vec![];
+    for (event, rupture) in ruptures.iter().enumerate() {
+        let bond = rupture.bond as usize;
+        let (e, at, [left, right]) = (unit(bonds.pair[bond]), points[bond], voids.beside[bond]);
+        let mut end = |void: Option<usize>, side: f64| match void {
+            Some(void) if left != right => (void, voids.centre[void]),
+            _ => {
+                let reach = 0.5 * side * bonds.mean_diameter[bond];
+                free += 1;
+                (free - 1, [at[0] - reach * e[1], at[1] + reach * e[0]])
+            }
+        };
+        let (a, b) = (end(left, 1.0), end(right, -1.0));
+        segments.push(Segment {
+            event,
+            nodes: [a.0, b.0],
+            line: [a.1, at, b.1],
+            length: distance(a.1, at) + distance(at, b.1),
+            crack: 0,
+            on_path: false,
+        });
+    }
+    segments
+}
+
+fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (b[0] - a[0]).hypot(b[1] - a[1])
+}
+
+/// The segments from one end of a crack to the other, each with whether it is passed from its first node to its second.
+fn longest_path(segments: &[Segment], group: &[usize]) -> Vec<(usize, bool)> {
+    let ways = Ways::new(segments, group);
+    let farthest =
+        |found: &Found| (0..ways.nodes.len()).max_by(|&a, &b| found.far[a].total_cmp(&found.far[b])).unwrap_or(0);
+    let start = farthest(&ways.from(0));
+    let found = ways.from(start);
+    let mut node = farthest(&found);
+    let mut path = vec![];
+    while let Some((before, segment)) = found.before[node] {
+        path.push((segment, segments[segment].nodes[0] == ways.nodes[before]));
+        node = before;
+    }
+    path.reverse();
+    path
+}
+
+/// The graph of one crack, its nodes numbered from 0.
+struct Ways {
+    nodes: Vec<usize>,
+    /// From each node: the node that is reached, the length (m), the segment.
+    next: Vec<Vec<(usize, f64, usize)>>,
+}
+
+/// The shortest ways from one node: their lengths (m), and the node and segment before each.
+struct Found {
+    far: Vec<f64>,
+    before: Vec<Option<(usize, usize)>>,
+}
+
+impl Ways {
+    fn new(segments: &[Segment], group: &[usize]) -> Self {
+        let mut nodes: Vec<usize> = group.iter().flat_map(|&k| segments[k].nodes).collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        let mut next = vec![vec![]; nodes.len()];
+        for &k in group {
+            let [a, b] = segments[k].nodes.map(|node| nodes.partition_point(|&other| other < node));
+            next[a].push((b, segments[k].length, k));
+            next[b].push((a, segments[k].length, k));
+        }
+        Self { nodes, next }
+    }
+
+    /// Dijkstra's search.
+    fn from(&self, start: usize) -> Found {
+        let mut found = Found { far: vec![f64::INFINITY; self.nodes.len()], before: vec![None; self.nodes.len()] };
+        found.far[start] = 0.0;
+        // lengths are not negative, so their bits are in the order of their values
+        let mut queue = BinaryHeap::from([(Reverse(0u64), start)]);
+        while let Some((Reverse(bits), node)) = queue.pop() {
+            let far = f64::from_bits(bits);
+            if far > found.far[node] {
+                continue;
+            }
+            for &(other, length, segment) in &self.next[node] {
+                if far + length < found.far[other] {
+                    found.far[other] = far + length;
+                    found.before[other] = Some((node, segment));
+                    queue.push((Reverse((far + length).to_bits()), other));
+                }
+            }
+        }
+        found
+    }
+}
+
+fn crack(number: usize, segments: &[Segment], group: &[usize], path: &[(usize, bool)], ruptures: &[Rupture]) -> Crack {
+    let place =
+        |&(k, forward): &(usize, bool), end: usize| segments[k].line[if forward { 2 * end } else { 2 - 2 * end }];
+    let first = group[0];
+    // a segment has two ends, so a path has at least one segment
+    let alone = (first, true);
+    let (head, tail) = (path.first().unwrap_or(&alone), path.last().unwrap_or(&alone));
+    let (mut from, mut to) = (place(head, 0), place(tail, 1));
+    if segments[head.0].event > segments[tail.0].event {
+        std::mem::swap(&mut from, &mut to);
+    }
+    let end_to_end = distance(from, to);
+    let way =
+        if end_to_end > 0.0 { [(to[0] - from[0]) / end_to_end, (to[1] - from[1]) / end_to_end] } else { [1.0, 0.0] };
+    let path_length = path.iter().map(|&(k, _)| segments[k].length).sum();
+    let mut modes = Modes::default();
+    group.iter().for_each(|&k| modes.add(ruptures[segments[k].event].mode));
+    Crack {
+        number,
+        bonds: group.len(),
+        length: group.iter().map(|&k| segments[k].length).sum(),
+        path_bonds: path.len(),
+        path_length,
+        end_to_end,
+        orientation: way[1].atan2(way[0]).to_degrees().rem_euclid(180.0),
+        tortuosity: if end_to_end > 0.0 { path_length / end_to_end } else { 1.0 },
+        first: ruptures[segments[first].event].time,
+        last: ruptures[segments[group[group.len() - 1]].event].time,
+        modes,
+        origin: segments[first].line[1],
+        direction: way,
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,201 @@
+//! The drawings of cracks.
+
+use dem_run::history::{BondStatus, History};
+
+use super::front::Growth;
+use super::paths::{Crack, Segment};
+use super::{Pieces, Report};
+use crate::fragments::Fragments;
+use crate::map::{Colour, Key, Link, Panel, Ramp, Sample, Scale, draw, draw_view};
+use crate::output::{Result, number};
+use crate::plot::{Chart, Drawing, Style, colour};
+
+/// Fill of grains that kept all their bonds.
+const BONDED: &str = "#8c8c8c";
+/// Fill of grains that lost a bond: white, as in the paper.
+const RELEASED: &str = "#ffffff";
+/// Fill and outline of grains under cracks.
+const PALE: [&str; 2] = ["#f0f0f0", "#cfcfcf"];
+/// Widths of a segment on the path of its crack and of another.
+const WIDTHS: [f64; 2] = [3.2, 1.8];
+/// Colours of the backs of cracks: lighter than those of their fronts.
+const PALER: [&str; 3] = ["#7fb8d8", "#eaae7f", "#7fceb9"];
+/// Cracks whose fronts are drawn.
+const FRONTS: usize = 3;
+
+/// Broken bonds over time, by mode, until `end` (s).
+pub fn broken_chart(curve: &[(f64, [usize; 3])], end: f64) -> Chart {
+    let points = |count: &dyn Fn(&[usize; 3]) -> usize| -> Vec<(f64, f64)> {
+        let last = curve.last().map_or(0, |(_, n)| count(n));
+        let inner = curve.iter().map(|(time, n)| (*time, count(n) as f64));
+        std::iter::once((0.0, 0.0)).chain(inner).chain([(end, last as f64)]).collect()
+    };
+    let mut chart = Chart::new("time (s)", "broken bonds")
+        .curve("all", colour::BLACK, Style::Steps, points(&|n| n.iter().sum()))
+        .curve("tension", colour::BLUE, Style::Steps, points(&|n| n[0]))
+        .curve("shear", colour::VERMILLION, Style::Steps, points(&|n| n[1]))
+        .curve("rolling", colour::GREEN, Style::Steps, points(&|n| n[2]));
+    chart.counts = true;
+    chart
+}
+
+/// Number of fragments, and mass of the largest, over time.
+pub fn fragment_charts(pieces: &[Pieces]) -> Vec<Chart> {
+    let points = |value: &dyn Fn(&Fragments) -> f64| pieces.iter().map(|p| (p.time, value(&p.fragments))).collect();
+    let mut number = Chart::new("time (s)", "number of fragments")
+        .curve("all", colour::BLACK, Style::Steps, points(&|f| f.count as f64))
+        .curve("single grains", colour::VERMILLION, Style::Steps, points(&|f| f.singles as f64));
+    number.counts = true;
+    let largest = Chart::new("time (s)", "largest fragment (% of the mass)").curve(
+        "largest fragment",
+        colour::BLUE,
+        Style::Steps,
+        points(&|f| 100.0 * f.largest_mass_fraction),
+    );
+    vec![number, largest]
+}
+
+/// The tips of the longest cracks over time; the length of all cracks and of the longest over time; and, where a step
+/// broke bonds in several rounds, these lengths over the rounds of the step that has most of them.
+pub fn front_charts(report: &Report) -> Vec<Chart> {
+    let mut over_time = Chart::new("time (s)", "place of the tips along the crack (mm)");
+    over_time.set_off = true;
+    // what broke at once has no way over time
+    let grown = |crack: &&Crack| crack.first < crack.last;
+    for crack in report.cracks.iter().filter(grown).take(FRONTS) {
+        let rows = || report.fronts.iter().filter(|row| row.crack == crack.number);
+        let place = over_time.curves.len() / 2;
+        let colour = colour::CYCLE[place % colour::CYCLE.len()];
+        let label = |tip: &str| format!("crack {}, {tip}", crack.number);
+        let front = rows().map(|row| (row.time, 1e3 * row.front)).collect();
+        let back = rows().map(|row| (row.time, 1e3 * row.back)).collect();
+        over_time = over_time.curve(&label("front"), colour, Style::Steps, front);
+        over_time = over_time.curve(&label("back"), PALER[place % PALER.len()], Style::Steps, back);
+    }
+    let mut charts = if over_time.curves.is_empty() { vec![] } else { vec![over_time] };
+    charts.extend(growth_chart(report));
+    charts.extend(cascade_chart(report));
+    charts
+}
+
+/// The length of all cracks and of the longest over time, unless all broke at once.
+fn growth_chart(report: &Report) -> Option<Chart> {
+    report.growth.first().zip(report.growth.last()).filter(|(first, last)| first.time < last.time)?;
+    let points = |length: fn(&Growth) -> f64| report.growth.iter().map(|row| (row.time, 1e3 * length(row))).collect();
+    let mut chart = Chart::new("time (s)", "length of cracks (mm)")
+        .curve("all", colour::BLACK, Style::Steps, points(|row| row.length))
+        .curve("the longest", colour::BLUE, Style::Steps, points(|row| row.longest));
+    chart.set_off = true;
+    Some(chart)
+}
+
+fn cascade_chart(report: &Report) -> Option<Chart> {
+    let steps = report.growth.chunk_by(|a, b| a.step == b.step);
+    let rounds = steps.max_by_key(|rounds| rounds.len()).filter(|rounds| rounds.len() > 1)?;
+    let points = |length: fn(&Growth) -> f64| -> Vec<(f64, f64)> {
+        rounds.iter().map(|row| (f64::from(row.round), 1e3 * length(row))).collect()
+    };
+    let mut chart = Chart::new(&format!("round of the cascade in step {}", rounds[0].step), "length of cracks (mm)")
+        .curve("all", colour::BLACK, Style::Marked, points(|row| row.length))
+        .curve("the longest", colour::BLUE, Style::Marked, points(|row| row.longest));
+    chart.set_off = true;
+    Some(chart)
+}
+
+/// The cracks over the grains of the first frame, coloured by the time at which each bond broke, or by the round of the
+/// cascade where all broke in one step. The second drawing shows the part around the cracks, where that is small.
+///
+/// # Errors
+/// Those of reading the history.
+pub fn crack_map(history: &History, report: &Report) -> Result<(Drawing, Option<Drawing>)> {
+    let (first, last) = (report.events.first(), report.events.last());
+    let span = first.zip(last).map_or([0.0; 2], |(first, last)| [first.time, last.time]);
+    let one_step = span[0] == span[1];
+    let value = |segment: &Segment| {
+        let event = &report.events[segment.event];
+        if one_step { f64::from(event.round) } else { event.time }
+    };
+    let values = || report.paths.segments.iter().map(value);
+    let scale = Scale {
+        title: if one_step {
+            format!("round of the cascade at t = {} s", number(span[0]))
+        } else {
+            "broken at t (s)".into()
+        },
+        low: values().fold(f64::INFINITY, f64::min),
+        high: values().fold(f64::NEG_INFINITY, f64::max),
+        ramp: Ramp::Lines,
+    };
+    let mut links = vec![];
+    // the latest first, so that where the crack began is on top
+    for segment in report.paths.segments.iter().rev() {
+        let [a, b, c] = segment.line.map(Vec::from);
+        let (width, colour) = (WIDTHS[usize::from(!segment.on_path)], scale.colour(value(segment)));
+        links.push(Link { from: a, to: b.clone(), width, colour: colour.clone() });
+        links.push(Link { from: b, to: c, width, colour });
+    }
+    let plural = |count: usize| if count == 1 { "" } else { "s" };
+    let (cracks, broken) = (report.cracks.len(), report.broken.total());
+    let panel = Panel {
+        caption: vec![
+            format!("{cracks} crack{} of {broken} broken bond{}", plural(cracks), plural(broken)),
+            "places of the first frame".into(),
+        ],
+        grains: history.grain_state(0)?,
+        walls: history.wall_state(0)?,
+        fills: vec![PALE[0].into(); history.grains()?.radius.len()],
+        outline: PALE[1],
+        links,
+        arrows: vec![],
+    };
+    let mut legend = vec![
+        Key::Line(colour::GREY, WIDTHS[0], "path of a crack".into()),
+        Key::Line(colour::GREY, WIDTHS[1], "branch".into()),
+    ];
+    // a single value needs no scale
+    if scale.low < scale.high {
+        legend.insert(0, Key::Bar(scale));
+    }
+    let (sample, panels) = (Sample::read(history)?, [panel]);
+    let all = sample.view(panels.iter().map(|panel| (&panel.grains, &panel.walls)));
+    let near = sample.near(report.paths.segments.iter().flat_map(|s| s.line.iter().map(|x| x.as_slice())), all);
+    let near = near.map(|view| draw_view(&sample, view, &panels, &legend));
+    Ok((draw_view(&sample, all, &panels, &legend), near))
+}
+
+/// The decohesion map at some frames: grains that lost a bond in white.
+///
+/// # Errors
+/// Those of reading the history.
+pub fn decohesion(history: &History, frames: &[usize]) -> Result<Drawing> {
+    let bonds = history.bonds()?;
+    let sample = Sample::read(history)?;
+    let mut panels = vec![];
+    for &frame in frames {
+        let status = history.bond_status(frame)?;
+        let grains = history.grain_state(frame)?;
+        let mut fills = vec![Colour::from(BONDED); history.grains()?.radius.len()];
+        let mut broken = 0;
+        for ([i, j], _) in bonds.pair.iter().zip(&status).filter(|(_, status)| **status != BondStatus::Intact) {
+            (fills[*i as usize], fills[*j as usize]) = (RELEASED.into(), RELEASED.into());
+            broken += 1;
+        }
+        panels.push(Panel {
+            caption: vec![
+                format!("t = {} s", number(history.times()[frame])),
+                format!("{broken} of {} bonds broken", bonds.len()),
+            ],
+            grains,
+            walls: history.wall_state(frame)?,
+            fills,
+            outline: "#404040",
+            links: vec![],
+            arrows: vec![],
+        });
+    }
+    let legend = [
+        Key::Disk(BONDED, "#404040", "all bonds intact".into()),
+        Key::Disk(RELEASED, "#404040", "lost at least one bond".into()),
+    ];
+    Ok(draw(&sample, &panels, &legend))
+}

@@ -1,0 +1,221 @@
+//! A series of pictures, one a frame, numbered for viewers and video encoders.
+//!
+//! All pictures have one scale, one part of the plane, the same even number of pixels and, where a colour or a width
+//! stands for a value, the same meaning of it. They are read, drawn and written one by one, so a long series needs no
+//! more memory than a short one.
+
+use clap::ValueEnum;
+use dem_run::history::{BondStatus, History, RuptureMode};
+use serde::Serialize;
+
+use crate::chains::pictures::{force_legend, links};
+use crate::chains::{require_reactions, statistics};
+use crate::map::{Colour, Key, Link, Panel, Ramp, Sample, Scale, View, draw_view};
+use crate::output::{Folder, PostError, Result, facts, number, progress, quantity, short};
+use crate::plot::colour;
+use crate::velocities::{speeds, usual_speed};
+use crate::{cracks, moments};
+
+/// Pixels per unit of a drawing.
+const PIXELS: f32 = 2.0;
+/// Fill and outline of grains.
+const GRAIN: [&str; 2] = ["#f0f0f0", "#bdbdbd"];
+/// Fill of grains that lost a bond.
+const RELEASED: &str = "#ffffff";
+/// Width of the lines of bonds and of cracks.
+const BOND: f64 = 1.6;
+const CRACK: f64 = 2.8;
+
+/// What the pictures show.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Subject {
+    /// Bonds that hold, and those that broke while the two grains are still neighbours.
+    #[default]
+    Bonds,
+    /// Contact forces.
+    Forces,
+    /// Speeds of the grains.
+    Speed,
+}
+
+/// Which frames, and what of them.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// What the pictures show.
+    pub subject: Subject,
+    /// The frames, in order.
+    pub frames: Vec<usize>,
+    /// Time of the first and of the last, s.
+    pub span: [f64; 2],
+    /// What the scale is made for: mean force (N) or usual speed (m/s) of the frame where it is greatest.
+    pub scale: Option<f64>,
+}
+
+/// Chooses the frames: those nearest to `times` (s), or every `every`-th and the last.
+///
+/// # Errors
+/// [`PostError::Usage`] for times outside the history or `every` of zero; [`PostError::Lacking`] for a history without
+/// frames, without bonds where bonds are to be drawn, or without any force or motion where these are.
+pub fn read(history: &History, subject: Subject, every: usize, times: &[f64]) -> Result<Report> {
+    let lacking = |what: &str| PostError::Lacking { path: history.path().into(), what: what.into() };
+    if every == 0 {
+        return Err(PostError::Usage("--every 0: give 1 or more".into()));
+    }
+    // says what is wrong with the times, or with a history without frames
+    let mut frames = moments::chosen(history, times)?;
+    if times.is_empty() {
+        let last = history.frames() - 1;
+        frames = (0..=last).filter(|frame| frame % every == 0 || *frame == last).collect();
+    }
+    if subject == Subject::Bonds && history.bonds()?.is_empty() {
+        return Err(lacking("this scene has no bonds to draw: choose --draw forces or --draw speed"));
+    }
+    if subject == Subject::Forces {
+        require_reactions(history)?;
+    }
+    let scale = match subject {
+        Subject::Bonds => None,
+        Subject::Forces => Some(greatest(&frames, |frame| {
+            let contacts = history.contacts(frame)?;
+            Ok(statistics(&(0..contacts.len()).map(|c| contacts.normal_force(c)).collect::<Vec<_>>()).mean)
+        })?),
+        Subject::Speed => {
+            Some(greatest(&frames, |frame| Ok(usual_speed(speeds(&history.grain_state(frame)?, history.dimension()))))?)
+        }
+    };
+    if scale == Some(0.0) {
+        let what = if subject == Subject::Forces { "no contact carries a force" } else { "nothing moves" };
+        return Err(lacking(&format!("{what} in these frames: choose others by --times, or another --draw")));
+    }
+    let time = |frame: Option<&usize>| frame.map_or(0.0, |&frame| history.times()[frame]);
+    Ok(Report { subject, span: [time(frames.first()), time(frames.last())], frames, scale })
+}
+
+fn greatest(frames: &[usize], value: impl Fn(usize) -> Result<f64>) -> Result<f64> {
+    frames.iter().try_fold(0.0, |most, &frame| Ok(value(frame)?.max(most)))
+}
+
+impl Report {
+    /// The report as a table.
+    pub fn table(&self) -> String {
+        let subject = self.subject.to_possible_value().map_or_else(String::new, |value| value.get_name().to_string());
+        let unit = if self.subject == Subject::Speed { "m/s" } else { "N" };
+        facts(&[
+            ("pictures", self.frames.len().to_string()),
+            ("of", subject),
+            ("from", quantity(Some(self.span[0]), "s")),
+            ("to", quantity(Some(self.span[1]), "s")),
+            ("scale made for", quantity(self.scale, unit)),
+            ("a film", "ffmpeg -framerate 25 -i frame-%05d.png -pix_fmt yuv420p film.mp4".into()),
+        ])
+    }
+}
+
+/// Writes `frame-00000.png`, `frame-00001.png` and so on; with a bar on a terminal unless `quiet`.
+///
+/// # Errors
+/// [`PostError::Write`], and those of reading the history.
+pub fn write(history: &History, report: &Report, folder: &mut Folder, quiet: bool) -> Result<()> {
+    let (sample, view) = shown(history, report)?;
+    let bar = progress(report.frames.len() as u64, quiet, "{bar:24} {pos} of {len} pictures, {eta} left");
+    for (k, &frame) in report.frames.iter().enumerate() {
+        let (panel, legend) = picture(history, report, frame)?;
+        let name = format!("frame-{k:05}.png");
+        let png = draw_view(&sample, view, &[panel], &legend).png_scaled(PIXELS);
+        folder.write(&name, &png.map_err(|why| PostError::Usage(format!("{name}: {why}")))?)?;
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    Ok(())
+}
+
+/// The part of the plane that shows all frames.
+fn shown(history: &History, report: &Report) -> Result<(Sample, View)> {
+    let sample = Sample::read(history)?;
+    let mut view = View::EMPTY;
+    for &frame in &report.frames {
+        let (grains, walls) = (history.grain_state(frame)?, history.wall_state(frame)?);
+        view = view.join(sample.view(std::iter::once((&grains, &walls))));
+    }
+    Ok((sample, view))
+}
+
+fn picture(history: &History, report: &Report, frame: usize) -> Result<(Panel, Vec<Key>)> {
+    let grains = history.grain_state(frame)?;
+    let number_of_grains = history.grains()?.radius.len();
+    let mut panel = Panel {
+        caption: vec![format!("t = {} s", number(history.times()[frame]))],
+        walls: history.wall_state(frame)?,
+        fills: vec![GRAIN[0].into(); number_of_grains],
+        outline: GRAIN[1],
+        links: vec![],
+        arrows: vec![],
+        grains,
+    };
+    let scale = report.scale.unwrap_or(1.0);
+    let legend = match report.subject {
+        Subject::Bonds => bonds(history, frame, &mut panel)?,
+        Subject::Forces => {
+            let contacts = history.contacts(frame)?;
+            panel.links = links(&contacts, &panel.grains.position, scale, history.dimension());
+            panel.caption.push(format!("⟨f⟩ = {} N, the greatest mean of the series", short(scale)));
+            force_legend()
+        }
+        Subject::Speed => {
+            let scale = Scale { title: "speed (m/s)".into(), low: 0.0, high: scale, ramp: Ramp::Areas };
+            let speeds = speeds(&panel.grains, history.dimension());
+            panel.fills = speeds.iter().map(|&speed| scale.colour(speed)).collect();
+            panel.caption.push(format!("greatest speed {} m/s", short(speeds.iter().copied().fold(0.0, f64::max))));
+            vec![Key::Bar(scale)]
+        }
+    };
+    Ok((panel, legend))
+}
+
+/// A line for each bond, in the colour of how it broke.
+fn bonds(history: &History, frame: usize, panel: &mut Panel) -> Result<Vec<Key>> {
+    let (d, bonds, status) = (history.dimension(), history.bonds()?, history.bond_status(frame)?);
+    let mut modes = cracks::Modes::default();
+    let centre =
+        |panel: &Panel, grain: i32| panel.grains.position[grain as usize * d..(grain as usize + 1) * d].to_vec();
+    for (k, (pair, status)) in bonds.pair.iter().zip(&status).enumerate() {
+        let Some((colour, mode)) = broken(*status) else {
+            continue;
+        };
+        modes.add(mode);
+        pair.iter().for_each(|&grain| panel.fills[grain as usize] = RELEASED.into());
+        let (from, to) = (centre(panel, pair[0]), centre(panel, pair[1]));
+        let distance = from.iter().zip(&to).map(|(a, b)| (b - a).powi(2)).sum::<f64>().sqrt();
+        // a line across the sample between grains that went apart would say nothing
+        if distance < 1.5 * bonds.mean_diameter[k] {
+            panel.links.push(Link { from, to, width: CRACK, colour });
+        }
+    }
+    let holding = |&(_, status): &(&[i32; 2], &BondStatus)| *status == BondStatus::Intact;
+    let intact: Vec<Link> = (bonds.pair.iter().zip(&status).filter(holding))
+        .map(|(pair, _)| Link {
+            from: centre(panel, pair[0]),
+            to: centre(panel, pair[1]),
+            width: BOND,
+            colour: "#9a9a9a".into(),
+        })
+        .collect();
+    panel.links.splice(0..0, intact);
+    panel.caption.push(format!("{} of {} bonds broken", modes.total(), bonds.len()));
+    Ok(vec![
+        Key::Line("#9a9a9a", BOND, "bond".into()),
+        Key::Line(colour::BLUE, CRACK, "broken in tension".into()),
+        Key::Line(colour::VERMILLION, CRACK, "in shear".into()),
+        Key::Line(colour::GREEN, CRACK, "by rolling".into()),
+    ])
+}
+
+fn broken(status: BondStatus) -> Option<(Colour, RuptureMode)> {
+    match status {
+        BondStatus::Intact => None,
+        BondStatus::Tension => Some((colour::BLUE.into(), RuptureMode::Tension)),
+        BondStatus::Shear => Some((colour::VERMILLION.into(), RuptureMode::Shear)),
+        BondStatus::Rolling => Some((colour::GREEN.into(), RuptureMode::Rolling)),
+    }
+}

@@ -1,0 +1,138 @@
+//! How accurately a run was solved, by the measures that it recorded at every step.
+
+use dem_run::history::History;
+use serde::Serialize;
+
+use crate::output::{Result, number};
+
+/// The spread of a measure over the steps.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Spread {
+    /// Middle value.
+    pub median: f64,
+    /// Value that one step in a hundred exceeds.
+    pub high: f64,
+    /// Greatest value.
+    pub worst: f64,
+    /// Time of the greatest value, s.
+    pub time: f64,
+}
+
+/// The solver's own figures; `None` for what was not recorded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Accuracy {
+    /// Observed steps.
+    pub steps: usize,
+    /// The residual aimed at, from the scene.
+    pub tolerance: Option<f64>,
+    /// The residual accepted, from the scene.
+    pub accept: Option<f64>,
+    /// Residuals.
+    pub residual: Option<Spread>,
+    /// Load errors.
+    pub load_error: Option<Spread>,
+    /// Steps whose residual exceeds the tolerance.
+    pub missed: Option<usize>,
+    /// Solves that were not accepted.
+    pub rejected: Option<f64>,
+    /// Iterations of a step.
+    pub iterations: Option<Spread>,
+    /// Mean number of iterations of a step.
+    pub mean_iterations: Option<f64>,
+    /// Newton iterations and factorisations of a step, means.
+    pub newton: Option<[f64; 2]>,
+    /// Processor time of the run, s.
+    pub cpu_time: Option<f64>,
+}
+
+/// Reads the solver's figures.
+///
+/// # Errors
+/// Those of reading the history.
+pub fn read(history: &History) -> Result<Accuracy> {
+    let scene: serde_json::Value = serde_json::from_str(&history.parameters()?.scene).unwrap_or_default();
+    let setting = |name: &str| scene.get("solver").and_then(|solver| solver.get(name)).and_then(|value| value.as_f64());
+    let series = |name: &str| -> Result<Option<(Vec<f64>, Vec<f64>)>> {
+        Ok(history.observable(name)?.filter(|s| !s.value.is_empty()).map(|s| (s.time, s.value)))
+    };
+    let of = |name: &str| -> Result<Option<Spread>> { Ok(series(name)?.map(|(time, value)| spread(&time, value))) };
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let mean_of = |name: &str| -> Result<Option<f64>> { Ok(series(name)?.map(|(_, value)| mean(&value))) };
+    let tolerance = setting("tolerance");
+    let residual = series("solver_residual")?;
+    let beyond =
+        |limit: f64| residual.as_ref().map(|(_, value)| value.iter().filter(|&&r| r.is_nan() || r > limit).count());
+    Ok(Accuracy {
+        steps: history.observed_steps(),
+        tolerance,
+        accept: setting("accept"),
+        missed: tolerance.and_then(beyond),
+        residual: of("solver_residual")?,
+        load_error: of("solver_load_error")?,
+        rejected: series("solver_rejected")?.map(|(_, value)| value.iter().sum()),
+        iterations: of("solver_iterations")?,
+        mean_iterations: mean_of("solver_iterations")?,
+        newton: mean_of("solver_newton_iterations")?.zip(mean_of("solver_factorisations")?).map(|(n, f)| [n, f]),
+        cpu_time: series("cpu_time")?.and_then(|(_, value)| value.last().copied()),
+    })
+}
+
+/// The spread of `value` over the times `time` (s), of at least one step.
+pub fn spread(time: &[f64], value: Vec<f64>) -> Spread {
+    let worst = (0..value.len()).max_by(|&a, &b| value[a].total_cmp(&value[b]).then(b.cmp(&a))).unwrap_or(0);
+    let (greatest, at) = (value[worst], time.get(worst).copied().unwrap_or(0.0));
+    let mut sorted = value;
+    sorted.sort_by(f64::total_cmp);
+    let place = |share: f64| sorted[((share * sorted.len() as f64).ceil() as usize).clamp(1, sorted.len()) - 1];
+    Spread { median: place(0.5), high: place(0.99), worst: greatest, time: at }
+}
+
+impl Accuracy {
+    /// The figures as names and values, for people.
+    pub fn lines(&self) -> Vec<(String, String)> {
+        let spread = |found: Option<Spread>| {
+            found.map_or_else(
+                || "not recorded".into(),
+                |s| {
+                    let [median, high, worst, time] = [s.median, s.high, s.worst, s.time].map(number);
+                    format!("median {median}; one step in a hundred above {high}; worst {worst} at t = {time} s")
+                },
+            )
+        };
+        let plain = |value: Option<f64>| value.map_or_else(|| "–".into(), number);
+        let missed = self.missed.map_or_else(
+            || "–".into(),
+            |n| format!("{n} of {} ({:.1} %)", self.steps, 100.0 * n as f64 / self.steps.max(1) as f64),
+        );
+        let newton = self.newton.map_or_else(
+            || "–".into(),
+            |[n, f]| format!("{} iterations and {} factorisations a step", number(n), number(f)),
+        );
+        [
+            ("Residual aimed at, accepted", format!("{}, {}", plain(self.tolerance), plain(self.accept))),
+            ("Residual", spread(self.residual)),
+            ("Load error", spread(self.load_error)),
+            ("Steps that missed the residual aimed at", missed),
+            ("Solves not accepted", plain(self.rejected)),
+            ("Iterations of a step", format!("mean {}; {}", plain(self.mean_iterations), spread(self.iterations))),
+            ("Newton", newton),
+            ("Processor time", self.cpu_time.map_or_else(|| "–".into(), |t| format!("{} s", number(t)))),
+        ]
+        .map(|(name, value)| (name.to_string(), value))
+        .into()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_spread_tells_middle_tail_and_worst() {
+        let time: Vec<f64> = (0..200).map(|k| f64::from(k) * 0.5).collect();
+        // 0 … 199 in reverse: the worst comes first
+        let found = spread(&time, (0..200).rev().map(f64::from).collect());
+        assert_eq!(found, Spread { median: 99.0, high: 197.0, worst: 199.0, time: 0.0 });
+        assert_eq!(spread(&[2.0], vec![7.0]), Spread { median: 7.0, high: 7.0, worst: 7.0, time: 2.0 });
+    }
+}

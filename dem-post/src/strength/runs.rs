@@ -1,0 +1,265 @@
+//! The runs that are asked for, and the load at which each gave way.
+
+use std::path::{Path, PathBuf};
+
+use clap::ValueEnum;
+use dem_run::collapse::{BROKEN_SHARE, STRAINS};
+use dem_run::history::{History, WallDrive};
+use dem_run::scene::Load;
+use dem_run::sweep::store::{State, Store};
+use serde::Serialize;
+use serde_json::Value;
+
+use super::LeftOut;
+use crate::collapse::{last_step_below, peak};
+use crate::output::{PostError, Result, quantity};
+use crate::stress_strain;
+
+/// What counts as the strength of a run: the load at …
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Measure {
+    /// The first break of a bond.
+    FirstBreak,
+    /// The break by which 5 % of the bonds had broken.
+    #[default]
+    Broken,
+    /// The last step before the strain of the sample exceeds 1e-4.
+    Collapse,
+    /// The greatest load, where it falls by 5 % afterwards.
+    Peak,
+}
+
+impl Measure {
+    /// The strength that it measures, in words.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::FirstBreak => "load at the first break",
+            Self::Broken => "load with 5 % of bonds broken",
+            Self::Collapse => "collapse load (strain 1e-4)",
+            Self::Peak => "peak load",
+        }
+    }
+}
+
+/// A run as it was read.
+#[derive(Clone, Debug)]
+pub struct Found {
+    /// Its file.
+    pub path: PathBuf,
+    /// Its scene, JSON.
+    pub scene: String,
+    /// Where it gave way; or how far it came, if it did not.
+    pub strength: std::result::Result<Strength, String>,
+    /// Radii of its grains and its bonds: equal in two runs of the same grains.
+    pub grains: (Vec<f64>, Vec<[i32; 2]>),
+}
+
+/// Where a run gave way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Strength {
+    /// The load, N.
+    pub load: f64,
+    /// When, s.
+    pub time: f64,
+    /// Whether rigid bonds were still whole, so that the strain which counts as collapse is the solver's.
+    pub early: bool,
+}
+
+/// The histories that `paths` name: files, and of the folders of sweeps the runs that are done; with the runs that are not.
+///
+/// # Errors
+/// [`PostError::Usage`] for no path at all, a folder without a manifest, and where no run is done; [`PostError::Sweep`]
+/// for a manifest that cannot be read.
+pub fn histories(paths: &[PathBuf]) -> Result<(Vec<PathBuf>, Vec<LeftOut>)> {
+    let (mut found, mut left_out) = (vec![], vec![]);
+    for path in paths {
+        if !path.is_dir() {
+            found.push(path.clone());
+            continue;
+        }
+        let store = Store::new(path.clone());
+        let Some(mut manifest) = store.manifest()? else {
+            let shown = path.display();
+            return Err(PostError::Usage(format!(
+                "{shown} holds no manifest.json: give the folder of a sweep, which dem-run sweep writes, or the histories"
+            )));
+        };
+        store.gather(&mut manifest);
+        for run in manifest.runs {
+            let history = path.join(&run.history);
+            if run.state == State::Done {
+                found.push(history);
+                continue;
+            }
+            let why = run.message.as_deref().and_then(|message| message.lines().next()).unwrap_or_default();
+            let why = if why.is_empty() { String::new() } else { format!(": {why}") };
+            left_out.push(LeftOut { run: name(&history), why: format!("{}{why}", run.state.name()) });
+        }
+    }
+    if found.is_empty() {
+        let shown: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
+        let what = if shown.is_empty() {
+            "no runs: give".into()
+        } else {
+            format!("no run of {} is done: give", shown.join(", "))
+        };
+        return Err(PostError::Usage(format!("{what} histories, or the folder of a sweep that has been run")));
+    }
+    Ok((found, left_out))
+}
+
+/// The name of a run in tables.
+pub fn name(path: &Path) -> String {
+    path.display().to_string()
+}
+
+/// Reads where a run gave way; `wall` is the driven wall, where there are several.
+///
+/// # Errors
+/// [`PostError::Lacking`] for a run without a load, or without what the measure needs; those of reading it.
+pub fn read(path: &Path, measure: Measure, wall: Option<&str>) -> Result<Found> {
+    let history = History::open(path)?;
+    let bonds = history.bonds()?;
+    let course = Course::read(&history, wall)?;
+    let scene = history.parameters()?.scene;
+    if bonds.is_empty() && matches!(measure, Measure::FirstBreak | Measure::Broken) {
+        let what = "it has no bonds that could break: choose --measure collapse or peak".into();
+        return Err(PostError::Lacking { path: path.into(), what });
+    }
+    let step = course.gives_way(path, measure, bonds.len())?;
+    // the bonds are looked at when the strain has passed its limit, which is a step later
+    let whole = |step: usize| course.broken.get(step + 1).or(course.broken.last()).is_some_and(|&n| n == 0.0);
+    let early = |step| measure == Measure::Collapse && !bonds.is_empty() && !is_elastic(&scene) && whole(step);
+    let strength = match step {
+        Some(step) => Ok(Strength { load: course.load[step], time: course.time[step], early: early(step) }),
+        None => Err(course.how_far(measure, bonds.len())),
+    };
+    Ok(Found { path: path.into(), scene, strength, grains: (history.grains()?.radius, bonds.pair) })
+}
+
+/// What happens to a sample, one entry per observed step.
+#[derive(Debug, Default)]
+struct Course {
+    /// Times, s.
+    time: Vec<f64>,
+    /// The load, N, counted in its own sense.
+    load: Vec<f64>,
+    /// Axial strain fitted to the grains, along the load; empty if not recorded.
+    strain: Vec<f64>,
+    /// Bonds broken; empty if not recorded.
+    broken: Vec<f64>,
+}
+
+impl Course {
+    fn read(history: &History, wall: Option<&str>) -> Result<Self> {
+        let driven = history.walls()?.iter().any(|wall| wall.drive != WallDrive::Fixed);
+        match (driven, wall) {
+            (false, None) => Self::of_grain(history),
+            _ => {
+                let found = stress_strain::read(history, wall)?;
+                Ok(Self { time: found.time, load: found.load, strain: found.strain, broken: found.broken })
+            }
+        }
+    }
+
+    /// The course under the force on a grain, where the scene has one such force and no driven wall.
+    fn of_grain(history: &History) -> Result<Self> {
+        let scene = serde_json::from_str::<Value>(&history.parameters()?.scene).unwrap_or_default();
+        let loads: Vec<Load> = serde_json::from_value(scene["grains"]["loads"].clone()).unwrap_or_default();
+        let magnitude = |load: &Load| load.force.iter().flatten().map(|f| f * f).sum::<f64>().sqrt();
+        let pulling: Vec<&Load> = loads.iter().filter(|load| magnitude(load) > 0.0).collect();
+        let lacking = |what: &str| PostError::Lacking { path: history.path().into(), what: what.into() };
+        let [load] = pulling.as_slice() else {
+            return Err(lacking(
+                "its strength needs a driven wall, or one force on a grain, and this scene has none: give one of its \
+                 walls a velocity or a force",
+            ));
+        };
+        let steps = history.observable("bonds_broken")?.filter(|series| !series.step.is_empty());
+        let steps = steps.ok_or_else(|| lacking("it has no steps of /observables/bonds_broken"))?;
+        let size = magnitude(load);
+        let direction: Vec<f64> = load.force.iter().flatten().map(|f| f / size).collect();
+        let d = history.dimension();
+        let mut strain = vec![];
+        if let Some(series) = history.observable("strain")? {
+            strain = vec![0.0; series.step.len()];
+            for (i, j) in (0..d * d).map(|k| (k / d, k % d)) {
+                let weight = direction.get(i).zip(direction.get(j)).map_or(0.0, |(a, b)| a * b);
+                let part = series.component(&[i, j]).unwrap_or_default();
+                strain.iter_mut().zip(part).for_each(|(sum, part)| *sum += weight * part);
+            }
+        }
+        let load = steps.time.iter().map(|&t| size * load.time.at(t)).collect();
+        Ok(Self { time: steps.time, load, strain, broken: steps.value })
+    }
+
+    /// The step at which the sample gives way; `None` if it does not.
+    fn gives_way(&self, path: &Path, measure: Measure, bonds: usize) -> Result<Option<usize>> {
+        let recorded = |values: &[f64], name: &str| match values {
+            [] => {
+                Err(PostError::Lacking { path: path.into(), what: format!("it has no steps of /observables/{name}") })
+            }
+            _ => Ok(()),
+        };
+        let step = match measure {
+            Measure::FirstBreak | Measure::Broken => {
+                recorded(&self.broken, "bonds_broken")?;
+                let share = if measure == Measure::Broken { BROKEN_SHARE * bonds as f64 } else { 0.0 };
+                self.broken.iter().position(|&n| n > 0.0 && n >= share)
+            }
+            Measure::Collapse => {
+                recorded(&self.strain, "strain")?;
+                last_step_below(&self.strain, STRAINS[0])
+            }
+            Measure::Peak => peak(&self.load),
+        };
+        Ok(step.filter(|&step| step < self.load.len()))
+    }
+
+    /// What a run came to that did not give way.
+    fn how_far(&self, measure: Measure, bonds: usize) -> String {
+        let greatest = quantity(self.load.iter().copied().reduce(f64::max), "N");
+        let broken = self.broken.last().copied().unwrap_or(0.0);
+        match measure {
+            Measure::FirstBreak => format!("no bond has broken by {greatest}"),
+            Measure::Broken => format!("{broken} of {bonds} bonds have broken by {greatest}, fewer than 5 %"),
+            Measure::Collapse => {
+                let strain = self.strain.iter().map(|e| e.abs()).fold(0.0, f64::max);
+                format!("its strain comes to {} by {greatest}, not to 1e-4", quantity(Some(strain), ""))
+            }
+            Measure::Peak => format!("its load never falls by 5 %; it comes to {greatest}"),
+        }
+    }
+}
+
+fn is_elastic(scene: &str) -> bool {
+    serde_json::from_str::<Value>(scene).is_ok_and(|scene| !scene["bonds"]["stiffness"].is_null())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn step(measure: Measure, bonds: usize) -> Option<usize> {
+        let course = Course {
+            time: (0..6).map(f64::from).collect(),
+            load: vec![0.0, 10.0, 20.0, 30.0, 40.0, 12.0],
+            strain: vec![0.0, 0.0, 0.0, -5e-5, -2e-4, -2e-3],
+            broken: vec![0.0, 0.0, 1.0, 1.0, 5.0, 9.0],
+        };
+        course.gives_way(Path::new("run.h5"), measure, bonds).unwrap()
+    }
+
+    #[test]
+    fn each_measure_has_its_step() {
+        assert_eq!(step(Measure::FirstBreak, 100), Some(2));
+        assert_eq!(
+            (step(Measure::Broken, 100), step(Measure::Broken, 20), step(Measure::Broken, 200)),
+            (Some(4), Some(2), None)
+        );
+        assert_eq!(step(Measure::Collapse, 100), Some(3));
+        assert_eq!(step(Measure::Peak, 100), Some(4));
+        assert!(Course::default().gives_way(Path::new("a.h5"), Measure::Collapse, 1).is_err());
+    }
+}

@@ -1,0 +1,273 @@
+//! Velocity field: how fast and which way the grains move, at some moments.
+//!
+//! The map fills each grain with the colour of its speed, over the speed v that all but one in a hundred grains of the
+//! panel stay below: speeds grow by orders of magnitude in a collapse, and one scale would leave all but one panel dark.
+//! Arrows show the mean velocity of the grains whose centres lie
+//! in the same square of a grid, so that they can be told apart in a large sample too; they begin in the middle of these
+//! centres; the longest of a panel is as long as a square is wide. So both compare grains of one panel; the captions
+//! compare panels.
+
+use dem_run::history::{GrainState, History};
+use serde::Serialize;
+
+use crate::map::{Arrow, Key, Panel, Ramp, Sample, Scale, draw};
+use crate::moments;
+use crate::output::{Folder, Result, Text, number, short};
+use crate::plot::{Drawing, colour};
+use crate::row;
+
+/// Squares of the grid along the longer side of the sample.
+const SQUARES: f64 = 18.0;
+/// Share of the speeds that the scale of colours covers, so that one grain thrown off does not make all others equal.
+const COVERED: f64 = 0.99;
+
+/// The motion of the grains at one moment.
+#[derive(Clone, Debug, Serialize)]
+pub struct Field {
+    /// The frame.
+    pub frame: usize,
+    /// Its step.
+    pub step: i64,
+    /// Its time, s.
+    pub time: f64,
+    /// Mean speed of the grains, m/s.
+    pub mean_speed: f64,
+    /// Root of the mean square of the speeds, m/s.
+    pub rms_speed: f64,
+    /// Greatest speed, m/s.
+    pub greatest_speed: f64,
+    /// The grain that has it.
+    pub fastest: usize,
+    /// Velocity of the centre of mass, m/s, D numbers.
+    pub drift: Vec<f64>,
+    /// Translational kinetic energy, J.
+    pub kinetic_energy: f64,
+    /// The speeds, m/s.
+    #[serde(skip)]
+    pub speed: Vec<f64>,
+    /// The grains.
+    #[serde(skip)]
+    pub state: GrainState,
+}
+
+/// The motion at the chosen moments.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// One entry for each moment.
+    pub fields: Vec<Field>,
+}
+
+/// Reads the motion at the frames nearest to `times` (s), or at chosen ones.
+///
+/// # Errors
+/// [`crate::output::PostError::Usage`] for times outside the history.
+pub fn read(history: &History, times: &[f64]) -> Result<Report> {
+    let mass = history.grains()?.mass;
+    let mut fields = vec![];
+    for frame in moments::chosen(history, times)? {
+        let state = history.grain_state(frame)?;
+        fields.push(field(frame, (history.steps()[frame], history.times()[frame]), state, &mass, history.dimension()));
+    }
+    Ok(Report { fields })
+}
+
+fn field(frame: usize, (step, time): (i64, f64), state: GrainState, mass: &[f64], d: usize) -> Field {
+    let speed = speeds(&state, d);
+    let n = speed.len() as f64;
+    let fastest = (0..speed.len()).max_by(|&a, &b| speed[a].total_cmp(&speed[b]).then(b.cmp(&a))).unwrap_or(0);
+    let total: f64 = mass.iter().sum();
+    let momentum = |k: usize| mass.iter().zip(state.velocity.chunks(d)).map(|(m, v)| m * v[k]).sum::<f64>();
+    Field {
+        frame,
+        step,
+        time,
+        mean_speed: speed.iter().sum::<f64>() / n,
+        rms_speed: (speed.iter().map(|v| v * v).sum::<f64>() / n).sqrt(),
+        greatest_speed: speed.get(fastest).copied().unwrap_or(0.0),
+        fastest,
+        drift: (0..d).map(|k| momentum(k) / total).collect(),
+        kinetic_energy: 0.5 * mass.iter().zip(&speed).map(|(m, v)| m * v * v).sum::<f64>(),
+        speed,
+        state,
+    }
+}
+
+/// Speed of each grain, m/s.
+pub fn speeds(state: &GrainState, d: usize) -> Vec<f64> {
+    state.velocity.chunks(d).map(|v| v.iter().map(|x| x * x).sum::<f64>().sqrt()).collect()
+}
+
+/// The speed (m/s) that all but one in a hundred stay below; zero of none.
+pub fn usual_speed(mut speeds: Vec<f64>) -> f64 {
+    speeds.sort_by(f64::total_cmp);
+    let place = (COVERED * speeds.len() as f64).ceil() as usize;
+    speeds.get(place.saturating_sub(1)).copied().unwrap_or(0.0)
+}
+
+impl Report {
+    /// The report as a table.
+    pub fn table(&self) -> String {
+        let mut table = Text::new(&[
+            "time (s)",
+            "mean speed (m/s)",
+            "rms speed (m/s)",
+            "max speed (m/s)",
+            "grain",
+            "drift (m/s)",
+            "kinetic energy (J)",
+        ]);
+        for field in &self.fields {
+            let drift: Vec<String> = field.drift.iter().map(|v| short(*v)).collect();
+            table.row(vec![
+                number(field.time),
+                number(field.mean_speed),
+                number(field.rms_speed),
+                number(field.greatest_speed),
+                field.fastest.to_string(),
+                format!("({})", drift.join(", ")),
+                number(field.kinetic_energy),
+            ]);
+        }
+        table.lines()
+    }
+}
+
+/// Writes `velocities.csv`, and as a drawing `velocities`.
+///
+/// # Errors
+/// [`crate::output::PostError::Write`].
+pub fn write(history: &History, report: &Report, folder: &mut Folder) -> Result<()> {
+    let d = history.dimension();
+    let axes =
+        |name: &str, unit: &str| ["x", "y", "z"][..d].iter().map(|a| format!("{name}{a}_{unit}")).collect::<Vec<_>>();
+    let head = [
+        vec!["step".into(), "time_s".into(), "grain".into()],
+        axes("", "m"),
+        axes("v", "m_per_s"),
+        vec!["speed_m_per_s".into()],
+    ]
+    .concat();
+    let head: Vec<&str> = head.iter().map(String::as_str).collect();
+    let rows = report.fields.iter().flat_map(|field| {
+        (0..field.speed.len()).map(move |grain| {
+            let part =
+                |all: &[f64]| all[grain * d..(grain + 1) * d].iter().map(ToString::to_string).collect::<Vec<_>>();
+            let (position, velocity) = (part(&field.state.position), part(&field.state.velocity));
+            [row![field.step, field.time, grain], position, velocity, row![field.speed[grain]]].concat()
+        })
+    });
+    folder.table("velocities", &head, rows)?;
+    Ok(folder.draw("velocities", &map(history, report)?)?)
+}
+
+/// The map of the velocities.
+///
+/// # Errors
+/// Those of reading the history.
+pub fn map(history: &History, report: &Report) -> Result<Drawing> {
+    let scale = |title: &str, high: f64| Scale { title: title.into(), low: 0.0, high, ramp: Ramp::Areas };
+    let mut panels = vec![];
+    for field in &report.fields {
+        let usual = scale("", usual_speed(field.speed.clone()));
+        panels.push(Panel {
+            caption: vec![
+                format!("t = {} s", number(field.time)),
+                format!("v = {} m/s, mean {} m/s", short(usual.high), short(field.mean_speed)),
+            ],
+            grains: field.state.clone(),
+            walls: history.wall_state(field.frame)?,
+            fills: field.speed.iter().map(|&speed| usual.colour(speed)).collect(),
+            outline: colour::GREY,
+            links: vec![],
+            arrows: arrows(&field.state, history.dimension()),
+        });
+    }
+    let legend = [Key::Bar(scale("speed over v", 1.0)), Key::Arrow("mean velocity of a square".into())];
+    Ok(draw(&Sample::read(history)?, &panels, &legend))
+}
+
+/// The mean velocities of the squares of a grid as arrows, the longest as long as a square is wide.
+fn arrows(state: &GrainState, d: usize) -> Vec<Arrow> {
+    let axes = [0, d - 1];
+    let range = axes.map(|k| {
+        let values = || state.position.chunks(d).map(|x| x[k]);
+        (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max))
+    });
+    let side = range.iter().map(|(low, high)| high - low).fold(0.0, f64::max) / SQUARES;
+    if side <= 0.0 || !side.is_finite() {
+        return vec![];
+    }
+    let square = |x: &[f64]| [0, 1].map(|k| ((x[axes[k]] - range[k].0) / side) as i64);
+    let mut grains: Vec<usize> = (0..state.position.len() / d).collect();
+    let place = |grain: usize| &state.position[grain * d..(grain + 1) * d];
+    grains.sort_by_key(|&grain| square(place(grain)));
+    let mean = |group: &[usize], all: &[f64]| -> Vec<f64> {
+        (0..d).map(|k| group.iter().map(|&grain| all[grain * d + k]).sum::<f64>() / group.len() as f64).collect()
+    };
+    let means: Vec<[Vec<f64>; 2]> = grains
+        .chunk_by(|&a, &b| square(place(a)) == square(place(b)))
+        .map(|group| [mean(group, &state.position), mean(group, &state.velocity)])
+        .collect();
+    // what points at the reader has no length
+    let length = |v: &[f64]| v[axes[0]].hypot(v[axes[1]]);
+    let longest = means.iter().map(|[_, v]| length(v)).fold(0.0, f64::max);
+    if longest == 0.0 {
+        return vec![];
+    }
+    let arrow = |[from, v]: [Vec<f64>; 2]| Arrow {
+        to: from.iter().zip(v).map(|(x, v)| x + v * side / longest).collect(),
+        from,
+    };
+    means.into_iter().map(arrow).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A row of grains that turns about the origin at 2 rad/s.
+    fn turning() -> GrainState {
+        let x = [-3.0, -1.0, 1.0, 3.0];
+        GrainState {
+            position: x.iter().flat_map(|x| [*x, 0.0]).collect(),
+            velocity: x.iter().flat_map(|x| [0.0, 2.0 * x]).collect(),
+            ..GrainState::default()
+        }
+    }
+
+    #[test]
+    fn a_turning_row_has_the_speeds_of_a_rigid_body() {
+        let field = field(0, (0, 0.0), turning(), &[1.0, 3.0, 3.0, 1.0], 2);
+        assert_eq!(field.speed, [6.0, 2.0, 2.0, 6.0]);
+        assert_eq!((field.mean_speed, field.greatest_speed, field.fastest), (4.0, 6.0, 0));
+        assert_eq!((field.rms_speed, field.drift), (20f64.sqrt(), vec![0.0, 0.0]));
+        // ½ ω² Σ m x² = ½ · 4 · (9 + 3 + 3 + 9)
+        assert_eq!(field.kinetic_energy, 48.0);
+    }
+
+    #[test]
+    fn the_longest_arrow_is_one_square_long() {
+        let arrows = arrows(&turning(), 2);
+        assert_eq!(arrows.len(), 4);
+        let rise: Vec<f64> = arrows.iter().map(|a| a.to[1] - a.from[1]).collect();
+        let side = 6.0 / SQUARES;
+        for (rise, expected) in rise.iter().zip([-side, -side / 3.0, side / 3.0, side]) {
+            assert!((rise - expected).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn grains_at_rest_have_no_arrows() {
+        let still = GrainState { velocity: vec![0.0; 8], ..turning() };
+        assert!(arrows(&still, 2).is_empty());
+        assert!(arrows(&GrainState::default(), 2).is_empty());
+    }
+
+    #[test]
+    fn one_fast_grain_does_not_set_the_scale() {
+        let mut speeds = vec![1.0; 199];
+        speeds.push(50.0);
+        assert_eq!(usual_speed(speeds), 1.0);
+        assert_eq!(usual_speed(vec![]), 0.0);
+    }
+}
