@@ -11,19 +11,33 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture(scope="session")
-def dem_run():
-    """Runs `dem-run` with these arguments in a folder."""
+def programs():
+    """The paths of `dem-run` and `dem-post`."""
     build = [os.environ.get("CARGO", "cargo"), "build", "--release", "--locked", "-p", "dem-run", "-p", "dem-post"]
     built = subprocess.run(
         build + ["--message-format=json-render-diagnostics"], cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True
     )
     artifacts = [json.loads(line) for line in built.stdout.splitlines()]
-    program = next(a["executable"] for a in artifacts if a.get("executable") and a["target"]["name"] == "dem-run")
+    return {a["target"]["name"]: a["executable"] for a in artifacts if a.get("executable")}
 
+
+def runner(program):
     def run(folder, *arguments):
         subprocess.run([program, *map(str, arguments)], cwd=folder, check=True, stdout=subprocess.DEVNULL, timeout=300)
 
     return run
+
+
+@pytest.fixture(scope="session")
+def dem_run(programs):
+    """Runs `dem-run` with these arguments in a folder."""
+    return runner(programs["dem-run"])
+
+
+@pytest.fixture(scope="session")
+def dem_post(programs):
+    """Runs `dem-post` with these arguments in a folder."""
+    return runner(programs["dem-post"])
 
 
 @pytest.fixture(scope="session")

@@ -1,12 +1,16 @@
 //! The commands end to end, as a user runs them: release builds, scenes from `configs/`, files in a folder of their own.
 
 mod accuracy;
+mod bending;
 mod collapse;
 mod common;
 mod compression;
 mod elastic;
 mod fclib;
 mod interrupt;
+mod pack;
+mod resume;
+mod sweep;
 mod teaching;
 mod wrong_history;
 mod wrong_scene;

@@ -105,7 +105,7 @@ fn the_commands_that_a_summary_names_show_something() {
         let outcome = here.dem_run(&["run", &config(&format!("{scene}.json"))]).succeeds();
         let commands: Vec<&str> = outcome.stdout.lines().filter_map(|line| line.strip_prefix("  dem-post ")).collect();
         // neither has bonds or a driven wall
-        assert_eq!(commands, [format!("info {scene}.h5"), format!("chains {scene}.h5")]);
+        assert_eq!(commands, ["info", "report", "chains"].map(|command| format!("{command} {scene}.h5")));
         for command in commands {
             here.dem_post(&command.split(' ').collect::<Vec<_>>()).succeeds();
         }

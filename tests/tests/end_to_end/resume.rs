@@ -1,0 +1,361 @@
+//! Runs that end before their time and go on: what was recorded stays, and the end is that of a run without a stop.
+
+use crate::common::{Folder, SMALL, config, problems, program};
+use dem_run::history::History;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// That two histories hold the same to the bit, but for the processor time.
+fn same(a: &History, b: &History) {
+    let (mut layout, other) = (a.layout().expect("layout"), b.layout().expect("layout"));
+    let parameters = std::mem::replace(&mut layout.parameters, other.parameters.clone());
+    assert_eq!(layout, other);
+    assert_eq!(parameters.scene, other.parameters.scene);
+    assert_eq!(a.complete().expect("rows"), b.complete().expect("rows"));
+    assert_eq!(a.ruptures().expect("events"), b.ruptures().expect("events"));
+    for name in a.observable_names().expect("names").iter().filter(|name| *name != "cpu_time") {
+        let bits = |h: &History| {
+            let series = h.observable(name).expect("read").expect("observable");
+            (series.step, [series.time, series.value].concat().into_iter().map(f64::to_bits).collect::<Vec<_>>())
+        };
+        assert_eq!(bits(a), bits(b), "{name}");
+    }
+    assert_eq!((a.steps(), a.times()), (b.steps(), b.times()));
+    for frame in 0..a.frames() {
+        assert_eq!(a.grain_state(frame).expect("grains"), b.grain_state(frame).expect("grains"), "frame {frame}");
+        assert_eq!(a.wall_state(frame).expect("walls"), b.wall_state(frame).expect("walls"), "frame {frame}");
+        assert_eq!(a.contacts(frame).expect("contacts"), b.contacts(frame).expect("contacts"), "frame {frame}");
+        assert_eq!(a.bond_status(frame).expect("bonds"), b.bond_status(frame).expect("bonds"), "frame {frame}");
+    }
+}
+
+/// The small compression, with frames and checkpoints so often that a kill hits any place of the writer.
+fn scene() -> Vec<String> {
+    let mut args = vec![config("compression.json")];
+    args.extend(SMALL.iter().map(ToString::to_string));
+    args.extend(["--set", "output.every_steps=5", "--set", "output.checkpoint_every=7"].map(String::from));
+    args
+}
+
+fn run(here: &Folder, file: &str, more: &[&str]) {
+    let args: Vec<String> =
+        ["run".to_string()].into_iter().chain(scene()).chain(["-o", file].map(String::from)).collect();
+    let args: Vec<&str> = args.iter().map(String::as_str).chain(more.iter().copied()).collect();
+    here.dem_run(&args).succeeds();
+}
+
+/// What a kill left, and what became of it.
+struct Killed {
+    frames: usize,
+    /// Frames that were beyond the last checkpoint.
+    beyond: usize,
+}
+
+/// Starts the scene, or goes on with it, and kills the process `after` so long; none if it ended before.
+fn kill(here: &Folder, file: &str, after: Duration) -> bool {
+    let resumed = here.path(file).exists();
+    let mut command = Command::new(program("dem-run"));
+    match resumed {
+        true => command.args(["resume", file]),
+        false => command.arg("run").args(scene()).args(["-o", file]),
+    };
+    let command = command.current_dir(here.path("")).arg("--quiet").stdout(Stdio::null());
+    let mut child = command.spawn().expect("start");
+    std::thread::sleep(after);
+    let running = child.try_wait().expect("status").is_none();
+    child.kill().expect("kill");
+    child.wait().expect("end");
+    running
+}
+
+/// Kills a run, and what goes on with it, at `moments` random moments; it then goes on to its end. The kills that hit.
+fn killed(here: &Folder, whole: &History, file: &str, seed: u64, moments: usize, longest: Duration) -> Vec<Killed> {
+    let mut rng = Pcg64::seed_from_u64(seed);
+    let mut hits = vec![];
+    for _ in 0..moments {
+        let hit = kill(here, file, longest.mul_f64(rng.random::<f64>()));
+        if !here.path(file).exists() {
+            // not even begun: the sample was being packed
+            continue;
+        }
+        // it opens, and holds every frame that was complete
+        let history = here.history(file);
+        assert_eq!(history.steps(), &whole.steps()[..history.frames()]);
+        for frame in [0, history.frames() / 2, history.frames().saturating_sub(1)] {
+            if frame < history.frames() {
+                assert_eq!(history.grain_state(frame).expect("grains"), whole.grain_state(frame).expect("grains"));
+                assert_eq!(history.contacts(frame).expect("contacts"), whole.contacts(frame).expect("contacts"));
+            }
+        }
+        let checkpoint = history.checkpoint().expect("checkpoint").map_or(0, |c| c.step);
+        if hit {
+            let beyond = history.steps().iter().filter(|step| **step > checkpoint).count();
+            hits.push(Killed { frames: history.frames(), beyond });
+        }
+    }
+    if !here.path(file).exists() {
+        run(here, file, &["--quiet"]);
+    }
+    here.dem_run(&["resume", file, "--quiet"]).succeeds();
+    same(whole, &here.history(file));
+    // what a kill left while a file was made beside is gone
+    let left: Vec<String> = here.names().into_iter().filter(|name| name.ends_with(".part")).collect();
+    assert!(left.iter().all(|name| !name.contains(file)), "{left:?}");
+    hits
+}
+
+/// The scene run without a stop, and how long that took.
+fn whole(here: &Folder) -> (History, Duration) {
+    program("dem-run");
+    let start = Instant::now();
+    run(here, "whole.h5", &[]);
+    (here.history("whole.h5"), start.elapsed())
+}
+
+#[test]
+fn a_killed_run_goes_on_as_if_it_had_never_stopped() {
+    let here = Folder::new();
+    let (whole, took) = whole(&here);
+    let mut hits = 0;
+    for file in ["a.h5", "b.h5", "c.h5"] {
+        hits += killed(&here, &whole, file, file.len() as u64 + u64::from(file.as_bytes()[0]), 4, took).len();
+    }
+    assert!(hits > 0, "no kill hit a run");
+}
+
+/// The long form, which docs/history.md names.
+#[test]
+#[ignore = "takes minutes: 200 kills"]
+fn two_hundred_kills_lose_nothing() {
+    let here = Folder::new();
+    let (whole, took) = whole(&here);
+    let mut hits = vec![];
+    for round in 0.. {
+        let file = format!("{round}.h5");
+        hits.extend(killed(&here, &whole, &file, round, 5, took));
+        std::fs::remove_file(here.path(&file)).unwrap_or_default();
+        if hits.len() >= 200 {
+            break;
+        }
+    }
+    let most = hits.iter().map(|hit| hit.beyond).max().unwrap_or(0);
+    let (low, high) = (hits.iter().map(|h| h.frames).min(), hits.iter().map(|h| h.frames).max());
+    println!(
+        "{} kills, after {low:?} to {high:?} of {} frames; every file opened with all of them,",
+        hits.len(),
+        whole.frames()
+    );
+    println!("went on from at most {most} frames before, and ended as the run without a stop, to the bit");
+}
+
+#[test]
+fn an_interrupted_run_goes_on_from_its_last_step() {
+    let here = Folder::new();
+    let (whole, _) = whole(&here);
+    let mut command = Command::new(program("dem-run"));
+    command.arg("run").args(scene()).args(["-o", "a.h5", "--quiet"]).current_dir(here.path("")).stdout(Stdio::null());
+    let mut child = command.stderr(Stdio::null()).spawn().expect("start");
+    // once a few frames stand
+    while !here.path("a.h5").exists() {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    std::thread::sleep(Duration::from_millis(60));
+    Command::new("sh").args(["-c", &format!("kill -INT {}", child.id())]).status().expect("sh");
+    assert_eq!(child.wait().expect("end").code(), Some(130));
+    let history = here.history("a.h5");
+    // nothing is computed twice: the last state is a checkpoint
+    let last = history.steps().last().copied();
+    assert_eq!(history.checkpoint().expect("read").map(|c| c.step), last);
+    assert!(last < whole.steps().last().copied());
+    drop(history);
+    here.dem_run(&["resume", "a.h5", "--quiet"]).succeeds();
+    same(&whole, &here.history("a.h5"));
+    // and again: there is nothing to do
+    let before = here.read("a.h5");
+    let told = here.dem_run(&["resume", "a.h5", "--quiet"]).succeeds();
+    assert!(told.stdout.contains("nothing to do"), "{}", told.stdout);
+    assert_eq!(here.read("a.h5"), before);
+}
+
+#[test]
+fn a_finished_run_goes_on_to_a_later_end() {
+    let here = Folder::new();
+    // the first end lies between two frames
+    run(&here, "long.h5", &["--set", "time.end=0.08", "--quiet"]);
+    run(&here, "short.h5", &["--set", "time.end=0.0403", "--quiet"]);
+    here.dem_run(&["resume", "short.h5", "--until", "0.08", "--quiet"]).succeeds();
+    same(&here.history("long.h5"), &here.history("short.h5"));
+    // the summary counts the whole run
+    let summary = here.dem_run(&["resume", "short.h5", "--until", "0.09", "--json", "--quiet"]).json();
+    assert_eq!(summary["steps"], 900);
+    assert_eq!(summary["grains"], 60);
+    assert!(summary["solid_fraction"].as_f64().expect("a fraction") > 0.5);
+}
+
+#[test]
+fn other_scenes_are_refused_with_what_differs() {
+    let here = Folder::new();
+    run(&here, "a.h5", &["--set", "time.end=0.02", "--quiet"]);
+    let before = here.read("a.h5");
+    let resume = |set: &str, more: &[&str]| {
+        here.dem_run(&[&["resume", "a.h5", "--until", "0.03", "--set", set, "--quiet"], more].concat())
+    };
+    resume("bonds.strength=5", &[]).fails(2, &["bonds.strength", "10", "5", "cannot change"]);
+    resume("bonds.strength=5", &["--force"]).fails(2, &["bonds.strength", "cannot change"]);
+    resume("walls.top.force_rate=200", &[]).fails(2, &["walls.top.force_rate", "--force"]);
+    resume("time.step=5e-5", &["--force"]).fails(2, &["time.step", "cannot change"]);
+    resume("output.every_steps=7", &["--force"]).fails(2, &["output.every_steps"]);
+    resume("solver.tolerance=0", &[]).fails(2, &["solver.tolerance"]);
+    assert_eq!(here.read("a.h5"), before);
+    resume("solver.tolerance=1e-7", &["--force"]).succeeds();
+    assert_eq!(here.history("a.h5").steps().last(), Some(&300));
+}
+
+#[test]
+fn files_that_cannot_go_on_are_left_as_they_are() {
+    let here = Folder::new();
+    run(&here, "a.h5", &["--set", "time.end=0.02", "--quiet"]);
+    let whole = here.read("a.h5");
+    let resume = |file: &str| here.dem_run(&["resume", file, "--until", "0.03", "--quiet"]);
+    resume("none.h5").fails(4, &["none.h5"]);
+    here.write("text.h5", "x,y,radius\n");
+    resume("text.h5").fails(4, &["text.h5", "not an HDF5 file"]);
+    std::fs::copy(problems().join("pressed.hdf5"), here.path("foreign.h5")).expect("copy");
+    resume("foreign.h5").fails(4, &["foreign.h5", "not a history"]);
+    let mut rng = Pcg64::seed_from_u64(5);
+    for _ in 0..40 {
+        let cut = rng.random_range(0..whole.len());
+        here.write("cut.h5", &whole[..cut]);
+        let outcome = resume("cut.h5");
+        assert_eq!(outcome.code, Some(4), "cut at {cut}: {}", outcome.stderr);
+        assert!(!outcome.stderr.contains("panicked"), "{}", outcome.stderr);
+        assert_eq!(here.read("cut.h5"), &whole[..cut], "cut at {cut}");
+    }
+    // a byte that is another one: an error, or a result; never a panic, and never an end that hangs
+    for _ in 0..40 {
+        let mut wrong = whole.clone();
+        let place = rng.random_range(0..wrong.len());
+        wrong[place] ^= 1 << rng.random_range(0..8);
+        here.write("wrong.h5", &wrong);
+        let outcome = resume("wrong.h5");
+        assert!(matches!(outcome.code, Some(0 | 2 | 3 | 4)), "byte {place}: {:?} {}", outcome.code, outcome.stderr);
+        if outcome.code != Some(0) {
+            assert_eq!(here.read("wrong.h5"), wrong, "byte {place}");
+        }
+    }
+}
+
+#[test]
+fn a_history_that_is_being_written_is_refused() {
+    let here = Folder::new();
+    let column = config("column.json");
+    let mut command = Command::new(program("dem-run"));
+    command.args(["run", &column, "-o", "a.h5", "--quiet", "--set", "time.end=1e4"]).current_dir(here.path(""));
+    let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("start");
+    while !here.path("a.h5").exists() {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    here.dem_run(&["resume", "a.h5"]).fails(4, &["being written by process", &child.id().to_string()]);
+    child.kill().expect("kill");
+    child.wait().expect("end");
+}
+
+#[test]
+fn a_full_disk_leaves_a_history_that_is_good_up_to_its_last_frame() {
+    let here = Folder::new();
+    run(&here, "whole.h5", &[]);
+    let whole = here.history("whole.h5");
+    // the system's limit on the size of a file stands in for the end of a disk
+    let limit = whole.length() / 1024 / 2;
+    let args = scene().join("' '");
+    let command = format!(
+        "trap '' XFSZ; ulimit -f {limit}; exec '{}' run '{args}' -o a.h5 --quiet",
+        program("dem-run").display()
+    );
+    let output = Command::new("bash").args(["-c", &command]).current_dir(here.path("")).output().expect("bash");
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(4), "{told}");
+    assert!(told.contains("a.h5") && told.contains("disk full"), "{told}");
+    let history = here.history("a.h5");
+    assert!(history.frames() > 10 && history.frames() < whole.frames(), "{}", history.frames());
+    let last = history.frames() - 1;
+    assert_eq!(history.contacts(last).expect("contacts"), whole.contacts(last).expect("contacts"));
+    drop(history);
+    // and with room on the disk it goes on
+    here.dem_run(&["resume", "a.h5", "--quiet"]).succeeds();
+    same(&whole, &here.history("a.h5"));
+}
+
+#[test]
+fn a_history_that_disappears_ends_the_run() {
+    let here = Folder::new();
+    let column = config("column.json");
+    let set = ["--set", "time.end=1e4", "--set", "output.every_steps=10"];
+    let mut command = Command::new(program("dem-run"));
+    command.args(["run", &column, "-o", "a.h5", "--quiet"]).args(set).current_dir(here.path(""));
+    let child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("start");
+    while !here.path("a.h5").exists() {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    std::fs::remove_file(here.path("a.h5")).expect("remove");
+    let output = child.wait_with_output().expect("end");
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(4), "{told}");
+    assert!(told.contains("moved, deleted or replaced"), "{told}");
+}
+
+#[test]
+fn a_frame_holds_what_the_scene_asks_for() {
+    let here = Folder::new();
+    run(&here, "double.h5", &["--set", "time.end=0.02", "--quiet"]);
+    run(&here, "single.h5", &["--set", "time.end=0.02", "--quiet", "--set", "output.precision=single"]);
+    let less = ["--set", "time.end=0.02", "--quiet", "--set", "output.reactions=false"];
+    run(&here, "less.h5", &less);
+    let [double, single, less] = ["double.h5", "single.h5", "less.h5"].map(|name| here.history(name));
+    let last = double.frames() - 1;
+    let (a, b) = (double.grain_state(last).expect("grains"), single.grain_state(last).expect("grains"));
+    assert!(a.position.iter().zip(&b.position).all(|(a, b)| (*a as f32) as f64 == *b));
+    assert!(a.position != b.position);
+    // what is observed does not depend on what is stored
+    let load = |h: &History| h.observable("applied_force").expect("read").expect("observable");
+    assert_eq!(load(&double), load(&single));
+    assert_eq!(load(&double), load(&less));
+    let contacts = less.contacts(last).expect("contacts");
+    assert!(!contacts.is_empty() && contacts.reaction.is_empty() && contacts.moment.is_empty());
+    assert_eq!(contacts.gap, double.contacts(last).expect("contacts").gap);
+    here.dem_post(&["chains", "less.h5"]).fails(2, &["reactions", "output.reactions=true"]);
+    for view in ["cracks", "stress-strain", "info"] {
+        here.dem_post(&[view, "less.h5"]).succeeds();
+        here.dem_post(&[view, "single.h5"]).succeeds();
+    }
+    here.dem_post(&["chains", "single.h5"]).succeeds();
+    // each goes on in its own way
+    for name in ["single.h5", "less.h5"] {
+        here.dem_run(&["resume", name, "--until", "0.03", "--quiet"]).succeeds();
+        assert_eq!(here.history(name).steps().last(), Some(&300));
+    }
+}
+
+#[test]
+fn a_run_that_was_killed_before_its_first_checkpoint_begins_anew() {
+    let here = Folder::new();
+    run(&here, "whole.h5", &["--set", "time.end=0.02", "--quiet"]);
+    std::fs::copy(here.path("whole.h5"), here.path("a.h5")).expect("copy");
+    let file = hdf5::File::open_rw(here.path("a.h5")).expect("open");
+    file.dataset("checkpoint/index").expect("index").write_raw(&[0u64; 8]).expect("write");
+    drop(file);
+    // of one that has gone on for long, nothing is thrown away
+    let before = here.read("a.h5");
+    here.dem_run(&["resume", "a.h5", "--quiet"]).fails(4, &["no whole state", "damaged"]);
+    assert_eq!(here.read("a.h5"), before);
+    for frames in [0u64, 1] {
+        std::fs::write(here.path("b.h5"), &before).expect("write");
+        let file = hdf5::File::open_rw(here.path("b.h5")).expect("open");
+        file.dataset("commit").expect("commit").write_scalar(&frames).expect("write");
+        drop(file);
+        here.dem_run(&["resume", "b.h5", "--quiet"]).succeeds();
+        same(&here.history("whole.h5"), &here.history("b.h5"));
+    }
+}
