@@ -48,7 +48,7 @@ impl Saved {
 
     /// Reads the numbers from the first on.
     pub fn read(&self) -> Reader<'_> {
-        Reader { reals: &self.reals, counts: &self.counts }
+        Reader::new(&self.reals, &self.counts)
     }
 }
 
@@ -60,6 +60,11 @@ pub struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
+    /// Reads what was saved as these reals and counts.
+    pub fn new(reals: &'a [f64], counts: &'a [u64]) -> Self {
+        Self { reals, counts }
+    }
+
     /// The next real.
     ///
     /// # Errors

@@ -155,17 +155,24 @@ struct ShowArgs {
     quiet: bool,
 }
 
-/// What the commands that run a scene have in common.
+/// How a command is carried out.
 #[derive(Debug, Args)]
-struct MannerArgs {
-    /// Overwrite files that exist.
-    #[arg(long)]
-    force: bool,
+struct ExecutionArgs {
     /// Number of threads; the result does not depend on it [default: all].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
     #[command(flatten)]
     show: ShowArgs,
+}
+
+/// What the commands that run a scene from its start have in common.
+#[derive(Debug, Args)]
+struct MannerArgs {
+    /// Overwrite files that exist.
+    #[arg(long)]
+    force: bool,
+    #[command(flatten)]
+    execution: ExecutionArgs,
 }
 
 #[derive(Debug, Args)]
@@ -205,11 +212,8 @@ struct ResumeArgs {
     /// Go on even though the scene differs.
     #[arg(long)]
     force: bool,
-    /// Number of threads; the result does not depend on it [default: all].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
-    threads: Option<u16>,
     #[command(flatten)]
-    show: ShowArgs,
+    execution: ExecutionArgs,
     /// Print the summary as JSON.
     #[arg(long)]
     json: bool,
@@ -369,9 +373,9 @@ pub fn main() -> ExitCode {
     }
 }
 
-impl MannerArgs {
-    fn execution(&self) -> Execution {
-        Execution { threads: self.threads.map(usize::from), progress: self.show.progress, quiet: self.show.quiet }
+impl From<ExecutionArgs> for Execution {
+    fn from(args: ExecutionArgs) -> Self {
+        Self { threads: args.threads.map(usize::from), progress: args.show.progress, quiet: args.show.quiet }
     }
 }
 
@@ -389,7 +393,7 @@ fn run(args: RunArgs) -> Result<(), RunError> {
     let options = RunOptions {
         output: args.output.unwrap_or_else(|| default_output(&args.scene.scene)),
         overwrite: args.manner.force,
-        execution: args.manner.execution(),
+        execution: args.manner.execution.into(),
         json: args.json,
         write_sample: args.write_sample,
     };
@@ -402,14 +406,13 @@ fn run(args: RunArgs) -> Result<(), RunError> {
 }
 
 fn resume(args: ResumeArgs) -> Result<(), RunError> {
-    let threads = args.threads.map(usize::from);
     resume::resume(&ResumeOptions {
         history: args.history,
         until: args.until,
         scene: args.scene,
         set: args.set,
         force: args.force,
-        execution: Execution { threads, progress: args.show.progress, quiet: args.show.quiet },
+        execution: args.execution.into(),
         json: args.json,
     })
 }
@@ -436,7 +439,7 @@ fn export(args: ExportArgs) -> Result<(), RunError> {
         history: args.history,
         step: args.step,
         output: args.output,
-        execution: args.manner.execution(),
+        execution: args.manner.execution.into(),
     })
 }
 
@@ -490,7 +493,7 @@ fn accuracy(args: AccuracyArgs) -> Result<(), RunError> {
         steps: args.steps,
         orders: args.orders,
         whole: args.whole,
-        execution: args.manner.execution(),
+        execution: args.manner.execution.into(),
         json: args.json,
     };
     accuracy::accuracy(&scene, &options)

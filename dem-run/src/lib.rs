@@ -14,6 +14,7 @@ pub mod plot;
 pub mod prepare;
 pub mod progress;
 pub mod record;
+mod replace;
 pub mod resume;
 pub mod run;
 pub mod scene;

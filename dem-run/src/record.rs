@@ -1,5 +1,6 @@
 //! From a world to its history: the layout, the frames, the rupture events and the observables of every step.
 
+use crate::build::Built;
 use crate::history::{
     self, Background, Batch, BondStatus, Checkpoint, ContactRows, ContactStatus, Frame, GrainState, History, Kept,
     Layout, Observable, Parameters, Rupture, RuptureMode, WallDrive, WallKind, WallState, Writer,
@@ -32,14 +33,8 @@ const GATHERED: usize = 256;
 
 impl<D: Dim> Recorder<D> {
     /// Create the history of a world at `path`.
-    pub fn create(
-        path: &Path,
-        overwrite: bool,
-        scene: &Scene,
-        names: &[String],
-        world: &World<D>,
-    ) -> history::Result<Self> {
-        let (layout, measures) = describe(scene, names, world, parameters(scene));
+    pub fn create(path: &Path, overwrite: bool, scene: &Scene, built: &Built<D>) -> history::Result<Self> {
+        let (layout, measures) = describe(scene, &built.world, parameters(scene, built.solid_fraction));
         let writer = Writer::create(path, &layout, overwrite)?;
         Ok(Self::new(writer, &layout, measures, 0.0))
     }
@@ -55,9 +50,8 @@ impl<D: Dim> Recorder<D> {
         cpu_before: f64,
         tell: &mut dyn FnMut(f64) -> bool,
     ) -> history::Result<Self> {
-        let names: Vec<String> = scene.walls.keys().cloned().collect();
         let origin = Parameters { scene: scene.to_json().unwrap_or_default(), ..history.parameters()? };
-        let (layout, measures) = describe(scene, &names, world, origin);
+        let (layout, measures) = describe(scene, world, origin);
         // what a scene without friction has no column for, it does not get later
         let layout = Layout { friction: history.layout()?.friction, ..layout };
         let writer = Writer::go_on(history.path(), &layout, history, kept, checkpoint, tell)?;
@@ -173,12 +167,7 @@ impl<D: Dim> Recorder<D> {
 
 /// What the history of a world holds, and what measures its observables; the processor time, the last, is told by the
 /// recorder.
-fn describe<D: Dim>(
-    scene: &Scene,
-    names: &[String],
-    world: &World<D>,
-    parameters: Parameters,
-) -> (Layout, Vec<Measure<D>>) {
+fn describe<D: Dim>(scene: &Scene, world: &World<D>, parameters: Parameters) -> (Layout, Vec<Measure<D>>) {
     let bonded = !world.bonds.is_empty();
     let friction = world.settings.friction > 0.0 || world.walls.iter().any(|w| w.friction > 0.0);
     // without friction, bonds and torques nothing ever turns, unless it turns from the start
@@ -197,7 +186,7 @@ fn describe<D: Dim>(
             mass: world.grains.mass.clone(),
             inertia: world.grains.inertia.clone(),
         },
-        walls: world.walls.iter().zip(names).map(|(wall, name)| describe_wall(wall, name)).collect(),
+        walls: world.walls.iter().zip(scene.walls.keys()).map(|(wall, name)| describe_wall(wall, name)).collect(),
         bonds: describe_bonds(world),
         observables,
         parameters,
@@ -279,7 +268,7 @@ fn describe_bonds<D: Dim>(world: &World<D>) -> history::Bonds {
     }
 }
 
-fn parameters(scene: &Scene) -> Parameters {
+fn parameters(scene: &Scene, solid_fraction: Option<f64>) -> Parameters {
     Parameters {
         scene: scene.to_json().unwrap_or_default(),
         seed: scene.seed,
@@ -288,6 +277,7 @@ fn parameters(scene: &Scene) -> Parameters {
         build: env!("DEM_BUILD").into(),
         host: rustix::system::uname().nodename().to_string_lossy().into_owned(),
         start: humantime::format_rfc3339_seconds(std::time::SystemTime::now()).to_string(),
+        solid_fraction,
     }
 }
 

@@ -138,8 +138,7 @@ fn resume_in<D: Dim>(
         HistoryError::Interrupted => RunError::Interrupted("the history is as it was"),
         error => error.into(),
     })?;
-    let framed = state.world.steps.is_multiple_of(scene.steps_per_frame());
-    let mut run = Run { scene, state, recorder, framed, kept: true };
+    let mut run = Run { scene, state, recorder, solid_fraction: history.parameters()?.solid_fraction };
     let outcome = run.step_on(interrupt, &mut progress);
     run.conclude(path, outcome, options.json, progress)
 }

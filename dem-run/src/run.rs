@@ -11,7 +11,7 @@ use crate::scene::{Scene, SceneError};
 use crate::signals::{self, INTERRUPTED, Interrupt};
 use crate::summary::{Ending, Summary};
 use dem_core::dim::{D2, D3, Dim};
-use dem_core::saved::{Mismatch, Saved};
+use dem_core::saved::{Mismatch, Reader, Saved};
 use dem_core::world::{StepError, StepReport, World};
 use std::path::{Path, PathBuf};
 
@@ -139,11 +139,10 @@ pub(crate) fn run_in<D: Dim>(scene: &Scene, options: &RunOptions, interrupt: &In
         write_sample(&built.world.grains, path)
             .map_err(|e| RunError::InputOutput(format!("{} cannot be written: {e}", path.display())))?;
     }
-    let names: Vec<String> = scene.walls.keys().cloned().collect();
-    let recorder = Recorder::create(&options.output, options.overwrite, scene, &names, &built.world)?;
+    let recorder = Recorder::create(&options.output, options.overwrite, scene, &built)?;
     let course = Course::new(scene, &built.world);
-    let state = State { world: built.world, course, solid_fraction: built.solid_fraction };
-    let mut run = Run { scene, state, recorder, framed: true, kept: true };
+    let state = State { world: built.world, course };
+    let mut run = Run { scene, state, recorder, solid_fraction: built.solid_fraction };
     let outcome = run.begin().and_then(|()| run.step_on(interrupt, &mut progress));
     run.conclude(&options.output, outcome, options.json, progress)
 }
@@ -152,7 +151,6 @@ pub(crate) fn run_in<D: Dim>(scene: &Scene, options: &RunOptions, interrupt: &In
 pub(crate) struct State<D: Dim> {
     pub world: World<D>,
     pub course: Course<D>,
-    pub solid_fraction: Option<f64>,
 }
 
 /// The form of what [`State::save`] writes; another form has another number.
@@ -165,24 +163,19 @@ impl<D: Dim> State<D> {
         to.count(FORM);
         self.world.save(&mut to);
         self.course.save(&mut to);
-        to.flag(self.solid_fraction.is_some());
-        to.real(self.solid_fraction.unwrap_or(0.0));
         Checkpoint { step: self.world.steps as i64, reals: to.reals, counts: to.counts }
     }
 
     /// The state that [`State::save`] wrote.
     pub fn restored(scene: &Scene, checkpoint: &Checkpoint) -> Result<Self, Mismatch> {
-        let saved = Saved { reals: checkpoint.reals.clone(), counts: checkpoint.counts.clone() };
-        let mut from = saved.read();
+        let mut from = Reader::new(&checkpoint.reals, &checkpoint.counts);
         if from.count()? != FORM {
             return Err(Mismatch);
         }
         let world = rebuild::<D>(scene, &mut from)?;
         let course = Course::restored(scene, &world, &mut from)?;
-        let known = from.flag()?;
-        let solid_fraction = from.real()?;
         from.end()?;
-        Ok(Self { world, course, solid_fraction: known.then_some(solid_fraction) })
+        Ok(Self { world, course })
     }
 }
 
@@ -191,9 +184,8 @@ pub(crate) struct Run<'a, D: Dim> {
     pub scene: &'a Scene,
     pub state: State<D>,
     pub recorder: Recorder<D>,
-    /// Whether the last state was recorded as a frame, and as a checkpoint.
-    pub framed: bool,
-    pub kept: bool,
+    /// Solid fraction that the sample was packed to (–).
+    pub solid_fraction: Option<f64>,
 }
 
 impl<D: Dim> Run<'_, D> {
@@ -204,7 +196,7 @@ impl<D: Dim> Run<'_, D> {
 
     /// Step until the time, a stop condition, an interruption or a failure ends the run.
     pub fn step_on(&mut self, interrupt: &Interrupt, progress: &mut Progress) -> Result<Ending, RunError> {
-        let (steps, every) = (self.scene.time.steps(), self.scene.steps_per_frame());
+        let steps = self.scene.time.steps();
         while self.state.world.steps < steps {
             let report = match self.state.world.step() {
                 Ok(report) => report,
@@ -214,11 +206,9 @@ impl<D: Dim> Run<'_, D> {
             self.recorder.step(world, &report)?;
             course.count(world, &report);
             progress.step(&self.standing(&report));
-            let steps = self.state.world.steps;
-            self.framed = steps.is_multiple_of(every);
-            self.kept = steps.is_multiple_of(every * self.scene.output.checkpoint_every);
-            if self.framed {
-                self.record(true, self.kept)?;
+            let [frame, checkpoint] = self.due();
+            if frame {
+                self.record(true, checkpoint)?;
             }
             let State { world, course, .. } = &mut self.state;
             if let Some(ending) = course.ending(world) {
@@ -229,6 +219,12 @@ impl<D: Dim> Run<'_, D> {
             }
         }
         Ok(Ending::Time)
+    }
+
+    /// Whether the state is one to record as a frame, and as a checkpoint too.
+    fn due(&self) -> [bool; 2] {
+        let (steps, every) = (self.state.world.steps, self.scene.steps_per_frame());
+        [every, every * self.scene.output.checkpoint_every].map(|every| steps.is_multiple_of(every))
     }
 
     /// Record the state as a frame, as a checkpoint, or as both.
@@ -272,10 +268,12 @@ impl<D: Dim> Run<'_, D> {
             Err(error @ RunError::NoConvergence(_)) => (Ending::NoConvergence, Err(error)),
             Err(error) => return Err(error),
         };
-        self.record(!self.framed, !self.kept)?;
+        // what is due was recorded in its turn
+        let [framed, kept] = self.due();
+        self.record(!framed, !kept)?;
         let cpu_time = self.recorder.cpu_time();
         self.recorder.finish()?;
-        let summary = self.state.summary(self.scene, path, ending, cpu_time);
+        let summary = self.state.summary(self.scene, self.solid_fraction, path, ending, cpu_time);
         let printed = print_result(&summary, json);
         // why the run ended matters more than where its summary went
         end.and(printed.map_err(RunError::from))
@@ -283,7 +281,14 @@ impl<D: Dim> Run<'_, D> {
 }
 
 impl<D: Dim> State<D> {
-    fn summary(&self, scene: &Scene, history: &Path, ending: Ending, cpu_time: f64) -> Summary {
+    fn summary(
+        &self,
+        scene: &Scene,
+        solid_fraction: Option<f64>,
+        history: &Path,
+        ending: Ending,
+        cpu_time: f64,
+    ) -> Summary {
         let (world, course) = (&self.world, &self.course);
         Summary {
             history: history.to_path_buf(),
@@ -292,7 +297,7 @@ impl<D: Dim> State<D> {
             driven: course.driven.is_some(),
             time: world.time,
             grains: world.grains.len(),
-            solid_fraction: self.solid_fraction,
+            solid_fraction,
             bonds: world.bonds.len(),
             elastic: world.bonds.iter().any(|b| b.stiffness.is_some()),
             broken: course.broken,

@@ -140,7 +140,12 @@ fn numbers(c: &mut Checker) {
     let places: Vec<String> = c.sound.keys().cloned().collect();
     for place in places {
         let coded = place == RUPTURE || place == STATUS || place.ends_with("/kind") || place.ends_with("/drive");
-        if coded || whole(&place) || place == "contacts/status" || place.starts_with("commit_rows/") {
+        if coded
+            || whole(&place)
+            || place == "contacts/status"
+            || place.starts_with("commit_rows/")
+            || place.starts_with("checkpoint/")
+        {
             continue;
         }
         let width = c.sound[&place][1].max(1);

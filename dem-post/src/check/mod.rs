@@ -54,6 +54,8 @@ pub struct Violation {
 struct Checker {
     file: File,
     sizes: Sizes,
+    /// Whether a whole checkpoint stands in it.
+    resumable: bool,
     report: Report,
     /// Datasets of the type and shape that the layout promises, with the rows that are complete and the numbers in each.
     sound: BTreeMap<String, [usize; 2]>,
@@ -87,7 +89,8 @@ pub fn read(history: &History, quiet: bool) -> Result<Report> {
     let report = Report { file: history.path().display().to_string(), frames: history.frames(), ..Report::default() };
     let sizes = Sizes { d: history.dimension(), t: history.frames(), ..Sizes::default() };
     let bar = progress(0, quiet, "{bar:24} {percent} % checked, {eta} left");
-    let mut checker = Checker { file, sizes, report, sound: BTreeMap::new(), told: BTreeMap::new(), bar };
+    let resumable = history.checkpoint().is_ok_and(|checkpoint| checkpoint.is_some());
+    let mut checker = Checker { file, sizes, resumable, report, sound: BTreeMap::new(), told: BTreeMap::new(), bar };
     schema::check(&mut checker);
     let numbers: usize = checker.sound.values().map(|[rows, width]| rows * width).sum();
     checker.bar.set_length(numbers as u64);

@@ -6,6 +6,7 @@ use hdf5::types::{EnumMember, EnumType, FloatSize, IntSize, TypeDescriptor, VarL
 
 use super::{Checker, Sizes};
 
+const F32: TypeDescriptor = TypeDescriptor::Float(FloatSize::U4);
 const F64: TypeDescriptor = TypeDescriptor::Float(FloatSize::U8);
 const I32: TypeDescriptor = TypeDescriptor::Integer(IntSize::U4);
 const I64: TypeDescriptor = TypeDescriptor::Integer(IntSize::U8);
@@ -34,6 +35,14 @@ pub(super) fn check(c: &mut Checker) {
     }
     contacts(c);
     observables(c);
+    checkpoint(c);
+}
+
+/// The type of the reals of frames (`output.precision`): all are as the positions are.
+fn reals(c: &Checker) -> TypeDescriptor {
+    let positions = c.dataset("particles/grains/position/value");
+    let found = positions.and_then(|positions| positions.dtype().and_then(|dtype| dtype.to_descriptor()).ok());
+    found.filter(|found| *found == F32).unwrap_or(F64)
 }
 
 /// The datatype of an enumeration whose codes start at `first`.
@@ -184,16 +193,17 @@ fn grains(c: &mut Checker) {
     for (name, unit) in [("radius", "m"), ("mass", "kg"), ("inertia", "kg m2")] {
         c.table(&format!("particles/grains/{name}"), &F64, n, &[], unit);
     }
-    c.element("particles/grains/position", &F64, &[n, d], "m");
-    c.element("particles/grains/velocity", &F64, &[n, d], "m s-1");
+    let real = reals(c);
+    c.element("particles/grains/position", &real, &[n, d], "m");
+    c.element("particles/grains/velocity", &real, &[n, d], "m s-1");
     let (spin, angle) = ("particles/grains/angular_velocity", if d == 2 { "angle" } else { "orientation" });
     let angle = format!("particles/grains/{angle}");
     // both or neither
     if c.has(spin) || c.has(&angle) {
         let (spins, angles, unit): (&[usize], &[usize], _) =
             if d == 2 { (&[n], &[n], "rad") } else { (&[n, 3], &[n, 4], "") };
-        c.element(spin, &F64, spins, "rad s-1");
-        c.element(&angle, &F64, angles, unit);
+        c.element(spin, &real, spins, "rad s-1");
+        c.element(&angle, &real, angles, unit);
     }
     let cell = c.file.group("particles/grains/box").and_then(|cell| cell.attr("boundary"));
     if cell.is_ok_and(|boundary| boundary.shape() == [d]) {
@@ -214,7 +224,7 @@ fn walls(c: &mut Checker) {
     c.table("walls/direction", &F64, w, &[d], "");
     c.table("walls/radius", &F64, w, &[], "m");
     for (name, unit) in [("position", "m"), ("velocity", "m s-1"), ("force", "N")] {
-        c.element(&format!("walls/{name}"), &F64, &[w, d], unit);
+        c.element(&format!("walls/{name}"), &reals(c), &[w, d], unit);
     }
 }
 
@@ -258,34 +268,44 @@ fn events(c: &mut Checker) {
 
 fn contacts(c: &mut Checker) {
     let Sizes { d, t, m, .. } = c.sizes;
-    let bonded = c.has("bonds");
+    let (bonded, real) = (c.has("bonds"), reals(c));
     c.table("contacts/step", &I64, t, &[], "");
     c.table("contacts/time", &F64, t, &[], "s");
     c.table("contacts/start", &U64, t, &[], "");
     c.table("contacts/count", &U32, t, &[], "");
     c.table("contacts/pair", &I32, m, &[2], "");
-    c.table("contacts/point", &F64, m, &[d], "m");
-    c.table("contacts/normal", &F64, m, &[d], "");
+    c.table("contacts/point", &real, m, &[d], "m");
+    c.table("contacts/normal", &real, m, &[d], "");
+    c.table("contacts/gap", &real, m, &[], "m");
+    c.table("contacts/status", &bytes(ContactStatus::ALL.iter().map(|status| status.label())), m, &[], "");
+    if bonded {
+        c.table("contacts/bond", &I32, m, &[], "");
+    }
+    // a history may do without reactions (`output.reactions`): then it has none of what belongs to them
+    if ["reaction", "tangent", "moment"].iter().any(|name| c.has(&format!("contacts/{name}"))) {
+        reactions(c, &real);
+    }
+}
+
+fn reactions(c: &mut Checker, real: &TypeDescriptor) {
+    let (Sizes { d, m, .. }, bonded) = (c.sizes, c.has("bonds"));
     let tangential = bonded
         || c.has("contacts/tangent")
         || c.dataset("contacts/reaction").is_some_and(|r| {
             // without bonds the friction decides
             r.shape().get(1) != Some(&1)
         });
-    c.table("contacts/reaction", &F64, m, &[if tangential { d } else { 1 }], "N");
+    c.table("contacts/reaction", real, m, &[if tangential { d } else { 1 }], "N");
     let frame = c.file.dataset("contacts/reaction").and_then(|reaction| reaction.attr("frame"));
     if text(frame).as_deref() != Some("local") {
         c.wrong("contacts/reaction@frame", None, "is not \"local\"");
     }
     if tangential && d == 3 {
-        c.table("contacts/tangent", &F64, m, &[d], "");
+        c.table("contacts/tangent", real, m, &[d], "");
     }
     if bonded {
-        c.table("contacts/moment", &F64, m, if d == 2 { &[] } else { &[2] }, "N m");
-        c.table("contacts/bond", &I32, m, &[], "");
+        c.table("contacts/moment", real, m, if d == 2 { &[] } else { &[2] }, "N m");
     }
-    c.table("contacts/gap", &F64, m, &[], "m");
-    c.table("contacts/status", &bytes(ContactStatus::ALL.iter().map(|status| status.label())), m, &[], "");
 }
 
 fn observables(c: &mut Checker) {
@@ -304,5 +324,24 @@ fn observables(c: &mut Checker) {
         }
         c.table(&format!("observables/{name}/step"), &I64, s, &[], "");
         c.table(&format!("observables/{name}/time"), &F64, s, &[], "s");
+    }
+}
+
+/// The two slots of the state from which the run goes on. What stands in them vouches for itself by a sum: one of them
+/// may be torn, of a run that was killed while it wrote it.
+fn checkpoint(c: &mut Checker) {
+    c.table("checkpoint/index", &U64, 2, &[4], "");
+    for slot in 0..2 {
+        for (name, kind) in [("reals", &F64), ("counts", &U64)] {
+            let place = format!("checkpoint/{name}_{slot}");
+            let rows = c.count(&place);
+            c.table(&place, kind, rows, &[], "");
+            // they are read by their sum, not one by one
+            c.sound.remove(&place);
+        }
+    }
+    let written = c.rows::<u64>("checkpoint/index", 0..2).unwrap_or_default().iter().any(|number| *number > 0);
+    if written && !c.resumable {
+        c.wrong("checkpoint", None, "holds no whole state to go on from");
     }
 }

@@ -177,7 +177,8 @@ pub(super) fn contacts(companion: &Companion, history: &History, o: &Outline) ->
 
     let data = poly.data("Cell", &o.starts)?;
     let (m, scalars) = (o.rows, Rows::scalars(o.rows));
-    let rows = companion.shape("contacts/reaction")?[1];
+    // a history may do without reactions
+    let rows = if companion.has("contacts/reaction") { companion.shape("contacts/reaction")?[1] } else { 0 };
     data.moving::<f64>("normal_force", "contacts/reaction", vec![span(0..m), span(0..1)], &scalars)?;
     if rows > 1 {
         // in the plane along (−n_y, n_x), in space along t1 and t2

@@ -6,7 +6,8 @@ use hdf5::types::FixedAscii;
 use hdf5::{File, Group, H5Type};
 
 use super::{FclibError, Problem};
-use crate::history::{partial, reason};
+use crate::history::reason;
+use crate::replace::replace;
 
 impl Problem {
     /// Writes the problem, its reactions as the first guess if they are not all zero, and its solution if there is one.
@@ -17,19 +18,10 @@ impl Problem {
     /// [`FclibError::Io`] and [`FclibError::Write`].
     pub fn write(&self, path: &Path) -> Result<(), FclibError> {
         hdf5::silence_errors(true);
-        let io = |doing| move |source| FclibError::Io { path: path.into(), doing, source };
-        let part = partial(path).map_err(io("create"))?;
-        // HDF5 would not say why; the operating system does
-        std::fs::File::create(&part).map_err(io("create"))?;
-        let written = self
-            .fill(&part)
-            .map_err(|error| FclibError::Write { path: path.into(), why: reason(&error) })
-            .and_then(|()| std::fs::rename(&part, path).map_err(io("replace")));
-        if written.is_err() {
-            // the first error is the one to report
-            let _ = std::fs::remove_file(&part);
-        }
-        written
+        let failed = |doing, source| FclibError::Io { path: path.into(), doing, source };
+        replace(path, failed, |part| {
+            self.fill(part).map_err(|error| FclibError::Write { path: path.into(), why: reason(&error) })
+        })
     }
 
     fn fill(&self, path: &Path) -> hdf5::Result<()> {

@@ -6,13 +6,15 @@ use std::path::Path;
 
 use hdf5::H5Type;
 
+use crate::replace::replace;
+
 use super::codes::{BondCode, ContactCode};
-use super::error::{HistoryError, Result, while_writing};
+use super::error::{HistoryError, Result, refused, while_writing};
 use super::reader::History;
 use super::schema::RuptureRow;
 use super::source::Source;
 use super::table::Table;
-use super::writer::{Writer, partial};
+use super::writer::Writer;
 
 /// Complete rows of each kind of table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -179,17 +181,7 @@ pub fn copy(history: &History, path: &Path, how: CopyAs, tell: &mut dyn FnMut(f6
     if let Some(process) = history.writer()? {
         return Err(HistoryError::Busy { path: history.path().into(), process });
     }
-    let io = |doing| move |source| HistoryError::Io { path: path.into(), doing, source };
-    let part = partial(path).map_err(io("create"))?;
-    let copied = copy_to(history, &part, how, tell).and_then(|length| {
-        std::fs::rename(&part, path).map_err(io("replace"))?;
-        Ok(length)
-    });
-    if copied.is_err() {
-        // the first error is the one to report
-        let _ = std::fs::remove_file(&part);
-    }
-    copied
+    replace(path, refused(path), |part| copy_to(history, part, how, tell))
 }
 
 fn copy_to(history: &History, part: &Path, how: CopyAs, tell: &mut dyn FnMut(f64) -> bool) -> Result<u64> {

@@ -160,6 +160,9 @@ pub(super) fn write_identity(file: &File, layout: &Layout) -> hdf5::Result<()> {
     ] {
         text_attribute(&parameters, name, value)?;
     }
+    if let Some(fraction) = run.solid_fraction {
+        parameters.new_attr::<f64>().create("solid_fraction")?.write_scalar(&fraction)?;
+    }
     let scene = file.new_dataset::<VarLenUnicode>().obj_track_times(false).create(path::SCENE)?;
     scene.write_scalar(&text(&run.scene))
 }

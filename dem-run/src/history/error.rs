@@ -139,6 +139,11 @@ pub(crate) fn reason(error: &hdf5::Error) -> String {
     system.map_or_else(|| text.clone(), |(message, _)| message.into())
 }
 
+/// Turns what the operating system refuses to do, as in "create", into [`HistoryError::Io`].
+pub(super) fn refused(path: &Path) -> impl Fn(&'static str, std::io::Error) -> HistoryError + '_ {
+    move |doing, source| HistoryError::Io { path: path.into(), doing, source }
+}
+
 /// Turns HDF5's errors while writing into [`HistoryError::Write`].
 pub(super) fn while_writing(path: &Path) -> impl Fn(hdf5::Error) -> HistoryError + '_ {
     move |error| HistoryError::Write { path: path.into(), why: reason(&error) }

@@ -38,7 +38,7 @@
 //! /observables/            step i64[S], time [S], shared by all (hard links, as H5MD allows)
 //!     NAME                 {step, time, value[S,…]}
 //! /parameters/             scene (the JSON as run); attributes schema_version, seed, version, git_revision, build,
-//!                          host, start
+//!                          host, start; solid_fraction, of a sample that was packed
 //! ```
 //!
 //! **Writing.** Everything is created first; then the file turns to HDF5's single-writer mode, so that others may read
@@ -75,7 +75,6 @@ pub use error::{HistoryError, Result};
 pub use reader::{History, Series};
 pub use schema::SCHEMA_VERSION;
 pub use writer::Writer;
-pub(crate) use writer::partial;
 
 /// What a history will hold: everything that is known before the first step. Lengths: see each field.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -183,7 +182,7 @@ impl Observable {
 }
 
 /// Where a run comes from.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Parameters {
     /// The scene as it was run, JSON.
     pub scene: String,
@@ -199,6 +198,8 @@ pub struct Parameters {
     pub host: String,
     /// When it started, ISO 8601.
     pub start: String,
+    /// Solid fraction that the sample was packed to (–); none where it was not packed.
+    pub solid_fraction: Option<f64>,
 }
 
 /// One frame to be written. Arrays of what the layout lacks are empty.

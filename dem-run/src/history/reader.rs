@@ -9,7 +9,7 @@ use hdf5::types::VarLenUnicode;
 use super::checkpoint::Checkpoint;
 use super::codes::{BondCode, BondStatus, ContactCode, WallDriveCode, WallKindCode};
 use super::copy::Kept;
-use super::error::{HistoryError, Result, while_reading};
+use super::error::{HistoryError, Result, refused, while_reading};
 use super::schema::{RuptureRow, path};
 use super::source::Source;
 use super::{Bonds, ContactRows, GrainState, Grains, Layout, Observable, Parameters, Rupture, Wall, WallState};
@@ -133,7 +133,7 @@ impl History {
     /// [`HistoryError::Io`].
     pub fn writer(&self) -> Result<Option<i32>> {
         let path = &self.source.path;
-        lock::holder(path).map_err(|source| HistoryError::Io { path: path.clone(), doing: "read", source })
+        lock::holder(path).map_err(|error| refused(path)("read", error))
     }
 
     pub(super) fn source(&self) -> &Source {
@@ -234,6 +234,7 @@ impl History {
             build: text("build")?,
             host: text("host")?,
             start: text("start")?,
+            solid_fraction: self.source.optional_attribute(path::PARAMETERS, "solid_fraction")?,
         })
     }
 

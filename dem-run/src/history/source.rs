@@ -9,7 +9,7 @@ use hdf5::types::VarLenUnicode;
 use hdf5::{Dataset, File, H5Type, OpenMode};
 
 use super::codes::Coded;
-use super::error::{HistoryError, Result, reason, while_reading};
+use super::error::{HistoryError, Result, reason, refused, while_reading};
 use super::schema::{CREATOR, SCHEMA_VERSION, path};
 use super::table::rows;
 
@@ -92,6 +92,15 @@ impl Source {
         read.map_err(while_reading(&self.path, &format!("{place}@{name}")))
     }
 
+    /// An attribute that not every history has.
+    pub fn optional_attribute<T: H5Type>(&self, place: &str, name: &str) -> Result<Option<T>> {
+        let names = self.file.group(place).and_then(|group| group.attr_names());
+        match names.map_err(while_reading(&self.path, place))?.iter().any(|found| found == name) {
+            true => self.attribute(place, name).map(Some),
+            false => Ok(None),
+        }
+    }
+
     pub fn coded<C: Coded>(&self, place: &str, codes: Vec<C::Code>, expected: usize) -> Result<Vec<C>> {
         let known: Option<Vec<C>> = codes.into_iter().map(C::from_code).collect();
         match known {
@@ -112,7 +121,7 @@ impl Source {
 ///
 /// HDF5 itself reads zeros beyond the end of a file that was never closed, so the end is checked here.
 fn check_superblock(path: &Path) -> Result<(u64, bool)> {
-    let io = |source| HistoryError::Io { path: path.into(), doing: "read", source };
+    let io = |error| refused(path)("read", error);
     let metadata = fs::metadata(path).map_err(|error| match error.kind() {
         std::io::ErrorKind::NotFound => HistoryError::Missing { path: path.into() },
         _ => io(error),

@@ -47,6 +47,7 @@ fn full(dimension: usize) -> Layout {
             scene: "{\"dimension\": 2, \"name\": \"été\"}".into(),
             seed: u64::MAX,
             version: "0.1.0".into(),
+            solid_fraction: Some(0.8),
             git_revision: "abc".into(),
             build: "debug".into(),
             host: "here".into(),

@@ -5,11 +5,13 @@ use std::path::{Path, PathBuf};
 
 use hdf5::File;
 
+use crate::replace::replace;
+
 use super::checkpoint::{Checkpoint, Slots};
 use super::codes::{BondCode, Coded};
 use super::copy::{Bytes, Copy, Kept, Share, Visit};
 use super::create::{self, Column, Commit, ContactTables, Observables, check_length};
-use super::error::{HistoryError, Result, while_writing};
+use super::error::{HistoryError, Result, refused, while_writing};
 use super::lock;
 use super::reader::History;
 use super::schema::{RuptureRow, path};
@@ -94,25 +96,18 @@ impl Writer {
 
     /// Makes the file beside `path`, fills it by `fill`, turns to HDF5's single-writer mode and moves it to `path`.
     fn begin(path: &Path, layout: &Layout, fill: impl FnOnce(&mut Self) -> Result<()>) -> Result<Self> {
-        let io = |doing| move |source| HistoryError::Io { path: path.into(), doing, source };
-        let part = partial(path).map_err(io("create"))?;
-        remove_orphans(path);
-        let made = Self::build(path, &part, layout, false).and_then(|mut writer| {
+        let failed = refused(path);
+        replace(path, &failed, |part| {
+            let mut writer = Self::build(path, part, layout, false)?;
             fill(&mut writer)?;
             writer.flush()?;
             // from here on no object can be created, and the file is readable at any time
             writer.file.start_swmr().map_err(while_writing(path))?;
-            writer.lock = Some(lock::hold(&part).map_err(io("lock"))?);
-            writer.keep_head().map_err(io("read"))?;
-            writer.identity = identity(&part);
-            std::fs::rename(&part, path).map_err(io("replace"))?;
+            writer.lock = Some(lock::hold(part).map_err(|error| failed("lock", error))?);
+            writer.keep_head().map_err(|error| failed("read", error))?;
+            writer.identity = identity(part);
             Ok(writer)
-        });
-        if made.is_err() {
-            // the first error is the one to report
-            let _ = std::fs::remove_file(&part);
-        }
-        made
+        })
     }
 
     /// A file that no one reads before it is closed: compressed, with checksums, if `packed`.
@@ -131,12 +126,6 @@ impl Writer {
     fn build(path: &Path, part: &Path, layout: &Layout, packed: bool) -> Result<Self> {
         hdf5::silence_errors(true);
         check_layout(layout)?;
-        // HDF5 would not say why; the operating system does
-        std::fs::File::create(part).map_err(|source| HistoryError::Io {
-            path: path.into(),
-            doing: "create",
-            source,
-        })?;
         let storage = Storage { single: layout.single, packed };
         Self::fill(path, part, layout, storage).map_err(while_writing(path))
     }
@@ -241,8 +230,7 @@ impl Writer {
             return Err(HistoryError::Gone { path: self.path.clone() });
         }
         self.write_frame(frame).map_err(while_writing(&self.path))?;
-        let path = self.path.clone();
-        self.keep_head().map_err(|source| HistoryError::Io { path, doing: "read", source })
+        self.keep_head().map_err(|error| refused(&self.path)("read", error))
     }
 
     /// Records a bond that broke; visible with the next frame.
@@ -396,30 +384,4 @@ fn check_layout(layout: &Layout) -> Result<()> {
 /// The file at `path` as the system knows it: device and number.
 fn identity(path: &Path) -> Option<(u64, u64)> {
     std::fs::metadata(path).ok().map(|file| (file.dev(), file.ino()))
-}
-
-/// Removes what processes that were killed left of files that they made beside `path`.
-fn remove_orphans(path: &Path) {
-    let Some(name) = path.file_name() else { return };
-    let folder = path.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
-        let found = entry.file_name();
-        let process = found
-            .to_str()
-            .and_then(|found| found.strip_prefix(&format!(".{}.", name.to_string_lossy()))?.strip_suffix(".part"))
-            .and_then(|process| rustix::process::Pid::from_raw(process.parse().ok()?));
-        let gone = |process| rustix::process::test_kill_process(process) == Err(rustix::io::Errno::SRCH);
-        if process.is_some_and(gone) {
-            // one that cannot be removed does no harm
-            let _ = std::fs::remove_file(entry.path());
-        }
-    }
-}
-
-/// The name under which a file is made: in the same folder, so that the move is atomic.
-pub(crate) fn partial(path: &Path) -> std::io::Result<PathBuf> {
-    let Some(name) = path.file_name().filter(|_| !path.is_dir()) else {
-        return Err(std::io::Error::new(std::io::ErrorKind::IsADirectory, "it is a folder, give a file name"));
-    };
-    Ok(path.with_file_name(format!(".{}.{}.part", name.to_string_lossy(), std::process::id())))
 }

@@ -1,12 +1,12 @@
 //! The programs, a folder to run them in, and what they answered.
 
 use assert_cmd::Command;
-use dem_run::history::History;
+use dem_run::history::{History, Layout, Parameters};
 use serde_json::Value;
 use std::collections::HashMap;
 use std::env;
 use std::path::{Path, PathBuf};
-use std::process::Stdio;
+use std::process::{Child, Output, Stdio};
 use std::sync::OnceLock;
 use std::time::Duration;
 use tempfile::TempDir;
@@ -123,6 +123,66 @@ impl Folder {
             code: output.status.code(),
             stdout: text(output.stdout),
             stderr: text(output.stderr),
+        }
+    }
+}
+
+/// All that a history holds, part by part, but its parameters and the processor time.
+pub fn content(history: &History) -> Vec<String> {
+    let shown = history.path().display();
+    assert!(!history.open_ended(), "{shown}: not closed");
+    let layout = history.layout().map(|layout| Layout { parameters: Parameters::default(), ..layout });
+    let mut content = vec![
+        format!("layout {layout:?}"),
+        format!("rows {:?}", history.complete()),
+        format!("frames {:?} {:?}", history.steps(), history.times()),
+        format!("ruptures {:?}", history.ruptures()),
+    ];
+    for name in history.observable_names().expect("names").iter().filter(|name| *name != "cpu_time") {
+        content.push(format!("{name} {:?}", history.observable(name)));
+    }
+    for frame in 0..history.frames() {
+        content.push(format!("frame {frame}: grains {:?}", history.grain_state(frame)));
+        content.push(format!("frame {frame}: walls {:?}", history.wall_state(frame)));
+        content.push(format!("frame {frame}: contacts {:?}", history.contacts(frame)));
+        content.push(format!("frame {frame}: bonds {:?}", history.bond_status(frame)));
+    }
+    assert!(content.iter().all(|part| !part.contains("Err(")), "{shown}: unreadable");
+    content
+}
+
+/// A run that would go on for hours, killed when it is dropped.
+pub struct Endless(Option<Child>);
+
+impl Endless {
+    /// Starts it, and waits until its history stands with so many frames.
+    pub fn start(here: &Folder, file: &str, frames: usize) -> Self {
+        let mut command = std::process::Command::new(program("dem-run"));
+        command.args(["run", &config("column.json"), "-o", file, "--quiet"]);
+        command.args(["--set", "time.end=1e4", "--set", "output.every_steps=10"]).current_dir(here.path(""));
+        let endless = Self(Some(command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("start")));
+        while !here.path(file).exists() || here.history(file).frames() < frames {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        endless
+    }
+
+    /// The number of its process.
+    pub fn id(&self) -> u32 {
+        self.0.as_ref().expect("a process").id()
+    }
+
+    /// Waits for its end.
+    pub fn end(mut self) -> Output {
+        self.0.take().expect("a process").wait_with_output().expect("end")
+    }
+}
+
+impl Drop for Endless {
+    fn drop(&mut self) {
+        if let Some(child) = &mut self.0 {
+            child.kill().expect("kill");
+            child.wait().expect("end");
         }
     }
 }

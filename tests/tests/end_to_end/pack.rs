@@ -1,8 +1,6 @@
 //! Packed histories: smaller, and the same in every analysis.
 
-use crate::common::{Folder, SMALL, config, program};
-use std::process::{Command, Stdio};
-use std::time::Duration;
+use crate::common::{Endless, Folder, SMALL};
 
 #[test]
 fn analyses_of_a_packed_history_are_the_same_to_the_byte() {
@@ -47,18 +45,11 @@ fn a_copy_goes_where_it_is_sent() {
 #[test]
 fn the_file_of_a_killed_run_is_made_whole() {
     let here = Folder::new();
-    let column = config("column.json");
-    let mut command = Command::new(program("dem-run"));
-    command.args(["run", &column, "-o", "a.h5", "--quiet", "--set", "time.end=1e4"]).current_dir(here.path(""));
-    let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("start");
-    while !here.path("a.h5").exists() || here.history("a.h5").frames() < 3 {
-        std::thread::sleep(Duration::from_millis(5));
-    }
+    let endless = Endless::start(&here, "a.h5", 3);
     // not while it is being written
     here.dem_post(&["pack", "a.h5"]).fails(4, &["being written by process"]);
     here.dem_post(&["info", "a.h5", "--repair"]).fails(4, &["being written by process"]);
-    child.kill().expect("kill");
-    child.wait().expect("end");
+    drop(endless);
     let frames = here.history("a.h5").frames();
     assert!(here.history("a.h5").open_ended());
     here.dem_post(&["info", "a.h5", "--repair"]).succeeds();

@@ -1,34 +1,20 @@
 //! Runs that end before their time and go on: what was recorded stays, and the end is that of a run without a stop.
 
-use crate::common::{Folder, SMALL, config, problems, program};
+use crate::common::{Endless, Folder, SMALL, config, content, problems, program};
 use dem_run::history::History;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// That two histories hold the same to the bit, but for the processor time.
+/// That two histories hold the same to the bit, but for the processor time, and come from the same scene.
 fn same(a: &History, b: &History) {
-    let (mut layout, other) = (a.layout().expect("layout"), b.layout().expect("layout"));
-    let parameters = std::mem::replace(&mut layout.parameters, other.parameters.clone());
-    assert_eq!(layout, other);
-    assert_eq!(parameters.scene, other.parameters.scene);
-    assert_eq!(a.complete().expect("rows"), b.complete().expect("rows"));
-    assert_eq!(a.ruptures().expect("events"), b.ruptures().expect("events"));
-    for name in a.observable_names().expect("names").iter().filter(|name| *name != "cpu_time") {
-        let bits = |h: &History| {
-            let series = h.observable(name).expect("read").expect("observable");
-            (series.step, [series.time, series.value].concat().into_iter().map(f64::to_bits).collect::<Vec<_>>())
-        };
-        assert_eq!(bits(a), bits(b), "{name}");
+    let [one, other] = [a, b].map(|history| history.parameters().expect("parameters").scene);
+    assert_eq!(one, other);
+    for (one, other) in content(a).iter().zip(&content(b)) {
+        assert!(one == other, "{one:.400}\n{other:.400}");
     }
-    assert_eq!((a.steps(), a.times()), (b.steps(), b.times()));
-    for frame in 0..a.frames() {
-        assert_eq!(a.grain_state(frame).expect("grains"), b.grain_state(frame).expect("grains"), "frame {frame}");
-        assert_eq!(a.wall_state(frame).expect("walls"), b.wall_state(frame).expect("walls"), "frame {frame}");
-        assert_eq!(a.contacts(frame).expect("contacts"), b.contacts(frame).expect("contacts"), "frame {frame}");
-        assert_eq!(a.bond_status(frame).expect("bonds"), b.bond_status(frame).expect("bonds"), "frame {frame}");
-    }
+    assert_eq!(content(a).len(), content(b).len());
 }
 
 /// The small compression, with frames and checkpoints so often that a kill hits any place of the writer.
@@ -250,16 +236,8 @@ fn files_that_cannot_go_on_are_left_as_they_are() {
 #[test]
 fn a_history_that_is_being_written_is_refused() {
     let here = Folder::new();
-    let column = config("column.json");
-    let mut command = Command::new(program("dem-run"));
-    command.args(["run", &column, "-o", "a.h5", "--quiet", "--set", "time.end=1e4"]).current_dir(here.path(""));
-    let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("start");
-    while !here.path("a.h5").exists() {
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    here.dem_run(&["resume", "a.h5"]).fails(4, &["being written by process", &child.id().to_string()]);
-    child.kill().expect("kill");
-    child.wait().expect("end");
+    let endless = Endless::start(&here, "a.h5", 0);
+    here.dem_run(&["resume", "a.h5"]).fails(4, &["being written by process", &endless.id().to_string()]);
 }
 
 #[test]
@@ -291,16 +269,9 @@ fn a_full_disk_leaves_a_history_that_is_good_up_to_its_last_frame() {
 #[test]
 fn a_history_that_disappears_ends_the_run() {
     let here = Folder::new();
-    let column = config("column.json");
-    let set = ["--set", "time.end=1e4", "--set", "output.every_steps=10"];
-    let mut command = Command::new(program("dem-run"));
-    command.args(["run", &column, "-o", "a.h5", "--quiet"]).args(set).current_dir(here.path(""));
-    let child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("start");
-    while !here.path("a.h5").exists() {
-        std::thread::sleep(Duration::from_millis(5));
-    }
+    let endless = Endless::start(&here, "a.h5", 0);
     std::fs::remove_file(here.path("a.h5")).expect("remove");
-    let output = child.wait_with_output().expect("end");
+    let output = endless.end();
     let told = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(4), "{told}");
     assert!(told.contains("moved, deleted or replaced"), "{told}");
@@ -326,9 +297,11 @@ fn a_frame_holds_what_the_scene_asks_for() {
     assert!(!contacts.is_empty() && contacts.reaction.is_empty() && contacts.moment.is_empty());
     assert_eq!(contacts.gap, double.contacts(last).expect("contacts").gap);
     here.dem_post(&["chains", "less.h5"]).fails(2, &["reactions", "output.reactions=true"]);
-    for view in ["cracks", "stress-strain", "info"] {
-        here.dem_post(&[view, "less.h5"]).succeeds();
-        here.dem_post(&[view, "single.h5"]).succeeds();
+    for name in ["single.h5", "less.h5"] {
+        for view in ["cracks", "stress-strain", "view"] {
+            here.dem_post(&[view, name]).succeeds();
+        }
+        here.dem_post(&["info", name, "--check"]).succeeds();
     }
     here.dem_post(&["chains", "single.h5"]).succeeds();
     // each goes on in its own way

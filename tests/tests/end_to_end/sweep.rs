@@ -1,10 +1,8 @@
 //! Sweeps: every run a history, killed and gone on with, with runs that fail, and refused where they are wrong.
 
-use crate::common::{Folder, SMALL, config, program};
-use dem_run::history::History;
+use crate::common::{Folder, SMALL, config, content, program};
 use serde_json::{Value, json};
 use std::fs;
-use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant, SystemTime};
 
@@ -56,25 +54,6 @@ fn written(here: &Folder, folder: &str, id: &str) -> [SystemTime; 2] {
     })
 }
 
-/// All that a history holds, but its parameters and the processor time.
-fn content(path: &Path) -> Vec<String> {
-    let history = History::open(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-    assert!(!history.open_ended(), "{}: not closed", path.display());
-    let mut content =
-        vec![format!("{:?} {:?}", history.grains(), history.bonds()), format!("{:?}", history.ruptures())];
-    for frame in 0..history.frames() {
-        content.push(format!("{:?}", history.grain_state(frame)));
-        content.push(format!("{:?} {:?}", history.contacts(frame), history.bond_status(frame)));
-    }
-    for name in history.observable_names().expect("names") {
-        if name != "cpu_time" {
-            content.push(format!("{name} {:?}", history.observable(&name)));
-        }
-    }
-    assert!(content.iter().all(|part| !part.contains("Err(")), "{}: unreadable", path.display());
-    content
-}
-
 fn start(here: &Folder, args: &[&str]) -> Child {
     let mut command = Command::new(program("dem-run"));
     command.arg("sweep").args(args).current_dir(here.path("")).stdout(Stdio::null()).stderr(Stdio::null());
@@ -120,9 +99,9 @@ fn every_run_of_a_sweep_is_the_run_of_its_scene() {
     assert_eq!(files(&here, "sweep-sweep", ".h5"), ["0001.h5", "0002.h5", "0003.h5", "0004.h5"]);
 
     here.run_config("two-grains.json", &["-o", "alone.h5", "--set", "bonds.strength=10", "--set", "time.end=0.11"]);
-    let alone = content(&here.path("alone.h5"));
-    assert_eq!(content(&here.path("sweep-sweep/runs/0003.h5")), alone);
-    assert_ne!(content(&here.path("sweep-sweep/runs/0001.h5")), alone);
+    let alone = content(&here.history("alone.h5"));
+    assert_eq!(content(&here.history("sweep-sweep/runs/0003.h5")), alone);
+    assert_ne!(content(&here.history("sweep-sweep/runs/0001.h5")), alone);
 
     let table = String::from_utf8(here.read("sweep-sweep/runs.csv")).expect("UTF-8");
     let lines: Vec<&str> = table.lines().collect();
@@ -136,7 +115,7 @@ fn every_run_of_a_sweep_is_the_run_of_its_scene() {
     // a history that is lost is made again
     fs::remove_file(here.path("sweep-sweep/runs/0003.h5")).expect("remove");
     here.dem_run(&["sweep", "sweep.json", "-q"]).succeeds();
-    assert_eq!(content(&here.path("sweep-sweep/runs/0003.h5")), alone);
+    assert_eq!(content(&here.history("sweep-sweep/runs/0003.h5")), alone);
     assert_eq!(written(&here, "sweep-sweep", "0002"), before);
 }
 
@@ -167,7 +146,7 @@ fn a_sweep_that_was_killed_ends_as_one_that_was_not() {
 
     here.dem_run(&["sweep", "sweep.json", "-o", "whole", "-q"]).succeeds();
     for id in 1..=6 {
-        let of = |folder: &str| content(&here.path(&format!("{folder}/runs/{id:04}.h5")));
+        let of = |folder: &str| content(&here.history(&format!("{folder}/runs/{id:04}.h5")));
         assert!(of("killed") == of("whole"), "run {id} differs");
     }
 }
