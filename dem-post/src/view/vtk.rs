@@ -3,7 +3,7 @@
 //! VTK wants all frames of an array behind each other and, for each frame, where it begins. Positions of shape [T,N,D]
 //! are such an array of T N points, and the pairs of a frame are lines between them.
 
-use dem_run::history::{ContactRows, History};
+use dem_run::history::History;
 use hdf5::{Group, H5Type, Hyperslab, SliceOrIndex};
 use ndarray::ArrayView3;
 
@@ -201,7 +201,7 @@ fn write_lines(companion: &Companion, history: &History, o: &Outline, room: usiz
     let places = companion.file.new_dataset::<f64>().shape([o.frames, room, o.dimension]).create(PLACES)?;
     let (mut offsets, mut last, mut start) = (vec![], vec![], 0);
     for frame in 0..o.frames {
-        let (lines, at_walls) = lines(&history.contacts(frame)?, o);
+        let (lines, at_walls) = lines(&history.contact_pairs(frame)?, &history.contact_points(frame)?, o);
         if lines != last {
             start = list.size() as i64;
             append(&list, &lines)?;
@@ -221,9 +221,9 @@ fn write_lines(companion: &Companion, history: &History, o: &Outline, room: usiz
 }
 
 /// The lines of one frame as pairs of points, and the points on walls, which come behind the grains.
-fn lines(contacts: &ContactRows, o: &Outline) -> (Vec<i32>, Vec<f64>) {
-    let (mut lines, mut at_walls) = (Vec::with_capacity(2 * contacts.len()), vec![]);
-    for (&[i, j], point) in contacts.pair.iter().zip(contacts.point.chunks_exact(o.dimension)) {
+fn lines(pairs: &[[i32; 2]], points: &[f64], o: &Outline) -> (Vec<i32>, Vec<f64>) {
+    let (mut lines, mut at_walls) = (Vec::with_capacity(2 * pairs.len()), vec![]);
+    for (&[i, j], point) in pairs.iter().zip(points.chunks_exact(o.dimension)) {
         if j >= 0 {
             lines.extend([i, j]);
         } else {

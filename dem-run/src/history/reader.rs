@@ -370,6 +370,14 @@ impl History {
         self.pairs_in(self.contact_rows(frame)?)
     }
 
+    /// The points of the contacts at frame `frame`, m, m × D.
+    ///
+    /// # Errors
+    /// [`HistoryError::NoFrame`], [`HistoryError::Damaged`].
+    pub fn contact_points(&self, frame: usize) -> Result<Vec<f64>> {
+        self.reals_in(self.contact_rows(frame)?, "point", &[self.dimension])
+    }
+
     /// The contacts at frame `frame`.
     ///
     /// # Errors
@@ -377,17 +385,7 @@ impl History {
     pub fn contacts(&self, frame: usize) -> Result<ContactRows> {
         let range = self.contact_rows(frame)?;
         let place = |name: &str| format!("{}/{name}", path::CONTACTS);
-        // a column that the scene lacks is empty; the others have rows of one of the lengths allowed
-        let column = |name: &str, widths: &[usize]| -> Result<Vec<f64>> {
-            if !self.source.has(&place(name)) {
-                return Ok(vec![]);
-            }
-            let (row, values) = self.source.read::<f64>(&place(name), range.clone())?;
-            if !widths.contains(&row.iter().product()) {
-                return Err(self.source.damaged(&place(name), "its rows have another length"));
-            }
-            Ok(values)
-        };
+        let column = |name: &str, widths: &[usize]| self.reals_in(range.clone(), name, widths);
         let d = self.dimension;
         let codes = self.source.read::<ContactCode>(&place("status"), range.clone())?.1;
         let bond =
@@ -486,6 +484,19 @@ impl History {
     }
 
     /// Pairs of contacts, whose grains and walls must all be there.
+    /// A column of the contacts; one that the scene lacks is empty, the others have rows of one of the lengths allowed.
+    fn reals_in(&self, range: Range<usize>, name: &str, widths: &[usize]) -> Result<Vec<f64>> {
+        let place = format!("{}/{name}", path::CONTACTS);
+        if !self.source.has(&place) {
+            return Ok(vec![]);
+        }
+        let (row, values) = self.source.read::<f64>(&place, range)?;
+        if !widths.contains(&row.iter().product()) {
+            return Err(self.source.damaged(&place, "its rows have another length"));
+        }
+        Ok(values)
+    }
+
     fn pairs_in(&self, range: Range<usize>) -> Result<Vec<[i32; 2]>> {
         let place = format!("{}/pair", path::CONTACTS);
         let (row, flat) = self.source.read::<i32>(&place, range)?;

@@ -98,3 +98,31 @@ fn a_rigid_beam_under_a_slow_force_breaks_first_at_its_lower_face() {
     let concentrated = concentration(&history, history.frame_at(0.12).expect("a frame"));
     assert!(concentrated.iter().all(|c| *c > 3.0), "{concentrated:?}");
 }
+
+/// A sixth of the shipped scene: the whole of it takes minutes to pack.
+#[test]
+fn a_polydisperse_beam_cracks_upwards_through_its_middle() {
+    let here = Folder::new();
+    let set = [
+        "sample.random.count=700",
+        "sample.random.width=0.44",
+        "walls.left.shape.circle.center=[0.03, -0.1]",
+        "walls.right.shape.circle.center=[0.41, -0.1]",
+        "walls.loader.shape.circle.center=[0.22, 0.3]",
+        "time.end=0.04",
+    ];
+    let mut args = vec!["-o", "a.h5", "--quiet"];
+    set.iter().for_each(|set| args.extend(["--set", set]));
+    let summary = here.run_config("bending-polydisperse.json", &args);
+    assert_eq!((&summary["rejected"], &summary["missed_tolerance"]), (&0.into(), &0.into()), "{summary}");
+    let history = here.history("a.h5");
+    let grains = history.grain_state(0).expect("grains");
+    let height = grains.position.iter().skip(1).step_by(2).copied().fold(0.0, f64::max);
+    let ruptures = history.ruptures().expect("ruptures");
+    assert!(ruptures.len() >= 4, "{ruptures:?}");
+    assert!(ruptures.iter().all(|r| (r.point[0] - 0.22).abs() < 0.5 * height), "{ruptures:?}");
+    // step by step it climbs, from the lower half to the upper face
+    let steps = ruptures.chunk_by(|a, b| a.step == b.step);
+    let tops: Vec<f64> = steps.map(|step| step.iter().map(|r| r.point[1]).fold(0.0, f64::max)).collect();
+    assert!(tops.is_sorted() && tops[0] < 0.5 * height && tops[tops.len() - 1] > 0.9 * height, "{tops:?} of {height}");
+}

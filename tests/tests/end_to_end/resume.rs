@@ -211,7 +211,7 @@ fn files_that_cannot_go_on_are_left_as_they_are() {
     std::fs::copy(problems().join("pressed.hdf5"), here.path("foreign.h5")).expect("copy");
     resume("foreign.h5").fails(4, &["foreign.h5", "not a history"]);
     let mut rng = Pcg64::seed_from_u64(5);
-    for _ in 0..40 {
+    for _ in 0..200 {
         let cut = rng.random_range(0..whole.len());
         here.write("cut.h5", &whole[..cut]);
         let outcome = resume("cut.h5");
