@@ -56,6 +56,17 @@ pub(super) fn row_chunk(rows: usize, item: usize, row: &[usize]) -> Vec<usize> {
     chunk
 }
 
+/// Slots and bytes of the cache of chunks that each dataset of a file has, for `grains` grains: the chunks that a frame is
+/// appended to, or every frame would evict and reload partly filled ones. No more, for every append and every flush goes
+/// through all that is cached. (It is a setting of the file: single-writer mode forgets those of datasets.)
+pub(super) fn chunk_cache(grains: usize, dimension: usize) -> (usize, usize) {
+    // positions, or in space quaternions, are the widest
+    let chunk = frame_chunk(8, &[grains, if dimension == 2 { 2 } else { 4 }]);
+    let band = grains.div_ceil(chunk[1]);
+    let bytes = 8 * band * chunk.iter().product::<usize>();
+    (2 * band + 1, bytes.max(8 * CHUNK))
+}
+
 /// A rupture as the file holds it: scalars only (pandas refuses arrays), the padding a member of its own (its bytes
 /// would otherwise be whatever the memory held, and two runs would differ).
 #[derive(Clone, Copy, Debug, H5Type)]

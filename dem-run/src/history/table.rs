@@ -51,17 +51,9 @@ impl Table {
         };
         let mut extents = vec![Extent::resizable(0)];
         extents.extend(row.iter().map(|&n| Extent::fixed(n)));
-        // the cache holds one band of chunks, or every frame would evict and reload partly filled ones
-        let band = row.first().map_or(1, |&n| n.div_ceil(chunk[1]));
-        let bytes = chunk.iter().product::<usize>() * item * band;
         let builder = group.new_dataset::<T>();
         let builder = if storage.packed { builder.shuffle().deflate(DEFLATE).fletcher32() } else { builder };
-        let dataset = builder
-            .shape(SimpleExtents::from(extents))
-            .chunk(chunk)
-            .chunk_cache(521.max(10 * band + 1), bytes + (1 << 16), 0.75)
-            .obj_track_times(false)
-            .create(name)?;
+        let dataset = builder.shape(SimpleExtents::from(extents)).chunk(chunk).obj_track_times(false).create(name)?;
         set_unit(&dataset, unit)?;
         Ok(Self { dataset, rows: 0, row: row.to_vec() })
     }

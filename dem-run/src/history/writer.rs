@@ -14,7 +14,7 @@ use super::create::{self, Column, Commit, ContactTables, Observables, check_leng
 use super::error::{HistoryError, Result, refused, while_writing};
 use super::lock;
 use super::reader::History;
-use super::schema::{RuptureRow, path};
+use super::schema::{RuptureRow, chunk_cache, path};
 use super::source::{Source, end_of_file};
 use super::table::{Growth, Storage, Table};
 use super::{Frame, Layout, Rupture};
@@ -131,7 +131,9 @@ impl Writer {
     }
 
     fn fill(path: &Path, part: &Path, layout: &Layout, storage: Storage) -> hdf5::Result<Self> {
-        let file = File::with_options().with_fapl(|fapl| fapl.libver_v110()).create(part)?;
+        let (slots, bytes) = chunk_cache(layout.grains.id.len(), layout.dimension);
+        let file =
+            File::with_options().with_fapl(|fapl| fapl.libver_v110().chunk_cache(slots, bytes, 0.75)).create(part)?;
         create::write_identity(&file, layout)?;
         let grains = create::grains(&file, layout)?;
         let motion = grains.create_group("position")?;
