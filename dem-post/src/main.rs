@@ -93,9 +93,9 @@ fn run(cli: &Cli) -> Result<()> {
         }
         Command::View(files) => {
             let history = History::open(&files.history)?;
-            let mut report = view::read(&history)?;
+            let mut report = view::read(&history, cli.quiet)?;
             let mut folder = folder(files)?;
-            view::write(&history, &mut report, &mut folder)?;
+            view::write(&history, &mut report, &mut folder, cli.quiet)?;
             report_on(cli, &report, || report.table(), Some(&folder))
         }
         Command::Pack { history, output, force } => {

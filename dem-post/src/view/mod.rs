@@ -11,9 +11,10 @@ mod vtk;
 use std::path::{Path, PathBuf};
 
 use dem_run::history::History;
+use indicatif::ProgressBar;
 use serde::Serialize;
 
-use crate::output::{Folder, PostError, Result, WriteError, facts};
+use crate::output::{Folder, PostError, Result, WriteError, facts, progress};
 use companion::{Companion, Fault, relative};
 
 /// All that a history may have.
@@ -62,7 +63,7 @@ struct Outline {
 }
 
 impl Outline {
-    fn read(history: &History) -> Result<Self> {
+    fn read(history: &History, quiet: bool) -> Result<Self> {
         let mut outline = Self {
             dimension: history.dimension(),
             frames: history.frames(),
@@ -70,7 +71,9 @@ impl Outline {
             bonds: history.bonds()?.len(),
             ..Self::default()
         };
+        let bar = progress(history.frames() as u64, quiet, "{bar:24} {percent} % of the pairs read, {eta} left");
         for frame in 0..history.frames() {
+            bar.inc(1);
             let rows = history.contact_rows(frame)?;
             let at_walls = history.contact_pairs(frame)?.iter().filter(|[_, j]| *j < 0).count();
             outline.starts.push(rows.start as i64);
@@ -78,6 +81,7 @@ impl Outline {
             outline.at_walls.push(at_walls as i64);
             outline.rows = outline.rows.max(rows.end);
         }
+        bar.finish_and_clear();
         Ok(outline)
     }
 
@@ -87,12 +91,12 @@ impl Outline {
     }
 }
 
-/// Reads what there is to map.
+/// Reads what there is to map; with a bar on a terminal unless `quiet`, here and below.
 ///
 /// # Errors
 /// [`PostError::Lacking`] for a history without frames, or one that was never closed and that viewers cannot open; those
 /// of reading it.
-pub fn read(history: &History) -> Result<Report> {
+pub fn read(history: &History, quiet: bool) -> Result<Report> {
     let lacking = |what: &str| PostError::Lacking { path: history.path().into(), what: what.into() };
     if history.open_ended() {
         return Err(lacking(
@@ -103,7 +107,7 @@ pub fn read(history: &History) -> Result<Report> {
     if history.frames() == 0 {
         return Err(lacking("it has no frame to view"));
     }
-    let outline = Outline::read(history)?;
+    let outline = Outline::read(history, quiet)?;
     let mut companions =
         vec![(NAMES[0], format!("{} grains as points: radius, mass, velocities, angles", outline.grains))];
     if outline.rows > 0 {
@@ -144,7 +148,7 @@ impl Report {
 ///
 /// # Errors
 /// [`PostError::Write`], [`PostError::Usage`] for a history that has the name of a companion, and those of reading it.
-pub fn write(history: &History, report: &mut Report, folder: &mut Folder) -> Result<()> {
+pub fn write(history: &History, report: &mut Report, folder: &mut Folder, quiet: bool) -> Result<()> {
     let absolute = |path: &Path| path.canonicalize().map_err(|error| failed(path, &error));
     let source = absolute(history.path())?;
     let home = absolute(folder.path())?;
@@ -160,7 +164,9 @@ pub fn write(history: &History, report: &mut Report, folder: &mut Folder) -> Res
     let file = hdf5::File::open(&source).map_err(|error| failed(&source, &error))?;
     for companion in &mut report.companions {
         let path = folder.place(companion.name);
-        let made = make(companion.name, &path, &file, link, history, &report.outline);
+        let bar = progress(history.frames() as u64, quiet, "{bar:24} {percent} % of the contacts written, {eta} left");
+        let made = make(companion.name, &path, &file, link, history, &report.outline, &bar);
+        bar.finish_and_clear();
         companion.bytes = made.and_then(|()| length(&path)).inspect_err(|_| {
             // the first error is the one to report
             let _ = std::fs::remove_file(&path);
@@ -169,12 +175,20 @@ pub fn write(history: &History, report: &mut Report, folder: &mut Folder) -> Res
     Ok(())
 }
 
-fn make(name: &str, path: &Path, file: &hdf5::File, link: &str, history: &History, outline: &Outline) -> Result<()> {
+fn make(
+    name: &str,
+    path: &Path,
+    file: &hdf5::File,
+    link: &str,
+    history: &History,
+    outline: &Outline,
+    bar: &ProgressBar,
+) -> Result<()> {
     let write = || -> std::result::Result<(), Fault> {
         let companion = Companion::create(path, file, link)?;
         match name {
             "grains.vtkhdf" => vtk::grains(&companion, outline)?,
-            "contacts.vtkhdf" => vtk::contacts(&companion, history, outline)?,
+            "contacts.vtkhdf" => vtk::contacts(&companion, history, outline, bar)?,
             "bonds.vtkhdf" => vtk::bonds(&companion, outline)?,
             _ => h5md::trajectory(&companion, outline)?,
         }

@@ -5,6 +5,7 @@
 
 use dem_run::history::History;
 use hdf5::{Group, H5Type, Hyperslab, SliceOrIndex};
+use indicatif::ProgressBar;
 use ndarray::ArrayView3;
 
 use super::Outline;
@@ -165,12 +166,12 @@ pub(super) fn bonds(companion: &Companion, o: &Outline) -> hdf5::Result<()> {
 /// The points of a frame are the grains, mapped, and behind them the points on walls. These must be written, each frame
 /// with room for as many as the frame with the most, so that one mapping serves all frames; and so must the pairs,
 /// once for frames in a row that have the same.
-pub(super) fn contacts(companion: &Companion, history: &History, o: &Outline) -> Result<(), Fault> {
+pub(super) fn contacts(companion: &Companion, history: &History, o: &Outline, bar: &ProgressBar) -> Result<(), Fault> {
     let (n, d) = (o.grains, o.dimension);
     let room = o.at_walls.iter().copied().max().unwrap_or(0) as usize;
     let counts: Vec<i64> = o.at_walls.iter().map(|&at_walls| n as i64 + at_walls).collect();
     let poly = Poly::create(companion, &counts, &o.every(n + room))?;
-    let offsets = write_lines(companion, history, o, room)?;
+    let offsets = write_lines(companion, history, o, room, bar)?;
     let cells = poly.cells("Lines", 2, &o.counts, &offsets)?;
     companion.file.relink(LINES, &format!("{}/Connectivity", cells.name()))?;
     points(&poly, o, room)?;
@@ -196,11 +197,18 @@ pub(super) fn contacts(companion: &Companion, history: &History, o: &Outline) ->
 }
 
 /// Writes the lines and the points on walls; where the lines of each frame begin.
-fn write_lines(companion: &Companion, history: &History, o: &Outline, room: usize) -> Result<Vec<i64>, Fault> {
+fn write_lines(
+    companion: &Companion,
+    history: &History,
+    o: &Outline,
+    room: usize,
+    bar: &ProgressBar,
+) -> Result<Vec<i64>, Fault> {
     let list = companion.file.new_dataset::<i32>().shape(0..).chunk(CHUNK).create(LINES)?;
     let places = companion.file.new_dataset::<f64>().shape([o.frames, room, o.dimension]).create(PLACES)?;
     let (mut offsets, mut last, mut start) = (vec![], vec![], 0);
     for frame in 0..o.frames {
+        bar.inc(1);
         let (lines, at_walls) = lines(&history.contact_pairs(frame)?, &history.contact_points(frame)?, o);
         if lines != last {
             start = list.size() as i64;
