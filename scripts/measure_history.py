@@ -27,11 +27,11 @@ def start(folder, program, *arguments):
 
 
 def finish(process):
-    """Waits for a process: its processor time (s) and its greatest resident size (MB)."""
+    """Waits for a process: its greatest resident size (MB)."""
     _, status, used = os.wait4(process.pid, 0)
     if status:
         raise SystemExit(f"{process.args} failed")
-    return used.ru_utime + used.ru_stime, used.ru_maxrss / 1024
+    return used.ru_maxrss / 1024
 
 
 def beam(folder, name, steps, every, *options):
@@ -55,8 +55,8 @@ def writing(folder):
 def memory(folder, frames=1_000_000):
     """Resident size while a small scene writes a frame a step."""
     scene = ROOT / "configs/two-grains.json"
-    step = json.loads(subprocess.run([ROOT / "target/release/dem-run", "check", scene, "--json"], capture_output=True, check=True).stdout)
-    step = step["step"]
+    check = [ROOT / "target/release/dem-run", "check", scene, "--json"]
+    step = json.loads(subprocess.run(check, capture_output=True, check=True).stdout)["step"]
     process = start(
         folder, "dem-run", "run", scene, "-o", "long.h5", "-q", "--force",
         "--set", f"time.end={frames * step:.9g}", "--set", "output.every_steps=1", "--set", "bonds.strength=1e9",
@@ -87,8 +87,10 @@ def least(repeat, action):
 
 
 def large(folder, frames=16_500):
-    """Reading a large file: through h5py, and what dem-post takes of it. The beam is at rest, so that steps cost little (and has no
-    forces, which `chains` refuses)."""
+    """Reading a large file: through h5py, and what dem-post takes of it.
+
+    The beam is at rest, so that steps cost little; it has no forces then, which `chains` refuses.
+    """
     path = folder / "large.h5"
     rest = ("walls.loader.force_rate=0", 'solver.kind={"gauss_seidel":{}}', "output.checkpoint_every=1000")
     took = beam(folder, path.name, frames, 1, *rest)
@@ -110,7 +112,7 @@ def large(folder, frames=16_500):
         print(f"| h5py: positions of one grain over 10,000 frames | {least(5, particle):.0f} ms |", flush=True)
     for command in (["info"], ["stress-strain"], ["cracks"], ["velocities"], ["view"], ["info", "--check"]):
         before = time.perf_counter()
-        used, resident = finish(start(folder, "dem-post", command[0], path.name, *command[1:]))
+        resident = finish(start(folder, "dem-post", command[0], path.name, *command[1:]))
         print(f"| `dem-post {' '.join(command)}` | {time.perf_counter() - before:.1f} s, at most {resident:.0f} MB |", flush=True)
 
 

@@ -256,6 +256,12 @@ impl Chart {
         } else if low < high {
             let off = if self.set_off { 0.03 * (high - low) } else { 0.0 };
             layout = layout.with_x_axis_min(low - off).with_x_axis_max(high + off);
+            // the plotting crate's three digits would give one text to several ticks
+            if high - low < 0.05 * low.abs().max(high.abs()) {
+                let decimals = (10.0 / (high - low)).log10().ceil().max(0.0) as usize;
+                let tick = move |value: f64| format!("{value:.decimals$}");
+                layout = layout.with_x_tick_format(TickFormat::Custom(Arc::new(tick)));
+            }
         }
         if self.log_y {
             // a level that cannot be seen tells nothing
@@ -274,7 +280,8 @@ impl Chart {
                     layout.with_y_axis_min(decade(low.log10().floor())).with_y_axis_max(decade(high.log10().ceil()));
             }
         } else if self.counts {
-            layout = layout.with_y_tick_format(TickFormat::Integer);
+            let whole = |value: f64| if value.fract() == 0.0 { format!("{value}") } else { String::new() };
+            layout = layout.with_y_tick_format(TickFormat::Custom(Arc::new(whole)));
             let high = values().map(|p| p.1).fold(0.0, f64::max);
             // on a shorter axis ticks would stand between whole numbers
             if high < FEW {

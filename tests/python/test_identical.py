@@ -1,6 +1,8 @@
 """What must not change a bit: a second run, another number of threads, a sample read back from its file."""
 
 import json
+import os
+from concurrent.futures import ThreadPoolExecutor
 
 import h5py
 import pytest
@@ -37,24 +39,35 @@ def assert_identical(one, other):
     assert [name for name in one if one[name] != other[name]] == []
 
 
-def test_a_second_run(compression, dem_run, tmp_path):
-    dem_run(tmp_path, "run", SCENE, "--quiet")
-    assert_identical(compression / "compression.h5", tmp_path / "compression.h5")
+@pytest.fixture(scope="module")
+def runs(compression, dem_run, tmp_path_factory):
+    """The same run over and over, as many at a time as there are cores: by name, its folder with compression.h5."""
+    folders = {name: tmp_path_factory.mktemp("run") for name in ["packed", "second", "1", "2", "3", "read"]}
+
+    def again(name, *options):
+        dem_run(folders[name], "run", SCENE, "--quiet", *options)
+
+    def packed_and_read():
+        again("packed", "--write-sample", "sample.csv")
+        sample = json.dumps({"file": {"path": str(folders["packed"] / "sample.csv")}})
+        again("read", "--set", f"sample={sample}", "--write-sample", "sample.csv")
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        waiting = [pool.submit(packed_and_read), pool.submit(again, "second")]
+        waiting += [pool.submit(again, threads, "--threads", threads) for threads in ["1", "2", "3"]]
+        for one in waiting:
+            one.result()
+    return folders
 
 
-@pytest.mark.parametrize("threads", [1, 2, 3])
-def test_any_number_of_threads(compression, dem_run, tmp_path, threads):
-    dem_run(tmp_path, "run", SCENE, "--quiet", "--threads", threads)
-    assert_identical(compression / "compression.h5", tmp_path / "compression.h5")
+@pytest.mark.parametrize("other", ["second", "1", "2", "3", "packed", "read"])
+def test_a_run_is_the_same_again(compression, runs, other):
+    """Run once more, with any number of threads, writing its sample, and with that sample read back."""
+    assert_identical(compression / "compression.h5", runs[other] / "compression.h5")
 
 
-def test_a_sample_read_back_from_its_file(compression, dem_run, tmp_path):
-    dem_run(tmp_path, "run", SCENE, "--quiet", "--write-sample", "sample.csv", "-o", "packed.h5")
-    sample = json.dumps({"file": {"path": str(tmp_path / "sample.csv")}})
-    dem_run(tmp_path, "run", SCENE, "--quiet", "--set", f"sample={sample}", "--write-sample", "again.csv", "-o", "read.h5")
-    assert (tmp_path / "sample.csv").read_bytes() == (tmp_path / "again.csv").read_bytes()
-    assert_identical(compression / "compression.h5", tmp_path / "packed.h5")
-    assert_identical(tmp_path / "packed.h5", tmp_path / "read.h5")
+def test_a_sample_read_back_is_the_sample(runs):
+    assert (runs["packed"] / "sample.csv").read_bytes() == (runs["read"] / "sample.csv").read_bytes()
 
 
 def test_other_samples_differ(compression, dem_run, tmp_path):

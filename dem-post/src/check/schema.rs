@@ -223,8 +223,9 @@ fn walls(c: &mut Checker) {
     c.table("walls/normal", &F64, w, &[d], "");
     c.table("walls/direction", &F64, w, &[d], "");
     c.table("walls/radius", &F64, w, &[], "m");
+    let reals = reals(c);
     for (name, unit) in [("position", "m"), ("velocity", "m s-1"), ("force", "N")] {
-        c.element(&format!("walls/{name}"), &reals(c), &[w, d], unit);
+        c.element(&format!("walls/{name}"), &reals, &[w, d], unit);
     }
 }
 

@@ -11,7 +11,6 @@ mod vtk;
 use std::path::{Path, PathBuf};
 
 use dem_run::history::History;
-use indicatif::ProgressBar;
 use serde::Serialize;
 
 use crate::output::{Folder, PostError, Result, WriteError, facts, progress};
@@ -164,9 +163,7 @@ pub fn write(history: &History, report: &mut Report, folder: &mut Folder, quiet:
     let file = hdf5::File::open(&source).map_err(|error| failed(&source, &error))?;
     for companion in &mut report.companions {
         let path = folder.place(companion.name);
-        let bar = progress(history.frames() as u64, quiet, "{bar:24} {percent} % of the contacts written, {eta} left");
-        let made = make(companion.name, &path, &file, link, history, &report.outline, &bar);
-        bar.finish_and_clear();
+        let made = make(companion.name, &path, &file, link, history, &report.outline, quiet);
         companion.bytes = made.and_then(|()| length(&path)).inspect_err(|_| {
             // the first error is the one to report
             let _ = std::fs::remove_file(&path);
@@ -182,13 +179,18 @@ fn make(
     link: &str,
     history: &History,
     outline: &Outline,
-    bar: &ProgressBar,
+    quiet: bool,
 ) -> Result<()> {
     let write = || -> std::result::Result<(), Fault> {
         let companion = Companion::create(path, file, link)?;
         match name {
             "grains.vtkhdf" => vtk::grains(&companion, outline)?,
-            "contacts.vtkhdf" => vtk::contacts(&companion, history, outline, bar)?,
+            "contacts.vtkhdf" => {
+                let bar = progress(history.frames() as u64, quiet, "{bar:24} {percent} % of the contacts written, {eta} left");
+                let made = vtk::contacts(&companion, history, outline, &bar);
+                bar.finish_and_clear();
+                made?;
+            }
             "bonds.vtkhdf" => vtk::bonds(&companion, outline)?,
             _ => h5md::trajectory(&companion, outline)?,
         }
