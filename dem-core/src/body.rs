@@ -150,18 +150,36 @@ impl<D: Dim> Shape<D> {
             Self::Round { radius: wall, inside, axis } => {
                 let offset = axis.map_or(offset, |a| offset - a * a.dot(&offset));
                 let distance = offset.norm();
-                // a grain in the very centre touches everywhere at once: any normal serves
-                let outward = if distance > 0.0 { offset * (1.0 / distance) } else { first_axis::<D>() };
+                let outward = direction::<D>(offset, distance);
                 if inside { (wall - distance - radius, -outward) } else { (distance - wall - radius, outward) }
             }
         }
     }
 }
 
-fn first_axis<D: Dim>() -> D::Vector {
-    let mut e = D::Vector::zero();
-    e[0] = 1.0;
-    e
+impl<D: Dim> Shape<D> {
+    /// The smallest gap (m) on the straight way `way` (m) from `offset`.
+    pub(crate) fn smallest_gap(&self, offset: D::Vector, way: D::Vector, radius: f64) -> f64 {
+        let end = self.gap(offset + way, radius).0.min(self.gap(offset, radius).0);
+        let Self::Round { inside: false, axis, .. } = *self else {
+            // along a line these gaps are smallest at an end
+            return end;
+        };
+        let across = |x: D::Vector| axis.map_or(x, |a| x - a * a.dot(&x));
+        let (x, w) = (across(offset), across(way));
+        let nearest = -x.dot(&w) / w.dot(&w);
+        if 0.0 < nearest && nearest < 1.0 { self.gap(offset + way * nearest, radius).0 } else { end }
+    }
+}
+
+/// The unit vector along `offset`, whose norm is `distance`. Where two centres are one, any normal serves: the first axis.
+pub(crate) fn direction<D: Dim>(offset: D::Vector, distance: f64) -> D::Vector {
+    if distance > 0.0 {
+        return offset * (1.0 / distance);
+    }
+    let mut first = D::Vector::zero();
+    first[0] = 1.0;
+    first
 }
 
 /// What moves a wall.

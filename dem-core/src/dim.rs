@@ -92,6 +92,12 @@ pub fn resized<A: Vect, B: Vect>(rows: A) -> B {
     out
 }
 
+/// 1 − cos φ for s = sin φ, with all digits where φ is small.
+fn versine(s: f64) -> f64 {
+    let square = s * s;
+    square / (1.0 + (1.0 - square).max(0.0).sqrt())
+}
+
 /// A dimension of space, as the contact problem sees it.
 pub trait Dim: Copy + Debug + Default + Send + Sync + 'static {
     /// Number of space dimensions.
@@ -137,6 +143,9 @@ pub trait Dim: Copy + Debug + Default + Send + Sync + 'static {
     fn unturned() -> Self::Orientation;
     /// The orientation after turning by the rotation vector `turn` (rad).
     fn turned(orientation: Self::Orientation, turn: Self::Spin) -> Self::Orientation;
+    /// (R − 1) x: what a rotation changes of a vector, for the rotation about `sine` by the angle whose sine is its norm, at
+    /// most a quarter of a turn.
+    fn swing(vector: Self::Vector, sine: Self::Spin) -> Self::Vector;
     /// Area (2D) or volume (3D) of a disk or sphere, m² or m³.
     fn volume(radius: f64) -> f64;
     /// Moment of inertia over m R²: 1/2 for a disk, 2/5 for a sphere.
@@ -218,6 +227,10 @@ impl Dim for D2 {
     #[inline]
     fn turned(orientation: Self::Orientation, turn: Self::Spin) -> Self::Orientation {
         orientation + turn
+    }
+    fn swing(x: Self::Vector, sine: Self::Spin) -> Self::Vector {
+        let s = sine[0].clamp(-1.0, 1.0);
+        Self::Vector::from([-x[1], x[0]]) * s - x * versine(s)
     }
     fn volume(radius: f64) -> f64 {
         std::f64::consts::PI * radius * radius
@@ -308,6 +321,14 @@ impl Dim for D3 {
         let u = v * c + p * q[0] + p.cross(&v);
         let next: Self::Orientation = [w, u[0], u[1], u[2]].into();
         next / next.norm()
+    }
+    fn swing(x: Self::Vector, sine: Self::Spin) -> Self::Vector {
+        let norm = sine.norm();
+        if norm == 0.0 {
+            return Self::Vector::zero();
+        }
+        let (axis, s) = (sine / norm, norm.min(1.0));
+        axis.cross(&x) * s - (x - axis * Vect::dot(&axis, &x)) * versine(s)
     }
     fn volume(radius: f64) -> f64 {
         4.0 / 3.0 * std::f64::consts::PI * radius.powi(3)

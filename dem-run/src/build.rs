@@ -119,7 +119,7 @@ fn listed<D: Dim>(spec: &scene::GrainSpec, scene: &Scene) -> Grain<D> {
 
 /// Two grains at one place have no normal between them.
 fn refuse_coincident<D: Dim>(grains: &Grains<D>) -> Result<(), RunError> {
-    for [i, j] in pairs_within(grains, &grains.position, 0.0) {
+    for [i, j] in pairs_within(grains, &grains.position, &vec![0.0; grains.len()]) {
         let apart = (grains.position[i as usize] - grains.position[j as usize]).norm();
         let smaller = grains.radius[i as usize].min(grains.radius[j as usize]);
         if apart <= TOUCHING * smaller {

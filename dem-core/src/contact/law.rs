@@ -248,6 +248,7 @@ pub struct Bonded<T, B> {
     shift: f64,
     cone: Cone,
     flow: BondFlow,
+    bias: f64,
     rows: PhantomData<(T, B)>,
 }
 
@@ -264,8 +265,15 @@ impl<T: Vect, B: Vect> Bonded<T, B> {
             shift,
             cone,
             flow,
+            bias: 0.0,
             rows: PhantomData,
         }
+    }
+
+    /// The same bond with something added to the normal velocity before the law (m/s).
+    #[must_use]
+    pub fn with_bias(self, bias: f64) -> Self {
+        Self { bias, ..self }
     }
 
     /// The local block back from its inverse.
@@ -280,7 +288,8 @@ impl<A: Vect> Law for Bonded<A, A> {
     type B = A;
 
     #[inline(always)]
-    fn improve(&self, local: LocalSolve, r: Local<A, A>, u: Local<A, A>) -> Local<A, A> {
+    fn improve(&self, local: LocalSolve, r: Local<A, A>, mut u: Local<A, A>) -> Local<A, A> {
+        u.n += self.bias;
         match local {
             LocalSolve::Exact => {
                 let stuck = Local {
@@ -300,8 +309,13 @@ impl<A: Vect> Law for Bonded<A, A> {
     }
 
     #[inline(always)]
-    fn natural_map(&self, r: Local<A, A>, u: Local<A, A>) -> Local<A, A> {
+    fn natural_map(&self, r: Local<A, A>, mut u: Local<A, A>) -> Local<A, A> {
+        u.n += self.bias;
         self.predict_correct(r, u) * -1.0
+    }
+
+    fn bias(&self) -> f64 {
+        self.bias
     }
 
     fn gamma(&self) -> f64 {
@@ -397,6 +411,12 @@ impl<T: Vect, B: Vect> Elastic<T, B> {
         let soft = Block { n: block.n + compliance.n, t: block.t + compliance.t, m: block.m + compliance.m, ..block };
         Self { bond: Bonded::new(soft, arm, shift, cone, flow), compliance, carried }
     }
+
+    /// The same bond with something added to the normal velocity before the law (m/s).
+    #[must_use]
+    pub fn with_bias(self, bias: f64) -> Self {
+        Self { bond: self.bond.with_bias(bias), ..self }
+    }
 }
 
 impl<A: Vect> Law for Elastic<A, A> {
@@ -433,6 +453,10 @@ impl<A: Vect> Law for Elastic<A, A> {
     #[inline(always)]
     fn arm(&self) -> f64 {
         self.bond.arm
+    }
+
+    fn bias(&self) -> f64 {
+        self.bond.bias
     }
 
     fn compliance(&self) -> Weights {

@@ -2,6 +2,7 @@
 
 use super::World;
 use super::touch::{Touch, TouchStatus};
+use crate::body::direction;
 use crate::bond::{Bond, BondStatus};
 use crate::contact::{Bonded, Coulomb, Elastic, Frictionless, Law, Local};
 use crate::dim::{Dim, Vect};
@@ -10,6 +11,9 @@ use crate::problem::{Contact, ContactProblem, Group, Link, Node, Nodes};
 /// Gap over the radius of the grain below which a contact touches. The rounding of positions would else be a misfit of
 /// rigid contacts, to which stiff ones answer with forces.
 const TOUCHING: f64 = 1e-9;
+
+/// Gap over the radius of the grain below which a contact that does not close is part of the problem.
+const NEAR: f64 = 1e-3;
 
 /// The configuration at mid-step, where contacts are looked for.
 pub(super) struct Midpoint<D: Dim> {
@@ -49,7 +53,7 @@ impl<D: Dim> World<D> {
             None => {
                 let apart = x - mid.grains[j];
                 let distance = apart.norm();
-                (distance - r - self.grains.radius[j], apart * (1.0 / distance))
+                (distance - r - self.grains.radius[j], direction::<D>(apart, distance))
             }
             Some(wall) => self.walls[wall].shape.gap(x - mid.walls[wall], r),
         };
@@ -95,7 +99,7 @@ impl<D: Dim> World<D> {
             let touch = self.new_touch(mid, motion, pair, None);
             let approach = pair.map(|k| motion.free[k as usize].0);
             let closing = -(approach[0] - approach[1]).dot(&D::normal(&touch.frame));
-            let near = 1e-3 * self.grains.radius[pair[0] as usize];
+            let near = NEAR * self.grains.radius[pair[0] as usize];
             if touch.gap <= near + 2.0 * h * closing.max(0.0) {
                 touches.push(touch);
             }
@@ -134,12 +138,12 @@ impl<D: Dim> World<D> {
 
     /// Make the list of candidates valid for this step.
     fn refresh_candidates(&mut self, mid: &Midpoint<D>, motion: &Motion<D>, h: f64) {
-        let fastest = motion.free.iter().map(|(v, _)| v.dot(v)).fold(0.0, f64::max).sqrt();
-        let smallest = self.grains.radius.iter().copied().fold(f64::INFINITY, f64::min);
-        let largest = self.grains.radius.iter().copied().fold(0.0, f64::max);
-        let reach = 1e-3 * largest + 4.0 * h * fastest;
+        let radius = |k: usize| self.grains.radius.get(k).copied().unwrap_or(0.0);
+        let way = |k: usize| h * motion.free[k].0.norm().max(motion.before[k].0.norm());
+        let reach = |k: usize| NEAR * radius(k) + 2.0 * way(k);
         if !self.candidates.covers(&mid.grains, &mid.walls, reach) {
-            let skin = 1.5 * reach + 0.3 * smallest;
+            // what a body may go before the list is built anew: some of its size, or three steps at its speed
+            let skin = (0..motion.free.len()).map(|k| reach(k) + (0.15 * radius(k)).max(3.0 * way(k))).collect();
             self.candidates.rebuild(&self.grains, &mid.grains, &self.walls, &mid.walls, skin);
         }
     }
@@ -153,9 +157,10 @@ impl<D: Dim> World<D> {
         nodes: &Nodes<D>,
         h: f64,
     ) -> Vec<Touch<D>> {
-        let fastest = nodes.all.iter().map(|n| n.velocity.dot(&n.velocity)).fold(0.0, f64::max).sqrt();
-        if !self.candidates.covers(&mid.grains, &mid.walls, 2.0 * h * fastest) {
-            self.candidates.rebuild(&self.grains, &mid.grains, &self.walls, &mid.walls, 3.0 * h * fastest);
+        let way = |k: usize| h * nodes.all[k].velocity.norm();
+        if !self.candidates.covers(&mid.grains, &mid.walls, way) {
+            let skin = (0..nodes.all.len()).map(|k| 1.5 * way(k)).collect();
+            self.candidates.rebuild(&self.grains, &mid.grains, &self.walls, &mid.walls, skin);
         }
         let mut present = touches.iter().peekable();
         let mut missed = Vec::new();
@@ -247,16 +252,17 @@ impl<D: Dim> World<D> {
             let start = touch.reaction * h;
             if let Some((number, bond)) = touch.bond.map(|b| (b as usize, &self.bonds[b as usize])) {
                 let arm = bond.mean_diameter;
+                let bias = turning(&link, motion, h);
                 let block = link.block(i, j, arm, None);
                 let r = over_arm(start, arm);
                 let (shift, cone, flow) = (h * bond.strength, bond.cone(), self.settings.bond_flow);
                 if let Some(compliance) = bond.compliance(h) {
                     let carried = over_arm(carried[number] * h, arm);
-                    let law = Elastic::new(block, compliance, carried, arm, shift, cone, flow);
+                    let law = Elastic::new(block, compliance, carried, arm, shift, cone, flow).with_bias(bias);
                     problem.elastic.push(Contact { link, law, r });
                     places.elastic.push(place);
                 } else {
-                    let law = Bonded::new(block, arm, shift, cone, flow);
+                    let law = Bonded::new(block, arm, shift, cone, flow).with_bias(bias);
                     problem.bonded.push(Contact { link, law, r });
                     places.bonded.push(place);
                 }
@@ -283,6 +289,18 @@ impl<D: Dim> World<D> {
         let radius = |k: u32| self.grains.radius.get(k as usize).map_or(0.0, |r| r + 0.5 * touch.gap);
         Link { nodes: touch.pair, frame: touch.frame, lever: touch.pair.map(radius) }
     }
+}
+
+/// What is added to the normal velocity of a bond before its law, so that a bond that turns keeps its length (m/s).
+///
+/// A velocity along the tangent of mid-step leads away from the partner before mid-step and after it. Where the bond turned
+/// by R since the last mid-step, its velocity u⁻ gained n·(1 − R) u⁻ along the normal by that alone; half of it back,
+/// u_n⁺ = −½ n·(1 − R) u⁻, makes the step symmetric in time: the length is kept, and since u_n⁺ = −u_n⁻ the reaction does no
+/// work. Within a rigid fragment R is one for all, so that all bonds can do so at once. See docs/theory/time-stepping.md.
+fn turning<D: Dim>(link: &Link<D>, motion: &Motion<D>, h: f64) -> f64 {
+    let [(v_i, spin_i), (v_j, spin_j)] = link.nodes.map(|k| motion.before[k as usize]);
+    // spins follow the tangential row at mid-step, where they are sin φ / h of the angle φ between two of them
+    -0.5 * D::normal(&link.frame).dot(&D::swing(v_i - v_j, (spin_i + spin_j) * (0.5 * h)))
 }
 
 /// Moments over the mean diameter.

@@ -5,6 +5,7 @@
 
 mod assembly;
 mod ledger;
+mod limits;
 mod observe;
 mod start;
 mod state;
@@ -124,8 +125,9 @@ impl<D: Dim> World<D> {
     ///
     /// Pairs of two fixed grains are left out: nothing can strain their bond.
     pub fn form_bonds(&mut self, gap_tolerance: f64, strength: impl Fn(f64) -> f64, friction: f64) {
-        let diameter = 2.0 * self.grains.radius.iter().copied().fold(0.0, f64::max);
-        let pairs = pairs_within(&self.grains, &self.grains.position, gap_tolerance * diameter);
+        // too many: the gap decides below
+        let skin: Vec<f64> = self.grains.radius.iter().map(|r| 2.0 * gap_tolerance * r).collect();
+        let pairs = pairs_within(&self.grains, &self.grains.position, &skin);
         for pair in pairs {
             let [i, j] = pair.map(|k| k as usize);
             let mean_diameter = self.grains.radius[i] + self.grains.radius[j];

@@ -1,6 +1,7 @@
 //! The reactions that a run starts from.
 
 use super::{Touch, TouchStatus, World};
+use crate::body::direction;
 use crate::bond::{Bond, BondStatus};
 use crate::contact::Local;
 use crate::dim::{Dim, Vect};
@@ -17,7 +18,7 @@ impl<D: Dim> World<D> {
             let [i, j] = bond.pair.map(|k| k as usize);
             let apart = self.grains.position[i] - self.grains.position[j];
             let distance = apart.norm();
-            let normal = apart * (1.0 / distance);
+            let normal = direction::<D>(apart, distance);
             let (radius, gap) = (self.grains.radius[i], distance - bond.mean_diameter);
             self.touches.push(Touch {
                 pair: bond.pair,

@@ -53,6 +53,31 @@ pub enum StepError {
         /// Iterations of its solve.
         iterations: u64,
     },
+    /// A grain would pass through another body, or be pushed by one it passes, in the shortest part of a step.
+    #[error(
+        "grain {} is too fast for the step at t = {time:.6e} s: even in {PARTS} parts it would pass through body {} (walls \
+         follow the grains): shorten time.step, or look why it is so fast", pair[0], pair[1]
+    )]
+    TooFast {
+        /// Time at which the part of the step that failed began (s).
+        time: f64,
+        /// Grain, and grain or wall (walls follow the grains).
+        pair: [u32; 2],
+    },
+    /// A contact yields though the residual is small enough.
+    #[error(
+        "grain {} comes closer to body {} (walls follow the grains) by {:.1e} of a radius a step, or leaves it though they \
+         are bonded, at t = {time:.6e} s, though the residual is small enough: lower solver.tolerance and solver.accept, \
+         shorten time.step, or bring the masses nearer to each other", pair[0], pair[1], share
+    )]
+    Yielded {
+        /// Time at which the step that failed began (s), or its half.
+        time: f64,
+        /// Grain, and grain or wall (walls follow the grains).
+        pair: [u32; 2],
+        /// How far in the step, over the smaller radius (–).
+        share: f64,
+    },
     /// A velocity or a reaction is not a finite number.
     #[error(
         "a velocity is not a finite number at t = {time:.6e} s: look for grains squeezed between bodies that cannot yield"
@@ -63,10 +88,13 @@ pub enum StepError {
     },
 }
 
+/// Parts into which a step is divided at most where bodies are fast.
+const PARTS: u32 = 4096;
+
 impl<D: Dim> World<D> {
     /// Carry the world on by one time step. An error leaves the world as it was.
     pub fn step(&mut self) -> Result<StepReport<D>, StepError> {
-        let mut report = self.advance(self.settings.step, 0)?;
+        let mut report = self.advance(self.settings.step, 0, 1)?;
         self.steps += 1;
         // a product, not a sum: the clock does not drift
         self.time = self.steps as f64 * self.settings.step;
@@ -74,22 +102,25 @@ impl<D: Dim> World<D> {
         Ok(report)
     }
 
-    /// One step of length `h`, or two of half that length if its solve is not accepted.
-    fn advance(&mut self, h: f64, halvings: u32) -> Result<StepReport<D>, StepError> {
-        match self.attempt(h) {
-            Err(StepError::NotAccepted { .. }) if halvings < self.settings.max_halvings => {
-                let before = self.state();
-                let first = self.advance(0.5 * h, halvings + 1)?;
-                match self.advance(0.5 * h, halvings + 1) {
-                    Ok(second) => Ok(first.followed_by(second)),
-                    Err(error) => {
-                        // half a step that stands alone would be neither the old state nor the new one
-                        self.restore(before);
-                        Err(error)
-                    }
-                }
+    /// One step of length `h`, or two of half that length if its solve is not accepted, or if bodies are too fast for it;
+    /// `parts` of its length were the step.
+    fn advance(&mut self, h: f64, halvings: u32, parts: u32) -> Result<StepReport<D>, StepError> {
+        let refused = match self.attempt(h) {
+            Err(StepError::NotAccepted { .. } | StepError::Yielded { .. }) if halvings < self.settings.max_halvings => {
+                1
             }
-            outcome => outcome,
+            Err(StepError::TooFast { .. }) if parts < PARTS => 0,
+            outcome => return outcome,
+        };
+        let before = self.state();
+        let first = self.advance(0.5 * h, halvings + refused, 2 * parts)?;
+        match self.advance(0.5 * h, halvings + refused, 2 * parts) {
+            Ok(second) => Ok(first.followed_by(second, refused)),
+            Err(error) => {
+                // half a step that stands alone would be neither the old state nor the new one
+                self.restore(before);
+                Err(error)
+            }
         }
     }
 
@@ -99,6 +130,12 @@ impl<D: Dim> World<D> {
         let motion = self.free_motion(h);
         let applied = self.applied_impulse(h);
         let mut touches = self.detect(&mid, &motion, h);
+        self.refuse_crossing(self.crossing(
+            &self.grains.position,
+            &self.wall_places(),
+            |k| motion.before[k].0,
+            0.5 * h,
+        ))?;
         let carried = self.carried(&touches);
         let mut done = Solves::default();
         let mut breaks: Vec<Break<D>> = Vec::new();
@@ -108,6 +145,9 @@ impl<D: Dim> World<D> {
             done.add(solve);
             self.refuse_unaccepted(solve, &problem, h)?;
             write_reactions(&mut touches, &problem, &places, h);
+            if let Some((pair, share)) = self.yielding(&touches, &problem) {
+                return Err(StepError::Yielded { time: self.time, pair, share });
+            }
             let missed = self.missed(&mid, &motion, &touches, &problem.nodes, h);
             if !missed.is_empty() {
                 touches.extend(missed);
@@ -124,6 +164,8 @@ impl<D: Dim> World<D> {
                 break problem;
             }
         };
+        self.refuse_crossing(self.pushes_from_afar(&touches, &problem.nodes, h))?;
+        self.refuse_crossing(self.crossing(&mid.grains, &mid.walls, |k| problem.nodes.all[k].velocity, 0.5 * h))?;
         let report = self.report(&touches, &motion, &problem, done, breaks, h);
         self.settle(h, &mid, &motion, &problem, touches, &report.breaks);
         Ok(report)
@@ -215,6 +257,14 @@ impl<D: Dim> World<D> {
         Ok(())
     }
 
+    fn refuse_crossing(&self, found: Option<[u32; 2]>) -> Result<(), StepError> {
+        found.map_or(Ok(()), |pair| Err(StepError::TooFast { time: self.time, pair }))
+    }
+
+    fn wall_places(&self) -> Vec<D::Vector> {
+        self.walls.iter().map(|w| w.position).collect()
+    }
+
     /// The bonds that the accepted solve left at their limit, as many as the scene's rule lets break in one round.
     fn at_limit(
         &self,
@@ -247,7 +297,8 @@ impl<D: Dim> World<D> {
             let law = &contact.law;
             let Some(mode) = failure(&contact.r, law.shift(), law.cone()) else { continue };
             let touch = &touches[*place];
-            let u = nodes.relative_velocity::<D::Tangent, D::Tangent>(&contact.link, law.arm());
+            let mut u = nodes.relative_velocity::<D::Tangent, D::Tangent>(&contact.link, law.arm());
+            u.n += law.bias();
             let flow = u + law.compliance().times(&(contact.r - law.carried()));
             let Some(bond) = touch.bond else { continue };
             // what the books hold of it: of the step's beginning where the step is made without the bond
@@ -461,8 +512,8 @@ impl Solves {
 }
 
 impl<D: Dim> StepReport<D> {
-    /// Two half steps as one.
-    fn followed_by(self, second: Self) -> Self {
+    /// Two half steps as one, made because `refused` solves were not accepted.
+    fn followed_by(self, second: Self, refused: u32) -> Self {
         let mut breaks = self.breaks;
         let rounds = breaks.last().map_or(0, |b| b.round + 1);
         breaks.extend(second.breaks.into_iter().map(|b| Break { round: b.round + rounds, ..b }));
@@ -474,7 +525,7 @@ impl<D: Dim> StepReport<D> {
             load_error: self.load_error.max(second.load_error),
             breaks,
             penetration: self.penetration.max(second.penetration),
-            rejected: self.rejected + second.rejected + 1,
+            rejected: self.rejected + second.rejected + refused,
             ..second
         }
     }

@@ -1,0 +1,182 @@
+//! Random scenes: everything that a scene can say, in every combination. Nothing is known of them but what must hold always.
+
+use crate::harness::watch;
+use crate::scene::Kind;
+use dem_core::body::{Drive, Grain, Load, Shape, Wall};
+use dem_core::bond::{Rupture, Stiffness};
+use dem_core::contact::BondFlow;
+use dem_core::dim::{D2, D3, Dim, Vect};
+use dem_core::world::{Restitution, Settings, World};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use rayon::prelude::*;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+
+/// Scenes that once failed.
+const REGRESSIONS: [u64; 0] = [];
+
+struct Dice(Pcg64);
+
+impl Dice {
+    fn unit(&mut self) -> f64 {
+        self.0.random::<f64>()
+    }
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.unit()
+    }
+    /// Evenly over the orders of magnitude.
+    fn decade(&mut self, low: f64, high: f64) -> f64 {
+        (self.between(low.ln(), high.ln())).exp()
+    }
+    fn one_in(&mut self, n: u32) -> bool {
+        self.unit() < 1.0 / f64::from(n)
+    }
+    fn pick<T: Copy>(&mut self, list: &[T]) -> T {
+        list[(self.unit() * list.len() as f64) as usize]
+    }
+    fn direction<D: Dim>(&mut self) -> D::Vector {
+        loop {
+            let mut x = D::Vector::zero();
+            (0..D::N).for_each(|axis| x[axis] = self.between(-1.0, 1.0));
+            let norm = x.norm();
+            if norm > 0.1 && norm <= 1.0 {
+                return x * (1.0 / norm);
+            }
+        }
+    }
+}
+
+/// A random scene of at most `most` grains, and what its solver accepts.
+fn scene<D: Dim>(dice: &mut Dice, most: f64) -> (World<D>, f64) {
+    let count = dice.decade(2.0, most).round();
+    let side = count.powf(1.0 / D::N as f64).ceil() as usize;
+    let size = dice.decade(1e-6, 1e2);
+    let ratio = dice.pick(&[1.0, 1.0, 2.0, 10.0]);
+    let spacing = dice.pick(&[2.0, 2.0, 2.02, 2.2]) * size;
+    let speed = dice.pick(&[0.0, 0.0, 0.1, 1.0, 10.0]) * (9.81 * size).sqrt();
+    let heavy = dice.pick(&[1.0, 1.0, 1e2, 1e4]);
+    let mut grains: Vec<Grain<D>> = Vec::new();
+    for k in 0..count as usize {
+        let mut x = D::Vector::zero();
+        (0..D::N).for_each(|axis| x[axis] = spacing * ((k / side.pow(axis as u32)) % side) as f64);
+        let radius = if dice.one_in(2) { size } else { size / dice.between(1.0, ratio) };
+        let mut grain = Grain::<D>::at_rest(x, radius, 2500.0);
+        grain.velocity = dice.direction::<D>() * (speed * dice.unit());
+        if dice.one_in(10) {
+            (0..D::Spin::LEN).for_each(|axis| grain.spin[axis] = dice.between(-1.0, 1.0) * speed / radius);
+        }
+        if dice.one_in(10) {
+            grain.mass *= heavy;
+            grain.inertia *= heavy;
+        }
+        grain.fixed = dice.one_in(50);
+        if grain.fixed {
+            (grain.velocity, grain.spin) = (D::Vector::zero(), D::Spin::zero());
+        }
+        grains.push(grain);
+    }
+    let friction = dice.pick(&[0.0, 0.0, 0.3, 0.3, 1.0]);
+    let extent = spacing * side as f64;
+    let weight = 2500.0 * D::volume(size) * 9.81 * count;
+    let mut walls = Vec::new();
+    for _ in 0..dice.pick(&[0, 1, 2, 3, 4]) {
+        let normal = dice.direction::<D>();
+        // outside the ball that holds the sample
+        let mut centre = D::Vector::zero();
+        (0..D::N).for_each(|axis| centre[axis] = 0.5 * (extent - spacing));
+        let away = size + 0.5 * extent * (D::N as f64).sqrt();
+        let place = centre - normal * away;
+        let (shape, at) = match dice.pick(&[0, 0, 1, 2]) {
+            0 => (Shape::Plane { normal }, place),
+            1 => {
+                let radius = dice.between(0.2, 3.0) * extent;
+                (Shape::Round { radius, inside: false, axis: None }, place - normal * radius)
+            }
+            _ => (Shape::Round { radius: 1.5 * away, inside: true, axis: None }, centre),
+        };
+        let mut wall = Wall::fixed(shape, at, dice.pick(&[0.0, 0.2, friction]));
+        let rate = dice.between(-1.0, 1.0);
+        match dice.pick(&[0, 0, 1, 2]) {
+            1 => {
+                let v = rate * speed;
+                wall.drive = Drive::Velocity { direction: normal, speed: Arc::new(move |_| v) };
+            }
+            2 => {
+                let mass = dice.decade(0.1, 10.0) * weight / 9.81;
+                let force = Arc::new(move |t: f64| weight * rate * (1.0 + t));
+                wall.drive = Drive::Force { direction: normal, mass, force };
+            }
+            _ => {}
+        }
+        walls.push(wall);
+    }
+    let mut loads = Vec::new();
+    if dice.one_in(4) {
+        let grain = (dice.unit() * count) as usize;
+        let force = dice.direction::<D>() * (weight * dice.unit());
+        loads.push(Load { grain, force, torque: D::Spin::zero(), factor: Arc::new(|t| t.cos()) });
+    }
+    let bonded = dice.one_in(2);
+    let accept = if bonded { 1e-6 } else { 1e-4 };
+    let mut settings = Settings {
+        step: dice.decade(1e-3, 0.1) * (size / 9.81).sqrt(),
+        gravity: (!dice.one_in(3)).then(|| dice.direction::<D>() * 9.81),
+        friction,
+        restitution: None,
+        bond_flow: dice.pick(&[BondFlow::Associated, BondFlow::Associated, BondFlow::Bipotential]),
+        rupture: dice.pick(&[Rupture::Cascade, Rupture::Cascade, Rupture::CascadeWorst, Rupture::EndOfStep]),
+        solver: dice.pick(&Kind::ALL).settings(1e-8, accept),
+        max_halvings: dice.pick(&[0, 4]),
+        thickness: 1.0,
+        expel_overlaps: false,
+    };
+    if dice.one_in(3) {
+        let (grain_grain, grain_wall) = (dice.unit(), dice.unit());
+        settings.restitution = Some(Restitution { grain_grain, grain_wall, threshold_speed: 0.01 * speed });
+    }
+    let mut world = World::new(grains.into_iter().collect(), walls, loads, settings);
+    if bonded {
+        let strength = weight / count * dice.decade(1e-2, 1e4);
+        let tolerance = dice.pick(&[1e-3, 0.05, 0.2]);
+        let mu = dice.pick(&[0.0, 0.3, 1.0]);
+        world.form_bonds(tolerance, |_| strength, mu);
+        if dice.one_in(3) {
+            let k = strength / size * dice.decade(1.0, 1e6);
+            world.make_bonds_elastic(|d| Stiffness { normal: k, tangential: k, rolling: k * d * d / 12.0 });
+        }
+    }
+    (world, accept)
+}
+
+/// Make scene `seed` and carry it on.
+fn scene_holds(seed: u64, most: f64, steps: usize) {
+    let mut dice = Dice(Pcg64::seed_from_u64(seed));
+    if dice.one_in(2) {
+        let (mut world, accept) = scene::<D2>(&mut dice, most);
+        watch(&mut world, steps, accept);
+    } else {
+        let (mut world, accept) = scene::<D3>(&mut dice, most);
+        watch(&mut world, steps, accept);
+    }
+}
+
+/// The scenes that fail, of these.
+fn failures(seeds: std::ops::Range<u64>, most: f64, steps: usize) -> Vec<u64> {
+    let fails = |seed: &u64| catch_unwind(AssertUnwindSafe(|| scene_holds(*seed, most, steps))).is_err();
+    seeds.into_par_iter().filter(fails).collect()
+}
+
+#[test]
+fn random_scenes_keep_what_must_hold() {
+    assert_eq!(failures(0..100, 30.0, 20), [], "seeds of scenes that fail");
+    REGRESSIONS.into_iter().for_each(|seed| scene_holds(seed, 200.0, 200));
+}
+
+/// `STABILITY_SCENES=20000 cargo test --release -p dem-core --test stability twenty_thousand -- --ignored`
+#[test]
+#[ignore = "long: see README"]
+fn twenty_thousand_random_scenes() {
+    let count = std::env::var("STABILITY_SCENES").map_or(20_000, |n| n.parse().expect("a number of scenes"));
+    assert_eq!(failures(0..count, 200.0, 200), [], "seeds of scenes that fail");
+}
