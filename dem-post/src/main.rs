@@ -41,7 +41,7 @@ fn run(cli: &Cli) -> Result<()> {
         }
         Command::Cracks(moments) => {
             let history = History::open(&moments.files.history)?;
-            let report = cracks::read(&history)?;
+            let report = cracks::read(&history, cli.quiet)?;
             let mut folder = folder(&moments.files)?;
             cracks::write(&history, &report, &moments.times, &mut folder)?;
             report_on(cli, &report, || report.table(), Some(&folder))
@@ -77,7 +77,7 @@ fn run(cli: &Cli) -> Result<()> {
         }
         Command::Report(moments) => {
             let history = History::open(&moments.files.history)?;
-            let found = report::read(&history, &moments.times)?;
+            let found = report::read(&history, &moments.times, cli.quiet)?;
             let mut folder = folder(&moments.files)?;
             report::write(&history, &found, &mut folder)?;
             report_on(cli, &found, || found.table(), Some(&folder))

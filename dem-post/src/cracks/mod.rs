@@ -8,7 +8,7 @@ use dem_run::history::{History, Rupture, RuptureMode};
 use serde::Serialize;
 
 use crate::fragments::{Fragments, fragments};
-use crate::output::{PostError, Result, Text, facts, number, quantity};
+use crate::output::{PostError, Result, Text, facts, number, progress, quantity};
 
 pub use files::write;
 
@@ -132,11 +132,11 @@ pub struct Report {
     pub paths: Paths,
 }
 
-/// Reads what became of the bonds.
+/// Reads what became of the bonds, with a bar unless `quiet`.
 ///
 /// # Errors
 /// [`PostError::Lacking`] for a scene without bonds.
-pub fn read(history: &History) -> Result<Report> {
+pub fn read(history: &History, quiet: bool) -> Result<Report> {
     let bonds = history.bonds()?;
     if bonds.is_empty() {
         let what = "cracks need bonds, and this scene has none: add `bonds` to the scene".into();
@@ -147,10 +147,13 @@ pub fn read(history: &History) -> Result<Report> {
     ruptures.iter().for_each(|rupture| broken.add(rupture.mode));
     let mass = history.grains()?.mass;
     let mut pieces = vec![];
+    let bar = progress(history.frames() as u64, quiet, "{bar:24} {percent} % of the frames read, {eta} left");
     for (frame, (&step, &time)) in history.steps().iter().zip(history.times()).enumerate() {
         let fragments = fragments(&mass, &bonds, &history.bond_status(frame)?);
         pieces.push(Pieces { step, time, fragments });
+        bar.inc(1);
     }
+    bar.finish_and_clear();
     let five = (bonds.len() as f64 * 0.05).ceil() as usize;
     let paths = if history.dimension() == 2 && history.frames() > 0 {
         let position: Vec<[f64; 2]> = history.grain_state(0)?.position.chunks(2).map(|x| [x[0], x[1]]).collect();

@@ -38,13 +38,13 @@ pub struct Report {
 ///
 /// # Errors
 /// [`PostError::Usage`] for times outside the history, [`PostError::Lacking`] for a history without frames.
-pub fn read(history: &History, times: &[f64]) -> Result<Report> {
+pub fn read(history: &History, times: &[f64], quiet: bool) -> Result<Report> {
     Ok(Report {
         // the first to say that a time is wrong or that there is no frame
         velocities: velocities::read(history, times)?,
         info: info::read(history)?,
         accuracy: solver::read(history)?,
-        cracks: if_there(cracks::read(history))?,
+        cracks: if_there(cracks::read(history, quiet))?,
         chains: if_there(chains::read(history, times))?,
         stress_strain: match stress_strain::read(history, None) {
             // several driven walls: which one is meant only a person can say

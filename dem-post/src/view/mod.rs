@@ -186,7 +186,11 @@ fn make(
         match name {
             "grains.vtkhdf" => vtk::grains(&companion, outline)?,
             "contacts.vtkhdf" => {
-                let bar = progress(history.frames() as u64, quiet, "{bar:24} {percent} % of the contacts written, {eta} left");
+                let bar = progress(
+                    history.frames() as u64,
+                    quiet,
+                    "{bar:24} {percent} % of the contacts written, {eta} left",
+                );
                 let made = vtk::contacts(&companion, history, outline, &bar);
                 bar.finish_and_clear();
                 made?;
