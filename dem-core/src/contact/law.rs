@@ -411,12 +411,6 @@ impl<T: Vect, B: Vect> Elastic<T, B> {
         let soft = Block { n: block.n + compliance.n, t: block.t + compliance.t, m: block.m + compliance.m, ..block };
         Self { bond: Bonded::new(soft, arm, shift, cone, flow), compliance, carried }
     }
-
-    /// The same bond with something added to the normal velocity before the law (m/s).
-    #[must_use]
-    pub fn with_bias(self, bias: f64) -> Self {
-        Self { bond: self.bond.with_bias(bias), ..self }
-    }
 }
 
 impl<A: Vect> Law for Elastic<A, A> {
@@ -453,10 +447,6 @@ impl<A: Vect> Law for Elastic<A, A> {
     #[inline(always)]
     fn arm(&self) -> f64 {
         self.bond.arm
-    }
-
-    fn bias(&self) -> f64 {
-        self.bond.bias
     }
 
     fn compliance(&self) -> Weights {

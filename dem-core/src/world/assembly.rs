@@ -252,17 +252,16 @@ impl<D: Dim> World<D> {
             let start = touch.reaction * h;
             if let Some((number, bond)) = touch.bond.map(|b| (b as usize, &self.bonds[b as usize])) {
                 let arm = bond.mean_diameter;
-                let bias = turning(&link, motion, h);
                 let block = link.block(i, j, arm, None);
                 let r = over_arm(start, arm);
                 let (shift, cone, flow) = (h * bond.strength, bond.cone(), self.settings.bond_flow);
                 if let Some(compliance) = bond.compliance(h) {
                     let carried = over_arm(carried[number] * h, arm);
-                    let law = Elastic::new(block, compliance, carried, arm, shift, cone, flow).with_bias(bias);
+                    let law = Elastic::new(block, compliance, carried, arm, shift, cone, flow);
                     problem.elastic.push(Contact { link, law, r });
                     places.elastic.push(place);
                 } else {
-                    let law = Bonded::new(block, arm, shift, cone, flow).with_bias(bias);
+                    let law = Bonded::new(block, arm, shift, cone, flow).with_bias(turning(&link, motion, h));
                     problem.bonded.push(Contact { link, law, r });
                     places.bonded.push(place);
                 }
@@ -291,7 +290,7 @@ impl<D: Dim> World<D> {
     }
 }
 
-/// What is added to the normal velocity of a bond before its law, so that a bond that turns keeps its length (m/s).
+/// What is added to the normal velocity of a rigid bond before its law, so that a bond that turns keeps its length (m/s).
 ///
 /// A velocity along the tangent of mid-step leads away from the partner before mid-step and after it. Where the bond turned
 /// by R since the last mid-step, its velocity u⁻ gained n·(1 − R) u⁻ along the normal by that alone; half of it back,
