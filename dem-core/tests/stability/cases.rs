@@ -225,6 +225,58 @@ fn all_bonds_break_in_one_step() {
     everywhere!(case);
 }
 
+/// The same world in other units: lengths, masses and times times these.
+fn in_units<D: Dim>(world: &mut World<D>, length: f64, mass: f64, time: f64) {
+    let (speed, force) = (length / time, mass * length / (time * time));
+    let g = &mut world.grains;
+    for k in 0..g.len() {
+        g.position[k] = g.position[k] * length;
+        g.velocity[k] = g.velocity[k] * speed;
+        g.spin[k] = g.spin[k] * (1.0 / time);
+        g.radius[k] *= length;
+        g.mass[k] *= mass;
+        g.inertia[k] *= mass * length * length;
+    }
+    for wall in &mut world.walls {
+        wall.position = wall.position * length;
+    }
+    for bond in &mut world.bonds {
+        bond.rest_gap *= length;
+        bond.mean_diameter *= length;
+        bond.strength *= force;
+    }
+    let set = &mut world.settings;
+    set.step *= time;
+    set.gravity = set.gravity.map(|g| g * (length / (time * time)));
+}
+
+#[test]
+fn units_scaled_by_powers_of_two_change_no_bit() {
+    fn case<D: Dim + PartialEq>(kind: Kind) {
+        for cohesion in [0.0, 3.0] {
+            let heap = Heap { kind, cohesion, side: 3, speed: 1.0, ..Heap::default() };
+            let mut one = heap.world::<D>();
+            let out = watch(&mut one, 60, heap.accept());
+            assert_eq!(out.stopped, None);
+            assert!(out.broken > 0 || cohesion == 0.0);
+            for (a, b, c) in [(1, 0, 0), (0, 1, 0), (0, 0, 1), (-10, -31, 5), (13, 8, -7)] {
+                let (length, mass, time) = (2f64.powi(a), 2f64.powi(b), 2f64.powi(c));
+                let mut other = heap.world::<D>();
+                in_units(&mut other, length, mass, time);
+                assert_eq!(watch(&mut other, 60, heap.accept()).stopped, None);
+                for k in 0..one.grains.len() {
+                    let same = one.grains.position[k] * length == other.grains.position[k]
+                        && one.grains.velocity[k] * (length / time) == other.grains.velocity[k]
+                        && one.grains.spin[k] * (1.0 / time) == other.grains.spin[k];
+                    assert!(same, "{kind:?} {}D, 2^{a} 2^{b} 2^{c}, cohesion {cohesion}, grain {k}", D::N);
+                }
+                assert!(one.bonds.iter().zip(&other.bonds).all(|(x, y)| x.status == y.status));
+            }
+        }
+    }
+    everywhere!(case);
+}
+
 /// A block of the hexagonal lattice (2D) or the cubic one (3D), bonded, that turns at ω = 1e-3 / h.
 fn turning<D: Dim + PartialEq>(kind: Kind, steps: usize) -> (f64, f64) {
     let mut grains = Vec::new();

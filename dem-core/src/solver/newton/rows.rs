@@ -1,7 +1,8 @@
 //! The contact problem as rows over scaled unknowns, free of dimension.
 //!
 //! Unknowns are y = M^{1/2} v of the nodes that can move, so the mass matrix is the identity and any ratio of masses is
-//! as good as another. Each contact keeps the coefficients of its rows, u = Hᵀ v = Σ h y + u₀, where u₀ comes from
+//! as good as another. Masses and impulses are counted in a unit of 1 or 2 kg ([`mass_unit`]), so that a scene whose masses are
+//! scaled by a power of two has the same bits. Each contact keeps the coefficients of its rows, u = Hᵀ v = Σ h y + u₀, where u₀ comes from
 //! nodes whose velocity is given.
 
 use crate::contact::{Cone, Law, Padded, Weights};
@@ -105,10 +106,12 @@ pub(super) struct Rows {
     pub free: Vec<f64>,
 }
 
-/// First unknown of each node, and the scale 1/√m of its translations and 1/√I of its spins.
+/// First unknown of each node.
 struct Unknowns {
     first: Vec<usize>,
     total: usize,
+    /// Unit of mass (kg).
+    unit: f64,
 }
 
 /// Relative compliance of the rows: 1/k over that of the normal row, from stiffness settings.
@@ -154,7 +157,7 @@ impl Unknowns {
             first.push(total);
             total += degrees(nodes, k, node.inverse_mass > 0.0);
         }
-        Self { first, total }
+        Self { first, total, unit: mass_unit(nodes) }
     }
 }
 
@@ -243,6 +246,15 @@ impl Rows {
     }
 }
 
+/// The unit of mass (kg), 1 or 2: the heaviest grain has an even binary exponent in it, and roots of masses that are scaled by
+/// powers of two differ by powers of two.
+pub(super) fn mass_unit<D: Dim>(nodes: &Nodes<D>) -> f64 {
+    let inverse = nodes.all[..nodes.grains].iter().map(|n| n.inverse_mass).filter(|m| *m > 0.0);
+    let exponent = inverse.fold(f64::INFINITY, f64::min).to_bits() >> 52;
+    // the exponent is stored with an odd offset
+    if exponent % 2 == 0 { 2.0 } else { 1.0 }
+}
+
 /// A row of a padded vector by its place.
 #[inline]
 pub(super) fn entry(r: &mut Padded, place: usize) -> &mut f64 {
@@ -254,12 +266,13 @@ pub(super) fn entry(r: &mut Padded, place: usize) -> &mut f64 {
 }
 
 fn write_scaled<D: Dim>(nodes: &Nodes<D>, unknowns: &Unknowns, k: usize, v: &D::Vector, w: &D::Spin, out: &mut [f64]) {
+    let unit = unknowns.unit;
     let node = &nodes.all[k];
     if node.inverse_mass == 0.0 {
         return;
     }
     let first = unknowns.first[k];
-    let mass = 1.0 / node.inverse_mass.sqrt();
+    let mass = 1.0 / (node.inverse_mass * unit).sqrt();
     if k >= nodes.grains {
         out[first] = mass * v.dot(&nodes.drives[k - nodes.grains]);
         return;
@@ -268,7 +281,7 @@ fn write_scaled<D: Dim>(nodes: &Nodes<D>, unknowns: &Unknowns, k: usize, v: &D::
         out[first + axis] = mass * v[axis];
     }
     for axis in 0..D::Spin::LEN {
-        out[first + D::N + axis] = w[axis] / node.inverse_inertia.sqrt();
+        out[first + D::N + axis] = w[axis] / (node.inverse_inertia * unit).sqrt();
     }
 }
 
@@ -300,6 +313,7 @@ impl<D: Dim> Flatten<'_, D> {
         let k = link.nodes[side] as usize;
         let nodes = &self.problem.nodes;
         let node = &nodes.all[k];
+        let unit = self.unknowns.unit;
         if node.inverse_mass == 0.0 {
             return 0;
         }
@@ -307,20 +321,20 @@ impl<D: Dim> Flatten<'_, D> {
         let zero = D::Tangent::zero();
         if k >= nodes.grains {
             let (n, t) = D::split(&link.frame, nodes.drives[k - nodes.grains]);
-            table.add(-n, -t, zero, node.inverse_mass.sqrt());
+            table.add(-n, -t, zero, (node.inverse_mass * unit).sqrt());
             return 1;
         }
         for axis in 0..D::N {
             let mut e = D::Vector::zero();
             e[axis] = sign;
             let (n, t) = D::split(&link.frame, e);
-            table.add(n, t, zero, node.inverse_mass.sqrt());
+            table.add(n, t, zero, (node.inverse_mass * unit).sqrt());
         }
         for axis in 0..D::Spin::LEN {
             let mut e = D::Spin::zero();
             e[axis] = 1.0;
             let turn = D::spin_rows(&link.frame, e);
-            table.add(0.0, turn * -link.lever[side], turn * (sign * arm), node.inverse_inertia.sqrt());
+            table.add(0.0, turn * -link.lever[side], turn * (sign * arm), (node.inverse_inertia * unit).sqrt());
         }
         D::N + D::Spin::LEN
     }
@@ -329,7 +343,7 @@ impl<D: Dim> Flatten<'_, D> {
 impl<D: Dim> Visitor<D> for Flatten<'_, D> {
     fn visit<L: Law>(&mut self, _: &Nodes<D>, c: &Contact<D, L>) {
         let rows = places(L::T::LEN, L::B::LEN);
-        let arm = c.law.arm();
+        let (arm, unit) = (c.law.arm(), self.unknowns.unit);
         let mut table = Table { rows: [[0.0; PAIR]; 5], tangents: L::T::LEN, bends: L::B::LEN, width: 0 };
         let first = self.node(&c.link, arm, 0, &mut table);
         let second = self.node(&c.link, arm, 1, &mut table);
@@ -351,12 +365,12 @@ impl<D: Dim> Visitor<D> for Flatten<'_, D> {
             rows,
             cone: c.law.cone(),
             associated: c.law.associated(),
-            shift: c.law.shift(),
+            shift: c.law.shift() / unit,
             given,
             weights: Weights { n: soft, t: soft / self.ratio.tangential, m: soft / self.ratio.rolling },
-            multiplier: c.r.resized(),
-            compliance: c.law.compliance(),
-            carried: c.law.carried().resized(),
+            multiplier: c.r.resized() * (1.0 / unit),
+            compliance: c.law.compliance() * unit,
+            carried: c.law.carried().resized() * (1.0 / unit),
             lag: None,
             size: table.rows[..rows.len()].iter().flat_map(|row| &row[..table.width]).map(|h| h * h).sum(),
         });

@@ -1,6 +1,6 @@
 //! What the Newton solver asks of a problem, matrix-free or with its matrix.
 
-use super::rows::{Rows, StiffnessRatio};
+use super::rows::{Rows, StiffnessRatio, mass_unit};
 use crate::contact::{Law, LocalSolve, Padded};
 use crate::dim::{Dim, Vect};
 use crate::problem::residual::residual;
@@ -15,9 +15,9 @@ pub(super) trait Solvable {
     fn velocities_from_reactions(&mut self);
     /// The residual of the reactions at hand (–).
     fn residual(&self) -> f64;
-    /// The reactions after some sweeps of Gauss–Seidel.
+    /// The reactions after some sweeps of Gauss–Seidel, in the unit of the rows.
     fn swept(&mut self, sweeps: usize) -> Vec<Padded>;
-    /// Take over reactions.
+    /// Take over reactions in the unit of the rows.
     fn write_back(&mut self, reactions: &[Padded]);
     /// Set the reactions to zero.
     fn forget_reactions(&mut self);
@@ -50,22 +50,25 @@ impl<D: Dim> Solvable for ContactProblem<D> {
         reactions.extend(self.elastic.iter().map(|c| c.r.resized()));
         reactions.extend(self.dry.iter().map(|c| c.r.resized()));
         reactions.extend(self.frictionless.iter().map(|c| c.r.resized()));
+        let unit = mass_unit(&self.nodes);
+        reactions.iter_mut().for_each(|r| *r = *r * (1.0 / unit));
         reactions
     }
 
     fn write_back(&mut self, reactions: &[Padded]) {
-        fn group<D: Dim, L: Law>(group: &mut Group<D, L>, list: &[Padded]) {
+        fn group<D: Dim, L: Law>(group: &mut Group<D, L>, list: &[Padded], unit: f64) {
             for (c, r) in group.iter_mut().zip(list) {
-                c.r = r.resized();
+                c.r = (*r * unit).resized();
             }
         }
+        let unit = mass_unit(&self.nodes);
         let bonded = self.bonded.len();
         let elastic = bonded + self.elastic.len();
         let dry = elastic + self.dry.len();
-        group(&mut self.bonded, &reactions[..bonded]);
-        group(&mut self.elastic, &reactions[bonded..elastic]);
-        group(&mut self.dry, &reactions[elastic..dry]);
-        group(&mut self.frictionless, &reactions[dry..]);
+        group(&mut self.bonded, &reactions[..bonded], unit);
+        group(&mut self.elastic, &reactions[bonded..elastic], unit);
+        group(&mut self.dry, &reactions[elastic..dry], unit);
+        group(&mut self.frictionless, &reactions[dry..], unit);
     }
 
     fn forget_reactions(&mut self) {
