@@ -1,6 +1,7 @@
 //! What a run tells at its end, on stdout.
 
 use crate::collapse::{Failure, STRAINS};
+use crate::output::number;
 use dem_core::solver::Work;
 use serde::Serialize;
 use std::fmt;
@@ -145,7 +146,7 @@ impl Summary {
         if broken > 0 && first_break.is_none() {
             return writeln!(f, "                 no wall is driven: there is no applied force to tell");
         }
-        let load = |load: Option<f64>| load.map_or("none".into(), |n| format!("{n:.4} N"));
+        let load = |load: Option<f64>| load.map_or("none".into(), |n| format!("{} N", number(n)));
         writeln!(f, "first break      {}", load(first_break))?;
         for ((collapse, early), strain) in collapse.into_iter().zip(early).zip(STRAINS) {
             // rigid grains and bonds: before the first break nothing can have moved
