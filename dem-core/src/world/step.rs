@@ -66,9 +66,9 @@ pub enum StepError {
     },
     /// A contact yields though the residual is small enough.
     #[error(
-        "grain {} comes closer to body {} (walls follow the grains) by {:.1e} of a radius a step, or leaves it though they \
-         are bonded, at t = {time:.6e} s, though the residual is small enough: lower solver.tolerance and solver.accept, \
-         shorten time.step, or bring the masses nearer to each other", pair[0], pair[1], share
+        "the contact of grain {} with body {} (walls follow the grains) yields at t = {time:.6e} s, by {share:.1e} of a \
+         radius a step, though the residual is small enough: look for bodies that squeeze it, lower solver.tolerance and \
+         solver.accept, or shorten time.step", pair[0], pair[1]
     )]
     Yielded {
         /// Time at which the step that failed began (s), or its half.

@@ -338,3 +338,83 @@ fn a_lattice_turns_for_a_million_steps() {
         assert!(stretch <= 1e-6 && turned <= 1e-9, "{stretch:e} {turned:e}");
     }
 }
+
+/// A pyramid of disks, on a floor that friction alone holds.
+fn pyramid(base: usize, kind: Kind) -> World<D2> {
+    let mut grains = Vec::new();
+    for row in 0..base {
+        for column in 0..base - row {
+            let (x, y) = (2 * column + row, row);
+            grains.push(grain::<D2>(&[R * x as f64, R * (1.0 + 3f64.sqrt() * y as f64)]));
+        }
+    }
+    let mut set = settings(1e-4, kind);
+    set.gravity = Some([0.0, -9.81].into());
+    set.friction = 0.5;
+    world(grains, vec![plane(&[0.0, 1.0], &[], 0.5)], set)
+}
+
+#[test]
+fn a_pile_rests() {
+    for kind in Kind::ALL {
+        let out = watch(&mut pyramid(5, kind), 2_000, 1e-4);
+        assert_eq!(out.stopped, None);
+        assert!(out.travel < 1e-6 && out.gain < 1e-6, "{kind:?} {out:?}");
+    }
+}
+
+#[test]
+#[ignore = "long: see README"]
+fn a_pile_rests_for_ten_million_steps() {
+    let mut pile = pyramid(4, Kind::Auto);
+    let start = pile.grains.position.clone();
+    let mut crept = [0.0; 2];
+    for (half, crept) in crept.iter_mut().enumerate() {
+        for step in 0..5_000_000u64 {
+            pile.step().unwrap_or_else(|error| panic!("step {step} of half {half}: {error}"));
+        }
+        *crept = start.iter().zip(&pile.grains.position).map(|(a, b)| (*b - *a).norm()).fold(0.0, f64::max) / R;
+    }
+    let heat = pile.kinetic_energy() / (pile.grains.mass[0] * 9.81 * R);
+    println!("crept {:.1e} R and {:.1e} R, kinetic energy {heat:.1e} m g R", crept[0], crept[1]);
+    assert!(crept[1] < 1e-3 && heat < 1e-12, "{crept:?} {heat:e}");
+}
+
+/// Disks one on another, or hanging from the first by their bonds; the force at the end that bears all, over their weight.
+fn tower(count: usize, hanging: bool, kind: Kind) -> f64 {
+    let down = if hanging { -1.0 } else { 1.0 };
+    let mut grains: Vec<_> = (0..count).map(|k| grain::<D2>(&[0.0, down * R * (2 * k + 1) as f64])).collect();
+    grains[0].fixed = hanging;
+    let mut set = settings(1e-3, kind);
+    set.gravity = Some([0.0, -9.81].into());
+    let mass: f64 = grains.iter().filter(|g| !g.fixed).map(|g| g.mass).sum();
+    let walls = if hanging { vec![] } else { vec![plane(&[0.0, 1.0], &[], 0.3)] };
+    let mut w = world(grains, walls, set);
+    if hanging {
+        w.form_bonds(1e-6, |_| 1e9, 0.3);
+    }
+    let out = watch(&mut w, 3, 1e-6);
+    assert_eq!(out.stopped, None);
+    let bears = w.touches.iter().map(|t| t.reaction.n.abs()).fold(0.0, f64::max);
+    bears / (mass * 9.81)
+}
+
+#[test]
+fn towers_and_chains_bear_their_weight() {
+    for kind in [Kind::Newton, Kind::Auto] {
+        for hanging in [false, true] {
+            let share = tower(300, hanging, kind);
+            assert!((share - 1.0).abs() < 1e-6, "{kind:?} {hanging}: {share}");
+        }
+    }
+}
+
+#[test]
+#[ignore = "long: see README"]
+fn towers_and_chains_of_ten_thousand_bear_their_weight() {
+    for hanging in [false, true] {
+        let share = tower(10_000, hanging, Kind::Auto);
+        println!("hanging: {hanging}; force at the end over the weight: 1 + {:.1e}", share - 1.0);
+        assert!((share - 1.0).abs() < 1e-5, "{hanging}: {share}");
+    }
+}

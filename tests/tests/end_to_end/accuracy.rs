@@ -127,9 +127,9 @@ fn a_scene_s_accuracy_is_measured_twice_alike() {
 #[test]
 fn a_run_that_does_not_converge_is_a_row() {
     let here = Folder::new();
-    let args = ["--set", "solver.kind.gauss_seidel.max_sweeps=20", "--set", "solver.max_step_halvings=0"];
+    let args = ["--set", "solver.kind.gauss_seidel.max_sweeps=100", "--set", "solver.max_step_halvings=0"];
     let more =
-        ["--set", "solver.accept=1e-4", "--solvers", "gauss-seidel", "--tolerances", "1e-1,1e-6", "--steps", "1"];
+        ["--set", "solver.accept=1e-4", "--solvers", "gauss-seidel", "--tolerances", "1e-2,1e-6", "--steps", "1"];
     let report = measure(&here, &[&args[..], &more, &["--orders", "0"]].concat());
     assert_eq!(report["runs"][1]["ended"], "no_convergence");
     assert!(report["runs"][1]["error"].as_str().is_some_and(|why| why.contains("no convergence")), "{report}");
