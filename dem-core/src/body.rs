@@ -148,16 +148,14 @@ impl<D: Dim> Shape<D> {
         match *self {
             Self::Plane { normal } => (offset.dot(&normal) - radius, normal),
             Self::Round { radius: wall, inside, axis } => {
-                let offset = axis.map_or(offset, |a| offset - a * a.dot(&offset));
+                let offset = across::<D>(offset, axis);
                 let distance = offset.norm();
                 let outward = direction::<D>(offset, distance);
                 if inside { (wall - distance - radius, -outward) } else { (distance - wall - radius, outward) }
             }
         }
     }
-}
 
-impl<D: Dim> Shape<D> {
     /// The smallest gap (m) on the straight way `way` (m) from `offset`.
     pub(crate) fn smallest_gap(&self, offset: D::Vector, way: D::Vector, radius: f64) -> f64 {
         let end = self.gap(offset + way, radius).0.min(self.gap(offset, radius).0);
@@ -165,11 +163,15 @@ impl<D: Dim> Shape<D> {
             // along a line these gaps are smallest at an end
             return end;
         };
-        let across = |x: D::Vector| axis.map_or(x, |a| x - a * a.dot(&x));
-        let (x, w) = (across(offset), across(way));
+        let (x, w) = (across::<D>(offset, axis), across::<D>(way, axis));
         let nearest = -x.dot(&w) / w.dot(&w);
         if 0.0 < nearest && nearest < 1.0 { self.gap(offset + way * nearest, radius).0 } else { end }
     }
+}
+
+/// The part of a vector across the axis of a cylinder, if there is one.
+fn across<D: Dim>(x: D::Vector, axis: Option<D::Vector>) -> D::Vector {
+    axis.map_or(x, |a| x - a * a.dot(&x))
 }
 
 /// The unit vector along `offset`, whose norm is `distance`. Where two centres are one, any normal serves: the first axis.

@@ -29,23 +29,24 @@ impl<D: Dim> Default for Candidates<D> {
 }
 
 impl<D: Dim> Candidates<D> {
-    /// Whether every pair is in the list whose gap is at most the sum of what `reach` (m) gives for its bodies, grains first, at
-    /// these positions.
-    pub fn covers(&self, grains: &[D::Vector], walls: &[D::Vector], reach: impl Fn(usize) -> f64) -> bool {
-        let now = || grains.iter().chain(walls);
-        self.then.len() == grains.len() + walls.len()
-            && now().zip(&self.then).enumerate().all(|(k, (x, then))| (*x - *then).norm() + reach(k) <= self.skin[k])
-    }
-
-    /// Build the list anew for these positions, with these skins (m) of the bodies, grains first.
-    pub fn rebuild(
+    /// Make the list hold every pair whose gap at these places is at most the sum of what `reach` (m) gives for its bodies,
+    /// grains first. If it must be built anew, each body may go as far as `spare` (m) gives before that is so again.
+    pub fn cover(
         &mut self,
         grains: &Grains<D>,
         position: &[D::Vector],
         walls: &[Wall<D>],
         wall_position: &[D::Vector],
-        skin: Vec<f64>,
+        reach: impl Fn(usize) -> f64,
+        spare: impl Fn(usize) -> f64,
     ) {
+        let bodies = grains.len() + walls.len();
+        let now = || position.iter().chain(wall_position);
+        let within = |(k, (x, then)): (usize, (&D::Vector, &D::Vector))| (*x - *then).norm() + reach(k) <= self.skin[k];
+        if self.then.len() == bodies && now().zip(&self.then).enumerate().all(within) {
+            return;
+        }
+        let skin: Vec<f64> = (0..bodies).map(|k| reach(k) + spare(k)).collect();
         self.pairs = pairs_within(grains, position, &skin);
         let first_wall = grains.len();
         for (w, (wall, place)) in walls.iter().zip(wall_position).enumerate() {
@@ -57,7 +58,7 @@ impl<D: Dim> Candidates<D> {
         }
         self.pairs.sort_unstable();
         self.then.clear();
-        self.then.extend(position.iter().chain(wall_position));
+        self.then.extend(now());
         self.skin = skin;
     }
 }

@@ -9,9 +9,7 @@ use dem_core::problem::ContactProblem;
 use dem_core::problem::assembled::{Assembled, AssemblyError, BlockMatrix, ContactRows, Parts};
 use dem_core::problem::residual::residual;
 use dem_core::solver::assembled::gauss_seidel;
-use dem_core::solver::{
-    ContactSolver, GaussSeidelSettings, Newton, NewtonSettings, SolveStatus, Start, StiffnessRatio,
-};
+use dem_core::solver::{ContactSolver, GaussSeidelSettings, Newton, SolveStatus};
 
 fn settings(local: LocalSolve, tolerance: f64) -> GaussSeidelSettings {
     GaussSeidelSettings { local, tolerance, accept: tolerance, max_sweeps: 200_000, acceleration: 0 }
@@ -85,14 +83,7 @@ fn newton_finds_the_same_velocities() {
 
 /// On the matrix and on the bodies, from zero to the stiff limit.
 fn newton_is_newton<D: Dim>(mut problem: ContactProblem<D>) {
-    let settings = NewtonSettings {
-        tolerance: 1e-10,
-        accept: 1e-10,
-        load_tolerance: 1e-6,
-        start: Start::StiffLimit,
-        stiffness: StiffnessRatio { tangential: 1.0, rolling: 1.0 / 12.0 },
-        max_iterations: 300,
-    };
+    let settings = common::newton(1e-10, 1e-10, 1e-6);
     let mut assembled = Assembled::of(&problem);
     let report = Newton::new(settings).solve_assembled(&mut assembled);
     assert_eq!(report.status, SolveStatus::Converged, "{report:?}");

@@ -8,7 +8,7 @@ use dem_core::bond::{BondStatus, Rupture, Stiffness};
 use dem_core::contact::{BondFlow, Law, Local};
 use dem_core::dim::{D2, D3, Dim, Vect};
 use dem_core::problem::ContactProblem;
-use dem_core::solver::{GaussSeidelSettings, NewtonSettings, SolveStatus, SolverSettings, Start, StiffnessRatio};
+use dem_core::solver::{GaussSeidelSettings, SolveStatus, SolverSettings};
 use dem_core::world::World;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -24,14 +24,7 @@ const K: f64 = 1e6;
 const UNBREAKABLE: f64 = 1e3;
 
 fn newton(tolerance: f64, load_tolerance: f64) -> SolverSettings {
-    SolverSettings::Newton(NewtonSettings {
-        tolerance,
-        accept: 100.0 * tolerance,
-        load_tolerance,
-        start: Start::StiffLimit,
-        stiffness: StiffnessRatio { tangential: 1.0, rolling: 1.0 / 12.0 },
-        max_iterations: 300,
-    })
+    SolverSettings::Newton(common::newton(tolerance, 100.0 * tolerance, load_tolerance))
 }
 
 /// Springs with the tangential stiffness over the normal one, that bend as a bar as wide as long does.

@@ -9,21 +9,14 @@ use dem_core::contact::Law;
 use dem_core::dim::{D2, D3, Dim, Vect};
 use dem_core::problem::ContactProblem;
 use dem_core::problem::residual::residual;
-use dem_core::solver::{NewtonSettings, SolveStatus, SolverSettings, Start, StiffnessRatio};
+use dem_core::solver::{NewtonSettings, SolveStatus, SolverSettings, Start};
 use dem_core::world::World;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use std::sync::Arc;
 
 fn newton(tolerance: f64, start: Start) -> SolverSettings {
-    SolverSettings::Newton(NewtonSettings {
-        tolerance,
-        accept: tolerance,
-        load_tolerance: 1e-6,
-        start,
-        stiffness: StiffnessRatio { tangential: 1.0, rolling: 1.0 / 12.0 },
-        max_iterations: 300,
-    })
+    SolverSettings::Newton(NewtonSettings { start, ..common::newton(tolerance, tolerance, 1e-6) })
 }
 
 #[test]

@@ -12,7 +12,7 @@ use dem_core::contact::BondFlow;
 use dem_core::dim::{D2, D3, Dim};
 use dem_core::problem::ContactProblem;
 use dem_core::problem::assembled::Assembled;
-use dem_core::solver::{NewtonSettings, SolveStatus, SolverSettings, Start, StiffnessRatio};
+use dem_core::solver::{SolveStatus, SolverSettings};
 use nalgebra::{DMatrix, SymmetricEigen};
 
 /// L with W = L Lᵀ, one row for each row of W.
@@ -82,14 +82,7 @@ fn interior_point(problem: &Assembled) -> Vec<f64> {
 }
 
 fn newton() -> SolverSettings {
-    SolverSettings::Newton(NewtonSettings {
-        tolerance: 1e-11,
-        accept: 1e-11,
-        load_tolerance: 1e-6,
-        start: Start::StiffLimit,
-        stiffness: StiffnessRatio { tangential: 1.0, rolling: 1.0 / 12.0 },
-        max_iterations: 300,
-    })
+    SolverSettings::Newton(common::newton(1e-11, 1e-11, 1e-6))
 }
 
 /// Largest difference of the relative velocities, over the largest of them.

@@ -8,18 +8,12 @@ use dem_core::bond::Stiffness;
 use dem_core::contact::BondFlow;
 use dem_core::dim::{D2, D3, Dim};
 use dem_core::saved::{Mismatch, Saved};
-use dem_core::solver::{NewtonSettings, SolverSettings, Start, StiffnessRatio};
+use dem_core::solver::{NewtonSettings, SolverSettings, StiffnessRatio};
 use dem_core::world::World;
 
 fn settings() -> NewtonSettings {
-    NewtonSettings {
-        tolerance: 1e-8,
-        accept: 1e-4,
-        load_tolerance: 1e-5,
-        start: Start::StiffLimit,
-        stiffness: StiffnessRatio { tangential: 0.5, rolling: 0.1 },
-        max_iterations: 300,
-    }
+    let stiffness = StiffnessRatio { tangential: 0.5, rolling: 0.1 };
+    NewtonSettings { stiffness, ..common::newton(1e-8, 1e-4, 1e-5) }
 }
 
 fn saved<D: Dim>(world: &World<D>) -> Saved {

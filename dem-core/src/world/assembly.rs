@@ -21,6 +21,13 @@ pub(super) struct Midpoint<D: Dim> {
     pub walls: Vec<D::Vector>,
 }
 
+impl<D: Dim> Midpoint<D> {
+    /// The place of a body (m), grains first.
+    pub fn place(&self, body: usize) -> D::Vector {
+        body.checked_sub(self.grains.len()).map_or_else(|| self.grains[body], |wall| self.walls[wall])
+    }
+}
+
 /// Node velocities before the step (m/s, rad/s) and their free values, grains first.
 pub(super) struct Motion<D: Dim> {
     pub before: Vec<(D::Vector, D::Spin)>,
@@ -141,11 +148,9 @@ impl<D: Dim> World<D> {
         let radius = |k: usize| self.grains.radius.get(k).copied().unwrap_or(0.0);
         let way = |k: usize| h * motion.free[k].0.norm().max(motion.before[k].0.norm());
         let reach = |k: usize| NEAR * radius(k) + 2.0 * way(k);
-        if !self.candidates.covers(&mid.grains, &mid.walls, reach) {
-            // what a body may go before the list is built anew: some of its size, or three steps at its speed
-            let skin = (0..motion.free.len()).map(|k| reach(k) + (0.15 * radius(k)).max(3.0 * way(k))).collect();
-            self.candidates.rebuild(&self.grains, &mid.grains, &self.walls, &mid.walls, skin);
-        }
+        // some of its size, or three steps at its speed
+        let spare = |k: usize| (0.15 * radius(k)).max(3.0 * way(k));
+        self.candidates.cover(&self.grains, &mid.grains, &self.walls, &mid.walls, reach, spare);
     }
 
     /// Contacts that the step left out and that its velocities would close: they are added, and the step is solved again.
@@ -158,10 +163,7 @@ impl<D: Dim> World<D> {
         h: f64,
     ) -> Vec<Touch<D>> {
         let way = |k: usize| h * nodes.all[k].velocity.norm();
-        if !self.candidates.covers(&mid.grains, &mid.walls, way) {
-            let skin = (0..nodes.all.len()).map(|k| 1.5 * way(k)).collect();
-            self.candidates.rebuild(&self.grains, &mid.grains, &self.walls, &mid.walls, skin);
-        }
+        self.candidates.cover(&self.grains, &mid.grains, &self.walls, &mid.walls, way, |k| 0.5 * way(k));
         let mut present = touches.iter().peekable();
         let mut missed = Vec::new();
         for &pair in &self.candidates.pairs {

@@ -8,7 +8,7 @@
 //! *Contacts that yield.* The residual is relative to all reactions. Where a light grain is pressed between heavy ones, an
 //! error that is small beside their weight is a great velocity of the light one.
 //!
-//! Neither holds where overlaps are pushed out: the speeds of that preparation mean nothing.
+//! The step asks for none of this where overlaps are pushed out: the speeds of that preparation mean nothing.
 
 use super::{Touch, World};
 use crate::body::Shape;
@@ -34,50 +34,36 @@ impl<D: Dim> World<D> {
     /// all candidates the first.
     pub(super) fn crossing(
         &self,
-        grains: &[D::Vector],
-        walls: &[D::Vector],
+        place: impl Fn(usize) -> D::Vector,
         velocity: impl Fn(usize) -> D::Vector,
         time: f64,
     ) -> Option<[u32; 2]> {
-        if self.settings.expel_overlaps {
-            return None;
-        }
-        let bodies = grains.len() + walls.len();
-        let fastest = (0..bodies).map(|k| velocity(k).norm()).fold(0.0, f64::max);
+        let fastest = (0..self.grains.len() + self.walls.len()).map(|k| velocity(k).norm()).fold(0.0, f64::max);
         let smallest = self.grains.radius.iter().copied().fold(f64::INFINITY, f64::min);
         if 2.0 * fastest * time <= DEEP * smallest {
             return None;
         }
-        let place = |k: usize| grains.get(k).unwrap_or_else(|| &walls[k - grains.len()]);
         let too_deep = |pair: &&[u32; 2]| {
             let [i, j] = pair.map(|k| k as usize);
-            let radius = self.grains.radius[i];
-            let shape = match j.checked_sub(grains.len()) {
-                None => Shape::Round { radius: self.grains.radius[j], inside: false, axis: None },
-                Some(wall) => self.walls[wall].shape,
-            };
-            let (offset, way) = (*place(i) - *place(j), (velocity(i) - velocity(j)) * time);
-            let before = shape.gap(offset, radius).0.min(0.0);
-            shape.smallest_gap(offset, way, radius) < before - DEEP * self.smaller(**pair)
+            let (surface, radius) = (self.surface(j), self.grains.radius[i]);
+            let (offset, way) = (place(i) - place(j), (velocity(i) - velocity(j)) * time);
+            let before = surface.gap(offset, radius).0.min(0.0);
+            surface.smallest_gap(offset, way, radius) < before - DEEP * self.smaller(**pair)
         };
         self.candidates.pairs.iter().find(too_deep).copied()
     }
 
     /// A pair of grains that pushes though it would pass at a distance: only its tangent plane was in the way.
     pub(super) fn pushes_from_afar(&self, touches: &[Touch<D>], nodes: &Nodes<D>, h: f64) -> Option<[u32; 2]> {
-        if self.settings.expel_overlaps {
-            return None;
-        }
         let far = |t: &&Touch<D>| {
             let margin = PASSING * self.smaller(t.pair);
             if t.bond.is_some() || t.reaction.n <= 0.0 || t.gap <= margin {
                 return false;
             }
             let [i, j] = t.pair.map(|k| k as usize);
-            let shape: Shape<D> = Shape::Round { radius: self.grains.radius[j], inside: false, axis: None };
             let offset = D::normal(&t.frame) * (t.gap + self.grains.radius[i] + self.grains.radius[j]);
             let way = (nodes.all[i].velocity - nodes.all[j].velocity) * h;
-            shape.smallest_gap(offset, way, self.grains.radius[i]) > margin
+            self.surface(j).smallest_gap(offset, way, self.grains.radius[i]) > margin
         };
         touches.iter().filter(|t| (t.pair[1] as usize) < self.grains.len()).find(far).map(|t| t.pair)
     }
@@ -85,9 +71,6 @@ impl<D: Dim> World<D> {
     /// The contact of a solution that yields most, if it does so too far, and how far it would in a whole step (–, over the
     /// smaller radius).
     pub(super) fn yielding(&self, touches: &[Touch<D>], problem: &ContactProblem<D>) -> Option<([u32; 2], f64)> {
-        if self.settings.expel_overlaps {
-            return None;
-        }
         let mut worst = Yielding { world: self, pair: [0; 2], share: 0.0 };
         problem.visit(&mut worst);
         if worst.share > YIELDING {
@@ -102,15 +85,25 @@ impl<D: Dim> World<D> {
         touches.iter().filter(deep).map(|t| (t.pair, closing(t))).find(|(_, share)| *share > SQUEEZING)
     }
 
+    /// The place of a body (m), grains first.
+    pub(super) fn place(&self, body: usize) -> D::Vector {
+        body.checked_sub(self.grains.len()).map_or_else(|| self.grains.position[body], |wall| self.walls[wall].position)
+    }
+
+    /// The surface of a body, grains first.
+    fn surface(&self, body: usize) -> Shape<D> {
+        match body.checked_sub(self.grains.len()) {
+            None => Shape::Round { radius: self.grains.radius[body], inside: false, axis: None },
+            Some(wall) => self.walls[wall].shape,
+        }
+    }
+
     /// The radius of the smaller body of a pair (m); that of the grain at a plane.
     fn smaller(&self, pair: [u32; 2]) -> f64 {
         let [i, j] = pair.map(|k| k as usize);
-        let other = match j.checked_sub(self.grains.len()) {
-            None => self.grains.radius[j],
-            Some(wall) => match self.walls[wall].shape {
-                Shape::Plane { .. } => f64::INFINITY,
-                Shape::Round { radius, .. } => radius,
-            },
+        let other = match self.surface(j) {
+            Shape::Plane { .. } => f64::INFINITY,
+            Shape::Round { radius, .. } => radius,
         };
         self.grains.radius[i].min(other)
     }
@@ -126,17 +119,17 @@ struct Yielding<'a, D: Dim> {
 impl<D: Dim> Visitor<D> for Yielding<'_, D> {
     #[inline(always)]
     fn visit<L: Law>(&mut self, nodes: &Nodes<D>, c: &Contact<D, L>) {
-        let (law, arm) = (&c.law, c.law.arm());
-        let speed = if law.shift() == 0.0 {
-            -(nodes.relative_velocity::<L::T, L::B>(&c.link, arm).n + law.bias())
-        } else if law.compliance().n == 0.0 && failure(&c.r, law.shift(), law.cone()).is_none() {
-            (nodes.relative_velocity::<L::T, L::B>(&c.link, arm).n + law.bias()).abs()
-        } else {
-            // elastic, or about to break
+        let law = &c.law;
+        // what is elastic yields by its spring
+        if law.compliance().n > 0.0 {
             return;
-        };
+        }
+        let dry = law.shift() == 0.0;
+        let opening = nodes.relative_velocity::<L::T, L::B>(&c.link, law.arm()).n + law.bias();
+        let speed = if dry { -opening } else { opening.abs() };
         let share = self.world.settings.step * speed / self.world.smaller(c.link.nodes);
-        if share > self.share {
+        // a bond at its limit is about to break
+        if share > self.share && (dry || failure(&c.r, law.shift(), law.cone()).is_none()) {
             (self.pair, self.share) = (c.link.nodes, share);
         }
     }

@@ -130,12 +130,11 @@ impl<D: Dim> World<D> {
         let motion = self.free_motion(h);
         let applied = self.applied_impulse(h);
         let mut touches = self.detect(&mid, &motion, h);
-        self.refuse_crossing(self.crossing(
-            &self.grains.position,
-            &self.wall_places(),
-            |k| motion.before[k].0,
-            0.5 * h,
-        ))?;
+        // packing pushes grains apart at speeds that mean nothing
+        let limited = !self.settings.expel_overlaps;
+        if limited {
+            self.refuse_crossing(self.crossing(|k| self.place(k), |k| motion.before[k].0, 0.5 * h))?;
+        }
         let carried = self.carried(&touches);
         let mut done = Solves::default();
         let mut breaks: Vec<Break<D>> = Vec::new();
@@ -145,7 +144,7 @@ impl<D: Dim> World<D> {
             done.add(solve);
             self.refuse_unaccepted(solve, &problem, h)?;
             write_reactions(&mut touches, &problem, &places, h);
-            if let Some((pair, share)) = self.yielding(&touches, &problem) {
+            if limited && let Some((pair, share)) = self.yielding(&touches, &problem) {
                 return Err(StepError::Yielded { time: self.time, pair, share });
             }
             let missed = self.missed(&mid, &motion, &touches, &problem.nodes, h);
@@ -164,8 +163,11 @@ impl<D: Dim> World<D> {
                 break problem;
             }
         };
-        self.refuse_crossing(self.pushes_from_afar(&touches, &problem.nodes, h))?;
-        self.refuse_crossing(self.crossing(&mid.grains, &mid.walls, |k| problem.nodes.all[k].velocity, 0.5 * h))?;
+        if limited {
+            let velocity = |k: usize| problem.nodes.all[k].velocity;
+            self.refuse_crossing(self.pushes_from_afar(&touches, &problem.nodes, h))?;
+            self.refuse_crossing(self.crossing(|k| mid.place(k), velocity, 0.5 * h))?;
+        }
         let report = self.report(&touches, &motion, &problem, done, breaks, h);
         self.settle(h, &mid, &motion, &problem, touches, &report.breaks);
         Ok(report)
@@ -259,10 +261,6 @@ impl<D: Dim> World<D> {
 
     fn refuse_crossing(&self, found: Option<[u32; 2]>) -> Result<(), StepError> {
         found.map_or(Ok(()), |pair| Err(StepError::TooFast { time: self.time, pair }))
-    }
-
-    fn wall_places(&self) -> Vec<D::Vector> {
-        self.walls.iter().map(|w| w.position).collect()
     }
 
     /// The bonds that the accepted solve left at their limit, as many as the scene's rule lets break in one round.

@@ -5,7 +5,7 @@ use dem_core::body::{Drive, Grain, Grains, Load, Shape, Wall};
 use dem_core::bond::Rupture;
 use dem_core::contact::{BondFlow, LocalSolve};
 use dem_core::dim::{D2, Dim, Vect};
-use dem_core::solver::{GaussSeidelSettings, SolverSettings};
+use dem_core::solver::{GaussSeidelSettings, NewtonSettings, SolverSettings, Start, StiffnessRatio};
 use dem_core::world::{Settings, World};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -21,6 +21,18 @@ pub fn solver(tolerance: f64) -> SolverSettings {
         max_sweeps: 1_000_000,
         acceleration: 0,
     })
+}
+
+/// Newton from the stiff limit, with the settings that a scene has by default but for its tolerances.
+pub fn newton(tolerance: f64, accept: f64, load_tolerance: f64) -> NewtonSettings {
+    NewtonSettings {
+        tolerance,
+        accept,
+        load_tolerance,
+        start: Start::StiffLimit,
+        stiffness: StiffnessRatio { tangential: 1.0, rolling: 1.0 / 12.0 },
+        max_iterations: 300,
+    }
 }
 
 pub fn settings<D: Dim>(step: f64) -> Settings<D> {

@@ -1,10 +1,10 @@
 //! Single situations that break simulators, each in its smallest scene.
 
+use crate::common::{self, DENSITY, down, floor, world};
 use crate::harness::{stretch, watch};
 use crate::scene::{Heap, Kind, TOLERANCE};
 use dem_core::body::{Drive, Grain, Load, Shape, Wall};
-use dem_core::bond::{BondStatus, Rupture};
-use dem_core::contact::BondFlow;
+use dem_core::bond::BondStatus;
 use dem_core::dim::{D2, D3, Dim, Vect};
 use dem_core::world::{Settings, StepError, World};
 use std::sync::Arc;
@@ -12,18 +12,7 @@ use std::sync::Arc;
 const R: f64 = 1e-3;
 
 fn settings<D: Dim>(step: f64, kind: Kind) -> Settings<D> {
-    Settings {
-        step,
-        gravity: None,
-        friction: 0.3,
-        restitution: None,
-        bond_flow: BondFlow::Associated,
-        rupture: Rupture::Cascade,
-        solver: kind.settings(TOLERANCE, 1e-6),
-        max_halvings: 4,
-        thickness: 1.0,
-        expel_overlaps: false,
-    }
+    Settings { solver: kind.settings(TOLERANCE, 1e-6), max_halvings: 4, ..common::settings(step) }
 }
 
 fn at<D: Dim>(components: &[f64]) -> D::Vector {
@@ -35,15 +24,11 @@ fn at<D: Dim>(components: &[f64]) -> D::Vector {
 }
 
 fn grain<D: Dim>(components: &[f64]) -> Grain<D> {
-    Grain::at_rest(at::<D>(components), R, 2500.0)
+    Grain::at_rest(at::<D>(components), R, DENSITY)
 }
 
 fn plane<D: Dim>(normal: &[f64], through: &[f64], friction: f64) -> Wall<D> {
     Wall::fixed(Shape::Plane { normal: at::<D>(normal) }, at::<D>(through), friction)
-}
-
-fn world<D: Dim>(grains: Vec<Grain<D>>, walls: Vec<Wall<D>>, settings: Settings<D>) -> World<D> {
-    World::new(grains.into_iter().collect(), walls, Vec::new(), settings)
 }
 
 /// Both dimensions, every solver.
@@ -94,11 +79,9 @@ fn touching_and_aligned_to_the_last_bit() {
             x[D::N - 1] = R * f64::from(2 * k + 1);
             grain::<D>(&x)
         });
-        let mut normal = vec![0.0; D::N];
-        normal[D::N - 1] = 1.0;
         let mut set = settings(1e-3, kind);
-        set.gravity = Some(at::<D>(&normal) * -9.81);
-        let mut w = world(column.collect(), vec![plane(&normal, &[], 0.3)], set);
+        set.gravity = down::<D>(9.81);
+        let mut w = world(column.collect(), vec![floor(0.3)], set);
         let out = watch(&mut w, 300, 1e-6);
         assert_eq!(out.stopped, None);
         assert!(out.travel < 1e-4 && out.penetration < 1e-4, "{out:?}");
@@ -343,9 +326,9 @@ fn a_lattice_turns_for_a_million_steps() {
 fn pile_of_three(friction: f64, kind: Kind) -> World<D2> {
     let grains = vec![grain(&[-R, R]), grain(&[R, R]), grain(&[0.0, R * (1.0 + 3f64.sqrt())])];
     let mut set = settings(1e-4, kind);
-    set.gravity = Some([0.0, -9.81].into());
+    set.gravity = down::<D2>(9.81);
     set.friction = friction;
-    world(grains, vec![plane(&[0.0, 1.0], &[], friction)], set)
+    world(grains, vec![floor(friction)], set)
 }
 
 #[test]
@@ -377,13 +360,13 @@ fn a_pile_rests_for_ten_million_steps() {
 
 /// Disks one on another, or hanging from the first by their bonds; the force at the end that bears all, over their weight.
 fn tower(count: usize, hanging: bool, kind: Kind) -> f64 {
-    let down = if hanging { -1.0 } else { 1.0 };
-    let mut grains: Vec<_> = (0..count).map(|k| grain::<D2>(&[0.0, down * R * (2 * k + 1) as f64])).collect();
+    let up = if hanging { -1.0 } else { 1.0 };
+    let mut grains: Vec<_> = (0..count).map(|k| grain::<D2>(&[0.0, up * R * (2 * k + 1) as f64])).collect();
     grains[0].fixed = hanging;
     let mut set = settings(1e-3, kind);
-    set.gravity = Some([0.0, -9.81].into());
+    set.gravity = down::<D2>(9.81);
     let mass: f64 = grains.iter().filter(|g| !g.fixed).map(|g| g.mass).sum();
-    let walls = if hanging { vec![] } else { vec![plane(&[0.0, 1.0], &[], 0.3)] };
+    let walls = if hanging { vec![] } else { vec![floor(0.3)] };
     let mut w = world(grains, walls, set);
     if hanging {
         w.form_bonds(1e-6, |_| 1e9, 0.3);

@@ -3,6 +3,8 @@
 
 mod atlas;
 mod cases;
+#[path = "../common/mod.rs"]
+mod common;
 mod harness;
 mod random;
 mod scene;

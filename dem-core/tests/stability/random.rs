@@ -1,5 +1,6 @@
 //! Random scenes: everything that a scene can say, in every combination. Nothing is known of them but what must hold always.
 
+use crate::common::DENSITY;
 use crate::harness::watch;
 use crate::scene::Kind;
 use dem_core::body::{Drive, Grain, Load, Shape, Wall};
@@ -61,7 +62,7 @@ fn scene<D: Dim>(dice: &mut Dice, most: f64) -> (World<D>, f64) {
         let mut x = D::Vector::zero();
         (0..D::N).for_each(|axis| x[axis] = spacing * ((k / side.pow(axis as u32)) % side) as f64);
         let radius = if dice.one_in(2) { size } else { size / dice.between(1.0, ratio) };
-        let mut grain = Grain::<D>::at_rest(x, radius, 2500.0);
+        let mut grain = Grain::<D>::at_rest(x, radius, DENSITY);
         grain.velocity = dice.direction::<D>() * (speed * dice.unit());
         if dice.one_in(10) {
             (0..D::Spin::LEN).for_each(|axis| grain.spin[axis] = dice.between(-1.0, 1.0) * speed / radius);
@@ -78,7 +79,7 @@ fn scene<D: Dim>(dice: &mut Dice, most: f64) -> (World<D>, f64) {
     }
     let friction = dice.pick(&[0.0, 0.0, 0.3, 0.3, 1.0]);
     let extent = spacing * side as f64;
-    let weight = 2500.0 * D::volume(size) * 9.81 * count;
+    let weight = DENSITY * D::volume(size) * 9.81 * count;
     let mut walls = Vec::new();
     for _ in 0..dice.pick(&[0, 1, 2, 3, 4]) {
         let normal = dice.direction::<D>();

@@ -1,10 +1,10 @@
 //! One scene with everything in it that can be pushed to its limits.
 
-use dem_core::body::{Grain, Load, Shape, Wall};
-use dem_core::bond::Rupture;
-use dem_core::contact::{BondFlow, LocalSolve};
+use crate::common;
+use dem_core::body::{Grain, Shape, Wall};
+use dem_core::contact::LocalSolve;
 use dem_core::dim::{Dim, Vect};
-use dem_core::solver::{GaussSeidelSettings, NewtonSettings, SolverSettings, Start, StiffnessRatio};
+use dem_core::solver::{GaussSeidelSettings, SolverSettings};
 use dem_core::world::{Restitution, Settings, World};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -24,14 +24,7 @@ impl Kind {
     pub const ALL: [Self; 3] = [Self::GaussSeidel, Self::Newton, Self::Auto];
 
     pub fn settings(self, tolerance: f64, accept: f64) -> SolverSettings {
-        let newton = NewtonSettings {
-            tolerance,
-            accept,
-            load_tolerance: 1e-5,
-            start: Start::StiffLimit,
-            stiffness: StiffnessRatio { tangential: 1.0, rolling: 1.0 / 12.0 },
-            max_iterations: 300,
-        };
+        let newton = common::newton(tolerance, accept, 1e-5);
         match self {
             Self::GaussSeidel => SolverSettings::GaussSeidel(GaussSeidelSettings {
                 local: LocalSolve::Exact,
@@ -80,7 +73,7 @@ impl Default for Heap {
             kind: Kind::Auto,
             side: 4,
             radius: 1e-2,
-            density: 2500.0,
+            density: common::DENSITY,
             mass_ratio: 1.0,
             size_ratio: 1.0,
             friction: 0.3,
@@ -154,7 +147,6 @@ impl Heap {
         gravity[D::N - 1] = -G * self.gravity;
         let weight = self.density * D::volume(r) * G;
         let settings = Settings {
-            step: self.step * (r / G).sqrt(),
             gravity: (self.gravity > 0.0).then_some(gravity),
             friction: self.friction,
             restitution: (self.restitution > 0.0).then_some(Restitution {
@@ -162,15 +154,11 @@ impl Heap {
                 grain_wall: self.restitution,
                 threshold_speed: 0.0,
             }),
-            bond_flow: BondFlow::Associated,
-            rupture: Rupture::Cascade,
             solver: self.kind.settings(TOLERANCE, self.accept()),
             max_halvings: 4,
-            thickness: 1.0,
-            expel_overlaps: false,
+            ..common::settings(self.step * (r / G).sqrt())
         };
-        let loads: Vec<Load<D>> = Vec::new();
-        let mut world = World::new(grains.into_iter().collect(), walls, loads, settings);
+        let mut world = common::world(grains, walls, settings);
         if self.cohesion > 0.0 {
             world.form_bonds(0.02, |_| self.cohesion * weight, self.friction);
         }

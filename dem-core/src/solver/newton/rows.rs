@@ -1,9 +1,9 @@
 //! The contact problem as rows over scaled unknowns, free of dimension.
 //!
 //! Unknowns are y = M^{1/2} v of the nodes that can move, so the mass matrix is the identity and any ratio of masses is
-//! as good as another. Masses and impulses are counted in a unit of 1 or 2 kg ([`mass_unit`]), so that a scene whose masses are
-//! scaled by a power of two has the same bits. Each contact keeps the coefficients of its rows, u = Hᵀ v = Σ h y + u₀, where u₀ comes from
-//! nodes whose velocity is given.
+//! as good as another. Masses and impulses are counted in a unit of 1 or 2 kg ([`mass_unit`]), so that a scene whose
+//! masses are scaled by a power of two has the same bits. Each contact keeps the coefficients of its rows,
+//! u = Hᵀ v = Σ h y + u₀, where u₀ comes from nodes whose velocity is given.
 
 use crate::contact::{Cone, Law, Padded, Weights};
 use crate::dim::{Dim, Vect};
@@ -159,6 +159,11 @@ impl Unknowns {
         }
         Self { first, total, unit: mass_unit(nodes) }
     }
+
+    /// Root of an inverse mass or inertia, in the unit of mass: velocity over the unknown that stands for it.
+    fn root(&self, inverse: f64) -> f64 {
+        (inverse * self.unit).sqrt()
+    }
 }
 
 fn degrees<D: Dim>(nodes: &Nodes<D>, k: usize, moves: bool) -> usize {
@@ -266,13 +271,12 @@ pub(super) fn entry(r: &mut Padded, place: usize) -> &mut f64 {
 }
 
 fn write_scaled<D: Dim>(nodes: &Nodes<D>, unknowns: &Unknowns, k: usize, v: &D::Vector, w: &D::Spin, out: &mut [f64]) {
-    let unit = unknowns.unit;
     let node = &nodes.all[k];
     if node.inverse_mass == 0.0 {
         return;
     }
     let first = unknowns.first[k];
-    let mass = 1.0 / (node.inverse_mass * unit).sqrt();
+    let mass = 1.0 / unknowns.root(node.inverse_mass);
     if k >= nodes.grains {
         out[first] = mass * v.dot(&nodes.drives[k - nodes.grains]);
         return;
@@ -281,7 +285,7 @@ fn write_scaled<D: Dim>(nodes: &Nodes<D>, unknowns: &Unknowns, k: usize, v: &D::
         out[first + axis] = mass * v[axis];
     }
     for axis in 0..D::Spin::LEN {
-        out[first + D::N + axis] = w[axis] / (node.inverse_inertia * unit).sqrt();
+        out[first + D::N + axis] = w[axis] / unknowns.root(node.inverse_inertia);
     }
 }
 
@@ -313,7 +317,6 @@ impl<D: Dim> Flatten<'_, D> {
         let k = link.nodes[side] as usize;
         let nodes = &self.problem.nodes;
         let node = &nodes.all[k];
-        let unit = self.unknowns.unit;
         if node.inverse_mass == 0.0 {
             return 0;
         }
@@ -321,20 +324,20 @@ impl<D: Dim> Flatten<'_, D> {
         let zero = D::Tangent::zero();
         if k >= nodes.grains {
             let (n, t) = D::split(&link.frame, nodes.drives[k - nodes.grains]);
-            table.add(-n, -t, zero, (node.inverse_mass * unit).sqrt());
+            table.add(-n, -t, zero, self.unknowns.root(node.inverse_mass));
             return 1;
         }
         for axis in 0..D::N {
             let mut e = D::Vector::zero();
             e[axis] = sign;
             let (n, t) = D::split(&link.frame, e);
-            table.add(n, t, zero, (node.inverse_mass * unit).sqrt());
+            table.add(n, t, zero, self.unknowns.root(node.inverse_mass));
         }
         for axis in 0..D::Spin::LEN {
             let mut e = D::Spin::zero();
             e[axis] = 1.0;
             let turn = D::spin_rows(&link.frame, e);
-            table.add(0.0, turn * -link.lever[side], turn * (sign * arm), (node.inverse_inertia * unit).sqrt());
+            table.add(0.0, turn * -link.lever[side], turn * (sign * arm), self.unknowns.root(node.inverse_inertia));
         }
         D::N + D::Spin::LEN
     }
