@@ -12,7 +12,9 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @pytest.fixture(scope="session")
 def programs():
-    """The paths of `dem-run` and `dem-post`."""
+    """The paths of `dem-run` and `dem-post`: `scripts/test` says where they are, or they are built."""
+    if "DEM_PROGRAMS" in os.environ:
+        return {name: Path(os.environ["DEM_PROGRAMS"]) / name for name in ("dem-run", "dem-post")}
     build = [os.environ.get("CARGO", "cargo"), "build", "--release", "--locked", "-p", "dem-run", "-p", "dem-post"]
     built = subprocess.run(
         build + ["--message-format=json-render-diagnostics"], cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True

@@ -41,11 +41,16 @@ pub fn problems() -> PathBuf {
     root().join("tests/problems")
 }
 
-/// The path of a program. Cargo knows the programs of a test's own package only, so it is asked to build these two,
-/// in release, as README does: the compression takes seconds there, and minutes in the profile of the tests.
+/// The path of a program. `scripts/test` says in which folder it built them. Cargo knows the programs of a test's own
+/// package only, so it is asked to build them otherwise, in release, as README does: the compression takes seconds there,
+/// and minutes in the profile of the tests.
 pub fn program(name: &str) -> &'static Path {
     static PROGRAMS: OnceLock<HashMap<String, PathBuf>> = OnceLock::new();
-    &PROGRAMS.get_or_init(build)[name]
+    let programs = || match env::var_os("DEM_PROGRAMS") {
+        Some(folder) => ["dem-run", "dem-post"].map(|p| (p.to_string(), Path::new(&folder).join(p))).into(),
+        None => build(),
+    };
+    &PROGRAMS.get_or_init(programs)[name]
 }
 
 fn build() -> HashMap<String, PathBuf> {
