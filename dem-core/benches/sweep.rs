@@ -1,36 +1,17 @@
-//! Cost of one Gauss–Seidel sweep per contact: 2 and 3 rows, 430 and 4190 disks, beside a loop that streams the same bytes.
+//! Cost of one Gauss–Seidel sweep per contact, for each law and from 430 to 1,000,000 disks, beside a loop that streams the
+//! same bytes on one thread. Large problems are swept by as many threads as `RAYON_NUM_THREADS` says.
 //!
 //! `cargo bench -p dem-core --bench sweep`; criterion's throughput line gives contacts per second, 1e9 / that is ns a contact.
 
 #[path = "../tests/common/mod.rs"]
 mod common;
 
-use common::{floor, grain, settings, world};
+use common::family::{FEATURES, Feature, rows_of_disks};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use dem_core::contact::LocalSolve;
-use dem_core::dim::D2;
-use dem_core::problem::ContactProblem;
 use dem_core::solver::sweep;
 use std::hint::black_box;
-
-/// Hexagonal rows of `columns` and `columns` − 1 disks under gravity on a floor.
-fn lattice(rows: usize, columns: usize, bonded: bool) -> ContactProblem<D2> {
-    let r = 2e-3;
-    let mut disks = Vec::new();
-    for row in 0..rows {
-        let shift = if row % 2 == 0 { 0.0 } else { r };
-        for column in 0..columns - row % 2 {
-            disks.push(grain::<D2>(&[2.0 * r * column as f64 + shift, r + 3f64.sqrt() * r * row as f64], r));
-        }
-    }
-    let mut set = settings(1e-4);
-    set.gravity = common::down::<D2>(9.81);
-    let mut w = world(disks, vec![floor(0.2)], set);
-    if bonded {
-        w.form_bonds(1e-6, |_| 100.0, 0.3);
-    }
-    w.contact_problem()
-}
+use std::time::Instant;
 
 /// Sum of all words in eight lanes: bound by memory, not by the latency of one chain of additions.
 fn stream(words: &[f64]) -> f64 {
@@ -44,17 +25,27 @@ fn stream(words: &[f64]) -> f64 {
 }
 
 fn sweeps(c: &mut Criterion) {
-    for (name, rows, columns) in [("430", 20, 22), ("4190", 20, 210)] {
+    for (name, rows, columns) in [("430", 20, 22), ("4190", 20, 210), ("40000", 200, 200), ("1000000", 1000, 1000)] {
         let mut group = c.benchmark_group(format!("sweep {name} disks"));
-        for (kind, bonded) in [("2 rows", false), ("3 rows", true)] {
-            let mut problem = lattice(rows, columns, bonded);
+        for (kind, feature) in FEATURES {
+            // restitution is a dry contact; a million disks are there to be compared with memory
+            if feature == Feature::Restitution || (rows == 1000 && feature != Feature::Friction) {
+                continue;
+            }
+            let mut problem = rows_of_disks(rows, columns, feature, 0).contact_problem();
+            let bytes = problem.contact_bytes();
+            println!("{kind}: {} contacts of {} bytes", problem.len(), bytes / problem.len());
             group.throughput(Throughput::Elements(problem.len() as u64));
             for local in [LocalSolve::Exact, LocalSolve::PredictorCorrector] {
                 group.bench_function(BenchmarkId::new(kind, format!("{local:?}")), |b| {
-                    b.iter(|| sweep(black_box(&mut problem), local))
+                    b.iter_custom(|times| {
+                        let start = Instant::now();
+                        // among the threads of the pool, as a solver sweeps
+                        rayon::scope(|_| (0..times).for_each(|_| sweep(black_box(&mut problem), local)));
+                        start.elapsed()
+                    })
                 });
             }
-            let bytes = size_of_val(problem.bonded.as_slice()) + size_of_val(problem.dry.as_slice());
             let words = vec![1.0f64; bytes / 8];
             group.bench_function(BenchmarkId::new(kind, "stream"), |b| b.iter(|| stream(black_box(&words))));
         }

@@ -3,7 +3,7 @@
 mod common;
 
 use common::{pressed, solver};
-use dem_core::contact::{BondFlow, LocalSolve};
+use dem_core::contact::{BondFlow, Law, LocalSolve};
 use dem_core::dim::{D2, D3, Dim};
 use dem_core::problem::ContactProblem;
 use dem_core::problem::assembled::{Assembled, AssemblyError, BlockMatrix, ContactRows, Parts};
@@ -35,7 +35,7 @@ fn same<D: Dim>(mut problem: ContactProblem<D>) {
         let scale = largest(&u);
         for (c, contact) in problem.dry.iter().enumerate() {
             let at = (problem.bonded.len() + c) * size;
-            let found = problem.nodes.relative_velocity::<D::Tangent, D::Tangent>(&contact.link, 0.0);
+            let found = problem.nodes.relative_velocity::<D::Tangent, D::Tangent>(&contact.link, contact.law.arms());
             assert!((u[at] - found.n).abs() <= 1e-12 * scale || contact.link.nodes[1] as usize >= problem.nodes.grains);
             assert!((u[at + 1] - found.t[0]).abs() <= 1e-12 * scale);
         }

@@ -1,6 +1,6 @@
 //! The cone and the laws on it, at random points: projection by its defining inequalities, local solves by the law they solve.
 
-use dem_core::contact::{Block, BondFlow, Bonded, Cone, Coulomb, Law, Local, LocalSolve, Weights};
+use dem_core::contact::{Arms, Block, BondFlow, Bonded, Cone, Coulomb, Law, Local, LocalSolve, Weights};
 use dem_core::dim::{V0, Vect};
 use nalgebra::SVector;
 use proptest::prelude::*;
@@ -64,7 +64,7 @@ proptest! {
     fn dry_local_solves_agree(mu in 0.0..2.0f64, n in 0.3..3.0f64, t in 0.3..3.0f64, q in local(vect::<2>(), Just(V0::zeros()))) {
         let block = Block { n, t, m: 1.0, tm: 0.0 };
         let velocity = |r: Local<SVector<f64, 2>, V0>| Local { n: n * r.n + q.n, t: r.t * t + q.t, m: r.m };
-        agree(Coulomb::<SVector<f64, 2>>::new(block, mu, 0.0), velocity);
+        agree(Coulomb::<SVector<f64, 2>>::new(block, [0.5; 2], mu, 0.0), velocity);
     }
 
     /// The same for bonds of either flow, with t and m coupled as for grains of different size.
@@ -78,7 +78,7 @@ proptest! {
         let flow = if bipotential { BondFlow::Bipotential } else { BondFlow::Associated };
         let block = Block { n, t, m, tm };
         let velocity = |r: Local<SVector<f64, 2>, SVector<f64, 2>>| Local { n: n * r.n + q.n, t: r.t * t + r.m * tm + q.t, m: r.m * m + r.t * tm + q.m };
-        agree(Bonded::new(block, 1.0, shift, k, flow), velocity);
+        agree(Bonded::new(block, Arms { lever: [0.5; 2], bending: 1.0 }, shift, k, flow), velocity);
     }
 }
 

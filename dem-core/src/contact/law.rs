@@ -40,6 +40,15 @@ pub struct Block {
     pub tm: f64,
 }
 
+/// Lengths by which the forces of a contact turn its bodies.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Arms {
+    /// Distances from the centres of i and j to the contact point along the normal (m).
+    pub lever: [f64; 2],
+    /// Length that scales moments and relative spins: the mean diameter of a bonded pair (m).
+    pub bending: f64,
+}
+
 /// The law of one contact, with the constants that its local solve needs.
 pub trait Law: Copy + Send + Sync + 'static {
     /// Tangential rows.
@@ -79,9 +88,9 @@ pub trait Law: Copy + Send + Sync + 'static {
         true
     }
 
-    /// Length that scales moments and relative spins: the mean diameter of a bonded pair (m).
-    fn arm(&self) -> f64 {
-        0.0
+    /// By which lengths its rows turn the bodies; zero for rows that it lacks.
+    fn arms(&self) -> Arms {
+        Arms::default()
     }
 
     /// Compliance of the rows over the step (1/kg), zero for what is rigid.
@@ -168,15 +177,16 @@ impl Law for Frictionless {
 pub struct Coulomb<T> {
     inverse_n: f64,
     inverse_t: f64,
+    lever: [f64; 2],
     bias: f64,
     mu: f64,
     rows: PhantomData<T>,
 }
 
 impl<T: Vect> Coulomb<T> {
-    /// From the local block, the friction coefficient and the bias of the normal velocity (m/s).
-    pub fn new(block: Block, mu: f64, bias: f64) -> Self {
-        Self { inverse_n: 1.0 / block.n, inverse_t: 1.0 / block.t, bias, mu, rows: PhantomData }
+    /// From the local block, the levers (m), the friction coefficient and the bias of the normal velocity (m/s).
+    pub fn new(block: Block, lever: [f64; 2], mu: f64, bias: f64) -> Self {
+        Self { inverse_n: 1.0 / block.n, inverse_t: 1.0 / block.t, lever, bias, mu, rows: PhantomData }
     }
 
     fn predict_correct(&self, r: Local<T, V0>, u: Local<T, V0>) -> Local<T, V0> {
@@ -224,6 +234,11 @@ impl<T: Vect> Law for Coulomb<T> {
     fn cone(&self) -> Cone {
         Cone { mu: self.mu, nu: 0.0 }
     }
+
+    #[inline(always)]
+    fn arms(&self) -> Arms {
+        Arms { lever: self.lever, bending: 0.0 }
+    }
 }
 
 /// What a bond at its limit does within the solve; it breaks there afterwards.
@@ -244,7 +259,7 @@ pub struct Bonded<T, B> {
     inverse_t: f64,
     inverse_m: f64,
     inverse_tm: f64,
-    arm: f64,
+    arms: Arms,
     shift: f64,
     cone: Cone,
     flow: BondFlow,
@@ -253,15 +268,15 @@ pub struct Bonded<T, B> {
 }
 
 impl<T: Vect, B: Vect> Bonded<T, B> {
-    /// From the local block, the mean diameter (m), the cohesion as an impulse h r_coh (N s), the cone and the flow rule.
-    pub fn new(block: Block, arm: f64, shift: f64, cone: Cone, flow: BondFlow) -> Self {
+    /// From the local block, the arms, the cohesion as an impulse h r_coh (N s), the cone and the flow rule.
+    pub fn new(block: Block, arms: Arms, shift: f64, cone: Cone, flow: BondFlow) -> Self {
         let det = block.t * block.m - block.tm * block.tm;
         Self {
             inverse_n: 1.0 / block.n,
             inverse_t: block.m / det,
             inverse_m: block.t / det,
             inverse_tm: -block.tm / det,
-            arm,
+            arms,
             shift,
             cone,
             flow,
@@ -337,8 +352,8 @@ impl<A: Vect> Law for Bonded<A, A> {
     }
 
     #[inline(always)]
-    fn arm(&self) -> f64 {
-        self.arm
+    fn arms(&self) -> Arms {
+        self.arms
     }
 }
 
@@ -403,13 +418,13 @@ impl<T: Vect, B: Vect> Elastic<T, B> {
         block: Block,
         compliance: Weights,
         carried: Local<T, B>,
-        arm: f64,
+        arms: Arms,
         shift: f64,
         cone: Cone,
         flow: BondFlow,
     ) -> Self {
         let soft = Block { n: block.n + compliance.n, t: block.t + compliance.t, m: block.m + compliance.m, ..block };
-        Self { bond: Bonded::new(soft, arm, shift, cone, flow), compliance, carried }
+        Self { bond: Bonded::new(soft, arms, shift, cone, flow), compliance, carried }
     }
 }
 
@@ -445,8 +460,8 @@ impl<A: Vect> Law for Elastic<A, A> {
     }
 
     #[inline(always)]
-    fn arm(&self) -> f64 {
-        self.bond.arm
+    fn arms(&self) -> Arms {
+        self.bond.arms
     }
 
     fn compliance(&self) -> Weights {

@@ -5,4 +5,4 @@ pub mod law;
 
 pub(crate) use cone::Padded;
 pub use cone::{Cone, Local, Weights};
-pub use law::{Block, BondFlow, Bonded, Coulomb, Elastic, Frictionless, Law, LocalSolve};
+pub use law::{Arms, Block, BondFlow, Bonded, Coulomb, Elastic, Frictionless, Law, LocalSolve};

@@ -11,7 +11,7 @@
 use super::residual::relative;
 use super::{Contact, ContactProblem, Link, Nodes, Visitor};
 use crate::contact::law::predict_correct;
-use crate::contact::{Cone, Law, Local, Padded, Weights};
+use crate::contact::{Arms, Cone, Law, Local, Padded, Weights};
 use crate::dim::{Dim, Vect};
 use thiserror::Error;
 
@@ -400,7 +400,7 @@ impl Assembled {
         let rows = ContactRows { tangents: D::N - 1, bends };
         let matrix = delassus(&problem.nodes, &list, rows);
         let mut nodes = problem.nodes.clone();
-        for (node, free) in nodes.all.iter_mut().zip(&problem.free) {
+        for (node, free) in nodes.all.iter_mut().zip(problem.free.iter()) {
             (node.velocity, node.spin) = *free;
         }
         let size = rows.count();
@@ -437,7 +437,7 @@ impl Assembled {
 /// A contact whatever its law.
 struct Item<D: Dim> {
     link: Link<D>,
-    arm: f64,
+    arms: Arms,
     tangents: usize,
     bends: usize,
     cone: Cone,
@@ -455,7 +455,7 @@ impl<D: Dim> Visitor<D> for List<D> {
     fn visit<L: Law>(&mut self, _: &Nodes<D>, c: &Contact<D, L>) {
         self.0.push(Item {
             link: c.link,
-            arm: c.law.arm(),
+            arms: c.law.arms(),
             tangents: L::T::LEN,
             bends: L::B::LEN,
             cone: c.law.cone(),
@@ -472,7 +472,7 @@ impl<D: Dim> Visitor<D> for List<D> {
 impl<D: Dim> Item<D> {
     /// The relative velocity, zero in rows that the contact lacks.
     fn velocity(&self, nodes: &Nodes<D>) -> Padded {
-        let u = nodes.relative_velocity::<D::Tangent, D::Tangent>(&self.link, self.arm);
+        let u = nodes.relative_velocity::<D::Tangent, D::Tangent>(&self.link, self.arms);
         let mut out = Padded { n: u.n, ..Padded::zero() };
         for k in 0..self.tangents {
             out.t[k] = u.t[k];
@@ -505,7 +505,7 @@ fn delassus<D: Dim>(nodes: &Nodes<D>, list: &[Item<D>], rows: ContactRows) -> Bl
         for k in (0..1 + item.tangents).chain(1 + rows.tangents..1 + rows.tangents + item.bends) {
             let mut unit = [0.0; 5];
             unit[k] = 1.0;
-            nodes.apply(&item.link, item.arm, rows.padded(&unit[..size]));
+            nodes.apply(&item.link, item.arms, rows.padded(&unit[..size]));
             for &d in &near {
                 let mut u = [0.0; 5];
                 let mut moved = list[d].velocity(&nodes);

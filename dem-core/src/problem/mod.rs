@@ -4,10 +4,12 @@
 //! matrix-free: the Delassus operator W = Hᵀ M⁻¹ H acts through the velocities of the nodes.
 
 pub mod assembled;
+pub(crate) mod blocks;
 pub mod residual;
 
-use crate::contact::{Block, Bonded, Coulomb, Elastic, Frictionless, Law, Local};
+use crate::contact::{Arms, Block, Bonded, Coulomb, Elastic, Frictionless, Law, Local};
 use crate::dim::{Dim, Vect, resized};
+use std::sync::Arc;
 
 /// The velocity unknowns of one body, and what an impulse does to them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,14 +31,12 @@ pub struct Link<D: Dim> {
     pub nodes: [u32; 2],
     /// Orthonormal frame (n, t…).
     pub frame: D::Frame,
-    /// Distances from the centres of i and j to the contact point along the normal (m).
-    pub lever: [f64; 2],
 }
 
 /// One contact of the problem: its geometry, its law and its impulse.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact<D: Dim, L: Law> {
-    /// Nodes, frame and levers.
+    /// Nodes and frame.
     pub link: Link<D>,
     /// Law with the constants of the local solve.
     pub law: L,
@@ -45,10 +45,10 @@ pub struct Contact<D: Dim, L: Law> {
 }
 
 impl<D: Dim> Link<D> {
-    /// Local Delassus block for two nodes; `arm` is the mean diameter (m). `drive` is the direction of the one degree of freedom of
-    /// a force-driven wall j, if it is one.
-    pub fn block(&self, i: &Node<D>, j: &Node<D>, arm: f64, drive: Option<D::Vector>) -> Block {
-        let [li, lj] = self.lever;
+    /// Local Delassus block for two nodes. `drive` is the direction of the one degree of freedom of a force-driven wall j, if
+    /// it is one.
+    pub fn block(&self, i: &Node<D>, j: &Node<D>, arms: Arms, drive: Option<D::Vector>) -> Block {
+        let Arms { lever: [li, lj], bending: arm } = arms;
         let spin = i.inverse_inertia + j.inverse_inertia;
         let mut block = Block {
             n: i.inverse_mass + j.inverse_mass,
@@ -72,7 +72,7 @@ impl<D: Dim> Link<D> {
     }
 }
 
-/// Contacts with the same rows, sorted by key.
+/// Contacts with the same rows, sorted by key; in a large problem, by the blocks in which they are swept.
 pub type Group<D, L> = Vec<Contact<D, L>>;
 
 /// The law of a dry contact in dimension D.
@@ -88,7 +88,7 @@ pub struct ContactProblem<D: Dim> {
     /// The velocities that the contacts act on.
     pub nodes: Nodes<D>,
     /// Free velocities v_f (m/s) and spins (rad/s) of the nodes.
-    pub free: Vec<(D::Vector, D::Spin)>,
+    pub free: Arc<[(D::Vector, D::Spin)]>,
     /// Intact rigid bonds.
     pub bonded: Group<D, Bond<D>>,
     /// Intact elastic bonds.
@@ -97,6 +97,8 @@ pub struct ContactProblem<D: Dim> {
     pub dry: Group<D, Dry<D>>,
     /// Contacts without friction.
     pub frictionless: Group<D, Frictionless>,
+    /// Radii of the grains (m) where the stiffness of a contact follows them, in space; empty in the plane.
+    pub radii: Vec<f64>,
     /// Euclidean norm of the applied impulses h F_ext (N s), one scale of the residual.
     pub applied: f64,
 }
@@ -112,30 +114,80 @@ pub struct Nodes<D: Dim> {
     pub drives: Vec<D::Vector>,
 }
 
+/// Nodes that follow one another, and the walls where they are all of them.
+pub(crate) struct Span<'a, D: Dim> {
+    all: &'a mut [Node<D>],
+    /// Number of the first.
+    first: usize,
+    /// How many are grains.
+    grains: usize,
+    drives: &'a [D::Vector],
+}
+
 impl<D: Dim> Nodes<D> {
     /// Relative velocity u = Hᵀ v of node i with respect to node j at the contact point.
     #[inline(always)]
-    pub fn relative_velocity<T: Vect, B: Vect>(&self, link: &Link<D>, arm: f64) -> Local<T, B> {
-        let [i, j] = link.nodes.map(|node| &self.all[node as usize]);
-        let (n, t) = D::split(&link.frame, i.velocity - j.velocity);
-        if T::LEN == 0 {
-            return Local { n, ..Local::zero() };
-        }
-        let turn = D::spin_rows(&link.frame, i.spin * link.lever[0] + j.spin * link.lever[1]);
-        let m = if B::LEN == 0 { B::zero() } else { resized(D::spin_rows(&link.frame, (i.spin - j.spin) * arm)) };
-        Local { n, t: resized(t - turn), m }
+    pub fn relative_velocity<T: Vect, B: Vect>(&self, link: &Link<D>, arms: Arms) -> Local<T, B> {
+        let [i, j] = link.nodes.map(|node| self.all[node as usize].motion());
+        link.relative_velocity(arms, i, j)
     }
 
     /// Add the impulse r of node j on node i: v += M⁻¹ H r.
     #[inline(always)]
-    pub fn apply<T: Vect, B: Vect>(&mut self, link: &Link<D>, arm: f64, r: Local<T, B>) {
-        let [i, j] = link.nodes.map(|node| node as usize);
+    pub fn apply<T: Vect, B: Vect>(&mut self, link: &Link<D>, arms: Arms, r: Local<T, B>) {
+        self.span().apply(link, arms, r);
+    }
+
+    fn span(&mut self) -> Span<'_, D> {
+        Span { first: 0, all: &mut self.all, grains: self.grains, drives: &self.drives }
+    }
+}
+
+impl<D: Dim> Node<D> {
+    #[inline(always)]
+    fn motion(&self) -> (D::Vector, D::Spin) {
+        (self.velocity, self.spin)
+    }
+}
+
+impl<D: Dim> Link<D> {
+    /// Relative velocity of a body with this velocity and spin, i, with respect to another, j, at the contact point.
+    #[inline(always)]
+    pub(crate) fn relative_velocity<T: Vect, B: Vect>(
+        &self,
+        arms: Arms,
+        (velocity_i, spin_i): (D::Vector, D::Spin),
+        (velocity_j, spin_j): (D::Vector, D::Spin),
+    ) -> Local<T, B> {
+        let (n, t) = D::split(&self.frame, velocity_i - velocity_j);
+        if T::LEN == 0 {
+            return Local { n, ..Local::zero() };
+        }
+        let turn = D::spin_rows(&self.frame, spin_i * arms.lever[0] + spin_j * arms.lever[1]);
+        let bend = |spin: D::Spin| resized(D::spin_rows(&self.frame, spin * arms.bending));
+        let m = if B::LEN == 0 { B::zero() } else { bend(spin_i - spin_j) };
+        Local { n, t: resized(t - turn), m }
+    }
+}
+
+impl<D: Dim> Span<'_, D> {
+    /// As [`Nodes::relative_velocity`].
+    #[inline(always)]
+    pub fn relative_velocity<T: Vect, B: Vect>(&self, link: &Link<D>, arms: Arms) -> Local<T, B> {
+        let [i, j] = link.nodes.map(|node| self.all[node as usize - self.first].motion());
+        link.relative_velocity(arms, i, j)
+    }
+
+    /// As [`Nodes::apply`].
+    #[inline(always)]
+    pub fn apply<T: Vect, B: Vect>(&mut self, link: &Link<D>, arms: Arms, r: Local<T, B>) {
+        let [i, j] = link.nodes.map(|node| node as usize - self.first);
         let (t, m): (D::Tangent, D::Tangent) = (resized(r.t), resized(r.m));
-        let impulse = D::compose(&link.frame, r.n, t);
+        let impulse = if T::LEN > 0 { D::compose(&link.frame, r.n, t) } else { D::normal(&link.frame) * r.n };
         let node = &mut self.all[i];
         node.velocity += impulse * node.inverse_mass;
         if T::LEN > 0 {
-            let turn = D::spin_rows_transposed(&link.frame, t * -link.lever[0] + m * arm);
+            let turn = D::spin_rows_transposed(&link.frame, t * -arms.lever[0] + m * arms.bending);
             node.spin += turn * node.inverse_inertia;
         }
         let node = &mut self.all[j];
@@ -146,7 +198,7 @@ impl<D: Dim> Nodes<D> {
         }
         node.velocity -= impulse * node.inverse_mass;
         if T::LEN > 0 {
-            let turn = D::spin_rows_transposed(&link.frame, t * -link.lever[1] - m * arm);
+            let turn = D::spin_rows_transposed(&link.frame, t * -arms.lever[1] - m * arms.bending);
             node.spin += turn * node.inverse_inertia;
         }
     }
@@ -155,7 +207,7 @@ impl<D: Dim> Nodes<D> {
 /// A fold over all contacts of a problem, whatever their rows.
 pub trait Visitor<D: Dim> {
     /// Called once for each contact: rigid bonds, elastic bonds, dry contacts, frictionless ones, each in the order of
-    /// their keys.
+    /// its group.
     fn visit<L: Law>(&mut self, nodes: &Nodes<D>, contact: &Contact<D, L>);
 }
 
@@ -168,6 +220,14 @@ impl<D: Dim> ContactProblem<D> {
     /// Whether there is no contact at all.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
+    }
+
+    /// Bytes that the contacts take.
+    pub fn contact_bytes(&self) -> usize {
+        size_of_val(self.bonded.as_slice())
+            + size_of_val(self.elastic.as_slice())
+            + size_of_val(self.dry.as_slice())
+            + size_of_val(self.frictionless.as_slice())
     }
 
     /// Visit every contact.
@@ -188,13 +248,15 @@ impl<D: Dim> ContactProblem<D> {
 
     /// Set the node velocities to v_f + M⁻¹ H r, free of the rounding that a long series of increments leaves.
     pub fn velocities_from_reactions(&mut self) {
-        for (node, free) in self.nodes.all.iter_mut().zip(&self.free) {
+        for (node, free) in self.nodes.all.iter_mut().zip(self.free.iter()) {
             (node.velocity, node.spin) = *free;
         }
-        let nodes = &mut self.nodes;
-        self.bonded.iter().for_each(|c| nodes.apply(&c.link, c.law.arm(), c.r));
-        self.elastic.iter().for_each(|c| nodes.apply(&c.link, c.law.arm(), c.r));
-        self.dry.iter().for_each(|c| nodes.apply(&c.link, c.law.arm(), c.r));
-        self.frictionless.iter().for_each(|c| nodes.apply(&c.link, c.law.arm(), c.r));
+        fn group<D: Dim, L: Law>(nodes: &mut Nodes<D>, group: &mut Group<D, L>) {
+            blocks::for_each(nodes, group, |span, c| span.apply(&c.link, c.law.arms(), c.r));
+        }
+        group(&mut self.nodes, &mut self.bonded);
+        group(&mut self.nodes, &mut self.elastic);
+        group(&mut self.nodes, &mut self.dry);
+        group(&mut self.nodes, &mut self.frictionless);
     }
 }

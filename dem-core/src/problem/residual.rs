@@ -5,9 +5,10 @@
 //! hide the load. A natural map that is as small as the rounding of the velocities behind it is zero: grains that part
 //! leave reactions so small that their ratio to the map says nothing.
 
-use super::{Contact, ContactProblem, Nodes, Visitor};
+use super::{Contact, ContactProblem, Group, Nodes};
 use crate::contact::Law;
 use crate::dim::{Dim, Vect};
+use rayon::prelude::*;
 
 /// Relative rounding of the natural map that counts as zero.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
@@ -20,15 +21,36 @@ struct Sums {
     motion: f64,
 }
 
-impl<D: Dim> Visitor<D> for Sums {
+/// Contacts that are summed one after another; chunks of so many are summed at the same time.
+const CHUNK: usize = 32_768;
+
+impl Sums {
+    fn group<D: Dim, L: Law>(&mut self, nodes: &Nodes<D>, group: &Group<D, L>) {
+        if group.len() <= CHUNK {
+            group.iter().for_each(|c| self.add(nodes, c));
+            return;
+        }
+        let sum = |chunk: &[Contact<D, L>]| {
+            let mut part = Self::default();
+            chunk.iter().for_each(|c| part.add(nodes, c));
+            part
+        };
+        let parts: Vec<Self> = group.par_chunks(CHUNK).map(sum).collect();
+        for part in parts {
+            self.map += part.map;
+            self.reaction += part.reaction;
+            self.motion += part.motion;
+        }
+    }
+
     #[inline(always)]
-    fn visit<L: Law>(&mut self, nodes: &Nodes<D>, c: &Contact<D, L>) {
-        let u = nodes.relative_velocity(&c.link, c.law.arm());
+    fn add<D: Dim, L: Law>(&mut self, nodes: &Nodes<D>, c: &Contact<D, L>) {
+        let u = nodes.relative_velocity(&c.link, c.law.arms());
         let map = c.law.natural_map(c.r, u);
         self.map += map.dot(&map);
         self.reaction += c.r.dot(&c.r);
         let gamma = c.law.gamma();
-        for (node, lever) in c.link.nodes.iter().zip(c.link.lever) {
+        for (node, lever) in c.link.nodes.iter().zip(c.law.arms().lever) {
             let node = &nodes.all[*node as usize];
             let speed = node.velocity.dot(&node.velocity) + lever * lever * node.spin.dot(&node.spin);
             self.motion += gamma * gamma * speed;
@@ -39,7 +61,10 @@ impl<D: Dim> Visitor<D> for Sums {
 /// The residual of the impulses and node velocities that the problem now holds (–). Not a number stays not a number.
 pub fn residual<D: Dim>(problem: &ContactProblem<D>) -> f64 {
     let mut sums = Sums::default();
-    problem.visit(&mut sums);
+    sums.group(&problem.nodes, &problem.bonded);
+    sums.group(&problem.nodes, &problem.elastic);
+    sums.group(&problem.nodes, &problem.dry);
+    sums.group(&problem.nodes, &problem.frictionless);
     let scale = sums.reaction.sqrt().max(problem.applied);
     relative(sums.map.sqrt(), sums.motion.sqrt(), scale)
 }

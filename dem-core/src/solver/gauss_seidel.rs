@@ -10,7 +10,7 @@ use super::{ContactSolver, SolveReport, SolveStatus, Work};
 use crate::contact::{Law, LocalSolve};
 use crate::dim::{Dim, Vect};
 use crate::problem::residual::residual;
-use crate::problem::{ContactProblem, Group, Nodes};
+use crate::problem::{ContactProblem, Group, Nodes, blocks};
 
 /// Settings of [`GaussSeidel`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,13 +52,13 @@ impl GaussSeidel {
 /// One visit of every contact of a group.
 #[inline]
 fn sweep_group<D: Dim, L: Law>(nodes: &mut Nodes<D>, group: &mut Group<D, L>, local: LocalSolve) {
-    for c in group {
-        let arm = c.law.arm();
-        let u = nodes.relative_velocity(&c.link, arm);
+    blocks::for_each(nodes, group, |span, c| {
+        let arms = c.law.arms();
+        let u = span.relative_velocity(&c.link, arms);
         let r = c.law.improve(local, c.r, u);
-        nodes.apply(&c.link, arm, r - c.r);
+        span.apply(&c.link, arms, r - c.r);
         c.r = r;
-    }
+    });
 }
 
 /// One sweep over all contacts: bonds, then dry contacts, then frictionless ones.
@@ -205,6 +205,7 @@ pub(super) fn iterate(problem: &mut impl Sweepable, settings: &GaussSeidelSettin
 
 impl<D: Dim> ContactSolver<D> for GaussSeidel {
     fn solve(&mut self, problem: &mut ContactProblem<D>) -> SolveReport {
-        iterate(problem, &self.settings)
+        let settings = self.settings;
+        blocks::among_threads(problem.nodes.grains, || iterate(problem, &settings))
     }
 }

@@ -4,9 +4,10 @@ use super::World;
 use super::touch::{Touch, TouchStatus};
 use crate::body::direction;
 use crate::bond::{Bond, BondStatus};
-use crate::contact::{Bonded, Coulomb, Elastic, Frictionless, Law, Local};
+use crate::contact::{Arms, Bonded, Coulomb, Elastic, Frictionless, Law, Local};
 use crate::dim::{Dim, Vect};
-use crate::problem::{Contact, ContactProblem, Group, Link, Node, Nodes};
+use crate::problem::{Contact, ContactProblem, Group, Link, Node, Nodes, blocks};
+use std::sync::Arc;
 
 /// Gap over the radius of the grain below which a contact touches. The rounding of positions would else be a misfit of
 /// rigid contacts, to which stiff ones answer with forces.
@@ -31,16 +32,16 @@ impl<D: Dim> Midpoint<D> {
 /// Node velocities before the step (m/s, rad/s) and their free values, grains first.
 pub(super) struct Motion<D: Dim> {
     pub before: Vec<(D::Vector, D::Spin)>,
-    pub free: Vec<(D::Vector, D::Spin)>,
+    pub free: Arc<[(D::Vector, D::Spin)]>,
 }
 
 /// Place of each contact of the step in the groups of the problem.
 #[derive(Default)]
 pub(super) struct Places {
-    pub bonded: Vec<usize>,
-    pub elastic: Vec<usize>,
-    pub dry: Vec<usize>,
-    pub frictionless: Vec<usize>,
+    pub bonded: Vec<u32>,
+    pub elastic: Vec<u32>,
+    pub dry: Vec<u32>,
+    pub frictionless: Vec<u32>,
 }
 
 impl<D: Dim> World<D> {
@@ -68,15 +69,8 @@ impl<D: Dim> World<D> {
     }
 
     /// A contact without reaction at the geometry of mid-step.
-    pub(super) fn new_touch(
-        &self,
-        mid: &Midpoint<D>,
-        motion: &Motion<D>,
-        pair: [u32; 2],
-        bond: Option<u32>,
-    ) -> Touch<D> {
+    pub(super) fn new_touch(&self, mid: &Midpoint<D>, pair: [u32; 2], bond: Option<u32>) -> Touch<D> {
         let (gap, normal, point) = self.geometry(mid, pair);
-        let [i, j] = pair.map(|k| motion.before[k as usize].0);
         Touch {
             pair,
             frame: D::frame(normal),
@@ -85,17 +79,16 @@ impl<D: Dim> World<D> {
             bond,
             reaction: Local::zero(),
             status: if bond.is_some() { TouchStatus::Bonded } else { TouchStatus::Open },
-            approach: (i - j).dot(&normal),
         }
     }
 
     /// All contacts of the step, sorted by pair, with the reactions of the last step as a start.
     pub(super) fn detect(&mut self, mid: &Midpoint<D>, motion: &Motion<D>, h: f64) -> Vec<Touch<D>> {
         self.refresh_candidates(mid, motion, h);
-        let mut touches: Vec<Touch<D>> = Vec::with_capacity(self.touches.len() + 16);
+        let mut touches: Vec<Touch<D>> = Vec::with_capacity(self.touches.len() + self.touches.len() / 8 + 16);
         let intact = |b: &Bond| b.status == BondStatus::Intact;
         for (k, bond) in self.bonds.iter().enumerate().filter(|(_, b)| intact(b)) {
-            touches.push(self.new_touch(mid, motion, bond.pair, Some(k as u32)));
+            touches.push(self.new_touch(mid, bond.pair, Some(k as u32)));
         }
         let mut bonded = self.bonds.iter().filter(|b| intact(b)).map(|b| b.pair).peekable();
         for &pair in &self.candidates.pairs {
@@ -103,7 +96,7 @@ impl<D: Dim> World<D> {
             if bonded.peek() == Some(&pair) || pair.iter().all(|k| self.immovable(*k as usize)) {
                 continue;
             }
-            let touch = self.new_touch(mid, motion, pair, None);
+            let touch = self.new_touch(mid, pair, None);
             let approach = pair.map(|k| motion.free[k as usize].0);
             let closing = -(approach[0] - approach[1]).dot(&D::normal(&touch.frame));
             let near = NEAR * self.grains.radius[pair[0] as usize];
@@ -157,7 +150,6 @@ impl<D: Dim> World<D> {
     pub(super) fn missed(
         &mut self,
         mid: &Midpoint<D>,
-        motion: &Motion<D>,
         touches: &[Touch<D>],
         nodes: &Nodes<D>,
         h: f64,
@@ -171,7 +163,7 @@ impl<D: Dim> World<D> {
             if present.peek().is_some_and(|t| t.pair == pair) || pair.iter().all(|k| self.immovable(*k as usize)) {
                 continue;
             }
-            let touch = self.new_touch(mid, motion, pair, None);
+            let touch = self.new_touch(mid, pair, None);
             let [i, j] = pair.map(|k| nodes.all[k as usize].velocity);
             if touch.gap + h * (i - j).dot(&D::normal(&touch.frame)) < 0.0 && self.restitution_of(pair) == 0.0 {
                 missed.push(touch);
@@ -190,15 +182,17 @@ impl<D: Dim> World<D> {
     }
 
     /// What is added to the normal velocity of a dry contact before Signorini's law (m/s); none if it cannot act in this step.
-    fn bias(&self, touch: &Touch<D>, h: f64) -> Option<f64> {
+    fn bias(&self, touch: &Touch<D>, motion: &Motion<D>, h: f64) -> Option<f64> {
         let e = self.restitution_of(touch.pair);
         if e == 0.0 {
             let touching = touch.gap <= TOUCHING * self.grains.radius[touch.pair[0] as usize];
             let gap = if self.settings.expel_overlaps || !touching { touch.gap } else { 0.0 };
             return Some(gap / h);
         }
-        let slow = self.settings.restitution.is_some_and(|r| touch.approach.abs() < r.threshold_speed);
-        (touch.gap <= 0.0).then_some(if slow { 0.0 } else { e * touch.approach })
+        let [i, j] = touch.pair.map(|k| motion.before[k as usize].0);
+        let approach = (i - j).dot(&D::normal(&touch.frame));
+        let slow = self.settings.restitution.is_some_and(|r| approach.abs() < r.threshold_speed);
+        (touch.gap <= 0.0).then_some(if slow { 0.0 } else { e * approach })
     }
 
     /// Friction coefficient of a dry contact (–).
@@ -243,52 +237,76 @@ impl<D: Dim> World<D> {
             elastic: Vec::new(),
             dry: Vec::new(),
             frictionless: Vec::new(),
+            radii: if D::N > 2 { self.grains.radius.clone() } else { Vec::new() },
             applied,
         };
         let mut places = Places::default();
-        for (place, touch) in touches.iter().enumerate() {
-            let link = self.link(touch);
+        self.reserve(touches, &mut problem, &mut places);
+        let order = blocks::order(touches.iter().map(|t| t.pair), self.grains.len());
+        for k in 0..touches.len() {
+            let place = order.as_ref().map_or(k, |order| order[k] as usize);
+            let touch = &touches[place];
+            let link = Link { nodes: touch.pair, frame: touch.frame };
+            let lever = self.levers(touch);
             let [i, j] = link.nodes.map(|k| &problem.nodes.all[k as usize]);
             let drive =
                 (touch.pair[1] as usize).checked_sub(self.grains.len()).and_then(|w| self.walls[w].free_direction());
             let start = touch.reaction * h;
             if let Some((number, bond)) = touch.bond.map(|b| (b as usize, &self.bonds[b as usize])) {
                 let arm = bond.mean_diameter;
-                let block = link.block(i, j, arm, None);
+                let arms = Arms { lever, bending: arm };
+                let block = link.block(i, j, arms, None);
                 let r = over_arm(start, arm);
                 let (shift, cone, flow) = (h * bond.strength, bond.cone(), self.settings.bond_flow);
                 if let Some(compliance) = bond.compliance(h) {
                     let carried = over_arm(carried[number] * h, arm);
-                    let law = Elastic::new(block, compliance, carried, arm, shift, cone, flow);
+                    let law = Elastic::new(block, compliance, carried, arms, shift, cone, flow);
                     problem.elastic.push(Contact { link, law, r });
-                    places.elastic.push(place);
+                    places.elastic.push(place as u32);
                 } else {
-                    let law = Bonded::new(block, arm, shift, cone, flow).with_bias(turning(&link, motion, h));
+                    let law = Bonded::new(block, arms, shift, cone, flow).with_bias(turning(&link, motion, h));
                     problem.bonded.push(Contact { link, law, r });
-                    places.bonded.push(place);
+                    places.bonded.push(place as u32);
                 }
-            } else if let Some(bias) = self.bias(touch, h) {
-                let block = link.block(i, j, 0.0, drive.map(|(d, _)| d));
+            } else if let Some(bias) = self.bias(touch, motion, h) {
+                let block = link.block(i, j, Arms { lever, bending: 0.0 }, drive.map(|(d, _)| d));
                 let mu = self.friction_of(touch.pair);
                 if mu > 0.0 {
-                    problem.dry.push(Contact { link, law: Coulomb::new(block, mu, bias), r: start.resized() });
-                    places.dry.push(place);
+                    problem.dry.push(Contact { link, law: Coulomb::new(block, lever, mu, bias), r: start.resized() });
+                    places.dry.push(place as u32);
                 } else {
                     problem.frictionless.push(Contact {
                         link,
                         law: Frictionless::new(block, bias),
                         r: start.resized(),
                     });
-                    places.frictionless.push(place);
+                    places.frictionless.push(place as u32);
                 }
             }
         }
         (problem, places)
     }
 
-    fn link(&self, touch: &Touch<D>) -> Link<D> {
-        let radius = |k: u32| self.grains.radius.get(k as usize).map_or(0.0, |r| r + 0.5 * touch.gap);
-        Link { nodes: touch.pair, frame: touch.frame, lever: touch.pair.map(radius) }
+    /// Room for these contacts, and no more: lists that grow by doubling would take twice the memory of a large problem.
+    fn reserve(&self, touches: &[Touch<D>], problem: &mut ContactProblem<D>, places: &mut Places) {
+        let number = |law: fn(&Self, &Touch<D>) -> bool| touches.iter().filter(|t| law(self, t)).count();
+        let bonded = number(|world, t| t.bond.is_some_and(|b| world.bonds[b as usize].stiffness.is_none()));
+        let elastic = number(|_, t| t.bond.is_some()) - bonded;
+        let dry = number(|world, t| t.bond.is_none() && world.friction_of(t.pair) > 0.0);
+        let frictionless = touches.len() - bonded - elastic - dry;
+        problem.bonded.reserve_exact(bonded);
+        problem.elastic.reserve_exact(elastic);
+        problem.dry.reserve_exact(dry);
+        problem.frictionless.reserve_exact(frictionless);
+        places.bonded.reserve_exact(bonded);
+        places.elastic.reserve_exact(elastic);
+        places.dry.reserve_exact(dry);
+        places.frictionless.reserve_exact(frictionless);
+    }
+
+    /// Distances from the centres to the contact point (m); none to that of a wall.
+    fn levers(&self, touch: &Touch<D>) -> [f64; 2] {
+        touch.pair.map(|k| self.grains.radius.get(k as usize).map_or(0.0, |r| r + 0.5 * touch.gap))
     }
 }
 
@@ -310,10 +328,10 @@ fn over_arm<T: Vect>(r: Local<T, T>, arm: f64) -> Local<T, T> {
 }
 
 /// Write the impulses of a group back to the contacts as forces.
-pub(super) fn read_back<D: Dim, L: Law>(touches: &mut [Touch<D>], group: &Group<D, L>, places: &[usize], h: f64) {
+pub(super) fn read_back<D: Dim, L: Law>(touches: &mut [Touch<D>], group: &Group<D, L>, places: &[u32], h: f64) {
     for (contact, place) in group.iter().zip(places) {
-        let touch = &mut touches[*place];
-        let arm = contact.law.arm();
+        let touch = &mut touches[*place as usize];
+        let arm = contact.law.arms().bending;
         let r: Local<D::Tangent, D::Tangent> = contact.r.resized();
         touch.reaction = Local { n: r.n / h, t: r.t * (1.0 / h), m: r.m * (arm / h) };
         touch.status = if touch.bond.is_some() {

@@ -45,11 +45,16 @@ pub(super) fn elastic_energy<L: Law>(law: &L, r: &Local<L::T, L::B>) -> f64 {
 }
 
 /// Energy (J) that the rows of a group took from the bodies: −Σ r·(u⁺ + u⁻)/2 for n, t and m.
-pub(super) fn group_losses<D: Dim, L: Law>(before: &Nodes<D>, after: &Nodes<D>, group: &Group<D, L>) -> [f64; 3] {
+pub(super) fn group_losses<D: Dim, L: Law>(
+    before: &[(D::Vector, D::Spin)],
+    after: &Nodes<D>,
+    group: &Group<D, L>,
+) -> [f64; 3] {
     let mut sums = [0.0; 3];
     for c in group {
-        let arm = c.law.arm();
-        let u = (before.relative_velocity(&c.link, arm) + after.relative_velocity(&c.link, arm)) * 0.5;
+        let arms = c.law.arms();
+        let [i, j] = c.link.nodes.map(|k| before[k as usize]);
+        let u = (c.link.relative_velocity(arms, i, j) + after.relative_velocity(&c.link, arms)) * 0.5;
         let rows: [f64; 3] = [c.r.n * u.n, c.r.t.dot(&u.t), c.r.m.dot(&u.m)];
         for (sum, row) in sums.iter_mut().zip(rows) {
             *sum -= row;

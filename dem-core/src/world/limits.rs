@@ -125,7 +125,7 @@ impl<D: Dim> Visitor<D> for Yielding<'_, D> {
             return;
         }
         let dry = law.shift() == 0.0;
-        let opening = nodes.relative_velocity::<L::T, L::B>(&c.link, law.arm()).n + law.bias();
+        let opening = nodes.relative_velocity::<L::T, L::B>(&c.link, law.arms()).n + law.bias();
         let speed = if dry { -opening } else { opening.abs() };
         let share = self.world.settings.step * speed / self.world.smaller(c.link.nodes);
         // a bond at its limit is about to break

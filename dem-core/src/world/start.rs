@@ -28,7 +28,6 @@ impl<D: Dim> World<D> {
                 bond: Some(k as u32),
                 reaction: reaction(bond),
                 status: TouchStatus::Bonded,
-                approach: 0.0,
             });
         }
     }

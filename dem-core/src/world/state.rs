@@ -161,7 +161,7 @@ fn save_touch<D: Dim>(touch: &Touch<D>, to: &mut Saved) {
     D::write_frame(&touch.frame, &mut to.reals);
     to.vector(&touch.point);
     to.counts.push(touch.bond.map_or(NONE, u64::from));
-    to.reals.extend([touch.gap, touch.approach, touch.reaction.n]);
+    to.reals.extend([touch.gap, touch.reaction.n]);
     to.vectors(&[touch.reaction.t, touch.reaction.m]);
     to.count(code(&TOUCHES, &touch.status));
 }
@@ -175,7 +175,7 @@ fn restored_touch<D: Dim>(bodies: usize, bonds: usize, from: &mut Reader) -> Res
         bond if bond < bonds => Some(bond as u32),
         _ => return Err(Mismatch),
     };
-    let (gap, approach, n) = (from.real()?, from.real()?, from.real()?);
+    let (gap, n) = (from.real()?, from.real()?);
     let reaction = Local { n, t: from.vector()?, m: from.vector()? };
-    Ok(Touch { pair, frame, point, gap, bond, reaction, status: coded(&TOUCHES, from)?, approach })
+    Ok(Touch { pair, frame, point, gap, bond, reaction, status: coded(&TOUCHES, from)? })
 }

@@ -8,7 +8,7 @@ use crate::body::Drive;
 use crate::bond::{Rupture, failure};
 use crate::contact::{Law, Local};
 use crate::dim::{Dim, Vect};
-use crate::problem::{ContactProblem, Group, Node, Nodes};
+use crate::problem::{ContactProblem, Group, Nodes};
 use crate::solver::{SolveReport, SolveStatus, Work};
 use thiserror::Error;
 
@@ -147,7 +147,7 @@ impl<D: Dim> World<D> {
             if limited && let Some((pair, share)) = self.yielding(&touches, &problem) {
                 return Err(StepError::Yielded { time: self.time, pair, share });
             }
-            let missed = self.missed(&mid, &motion, &touches, &problem.nodes, h);
+            let missed = self.missed(&mid, &touches, &problem.nodes, h);
             if !missed.is_empty() {
                 touches.extend(missed);
                 touches.sort_by_key(|t| t.pair);
@@ -226,7 +226,7 @@ impl<D: Dim> World<D> {
                 }
             });
         }
-        Motion { before, free }
+        Motion { before, free: free.into() }
     }
 
     /// ‖h F_ext‖ over all bodies that can move (N s).
@@ -287,15 +287,15 @@ impl<D: Dim> World<D> {
         touches: &[Touch<D>],
         nodes: &Nodes<D>,
         group: &Group<D, L>,
-        places: &[usize],
+        places: &[u32],
         round: u32,
     ) -> Vec<(f64, Break<D>)> {
         let mut found = Vec::new();
         for (contact, place) in group.iter().zip(places) {
             let law = &contact.law;
             let Some(mode) = failure(&contact.r, law.shift(), law.cone()) else { continue };
-            let touch = &touches[*place];
-            let mut u = nodes.relative_velocity::<D::Tangent, D::Tangent>(&contact.link, law.arm());
+            let touch = &touches[*place as usize];
+            let mut u = nodes.relative_velocity::<D::Tangent, D::Tangent>(&contact.link, law.arms());
             u.n += law.bias();
             let flow = u + law.compliance().times(&(contact.r - law.carried()));
             let Some(bond) = touch.bond else { continue };
@@ -305,6 +305,8 @@ impl<D: Dim> World<D> {
             let (pair, point, reaction) = (touch.pair, touch.point, touch.reaction);
             found.push((flow.dot(&flow), Break { bond, pair, mode, round, point, reaction, energy }));
         }
+        // a large problem has an order of its own
+        found.sort_by_key(|(_, failed)| failed.pair);
         found
     }
 
@@ -347,17 +349,13 @@ impl<D: Dim> World<D> {
 
     /// Enter the step in the energy ledger.
     fn book(&mut self, h: f64, motion: &Motion<D>, problem: &ContactProblem<D>, breaks: &[Break<D>]) {
-        let before = Nodes {
-            all: with_velocities(&problem.nodes, &motion.before),
-            drives: problem.nodes.drives.clone(),
-            ..problem.nodes
-        };
+        let before = &motion.before;
         let kinetic = self.kinetic_after(&problem.nodes);
         let external = self.external_work(h, motion, problem);
-        let dry = group_losses(&before, &problem.nodes, &problem.dry);
-        let smooth = group_losses(&before, &problem.nodes, &problem.frictionless);
-        let bonds: f64 = group_losses(&before, &problem.nodes, &problem.bonded).iter().sum();
-        let elastic: f64 = group_losses(&before, &problem.nodes, &problem.elastic).iter().sum();
+        let dry = group_losses(before, &problem.nodes, &problem.dry);
+        let smooth = group_losses(before, &problem.nodes, &problem.frictionless);
+        let bonds: f64 = group_losses(before, &problem.nodes, &problem.bonded).iter().sum();
+        let elastic: f64 = group_losses(before, &problem.nodes, &problem.elastic).iter().sum();
         let stored: f64 = problem.elastic.iter().map(|c| elastic_energy(&c.law, &c.r)).sum();
         let released: f64 = breaks.iter().map(|b| b.energy).sum();
         // bonds that break at the end of the step are still among those that store
@@ -443,11 +441,6 @@ impl<D: Dim> World<D> {
             rejected: 0,
         }
     }
-}
-
-/// The same nodes with other velocities.
-fn with_velocities<D: Dim>(nodes: &Nodes<D>, velocities: &[(D::Vector, D::Spin)]) -> Vec<Node<D>> {
-    nodes.all.iter().zip(velocities).map(|(node, &(velocity, spin))| Node { velocity, spin, ..*node }).collect()
 }
 
 /// Impulse of the grains on each wall (N s).

@@ -34,8 +34,6 @@ pub struct Touch<D: Dim> {
     pub reaction: Local<D::Tangent, D::Tangent>,
     /// What it did.
     pub status: TouchStatus,
-    /// Normal velocity before the step (m/s), kept where restitution needs it.
-    pub(super) approach: f64,
 }
 
 /// Number of contacts by what they did.

@@ -1,6 +1,8 @@
 //! Small worlds that the tests of this folder share.
 #![allow(dead_code)]
 
+pub mod family;
+
 use dem_core::body::{Drive, Grain, Grains, Load, Shape, Wall};
 use dem_core::bond::Rupture;
 use dem_core::contact::{BondFlow, LocalSolve};

@@ -5,7 +5,7 @@
 //! masses are scaled by a power of two has the same bits. Each contact keeps the coefficients of its rows,
 //! u = Hᵀ v = Σ h y + u₀, where u₀ comes from nodes whose velocity is given.
 
-use crate::contact::{Cone, Law, Padded, Weights};
+use crate::contact::{Arms, Cone, Law, Padded, Weights};
 use crate::dim::{Dim, Vect};
 use crate::problem::{Contact, ContactProblem, Link, Nodes, Visitor};
 use nalgebra::SMatrix;
@@ -185,7 +185,7 @@ impl Rows {
         }
         let rows = Rows { unknowns: unknowns.total, free, ..Rows::default() };
         let mut still = problem.nodes.clone();
-        for (node, free) in still.all.iter_mut().zip(&problem.free) {
+        for (node, free) in still.all.iter_mut().zip(problem.free.iter()) {
             let moves = node.inverse_mass > 0.0;
             (node.velocity, node.spin) = if moves { (D::Vector::zero(), D::Spin::zero()) } else { *free };
         }
@@ -313,7 +313,7 @@ impl Table {
 
 impl<D: Dim> Flatten<'_, D> {
     /// Add the columns of one node's unknowns to the table of a contact; returns how many.
-    fn node(&self, link: &Link<D>, arm: f64, side: usize, table: &mut Table) -> usize {
+    fn node(&self, link: &Link<D>, arms: Arms, side: usize, table: &mut Table) -> usize {
         let k = link.nodes[side] as usize;
         let nodes = &self.problem.nodes;
         let node = &nodes.all[k];
@@ -337,7 +337,12 @@ impl<D: Dim> Flatten<'_, D> {
             let mut e = D::Spin::zero();
             e[axis] = 1.0;
             let turn = D::spin_rows(&link.frame, e);
-            table.add(0.0, turn * -link.lever[side], turn * (sign * arm), self.unknowns.root(node.inverse_inertia));
+            table.add(
+                0.0,
+                turn * -arms.lever[side],
+                turn * (sign * arms.bending),
+                self.unknowns.root(node.inverse_inertia),
+            );
         }
         D::N + D::Spin::LEN
     }
@@ -346,21 +351,22 @@ impl<D: Dim> Flatten<'_, D> {
 impl<D: Dim> Visitor<D> for Flatten<'_, D> {
     fn visit<L: Law>(&mut self, _: &Nodes<D>, c: &Contact<D, L>) {
         let rows = places(L::T::LEN, L::B::LEN);
-        let (arm, unit) = (c.law.arm(), self.unknowns.unit);
+        let (arms, unit) = (c.law.arms(), self.unknowns.unit);
         let mut table = Table { rows: [[0.0; PAIR]; 5], tangents: L::T::LEN, bends: L::B::LEN, width: 0 };
-        let first = self.node(&c.link, arm, 0, &mut table);
-        let second = self.node(&c.link, arm, 1, &mut table);
+        let first = self.node(&c.link, arms, 0, &mut table);
+        let second = self.node(&c.link, arms, 1, &mut table);
         let start = self.rows.coefficients.len();
         for row in &table.rows[..rows.len()] {
             self.rows.coefficients.extend_from_slice(&row[..table.width]);
         }
         // what the given velocities of nodes that cannot move do
-        let mut given: Padded = self.still.relative_velocity::<L::T, L::B>(&c.link, arm).resized();
+        let mut given: Padded = self.still.relative_velocity::<L::T, L::B>(&c.link, arms).resized();
         given.n += c.law.bias();
         let normal: f64 = table.rows[0][..table.width].iter().map(|h| h * h).sum();
         self.normal.push(normal);
-        let size = c.link.lever[0] + if c.link.lever[1] > 0.0 { c.link.lever[1] } else { c.link.lever[0] };
-        let soft = size.powi(2 - D::N as i32);
+        let radius = |side: usize| self.problem.radii.get(c.link.nodes[side] as usize).copied();
+        // of two grains, or of a grain at a wall; in the plane stiffness knows no size
+        let soft = radius(0).map_or(1.0, |r| 1.0 / (r + radius(1).unwrap_or(r)));
         self.rows.list.push(Row {
             at: c.link.nodes.map(|k| self.unknowns.first[k as usize]),
             count: [first, second],

@@ -1,0 +1,30 @@
+//! A scene that does one thing many times, for tools that count instructions or bytes:
+//! `cost FEATURE ROWS COLUMNS sweep|step TIMES` prints the number of grains and contacts and the bytes of a contact.
+
+#[path = "../tests/common/mod.rs"]
+mod common;
+
+use common::family::{FEATURES, rows_of_disks};
+use dem_core::contact::LocalSolve;
+use dem_core::solver::sweep;
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [feature, rows, columns, what, times] = arguments.as_slice() else {
+        panic!("usage: cost FEATURE ROWS COLUMNS sweep|step TIMES");
+    };
+    let number = |text: &str| text.parse::<usize>().expect("a whole number");
+    let feature = FEATURES.iter().find(|(name, _)| name == feature).expect("a feature of common/family.rs").1;
+    let mut world = rows_of_disks(number(rows), number(columns), feature, 20);
+    let mut problem = world.contact_problem();
+    let (contacts, bytes) = (problem.len(), problem.contact_bytes());
+    if what == "sweep" {
+        rayon::scope(|_| (0..number(times)).for_each(|_| sweep(&mut problem, LocalSolve::Exact)));
+    } else {
+        drop(problem);
+        for _ in 0..number(times) {
+            world.step().expect("any residual is accepted");
+        }
+    }
+    println!("{} {contacts} {}", world.grains.len(), bytes / contacts);
+}

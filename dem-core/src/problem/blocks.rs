@@ -1,0 +1,134 @@
+//! Large problems in blocks that are swept at the same time.
+//!
+//! A block is [`BLOCK`] grains that follow one another in the list. Contacts within a block come first, block by block: no
+//! two blocks share a grain, so they are swept in parallel. Contacts between blocks and at walls come last. Within each
+//! part, contacts that follow one another share no grain if that can be (a greedy colouring), so that a processor need
+//! not wait for the contact before. All of this is fixed by the problem alone: results are the same for any number of
+//! threads. A problem of less than two blocks keeps the order of its keys.
+
+use super::{Contact, Group, Nodes, Span};
+use crate::contact::Law;
+use crate::dim::Dim;
+use rayon::prelude::*;
+
+/// Grains of a block: their velocities stay in a core's own cache.
+pub const BLOCK: usize = 4096;
+
+/// Do this where threads are near at hand, if the problem is large: else each sweep would wake them anew.
+pub(crate) fn among_threads<R: Send>(grains: usize, work: impl FnOnce() -> R + Send) -> R {
+    if blocks(grains) > 1 { rayon::scope(|_| work()) } else { work() }
+}
+
+/// Number of blocks of so many grains; one means that all is done in the order of the keys.
+fn blocks(grains: usize) -> usize {
+    if grains < 2 * BLOCK { 1 } else { grains.div_ceil(BLOCK) }
+}
+
+/// The block that holds both bodies of a pair, and the number of blocks if there is none.
+fn block_of(pair: [u32; 2], grains: usize) -> usize {
+    let [i, j] = pair.map(|k| k as usize);
+    if j < grains && i / BLOCK == j / BLOCK { i / BLOCK } else { blocks(grains) }
+}
+
+/// The order in which the contacts of these pairs, sorted, are swept; none where it is that of the list.
+pub(crate) fn order(pairs: impl ExactSizeIterator<Item = [u32; 2]>, grains: usize) -> Option<Vec<u32>> {
+    let blocks = blocks(grains);
+    if blocks == 1 {
+        return None;
+    }
+    const COLOURS: usize = 64;
+    let mut taken = vec![0u64; grains];
+    let mut colour = |pair: [u32; 2]| {
+        let [i, j] = pair.map(|k| k as usize);
+        let beside = taken.get(j).copied().unwrap_or(0);
+        let colour = (taken[i] | beside).trailing_ones().min(COLOURS as u32 - 1);
+        taken[i] |= 1 << colour;
+        if let Some(other) = taken.get_mut(j) {
+            *other |= 1 << colour;
+        }
+        colour as usize
+    };
+    let bins: Vec<u32> = pairs.map(|pair| (block_of(pair, grains) * COLOURS + colour(pair)) as u32).collect();
+    // sorted by counting: as fast as reading the list
+    let mut next = vec![0u32; (blocks + 1) * COLOURS + 1];
+    bins.iter().for_each(|bin| next[*bin as usize + 1] += 1);
+    for bin in 1..next.len() {
+        next[bin] += next[bin - 1];
+    }
+    let mut order = vec![0; bins.len()];
+    for (place, bin) in bins.iter().enumerate() {
+        let next = &mut next[*bin as usize];
+        order[*next as usize] = place as u32;
+        *next += 1;
+    }
+    Some(order)
+}
+
+/// Visit every contact of a group, those of different blocks at the same time.
+#[inline]
+pub(crate) fn for_each<D: Dim, L: Law>(
+    nodes: &mut Nodes<D>,
+    group: &mut Group<D, L>,
+    visit: impl Fn(&mut Span<D>, &mut Contact<D, L>) + Sync,
+) {
+    let grains = nodes.grains;
+    let number = blocks(grains);
+    let mut rest = group.as_mut_slice();
+    if number > 1 && !rest.is_empty() {
+        let mut parts = Vec::with_capacity(number);
+        for (block, all) in nodes.all[..grains].chunks_mut(BLOCK).enumerate() {
+            let end = rest.partition_point(|c| block_of(c.link.nodes, grains) <= block);
+            let (contacts, others) = rest.split_at_mut(end);
+            parts.push((Span { first: block * BLOCK, grains: all.len(), all, drives: &[] }, contacts));
+            rest = others;
+        }
+        parts.into_par_iter().for_each(|(mut span, contacts)| contacts.iter_mut().for_each(|c| visit(&mut span, c)));
+    }
+    let mut span = nodes.span();
+    rest.iter_mut().for_each(|c| visit(&mut span, c));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Pairs of a square lattice, sorted, and of each grain in its first row with a wall.
+    fn pairs(side: u32) -> Vec<[u32; 2]> {
+        let mut pairs = Vec::new();
+        for k in 0..side * side {
+            if k % side + 1 < side {
+                pairs.push([k, k + 1]);
+            }
+            if k / side + 1 < side {
+                pairs.push([k, k + side]);
+            }
+            if k < side {
+                pairs.push([k, side * side]);
+            }
+        }
+        pairs
+    }
+
+    #[test]
+    fn blocks_come_one_after_another_and_what_joins_them_last() {
+        let (side, pairs) = (100, pairs(100));
+        let grains = side * side;
+        let order = order(pairs.iter().copied(), grains).expect("more than one block");
+        let mut sorted = order.clone();
+        sorted.sort_unstable();
+        assert!(sorted.into_iter().eq(0..pairs.len() as u32), "a permutation");
+        let blocks: Vec<usize> = order.iter().map(|k| block_of(pairs[*k as usize], grains)).collect();
+        assert!(blocks.is_sorted());
+        assert_eq!(blocks.last(), Some(&3));
+        let joining = |p: &&[u32; 2]| p[1] as usize == grains || p[0] as usize / BLOCK != p[1] as usize / BLOCK;
+        assert_eq!(blocks.iter().filter(|b| **b == 3).count(), pairs.iter().filter(joining).count());
+        // hardly any contact waits for the one before
+        let shares = |k: &&[u32]| pairs[k[0] as usize].iter().any(|b| pairs[k[1] as usize].contains(b));
+        assert!(order.windows(2).filter(shares).count() < pairs.len() / 50);
+    }
+
+    #[test]
+    fn a_small_problem_keeps_its_order() {
+        assert_eq!(order(pairs(90).into_iter(), 90 * 90), None);
+    }
+}
