@@ -19,20 +19,20 @@ SIDES = [100, 178, 316, 562, 1000]
 
 
 def run(side, what, times, threads):
-    """Runs the scene: wall time (s) and greatest resident size (bytes)."""
+    """Runs the scene: wall time (s), numbers of grains and of contacts, greatest resident size (bytes)."""
     command = [COST, "dry", str(side), str(side), what, str(times)]
     before = time.perf_counter()
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, env=os.environ | {"RAYON_NUM_THREADS": str(threads)})
-    _, status, used = os.wait4(process.pid, 0)
-    if status:
-        raise SystemExit(f"{command} failed")
-    return time.perf_counter() - before, used.ru_maxrss * 1024
+    out = subprocess.run(
+        command, capture_output=True, text=True, check=True, env=os.environ | {"RAYON_NUM_THREADS": str(threads)}
+    )
+    grains, contacts, _, peak = map(int, out.stdout.split())
+    return time.perf_counter() - before, grains, contacts, peak * 1024
 
 
 def each(side, what, few, many, threads):
     """Time of one sweep or step (s), the best of three, and the greatest resident size (bytes)."""
     rounds = [(run(side, what, few, threads), run(side, what, many, threads)) for _ in range(3)]
-    return min((b[0] - a[0]) / (many - few) for a, b in rounds), max(b[1] for _, b in rounds)
+    return min((b[0] - a[0]) / (many - few) for a, b in rounds), max(b[3] for _, b in rounds)
 
 
 def main():
@@ -41,8 +41,7 @@ def main():
     print("| grains | contacts | sweep, 1 thread | 2 threads | step, 1 thread | 2 threads | memory |")
     print("|---|---|---|---|---|---|---|")
     for side in SIDES:
-        out = subprocess.run([COST, "dry", str(side), str(side), "sweep", "0"], capture_output=True, text=True, check=True)
-        grains, contacts, _ = map(int, out.stdout.split())
+        _, grains, contacts, _ = run(side, "sweep", 0, 1)
         many = max(2, 60_000_000 // contacts)
         sweeps = [each(side, "sweep", 0, many, threads)[0] / contacts * 1e9 for threads in (1, 2)]
         many = max(3, 3_000_000 // contacts)

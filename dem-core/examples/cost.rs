@@ -1,5 +1,6 @@
 //! A scene that does one thing many times, for tools that count instructions or bytes:
-//! `cost FEATURE ROWS COLUMNS sweep|step TIMES` prints the number of grains and contacts and the bytes of a contact.
+//! `cost FEATURE ROWS COLUMNS sweep|step TIMES` prints the number of grains and contacts, the bytes of
+//! a contact, and the greatest resident size (kB).
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -26,5 +27,12 @@ fn main() {
             world.step().expect("any residual is accepted");
         }
     }
-    println!("{} {contacts} {}", world.grains.len(), bytes / contacts);
+    println!("{} {contacts} {} {}", world.grains.len(), bytes / contacts, peak());
+}
+
+/// The greatest resident size of this process (kB), where Linux tells it; else zero.
+fn peak() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    line.and_then(|line| line.trim().strip_suffix(" kB")?.parse().ok()).unwrap_or(0)
 }

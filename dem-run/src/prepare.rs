@@ -6,7 +6,7 @@
 //! so little thrust that grains which carry the load touch to rounding, walls included. Time has no meaning here (h = 1), so the
 //! packing of a sample scales exactly with its lengths.
 
-use crate::scene::{Diameters, Lattice, Preparation, RandomSample};
+use crate::scene::{Diameters, Lattice, Preparation, RandomSample, Section};
 use dem_core::body::{Drive, Grain, Grains, Shape, Wall};
 use dem_core::bond::Rupture;
 use dem_core::contact::{BondFlow, LocalSolve};
@@ -16,6 +16,7 @@ use dem_core::world::{Settings, StepError, World};
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
+use std::marker::PhantomData;
 use std::sync::Arc;
 use thiserror::Error;
 
@@ -120,13 +121,94 @@ fn draw_radii(diameters: &Diameters, count: usize, rng: &mut Pcg64) -> Vec<f64> 
     (0..count).map(|_| 0.5 * draw()).collect()
 }
 
-/// A random packing in a box that starts at the origin, `width` wide and (in 3D) `depth` deep; the last axis is up.
+/// The box of a packing, which starts at the origin; the last axis is up.
+struct Container<D: Dim> {
+    section: Section,
+    /// Width and depth (m).
+    sides: [f64; 2],
+    space: PhantomData<D>,
+}
+
+impl<D: Dim> Container<D> {
+    fn of(sample: &RandomSample) -> Self {
+        let sides = [sample.width, sample.depth.unwrap_or(sample.width)];
+        Self { section: sample.section, sides, space: PhantomData }
+    }
+
+    /// Area (m²) in 3D, width (m) in 2D.
+    fn floor(&self) -> f64 {
+        match self.section {
+            Section::Rectangle => self.sides[..D::N - 1].iter().product(),
+            Section::Circle => std::f64::consts::PI * 0.25 * self.sides[0] * self.sides[0],
+        }
+    }
+
+    /// Floor and sides, without friction.
+    fn walls(&self) -> Vec<Wall<D>> {
+        let up = D::N - 1;
+        let plane = |normal, place| Wall::fixed(Shape::Plane { normal }, place, 0.0);
+        let mut walls = vec![plane(unit::<D>(up, 1.0), D::Vector::zero())];
+        match self.section {
+            Section::Rectangle => {
+                for axis in 0..up {
+                    walls.push(plane(unit::<D>(axis, 1.0), D::Vector::zero()));
+                    walls.push(plane(unit::<D>(axis, -1.0), unit::<D>(axis, self.sides[axis])));
+                }
+            }
+            Section::Circle => {
+                let radius = 0.5 * self.sides[0];
+                let axis = Some(unit::<D>(up, 1.0));
+                let middle = unit::<D>(0, radius) + unit::<D>(1, radius);
+                walls.push(Wall::fixed(Shape::Round { radius, inside: true, axis }, middle, 0.0));
+            }
+        }
+        walls
+    }
+
+    /// The places of a layer: the lower corners of cells at least `size` (m) wide, and their widths (m).
+    fn cells(&self, size: f64) -> (Vec<D::Vector>, [f64; 2]) {
+        let mut number = [1; 2];
+        let mut spacing = self.sides;
+        for axis in 0..D::N - 1 {
+            number[axis] = ((self.sides[axis] / size) as usize).max(1);
+            spacing[axis] = self.sides[axis] / number[axis] as f64;
+        }
+        let corner = |k: usize| {
+            unit::<D>(0, (k % number[0]) as f64 * spacing[0])
+                + if D::N == 3 { unit::<D>(1, (k / number[0]) as f64 * spacing[1]) } else { D::Vector::zero() }
+        };
+        let corners = (0..number[0] * number[1]).map(corner);
+        match self.section {
+            Section::Rectangle => (corners.collect(), spacing),
+            Section::Circle => {
+                // cells whose corners all lie in the circle; one in the middle if there is none
+                let radius = 0.5 * self.sides[0];
+                let far = |x: f64| (x - radius).abs().max((x + spacing[0] - radius).abs());
+                let inside: Vec<_> = corners.filter(|x| far(x[0]).hypot(far(x[1])) <= radius).collect();
+                if inside.is_empty() {
+                    let side = radius * std::f64::consts::SQRT_2;
+                    let low = radius - 0.5 * side;
+                    return (vec![unit::<D>(0, low) + unit::<D>(1, low)], [side; 2]);
+                }
+                (inside, spacing)
+            }
+        }
+    }
+}
+
+fn unit<D: Dim>(axis: usize, length: f64) -> D::Vector {
+    let mut e = D::Vector::zero();
+    e[axis] = length;
+    e
+}
+
+/// A random packing.
 pub fn pack<D: Dim>(sample: &RandomSample, seed: u64, watch: Watch) -> Result<Packing<D>, PrepareError> {
     let mut rng = Pcg64::seed_from_u64(seed);
     let mut radii = draw_radii(&sample.diameter, sample.count, &mut rng);
     let largest = 2.0 * radii.iter().copied().fold(0.0, f64::max);
-    let sides = [sample.width, sample.depth.unwrap_or(sample.width)];
-    for side in &sides[..D::N - 1] {
+    let container = Container::<D>::of(sample);
+    for side in &container.sides[..D::N - 1] {
         if *side < largest {
             return Err(PrepareError::TooNarrow { width: *side, diameter: largest });
         }
@@ -138,11 +220,11 @@ pub fn pack<D: Dim>(sample: &RandomSample, seed: u64, watch: Watch) -> Result<Pa
     let mut reached = 0.0;
     for attempt in 0..MOST_PACKINGS {
         radii.shuffle(&mut rng);
-        let (grains, top) = scatter::<D>(&radii, &sides, &mut rng);
-        let mut world = packing_world(grains, &sides, top, from_top);
+        let (grains, top) = scatter::<D>(&radii, &container, &mut rng);
+        let mut world = packing_world(grains, &container, top, from_top);
         let share = |done: f64| (attempt as f64 + done) / MOST_PACKINGS as f64;
         settle(&mut world, from_top, &mut |done| watch(if attempt == 0 { done } else { share(done) }))?;
-        let packing = measured(&world, &sides);
+        let packing = measured(&world, &container);
         if packing.solid_fraction >= wanted {
             return Ok(packing);
         }
@@ -152,52 +234,40 @@ pub fn pack<D: Dim>(sample: &RandomSample, seed: u64, watch: Watch) -> Result<Pa
 }
 
 /// The grains of a packing and their solid fraction under the highest of them.
-fn measured<D: Dim>(world: &World<D>, sides: &[f64; 2]) -> Packing<D> {
+fn measured<D: Dim>(world: &World<D>, container: &Container<D>) -> Packing<D> {
     let balls: Vec<Ball<D>> = world.grains.position.iter().copied().zip(world.grains.radius.iter().copied()).collect();
     let height = balls.iter().map(|(x, r)| x[D::N - 1] + r).fold(0.0, f64::max);
-    let box_volume = sides[..D::N - 1].iter().product::<f64>() * height;
-    let solid_fraction = balls.iter().map(|(_, r)| D::volume(*r)).sum::<f64>() / box_volume;
+    let volume = container.floor() * height;
+    let solid_fraction = balls.iter().map(|(_, r)| D::volume(*r)).sum::<f64>() / volume;
     Packing { balls, solid_fraction }
 }
 
 /// Grains on a loose grid with random offsets, and the height above them all.
-fn scatter<D: Dim>(radii: &[f64], sides: &[f64; 2], rng: &mut Pcg64) -> (Grains<D>, f64) {
-    let largest = 2.0 * radii.iter().copied().fold(0.0, f64::max);
-    let across: Vec<usize> = sides[..D::N - 1].iter().map(|side| ((side / (1.05 * largest)) as usize).max(1)).collect();
-    let layer: usize = across.iter().product();
-    let spacing: Vec<f64> = across.iter().zip(sides).map(|(n, side)| side / *n as f64).collect();
-    let rise = 1.05 * largest;
+fn scatter<D: Dim>(radii: &[f64], container: &Container<D>, rng: &mut Pcg64) -> (Grains<D>, f64) {
+    let rise = 1.05 * 2.0 * radii.iter().copied().fold(0.0, f64::max);
+    let (cells, widths) = container.cells(rise);
     let place = |(k, r): (usize, &f64)| {
-        let mut x = D::Vector::zero();
-        let mut rest = k % layer;
+        let mut x = cells[k % cells.len()];
         for axis in 0..D::N - 1 {
-            let slack = spacing[axis] - 2.0 * r;
-            x[axis] = (rest % across[axis]) as f64 * spacing[axis] + r + slack * rng.random::<f64>();
-            rest /= across[axis];
+            let slack = widths[axis] - 2.0 * r;
+            let offset = slack * rng.random::<f64>();
+            // a grain wider than the square in a narrow tube stands in its middle
+            x[axis] = if slack >= 0.0 { x[axis] + r + offset } else { x[axis] + 0.5 * widths[axis] };
         }
-        x[D::N - 1] = (k / layer) as f64 * rise + r + (rise - 2.0 * r) * rng.random::<f64>();
+        x[D::N - 1] = (k / cells.len()) as f64 * rise + r + (rise - 2.0 * r) * rng.random::<f64>();
         Grain::at_rest(x, *r, 1.0)
     };
     let grains: Grains<D> = radii.iter().enumerate().map(place).collect();
-    let top = radii.len().div_ceil(layer) as f64 * rise;
+    let top = radii.len().div_ceil(cells.len()) as f64 * rise;
     (grains, top)
 }
 
 /// A frictionless box: floor and sides fixed, and either a lid that is pressed down or gravity.
-fn packing_world<D: Dim>(grains: Grains<D>, sides: &[f64; 2], top: f64, from_top: bool) -> World<D> {
-    let unit = |axis: usize, sign: f64| {
-        let mut e = D::Vector::zero();
-        e[axis] = sign;
-        e
-    };
+fn packing_world<D: Dim>(grains: Grains<D>, container: &Container<D>, top: f64, from_top: bool) -> World<D> {
     let up = D::N - 1;
-    let mut walls = vec![Wall::fixed(Shape::Plane { normal: unit(up, 1.0) }, D::Vector::zero(), 0.0)];
-    for axis in 0..up {
-        walls.push(Wall::fixed(Shape::Plane { normal: unit(axis, 1.0) }, D::Vector::zero(), 0.0));
-        walls.push(Wall::fixed(Shape::Plane { normal: unit(axis, -1.0) }, unit(axis, sides[axis]), 0.0));
-    }
+    let mut walls = container.walls();
     if from_top {
-        walls.push(Wall::fixed(Shape::Plane { normal: unit(up, -1.0) }, unit(up, top), 0.0));
+        walls.push(Wall::fixed(Shape::Plane { normal: unit::<D>(up, -1.0) }, unit::<D>(up, top), 0.0));
     }
     let settings = Settings {
         step: 1.0,
@@ -269,4 +339,40 @@ fn settle<D: Dim>(world: &mut World<D>, from_top: bool, watch: Watch) -> Result<
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Compaction;
+    use dem_core::dim::D3;
+
+    fn cylinder(count: usize, width: f64) -> RandomSample {
+        RandomSample {
+            count,
+            diameter: Diameters::Constant(2e-3),
+            section: Section::Circle,
+            width,
+            depth: None,
+            preparation: Preparation::Compaction(Compaction { solid_fraction: 0.1 }),
+        }
+    }
+
+    #[test]
+    fn a_cylinder_is_filled_to_its_wall_and_not_beyond() {
+        let sample = cylinder(200, 0.012);
+        let packing = pack::<D3>(&sample, 3, &mut |_| true).expect("a packing");
+        assert!(packing.solid_fraction > 0.5, "{}", packing.solid_fraction);
+        let reach = |(x, r): &Ball<D3>| (x[0] - 6e-3).hypot(x[1] - 6e-3) + r;
+        let far = packing.balls.iter().map(reach).fold(0.0, f64::max);
+        assert!((far - 6e-3).abs() < 1e-9, "the outermost grains touch the wall: {far}");
+        assert!(packing.balls.iter().all(|(x, r)| x[2] >= r * (1.0 - 1e-9)));
+    }
+
+    #[test]
+    fn spheres_stack_in_a_tube_narrower_than_two() {
+        let packing = pack::<D3>(&cylinder(5, 2.2e-3), 1, &mut |_| true).expect("a packing");
+        let highest = packing.balls.iter().map(|(x, r)| x[2] + r).fold(0.0, f64::max);
+        assert!((0.0095..0.0101).contains(&highest), "five spheres of 2 mm: {highest}");
+    }
 }

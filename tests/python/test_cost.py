@@ -48,7 +48,7 @@ def cost(program):
     """For each feature: bytes of a contact, and instructions of a contact in a sweep and in a step of 20 sweeps."""
 
     def measured(feature):
-        _, contacts, size = map(int, run(program, feature, ROWS, COLUMNS, "sweep", 0).stdout.split())
+        _, contacts, size, _ = map(int, run(program, feature, ROWS, COLUMNS, "sweep", 0).stdout.split())
         each = {"bytes": size}
         for what, few, many in [("sweep", 10, 60), ("step", 2, 12)]:
             spent = counted(program, feature, what, many) - counted(program, feature, what, few)

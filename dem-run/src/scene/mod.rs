@@ -39,7 +39,8 @@ pub use model::{
     Stop, Time, TravelFrom, WallTravel, Young,
 };
 pub use sample::{
-    Compaction, Deposition, Diameters, GrainSpec, Lattice, Preparation, RandomSample, Sample, SampleFile, UniformRange,
+    Compaction, Deposition, Diameters, GrainSpec, Lattice, Preparation, RandomSample, Sample, SampleFile, Section,
+    UniformRange,
 };
 pub use solver::{GaussSeidel, LocalSolve, Newton, Solver, SolverKind, Start};
 pub use validate::validate;

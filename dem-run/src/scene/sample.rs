@@ -27,13 +27,33 @@ pub struct RandomSample {
     pub count: usize,
     /// Distribution of the diameters (m).
     pub diameter: Diameters,
-    /// Width of the box, along x (m).
+    /// Shape of the box seen from above, in 3D only.
+    #[serde(default, skip_serializing_if = "Section::is_rectangle")]
+    pub section: Section,
+    /// Width of the box, along x (m): the diameter of a circle.
     pub width: f64,
-    /// Depth of the box, along y, in 3D only (m).
+    /// Depth of the box, along y (m), in 3D only and not of a circle.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth: Option<f64>,
     /// How the packing is made.
     pub preparation: Preparation,
+}
+
+/// The shape of a box seen from above.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Section {
+    /// `width` by `depth`.
+    #[default]
+    Rectangle,
+    /// A circle of diameter `width`: a cylinder, whose axis goes through x = y = `width` / 2.
+    Circle,
+}
+
+impl Section {
+    fn is_rectangle(&self) -> bool {
+        *self == Self::Rectangle
+    }
 }
 
 /// A distribution of diameters.

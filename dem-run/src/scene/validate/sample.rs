@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::report::{MAX_GRAINS, Number, Report};
 use crate::scene::model::Scene;
-use crate::scene::sample::{Diameters, GrainSpec, Lattice, Preparation, RandomSample, Sample};
+use crate::scene::sample::{Diameters, GrainSpec, Lattice, Preparation, RandomSample, Sample, Section};
 
 /// Checks `sample`.
 pub(super) fn sample(report: &mut Report, scene: &Scene) {
@@ -38,10 +38,18 @@ fn random_sample(report: &mut Report, random: &RandomSample) {
     report.count("sample.random.count", random.count);
     diameters(report, &random.diameter);
     report.positive("sample.random.width", random.width, "m");
-    match (report.dimension, random.depth) {
-        (2, depth) => report.absent("sample.random.depth", depth, "a box in 2D has a width only"),
-        (_, Some(depth)) => report.positive("sample.random.depth", depth, "m"),
-        (_, None) => report.wrong("sample.random.depth", "nothing", "a finite number > 0 (m), needed in 3D"),
+    match (report.dimension, random.section, random.depth) {
+        (2, section, depth) => {
+            report.absent("sample.random.depth", depth, "a box in 2D has a width only");
+            if section == Section::Circle {
+                report.wrong("sample.random.section", "circle", "rectangle: a box in 2D has a width only");
+            }
+        }
+        (_, Section::Circle, depth) => report.absent("sample.random.depth", depth, "a circle has a width only"),
+        (_, Section::Rectangle, Some(depth)) => report.positive("sample.random.depth", depth, "m"),
+        (_, Section::Rectangle, None) => {
+            report.wrong("sample.random.depth", "nothing", "a finite number > 0 (m), needed in 3D");
+        }
     }
     let largest = random.diameter.max();
     for (path, size) in [("sample.random.width", Some(random.width)), ("sample.random.depth", random.depth)] {
