@@ -63,7 +63,7 @@ def main():
     for axes in (left, right):
         axes.set(xscale="log", xlabel="grains")
         axes.grid(alpha=0.3)
-    left.legend()
+    left.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2)
     figure.savefig(ROOT / "docs/images/cost-size.png", dpi=120)
 
 
