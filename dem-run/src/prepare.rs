@@ -16,7 +16,6 @@ use dem_core::world::{Settings, StepError, World};
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use std::marker::PhantomData;
 use std::sync::Arc;
 use thiserror::Error;
 
@@ -122,21 +121,20 @@ fn draw_radii(diameters: &Diameters, count: usize, rng: &mut Pcg64) -> Vec<f64> 
 }
 
 /// The box of a packing, which starts at the origin; the last axis is up.
-struct Container<D: Dim> {
+struct Container {
     section: Section,
     /// Width and depth (m).
     sides: [f64; 2],
-    space: PhantomData<D>,
 }
 
-impl<D: Dim> Container<D> {
+impl Container {
     fn of(sample: &RandomSample) -> Self {
         let sides = [sample.width, sample.depth.unwrap_or(sample.width)];
-        Self { section: sample.section, sides, space: PhantomData }
+        Self { section: sample.section, sides }
     }
 
     /// Area (m²) in 3D, width (m) in 2D.
-    fn floor(&self) -> f64 {
+    fn floor<D: Dim>(&self) -> f64 {
         match self.section {
             Section::Rectangle => self.sides[..D::N - 1].iter().product(),
             Section::Circle => std::f64::consts::PI * 0.25 * self.sides[0] * self.sides[0],
@@ -144,7 +142,7 @@ impl<D: Dim> Container<D> {
     }
 
     /// Floor and sides, without friction.
-    fn walls(&self) -> Vec<Wall<D>> {
+    fn walls<D: Dim>(&self) -> Vec<Wall<D>> {
         let up = D::N - 1;
         let plane = |normal, place| Wall::fixed(Shape::Plane { normal }, place, 0.0);
         let mut walls = vec![plane(unit::<D>(up, 1.0), D::Vector::zero())];
@@ -166,7 +164,7 @@ impl<D: Dim> Container<D> {
     }
 
     /// The places of a layer: the lower corners of cells at least `size` (m) wide, and their widths (m).
-    fn cells(&self, size: f64) -> (Vec<D::Vector>, [f64; 2]) {
+    fn cells<D: Dim>(&self, size: f64) -> (Vec<D::Vector>, [f64; 2]) {
         let mut number = [1; 2];
         let mut spacing = self.sides;
         for axis in 0..D::N - 1 {
@@ -207,7 +205,7 @@ pub fn pack<D: Dim>(sample: &RandomSample, seed: u64, watch: Watch) -> Result<Pa
     let mut rng = Pcg64::seed_from_u64(seed);
     let mut radii = draw_radii(&sample.diameter, sample.count, &mut rng);
     let largest = 2.0 * radii.iter().copied().fold(0.0, f64::max);
-    let container = Container::<D>::of(sample);
+    let container = Container::of(sample);
     for side in &container.sides[..D::N - 1] {
         if *side < largest {
             return Err(PrepareError::TooNarrow { width: *side, diameter: largest });
@@ -234,18 +232,18 @@ pub fn pack<D: Dim>(sample: &RandomSample, seed: u64, watch: Watch) -> Result<Pa
 }
 
 /// The grains of a packing and their solid fraction under the highest of them.
-fn measured<D: Dim>(world: &World<D>, container: &Container<D>) -> Packing<D> {
+fn measured<D: Dim>(world: &World<D>, container: &Container) -> Packing<D> {
     let balls: Vec<Ball<D>> = world.grains.position.iter().copied().zip(world.grains.radius.iter().copied()).collect();
     let height = balls.iter().map(|(x, r)| x[D::N - 1] + r).fold(0.0, f64::max);
-    let volume = container.floor() * height;
+    let volume = container.floor::<D>() * height;
     let solid_fraction = balls.iter().map(|(_, r)| D::volume(*r)).sum::<f64>() / volume;
     Packing { balls, solid_fraction }
 }
 
 /// Grains on a loose grid with random offsets, and the height above them all.
-fn scatter<D: Dim>(radii: &[f64], container: &Container<D>, rng: &mut Pcg64) -> (Grains<D>, f64) {
+fn scatter<D: Dim>(radii: &[f64], container: &Container, rng: &mut Pcg64) -> (Grains<D>, f64) {
     let rise = 1.05 * 2.0 * radii.iter().copied().fold(0.0, f64::max);
-    let (cells, widths) = container.cells(rise);
+    let (cells, widths) = container.cells::<D>(rise);
     let place = |(k, r): (usize, &f64)| {
         let mut x = cells[k % cells.len()];
         for axis in 0..D::N - 1 {
@@ -263,7 +261,7 @@ fn scatter<D: Dim>(radii: &[f64], container: &Container<D>, rng: &mut Pcg64) -> 
 }
 
 /// A frictionless box: floor and sides fixed, and either a lid that is pressed down or gravity.
-fn packing_world<D: Dim>(grains: Grains<D>, container: &Container<D>, top: f64, from_top: bool) -> World<D> {
+fn packing_world<D: Dim>(grains: Grains<D>, container: &Container, top: f64, from_top: bool) -> World<D> {
     let up = D::N - 1;
     let mut walls = container.walls();
     if from_top {

@@ -10,17 +10,22 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 
 
+def built(*what):
+    """Builds in release: the paths of the programs by their names."""
+    build = [os.environ.get("CARGO", "cargo"), "build", "--release", "--locked", *what]
+    output = subprocess.run(
+        build + ["--message-format=json-render-diagnostics"], cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True
+    ).stdout
+    artifacts = [json.loads(line) for line in output.splitlines()]
+    return {a["target"]["name"]: a["executable"] for a in artifacts if a.get("executable")}
+
+
 @pytest.fixture(scope="session")
 def programs():
     """The paths of `dem-run` and `dem-post`: `scripts/test` says where they are, or they are built."""
     if "DEM_PROGRAMS" in os.environ:
         return {name: Path(os.environ["DEM_PROGRAMS"]) / name for name in ("dem-run", "dem-post")}
-    build = [os.environ.get("CARGO", "cargo"), "build", "--release", "--locked", "-p", "dem-run", "-p", "dem-post"]
-    built = subprocess.run(
-        build + ["--message-format=json-render-diagnostics"], cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True
-    )
-    artifacts = [json.loads(line) for line in built.stdout.splitlines()]
-    return {a["target"]["name"]: a["executable"] for a in artifacts if a.get("executable")}
+    return built("-p", "dem-run", "-p", "dem-post")
 
 
 def runner(program):

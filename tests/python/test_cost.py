@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
-from conftest import ROOT
+from conftest import built
 
 RECORD = Path(__file__).with_name("cost.json")
 FEATURES = ["frictionless", "dry", "restitution", "bonded", "elastic"]
@@ -23,11 +23,7 @@ ROWS, COLUMNS = "20", "40"
 def program():
     if "DEM_PROGRAMS" in os.environ:
         return Path(os.environ["DEM_PROGRAMS"]) / "examples/cost"
-    build = [os.environ.get("CARGO", "cargo"), "build", "--release", "--locked", "-p", "dem-core", "--example", "cost"]
-    built = subprocess.run(
-        build + ["--message-format=json-render-diagnostics"], cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True
-    )
-    return [json.loads(line)["executable"] for line in built.stdout.splitlines() if '"executable":"' in line][-1]
+    return built("-p", "dem-core", "--example", "cost")["cost"]
 
 
 def run(*command):

@@ -12,7 +12,7 @@ use crate::dim::Dim;
 use rayon::prelude::*;
 
 /// Grains of a block: their velocities stay in a core's own cache.
-pub const BLOCK: usize = 4096;
+const BLOCK: usize = 4096;
 
 /// Do this where threads are near at hand, if the problem is large: else each sweep would wake them anew.
 pub(crate) fn among_threads<R: Send>(grains: usize, work: impl FnOnce() -> R + Send) -> R {
