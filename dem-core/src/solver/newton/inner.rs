@@ -2,10 +2,10 @@
 
 use super::Newton;
 use super::corrector::{correct, operator};
+use super::guess::Guess;
 use super::krylov::gmres;
 use super::rows::{Operator, Row, Rows};
-use crate::contact::{Local, Padded};
-use crate::dim::Vect;
+use crate::contact::Padded;
 
 /// GMRES iterations beyond those of a fresh factor that a kept one may cost in all before it is renewed.
 const WASTE: usize = 20;
@@ -13,15 +13,17 @@ const WASTE: usize = 20;
 const TRUST: f64 = 1e-3;
 /// Linear solves by GMRES after one that the factor alone was trusted with and failed.
 const DISTRUST: usize = 100;
-/// Relative distance to a limit that counts as at it in a guess.
-const BEYOND: f64 = 1e-9;
+/// Least tolerance of a linear solve: where one may suffice, and where it must be followed by another.
+const TIGHT: f64 = 1e-12;
+const LOOSE: f64 = 1e-4;
 /// Most GMRES iterations of one linear solve.
 const MOST_KRYLOV: usize = 80;
 
 /// State of one solve.
 pub(super) struct Iterate {
     pub y: Vec<f64>,
-    velocities: Vec<Padded>,
+    /// Relative velocities of the contacts at `y`.
+    pub velocities: Vec<Padded>,
     /// The corrector's reactions at `y`.
     pub reactions: Vec<Padded>,
     /// F(y), and its norm.
@@ -57,13 +59,13 @@ impl Iterate {
 }
 
 impl Newton {
-    /// Solve the inner problem for fixed multipliers from `state`, in at most `patience` iterations. `guess` are
-    /// reactions whose active set is tried first. Returns the iterations made and whether F vanished.
+    /// Solve the inner problem for fixed multipliers from `state`, in at most `patience` iterations; the active set of
+    /// `guess` is tried first. Returns the iterations made and whether F vanished.
     pub(super) fn inner(
         &mut self,
         rows: &Rows,
         state: &mut Iterate,
-        guess: Option<&[Padded]>,
+        guess: Option<&Guess>,
         patience: u64,
     ) -> (u64, bool) {
         for iteration in 0..patience {
@@ -106,11 +108,13 @@ impl Newton {
     }
 
     /// The Newton direction −J⁻¹ F, by the factor at hand or GMRES on it, renewed if it serves badly.
-    fn direction(&mut self, rows: &Rows, state: &Iterate, guess: Option<&[Padded]>, target: f64) -> Option<Direction> {
+    fn direction(&mut self, rows: &Rows, state: &Iterate, guess: Option<&Guess>, target: f64) -> Option<Direction> {
         let (mut right, points) = linearise(rows, state, guess);
         right.iter_mut().for_each(|f| *f = -*f);
         let norm = norm2(&right).sqrt();
-        let tolerance = (0.1 * target / norm).clamp(1e-12, 1e-3);
+        // in space slips turn with every iteration, and no linear solve can foresee by how much
+        let least = if guess.is_none() && rows.in_space() { LOOSE } else { TIGHT };
+        let tolerance = (0.1 * target / norm).clamp(least, 1e-3);
         let serves = !self.renew && self.factor.serves(rows.unknowns);
         if serves && self.trusted {
             self.factor.solve(&mut right);
@@ -149,31 +153,17 @@ pub(super) fn norm2(x: &[f64]) -> f64 {
     x.iter().map(|x| x * x).sum()
 }
 
-/// The velocity at which the corrector gives the guessed reaction. One at its limit is moved beyond it, where rounding
-/// cannot make it stick.
-fn guessed_velocity(row: &Row, guess: &Padded) -> Padded {
-    let beyond = |limit: f64, size: f64| if size >= (1.0 - BEYOND) * limit { 1.0 + 2.0 * BEYOND } else { 1.0 };
-    let guess = Local {
-        n: guess.n,
-        t: guess.t * beyond(row.cone.mu * (guess.n + row.shift), Vect::norm(&guess.t)),
-        m: guess.m * beyond(row.cone.nu * (guess.n + row.shift), Vect::norm(&guess.m)),
-    };
-    let mut u = row.weights.times(&row.multiplier) + row.compliance.times(&row.carried) - row.metric().times(&guess);
-    u.n -= row.lag.unwrap_or(0.0);
-    u
-}
-
 /// F, and for each contact the velocity and reaction that its operator A belongs to: those of the state, or with a
 /// guess those of the guessed active set, from which F is then extrapolated.
-fn linearise(rows: &Rows, state: &Iterate, guess: Option<&[Padded]>) -> (Vec<f64>, Vec<(Padded, Padded)>) {
+fn linearise(rows: &Rows, state: &Iterate, guess: Option<&Guess>) -> (Vec<f64>, Vec<(Padded, Padded)>) {
     let Some(guess) = guess else {
         let points = state.velocities.iter().copied().zip(state.reactions.iter().copied());
         return (state.gradient.clone(), points.collect());
     };
     let mut gradient: Vec<f64> = state.y.iter().zip(&rows.free).map(|(y, f)| y - f).collect();
     let mut points = Vec::with_capacity(rows.list.len());
-    for ((row, u), guess) in rows.list.iter().zip(&state.velocities).zip(guess) {
-        let from = guessed_velocity(row, guess);
+    for (k, (row, u)) in rows.list.iter().zip(&state.velocities).enumerate() {
+        let from = guess.velocity(k, row);
         let at = correct(row, &from);
         let mut r = at;
         if let Some(a) = operator(row, &from, &at, false) {

@@ -18,6 +18,7 @@
 //! Acary, Armand, Nguyen & Shpakovych, Optim. Methods Softw. 39, 2024.
 
 use super::factor::Factor;
+use super::guess::Guess;
 use super::rows::{Operator, Row, Rows};
 use super::solvable::Solvable;
 use super::{Found, Newton, STALL_SWEEPS, SolveReport, net_change};
@@ -105,11 +106,6 @@ struct Point {
 struct Defect {
     momenta: Vec<f64>,
     slacks: Vec<Rays>,
-}
-
-/// Whether the method serves these rows: contacts in the plane.
-pub(super) fn serves(rows: &Rows) -> bool {
-    rows.list.iter().all(|row| !row.rows.contains(&2) && !row.rows.contains(&4))
 }
 
 /// The term μ‖u_t‖ + ν‖u_m‖ of dry friction at the velocities of `y`.
@@ -347,7 +343,7 @@ impl Newton {
             problem.write_back(&reactions);
             problem.velocities_from_reactions();
             let (residual, load_error) = (problem.residual(), net_change(&rows, &last, &reactions));
-            let mut guess = reactions.clone();
+            let mut guess = Guess::of(reactions.clone());
             if let Some(report) = self.rounds(problem, &mut base.clone(), &mut guess, iterations) {
                 return Some(report);
             }

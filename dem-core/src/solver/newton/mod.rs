@@ -21,6 +21,7 @@ mod approach;
 mod assembled;
 mod corrector;
 mod factor;
+mod guess;
 mod inner;
 mod interior;
 mod krylov;
@@ -35,6 +36,7 @@ use crate::problem::ContactProblem;
 use crate::problem::assembled::Assembled;
 use crate::saved::{Mismatch, Reader, Saved};
 use factor::Factor;
+use guess::{Guess, Slips};
 use inner::{Iterate, norm2};
 use rows::Rows;
 use solvable::Solvable;
@@ -97,6 +99,8 @@ pub struct Newton {
     /// GMRES iterations with a fresh factor, and those beyond it since.
     floor: usize,
     wasted: usize,
+    /// How far contacts slipped in the last solve.
+    slips: Slips,
     /// Factorisations before this solve.
     made_before: u64,
     /// Rests of the guess of the active set, and of the path of the softer metric.
@@ -153,6 +157,7 @@ impl Newton {
             distrust: 0,
             floor: 0,
             wasted: 0,
+            slips: Slips::default(),
             made_before: 0,
             rest: Rest::NONE,
             soft_rest: Rest::NONE,
@@ -197,16 +202,21 @@ impl Newton {
         &mut self,
         problem: &mut impl Solvable,
         rows: &mut Rows,
-        guess: &mut Vec<Padded>,
+        guess: &mut Guess,
         iterations: &mut u64,
     ) -> Option<SolveReport> {
+        guess.beyond = self.slips.in_rows(rows);
+        let mut first = true;
         let (mut last_error, mut last_change, mut softened, mut made_in_all) = (f64::INFINITY, 1.0, 0, 0);
         loop {
-            let mut state = Iterate::from_reactions(rows, guess);
+            let mut state = Iterate::from_reactions(rows, &guess.reactions);
             let (made, solved) = self.inner(rows, &mut state, Some(guess), PATIENCE);
             *iterations += made.max(1);
             if !solved {
                 return None;
+            }
+            if std::mem::take(&mut first) {
+                self.slips = Slips::of(rows, &state);
             }
             problem.write_back(&state.reactions);
             problem.velocities_from_reactions();
@@ -217,7 +227,7 @@ impl Newton {
             last_change = change;
             let error = problem.residual();
             rows.list.iter_mut().zip(&state.reactions).for_each(|(row, r)| row.multiplier = *r);
-            *guess = state.reactions;
+            *guess = Guess::of(state.reactions);
             let report = self.report(*iterations, error, load_error);
             if report.status == SolveStatus::Converged {
                 return Some(report);
@@ -269,13 +279,26 @@ impl Newton {
     }
 
     /// Rounds at the largest penalty, from the active set of the reactions that the problem brought along, bettered by
-    /// some sweeps; none if they run in circles.
+    /// some sweeps; none if they run in circles. In space sweeps that have not converged spoil the directions of slip, so
+    /// the reactions are tried as they are first.
     fn try_guess(&mut self, problem: &mut impl Solvable, rows: &Rows, iterations: &mut u64) -> Option<SolveReport> {
         let cold = rows.list.iter().all(|row| row.multiplier.n == 0.0);
-        let mut guess = problem.swept(if cold { COLD_SWEEPS } else { SWEEPS });
-        let report = self.rounds(problem, &mut self.started(rows), &mut guess, iterations);
-        self.renew |= report.is_none();
-        report
+        let tries = if cold {
+            &[COLD_SWEEPS][..]
+        } else if rows.in_space() {
+            &[0, SWEEPS][..]
+        } else {
+            &[SWEEPS]
+        };
+        for sweeps in tries {
+            let mut guess = Guess::of(problem.swept(*sweeps));
+            let report = self.rounds(problem, &mut self.started(rows), &mut guess, iterations);
+            self.renew |= report.is_none();
+            if report.is_some() {
+                return report;
+            }
+        }
+        None
     }
 
     /// The solution that is found without a guess: as the stiff limit if its active set gives that, else as it is.
@@ -286,11 +309,11 @@ impl Newton {
         iterations: &mut u64,
     ) -> Option<SolveReport> {
         let started = self.started(rows);
-        if interior::serves(rows) {
+        if !rows.in_space() {
             return self.interior(problem, &started, iterations);
         }
         let found = self.approach(problem, rows, iterations)?;
-        let mut guess = found.reactions.clone();
+        let mut guess = Guess::of(found.reactions.clone());
         if !rows.mostly_dry()
             && let Some(report) = self.rounds(problem, &mut started.clone(), &mut guess, iterations)
         {
@@ -318,6 +341,7 @@ impl Newton {
             to.count(rest.left as usize);
             to.count(rest.next as usize);
         }
+        self.slips.save(to);
         self.factor.save(to);
     }
 
@@ -330,6 +354,7 @@ impl Newton {
         for rest in [&mut self.rest, &mut self.soft_rest] {
             *rest = Rest { left: from.count()? as u64, next: from.count()? as u64 };
         }
+        self.slips = Slips::restored(from)?;
         self.factor = Factor::restored(from)?;
         Ok(())
     }

@@ -204,6 +204,11 @@ impl Rows {
         2 * self.list.iter().filter(|row| !row.associated).count() > self.list.len()
     }
 
+    /// Whether a contact has rows in two tangential directions.
+    pub fn in_space(&self) -> bool {
+        self.list.iter().any(|row| row.rows.contains(&2))
+    }
+
     /// Divide ρ of all rows by `factor`.
     pub fn soften(&mut self, factor: f64) {
         for row in &mut self.list {

@@ -1,0 +1,97 @@
+//! Guesses of the active set: which contacts are open, stick or slip, and in space how far they slip.
+//!
+//! Across its slip a contact resists by μ r_n / ‖q_t‖, the less the farther it slips. The matrix of a guess that knows how
+//! far that was in the last solve is nearly the one that the factor was made of.
+
+use super::inner::Iterate;
+use super::rows::{Row, Rows};
+use crate::contact::{Local, Padded};
+use crate::dim::Vect;
+use crate::saved::{Mismatch, Reader, Saved};
+
+/// Relative distance to a limit that counts as at it.
+const BEYOND: f64 = 1e-9;
+
+/// A guess of the active set.
+pub(super) struct Guess {
+    /// Reactions without the shift (N s).
+    pub reactions: Vec<Padded>,
+    /// How far the rows t and m of each contact are beyond their limits, over those; none where that is not known.
+    pub beyond: Vec<[f64; 2]>,
+}
+
+impl Guess {
+    /// The active set of these reactions.
+    pub fn of(reactions: Vec<Padded>) -> Self {
+        Self { reactions, beyond: Vec::new() }
+    }
+
+    /// The velocity at which the corrector of contact `k` gives the guessed reaction. One at its limit is moved beyond it,
+    /// where rounding cannot make it stick.
+    pub fn velocity(&self, k: usize, row: &Row) -> Padded {
+        let guess = &self.reactions[k];
+        let beyond = self.beyond.get(k).copied().unwrap_or_default();
+        let moved = |limit: f64, size: f64, beyond: f64| {
+            if size >= (1.0 - BEYOND) * limit { 1.0 + beyond.max(2.0 * BEYOND) } else { 1.0 }
+        };
+        let limit = guess.n + row.shift;
+        let guess = Local {
+            n: guess.n,
+            t: guess.t * moved(row.cone.mu * limit, Vect::norm(&guess.t), beyond[0]),
+            m: guess.m * moved(row.cone.nu * limit, Vect::norm(&guess.m), beyond[1]),
+        };
+        let mut u =
+            row.weights.times(&row.multiplier) + row.compliance.times(&row.carried) - row.metric().times(&guess);
+        u.n -= row.lag.unwrap_or(0.0);
+        u
+    }
+}
+
+/// How far contacts were beyond their limits in the first round of the last solve, by their first unknowns; contacts in
+/// space only.
+#[derive(Default)]
+pub(super) struct Slips(Vec<([usize; 2], [f64; 2])>);
+
+impl Slips {
+    /// Those of a state that solves an inner problem.
+    pub fn of(rows: &Rows, state: &Iterate) -> Self {
+        let mut list = Vec::new();
+        if rows.in_space() {
+            for ((row, u), r) in rows.list.iter().zip(&state.velocities).zip(&state.reactions) {
+                let (q, w, limit) = (row.form(u), row.metric(), r.n + row.shift);
+                let beyond = |norm: f64, limit: f64| if norm > limit && limit > 0.0 { norm / limit - 1.0 } else { 0.0 };
+                let slip =
+                    [beyond(q.t.norm(), w.t * row.cone.mu * limit), beyond(q.m.norm(), w.m * row.cone.nu * limit)];
+                if slip != [0.0; 2] {
+                    list.push((row.at, slip));
+                }
+            }
+            list.sort_by_key(|(at, _)| *at);
+        }
+        Self(list)
+    }
+
+    /// What is known of each contact of these rows.
+    pub fn in_rows(&self, rows: &Rows) -> Vec<[f64; 2]> {
+        let known = |at| self.0.binary_search_by_key(at, |(at, _)| *at).map_or([0.0; 2], |k| self.0[k].1);
+        if self.0.is_empty() { Vec::new() } else { rows.list.iter().map(|row| known(&row.at)).collect() }
+    }
+
+    pub fn save(&self, to: &mut Saved) {
+        to.count(self.0.len());
+        for (at, slip) in &self.0 {
+            at.iter().for_each(|k| to.count(*k));
+            to.reals.extend_from_slice(slip);
+        }
+    }
+
+    pub fn restored(from: &mut Reader) -> Result<Self, Mismatch> {
+        let mut list = Vec::with_capacity(from.number_of()?);
+        for _ in 0..list.capacity() {
+            let at = [from.count()?, from.count()?];
+            let slip = from.reals(2)?;
+            list.push((at, [slip[0], slip[1]]));
+        }
+        Ok(Self(list))
+    }
+}
