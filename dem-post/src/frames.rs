@@ -151,6 +151,7 @@ fn picture(history: &History, report: &Report, frame: usize) -> Result<(Panel, V
         outline: GRAIN[1],
         links: vec![],
         arrows: vec![],
+        patches: vec![],
         grains,
     };
     let scale = report.scale.unwrap_or(1.0);

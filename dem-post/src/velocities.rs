@@ -180,6 +180,7 @@ pub fn map(history: &History, report: &Report) -> Result<Drawing> {
             outline: colour::GREY,
             links: vec![],
             arrows: arrows(&field.state, history.dimension()),
+            patches: vec![],
         });
     }
     let legend = [Key::Bar(scale("speed over v", 1.0)), Key::Arrow("mean velocity of a square".into())];

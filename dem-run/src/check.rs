@@ -60,6 +60,8 @@ impl Check {
     pub fn new(scene: &Scene) -> Result<Self, RunError> {
         let grains = match &scene.sample {
             Sample::File(file) => count_rows(&file.path)?,
+            // before the cut
+            Sample::Random(random) => random.count,
             sample => sample.count().unwrap_or_default(),
         };
         let walls = scene.walls.iter().map(|(name, wall)| CheckedWall {
@@ -115,6 +117,7 @@ impl fmt::Display for Check {
 
 fn sample_name(sample: &Sample) -> &'static str {
     match sample {
+        Sample::Random(random) if random.cut.is_some() => "random packing before its cut",
         Sample::Random(_) => "random packing",
         Sample::Lattice(Lattice::Hexagonal { .. }) => "hexagonal lattice",
         Sample::Lattice(Lattice::Square { .. }) => "square lattice",

@@ -12,7 +12,7 @@ use kuva::render::annotations::ReferenceLine;
 use kuva::render::figure::Figure;
 use kuva::render::layout::{Layout, TickFormat};
 use kuva::render::plots::Plot;
-use kuva::render::render::{Primitive, Scene, TextAnchor};
+use kuva::render::render::{PathData, Primitive, Scene, TextAnchor};
 
 /// Colours that stay apart for colour-blind readers and in print (Okabe & Ito).
 pub mod colour {
@@ -472,6 +472,22 @@ impl Canvas {
             stroke_width: width,
             stroke_dasharray: None,
         });
+    }
+
+    /// A filled polygon with an outline.
+    pub fn polygon(&mut self, corners: &[(f64, f64)], fill: &str, outline: &str, width: f64) {
+        let mut d = String::new();
+        for (k, (x, y)) in corners.iter().enumerate() {
+            d += &format!("{}{x:.2},{y:.2} ", if k == 0 { "M" } else { "L" });
+        }
+        self.0.add(Primitive::Path(Box::new(PathData {
+            d: d + "Z",
+            fill: Some(fill.into()),
+            stroke: outline.into(),
+            stroke_width: width,
+            opacity: None,
+            stroke_dasharray: None,
+        })));
     }
 
     /// A filled rectangle.

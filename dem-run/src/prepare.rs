@@ -6,7 +6,7 @@
 //! so little thrust that grains which carry the load touch to rounding, walls included. Time has no meaning here (h = 1), so the
 //! packing of a sample scales exactly with its lengths.
 
-use crate::scene::{Diameters, Lattice, Preparation, RandomSample, Section};
+use crate::scene::{Cut, Diameters, Lattice, Preparation, RandomSample, Section};
 use dem_core::body::{Drive, Grain, Grains, Shape, Wall};
 use dem_core::bond::Rupture;
 use dem_core::contact::{BondFlow, LocalSolve};
@@ -44,6 +44,12 @@ pub enum PrepareError {
         /// Largest diameter (m).
         diameter: f64,
     },
+    /// The cut leaves nothing.
+    #[error("sample.random.cut.circle: no grain lies within a circle of {diameter} m: make it wider than a grain")]
+    NothingLeft {
+        /// Diameter of the circle (m).
+        diameter: f64,
+    },
     /// A step of the packing was not solved.
     #[error("the packing of the sample failed: {0}")]
     Step(#[from] StepError),
@@ -77,11 +83,15 @@ pub fn lattice<D: Dim>(lattice: &Lattice) -> Vec<Ball<D>> {
     let mut balls = Vec::new();
     let mut add = |x: [f64; 3]| balls.push((D::Vector::from_slice(&x[..D::N]), r));
     match *lattice {
-        Lattice::Hexagonal { rows, columns, .. } => {
-            for row in 0..rows {
-                for column in 0..columns - row % 2 {
-                    let x = r * (1.0 + 2.0 * column as f64 + (row % 2) as f64);
-                    add([x, r * (1.0 + 3f64.sqrt() * row as f64), 0.0]);
+        Lattice::Hexagonal { rows, columns, layers, .. } => {
+            for layer in 0..layers.unwrap_or(1) {
+                for row in 0..rows {
+                    let (short, deeper) = ((row + layer) % 2, (layer % 2) as f64 / 3.0);
+                    for column in 0..columns - short {
+                        let x = r * (1.0 + 2.0 * column as f64 + short as f64);
+                        let y = r * (1.0 + 3f64.sqrt() * (row as f64 + deeper));
+                        add([x, y, r * (1.0 + (8f64 / 3.0).sqrt() * layer as f64)]);
+                    }
                 }
             }
         }
@@ -222,8 +232,11 @@ pub fn pack<D: Dim>(sample: &RandomSample, seed: u64, watch: Watch) -> Result<Pa
         let mut world = packing_world(grains, &container, top, from_top);
         let share = |done: f64| (attempt as f64 + done) / MOST_PACKINGS as f64;
         settle(&mut world, from_top, &mut |done| watch(if attempt == 0 { done } else { share(done) }))?;
-        let packing = measured(&world, &container);
+        let mut packing = measured(&world, &container);
         if packing.solid_fraction >= wanted {
+            if let Some(cut) = sample.cut {
+                cut_out::<D>(&mut packing.balls, cut)?;
+            }
             return Ok(packing);
         }
         reached = packing.solid_fraction.max(reached);
@@ -238,6 +251,18 @@ fn measured<D: Dim>(world: &World<D>, container: &Container) -> Packing<D> {
     let volume = container.floor::<D>() * height;
     let solid_fraction = balls.iter().map(|(_, r)| D::volume(*r)).sum::<f64>() / volume;
     Packing { balls, solid_fraction }
+}
+
+/// Keep the grains that lie within the shape around the middle of the packing.
+fn cut_out<D: Dim>(balls: &mut Vec<Ball<D>>, cut: Cut) -> Result<(), PrepareError> {
+    let Cut::Circle(diameter) = cut;
+    let middle = [0, D::N - 1].map(|axis| {
+        let ends = balls.iter().map(|(x, r)| (x[axis] - r, x[axis] + r));
+        let (low, high) = ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (a, b)| (l.min(a), h.max(b)));
+        0.5 * (low + high)
+    });
+    balls.retain(|(x, r)| (x[0] - middle[0]).hypot(x[D::N - 1] - middle[1]) + r <= 0.5 * diameter);
+    if balls.is_empty() { Err(PrepareError::NothingLeft { diameter }) } else { Ok(()) }
 }
 
 /// Grains on a loose grid with random offsets, and the height above them all.
@@ -343,7 +368,7 @@ fn settle<D: Dim>(world: &mut World<D>, from_top: bool, watch: Watch) -> Result<
 mod tests {
     use super::*;
     use crate::scene::Compaction;
-    use dem_core::dim::D3;
+    use dem_core::dim::{D2, D3};
 
     fn cylinder(count: usize, width: f64) -> RandomSample {
         RandomSample {
@@ -353,6 +378,7 @@ mod tests {
             width,
             depth: None,
             preparation: Preparation::Compaction(Compaction { solid_fraction: 0.1 }),
+            cut: None,
         }
     }
 
@@ -365,6 +391,33 @@ mod tests {
         let far = packing.balls.iter().map(reach).fold(0.0, f64::max);
         assert!((far - 6e-3).abs() < 1e-9, "the outermost grains touch the wall: {far}");
         assert!(packing.balls.iter().all(|(x, r)| x[2] >= r * (1.0 - 1e-9)));
+    }
+
+    #[test]
+    fn a_disk_is_cut_out_of_the_middle_of_a_packing() {
+        let whole = RandomSample { section: Section::Rectangle, ..cylinder(300, 0.04) };
+        let cut = RandomSample { cut: Some(Cut::Circle(0.03)), ..whole.clone() };
+        let [whole, cut] = [whole, cut].map(|s| pack::<D2>(&s, 3, &mut |_| true).expect("a packing").balls);
+        let ends = |axis: usize, s: f64| whole.iter().map(|(x, r)| s * x[axis] + r).fold(f64::MIN, f64::max);
+        let middle = [0, 1].map(|axis| 0.5 * (ends(axis, 1.0) - ends(axis, -1.0)));
+        let within = |(x, r): &&Ball<D2>| (x[0] - middle[0]).hypot(x[1] - middle[1]) + r <= 0.015;
+        assert_eq!(cut, whole.iter().filter(within).copied().collect::<Vec<_>>());
+        assert!((100..290).contains(&cut.len()), "{}", cut.len());
+        let nothing = RandomSample { cut: Some(Cut::Circle(1e-3)), section: Section::Rectangle, ..cylinder(30, 0.01) };
+        assert!(matches!(pack::<D2>(&nothing, 3, &mut |_| true), Err(PrepareError::NothingLeft { .. })));
+    }
+
+    #[test]
+    fn each_sphere_inside_a_close_packing_touches_twelve() {
+        let lattice = Lattice::Hexagonal { diameter: 2.0, rows: 5, columns: 5, layers: Some(5) };
+        let balls = super::lattice::<D3>(&lattice);
+        assert_eq!(Some(balls.len()), lattice.count());
+        let distance = |a: &Ball<D3>, b: &Ball<D3>| (a.0 - b.0).norm();
+        let touching = |a: &Ball<D3>| balls.iter().filter(|b| (distance(a, b) - 2.0).abs() < 1e-12).count();
+        assert_eq!(balls.iter().map(touching).max(), Some(12));
+        let nearest = balls.iter().enumerate().flat_map(|(k, a)| balls[..k].iter().map(move |b| distance(a, b)));
+        assert!(nearest.fold(f64::MAX, f64::min) > 2.0 - 1e-12, "none overlap");
+        assert!(balls.iter().all(|(x, _)| (0..3).all(|axis| x[axis] >= 1.0)));
     }
 
     #[test]

@@ -90,6 +90,7 @@ pub fn chain_map(history: &History, report: &Report) -> Result<Drawing> {
             outline: GRAIN[1],
             links,
             arrows: vec![],
+            patches: vec![],
         });
     }
     let legend = [
@@ -130,6 +131,7 @@ pub fn network_map(history: &History, report: &Report) -> Result<Drawing> {
             fills: vec![GRAIN[0].into(); grains],
             outline: GRAIN[1],
             arrows: vec![],
+            patches: vec![],
         });
     }
     Ok(draw(&sample, &panels, &force_legend()))

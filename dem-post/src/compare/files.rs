@@ -118,6 +118,7 @@ fn bond_map(history: &History, report: &Report) -> Result<Drawing> {
         fills: vec!["#f4f4f4".into(); history.grains()?.radius.len()],
         outline: "#cfcfcf",
         arrows: vec![],
+        patches: vec![],
         grains,
     };
     let label = |k: usize| format!("{}: {}", ["in both", "only in A", "only in B"][k], report.broken[k]);

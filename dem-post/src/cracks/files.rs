@@ -1,18 +1,20 @@
 //! What `dem-post cracks` writes.
 
-use dem_run::history::History;
+use dem_run::history::{History, RuptureMode};
 
-use super::pictures::{broken_chart, crack_map, decohesion, fragment_charts, front_charts};
+use super::pictures::{broken_chart, crack_map, decohesion, fragment_charts, front_charts, surface_maps};
 use super::{Report, broken_over_time};
+use crate::map::Sample;
 use crate::moments;
 use crate::output::{Folder, Result, cell};
 use crate::plot::Chart;
 use crate::row;
 
-/// Writes `ruptures.csv`, `broken.csv`, `fragments.csv`, and as drawings `broken`, `fragments` and `decohesion`; the map
-/// shows the moments nearest to `times` (s), or chosen ones. Where cracks were found, also `cracks.csv`,
-/// `crack-segments.csv`, `crack-front.csv`, `crack-growth.csv`, and the drawings `cracks`, `cracks-near` where they fill a small
-/// part of the sample, and `crack-front` where one grew step by step or round by round.
+/// Writes `ruptures.csv`, `broken.csv`, `fragments.csv`, and as drawings `broken`, `fragments` and `decohesion`, of
+/// spheres also `decohesion-inside`; these maps show the moments nearest to `times` (s), or chosen ones. Where cracks were found, also `cracks.csv`,
+/// `crack-growth.csv`, and the drawings `cracks` and `crack-front`, where one grew step by step or round by round; in the plane
+/// `crack-segments.csv`, `crack-front.csv` and, where the cracks fill a small part of the sample, the drawing `cracks-near`; in
+/// space `crack-facets.csv`, their corners in `crack-facets.vtk`, and the drawing `cracks-side`.
 ///
 /// # Errors
 /// [`crate::output::PostError::Write`], and [`crate::output::PostError::Usage`] for times outside the history.
@@ -34,21 +36,33 @@ pub fn write(history: &History, report: &Report, times: &[f64], folder: &mut Fol
     let end = history.times().last().copied().unwrap_or(0.0);
     folder.draw("broken", &Chart::draw(vec![broken_chart(&curve, end)]))?;
     folder.draw("fragments", &Chart::draw(fragment_charts(&report.fragments)))?;
-    folder.draw("decohesion", &decohesion(history, &frames)?)?;
-    if report.cracks.is_empty() {
+    folder.draw("decohesion", &decohesion(history, &Sample::read(history)?, &frames)?)?;
+    if history.dimension() == 3 {
+        folder.draw("decohesion-inside", &decohesion(history, &Sample::cut_open(history)?, &frames)?)?;
+    }
+    let sizes = if !report.cracks.is_empty() {
+        write_cracks(report, folder)?;
+        write_segments(report, folder)?;
+        write_fronts(report, folder)?;
+        let (all, near) = crack_map(history, report)?;
+        folder.draw("cracks", &all)?;
+        if let Some(near) = near {
+            folder.draw("cracks-near", &near)?;
+        }
+        ["length_m", "longest_m"]
+    } else if !report.surfaces.is_empty() {
+        write_surfaces(report, folder)?;
+        write_facets(report, folder)?;
+        let [front, side] = surface_maps(history, report)?;
+        folder.draw("cracks", &front)?;
+        folder.draw("cracks-side", &side)?;
+        ["area_m2", "largest_m2"]
+    } else {
         return Ok(());
-    }
-    write_cracks(report, folder)?;
-    write_segments(report, folder)?;
-    write_fronts(report, folder)?;
-    let head = ["step", "time_s", "round", "bonds", "cracks", "length_m", "longest_m"];
-    let rows = report.growth.iter().map(|g| row![g.step, g.time, g.round, g.bonds, g.cracks, g.length, g.longest]);
+    };
+    let head = ["step", "time_s", "round", "bonds", "cracks", sizes[0], sizes[1]];
+    let rows = report.growth.iter().map(|g| row![g.step, g.time, g.round, g.bonds, g.cracks, g.size, g.largest]);
     folder.table("crack-growth", &head, rows)?;
-    let (all, near) = crack_map(history, report)?;
-    folder.draw("cracks", &all)?;
-    if let Some(near) = near {
-        folder.draw("cracks-near", &near)?;
-    }
     let charts = front_charts(report);
     if !charts.is_empty() {
         folder.draw("crack-front", &Chart::draw(charts))?;
@@ -91,6 +105,66 @@ fn write_cracks(report: &Report, folder: &mut Folder) -> Result<()> {
         ]
     });
     Ok(folder.table("cracks", &head, rows)?)
+}
+
+fn write_surfaces(report: &Report, folder: &mut Folder) -> Result<()> {
+    let head = [
+        "crack", "bonds", "tension", "shear", "rolling", "area_m2", "extent_m", "normal_x", "normal_y", "normal_z",
+        "flatness", "first_s", "last_s",
+    ];
+    let rows = report.surfaces.iter().map(|c| {
+        let (m, [x, y, z]) = (c.modes, c.normal);
+        row![c.number, c.bonds, m.tension, m.shear, m.rolling, c.area, c.extent, x, y, z, c.flatness, c.first, c.last]
+    });
+    Ok(folder.table("cracks", &head, rows)?)
+}
+
+/// A table of the facets, and the same with their corners as poly data that ParaView opens.
+fn write_facets(report: &Report, folder: &mut Folder) -> Result<()> {
+    let head = [
+        "crack", "step", "time_s", "round", "bond", "mode", "area_m2", "normal_x", "normal_y", "normal_z", "x_m",
+        "y_m", "z_m",
+    ];
+    let facets = &report.faces.facets;
+    let rows = facets.iter().map(|f| {
+        let (e, [x, y, z]) = (&report.events[f.event], f.normal);
+        let crack = f.crack + 1;
+        row![crack, e.step, e.time, e.round, e.bond, e.mode, f.area, x, y, z, e.point[0], e.point[1], e.point[2]]
+    });
+    folder.table("crack-facets", &head, rows)?;
+    let seen: Vec<_> = facets.iter().filter(|f| f.corners.len() > 2).collect();
+    let corners: usize = seen.iter().map(|f| f.corners.len()).sum();
+    let mut text = format!(
+        "# vtk DataFile Version 3.0\nfacets of broken bonds, m and s\nASCII\nDATASET POLYDATA\nPOINTS {corners} double\n"
+    );
+    for [x, y, z] in seen.iter().flat_map(|f| &f.corners) {
+        text += &format!("{x} {y} {z}\n");
+    }
+    text += &format!("POLYGONS {} {}\n", seen.len(), seen.len() + corners);
+    let mut first = 0;
+    for facet in &seen {
+        let next = first + facet.corners.len();
+        let ids: Vec<String> = (first..next).map(|k| k.to_string()).collect();
+        text += &format!("{} {}\n", ids.len(), ids.join(" "));
+        first = next;
+    }
+    text += &format!("CELL_DATA {}\n", seen.len());
+    for (name, kind) in [("time", "double"), ("crack", "int"), ("mode", "int")] {
+        text += &format!("SCALARS {name} {kind} 1\nLOOKUP_TABLE default\n");
+        for facet in &seen {
+            let event = &report.events[facet.event];
+            text += &match name {
+                "time" => format!("{}\n", event.time),
+                "crack" => format!("{}\n", facet.crack + 1),
+                // as in the history: 0 is intact
+                _ => format!(
+                    "{}\n",
+                    1 + RuptureMode::ALL.iter().position(|mode| mode.label() == event.mode).unwrap_or(0)
+                ),
+            };
+        }
+    }
+    Ok(folder.write("crack-facets.vtk", text.as_bytes())?)
 }
 
 fn write_segments(report: &Report, folder: &mut Folder) -> Result<()> {

@@ -101,33 +101,42 @@ pub struct Growth {
     pub bonds: usize,
     /// Number of cracks.
     pub cracks: usize,
-    /// Length of all of them, m.
-    pub length: f64,
-    /// Length of the longest, m.
-    pub longest: f64,
+    /// Length (m) or area (m²) of all of them.
+    pub size: f64,
+    /// That of the largest.
+    pub largest: f64,
 }
 
-/// The growth of all cracks, in order of time and round.
-pub fn growth(paths: &Paths, ruptures: &[Rupture]) -> Vec<Growth> {
-    let nodes = paths.segments.iter().flat_map(|segment| segment.nodes).max().map_or(0, |last| last + 1);
+/// A broken bond as part of a crack: its place in the list of ruptures, the points in which it meets others, its length (m)
+/// or area (m²).
+pub type Part<'a> = (usize, &'a [usize], f64);
+
+/// The growth of all cracks, in order of time and round, from the broken bonds in their order.
+pub fn growth<'a>(parts: impl Iterator<Item = Part<'a>> + Clone, ruptures: &[Rupture]) -> Vec<Growth> {
+    let nodes = parts.clone().flat_map(|(_, nodes, _)| nodes.iter().copied()).max().map_or(0, |last| last + 1);
     let mut joined = UnionFind::<usize>::new(nodes);
-    // of each crack at its root; zero where no segment has come yet
-    let mut lengths = vec![0.0; nodes];
+    // of each crack at its root; none where no part has come yet
+    let mut sizes = vec![None; nodes];
     let mut rows: Vec<Growth> = vec![];
-    let (mut cracks, mut longest, mut length) = (0usize, 0.0f64, 0.0);
-    for (k, segment) in paths.segments.iter().enumerate() {
-        let [a, b] = segment.nodes.map(|node| joined.find_mut(node));
-        cracks = cracks + 1 - usize::from(lengths[a] > 0.0) - usize::from(a != b && lengths[b] > 0.0);
-        let both = if a == b { lengths[a] } else { lengths[a] + lengths[b] } + segment.length;
-        joined.union(a, b);
-        lengths[joined.find_mut(a)] = both;
-        longest = longest.max(both);
-        length += segment.length;
-        let Rupture { step, time, round, .. } = ruptures[segment.event];
+    let (mut cracks, mut largest, mut size) = (0usize, 0.0f64, 0.0);
+    for (k, (event, nodes, own)) in parts.enumerate() {
+        let mut roots: Vec<usize> = nodes.iter().map(|node| joined.find_mut(*node)).collect();
+        roots.sort_unstable();
+        roots.dedup();
+        let met: Vec<f64> = roots.iter().filter_map(|root| sizes[*root].take()).collect();
+        cracks = cracks + 1 - met.len();
+        let all = met.iter().sum::<f64>() + own;
+        roots.windows(2).for_each(|pair| {
+            joined.union(pair[0], pair[1]);
+        });
+        sizes[joined.find_mut(roots[0])] = Some(all);
+        largest = largest.max(all);
+        size += own;
+        let Rupture { step, time, round, .. } = ruptures[event];
         if rows.last().is_some_and(|last| (last.step, last.round) == (step, round)) {
             rows.pop();
         }
-        rows.push(Growth { step, time, round, bonds: k + 1, cracks, length, longest });
+        rows.push(Growth { step, time, round, bonds: k + 1, cracks, size, largest });
     }
     rows
 }

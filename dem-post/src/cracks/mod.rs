@@ -1,8 +1,8 @@
 //! Cracks: the bonds that broke, when, where and how; the lines they make, how these grow, and what they leave of the
 //! sample.
 //!
-//! What a crack, its path and its front are: [`paths`] and [`front`]. Lines are found in the plane only; in 3D the
-//! ruptures are listed and counted.
+//! What a crack, its path and its front are: [`paths`] and [`front`] in the plane; in space a crack is a surface,
+//! [`surfaces`].
 
 use dem_run::history::{History, Rupture, RuptureMode};
 use serde::Serialize;
@@ -16,10 +16,12 @@ mod files;
 pub mod front;
 pub mod paths;
 pub mod pictures;
+pub mod surfaces;
 pub mod voids;
 
 use front::{Front, Growth, fronts, growth};
 use paths::{Crack, Paths};
+use surfaces::{Surface, Surfaces};
 
 /// Events that the table on the terminal shows; the CSV has them all.
 const SHOWN: usize = 12;
@@ -39,6 +41,10 @@ pub const CRACK_HEAD: [&str; 10] = [
     "first (s)",
     "last (s)",
 ];
+
+/// The columns of the table of cracks in space.
+pub const SURFACE_HEAD: [&str; 9] =
+    ["crack", "bonds", "T/S/R", "area (mm²)", "extent (mm)", "normal", "flatness", "first (s)", "last (s)"];
 
 /// A number for each way to break.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -121,8 +127,10 @@ pub struct Report {
     pub events: Vec<Event>,
     /// The pieces, frame by frame.
     pub fragments: Vec<Pieces>,
-    /// The cracks, the longest first; empty in 3D.
+    /// The cracks of a plane sample, the longest first.
     pub cracks: Vec<Crack>,
+    /// The cracks in space, the largest first.
+    pub surfaces: Vec<Surface>,
     /// How they grew, crack by crack.
     pub fronts: Vec<Front>,
     /// The cracks as they were after each round of breaks.
@@ -130,6 +138,9 @@ pub struct Report {
     /// The cracks with their segments.
     #[serde(skip)]
     pub paths: Paths,
+    /// The cracks with their facets.
+    #[serde(skip)]
+    pub faces: Surfaces,
 }
 
 /// Reads what became of the bonds, with a bar unless `quiet`.
@@ -155,12 +166,19 @@ pub fn read(history: &History, quiet: bool) -> Result<Report> {
     }
     bar.finish_and_clear();
     let five = (bonds.len() as f64 * 0.05).ceil() as usize;
-    let paths = if history.dimension() == 2 && history.frames() > 0 {
-        let position: Vec<[f64; 2]> = history.grain_state(0)?.position.chunks(2).map(|x| [x[0], x[1]]).collect();
-        Paths::find(&position, &history.grains()?.radius, &bonds, &ruptures)
-    } else {
-        Paths::default()
-    };
+    let (mut paths, mut faces) = (Paths::default(), Surfaces::default());
+    if history.frames() > 0 {
+        let (position, radius) = (history.grain_state(0)?.position, history.grains()?.radius);
+        if history.dimension() == 2 {
+            let position: Vec<[f64; 2]> = position.chunks(2).map(|x| [x[0], x[1]]).collect();
+            paths = Paths::find(&position, &radius, &bonds, &ruptures);
+        } else {
+            let position: Vec<[f64; 3]> = position.chunks(3).map(|x| [x[0], x[1], x[2]]).collect();
+            faces = Surfaces::find(&position, &radius, &bonds, &ruptures);
+        }
+    }
+    let growth =
+        if history.dimension() == 2 { growth(paths.parts(), &ruptures) } else { growth(faces.parts(), &ruptures) };
     Ok(Report {
         bonds: bonds.len(),
         broken,
@@ -169,9 +187,11 @@ pub fn read(history: &History, quiet: bool) -> Result<Report> {
         events: ruptures.iter().map(Event::from).collect(),
         fragments: pieces,
         cracks: paths.cracks.clone(),
+        surfaces: faces.cracks.clone(),
         fronts: fronts(&paths, &ruptures),
-        growth: growth(&paths, &ruptures),
+        growth,
         paths,
+        faces,
     })
 }
 
@@ -236,8 +256,12 @@ impl Report {
         if !self.events.is_empty() {
             out += &format!("\n{}", self.event_table());
         }
-        if !self.cracks.is_empty() {
-            out += &format!("\n{}", self.crack_table());
+        if let Some((head, rows)) = self.crack_rows() {
+            let mut table = Text::new(head);
+            rows.into_iter().for_each(|row| table.row(row));
+            let rest = (self.cracks.len() + self.surfaces.len()).saturating_sub(CRACKS);
+            let more = if rest > 0 { format!("… and {rest} more in cracks.csv\n") } else { String::new() };
+            out += &format!("\n{}{more}", table.lines());
         }
         out
     }
@@ -263,14 +287,14 @@ impl Report {
         table.lines() + &if rest > 0 { format!("… and {rest} more in ruptures.csv\n") } else { String::new() }
     }
 
-    /// The longest cracks, one a line, as [`CRACK_HEAD`] has them.
-    pub fn crack_rows(&self) -> Vec<Vec<String>> {
-        let row = |crack: &Crack| {
-            let Modes { tension, shear, rolling } = crack.modes;
+    /// The largest cracks, one a line, below the heads of their columns; none where nothing broke.
+    pub fn crack_rows(&self) -> Option<(&'static [&'static str], Vec<Vec<String>>)> {
+        let modes = |Modes { tension, shear, rolling }: Modes| format!("{tension}/{shear}/{rolling}");
+        let line = |crack: &Crack| {
             vec![
                 crack.number.to_string(),
                 crack.bonds.to_string(),
-                format!("{tension}/{shear}/{rolling}"),
+                modes(crack.modes),
                 number(1e3 * crack.length),
                 number(1e3 * crack.path_length),
                 number(1e3 * crack.end_to_end),
@@ -280,14 +304,27 @@ impl Report {
                 number(crack.last),
             ]
         };
-        self.cracks.iter().take(CRACKS).map(row).collect()
-    }
-
-    fn crack_table(&self) -> String {
-        let mut table = Text::new(&CRACK_HEAD);
-        self.crack_rows().into_iter().for_each(|row| table.row(row));
-        let rest = self.cracks.len().saturating_sub(CRACKS);
-        table.lines() + &if rest > 0 { format!("… and {rest} more in cracks.csv\n") } else { String::new() }
+        let surface = |crack: &Surface| {
+            let [x, y, z] = crack.normal;
+            vec![
+                crack.number.to_string(),
+                crack.bonds.to_string(),
+                modes(crack.modes),
+                number(1e6 * crack.area),
+                number(1e3 * crack.extent),
+                format!("({x:.2}, {y:.2}, {z:.2})"),
+                format!("{:.2}", crack.flatness),
+                number(crack.first),
+                number(crack.last),
+            ]
+        };
+        if !self.cracks.is_empty() {
+            Some((&CRACK_HEAD, self.cracks.iter().take(CRACKS).map(line).collect()))
+        } else if !self.surfaces.is_empty() {
+            Some((&SURFACE_HEAD, self.surfaces.iter().take(CRACKS).map(surface).collect()))
+        } else {
+            None
+        }
     }
 }
 

@@ -23,6 +23,7 @@ use petgraph::unionfind::UnionFind;
 use serde::Serialize;
 
 use super::Modes;
+use super::front::Part;
 use super::voids::Voids;
 
 /// A broken bond as a line.
@@ -113,6 +114,11 @@ impl Paths {
             path.iter().for_each(|&(k, _)| segments[k].on_path = true);
         }
         Self { cracks, segments }
+    }
+
+    /// The segments as parts of cracks that grow.
+    pub fn parts(&self) -> impl Iterator<Item = Part<'_>> + Clone {
+        self.segments.iter().map(|segment| (segment.event, segment.nodes.as_slice(), segment.length))
     }
 }
 

@@ -3,10 +3,10 @@
 use dem_run::history::{BondStatus, History};
 
 use super::front::Growth;
-use super::paths::{Crack, Segment};
+use super::paths::Crack;
 use super::{Pieces, Report};
 use crate::fragments::Fragments;
-use crate::map::{Colour, Key, Link, Panel, Ramp, Sample, Scale, draw, draw_view};
+use crate::map::{Colour, Key, Link, Panel, Patch, Ramp, Sample, Scale, draw, draw_view};
 use crate::output::{Result, number};
 use crate::plot::{Chart, Drawing, Style, colour};
 
@@ -55,8 +55,8 @@ pub fn fragment_charts(pieces: &[Pieces]) -> Vec<Chart> {
     vec![number, largest]
 }
 
-/// The tips of the longest cracks over time; the length of all cracks and of the longest over time; and, where a step
-/// broke bonds in several rounds, these lengths over the rounds of the step that has most of them.
+/// The tips of the longest cracks over time; the size of all cracks and of the largest over time; and, where a step
+/// broke bonds in several rounds, these sizes over the rounds of the step that has most of them.
 pub fn front_charts(report: &Report) -> Vec<Chart> {
     let mut over_time = Chart::new("time (s)", "place of the tips along the crack (mm)");
     over_time.set_off = true;
@@ -78,13 +78,23 @@ pub fn front_charts(report: &Report) -> Vec<Chart> {
     charts
 }
 
-/// The length of all cracks and of the longest over time, unless all broke at once.
+/// What the size of cracks is, and the factor from SI to its unit.
+fn size_of_cracks(report: &Report) -> (&'static str, f64) {
+    if report.surfaces.is_empty() { ("length of cracks (mm)", 1e3) } else { ("area of cracks (mm²)", 1e6) }
+}
+
+fn largest(report: &Report) -> &'static str {
+    if report.surfaces.is_empty() { "the longest" } else { "the largest" }
+}
+
+/// The size of all cracks and of the largest over time, unless all broke at once.
 fn growth_chart(report: &Report) -> Option<Chart> {
     report.growth.first().zip(report.growth.last()).filter(|(first, last)| first.time < last.time)?;
-    let points = |length: fn(&Growth) -> f64| report.growth.iter().map(|row| (row.time, 1e3 * length(row))).collect();
-    let mut chart = Chart::new("time (s)", "length of cracks (mm)")
-        .curve("all", colour::BLACK, Style::Steps, points(|row| row.length))
-        .curve("the longest", colour::BLUE, Style::Steps, points(|row| row.longest));
+    let (label, unit) = size_of_cracks(report);
+    let points = |size: fn(&Growth) -> f64| report.growth.iter().map(|row| (row.time, unit * size(row))).collect();
+    let mut chart = Chart::new("time (s)", label)
+        .curve("all", colour::BLACK, Style::Steps, points(|row| row.size))
+        .curve(largest(report), colour::BLUE, Style::Steps, points(|row| row.largest));
     chart.set_off = true;
     Some(chart)
 }
@@ -92,51 +102,63 @@ fn growth_chart(report: &Report) -> Option<Chart> {
 fn cascade_chart(report: &Report) -> Option<Chart> {
     let steps = report.growth.chunk_by(|a, b| a.step == b.step);
     let rounds = steps.max_by_key(|rounds| rounds.len()).filter(|rounds| rounds.len() > 1)?;
-    let points = |length: fn(&Growth) -> f64| -> Vec<(f64, f64)> {
-        rounds.iter().map(|row| (f64::from(row.round), 1e3 * length(row))).collect()
+    let (label, unit) = size_of_cracks(report);
+    let points = |size: fn(&Growth) -> f64| -> Vec<(f64, f64)> {
+        rounds.iter().map(|row| (f64::from(row.round), unit * size(row))).collect()
     };
-    let mut chart = Chart::new(&format!("round of the cascade in step {}", rounds[0].step), "length of cracks (mm)")
-        .curve("all", colour::BLACK, Style::Marked, points(|row| row.length))
-        .curve("the longest", colour::BLUE, Style::Marked, points(|row| row.longest));
+    let mut chart = Chart::new(&format!("round of the cascade in step {}", rounds[0].step), label)
+        .curve("all", colour::BLACK, Style::Marked, points(|row| row.size))
+        .curve(largest(report), colour::BLUE, Style::Marked, points(|row| row.largest));
     chart.set_off = true;
     Some(chart)
 }
 
-/// The cracks over the grains of the first frame, coloured by the time at which each bond broke, or by the round of the
-/// cascade where all broke in one step. The second drawing shows the part around the cracks, where that is small.
-///
-/// # Errors
-/// Those of reading the history.
-pub fn crack_map(history: &History, report: &Report) -> Result<(Drawing, Option<Drawing>)> {
-    let (first, last) = (report.events.first(), report.events.last());
-    let span = first.zip(last).map_or([0.0; 2], |(first, last)| [first.time, last.time]);
-    let one_step = span[0] == span[1];
-    let value = |segment: &Segment| {
-        let event = &report.events[segment.event];
-        if one_step { f64::from(event.round) } else { event.time }
-    };
-    let values = || report.paths.segments.iter().map(value);
-    let scale = Scale {
-        title: if one_step {
+/// Colours for when bonds broke: the time, or the round of the cascade where all broke in one step.
+struct When<'a> {
+    report: &'a Report,
+    one_step: bool,
+    scale: Scale,
+}
+
+impl<'a> When<'a> {
+    fn of(report: &'a Report) -> Self {
+        let (first, last) = (report.events.first(), report.events.last());
+        let span = first.zip(last).map_or([0.0; 2], |(first, last)| [first.time, last.time]);
+        let one_step = span[0] == span[1];
+        let title = if one_step {
             format!("round of the cascade at t = {} s", number(span[0]))
         } else {
             "broken at t (s)".into()
-        },
-        low: values().fold(f64::INFINITY, f64::min),
-        high: values().fold(f64::NEG_INFINITY, f64::max),
-        ramp: Ramp::Lines,
-    };
-    let mut links = vec![];
-    // the latest first, so that where the crack began is on top
-    for segment in report.paths.segments.iter().rev() {
-        let [a, b, c] = segment.line.map(Vec::from);
-        let (width, colour) = (WIDTHS[usize::from(!segment.on_path)], scale.colour(value(segment)));
-        links.push(Link { from: a, to: b.clone(), width, colour: colour.clone() });
-        links.push(Link { from: b, to: c, width, colour });
+        };
+        let scale = Scale { title, low: f64::INFINITY, high: f64::NEG_INFINITY, ramp: Ramp::Lines };
+        let mut when = Self { report, one_step, scale };
+        for event in 0..report.events.len() {
+            let value = when.value(event);
+            (when.scale.low, when.scale.high) = (when.scale.low.min(value), when.scale.high.max(value));
+        }
+        when
     }
+
+    fn value(&self, event: usize) -> f64 {
+        let event = &self.report.events[event];
+        if self.one_step { f64::from(event.round) } else { event.time }
+    }
+
+    fn colour(&self, event: usize) -> Colour {
+        self.scale.colour(self.value(event))
+    }
+
+    /// The key of the colours; a single value needs none.
+    fn key(self) -> Option<Key> {
+        (self.scale.low < self.scale.high).then_some(Key::Bar(self.scale))
+    }
+}
+
+/// The grains of the first frame, pale, below what the caption counts.
+fn pale_panel(history: &History, report: &Report, cracks: usize) -> Result<Panel> {
     let plural = |count: usize| if count == 1 { "" } else { "s" };
-    let (cracks, broken) = (report.cracks.len(), report.broken.total());
-    let panel = Panel {
+    let broken = report.broken.total();
+    Ok(Panel {
         caption: vec![
             format!("{cracks} crack{} of {broken} broken bond{}", plural(cracks), plural(broken)),
             "places of the first frame".into(),
@@ -145,17 +167,46 @@ pub fn crack_map(history: &History, report: &Report) -> Result<(Drawing, Option<
         walls: history.wall_state(0)?,
         fills: vec![PALE[0].into(); history.grains()?.radius.len()],
         outline: PALE[1],
-        links,
+        links: vec![],
         arrows: vec![],
-    };
-    let mut legend = vec![
-        Key::Line(colour::GREY, WIDTHS[0], "path of a crack".into()),
-        Key::Line(colour::GREY, WIDTHS[1], "branch".into()),
-    ];
-    // a single value needs no scale
-    if scale.low < scale.high {
-        legend.insert(0, Key::Bar(scale));
+        patches: vec![],
+    })
+}
+
+/// The facets of cracks in space over the grains of the first frame, coloured by the time at which each bond broke, seen along y
+/// and against x.
+///
+/// # Errors
+/// Those of reading the history.
+pub fn surface_maps(history: &History, report: &Report) -> Result<[Drawing; 2]> {
+    let when = When::of(report);
+    let mut panel = pale_panel(history, report, report.surfaces.len())?;
+    let facets = report.faces.facets.iter().filter(|facet| facet.corners.len() > 2);
+    panel.patches =
+        facets.map(|facet| Patch { corners: facet.corners.clone(), colour: when.colour(facet.event) }).collect();
+    let legend: Vec<Key> = when.key().into_iter().collect();
+    let panels = [panel];
+    Ok([draw(&Sample::read(history)?, &panels, &legend), draw(&Sample::from_the_side(history)?, &panels, &legend)])
+}
+
+/// The cracks over the grains of the first frame, coloured by the time at which each bond broke, or by the round of the
+/// cascade where all broke in one step. The second drawing shows the part around the cracks, where that is small.
+///
+/// # Errors
+/// Those of reading the history.
+pub fn crack_map(history: &History, report: &Report) -> Result<(Drawing, Option<Drawing>)> {
+    let when = When::of(report);
+    let mut panel = pale_panel(history, report, report.cracks.len())?;
+    // the latest first, so that where the crack began is on top
+    for segment in report.paths.segments.iter().rev() {
+        let [a, b, c] = segment.line.map(Vec::from);
+        let (width, colour) = (WIDTHS[usize::from(!segment.on_path)], when.colour(segment.event));
+        panel.links.push(Link { from: a, to: b.clone(), width, colour: colour.clone() });
+        panel.links.push(Link { from: b, to: c, width, colour });
     }
+    let mut legend: Vec<Key> = when.key().into_iter().collect();
+    legend.push(Key::Line(colour::GREY, WIDTHS[0], "path of a crack".into()));
+    legend.push(Key::Line(colour::GREY, WIDTHS[1], "branch".into()));
     let (sample, panels) = (Sample::read(history)?, [panel]);
     let all = sample.view(panels.iter().map(|panel| (&panel.grains, &panel.walls)));
     let near = sample.near(report.paths.segments.iter().flat_map(|s| s.line.iter().map(|x| x.as_slice())), all);
@@ -163,13 +214,12 @@ pub fn crack_map(history: &History, report: &Report) -> Result<(Drawing, Option<
     Ok((draw_view(&sample, all, &panels, &legend), near))
 }
 
-/// The decohesion map at some frames: grains that lost a bond in white.
+/// The decohesion map of a sample at some frames: grains that lost a bond in white.
 ///
 /// # Errors
 /// Those of reading the history.
-pub fn decohesion(history: &History, frames: &[usize]) -> Result<Drawing> {
+pub fn decohesion(history: &History, sample: &Sample, frames: &[usize]) -> Result<Drawing> {
     let bonds = history.bonds()?;
-    let sample = Sample::read(history)?;
     let mut panels = vec![];
     for &frame in frames {
         let status = history.bond_status(frame)?;
@@ -191,11 +241,12 @@ pub fn decohesion(history: &History, frames: &[usize]) -> Result<Drawing> {
             outline: "#404040",
             links: vec![],
             arrows: vec![],
+            patches: vec![],
         });
     }
     let legend = [
         Key::Disk(BONDED, "#404040", "all bonds intact".into()),
         Key::Disk(RELEASED, "#404040", "lost at least one bond".into()),
     ];
-    Ok(draw(&sample, &panels, &legend))
+    Ok(draw(sample, &panels, &legend))
 }

@@ -30,12 +30,14 @@ const EVEN: f64 = 4.0;
 /// Lines of a wall's hatching: their distance and length.
 const HATCH: f64 = 7.0;
 
-/// What all panels share: the grains' sizes, the walls, and the plane of the drawing (in 3D the first and last axes).
+/// What all panels share: the grains' sizes, the walls, and the plane of the drawing (in 3D seen along y, or along x).
 pub struct Sample {
     radius: Vec<f64>,
     walls: Vec<Wall>,
     dimension: usize,
     axes: [usize; 2],
+    /// Depth of the plane that cuts the spheres open, m, where one does.
+    slice: Option<f64>,
     /// Corners of what may be shown, m: the first frame and as much again around it.
     limits: Box2,
 }
@@ -56,6 +58,17 @@ pub struct Panel {
     pub links: Vec<Link>,
     /// Arrows on top of all.
     pub arrows: Vec<Arrow>,
+    /// Polygons over the grains; what is nearer to the eye covers what is behind it.
+    pub patches: Vec<Patch>,
+}
+
+/// A flat polygon in space.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Patch {
+    /// Its corners, m.
+    pub corners: Vec<[f64; 3]>,
+    /// Colour.
+    pub colour: Colour,
 }
 
 /// An arrow.
@@ -100,9 +113,34 @@ impl Sample {
     /// # Errors
     /// Those of [`History::grains`], [`History::walls`] and [`History::grain_state`].
     pub fn read(history: &History) -> Result<Self> {
+        Self::seen(history, [0, history.dimension() - 1])
+    }
+
+    /// As [`Sample::read`], of spheres seen from the side, against the first axis.
+    ///
+    /// # Errors
+    /// As [`Sample::read`].
+    pub fn from_the_side(history: &History) -> Result<Self> {
+        Self::seen(history, [1, 2])
+    }
+
+    /// As [`Sample::read`], of spheres cut open along the plane through the middle of their first places.
+    ///
+    /// # Errors
+    /// As [`Sample::read`].
+    pub fn cut_open(history: &History) -> Result<Self> {
+        let mut sample = Self::read(history)?;
+        let first = history.grain_state(0)?;
+        let depths = || first.position.chunks(sample.dimension).map(|x| sample.depth(x));
+        let middle = 0.5 * (depths().fold(f64::INFINITY, f64::min) + depths().fold(f64::NEG_INFINITY, f64::max));
+        sample.slice = Some(middle);
+        Ok(sample)
+    }
+
+    fn seen(history: &History, axes: [usize; 2]) -> Result<Self> {
         let Grains { radius, .. } = history.grains()?;
         let (walls, dimension) = (history.walls()?, history.dimension());
-        let mut sample = Self { radius, walls, dimension, axes: [0, dimension - 1], limits: [[0.0; 2]; 2] };
+        let mut sample = Self { radius, walls, dimension, axes, slice: None, limits: [[0.0; 2]; 2] };
         let first = history.grain_state(0)?;
         let [low, high] = sample.bounds(&first, EVERYWHERE);
         let spread = |k: usize| 0.5 * (high[k] - low[k]);
@@ -112,6 +150,20 @@ impl Sample {
 
     fn flat(&self, point: &[f64]) -> [f64; 2] {
         self.axes.map(|axis| point[axis])
+    }
+
+    /// How far a point of space is from the eye, m, from where it does not matter. The axes of the drawing and the direction
+    /// to the eye are right-handed: it looks along y, or against x.
+    fn depth(&self, point: &[f64]) -> f64 {
+        if self.axes[0] == 0 { point[1] } else { -point[0] }
+    }
+
+    /// The radius at which a grain shows, m; none where it is not cut.
+    fn seen_radius(&self, state: &GrainState, grain: usize) -> Option<f64> {
+        let radius = self.radius[grain];
+        let Some(plane) = self.slice else { return Some(radius) };
+        let off = self.depth(&state.position[grain * self.dimension..]) - plane;
+        (off.abs() < radius).then(|| (radius * radius - off * off).sqrt())
     }
 
     fn centre(&self, state: &GrainState, grain: usize) -> [f64; 2] {
@@ -252,12 +304,13 @@ fn draw_panel(canvas: &mut Canvas, sample: &Sample, panel: &Panel, frame: &Frame
     }
     let mut order: Vec<usize> = (0..sample.radius.len()).collect();
     if sample.dimension == 3 {
-        // what is further away (along y) is drawn first
-        let depth = |grain: usize| panel.grains.position[grain * 3 + 1];
+        // what is further away is drawn first
+        let depth = |grain: usize| sample.depth(&panel.grains.position[grain * 3..]);
         order.sort_by(|&a, &b| depth(b).total_cmp(&depth(a)));
     }
     for grain in order {
-        let (at, radius) = (frame.at(sample.centre(&panel.grains, grain)), sample.radius[grain] * frame.scale);
+        let Some(radius) = sample.seen_radius(&panel.grains, grain) else { continue };
+        let (at, radius) = (frame.at(sample.centre(&panel.grains, grain)), radius * frame.scale);
         if frame.shows(at, radius) {
             // the outline of a tiny disk must not hide its fill
             let outline = (0.15 * radius).min(0.6);
@@ -267,6 +320,14 @@ fn draw_panel(canvas: &mut Canvas, sample: &Sample, panel: &Panel, frame: &Frame
     // lines between grains that are drawn tiny must not run into one another
     let diameter = 2.0 * frame.scale * sample.radius.iter().sum::<f64>() / sample.radius.len() as f64;
     let widest = (0.6 * diameter).max(1.0);
+    let middle =
+        |patch: &Patch| patch.corners.iter().map(|x| sample.depth(x)).sum::<f64>() / patch.corners.len().max(1) as f64;
+    let mut patches: Vec<(f64, &Patch)> = panel.patches.iter().map(|patch| (middle(patch), patch)).collect();
+    patches.sort_by(|a, b| b.0.total_cmp(&a.0));
+    for (_, patch) in patches {
+        let corners: Vec<_> = patch.corners.iter().map(|x| frame.at(sample.flat(x))).collect();
+        canvas.polygon(&corners, &patch.colour, "#ffffff", 0.3);
+    }
     for link in &panel.links {
         let ends = [&link.from, &link.to].map(|point| frame.at(sample.flat(point)));
         if ends.iter().all(|&end| frame.shows(end, 2.0)) {

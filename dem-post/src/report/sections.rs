@@ -6,8 +6,9 @@ use super::Report;
 use super::page::{Figure, Section, Table, chart, map};
 use crate::chains::pictures::{chain_map, distribution_chart, length_charts, network_map};
 use crate::chains::{CHAIN_HEAD, Report as Chains};
-use crate::cracks::pictures::{broken_chart, crack_map, decohesion, fragment_charts, front_charts};
-use crate::cracks::{CRACK_HEAD, Report as Cracks, broken_over_time};
+use crate::cracks::pictures::{broken_chart, crack_map, decohesion, fragment_charts, front_charts, surface_maps};
+use crate::cracks::{Report as Cracks, broken_over_time};
+use crate::map::Sample;
 use crate::output::{Result, number, quantity};
 use crate::plot::{Chart, Style, colour};
 use crate::stress_strain::{Report as StressStrain, force_displacement, onset, stress_strain};
@@ -134,10 +135,24 @@ fn cracks(history: &History, report: &Report, found: &Cracks) -> Result<Section>
             figures.push(map(&near, &format!("{alt} Enlarged."), "The part around the cracks.")?);
         }
     }
+    if !found.surfaces.is_empty() {
+        let alt =
+            "Facets of broken bonds over the grains of the first frame, coloured by the time at which they broke.";
+        let [front, side] = surface_maps(history, found)?;
+        figures.push(map(&front, alt, "Cracks by the time at which each bond broke, seen along y.")?);
+        figures.push(map(&side, alt, "The same, seen against x.")?);
+    }
     for field in &report.velocities.fields {
         let time = number(field.time);
         let alt = format!("Grains at t = {time} s; those that lost a bond are white.");
-        figures.push(map(&decohesion(history, &[field.frame])?, &alt, &format!("Lost bonds at t = {time} s."))?);
+        // spheres hide what breaks behind them
+        let (sample, seen) = if history.dimension() == 2 {
+            (Sample::read(history)?, "")
+        } else {
+            (Sample::cut_open(history)?, ", cut open along the middle")
+        };
+        let caption = format!("Lost bonds at t = {time} s{seen}.");
+        figures.push(map(&decohesion(history, &sample, &[field.frame])?, &alt, &caption)?);
     }
     if found.broken.total() > 0 {
         let curve = broken_chart(&broken_over_time(&found.events), end);
@@ -147,27 +162,28 @@ fn cracks(history: &History, report: &Report, found: &Cracks) -> Result<Section>
             figures.push(chart(curve, &alt, &alt));
         }
     }
-    if !found.cracks.is_empty() {
+    if !found.cracks.is_empty() || !found.surfaces.is_empty() {
         for curve in front_charts(found) {
             let alt = format!("{} over {}.", capitalised(&curve.y), curve.x);
             figures.push(chart(curve, &alt, &alt));
         }
     }
-    let tables = if found.cracks.is_empty() {
-        vec![]
-    } else {
-        let caption = "The longest cracks; T/S/R: bonds broken in tension, in shear, by rolling";
-        vec![Table::new(caption, &CRACK_HEAD, found.crack_rows())]
-    };
+    let caption = "The largest cracks; T/S/R: bonds broken in tension, in shear, by rolling";
+    let tables = found.crack_rows().into_iter().map(|(head, rows)| Table::new(caption, head, rows)).collect();
     let facts = vec![
         ("Bonds".into(), found.bonds.to_string()),
         ("Broken".into(), found.broken.total().to_string()),
-        ("Cracks".into(), found.cracks.len().to_string()),
+        ("Cracks".into(), (found.cracks.len() + found.surfaces.len()).to_string()),
         ("First break".into(), quantity(found.first_break, "s")),
         ("5 % broken".into(), quantity(found.time_of_5_percent, "s")),
     ];
-    let text = "A crack is a set of broken bonds that meet in the voids between the grains; its path is the longest way \
-                through it, drawn thick. Places are those of the first frame.";
+    let text = if history.dimension() == 2 {
+        "A crack is a set of broken bonds that meet in the voids between the grains; its path is the longest way through it, drawn \
+         thick. Places are those of the first frame."
+    } else {
+        "A crack is a set of broken bonds whose facets, the faces that the cells of two grains share, meet in the voids between the \
+         grains. Places are those of the first frame."
+    };
     Ok(Section { id: "cracks", title: "Cracks", text: text.into(), facts, figures, tables })
 }
 

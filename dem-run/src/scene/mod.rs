@@ -39,7 +39,7 @@ pub use model::{
     Stop, Time, TravelFrom, WallTravel, Young,
 };
 pub use sample::{
-    Compaction, Deposition, Diameters, GrainSpec, Lattice, Preparation, RandomSample, Sample, SampleFile, Section,
+    Compaction, Cut, Deposition, Diameters, GrainSpec, Lattice, Preparation, RandomSample, Sample, SampleFile, Section,
     UniformRange,
 };
 pub use solver::{GaussSeidel, LocalSolve, Newton, Solver, SolverKind, Start};

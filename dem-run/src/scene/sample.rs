@@ -37,6 +37,18 @@ pub struct RandomSample {
     pub depth: Option<f64>,
     /// How the packing is made.
     pub preparation: Preparation,
+    /// Shape that is cut out of the packing; all of it is kept where this is absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cut: Option<Cut>,
+}
+
+/// A shape whose grains are kept of a packing.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Cut {
+    /// A circle of this diameter (m) around the middle of the packing, upright along x: a disk in 2D, in 3D a cylinder
+    /// along y. Grains that it would cut are left out. Higher than the packing, it has flats where floor and lid were.
+    Circle(f64),
 }
 
 /// The shape of a box seen from above.
@@ -120,14 +132,18 @@ pub struct Deposition {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Lattice {
-    /// 2D, close packed: rows of `columns` and `columns` − 1 disks in turn.
+    /// Close packed: rows of `columns` and `columns` − 1 grains in turn, in 3D in layers, of which every second begins with
+    /// the shorter row.
     Hexagonal {
-        /// Diameter of the disks (m).
+        /// Diameter of the grains (m).
         diameter: f64,
         /// Number of rows, along y.
         rows: usize,
-        /// Number of disks in the first row, along x.
+        /// Number of grains in the first row, along x.
         columns: usize,
+        /// Number of layers, along z, in 3D only.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        layers: Option<usize>,
     },
     /// 2D: `rows` rows of `columns` disks.
     Square {
@@ -162,8 +178,12 @@ impl Lattice {
     #[must_use]
     pub fn count(&self) -> Option<usize> {
         match self {
-            // every second row is one disk shorter
-            Self::Hexagonal { rows, columns, .. } => rows.checked_mul(*columns)?.checked_sub(rows / 2),
+            // every second row is one grain shorter, and of every second layer the first row is
+            Self::Hexagonal { rows, columns, layers, .. } => {
+                let layers = layers.unwrap_or(1);
+                let short = (rows / 2).checked_mul(layers)?.checked_add((rows % 2).checked_mul(layers / 2)?)?;
+                rows.checked_mul(*columns)?.checked_mul(layers)?.checked_sub(short)
+            }
             Self::Square { rows, columns, .. } => rows.checked_mul(*columns),
             Self::Cubic { counts, .. } => counts[0].checked_mul(counts[1])?.checked_mul(counts[2]),
         }
@@ -204,11 +224,12 @@ pub struct GrainSpec {
 }
 
 impl Sample {
-    /// Number of grains, where it is known without reading a file.
+    /// Number of grains, where it is known before the sample is prepared.
     #[must_use]
     pub fn count(&self) -> Option<usize> {
         match self {
-            Self::Random(random) => Some(random.count),
+            // how many a cut leaves is known when the packing is made
+            Self::Random(random) => random.cut.is_none().then_some(random.count),
             Self::Lattice(lattice) => lattice.count(),
             Self::File(_) => None,
             Self::Grains(grains) => Some(grains.len()),
@@ -222,8 +243,10 @@ mod tests {
 
     #[test]
     fn twenty_rows_of_210_and_209_disks_are_4190() {
-        assert_eq!(Lattice::Hexagonal { diameter: 4e-3, rows: 20, columns: 210 }.count(), Some(4190));
-        assert_eq!(Lattice::Hexagonal { diameter: 4e-3, rows: 3, columns: 1 }.count(), Some(2));
+        let hexagonal = |rows, columns, layers| Lattice::Hexagonal { diameter: 4e-3, rows, columns, layers }.count();
+        assert_eq!(hexagonal(20, 210, None), Some(4190));
+        assert_eq!(hexagonal(3, 1, None), Some(2));
+        assert_eq!(hexagonal(3, 4, Some(2)), Some(11 + 10));
     }
 
     #[test]

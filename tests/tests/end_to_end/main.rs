@@ -10,6 +10,7 @@ mod fclib;
 mod interrupt;
 mod pack;
 mod resume;
+mod specimens;
 mod sweep;
 mod teaching;
 mod wrong_history;

@@ -34,14 +34,17 @@ impl Guess {
         let moved = |limit: f64, size: f64, beyond: f64| {
             if size >= (1.0 - BEYOND) * limit { 1.0 + beyond.max(2.0 * BEYOND) } else { 1.0 }
         };
-        let limit = guess.n + row.shift;
+        let (limit, w) = (guess.n + row.shift, row.metric());
         let guess = Local {
             n: guess.n,
             t: guess.t * moved(row.cone.mu * limit, Vect::norm(&guess.t), beyond[0]),
             m: guess.m * moved(row.cone.nu * limit, Vect::norm(&guess.m), beyond[1]),
         };
-        let mut u =
-            row.weights.times(&row.multiplier) + row.compliance.times(&row.carried) - row.metric().times(&guess);
+        let mut u = row.weights.times(&row.multiplier) + row.compliance.times(&row.carried) - w.times(&guess);
+        if row.convex() && beyond != [0.0; 2] {
+            // what slips with associated flow opens by so much
+            u.n += limit * (row.cone.mu * row.cone.mu * w.t * beyond[0] + row.cone.nu * row.cone.nu * w.m * beyond[1]);
+        }
         u.n -= row.lag.unwrap_or(0.0);
         u
     }

@@ -38,6 +38,7 @@ use crate::saved::{Mismatch, Reader, Saved};
 use factor::Factor;
 use guess::{Guess, Slips};
 use inner::{Iterate, norm2};
+use interior::{Disks, Rays};
 use rows::Rows;
 use solvable::Solvable;
 
@@ -205,7 +206,9 @@ impl Newton {
         guess: &mut Guess,
         iterations: &mut u64,
     ) -> Option<SolveReport> {
-        guess.beyond = self.slips.in_rows(rows);
+        if guess.beyond.is_empty() {
+            guess.beyond = self.slips.in_rows(rows);
+        }
         let mut first = true;
         let (mut last_error, mut last_change, mut softened, mut made_in_all) = (f64::INFINITY, 1.0, 0, 0);
         loop {
@@ -301,7 +304,7 @@ impl Newton {
         None
     }
 
-    /// The solution that is found without a guess: as the stiff limit if its active set gives that, else as it is.
+    /// The solution that is found without a guess: as the stiff limit if an active set on the way gives that, else as it is.
     fn come_from_afar(
         &mut self,
         problem: &mut impl Solvable,
@@ -309,9 +312,24 @@ impl Newton {
         iterations: &mut u64,
     ) -> Option<SolveReport> {
         let started = self.started(rows);
+        let swept = problem.swept(STALL_SWEEPS);
         if !rows.in_space() {
-            return self.interior(problem, &started, iterations);
+            let softly = self.softly::<Rays>(problem, &started, &swept, iterations);
+            return softly.or_else(|| self.through_the_middle::<Rays>(problem, &started, swept, iterations));
         }
+        self.softly::<Disks>(problem, &started, &swept, iterations)
+            .or_else(|| self.penalised(problem, rows, &started, iterations))
+            .or_else(|| self.through_the_middle::<Disks>(problem, &started, swept, iterations))
+    }
+
+    /// What the approach from afar finds.
+    fn penalised(
+        &mut self,
+        problem: &mut impl Solvable,
+        rows: &Rows,
+        started: &Rows,
+        iterations: &mut u64,
+    ) -> Option<SolveReport> {
         let found = self.approach(problem, rows, iterations)?;
         let mut guess = Guess::of(found.reactions.clone());
         if !rows.mostly_dry()

@@ -209,10 +209,10 @@ fn cracks_that_meet_grow_by_each_other() {
     let bonds = sample.crossing(1e-3..13e-3, 2.5e-3..3.5e-3);
     // two ends of a row, then what lies between them
     let ruptures = one_a_step(&[bonds[0], bonds[1], bonds[3], bonds[2]]);
-    let growth = growth(&sample.paths(&ruptures), &ruptures);
+    let growth = growth(sample.paths(&ruptures).parts(), &ruptures);
     assert_eq!(growth.iter().map(|row| row.cracks).collect::<Vec<_>>(), [1, 1, 2, 1]);
     for (row, (all, longest)) in growth.iter().zip([(1.0, 1.0), (2.0, 2.0), (3.0, 2.0), (4.0, 4.0)]) {
-        assert!(close(row.length, all * D) && close(row.longest, longest * D), "{row:?}");
+        assert!(close(row.size, all * D) && close(row.largest, longest * D), "{row:?}");
     }
 }
 
@@ -228,10 +228,10 @@ fn the_growth_ends_with_the_cracks_of_the_table() {
     assert_eq!(seen.len(), bonds.len());
     let ruptures = one_a_step(&bonds);
     let paths = sample.paths(&ruptures);
-    let end = *growth(&paths, &ruptures).last().unwrap();
+    let end = *growth(paths.parts(), &ruptures).last().unwrap();
     assert_eq!((end.cracks, end.bonds), (paths.cracks.len(), bonds.len()));
-    assert!(close(end.longest, paths.cracks[0].length));
-    assert!(close(end.length, paths.cracks.iter().map(|crack| crack.length).sum()));
+    assert!(close(end.largest, paths.cracks[0].length));
+    assert!(close(end.size, paths.cracks.iter().map(|crack| crack.length).sum()));
     // a path is no longer than its crack and no shorter than the distance of its ends
     for crack in &paths.cracks {
         assert!(crack.path_length <= crack.length * (1.0 + 1e-12) && crack.tortuosity >= 1.0 - 1e-12, "{crack:?}");

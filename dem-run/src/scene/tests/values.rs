@@ -103,8 +103,10 @@ const SOLID_CASES: &[(&str, &str)] = &[
     ("sample.random.preparation.deposition.solid_fraction=1", "sample.random.preparation.deposition.solid_fraction"),
     (
         "sample={\"lattice\": {\"hexagonal\": {\"diameter\": 1, \"rows\": 1, \"columns\": 1}}}",
-        "sample.lattice.hexagonal",
+        "sample.lattice.hexagonal.layers",
     ),
+    ("sample={\"lattice\": {\"square\": {\"diameter\": 1, \"rows\": 1, \"columns\": 1}}}", "sample.lattice.square"),
+    ("sample.random.cut={\"circle\": 0}", "sample.random.cut.circle"),
     ("sample={\"lattice\": {\"cubic\": {\"diameter\": -1, \"counts\": [1, 1, 1]}}}", "sample.lattice.cubic.diameter"),
     ("sample={\"lattice\": {\"cubic\": {\"diameter\": 1, \"counts\": [1, 0, 1]}}}", "sample.lattice.cubic.counts.1"),
     (

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::report::{MAX_GRAINS, Number, Report};
 use crate::scene::model::Scene;
-use crate::scene::sample::{Diameters, GrainSpec, Lattice, Preparation, RandomSample, Sample, Section};
+use crate::scene::sample::{Cut, Diameters, GrainSpec, Lattice, Preparation, RandomSample, Sample, Section};
 
 /// Checks `sample`.
 pub(super) fn sample(report: &mut Report, scene: &Scene) {
@@ -61,6 +61,13 @@ fn random_sample(report: &mut Report, random: &RandomSample) {
         Preparation::Compaction(compaction) => ("compaction", compaction.solid_fraction),
         Preparation::Deposition(deposition) => ("deposition", deposition.solid_fraction),
     };
+    if let Some(Cut::Circle(diameter)) = random.cut {
+        report.positive("sample.random.cut.circle", diameter, "m");
+        if random.section == Section::Circle {
+            let found = "circle, beside section: circle";
+            report.wrong("sample.random.cut", found, "a cut through a box, or none");
+        }
+    }
     let path = format!("sample.random.preparation.{path}.solid_fraction");
     report.range(path, fraction, fraction > 0.0 && fraction < 1.0, "a number above 0 and below 1");
 }
@@ -100,9 +107,16 @@ fn lattice(report: &mut Report, lattice: &Lattice) {
         (Lattice::Cubic { .. }, 2) => {
             report.wrong(&path, "a cubic lattice in 2D", "hexagonal or square, or dimension 3")
         }
-        (Lattice::Hexagonal { .. } | Lattice::Square { .. }, 3) => {
-            report.wrong(&path, format!("a {name} lattice in 3D"), "cubic, or dimension 2");
+        (Lattice::Square { .. }, 3) => {
+            report.wrong(&path, "a square lattice in 3D", "cubic or hexagonal, or dimension 2");
         }
+        (Lattice::Hexagonal { layers: Some(layers), .. }, 2) => {
+            report.wrong(format!("{path}.layers"), layers, "nothing: a lattice in 2D has rows and columns only");
+        }
+        (Lattice::Hexagonal { layers: None, .. }, 3) => {
+            report.wrong(format!("{path}.layers"), "nothing", "the number of layers along z, needed in 3D");
+        }
+        (Lattice::Hexagonal { layers: Some(layers), .. }, _) => report.count(&format!("{path}.layers"), *layers),
         _ => {}
     }
     report.positive(format!("{path}.diameter"), lattice.diameter(), "m");

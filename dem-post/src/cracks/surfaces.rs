@@ -1,0 +1,297 @@
+//! Cracks as surfaces, in space: facets of broken bonds, joined where they meet.
+//!
+//! All places are those of the first frame: where the crack runs in the sample as it was cemented, whatever the pieces
+//! did afterwards.
+//!
+//! * **Facet** of a broken bond: the face that the cells of its two grains share in the power diagram of all grains (the
+//!   Voronoi diagram where they are equal), as far as it lies within half the pair's mean diameter from the line of
+//!   centres: at the edge of the sample, or beside a large void, a cell has no end near by. Between equal spheres that touch
+//!   it is d² on a cubic lattice, but π/4 d² of it count, and d²/(2√2) on a close packing.
+//! * **Crack**: facets that meet in a corner, which is a point as far from the surfaces of four grains: the void between
+//!   them, as in the plane.
+//! * **Normal**: the direction to which the facets, weighed by their areas, are most perpendicular. **Flatness**: the mean of
+//!   cos² of the angle between the normals of the facets and it, 1 for a plane and 1/3 for a sphere.
+//! * **Extent**: the distance of two far corners: the farthest from the one that is farthest from the first.
+//!
+//! Source of the diagram: F. Aurenhammer, *Power diagrams*, SIAM J. Comput. 16, 1987.
+
+use std::collections::HashMap;
+
+use dem_run::history::{Bonds, Rupture};
+use nalgebra::Vector3;
+use petgraph::unionfind::UnionFind;
+use serde::Serialize;
+
+use super::Modes;
+use super::front::Part;
+use crate::chains::stress::major;
+
+/// Sides of the polygon that stands for a circle.
+const SIDES: usize = 24;
+/// Distance at which two corners are one, and size of the cells in which they are sought, over the mean diameter.
+const ONE: f64 = 1e-6;
+const CELL: f64 = 1e-4;
+
+type Point = Vector3<f64>;
+
+/// A broken bond as a polygon.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Facet {
+    /// Its place in the list of ruptures.
+    pub event: usize,
+    /// The points in which it meets others.
+    pub(super) nodes: Vec<usize>,
+    /// Its corners, one after the other, m; none where the cells do not meet near the line of centres.
+    pub corners: Vec<[f64; 3]>,
+    /// Area, m².
+    pub area: f64,
+    /// Unit vector from its second grain to its first.
+    pub normal: [f64; 3],
+    /// Number of its crack, from 0.
+    pub crack: usize,
+}
+
+/// A crack: facets that meet.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Surface {
+    /// Its number, from 1, the largest first.
+    pub number: usize,
+    /// Its bonds.
+    pub bonds: usize,
+    /// Area of all its facets, m².
+    pub area: f64,
+    /// Distance of two far corners, m.
+    pub extent: f64,
+    /// Unit normal; its last component is not negative.
+    pub normal: [f64; 3],
+    /// 1 for a plane, 1/3 for a sphere.
+    pub flatness: f64,
+    /// Time at which its first bond broke, s.
+    pub first: f64,
+    /// Time at which its last bond broke, s.
+    pub last: f64,
+    /// How its bonds broke.
+    pub modes: Modes,
+}
+
+/// The cracks of a sample, and their facets in the order in which they broke.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Surfaces {
+    /// The cracks, the largest first.
+    pub cracks: Vec<Surface>,
+    /// The facets, in the order of the ruptures.
+    pub facets: Vec<Facet>,
+}
+
+impl Surfaces {
+    /// Finds the cracks that `ruptures` make in the sample whose grains had centres `position` (m) and radii `radius` (m)
+    /// when `bonds` were formed.
+    pub fn find(position: &[[f64; 3]], radius: &[f64], bonds: &Bonds, ruptures: &[Rupture]) -> Self {
+        let mut facets = facets(position, radius, bonds, ruptures);
+        let nodes = facets.iter().flat_map(|facet| facet.nodes.iter().copied()).max().map_or(0, |last| last + 1);
+        let mut joined = UnionFind::<usize>::new(nodes);
+        for facet in &facets {
+            facet.nodes.windows(2).for_each(|pair| {
+                joined.union(pair[0], pair[1]);
+            });
+        }
+        // in the order of their first bond, so that equal areas have an order too
+        let mut groups: Vec<Vec<usize>> = vec![];
+        let mut group_of = vec![usize::MAX; nodes];
+        for (k, facet) in facets.iter().enumerate() {
+            let root = joined.find(facet.nodes[0]);
+            if group_of[root] == usize::MAX {
+                group_of[root] = groups.len();
+                groups.push(vec![]);
+            }
+            groups[group_of[root]].push(k);
+        }
+        let area = |group: &[usize]| -> f64 { group.iter().map(|&k| facets[k].area).sum() };
+        groups.sort_by(|a, b| area(b).total_cmp(&area(a)));
+        let cracks = groups.iter().enumerate().map(|(k, group)| surface(k + 1, &facets, group, ruptures)).collect();
+        for (number, group) in groups.iter().enumerate() {
+            group.iter().for_each(|&k| facets[k].crack = number);
+        }
+        Self { cracks, facets }
+    }
+
+    /// The facets as parts of cracks that grow.
+    pub fn parts(&self) -> impl Iterator<Item = Part<'_>> + Clone {
+        self.facets.iter().map(|facet| (facet.event, facet.nodes.as_slice(), facet.area))
+    }
+}
+
+fn surface(number: usize, facets: &[Facet], group: &[usize], ruptures: &[Rupture]) -> Surface {
+    let members = || group.iter().map(|&k| &facets[k]);
+    let mut modes = Modes::default();
+    let mut fabric = [[0.0; 3]; 3];
+    for facet in members() {
+        modes.add(ruptures[facet.event].mode);
+        for (row, a) in fabric.iter_mut().zip(facet.normal) {
+            row.iter_mut().zip(facet.normal).for_each(|(entry, b)| *entry += facet.area * a * b);
+        }
+    }
+    let area: f64 = members().map(|facet| facet.area).sum();
+    let (greatest, normal) = major(&fabric, 3);
+    let corners: Vec<Point> = members().flat_map(|facet| facet.corners.iter().map(|x| Point::from(*x))).collect();
+    let farthest = |from: Point| corners.iter().copied().max_by(|a, b| (a - from).norm().total_cmp(&(b - from).norm()));
+    let ends = corners.first().and_then(|first| farthest(*first)).and_then(|end| Some((end, farthest(end)?)));
+    let (first, last) = (&facets[group[0]], &facets[group[group.len() - 1]]);
+    Surface {
+        number,
+        bonds: group.len(),
+        area,
+        extent: ends.map_or(0.0, |(a, b)| (a - b).norm()),
+        normal: if normal[2] < 0.0 { normal.map(|x| -x) } else { normal },
+        flatness: if area > 0.0 { greatest / area } else { 1.0 },
+        first: ruptures[first.event].time,
+        last: ruptures[last.event].time,
+        modes,
+    }
+}
+
+/// The grains, in the order of their first coordinates.
+struct Neighbours {
+    centre: Vec<Point>,
+    radius: Vec<f64>,
+    /// First coordinates and grains.
+    along: Vec<(f64, usize)>,
+    greatest: f64,
+}
+
+impl Neighbours {
+    fn new(position: &[[f64; 3]], radius: &[f64]) -> Self {
+        let mut along: Vec<(f64, usize)> = position.iter().enumerate().map(|(k, x)| (x[0], k)).collect();
+        along.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let greatest = radius.iter().copied().fold(0.0, f64::max);
+        Self { centre: position.iter().map(|x| Point::from(*x)).collect(), radius: radius.into(), along, greatest }
+    }
+
+    /// The grains whose centres are nearer to `point` than `reach`.
+    fn near(&self, point: Point, reach: f64) -> impl Iterator<Item = usize> {
+        let from = self.along.partition_point(|(x, _)| *x < point.x - reach);
+        let candidates = self.along[from..].iter().take_while(move |(x, _)| *x <= point.x + reach);
+        candidates.map(|(_, k)| *k).filter(move |k| (self.centre[*k] - point).norm() < reach)
+    }
+
+    /// Where the line of centres passes the plane of equal power, and the part of the plane within `reach` of it (m) that is
+    /// nearest, in the sense of the power diagram, to both grains.
+    fn face(&self, [i, j]: [usize; 2], reach: f64) -> (Point, Point, Vec<Point>) {
+        let (a, b) = (self.centre[i], self.centre[j]);
+        let way = a - b;
+        let (length, normal) = (way.norm(), way.normalize());
+        let share = 0.5 * (length + (self.radius[j].powi(2) - self.radius[i].powi(2)) / length);
+        let middle = b + normal * share;
+        let mut polygon = circle(normal, reach);
+        // the power of a corner to either grain is at most this, so no grain farther away comes before them
+        let power = reach * reach / (std::f64::consts::PI / SIDES as f64).cos().powi(2) + (middle - a).norm_squared()
+            - self.radius[i].powi(2);
+        let far = 1.01 * reach + (power + self.greatest.powi(2)).max(0.0).sqrt();
+        for k in self.near(middle, far).filter(|k| ![i, j].contains(k)) {
+            let other = self.centre[k];
+            // |x − a|² − r_i² ≤ |x − c|² − r_k², for x counted from the middle
+            let limit = (other - middle).norm_squared() - (a - middle).norm_squared() - self.radius[k].powi(2)
+                + self.radius[i].powi(2);
+            clip(&mut polygon, 2.0 * (other - a), limit);
+        }
+        (middle, normal, polygon)
+    }
+}
+
+/// A regular polygon around the circle of a radius, perpendicular to the unit vector `normal`, around the origin.
+fn circle(normal: Point, radius: f64) -> Vec<Point> {
+    let least = normal.iamin();
+    let first = normal.cross(&Point::ith(least, 1.0)).normalize();
+    let second = normal.cross(&first);
+    let half = std::f64::consts::PI / SIDES as f64;
+    let corner = |k: usize| {
+        let (sin, cos) = ((2 * k) as f64 * half).sin_cos();
+        (first * cos + second * sin) * (radius / half.cos())
+    };
+    (0..SIDES).map(corner).collect()
+}
+
+/// Leave of a convex polygon what has x·direction ≤ limit.
+fn clip(polygon: &mut Vec<Point>, direction: Point, limit: f64) {
+    let beyond = |x: &Point| x.dot(&direction) - limit;
+    if polygon.iter().all(|x| beyond(x) <= 0.0) {
+        return;
+    }
+    let mut kept = vec![];
+    for (k, x) in polygon.iter().enumerate() {
+        let next = &polygon[(k + 1) % polygon.len()];
+        let (here, there) = (beyond(x), beyond(next));
+        if here <= 0.0 {
+            kept.push(*x);
+        }
+        if (here < 0.0 && there > 0.0) || (here > 0.0 && there < 0.0) {
+            kept.push(x + (next - x) * (here / (here - there)));
+        }
+    }
+    *polygon = kept;
+}
+
+/// The area of a convex polygon.
+fn area(polygon: &[Point]) -> f64 {
+    let Some((first, rest)) = polygon.split_first() else { return 0.0 };
+    0.5 * rest.windows(2).map(|pair| (pair[0] - first).cross(&(pair[1] - first)).norm()).sum::<f64>()
+}
+
+fn facets(position: &[[f64; 3]], radius: &[f64], bonds: &Bonds, ruptures: &[Rupture]) -> Vec<Facet> {
+    let neighbours = Neighbours::new(position, radius);
+    let diameter = 2.0 * radius.iter().sum::<f64>() / radius.len().max(1) as f64;
+    let mut meetings: HashMap<[i64; 3], usize> = HashMap::new();
+    let mut list = vec![];
+    // points without a corner come after those with one, by numbers that no corner has
+    let mut count = 0;
+    for (event, rupture) in ruptures.iter().enumerate() {
+        let bond = rupture.bond as usize;
+        let mean = bonds.mean_diameter[bond];
+        let (middle, normal, mut polygon) = neighbours.face(bonds.pair[bond].map(|k| k as usize), mean);
+        let mut nodes = vec![];
+        // what lies on the rim is no corner of the diagram
+        for x in polygon.iter().filter(|x| x.norm() < mean) {
+            for cell in cells(middle + x, diameter) {
+                let next = count;
+                let node = *meetings.entry(cell).or_insert(next);
+                count += usize::from(node == next);
+                nodes.push(node);
+            }
+        }
+        if nodes.is_empty() {
+            nodes.push(count);
+            count += 1;
+        }
+        nodes.sort_unstable();
+        nodes.dedup();
+        for side in circle(normal, 0.5 * mean) {
+            clip(&mut polygon, side, 0.5 * mean * side.norm());
+        }
+        list.push(Facet {
+            event,
+            nodes,
+            area: area(&polygon),
+            corners: polygon.iter().map(|x| (middle + x).into()).collect(),
+            normal: normal.into(),
+            crack: 0,
+        });
+    }
+    list
+}
+
+/// The cells that a point, as large as the distance at which two are one, lies in.
+fn cells(x: Point, diameter: f64) -> Vec<[i64; 3]> {
+    let ends = |k: usize| [-ONE, ONE].map(|s| ((x[k] / diameter + s) / CELL).floor() as i64);
+    let mut cells = vec![[0; 3]];
+    for k in 0..3 {
+        let [low, high] = ends(k);
+        let with = |value: i64| {
+            cells.iter().map(move |cell: &[i64; 3]| std::array::from_fn(|c| if c == k { value } else { cell[c] }))
+        };
+        cells = if low == high { with(low).collect() } else { with(low).chain(with(high)).collect() };
+    }
+    cells
+}
+
+#[cfg(test)]
+mod tests;
