@@ -11,8 +11,8 @@ use crate::plot::Chart;
 use crate::row;
 
 /// Writes `ruptures.csv`, `broken.csv`, `fragments.csv`, and as drawings `broken`, `fragments` and `decohesion`, of
-/// spheres also `decohesion-inside`; these maps show the moments nearest to `times` (s), or chosen ones. Where cracks were found, also `cracks.csv`,
-/// `crack-growth.csv`, and the drawings `cracks` and `crack-front`, where one grew step by step or round by round; in the plane
+/// spheres also `decohesion-inside`; these maps show the moments nearest to `times` (s), or chosen ones. Where cracks were
+/// found, also `cracks.csv`, `crack-growth.csv`, and the drawings `cracks` and `crack-front`, where one grew step by step or round by round; in the plane
 /// `crack-segments.csv`, `crack-front.csv` and, where the cracks fill a small part of the sample, the drawing `cracks-near`; in
 /// space `crack-facets.csv`, their corners in `crack-facets.vtk`, and the drawing `cracks-side`.
 ///

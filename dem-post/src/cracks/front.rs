@@ -7,7 +7,7 @@
 //! of the tip from the last time at which the crack grew to this one.
 //!
 //! The **growth** takes the other view: after each round, the cracks as they are then, joined only by what has broken so
-//! far. Where cracks meet, the longest grows by the whole of the other.
+//! far. Where cracks meet, the largest grows by the whole of the other.
 
 use dem_run::history::Rupture;
 use petgraph::unionfind::UnionFind;

@@ -173,8 +173,8 @@ fn pale_panel(history: &History, report: &Report, cracks: usize) -> Result<Panel
     })
 }
 
-/// The facets of cracks in space over the grains of the first frame, coloured by the time at which each bond broke, seen along y
-/// and against x.
+/// The facets of cracks in space over the grains of the first frame, coloured by the time at which each bond broke, or by the
+/// round of the cascade where all broke in one step; seen along y and against x.
 ///
 /// # Errors
 /// Those of reading the history.

@@ -6,11 +6,12 @@
 //! * **Facet** of a broken bond: the face that the cells of its two grains share in the power diagram of all grains (the
 //!   Voronoi diagram where they are equal), as far as it lies within half the pair's mean diameter from the line of
 //!   centres: at the edge of the sample, or beside a large void, a cell has no end near by. Between equal spheres that touch
-//!   it is d² on a cubic lattice, but π/4 d² of it count, and d²/(2√2) on a close packing.
-//! * **Crack**: facets that meet in a corner, which is a point as far from the surfaces of four grains: the void between
-//!   them, as in the plane.
+//!   it is d² on a cubic lattice, of which the polygon of 24 sides around a circle of diameter d counts, and d²/(2√2) on a
+//!   close packing.
+//! * **Crack**: facets that meet in a corner, which is a point of equal power to four grains: in the void between them, as in
+//!   the plane.
 //! * **Normal**: the direction to which the facets, weighed by their areas, are most perpendicular. **Flatness**: the mean of
-//!   cos² of the angle between the normals of the facets and it, 1 for a plane and 1/3 for a sphere.
+//!   cos², weighed alike, of the angle between the normals of the facets and it, 1 for a plane and 1/3 for a sphere.
 //! * **Extent**: the distance of two far corners: the farthest from the one that is farthest from the first.
 //!
 //! Source of the diagram: F. Aurenhammer, *Power diagrams*, SIAM J. Comput. 16, 1987.
@@ -28,7 +29,8 @@ use crate::chains::stress::major;
 
 /// Sides of the polygon that stands for a circle.
 const SIDES: usize = 24;
-/// Distance at which two corners are one, and size of the cells in which they are sought, over the mean diameter.
+/// Distance within which two corners are always one, and the one beyond which they never are, over the mean diameter: those
+/// between are one where they lie in one cell.
 const ONE: f64 = 1e-6;
 const CELL: f64 = 1e-4;
 
@@ -242,7 +244,6 @@ fn facets(position: &[[f64; 3]], radius: &[f64], bonds: &Bonds, ruptures: &[Rupt
     let diameter = 2.0 * radius.iter().sum::<f64>() / radius.len().max(1) as f64;
     let mut meetings: HashMap<[i64; 3], usize> = HashMap::new();
     let mut list = vec![];
-    // points without a corner come after those with one, by numbers that no corner has
     let mut count = 0;
     for (event, rupture) in ruptures.iter().enumerate() {
         let bond = rupture.bond as usize;
@@ -259,6 +260,7 @@ fn facets(position: &[[f64; 3]], radius: &[f64], bonds: &Bonds, ruptures: &[Rupt
             }
         }
         if nodes.is_empty() {
+            // it meets nothing
             nodes.push(count);
             count += 1;
         }

@@ -31,19 +31,18 @@ impl Guess {
     pub fn velocity(&self, k: usize, row: &Row) -> Padded {
         let guess = &self.reactions[k];
         let beyond = self.beyond.get(k).copied().unwrap_or_default();
-        let moved = |limit: f64, size: f64, beyond: f64| {
-            if size >= (1.0 - BEYOND) * limit { 1.0 + beyond.max(2.0 * BEYOND) } else { 1.0 }
-        };
         let (limit, w) = (guess.n + row.shift, row.metric());
-        let guess = Local {
-            n: guess.n,
-            t: guess.t * moved(row.cone.mu * limit, Vect::norm(&guess.t), beyond[0]),
-            m: guess.m * moved(row.cone.nu * limit, Vect::norm(&guess.m), beyond[1]),
+        // how far the rows of one group are beyond their limit; zero for those that the guess lets stick
+        let at_limit = |c: f64, size: f64, known: f64| {
+            if size >= (1.0 - BEYOND) * c * limit { known.max(2.0 * BEYOND) } else { 0.0 }
         };
+        let slip = at_limit(row.cone.mu, Vect::norm(&guess.t), beyond[0]);
+        let bend = at_limit(row.cone.nu, Vect::norm(&guess.m), beyond[1]);
+        let guess = Local { n: guess.n, t: guess.t * (1.0 + slip), m: guess.m * (1.0 + bend) };
         let mut u = row.weights.times(&row.multiplier) + row.compliance.times(&row.carried) - w.times(&guess);
         if row.convex() && beyond != [0.0; 2] {
             // what slips with associated flow opens by so much
-            u.n += limit * (row.cone.mu * row.cone.mu * w.t * beyond[0] + row.cone.nu * row.cone.nu * w.m * beyond[1]);
+            u.n += limit * (row.cone.mu * row.cone.mu * w.t * slip + row.cone.nu * row.cone.nu * w.m * bend);
         }
         u.n -= row.lag.unwrap_or(0.0);
         u
@@ -70,6 +69,10 @@ impl Slips {
                 }
             }
             list.sort_by_key(|(at, _)| *at);
+            // bodies that cannot move have no unknowns, so contacts with two of them look alike: nothing is told of those
+            let alike = |k: usize, l: usize| list.get(k).zip(list.get(l)).is_some_and(|(a, b)| a.0 == b.0);
+            let unique = |k: &usize| !alike(*k, k + 1) && !(*k > 0 && alike(k - 1, *k));
+            list = (0..list.len()).filter(unique).map(|k| list[k]).collect();
         }
         Self(list)
     }

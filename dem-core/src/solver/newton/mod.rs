@@ -9,7 +9,7 @@
 //! reactions; with a large ρ two or three suffice, and nearly always the active set of the last step still holds, so
 //! each costs one linear solve. The Cholesky factor of the symmetric part is kept over steps as the preconditioner of
 //! GMRES and renewed when that needs too many iterations. Where the active set runs in circles an interior-point method,
-//! in space convex problems of growing penalty, do without a guess of it, and where those fail Gauss–Seidel takes over.
+//! and in space convex problems of growing penalty, do without a guess of it; where those fail Gauss–Seidel takes over.
 //!
 //! Started from zero reactions the first proximal step is the stiff limit: the reactions of least Σ r²/ρ among all
 //! that balance the load, the ones that elastic contacts with stiffnesses in the ratio of ρ would give.

@@ -91,7 +91,7 @@ fn a_cut_through_a_cubic_lattice_is_one_flat_crack() {
 }
 
 #[test]
-fn inside_a_close_packing_a_facet_is_a_rhombus() {
+fn inside_a_close_packing_twelve_facets_surround_a_grain() {
     let sample = close_packed(5);
     // all bonds of the grain in the middle
     let middle = 62;

@@ -99,7 +99,7 @@ fn bonds(report: &mut Report, bonds: &Bonds) {
 
 fn grains(report: &mut Report, scene: &Scene) {
     let Some(grains) = &scene.grains else { return };
-    // a sample file is counted when it is read
+    // a file or a cut sample is counted when it is made
     let count = scene.sample.count();
     let exists = |report: &mut Report, path: String, grain: usize| {
         if let Some(count) = count.filter(|count| grain >= *count && *count > 0) {

@@ -78,8 +78,8 @@ fn scaled(s: &Vector3<f64>, lambda: &Vector3<f64>) -> (Matrix3<f64>, Vector3<f64
 fn reach(x: &Vector3<f64>, d: &Vector3<f64>) -> f64 {
     let (a, b) = (hyperbolic(d), x[0] * d[0] - x[1] * d[1] - x[2] * d[2]);
     let c = hyperbolic(x);
-    let under = b * b - a * c;
-    let slope = if under < 0.0 { return f64::INFINITY } else { under.sqrt() - b };
+    // from inside the root is real, whatever rounding says
+    let slope = (b * b - a * c).max(0.0).sqrt() - b;
     if slope > 0.0 { c / slope } else { f64::INFINITY }
 }
 
@@ -123,7 +123,7 @@ impl Disks {
         inverse * divided(&right, point)
     }
 
-    /// A row that carries nothing.
+    /// Whether a row carries anything.
     fn carries(&self, place: usize) -> bool {
         self.metric[place].is_finite()
     }
@@ -316,6 +316,9 @@ mod tests {
                 assert!(way > 0.0 && hyperbolic(&end).abs() <= 1e-6 * end[0] * end[0], "{x} {d} {end}");
                 assert!(hyperbolic(&(x + d * (0.999 * way))) > 0.0);
             }
+            // straight to the tip, whatever rounding makes of it
+            let tip = reach(&x, &(x * -0.7));
+            assert!((tip - 1.0 / 0.7).abs() < 1e-6, "{x} {tip}");
             // into the cone there is no end
             assert_eq!(reach(&x, &Vector3::new(1.0, 0.4, 0.3)), f64::INFINITY);
         }

@@ -324,6 +324,7 @@ impl Newton {
                 let gap = at.gap(&sites);
                 gap <= S::END * at.scale(rows, &sites) || stall.at(gap)
             });
+            // slips of what only yields grow with the metric as the limits do, so they are told in it
             let mut guess = at.snapped(&rows, &sites, S::measure);
             let reactions = guess.reactions.clone();
             problem.write_back(&reactions);
