@@ -9,7 +9,7 @@
 use super::inner::Iterate;
 use super::rows::Rows;
 use super::solvable::Solvable;
-use super::{Found, Newton, STALL_SWEEPS, load_change};
+use super::{Found, Newton, load_change};
 use crate::contact::Padded;
 
 /// How much smaller the first penalty is, and by what it grows.
@@ -26,10 +26,15 @@ const TRY: u64 = 8;
 const MOST_FAILURES: u32 = 6;
 
 impl Newton {
-    /// The best reactions that are met on the way, from those at hand; none where they are not accepted.
-    pub(super) fn approach(&mut self, problem: &mut impl Solvable, base: &Rows, iterations: &mut u64) -> Option<Found> {
+    /// The best reactions that are met on the way from `reactions`; none where they are not accepted.
+    pub(super) fn approach(
+        &mut self,
+        problem: &mut impl Solvable,
+        base: &Rows,
+        mut reactions: Vec<Padded>,
+        iterations: &mut u64,
+    ) -> Option<Found> {
         let mut rows = base.clone();
-        let mut reactions = problem.swept(STALL_SWEEPS);
         let mut state = Iterate::from_reactions(&rows, &reactions);
         rows.soften(SOFT);
         let (mut level, mut share, mut failures) = (SOFT, 1.0f64, 0);

@@ -317,9 +317,19 @@ impl Newton {
             let softly = self.softly::<Rays>(problem, &started, &swept, iterations);
             return softly.or_else(|| self.through_the_middle::<Rays>(problem, &started, swept, iterations));
         }
-        self.softly::<Disks>(problem, &started, &swept, iterations)
-            .or_else(|| self.penalised(problem, rows, &started, iterations))
-            .or_else(|| self.through_the_middle::<Disks>(problem, &started, swept, iterations))
+        let report = self
+            .softly::<Disks>(problem, &started, &swept, iterations)
+            .or_else(|| self.penalised(problem, rows, swept.clone(), iterations));
+        if report.is_some() {
+            return report;
+        }
+        // where the approach ended, sweeps begin better than where the path ends
+        let reached = problem.swept(0);
+        let report = self.through_the_middle::<Disks>(problem, &started, swept, iterations);
+        if report.is_none() {
+            problem.write_back(&reached);
+        }
+        report
     }
 
     /// What the approach from afar finds.
@@ -327,13 +337,13 @@ impl Newton {
         &mut self,
         problem: &mut impl Solvable,
         rows: &Rows,
-        started: &Rows,
+        swept: Vec<Padded>,
         iterations: &mut u64,
     ) -> Option<SolveReport> {
-        let found = self.approach(problem, rows, iterations)?;
+        let found = self.approach(problem, rows, swept, iterations)?;
         let mut guess = Guess::of(found.reactions.clone());
         if !rows.mostly_dry()
-            && let Some(report) = self.rounds(problem, &mut started.clone(), &mut guess, iterations)
+            && let Some(report) = self.rounds(problem, &mut self.started(rows), &mut guess, iterations)
         {
             return Some(report);
         }
