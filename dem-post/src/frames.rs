@@ -149,10 +149,8 @@ fn picture(history: &History, report: &Report, frame: usize) -> Result<(Panel, V
         walls: history.wall_state(frame)?,
         fills: vec![GRAIN[0].into(); number_of_grains],
         outline: GRAIN[1],
-        links: vec![],
-        arrows: vec![],
-        patches: vec![],
         grains,
+        ..Panel::default()
     };
     let scale = report.scale.unwrap_or(1.0);
     let legend = match report.subject {

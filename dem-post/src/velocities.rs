@@ -178,9 +178,8 @@ pub fn map(history: &History, report: &Report) -> Result<Drawing> {
             walls: history.wall_state(field.frame)?,
             fills: field.speed.iter().map(|&speed| usual.colour(speed)).collect(),
             outline: colour::GREY,
-            links: vec![],
             arrows: arrows(&field.state, history.dimension()),
-            patches: vec![],
+            ..Panel::default()
         });
     }
     let legend = [Key::Bar(scale("speed over v", 1.0)), Key::Arrow("mean velocity of a square".into())];

@@ -89,8 +89,7 @@ pub fn chain_map(history: &History, report: &Report) -> Result<Drawing> {
             fills,
             outline: GRAIN[1],
             links,
-            arrows: vec![],
-            patches: vec![],
+            ..Panel::default()
         });
     }
     let legend = [
@@ -130,8 +129,7 @@ pub fn network_map(history: &History, report: &Report) -> Result<Drawing> {
             walls: history.wall_state(network.frame)?,
             fills: vec![GRAIN[0].into(); grains],
             outline: GRAIN[1],
-            arrows: vec![],
-            patches: vec![],
+            ..Panel::default()
         });
     }
     Ok(draw(&sample, &panels, &force_legend()))

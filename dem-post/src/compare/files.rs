@@ -117,9 +117,8 @@ fn bond_map(history: &History, report: &Report) -> Result<Drawing> {
         walls: history.wall_state(0)?,
         fills: vec!["#f4f4f4".into(); history.grains()?.radius.len()],
         outline: "#cfcfcf",
-        arrows: vec![],
-        patches: vec![],
         grains,
+        ..Panel::default()
     };
     let label = |k: usize| format!("{}: {}", ["in both", "only in A", "only in B"][k], report.broken[k]);
     let legend = [0, 1, 2].map(|k| Key::Line(COLOURS[k], WIDTH, label(k)));

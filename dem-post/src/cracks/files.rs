@@ -1,8 +1,9 @@
 //! What `dem-post cracks` writes.
 
-use dem_run::history::{History, RuptureMode};
+use dem_run::history::History;
 
 use super::pictures::{broken_chart, crack_map, decohesion, fragment_charts, front_charts, surface_maps};
+use super::surfaces::Facet;
 use super::{Report, broken_over_time};
 use crate::map::Sample;
 use crate::moments;
@@ -12,9 +13,10 @@ use crate::row;
 
 /// Writes `ruptures.csv`, `broken.csv`, `fragments.csv`, and as drawings `broken`, `fragments` and `decohesion`, of
 /// spheres also `decohesion-inside`; these maps show the moments nearest to `times` (s), or chosen ones. Where cracks were
-/// found, also `cracks.csv`, `crack-growth.csv`, and the drawings `cracks` and `crack-front`, where one grew step by step or round by round; in the plane
-/// `crack-segments.csv`, `crack-front.csv` and, where the cracks fill a small part of the sample, the drawing `cracks-near`; in
-/// space `crack-facets.csv`, their corners in `crack-facets.vtk`, and the drawing `cracks-side`.
+/// found, also `cracks.csv`, `crack-growth.csv`, and the drawings `cracks` and, where one grew step by step or round by
+/// round, `crack-front`; in the plane `crack-segments.csv`, `crack-front.csv` and, where the cracks fill a small part of the
+/// sample, the drawing `cracks-near`; in space `crack-facets.csv`, their corners in `crack-facets.vtk`, and the drawing
+/// `cracks-side`.
 ///
 /// # Errors
 /// [`crate::output::PostError::Write`], and [`crate::output::PostError::Usage`] for times outside the history.
@@ -125,46 +127,43 @@ fn write_facets(report: &Report, folder: &mut Folder) -> Result<()> {
         "crack", "step", "time_s", "round", "bond", "mode", "area_m2", "normal_x", "normal_y", "normal_z", "x_m",
         "y_m", "z_m",
     ];
-    let facets = &report.faces.facets;
-    let rows = facets.iter().map(|f| {
+    let rows = report.faces.facets.iter().map(|f| {
         let (e, [x, y, z]) = (&report.events[f.event], f.normal);
         let crack = f.crack + 1;
         row![crack, e.step, e.time, e.round, e.bond, e.mode, f.area, x, y, z, e.point[0], e.point[1], e.point[2]]
     });
     folder.table("crack-facets", &head, rows)?;
-    let seen: Vec<_> = facets.iter().filter(|f| f.corners.len() > 2).collect();
-    let corners: usize = seen.iter().map(|f| f.corners.len()).sum();
-    let mut text = format!(
-        "# vtk DataFile Version 3.0\nfacets of broken bonds, m and s\nASCII\nDATASET POLYDATA\nPOINTS {corners} double\n"
-    );
-    for [x, y, z] in seen.iter().flat_map(|f| &f.corners) {
+    Ok(folder.write("crack-facets.vtk", poly_data(report).as_bytes())?)
+}
+
+/// The facets in VTK's legacy format.
+fn poly_data(report: &Report) -> String {
+    let facets: Vec<&Facet> = report.faces.seen().collect();
+    let corners: usize = facets.iter().map(|f| f.corners.len()).sum();
+    let mut text =
+        String::from("# vtk DataFile Version 3.0\nfacets of broken bonds, m and s\nASCII\nDATASET POLYDATA\n");
+    text += &format!("POINTS {corners} double\n");
+    for [x, y, z] in facets.iter().flat_map(|f| &f.corners) {
         text += &format!("{x} {y} {z}\n");
     }
-    text += &format!("POLYGONS {} {}\n", seen.len(), seen.len() + corners);
+    text += &format!("POLYGONS {} {}\n", facets.len(), facets.len() + corners);
     let mut first = 0;
-    for facet in &seen {
+    for facet in &facets {
         let next = first + facet.corners.len();
         let ids: Vec<String> = (first..next).map(|k| k.to_string()).collect();
         text += &format!("{} {}\n", ids.len(), ids.join(" "));
         first = next;
     }
-    text += &format!("CELL_DATA {}\n", seen.len());
-    for (name, kind) in [("time", "double"), ("crack", "int"), ("mode", "int")] {
+    text += &format!("CELL_DATA {}\n", facets.len());
+    let mut array = |name: &str, kind: &str, value: &dyn Fn(&Facet) -> String| {
         text += &format!("SCALARS {name} {kind} 1\nLOOKUP_TABLE default\n");
-        for facet in &seen {
-            let event = &report.events[facet.event];
-            text += &match name {
-                "time" => format!("{}\n", event.time),
-                "crack" => format!("{}\n", facet.crack + 1),
-                // as in the history: 0 is intact
-                _ => format!(
-                    "{}\n",
-                    1 + RuptureMode::ALL.iter().position(|mode| mode.label() == event.mode).unwrap_or(0)
-                ),
-            };
-        }
-    }
-    Ok(folder.write("crack-facets.vtk", text.as_bytes())?)
+        facets.iter().for_each(|facet| text += &format!("{}\n", value(facet)));
+    };
+    array("time", "double", &|f| report.events[f.event].time.to_string());
+    array("crack", "int", &|f| (f.crack + 1).to_string());
+    // as in the history: 0 is intact
+    array("mode", "int", &|f| (1 + report.events[f.event].mode_number()).to_string());
+    text
 }
 
 fn write_segments(report: &Report, folder: &mut Folder) -> Result<()> {

@@ -13,6 +13,7 @@ use dem_run::history::Rupture;
 use petgraph::unionfind::UnionFind;
 use serde::Serialize;
 
+use super::parts::{Part, join, nodes};
 use super::paths::Paths;
 
 /// A crack after a round of breaks.
@@ -107,32 +108,26 @@ pub struct Growth {
     pub largest: f64,
 }
 
-/// A broken bond as part of a crack: its place in the list of ruptures, the points in which it meets others, its length (m)
-/// or area (m²).
-pub type Part<'a> = (usize, &'a [usize], f64);
-
 /// The growth of all cracks, in order of time and round, from the broken bonds in their order.
 pub fn growth<'a>(parts: impl Iterator<Item = Part<'a>> + Clone, ruptures: &[Rupture]) -> Vec<Growth> {
-    let nodes = parts.clone().flat_map(|(_, nodes, _)| nodes.iter().copied()).max().map_or(0, |last| last + 1);
+    let nodes = nodes(parts.clone());
     let mut joined = UnionFind::<usize>::new(nodes);
     // of each crack at its root; none where no part has come yet
     let mut sizes = vec![None; nodes];
     let mut rows: Vec<Growth> = vec![];
     let (mut cracks, mut largest, mut size) = (0usize, 0.0f64, 0.0);
-    for (k, (event, nodes, own)) in parts.enumerate() {
-        let mut roots: Vec<usize> = nodes.iter().map(|node| joined.find_mut(*node)).collect();
+    for (k, part) in parts.enumerate() {
+        let mut roots: Vec<usize> = part.nodes.iter().map(|node| joined.find_mut(*node)).collect();
         roots.sort_unstable();
         roots.dedup();
         let met: Vec<f64> = roots.iter().filter_map(|root| sizes[*root].take()).collect();
         cracks = cracks + 1 - met.len();
-        let all = met.iter().sum::<f64>() + own;
-        roots.windows(2).for_each(|pair| {
-            joined.union(pair[0], pair[1]);
-        });
+        let all = met.iter().sum::<f64>() + part.size;
+        join(&mut joined, &roots);
         sizes[joined.find_mut(roots[0])] = Some(all);
         largest = largest.max(all);
-        size += own;
-        let Rupture { step, time, round, .. } = ruptures[event];
+        size += part.size;
+        let Rupture { step, time, round, .. } = ruptures[part.event];
         if rows.last().is_some_and(|last| (last.step, last.round) == (step, round)) {
             rows.pop();
         }

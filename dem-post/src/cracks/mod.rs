@@ -14,6 +14,7 @@ pub use files::write;
 
 mod files;
 pub mod front;
+pub mod parts;
 pub mod paths;
 pub mod pictures;
 pub mod surfaces;
@@ -195,6 +196,13 @@ pub fn read(history: &History, quiet: bool) -> Result<Report> {
     })
 }
 
+impl Event {
+    /// The place of its mode among [`RuptureMode::ALL`].
+    pub fn mode_number(&self) -> usize {
+        RuptureMode::ALL.iter().position(|mode| mode.label() == self.mode).unwrap_or(0)
+    }
+}
+
 impl From<&Rupture> for Event {
     fn from(r: &Rupture) -> Self {
         Self {
@@ -218,8 +226,7 @@ pub fn broken_over_time(events: &[Event]) -> Vec<(f64, [usize; 3])> {
     let mut curve: Vec<(f64, [usize; 3])> = vec![];
     let mut count = [0; 3];
     for event in events {
-        let mode = RuptureMode::ALL.iter().position(|mode| mode.label() == event.mode).unwrap_or(0);
-        count[mode] += 1;
+        count[event.mode_number()] += 1;
         match curve.last_mut() {
             Some((time, counts)) if *time == event.time => *counts = count,
             _ => curve.push((event.time, count)),
@@ -289,34 +296,25 @@ impl Report {
 
     /// The largest cracks, one a line, below the heads of their columns; none where nothing broke.
     pub fn crack_rows(&self) -> Option<(&'static [&'static str], Vec<Vec<String>>)> {
-        let modes = |Modes { tension, shear, rolling }: Modes| format!("{tension}/{shear}/{rolling}");
-        let line = |crack: &Crack| {
-            vec![
-                crack.number.to_string(),
-                crack.bonds.to_string(),
-                modes(crack.modes),
-                number(1e3 * crack.length),
-                number(1e3 * crack.path_length),
-                number(1e3 * crack.end_to_end),
-                number(crack.tortuosity),
-                format!("{:.0}", crack.orientation),
-                number(crack.first),
-                number(crack.last),
-            ]
+        let row = |place: usize, bonds: usize, modes: Modes, own: Vec<String>, times: [f64; 2]| {
+            let Modes { tension, shear, rolling } = modes;
+            let head = [place.to_string(), bonds.to_string(), format!("{tension}/{shear}/{rolling}")];
+            head.into_iter().chain(own).chain(times.map(number)).collect::<Vec<_>>()
         };
-        let surface = |crack: &Surface| {
-            let [x, y, z] = crack.normal;
-            vec![
-                crack.number.to_string(),
-                crack.bonds.to_string(),
-                modes(crack.modes),
-                number(1e6 * crack.area),
-                number(1e3 * crack.extent),
+        let line = |c: &Crack| {
+            let own = [1e3 * c.length, 1e3 * c.path_length, 1e3 * c.end_to_end, c.tortuosity].map(number);
+            let own = own.into_iter().chain([format!("{:.0}", c.orientation)]).collect();
+            row(c.number, c.bonds, c.modes, own, [c.first, c.last])
+        };
+        let surface = |c: &Surface| {
+            let [x, y, z] = c.normal;
+            let own = vec![
+                number(1e6 * c.area),
+                number(1e3 * c.extent),
                 format!("({x:.2}, {y:.2}, {z:.2})"),
-                format!("{:.2}", crack.flatness),
-                number(crack.first),
-                number(crack.last),
-            ]
+                format!("{:.2}", c.flatness),
+            ];
+            row(c.number, c.bonds, c.modes, own, [c.first, c.last])
         };
         if !self.cracks.is_empty() {
             Some((&CRACK_HEAD, self.cracks.iter().take(CRACKS).map(line).collect()))

@@ -19,11 +19,10 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use dem_run::history::{Bonds, Rupture};
-use petgraph::unionfind::UnionFind;
 use serde::Serialize;
 
 use super::Modes;
-use super::front::Part;
+use super::parts::{Part, groups};
 use super::voids::Voids;
 
 /// A broken bond as a line.
@@ -88,24 +87,7 @@ impl Paths {
     /// (m) when `bonds` were formed.
     pub fn find(position: &[[f64; 2]], radius: &[f64], bonds: &Bonds, ruptures: &[Rupture]) -> Self {
         let mut segments = segments(position, radius, bonds, ruptures);
-        let nodes = segments.iter().flat_map(|segment| segment.nodes).max().map_or(0, |last| last + 1);
-        let mut joined = UnionFind::<usize>::new(nodes);
-        segments.iter().for_each(|segment| {
-            joined.union(segment.nodes[0], segment.nodes[1]);
-        });
-        // in the order of their first bond, so that equal lengths have an order too
-        let mut groups: Vec<Vec<usize>> = vec![];
-        let mut group_of = vec![usize::MAX; nodes];
-        for (k, segment) in segments.iter().enumerate() {
-            let root = joined.find(segment.nodes[0]);
-            if group_of[root] == usize::MAX {
-                group_of[root] = groups.len();
-                groups.push(vec![]);
-            }
-            groups[group_of[root]].push(k);
-        }
-        let length = |group: &[usize]| -> f64 { group.iter().map(|&k| segments[k].length).sum() };
-        groups.sort_by(|a, b| length(b).total_cmp(&length(a)));
+        let groups = groups(parts(&segments));
         let mut cracks = vec![];
         for (number, group) in groups.iter().enumerate() {
             let path = longest_path(&segments, group);
@@ -116,10 +98,14 @@ impl Paths {
         Self { cracks, segments }
     }
 
-    /// The segments as parts of cracks that grow.
+    /// The segments as parts of cracks.
     pub fn parts(&self) -> impl Iterator<Item = Part<'_>> + Clone {
-        self.segments.iter().map(|segment| (segment.event, segment.nodes.as_slice(), segment.length))
+        parts(&self.segments)
     }
+}
+
+fn parts(segments: &[Segment]) -> impl Iterator<Item = Part<'_>> + Clone {
+    segments.iter().map(|segment| Part { event: segment.event, nodes: &segment.nodes, size: segment.length })
 }
 
 fn segments(position: &[[f64; 2]], radius: &[f64], bonds: &Bonds, ruptures: &[Rupture]) -> Vec<Segment> {

@@ -4,6 +4,7 @@ use dem_run::history::{BondStatus, History};
 
 use super::front::Growth;
 use super::paths::Crack;
+use super::surfaces::Facet;
 use super::{Pieces, Report};
 use crate::fragments::Fragments;
 use crate::map::{Colour, Key, Link, Panel, Patch, Ramp, Sample, Scale, draw, draw_view};
@@ -167,9 +168,7 @@ fn pale_panel(history: &History, report: &Report, cracks: usize) -> Result<Panel
         walls: history.wall_state(0)?,
         fills: vec![PALE[0].into(); history.grains()?.radius.len()],
         outline: PALE[1],
-        links: vec![],
-        arrows: vec![],
-        patches: vec![],
+        ..Panel::default()
     })
 }
 
@@ -181,9 +180,8 @@ fn pale_panel(history: &History, report: &Report, cracks: usize) -> Result<Panel
 pub fn surface_maps(history: &History, report: &Report) -> Result<[Drawing; 2]> {
     let when = When::of(report);
     let mut panel = pale_panel(history, report, report.surfaces.len())?;
-    let facets = report.faces.facets.iter().filter(|facet| facet.corners.len() > 2);
-    panel.patches =
-        facets.map(|facet| Patch { corners: facet.corners.clone(), colour: when.colour(facet.event) }).collect();
+    let patch = |facet: &Facet| Patch { corners: facet.corners.clone(), colour: when.colour(facet.event) };
+    panel.patches = report.faces.seen().map(patch).collect();
     let legend: Vec<Key> = when.key().into_iter().collect();
     let panels = [panel];
     Ok([draw(&Sample::read(history)?, &panels, &legend), draw(&Sample::from_the_side(history)?, &panels, &legend)])
@@ -239,9 +237,7 @@ pub fn decohesion(history: &History, sample: &Sample, frames: &[usize]) -> Resul
             walls: history.wall_state(frame)?,
             fills,
             outline: "#404040",
-            links: vec![],
-            arrows: vec![],
-            patches: vec![],
+            ..Panel::default()
         });
     }
     let legend = [

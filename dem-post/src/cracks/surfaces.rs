@@ -20,11 +20,10 @@ use std::collections::HashMap;
 
 use dem_run::history::{Bonds, Rupture};
 use nalgebra::Vector3;
-use petgraph::unionfind::UnionFind;
 use serde::Serialize;
 
 use super::Modes;
-use super::front::Part;
+use super::parts::{Part, groups};
 use crate::chains::stress::major;
 
 /// Sides of the polygon that stands for a circle.
@@ -90,26 +89,7 @@ impl Surfaces {
     /// when `bonds` were formed.
     pub fn find(position: &[[f64; 3]], radius: &[f64], bonds: &Bonds, ruptures: &[Rupture]) -> Self {
         let mut facets = facets(position, radius, bonds, ruptures);
-        let nodes = facets.iter().flat_map(|facet| facet.nodes.iter().copied()).max().map_or(0, |last| last + 1);
-        let mut joined = UnionFind::<usize>::new(nodes);
-        for facet in &facets {
-            facet.nodes.windows(2).for_each(|pair| {
-                joined.union(pair[0], pair[1]);
-            });
-        }
-        // in the order of their first bond, so that equal areas have an order too
-        let mut groups: Vec<Vec<usize>> = vec![];
-        let mut group_of = vec![usize::MAX; nodes];
-        for (k, facet) in facets.iter().enumerate() {
-            let root = joined.find(facet.nodes[0]);
-            if group_of[root] == usize::MAX {
-                group_of[root] = groups.len();
-                groups.push(vec![]);
-            }
-            groups[group_of[root]].push(k);
-        }
-        let area = |group: &[usize]| -> f64 { group.iter().map(|&k| facets[k].area).sum() };
-        groups.sort_by(|a, b| area(b).total_cmp(&area(a)));
+        let groups = groups(parts(&facets));
         let cracks = groups.iter().enumerate().map(|(k, group)| surface(k + 1, &facets, group, ruptures)).collect();
         for (number, group) in groups.iter().enumerate() {
             group.iter().for_each(|&k| facets[k].crack = number);
@@ -117,10 +97,19 @@ impl Surfaces {
         Self { cracks, facets }
     }
 
-    /// The facets as parts of cracks that grow.
+    /// The facets as parts of cracks.
     pub fn parts(&self) -> impl Iterator<Item = Part<'_>> + Clone {
-        self.facets.iter().map(|facet| (facet.event, facet.nodes.as_slice(), facet.area))
+        parts(&self.facets)
     }
+
+    /// The facets that have an area.
+    pub fn seen(&self) -> impl Iterator<Item = &Facet> {
+        self.facets.iter().filter(|facet| facet.corners.len() > 2)
+    }
+}
+
+fn parts(facets: &[Facet]) -> impl Iterator<Item = Part<'_>> + Clone {
+    facets.iter().map(|facet| Part { event: facet.event, nodes: &facet.nodes, size: facet.area })
 }
 
 fn surface(number: usize, facets: &[Facet], group: &[usize], ruptures: &[Rupture]) -> Surface {

@@ -43,6 +43,7 @@ pub struct Sample {
 }
 
 /// One moment.
+#[derive(Default)]
 pub struct Panel {
     /// Lines of text above it.
     pub caption: Vec<String>,

@@ -5,7 +5,7 @@ use crate::common::Folder;
 #[test]
 fn a_disk_breaks_first_at_its_loaded_diameter_and_at_a_load_in_proportion_to_the_cohesion() {
     let here = Folder::new();
-    let mut loads = vec![];
+    let mut steps = vec![];
     for strength in [10, 30] {
         // the ramp is ten times as fast as the scene's: before the first break nothing moves
         let [strength_set, rate] =
@@ -22,10 +22,10 @@ fn a_disk_breaks_first_at_its_loaded_diameter_and_at_a_load_in_proportion_to_the
         };
         let middle = 0.5 * (ends(1.0) + ends(-1.0));
         assert!((first.point[0] - middle).abs() < 0.1 * 0.041, "{} m off the diameter", first.point[0] - middle);
-        loads.push(first.step as f64);
+        steps.push(first.step);
     }
-    // in steps of a ramp that is scaled by the cohesion
-    assert_eq!(loads[0], loads[1], "steps of the first break");
+    // of a ramp that is scaled by the cohesion
+    assert_eq!(steps[0], steps[1], "steps of the first break");
 }
 
 #[test]

@@ -70,9 +70,7 @@ impl Slips {
             }
             list.sort_by_key(|(at, _)| *at);
             // bodies that cannot move have no unknowns, so contacts with two of them look alike: nothing is told of those
-            let alike = |k: usize, l: usize| list.get(k).zip(list.get(l)).is_some_and(|(a, b)| a.0 == b.0);
-            let unique = |k: &usize| !(alike(*k, k + 1) || *k > 0 && alike(k - 1, *k));
-            list = (0..list.len()).filter(unique).map(|k| list[k]).collect();
+            list = list.chunk_by(|a, b| a.0 == b.0).filter(|alike| alike.len() == 1).map(|alike| alike[0]).collect();
         }
         Self(list)
     }

@@ -61,15 +61,14 @@ fn random_sample(report: &mut Report, random: &RandomSample) {
         Preparation::Compaction(compaction) => ("compaction", compaction.solid_fraction),
         Preparation::Deposition(deposition) => ("deposition", deposition.solid_fraction),
     };
+    let path = format!("sample.random.preparation.{path}.solid_fraction");
+    report.range(path, fraction, fraction > 0.0 && fraction < 1.0, "a number above 0 and below 1");
     if let Some(Cut::Circle(diameter)) = random.cut {
         report.positive("sample.random.cut.circle", diameter, "m");
         if random.section == Section::Circle {
-            let found = "circle, beside section: circle";
-            report.wrong("sample.random.cut", found, "a cut through a box, or none");
+            report.wrong("sample.random.cut", "circle, beside section: circle", "a cut through a box, or none");
         }
     }
-    let path = format!("sample.random.preparation.{path}.solid_fraction");
-    report.range(path, fraction, fraction > 0.0 && fraction < 1.0, "a number above 0 and below 1");
 }
 
 fn diameters(report: &mut Report, diameters: &Diameters) {

@@ -9,7 +9,7 @@
 //! the pattern of Newton's. What K is to the method stands in [`rays`] for the plane, in [`disks`] for space. The term
 //! μ‖u_t‖ of dry friction follows from iteration to iteration. At the end the point tells which contacts are at which limit.
 //!
-//! With the largest penalty 1/ρ would drown in the rounding of w, and the path would end in the middle of the many
+//! With the largest penalty 1/ρ would drown in the rounding of z, and the path would end in the middle of the many
 //! reactions that balance the load: there, bonds stand that the stiff limit breaks. So the metric is softer, and
 //! proximal rounds take away what that costs in balance.
 //!
@@ -28,7 +28,7 @@ use crate::contact::Padded;
 pub(super) use disks::Disks;
 pub(super) use rays::Rays;
 
-/// Proximal rounds of it.
+/// Proximal rounds of the softer metric.
 const ROUNDS: u64 = 2;
 /// Most iterations on one path; those in which the gap must halve with the softer metric, the residual without.
 const MOST: u64 = 100;
@@ -324,7 +324,7 @@ impl Newton {
                 let gap = at.gap(&sites);
                 gap <= S::END * at.scale(rows, &sites) || stall.at(gap)
             });
-            // slips of what only yields grow with the metric as the limits do, so they are told in it
+            // in the softer metric: of what only yields the slip is softer by as much, and its share beyond the limit stays
             let mut guess = at.snapped(&rows, &sites, S::measure);
             let reactions = guess.reactions.clone();
             problem.write_back(&reactions);

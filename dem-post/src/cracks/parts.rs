@@ -1,0 +1,48 @@
+//! What the cracks of the plane and of space have in common: broken bonds as parts that meet in points.
+
+use petgraph::unionfind::UnionFind;
+
+/// A broken bond as part of a crack.
+#[derive(Clone, Copy, Debug)]
+pub struct Part<'a> {
+    /// Its place in the list of ruptures.
+    pub event: usize,
+    /// The points in which it meets others, at least one.
+    pub nodes: &'a [usize],
+    /// Its length (m) or area (m²).
+    pub size: f64,
+}
+
+/// One more than the greatest number of a point.
+pub(super) fn nodes<'a>(parts: impl Iterator<Item = Part<'a>>) -> usize {
+    parts.flat_map(|part| part.nodes.iter().copied()).max().map_or(0, |last| last + 1)
+}
+
+/// Join all points of one part.
+pub(super) fn join(points: &mut UnionFind<usize>, nodes: &[usize]) {
+    nodes.windows(2).for_each(|pair| {
+        points.union(pair[0], pair[1]);
+    });
+}
+
+/// The parts of each crack by their places in the list, in order; the largest crack first.
+pub(super) fn groups<'a>(parts: impl Iterator<Item = Part<'a>> + Clone) -> Vec<Vec<usize>> {
+    let count = nodes(parts.clone());
+    let mut joined = UnionFind::<usize>::new(count);
+    parts.clone().for_each(|part| join(&mut joined, part.nodes));
+    // in the order of their first bond, so that equal sizes have an order too
+    let mut groups: Vec<(f64, Vec<usize>)> = vec![];
+    let mut group_of = vec![usize::MAX; count];
+    for (k, part) in parts.enumerate() {
+        let root = joined.find(part.nodes[0]);
+        if group_of[root] == usize::MAX {
+            group_of[root] = groups.len();
+            groups.push((0.0, vec![]));
+        }
+        let (size, members) = &mut groups[group_of[root]];
+        *size += part.size;
+        members.push(k);
+    }
+    groups.sort_by(|a, b| b.0.total_cmp(&a.0));
+    groups.into_iter().map(|(_, members)| members).collect()
+}
