@@ -49,43 +49,76 @@ impl Guess {
     }
 }
 
-/// How far contacts were beyond their limits in the first round of the last solve, by their first unknowns; contacts in
-/// space only.
+/// How a contact slipped.
+#[derive(Clone, Copy)]
+struct Slip {
+    /// First unknowns of its nodes.
+    at: [usize; 2],
+    /// How far its rows t and m were beyond their limits, over those.
+    beyond: [f64; 2],
+    /// μ‖u_t‖ + ν‖u_m‖ (m/s).
+    speed: f64,
+}
+
+/// How contacts slipped in the last solve, those in space only.
 #[derive(Default)]
-pub(super) struct Slips(Vec<([usize; 2], [f64; 2])>);
+pub(super) struct Slips(Vec<Slip>);
 
 impl Slips {
     /// Those of a state that solves an inner problem.
     pub fn of(rows: &Rows, state: &Iterate) -> Self {
-        let mut list = Vec::new();
-        if rows.in_space() {
-            for ((row, u), r) in rows.list.iter().zip(&state.velocities).zip(&state.reactions) {
-                let (q, w, limit) = (row.form(u), row.metric(), r.n + row.shift);
-                let beyond = |norm: f64, limit: f64| if norm > limit && limit > 0.0 { norm / limit - 1.0 } else { 0.0 };
-                let slip =
-                    [beyond(q.t.norm(), w.t * row.cone.mu * limit), beyond(q.m.norm(), w.m * row.cone.nu * limit)];
-                if slip != [0.0; 2] {
-                    list.push((row.at, slip));
-                }
-            }
-            list.sort_by_key(|(at, _)| *at);
-            // bodies that cannot move have no unknowns, so contacts with two of them look alike: nothing is told of those
-            list = list.chunk_by(|a, b| a.0 == b.0).filter(|alike| alike.len() == 1).map(|alike| alike[0]).collect();
-        }
-        Self(list)
+        let beyond = |((row, u), r): ((&Row, &Padded), &Padded)| {
+            let (q, w, limit) = (row.form(u), row.metric(), r.n + row.shift);
+            let beyond = |norm: f64, limit: f64| if norm > limit && limit > 0.0 { norm / limit - 1.0 } else { 0.0 };
+            [beyond(q.t.norm(), w.t * row.cone.mu * limit), beyond(q.m.norm(), w.m * row.cone.nu * limit)]
+        };
+        let all = rows.list.iter().zip(&state.velocities).zip(&state.reactions);
+        Self::listed(rows, &state.reactions, all.map(beyond))
     }
 
-    /// What is known of each contact of these rows.
+    /// Those of a guess.
+    pub fn of_guess(rows: &Rows, guess: &Guess) -> Self {
+        Self::listed(rows, &guess.reactions, guess.beyond.iter().copied())
+    }
+
+    fn listed(rows: &Rows, reactions: &[Padded], beyond: impl Iterator<Item = [f64; 2]>) -> Self {
+        if !rows.in_space() {
+            return Self::default();
+        }
+        let mut list = Vec::new();
+        for ((row, r), beyond) in rows.list.iter().zip(reactions).zip(beyond).filter(|(_, beyond)| *beyond != [0.0; 2])
+        {
+            let (w, limit) = (row.metric(), r.n + row.shift);
+            let speed = |c: f64, w: f64, beyond: f64| c * c * w * limit * beyond;
+            let speed = speed(row.cone.mu, w.t, beyond[0]) + speed(row.cone.nu, w.m, beyond[1]);
+            list.push(Slip { at: row.at, beyond, speed });
+        }
+        list.sort_by_key(|slip| slip.at);
+        // bodies that cannot move have no unknowns, so contacts with two of them look alike: nothing is told of those
+        Self(list.chunk_by(|a, b| a.at == b.at).filter(|alike| alike.len() == 1).map(|alike| alike[0]).collect())
+    }
+
+    fn known(&self, row: &Row) -> Option<&Slip> {
+        self.0.binary_search_by_key(&row.at, |slip| slip.at).ok().map(|k| &self.0[k])
+    }
+
+    /// How far each contact of these rows was beyond its limits; an empty list where nothing slipped.
     pub fn in_rows(&self, rows: &Rows) -> Vec<[f64; 2]> {
-        let known = |at| self.0.binary_search_by_key(at, |(at, _)| *at).map_or([0.0; 2], |k| self.0[k].1);
-        if self.0.is_empty() { Vec::new() } else { rows.list.iter().map(|row| known(&row.at)).collect() }
+        let beyond = |row| self.known(row).map_or([0.0; 2], |slip| slip.beyond);
+        if self.0.is_empty() { Vec::new() } else { rows.list.iter().map(beyond).collect() }
+    }
+
+    /// The term of dry friction of each contact of these rows.
+    pub fn speeds(&self, rows: &Rows) -> Vec<f64> {
+        rows.list.iter().map(|row| self.known(row).map_or(0.0, |slip| slip.speed)).collect()
     }
 
     pub fn save(&self, to: &mut Saved) {
         to.count(self.0.len());
-        for (at, slip) in &self.0 {
+        for Slip { at, beyond, speed } in &self.0 {
             at.iter().for_each(|k| to.count(*k));
-            to.reals.extend_from_slice(slip);
+            to.reals.extend_from_slice(beyond);
+            to.real(*speed);
         }
     }
 
@@ -93,8 +126,8 @@ impl Slips {
         let mut list = Vec::with_capacity(from.number_of()?);
         for _ in 0..list.capacity() {
             let at = [from.count()?, from.count()?];
-            let slip = from.reals(2)?;
-            list.push((at, [slip[0], slip[1]]));
+            let reals = from.reals(3)?;
+            list.push(Slip { at, beyond: [reals[0], reals[1]], speed: reals[2] });
         }
         Ok(Self(list))
     }

@@ -82,7 +82,7 @@ const SWEEPS: usize = 5;
 const COLD_SWEEPS: usize = 100;
 const STALL_SWEEPS: usize = 50;
 /// Most sweeps of Gauss–Seidel where it is tried first, and where nothing else is left.
-const FIRST_SWEEPS: u64 = 20_000;
+const FIRST_SWEEPS: u64 = 2_000;
 const MOST_SWEEPS: u64 = 200_000;
 /// Most solves for which something that failed is not tried again.
 const LONGEST_REST: u64 = 64;
@@ -104,9 +104,8 @@ pub struct Newton {
     slips: Slips,
     /// Factorisations before this solve.
     made_before: u64,
-    /// Rests of the guess of the active set, and of the path of the softer metric.
+    /// Rest of the guess of the active set.
     rest: Rest,
-    soft_rest: Rest,
 }
 
 /// Solves for which something that failed is not tried: steps that are alike fail alike.
@@ -138,6 +137,26 @@ impl Rest {
     }
 }
 
+/// The changes of proximal rounds.
+struct Shrinking {
+    last: f64,
+}
+
+impl Default for Shrinking {
+    fn default() -> Self {
+        Self { last: 1.0 }
+    }
+}
+
+impl Shrinking {
+    /// Enter the next change: the error that is left, for rounds that shorten it by c leave c/(1 − c) of the last change.
+    fn error(&mut self, change: f64) -> f64 {
+        let shrinkage = (change / self.last).min(0.5);
+        self.last = change;
+        change * shrinkage / (1.0 - shrinkage)
+    }
+}
+
 /// What was found without a guess of the active set.
 struct Found {
     /// Reactions without the shift.
@@ -161,7 +180,6 @@ impl Newton {
             slips: Slips::default(),
             made_before: 0,
             rest: Rest::NONE,
-            soft_rest: Rest::NONE,
         }
     }
 
@@ -210,7 +228,8 @@ impl Newton {
             guess.beyond = self.slips.in_rows(rows);
         }
         let mut first = true;
-        let (mut last_error, mut last_change, mut softened, mut made_in_all) = (f64::INFINITY, 1.0, 0, 0);
+        let mut shrinking = Shrinking::default();
+        let (mut last_error, mut softened, mut made_in_all) = (f64::INFINITY, 0, 0);
         loop {
             let mut state = Iterate::from_reactions(rows, &guess.reactions);
             let (made, solved) = self.inner(rows, &mut state, Some(guess), PATIENCE);
@@ -223,11 +242,7 @@ impl Newton {
             }
             problem.write_back(&state.reactions);
             problem.velocities_from_reactions();
-            // rounds that shorten the error by c leave c/(1 − c) of the last change
-            let change = load_change(rows, &state);
-            let shrinkage = (change / last_change).min(0.5);
-            let load_error = change * shrinkage / (1.0 - shrinkage);
-            last_change = change;
+            let load_error = shrinking.error(load_change(rows, &state));
             let error = problem.residual();
             rows.list.iter_mut().zip(&state.reactions).for_each(|(row, r)| row.multiplier = *r);
             *guess = Guess::of(state.reactions);
@@ -304,7 +319,7 @@ impl Newton {
         None
     }
 
-    /// The solution that is found without a guess: as the stiff limit if an active set on the way gives that, else as it is.
+    /// The solution that is found without a guess.
     fn come_from_afar(
         &mut self,
         problem: &mut impl Solvable,
@@ -314,22 +329,13 @@ impl Newton {
         let started = self.started(rows);
         let swept = problem.swept(STALL_SWEEPS);
         if !rows.in_space() {
-            let softly = self.softly::<Rays>(problem, &started, &swept, iterations);
-            return softly.or_else(|| self.through_the_middle::<Rays>(problem, &started, swept, iterations));
+            return self.through_the_middle::<Rays>(problem, &started, &swept, iterations);
         }
-        let report = self
-            .softly::<Disks>(problem, &started, &swept, iterations)
-            .or_else(|| self.penalised(problem, rows, swept.clone(), iterations));
-        if report.is_some() {
-            return report;
-        }
-        // where the approach ended, sweeps begin better than where the path ends
-        let reached = problem.swept(0);
-        let report = self.through_the_middle::<Disks>(problem, &started, swept, iterations);
-        if report.is_none() {
-            problem.write_back(&reached);
-        }
-        report
+        let report = self.through_the_middle::<Disks>(problem, &started, &swept, iterations);
+        report.or_else(|| {
+            let reached = problem.swept(0);
+            self.penalised(problem, rows, reached, iterations)
+        })
     }
 
     /// What the approach from afar finds.
@@ -337,10 +343,10 @@ impl Newton {
         &mut self,
         problem: &mut impl Solvable,
         rows: &Rows,
-        swept: Vec<Padded>,
+        start: Vec<Padded>,
         iterations: &mut u64,
     ) -> Option<SolveReport> {
-        let found = self.approach(problem, rows, swept, iterations)?;
+        let found = self.approach(problem, rows, start, iterations)?;
         let mut guess = Guess::of(found.reactions.clone());
         if !rows.mostly_dry()
             && let Some(report) = self.rounds(problem, &mut self.started(rows), &mut guess, iterations)
@@ -365,10 +371,8 @@ impl Newton {
         for count in [self.distrust, self.floor, self.wasted] {
             to.count(count);
         }
-        for rest in [self.rest, self.soft_rest] {
-            to.count(rest.left as usize);
-            to.count(rest.next as usize);
-        }
+        to.count(self.rest.left as usize);
+        to.count(self.rest.next as usize);
         self.slips.save(to);
         self.factor.save(to);
     }
@@ -379,9 +383,7 @@ impl Newton {
         for count in [&mut self.distrust, &mut self.floor, &mut self.wasted] {
             *count = from.count()?;
         }
-        for rest in [&mut self.rest, &mut self.soft_rest] {
-            *rest = Rest { left: from.count()? as u64, next: from.count()? as u64 };
-        }
+        self.rest = Rest { left: from.count()? as u64, next: from.count()? as u64 };
         self.slips = Slips::restored(from)?;
         self.factor = Factor::restored(from)?;
         Ok(())

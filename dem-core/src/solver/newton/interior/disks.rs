@@ -134,8 +134,6 @@ impl Site for Disks {
     type Slack = Vector5;
     type Scaling = Scaling;
     type Drive = Vector5;
-    const END: f64 = 1e-13;
-    const SOFT: f64 = 1e2;
 
     fn new(row: &Row) -> Self {
         let w = row.metric();
@@ -251,8 +249,10 @@ impl Site for Disks {
         ways.fold(longest, f64::min)
     }
 
-    fn snapped(&self, row: &Row, at: &Pair, measure: f64) -> (Padded, [f64; 2]) {
+    fn snapped(&self, row: &Row, at: &Pair) -> (Padded, [f64; 2]) {
         let (mut r, mut beyond) = (at.r, [0.0; 2]);
+        // between the velocity that a reaction gives free bodies, and what the metric lets those in its way yield
+        let measure = (yields(row) * row.metric().n).sqrt();
         let least = |x: &Vector3<f64>| x[0] - x[1].hypot(x[2]);
         if self.cones().all(|(k, c, _)| least(&at.lambda[k]) > c * r[0] * measure) {
             r = Vector5::zeros();
@@ -269,11 +269,6 @@ impl Site for Disks {
         let mut r = Padded::from_order(&r);
         r.n -= row.shift;
         (r, beyond)
-    }
-
-    /// Between the velocity that a reaction gives free bodies, and what the metric lets those in its way yield.
-    fn measure(row: &Row) -> f64 {
-        (yields(row) * row.metric().n).sqrt()
     }
 }
 

@@ -6,12 +6,16 @@
 //!
 //! a monotone complementarity problem for associated laws. Mehrotra's predictor–corrector follows its central path from
 //! anywhere in some twenty iterations, however large the plastic zone is, and the matrix of its steps, I + Σ H̃ D⁻¹ H̃ᵀ, has
-//! the pattern of Newton's. What K is to the method stands in [`rays`] for the plane, in [`disks`] for space. The term
-//! μ‖u_t‖ of dry friction follows from iteration to iteration. At the end the point tells which contacts are at which limit.
+//! the pattern of Newton's. What K is to the method stands in [`rays`] for the plane, in [`disks`] for space. At the end the
+//! point tells which contacts are at which limit.
 //!
-//! With the largest penalty 1/ρ would drown in the rounding of z, and the path would end in the middle of the many
-//! reactions that balance the load: there, bonds stand that the stiff limit breaks. So the metric is softer, and
-//! proximal rounds take away what that costs in balance.
+//! The term μ‖u_t‖ of dry friction is held along the path: where nearly nothing slips it would else move the path faster
+//! than the path closes in. Only where the term that was held turns out wrong, as at a collapse, does it follow the slips
+//! from iteration to iteration, and if that does not settle from path to path.
+//!
+//! The metric hardens as the gap closes. A hard one all along would lead to the middle of the many reactions that balance the
+//! load, from where the least of them is a long way at a small gap: there, bonds stand that the stiff limit breaks. How hard
+//! it may become rounding decides.
 //!
 //! Sources: Mehrotra, SIAM J. Optim. 2, 1992; Wright, Primal–dual interior-point methods, 1997; for contact with friction
 //! Acary, Armand, Nguyen & Shpakovych, Optim. Methods Softw. 39, 2024.
@@ -20,20 +24,38 @@ mod disks;
 mod rays;
 
 use super::factor::Factor;
-use super::guess::Guess;
+use super::guess::{Guess, Slips};
+use super::inner::norm2;
 use super::rows::{Operator, Row, Rows};
 use super::solvable::Solvable;
-use super::{Found, Newton, SolveReport, net_change};
-use crate::contact::Padded;
+use super::{Found, Newton, Shrinking, SolveReport, SolveStatus, net_change};
+use crate::contact::{Padded, Weights};
 pub(super) use disks::Disks;
 pub(super) use rays::Rays;
 
-/// Proximal rounds of the softer metric.
-const ROUNDS: u64 = 2;
-/// Most iterations on one path; those in which the gap must halve with the softer metric, the residual without.
+/// Most rounds of one solve, those that only bring the load error down, and most iterations of a round.
+const ROUNDS: usize = 12;
+const EXACT_ROUNDS: usize = 3;
 const MOST: u64 = 100;
-const SOFT_PATIENCE: u64 = 5;
-const PATIENCE: u64 = 15;
+/// Iterations in which the gap must halve, or where the term of dry friction moves the residual.
+const PATIENCE: u64 = 5;
+const MOVING_PATIENCE: u64 = 15;
+/// How much harder the metric is than Newton's where the path ends.
+const HARDER: f64 = 10.0;
+/// Where a path ends, as a gap over what the reactions and the velocities that they give multiply to; and where one ends that
+/// only serves the next term of dry friction.
+const END: f64 = 1e-24;
+const EARLY: f64 = 1e-14;
+/// Share of the change of that term that is followed, and the sweeps that show where it goes.
+const SHARE: f64 = 0.5;
+const SWEEPS: usize = 10;
+/// Residual at the end of a path beyond which its term of dry friction was wrong.
+const WRONG: f64 = 1e-5;
+/// Defect of the momenta, over their change, that rounding may leave: this, or a share of the tolerance of the residual.
+const ROUNDING: f64 = 1e-12;
+const ROUNDING_SHARE: f64 = 1e-3;
+/// How much softer a metric must be for its reactions to be compared with those at the end.
+const SOFTER: f64 = 100.0;
 /// How near the boundary a step may go.
 const NEAR: f64 = 0.995;
 
@@ -47,11 +69,6 @@ pub(super) trait Site: Sized {
     type Scaling;
     /// What the local equations alone ask of a step.
     type Drive;
-    /// Where the path ends: the gap over what the reactions and the velocities that they give multiply to.
-    const END: f64;
-    /// How much softer the metric is than that of the largest penalty, where reactions are not unique.
-    const SOFT: f64;
-
     fn new(row: &Row) -> Self;
     /// A point well inside: a reaction of at most `share` (N s), z larger than q and than `share` times `yields`, all
     /// products alike.
@@ -82,11 +99,9 @@ pub(super) trait Site: Sized {
     fn moved(at: &Self::Pair, step: &Self::Pair, length: f64) -> Self::Pair;
     /// The longest part of a step that stays inside, if that is less than `longest`.
     fn longest(&self, at: &Self::Pair, step: &Self::Pair, longest: f64) -> f64;
-    /// The reaction without the shift at the limits that it is nearer to than z is to its own, where a reaction counts as
-    /// `measure` times a velocity, and how far the rows t and m are beyond their limits, over those.
-    fn snapped(&self, row: &Row, at: &Self::Pair, measure: f64) -> (Padded, [f64; 2]);
-    /// The measure that tells active sets best (1/kg).
-    fn measure(row: &Row) -> f64;
+    /// The reaction without the shift at the limits that it is nearer to than z is to its own, and how far the rows t and m
+    /// are beyond their limits, over those.
+    fn snapped(&self, row: &Row, at: &Self::Pair) -> (Padded, [f64; 2]);
 }
 
 /// What the products of the next point should be.
@@ -122,27 +137,7 @@ fn yields(row: &Row) -> f64 {
     row.size / row.rows.len() as f64
 }
 
-/// The term μ‖u_t‖ + ν‖u_m‖ of dry friction at the velocities of `y`.
-fn follow_slip(rows: &mut Rows, y: &[f64]) {
-    for k in 0..rows.list.len() {
-        let row = &rows.list[k];
-        if !row.associated {
-            let u = rows.velocity(row, y);
-            rows.list[k].lag = Some(row.cone.mu * u.t.norm() + row.cone.nu * u.m.norm());
-        }
-    }
-}
-
 impl<S: Site> Point<S> {
-    /// Well inside, at the velocities that `reactions` give.
-    fn start(rows: &mut Rows, sites: &[S], reactions: &[Padded]) -> Self {
-        let mean = (reactions.iter().map(|r| r.dot(r)).sum::<f64>() / reactions.len() as f64).sqrt();
-        let mut y = rows.free.clone();
-        rows.list.iter().zip(reactions).for_each(|(row, r)| rows.apply(row, r, &mut y));
-        follow_slip(rows, &y);
-        Self::inside(rows, sites, y, mean)
-    }
-
     /// Well inside, at the velocities of `y`: reactions of the size of `reaction` and the shift, z to match.
     fn inside(rows: &Rows, sites: &[S], y: Vec<f64>, reaction: f64) -> Self {
         let pair = |(row, site): (&Row, &S)| {
@@ -195,13 +190,6 @@ impl<S: Site> Point<S> {
         let all = self.pairs.iter().zip(&step.pairs).zip(sites);
         let longest = all.fold(1.0 / NEAR, |longest, ((at, step), site)| site.longest(at, step, longest));
         (NEAR * longest).min(1.0)
-    }
-
-    /// The reactions, each at the limits that it is nearer to than its z is to its own.
-    fn snapped(&self, rows: &Rows, sites: &[S], measure: fn(&Row) -> f64) -> Guess {
-        let all = rows.list.iter().zip(sites).zip(&self.pairs);
-        let (reactions, beyond) = all.map(|((row, site), pair)| site.snapped(row, pair, measure(row))).unzip();
-        Guess { reactions, beyond }
     }
 }
 
@@ -256,106 +244,219 @@ impl Stall {
     }
 }
 
-impl Newton {
-    /// The stiff limit, if the active set at the end of the softer path leads to it.
-    pub(super) fn softly<S: Site>(
-        &mut self,
-        problem: &mut impl Solvable,
-        base: &Rows,
-        swept: &[Padded],
-        iterations: &mut u64,
-    ) -> Option<SolveReport> {
-        if base.mostly_dry() || !self.soft_rest.is_over() {
-            return None;
+/// A central path, and where it has come to.
+struct Path<S: Site> {
+    rows: Rows,
+    sites: Vec<S>,
+    at: Point<S>,
+    /// 1/ρ of each contact where the path ends.
+    hardest: Vec<Weights>,
+    /// How much softer the metric is, and the least that rounding allows.
+    softness: f64,
+    least: f64,
+    /// The last softness that was much more than the least, and the reactions there.
+    softer: (f64, Vec<Padded>),
+}
+
+impl<S: Site> Path<S> {
+    /// A path for these terms of dry friction.
+    fn new(base: &Rows, lags: &[f64]) -> Self {
+        let mut rows = base.clone();
+        rows.list.iter_mut().for_each(|row| row.weights = row.weights * (1.0 / HARDER));
+        rows.list.iter_mut().zip(lags).filter(|(row, _)| !row.associated).for_each(|(row, lag)| row.lag = Some(*lag));
+        let hardest = rows.list.iter().map(|row| row.weights).collect();
+        let at = Point { y: Vec::new(), pairs: Vec::new() };
+        Self {
+            rows,
+            sites: Vec::new(),
+            at,
+            hardest,
+            softness: f64::INFINITY,
+            least: 1.0,
+            softer: (f64::INFINITY, Vec::new()),
         }
-        let report = self.soft_path::<S>(problem, base, swept, iterations);
-        match report {
-            Some(_) => self.soft_rest.forget(),
-            None => self.soft_rest.lengthen(),
-        }
-        report
     }
 
-    /// The solution at the end of the path, as it is.
+    /// Begin well inside, at the velocities that `reactions` give, with a soft metric.
+    fn begin(&mut self, reactions: &[Padded]) {
+        let mean = (reactions.iter().map(|r| r.dot(r)).sum::<f64>() / reactions.len() as f64).sqrt();
+        self.sites = self.rows.list.iter().map(S::new).collect();
+        self.at = Point::inside(&self.rows, &self.sites, self.velocities(reactions), mean);
+        self.softness = f64::INFINITY;
+        self.softer = (f64::INFINITY, reactions.to_vec());
+    }
+
+    /// The gap over what the reactions and the velocities that they give multiply to.
+    fn gap(&self) -> f64 {
+        self.at.gap(&self.sites) / self.at.scale(&self.rows, &self.sites)
+    }
+
+    /// Make the metric as soft as the gap is wide.
+    fn harden(&mut self) {
+        let own = self.rows.list.iter().zip(&self.hardest).map(|(row, w)| w.n / yields(row)).fold(0.0, f64::max);
+        self.softness = (self.gap().min(1.0) / own).min(self.softness).max(self.least);
+        for (row, w) in self.rows.list.iter_mut().zip(&self.hardest) {
+            row.weights = *w * self.softness;
+        }
+        self.sites = self.rows.list.iter().map(S::new).collect();
+    }
+
+    /// The change of momentum that the velocities of the point stand for.
+    fn impulse(&self) -> f64 {
+        self.at.y.iter().zip(&self.rows.free).map(|(y, f)| (y - f) * (y - f)).sum::<f64>().sqrt()
+    }
+
+    /// Go to the next point.
+    fn advance(&mut self, next: Point<S>) {
+        self.at = next;
+        if self.softness >= SOFTER * self.least {
+            let all = self.sites.iter().zip(&self.rows.list).zip(&self.at.pairs);
+            self.softer = (self.softness, all.map(|((site, row), pair)| site.reaction(row, pair)).collect());
+        }
+    }
+
+    /// The reactions at the point, each at the limits that it is nearer to than its z is to its own.
+    fn snapped(&self) -> Guess {
+        let all = self.rows.list.iter().zip(&self.sites).zip(&self.at.pairs);
+        let (reactions, beyond) = all.map(|((row, site), pair)| site.snapped(row, pair)).unzip();
+        Guess { reactions, beyond }
+    }
+
+    /// How far the net impulses still are from those of a rigid metric: as far as the metric is soft.
+    fn load_error(&self, reactions: &[Padded]) -> f64 {
+        let (softness, softer) = &self.softer;
+        if *softness > self.softness {
+            net_change(&self.rows, softer, reactions) * self.softness / (softness - self.softness)
+        } else {
+            f64::INFINITY
+        }
+    }
+
+    /// The change of the net impulses in the round that these reactions end.
+    fn load_change(&self, reactions: &[Padded]) -> f64 {
+        let multipliers: Vec<Padded> = self.rows.list.iter().map(|row| row.multiplier).collect();
+        net_change(&self.rows, &multipliers, reactions)
+    }
+
+    /// Begin the next proximal step at these reactions.
+    fn move_multipliers(&mut self, reactions: &[Padded]) {
+        self.rows.list.iter_mut().zip(reactions).for_each(|(row, r)| row.multiplier = *r);
+    }
+
+    /// The velocities that reactions give.
+    fn velocities(&self, reactions: &[Padded]) -> Vec<f64> {
+        let mut y = self.rows.free.clone();
+        self.rows.list.iter().zip(reactions).for_each(|(row, r)| self.rows.apply(row, r, &mut y));
+        y
+    }
+
+    /// Let the term of dry friction follow the slips at the velocities of `y` by a share of their change.
+    fn follow_slips(&mut self, y: &[f64], share: f64) {
+        for k in 0..self.rows.list.len() {
+            let u = self.rows.velocity(&self.rows.list[k], y);
+            let row = &mut self.rows.list[k];
+            if let Some(lag) = &mut row.lag {
+                *lag += share * (row.cone.mu * u.t.norm() + row.cone.nu * u.m.norm() - *lag);
+            }
+        }
+    }
+}
+
+impl Newton {
+    /// What lies at the end of the central path: with the term of dry friction that was found last, then with one that
+    /// follows the slips along the path, then with those of the end that was found before.
     pub(super) fn through_the_middle<S: Site>(
         &mut self,
         problem: &mut impl Solvable,
         base: &Rows,
-        swept: Vec<Padded>,
-        iterations: &mut u64,
-    ) -> Option<SolveReport> {
-        let sites: Vec<S> = base.list.iter().map(S::new).collect();
-        let mut rows = base.clone();
-        let mut at = Point::start(&mut rows, &sites, &swept);
-        let (mut best, mut stall): (Option<Found>, _) = (None, Stall::after(PATIENCE));
-        let mut last = swept;
-        let tolerance = self.settings.tolerance;
-        self.follow_path(&mut rows, &sites, &mut at, iterations, |rows, at| {
-            let reactions = at.snapped(rows, &sites, yields).reactions;
-            problem.write_back(&reactions);
-            problem.velocities_from_reactions();
-            let residual = problem.residual();
-            if best.as_ref().is_none_or(|b| residual < b.residual) {
-                let load_error = net_change(rows, &last, &reactions);
-                best = Some(Found { reactions: reactions.clone(), residual, load_error });
-            }
-            last = reactions;
-            residual <= tolerance || stall.at(residual)
-        });
-        self.taken(problem, best?, *iterations)
-    }
-
-    /// Proximal rounds of a softer metric, each ended by rounds of the largest penalty on the active set that it found.
-    fn soft_path<S: Site>(
-        &mut self,
-        problem: &mut impl Solvable,
-        base: &Rows,
         swept: &[Padded],
         iterations: &mut u64,
     ) -> Option<SolveReport> {
-        let mut rows = base.clone();
-        rows.soften(S::SOFT);
-        let sites: Vec<S> = rows.list.iter().map(S::new).collect();
-        let mut last = swept.to_vec();
-        for _ in 0..ROUNDS {
-            let mut at = Point::start(&mut rows, &sites, swept);
-            let mut stall = Stall::after(SOFT_PATIENCE);
-            self.follow_path(&mut rows, &sites, &mut at, iterations, |rows, at| {
-                let gap = at.gap(&sites);
-                gap <= S::END * at.scale(rows, &sites) || stall.at(gap)
-            });
-            // in the softer metric: of what only yields the slip is softer by as much, and its share beyond the limit stays
-            let mut guess = at.snapped(&rows, &sites, S::measure);
-            let reactions = guess.reactions.clone();
+        let mut path = Path::<S>::new(base, &self.slips.speeds(base));
+        let (mut best, mut shrinking): (Option<Found>, _) = (None, Shrinking::default());
+        // whether the term of dry friction seems right, how often it was wrong, and whether Newton was tried from there
+        let (mut right, mut wrong, mut tried) = (true, 0, base.mostly_dry());
+        let dry = path.rows.list.iter().any(|row| row.lag.is_some());
+        for round in 0..ROUNDS {
+            path.begin(swept);
+            match wrong {
+                _ if right => self.follow_fixed(&mut path, END, iterations),
+                1 => self.follow_moving(&mut path, problem, iterations),
+                _ => self.follow_fixed(&mut path, EARLY, iterations),
+            }
+            let mut guess = path.snapped();
+            let mut reactions = guess.reactions.clone();
+            self.slips = Slips::of_guess(&path.rows, &guess);
             problem.write_back(&reactions);
             problem.velocities_from_reactions();
-            let (residual, load_error) = (problem.residual(), net_change(&rows, &last, &reactions));
-            if let Some(report) = self.rounds(problem, &mut base.clone(), &mut guess, iterations) {
+            let mut residual = problem.residual();
+            let load_error = path.load_error(&reactions).min(shrinking.error(path.load_change(&reactions)));
+            let report = self.report(*iterations, residual, load_error);
+            if report.status == SolveStatus::Converged {
                 return Some(report);
             }
-            if residual <= self.settings.tolerance {
-                return self.taken(problem, Found { reactions, residual, load_error }, *iterations);
+            path.move_multipliers(&reactions);
+            let near = if wrong == 0 { WRONG } else { self.settings.tolerance };
+            right = round < EXACT_ROUNDS && (residual <= near || !dry);
+            if !right {
+                // sweeps settle what single contacts disagree about
+                reactions = problem.swept(SWEEPS);
+                residual = problem.residual();
+                wrong += 1;
+            } else if !std::mem::replace(&mut tried, true)
+                && let Some(exact) = self.rounds(problem, &mut base.clone(), &mut guess, iterations)
+            {
+                return Some(exact);
             }
-            rows.list.iter_mut().zip(&reactions).for_each(|(row, r)| row.multiplier = *r);
-            last = reactions;
+            path.follow_slips(&path.velocities(&reactions), SHARE);
+            if best.as_ref().is_none_or(|b| residual < b.residual) {
+                best = Some(Found { reactions, residual, load_error });
+            }
+            if residual <= self.settings.accept && !right {
+                break;
+            }
         }
-        None
+        self.taken(problem, best?, *iterations)
+    }
+
+    /// Follow the path of one term of dry friction to where the gap is as small as `end`.
+    fn follow_fixed<S: Site>(&mut self, path: &mut Path<S>, end: f64, iterations: &mut u64) {
+        let mut stall = Stall::after(PATIENCE);
+        self.follow(path, iterations, |path| {
+            let gap = path.gap();
+            path.softness == path.least && gap <= end || stall.at(gap)
+        });
+    }
+
+    /// Follow the path while the term of dry friction follows the slips, to where the residual is small enough.
+    fn follow_moving<S: Site>(&mut self, path: &mut Path<S>, problem: &mut impl Solvable, iterations: &mut u64) {
+        let mut stall = Stall::after(MOVING_PATIENCE);
+        let tolerance = self.settings.tolerance;
+        self.follow(path, iterations, |path| {
+            problem.write_back(&path.snapped().reactions);
+            problem.velocities_from_reactions();
+            let residual = problem.residual();
+            let y = std::mem::take(&mut path.at.y);
+            path.follow_slips(&y, 1.0);
+            path.at.y = y;
+            residual <= tolerance || stall.at(residual)
+        });
     }
 
     /// Follow the central path until `arrived`, or as far as the factor goes.
-    fn follow_path<S: Site>(
+    fn follow<S: Site>(
         &mut self,
-        rows: &mut Rows,
-        sites: &[S],
-        at: &mut Point<S>,
+        path: &mut Path<S>,
         iterations: &mut u64,
-        mut arrived: impl FnMut(&Rows, &Point<S>) -> bool,
+        mut arrived: impl FnMut(&mut Path<S>) -> bool,
     ) {
         self.renew = true;
+        let mut last = f64::INFINITY;
         for _ in 0..MOST {
             *iterations += 1;
+            path.harden();
+            let Path { rows, sites, at, .. } = &*path;
             let gap = at.gap(sites);
-            follow_slip(rows, &at.y);
             let defect = at.defect(rows, sites);
             let scalings: Vec<_> = sites.iter().zip(&at.pairs).map(|(site, pair)| site.scaling(pair)).collect();
             let operators: Vec<_> =
@@ -368,13 +469,18 @@ impl Newton {
             let centring = (at.moved(&affine, reach).gap(sites) / gap).powi(3).min(1.0);
             let middle = |c: usize| Aim::Middle(centring * gap, &affine.pairs[c]);
             let direction = step(rows, sites, &scalings, &self.factor, at, &defect, middle);
-            let length = at.longest(&direction, sites);
-            let next = at.moved(&direction, length);
+            let next = at.moved(&direction, at.longest(&direction, sites));
             if !next.gap(sites).is_finite() {
                 break;
             }
-            *at = next;
-            if arrived(rows, at) {
+            // a step shortens the defect, unless rounding makes it grow: more so the harder the metric
+            let momenta = norm2(&defect.momenta).sqrt();
+            if momenta > last && momenta > ROUNDING.max(ROUNDING_SHARE * self.settings.tolerance) * path.impulse() {
+                path.least = path.softness;
+            }
+            last = momenta;
+            path.advance(next);
+            if arrived(path) {
                 break;
             }
         }

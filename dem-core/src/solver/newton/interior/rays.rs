@@ -53,9 +53,6 @@ impl Site for Rays {
     type Slack = Values;
     type Scaling = SMatrix<f64, 4, 4>;
     type Drive = Values;
-    const END: f64 = 1e-18;
-    // soft enough to tell between the reactions that rounding leaves alike
-    const SOFT: f64 = 1e3;
 
     fn new(row: &Row) -> Self {
         let signs = |c: f64, there: bool| if there && c > 0.0 { &[1.0, -1.0][..] } else { &[0.0][..] };
@@ -151,18 +148,14 @@ impl Site for Rays {
         longest
     }
 
-    fn snapped(&self, row: &Row, at: &Pair, measure: f64) -> (Padded, [f64; 2]) {
+    fn snapped(&self, row: &Row, at: &Pair) -> (Padded, [f64; 2]) {
         let mut lambda = at.lambda;
         for k in 0..self.count {
-            if lambda[k] * measure < at.slack[k] {
+            if lambda[k] * yields(row) < at.slack[k] {
                 lambda[k] = 0.0;
             }
         }
         // in the plane nothing asks how far
         (self.shifted(row, &lambda), [0.0; 2])
-    }
-
-    fn measure(row: &Row) -> f64 {
-        yields(row)
     }
 }
