@@ -44,8 +44,7 @@ impl Newton {
             for ((row, own), r) in rows.list.iter_mut().zip(&base.list).zip(&reactions) {
                 row.multiplier = *r;
                 if !own.associated {
-                    let u = base.velocity(own, &state.y);
-                    let slip = own.cone.mu * u.t.norm() + own.cone.nu * u.m.norm();
+                    let slip = base.slip(own, &state.y, r);
                     // a lag that overshoots is followed in part only
                     row.lag = Some(row.lag.map_or(slip, |last| last + share * (slip - last)));
                 }

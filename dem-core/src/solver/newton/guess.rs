@@ -85,17 +85,17 @@ impl Slips {
         if !rows.in_space() {
             return Self::default();
         }
-        let mut list = Vec::new();
-        for ((row, r), beyond) in rows.list.iter().zip(reactions).zip(beyond).filter(|(_, beyond)| *beyond != [0.0; 2])
-        {
+        let slip = |((row, r), beyond): ((&Row, &Padded), [f64; 2])| {
             let (w, limit) = (row.metric(), r.n + row.shift);
             let speed = |c: f64, w: f64, beyond: f64| c * c * w * limit * beyond;
             let speed = speed(row.cone.mu, w.t, beyond[0]) + speed(row.cone.nu, w.m, beyond[1]);
-            list.push(Slip { at: row.at, beyond, speed });
-        }
+            Slip { at: row.at, beyond, speed }
+        };
+        let mut list: Vec<Slip> = rows.list.iter().zip(reactions).zip(beyond).map(slip).collect();
         list.sort_by_key(|slip| slip.at);
         // bodies that cannot move have no unknowns, so contacts with two of them look alike: nothing is told of those
-        Self(list.chunk_by(|a, b| a.at == b.at).filter(|alike| alike.len() == 1).map(|alike| alike[0]).collect())
+        let unlike = list.chunk_by(|a, b| a.at == b.at).filter(|alike| alike.len() == 1).map(|alike| alike[0]);
+        Self(unlike.filter(|slip| slip.beyond != [0.0; 2]).collect())
     }
 
     fn known(&self, row: &Row) -> Option<&Slip> {

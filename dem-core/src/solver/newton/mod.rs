@@ -333,6 +333,7 @@ impl Newton {
         }
         let report = self.through_the_middle::<Disks>(problem, &started, &swept, iterations);
         report.or_else(|| {
+            problem.forget_what_is_not_finite();
             let reached = problem.swept(0);
             self.penalised(problem, rows, reached, iterations)
         })

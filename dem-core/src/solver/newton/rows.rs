@@ -222,6 +222,12 @@ impl Rows {
         row.given + self.pulled(row, y)
     }
 
+    /// μ‖s_t‖ + ν‖s_m‖ with the slip s = u + C (r − r₀) of the law of contact `row`.
+    pub fn slip(&self, row: &Row, y: &[f64], r: &Padded) -> f64 {
+        let slip = self.velocity(row, y) + row.compliance.times(&(*r - row.carried));
+        row.cone.mu * slip.t.norm() + row.cone.nu * slip.m.norm()
+    }
+
     /// H̃ᵀ y for one contact.
     #[inline]
     pub fn pulled(&self, row: &Row, y: &[f64]) -> Padded {

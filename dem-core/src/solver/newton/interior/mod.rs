@@ -255,7 +255,7 @@ struct Path<S: Site> {
     softness: f64,
     least: f64,
     /// The last softness that was much more than the least, and the reactions there.
-    softer: (f64, Vec<Padded>),
+    softer: Option<(f64, Vec<Padded>)>,
 }
 
 impl<S: Site> Path<S> {
@@ -266,15 +266,7 @@ impl<S: Site> Path<S> {
         rows.list.iter_mut().zip(lags).filter(|(row, _)| !row.associated).for_each(|(row, lag)| row.lag = Some(*lag));
         let hardest = rows.list.iter().map(|row| row.weights).collect();
         let at = Point { y: Vec::new(), pairs: Vec::new() };
-        Self {
-            rows,
-            sites: Vec::new(),
-            at,
-            hardest,
-            softness: f64::INFINITY,
-            least: 1.0,
-            softer: (f64::INFINITY, Vec::new()),
-        }
+        Self { rows, sites: Vec::new(), at, hardest, softness: f64::INFINITY, least: 1.0, softer: None }
     }
 
     /// Begin well inside, at the velocities that `reactions` give, with a soft metric.
@@ -283,7 +275,7 @@ impl<S: Site> Path<S> {
         self.sites = self.rows.list.iter().map(S::new).collect();
         self.at = Point::inside(&self.rows, &self.sites, self.velocities(reactions), mean);
         self.softness = f64::INFINITY;
-        self.softer = (f64::INFINITY, reactions.to_vec());
+        self.softer = None;
     }
 
     /// The gap over what the reactions and the velocities that they give multiply to.
@@ -301,6 +293,11 @@ impl<S: Site> Path<S> {
         self.sites = self.rows.list.iter().map(S::new).collect();
     }
 
+    /// The defect of the momenta.
+    fn momenta(&self) -> f64 {
+        norm2(&self.at.defect(&self.rows, &self.sites).momenta).sqrt()
+    }
+
     /// The change of momentum that the velocities of the point stand for.
     fn impulse(&self) -> f64 {
         self.at.y.iter().zip(&self.rows.free).map(|(y, f)| (y - f) * (y - f)).sum::<f64>().sqrt()
@@ -311,7 +308,7 @@ impl<S: Site> Path<S> {
         self.at = next;
         if self.softness >= SOFTER * self.least {
             let all = self.sites.iter().zip(&self.rows.list).zip(&self.at.pairs);
-            self.softer = (self.softness, all.map(|((site, row), pair)| site.reaction(row, pair)).collect());
+            self.softer = Some((self.softness, all.map(|((site, row), pair)| site.reaction(row, pair)).collect()));
         }
     }
 
@@ -322,14 +319,12 @@ impl<S: Site> Path<S> {
         Guess { reactions, beyond }
     }
 
-    /// How far the net impulses still are from those of a rigid metric: as far as the metric is soft.
+    /// How far the net impulses still are from those of a rigid metric: as far as the metric is soft. Infinite where no
+    /// point was much softer.
     fn load_error(&self, reactions: &[Padded]) -> f64 {
-        let (softness, softer) = &self.softer;
-        if *softness > self.softness {
-            net_change(&self.rows, softer, reactions) * self.softness / (softness - self.softness)
-        } else {
-            f64::INFINITY
-        }
+        self.softer.as_ref().map_or(f64::INFINITY, |(softness, softer)| {
+            net_change(&self.rows, softer, reactions) / (softness / self.softness - 1.0).max(0.0)
+        })
     }
 
     /// The change of the net impulses in the round that these reactions end.
@@ -351,12 +346,11 @@ impl<S: Site> Path<S> {
     }
 
     /// Let the term of dry friction follow the slips at the velocities of `y` by a share of their change.
-    fn follow_slips(&mut self, y: &[f64], share: f64) {
-        for k in 0..self.rows.list.len() {
-            let u = self.rows.velocity(&self.rows.list[k], y);
-            let row = &mut self.rows.list[k];
-            if let Some(lag) = &mut row.lag {
-                *lag += share * (row.cone.mu * u.t.norm() + row.cone.nu * u.m.norm() - *lag);
+    fn follow_slips(&mut self, y: &[f64], reactions: &[Padded], share: f64) {
+        for (k, r) in reactions.iter().enumerate() {
+            let slip = self.rows.slip(&self.rows.list[k], y, r);
+            if let Some(lag) = &mut self.rows.list[k].lag {
+                *lag += share * (slip - *lag);
             }
         }
     }
@@ -386,33 +380,38 @@ impl Newton {
             }
             let mut guess = path.snapped();
             let mut reactions = guess.reactions.clone();
+            // in the metric of the path: of what only creeps the slip is softer by as much, and its share beyond the limit stays
             self.slips = Slips::of_guess(&path.rows, &guess);
             problem.write_back(&reactions);
             problem.velocities_from_reactions();
             let mut residual = problem.residual();
-            let load_error = path.load_error(&reactions).min(shrinking.error(path.load_change(&reactions)));
+            let mut load_error = path.load_error(&reactions).min(shrinking.error(path.load_change(&reactions)));
             let report = self.report(*iterations, residual, load_error);
             if report.status == SolveStatus::Converged {
                 return Some(report);
             }
-            path.move_multipliers(&reactions);
             let near = if wrong == 0 { WRONG } else { self.settings.tolerance };
             right = round < EXACT_ROUNDS && (residual <= near || !dry);
-            if !right {
+            if right {
+                path.move_multipliers(&reactions);
+                if !std::mem::replace(&mut tried, true)
+                    && let Some(exact) = self.rounds(problem, &mut base.clone(), &mut guess, iterations)
+                {
+                    return Some(exact);
+                }
+            } else {
                 // sweeps settle what single contacts disagree about
-                reactions = problem.swept(SWEEPS);
+                let settled = problem.swept(SWEEPS);
+                load_error += net_change(&path.rows, &reactions, &settled);
+                reactions = settled;
                 residual = problem.residual();
                 wrong += 1;
-            } else if !std::mem::replace(&mut tried, true)
-                && let Some(exact) = self.rounds(problem, &mut base.clone(), &mut guess, iterations)
-            {
-                return Some(exact);
             }
-            path.follow_slips(&path.velocities(&reactions), SHARE);
-            if best.as_ref().is_none_or(|b| residual < b.residual) {
+            path.follow_slips(&path.velocities(&reactions), &reactions, SHARE);
+            if residual.is_finite() && best.as_ref().is_none_or(|b| residual < b.residual) {
                 best = Some(Found { reactions, residual, load_error });
             }
-            if residual <= self.settings.accept && !right {
+            if !right && (residual <= self.settings.accept || !dry) {
                 break;
             }
         }
@@ -428,19 +427,31 @@ impl Newton {
         });
     }
 
-    /// Follow the path while the term of dry friction follows the slips, to where the residual is small enough.
+    /// Follow the path while the term of dry friction follows the slips, to where the residual is small enough; else back to
+    /// where it was least.
     fn follow_moving<S: Site>(&mut self, path: &mut Path<S>, problem: &mut impl Solvable, iterations: &mut u64) {
         let mut stall = Stall::after(MOVING_PATIENCE);
         let tolerance = self.settings.tolerance;
+        let mut best: Option<(f64, Point<S>)> = None;
         self.follow(path, iterations, |path| {
-            problem.write_back(&path.snapped().reactions);
+            let reactions = path.snapped().reactions;
+            problem.write_back(&reactions);
             problem.velocities_from_reactions();
             let residual = problem.residual();
-            let y = std::mem::take(&mut path.at.y);
-            path.follow_slips(&y, 1.0);
-            path.at.y = y;
-            residual <= tolerance || stall.at(residual)
+            if best.as_ref().is_none_or(|(least, _)| residual < *least) {
+                best = Some((residual, Point { y: path.at.y.clone(), pairs: path.at.pairs.clone() }));
+            }
+            let arrived = residual <= tolerance || stall.at(residual);
+            if !arrived {
+                let y = std::mem::take(&mut path.at.y);
+                path.follow_slips(&y, &reactions, 1.0);
+                path.at.y = y;
+            }
+            arrived
         });
+        if let Some((_, at)) = best {
+            path.at = at;
+        }
     }
 
     /// Follow the central path until `arrived`, or as far as the factor goes.
@@ -454,6 +465,12 @@ impl Newton {
         let mut last = f64::INFINITY;
         for _ in 0..MOST {
             *iterations += 1;
+            // a step shortens the defect, unless rounding makes it grow: more so the harder the metric
+            let rounding = path.momenta();
+            if rounding > last && rounding > ROUNDING.max(ROUNDING_SHARE * self.settings.tolerance) * path.impulse() {
+                path.least = path.softness;
+            }
+            last = rounding;
             path.harden();
             let Path { rows, sites, at, .. } = &*path;
             let gap = at.gap(sites);
@@ -473,12 +490,6 @@ impl Newton {
             if !next.gap(sites).is_finite() {
                 break;
             }
-            // a step shortens the defect, unless rounding makes it grow: more so the harder the metric
-            let momenta = norm2(&defect.momenta).sqrt();
-            if momenta > last && momenta > ROUNDING.max(ROUNDING_SHARE * self.settings.tolerance) * path.impulse() {
-                path.least = path.softness;
-            }
-            last = momenta;
             path.advance(next);
             if arrived(path) {
                 break;
