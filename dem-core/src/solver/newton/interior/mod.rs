@@ -390,7 +390,7 @@ impl Newton {
             if report.status == SolveStatus::Converged {
                 return Some(report);
             }
-            let near = if wrong == 0 { WRONG } else { self.settings.tolerance };
+            let near = if wrong == 0 { WRONG } else { self.settings.accept };
             right = round < EXACT_ROUNDS && (residual <= near || !dry);
             if right {
                 path.move_multipliers(&reactions);
@@ -411,7 +411,8 @@ impl Newton {
             if residual.is_finite() && best.as_ref().is_none_or(|b| residual < b.residual) {
                 best = Some(Found { reactions, residual, load_error });
             }
-            if !right && (residual <= self.settings.accept || !dry) {
+            // what is only accepted is taken once the term has moved
+            if !right && (residual <= self.settings.accept && wrong > 1 || !dry) {
                 break;
             }
         }
