@@ -69,13 +69,11 @@ fn pressed<D: Dim>() -> World<D> {
 fn assert_twins(mut plane: World<D2>, mut space: World<D3>, most: usize) -> usize {
     for step in 0..most {
         let (two, three) = (plane.step().expect("accepted"), space.step().expect("accepted"));
-        let modes = |list: Vec<_>| format!("{list:?}");
-        assert_eq!(
-            modes(two.breaks.iter().map(|b| (b.bond, b.mode, b.round)).collect()),
-            modes(three.breaks.iter().map(|b| (b.bond, b.mode, b.round)).collect()),
-            "step {step}"
-        );
-        if !two.breaks.is_empty() {
+        // the first to break: the rounds after them, in which all falls, have contacts that slip and several solutions
+        let two: Vec<_> = two.breaks.iter().filter(|b| b.round == 0).map(|b| (b.bond, b.mode)).collect();
+        let three: Vec<_> = three.breaks.iter().filter(|b| b.round == 0).map(|b| (b.bond, b.mode)).collect();
+        assert_eq!(two, three, "step {step}");
+        if !two.is_empty() {
             return step;
         }
         // a grain at rest is one to the rounding of what gravity gives it in a step

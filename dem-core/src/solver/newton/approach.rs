@@ -41,14 +41,9 @@ impl Newton {
         let (mut last_error, mut made_in_all) = (f64::INFINITY, 0);
         let mut best: Option<Found> = None;
         while made_in_all < MOST && failures < MOST_FAILURES {
-            for ((row, own), r) in rows.list.iter_mut().zip(&base.list).zip(&reactions) {
-                row.multiplier = *r;
-                if !own.associated {
-                    let slip = base.slip(own, &state.y, r);
-                    // a lag that overshoots is followed in part only
-                    row.lag = Some(row.lag.map_or(slip, |last| last + share * (slip - last)));
-                }
-            }
+            rows.move_multipliers(&reactions);
+            // a lag that overshoots is followed in part only
+            rows.follow_slips(&state.y, &reactions, share);
             let mut made = 0;
             let mut solved = false;
             if last_error <= NEAR {
@@ -68,7 +63,7 @@ impl Newton {
                 level *= RAISE;
                 continue;
             }
-            let load_error = load_change(&rows, &state);
+            let load_error = load_change(&rows, &state.reactions);
             reactions.clone_from(&state.reactions);
             problem.write_back(&reactions);
             problem.velocities_from_reactions();
@@ -95,7 +90,7 @@ impl Newton {
     fn attempt(&mut self, rows: &Rows, reactions: &[Padded], state: &mut Iterate, patience: u64) -> (u64, bool) {
         let mut next = Iterate::from_reactions(rows, reactions);
         self.renew = true;
-        let (made, solved) = self.inner(rows, &mut next, None, patience);
+        let (made, solved) = self.inner(rows, &mut next, None, patience, patience);
         if solved {
             *state = next;
         }

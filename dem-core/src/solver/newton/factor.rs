@@ -1,12 +1,14 @@
 //! The symmetric matrix I + Σ H̃ A H̃ᵀ of a Newton step and its Cholesky factor, kept as a preconditioner: sparse where
 //! rows come from pairs of bodies, dense where they come from the factor of a matrix.
 
+use super::order::dissected;
 use super::rows::{Operator, PAIR, Rows};
 use crate::saved::{Mismatch, Reader, Saved};
+use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::prelude::Solve;
-use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
+use faer::sparse::linalg::cholesky::{LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky};
 use faer::sparse::{Argsort, Pair, SparseColMat, SymbolicSparseColMat};
-use faer::{Mat, MatMut, Side};
+use faer::{Conj, Mat, MatMut, Par, Side};
 
 /// A factor, and the pattern that it was made for.
 #[derive(Default)]
@@ -18,8 +20,8 @@ pub(super) struct Factor {
 }
 
 enum Numeric {
-    /// With the entries that it was made of.
-    Sparse(Llt<usize, f64>, Vec<f64>),
+    /// The values of L for the pattern at hand, and the entries that they were made of.
+    Sparse(Vec<f64>, Vec<f64>),
     Dense(faer::linalg::solvers::Llt<f64>),
 }
 
@@ -31,7 +33,7 @@ struct Pattern {
     entries: usize,
     matrix: SymbolicSparseColMat<usize>,
     order: Argsort<usize>,
-    symbolic: SymbolicLlt<usize>,
+    symbolic: SymbolicCholesky<usize>,
 }
 
 impl Factor {
@@ -111,10 +113,14 @@ impl Factor {
     pub fn solve(&self, x: &mut [f64]) {
         let n = x.len();
         let x = MatMut::from_column_major_slice_mut(x, n, 1);
-        match &self.numeric {
-            None => {}
-            Some(Numeric::Sparse(factor, _)) => factor.solve_in_place(x),
-            Some(Numeric::Dense(factor)) => factor.solve_in_place(x),
+        match (&self.numeric, &self.pattern) {
+            (Some(Numeric::Sparse(values, _)), Some(Pattern { symbolic, .. })) => {
+                let mut scratch = MemBuffer::new(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
+                let factor = LltRef::new(symbolic, values);
+                factor.solve_in_place_with_conj(Conj::No, x, Par::Seq, MemStack::new(&mut scratch));
+            }
+            (Some(Numeric::Dense(factor)), _) => factor.solve_in_place(x),
+            _ => {}
         }
     }
 }
@@ -139,15 +145,30 @@ impl Pattern {
             entries(*at, *count, |row, col, _, _| indices.push(Pair::new(row, col)));
         }
         let (matrix, order) = SymbolicSparseColMat::try_new_from_indices(unknowns, unknowns, &indices).ok()?;
-        let symbolic = SymbolicLlt::try_new(matrix.as_ref(), Side::Lower).ok()?;
+        // bodies in space have six unknowns
+        let in_space = blocks.iter().any(|(_, count)| count.contains(&6));
+        let own = if in_space { dissected(unknowns, &blocks) } else { None };
+        let places = own.as_ref().map_or(SymmetricOrdering::Amd, |own| SymmetricOrdering::Custom(own.as_ref()));
+        let symbolic = factorize_symbolic_cholesky(matrix.as_ref(), Side::Lower, places, Default::default()).ok()?;
         Some(Self { blocks, unknowns, entries: indices.len(), matrix, order, symbolic })
     }
 
     /// The factor of the matrix with these entries; `Some(None)` if it is not positive definite to rounding.
     fn factorised(&self, values: Vec<f64>) -> Option<Option<Numeric>> {
         let matrix = SparseColMat::new_from_argsort(self.matrix.clone(), &self.order, &values).ok()?;
-        let factor = Llt::try_new_with_symbolic(self.symbolic.clone(), matrix.as_ref(), Side::Lower);
-        Some(factor.ok().map(|factor| Numeric::Sparse(factor, values)))
+        let (symbolic, par) = (&self.symbolic, Par::Seq);
+        let mut factor = vec![0.0; symbolic.len_val()];
+        let mut scratch = MemBuffer::new(symbolic.factorize_numeric_llt_scratch::<f64>(par, Default::default()));
+        let made = symbolic.factorize_numeric_llt(
+            &mut factor,
+            matrix.as_ref(),
+            Side::Lower,
+            Default::default(),
+            par,
+            MemStack::new(&mut scratch),
+            Default::default(),
+        );
+        Some(made.is_ok().then_some(Numeric::Sparse(factor, values)))
     }
 }
 

@@ -98,6 +98,11 @@ impl Slips {
         Self(unlike.filter(|slip| slip.beyond != [0.0; 2]).collect())
     }
 
+    /// Whether a contact slipped.
+    pub fn any(&self) -> bool {
+        !self.0.is_empty()
+    }
+
     fn known(&self, row: &Row) -> Option<&Slip> {
         self.0.binary_search_by_key(&row.at, |slip| slip.at).ok().map(|k| &self.0[k])
     }
@@ -105,7 +110,7 @@ impl Slips {
     /// How far each contact of these rows was beyond its limits; an empty list where nothing slipped.
     pub fn in_rows(&self, rows: &Rows) -> Vec<[f64; 2]> {
         let beyond = |row| self.known(row).map_or([0.0; 2], |slip| slip.beyond);
-        if self.0.is_empty() { Vec::new() } else { rows.list.iter().map(beyond).collect() }
+        if self.any() { rows.list.iter().map(beyond).collect() } else { Vec::new() }
     }
 
     /// The term of dry friction of each contact of these rows.

@@ -1,10 +1,10 @@
 //! The inner problem F(y) = 0 for fixed multipliers: state, Newton direction, line search.
 
-use super::Newton;
 use super::corrector::{correct, operator};
 use super::guess::Guess;
 use super::krylov::gmres;
 use super::rows::{Operator, Row, Rows};
+use super::{Newton, Stall};
 use crate::contact::Padded;
 
 /// GMRES iterations beyond those of a fresh factor that a kept one may cost in all before it is renewed.
@@ -13,6 +13,10 @@ const WASTE: usize = 20;
 const TRUST: f64 = 1e-3;
 /// Linear solves by GMRES after one that the factor alone was trusted with and failed.
 const DISTRUST: usize = 100;
+/// What a linear solve may leave of F, over what is small enough: where one may suffice, and where it only has to find the
+/// active set.
+const SMALL: f64 = 0.1;
+const ROUGH: f64 = 1e5;
 /// Least tolerance of a linear solve: where one may suffice, and where it must be followed by another.
 const TIGHT: f64 = 1e-12;
 const LOOSE: f64 = 1e-4;
@@ -50,43 +54,38 @@ impl Iterate {
 
     /// The state at the velocities that the `reactions` give.
     pub fn from_reactions(rows: &Rows, reactions: &[Padded]) -> Self {
-        let mut y = rows.free.clone();
-        for (row, r) in rows.list.iter().zip(reactions) {
-            rows.apply(row, r, &mut y);
-        }
-        Self::at(rows, y)
+        Self::at(rows, rows.given_by(reactions))
     }
 }
 
 impl Newton {
-    /// Solve the inner problem for fixed multipliers from `state`, in at most `patience` iterations; the active set of
-    /// `guess` is tried first. Returns the iterations made and whether F vanished.
+    /// Solve the inner problem for fixed multipliers from `state`, in at most `most` iterations and `patience` without
+    /// progress; the active set of `guess` is tried first. Returns the iterations made and whether F vanished.
     pub(super) fn inner(
         &mut self,
         rows: &Rows,
         state: &mut Iterate,
         guess: Option<&Guess>,
         patience: u64,
+        most: u64,
     ) -> (u64, bool) {
-        for iteration in 0..patience {
+        let mut stall = Stall::after(patience, 0.9);
+        for iteration in 0..most {
             let guessed = guess.filter(|_| iteration == 0);
             let target = self.target(rows, state);
-            if guessed.is_none() && state.norm <= target {
-                return (iteration, true);
+            if guessed.is_none() && (state.norm <= target || stall.at(state.norm)) {
+                return (iteration, state.norm <= target);
             }
             let Some(direction) = self.direction(rows, state, guessed, target) else { return (iteration + 1, false) };
             let before = direction.norm;
             advance(rows, state, &direction.step, guessed.is_some());
-            if !state.norm.is_finite() {
-                return (iteration + 1, false);
-            }
             // a factor that was trusted blindly has to earn it
             if self.trusted && state.norm > (TRUST * before).max(target) {
                 self.trusted = false;
                 self.distrust = DISTRUST;
             }
         }
-        (patience, state.norm <= self.target(rows, state))
+        (most, state.norm <= self.target(rows, state))
     }
 
     /// The norm of F that is small enough: a tenth of what either tolerance allows, or what rounding leaves.
@@ -113,8 +112,9 @@ impl Newton {
         right.iter_mut().for_each(|f| *f = -*f);
         let norm = norm2(&right).sqrt();
         // in space slips turn with every iteration, and no linear solve can foresee by how much
+        let left = if guess.is_some() && self.slips.any() { ROUGH } else { SMALL };
         let least = if guess.is_none() && rows.in_space() { LOOSE } else { TIGHT };
-        let tolerance = (0.1 * target / norm).clamp(least, 1e-3);
+        let tolerance = (left * target / norm).clamp(least, 1e-3);
         let serves = !self.renew && self.factor.serves(rows.unknowns);
         if serves && self.trusted {
             self.factor.solve(&mut right);

@@ -25,6 +25,7 @@ mod guess;
 mod inner;
 mod interior;
 mod krylov;
+mod order;
 mod rows;
 mod solvable;
 
@@ -73,8 +74,10 @@ pub struct NewtonSettings {
 
 /// Penalty at the start, over the inverse of the mean normal entry of W.
 const KAPPA: f64 = 1e9;
-/// Newton iterations of one inner problem before the state is smoothed by sweeps.
+/// Newton iterations of one inner problem before the state is smoothed by sweeps: those in which F shrinks by less than a
+/// tenth, and all of them.
 const PATIENCE: u64 = 8;
+const MOST_INNER: u64 = 30;
 /// How often the penalty may be lowered a hundredfold in one solve.
 const MOST_SOFTENED: u32 = 4;
 /// Sweeps that look for the active set: at every step, from zero reactions, and where Newton stalls.
@@ -116,7 +119,7 @@ struct Rest {
 }
 
 impl Rest {
-    const NONE: Self = Self { left: 0, next: 1 };
+    const NONE: Self = Self { left: 0, next: 0 };
 
     /// Whether it is time to try again; else one solve of it passes.
     fn is_over(&mut self) -> bool {
@@ -125,10 +128,10 @@ impl Rest {
         over
     }
 
-    /// It failed again: twice as many solves as after the last failure.
+    /// It failed: one failure is forgiven, after the next it rests for one solve, then for twice as many each time.
     fn lengthen(&mut self) {
         self.left = self.next;
-        self.next = (2 * self.next).min(LONGEST_REST);
+        self.next = (2 * self.next).clamp(1, LONGEST_REST);
     }
 
     /// It served.
@@ -154,6 +157,30 @@ impl Shrinking {
         let shrinkage = (change / self.last).min(0.5);
         self.last = change;
         change * shrinkage / (1.0 - shrinkage)
+    }
+}
+
+/// Whether a quantity that should shrink no longer does.
+struct Stall {
+    mark: f64,
+    since: u64,
+    patience: u64,
+    share: f64,
+}
+
+impl Stall {
+    /// To less than this share of what it was in so many values.
+    fn after(patience: u64, share: f64) -> Self {
+        Self { mark: f64::INFINITY, since: 0, patience, share }
+    }
+
+    /// Enter the next value: whether it has not shrunk for too long, or is no number.
+    fn at(&mut self, value: f64) -> bool {
+        self.since += 1;
+        if value < self.share * self.mark {
+            (self.mark, self.since) = (value, 0);
+        }
+        self.since >= self.patience || !value.is_finite()
     }
 }
 
@@ -232,7 +259,7 @@ impl Newton {
         let (mut last_error, mut softened, mut made_in_all) = (f64::INFINITY, 0, 0);
         loop {
             let mut state = Iterate::from_reactions(rows, &guess.reactions);
-            let (made, solved) = self.inner(rows, &mut state, Some(guess), PATIENCE);
+            let (made, solved) = self.inner(rows, &mut state, Some(guess), PATIENCE, MOST_INNER);
             *iterations += made.max(1);
             if !solved {
                 return None;
@@ -242,9 +269,9 @@ impl Newton {
             }
             problem.write_back(&state.reactions);
             problem.velocities_from_reactions();
-            let load_error = shrinking.error(load_change(rows, &state));
+            let load_error = shrinking.error(load_change(rows, &state.reactions));
             let error = problem.residual();
-            rows.list.iter_mut().zip(&state.reactions).for_each(|(row, r)| row.multiplier = *r);
+            rows.move_multipliers(&state.reactions);
             *guess = Guess::of(state.reactions);
             let report = self.report(*iterations, error, load_error);
             if report.status == SolveStatus::Converged {
@@ -414,11 +441,11 @@ impl<D: Dim> ContactSolver<D> for Newton {
     }
 }
 
-/// How much the net impulses on the bodies changed in the last proximal step: with a contraction far below one, the load
-/// error of the step before.
-fn load_change(rows: &Rows, state: &Iterate) -> f64 {
+/// How much the net impulses on the bodies changed in the proximal step to these reactions: with a contraction far below
+/// one, the load error of the step before.
+fn load_change(rows: &Rows, reactions: &[Padded]) -> f64 {
     let multipliers: Vec<Padded> = rows.list.iter().map(|row| row.multiplier).collect();
-    net_change(rows, &multipliers, &state.reactions)
+    net_change(rows, &multipliers, reactions)
 }
 
 /// By how much the net impulses on the bodies differ between two sets of reactions, over those of the second.

@@ -222,6 +222,30 @@ impl Rows {
         row.given + self.pulled(row, y)
     }
 
+    /// The velocities that reactions give, in the scaled unknowns.
+    pub fn given_by(&self, reactions: &[Padded]) -> Vec<f64> {
+        let mut y = self.free.clone();
+        self.list.iter().zip(reactions).for_each(|(row, r)| self.apply(row, r, &mut y));
+        y
+    }
+
+    /// Begin the next proximal step at these reactions.
+    pub fn move_multipliers(&mut self, reactions: &[Padded]) {
+        self.list.iter_mut().zip(reactions).for_each(|(row, r)| row.multiplier = *r);
+    }
+
+    /// Let the term of dry friction follow the slips at the velocities of `y` by a `share` of their change: wholly where
+    /// none was held.
+    pub fn follow_slips(&mut self, y: &[f64], reactions: &[Padded], share: f64) {
+        for (k, r) in reactions.iter().enumerate() {
+            if !self.list[k].associated {
+                let slip = self.slip(&self.list[k], y, r);
+                let lag = &mut self.list[k].lag;
+                *lag = Some(lag.map_or(slip, |last| last + share * (slip - last)));
+            }
+        }
+    }
+
     /// μ‖s_t‖ + ν‖s_m‖ with the slip s = u + C (r − r₀) of the law of contact `row`.
     pub fn slip(&self, row: &Row, y: &[f64], r: &Padded) -> f64 {
         let slip = self.velocity(row, y) + row.compliance.times(&(*r - row.carried));

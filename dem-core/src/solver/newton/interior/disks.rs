@@ -184,8 +184,9 @@ impl Site for Disks {
         self.count
     }
 
-    fn add_scale(&self, at: &Pair, yields: f64, sum: &mut f64) {
+    fn add_scale(&self, at: &Pair, yields: f64, sum: &mut f64) -> usize {
         *sum += self.count as f64 * yields * at.r[0] * at.r[0];
+        self.count
     }
 
     fn scaling(&self, at: &Pair) -> Scaling {

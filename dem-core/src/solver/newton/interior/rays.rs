@@ -91,8 +91,9 @@ impl Site for Rays {
         self.count
     }
 
-    fn add_scale(&self, at: &Pair, yields: f64, sum: &mut f64) {
+    fn add_scale(&self, at: &Pair, yields: f64, sum: &mut f64) -> usize {
         (0..self.count).for_each(|k| *sum += yields * at.lambda[k] * at.lambda[k]);
+        self.count
     }
 
     /// (w/λ + Eᵀ(1/ρ + C)E)⁻¹.
