@@ -65,13 +65,14 @@ fn pressed<D: Dim>() -> World<D> {
     World::new(list.into_iter().collect(), vec![floor(0.3), side(0.0, 1.0), side(0.12, -1.0), lid], Vec::new(), set)
 }
 
-/// Steps both until a bond breaks, or `most` steps; everything is the same to 1e-8 and nothing leaves the plane.
-fn assert_twins(mut plane: World<D2>, mut space: World<D3>, most: usize) -> usize {
+/// Steps both until a bond breaks, or `most` steps; everything is the same to 1e-8 and nothing leaves the plane. Of the step in
+/// which bonds break so many rounds are compared.
+fn assert_twins(mut plane: World<D2>, mut space: World<D3>, most: usize, rounds: u32) -> usize {
     for step in 0..most {
         let (two, three) = (plane.step().expect("accepted"), space.step().expect("accepted"));
-        // the first to break: the rounds after them, in which all falls, have contacts that slip and several solutions
-        let two: Vec<_> = two.breaks.iter().filter(|b| b.round == 0).map(|b| (b.bond, b.mode)).collect();
-        let three: Vec<_> = three.breaks.iter().filter(|b| b.round == 0).map(|b| (b.bond, b.mode)).collect();
+        let two: Vec<_> = two.breaks.iter().filter(|b| b.round < rounds).map(|b| (b.bond, b.mode, b.round)).collect();
+        let three: Vec<_> =
+            three.breaks.iter().filter(|b| b.round < rounds).map(|b| (b.bond, b.mode, b.round)).collect();
         assert_eq!(two, three, "step {step}");
         if !two.is_empty() {
             return step;
@@ -104,14 +105,15 @@ fn assert_twins(mut plane: World<D2>, mut space: World<D3>, most: usize) -> usiz
 
 #[test]
 fn centres_in_a_plane_move_as_their_flat_twin() {
-    assert_eq!(assert_twins(pressed::<D2>(), pressed::<D3>(), 150), 150);
+    assert_eq!(assert_twins(pressed::<D2>(), pressed::<D3>(), 150, u32::MAX), 150);
 }
 
 #[test]
 fn bonds_in_a_plane_carry_and_break_as_in_their_flat_twin() {
     let newton = SolverSettings::Newton(newton(1e-12, 1e-12, 1e-9));
-    for solver in [solver(1e-12), newton] {
-        let first = assert_twins(sheared::<D2>(solver), sheared::<D3>(solver), 400);
+    // in the fifth round all falls and much slips: Newton then comes to other solutions in space than in the plane
+    for (solver, rounds) in [(solver(1e-12), u32::MAX), (newton, 4)] {
+        let first = assert_twins(sheared::<D2>(solver), sheared::<D3>(solver), 400, rounds);
         assert!((5..400).contains(&first), "the first break comes in step {first}");
     }
 }

@@ -66,7 +66,6 @@ impl Newton {
             let load_error = load_change(&rows, &state.reactions);
             reactions.clone_from(&state.reactions);
             problem.write_back(&reactions);
-            problem.velocities_from_reactions();
             let error = problem.residual();
             let least = best.as_ref().map_or(f64::INFINITY, |b| b.residual);
             if error <= least {

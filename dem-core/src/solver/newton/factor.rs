@@ -145,8 +145,8 @@ impl Pattern {
             entries(*at, *count, |row, col, _, _| indices.push(Pair::new(row, col)));
         }
         let (matrix, order) = SymbolicSparseColMat::try_new_from_indices(unknowns, unknowns, &indices).ok()?;
-        // bodies in space have six unknowns
-        let in_space = blocks.iter().any(|(_, count)| count.contains(&6));
+        // a body in space has half the unknowns that a pair has at most
+        let in_space = blocks.iter().any(|(_, count)| count.contains(&(PAIR / 2)));
         let own = if in_space { dissected(unknowns, &blocks) } else { None };
         let places = own.as_ref().map_or(SymmetricOrdering::Amd, |own| SymmetricOrdering::Custom(own.as_ref()));
         let symbolic = factorize_symbolic_cholesky(matrix.as_ref(), Side::Lower, places, Default::default()).ok()?;

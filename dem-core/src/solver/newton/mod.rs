@@ -268,7 +268,6 @@ impl Newton {
                 self.slips = Slips::of(rows, &state);
             }
             problem.write_back(&state.reactions);
-            problem.velocities_from_reactions();
             let load_error = shrinking.error(load_change(rows, &state.reactions));
             let error = problem.residual();
             rows.move_multipliers(&state.reactions);
@@ -387,7 +386,6 @@ impl Newton {
     /// The reactions that were found as they are, if they are accepted.
     fn taken(&self, problem: &mut impl Solvable, found: Found, iterations: u64) -> Option<SolveReport> {
         problem.write_back(&found.reactions);
-        problem.velocities_from_reactions();
         let report = self.report(iterations, problem.residual(), found.load_error);
         (report.status != SolveStatus::Failed).then_some(report)
     }

@@ -6,26 +6,24 @@
 //! Sources: George, SIAM J. Numer. Anal. 10, 1973; Karypis & Kumar, SIAM J. Sci. Comput. 20, 1998.
 
 use faer::perm::Perm;
+use faer::sparse::{Pair, SymbolicSparseColMat};
 use feral_metis::{CscPattern, metis_order};
 
 /// The order for contacts between nodes with these first unknowns and counts; none where it cannot be found.
 pub(super) fn dissected(unknowns: usize, blocks: &[([usize; 2], [usize; 2])]) -> Option<Perm<usize>> {
-    let mut nodes = nodes(unknowns, blocks);
-    let node = |first: usize| nodes.partition_point(|(start, _)| *start < first) as i32;
-    let mut edges: Vec<(i32, i32)> = (0..nodes.len() as i32).map(|k| (k, k)).collect();
+    let nodes = nodes(unknowns, blocks);
+    let node = |first: usize| nodes.partition_point(|(start, _)| *start < first);
+    let mut edges: Vec<_> = (0..nodes.len()).map(|k| Pair::new(k, k)).collect();
     for (at, _) in blocks.iter().filter(|(_, count)| !count.contains(&0)) {
         let (a, b) = (node(at[0]), node(at[1]));
-        edges.extend([(a, b), (b, a)]);
+        edges.extend([Pair::new(a, b), Pair::new(b, a)]);
     }
-    edges.sort_unstable();
-    edges.dedup();
-    let mut starts = vec![0; nodes.len() + 1];
-    edges.iter().for_each(|(column, _)| starts[*column as usize + 1] += 1);
-    (0..nodes.len()).for_each(|k| starts[k + 1] += starts[k]);
-    let rows: Vec<i32> = edges.iter().map(|(_, row)| *row).collect();
+    let (graph, _) = SymbolicSparseColMat::try_new_from_indices(nodes.len(), nodes.len(), &edges).ok()?;
+    let narrow = |list: &[usize]| list.iter().map(|k| *k as i32).collect::<Vec<_>>();
+    let (starts, rows) = (narrow(graph.col_ptr()), narrow(graph.row_idx()));
     let order = metis_order(&CscPattern::new(nodes.len(), &starts, &rows)?).ok()?;
-    nodes = order.iter().map(|k| nodes[*k as usize]).collect();
-    let forward: Vec<usize> = nodes.iter().flat_map(|(first, count)| *first..first + count).collect();
+    let ordered = order.iter().map(|k| nodes[*k as usize]);
+    let forward: Vec<usize> = ordered.flat_map(|(first, count)| first..first + count).collect();
     let mut inverse = vec![0; unknowns];
     forward.iter().enumerate().for_each(|(place, unknown)| inverse[*unknown] = place);
     Some(Perm::new_checked(forward.into(), inverse.into(), unknowns))

@@ -17,7 +17,7 @@ pub(super) trait Solvable {
     fn residual(&self) -> f64;
     /// The reactions after some sweeps of Gauss–Seidel, in the unit of the rows.
     fn swept(&mut self, sweeps: usize) -> Vec<Padded>;
-    /// Take over reactions in the unit of the rows.
+    /// Take over reactions in the unit of the rows, and the velocities that they give.
     fn write_back(&mut self, reactions: &[Padded]);
     /// Set the reactions to zero.
     fn forget_reactions(&mut self);
@@ -69,6 +69,7 @@ impl<D: Dim> Solvable for ContactProblem<D> {
         group(&mut self.elastic, &reactions[bonded..elastic], unit);
         group(&mut self.dry, &reactions[elastic..dry], unit);
         group(&mut self.frictionless, &reactions[dry..], unit);
+        self.velocities_from_reactions();
     }
 
     fn forget_reactions(&mut self) {

@@ -345,7 +345,6 @@ impl Newton {
             // in the metric of the path: of what only creeps the slip is softer by as much, and its share beyond the limit stays
             self.slips = Slips::of_guess(&path.rows, &guess);
             problem.write_back(&reactions);
-            problem.velocities_from_reactions();
             let mut residual = problem.residual();
             let mut load_error = path.load_error(&reactions).min(shrinking.error(load_change(&path.rows, &reactions)));
             let converged = self.report(*iterations, residual, load_error).status == SolveStatus::Converged;
@@ -357,7 +356,6 @@ impl Newton {
                     return Some(exact);
                 }
                 problem.write_back(&reactions);
-                problem.velocities_from_reactions();
             }
             if converged {
                 return Some(self.report(*iterations, residual, load_error));
@@ -402,7 +400,6 @@ impl Newton {
         self.follow(path, iterations, |path| {
             let reactions = path.snapped().reactions;
             problem.write_back(&reactions);
-            problem.velocities_from_reactions();
             let residual = problem.residual();
             if best.as_ref().is_none_or(|(least, _)| residual < *least) {
                 best = Some((residual, Point { y: path.at.y.clone(), pairs: path.at.pairs.clone() }));
