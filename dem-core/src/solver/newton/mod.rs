@@ -22,6 +22,7 @@ mod assembled;
 mod corrector;
 mod factor;
 mod guess;
+mod held;
 mod inner;
 mod interior;
 mod krylov;
@@ -360,8 +361,20 @@ impl Newton {
         let report = self.through_the_middle::<Disks>(problem, &started, &swept, iterations);
         report.or_else(|| {
             problem.forget_what_is_not_finite();
-            let reached = problem.swept(0);
-            self.penalised(problem, rows, reached, iterations)
+            let (reached, residual) = (problem.swept(0), problem.residual());
+            let report = self.penalised(problem, rows, reached.clone(), iterations);
+            if report.is_some() || problem.residual() <= residual {
+                return report;
+            }
+            // less was left before: some sweeps may do from there
+            let left = problem.swept(0);
+            problem.write_back(&reached);
+            let swept = self.swept(problem, rows, *iterations, FIRST_SWEEPS);
+            if swept.status == SolveStatus::Failed {
+                problem.write_back(&left);
+                return None;
+            }
+            Some(swept)
         })
     }
 
@@ -444,6 +457,17 @@ impl<D: Dim> ContactSolver<D> for Newton {
 fn load_change(rows: &Rows, reactions: &[Padded]) -> f64 {
     let multipliers: Vec<Padded> = rows.list.iter().map(|row| row.multiplier).collect();
     net_change(rows, &multipliers, reactions)
+}
+
+/// By how much two sets of reactions differ, over the second.
+fn relative_change(from: &[Padded], to: &[Padded]) -> f64 {
+    let (mut change, mut total) = (0.0, 0.0);
+    for (from, to) in from.iter().zip(to) {
+        let by = *to - *from;
+        change += by.dot(&by);
+        total += to.dot(to);
+    }
+    if change == 0.0 { 0.0 } else { (change / total).sqrt() }
 }
 
 /// By how much the net impulses on the bodies differ between two sets of reactions, over those of the second.

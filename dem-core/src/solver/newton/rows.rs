@@ -234,6 +234,13 @@ impl Rows {
         self.list.iter_mut().zip(reactions).for_each(|(row, r)| row.multiplier = *r);
     }
 
+    /// Hold these terms of dry friction, one for each contact.
+    pub fn hold(&mut self, terms: &[f64]) {
+        for (row, term) in self.list.iter_mut().zip(terms).filter(|(row, _)| !row.associated) {
+            row.lag = Some(*term);
+        }
+    }
+
     /// Let the term of dry friction follow the slips at the velocities of `y` by a `share` of their change: wholly where
     /// none was held.
     pub fn follow_slips(&mut self, y: &[f64], reactions: &[Padded], share: f64) {

@@ -39,7 +39,7 @@ const EXACT_ROUNDS: usize = 3;
 const MOST: u64 = 100;
 /// Iterations in which the gap must halve, or where the term of dry friction moves the residual.
 const PATIENCE: u64 = 5;
-const MOVING_PATIENCE: u64 = 15;
+const MOVING_PATIENCE: u64 = 45;
 /// How much harder the metric is than Newton's where the path ends.
 const HARDER: f64 = 10.0;
 /// Where a path ends, as a gap over what the reactions and the velocities that they give multiply to; and where one ends that
@@ -247,7 +247,7 @@ impl<S: Site> Path<S> {
     fn new(base: &Rows, lags: &[f64], reactions: &[Padded]) -> Self {
         let mut rows = base.clone();
         rows.soften(1.0 / HARDER);
-        rows.list.iter_mut().zip(lags).filter(|(row, _)| !row.associated).for_each(|(row, lag)| row.lag = Some(*lag));
+        rows.hold(lags);
         let hardest = rows.list.iter().map(|row| row.weights).collect();
         let own = rows.list.iter().map(|row| row.weights.n / yields(row)).fold(0.0, f64::max);
         let (sites, at) = Self::inside(&rows, reactions);
@@ -318,7 +318,7 @@ impl<S: Site> Path<S> {
 
 impl Newton {
     /// What lies at the end of the central path: with the term of dry friction that was found last, then with one that
-    /// follows the slips along the path, then with those of the end that was found before.
+    /// follows the slips along the path, and while what that leads to is not accepted with those of the end before.
     pub(super) fn through_the_middle<S: Site>(
         &mut self,
         problem: &mut impl Solvable,
@@ -336,8 +336,9 @@ impl Newton {
                 path.begin_again(swept);
             }
             match wrong {
-                _ if right => self.follow_fixed(&mut path, END, iterations),
-                1 => self.follow_moving(&mut path, problem, iterations),
+                0 => self.follow_fixed(&mut path, END, iterations),
+                // once it moves it moves: what creeps would else be given other reactions
+                _ if right || wrong == 1 => self.follow_moving(&mut path, problem, iterations),
                 _ => self.follow_fixed(&mut path, EARLY, iterations),
             }
             let mut guess = path.snapped();
@@ -347,15 +348,24 @@ impl Newton {
             problem.write_back(&reactions);
             let mut residual = problem.residual();
             let mut load_error = path.load_error(&reactions).min(shrinking.error(load_change(&path.rows, &reactions)));
+            if let Some(found) = best.as_mut().filter(|_| right) {
+                // these are nearer to those of a rigid metric
+                found.load_error = found.load_error.min(net_change(&path.rows, &found.reactions, &reactions));
+            }
             let converged = self.report(*iterations, residual, load_error).status == SolveStatus::Converged;
             let near = if wrong == 0 { WRONG } else { self.settings.accept };
             right = converged || round < EXACT_ROUNDS && (residual <= near || !dry);
             // where nothing moves many reactions balance the load: the term of what creeps chooses, and is Newton's to find
             if right && !std::mem::replace(&mut tried, true) {
-                if let Some(exact) = self.rounds(problem, &mut base.clone(), &mut guess, iterations) {
+                let exact = self.rounds(problem, &mut base.clone(), &mut guess, iterations);
+                if exact.is_some() {
+                    return exact;
+                }
+                if converged && let Some(exact) = self.rounds_from_held(problem, base, path.snapped(), iterations) {
                     return Some(exact);
                 }
                 problem.write_back(&reactions);
+                self.slips = Slips::of_guess(&path.rows, &path.snapped());
             }
             if converged {
                 return Some(self.report(*iterations, residual, load_error));
