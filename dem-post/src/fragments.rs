@@ -1,6 +1,8 @@
 //! Fragments: the pieces of a sample that intact bonds hold together.
 
-use dem_run::history::{BondStatus, Bonds};
+use std::f64::consts::PI;
+
+use dem_run::history::{BondStatus, Bonds, Grains};
 use petgraph::unionfind::UnionFind;
 use serde::Serialize;
 
@@ -17,17 +19,34 @@ pub struct Fragments {
     pub largest_mass_fraction: f64,
 }
 
+/// One piece.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Fragment {
+    /// Its grains.
+    pub grains: Vec<usize>,
+    /// Mass, kg.
+    pub mass: f64,
+    /// What its grains fill, without the pores between them: m³ in space, m² in the plane.
+    pub filled: f64,
+    /// Its centre of mass, m, D numbers.
+    pub centre: Vec<f64>,
+}
+
+/// For each grain, of which there are `count`, a grain that stands for its piece.
+fn pieces(count: usize, bonds: &Bonds, status: &[BondStatus]) -> Vec<usize> {
+    let mut pieces = UnionFind::<usize>::new(count);
+    for ([i, j], _) in bonds.pair.iter().zip(status).filter(|(_, status)| **status == BondStatus::Intact) {
+        pieces.union(*i as usize, *j as usize);
+    }
+    pieces.into_labeling()
+}
+
 /// The pieces that the intact bonds of `bonds` make of grains with masses `mass` (kg).
 ///
 /// `status` has one entry per bond; bonds must name grains within `mass`.
 pub fn fragments(mass: &[f64], bonds: &Bonds, status: &[BondStatus]) -> Fragments {
-    let mut pieces = UnionFind::<usize>::new(mass.len());
-    for ([i, j], _) in bonds.pair.iter().zip(status).filter(|(_, status)| **status == BondStatus::Intact) {
-        pieces.union(*i as usize, *j as usize);
-    }
     let (mut grains, mut masses) = (vec![0usize; mass.len()], vec![0.0; mass.len()]);
-    for (grain, mass) in mass.iter().enumerate() {
-        let piece = pieces.find_mut(grain);
+    for (piece, mass) in pieces(mass.len(), bonds, status).into_iter().zip(mass) {
         grains[piece] += 1;
         masses[piece] += mass;
     }
@@ -39,6 +58,27 @@ pub fn fragments(mass: &[f64], bonds: &Bonds, status: &[BondStatus]) -> Fragment
         largest: grains.iter().copied().max().unwrap_or(0),
         largest_mass_fraction: if total > 0.0 { heaviest / total } else { 0.0 },
     }
+}
+
+/// The same pieces one by one, the heaviest first; `position` has D numbers for each grain (m).
+pub fn fragment_list(sample: &Grains, position: &[f64], bonds: &Bonds, status: &[BondStatus]) -> Vec<Fragment> {
+    let dimension = position.len() / sample.mass.len().max(1);
+    let mut list: Vec<Option<Fragment>> = vec![None; sample.mass.len()];
+    for (grain, piece) in pieces(sample.mass.len(), bonds, status).into_iter().enumerate() {
+        let none = || Fragment { grains: vec![], mass: 0.0, filled: 0.0, centre: vec![0.0; dimension] };
+        let fragment = list[piece].get_or_insert_with(none);
+        let (mass, radius) = (sample.mass[grain], sample.radius[grain]);
+        fragment.grains.push(grain);
+        fragment.mass += mass;
+        fragment.filled += if dimension == 2 { PI * radius.powi(2) } else { 4.0 / 3.0 * PI * radius.powi(3) };
+        for (sum, x) in fragment.centre.iter_mut().zip(&position[grain * dimension..]) {
+            *sum += mass * x;
+        }
+    }
+    let mut list: Vec<Fragment> = list.into_iter().flatten().collect();
+    list.iter_mut().for_each(|f| f.centre.iter_mut().for_each(|x| *x /= f.mass));
+    list.sort_by(|a, b| b.mass.total_cmp(&a.mass));
+    list
 }
 
 #[cfg(test)]
@@ -66,5 +106,20 @@ mod tests {
         let found = fragments(&[1.0; 7], &bonds(), &status);
         let expected = Fragments { count: 5, singles: 3, largest: 2, largest_mass_fraction: 2.0 / 7.0 };
         assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn pieces_have_a_mass_a_volume_and_a_centre() {
+        let mass = vec![1.0, 1.0, 1.0, 1.0, 10.0, 30.0, 1.0];
+        let sample = Grains { radius: vec![2.0; 7], mass, ..Grains::default() };
+        // the chain lies along x, the pair along z
+        let mut position = vec![0.0; 21];
+        (position[3], position[6], position[9], position[17]) = (1.0, 2.0, 3.0, 4.0);
+        let list = fragment_list(&sample, &position, &bonds(), &[BondStatus::Intact; 4]);
+        let grains: Vec<&[usize]> = list.iter().map(|f| f.grains.as_slice()).collect();
+        assert_eq!(grains, [&[4, 5][..], &[0, 1, 2, 3], &[6]]);
+        assert_eq!((list[0].mass, list[0].centre.clone()), (40.0, vec![0.0, 0.0, 3.0]));
+        assert_eq!(list[1].centre, [1.5, 0.0, 0.0]);
+        assert!((list[1].filled / (4.0 * 4.0 / 3.0 * PI * 8.0) - 1.0).abs() < 1e-12);
     }
 }

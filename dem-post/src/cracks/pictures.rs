@@ -6,7 +6,7 @@ use super::front::Growth;
 use super::paths::Crack;
 use super::surfaces::Facet;
 use super::{Pieces, Report};
-use crate::fragments::Fragments;
+use crate::fragments::{Fragments, fragment_list};
 use crate::map::{Colour, Key, Link, Panel, Patch, Ramp, Sample, Scale, draw, draw_view};
 use crate::output::{Result, number};
 use crate::plot::{Chart, Drawing, Style, colour};
@@ -17,6 +17,8 @@ const BONDED: &str = "#8c8c8c";
 const RELEASED: &str = "#ffffff";
 /// Fill and outline of grains under cracks.
 const PALE: [&str; 2] = ["#f0f0f0", "#cfcfcf"];
+/// Fills of the heaviest fragments: colours that the colour-blind tell apart (Okabe & Ito 2008).
+const FRAGMENTS: [&str; 6] = ["#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#f0e442", "#d55e00"];
 /// Widths of a segment on the path of its crack and of another.
 const WIDTHS: [f64; 2] = [3.2, 1.8];
 /// Colours of the backs of cracks: lighter than those of their fronts.
@@ -210,6 +212,48 @@ pub fn crack_map(history: &History, report: &Report) -> Result<(Drawing, Option<
     let near = sample.near(report.paths.segments.iter().flat_map(|s| s.line.iter().map(|x| x.as_slice())), all);
     let near = near.map(|view| draw_view(&sample, view, &panels, &legend));
     Ok((draw_view(&sample, all, &panels, &legend), near))
+}
+
+/// The pieces of a sample at some frames: the heaviest in colours of their own, in the order of their masses.
+///
+/// # Errors
+/// Those of reading the history.
+pub fn fragment_map(history: &History, sample: &Sample, frames: &[usize]) -> Result<Drawing> {
+    let (grains, bonds) = (history.grains()?, history.bonds()?);
+    let total: f64 = grains.mass.iter().sum();
+    let (mut panels, mut shown) = (vec![], 0);
+    for &frame in frames {
+        let state = history.grain_state(frame)?;
+        let list = fragment_list(&grains, &state.position, &bonds, &history.bond_status(frame)?);
+        let mut fills = vec![Colour::from(PALE[0]); grains.radius.len()];
+        let coloured = list.iter().filter(|f| f.grains.len() > 1).zip(FRAGMENTS);
+        for (fragment, colour) in coloured.clone() {
+            fragment.grains.iter().for_each(|&grain| fills[grain] = colour.into());
+        }
+        shown = shown.max(coloured.count());
+        let heaviest = list.first().map_or(0.0, |f| 100.0 * f.mass / total);
+        let count = list.len();
+        panels.push(Panel {
+            caption: vec![
+                format!("t = {} s", number(history.times()[frame])),
+                format!("{count} fragment{}, the heaviest {heaviest:.1} %", if count == 1 { "" } else { "s" }),
+            ],
+            grains: state,
+            walls: history.wall_state(frame)?,
+            fills,
+            outline: "#404040",
+            ..Panel::default()
+        });
+    }
+    let names = ["heaviest", "second", "third", "fourth", "fifth", "sixth"];
+    let mut legend: Vec<Key> = FRAGMENTS
+        .iter()
+        .zip(names)
+        .take(shown)
+        .map(|(colour, name)| Key::Disk(colour, "#404040", name.into()))
+        .collect();
+    legend.push(Key::Disk(PALE[0], "#404040", "the rest".into()));
+    Ok(draw(sample, &panels, &legend))
 }
 
 /// The decohesion map of a sample at some frames: grains that lost a bond in white.
