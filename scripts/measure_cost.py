@@ -20,7 +20,7 @@ SIDES = [100, 178, 316, 562, 1000]
 
 def run(side, what, times, threads):
     """Runs the scene: wall time (s), numbers of grains and of contacts, greatest resident size (bytes)."""
-    command = [COST, "dry", str(side), str(side), what, str(times)]
+    command = [COST, "disks", "dry", str(side), str(side), what, str(times)]
     before = time.perf_counter()
     out = subprocess.run(
         command, capture_output=True, text=True, check=True, env=os.environ | {"RAYON_NUM_THREADS": str(threads)}

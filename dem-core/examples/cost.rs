@@ -1,29 +1,39 @@
 //! A scene that does one thing many times, for tools that count instructions or bytes:
-//! `cost FEATURE ROWS COLUMNS sweep|step TIMES` prints the number of grains and contacts, the bytes of
+//! `cost disks|spheres FEATURE ROWS COLUMNS sweep|step TIMES` prints the number of grains and contacts, the bytes of
 //! a contact, and the greatest resident size (kB).
 
 #[path = "../tests/common/mod.rs"]
 mod common;
 
-use common::family::{FEATURES, rows_of_disks};
+use common::family::{FEATURES, layers_of_spheres, rows_of_disks};
 use dem_core::contact::LocalSolve;
+use dem_core::dim::Dim;
 use dem_core::solver::sweep;
+use dem_core::world::World;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [feature, rows, columns, what, times] = arguments.as_slice() else {
-        panic!("usage: cost FEATURE ROWS COLUMNS sweep|step TIMES");
+    let [grains, feature, rows, columns, what, times] = arguments.as_slice() else {
+        panic!("usage: cost disks|spheres FEATURE ROWS COLUMNS sweep|step TIMES");
     };
     let number = |text: &str| text.parse::<usize>().expect("a whole number");
     let feature = FEATURES.iter().find(|(name, _)| name == feature).expect("a feature of common/family.rs").1;
-    let mut world = rows_of_disks(number(rows), number(columns), feature, 20);
+    let (rows, columns, times) = (number(rows), number(columns), number(times));
+    match grains.as_str() {
+        "disks" => spend(rows_of_disks(rows, columns, feature, 20), what, times),
+        "spheres" => spend(layers_of_spheres(rows, columns, feature, 20), what, times),
+        other => panic!("disks or spheres, not {other}"),
+    }
+}
+
+fn spend<D: Dim>(mut world: World<D>, what: &str, times: usize) {
     let mut problem = world.contact_problem();
     let (contacts, bytes) = (problem.len(), problem.contact_bytes());
     if what == "sweep" {
-        rayon::scope(|_| (0..number(times)).for_each(|_| sweep(&mut problem, LocalSolve::Exact)));
+        rayon::scope(|_| (0..times).for_each(|_| sweep(&mut problem, LocalSolve::Exact)));
     } else {
         drop(problem);
-        for _ in 0..number(times) {
+        for _ in 0..times {
             world.step().expect("any residual is accepted");
         }
     }

@@ -1,9 +1,10 @@
-//! One scene with and without each feature: hexagonal rows of disks that rest on a floor.
+//! One scene with and without each feature: hexagonal rows of disks, or close-packed layers of spheres, that rest on a floor.
 
 use super::{down, floor, grain, settings, world};
+use dem_core::body::Grain;
 use dem_core::bond::Stiffness;
 use dem_core::contact::LocalSolve;
-use dem_core::dim::D2;
+use dem_core::dim::{D2, D3, Dim};
 use dem_core::solver::{GaussSeidelSettings, SolverSettings};
 use dem_core::world::{Restitution, World};
 
@@ -30,19 +31,40 @@ pub const FEATURES: [(&str, Feature); 5] = [
     ("elastic", Feature::ElasticBonds),
 ];
 
+const RADIUS: f64 = 2e-3;
+
 /// `rows` rows of `columns` disks, every other one a disk shorter and between those below. A step makes `sweeps` sweeps,
 /// whatever they reach.
 pub fn rows_of_disks(rows: usize, columns: usize, feature: Feature, sweeps: u64) -> World<D2> {
-    let r = 2e-3;
+    let r = RADIUS;
     let mut disks = Vec::new();
     for row in 0..rows {
         let shift = if row % 2 == 0 { 0.0 } else { r };
         for column in 0..columns - row % 2 {
-            disks.push(grain::<D2>(&[2.0 * r * column as f64 + shift, r + 3f64.sqrt() * r * row as f64], r));
+            disks.push(grain(&[2.0 * r * column as f64 + shift, r + 3f64.sqrt() * r * row as f64], r));
         }
     }
+    resting(disks, feature, sweeps)
+}
+
+/// The same of spheres: `layers` layers of `columns` × `columns`.
+pub fn layers_of_spheres(layers: usize, columns: usize, feature: Feature, sweeps: u64) -> World<D3> {
+    let r = RADIUS;
+    let mut spheres = Vec::new();
+    for layer in 0..layers {
+        let (shift, count) = if layer % 2 == 0 { (0.0, columns) } else { (r, columns - 1) };
+        let height = r + 2f64.sqrt() * r * layer as f64;
+        for k in 0..count * count {
+            let [x, y] = [k % count, k / count].map(|c| 2.0 * r * c as f64 + shift);
+            spheres.push(grain(&[x, y, height], r));
+        }
+    }
+    resting(spheres, feature, sweeps)
+}
+
+fn resting<D: Dim>(grains: Vec<Grain<D>>, feature: Feature, sweeps: u64) -> World<D> {
     let mut set = settings(1e-4);
-    set.gravity = down::<D2>(9.81);
+    set.gravity = down::<D>(9.81);
     set.friction = if feature == Feature::None { 0.0 } else { 0.3 };
     set.restitution = (feature == Feature::Restitution).then_some(Restitution {
         grain_grain: 0.5,
@@ -56,7 +78,7 @@ pub fn rows_of_disks(rows: usize, columns: usize, feature: Feature, sweeps: u64)
         max_sweeps: sweeps,
         acceleration: 0,
     });
-    let mut w = world(disks, vec![floor(set.friction)], set);
+    let mut w = world(grains, vec![floor(set.friction)], set);
     if matches!(feature, Feature::Bonds | Feature::ElasticBonds) {
         w.form_bonds(1e-6, |_| 100.0, 0.3);
     }
