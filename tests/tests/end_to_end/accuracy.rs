@@ -124,6 +124,43 @@ fn a_scene_s_accuracy_is_measured_twice_alike() {
     assert_eq!(without_clock(&again), without_clock(&report));
 }
 
+/// A cylinder of 60 spheres: Newton keeps it rigid, and finds one first break whatever the order of the contacts and the start.
+#[test]
+fn spheres_are_measured_as_disks_are() {
+    let here = Folder::new();
+    let scene = config("cylinder-compression.json");
+    let small = [
+        "--set",
+        "sample.random.count=60",
+        "--set",
+        "sample.random.width=0.012",
+        "--set",
+        "sample.random.preparation.compaction.solid_fraction=0.5",
+    ];
+    let args = ["--solvers", "gauss-seidel,newton", "--tolerances", "1e-8", "--steps", "1", "--orders", "1"];
+    let command = [&["accuracy", &scene, "--json", "--quiet"], &small[..], &args].concat();
+    let report = here.dem_run(&command).json();
+
+    let runs = report["runs"].as_array().expect("runs");
+    let [swept, newton] = runs.as_slice() else { panic!("{} runs", runs.len()) };
+    for run in runs {
+        assert_eq!(run["first_break"]["place"].as_array().expect("a place").len(), 3);
+        assert!(number(&run["failure"]["collapse"][0]) >= number(&run["first_break"]["load"]), "{run}");
+    }
+    assert!(number(&newton["false_strain"]) <= 1e-7, "{newton}");
+    assert!(number(&newton["false_strain"]) < 1e-2 * number(&swept["false_strain"]), "{swept}");
+
+    let spreads = report["indeterminacy"]["spreads"].as_array().expect("spreads");
+    for spread in spreads.iter().filter(|spread| spread["solver"] == "newton") {
+        assert_eq!(spread["first_break"]["min"], spread["first_break"]["max"], "{spread}");
+        assert_eq!(number(&spread["first_bonds"]), 1.0, "{spread}");
+    }
+    for solver in report["profile"]["solvers"].as_array().expect("solvers") {
+        let costs = solver["costs"].as_array().expect("costs");
+        assert!(!costs.is_empty() && costs.iter().all(|cost| cost["solved"] == true), "{}", solver["solver"]);
+    }
+}
+
 #[test]
 fn a_run_that_does_not_converge_is_a_row() {
     let here = Folder::new();
