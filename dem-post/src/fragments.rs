@@ -20,12 +20,14 @@ pub struct Fragments {
 }
 
 /// One piece.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Fragment {
     /// Its grains.
     pub grains: Vec<usize>,
     /// Mass, kg.
     pub mass: f64,
+    /// Share of the sample's mass, 0 to 1.
+    pub mass_fraction: f64,
     /// What its grains fill, without the pores between them: m³ in space, m² in the plane.
     pub filled: f64,
     /// Its centre of mass, m, D numbers.
@@ -65,7 +67,7 @@ pub fn fragment_list(sample: &Grains, position: &[f64], bonds: &Bonds, status: &
     let dimension = position.len() / sample.mass.len().max(1);
     let mut list: Vec<Option<Fragment>> = vec![None; sample.mass.len()];
     for (grain, piece) in pieces(sample.mass.len(), bonds, status).into_iter().enumerate() {
-        let none = || Fragment { grains: vec![], mass: 0.0, filled: 0.0, centre: vec![0.0; dimension] };
+        let none = || Fragment { centre: vec![0.0; dimension], ..Fragment::default() };
         let fragment = list[piece].get_or_insert_with(none);
         let (mass, radius) = (sample.mass[grain], sample.radius[grain]);
         fragment.grains.push(grain);
@@ -76,7 +78,11 @@ pub fn fragment_list(sample: &Grains, position: &[f64], bonds: &Bonds, status: &
         }
     }
     let mut list: Vec<Fragment> = list.into_iter().flatten().collect();
-    list.iter_mut().for_each(|f| f.centre.iter_mut().for_each(|x| *x /= f.mass));
+    let total: f64 = sample.mass.iter().sum();
+    for fragment in &mut list {
+        fragment.mass_fraction = fragment.mass / total;
+        fragment.centre.iter_mut().for_each(|x| *x /= fragment.mass);
+    }
     list.sort_by(|a, b| b.mass.total_cmp(&a.mass));
     list
 }

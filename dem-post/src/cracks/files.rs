@@ -5,7 +5,7 @@ use dem_run::history::History;
 use super::pictures::{broken_chart, crack_map, decohesion, fragment_charts, fragment_map, front_charts, surface_maps};
 use super::surfaces::Facet;
 use super::{Report, broken_over_time};
-use crate::fragments::fragment_list;
+use crate::fragments::{Fragment, fragment_list};
 use crate::map::Sample;
 use crate::moments;
 use crate::output::{Folder, Result, cell};
@@ -13,12 +13,11 @@ use crate::plot::Chart;
 use crate::row;
 
 /// Writes `ruptures.csv`, `broken.csv`, `fragments.csv` and `fragment-list.csv`, and as drawings `broken`, `fragments`,
-/// `fragment-map` and `decohesion`, of spheres also `decohesion-inside`; that list and these maps show the moments nearest to `times` (s), or
-/// chosen ones. Where cracks were
-/// found, also `cracks.csv`, `crack-growth.csv`, and the drawings `cracks` and, where one grew step by step or round by
-/// round, `crack-front`; in the plane `crack-segments.csv`, `crack-front.csv` and, where the cracks fill a small part of the
-/// sample, the drawing `cracks-near`; in space `crack-facets.csv`, their corners in `crack-facets.vtk`, and the drawing
-/// `cracks-side`.
+/// `fragment-map` and `decohesion`, of spheres also `decohesion-inside`; that list and these maps show the moments nearest
+/// to `times` (s), or chosen ones. Where cracks were found, also `cracks.csv`, `crack-growth.csv`, and the drawings `cracks`
+/// and, where one grew step by step or round by round, `crack-front`; in the plane `crack-segments.csv`, `crack-front.csv`
+/// and, where the cracks fill a small part of the sample, the drawing `cracks-near`; in space `crack-facets.csv`, their
+/// corners in `crack-facets.vtk`, and the drawing `cracks-side`.
 ///
 /// # Errors
 /// [`crate::output::PostError::Write`], and [`crate::output::PostError::Usage`] for times outside the history.
@@ -37,12 +36,18 @@ pub fn write(history: &History, report: &Report, times: &[f64], folder: &mut Fol
         &["step", "time_s", "fragments", "single_grains", "largest_grains", "largest_mass_fraction"],
         rows,
     )?;
-    write_fragments(history, &frames, folder)?;
+    let (grains, bonds) = (history.grains()?, history.bonds()?);
+    let list = |&frame| {
+        Ok(fragment_list(&grains, &history.grain_state(frame)?.position, &bonds, &history.bond_status(frame)?))
+    };
+    let fragments = frames.iter().map(list).collect::<Result<Vec<_>>>()?;
+    write_fragments(history, &frames, &fragments, folder)?;
     let end = history.times().last().copied().unwrap_or(0.0);
     folder.draw("broken", &Chart::draw(vec![broken_chart(&curve, end)]))?;
     folder.draw("fragments", &Chart::draw(fragment_charts(&report.fragments)))?;
-    folder.draw("fragment-map", &fragment_map(history, &Sample::read(history)?, &frames)?)?;
-    folder.draw("decohesion", &decohesion(history, &Sample::read(history)?, &frames)?)?;
+    let sample = Sample::read(history)?;
+    folder.draw("fragment-map", &fragment_map(history, &sample, &frames, &fragments)?)?;
+    folder.draw("decohesion", &decohesion(history, &sample, &frames)?)?;
     if history.dimension() == 3 {
         folder.draw("decohesion-inside", &decohesion(history, &Sample::cut_open(history)?, &frames)?)?;
     }
@@ -77,22 +82,17 @@ pub fn write(history: &History, report: &Report, times: &[f64], folder: &mut Fol
 }
 
 /// The pieces one by one, the heaviest first, at each of `frames`.
-fn write_fragments(history: &History, frames: &[usize], folder: &mut Folder) -> Result<()> {
-    let (sample, bonds) = (history.grains()?, history.bonds()?);
-    let total: f64 = sample.mass.iter().sum();
-    let mut rows = vec![];
-    for &frame in frames {
+fn write_fragments(history: &History, frames: &[usize], lists: &[Vec<Fragment>], folder: &mut Folder) -> Result<()> {
+    let rows = frames.iter().zip(lists).flat_map(|(&frame, list)| {
         let (step, time) = (history.steps()[frame], history.times()[frame]);
-        let list = fragment_list(&sample, &history.grain_state(frame)?.position, &bonds, &history.bond_status(frame)?);
-        for (k, f) in list.iter().enumerate() {
+        list.iter().enumerate().map(move |(k, f)| {
             let at = |axis: usize| cell(f.centre.get(axis).copied());
-            let (number, share) = (k + 1, f.mass / total);
-            rows.push(row![step, time, number, f.grains.len(), f.mass, share, f.filled, at(0), at(1), at(2)]);
-        }
-    }
+            row![step, time, k + 1, f.grains.len(), f.mass, f.mass_fraction, f.filled, at(0), at(1), at(2)]
+        })
+    });
     let filled = if history.dimension() == 2 { "area_m2" } else { "volume_m3" };
     let head = ["step", "time_s", "fragment", "grains", "mass_kg", "mass_fraction", filled, "x_m", "y_m", "z_m"];
-    Ok(folder.table("fragment-list", &head, rows.into_iter())?)
+    Ok(folder.table("fragment-list", &head, rows)?)
 }
 
 fn write_cracks(report: &Report, folder: &mut Folder) -> Result<()> {

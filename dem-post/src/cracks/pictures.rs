@@ -6,7 +6,7 @@ use super::front::Growth;
 use super::paths::Crack;
 use super::surfaces::Facet;
 use super::{Pieces, Report};
-use crate::fragments::{Fragments, fragment_list};
+use crate::fragments::{Fragment, Fragments};
 use crate::map::{Colour, Key, Link, Panel, Patch, Ramp, Sample, Scale, draw, draw_view};
 use crate::output::{Result, number};
 use crate::plot::{Chart, Drawing, Style, colour};
@@ -15,6 +15,8 @@ use crate::plot::{Chart, Drawing, Style, colour};
 const BONDED: &str = "#8c8c8c";
 /// Fill of grains that lost a bond: white, as in the paper.
 const RELEASED: &str = "#ffffff";
+/// Outline of grains in a map of what became of them.
+const OUTLINE: &str = "#404040";
 /// Fill and outline of grains under cracks.
 const PALE: [&str; 2] = ["#f0f0f0", "#cfcfcf"];
 /// Fills of the heaviest fragments: colours that the colour-blind tell apart (Okabe & Ito 2008).
@@ -214,45 +216,42 @@ pub fn crack_map(history: &History, report: &Report) -> Result<(Drawing, Option<
     Ok((draw_view(&sample, all, &panels, &legend), near))
 }
 
-/// The pieces of a sample at some frames: the heaviest in colours of their own, in the order of their masses.
+/// The grains at a frame in these colours, below its time and `what`.
+fn filled_panel(history: &History, frame: usize, fills: Vec<Colour>, what: String) -> Result<Panel> {
+    Ok(Panel {
+        caption: vec![format!("t = {} s", number(history.times()[frame])), what],
+        grains: history.grain_state(frame)?,
+        walls: history.wall_state(frame)?,
+        fills,
+        outline: OUTLINE,
+        ..Panel::default()
+    })
+}
+
+/// The pieces of a sample at some frames, of which `lists` has one by one: the heaviest in colours of their own, in the order
+/// of their masses.
 ///
 /// # Errors
 /// Those of reading the history.
-pub fn fragment_map(history: &History, sample: &Sample, frames: &[usize]) -> Result<Drawing> {
-    let (grains, bonds) = (history.grains()?, history.bonds()?);
-    let total: f64 = grains.mass.iter().sum();
+pub fn fragment_map(history: &History, sample: &Sample, frames: &[usize], lists: &[Vec<Fragment>]) -> Result<Drawing> {
+    let grains = history.grains()?.radius.len();
     let (mut panels, mut shown) = (vec![], 0);
-    for &frame in frames {
-        let state = history.grain_state(frame)?;
-        let list = fragment_list(&grains, &state.position, &bonds, &history.bond_status(frame)?);
-        let mut fills = vec![Colour::from(PALE[0]); grains.radius.len()];
+    for (&frame, list) in frames.iter().zip(lists) {
+        let mut fills = vec![Colour::from(PALE[0]); grains];
         let coloured = list.iter().filter(|f| f.grains.len() > 1).zip(FRAGMENTS);
         for (fragment, colour) in coloured.clone() {
             fragment.grains.iter().for_each(|&grain| fills[grain] = colour.into());
         }
         shown = shown.max(coloured.count());
-        let heaviest = list.first().map_or(0.0, |f| 100.0 * f.mass / total);
-        let count = list.len();
-        panels.push(Panel {
-            caption: vec![
-                format!("t = {} s", number(history.times()[frame])),
-                format!("{count} fragment{}, the heaviest {heaviest:.1} %", if count == 1 { "" } else { "s" }),
-            ],
-            grains: state,
-            walls: history.wall_state(frame)?,
-            fills,
-            outline: "#404040",
-            ..Panel::default()
-        });
+        let heaviest = 100.0 * list.first().map_or(0.0, |f| f.mass_fraction);
+        let plural = if list.len() == 1 { "" } else { "s" };
+        let what = format!("{} fragment{plural}, the heaviest {heaviest:.1} %", list.len());
+        panels.push(filled_panel(history, frame, fills, what)?);
     }
     let names = ["heaviest", "second", "third", "fourth", "fifth", "sixth"];
-    let mut legend: Vec<Key> = FRAGMENTS
-        .iter()
-        .zip(names)
-        .take(shown)
-        .map(|(colour, name)| Key::Disk(colour, "#404040", name.into()))
-        .collect();
-    legend.push(Key::Disk(PALE[0], "#404040", "the rest".into()));
+    let coloured = FRAGMENTS.iter().zip(names).take(shown);
+    let mut legend: Vec<Key> = coloured.map(|(colour, name)| Key::Disk(colour, OUTLINE, name.into())).collect();
+    legend.push(Key::Disk(PALE[0], OUTLINE, "the rest".into()));
     Ok(draw(sample, &panels, &legend))
 }
 
@@ -265,28 +264,18 @@ pub fn decohesion(history: &History, sample: &Sample, frames: &[usize]) -> Resul
     let mut panels = vec![];
     for &frame in frames {
         let status = history.bond_status(frame)?;
-        let grains = history.grain_state(frame)?;
         let mut fills = vec![Colour::from(BONDED); history.grains()?.radius.len()];
         let mut broken = 0;
         for ([i, j], _) in bonds.pair.iter().zip(&status).filter(|(_, status)| **status != BondStatus::Intact) {
             (fills[*i as usize], fills[*j as usize]) = (RELEASED.into(), RELEASED.into());
             broken += 1;
         }
-        panels.push(Panel {
-            caption: vec![
-                format!("t = {} s", number(history.times()[frame])),
-                format!("{broken} of {} bonds broken", bonds.len()),
-            ],
-            grains,
-            walls: history.wall_state(frame)?,
-            fills,
-            outline: "#404040",
-            ..Panel::default()
-        });
+        let what = format!("{broken} of {} bonds broken", bonds.len());
+        panels.push(filled_panel(history, frame, fills, what)?);
     }
     let legend = [
-        Key::Disk(BONDED, "#404040", "all bonds intact".into()),
-        Key::Disk(RELEASED, "#404040", "lost at least one bond".into()),
+        Key::Disk(BONDED, OUTLINE, "all bonds intact".into()),
+        Key::Disk(RELEASED, OUTLINE, "lost at least one bond".into()),
     ];
     Ok(draw(sample, &panels, &legend))
 }
