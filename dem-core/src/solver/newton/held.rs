@@ -1,15 +1,14 @@
-//! Newton's own answer where nearly nothing slips, with the friction term held for a solve and then taken anew.
+//! A better guess where nearly nothing slips, with the friction term held for a solve and then taken anew.
 //!
-//! The end of a path that held the term of other slips has reactions that balance the load, and are not those of Newton's
-//! metric ([`super::interior`]); where many contacts creep Newton itself runs in circles from there. With the term held
-//! the inner problem is convex and its active set near. From solve to solve the reactions of what creeps change by a third
-//! of the change before.
+//! Where many contacts creep Newton runs in circles: after a bond has broken, and from the end of a path that held the term of
+//! other slips, whose reactions balance the load and are not those of Newton's metric ([`super::interior`]). With the
+//! term held the inner problem is convex and its active set near. From solve to solve the reactions of what creeps change
+//! by a third of the change before.
 
 use super::guess::{Guess, Slips};
 use super::inner::Iterate;
 use super::rows::Rows;
-use super::solvable::Solvable;
-use super::{Newton, SolveReport, relative_change};
+use super::{Newton, relative_change};
 
 /// Most solves, and Newton iterations of each: without progress, and all of them.
 const MOST_SOLVES: usize = 20;
@@ -19,14 +18,8 @@ const MOST: u64 = 60;
 const NEAR: f64 = 1e-2;
 
 impl Newton {
-    /// Rounds from the reactions to which the held terms lead from those of `guess`; none where they lead nowhere.
-    pub(super) fn rounds_from_held(
-        &mut self,
-        problem: &mut impl Solvable,
-        base: &Rows,
-        mut guess: Guess,
-        iterations: &mut u64,
-    ) -> Option<SolveReport> {
+    /// The guess to which the held terms lead from that of `guess`; none where they lead nowhere.
+    pub(super) fn by_held_terms(&mut self, base: &Rows, mut guess: Guess, iterations: &mut u64) -> Option<Guess> {
         let mut rows = base.clone();
         rows.hold(&self.slips.speeds(base));
         for _ in 0..MOST_SOLVES {
@@ -44,6 +37,6 @@ impl Newton {
                 break;
             }
         }
-        self.rounds(problem, &mut base.clone(), &mut guess, iterations)
+        Some(guess)
     }
 }

@@ -135,6 +135,11 @@ impl Rest {
         self.next = (2 * self.next).clamp(1, LONGEST_REST);
     }
 
+    /// Whether it did not fail the last time.
+    fn served(&self) -> bool {
+        self.next == 0
+    }
+
     /// It served.
     fn forget(&mut self) {
         *self = Self::NONE;
@@ -244,12 +249,14 @@ impl Newton {
     }
 
     /// Proximal rounds at the largest penalty, each begun with the active set of `guess`; none if an inner problem is
-    /// not solved: the problem then holds the reactions of the last one that was.
+    /// not solved, where `held` not by way of held terms either: the problem then holds the reactions of the last one
+    /// that was.
     fn rounds(
         &mut self,
         problem: &mut impl Solvable,
         rows: &mut Rows,
         guess: &mut Guess,
+        held: bool,
         iterations: &mut u64,
     ) -> Option<SolveReport> {
         if guess.beyond.is_empty() {
@@ -260,8 +267,14 @@ impl Newton {
         let (mut last_error, mut softened, mut made_in_all) = (f64::INFINITY, 0, 0);
         loop {
             let mut state = Iterate::from_reactions(rows, &guess.reactions);
-            let (made, solved) = self.inner(rows, &mut state, Some(guess), PATIENCE, MOST_INNER);
+            let (mut made, mut solved) = self.inner(rows, &mut state, Some(guess), PATIENCE, MOST_INNER);
             *iterations += made.max(1);
+            if !solved && held {
+                *guess = self.by_held_terms(rows, Guess::of(std::mem::take(&mut guess.reactions)), iterations)?;
+                state = Iterate::from_reactions(rows, &guess.reactions);
+                (made, solved) = self.inner(rows, &mut state, Some(guess), PATIENCE, MOST_INNER);
+                *iterations += made;
+            }
             if !solved {
                 return None;
             }
@@ -324,26 +337,20 @@ impl Newton {
     }
 
     /// Rounds at the largest penalty, from the active set of the reactions that the problem brought along, bettered by
-    /// some sweeps; none if they run in circles. In space sweeps that have not converged spoil the directions of slip, so
-    /// the reactions are tried as they are first.
+    /// some sweeps in the plane; none if they run in circles. In space sweeps that have not converged spoil the
+    /// directions of slip; where the last guess served, held terms help.
     fn try_guess(&mut self, problem: &mut impl Solvable, rows: &Rows, iterations: &mut u64) -> Option<SolveReport> {
         let cold = rows.list.iter().all(|row| row.multiplier.n == 0.0);
-        let tries = if cold {
-            &[COLD_SWEEPS][..]
-        } else if rows.in_space() {
-            &[0, SWEEPS][..]
-        } else {
-            &[SWEEPS]
+        let sweeps = match rows.in_space() {
+            _ if cold => COLD_SWEEPS,
+            true => 0,
+            false => SWEEPS,
         };
-        for sweeps in tries {
-            let mut guess = Guess::of(problem.swept(*sweeps));
-            let report = self.rounds(problem, &mut self.started(rows), &mut guess, iterations);
-            self.renew |= report.is_none();
-            if report.is_some() {
-                return report;
-            }
-        }
-        None
+        let mut guess = Guess::of(problem.swept(sweeps));
+        let held = rows.in_space() && self.rest.served();
+        let report = self.rounds(problem, &mut self.started(rows), &mut guess, held, iterations);
+        self.renew |= report.is_none();
+        report
     }
 
     /// The solution that is found without a guess.
@@ -389,7 +396,7 @@ impl Newton {
         let found = self.approach(problem, rows, start, iterations)?;
         let mut guess = Guess::of(found.reactions.clone());
         if !rows.mostly_dry()
-            && let Some(report) = self.rounds(problem, &mut self.started(rows), &mut guess, iterations)
+            && let Some(report) = self.rounds(problem, &mut self.started(rows), &mut guess, false, iterations)
         {
             return Some(report);
         }

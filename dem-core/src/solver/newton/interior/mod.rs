@@ -42,9 +42,10 @@ const PATIENCE: u64 = 5;
 const MOVING_PATIENCE: u64 = 45;
 /// How much harder the metric is than Newton's where the path ends.
 const HARDER: f64 = 10.0;
-/// Where a path ends, as a gap over what the reactions and the velocities that they give multiply to; and where one ends that
-/// only serves the next term of dry friction.
+/// Where a path ends, as a gap over what the reactions and the velocities that they give multiply to; where in space Newton is
+/// tried on the way; and where one ends that only serves the next term of dry friction.
 const END: f64 = 1e-24;
+const NEARLY: f64 = 1e-17;
 const EARLY: f64 = 1e-14;
 /// Share of the change of that term that is followed, and the sweeps that show where it goes.
 const SHARE: f64 = 0.5;
@@ -336,7 +337,16 @@ impl Newton {
                 path.begin_again(swept);
             }
             match wrong {
-                0 => self.follow_fixed(&mut path, END, iterations),
+                0 => {
+                    if base.in_space() {
+                        self.follow_fixed(&mut path, NEARLY, iterations);
+                        let exact = self.from_within(problem, base, &path, iterations);
+                        if exact.is_some() {
+                            return exact;
+                        }
+                    }
+                    self.follow_fixed(&mut path, END, iterations)
+                }
                 // once it moves it moves: what creeps would else be given other reactions
                 _ if right || wrong == 1 => self.follow_moving(&mut path, problem, iterations),
                 _ => self.follow_fixed(&mut path, EARLY, iterations),
@@ -357,12 +367,9 @@ impl Newton {
             right = converged || round < EXACT_ROUNDS && (residual <= near || !dry);
             // where nothing moves many reactions balance the load: the term of what creeps chooses, and is Newton's to find
             if right && !std::mem::replace(&mut tried, true) {
-                let exact = self.rounds(problem, &mut base.clone(), &mut guess, iterations);
+                let exact = self.rounds(problem, &mut base.clone(), &mut guess, converged, iterations);
                 if exact.is_some() {
                     return exact;
-                }
-                if converged && let Some(exact) = self.rounds_from_held(problem, base, path.snapped(), iterations) {
-                    return Some(exact);
                 }
                 problem.write_back(&reactions);
                 self.slips = Slips::of_guess(&path.rows, &path.snapped());
@@ -390,6 +397,28 @@ impl Newton {
             }
         }
         self.taken(problem, best?, *iterations)
+    }
+
+    /// Newton's own answer from a path on its way: the active set shows long before the end. None where the term of dry
+    /// friction was wrong, or where Newton runs in circles.
+    fn from_within<S: Site>(
+        &mut self,
+        problem: &mut impl Solvable,
+        base: &Rows,
+        path: &Path<S>,
+        iterations: &mut u64,
+    ) -> Option<SolveReport> {
+        let guess = path.snapped();
+        self.slips = Slips::of_guess(&path.rows, &guess);
+        problem.write_back(&guess.reactions);
+        if problem.residual() > WRONG || base.mostly_dry() {
+            return None;
+        }
+        let mut guess = self.by_held_terms(base, guess, iterations)?;
+        let exact = self.rounds(problem, &mut base.clone(), &mut guess, true, iterations)?;
+        // the next active set is near this one
+        self.rest.forget();
+        Some(exact)
     }
 
     /// Follow the path of one term of dry friction to where the gap is as small as `end`.
