@@ -52,6 +52,8 @@ const SHARE: f64 = 0.5;
 const SWEEPS: usize = 10;
 /// Residual at the end of a path beyond which its term of dry friction was wrong.
 const WRONG: f64 = 1e-5;
+/// Load error of reactions that were compared with none.
+const UNKNOWN: f64 = 1.0;
 /// Defect of the momenta, over their change, that rounding may leave: this, or a share of the tolerance of the residual.
 const ROUNDING: f64 = 1e-12;
 const ROUNDING_SHARE: f64 = 1e-3;
@@ -336,6 +338,8 @@ impl Newton {
             if round > 0 {
                 path.begin_again(swept);
             }
+            // what is accepted and has nothing yet to be compared with
+            let alone = best.as_ref().is_some_and(|b| b.residual <= self.settings.accept && b.load_error >= UNKNOWN);
             match wrong {
                 0 => {
                     if base.in_space() {
@@ -348,7 +352,7 @@ impl Newton {
                     self.follow_fixed(&mut path, END, iterations)
                 }
                 // once it moves it moves: what creeps would else be given other reactions
-                _ if right || wrong == 1 => self.follow_moving(&mut path, problem, iterations),
+                _ if right || wrong == 1 || alone => self.follow_moving(&mut path, problem, iterations),
                 _ => self.follow_fixed(&mut path, EARLY, iterations),
             }
             let mut guess = path.snapped();
@@ -358,7 +362,7 @@ impl Newton {
             problem.write_back(&reactions);
             let mut residual = problem.residual();
             let mut load_error = path.load_error(&reactions).min(shrinking.error(load_change(&path.rows, &reactions)));
-            if let Some(found) = best.as_mut().filter(|_| right) {
+            if let Some(found) = best.as_mut().filter(|_| right || alone) {
                 // these are nearer to those of a rigid metric
                 found.load_error = found.load_error.min(net_change(&path.rows, &found.reactions, &reactions));
             }
@@ -391,8 +395,9 @@ impl Newton {
             if residual.is_finite() && best.as_ref().is_none_or(|b| residual < b.residual) {
                 best = Some(Found { reactions, residual, load_error });
             }
-            // what is only accepted is taken once the term has moved
-            if !right && (residual <= self.settings.accept && wrong > 1 || !dry) {
+            // what is only accepted is taken once the term has moved, and the load error is known
+            let known = best.as_ref().is_some_and(|b| b.residual <= self.settings.accept && b.load_error < UNKNOWN);
+            if !right && (known && wrong > 1 || !dry) {
                 break;
             }
         }
