@@ -45,10 +45,11 @@ pub fn write(history: &History, report: &Report, times: &[f64], folder: &mut Fol
     let end = history.times().last().copied().unwrap_or(0.0);
     folder.draw("broken", &Chart::draw(vec![broken_chart(&curve, end)]))?;
     folder.draw("fragments", &Chart::draw(fragment_charts(&report.fragments)))?;
-    let sample = Sample::read(history)?;
+    let in_space = history.dimension() == 3;
+    let sample = if in_space { Sample::in_perspective(history)? } else { Sample::read(history)? };
     folder.draw("fragment-map", &fragment_map(history, &sample, &frames, &fragments)?)?;
     folder.draw("decohesion", &decohesion(history, &sample, &frames)?)?;
-    if history.dimension() == 3 {
+    if in_space {
         folder.draw("decohesion-inside", &decohesion(history, &Sample::cut_open(history)?, &frames)?)?;
     }
     let sizes = if !report.cracks.is_empty() {

@@ -5,10 +5,12 @@ use dem_run::history::{GrainState, Grains, History, Wall, WallKind, WallState};
 use crate::output::Result;
 use crate::plot::{Anchor, Canvas, Drawing, colour};
 
+use eye::{Eye, Place, corners, mixed};
 pub use legend::Key;
 use legend::{draw_legend, legend_rows, scale_bar};
 pub use scale::{Colour, Ramp, Scale};
 
+mod eye;
 mod legend;
 mod scale;
 
@@ -30,12 +32,12 @@ const EVEN: f64 = 4.0;
 /// Lines of a wall's hatching: their distance and length.
 const HATCH: f64 = 7.0;
 
-/// What all panels share: the grains' sizes, the walls, and the plane of the drawing (in 3D seen along y, or along x).
+/// What all panels share: the grains' sizes, the walls, and from where they are seen.
 pub struct Sample {
     radius: Vec<f64>,
     walls: Vec<Wall>,
     dimension: usize,
-    axes: [usize; 2],
+    eye: Eye,
     /// Depth of the plane that cuts the spheres open, m, where one does.
     slice: Option<f64>,
     /// Corners of what may be shown, m: the first frame and as much again around it.
@@ -114,7 +116,7 @@ impl Sample {
     /// # Errors
     /// Those of [`History::grains`], [`History::walls`] and [`History::grain_state`].
     pub fn read(history: &History) -> Result<Self> {
-        Self::seen(history, [0, history.dimension() - 1])
+        Self::seen(history, Eye::Along([0, history.dimension() - 1]))
     }
 
     /// As [`Sample::read`], of spheres seen from the side, against the first axis.
@@ -122,7 +124,16 @@ impl Sample {
     /// # Errors
     /// As [`Sample::read`].
     pub fn from_the_side(history: &History) -> Result<Self> {
-        Self::seen(history, [1, 2])
+        Self::seen(history, Eye::Along([1, 2]))
+    }
+
+    /// As [`Sample::read`], of spheres seen in perspective; what is farther is paler.
+    ///
+    /// # Errors
+    /// As [`Sample::read`].
+    pub fn in_perspective(history: &History) -> Result<Self> {
+        let first = history.grain_state(0)?;
+        Self::seen(history, Eye::At(Place::of(corners(first.position.chunks(3)))))
     }
 
     /// As [`Sample::read`], of spheres cut open along the plane through the middle of their first places.
@@ -132,16 +143,16 @@ impl Sample {
     pub fn cut_open(history: &History) -> Result<Self> {
         let mut sample = Self::read(history)?;
         let first = history.grain_state(0)?;
-        let depths = || first.position.chunks(sample.dimension).map(|x| sample.depth(x));
+        let depths = || first.position.chunks(sample.dimension).map(|x| sample.eye.depth(x));
         let middle = 0.5 * (depths().fold(f64::INFINITY, f64::min) + depths().fold(f64::NEG_INFINITY, f64::max));
         sample.slice = Some(middle);
         Ok(sample)
     }
 
-    fn seen(history: &History, axes: [usize; 2]) -> Result<Self> {
+    fn seen(history: &History, eye: Eye) -> Result<Self> {
         let Grains { radius, .. } = history.grains()?;
         let (walls, dimension) = (history.walls()?, history.dimension());
-        let mut sample = Self { radius, walls, dimension, axes, slice: None, limits: [[0.0; 2]; 2] };
+        let mut sample = Self { radius, walls, dimension, eye, slice: None, limits: [[0.0; 2]; 2] };
         let first = history.grain_state(0)?;
         let [low, high] = sample.bounds(&first, EVERYWHERE);
         let spread = |k: usize| 0.5 * (high[k] - low[k]);
@@ -150,20 +161,15 @@ impl Sample {
     }
 
     fn flat(&self, point: &[f64]) -> [f64; 2] {
-        self.axes.map(|axis| point[axis])
-    }
-
-    /// How far a point of space is from the eye, m, from where it does not matter. The axes of the drawing and the direction
-    /// to the eye are right-handed: it looks along y, or against x.
-    fn depth(&self, point: &[f64]) -> f64 {
-        if self.axes[0] == 0 { point[1] } else { -point[0] }
+        self.eye.flat(point)
     }
 
     /// The radius at which a grain shows, m; none where it is not cut.
     fn seen_radius(&self, state: &GrainState, grain: usize) -> Option<f64> {
         let radius = self.radius[grain];
-        let Some(plane) = self.slice else { return Some(radius) };
-        let off = self.depth(&state.position[grain * self.dimension..]) - plane;
+        let place = &state.position[grain * self.dimension..];
+        let Some(plane) = self.slice else { return Some(radius * self.eye.magnified(place)) };
+        let off = self.eye.depth(place) - plane;
         (off.abs() < radius).then(|| (radius * radius - off * off).sqrt())
     }
 
@@ -207,7 +213,11 @@ impl Sample {
             found = self.bounds(grains, EVERYWHERE);
         }
         for (wall, position) in self.walls.iter().zip(walls.position.chunks(self.dimension)) {
-            if wall.kind != WallKind::Plane {
+            if wall.kind == WallKind::Plane {
+                if let Some(place) = self.eye.place() {
+                    found = union(found, place.shows(&place.plane(position, wall.normal).0));
+                }
+            } else {
                 let [low, high] = around(self.flat(position), wall.radius.abs());
                 let near = |k: usize, x: f64| x.clamp(self.limits[0][k], self.limits[1][k]);
                 found = union(found, [[near(0, low[0]), near(1, low[1])], [near(0, high[0]), near(1, high[1])]]);
@@ -301,12 +311,16 @@ fn draw_panel(canvas: &mut Canvas, sample: &Sample, panel: &Panel, frame: &Frame
     }
     canvas.clip(frame.corner, frame.size);
     for (wall, position) in sample.walls.iter().zip(panel.walls.position.chunks(sample.dimension)) {
-        draw_wall(canvas, sample, wall, position, frame);
+        if wall.kind == WallKind::Plane && sample.eye.place().is_some() {
+            draw_plate(canvas, sample, wall, position, frame, true);
+        } else {
+            draw_wall(canvas, sample, wall, position, frame);
+        }
     }
     let mut order: Vec<usize> = (0..sample.radius.len()).collect();
     if sample.dimension == 3 {
         // what is further away is drawn first
-        let depth = |grain: usize| sample.depth(&panel.grains.position[grain * 3..]);
+        let depth = |grain: usize| sample.eye.depth(&panel.grains.position[grain * 3..]);
         order.sort_by(|&a, &b| depth(b).total_cmp(&depth(a)));
     }
     for grain in order {
@@ -315,14 +329,29 @@ fn draw_panel(canvas: &mut Canvas, sample: &Sample, panel: &Panel, frame: &Frame
         if frame.shows(at, radius) {
             // the outline of a tiny disk must not hide its fill
             let outline = (0.15 * radius).min(0.6);
-            canvas.disk(at, radius - 0.5 * outline, &panel.fills[grain], panel.outline, outline);
+            let Some(place) = sample.eye.place() else {
+                canvas.disk(at, radius - 0.5 * outline, &panel.fills[grain], panel.outline, outline);
+                continue;
+            };
+            let hazy = |colour: &str| place.hazy(colour, &panel.grains.position[grain * 3..]);
+            let fill = hazy(&panel.fills[grain]);
+            canvas.disk(at, radius - 0.5 * outline, &fill, &hazy(panel.outline), outline);
+            // light falls from above and the left
+            let (lit, light) = ((at.0 - 0.25 * radius, at.1 - 0.25 * radius), mixed(&fill, 0.3));
+            canvas.disk(lit, 0.5 * radius, &light, &light, 0.0);
+        }
+    }
+    for (wall, position) in sample.walls.iter().zip(panel.walls.position.chunks(sample.dimension)) {
+        if wall.kind == WallKind::Plane {
+            draw_plate(canvas, sample, wall, position, frame, false);
         }
     }
     // lines between grains that are drawn tiny must not run into one another
     let diameter = 2.0 * frame.scale * sample.radius.iter().sum::<f64>() / sample.radius.len() as f64;
     let widest = (0.6 * diameter).max(1.0);
-    let middle =
-        |patch: &Patch| patch.corners.iter().map(|x| sample.depth(x)).sum::<f64>() / patch.corners.len().max(1) as f64;
+    let middle = |patch: &Patch| {
+        patch.corners.iter().map(|x| sample.eye.depth(x)).sum::<f64>() / patch.corners.len().max(1) as f64
+    };
     let mut patches: Vec<(f64, &Patch)> = panel.patches.iter().map(|patch| (middle(patch), patch)).collect();
     patches.sort_by(|a, b| b.0.total_cmp(&a.0));
     for (_, patch) in patches {
@@ -373,6 +402,17 @@ fn draw_wall(canvas: &mut Canvas, sample: &Sample, wall: &Wall, position: &[f64]
     let (at, radius) = (frame.at(point), wall.radius.abs() * frame.scale);
     let fill = if wall.radius < 0.0 { "none" } else { "#d0d0d0" };
     canvas.disk(at, radius, fill, colour::BLACK, 1.5);
+}
+
+/// A plane in perspective, as a plate of the sample's size: full behind the grains, its edges alone before them; nothing where
+/// the eye sees no depth.
+fn draw_plate(canvas: &mut Canvas, sample: &Sample, wall: &Wall, position: &[f64], frame: &Frame, behind: bool) {
+    let Some(place) = sample.eye.place() else { return };
+    let (corners, is_behind) = place.plane(position, wall.normal);
+    if is_behind == behind {
+        let on_sheet = corners.map(|corner| frame.at(sample.flat(&corner)));
+        canvas.polygon(&on_sheet, if behind { "#e4e4e4" } else { "none" }, colour::GREY, 1.2);
+    }
 }
 
 /// A line across the panel, hatched on the side away from the grains.
