@@ -106,6 +106,8 @@ pub struct Newton {
     wasted: usize,
     /// How far contacts slipped in the last solve.
     slips: Slips,
+    /// Contacts in the last solve whose law has no potential, the dry ones.
+    dry: usize,
     /// Factorisations before this solve.
     made_before: u64,
     /// Rest of the guess of the active set.
@@ -211,6 +213,7 @@ impl Newton {
             floor: 0,
             wasted: 0,
             slips: Slips::default(),
+            dry: 0,
             made_before: 0,
             rest: Rest::NONE,
         }
@@ -317,8 +320,10 @@ impl Newton {
             return self.report(0, problem.residual(), 0.0);
         }
         let mut iterations = 0;
+        let dry = rows.list.iter().filter(|row| !row.convex()).count();
+        let changed = dry != std::mem::replace(&mut self.dry, dry);
         if self.rest.is_over() {
-            if let Some(report) = self.try_guess(problem, &rows, &mut iterations) {
+            if let Some(report) = self.try_guess(problem, &rows, changed, &mut iterations) {
                 self.rest.forget();
                 return report;
             }
@@ -338,17 +343,26 @@ impl Newton {
 
     /// Rounds at the largest penalty, from the active set of the reactions that the problem brought along, bettered by
     /// some sweeps in the plane; none if they run in circles. In space sweeps that have not converged spoil the
-    /// directions of slip; where the last guess served, held terms help.
-    fn try_guess(&mut self, problem: &mut impl Solvable, rows: &Rows, iterations: &mut u64) -> Option<SolveReport> {
+    /// directions of slip; where the last guess served, held terms help, at once where bonds have broken since.
+    fn try_guess(
+        &mut self,
+        problem: &mut impl Solvable,
+        rows: &Rows,
+        changed: bool,
+        iterations: &mut u64,
+    ) -> Option<SolveReport> {
         let cold = rows.list.iter().all(|row| row.multiplier.n == 0.0);
         let sweeps = match rows.in_space() {
             _ if cold => COLD_SWEEPS,
             true => 0,
             false => SWEEPS,
         };
-        let mut guess = Guess::of(problem.swept(sweeps));
+        let (mut started, mut guess) = (self.started(rows), Some(Guess::of(problem.swept(sweeps))));
         let held = rows.in_space() && self.rest.served();
-        let report = self.rounds(problem, &mut self.started(rows), &mut guess, held, iterations);
+        if held && changed && !cold {
+            guess = guess.and_then(|guess| self.by_held_terms(&started, guess, iterations));
+        }
+        let report = guess.and_then(|mut guess| self.rounds(problem, &mut started, &mut guess, held, iterations));
         self.renew |= report.is_none();
         report
     }
@@ -419,6 +433,7 @@ impl Newton {
         }
         to.count(self.rest.left as usize);
         to.count(self.rest.next as usize);
+        to.count(self.dry);
         self.slips.save(to);
         self.factor.save(to);
     }
@@ -430,6 +445,7 @@ impl Newton {
             *count = from.count()?;
         }
         self.rest = Rest { left: from.count()? as u64, next: from.count()? as u64 };
+        self.dry = from.count()?;
         self.slips = Slips::restored(from)?;
         self.factor = Factor::restored(from)?;
         Ok(())
