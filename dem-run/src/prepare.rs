@@ -76,6 +76,8 @@ const MOST_STEPS: usize = 20_000;
 const MOST_PACKINGS: usize = 8;
 /// Thrust at the start and at the end: what a free body would move in a step, in mean radii.
 const THRUST: (f64, f64) = (0.5, 1e-11);
+/// Solid fraction of a dense packing in the plane and in space, by which progress is measured.
+const DENSE: [f64; 2] = [0.82, 0.62];
 
 /// Grains on a regular lattice, the lowest corner of whose box is the origin.
 pub fn lattice<D: Dim>(lattice: &Lattice) -> Vec<Ball<D>> {
@@ -231,7 +233,7 @@ pub fn pack<D: Dim>(sample: &RandomSample, seed: u64, watch: Watch) -> Result<Pa
         let (grains, top) = scatter::<D>(&radii, &container, &mut rng);
         let mut world = packing_world(grains, &container, top, from_top);
         let share = |done: f64| (attempt as f64 + done) / MOST_PACKINGS as f64;
-        settle(&mut world, from_top, &mut |done| watch(if attempt == 0 { done } else { share(done) }))?;
+        settle(&mut world, &container, from_top, &mut |done| watch(if attempt == 0 { done } else { share(done) }))?;
         let mut packing = measured(&world, &container);
         if packing.solid_fraction >= wanted {
             if let Some(cut) = sample.cut {
@@ -334,13 +336,29 @@ fn push<D: Dim>(world: &mut World<D>, from_top: bool, travel: f64) {
     }
 }
 
+/// Height of the lid, or where there is none twice that of the mean grain (m).
+fn height<D: Dim>(world: &World<D>, from_top: bool) -> f64 {
+    let up = D::N - 1;
+    if from_top {
+        return world.walls.last().map_or(0.0, |lid| lid.position[up]);
+    }
+    2.0 * world.grains.position.iter().map(|x| x[up]).sum::<f64>() / world.grains.len() as f64
+}
+
 /// Step from rest to rest until nothing moves.
 ///
 /// The error of a step is a fraction of its thrust. Where the packing resists, the thrust is lowered, in the end to
 /// nearly nothing: a jammed packing is one for any thrust, and its contacts close to rounding.
-fn settle<D: Dim>(world: &mut World<D>, from_top: bool, watch: Watch) -> Result<(), PrepareError> {
+fn settle<D: Dim>(
+    world: &mut World<D>,
+    container: &Container,
+    from_top: bool,
+    watch: Watch,
+) -> Result<(), PrepareError> {
     let mean = world.grains.radius.iter().sum::<f64>() / world.grains.len() as f64;
     let mut thrust = THRUST.0;
+    let volume: f64 = world.grains.radius.iter().map(|r| D::volume(*r)).sum();
+    let (begun, dense) = (height(world, from_top), volume / (DENSE[D::N - 2] * container.floor::<D>()));
     for _ in 0..MOST_STEPS {
         push(world, from_top, thrust * mean);
         world.stop_motion();
@@ -356,8 +374,9 @@ fn settle<D: Dim>(world: &mut World<D>, from_top: bool, watch: Watch) -> Result<
         if thrust < THRUST.1 {
             return Ok(());
         }
-        let done = (THRUST.0 / thrust).ln() / (THRUST.0 / THRUST.1).ln();
-        if !watch(done) {
+        let fallen = ((begun - height(world, from_top)) / (begun - dense)).clamp(0.0, 1.0);
+        let closed = (THRUST.0 / thrust).ln() / (THRUST.0 / THRUST.1).ln();
+        if !watch(0.5 * (fallen + closed)) {
             return Err(PrepareError::Interrupted);
         }
     }
