@@ -205,9 +205,9 @@ fn velocities_apart(a: &Assembled, b: &Assembled) -> f64 {
     difference / largest(free.velocities().into_iter())
 }
 
-/// Whether a solver cannot solve a problem: in the step of a collapse 100,000 sweeps come to 6e-7.
+/// Whether a solver cannot solve a problem: in the steps of a collapse 100,000 sweeps come to 6e-7.
 fn beyond(name: &str, solver: &str) -> bool {
-    name == "sheared-collapse" && solver != "newton"
+    ["sheared-collapse", "cube-collapse"].contains(&name) && solver != "newton"
 }
 
 #[test]
@@ -216,7 +216,7 @@ fn the_collection_is_solved_by_every_solver() {
         std::fs::read_dir(problems()).expect("problems").map(|e| e.expect("entry").path()).collect();
     names.retain(|path| path.extension().is_some_and(|e| e == "hdf5"));
     names.sort();
-    assert_eq!(names.len(), 12);
+    assert_eq!(names.len(), 13);
     for path in names {
         let name = path.file_stem().expect("name").to_str().expect("UTF-8");
         assert!(path.metadata().expect("metadata").len() <= 50_000, "{name} is too large");
