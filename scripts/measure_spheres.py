@@ -50,7 +50,7 @@ def run(values, *options):
 def measured(values, history):
     """Median CPU time of a step (s), peak memory (bytes), worst residual, number of contacts."""
     last = FIRST + STEPS
-    memory = run([*values, f"time.end={last * 1e-4}", "output.every_steps=1000"], "-o", history)
+    memory = run([*values, "time.step=1e-4", f"time.end={last * 1e-4}", "output.every_steps=1000"], "-o", history)
     with h5py.File(history) as f:
         of = lambda name: f[f"observables/{name}/value"][:]
         times = np.diff(of("cpu_time"))[FIRST:]
@@ -91,6 +91,7 @@ def main():
                 f"sample.random.width={width}",
                 # a narrow cylinder packs looser
                 "sample.random.preparation.compaction.solid_fraction=0.5",
+                "time.step=1e-4",
                 "time.end=1e-4",
             ]
             run(packing, "-o", history, "--write-sample", sample)

@@ -136,6 +136,14 @@ fn spheres_are_measured_as_disks_are() {
         "sample.random.width=0.012",
         "--set",
         "sample.random.preparation.compaction.solid_fraction=0.5",
+        "--set",
+        "walls.top.force_rate=20000",
+        "--set",
+        "time.step=1e-4",
+        "--set",
+        "time.end=0.1",
+        "--set",
+        "output.every_steps=10",
     ];
     let args = ["--solvers", "gauss-seidel,newton", "--tolerances", "1e-8", "--steps", "1", "--orders", "1"];
     let command = [&["accuracy", &scene, "--json", "--quiet"], &small[..], &args].concat();

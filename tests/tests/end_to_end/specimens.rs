@@ -41,6 +41,8 @@ fn a_cylinder_of_spheres_breaks_and_its_cracks_are_surfaces() {
         "--set",
         "walls.top.force_rate=2000",
         "--set",
+        "time.step=1e-4",
+        "--set",
         "time.end=0.03",
         "-o",
         "cylinder.h5",

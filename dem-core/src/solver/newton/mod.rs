@@ -358,7 +358,7 @@ impl Newton {
             false => SWEEPS,
         };
         let (mut started, mut guess) = (self.started(rows), Some(Guess::of(problem.swept(sweeps))));
-        let held = rows.in_space() && self.rest.served();
+        let held = rows.in_space() && !rows.mostly_dry() && self.rest.served();
         if held && changed && !cold {
             guess = guess.and_then(|guess| self.by_held_terms(&started, guess, iterations));
         }

@@ -344,7 +344,7 @@ impl Newton {
                 0 => {
                     if base.in_space() {
                         self.follow_fixed(&mut path, NEARLY, iterations);
-                        let exact = self.from_within(problem, base, &path, iterations);
+                        let exact = self.answer_within(problem, base, &path, iterations);
                         if exact.is_some() {
                             return exact;
                         }
@@ -406,7 +406,7 @@ impl Newton {
 
     /// Newton's own answer from a path on its way: the active set shows long before the end. None where the term of dry
     /// friction was wrong, or where Newton runs in circles.
-    fn from_within<S: Site>(
+    fn answer_within<S: Site>(
         &mut self,
         problem: &mut impl Solvable,
         base: &Rows,
