@@ -1,6 +1,9 @@
 //! From where a sample is seen: straight along an axis, or in perspective from above and to the side.
 
-use super::{Box2, Colour, EMPTY};
+use nalgebra::Vector3;
+
+use super::scale::{Colour, mixed};
+use super::{Box2, EMPTY, around, union};
 
 /// How the sample is seen.
 pub(super) enum Eye {
@@ -13,17 +16,15 @@ pub(super) enum Eye {
 /// A place from where spheres are seen in perspective.
 pub(super) struct Place {
     /// The middle of the sample, which it looks at, and half the sides of the box around it, m.
-    focus: [f64; 3],
-    half: [f64; 3],
+    focus: Vector3<f64>,
+    half: Vector3<f64>,
     /// Unit vectors to the right, up, and away from the eye.
-    right: [f64; 3],
-    up: [f64; 3],
-    ahead: [f64; 3],
-    /// Half the diagonal of the box, m.
-    reach: f64,
+    right: Vector3<f64>,
+    up: Vector3<f64>,
+    ahead: Vector3<f64>,
 }
 
-/// How far the eye is, in halves of the diagonal: near enough to show depth, far enough for spheres to look round.
+/// How far the eye is, in halves of the diagonal of the box: near enough to show depth, far enough for spheres to look round.
 const FAR: f64 = 5.0;
 /// Angles to the side and above (rad).
 const ASIDE: f64 = 0.45;
@@ -33,65 +34,57 @@ const HAZE: f64 = 0.6;
 /// How much larger than the sample planes are drawn.
 const BEYOND: f64 = 1.15;
 
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a.iter().zip(&b).map(|(a, b)| a * b).sum()
-}
-
-fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn three(point: &[f64]) -> [f64; 3] {
-    [point[0], point[1], point[2]]
-}
-
 impl Place {
-    /// The place for a sample with these corners (m): z points up, y into the sheet.
-    pub fn of([low, high]: [[f64; 3]; 2]) -> Self {
-        let focus = [0, 1, 2].map(|k| 0.5 * (low[k] + high[k]));
-        let half = [0, 1, 2].map(|k| 0.5 * (high[k] - low[k]));
-        let ahead = [-ASIDE.sin() * ABOVE.cos(), ASIDE.cos() * ABOVE.cos(), -ABOVE.sin()];
-        let right = [ASIDE.cos(), ASIDE.sin(), 0.0];
-        Self { focus, half, right, up: cross(right, ahead), ahead, reach: dot(half, half).sqrt() }
+    /// The place for a sample of these centres (m): z points up, y into the sheet.
+    pub fn of<'a>(centres: impl Iterator<Item = &'a [f64]> + Clone) -> Self {
+        let corner = |pick: fn(&Vector3<f64>, &Vector3<f64>) -> Vector3<f64>| {
+            centres.clone().map(Vector3::from_column_slice).reduce(|a, b| pick(&a, &b)).unwrap_or_default()
+        };
+        let (low, high) = (corner(Vector3::inf), corner(Vector3::sup));
+        let ahead = Vector3::new(-ASIDE.sin() * ABOVE.cos(), ASIDE.cos() * ABOVE.cos(), -ABOVE.sin());
+        let right = Vector3::new(ASIDE.cos(), ASIDE.sin(), 0.0);
+        Self { focus: 0.5 * (low + high), half: 0.5 * (high - low), right, up: right.cross(&ahead), ahead }
     }
 
-    fn depth(&self, point: [f64; 3]) -> f64 {
-        dot(minus(point, self.focus), self.ahead)
+    fn depth(&self, point: &[f64]) -> f64 {
+        (Vector3::from_column_slice(&point[..3]) - self.focus).dot(&self.ahead)
     }
 
     /// How much larger a thing looks at this depth than in the middle of the sample.
     fn magnified(&self, depth: f64) -> f64 {
-        let far = FAR * self.reach;
+        let far = FAR * self.half.norm();
         // what comes close to the eye grows no further
         far / (far + depth).max(0.2 * far)
     }
 
-    fn flat(&self, point: [f64; 3]) -> [f64; 2] {
-        let (off, larger) = (minus(point, self.focus), self.magnified(self.depth(point)));
-        [dot(off, self.right) * larger, dot(off, self.up) * larger]
+    /// Where a point is in the picture, m.
+    pub fn flat(&self, point: &[f64]) -> [f64; 2] {
+        let off = Vector3::from_column_slice(&point[..3]) - self.focus;
+        [self.right, self.up].map(|axis| off.dot(&axis) * self.magnified(self.depth(point)))
     }
 
     /// The corners of a plane through `point`, m, as large as the sample, and whether the sample is in front of it.
     pub fn plane(&self, point: &[f64], normal: [f64; 3]) -> ([[f64; 3]; 4], bool) {
-        let height = dot(minus(three(point), self.focus), normal);
-        let middle = [0, 1, 2].map(|k| self.focus[k] + height * normal[k]);
-        let least = (0..3).min_by(|a, b| normal[*a].abs().total_cmp(&normal[*b].abs())).unwrap_or(0);
-        let mut axis = [0.0; 3];
-        axis[least] = 1.0;
-        let across = cross(normal, axis);
-        let length = dot(across, across).sqrt();
-        let s = across.map(|x| x / length);
-        let t = cross(normal, s);
-        let size = |t: [f64; 3]| BEYOND * (0..3).map(|k| (t[k] * self.half[k]).abs()).sum::<f64>();
-        let (along_s, along_t) = (size(s), size(t));
-        let corner = |a: f64, b: f64| [0, 1, 2].map(|k| middle[k] + a * along_s * s[k] + b * along_t * t[k]);
-        let eye = [0, 1, 2].map(|k| self.focus[k] - FAR * self.reach * self.ahead[k]);
-        let behind = dot(minus(eye, middle), normal) > 0.0;
-        ([corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)], behind)
+        let normal = Vector3::from(normal);
+        let middle = self.focus + (Vector3::from_column_slice(point) - self.focus).dot(&normal) * normal;
+        let s = normal.cross(&Vector3::ith(normal.iamin(), 1.0)).normalize();
+        let t = normal.cross(&s);
+        let [along_s, along_t] = [s, t].map(|t| BEYOND * t.abs().dot(&self.half) * t);
+        let eye = self.focus - FAR * self.half.norm() * self.ahead;
+        let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+        let corners = corners.map(|[a, b]| (middle + a * along_s + b * along_t).into());
+        (corners, (eye - middle).dot(&normal) > 0.0)
+    }
+
+    /// The box in the picture around some points, m.
+    pub fn shows(&self, points: &[[f64; 3]]) -> Box2 {
+        points.iter().fold(EMPTY, |found, point| union(found, around(self.flat(point), 0.0)))
+    }
+
+    /// A colour as it looks from here at a point: the paler the farther.
+    pub fn hazy(&self, colour: &str, point: &[f64]) -> Colour {
+        let part = 0.5 * (1.0 + (self.depth(point) / self.half.norm()).clamp(-1.0, 1.0));
+        mixed(colour, HAZE * part)
     }
 }
 
@@ -100,7 +93,7 @@ impl Eye {
     pub fn flat(&self, point: &[f64]) -> [f64; 2] {
         match self {
             Self::Along(axes) => axes.map(|axis| point[axis]),
-            Self::At(place) => place.flat(three(point)),
+            Self::At(place) => place.flat(point),
         }
     }
 
@@ -110,7 +103,7 @@ impl Eye {
         match self {
             Self::Along([0, _]) => point[1],
             Self::Along(_) => -point[0],
-            Self::At(place) => place.depth(three(point)),
+            Self::At(place) => place.depth(point),
         }
     }
 
@@ -118,7 +111,7 @@ impl Eye {
     pub fn magnified(&self, point: &[f64]) -> f64 {
         match self {
             Self::Along(_) => 1.0,
-            Self::At(place) => place.magnified(place.depth(three(point))),
+            Self::At(place) => place.magnified(place.depth(point)),
         }
     }
 
@@ -131,46 +124,12 @@ impl Eye {
     }
 }
 
-/// The box around some points of space, m.
-pub(super) fn corners<'a>(points: impl Iterator<Item = &'a [f64]>) -> [[f64; 3]; 2] {
-    let mut found = [[EMPTY[0][0]; 3], [EMPTY[1][0]; 3]];
-    for point in points {
-        for k in 0..3 {
-            found[0][k] = found[0][k].min(point[k]);
-            found[1][k] = found[1][k].max(point[k]);
-        }
-    }
-    found
-}
-
-impl Place {
-    /// A colour as it looks from here at a point: the paler the farther.
-    pub fn hazy(&self, colour: &str, point: &[f64]) -> Colour {
-        let part = 0.5 * (1.0 + (self.depth(three(point)) / self.reach).clamp(-1.0, 1.0));
-        mixed(colour, HAZE * part)
-    }
-
-    /// The box in the picture around the corners of a plane, m.
-    pub fn shows(&self, corners: &[[f64; 3]; 4]) -> Box2 {
-        let flat = corners.map(|corner| self.flat(corner));
-        let bound = |k: usize, pick: fn(f64, f64) -> f64| flat.iter().map(|x| x[k]).reduce(pick).unwrap_or(0.0);
-        [[bound(0, f64::min), bound(1, f64::min)], [bound(0, f64::max), bound(1, f64::max)]]
-    }
-}
-
-/// A colour with this share of white in it.
-pub(super) fn mixed(colour: &str, white: f64) -> Colour {
-    let part = |k: usize| colour.get(k..k + 2).and_then(|digits| u8::from_str_radix(digits, 16).ok()).unwrap_or(0);
-    let mix = |k: usize| (f64::from(part(k)) * (1.0 - white) + 255.0 * white).round() as u8;
-    format!("#{:02x}{:02x}{:02x}", mix(1), mix(3), mix(5)).into()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn place() -> Place {
-        Place::of([[-1.0, -2.0, -3.0], [1.0, 2.0, 3.0]])
+        Place::of([[-1.0, -2.0, -3.0], [1.0, 2.0, 3.0]].iter().map(<[f64; 3]>::as_slice))
     }
 
     #[test]
@@ -184,9 +143,9 @@ mod tests {
     fn right_up_and_ahead_are_orthonormal() {
         let Place { right, up, ahead, .. } = place();
         for (a, b) in [(right, up), (up, ahead), (ahead, right)] {
-            assert!(dot(a, b).abs() < 1e-15, "{}", dot(a, b));
+            assert!(a.dot(&b).abs() < 1e-15, "{}", a.dot(&b));
         }
-        assert!([right, up, ahead].iter().all(|a| (dot(*a, *a) - 1.0).abs() < 1e-15));
+        assert!([right, up, ahead].iter().all(|a| (a.dot(a) - 1.0).abs() < 1e-15));
         assert!(up[2] > 0.9);
     }
 
@@ -204,11 +163,5 @@ mod tests {
         let (floor, behind) = place().plane(&[5.0, 5.0, -3.0], [0.0, 0.0, 1.0]);
         assert!(behind && floor.iter().all(|corner| corner[2] == -3.0));
         assert!(!place().plane(&[0.0, 0.0, 3.0], [0.0, 0.0, -1.0]).1);
-    }
-
-    #[test]
-    fn white_is_mixed_in() {
-        assert_eq!(mixed("#102030", 0.0), "#102030");
-        assert_eq!(mixed("#102030", 1.0), "#ffffff");
     }
 }

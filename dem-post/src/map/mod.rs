@@ -5,9 +5,10 @@ use dem_run::history::{GrainState, Grains, History, Wall, WallKind, WallState};
 use crate::output::Result;
 use crate::plot::{Anchor, Canvas, Drawing, colour};
 
-use eye::{Eye, Place, corners, mixed};
+use eye::{Eye, Place};
 pub use legend::Key;
 use legend::{draw_legend, legend_rows, scale_bar};
+use scale::mixed;
 pub use scale::{Colour, Ramp, Scale};
 
 mod eye;
@@ -133,7 +134,7 @@ impl Sample {
     /// As [`Sample::read`].
     pub fn in_perspective(history: &History) -> Result<Self> {
         let first = history.grain_state(0)?;
-        Self::seen(history, Eye::At(Place::of(corners(first.position.chunks(3)))))
+        Self::seen(history, Eye::At(Place::of(first.position.chunks(3))))
     }
 
     /// As [`Sample::read`], of spheres cut open along the plane through the middle of their first places.
@@ -311,11 +312,7 @@ fn draw_panel(canvas: &mut Canvas, sample: &Sample, panel: &Panel, frame: &Frame
     }
     canvas.clip(frame.corner, frame.size);
     for (wall, position) in sample.walls.iter().zip(panel.walls.position.chunks(sample.dimension)) {
-        if wall.kind == WallKind::Plane && sample.eye.place().is_some() {
-            draw_plate(canvas, sample, wall, position, frame, true);
-        } else {
-            draw_wall(canvas, sample, wall, position, frame);
-        }
+        draw_wall(canvas, sample, wall, position, frame);
     }
     let mut order: Vec<usize> = (0..sample.radius.len()).collect();
     if sample.dimension == 3 {
@@ -324,26 +321,13 @@ fn draw_panel(canvas: &mut Canvas, sample: &Sample, panel: &Panel, frame: &Frame
         order.sort_by(|&a, &b| depth(b).total_cmp(&depth(a)));
     }
     for grain in order {
-        let Some(radius) = sample.seen_radius(&panel.grains, grain) else { continue };
-        let (at, radius) = (frame.at(sample.centre(&panel.grains, grain)), radius * frame.scale);
-        if frame.shows(at, radius) {
-            // the outline of a tiny disk must not hide its fill
-            let outline = (0.15 * radius).min(0.6);
-            let Some(place) = sample.eye.place() else {
-                canvas.disk(at, radius - 0.5 * outline, &panel.fills[grain], panel.outline, outline);
-                continue;
-            };
-            let hazy = |colour: &str| place.hazy(colour, &panel.grains.position[grain * 3..]);
-            let fill = hazy(&panel.fills[grain]);
-            canvas.disk(at, radius - 0.5 * outline, &fill, &hazy(panel.outline), outline);
-            // light falls from above and the left
-            let (lit, light) = ((at.0 - 0.25 * radius, at.1 - 0.25 * radius), mixed(&fill, 0.3));
-            canvas.disk(lit, 0.5 * radius, &light, &light, 0.0);
-        }
+        draw_grain(canvas, sample, panel, grain, frame);
     }
     for (wall, position) in sample.walls.iter().zip(panel.walls.position.chunks(sample.dimension)) {
-        if wall.kind == WallKind::Plane {
-            draw_plate(canvas, sample, wall, position, frame, false);
+        if wall.kind == WallKind::Plane
+            && let Some(place) = sample.eye.place()
+        {
+            draw_plate(canvas, place, wall, position, frame, false);
         }
     }
     // lines between grains that are drawn tiny must not run into one another
@@ -371,6 +355,27 @@ fn draw_panel(canvas: &mut Canvas, sample: &Sample, panel: &Panel, frame: &Frame
     canvas.end_clip();
 }
 
+/// A grain as a disk; in perspective the paler the farther, and lit from above and the left.
+fn draw_grain(canvas: &mut Canvas, sample: &Sample, panel: &Panel, grain: usize, frame: &Frame) {
+    let Some(radius) = sample.seen_radius(&panel.grains, grain) else { return };
+    let (at, radius) = (frame.at(sample.centre(&panel.grains, grain)), radius * frame.scale);
+    if !frame.shows(at, radius) {
+        return;
+    }
+    // the outline of a tiny disk must not hide its fill
+    let outline = (0.15 * radius).min(0.6);
+    let mut disk = |fill: &str, edge: &str| canvas.disk(at, radius - 0.5 * outline, fill, edge, outline);
+    let Some(place) = sample.eye.place() else {
+        disk(&panel.fills[grain], panel.outline);
+        return;
+    };
+    let hazy = |colour: &str| place.hazy(colour, &panel.grains.position[grain * 3..]);
+    let fill = hazy(&panel.fills[grain]);
+    disk(&fill, &hazy(panel.outline));
+    let (lit, light) = ((at.0 - 0.25 * radius, at.1 - 0.25 * radius), mixed(&fill, 0.3));
+    canvas.disk(lit, 0.5 * radius, &light, &light, 0.0);
+}
+
 /// An arrow with an open head that grows with it.
 fn draw_arrow(canvas: &mut Canvas, from: (f64, f64), to: (f64, f64)) {
     let (x, y) = (to.0 - from.0, to.1 - from.1);
@@ -392,6 +397,9 @@ fn draw_arrow(canvas: &mut Canvas, from: (f64, f64), to: (f64, f64)) {
 fn draw_wall(canvas: &mut Canvas, sample: &Sample, wall: &Wall, position: &[f64], frame: &Frame) {
     let point = sample.flat(position);
     if wall.kind == WallKind::Plane {
+        if let Some(place) = sample.eye.place() {
+            return draw_plate(canvas, place, wall, position, frame, true);
+        }
         let normal = sample.flat(&wall.normal[..sample.dimension]);
         // a plane that faces the reader has no line
         if normal[0].hypot(normal[1]) > 1e-6 {
@@ -404,13 +412,11 @@ fn draw_wall(canvas: &mut Canvas, sample: &Sample, wall: &Wall, position: &[f64]
     canvas.disk(at, radius, fill, colour::BLACK, 1.5);
 }
 
-/// A plane in perspective, as a plate of the sample's size: full behind the grains, its edges alone before them; nothing where
-/// the eye sees no depth.
-fn draw_plate(canvas: &mut Canvas, sample: &Sample, wall: &Wall, position: &[f64], frame: &Frame, behind: bool) {
-    let Some(place) = sample.eye.place() else { return };
+/// A plane in perspective, as a plate of the sample's size, if it is behind the grains or before them: full, or its edges alone.
+fn draw_plate(canvas: &mut Canvas, place: &Place, wall: &Wall, position: &[f64], frame: &Frame, behind: bool) {
     let (corners, is_behind) = place.plane(position, wall.normal);
     if is_behind == behind {
-        let on_sheet = corners.map(|corner| frame.at(sample.flat(&corner)));
+        let on_sheet = corners.map(|corner| frame.at(place.flat(&corner)));
         canvas.polygon(&on_sheet, if behind { "#e4e4e4" } else { "none" }, colour::GREY, 1.2);
     }
 }

@@ -65,12 +65,23 @@ impl Scale {
         let part = if span > 0.0 { ((value - self.low) / span).clamp(0.0, 1.0) } else { 0.0 };
         let place = part * (stops.len() - 1) as f64;
         let k = (place as usize).min(stops.len() - 2);
-        let mix = |c: usize| {
-            let (from, to) = (f64::from(stops[k][c]), f64::from(stops[k + 1][c]));
-            (from + (to - from) * (place - k as f64)).round() as u8
-        };
-        format!("#{:02x}{:02x}{:02x}", mix(0), mix(1), mix(2)).into()
+        between(stops[k], stops[k + 1], place - k as f64)
     }
+}
+
+/// The colour that is this part of the way from one to another.
+fn between(from: [u8; 3], to: [u8; 3], part: f64) -> Colour {
+    let mix = |c: usize| {
+        let (from, to) = (f64::from(from[c]), f64::from(to[c]));
+        (from + (to - from) * part).round() as u8
+    };
+    format!("#{:02x}{:02x}{:02x}", mix(0), mix(1), mix(2)).into()
+}
+
+/// A colour with this share of white in it.
+pub(super) fn mixed(colour: &str, white: f64) -> Colour {
+    let part = |k: usize| colour.get(k..k + 2).and_then(|digits| u8::from_str_radix(digits, 16).ok()).unwrap_or(0);
+    between([part(1), part(3), part(5)], [0xff; 3], white)
 }
 
 #[cfg(test)]
@@ -87,6 +98,12 @@ mod tests {
         assert_eq!((scale.colour(-1.0), scale.colour(3.0)), ("#440154".into(), "#fde725".into()));
         assert_eq!((scale.colour(-9.0), scale.colour(9.0)), ("#440154".into(), "#fde725".into()));
         assert_eq!(Scale { high: -1.0, ..scale }.colour(-1.0), "#440154");
+    }
+
+    #[test]
+    fn white_is_mixed_in() {
+        assert_eq!(mixed("#102030", 0.0), "#102030");
+        assert_eq!(mixed("#102030", 1.0), "#ffffff");
     }
 
     #[test]

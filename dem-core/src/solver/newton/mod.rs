@@ -106,7 +106,7 @@ pub struct Newton {
     wasted: usize,
     /// How far contacts slipped in the last solve.
     slips: Slips,
-    /// Contacts in the last solve whose law has no potential, the dry ones.
+    /// Dry contacts in the last solve.
     dry: usize,
     /// Factorisations before this solve.
     made_before: u64,
@@ -320,8 +320,7 @@ impl Newton {
             return self.report(0, problem.residual(), 0.0);
         }
         let mut iterations = 0;
-        let dry = rows.list.iter().filter(|row| !row.convex()).count();
-        let changed = dry != std::mem::replace(&mut self.dry, dry);
+        let changed = rows.dry() != std::mem::replace(&mut self.dry, rows.dry());
         if self.rest.is_over() {
             if let Some(report) = self.try_guess(problem, &rows, changed, &mut iterations) {
                 self.rest.forget();

@@ -201,7 +201,12 @@ impl Rows {
 
     /// Whether most contacts follow Coulomb's law, which is not the gradient of a convex function.
     pub fn mostly_dry(&self) -> bool {
-        2 * self.list.iter().filter(|row| !row.associated).count() > self.list.len()
+        2 * self.dry() > self.list.len()
+    }
+
+    /// Number of contacts that follow Coulomb's law.
+    pub fn dry(&self) -> usize {
+        self.list.iter().filter(|row| !row.associated).count()
     }
 
     /// Whether a contact has rows in two tangential directions.
