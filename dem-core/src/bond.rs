@@ -1,7 +1,7 @@
 //! Cohesive bonds: how they form, what they carry and when they break for good (Guessasma & Fortin 2011, (4) and (5)).
 
 use crate::contact::{Cone, Local, Weights};
-use crate::dim::Vect;
+use crate::dim::{Moments, Vect};
 
 /// Relative distance to the limit at which a bond counts as being at it (–).
 pub const LIMIT: f64 = 1e-7;
@@ -17,6 +17,8 @@ pub enum BondStatus {
     Shear,
     /// Broken: the moment reached μ a (r_n + r_coh).
     Rolling,
+    /// Broken: the twisting moment reached ξ a (r_n + r_coh).
+    Twist,
 }
 
 /// Stiffness of an elastic bond.
@@ -28,6 +30,8 @@ pub struct Stiffness {
     pub tangential: f64,
     /// Bending (N m/rad).
     pub rolling: f64,
+    /// Twist (N m/rad), where bonds resist it.
+    pub twist: f64,
 }
 
 /// A bond between two grains; it formed once and never re-forms.
@@ -43,6 +47,8 @@ pub struct Bond {
     pub strength: f64,
     /// Friction coefficient μ of its limits (–).
     pub friction: f64,
+    /// Coefficient ξ of the twisting moment, where bonds resist it (–).
+    pub twist: f64,
     /// Stiffness; none for a rigid bond.
     pub stiffness: Option<Stiffness>,
     /// Whether it holds.
@@ -50,9 +56,9 @@ pub struct Bond {
 }
 
 impl Bond {
-    /// The cone of its shifted reaction. Moments are divided by the mean diameter, so both coefficients are μ.
+    /// The cone of its shifted reaction. Moments are divided by the mean diameter, so shear and bending have one coefficient, μ.
     pub fn cone(&self) -> Cone {
-        Cone { mu: self.friction, nu: self.friction }
+        Cone { mu: self.friction, nu: self.friction, xi: self.twist }
     }
 
     /// Compliance of its rows over an implicit step `h` (s), 1/(k h²) (1/kg); none for a rigid bond.
@@ -62,6 +68,7 @@ impl Bond {
             n: 1.0 / (k.normal * h * h),
             t: 1.0 / (k.tangential * h * h),
             m: a * a / (k.rolling * h * h),
+            w: a * a / (k.twist * h * h),
         })
     }
 }
@@ -80,20 +87,22 @@ pub enum Rupture {
 
 /// The mode in which a bond fails under the reaction `r`, for a shift s = r_coh in the unit of `r`; none if it holds.
 ///
-/// TENSION if r_n + s ≤ ε s; else SHEAR or ROLLING, whichever of ‖t‖ and ‖m‖ is nearer its limit (a tie is SHEAR), once it
-/// reaches (1 − ε) μ (r_n + s). Compression never breaks a bond, and one without friction fails in tension only.
-pub fn failure<T: Vect, B: Vect>(r: &Local<T, B>, shift: f64, cone: Cone) -> Option<BondStatus> {
+/// TENSION if r_n + s ≤ ε s; else SHEAR, ROLLING or TWIST, whichever of ‖t‖/μ, ‖m‖/ν and |τ|/ξ is the largest (the first of
+/// those that tie), once it reaches (1 − ε) (r_n + s). Compression never breaks a bond, and one without friction fails in
+/// tension only.
+pub fn failure<T: Vect, B: Moments>(r: &Local<T, B>, shift: f64, cone: Cone) -> Option<BondStatus> {
     let limit = r.n + shift;
     if limit <= LIMIT * shift {
         return Some(BondStatus::Tension);
     }
-    if cone.mu == 0.0 {
-        return None;
-    }
-    let shear = r.t.norm() / cone.mu;
-    let rolling = r.m.norm() / cone.nu;
-    if shear.max(rolling) < (1.0 - LIMIT) * limit {
+    let over = |size: f64, coefficient: f64| if coefficient > 0.0 { size / coefficient } else { 0.0 };
+    let shear = over(r.t.norm(), cone.mu);
+    let rolling = over(r.m.bending(), cone.nu);
+    let twist = over(r.m.twist(), cone.xi);
+    if shear.max(rolling).max(twist) < (1.0 - LIMIT) * limit {
         None
+    } else if twist > shear.max(rolling) {
+        Some(BondStatus::Twist)
     } else if rolling > shear {
         Some(BondStatus::Rolling)
     } else {

@@ -1,6 +1,6 @@
 //! Two and three dimensions from one source.
 //!
-//! Everything above this file is written for a [`Dim`]; [`D2`] and [`D3`] say what a vector, a spin, a contact
+//! Everything above this file is written for a [`Dim`]; [`D2`] and [`Space`] say what a vector, a spin, a contact
 //! frame and an orientation are. Nothing else in the crate names a dimension.
 //!
 //! Symbols: n normal from body j to body i; t tangent(s), in 2D t = (−n_y, n_x), in 3D n = t₁ × t₂;
@@ -82,6 +82,70 @@ impl<const N: usize> Vect for SVector<f64, N> {
 /// The rows that a contact lacks: no storage, no instruction.
 pub type V0 = SVector<f64, 0>;
 
+/// One row.
+pub type V1 = SVector<f64, 1>;
+
+/// The moment rows of a contact: as many bending rows as tangential ones and, where there are three, one of twist last.
+///
+/// Bending and twist have limits of their own.
+pub trait Moments: Vect {
+    /// A number that only a contact with a twist row has: no storage in the others.
+    type Twist: Vect;
+
+    /// Whether the last row is one of twist.
+    const TWISTS: bool = Self::Twist::LEN > 0;
+
+    /// Norm of the bending rows.
+    #[inline(always)]
+    fn bending(&self) -> f64 {
+        if Self::TWISTS { (self[0] * self[0] + self[1] * self[1]).sqrt() } else { self.norm() }
+    }
+
+    /// Size of the twist row, zero where there is none.
+    #[inline(always)]
+    fn twist(&self) -> f64 {
+        if Self::TWISTS { self[2].abs() } else { 0.0 }
+    }
+
+    /// The bending rows times one factor, the twist row times another.
+    #[inline(always)]
+    fn scaled(self, bending: f64, twist: f64) -> Self {
+        let mut out = self * bending;
+        if Self::TWISTS {
+            out[2] = self[2] * twist;
+        }
+        out
+    }
+
+    /// The nearest rows with norms of at most these limits.
+    #[inline(always)]
+    fn within(self, bending: f64, twist: f64) -> Self {
+        if !Self::TWISTS {
+            return self.clipped(bending);
+        }
+        let norm = self.bending();
+        let mut out = if norm <= bending { self } else { self * (bending / norm) };
+        out[2] = self[2].clamp(-twist, twist);
+        out
+    }
+}
+
+impl Moments for V0 {
+    type Twist = V0;
+}
+
+impl Moments for V1 {
+    type Twist = V0;
+}
+
+impl Moments for SVector<f64, 2> {
+    type Twist = V0;
+}
+
+impl Moments for SVector<f64, 3> {
+    type Twist = V1;
+}
+
 /// The rows of `rows` that a group of type `B` has: all, or none; missing ones are zero.
 #[inline(always)]
 pub fn resized<A: Vect, B: Vect>(rows: A) -> B {
@@ -106,8 +170,10 @@ pub trait Dim: Copy + Debug + Default + Send + Sync + 'static {
     type Vector: Vect;
     /// Angular velocity, torque: one component in 2D, three in 3D.
     type Spin: Vect;
-    /// Tangential rows of a contact, and as many bending rows of a bond.
+    /// Tangential rows of a contact.
     type Tangent: Vect;
+    /// Moment rows of a bond.
+    type Moment: Moments;
     /// Orthonormal frame (n, t…) of a contact.
     type Frame: Copy + Debug + PartialEq + Send + Sync + 'static;
     /// Orientation of a body: an angle (rad) in 2D, a unit quaternion w, x, y, z in 3D.
@@ -135,8 +201,19 @@ pub trait Dim: Copy + Debug + Default + Send + Sync + 'static {
     fn spin_rows(frame: &Self::Frame, spin: Self::Spin) -> Self::Tangent;
     /// Transpose of [`Dim::spin_rows`]: the torque that does the work of tangential rows.
     fn spin_rows_transposed(frame: &Self::Frame, rows: Self::Tangent) -> Self::Spin;
-    /// Components of a torque about the tangents of a frame; in 2D the torque itself.
-    fn about_tangents(frame: &Self::Frame, torque: Self::Spin) -> Self::Tangent;
+    /// Moment rows of a relative spin ω: those of ω × n, and the component of ω along n where twist has a row.
+    #[inline(always)]
+    fn moment_rows(frame: &Self::Frame, spin: Self::Spin) -> Self::Moment {
+        resized(Self::spin_rows(frame, spin))
+    }
+    /// The torque that does the work of tangential and moment rows; for the latter the transpose of [`Dim::moment_rows`].
+    #[inline(always)]
+    fn torque_of_rows(frame: &Self::Frame, tangential: Self::Tangent, moment: Self::Moment) -> Self::Spin {
+        Self::spin_rows_transposed(frame, tangential + resized(moment))
+    }
+    /// Components of a torque about the tangents of a frame, and about its normal where twist has a row; in 2D the torque
+    /// itself.
+    fn about_axes(frame: &Self::Frame, torque: Self::Spin) -> Self::Moment;
     /// The torque x × f of a force with lever x.
     fn torque(lever: Self::Vector, force: Self::Vector) -> Self::Spin;
     /// The orientation of a body that has not turned.
@@ -156,9 +233,15 @@ pub trait Dim: Copy + Debug + Default + Send + Sync + 'static {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct D2;
 
-/// Space: spheres, three spins.
+/// Space: spheres, three spins, and bonds of so many moment rows.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct D3;
+pub struct Space<const MOMENTS: usize>;
+
+/// Space with bonds that bend and are free to spin about their normal.
+pub type D3 = Space<2>;
+
+/// Space with bonds that resist twist, too.
+pub type D3Twist = Space<3>;
 
 /// Frame of a contact in space: n = t₁ × t₂.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -173,6 +256,7 @@ impl Dim for D2 {
     type Vector = SVector<f64, 2>;
     type Spin = SVector<f64, 1>;
     type Tangent = SVector<f64, 1>;
+    type Moment = SVector<f64, 1>;
     type Frame = SVector<f64, 2>;
     type Orientation = SVector<f64, 1>;
 
@@ -215,7 +299,7 @@ impl Dim for D2 {
     fn spin_rows_transposed(_: &Self::Frame, rows: Self::Tangent) -> Self::Spin {
         rows
     }
-    fn about_tangents(_: &Self::Frame, torque: Self::Spin) -> Self::Tangent {
+    fn about_axes(_: &Self::Frame, torque: Self::Spin) -> Self::Moment {
         torque
     }
     fn torque(x: Self::Vector, f: Self::Vector) -> Self::Spin {
@@ -237,12 +321,16 @@ impl Dim for D2 {
     }
 }
 
-impl Dim for D3 {
+impl<const MOMENTS: usize> Dim for Space<MOMENTS>
+where
+    SVector<f64, MOMENTS>: Moments,
+{
     const N: usize = 3;
     const INERTIA_FACTOR: f64 = 0.4;
     type Vector = SVector<f64, 3>;
     type Spin = SVector<f64, 3>;
     type Tangent = SVector<f64, 2>;
+    type Moment = SVector<f64, MOMENTS>;
     type Frame = Frame3;
     type Orientation = SVector<f64, 4>;
 
@@ -299,8 +387,25 @@ impl Dim for D3 {
     fn spin_rows_transposed(f: &Self::Frame, rows: Self::Tangent) -> Self::Spin {
         f.t[1] * rows[0] - f.t[0] * rows[1]
     }
-    fn about_tangents(f: &Self::Frame, torque: Self::Spin) -> Self::Tangent {
-        [Vect::dot(&f.t[0], &torque), Vect::dot(&f.t[1], &torque)].into()
+    #[inline(always)]
+    fn moment_rows(f: &Self::Frame, spin: Self::Spin) -> Self::Moment {
+        let mut rows: Self::Moment = resized(Self::spin_rows(f, spin));
+        if Self::Moment::TWISTS {
+            rows[2] = Vect::dot(&f.n, &spin);
+        }
+        rows
+    }
+    #[inline(always)]
+    fn torque_of_rows(f: &Self::Frame, tangential: Self::Tangent, moment: Self::Moment) -> Self::Spin {
+        let turn = Self::spin_rows_transposed(f, tangential + resized::<_, Self::Tangent>(moment));
+        if Self::Moment::TWISTS { turn + f.n * moment[2] } else { turn }
+    }
+    fn about_axes(f: &Self::Frame, torque: Self::Spin) -> Self::Moment {
+        let mut about = Self::Moment::zeros();
+        for (k, axis) in [f.t[0], f.t[1], f.n].iter().enumerate().take(MOMENTS) {
+            about[k] = Vect::dot(axis, &torque);
+        }
+        about
     }
     fn torque(x: Self::Vector, f: Self::Vector) -> Self::Spin {
         x.cross(&f)

@@ -1,7 +1,7 @@
 //! The cone and the laws on it, at random points: projection by its defining inequalities, local solves by the law they solve.
 
 use dem_core::contact::{Arms, Block, BondFlow, Bonded, Cone, Coulomb, Law, Local, LocalSolve, Weights};
-use dem_core::dim::{V0, Vect};
+use dem_core::dim::{Moments, V0, Vect};
 use nalgebra::SVector;
 use proptest::prelude::*;
 
@@ -9,7 +9,7 @@ fn vect<const N: usize>() -> impl Strategy<Value = SVector<f64, N>> {
     prop::array::uniform(-1.0..1.0f64).prop_map(SVector::from)
 }
 
-fn local<T: Vect, B: Vect>(
+fn local<T: Vect, B: Moments>(
     t: impl Strategy<Value = T>,
     m: impl Strategy<Value = B>,
 ) -> impl Strategy<Value = Local<T, B>> {
@@ -17,21 +17,28 @@ fn local<T: Vect, B: Vect>(
 }
 
 fn cone() -> impl Strategy<Value = Cone> {
-    (0.0..3.0f64, 0.0..3.0f64).prop_map(|(mu, nu)| Cone { mu, nu })
+    (0.0..3.0f64, 0.0..3.0f64, 0.0..3.0f64).prop_map(|(mu, nu, xi)| Cone { mu, nu, xi })
+}
+
+/// Norm of the bending rows, which are at most two.
+fn bending<T: Vect, B: Moments>(x: &Local<T, B>) -> f64 {
+    x.m.as_slice().iter().take(2).map(|m| m * m).sum::<f64>().sqrt()
 }
 
 /// How far `x` is outside K, relative to its size.
-fn outside<T: Vect, B: Vect>(k: Cone, x: &Local<T, B>) -> f64 {
-    (-x.n).max(x.t.norm() - k.mu * x.n).max(x.m.norm() - k.nu * x.n)
+fn outside<T: Vect, B: Moments>(k: Cone, x: &Local<T, B>) -> f64 {
+    let twist = if B::LEN == 3 { x.m[2].abs() - k.xi * x.n } else { 0.0 };
+    (-x.n).max(x.t.norm() - k.mu * x.n).max(bending(x) - k.nu * x.n).max(twist)
 }
 
-/// How far `y` is outside the polar cone { n ≤ −μ‖t‖ − ν‖m‖ }.
-fn outside_polar<T: Vect, B: Vect>(k: Cone, y: &Local<T, B>) -> f64 {
-    y.n + k.mu * y.t.norm() + k.nu * y.m.norm()
+/// How far `y` is outside the polar cone { n ≤ −μ‖t‖ − ν‖m‖ − ξ|τ| }.
+fn outside_polar<T: Vect, B: Moments>(k: Cone, y: &Local<T, B>) -> f64 {
+    let twist = if B::LEN == 3 { k.xi * y.m[2].abs() } else { 0.0 };
+    y.n + k.mu * y.t.norm() + k.nu * bending(y) + twist
 }
 
 /// Moreau: p = P_K(x) if and only if p ∈ K, x − p ∈ K°, p ⊥ x − p.
-fn is_projection<T: Vect, B: Vect>(k: Cone, x: Local<T, B>) {
+fn is_projection<T: Vect, B: Moments>(k: Cone, x: Local<T, B>) {
     let p = k.project(x);
     let rest = x - p;
     assert!(outside(k, &p) <= 1e-13, "{p:?} is outside the cone");
@@ -47,13 +54,18 @@ proptest! {
     fn projection_in_3d(k in cone(), x in local(vect::<2>(), vect::<2>())) { is_projection(k, x) }
 
     #[test]
+    fn projection_with_twist(k in cone(), x in local(vect::<2>(), vect::<3>())) { is_projection(k, x) }
+
+    #[test]
     fn projection_without_bending(k in cone(), x in local(vect::<2>(), Just(V0::zeros()))) { is_projection(k, x) }
 
     /// The minimiser of ½ Σ w r² + q·r over K: r ∈ K, w r + q ∈ K*, r ⊥ w r + q.
     #[test]
-    fn minimisation(k in cone(), q in local(vect::<2>(), vect::<2>()), n in 0.1..10.0f64, t in 0.1..10.0f64, m in 0.1..10.0f64) {
-        let r = k.minimise(Weights { n, t, m }, q);
-        let u = Local { n: n * r.n + q.n, t: r.t * t + q.t, m: r.m * m + q.m };
+    fn minimisation(k in cone(), q in local(vect::<2>(), vect::<3>()), weights in prop::array::uniform4(0.1..10.0f64)) {
+        let [n, t, m, w] = weights;
+        let r = k.minimise(Weights { n, t, m, w }, q);
+        let moments = SVector::from([m * r.m[0], m * r.m[1], w * r.m[2]]);
+        let u = Local { n: n * r.n + q.n, t: r.t * t + q.t, m: moments + q.m };
         prop_assert!(outside(k, &r) <= 1e-12);
         prop_assert!(outside_polar(k, &(u * -1.0)) <= 1e-11);
         prop_assert!(r.dot(&u).abs() <= 1e-11);
@@ -62,7 +74,7 @@ proptest! {
     /// The exact local solve of a dry contact satisfies the bipotential's fixed point, and its steps lead there.
     #[test]
     fn dry_local_solves_agree(mu in 0.0..2.0f64, n in 0.3..3.0f64, t in 0.3..3.0f64, q in local(vect::<2>(), Just(V0::zeros()))) {
-        let block = Block { n, t, m: 1.0, tm: 0.0 };
+        let block = Block { n, t, m: 1.0, w: 1.0, tm: 0.0 };
         let velocity = |r: Local<SVector<f64, 2>, V0>| Local { n: n * r.n + q.n, t: r.t * t + q.t, m: r.m };
         agree(Coulomb::<SVector<f64, 2>>::new(block, [0.5; 2], mu, 0.0), velocity);
     }
@@ -70,14 +82,19 @@ proptest! {
     /// The same for bonds of either flow, with t and m coupled as for grains of different size.
     #[test]
     fn bonded_local_solves_agree(
-        k in (0.05..1.5f64, 0.05..1.5f64).prop_map(|(mu, nu)| Cone { mu, nu }),
-        n in 0.3..3.0f64, t in 0.3..3.0f64, m in 0.3..3.0f64, share in -0.7..0.7f64, shift in 0.0..1.0f64, bipotential: bool,
-        q in local(vect::<2>(), vect::<2>()),
+        k in prop::array::uniform3(0.05..1.5f64).prop_map(|[mu, nu, xi]| Cone { mu, nu, xi }),
+        [n, t, m, w] in prop::array::uniform4(0.3..3.0f64), share in -0.7..0.7f64, shift in 0.0..1.0f64, bipotential: bool,
+        q in local(vect::<2>(), vect::<3>()),
     ) {
         let tm = share * (t * m).sqrt();
         let flow = if bipotential { BondFlow::Bipotential } else { BondFlow::Associated };
-        let block = Block { n, t, m, tm };
-        let velocity = |r: Local<SVector<f64, 2>, SVector<f64, 2>>| Local { n: n * r.n + q.n, t: r.t * t + r.m * tm + q.t, m: r.m * m + r.t * tm + q.m };
+        let block = Block { n, t, m, w, tm };
+        let velocity = |r: Local<SVector<f64, 2>, SVector<f64, 3>>| {
+            let bending = r.m.fixed_rows::<2>(0);
+            let coupled = bending * m + r.t * tm;
+            let moments = SVector::from([coupled[0], coupled[1], w * r.m[2]]);
+            Local { n: n * r.n + q.n, t: r.t * t + bending * tm + q.t, m: moments + q.m }
+        };
         agree(Bonded::new(block, Arms { lever: [0.5; 2], bending: 1.0 }, shift, k, flow), velocity);
     }
 }

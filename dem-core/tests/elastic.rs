@@ -6,7 +6,7 @@ use common::{bonded_pair, grain, pressed, settings, solver, world};
 use dem_core::body::{Grain, Grains, Load, Schedule, Shape, Wall};
 use dem_core::bond::{BondStatus, Rupture, Stiffness};
 use dem_core::contact::{BondFlow, Law, Local};
-use dem_core::dim::{D2, D3, Dim, Vect};
+use dem_core::dim::{D2, D3, D3Twist, Dim, Moments, Vect};
 use dem_core::problem::ContactProblem;
 use dem_core::solver::{GaussSeidelSettings, SolveStatus, SolverSettings};
 use dem_core::world::World;
@@ -29,7 +29,12 @@ fn newton(tolerance: f64, load_tolerance: f64) -> SolverSettings {
 
 /// Springs with the tangential stiffness over the normal one, that bend as a bar as wide as long does.
 fn springs(normal: f64, ratio: f64) -> impl Fn(f64) -> Stiffness {
-    move |a| Stiffness { normal, tangential: ratio * normal, rolling: normal * a * a / 12.0 }
+    move |a| Stiffness {
+        normal,
+        tangential: ratio * normal,
+        rolling: normal * a * a / 12.0,
+        twist: normal * a * a / 16.0,
+    }
 }
 
 /// The angular frequency that steps of length h show of a vibration ω: a step turns it by atan(ωh) and not ωh.
@@ -244,6 +249,31 @@ fn a_cantilever_bends_by_its_springs() {
     assert!((w.ledger.elastic / (0.5 * force * expected) - 1.0).abs() < 1e-5);
 }
 
+#[test]
+fn a_row_twists_by_its_springs() {
+    let count = 8;
+    let list = (0..=count).map(|k| grain::<D3Twist>(&[A * k as f64, 0.0, 0.0], R));
+    let mut grains: Grains<D3Twist> = list.collect();
+    grains.fixed[0] = true;
+    let torque = 1e-5;
+    let (force, torques) = ([0.0; 3].into(), [torque, 0.0, 0.0].into());
+    let load = Load { grain: count, force, torque: torques, factor: Arc::new(|_| 1.0) };
+    // long beside the slowest period, 8 ms
+    let mut set = settings(0.1);
+    set.solver = newton(1e-12, 1e-12);
+    let mut w = World::new(grains, vec![], vec![load], set);
+    w.form_bonds(1e-6, |_| 1.0, 0.3);
+    w.limit_twist(0.2);
+    let k = springs(K, 0.4)(A);
+    w.make_bonds_elastic(|_| k);
+    settle(&mut w);
+    let expected = count as f64 * torque / k.twist;
+    // a quaternion turned by φ about x is cos φ/2, sin φ/2
+    let found = 2.0 * w.grains.orientation[count][1].asin();
+    assert!((found / expected - 1.0).abs() < 1e-5, "{found:e} against {expected:e}");
+    assert!((w.ledger.elastic / (0.5 * torque * expected) - 1.0).abs() < 1e-5);
+}
+
 /// The energy that the bonds of a world store, from their reactions.
 fn stored<D: Dim>(w: &World<D>) -> f64 {
     let intact = w.touches.iter().filter_map(|t| Some((t, &w.bonds[t.bond? as usize])));
@@ -251,7 +281,9 @@ fn stored<D: Dim>(w: &World<D>) -> f64 {
         .filter(|(_, bond)| bond.status == BondStatus::Intact)
         .map(|(t, bond)| {
             let (k, r) = (bond.stiffness.unwrap(), t.reaction);
-            0.5 * (r.n * r.n / k.normal + r.t.dot(&r.t) / k.tangential + r.m.dot(&r.m) / k.rolling)
+            let (bending, twist) = (r.m.bending(), r.m.twist());
+            let moments = bending * bending / k.rolling + if twist > 0.0 { twist * twist / k.twist } else { 0.0 };
+            0.5 * (r.n * r.n / k.normal + r.t.dot(&r.t) / k.tangential + moments)
         })
         .sum()
 }
@@ -292,6 +324,7 @@ fn the_books_balance_through_breaks() {
     for rupture in [Rupture::Cascade, Rupture::CascadeWorst, Rupture::EndOfStep] {
         books::<D2>(1, 6, rupture);
         books::<D3>(2, 3, rupture);
+        books::<D3Twist>(2, 3, rupture);
     }
 }
 
@@ -451,11 +484,12 @@ fn solvers_agree<D: Dim>(side: usize) {
 fn all_solvers_reach_the_same_velocities() {
     solvers_agree::<D2>(6);
     solvers_agree::<D3>(3);
+    solvers_agree::<D3Twist>(3);
 }
 
 /// Distance of the reactions of elastic bonds, over their size.
 fn reactions_apart<D: Dim>(a: &ContactProblem<D>, b: &ContactProblem<D>) -> f64 {
-    let square = |r: Local<D::Tangent, D::Tangent>| r.dot(&r);
+    let square = |r: Local<D::Tangent, D::Moment>| r.dot(&r);
     let size: f64 = a.elastic.iter().map(|c| square(c.r)).sum();
     (a.elastic.iter().zip(&b.elastic).map(|(a, b)| square(a.r - b.r)).sum::<f64>() / size).sqrt()
 }
@@ -469,7 +503,7 @@ fn start_does_not_matter<D: Dim>(side: usize) {
         for contact in &mut problem.elastic {
             contact.r.n = size * (rng.random::<f64>() - 0.5);
             contact.r.t = D::Tangent::from_slice(&vec![0.1 * size * (rng.random::<f64>() - 0.5); D::N - 1]);
-            contact.r.m = D::Tangent::from_slice(&vec![0.1 * size * (rng.random::<f64>() - 0.5); D::N - 1]);
+            contact.r.m = D::Moment::from_slice(&vec![0.1 * size * (rng.random::<f64>() - 0.5); D::Moment::LEN]);
         }
         let other = solved(&problem, newton(1e-10, 1e-10));
         let distance = reactions_apart(&found, &other);
@@ -481,6 +515,7 @@ fn start_does_not_matter<D: Dim>(side: usize) {
 fn the_answer_does_not_depend_on_the_start() {
     start_does_not_matter::<D2>(6);
     start_does_not_matter::<D3>(3);
+    start_does_not_matter::<D3Twist>(3);
 }
 
 /// A hexagonal block whose first column is held and whose last is pulled across: many reactions balance that.

@@ -1,6 +1,6 @@
 //! The convex problems against an interior-point method: without friction, or with associated bonds only.
 //!
-//! minimise ½ r̂·W r̂ + q·r̂ over the cones; K = { ‖t‖ ≤ μ n, ‖m‖ ≤ ν n } is two second-order cones on the same n.
+//! minimise ½ r̂·W r̂ + q·r̂ over the cones; K = { ‖t‖ ≤ μ n, ‖m‖ ≤ ν n, |τ| ≤ ξ n } is second-order cones on the same n.
 
 mod common;
 
@@ -9,7 +9,7 @@ use clarabel::solver::SupportedConeT::{self, NonnegativeConeT, SecondOrderConeT,
 use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver};
 use common::{pressed, solver};
 use dem_core::contact::BondFlow;
-use dem_core::dim::{D2, D3, Dim};
+use dem_core::dim::{D2, D3, D3Twist, Dim};
 use dem_core::problem::ContactProblem;
 use dem_core::problem::assembled::Assembled;
 use dem_core::solver::{SolveStatus, SolverSettings};
@@ -32,6 +32,8 @@ fn root(problem: &Assembled) -> DMatrix<f64> {
 fn interior_point(problem: &Assembled) -> Vec<f64> {
     let parts = problem.parts();
     let (rows, size, n) = (parts.rows, parts.rows.count(), problem.r.len());
+    let bends = rows.moments.min(rows.tangents);
+    let twists = rows.moments - bends;
     let root = root(problem);
     let unknowns = n + root.ncols();
     let ones: Vec<usize> = (n..unknowns).collect();
@@ -54,7 +56,10 @@ fn interior_point(problem: &Assembled) -> Vec<f64> {
         list.push((height, c * size, -1.0));
         cones.push(NonnegativeConeT(1));
         height += 1;
-        for (coefficient, first, count) in [(cone.mu, 1, rows.tangents), (cone.nu, 1 + rows.tangents, rows.bends)] {
+        let after = 1 + rows.tangents;
+        for (coefficient, first, count) in
+            [(cone.mu, 1, rows.tangents), (cone.nu, after, bends), (cone.xi, after + bends, twists)]
+        {
             let group: Vec<usize> = (0..count).map(|k| c * size + first + k).filter(|v| present(*v)).collect();
             if !group.is_empty() {
                 list.push((height, c * size, -coefficient));
@@ -113,6 +118,12 @@ fn associated_bonds_agree() {
     for seed in 0..3 {
         let distance = apart(pressed::<D3>(seed, 3, 0.0, flow).contact_problem(), newton());
         assert!(distance <= 1e-7, "3D, seed {seed}: {distance:e}");
+    }
+    // problems with bonds at the limit of twist that the oracle solves, too
+    for seed in [0, 3, 5, 6, 7] {
+        let problem = pressed::<D3Twist>(seed, 3, 0.0, flow).contact_problem();
+        let distance = apart(problem, newton());
+        assert!(distance <= 1e-7, "3D with twist, seed {seed}: {distance:e}");
     }
 }
 

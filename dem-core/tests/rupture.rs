@@ -5,13 +5,15 @@ mod common;
 use common::{grain, settings, world};
 use dem_core::body::{Grains, Load};
 use dem_core::bond::{BondStatus, Rupture};
-use dem_core::dim::{D2, D3, Dim, Vect};
+use dem_core::dim::{D2, D3, D3Twist, Dim, Vect};
 use dem_core::solver::{GaussSeidelSettings, SolverSettings};
 use dem_core::world::{Break, StepError, World};
 use std::sync::Arc;
 
 const R_COH: f64 = 10.0;
 const MU: f64 = 0.3;
+/// Coefficient of the twisting moment.
+const XI: f64 = 0.17;
 /// Mean diameter of the pair (m).
 const A: f64 = 2e-3;
 
@@ -30,6 +32,7 @@ fn pair<D: Dim>(force: &[f64], torque: &[f64]) -> World<D> {
     };
     let mut w = World::new(grains, Vec::new(), vec![load], settings(1e-4));
     w.form_bonds(1e-6, |_| R_COH, MU);
+    w.limit_twist(XI);
     w
 }
 
@@ -67,8 +70,31 @@ fn thresholds_are_met_within_1e_6() {
             assert_eq!(found.map(|b| b.mode), breaks.map(|_| BondStatus::Rolling), "normal {normal}");
             let found = first_break(pair::<D3>(&[-normal, 0.0, 0.0], &[0.0, moment, 0.0]));
             assert_eq!(found.map(|b| b.mode), breaks.map(|_| BondStatus::Rolling), "3D, normal {normal}");
+            // twist has a limit of its own: bending just below its limit changes nothing
+            for bending in [0.0, (1.0 - near) * MU * A * limit] {
+                let torque = [XI * A * limit * share, bending * 0.6, bending * 0.8];
+                let found = first_break(pair::<D3Twist>(&[-normal, 0.0, 0.0], &torque));
+                assert_eq!(found.map(|b| b.mode), breaks.map(|_| BondStatus::Twist), "normal {normal}");
+                if let Some(found) = found {
+                    let limit = XI * A * (found.reaction.n + R_COH);
+                    assert!((found.reaction.m[2].abs() - limit).abs() < 1e-9 * limit, "{found:?}");
+                }
+            }
         }
     }
+}
+
+#[test]
+fn without_a_twist_row_a_bonded_grain_spins_freely_about_its_normal() {
+    let torque = 1e-4;
+    let mut free = pair::<D3>(&[0.0; 3], &[torque, 0.0, 0.0]);
+    let mut held = pair::<D3Twist>(&[0.0; 3], &[torque, 0.0, 0.0]);
+    common::run(&mut free, 10);
+    common::run(&mut held, 10);
+    let spin = torque * 1e-3 / free.grains.inertia[1];
+    assert!((free.grains.spin[1][0] / spin - 1.0).abs() < 1e-9, "{}", free.grains.spin[1]);
+    assert!(held.grains.spin[1].norm() < 1e-9 * spin, "{}", held.grains.spin[1]);
+    assert!((held.touches[0].reaction.m[2].abs() / torque - 1.0).abs() < 1e-9);
 }
 
 #[test]

@@ -4,10 +4,11 @@ mod common;
 
 use common::{DENSITY, down, floor, force_driven, newton, settings, solver};
 use dem_core::body::{Drive, Grain, Grains, Load, Shape, Wall};
-use dem_core::dim::{D2, D3, Dim, Vect};
+use dem_core::bond::{BondStatus, Stiffness};
+use dem_core::dim::{D2, D3, D3Twist, Dim, Moments, Space, Vect};
 use dem_core::solver::{SolverSettings, Start};
-use dem_core::world::{Settings, World};
-use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
+use dem_core::world::{Break, Settings, World};
+use nalgebra::{Matrix3, Rotation3, SVector, Unit, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use std::sync::Arc;
@@ -122,13 +123,16 @@ fn bonds_in_a_plane_carry_and_break_as_in_their_flat_twin() {
 const SPEED: f64 = 0.05;
 
 /// A scene in space, all of it turned by a rotation.
-fn turned(by: &Rotation3<f64>, bonds: bool) -> World<D3> {
+fn turned<const M: usize>(by: &Rotation3<f64>, bonds: bool) -> World<Space<M>>
+where
+    SVector<f64, M>: Moments,
+{
     let mut rng = Pcg64::seed_from_u64(9);
     let mut list = Vec::new();
     for k in 0..64 {
         let r = 0.01 * if bonds { 1.0 } else { 0.8 + 0.2 * rng.random::<f64>() };
         let x = Vector3::new(f64::from(k % 4), f64::from(k / 4 % 4), 0.5 + f64::from(k / 16)) * 0.02;
-        let mut grain = Grain::<D3>::at_rest(by * x, r, DENSITY);
+        let mut grain = Grain::<Space<M>>::at_rest(by * x, r, DENSITY);
         let mut any = || rng.random::<f64>() - 0.5;
         grain.velocity = by * Vector3::new(any(), any(), any()) * 2.0 * SPEED;
         grain.spin = by * Vector3::new(any(), any(), any()) * 5.0;
@@ -145,37 +149,55 @@ fn turned(by: &Rotation3<f64>, bonds: bool) -> World<D3> {
     if bonds {
         world.set_solver(SolverSettings::Newton(newton(1e-12, 1e-12, 1e-9)));
         world.form_bonds(1e-6, |_| 1.5, 0.3);
-        world.make_bonds_elastic(|a| dem_core::bond::Stiffness { normal: 1e5, tangential: 1e5, rolling: 1e4 * a * a });
+        world.limit_twist(0.1);
+        let rolling = |a: f64| 1e4 * a * a;
+        world.make_bonds_elastic(|a| Stiffness {
+            normal: 1e5,
+            tangential: 1e5,
+            rolling: rolling(a),
+            twist: rolling(a),
+        });
     }
     world
 }
 
 #[test]
 fn a_turned_scene_does_the_same_turned() {
+    let modes = turned_is_the_same::<2>(false);
+    assert!(modes.is_empty(), "{modes:?}");
+    let modes = turned_is_the_same::<2>(true);
+    assert!(!modes.is_empty() && !modes.contains(&BondStatus::Twist), "{modes:?}");
+    let modes = turned_is_the_same::<3>(true);
+    assert!(modes.contains(&BondStatus::Twist), "{modes:?}");
+}
+
+/// How the bonds broke.
+fn turned_is_the_same<const M: usize>(bonds: bool) -> Vec<BondStatus>
+where
+    SVector<f64, M>: Moments,
+{
     let by = Rotation3::from_axis_angle(&Unit::new_normalize(Vector3::new(0.3, -0.8, 0.5)), 1.1);
-    for bonds in [false, true] {
-        let (mut straight, mut other) = (turned(&Rotation3::identity(), bonds), turned(&by, bonds));
-        let mut broken = 0;
-        for step in 0..100 {
-            let (a, b) = (straight.step().expect("accepted"), other.step().expect("accepted"));
-            let bonds = |list: &[dem_core::world::Break<D3>]| list.iter().map(|b| (b.bond, b.mode)).collect::<Vec<_>>();
-            assert_eq!(bonds(&a.breaks), bonds(&b.breaks), "step {step}");
-            broken += a.breaks.len();
-        }
-        let (a, b) = (&straight.grains, &other.grains);
-        for k in 0..a.len() {
-            assert!((by * a.position[k] - b.position[k]).norm() <= 1e-9 * a.radius[k], "grain {k}");
-            // a spring turns the rounding of lengths into forces
-            let near = SPEED * if bonds { 1e-7 } else { 1e-9 };
-            assert!((by * a.velocity[k] - b.velocity[k]).norm() <= near, "grain {k}");
-            assert!((by * a.spin[k] - b.spin[k]).norm() * a.radius[k] <= near, "grain {k}");
-        }
-        assert_eq!(broken > 0, bonds, "{broken} bonds broke");
+    let (mut straight, mut other) = (turned::<M>(&Rotation3::identity(), bonds), turned::<M>(&by, bonds));
+    let mut modes = Vec::new();
+    for step in 0..100 {
+        let (a, b) = (straight.step().expect("accepted"), other.step().expect("accepted"));
+        let bonds = |list: &[Break<Space<M>>]| list.iter().map(|b| (b.bond, b.mode)).collect::<Vec<_>>();
+        assert_eq!(bonds(&a.breaks), bonds(&b.breaks), "step {step}");
+        modes.extend(a.breaks.iter().map(|b| b.mode));
     }
+    let (a, b) = (&straight.grains, &other.grains);
+    for k in 0..a.len() {
+        assert!((by * a.position[k] - b.position[k]).norm() <= 1e-9 * a.radius[k], "grain {k}");
+        // a spring turns the rounding of lengths into forces
+        let near = SPEED * if bonds { 1e-7 } else { 1e-9 };
+        assert!((by * a.velocity[k] - b.velocity[k]).norm() <= near, "grain {k}");
+        assert!((by * a.spin[k] - b.spin[k]).norm() * a.radius[k] <= near, "grain {k}");
+    }
+    modes
 }
 
 /// The rotation matrix of a unit quaternion.
-fn matrix(q: &nalgebra::SVector<f64, 4>) -> Matrix3<f64> {
+fn matrix(q: &SVector<f64, 4>) -> Matrix3<f64> {
     let q = nalgebra::UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(q[0], q[1], q[2], q[3]));
     q.to_rotation_matrix().into_inner()
 }
@@ -224,5 +246,42 @@ fn a_cantilever_of_spheres_carries_its_load_at_the_root() {
         assert!((touch.reaction.t.norm() - force).abs() < 1e-9 * force, "shear in bond {k}");
         assert!((touch.reaction.m.norm() - force * length).abs() < 1e-9 * force * length, "moment in bond {k}");
         assert!(touch.reaction.n.abs() < 1e-9 * force);
+    }
+}
+
+/// A row of spheres along x with an arm along y at its end, which a force along z pulls: the row bends and twists.
+fn bent_arm(solver: SolverSettings) -> World<D3Twist> {
+    let (row, arm) = (6, 4);
+    let centre = |k: usize| if k < row { [k as f64, 0.0, 0.0] } else { [(row - 1) as f64, (k + 1 - row) as f64, 0.0] };
+    let list = (0..row + arm).map(|k| common::grain::<D3Twist>(&centre(k).map(|x| 0.02 * x), 0.01));
+    let mut grains: Grains<D3Twist> = list.collect();
+    grains.fixed[0] = true;
+    let force = Vector3::z() * ARM_FORCE;
+    let load = Load { grain: row + arm - 1, force, torque: Vector3::zeros(), factor: Arc::new(|_| 1.0) };
+    let mut world = World::new(grains, Vec::new(), vec![load], Settings { solver, ..settings(1e-4) });
+    world.form_bonds(1e-6, |_| 1e3, 0.3);
+    world.limit_twist(0.1);
+    world
+}
+
+/// Force at the end of the arm (N).
+const ARM_FORCE: f64 = 0.05;
+
+#[test]
+fn an_arm_twists_the_row_that_carries_it() {
+    let stiff = dem_core::solver::NewtonSettings { start: Start::StiffLimit, ..newton(1e-13, 1e-13, 1e-12) };
+    for solver in [SolverSettings::Newton(stiff), solver(1e-13)] {
+        let mut world = bent_arm(solver);
+        common::run(&mut world, 3);
+        for touch in &world.touches {
+            let along_row = touch.point[1].abs() < 1e-9;
+            // the load is 80 mm off the row, and 100 mm from its root
+            let twist = if along_row { ARM_FORCE * 0.08 } else { 0.0 };
+            let length = if along_row { 0.1 - touch.point[0] } else { 0.08 - touch.point[1] };
+            let (m, whole) = (touch.reaction.m, ARM_FORCE * 0.1);
+            assert!((m[2].abs() - twist).abs() < 1e-9 * whole, "{solver:?}: {touch:?}");
+            assert!((m.fixed_rows::<2>(0).norm() - ARM_FORCE * length).abs() < 1e-9 * whole, "{solver:?}: {touch:?}");
+            assert!((touch.reaction.t.norm() - ARM_FORCE).abs() < 1e-9 * ARM_FORCE);
+        }
     }
 }

@@ -66,7 +66,7 @@ fn a_state_goes_on_to_the_bit_with_every_solver() {
         goes_on(pressed::<D2>(5, 8, 0.0, None), solver);
     }
     let mut elastic = pressed::<D2>(3, 8, 0.3, Some(BondFlow::Associated));
-    elastic.make_bonds_elastic(|_| Stiffness { normal: 1e6, tangential: 4e5, rolling: 10.0 });
+    elastic.make_bonds_elastic(|_| Stiffness { normal: 1e6, tangential: 4e5, rolling: 10.0, twist: 0.0 });
     goes_on(elastic, auto);
 }
 

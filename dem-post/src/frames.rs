@@ -202,12 +202,16 @@ fn bonds(history: &History, frame: usize, panel: &mut Panel) -> Result<Vec<Key>>
         .collect();
     panel.links.splice(0..0, intact);
     panel.caption.push(format!("{} of {} bonds broken", modes.total(), bonds.len()));
-    Ok(vec![
+    let mut keys = vec![
         Key::Line("#9a9a9a", BOND, "bond".into()),
         Key::Line(colour::BLUE, CRACK, "broken in tension".into()),
         Key::Line(colour::VERMILLION, CRACK, "in shear".into()),
         Key::Line(colour::GREEN, CRACK, "by rolling".into()),
-    ])
+    ];
+    if modes.twist > 0 {
+        keys.push(Key::Line(colour::PURPLE, CRACK, "by twist".into()));
+    }
+    Ok(keys)
 }
 
 fn broken(status: BondStatus) -> Option<(Colour, RuptureMode)> {
@@ -216,5 +220,6 @@ fn broken(status: BondStatus) -> Option<(Colour, RuptureMode)> {
         BondStatus::Tension => Some((colour::BLUE.into(), RuptureMode::Tension)),
         BondStatus::Shear => Some((colour::VERMILLION.into(), RuptureMode::Shear)),
         BondStatus::Rolling => Some((colour::GREEN.into(), RuptureMode::Rolling)),
+        BondStatus::Twist => Some((colour::PURPLE.into(), RuptureMode::Twist)),
     }
 }

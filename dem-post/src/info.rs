@@ -203,13 +203,12 @@ impl Report {
             return "none".into();
         };
         let range = if least == most { number(least) } else { format!("{} to {}", number(least), number(most)) };
-        let [tension, shear, rolling] = [self.broken.tension, self.broken.shear, self.broken.rolling];
-        let [t, s, r] = [RuptureMode::Tension, RuptureMode::Shear, RuptureMode::Rolling].map(RuptureMode::label);
-        format!(
-            "{}, cohesion {range} N; {} broken: {tension} {t}, {shear} {s}, {rolling} {r}",
-            self.bonds,
-            self.broken.total()
-        )
+        let Modes { tension, shear, rolling, twist } = self.broken;
+        let [t, s, r, w] = [RuptureMode::Tension, RuptureMode::Shear, RuptureMode::Rolling, RuptureMode::Twist];
+        let modes = [(tension, t), (shear, s), (rolling, r), (twist, w)].into_iter();
+        let told = modes.filter(|(number, mode)| *number > 0 || *mode != RuptureMode::Twist);
+        let told: Vec<String> = told.map(|(number, mode)| format!("{number} {}", mode.label())).collect();
+        format!("{}, cohesion {range} N; {} broken: {}", self.bonds, self.broken.total(), told.join(", "))
     }
 
     fn time_line(&self) -> String {

@@ -41,6 +41,9 @@ pub fn build<D: Dim>(scene: &Scene, watch: Watch) -> Result<Built<D>, RunError> 
     if let Some(bonds) = &scene.bonds {
         let strength = |mean_diameter| bonds.cohesion(scene.dimension, mean_diameter, scene.thickness());
         world.form_bonds(bonds.gap_tolerance, strength, bonds.friction.unwrap_or(scene.materials.friction.grain_grain));
+        if let Some(twist) = bonds.twist {
+            world.limit_twist(twist);
+        }
         if let Some(stiffness) = bonds.stiffness {
             world.make_bonds_elastic(|a| bond_stiffness::<D>(stiffness, a, scene.thickness()));
         }
@@ -354,11 +357,12 @@ fn newton_settings(newton: &scene::Newton, tolerance: f64, accept: f64) -> Newto
 }
 
 /// Stiffness of a bond of mean diameter `a` (m). A bar of length a and width a, t thick or round, has E A/a along itself,
-/// G A/a across, E I/a in bending.
+/// G A/a across, E I/a in bending, and G 2I/a in twist where it is
+/// round.
 fn bond_stiffness<D: Dim>(stiffness: scene::Stiffness, a: f64, thickness: f64) -> bond::Stiffness {
     match stiffness {
-        scene::Stiffness::Springs(scene::Springs { normal, tangential, rolling }) => {
-            bond::Stiffness { normal, tangential, rolling }
+        scene::Stiffness::Springs(scene::Springs { normal, tangential, rolling, twist }) => {
+            bond::Stiffness { normal, tangential, rolling, twist: twist.unwrap_or_default() }
         }
         scene::Stiffness::Young(scene::Young { modulus, poisson_ratio }) => {
             let (area, second_moment) = match D::N {
@@ -367,7 +371,8 @@ fn bond_stiffness<D: Dim>(stiffness: scene::Stiffness, a: f64, thickness: f64) -
             };
             let normal = modulus * area / a;
             let tangential = normal / (2.0 * (1.0 + poisson_ratio));
-            bond::Stiffness { normal, tangential, rolling: modulus * second_moment / a }
+            let rolling = modulus * second_moment / a;
+            bond::Stiffness { normal, tangential, rolling, twist: rolling / (1.0 + poisson_ratio) }
         }
     }
 }

@@ -17,8 +17,8 @@ pub struct Course<D: Dim> {
     pub collapse: Collapse,
     /// The wall whose force loads the sample: the first that is driven.
     pub driven: Option<usize>,
-    /// Bonds broken in tension, shear and rolling.
-    pub broken: [usize; 3],
+    /// Bonds broken in tension, shear, rolling and twist.
+    pub broken: [usize; 4],
     /// Largest residual of an accepted solve (–).
     pub worst_residual: f64,
     /// What all solves took.
@@ -48,7 +48,7 @@ impl<D: Dim> Course<D> {
         Self {
             collapse: Collapse::default(),
             driven: world.walls.iter().position(|w| drive_direction(w).is_some()),
-            broken: [0; 3],
+            broken: [0; 4],
             worst_residual: 0.0,
             work: Work::default(),
             missed_tolerance: 0,
@@ -81,7 +81,7 @@ impl<D: Dim> Course<D> {
     pub fn restored(scene: &Scene, world: &World<D>, from: &mut Reader) -> Result<Self, Mismatch> {
         let mut course = Self::new(scene, world);
         course.collapse = Collapse::restored(from)?;
-        course.broken = [from.count()?, from.count()?, from.count()?];
+        course.broken = [from.count()?, from.count()?, from.count()?, from.count()?];
         (course.worst_residual, course.penetration) = (from.real()?, from.real()?);
         let mut count = || from.count().map(|n| n as u64);
         course.work = Work { sweeps: count()?, newton: count()?, factorisations: count()? };
@@ -112,6 +112,7 @@ impl<D: Dim> Course<D> {
             let mode = match failed.mode {
                 BondStatus::Shear => 1,
                 BondStatus::Rolling => 2,
+                BondStatus::Twist => 3,
                 _ => 0,
             };
             self.broken[mode] += 1;

@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::PathBuf;
 
-use dem_core::dim::{D2, D3, Dim};
+use dem_core::dim::{D2, D3, D3Twist, Dim};
 use dem_core::problem::assembled::Assembled;
 use dem_core::solver::SolveStatus;
 
@@ -54,6 +54,7 @@ pub fn export(options: &ExportOptions) -> Result<(), RunError> {
     }
     match scene.dimension {
         2 => export_in::<D2>(&scene, options, &interrupt),
+        _ if scene.twists() => export_in::<D3Twist>(&scene, options, &interrupt),
         _ => export_in::<D3>(&scene, options, &interrupt),
     }
 }

@@ -146,9 +146,9 @@ impl<D: Dim> Recorder<D> {
                 }
             }
             if bonded && self.reactions {
-                // the rows of the solver are the components of m × n; those of the file are moments about the tangents
-                let moment = D::spin_rows_transposed(&touch.frame, touch.reaction.m);
-                rows.moment.extend(D::about_tangents(&touch.frame, moment).as_slice());
+                // the bending rows of the solver are the components of m × n; those of the file are moments about the axes
+                let moment = D::torque_of_rows(&touch.frame, D::Tangent::zero(), touch.reaction.m);
+                rows.moment.extend(D::about_axes(&touch.frame, moment).as_slice());
             }
             if bonded {
                 rows.bond.push(touch.bond.map_or(-1, |b| b as i32));
@@ -178,6 +178,7 @@ fn describe<D: Dim>(scene: &Scene, world: &World<D>, parameters: Parameters) -> 
         dimension: D::N,
         rotation: friction || bonded || turning,
         friction,
+        twist: scene.twists(),
         without_reactions: !scene.output.reactions,
         single: scene.output.precision == Precision::Single,
         grains: history::Grains {
@@ -200,6 +201,7 @@ fn bond_status(status: bond::BondStatus) -> BondStatus {
         bond::BondStatus::Tension => BondStatus::Tension,
         bond::BondStatus::Shear => BondStatus::Shear,
         bond::BondStatus::Rolling => BondStatus::Rolling,
+        bond::BondStatus::Twist => BondStatus::Twist,
     }
 }
 
@@ -218,6 +220,7 @@ fn rupture<D: Dim>(failed: &Break<D>, step: i64, time: f64) -> Rupture {
         mode: match failed.mode {
             bond::BondStatus::Shear => RuptureMode::Shear,
             bond::BondStatus::Rolling => RuptureMode::Rolling,
+            bond::BondStatus::Twist => RuptureMode::Twist,
             _ => RuptureMode::Tension,
         },
     }

@@ -7,7 +7,7 @@ use crate::record::Recorder;
 use crate::run::{Execution, Run, RunError, RunOptions, State, handle_signals, run_in};
 use crate::scene::{self, Scene, differences};
 use crate::signals::Interrupt;
-use dem_core::dim::{D2, D3, Dim};
+use dem_core::dim::{D2, D3, D3Twist, Dim};
 use std::path::{Path, PathBuf};
 
 /// How a run is resumed.
@@ -51,6 +51,7 @@ pub fn resume(options: &ResumeOptions) -> Result<(), RunError> {
     let scene = scene_of(&history, options)?;
     match scene.dimension {
         2 => resume_in::<D2>(&scene, &history, options, &interrupt),
+        _ if scene.twists() => resume_in::<D3Twist>(&scene, &history, options, &interrupt),
         _ => resume_in::<D3>(&scene, &history, options, &interrupt),
     }
 }

@@ -10,7 +10,7 @@ use crate::record::Recorder;
 use crate::scene::{Scene, SceneError};
 use crate::signals::{self, INTERRUPTED, Interrupt};
 use crate::summary::{Ending, Summary};
-use dem_core::dim::{D2, D3, Dim};
+use dem_core::dim::{D2, D3, D3Twist, Dim};
 use dem_core::saved::{Mismatch, Reader, Saved};
 use dem_core::world::{StepError, StepReport, World};
 use std::path::{Path, PathBuf};
@@ -120,6 +120,7 @@ pub fn run(scene: &Scene, options: &RunOptions) -> Result<(), RunError> {
     options.execution.start_threads()?;
     match scene.dimension {
         2 => run_in::<D2>(scene, options, &interrupt),
+        _ if scene.twists() => run_in::<D3Twist>(scene, options, &interrupt),
         _ => run_in::<D3>(scene, options, &interrupt),
     }
 }
@@ -301,6 +302,7 @@ impl<D: Dim> State<D> {
             bonds: world.bonds.len(),
             elastic: world.bonds.iter().any(|b| b.stiffness.is_some()),
             broken: course.broken,
+            twists: scene.twists(),
             failure: course.collapse.failure,
             tolerance: scene.solver.tolerance,
             worst_residual: course.worst_residual,

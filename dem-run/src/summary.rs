@@ -45,8 +45,10 @@ pub struct Summary {
     pub bonds: usize,
     /// Whether they are elastic: then the sample may deform before any breaks.
     pub elastic: bool,
-    /// Bonds broken in tension, shear and rolling.
-    pub broken: [usize; 3],
+    /// Bonds broken in tension, shear, rolling and twist.
+    pub broken: [usize; 4],
+    /// Whether bonds resist twist.
+    pub twists: bool,
     /// Loads at which the sample failed (N).
     pub failure: Failure,
     /// Tolerance of the solver (–).
@@ -135,10 +137,11 @@ impl fmt::Display for Summary {
 impl Summary {
     fn write_bonds(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let broken: usize = self.broken.iter().sum();
-        let [tension, shear, rolling] = self.broken;
+        let [tension, shear, rolling, twist] = self.broken;
+        let twist = if self.twists { format!(", twist {twist}") } else { String::new() };
         writeln!(
             f,
-            "bonds            {}, broken {broken} ({:.1} %): tension {tension}, shear {shear}, rolling {rolling}",
+            "bonds            {}, broken {broken} ({:.1} %): tension {tension}, shear {shear}, rolling {rolling}{twist}",
             self.bonds,
             100.0 * broken as f64 / self.bonds as f64
         )?;

@@ -1,6 +1,6 @@
 //! Contact laws: frictionless (Signorini), dry (Signorini–Coulomb) and the intact bond, all as one shifted cone.
 //!
-//! With r̂ = r + s n (s = h r_coh for a bond, 0 else), ũ = u + (μ‖u_t‖ + ν‖u_m‖) n and the cone K,
+//! With r̂ = r + s n (s = h r_coh for a bond, 0 else), ũ = u + (μ‖u_t‖ + ν‖u_m‖ + ξ|u_τ|) n and the cone K,
 //!
 //! K ∋ r̂ ⊥ ũ ∈ K*   ⇔   r̂ = P_K(r̂ − γ ũ) for any γ > 0:
 //!
@@ -12,7 +12,7 @@
 //! same fixed points.
 
 use super::cone::{Cone, Local, Weights};
-use crate::dim::{V0, Vect};
+use crate::dim::{Moments, V0, V1, Vect, resized};
 use std::marker::PhantomData;
 
 /// How one contact is bettered within a sweep.
@@ -27,7 +27,7 @@ pub enum LocalSolve {
 
 /// The local Delassus block of a contact: what a unit of each group of rows does to its own relative velocity.
 ///
-/// For disks and spheres every group is a multiple of the identity, and only t and m are coupled.
+/// For disks and spheres every group is a multiple of the identity, and only t and bending are coupled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Block {
     /// Normal entry (1/kg).
@@ -36,6 +36,8 @@ pub struct Block {
     pub t: f64,
     /// Bending entries, after scaling by the mean diameter (1/kg).
     pub m: f64,
+    /// Twist entry, likewise (1/kg).
+    pub w: f64,
     /// Coupling of t and m (1/kg).
     pub tm: f64,
 }
@@ -53,8 +55,8 @@ pub struct Arms {
 pub trait Law: Copy + Send + Sync + 'static {
     /// Tangential rows.
     type T: Vect;
-    /// Bending rows.
-    type B: Vect;
+    /// Moment rows.
+    type B: Moments;
 
     /// A better impulse for this contact alone, from its impulse `r` (N s) and relative velocity `u` (m/s).
     fn improve(
@@ -108,7 +110,7 @@ pub trait Law: Copy + Send + Sync + 'static {
 ///
 /// A predictor inside the cone is its own projection; the change −γ ũ is then exact, however large the shift s is beside r.
 #[inline]
-pub(crate) fn predict_correct<T: Vect, B: Vect>(
+pub(crate) fn predict_correct<T: Vect, B: Moments>(
     cone: Cone,
     shift: f64,
     non_associated: bool,
@@ -117,7 +119,10 @@ pub(crate) fn predict_correct<T: Vect, B: Vect>(
     mut u: Local<T, B>,
 ) -> Local<T, B> {
     if non_associated {
-        u.n += cone.mu * u.t.norm() + cone.nu * u.m.norm();
+        u.n += cone.mu * u.t.norm() + cone.nu * u.m.bending();
+        if B::TWISTS {
+            u.n += cone.xi * u.m.twist();
+        }
     }
     let change = u * -gamma;
     let mut predictor = r + change;
@@ -168,7 +173,7 @@ impl Law for Frictionless {
     }
 
     fn cone(&self) -> Cone {
-        Cone { mu: 0.0, nu: 0.0 }
+        Cone { mu: 0.0, nu: 0.0, xi: 0.0 }
     }
 }
 
@@ -190,7 +195,7 @@ impl<T: Vect> Coulomb<T> {
     }
 
     fn predict_correct(&self, r: Local<T, V0>, u: Local<T, V0>) -> Local<T, V0> {
-        predict_correct(Cone { mu: self.mu, nu: 0.0 }, 0.0, true, self.gamma(), r, u)
+        predict_correct(Cone { mu: self.mu, nu: 0.0, xi: 0.0 }, 0.0, true, self.gamma(), r, u)
     }
 }
 
@@ -232,7 +237,7 @@ impl<T: Vect> Law for Coulomb<T> {
 
     #[inline(always)]
     fn cone(&self) -> Cone {
-        Cone { mu: self.mu, nu: 0.0 }
+        Cone { mu: self.mu, nu: 0.0, xi: 0.0 }
     }
 
     #[inline(always)]
@@ -251,9 +256,9 @@ pub enum BondFlow {
     Bipotential,
 }
 
-/// An intact cohesive bond: normal, tangential and bending rows, shifted by the cohesion.
+/// An intact cohesive bond: normal, tangential and moment rows, shifted by the cohesion.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bonded<T, B> {
+pub struct Bonded<T, B: Moments> {
     inverse_n: f64,
     // inverse of the 2 × 2 block that couples t and m
     inverse_t: f64,
@@ -261,13 +266,28 @@ pub struct Bonded<T, B> {
     inverse_tm: f64,
     arms: Arms,
     shift: f64,
-    cone: Cone,
+    mu: f64,
+    nu: f64,
+    // inverse entry and coefficient of the twist row
+    inverse_w: B::Twist,
+    xi: B::Twist,
     flow: BondFlow,
     bias: f64,
     rows: PhantomData<(T, B)>,
 }
 
-impl<T: Vect, B: Vect> Bonded<T, B> {
+/// A number as one that only a twist row has.
+fn only_twist<B: Moments>(x: f64) -> B::Twist {
+    resized(V1::from([x]))
+}
+
+/// The number of a twist row, `other` where there is none.
+#[inline(always)]
+fn of_twist<B: Moments>(x: B::Twist, other: f64) -> f64 {
+    if B::TWISTS { x[0] } else { other }
+}
+
+impl<T: Vect, B: Moments> Bonded<T, B> {
     /// From the local block, the arms, the cohesion as an impulse h r_coh (N s), the cone and the flow rule.
     pub fn new(block: Block, arms: Arms, shift: f64, cone: Cone, flow: BondFlow) -> Self {
         let det = block.t * block.m - block.tm * block.tm;
@@ -278,7 +298,10 @@ impl<T: Vect, B: Vect> Bonded<T, B> {
             inverse_tm: -block.tm / det,
             arms,
             shift,
-            cone,
+            mu: cone.mu,
+            nu: cone.nu,
+            inverse_w: only_twist::<B>(1.0 / block.w),
+            xi: only_twist::<B>(cone.xi),
             flow,
             bias: 0.0,
             rows: PhantomData,
@@ -294,26 +317,35 @@ impl<T: Vect, B: Vect> Bonded<T, B> {
     /// The local block back from its inverse.
     fn block(&self) -> Block {
         let det = self.inverse_t * self.inverse_m - self.inverse_tm * self.inverse_tm;
-        Block { n: 1.0 / self.inverse_n, t: self.inverse_m / det, m: self.inverse_t / det, tm: -self.inverse_tm / det }
+        let (t, m) = (self.inverse_m / det, self.inverse_t / det);
+        let w = if B::TWISTS { 1.0 / self.inverse_w[0] } else { m };
+        Block { n: 1.0 / self.inverse_n, t, m, w, tm: -self.inverse_tm / det }
+    }
+
+    #[inline(always)]
+    fn limits(&self) -> Cone {
+        Cone { mu: self.mu, nu: self.nu, xi: of_twist::<B>(self.xi, 0.0) }
     }
 }
 
-impl<A: Vect> Law for Bonded<A, A> {
+impl<A: Vect, B: Moments> Law for Bonded<A, B> {
     type T = A;
-    type B = A;
+    type B = B;
 
     #[inline(always)]
-    fn improve(&self, local: LocalSolve, r: Local<A, A>, mut u: Local<A, A>) -> Local<A, A> {
+    fn improve(&self, local: LocalSolve, r: Local<A, B>, mut u: Local<A, B>) -> Local<A, B> {
         u.n += self.bias;
         match local {
             LocalSolve::Exact => {
                 let stuck = Local {
                     n: r.n - u.n * self.inverse_n,
-                    t: r.t - u.t * self.inverse_t - u.m * self.inverse_tm,
-                    m: r.m - u.m * self.inverse_m - u.t * self.inverse_tm,
+                    t: r.t - u.t * self.inverse_t - resized::<B, A>(u.m) * self.inverse_tm,
+                    m: r.m
+                        - u.m.scaled(self.inverse_m, of_twist::<B>(self.inverse_w, 0.0))
+                        - resized::<A, B>(u.t) * self.inverse_tm,
                 };
                 // nearly every bond sticks: no square root, no division
-                if self.cone.contains(&Local { n: stuck.n + self.shift, ..stuck }) {
+                if self.limits().contains(&Local { n: stuck.n + self.shift, ..stuck }) {
                     stuck
                 } else {
                     self.at_limit(r, u)
@@ -324,7 +356,7 @@ impl<A: Vect> Law for Bonded<A, A> {
     }
 
     #[inline(always)]
-    fn natural_map(&self, r: Local<A, A>, mut u: Local<A, A>) -> Local<A, A> {
+    fn natural_map(&self, r: Local<A, B>, mut u: Local<A, B>) -> Local<A, B> {
         u.n += self.bias;
         self.predict_correct(r, u) * -1.0
     }
@@ -335,11 +367,11 @@ impl<A: Vect> Law for Bonded<A, A> {
 
     fn gamma(&self) -> f64 {
         let block = self.block();
-        1.0 / block.n.max(block.t).max(block.m)
+        1.0 / block.n.max(block.t).max(block.m).max(block.w)
     }
 
     fn cone(&self) -> Cone {
-        self.cone
+        self.limits()
     }
 
     fn associated(&self) -> bool {
@@ -357,9 +389,9 @@ impl<A: Vect> Law for Bonded<A, A> {
     }
 }
 
-impl<A: Vect> Bonded<A, A> {
-    fn predict_correct(&self, r: Local<A, A>, u: Local<A, A>) -> Local<A, A> {
-        predict_correct(self.cone, self.shift, self.flow == BondFlow::Bipotential, self.gamma(), r, u)
+impl<A: Vect, B: Moments> Bonded<A, B> {
+    fn predict_correct(&self, r: Local<A, B>, u: Local<A, B>) -> Local<A, B> {
+        predict_correct(self.limits(), self.shift, self.flow == BondFlow::Bipotential, self.gamma(), r, u)
     }
 
     /// Local solve on the boundary of the cone.
@@ -368,24 +400,29 @@ impl<A: Vect> Bonded<A, A> {
     /// W = B + C with B = diag W converges because B − C is positive definite where W is, by a factor
     /// |w_tm| / √(w_t w_m) a round: zero for grains of one size, 0.8 at a size ratio of four.
     #[cold]
-    fn at_limit(&self, r: Local<A, A>, u: Local<A, A>) -> Local<A, A> {
-        let w = self.block();
+    fn at_limit(&self, r: Local<A, B>, u: Local<A, B>) -> Local<A, B> {
+        let (w, cone) = (self.block(), self.limits());
+        let coupled = |t: A| resized::<A, B>(t) * w.tm;
         let mut x = r;
         x.n += self.shift;
         // u = W x + q
-        let q = Local { n: u.n - w.n * x.n, t: u.t - x.t * w.t - x.m * w.tm, m: u.m - x.m * w.m - x.t * w.tm };
-        let weights = Weights { n: w.n, t: w.t, m: w.m };
+        let q = Local {
+            n: u.n - w.n * x.n,
+            t: u.t - x.t * w.t - resized::<B, A>(x.m) * w.tm,
+            m: u.m - x.m.scaled(w.m, w.w) - coupled(x.t),
+        };
+        let weights = Weights { n: w.n, t: w.t, m: w.m, w: w.w };
         let rounds = if w.tm == 0.0 { 1 } else { 200 };
         for _ in 0..rounds {
-            let lagged = Local { n: q.n, t: q.t + x.m * w.tm, m: q.m + x.t * w.tm };
+            let lagged = Local { n: q.n, t: q.t + resized::<B, A>(x.m) * w.tm, m: q.m + coupled(x.t) };
             let next = match self.flow {
-                BondFlow::Associated => self.cone.minimise(weights, lagged),
+                BondFlow::Associated => cone.minimise(weights, lagged),
                 BondFlow::Bipotential => {
                     let n = (-lagged.n / w.n).max(0.0);
                     Local {
                         n,
-                        t: (lagged.t * (-1.0 / w.t)).clipped(self.cone.mu * n),
-                        m: (lagged.m * (-1.0 / w.m)).clipped(self.cone.nu * n),
+                        t: (lagged.t * (-1.0 / w.t)).clipped(cone.mu * n),
+                        m: lagged.m.scaled(-1.0 / w.m, -1.0 / w.w).within(cone.nu * n, cone.xi * n),
                     }
                 }
             };
@@ -405,13 +442,15 @@ impl<A: Vect> Bonded<A, A> {
 /// An elastic row of stiffness k over an implicit step h has f⁺ = f − k h u⁺, which is C = 1/(k h²) for impulses and
 /// r₀ = h f the impulse that the bond carried when the step began, see docs/theory/elastic-bonds.md.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Elastic<T, B> {
+pub struct Elastic<T, B: Moments> {
     bond: Bonded<T, B>,
-    compliance: Weights,
+    // compliance of the rows n, t and m, and of the twist row
+    soft: [f64; 3],
+    soft_w: B::Twist,
     carried: Local<T, B>,
 }
 
-impl<T: Vect, B: Vect> Elastic<T, B> {
+impl<T: Vect, B: Moments> Elastic<T, B> {
     /// From the local block of the rigid bond, its compliance (1/kg), the impulse that it carried (N s), and what
     /// [`Bonded::new`] takes.
     pub fn new(
@@ -423,23 +462,25 @@ impl<T: Vect, B: Vect> Elastic<T, B> {
         cone: Cone,
         flow: BondFlow,
     ) -> Self {
-        let soft = Block { n: block.n + compliance.n, t: block.t + compliance.t, m: block.m + compliance.m, ..block };
-        Self { bond: Bonded::new(soft, arms, shift, cone, flow), compliance, carried }
+        let Weights { n, t, m, w } = compliance;
+        let block = Block { n: block.n + n, t: block.t + t, m: block.m + m, w: block.w + w, ..block };
+        let bond = Bonded::new(block, arms, shift, cone, flow);
+        Self { bond, soft: [n, t, m], soft_w: only_twist::<B>(w), carried }
     }
 }
 
-impl<A: Vect> Law for Elastic<A, A> {
+impl<A: Vect, B: Moments> Law for Elastic<A, B> {
     type T = A;
-    type B = A;
+    type B = B;
 
     #[inline(always)]
-    fn improve(&self, local: LocalSolve, r: Local<A, A>, u: Local<A, A>) -> Local<A, A> {
-        self.bond.improve(local, r, u + self.compliance.times(&(r - self.carried)))
+    fn improve(&self, local: LocalSolve, r: Local<A, B>, u: Local<A, B>) -> Local<A, B> {
+        self.bond.improve(local, r, u + self.compliance().times(&(r - self.carried)))
     }
 
     #[inline(always)]
-    fn natural_map(&self, r: Local<A, A>, u: Local<A, A>) -> Local<A, A> {
-        self.bond.natural_map(r, u + self.compliance.times(&(r - self.carried)))
+    fn natural_map(&self, r: Local<A, B>, u: Local<A, B>) -> Local<A, B> {
+        self.bond.natural_map(r, u + self.compliance().times(&(r - self.carried)))
     }
 
     fn gamma(&self) -> f64 {
@@ -447,7 +488,7 @@ impl<A: Vect> Law for Elastic<A, A> {
     }
 
     fn cone(&self) -> Cone {
-        self.bond.cone
+        self.bond.limits()
     }
 
     fn associated(&self) -> bool {
@@ -464,11 +505,13 @@ impl<A: Vect> Law for Elastic<A, A> {
         self.bond.arms
     }
 
+    #[inline(always)]
     fn compliance(&self) -> Weights {
-        self.compliance
+        let [n, t, m] = self.soft;
+        Weights { n, t, m, w: of_twist::<B>(self.soft_w, 0.0) }
     }
 
-    fn carried(&self) -> Local<A, A> {
+    fn carried(&self) -> Local<A, B> {
         self.carried
     }
 }

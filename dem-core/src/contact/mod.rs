@@ -3,6 +3,6 @@
 pub mod cone;
 pub mod law;
 
-pub(crate) use cone::Padded;
 pub use cone::{Cone, Local, Weights};
+pub(crate) use cone::{PADDED, Padded};
 pub use law::{Arms, Block, BondFlow, Bonded, Coulomb, Elastic, Frictionless, Law, LocalSolve};

@@ -11,7 +11,7 @@
 use super::residual::relative;
 use super::{Contact, ContactProblem, Link, Nodes, Visitor};
 use crate::contact::law::predict_correct;
-use crate::contact::{Arms, Cone, Law, Local, Padded, Weights};
+use crate::contact::{Arms, Cone, Law, Local, PADDED, Padded, Weights};
 use crate::dim::{Dim, Vect};
 use thiserror::Error;
 
@@ -23,8 +23,8 @@ const ASYMMETRY: f64 = 1e-6;
 pub struct ContactRows {
     /// Tangential rows: 1 in the plane, 2 in space.
     pub tangents: usize,
-    /// Bending rows: none, or as many as tangential ones.
-    pub bends: usize,
+    /// Moment rows: none, as many of bending as there are tangential ones, or those and one of twist.
+    pub moments: usize,
 }
 
 /// A matrix of square blocks, one row and one column of them for each contact; diagonal blocks are always there.
@@ -52,6 +52,8 @@ pub struct Parts {
     pub mu: Vec<f64>,
     /// Coefficients of the bending rows, moments being divided by the mean diameter (–), C.
     pub nu: Vec<f64>,
+    /// Coefficients of the twist rows, likewise (–), C.
+    pub xi: Vec<f64>,
     /// Whether the flow of a contact is normal to its cone, C.
     pub associated: Vec<bool>,
     /// What r̂ is above the reaction r in the normal row (N s), C; zero where it is not known.
@@ -111,7 +113,7 @@ impl ContactRows {
     /// How many rows a contact has: M.
     #[must_use]
     pub fn count(self) -> usize {
-        1 + self.tangents + self.bends
+        1 + self.tangents + self.moments
     }
 
     /// The rows of one contact in a slice of M numbers.
@@ -121,7 +123,7 @@ impl ContactRows {
         for k in 0..self.tangents {
             out.t[k] = rows[1 + k];
         }
-        for k in 0..self.bends {
+        for k in 0..self.moments {
             out.m[k] = rows[1 + self.tangents + k];
         }
         out
@@ -132,7 +134,7 @@ impl ContactRows {
     pub(crate) fn write(self, r: &Padded, rows: &mut [f64]) {
         rows[0] = r.n;
         rows[1..=self.tangents].copy_from_slice(&r.t.as_slice()[..self.tangents]);
-        rows[1 + self.tangents..].copy_from_slice(&r.m.as_slice()[..self.bends]);
+        rows[1 + self.tangents..].copy_from_slice(&r.m.as_slice()[..self.moments]);
     }
 }
 
@@ -243,6 +245,7 @@ impl Parts {
         length("q", self.q.len(), contacts * self.rows.count())?;
         length("mu", self.mu.len(), contacts)?;
         length("mu_r", self.nu.len(), contacts)?;
+        length("mu_t", self.xi.len(), contacts)?;
         length("associated", self.associated.len(), contacts)?;
         length("shift", self.shift.len(), contacts)?;
         let values = |array, values: &[f64], least: f64, allowed| {
@@ -254,6 +257,7 @@ impl Parts {
         values("q", &self.q, f64::NEG_INFINITY, finite)?;
         values("mu", &self.mu, 0.0, coefficient)?;
         values("mu_r", &self.nu, 0.0, coefficient)?;
+        values("mu_t", &self.xi, 0.0, coefficient)?;
         values("shift", &self.shift, 0.0, coefficient)?;
         values("applied", &[self.applied], 0.0, coefficient)?;
         let largest = self.matrix.value.iter().fold(0.0, |most: f64, w| most.max(w.abs()));
@@ -309,7 +313,7 @@ impl Assembled {
     /// The cone of a contact.
     #[must_use]
     pub fn cone(&self, contact: usize) -> Cone {
-        Cone { mu: self.parts.mu[contact], nu: self.parts.nu[contact] }
+        Cone { mu: self.parts.mu[contact], nu: self.parts.nu[contact], xi: self.parts.xi[contact] }
     }
 
     /// The shifted reaction of a contact.
@@ -323,7 +327,7 @@ impl Assembled {
     #[inline]
     pub(crate) fn velocity(&self, contact: usize) -> Padded {
         let (rows, size) = (self.parts.rows, self.parts.rows.count());
-        let mut u = [0.0; 5];
+        let mut u = [0.0; PADDED];
         u[..size].copy_from_slice(&self.parts.q[contact * size..(contact + 1) * size]);
         self.parts.matrix.multiply_row(contact, &self.r, &mut u[..size]);
         rows.padded(&u[..size])
@@ -396,8 +400,8 @@ impl Assembled {
         let mut list = List(Vec::with_capacity(problem.len()));
         problem.visit(&mut list);
         let List(list) = list;
-        let bends = if problem.bonded.is_empty() && problem.elastic.is_empty() { 0 } else { D::N - 1 };
-        let rows = ContactRows { tangents: D::N - 1, bends };
+        let moments = if problem.bonded.is_empty() && problem.elastic.is_empty() { 0 } else { D::Moment::LEN };
+        let rows = ContactRows { tangents: D::N - 1, moments };
         let matrix = delassus(&problem.nodes, &list, rows);
         let mut nodes = problem.nodes.clone();
         for (node, free) in nodes.all.iter_mut().zip(problem.free.iter()) {
@@ -426,6 +430,7 @@ impl Assembled {
             q,
             mu: list.iter().map(|item| item.cone.mu).collect(),
             nu: list.iter().map(|item| item.cone.nu).collect(),
+            xi: list.iter().map(|item| item.cone.xi).collect(),
             associated: list.iter().map(|item| item.associated).collect(),
             shift: list.iter().map(|item| item.shift).collect(),
             applied: problem.applied,
@@ -439,7 +444,7 @@ struct Item<D: Dim> {
     link: Link<D>,
     arms: Arms,
     tangents: usize,
-    bends: usize,
+    moments: usize,
     cone: Cone,
     associated: bool,
     shift: f64,
@@ -457,7 +462,7 @@ impl<D: Dim> Visitor<D> for List<D> {
             link: c.link,
             arms: c.law.arms(),
             tangents: L::T::LEN,
-            bends: L::B::LEN,
+            moments: L::B::LEN,
             cone: c.law.cone(),
             associated: c.law.associated(),
             shift: c.law.shift(),
@@ -472,12 +477,12 @@ impl<D: Dim> Visitor<D> for List<D> {
 impl<D: Dim> Item<D> {
     /// The relative velocity, zero in rows that the contact lacks.
     fn velocity(&self, nodes: &Nodes<D>) -> Padded {
-        let u = nodes.relative_velocity::<D::Tangent, D::Tangent>(&self.link, self.arms);
+        let u = nodes.relative_velocity::<D::Tangent, D::Moment>(&self.link, self.arms);
         let mut out = Padded { n: u.n, ..Padded::zero() };
         for k in 0..self.tangents {
             out.t[k] = u.t[k];
         }
-        for k in 0..self.bends {
+        for k in 0..self.moments {
             out.m[k] = u.m[k];
         }
         out
@@ -502,12 +507,12 @@ fn delassus<D: Dim>(nodes: &Nodes<D>, list: &[Item<D>], rows: ContactRows) -> Bl
         let mut near: Vec<usize> = moving.flat_map(|k| around[k].iter().copied()).collect();
         near.sort_unstable();
         near.dedup();
-        for k in (0..1 + item.tangents).chain(1 + rows.tangents..1 + rows.tangents + item.bends) {
-            let mut unit = [0.0; 5];
+        for k in (0..1 + item.tangents).chain(1 + rows.tangents..1 + rows.tangents + item.moments) {
+            let mut unit = [0.0; PADDED];
             unit[k] = 1.0;
             nodes.apply(&item.link, item.arms, rows.padded(&unit[..size]));
             for &d in &near {
-                let mut u = [0.0; 5];
+                let mut u = [0.0; PADDED];
                 let mut moved = list[d].velocity(&nodes);
                 if d == c {
                     moved += item.compliance.times(&rows.padded(&unit[..size]));

@@ -8,7 +8,7 @@ pub(crate) mod blocks;
 pub mod residual;
 
 use crate::contact::{Arms, Block, Bonded, Coulomb, Elastic, Frictionless, Law, Local};
-use crate::dim::{Dim, Vect, resized};
+use crate::dim::{Dim, Moments, Vect, resized};
 use std::sync::Arc;
 
 /// The velocity unknowns of one body, and what an impulse does to them.
@@ -54,6 +54,7 @@ impl<D: Dim> Link<D> {
             n: i.inverse_mass + j.inverse_mass,
             t: i.inverse_mass + j.inverse_mass + li * li * i.inverse_inertia + lj * lj * j.inverse_inertia,
             m: arm * arm * spin,
+            w: arm * arm * spin,
             tm: arm * (lj * j.inverse_inertia - li * i.inverse_inertia),
         };
         if let Some(d) = drive {
@@ -78,9 +79,9 @@ pub type Group<D, L> = Vec<Contact<D, L>>;
 /// The law of a dry contact in dimension D.
 pub type Dry<D> = Coulomb<<D as Dim>::Tangent>;
 /// The law of an intact rigid bond in dimension D.
-pub type Bond<D> = Bonded<<D as Dim>::Tangent, <D as Dim>::Tangent>;
+pub type Bond<D> = Bonded<<D as Dim>::Tangent, <D as Dim>::Moment>;
 /// The law of an intact elastic bond in dimension D.
-pub type ElasticBond<D> = Elastic<<D as Dim>::Tangent, <D as Dim>::Tangent>;
+pub type ElasticBond<D> = Elastic<<D as Dim>::Tangent, <D as Dim>::Moment>;
 
 /// The contact problem of one step.
 #[derive(Clone, Debug)]
@@ -127,14 +128,14 @@ pub(crate) struct Span<'a, D: Dim> {
 impl<D: Dim> Nodes<D> {
     /// Relative velocity u = Hᵀ v of node i with respect to node j at the contact point.
     #[inline(always)]
-    pub fn relative_velocity<T: Vect, B: Vect>(&self, link: &Link<D>, arms: Arms) -> Local<T, B> {
+    pub fn relative_velocity<T: Vect, B: Moments>(&self, link: &Link<D>, arms: Arms) -> Local<T, B> {
         let [i, j] = link.nodes.map(|node| self.all[node as usize].motion());
         link.relative_velocity(arms, i, j)
     }
 
     /// Add the impulse r of node j on node i: v += M⁻¹ H r.
     #[inline(always)]
-    pub fn apply<T: Vect, B: Vect>(&mut self, link: &Link<D>, arms: Arms, r: Local<T, B>) {
+    pub fn apply<T: Vect, B: Moments>(&mut self, link: &Link<D>, arms: Arms, r: Local<T, B>) {
         self.span().apply(link, arms, r);
     }
 
@@ -153,7 +154,7 @@ impl<D: Dim> Node<D> {
 impl<D: Dim> Link<D> {
     /// Relative velocity of a body with this velocity and spin, i, with respect to another, j, at the contact point.
     #[inline(always)]
-    pub(crate) fn relative_velocity<T: Vect, B: Vect>(
+    pub(crate) fn relative_velocity<T: Vect, B: Moments>(
         &self,
         arms: Arms,
         (velocity_i, spin_i): (D::Vector, D::Spin),
@@ -164,8 +165,8 @@ impl<D: Dim> Link<D> {
             return Local { n, ..Local::zero() };
         }
         let turn = D::spin_rows(&self.frame, spin_i * arms.lever[0] + spin_j * arms.lever[1]);
-        let bend = |spin: D::Spin| resized(D::spin_rows(&self.frame, spin * arms.bending));
-        let m = if B::LEN == 0 { B::zero() } else { bend(spin_i - spin_j) };
+        let moment = |spin: D::Spin| resized(D::moment_rows(&self.frame, spin * arms.bending));
+        let m = if B::LEN == 0 { B::zero() } else { moment(spin_i - spin_j) };
         Local { n, t: resized(t - turn), m }
     }
 }
@@ -173,21 +174,21 @@ impl<D: Dim> Link<D> {
 impl<D: Dim> Span<'_, D> {
     /// As [`Nodes::relative_velocity`].
     #[inline(always)]
-    pub fn relative_velocity<T: Vect, B: Vect>(&self, link: &Link<D>, arms: Arms) -> Local<T, B> {
+    pub fn relative_velocity<T: Vect, B: Moments>(&self, link: &Link<D>, arms: Arms) -> Local<T, B> {
         let [i, j] = link.nodes.map(|node| self.all[node as usize - self.first].motion());
         link.relative_velocity(arms, i, j)
     }
 
     /// As [`Nodes::apply`].
     #[inline(always)]
-    pub fn apply<T: Vect, B: Vect>(&mut self, link: &Link<D>, arms: Arms, r: Local<T, B>) {
+    pub fn apply<T: Vect, B: Moments>(&mut self, link: &Link<D>, arms: Arms, r: Local<T, B>) {
         let [i, j] = link.nodes.map(|node| node as usize - self.first);
-        let (t, m): (D::Tangent, D::Tangent) = (resized(r.t), resized(r.m));
+        let (t, m): (D::Tangent, D::Moment) = (resized(r.t), resized(r.m));
         let impulse = if T::LEN > 0 { D::compose(&link.frame, r.n, t) } else { D::normal(&link.frame) * r.n };
         let node = &mut self.all[i];
         node.velocity += impulse * node.inverse_mass;
         if T::LEN > 0 {
-            let turn = D::spin_rows_transposed(&link.frame, t * -arms.lever[0] + m * arms.bending);
+            let turn = D::torque_of_rows(&link.frame, t * -arms.lever[0], m * arms.bending);
             node.spin += turn * node.inverse_inertia;
         }
         let node = &mut self.all[j];
@@ -198,7 +199,7 @@ impl<D: Dim> Span<'_, D> {
         }
         node.velocity -= impulse * node.inverse_mass;
         if T::LEN > 0 {
-            let turn = D::spin_rows_transposed(&link.frame, t * -arms.lever[1] - m * arms.bending);
+            let turn = D::torque_of_rows(&link.frame, t * -arms.lever[1], m * -arms.bending);
             node.spin += turn * node.inverse_inertia;
         }
     }

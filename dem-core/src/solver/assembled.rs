@@ -7,15 +7,15 @@
 
 use super::gauss_seidel::{Sweepable, iterate};
 use super::{GaussSeidelSettings, SolveReport};
-use crate::contact::{LocalSolve, Padded};
-use crate::dim::Vect;
+use crate::contact::{LocalSolve, PADDED, Padded};
+use crate::dim::{Moments, Vect};
 use crate::problem::assembled::Assembled;
 use nalgebra::SMatrix;
 
 /// Most repetitions of the predictor–corrector in one visit of a contact; the next sweep goes on.
 const ROUNDS: usize = 100;
 
-type Block = SMatrix<f64, 5, 5>;
+type Block = SMatrix<f64, PADDED, PADDED>;
 
 /// The block of a contact, padded, and what its local solve needs.
 struct Site {
@@ -40,7 +40,7 @@ impl Site {
         }
         // rows that the contact lacks: one on the diagonal keeps them out of the way of the inverse
         let mut filled = block;
-        let lacks: Vec<usize> = (0..5).filter(|k| block.row(*k).iter().all(|w| *w == 0.0)).collect();
+        let lacks: Vec<usize> = (0..PADDED).filter(|k| block.row(*k).iter().all(|w| *w == 0.0)).collect();
         lacks.iter().for_each(|k| filled[(*k, *k)] = scale);
         let inverse = filled.cholesky().map(|factor| {
             let mut inverse = factor.inverse();
@@ -62,7 +62,7 @@ impl Site {
         }
         let open = u + Padded::from_order(&(self.block * r.in_order())) * -1.0;
         let pull = if problem.parts().associated[contact] {
-            cone.mu * Vect::norm(&open.t) + cone.nu * Vect::norm(&open.m)
+            cone.mu * Vect::norm(&open.t) + cone.nu * open.m.bending() + cone.xi * open.m.twist()
         } else {
             0.0
         };

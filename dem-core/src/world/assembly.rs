@@ -5,7 +5,7 @@ use super::touch::{Touch, TouchStatus};
 use crate::body::direction;
 use crate::bond::{Bond, BondStatus};
 use crate::contact::{Arms, Bonded, Coulomb, Elastic, Frictionless, Law, Local};
-use crate::dim::{Dim, Vect};
+use crate::dim::{Dim, Moments, Vect};
 use crate::problem::{Contact, ContactProblem, Group, Link, Node, Nodes, blocks};
 use std::sync::Arc;
 
@@ -123,7 +123,7 @@ impl<D: Dim> World<D> {
 
     /// Reactions (N, N m) that the elastic bonds carry as a step begins, by the number of the bond; empty where bonds are
     /// rigid.
-    pub(super) fn carried(&self, touches: &[Touch<D>]) -> Vec<Local<D::Tangent, D::Tangent>> {
+    pub(super) fn carried(&self, touches: &[Touch<D>]) -> Vec<Local<D::Tangent, D::Moment>> {
         if self.bonds.iter().all(|b| b.stiffness.is_none()) {
             return Vec::new();
         }
@@ -226,7 +226,7 @@ impl<D: Dim> World<D> {
         &self,
         touches: &[Touch<D>],
         motion: &Motion<D>,
-        carried: &[Local<D::Tangent, D::Tangent>],
+        carried: &[Local<D::Tangent, D::Moment>],
         applied: f64,
         h: f64,
     ) -> (ContactProblem<D>, Places) {
@@ -323,7 +323,7 @@ fn turning<D: Dim>(link: &Link<D>, motion: &Motion<D>, h: f64) -> f64 {
 }
 
 /// Moments over the mean diameter.
-fn over_arm<T: Vect>(r: Local<T, T>, arm: f64) -> Local<T, T> {
+fn over_arm<T: Vect, B: Moments>(r: Local<T, B>, arm: f64) -> Local<T, B> {
     Local { m: r.m * (1.0 / arm), ..r }
 }
 
@@ -332,7 +332,7 @@ pub(super) fn read_back<D: Dim, L: Law>(touches: &mut [Touch<D>], group: &Group<
     for (contact, place) in group.iter().zip(places) {
         let touch = &mut touches[*place as usize];
         let arm = contact.law.arms().bending;
-        let r: Local<D::Tangent, D::Tangent> = contact.r.resized();
+        let r: Local<D::Tangent, D::Moment> = contact.r.resized();
         touch.reaction = Local { n: r.n / h, t: r.t * (1.0 / h), m: r.m * (arm / h) };
         touch.status = if touch.bond.is_some() {
             TouchStatus::Bonded

@@ -136,10 +136,16 @@ impl<D: Dim> World<D> {
             let held = self.grains.fixed[i] && self.grains.fixed[j];
             if rest_gap <= gap_tolerance * mean_diameter && strength > 0.0 && !held {
                 let status = BondStatus::Intact;
-                let stiffness = None;
-                self.bonds.push(Bond { pair, rest_gap, mean_diameter, strength, friction, stiffness, status });
+                let (twist, stiffness) = (0.0, None);
+                self.bonds.push(Bond { pair, rest_gap, mean_diameter, strength, friction, twist, stiffness, status });
             }
         }
+    }
+
+    /// Give the twisting moment of every bond the limit ξ a (r_n + r_coh) with this ξ (–); in space with twist rows, where a
+    /// bond that has none breaks as soon as it is twisted.
+    pub fn limit_twist(&mut self, xi: f64) {
+        self.bonds.iter_mut().for_each(|bond| bond.twist = xi);
     }
 
     /// Make every bond elastic; `stiffness` gives its stiffness for a mean diameter (m).

@@ -12,7 +12,7 @@ impl<D: Dim> World<D> {
     ///
     /// A start is where a solver begins, not a load: what the solver makes of it is up to the solver. In a rigid sample,
     /// whose reactions are not unique, different starts lead to different reactions that are all solutions.
-    pub fn start_from(&mut self, mut reaction: impl FnMut(&Bond) -> Local<D::Tangent, D::Tangent>) {
+    pub fn start_from(&mut self, mut reaction: impl FnMut(&Bond) -> Local<D::Tangent, D::Moment>) {
         self.touches.clear();
         for (k, bond) in self.bonds.iter().enumerate().filter(|(_, b)| b.status == BondStatus::Intact) {
             let [i, j] = bond.pair.map(|k| k as usize);

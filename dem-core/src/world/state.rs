@@ -13,7 +13,8 @@ use crate::saved::{Mismatch, Reader, Saved};
 /// The code of "no bond" where an index could stand.
 const NONE: u64 = u64::MAX;
 
-const BONDS: [BondStatus; 4] = [BondStatus::Intact, BondStatus::Tension, BondStatus::Shear, BondStatus::Rolling];
+const BONDS: [BondStatus; 5] =
+    [BondStatus::Intact, BondStatus::Tension, BondStatus::Shear, BondStatus::Rolling, BondStatus::Twist];
 const TOUCHES: [TouchStatus; 4] = [TouchStatus::Open, TouchStatus::Stick, TouchStatus::Slip, TouchStatus::Bonded];
 
 /// A value by its code, the place in `all`.
@@ -137,23 +138,27 @@ fn restored_pair(bodies: usize, from: &mut Reader) -> Result<[u32; 2], Mismatch>
 
 fn save_bond(bond: &Bond, to: &mut Saved) {
     save_pair(bond.pair, to);
-    to.reals.extend([bond.rest_gap, bond.mean_diameter, bond.strength, bond.friction]);
+    to.reals.extend([bond.rest_gap, bond.mean_diameter, bond.strength, bond.friction, bond.twist]);
     to.flag(bond.stiffness.is_some());
-    if let Some(Stiffness { normal, tangential, rolling }) = bond.stiffness {
-        to.reals.extend([normal, tangential, rolling]);
+    if let Some(Stiffness { normal, tangential, rolling, twist }) = bond.stiffness {
+        to.reals.extend([normal, tangential, rolling, twist]);
     }
     to.count(code(&BONDS, &bond.status));
 }
 
 fn restored_bond(grains: usize, from: &mut Reader) -> Result<Bond, Mismatch> {
     let pair = restored_pair(grains, from)?;
-    let (rest_gap, mean_diameter, strength, friction) = (from.real()?, from.real()?, from.real()?, from.real()?);
+    let (rest_gap, mean_diameter, strength) = (from.real()?, from.real()?, from.real()?);
+    let (friction, twist) = (from.real()?, from.real()?);
     let stiffness = match from.flag()? {
-        true => Some(Stiffness { normal: from.real()?, tangential: from.real()?, rolling: from.real()? }),
+        true => {
+            let (normal, tangential) = (from.real()?, from.real()?);
+            Some(Stiffness { normal, tangential, rolling: from.real()?, twist: from.real()? })
+        }
         false => None,
     };
     let status = coded(&BONDS, from)?;
-    Ok(Bond { pair, rest_gap, mean_diameter, strength, friction, stiffness, status })
+    Ok(Bond { pair, rest_gap, mean_diameter, strength, friction, twist, stiffness, status })
 }
 
 fn save_touch<D: Dim>(touch: &Touch<D>, to: &mut Saved) {
@@ -162,7 +167,8 @@ fn save_touch<D: Dim>(touch: &Touch<D>, to: &mut Saved) {
     to.vector(&touch.point);
     to.counts.push(touch.bond.map_or(NONE, u64::from));
     to.reals.extend([touch.gap, touch.reaction.n]);
-    to.vectors(&[touch.reaction.t, touch.reaction.m]);
+    to.vector(&touch.reaction.t);
+    to.vector(&touch.reaction.m);
     to.count(code(&TOUCHES, &touch.status));
 }
 

@@ -282,7 +282,7 @@ impl<D: Dim> World<D> {
     }
 
     /// The bonds of a group that are at their limit, each with the square of its flow.
-    fn group_at_limit<L: Law<T = D::Tangent, B = D::Tangent>>(
+    fn group_at_limit<L: Law<T = D::Tangent, B = D::Moment>>(
         &self,
         touches: &[Touch<D>],
         nodes: &Nodes<D>,
@@ -295,7 +295,7 @@ impl<D: Dim> World<D> {
             let law = &contact.law;
             let Some(mode) = failure(&contact.r, law.shift(), law.cone()) else { continue };
             let touch = &touches[*place as usize];
-            let mut u = nodes.relative_velocity::<D::Tangent, D::Tangent>(&contact.link, law.arms());
+            let mut u = nodes.relative_velocity::<D::Tangent, D::Moment>(&contact.link, law.arms());
             u.n += law.bias();
             let flow = u + law.compliance().times(&(contact.r - law.carried()));
             let Some(bond) = touch.bond else { continue };

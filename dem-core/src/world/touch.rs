@@ -30,8 +30,8 @@ pub struct Touch<D: Dim> {
     pub gap: f64,
     /// Index of the bond that ties the pair, if it holds.
     pub bond: Option<u32>,
-    /// Reaction of j on i (N), and moment (N m, as tangential components of the frame; zero without a bond).
-    pub reaction: Local<D::Tangent, D::Tangent>,
+    /// Reaction of j on i (N), and moment (N m, as rows of the frame; zero without a bond).
+    pub reaction: Local<D::Tangent, D::Moment>,
     /// What it did.
     pub status: TouchStatus,
 }
@@ -79,7 +79,7 @@ pub struct Break<D: Dim> {
     /// Contact point (m).
     pub point: D::Vector,
     /// Reaction at rupture (N, N m).
-    pub reaction: Local<D::Tangent, D::Tangent>,
+    pub reaction: Local<D::Tangent, D::Moment>,
     /// Elastic energy released (J); zero for a rigid bond.
     pub energy: f64,
 }

@@ -83,7 +83,7 @@ fn resting<D: Dim>(grains: Vec<Grain<D>>, feature: Feature, sweeps: u64) -> Worl
         w.form_bonds(1e-6, |_| 100.0, 0.3);
     }
     if feature == Feature::ElasticBonds {
-        w.make_bonds_elastic(|d| Stiffness { normal: 1e8, tangential: 1e8, rolling: 1e8 * d * d / 12.0 });
+        w.make_bonds_elastic(|d| Stiffness { normal: 1e8, tangential: 1e8, rolling: 1e8 * d * d / 12.0, twist: 0.0 });
     }
     w
 }

@@ -119,6 +119,7 @@ pub fn pressed<D: Dim>(seed: u64, side: usize, friction: f64, bonds: Option<Bond
     let mut w = world(grains, vec![floor(friction), lid], set);
     if bonds.is_some() {
         w.form_bonds(0.03, |_| 20.0, 0.3);
+        w.limit_twist(0.02);
     }
     w
 }

@@ -144,7 +144,7 @@ fn scene<D: Dim>(dice: &mut Dice, most: f64) -> (World<D>, f64) {
         world.form_bonds(tolerance, |_| strength, mu);
         if dice.one_in(3) {
             let k = strength / size * dice.decade(1.0, 1e6);
-            world.make_bonds_elastic(|d| Stiffness { normal: k, tangential: k, rolling: k * d * d / 12.0 });
+            world.make_bonds_elastic(|d| Stiffness { normal: k, tangential: k, rolling: k * d * d / 12.0, twist: 0.0 });
         }
     }
     (world, accept)

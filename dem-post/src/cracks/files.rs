@@ -25,8 +25,8 @@ pub fn write(history: &History, report: &Report, times: &[f64], folder: &mut Fol
     let frames = moments::chosen(history, times)?;
     write_ruptures(report, folder)?;
     let curve = broken_over_time(&report.events);
-    let rows = curve.iter().map(|(time, n)| row![time, n[0], n[1], n[2], n.iter().sum::<usize>()]);
-    folder.table("broken", &["time_s", "tension", "shear", "rolling", "total"], rows)?;
+    let rows = curve.iter().map(|(time, n)| row![time, n[0], n[1], n[2], n[3], n.iter().sum::<usize>()]);
+    folder.table("broken", &["time_s", "tension", "shear", "rolling", "twist", "total"], rows)?;
     let rows = report.fragments.iter().map(|pieces| {
         let f = pieces.fragments;
         row![pieces.step, pieces.time, f.count, f.singles, f.largest, f.largest_mass_fraction]
@@ -135,12 +135,15 @@ fn write_cracks(report: &Report, folder: &mut Folder) -> Result<()> {
 
 fn write_surfaces(report: &Report, folder: &mut Folder) -> Result<()> {
     let head = [
-        "crack", "bonds", "tension", "shear", "rolling", "area_m2", "extent_m", "normal_x", "normal_y", "normal_z",
-        "flatness", "first_s", "last_s",
+        "crack", "bonds", "tension", "shear", "rolling", "twist", "area_m2", "extent_m", "normal_x", "normal_y",
+        "normal_z", "flatness", "first_s", "last_s",
     ];
     let rows = report.surfaces.iter().map(|c| {
         let (m, [x, y, z]) = (c.modes, c.normal);
-        row![c.number, c.bonds, m.tension, m.shear, m.rolling, c.area, c.extent, x, y, z, c.flatness, c.first, c.last]
+        row![
+            c.number, c.bonds, m.tension, m.shear, m.rolling, m.twist, c.area, c.extent, x, y, z, c.flatness, c.first,
+            c.last
+        ]
     });
     Ok(folder.table("cracks", &head, rows)?)
 }

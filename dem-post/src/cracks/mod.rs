@@ -45,7 +45,7 @@ pub const CRACK_HEAD: [&str; 10] = [
 
 /// The columns of the table of cracks in space.
 pub const SURFACE_HEAD: [&str; 9] =
-    ["crack", "bonds", "T/S/R", "area (mm²)", "extent (mm)", "normal", "flatness", "first (s)", "last (s)"];
+    ["crack", "bonds", "T/S/R/Tw", "area (mm²)", "extent (mm)", "normal", "flatness", "first (s)", "last (s)"];
 
 /// A number for each way to break.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -56,12 +56,14 @@ pub struct Modes {
     pub shear: usize,
     /// By the rolling moment.
     pub rolling: usize,
+    /// By the twisting moment.
+    pub twist: usize,
 }
 
 impl Modes {
     /// All together.
     pub fn total(self) -> usize {
-        self.tension + self.shear + self.rolling
+        self.tension + self.shear + self.rolling + self.twist
     }
 
     /// Counts one more.
@@ -70,6 +72,7 @@ impl Modes {
             RuptureMode::Tension => self.tension += 1,
             RuptureMode::Shear => self.shear += 1,
             RuptureMode::Rolling => self.rolling += 1,
+            RuptureMode::Twist => self.twist += 1,
         }
     }
 }
@@ -221,10 +224,10 @@ impl From<&Rupture> for Event {
     }
 }
 
-/// Broken bonds by mode after each time at which any broke: (time s, [tension, shear, rolling]), from zero on.
-pub fn broken_over_time(events: &[Event]) -> Vec<(f64, [usize; 3])> {
-    let mut curve: Vec<(f64, [usize; 3])> = vec![];
-    let mut count = [0; 3];
+/// Broken bonds by mode after each time at which any broke: (time s, [tension, shear, rolling, twist]), from zero on.
+pub fn broken_over_time(events: &[Event]) -> Vec<(f64, [usize; 4])> {
+    let mut curve: Vec<(f64, [usize; 4])> = vec![];
+    let mut count = [0; 4];
     for event in events {
         count[event.mode_number()] += 1;
         match curve.last_mut() {
@@ -240,12 +243,17 @@ impl Report {
     pub fn table(&self) -> String {
         let share = 100.0 * self.broken.total() as f64 / self.bonds as f64;
         let last = self.fragments.last().map(|pieces| pieces.fragments);
-        let mut out = facts(&[
+        let mut lines = vec![
             ("bonds", self.bonds.to_string()),
             ("broken", format!("{} ({share:.1} %)", self.broken.total())),
             ("  TENSION", self.broken.tension.to_string()),
             ("  SHEAR", self.broken.shear.to_string()),
             ("  ROLLING", self.broken.rolling.to_string()),
+        ];
+        if self.broken.twist > 0 {
+            lines.push(("  TWIST", self.broken.twist.to_string()));
+        }
+        lines.extend([
             ("first break", quantity(self.first_break, "s")),
             ("5 % broken", quantity(self.time_of_5_percent, "s")),
             (
@@ -260,6 +268,7 @@ impl Report {
                 ),
             ),
         ]);
+        let mut out = facts(&lines);
         if !self.events.is_empty() {
             out += &format!("\n{}", self.event_table());
         }
@@ -297,8 +306,10 @@ impl Report {
     /// The largest cracks, one a line, below the heads of their columns; none where nothing broke.
     pub fn crack_rows(&self) -> Option<(&'static [&'static str], Vec<Vec<String>>)> {
         let row = |place: usize, bonds: usize, modes: Modes, own: Vec<String>, times: [f64; 2]| {
-            let Modes { tension, shear, rolling } = modes;
-            let head = [place.to_string(), bonds.to_string(), format!("{tension}/{shear}/{rolling}")];
+            let Modes { tension, shear, rolling, twist } = modes;
+            // disks do not twist
+            let twist = if self.surfaces.is_empty() { String::new() } else { format!("/{twist}") };
+            let head = [place.to_string(), bonds.to_string(), format!("{tension}/{shear}/{rolling}{twist}")];
             head.into_iter().chain(own).chain(times.map(number)).collect::<Vec<_>>()
         };
         let line = |c: &Crack| {

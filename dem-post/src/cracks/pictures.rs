@@ -29,8 +29,8 @@ const PALER: [&str; 3] = ["#7fb8d8", "#eaae7f", "#7fceb9"];
 const FRONTS: usize = 3;
 
 /// Broken bonds over time, by mode, until `end` (s).
-pub fn broken_chart(curve: &[(f64, [usize; 3])], end: f64) -> Chart {
-    let points = |count: &dyn Fn(&[usize; 3]) -> usize| -> Vec<(f64, f64)> {
+pub fn broken_chart(curve: &[(f64, [usize; 4])], end: f64) -> Chart {
+    let points = |count: &dyn Fn(&[usize; 4]) -> usize| -> Vec<(f64, f64)> {
         let last = curve.last().map_or(0, |(_, n)| count(n));
         let inner = curve.iter().map(|(time, n)| (*time, count(n) as f64));
         std::iter::once((0.0, 0.0)).chain(inner).chain([(end, last as f64)]).collect()
@@ -40,6 +40,9 @@ pub fn broken_chart(curve: &[(f64, [usize; 3])], end: f64) -> Chart {
         .curve("tension", colour::BLUE, Style::Steps, points(&|n| n[0]))
         .curve("shear", colour::VERMILLION, Style::Steps, points(&|n| n[1]))
         .curve("rolling", colour::GREEN, Style::Steps, points(&|n| n[2]));
+    if curve.last().is_some_and(|(_, n)| n[3] > 0) {
+        chart = chart.curve("twist", colour::PURPLE, Style::Steps, points(&|n| n[3]));
+    }
     chart.counts = true;
     chart
 }

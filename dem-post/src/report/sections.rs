@@ -168,7 +168,11 @@ fn cracks(history: &History, report: &Report, found: &Cracks) -> Result<Section>
             figures.push(chart(curve, &alt, &alt));
         }
     }
-    let caption = "The largest cracks; T/S/R: bonds broken in tension, in shear, by rolling";
+    let caption = if found.surfaces.is_empty() {
+        "The largest cracks; T/S/R: bonds broken in tension, in shear, by rolling"
+    } else {
+        "The largest cracks; T/S/R/Tw: bonds broken in tension, in shear, by rolling, by twist"
+    };
     let tables = found.crack_rows().into_iter().map(|(head, rows)| Table::new(caption, head, rows)).collect();
     let facts = vec![
         ("Bonds".into(), found.bonds.to_string()),

@@ -186,7 +186,13 @@ pub(super) fn contacts(companion: &Companion, history: &History, o: &Outline, ba
         let along = Rows { count: m, width: rows - 1, filled: 0..rows - 1 };
         data.moving::<f64>("tangential_force", "contacts/reaction", vec![span(0..m), span(1..rows)], &along)?;
     }
-    let (moment, along) = if d == 2 { (first(&[m]), 1) } else { (first(&[m, 2]), 2) };
+    // along t1 and t2, and along n where bonds resist twist
+    let twists = || companion.shape("contacts/moment").is_ok_and(|shape| shape.get(1) == Some(&3));
+    let (moment, along) = match d {
+        2 => (first(&[m]), 1),
+        _ if companion.has("contacts/moment") && twists() => (first(&[m, 3]), 3),
+        _ => (first(&[m, 2]), 2),
+    };
     data.moving::<f64>("moment", "contacts/moment", moment, &Rows { count: m, width: along, filled: 0..along })?;
     for (name, place) in [("point", "contacts/point"), ("normal", "contacts/normal"), ("tangent", "contacts/tangent")] {
         data.moving::<f64>(name, place, first(&[m, d]), &Rows::vectors(m, d))?;

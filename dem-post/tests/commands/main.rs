@@ -245,7 +245,7 @@ fn a_wall_that_moves_needs_no_prescribed_force() {
 fn cracks_count_bonds_and_pieces() {
     let (_folder, path) = sample(&layout(2));
     let found = json(&dem_post(&path, &["cracks", "--json", "--times", "0.03,0.1"]));
-    assert_eq!(found["broken"], serde_json::json!({"tension": 1, "shear": 1, "rolling": 0}));
+    assert_eq!(found["broken"], serde_json::json!({"tension": 1, "shear": 1, "rolling": 0, "twist": 0}));
     assert_eq!(found["first_break"], 0.03);
     // two bonds of a ring leave two pieces: 1 alone, and 2–3–0
     let last = found["fragments"].as_array().unwrap().last().unwrap();

@@ -17,7 +17,7 @@ use crate::progress::Progress;
 use crate::run::{Execution, RunError, handle_signals};
 use crate::scene::Scene;
 use crate::signals::Interrupt;
-use dem_core::dim::{D2, D3, Dim};
+use dem_core::dim::{D2, D3, D3Twist, Dim};
 use profile::Profile;
 use rayon::prelude::*;
 use report::{Asked, Indeterminacy, Report, Row, VariedRun};
@@ -60,6 +60,7 @@ pub fn accuracy(scene: &Scene, options: &AccuracyOptions) -> Result<(), RunError
     let mut folder = Folder::create(options.folder.clone())?;
     let report = match scene.dimension {
         2 => measure::<D2>(scene, options, &interrupt)?,
+        _ if scene.twists() => measure::<D3Twist>(scene, options, &interrupt)?,
         _ => measure::<D3>(scene, options, &interrupt)?,
     };
     let json = serde_json::to_string_pretty(&report).map_err(|e| RunError::InputOutput(e.to_string()))? + "\n";

@@ -174,11 +174,14 @@ fn start_anywhere<D: Dim>(world: &mut World<D>, seed: u64) {
     let mut upto = |limit: f64| START_SHARE * limit * (2.0 * random.random::<f64>() - 1.0);
     world.start_from(|bond| {
         let (shear, arm) = (bond.friction * bond.strength, bond.mean_diameter);
-        let mut start = Local::<D::Tangent, D::Tangent>::zero();
+        let mut start = Local::<D::Tangent, D::Moment>::zero();
         start.n = upto(bond.strength);
         for k in 0..D::Tangent::LEN {
             start.t[k] = upto(shear);
             start.m[k] = upto(shear * arm);
+        }
+        for k in D::Tangent::LEN..D::Moment::LEN {
+            start.m[k] = upto(bond.twist * bond.strength * arm);
         }
         start
     });

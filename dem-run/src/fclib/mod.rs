@@ -4,12 +4,13 @@
 //!
 //! ```text
 //! /fclib_local/
-//!     spacedim             M: 2 (n, t), 3 (n, t1, t2); with mu_r 3 (n, t, m) or 5 (n, t1, t2, m1, m2)
+//!     spacedim             M: 2 (n, t), 3 (n, t1, t2); with mu_r 3 (n, t, m) or 5 (n, t1, t2, m1, m2); with mu_t, too,
+//!                          6 (…, twist), which other programs do not know
 //!     W/                   m, n, nzmax, nz, p, i, x: the matrix, C·M × C·M
 //!         nz = −1          by columns: p[n + 1] where each starts, i[nzmax] rows, x[nzmax] values
 //!         nz = −2          by rows: p[m + 1] where each starts, i[nzmax] columns, x[nzmax] values
 //!         nz ≥ 0           nz triplets: i[nz] rows, p[nz] columns, x[nz] values
-//!     vectors/             q [C·M]; mu [C]; mu_r [C] where there are rolling rows
+//!     vectors/             q [C·M]; mu [C]; mu_r [C] where there are rolling rows; mu_t [C] where there is one of twist
 //!     info/                title, description, math_info: text
 //! /guesses/                number_of_guesses; 1, 2, …: u, r [C·M]
 //! /solution/               u, r [C·M]

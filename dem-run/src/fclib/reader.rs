@@ -151,13 +151,17 @@ impl Source {
         let rolling = self.has("fclib_local/vectors/mu_r");
         let dimension = self.integer("fclib_local/spacedim")?;
         let rows = match (dimension, rolling) {
-            (2, false) => ContactRows { tangents: 1, bends: 0 },
-            (3, false) => ContactRows { tangents: 2, bends: 0 },
-            (3, true) => ContactRows { tangents: 1, bends: 1 },
-            (5, true) => ContactRows { tangents: 2, bends: 2 },
-            (5, false) => return Err(self.wrong("fclib_local/vectors/mu_r", "it is missing, and spacedim is 5")),
+            (2, false) => ContactRows { tangents: 1, moments: 0 },
+            (3, false) => ContactRows { tangents: 2, moments: 0 },
+            (3, true) => ContactRows { tangents: 1, moments: 1 },
+            (5, true) => ContactRows { tangents: 2, moments: 2 },
+            (6, true) => ContactRows { tangents: 2, moments: 3 },
+            (5 | 6, false) => {
+                let why = format!("it is missing, and spacedim is {dimension}");
+                return Err(self.wrong("fclib_local/vectors/mu_r", why));
+            }
             _ => {
-                let allowed = if rolling { "3 or 5, as there is a mu_r" } else { "2 or 3, or with mu_r 3 or 5" };
+                let allowed = if rolling { "3, 5 or 6, as there is a mu_r" } else { "2 or 3, or with mu_r 3, 5 or 6" };
                 return Err(self.wrong("fclib_local/spacedim", format!("it is {dimension}, it must be {allowed}")));
             }
         };
@@ -174,6 +178,11 @@ impl Source {
             q,
             mu: coefficients("fclib_local/vectors/mu")?,
             nu: if rolling { coefficients("fclib_local/vectors/mu_r")? } else { vec![0.0; contacts] },
+            xi: if rows.moments > rows.tangents {
+                coefficients("fclib_local/vectors/mu_t")?
+            } else {
+                vec![0.0; contacts]
+            },
             associated: if ours {
                 self.indices("cohesive_dem/associated", contacts, 2)?.into_iter().map(|flag| flag == 1).collect()
             } else {
@@ -186,7 +195,7 @@ impl Source {
             let place = match &error {
                 AssemblyError::Length { array, .. } | AssemblyError::Value { array, .. } => match *array {
                     "shift" | "applied" | "associated" => format!("cohesive_dem/{array}"),
-                    "mu" | "mu_r" | "q" => format!("fclib_local/vectors/{array}"),
+                    "mu" | "mu_r" | "mu_t" | "q" => format!("fclib_local/vectors/{array}"),
                     _ => "fclib_local/W/x".into(),
                 },
                 AssemblyError::Asymmetric { .. } => "fclib_local/W".into(),

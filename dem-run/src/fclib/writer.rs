@@ -33,8 +33,11 @@ impl Problem {
         let vectors = local.create_group("vectors")?;
         dataset(&vectors, "q", &parts.q)?;
         dataset(&vectors, "mu", &parts.mu)?;
-        if parts.rows.bends > 0 {
+        if parts.rows.moments > 0 {
             dataset(&vectors, "mu_r", &parts.nu)?;
+        }
+        if parts.rows.moments > parts.rows.tangents {
+            dataset(&vectors, "mu_t", &parts.xi)?;
         }
         let info = local.create_group("info")?;
         text::<128>(&info, "title", &self.title)?;

@@ -84,7 +84,9 @@ codes! {
     /// It broke in shear.
     Shear = 2 "SHEAR",
     /// It broke by its rolling moment.
-    Rolling = 3 "ROLLING"
+    Rolling = 3 "ROLLING",
+    /// It broke by its twisting moment.
+    Twist = 4 "TWIST"
 }
 
 codes! {
@@ -95,7 +97,9 @@ codes! {
     /// The tangential force reached its limit.
     Shear = 2 "SHEAR",
     /// The rolling moment reached its limit.
-    Rolling = 3 "ROLLING"
+    Rolling = 3 "ROLLING",
+    /// The twisting moment reached its limit.
+    Twist = 4 "TWIST"
 }
 
 codes! {
@@ -128,6 +132,7 @@ impl From<RuptureMode> for BondStatus {
             RuptureMode::Tension => Self::Tension,
             RuptureMode::Shear => Self::Shear,
             RuptureMode::Rolling => Self::Rolling,
+            RuptureMode::Twist => Self::Twist,
         }
     }
 }

@@ -286,7 +286,7 @@ pub(super) fn contacts(file: &File, layout: &Layout, storage: Storage) -> hdf5::
             columns.push(column("contacts/tangent", "tangent", "", &[d], |f| &f.contacts.tangent)?);
         }
         if bonded {
-            let row: &[usize] = if d == 2 { &[] } else { &[2] };
+            let row: &[usize] = if d == 2 { &[] } else { &[2 + usize::from(layout.twist)] };
             columns.push(column("contacts/moment", "moment", "N m", row, |f| &f.contacts.moment)?);
         }
     }

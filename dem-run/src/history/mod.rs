@@ -29,12 +29,12 @@
 //!     point, normal [M,D]; tangent [M,D] in 3D only (in 2D it is (−n_y, n_x))
 //!     reaction [M,D]       N, of j on i, rows n, t (2D) or n, t1, t2 (3D; t2 = n × t1); [M,1] with neither
 //!                          friction nor bonds
-//!     moment [M] (2D), [M,2] (3D, along t1 and t2)                                           N m, if bonds
+//!     moment [M] (2D), [M,2] (3D, along t1 and t2), [M,3] (and n, where bonds resist twist)  N m, if bonds
 //!     gap [M], status (enum OPEN, STICK, SLIP, BONDED) [M], bond i32[M] (−1 for none)        bond: if bonds
 //! /bonds/                  pair i32[B,2]; rest_gap, strength, friction, mean_diameter [B]    m, N, –, m
-//!     status               {step, time, value[T,B]}: enum INTACT, TENSION, SHEAR, ROLLING
+//!     status               {step, time, value[T,B]}: enum INTACT, TENSION, SHEAR, ROLLING, TWIST
 //! /events/rupture          compound [E]: step i64; time, x, y, z, rn, rt, m, energy f64; round, bond, i, j i32;
-//!                          mode i32 enum TENSION, SHEAR, ROLLING; pad i32 (0)
+//!                          mode i32 enum TENSION, SHEAR, ROLLING, TWIST; pad i32 (0)
 //! /observables/            step i64[S], time [S], shared by all (hard links, as H5MD allows)
 //!     NAME                 {step, time, value[S,…]}
 //! /parameters/             scene (the JSON as run); attributes schema_version, seed, version, git_revision, build,
@@ -85,6 +85,8 @@ pub struct Layout {
     pub rotation: bool,
     /// Whether contacts carry tangential reactions; with bonds they always do.
     pub friction: bool,
+    /// Whether bonds carry twisting moments, 3D only.
+    pub twist: bool,
     /// Whether reactions and moments are left out.
     pub without_reactions: bool,
     /// Whether what a frame holds is stored in single precision.

@@ -3,7 +3,6 @@
 use std::ops::Range;
 use std::path::Path;
 
-use hdf5::H5Type;
 use hdf5::types::VarLenUnicode;
 
 use super::checkpoint::Checkpoint;
@@ -158,6 +157,7 @@ impl History {
             dimension: self.dimension,
             rotation: self.source.has(&format!("{}/angular_velocity", path::GRAINS)),
             friction: !without_reactions && width(&contacts("reaction"))? > 1,
+            twist: self.source.has(&contacts("moment")) && width(&contacts("moment"))? > 2,
             without_reactions,
             single: size == 4,
             grains: self.grains()?,
@@ -396,7 +396,7 @@ impl History {
             normal: column("normal", &[d])?,
             tangent: column("tangent", &[d])?,
             reaction: column("reaction", &[1, d])?,
-            moment: column("moment", &[d - 1])?,
+            moment: column("moment", if d == 2 { &[1] } else { &[2, 3] })?,
             gap: column("gap", &[1])?,
             status: self.source.coded(&place("status"), codes, range.len())?,
             bond,
@@ -412,7 +412,7 @@ impl History {
             return Ok(vec![]);
         }
         let found = self.source.dataset(path::RUPTURE)?.dtype().and_then(|dtype| dtype.to_descriptor());
-        if found.map_err(while_reading(&self.source.path, path::RUPTURE))? != RuptureRow::type_descriptor() {
+        if !RuptureRow::is_read_from(&found.map_err(while_reading(&self.source.path, path::RUPTURE))?) {
             return Err(self.source.damaged(path::RUPTURE, "its members are others"));
         }
         let (_, events) = self.source.read::<RuptureRow>(path::RUPTURE, 0..self.events)?;

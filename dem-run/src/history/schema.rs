@@ -1,6 +1,7 @@
 //! Names, versions and chunk sizes of the layout; the layout itself stands in the module's documentation.
 
 use hdf5::H5Type;
+use hdf5::types::TypeDescriptor;
 
 use super::codes::{Coded, ModeCode};
 use super::{Rupture, RuptureMode};
@@ -113,6 +114,18 @@ impl From<&Rupture> for RuptureRow {
 }
 
 impl RuptureRow {
+    /// Whether events are read from rows of this type: histories from before there was twist lack that mode.
+    pub(super) fn is_read_from(found: &TypeDescriptor) -> bool {
+        let (now, mut before) = (Self::type_descriptor(), Self::type_descriptor());
+        if let TypeDescriptor::Compound(row) = &mut before
+            && let Some(TypeDescriptor::Enum(modes)) =
+                row.fields.iter_mut().find(|f| f.name == "mode").map(|f| &mut f.ty)
+        {
+            modes.members.retain(|mode| mode.name != RuptureMode::Twist.label());
+        }
+        [now, before].contains(found)
+    }
+
     /// Whether two rows are alike to the bit.
     pub(super) fn same(&self, other: &Self) -> bool {
         let reals = |r: &Self| [r.time, r.x, r.y, r.z, r.rn, r.rt, r.m, r.energy].map(f64::to_bits);

@@ -101,12 +101,12 @@ fn sample(l: &Layout, k: usize) -> Sample {
             normal: numbers(m * d, 8e3 + s),
             tangent: numbers(if d == 3 && tangential { m * 3 } else { 0 }, 9e3 + s),
             reaction: numbers(if tangential { m * d } else { m }, 1e4 + s),
-            moment: numbers(if bonded { m * (d - 1) } else { 0 }, 11e3 + s),
+            moment: numbers(if bonded { m * (d - 1 + usize::from(l.twist)) } else { 0 }, 11e3 + s),
             gap: numbers(m, 12e3 + s),
             status: (0..m).map(|c| ContactStatus::ALL[c % 4]).collect(),
             bond: if bonded { (0..m as i32).map(|c| c - 1).collect() } else { vec![] },
         },
-        bonds: (0..l.bonds.len()).map(|b| BondStatus::ALL[(b + k) % 4]).collect(),
+        bonds: (0..l.bonds.len()).map(|b| BondStatus::ALL[(b + k) % 5]).collect(),
     }
 }
 
@@ -122,7 +122,7 @@ fn rupture(k: usize) -> Rupture {
         round: 3,
         bond: 1,
         pair: [1, 2],
-        mode: RuptureMode::ALL[k % 3],
+        mode: RuptureMode::ALL[k % 4],
     }
 }
 
@@ -421,7 +421,8 @@ fn a_file_with_wrong_bytes_never_makes_the_reader_panic() {
 fn a_packed_history_is_the_same_and_smaller() {
     let (folder, path) = folder();
     let packed = folder.path().join("packed.h5");
-    for layout in [full(2), full(3), Layout { single: true, without_reactions: true, ..full(3) }] {
+    let twisting = Layout { twist: true, ..full(3) };
+    for layout in [full(2), full(3), twisting, Layout { single: true, without_reactions: true, ..full(3) }] {
         let _ = fs::remove_file(&path);
         let mut writer = Writer::create(&path, &layout, false).unwrap();
         for k in 0..300 {

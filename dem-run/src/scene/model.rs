@@ -109,6 +109,10 @@ pub struct Bonds {
     /// Friction of intact bonds; that between grains where it is absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub friction: Option<f64>,
+    /// Coefficient of the twisting moment of bonds in 3D, which an intact bond bears up to this times the mean diameter times
+    /// (r_n + r_coh); where it is absent two grains are free to spin about their normal.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub twist: Option<f64>,
     /// Flow of an intact bond at its limit.
     #[serde(default)]
     pub flow: Flow,
@@ -138,6 +142,9 @@ pub struct Springs {
     pub tangential: f64,
     /// In bending (N m/rad).
     pub rolling: f64,
+    /// In twist (N m/rad), of bonds that resist it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub twist: Option<f64>,
 }
 
 /// Material of a bond.
@@ -296,6 +303,12 @@ impl Scene {
     #[must_use]
     pub fn thickness(&self) -> f64 {
         self.thickness.unwrap_or(1.0)
+    }
+
+    /// Whether there are bonds that resist twist.
+    #[must_use]
+    pub fn twists(&self) -> bool {
+        self.bonds.as_ref().is_some_and(|bonds| bonds.twist.is_some())
     }
 
     /// Number of components of a spin or a torque: 1 in 2D, 3 in 3D.

@@ -61,7 +61,7 @@ impl Solvable for Assembled {
         let rank = columns.len();
         let normal: f64 = (0..self.len()).map(|c| parts.matrix.diagonal(c)[0]).sum();
         let soft = normal / (self.len().max(1) as f64 * kappa);
-        let weights = Weights { n: soft, t: soft / ratio.tangential, m: soft / ratio.rolling };
+        let weights = ratio.weights(soft);
         // without the shift, u = W r + q
         let mut shifts = vec![0.0; self.r.len()];
         (0..self.len()).for_each(|c| shifts[c * size] = parts.shift[c]);
@@ -73,7 +73,7 @@ impl Solvable for Assembled {
                 at: [0, 0],
                 count: [rank, 0],
                 start: c * size * rank,
-                rows: places(rows.tangents, rows.bends),
+                rows: places(rows.tangents, rows.moments),
                 cone: self.cone(c),
                 associated: parts.associated[c],
                 shift: parts.shift[c],

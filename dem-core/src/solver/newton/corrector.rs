@@ -6,9 +6,9 @@
 //! negative derivative A = −∂r/∂q is what a contact adds to the matrix of the Newton step; it is symmetric where the
 //! law is associated.
 
-use super::rows::{Operator, Row};
-use crate::contact::{Local, Padded, Weights};
-use crate::dim::Vect;
+use super::rows::{Operator, Row, TWIST};
+use crate::contact::{Local, PADDED, Padded, Weights};
+use crate::dim::{Moments, Vect};
 use nalgebra::{SMatrix, SVector, Vector2};
 
 /// The corrected reaction for the relative velocity `u`, without the shift: a reaction that is small beside the
@@ -18,7 +18,7 @@ pub(super) fn correct(row: &Row, u: &Padded) -> Padded {
     let mut q = row.form(u);
     let (w, cone, shift) = (row.metric(), &row.cone, row.shift);
     // most contacts stick, and then nothing couples
-    let stuck = Local { n: -q.n / w.n, t: q.t * (-1.0 / w.t), m: q.m * (-1.0 / w.m) };
+    let stuck = Local { n: -q.n / w.n, t: q.t * (-1.0 / w.t), m: q.m.scaled(-1.0 / w.m, -1.0 / w.w) };
     if cone.contains(&Local { n: stuck.n + shift, ..stuck }) {
         return stuck;
     }
@@ -27,7 +27,7 @@ pub(super) fn correct(row: &Row, u: &Padded) -> Padded {
         cone.minimise(w, q)
     } else {
         let n = (stuck.n + shift).max(0.0);
-        Local { n, t: stuck.t.clipped(cone.mu * n), m: stuck.m.clipped(cone.nu * n) }
+        Local { n, t: stuck.t.clipped(cone.mu * n), m: stuck.m.within(cone.nu * n, cone.xi * n) }
     };
     r.n -= shift;
     r
@@ -44,16 +44,17 @@ pub(super) fn operator(row: &Row, u: &Padded, r: &Padded, symmetric: bool) -> Op
     let q = row.form(u);
     let (w, cone) = (row.metric(), &row.cone);
     let slip = limit_direction(q.t, w.t, cone.mu * limit);
-    let bend = limit_direction(q.m, w.m, cone.nu * limit);
-    if slip.is_none() && bend.is_none() {
-        return Some(Operator::Diagonal(Weights { n: 1.0 / w.n, t: 1.0 / w.t, m: 1.0 / w.m }));
+    let bend = limit_direction(q.m.fixed_rows::<2>(0).into(), w.m, cone.nu * limit);
+    let twists = q.m.twist() > w.w * cone.xi * limit;
+    if slip.is_none() && bend.is_none() && !twists {
+        return Some(Operator::Diagonal(Weights { n: 1.0 / w.n, t: 1.0 / w.t, m: 1.0 / w.m, w: 1.0 / w.w }));
     }
-    let mut a = SMatrix::<f64, 5, 5>::zeros();
+    let mut a = SMatrix::<f64, PADDED, PADDED>::zeros();
     // a row group inside its ball follows its own stiffness; on the sphere it turns with q
     block(&mut a, 1, slip, 1.0 / w.t, cone.mu * limit);
     block(&mut a, 3, bend, 1.0 / w.m, cone.nu * limit);
-    // the normal row drags the limits along: r = n (1, −μ q̂_t, −ν q̂_m) on the active ones
-    let mut drag = SVector::<f64, 5>::ith(0, 1.0);
+    // the normal row drags the limits along: r = n (1, −μ q̂_t, −ν q̂_m, −ξ q̂_τ) on the active ones
+    let mut drag = SVector::<f64, PADDED>::ith(0, 1.0);
     let mut stiffness = w.n;
     if let Some((direction, _)) = slip {
         drag.fixed_rows_mut::<2>(1).copy_from(&(direction * -cone.mu));
@@ -63,12 +64,18 @@ pub(super) fn operator(row: &Row, u: &Padded, r: &Padded, symmetric: bool) -> Op
         drag.fixed_rows_mut::<2>(3).copy_from(&(direction * -cone.nu));
         stiffness += if row.convex() { cone.nu * cone.nu * w.m } else { 0.0 };
     }
+    if twists {
+        drag[TWIST] = -cone.xi.copysign(q.m[2]);
+        stiffness += if row.convex() { cone.xi * cone.xi * w.w } else { 0.0 };
+    } else {
+        a[(TWIST, TWIST)] = 1.0 / w.w;
+    }
     if row.convex() {
         a += drag * drag.transpose() / stiffness;
     } else if symmetric {
         a[(0, 0)] += 1.0 / w.n;
     } else {
-        a += drag * SVector::<f64, 5>::ith(0, 1.0).transpose() / w.n;
+        a += drag * SVector::<f64, PADDED>::ith(0, 1.0).transpose() / w.n;
     }
     Some(Operator::Full(a))
 }
@@ -80,7 +87,13 @@ fn limit_direction(q: Vector2<f64>, weight: f64, limit: f64) -> Option<(Vector2<
 }
 
 /// The part of A that a row group has for a fixed limit.
-fn block(a: &mut SMatrix<f64, 5, 5>, at: usize, limited: Option<(Vector2<f64>, f64)>, stiffness: f64, limit: f64) {
+fn block(
+    a: &mut SMatrix<f64, PADDED, PADDED>,
+    at: usize,
+    limited: Option<(Vector2<f64>, f64)>,
+    stiffness: f64,
+    limit: f64,
+) {
     match limited {
         None => {
             a[(at, at)] += stiffness;

@@ -3,6 +3,7 @@
 
 use super::order::dissected;
 use super::rows::{Operator, PAIR, Rows};
+use crate::contact::PADDED;
 use crate::saved::{Mismatch, Reader, Saved};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::prelude::Solve;
@@ -179,7 +180,7 @@ fn values(rows: &Rows, operators: &[Option<Operator>]) -> Vec<f64> {
         let width = row.count[0] + row.count[1];
         let h = |k: usize, c: usize| rows.coefficients[row.start + k * width + c];
         // A H̃ᵀ, then H̃ (A H̃ᵀ)
-        let mut pulled = [[0.0; PAIR]; 5];
+        let mut pulled = [[0.0; PAIR]; PADDED];
         if let Some(a) = operator {
             for (k, row_place) in row.rows.iter().enumerate() {
                 for c in 0..width {

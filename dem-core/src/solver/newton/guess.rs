@@ -6,18 +6,21 @@
 use super::inner::Iterate;
 use super::rows::{Row, Rows};
 use crate::contact::{Local, Padded};
-use crate::dim::Vect;
+use crate::dim::{Moments, Vect};
 use crate::saved::{Mismatch, Reader, Saved};
 
 /// Relative distance to a limit that counts as at it.
 const BEYOND: f64 = 1e-9;
 
+/// How far the tangential, bending and twist rows of a contact are beyond their limits, over those.
+pub(super) type Beyond = [f64; 3];
+
 /// A guess of the active set.
 pub(super) struct Guess {
     /// Reactions without the shift (N s).
     pub reactions: Vec<Padded>,
-    /// How far the rows t and m of each contact are beyond their limits, over those; none where that is not known.
-    pub beyond: Vec<[f64; 2]>,
+    /// How far each contact is beyond its limits; none where that is not known.
+    pub beyond: Vec<Beyond>,
 }
 
 impl Guess {
@@ -37,12 +40,16 @@ impl Guess {
             if size >= (1.0 - BEYOND) * c * limit { known.max(2.0 * BEYOND) } else { 0.0 }
         };
         let slip = at_limit(row.cone.mu, Vect::norm(&guess.t), beyond[0]);
-        let bend = at_limit(row.cone.nu, Vect::norm(&guess.m), beyond[1]);
-        let guess = Local { n: guess.n, t: guess.t * (1.0 + slip), m: guess.m * (1.0 + bend) };
+        let bend = at_limit(row.cone.nu, guess.m.bending(), beyond[1]);
+        let twist = at_limit(row.cone.xi, guess.m.twist(), beyond[2]);
+        let m = guess.m.scaled(1.0 + bend, 1.0 + twist);
+        let guess = Local { n: guess.n, t: guess.t * (1.0 + slip), m };
         let mut u = row.weights.times(&row.multiplier) + row.compliance.times(&row.carried) - w.times(&guess);
-        if row.convex() && beyond != [0.0; 2] {
+        if row.convex() && beyond != Beyond::default() {
             // what slips with associated flow opens by so much
-            u.n += limit * (row.cone.mu * row.cone.mu * w.t * slip + row.cone.nu * row.cone.nu * w.m * bend);
+            let cone = &row.cone;
+            u.n += limit
+                * (cone.mu * cone.mu * w.t * slip + cone.nu * cone.nu * w.m * bend + cone.xi * cone.xi * w.w * twist);
         }
         u.n -= row.lag.unwrap_or(0.0);
         u
@@ -54,9 +61,8 @@ impl Guess {
 struct Slip {
     /// First unknowns of its nodes.
     at: [usize; 2],
-    /// How far its rows t and m were beyond their limits, over those.
-    beyond: [f64; 2],
-    /// μ‖u_t‖ + ν‖u_m‖ (m/s).
+    beyond: Beyond,
+    /// μ‖u_t‖ + ν‖u_m‖ + ξ|u_τ| (m/s).
     speed: f64,
 }
 
@@ -70,7 +76,11 @@ impl Slips {
         let beyond = |((row, u), r): ((&Row, &Padded), &Padded)| {
             let (q, w, limit) = (row.form(u), row.metric(), r.n + row.shift);
             let beyond = |norm: f64, limit: f64| if norm > limit && limit > 0.0 { norm / limit - 1.0 } else { 0.0 };
-            [beyond(q.t.norm(), w.t * row.cone.mu * limit), beyond(q.m.norm(), w.m * row.cone.nu * limit)]
+            [
+                beyond(q.t.norm(), w.t * row.cone.mu * limit),
+                beyond(q.m.bending(), w.m * row.cone.nu * limit),
+                beyond(q.m.twist(), w.w * row.cone.xi * limit),
+            ]
         };
         let all = rows.list.iter().zip(&state.velocities).zip(&state.reactions);
         Self::listed(rows, &state.reactions, all.map(beyond))
@@ -81,21 +91,21 @@ impl Slips {
         Self::listed(rows, &guess.reactions, guess.beyond.iter().copied())
     }
 
-    fn listed(rows: &Rows, reactions: &[Padded], beyond: impl Iterator<Item = [f64; 2]>) -> Self {
+    fn listed(rows: &Rows, reactions: &[Padded], beyond: impl Iterator<Item = Beyond>) -> Self {
         if !rows.in_space() {
             return Self::default();
         }
-        let slip = |((row, r), beyond): ((&Row, &Padded), [f64; 2])| {
-            let (w, limit) = (row.metric(), r.n + row.shift);
-            let speed = |c: f64, w: f64, beyond: f64| c * c * w * limit * beyond;
-            let speed = speed(row.cone.mu, w.t, beyond[0]) + speed(row.cone.nu, w.m, beyond[1]);
+        let slip = |((row, r), beyond): ((&Row, &Padded), Beyond)| {
+            let speed = |c: f64, w: f64, beyond: f64| c * c * w * (r.n + row.shift) * beyond;
+            let (w, [slip, bend, twist]) = (row.metric(), beyond);
+            let speed = speed(row.cone.mu, w.t, slip) + speed(row.cone.nu, w.m, bend) + speed(row.cone.xi, w.w, twist);
             Slip { at: row.at, beyond, speed }
         };
         let mut list: Vec<Slip> = rows.list.iter().zip(reactions).zip(beyond).map(slip).collect();
         list.sort_by_key(|slip| slip.at);
         // bodies that cannot move have no unknowns, so contacts with two of them look alike: nothing is told of those
         let unlike = list.chunk_by(|a, b| a.at == b.at).filter(|alike| alike.len() == 1).map(|alike| alike[0]);
-        Self(unlike.filter(|slip| slip.beyond != [0.0; 2]).collect())
+        Self(unlike.filter(|slip| slip.beyond != Beyond::default()).collect())
     }
 
     /// Whether a contact slipped.
@@ -108,8 +118,8 @@ impl Slips {
     }
 
     /// How far each contact of these rows was beyond its limits; an empty list where nothing slipped.
-    pub fn in_rows(&self, rows: &Rows) -> Vec<[f64; 2]> {
-        let beyond = |row| self.known(row).map_or([0.0; 2], |slip| slip.beyond);
+    pub fn in_rows(&self, rows: &Rows) -> Vec<Beyond> {
+        let beyond = |row| self.known(row).map_or(Beyond::default(), |slip| slip.beyond);
         if self.any() { rows.list.iter().map(beyond).collect() } else { Vec::new() }
     }
 
@@ -131,8 +141,8 @@ impl Slips {
         let mut list = Vec::with_capacity(from.number_of()?);
         for _ in 0..list.capacity() {
             let at = [from.count()?, from.count()?];
-            let reals = from.reals(3)?;
-            list.push(Slip { at, beyond: [reals[0], reals[1]], speed: reals[2] });
+            let reals = from.reals(4)?;
+            list.push(Slip { at, beyond: [reals[0], reals[1], reals[2]], speed: reals[3] });
         }
         Ok(Self(list))
     }

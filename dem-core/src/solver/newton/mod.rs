@@ -40,7 +40,7 @@ use crate::saved::{Mismatch, Reader, Saved};
 use factor::Factor;
 use guess::{Guess, Slips};
 use inner::{Iterate, norm2};
-use interior::{Disks, Rays};
+use interior::{Bending, Rays, Twisting};
 use rows::Rows;
 use solvable::Solvable;
 
@@ -378,7 +378,11 @@ impl Newton {
         if !rows.in_space() {
             return self.through_the_middle::<Rays>(problem, &started, &swept, iterations);
         }
-        let report = self.through_the_middle::<Disks>(problem, &started, &swept, iterations);
+        let report = if rows.twist() {
+            self.through_the_middle::<Twisting>(problem, &started, &swept, iterations)
+        } else {
+            self.through_the_middle::<Bending>(problem, &started, &swept, iterations)
+        };
         report.or_else(|| {
             problem.forget_what_is_not_finite();
             let (reached, residual) = (problem.swept(0), problem.residual());

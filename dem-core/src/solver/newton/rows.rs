@@ -5,8 +5,8 @@
 //! masses are scaled by a power of two has the same bits. Each contact keeps the coefficients of its rows,
 //! u = Hᵀ v = Σ h y + u₀, where u₀ comes from nodes whose velocity is given.
 
-use crate::contact::{Arms, Cone, Law, Padded, Weights};
-use crate::dim::{Dim, Vect};
+use crate::contact::{Arms, Cone, Law, PADDED, Padded, Weights};
+use crate::dim::{Dim, Moments, Vect};
 use crate::problem::{Contact, ContactProblem, Link, Nodes, Visitor};
 use nalgebra::SMatrix;
 
@@ -16,7 +16,7 @@ pub(super) enum Operator {
     /// Every group of rows on its own.
     Diagonal(Weights),
     /// In the order n, t, m.
-    Full(SMatrix<f64, 5, 5>),
+    Full(SMatrix<f64, PADDED, PADDED>),
 }
 
 impl Operator {
@@ -34,7 +34,7 @@ impl Operator {
     pub fn entry(&self, r: usize, c: usize) -> f64 {
         match self {
             Self::Diagonal(_) if r != c => 0.0,
-            Self::Diagonal(w) => [w.n, w.t, w.t, w.m, w.m][r],
+            Self::Diagonal(w) => [w.n, w.t, w.t, w.m, w.m, w.w][r],
             Self::Full(a) => a[(r, c)],
         }
     }
@@ -59,7 +59,7 @@ pub(super) struct Row {
     pub shift: f64,
     /// Relative velocity that comes from given velocities, with the bias (m/s).
     pub given: Padded,
-    /// 1/ρ of n, t and m.
+    /// 1/ρ of each group.
     pub weights: Weights,
     /// Multiplier: a reaction, without the shift, which would round it (N s).
     pub multiplier: Padded,
@@ -123,6 +123,14 @@ pub struct StiffnessRatio {
     pub rolling: f64,
 }
 
+impl StiffnessRatio {
+    /// 1/ρ of each group for that of the normal row. In twist a bar has the shear modulus and, round, twice the second moment.
+    pub(super) fn weights(&self, normal: f64) -> Weights {
+        let (t, m) = (normal / self.tangential, normal / self.rolling);
+        Weights { n: normal, t, m, w: 0.5 * m / self.tangential }
+    }
+}
+
 struct Flatten<'a, D: Dim> {
     rows: Rows,
     unknowns: &'a Unknowns,
@@ -138,14 +146,19 @@ const DRY_2D: &[usize] = &[0, 1];
 const DRY_3D: &[usize] = &[0, 1, 2];
 const BOND_2D: &[usize] = &[0, 1, 3];
 const BOND_3D: &[usize] = &[0, 1, 2, 3, 4];
+const BOND_3D_TWIST: &[usize] = &[0, 1, 2, 3, 4, TWIST];
 
-pub(super) fn places(tangents: usize, bends: usize) -> &'static [usize] {
-    match (tangents, bends) {
+/// Place of the twist row.
+pub(super) const TWIST: usize = 5;
+
+pub(super) fn places(tangents: usize, moments: usize) -> &'static [usize] {
+    match (tangents, moments) {
         (0, _) => FRICTIONLESS,
         (1, 0) => DRY_2D,
         (_, 0) => DRY_3D,
         (1, _) => BOND_2D,
-        _ => BOND_3D,
+        (_, 2) => BOND_3D,
+        _ => BOND_3D_TWIST,
     }
 }
 
@@ -258,10 +271,15 @@ impl Rows {
         }
     }
 
-    /// μ‖s_t‖ + ν‖s_m‖ with the slip s = u + C (r − r₀) of the law of contact `row`.
+    /// Whether a contact resists twist.
+    pub fn twist(&self) -> bool {
+        self.list.iter().any(|row| row.rows.contains(&TWIST))
+    }
+
+    /// μ‖s_t‖ + ν‖s_m‖ + ξ|s_τ| with the slip s = u + C (r − r₀) of the law of contact `row`.
     pub fn slip(&self, row: &Row, y: &[f64], r: &Padded) -> f64 {
         let slip = self.velocity(row, y) + row.compliance.times(&(*r - row.carried));
-        row.cone.mu * slip.t.norm() + row.cone.nu * slip.m.norm()
+        row.cone.mu * slip.t.norm() + row.cone.nu * slip.m.bending() + row.cone.xi * slip.m.twist()
     }
 
     /// H̃ᵀ y for one contact.
@@ -338,20 +356,20 @@ fn write_scaled<D: Dim>(nodes: &Nodes<D>, unknowns: &Unknowns, k: usize, v: &D::
 
 /// Coefficients of the rows of one contact, over the unknowns of its pair.
 struct Table {
-    rows: [[f64; PAIR]; 5],
+    rows: [[f64; PAIR]; PADDED],
     tangents: usize,
-    bends: usize,
+    moments: usize,
     /// Columns filled so far.
     width: usize,
 }
 
 impl Table {
-    fn add<T: Vect>(&mut self, n: f64, t: T, m: T, scale: f64) {
+    fn add<T: Vect, B: Vect>(&mut self, n: f64, t: T, m: B, scale: f64) {
         self.rows[0][self.width] = n * scale;
         for c in 0..self.tangents {
             self.rows[1 + c][self.width] = t[c] * scale;
         }
-        for c in 0..self.bends {
+        for c in 0..self.moments {
             self.rows[1 + self.tangents + c][self.width] = m[c] * scale;
         }
         self.width += 1;
@@ -368,7 +386,7 @@ impl<D: Dim> Flatten<'_, D> {
             return 0;
         }
         let sign = if side == 0 { 1.0 } else { -1.0 };
-        let zero = D::Tangent::zero();
+        let zero = D::Moment::zero();
         if k >= nodes.grains {
             let (n, t) = D::split(&link.frame, nodes.drives[k - nodes.grains]);
             table.add(-n, -t, zero, self.unknowns.root(node.inverse_mass));
@@ -383,13 +401,9 @@ impl<D: Dim> Flatten<'_, D> {
         for axis in 0..D::Spin::LEN {
             let mut e = D::Spin::zero();
             e[axis] = 1.0;
-            let turn = D::spin_rows(&link.frame, e);
-            table.add(
-                0.0,
-                turn * -arms.lever[side],
-                turn * (sign * arms.bending),
-                self.unknowns.root(node.inverse_inertia),
-            );
+            let turn = D::spin_rows(&link.frame, e) * -arms.lever[side];
+            let moment = D::moment_rows(&link.frame, e) * (sign * arms.bending);
+            table.add(0.0, turn, moment, self.unknowns.root(node.inverse_inertia));
         }
         D::N + D::Spin::LEN
     }
@@ -399,7 +413,7 @@ impl<D: Dim> Visitor<D> for Flatten<'_, D> {
     fn visit<L: Law>(&mut self, _: &Nodes<D>, c: &Contact<D, L>) {
         let rows = places(L::T::LEN, L::B::LEN);
         let (arms, unit) = (c.law.arms(), self.unknowns.unit);
-        let mut table = Table { rows: [[0.0; PAIR]; 5], tangents: L::T::LEN, bends: L::B::LEN, width: 0 };
+        let mut table = Table { rows: [[0.0; PAIR]; PADDED], tangents: L::T::LEN, moments: L::B::LEN, width: 0 };
         let first = self.node(&c.link, arms, 0, &mut table);
         let second = self.node(&c.link, arms, 1, &mut table);
         let start = self.rows.coefficients.len();
@@ -423,7 +437,7 @@ impl<D: Dim> Visitor<D> for Flatten<'_, D> {
             associated: c.law.associated(),
             shift: c.law.shift() / unit,
             given,
-            weights: Weights { n: soft, t: soft / self.ratio.tangential, m: soft / self.ratio.rolling },
+            weights: self.ratio.weights(soft),
             multiplier: c.r.resized() * (1.0 / unit),
             compliance: c.law.compliance() * unit,
             carried: c.law.carried().resized() * (1.0 / unit),

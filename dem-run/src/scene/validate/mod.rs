@@ -36,7 +36,7 @@ pub fn validate(scene: &Scene) -> Vec<Problem> {
     sample::sample(&mut report, scene);
     materials(&mut report, scene);
     if let Some(bonds) = &scene.bonds {
-        self::bonds(&mut report, bonds);
+        self::bonds(&mut report, bonds, scene.dimension);
     }
     grains(&mut report, scene);
     for (name, wall) in &scene.walls {
@@ -61,7 +61,7 @@ fn materials(report: &mut Report, scene: &Scene) {
     report.non_negative("materials.restitution.threshold_speed", materials.restitution.threshold_speed, "m/s");
 }
 
-fn bonds(report: &mut Report, bonds: &Bonds) {
+fn bonds(report: &mut Report, bonds: &Bonds, dimension: u8) {
     match (bonds.strength, bonds.stress) {
         (Some(strength), Some(stress)) => {
             let found = format!("strength {strength:?} N and stress {stress:?} Pa");
@@ -81,12 +81,28 @@ fn bonds(report: &mut Report, bonds: &Bonds) {
     if let Some(friction) = bonds.friction {
         report.non_negative("bonds.friction", friction, "no unit");
     }
+    if let Some(twist) = bonds.twist {
+        report.positive("bonds.twist", twist, "no unit; without it bonds are free to spin about their normal");
+        if dimension == 2 {
+            report.wrong("bonds.twist", "a value in a scene of dimension 2", "left out: disks do not twist");
+        }
+    }
     match &bonds.stiffness {
         Some(Stiffness::Springs(springs)) => {
             let path = |name: &str| format!("bonds.stiffness.springs.{name}");
             report.positive(path("normal"), springs.normal, "N/m");
             report.positive(path("tangential"), springs.tangential, "N/m");
             report.positive(path("rolling"), springs.rolling, "N m/rad");
+            match (bonds.twist, springs.twist) {
+                (Some(_), Some(twist)) => report.positive(path("twist"), twist, "N m/rad"),
+                (Some(_), None) => {
+                    report.wrong(path("twist"), "nothing", "a stiffness (N m/rad), as bonds.twist is given")
+                }
+                (None, Some(_)) => {
+                    report.wrong(path("twist"), "a value", "left out, or bonds.twist given: bonds resist no twist")
+                }
+                (None, None) => {}
+            }
         }
         Some(Stiffness::Young(young)) => {
             report.positive("bonds.stiffness.young.modulus", young.modulus, "Pa");

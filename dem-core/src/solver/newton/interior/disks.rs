@@ -1,39 +1,53 @@
-//! The cone of a contact in space: a disk for t and one for m at every r̂_n, so an intersection of second-order cones.
+//! The cone of a contact in space: a disk for t and one for m at every r̂_n, so an intersection of second-order cones; for τ a
+//! third, whose disk is a line.
 //!
 //! With Q = { x : ‖(x₁, x₂)‖ ≤ x₀ } the reaction is in K where s = G r̂ is in Q × Q, s = (μ r̂_n, r̂_t; ν r̂_n, r̂_m), and z is in K*
-//! where z = Gᵀ λ with λ in Q × Q; s·λ = 0. The symmetric N with N λ = N⁻¹ s (Nesterov & Todd, SIAM J. Optim. 8, 1998;
+//! where z = Gᵀ λ with λ in Q × Q; s·λ = 0; for twist with one Q more. The symmetric N with N λ = N⁻¹ s (Nesterov & Todd, SIAM J. Optim. 8, 1998;
 //! Vandenberghe, *The CVXOPT linear and quadratic cone program solvers*, 2010) gives D = 1/ρ + C + Gᵀ N⁻² G. Of rows without
 //! friction a ray is left, Q of one component.
 
-use super::super::rows::{Operator, Row};
+use super::super::guess::Beyond;
+use super::super::rows::{Operator, Row, TWIST};
 use super::{Aim, Site, yields};
-use crate::contact::Padded;
+use crate::contact::{PADDED, Padded};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector2, Vector3};
 
-type Vector5 = SVector<f64, 5>;
-type Matrix5 = SMatrix<f64, 5, 5>;
-
-/// A contact: its second-order cones.
-pub(in super::super) struct Disks {
-    /// Coefficient of r̂_n, and the place of the first of the two rows beside it; none where the cone is a ray.
-    cones: [(f64, Option<usize>); 2],
+/// A contact of at most R rows: its second-order cones, at most C.
+pub(in super::super) struct Disks<const R: usize, const C: usize> {
+    cones: [Disk; C],
     /// How many there are.
     count: usize,
     /// 1/ρ + C in order; infinite for rows that carry nothing.
-    metric: Vector5,
+    metric: SVector<f64, R>,
+}
+
+/// A contact whose bonds are free to spin about their normal.
+pub(in super::super) type Bending = Disks<5, 2>;
+
+/// A contact whose bonds may resist twist.
+pub(in super::super) type Twisting = Disks<6, 3>;
+
+/// A second-order cone of a contact.
+#[derive(Clone, Copy)]
+struct Disk {
+    /// Coefficient of r̂_n.
+    coefficient: f64,
+    /// Place of the first row beside it, and how many there are: none where the cone is a ray.
+    first: usize,
+    rows: usize,
 }
 
 /// The shifted reaction r̂ (N s) and the multiplier λ of each cone (m/s).
 #[derive(Clone, Copy)]
-pub(in super::super) struct Pair {
-    r: Vector5,
-    lambda: [Vector3<f64>; 2],
+pub(in super::super) struct Pair<const R: usize, const C: usize> {
+    r: SVector<f64, R>,
+    lambda: [Vector3<f64>; C],
 }
 
 /// D⁻¹, and of each cone N⁻¹ and N λ = N⁻¹ s.
-pub(in super::super) struct Scaling {
-    inverse: Matrix5,
-    cones: [(Matrix3<f64>, Vector3<f64>); 2],
+pub(in super::super) struct Scaling<const R: usize, const C: usize> {
+    inverse: SMatrix<f64, R, R>,
+    cones: [(Matrix3<f64>, Vector3<f64>); C],
 }
 
 /// s₀² − ‖(s₁, s₂)‖², without cancellation.
@@ -83,34 +97,31 @@ fn reach(x: &Vector3<f64>, d: &Vector3<f64>) -> f64 {
     if slope > 0.0 { c / slope } else { f64::INFINITY }
 }
 
-impl Disks {
-    fn cones(&self) -> impl Iterator<Item = (usize, f64, Option<usize>)> {
-        self.cones[..self.count].iter().enumerate().map(|(k, (c, place))| (k, *c, *place))
+impl<const R: usize, const C: usize> Disks<R, C> {
+    fn cones(&self) -> impl Iterator<Item = (usize, Disk)> {
+        self.cones[..self.count].iter().copied().enumerate()
     }
 
     /// s of cone `k`.
-    fn image(&self, k: usize, r: &Vector5) -> Vector3<f64> {
-        match self.cones[k] {
-            (c, Some(place)) => [c * r[0], r[place], r[place + 1]].into(),
-            (c, None) => [c * r[0], 0.0, 0.0].into(),
-        }
+    fn image(&self, k: usize, r: &SVector<f64, R>) -> Vector3<f64> {
+        let Disk { coefficient, first, rows } = self.cones[k];
+        let mut s = Vector3::new(coefficient * r[0], 0.0, 0.0);
+        (0..rows).for_each(|row| s[1 + row] = r[first + row]);
+        s
     }
 
     /// Gᵀ of values for each cone.
-    fn gathered(&self, values: &[Vector3<f64>; 2]) -> Vector5 {
-        let mut out = Vector5::zeros();
-        for (k, c, place) in self.cones() {
-            out[0] += c * values[k][0];
-            if let Some(place) = place {
-                out[place] += values[k][1];
-                out[place + 1] += values[k][2];
-            }
+    fn gathered(&self, values: &[Vector3<f64>; C]) -> SVector<f64, R> {
+        let mut out = SVector::zeros();
+        for (k, disk) in self.cones() {
+            out[0] += disk.coefficient * values[k][0];
+            (0..disk.rows).for_each(|row| out[disk.first + row] += values[k][1 + row]);
         }
         out
     }
 
     /// N⁻¹ (N λ \ right), where right is what N λ ∘ (N Δλ + N⁻¹ Δs) should be.
-    fn aimed(&self, k: usize, scaling: &Scaling, aim: Aim<Pair>) -> Vector3<f64> {
+    fn aimed(&self, k: usize, scaling: &Scaling<R, C>, aim: Aim<Pair<R, C>>) -> Vector3<f64> {
         let (inverse, point) = &scaling.cones[k];
         let mut right = -product(point, point);
         if let Aim::Middle(gap, affine) = aim {
@@ -129,145 +140,170 @@ impl Disks {
     }
 }
 
-impl Site for Disks {
-    type Pair = Pair;
-    type Slack = Vector5;
-    type Scaling = Scaling;
-    type Drive = Vector5;
+/// The rows of a contact that has no more than R.
+fn rows_of<const R: usize>(x: &Padded) -> SVector<f64, R> {
+    x.in_order().fixed_rows::<R>(0).into()
+}
+
+/// The inverse of [`rows_of`].
+fn padded<const R: usize>(x: &SVector<f64, R>) -> Padded {
+    let mut all = SVector::<f64, PADDED>::zeros();
+    all.fixed_rows_mut::<R>(0).copy_from(x);
+    Padded::from_order(&all)
+}
+
+impl<const R: usize, const C: usize> Site for Disks<R, C> {
+    type Pair = Pair<R, C>;
+    type Slack = SVector<f64, R>;
+    type Scaling = Scaling<R, C>;
+    type Drive = SVector<f64, R>;
 
     fn new(row: &Row) -> Self {
         let w = row.metric();
-        let mut metric = Vector5::from([w.n, w.t, w.t, w.m, w.m]);
-        let mut cones = [(1.0, None); 2];
+        let mut metric = rows_of::<R>(&Padded::from_order(&[w.n, w.t, w.t, w.m, w.m, w.w].into()));
+        let mut cones = [Disk { coefficient: 1.0, first: 0, rows: 0 }; C];
         let mut count = 0;
-        for (c, place) in [(row.cone.mu, 1), (row.cone.nu, 3)] {
-            if c > 0.0 && row.rows.contains(&place) {
-                cones[count] = (c, Some(place));
+        for (coefficient, first, rows) in [(row.cone.mu, 1, 2), (row.cone.nu, 3, 2), (row.cone.xi, TWIST, 1)] {
+            if coefficient > 0.0 && row.rows.contains(&first) {
+                cones[count] = Disk { coefficient, first, rows };
                 count += 1;
             } else {
-                (metric[place], metric[place + 1]) = (f64::INFINITY, f64::INFINITY);
+                (first..R.min(first + rows)).for_each(|place| metric[place] = f64::INFINITY);
             }
         }
         Self { cones, count: count.max(1), metric }
     }
 
-    fn inside(&self, q: &Padded, share: f64, yields: f64) -> Pair {
-        let q = q.in_order();
-        let tail = |place: Option<usize>| place.map_or([0.0; 2], |place| [q[place], q[place + 1]]);
+    fn inside(&self, q: &Padded, share: f64, yields: f64) -> Pair<R, C> {
+        let q = rows_of::<R>(q);
         let least = share * yields;
-        let most = self.cones().map(|(_, c, place)| c * tail(place)[0].hypot(tail(place)[1]));
+        let norm = |disk: &Disk| (0..disk.rows).fold(0.0, |sum: f64, row| sum.hypot(q[disk.first + row]));
+        let most = self.cones().map(|(_, disk)| disk.coefficient * norm(&disk));
         let size = most.fold(q[0].abs(), f64::max) + least;
-        let mut pair = Pair { r: Vector5::zeros(), lambda: [Vector3::x(); 2] };
+        let mut pair = Pair { r: SVector::zeros(), lambda: [Vector3::x(); C] };
         // all products alike: in the middle of the path
         pair.r[0] = share * least / size;
-        for (k, c, place) in self.cones() {
-            let [a, b] = tail(place);
-            pair.lambda[k] = [size / c, a, b].into();
+        for (k, disk) in self.cones() {
+            pair.lambda[k] = self.image(k, &q);
+            pair.lambda[k][0] = size / disk.coefficient;
         }
         pair
     }
 
-    fn reaction(&self, row: &Row, at: &Pair) -> Padded {
-        let mut r = Padded::from_order(&at.r);
+    fn reaction(&self, row: &Row, at: &Pair<R, C>) -> Padded {
+        let mut r = padded(&at.r);
         r.n -= row.shift;
         r
     }
 
-    fn defect(&self, at: &Pair, z: &Padded) -> Vector5 {
-        let mut off = self.gathered(&at.lambda) - z.in_order();
-        (0..5).filter(|k| !self.carries(*k)).for_each(|k| off[k] = 0.0);
+    fn defect(&self, at: &Pair<R, C>, z: &Padded) -> SVector<f64, R> {
+        let mut off = self.gathered(&at.lambda) - rows_of::<R>(z);
+        (0..R).filter(|k| !self.carries(*k)).for_each(|k| off[k] = 0.0);
         off
     }
 
-    fn add_products(&self, at: &Pair, sum: &mut f64) -> usize {
-        self.cones().for_each(|(k, ..)| *sum += self.image(k, &at.r).dot(&at.lambda[k]));
+    fn add_products(&self, at: &Pair<R, C>, sum: &mut f64) -> usize {
+        self.cones().for_each(|(k, _)| *sum += self.image(k, &at.r).dot(&at.lambda[k]));
         self.count
     }
 
-    fn add_scale(&self, at: &Pair, yields: f64, sum: &mut f64) -> usize {
+    fn add_scale(&self, at: &Pair<R, C>, yields: f64, sum: &mut f64) -> usize {
         *sum += self.count as f64 * yields * at.r[0] * at.r[0];
         self.count
     }
 
-    fn scaling(&self, at: &Pair) -> Scaling {
-        let mut scaling = Scaling { inverse: Matrix5::zeros(), cones: [(Matrix3::zeros(), Vector3::zeros()); 2] };
-        let mut d = Matrix5::from_diagonal(&self.metric.map(|w| if w.is_finite() { w } else { 1.0 }));
-        for (k, c, place) in self.cones() {
+    fn scaling(&self, at: &Pair<R, C>) -> Scaling<R, C> {
+        let mut cones = [(Matrix3::zeros(), Vector3::zeros()); C];
+        let mut d = SMatrix::<f64, R, R>::from_diagonal(&self.metric.map(|w| if w.is_finite() { w } else { 1.0 }));
+        for (k, disk) in self.cones() {
             let (inverse, point) = scaled(&self.image(k, &at.r), &at.lambda[k]);
             let square = inverse * inverse;
             // G picks (c r_n, r_t)
-            let pick = [Some((0, c)), place.map(|p| (p, 1.0)), place.map(|p| (p + 1, 1.0))];
-            for (a, row) in pick.iter().enumerate() {
-                for (b, column) in pick.iter().enumerate() {
-                    if let (Some((i, x)), Some((j, y))) = (row, column) {
-                        d[(*i, *j)] += x * y * square[(a, b)];
-                    }
+            let pick = |a: usize| if a == 0 { (0, disk.coefficient) } else { (disk.first + a - 1, 1.0) };
+            for a in 0..=disk.rows {
+                for b in 0..=disk.rows {
+                    let ((i, x), (j, y)) = (pick(a), pick(b));
+                    d[(i, j)] += x * y * square[(a, b)];
                 }
             }
-            scaling.cones[k] = (inverse, point);
+            cones[k] = (inverse, point);
         }
-        scaling.inverse = d.try_inverse().unwrap_or_else(Matrix5::zeros);
-        for k in (0..5).filter(|k| !self.carries(*k)) {
-            scaling.inverse[(k, k)] = 0.0;
+        let mut inverse = d.try_inverse().unwrap_or_else(SMatrix::zeros);
+        for k in (0..R).filter(|k| !self.carries(*k)) {
+            inverse[(k, k)] = 0.0;
         }
-        scaling
+        Scaling { inverse, cones }
     }
 
-    fn operator(&self, scaling: &Scaling) -> Operator {
-        Operator::Full(scaling.inverse)
+    fn operator(&self, scaling: &Scaling<R, C>) -> Operator {
+        let mut all = SMatrix::<f64, PADDED, PADDED>::zeros();
+        all.fixed_view_mut::<R, R>(0, 0).copy_from(&scaling.inverse);
+        Operator::Full(all)
     }
 
-    fn drive(&self, scaling: &Scaling, _: &Pair, off: &Vector5, aim: Aim<Pair>) -> Vector5 {
-        let mut aimed = [Vector3::zeros(); 2];
-        self.cones().for_each(|(k, ..)| aimed[k] = self.aimed(k, scaling, aim));
+    fn drive(
+        &self,
+        scaling: &Scaling<R, C>,
+        _: &Pair<R, C>,
+        off: &SVector<f64, R>,
+        aim: Aim<Pair<R, C>>,
+    ) -> SVector<f64, R> {
+        let mut aimed = [Vector3::zeros(); C];
+        self.cones().for_each(|(k, _)| aimed[k] = self.aimed(k, scaling, aim));
         scaling.inverse * (self.gathered(&aimed) + off)
     }
 
-    fn force(&self, drive: &Vector5) -> Padded {
-        Padded::from_order(drive)
+    fn force(&self, drive: &SVector<f64, R>) -> Padded {
+        padded(drive)
     }
 
-    fn step(&self, scaling: &Scaling, _: &Pair, drive: &Vector5, pulled: &Padded, aim: Aim<Pair>) -> Pair {
-        let r = drive - scaling.inverse * pulled.in_order();
-        let mut lambda = [Vector3::zeros(); 2];
-        for (k, ..) in self.cones() {
+    fn step(
+        &self,
+        scaling: &Scaling<R, C>,
+        _: &Pair<R, C>,
+        drive: &SVector<f64, R>,
+        pulled: &Padded,
+        aim: Aim<Pair<R, C>>,
+    ) -> Pair<R, C> {
+        let r = drive - scaling.inverse * rows_of::<R>(pulled);
+        let mut lambda = [Vector3::zeros(); C];
+        for (k, _) in self.cones() {
             let inverse = &scaling.cones[k].0;
             lambda[k] = self.aimed(k, scaling, aim) - inverse * (inverse * self.image(k, &r));
         }
         Pair { r, lambda }
     }
 
-    fn moved(at: &Pair, step: &Pair, length: f64) -> Pair {
-        let lambda = [0, 1].map(|k| at.lambda[k] + step.lambda[k] * length);
+    fn moved(at: &Pair<R, C>, step: &Pair<R, C>, length: f64) -> Pair<R, C> {
+        let lambda = std::array::from_fn(|k| at.lambda[k] + step.lambda[k] * length);
         Pair { r: at.r + step.r * length, lambda }
     }
 
-    fn longest(&self, at: &Pair, step: &Pair, longest: f64) -> f64 {
-        let ways = self.cones().map(|(k, ..)| {
+    fn longest(&self, at: &Pair<R, C>, step: &Pair<R, C>, longest: f64) -> f64 {
+        let ways = self.cones().map(|(k, _)| {
             let s = reach(&self.image(k, &at.r), &self.image(k, &step.r));
             s.min(reach(&at.lambda[k], &step.lambda[k]))
         });
         ways.fold(longest, f64::min)
     }
 
-    fn snapped(&self, row: &Row, at: &Pair) -> (Padded, [f64; 2]) {
-        let (mut r, mut beyond) = (at.r, [0.0; 2]);
+    fn snapped(&self, row: &Row, at: &Pair<R, C>) -> (Padded, Beyond) {
+        let (mut r, mut beyond) = (at.r, Beyond::default());
         // between the velocity that a reaction gives free bodies, and what the metric lets those in its way yield
         let measure = (yields(row) * row.metric().n).sqrt();
         let least = |x: &Vector3<f64>| x[0] - x[1].hypot(x[2]);
-        if self.cones().all(|(k, c, _)| least(&at.lambda[k]) > c * r[0] * measure) {
-            r = Vector5::zeros();
+        if self.cones().all(|(k, disk)| least(&at.lambda[k]) > disk.coefficient * r[0] * measure) {
+            r = SVector::zeros();
         }
-        for (k, c, place) in self.cones() {
-            let Some(place) = place else { continue };
-            let (size, limit) = (r[place].hypot(r[place + 1]), c * r[0]);
+        for (k, Disk { coefficient, first, rows }) in self.cones().filter(|(_, disk)| disk.rows > 0) {
+            let size = r.rows(first, rows).fold(0.0, f64::hypot);
+            let limit = coefficient * r[0];
             if size > 0.0 && (limit - size) * measure < at.lambda[k][0] {
-                r[place] *= limit / size;
-                r[place + 1] *= limit / size;
-                beyond[place / 2] = at.lambda[k][1].hypot(at.lambda[k][2]) / (self.metric[place] * limit);
+                r.rows_mut(first, rows).scale_mut(limit / size);
+                beyond[first / 2] = at.lambda[k][1].hypot(at.lambda[k][2]) / (self.metric[first] * limit);
             }
         }
-        let mut r = Padded::from_order(&r);
+        let mut r = padded(&r);
         r.n -= row.shift;
         (r, beyond)
     }

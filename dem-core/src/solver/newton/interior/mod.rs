@@ -24,13 +24,13 @@ mod disks;
 mod rays;
 
 use super::factor::Factor;
-use super::guess::{Guess, Slips};
+use super::guess::{Beyond, Guess, Slips};
 use super::inner::norm2;
 use super::rows::{Operator, Row, Rows};
 use super::solvable::Solvable;
 use super::{Found, Newton, Shrinking, SolveReport, SolveStatus, Stall, load_change, net_change};
 use crate::contact::{Padded, Weights};
-pub(super) use disks::Disks;
+pub(super) use disks::{Bending, Twisting};
 pub(super) use rays::Rays;
 
 /// Most rounds of one solve, those that only bring the load error down, and most iterations of a round.
@@ -102,9 +102,8 @@ pub(super) trait Site: Sized {
     fn moved(at: &Self::Pair, step: &Self::Pair, length: f64) -> Self::Pair;
     /// The longest part of a step that stays inside, if that is less than `longest`.
     fn longest(&self, at: &Self::Pair, step: &Self::Pair, longest: f64) -> f64;
-    /// The reaction without the shift at the limits that it is nearer to than z is to its own, and how far the rows t and m
-    /// are beyond their limits, over those.
-    fn snapped(&self, row: &Row, at: &Self::Pair) -> (Padded, [f64; 2]);
+    /// The reaction without the shift at the limits that it is nearer to than z is to its own, and how far it is beyond them.
+    fn snapped(&self, row: &Row, at: &Self::Pair) -> (Padded, Beyond);
 }
 
 /// What the products of the next point should be.
@@ -570,8 +569,16 @@ mod tests {
         found.forget_reactions();
         let rows = found.rows(KAPPA, settings.stiffness);
         let swept = found.swept(50);
-        let report = newton.through_the_middle::<Disks>(&mut found, &newton.started(&rows), &swept, &mut 0).unwrap();
+        let mut with_twist = found.clone();
+        let report = newton.through_the_middle::<Bending>(&mut found, &newton.started(&rows), &swept, &mut 0).unwrap();
         assert_eq!(report.status, SolveStatus::Converged);
+        // no bond here twists, and the cones for those that do have room for all others
+        let mut newton = Newton::new(settings);
+        let started = newton.started(&rows);
+        newton.through_the_middle::<Twisting>(&mut with_twist, &started, &swept, &mut 0).unwrap();
+        for (a, b) in found.dry.iter().zip(&with_twist.dry) {
+            assert!((a.r.n - b.r.n).abs() <= 1e-9 * a.r.n.abs().max(1e-9), "{:?} {:?}", a.r, b.r);
+        }
 
         let at_limit = guessed.dry.iter().filter(|c| c.r.n > 0.0 && c.r.t.norm() > 0.29 * c.r.n).count();
         assert!(at_limit > 10, "{at_limit} slip of {}", guessed.dry.len());

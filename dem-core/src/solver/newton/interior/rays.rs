@@ -2,9 +2,10 @@
 //!
 //! r̂ = Σ λ e with λ ≥ 0, and z ∈ K* where w = Eᵀ z ≥ 0; λ w = 0. D⁻¹ is E (w/λ + Eᵀ(1/ρ + C)E)⁻¹ Eᵀ.
 
+use super::super::guess::Beyond;
 use super::super::rows::{Operator, Row};
 use super::{Aim, Site, yields};
-use crate::contact::Padded;
+use crate::contact::{PADDED, Padded};
 use nalgebra::{SMatrix, SVector};
 
 /// A value for each ray.
@@ -12,10 +13,10 @@ type Values = SVector<f64, 4>;
 
 /// A contact: the rays of its cone, and how many it has.
 pub(in super::super) struct Rays {
-    rays: SMatrix<f64, 5, 4>,
+    rays: SMatrix<f64, PADDED, 4>,
     count: usize,
     /// 1/ρ + C in order.
-    metric: SVector<f64, 5>,
+    metric: SVector<f64, PADDED>,
 }
 
 /// Multipliers of the rays (N s) and their slacks (m/s), one for each; ones beyond the last ray.
@@ -56,16 +57,16 @@ impl Site for Rays {
 
     fn new(row: &Row) -> Self {
         let signs = |c: f64, there: bool| if there && c > 0.0 { &[1.0, -1.0][..] } else { &[0.0][..] };
-        let mut rays = SMatrix::<f64, 5, 4>::zeros();
+        let mut rays = SMatrix::<f64, PADDED, 4>::zeros();
         let mut count = 0;
         for t in signs(row.cone.mu, row.rows.contains(&1)) {
             for m in signs(row.cone.nu, row.rows.contains(&3)) {
-                rays.set_column(count, &SVector::from([1.0, t * row.cone.mu, 0.0, m * row.cone.nu, 0.0]));
+                rays.set_column(count, &SVector::from([1.0, t * row.cone.mu, 0.0, m * row.cone.nu, 0.0, 0.0]));
                 count += 1;
             }
         }
         let w = row.metric();
-        Self { rays, count, metric: [w.n, w.t, w.t, w.m, w.m].into() }
+        Self { rays, count, metric: [w.n, w.t, w.t, w.m, w.m, w.w].into() }
     }
 
     fn inside(&self, q: &Padded, share: f64, yields: f64) -> Pair {
@@ -149,7 +150,7 @@ impl Site for Rays {
         longest
     }
 
-    fn snapped(&self, row: &Row, at: &Pair) -> (Padded, [f64; 2]) {
+    fn snapped(&self, row: &Row, at: &Pair) -> (Padded, Beyond) {
         let mut lambda = at.lambda;
         for k in 0..self.count {
             if lambda[k] * yields(row) < at.slack[k] {
@@ -157,6 +158,6 @@ impl Site for Rays {
             }
         }
         // in the plane nothing asks how far
-        (self.shifted(row, &lambda), [0.0; 2])
+        (self.shifted(row, &lambda), Beyond::default())
     }
 }
