@@ -81,7 +81,7 @@ fn newton_finds_the_same_velocities() {
         newton_is_newton(pressed::<D3>(0, 3, mu, flow).contact_problem(), 1e-10);
     }
     // where twist holds the grains, too, the rest of a residual of 1e-10 is more velocity
-    let twisting = pressed::<D3Twist>(0, 3, 0.0, Some(BondFlow::Associated));
+    let mut twisting = pressed::<D3Twist>(0, 3, 0.0, Some(BondFlow::Associated));
     newton_is_newton(twisting.contact_problem(), 1e-11);
 }
 

@@ -33,7 +33,7 @@ def test_the_pandas_example(compression):
         ruptures = history["events/rupture"].size
     lines = run("pandas_example.py", compression)
     table = {line.split()[0]: line.split()[1:] for line in lines[2:]}
-    assert set(table) <= {"TENSION", "SHEAR", "ROLLING"}
+    assert set(table) <= {"TENSION", "SHEAR", "ROLLING", "TWIST"}
     assert sum(int(row[0]) for row in table.values()) == ruptures > 0
 
 

@@ -3,6 +3,7 @@
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
+use dem_run::history::{BondStatus, RuptureMode};
 use hdf5::H5Type;
 
 use super::{Checker, Sizes};
@@ -199,7 +200,7 @@ fn states(c: &mut Checker) -> Broken {
                 row.iter().zip(&mut last).enumerate().filter(|(_, (now, last))| *now != &**last)
             {
                 let frame = start + k;
-                if now > 3 {
+                if now as usize >= BondStatus::ALL.len() {
                     c.wrong(STATUS, Some(frame), format!("bond {bond}: code {now} names nothing"));
                 } else if *before != INTACT {
                     c.wrong(STATUS, Some(frame), format!("bond {bond}: {now} after {before}, broken once and for all"));
@@ -300,7 +301,7 @@ fn disagreement(
     told: &mut BTreeMap<usize, usize>,
     row: usize,
 ) -> Option<String> {
-    if !(1..=3).contains(&event.mode) {
+    if !(1..=RuptureMode::ALL.len() as i32).contains(&event.mode) {
         return Some(format!("mode {} names nothing", event.mode));
     }
     let Some((bond, pair)) = usize::try_from(event.bond).ok().and_then(|bond| Some((bond, pairs.get(bond)?))) else {

@@ -362,6 +362,6 @@ mod tests {
     fn ruptures_of_one_time_are_one_point_of_the_curve() {
         let events =
             [event(1.0, RuptureMode::Tension), event(1.0, RuptureMode::Rolling), event(2.0, RuptureMode::Shear)];
-        assert_eq!(broken_over_time(&events), [(1.0, [1, 0, 1]), (2.0, [1, 1, 1])]);
+        assert_eq!(broken_over_time(&events), [(1.0, [1, 0, 1, 0]), (2.0, [1, 1, 1, 0])]);
     }
 }

@@ -6,8 +6,8 @@ use hdf5::types::TypeDescriptor;
 use super::codes::{Coded, ModeCode};
 use super::{Rupture, RuptureMode};
 
-/// Version of the layout. It grows with every change that an older reader would misread.
-pub const SCHEMA_VERSION: u32 = 1;
+/// Version of the layout. It grows with every change that an older reader would misread. 2: bonds break in twist, too.
+pub const SCHEMA_VERSION: u32 = 2;
 
 /// The program's name as `/h5md/creator` records it.
 pub(super) const CREATOR: &str = "dem-run";

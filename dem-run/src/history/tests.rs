@@ -19,6 +19,7 @@ fn full(dimension: usize) -> Layout {
         dimension,
         rotation: true,
         friction: true,
+        twist: false,
         without_reactions: false,
         single: false,
         grains: Grains {

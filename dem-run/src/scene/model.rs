@@ -385,6 +385,7 @@ mod tests {
             stress: Some(1e6),
             gap_tolerance: 1e-3,
             friction: None,
+            twist: None,
             flow: Flow::Associated,
             stiffness: None,
         };

@@ -122,7 +122,7 @@ fn refused<T: hdf5::H5Type>(place: &str, values: Option<&[T]>, parts: &[&str]) {
 #[test]
 fn wrong_datasets_are_named() {
     refused::<i32>("fclib_local/spacedim", None, &["missing"]);
-    refused("fclib_local/spacedim", Some(&[2i32]), &["it is 2", "3 or 5"]);
+    refused("fclib_local/spacedim", Some(&[2i32]), &["it is 2", "3, 5 or 6"]);
     refused("fclib_local/spacedim", Some(&[3i32, 3]), &["2 values instead of 1"]);
     refused("fclib_local/W/n", Some(&[101i32]), &["it is 101", "W must be square"]);
     refused("fclib_local/W/nz", Some(&[-3i32]), &["it is -3", "by columns"]);

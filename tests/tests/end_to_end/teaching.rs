@@ -42,6 +42,7 @@ fn two_grains_part_when_the_load_reaches_the_strength() {
             RuptureMode::Tension => close(rupture.normal_force, -cohesion, 1e-9),
             RuptureMode::Shear => close(rupture.tangential_force, limit, 1e-9),
             RuptureMode::Rolling => close(rupture.moment, diameter * limit, 1e-9),
+            RuptureMode::Twist => panic!("disks do not twist"),
         }
     }
 }
@@ -51,6 +52,39 @@ fn two_grains_pressed_together_never_part() {
     let history = run(&Folder::new(), "two-grains.json", &["--set", "grains.loads.0.force=[-1, 0]"]);
     assert!(history.ruptures().expect("ruptures").is_empty());
     assert_eq!(history.steps().last(), Some(&1500));
+}
+
+#[test]
+fn a_bent_arm_twists_its_row_off_or_bends_it() {
+    // the load grows by 100 N/s; the row carries it with the arm of 12 mm in twist, its first bond with 10 mm in bending
+    let (strength, diameter, arm, root) = (100.0, 4e-3, 12e-3, 10e-3);
+    for (twist, mode, bonds, load) in [
+        ("bonds.twist=0.1", RuptureMode::Twist, 3, 0.1 * diameter * strength / arm),
+        ("bonds.twist=1", RuptureMode::Rolling, 1, 0.3 * diameter * strength / root),
+    ] {
+        let here = Folder::new();
+        let history = run(&here, "bent-arm.json", &["--set", twist]);
+        let ruptures = history.ruptures().expect("ruptures");
+        assert_eq!(ruptures.len(), bonds, "{ruptures:?}");
+        for rupture in &ruptures {
+            assert_eq!(rupture.mode, mode);
+            assert!((rupture.time - load / 100.0).abs() < 1.01e-4, "{mode:?} at {} s", rupture.time);
+        }
+        // the moments about t1, t2 and n of the last frame before the break, 10 steps of 0.01 N apart
+        let contacts = history.contacts(history.frames() - 2).expect("contacts");
+        let time = history.times()[history.frames() - 2] - 5e-5;
+        for (c, moment) in contacts.moment.chunks(3).enumerate() {
+            let in_row = contacts.point[3 * c + 1].abs() < 1e-6;
+            close(moment[2].abs() + 1.0, 1.0 + if in_row { 100.0 * time * arm } else { 0.0 }, 1e-9);
+        }
+        assert!(here.dem_post(&["info", "--check", "a.h5"]).succeeds().stdout.contains("sound    yes"));
+        here.dem_run(&["export", "a.h5", "--step", "333", "-o", "arm.hdf5"]).succeeds();
+        here.dem_run(&["solve", "arm.hdf5", "--solver", "newton"]).succeeds();
+    }
+    // free to spin about their normals, the arm swings round
+    let free = run(&Folder::new(), "bent-arm.json", &["--set", "bonds.twist=null", "--set", "time.end=0.02"]);
+    let end = free.grain_state(free.frames() - 1).expect("state").position;
+    assert!(end[6 * 3 + 2] > 1e-3, "{end:?}");
 }
 
 /// Way along the incline and angle at the last frame.

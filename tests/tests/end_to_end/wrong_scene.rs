@@ -17,6 +17,13 @@ fn wrong_values_are_refused_with_their_place_and_the_remedy() {
         ("compression.json", "bonds.strenght=5", &["bonds.strenght", "nearest  bonds.strength"]),
         ("column.json", "time.step=\"short\"", &["time.step", "found    string \"short\"", "a number"]),
         ("column.json", "dimension=[2]", &["dimension", "allowed"]),
+        ("two-grains.json", "bonds.twist=0.1", &["bonds.twist", "dimension 2", "disks do not twist"]),
+        ("bent-arm.json", "bonds.twist=0", &["bonds.twist", "> 0", "free to spin"]),
+        (
+            "bent-arm.json",
+            r#"bonds.stiffness={"springs": {"normal": 1e6, "tangential": 1e6, "rolling": 1}}"#,
+            &["bonds.stiffness.springs.twist", "found    nothing", "as bonds.twist is given"],
+        ),
         ("two-grains.json", "sample.grains.1.radius=-2e-3", &["sample.grains.1.radius", "-0.002", "> 0 (m)"]),
         ("column.json", "time.step=NaN", &["time.step", "NaN", "a number"]),
         ("column.json", "time.step=Infinity", &["time.step", "Infinity", "a number"]),

@@ -77,7 +77,7 @@ pub(super) fn operator(row: &Row, u: &Padded, r: &Padded, symmetric: bool) -> Op
     } else {
         a += drag * SVector::<f64, PADDED>::ith(0, 1.0).transpose() / w.n;
     }
-    Some(Operator::Full(a))
+    Some(Operator::Full(Box::new(a)))
 }
 
 /// Direction and norm of a row group's q where the group is at its limit.

@@ -11,12 +11,12 @@ use crate::problem::{Contact, ContactProblem, Link, Nodes, Visitor};
 use nalgebra::SMatrix;
 
 /// The derivative of padded rows.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) enum Operator {
     /// Every group of rows on its own.
     Diagonal(Weights),
     /// In the order n, t, m.
-    Full(SMatrix<f64, PADDED, PADDED>),
+    Full(Box<SMatrix<f64, PADDED, PADDED>>),
 }
 
 impl Operator {
@@ -25,7 +25,7 @@ impl Operator {
     pub fn times(&self, x: &Padded) -> Padded {
         match self {
             Self::Diagonal(w) => w.times(x),
-            Self::Full(a) => Padded::from_order(&(a * x.in_order())),
+            Self::Full(a) => Padded::from_order(&(**a * x.in_order())),
         }
     }
 

@@ -238,7 +238,7 @@ impl<const R: usize, const C: usize> Site for Disks<R, C> {
     fn operator(&self, scaling: &Scaling<R, C>) -> Operator {
         let mut all = SMatrix::<f64, PADDED, PADDED>::zeros();
         all.fixed_view_mut::<R, R>(0, 0).copy_from(&scaling.inverse);
-        Operator::Full(all)
+        Operator::Full(Box::new(all))
     }
 
     fn drive(

@@ -107,7 +107,7 @@ impl Site for Rays {
     }
 
     fn operator(&self, inverse: &SMatrix<f64, 4, 4>) -> Operator {
-        Operator::Full(self.rays * inverse * self.rays.transpose())
+        Operator::Full(Box::new(self.rays * inverse * self.rays.transpose()))
     }
 
     fn drive(&self, inverse: &SMatrix<f64, 4, 4>, at: &Pair, off: &Values, aim: Aim<Pair>) -> Values {
