@@ -185,11 +185,14 @@ impl<D: Dim> Span<'_, D> {
         let [i, j] = link.nodes.map(|node| node as usize - self.first);
         let (t, m): (D::Tangent, D::Moment) = (resized(r.t), resized(r.m));
         let impulse = if T::LEN > 0 { D::compose(&link.frame, r.n, t) } else { D::normal(&link.frame) * r.n };
+        let turn = |lever: f64, arm: f64| match B::LEN {
+            0 => D::spin_rows_transposed(&link.frame, t * -lever),
+            _ => D::torque_of_rows(&link.frame, t * -lever, m * arm),
+        };
         let node = &mut self.all[i];
         node.velocity += impulse * node.inverse_mass;
         if T::LEN > 0 {
-            let turn = D::torque_of_rows(&link.frame, t * -arms.lever[0], m * arms.bending);
-            node.spin += turn * node.inverse_inertia;
+            node.spin += turn(arms.lever[0], arms.bending) * node.inverse_inertia;
         }
         let node = &mut self.all[j];
         if j >= self.grains {
@@ -199,8 +202,7 @@ impl<D: Dim> Span<'_, D> {
         }
         node.velocity -= impulse * node.inverse_mass;
         if T::LEN > 0 {
-            let turn = D::torque_of_rows(&link.frame, t * -arms.lever[1], m * -arms.bending);
-            node.spin += turn * node.inverse_inertia;
+            node.spin += turn(arms.lever[1], -arms.bending) * node.inverse_inertia;
         }
     }
 }

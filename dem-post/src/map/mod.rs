@@ -184,7 +184,8 @@ impl Sample {
         for (grain, &radius) in self.radius.iter().enumerate() {
             let centre = self.centre(state, grain);
             if (0..2).all(|k| (limits[0][k]..=limits[1][k]).contains(&centre[k])) {
-                found = union(found, around(centre, radius));
+                let larger = self.eye.magnified(&state.position[grain * self.dimension..]);
+                found = union(found, around(centre, radius * larger));
             }
         }
         found
