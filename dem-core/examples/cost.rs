@@ -1,5 +1,5 @@
 //! A scene that does one thing many times, for tools that count instructions or bytes:
-//! `cost disks|spheres FEATURE ROWS COLUMNS sweep|step TIMES` prints the number of grains and contacts, the bytes of
+//! `cost disks|spheres|twisting FEATURE ROWS COLUMNS sweep|step TIMES` prints the number of grains and contacts, the bytes of
 //! a contact, and the greatest resident size (kB).
 
 #[path = "../tests/common/mod.rs"]
@@ -7,22 +7,23 @@ mod common;
 
 use common::family::{FEATURES, layers_of_spheres, rows_of_disks};
 use dem_core::contact::LocalSolve;
-use dem_core::dim::Dim;
+use dem_core::dim::{D3, D3Twist, Dim};
 use dem_core::solver::sweep;
 use dem_core::world::World;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [grains, feature, rows, columns, what, times] = arguments.as_slice() else {
-        panic!("usage: cost disks|spheres FEATURE ROWS COLUMNS sweep|step TIMES");
+        panic!("usage: cost disks|spheres|twisting FEATURE ROWS COLUMNS sweep|step TIMES");
     };
     let number = |text: &str| text.parse::<usize>().expect("a whole number");
     let feature = FEATURES.iter().find(|(name, _)| name == feature).expect("a feature of common/family.rs").1;
     let (rows, columns, times) = (number(rows), number(columns), number(times));
     match grains.as_str() {
         "disks" => spend(rows_of_disks(rows, columns, feature, 20), what, times),
-        "spheres" => spend(layers_of_spheres(rows, columns, feature, 20), what, times),
-        other => panic!("disks or spheres, not {other}"),
+        "spheres" => spend(layers_of_spheres::<D3>(rows, columns, feature, 20), what, times),
+        "twisting" => spend(layers_of_spheres::<D3Twist>(rows, columns, feature, 20), what, times),
+        other => panic!("disks, spheres or twisting, not {other}"),
     }
 }
 

@@ -4,7 +4,7 @@ use super::{down, floor, grain, settings, world};
 use dem_core::body::Grain;
 use dem_core::bond::Stiffness;
 use dem_core::contact::LocalSolve;
-use dem_core::dim::{D2, D3, Dim};
+use dem_core::dim::{D2, Dim};
 use dem_core::solver::{GaussSeidelSettings, SolverSettings};
 use dem_core::world::{Restitution, World};
 
@@ -47,8 +47,8 @@ pub fn rows_of_disks(rows: usize, columns: usize, feature: Feature, sweeps: u64)
     resting(disks, feature, sweeps)
 }
 
-/// The same of spheres: `layers` layers of `columns` × `columns`.
-pub fn layers_of_spheres(layers: usize, columns: usize, feature: Feature, sweeps: u64) -> World<D3> {
+/// The same of spheres, in a dimension of three: `layers` layers of `columns` × `columns`.
+pub fn layers_of_spheres<D: Dim>(layers: usize, columns: usize, feature: Feature, sweeps: u64) -> World<D> {
     let r = RADIUS;
     let mut spheres = Vec::new();
     for layer in 0..layers {
@@ -81,9 +81,10 @@ fn resting<D: Dim>(grains: Vec<Grain<D>>, feature: Feature, sweeps: u64) -> Worl
     let mut w = world(grains, vec![floor(set.friction)], set);
     if matches!(feature, Feature::Bonds | Feature::ElasticBonds) {
         w.form_bonds(1e-6, |_| 100.0, 0.3);
+        w.limit_twist(0.1);
     }
     if feature == Feature::ElasticBonds {
-        w.make_bonds_elastic(|d| Stiffness { normal: 1e8, tangential: 1e8, rolling: 1e8 * d * d / 12.0, twist: 0.0 });
+        w.make_bonds_elastic(|d| Stiffness { normal: 1e8, tangential: 1e8, rolling: 1e8 * d * d / 12.0, twist: 1e8 * d * d / 16.0 });
     }
     w
 }
