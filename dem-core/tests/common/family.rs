@@ -84,7 +84,12 @@ fn resting<D: Dim>(grains: Vec<Grain<D>>, feature: Feature, sweeps: u64) -> Worl
         w.limit_twist(0.1);
     }
     if feature == Feature::ElasticBonds {
-        w.make_bonds_elastic(|d| Stiffness { normal: 1e8, tangential: 1e8, rolling: 1e8 * d * d / 12.0, twist: 1e8 * d * d / 16.0 });
+        w.make_bonds_elastic(|d| Stiffness {
+            normal: 1e8,
+            tangential: 1e8,
+            rolling: 1e8 * d * d / 12.0,
+            twist: 1e8 * d * d / 16.0,
+        });
     }
     w
 }

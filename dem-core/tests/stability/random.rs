@@ -6,7 +6,7 @@ use crate::scene::Kind;
 use dem_core::body::{Drive, Grain, Load, Shape, Wall};
 use dem_core::bond::{Rupture, Stiffness};
 use dem_core::contact::BondFlow;
-use dem_core::dim::{D2, D3, Dim, Vect};
+use dem_core::dim::{D2, D3, D3Twist, Dim, Vect};
 use dem_core::world::{Restitution, Settings, World};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -142,9 +142,15 @@ fn scene<D: Dim>(dice: &mut Dice, most: f64) -> (World<D>, f64) {
         let tolerance = dice.pick(&[1e-3, 0.05, 0.2]);
         let mu = dice.pick(&[0.0, 0.3, 1.0]);
         world.form_bonds(tolerance, |_| strength, mu);
+        world.limit_twist(0.1);
         if dice.one_in(3) {
             let k = strength / size * dice.decade(1.0, 1e6);
-            world.make_bonds_elastic(|d| Stiffness { normal: k, tangential: k, rolling: k * d * d / 12.0, twist: 0.0 });
+            world.make_bonds_elastic(|d| Stiffness {
+                normal: k,
+                tangential: k,
+                rolling: k * d * d / 12.0,
+                twist: k * d * d / 16.0,
+            });
         }
     }
     (world, accept)
@@ -155,6 +161,9 @@ fn scene_holds(seed: u64, most: f64, steps: usize) {
     let mut dice = Dice(Pcg64::seed_from_u64(seed));
     if dice.one_in(2) {
         let (mut world, accept) = scene::<D2>(&mut dice, most);
+        watch(&mut world, steps, accept);
+    } else if seed % 3 == 0 {
+        let (mut world, accept) = scene::<D3Twist>(&mut dice, most);
         watch(&mut world, steps, accept);
     } else {
         let (mut world, accept) = scene::<D3>(&mut dice, most);
