@@ -162,7 +162,7 @@ fn scene_holds(seed: u64, most: f64, steps: usize) {
     if dice.one_in(2) {
         let (mut world, accept) = scene::<D2>(&mut dice, most);
         watch(&mut world, steps, accept);
-    } else if seed % 3 == 0 {
+    } else if seed.is_multiple_of(3) {
         let (mut world, accept) = scene::<D3Twist>(&mut dice, most);
         watch(&mut world, steps, accept);
     } else {
