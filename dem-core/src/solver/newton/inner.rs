@@ -7,8 +7,10 @@ use super::rows::{Operator, Row, Rows};
 use super::{Newton, Stall};
 use crate::contact::Padded;
 
-/// GMRES iterations beyond those of a fresh factor that a kept one may cost in all before it is renewed.
+/// GMRES iterations beyond those of a fresh factor that a kept one may cost in all before it is renewed; in space, where
+/// fifteen take as long as a factorisation.
 const WASTE: usize = 20;
+const WASTE_IN_SPACE: usize = 12;
 /// Error of a linear solve with the factor alone up to which the next is left to it.
 const TRUST: f64 = 1e-3;
 /// Linear solves by GMRES after one that the factor alone was trusted with and failed.
@@ -17,11 +19,13 @@ const DISTRUST: usize = 100;
 /// active set.
 const SMALL: f64 = 0.1;
 const ROUGH: f64 = 1e5;
-/// Least tolerance of a linear solve: where one may suffice, and where it must be followed by another.
+/// Tolerance of a linear solve: the least and the largest where one may suffice, and where another must follow.
 const TIGHT: f64 = 1e-12;
-const LOOSE: f64 = 1e-4;
-/// Most GMRES iterations of one linear solve.
+const FAIR: f64 = 1e-3;
+const LOOSE: f64 = 1e-2;
+/// Most GMRES iterations of one linear solve, and in space with a kept factor.
 const MOST_KRYLOV: usize = 80;
+const MOST_KEPT_IN_SPACE: usize = 15;
 
 /// State of one solve.
 pub(super) struct Iterate {
@@ -113,8 +117,9 @@ impl Newton {
         let norm = norm2(&right).sqrt();
         // in space slips turn with every iteration, and no linear solve can foresee by how much
         let left = if guess.is_some() && self.slips.any() { ROUGH } else { SMALL };
-        let least = if guess.is_none() && rows.in_space() { LOOSE } else { TIGHT };
-        let tolerance = (left * target / norm).clamp(least, 1e-3);
+        let must_follow = guess.is_none() && rows.in_space();
+        let tolerance = if must_follow { LOOSE } else { (left * target / norm).clamp(TIGHT, FAIR) };
+        let (most, waste) = if rows.in_space() { (MOST_KEPT_IN_SPACE, WASTE_IN_SPACE) } else { (MOST_KRYLOV, WASTE) };
         let serves = !self.renew && self.factor.serves(rows.unknowns);
         if serves && self.trusted {
             self.factor.solve(&mut right);
@@ -126,13 +131,14 @@ impl Newton {
                 return None;
             }
             let apply = |x: &[f64], out: &mut [f64]| multiply(rows, &exact, x, out);
-            let (step, report) = gmres(&right, tolerance, MOST_KRYLOV, apply, |x| self.factor.solve(x));
+            let most = if fresh { MOST_KRYLOV } else { most };
+            let (step, report) = gmres(&right, tolerance, most, apply, |x| self.factor.solve(x));
             if fresh {
                 // what even a fresh factor needs is the part that is not symmetric
                 (self.floor, self.wasted) = (report.iterations, 0);
             }
             self.wasted += report.iterations.saturating_sub(self.floor);
-            self.renew = self.wasted > WASTE;
+            self.renew = self.wasted > waste;
             self.distrust = self.distrust.saturating_sub(1);
             self.trusted = self.distrust == 0 && report.plain <= TRUST;
             if report.residual <= tolerance || fresh {
