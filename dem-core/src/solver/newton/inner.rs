@@ -97,7 +97,7 @@ impl Newton {
     /// An error of F turns up as a velocity when v is computed from the reactions. Rounding comes from ρ u, where u is a
     /// sum of velocities.
     fn target(&self, rows: &Rows, state: &Iterate) -> f64 {
-        let change: f64 = state.y.iter().zip(&rows.free).map(|(y, f)| (y - f) * (y - f)).sum();
+        let change = distance(&state.y, &rows.free);
         let (mut rounding, mut carried) = (0.0, 0.0);
         for (row, r) in rows.list.iter().zip(&state.reactions) {
             let speed: f64 = (0..2).map(|side| norm2(&state.y[row.at[side]..][..row.count[side]])).sum();
@@ -105,8 +105,7 @@ impl Newton {
             rounding += row.size * (speed * row.size / (soft * soft) + r.dot(r));
             carried += row.size * r.dot(r);
         }
-        let wanted =
-            (0.1 * self.settings.load_tolerance * change.sqrt()).min(0.1 * self.settings.tolerance * carried.sqrt());
+        let wanted = (0.1 * self.settings.load_tolerance * change).min(0.1 * self.settings.tolerance * carried.sqrt());
         wanted.max(4.0 * f64::EPSILON * rounding.sqrt())
     }
 
@@ -117,9 +116,9 @@ impl Newton {
         let norm = norm2(&right).sqrt();
         // in space slips turn with every iteration, and no linear solve can foresee by how much
         let left = if guess.is_some() && self.slips.any() { ROUGH } else { SMALL };
-        let must_follow = guess.is_none() && rows.in_space();
-        let tolerance = if must_follow { LOOSE } else { (left * target / norm).clamp(TIGHT, FAIR) };
-        let (most, waste) = if rows.in_space() { (MOST_KEPT_IN_SPACE, WASTE_IN_SPACE) } else { (MOST_KRYLOV, WASTE) };
+        let in_space = rows.in_space();
+        let tolerance = if in_space && guess.is_none() { LOOSE } else { (left * target / norm).clamp(TIGHT, FAIR) };
+        let (most, waste) = if in_space { (MOST_KEPT_IN_SPACE, WASTE_IN_SPACE) } else { (MOST_KRYLOV, WASTE) };
         let serves = !self.renew && self.factor.serves(rows.unknowns);
         if serves && self.trusted {
             self.factor.solve(&mut right);
@@ -157,6 +156,11 @@ struct Direction {
 
 pub(super) fn norm2(x: &[f64]) -> f64 {
     x.iter().map(|x| x * x).sum()
+}
+
+/// ‖a − b‖.
+pub(super) fn distance(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
 }
 
 /// F, and for each contact the velocity and reaction that its operator A belongs to: those of the state, or with a

@@ -39,7 +39,7 @@ use crate::problem::assembled::Assembled;
 use crate::saved::{Mismatch, Reader, Saved};
 use factor::Factor;
 use guess::{Guess, Slips};
-use inner::{Iterate, norm2};
+use inner::{Iterate, distance, norm2};
 use interior::{Bending, Rays, Twisting};
 use rows::Rows;
 use solvable::Solvable;
@@ -272,11 +272,11 @@ impl Newton {
         let (mut last_error, mut softened, mut made_in_all) = (f64::INFINITY, 0, 0);
         loop {
             let mut state = Iterate::from_reactions(rows, &guess.reactions);
-            let begun = state.y.clone();
             let (mut made, mut solved) = self.inner(rows, &mut state, Some(guess), patience, MOST_INNER);
             *iterations += made.max(1);
             if !solved && made > 1 && last_error <= self.settings.tolerance {
                 // what the round before left is good enough, and this was to tell its load error: the velocities show it
+                let begun = rows.given_by(&guess.reactions);
                 let load_error = distance(&begun, &state.y) / distance(&begun, &rows.free);
                 let report = self.report(*iterations, last_error, load_error);
                 if report.status == SolveStatus::Converged {
@@ -507,11 +507,6 @@ fn relative_change(from: &[Padded], to: &[Padded]) -> f64 {
         total += to.dot(to);
     }
     if change == 0.0 { 0.0 } else { (change / total).sqrt() }
-}
-
-/// ‖b − a‖.
-fn distance(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (b - a) * (b - a)).sum::<f64>().sqrt()
 }
 
 /// By how much the net impulses on the bodies differ between two sets of reactions, over those of the second.

@@ -25,7 +25,7 @@ mod rays;
 
 use super::factor::Factor;
 use super::guess::{Beyond, Guess, Slips};
-use super::inner::norm2;
+use super::inner::{distance, norm2};
 use super::rows::{Operator, Row, Rows};
 use super::solvable::Solvable;
 use super::{Found, Newton, Shrinking, SolveReport, SolveStatus, Stall, load_change, net_change};
@@ -290,7 +290,7 @@ impl<S: Site> Path<S> {
 
     /// The change of momentum that the velocities of the point stand for.
     fn impulse(&self) -> f64 {
-        self.at.y.iter().zip(&self.rows.free).map(|(y, f)| (y - f) * (y - f)).sum::<f64>().sqrt()
+        distance(&self.at.y, &self.rows.free)
     }
 
     /// Go to the next point.
