@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Measures what docs/cost.md says of size: `.venv/bin/python scripts/measure_cost.py`, a few minutes and 1.2 GB.
+"""Measures what docs/cost.md says of size: `.venv/bin/python scripts/measure_cost.py`, a few minutes and 0.9 GB.
 
 Dry disks, 10,000 to 1,000,000, in steps of 20 sweeps with the figure docs/images/cost-size.png. Times are wall times of
 one machine: differences between many steps and few, so that neither the start of the program nor the building of the

@@ -162,12 +162,22 @@ fn versine(s: f64) -> f64 {
     square / (1.0 + (1.0 - square).max(0.0).sqrt())
 }
 
+/// The axes of a contact that its rows need: the whole frame, or the normal alone where nothing rubs.
+pub trait Axes<D: Dim>: Copy + Debug + PartialEq + Send + Sync + 'static {
+    /// Those of a frame.
+    fn of(frame: D::Frame) -> Self;
+    /// The normal.
+    fn normal(&self) -> D::Vector;
+    /// The frame, if they are one.
+    fn frame(&self) -> Option<&D::Frame>;
+}
+
 /// A dimension of space, as the contact problem sees it.
 pub trait Dim: Copy + Debug + Default + Send + Sync + 'static {
     /// Number of space dimensions.
     const N: usize;
     /// Position, velocity, force.
-    type Vector: Vect;
+    type Vector: Vect + Axes<Self>;
     /// Angular velocity, torque: one component in 2D, three in 3D.
     type Spin: Vect;
     /// Tangential rows of a contact.
@@ -175,24 +185,27 @@ pub trait Dim: Copy + Debug + Default + Send + Sync + 'static {
     /// Moment rows of a bond.
     type Moment: Moments;
     /// Orthonormal frame (n, t…) of a contact.
-    type Frame: Copy + Debug + PartialEq + Send + Sync + 'static;
+    type Frame: Axes<Self>;
+    /// The tangents of a frame as numbers, where the normal does not give them: none in the plane.
+    type Tangents: Vect;
     /// Orientation of a body: an angle (rad) in 2D, a unit quaternion w, x, y, z in 3D.
     type Orientation: Vect;
 
     /// The frame of a unit normal.
     fn frame(normal: Self::Vector) -> Self::Frame;
     /// The frame of a unit normal that turned least from `old`; it keeps tangential reactions meaningful between steps.
-    fn transported(old: &Self::Frame, normal: Self::Vector) -> Self::Frame;
+    fn transported(old: &Self::Tangents, normal: Self::Vector) -> Self::Frame;
     /// The normal of a frame.
-    fn normal(frame: &Self::Frame) -> Self::Vector;
+    #[inline(always)]
+    fn normal(frame: &Self::Frame) -> Self::Vector {
+        frame.normal()
+    }
     /// First tangent of a frame.
     fn tangent(frame: &Self::Frame) -> Self::Vector;
-    /// Numbers of a frame.
-    const FRAME: usize;
-    /// The numbers of a frame, appended to `out`: normal, then tangents.
-    fn write_frame(frame: &Self::Frame, out: &mut Vec<f64>);
-    /// The frame of these numbers; there must be exactly [`Dim::FRAME`].
-    fn read_frame(numbers: &[f64]) -> Self::Frame;
+    /// What a frame has beside its normal.
+    fn tangents(frame: &Self::Frame) -> Self::Tangents;
+    /// The frame of this normal and these tangents.
+    fn with_tangents(normal: Self::Vector, tangents: &Self::Tangents) -> Self::Frame;
     /// Normal and tangential components of a vector.
     fn split(frame: &Self::Frame, vector: Self::Vector) -> (f64, Self::Tangent);
     /// The vector with the given normal and tangential components; transpose of [`Dim::split`].
@@ -250,6 +263,57 @@ pub struct Frame3 {
     t: [SVector<f64, 3>; 2],
 }
 
+impl Axes<D2> for SVector<f64, 2> {
+    #[inline(always)]
+    fn of(frame: Self) -> Self {
+        frame
+    }
+    #[inline(always)]
+    fn normal(&self) -> Self {
+        *self
+    }
+    #[inline(always)]
+    fn frame(&self) -> Option<&Self> {
+        Some(self)
+    }
+}
+
+impl<const MOMENTS: usize> Axes<Space<MOMENTS>> for SVector<f64, 3>
+where
+    SVector<f64, MOMENTS>: Moments,
+{
+    #[inline(always)]
+    fn of(frame: Frame3) -> Self {
+        frame.n
+    }
+    #[inline(always)]
+    fn normal(&self) -> Self {
+        *self
+    }
+    #[inline(always)]
+    fn frame(&self) -> Option<&Frame3> {
+        None
+    }
+}
+
+impl<const MOMENTS: usize> Axes<Space<MOMENTS>> for Frame3
+where
+    SVector<f64, MOMENTS>: Moments,
+{
+    #[inline(always)]
+    fn of(frame: Self) -> Self {
+        frame
+    }
+    #[inline(always)]
+    fn normal(&self) -> SVector<f64, 3> {
+        self.n
+    }
+    #[inline(always)]
+    fn frame(&self) -> Option<&Self> {
+        Some(self)
+    }
+}
+
 impl Dim for D2 {
     const N: usize = 2;
     const INERTIA_FACTOR: f64 = 0.5;
@@ -258,6 +322,7 @@ impl Dim for D2 {
     type Tangent = SVector<f64, 1>;
     type Moment = SVector<f64, 1>;
     type Frame = SVector<f64, 2>;
+    type Tangents = V0;
     type Orientation = SVector<f64, 1>;
 
     #[inline(always)]
@@ -265,23 +330,20 @@ impl Dim for D2 {
         normal
     }
     #[inline(always)]
-    fn transported(_: &Self::Frame, normal: Self::Vector) -> Self::Frame {
+    fn transported(_: &Self::Tangents, normal: Self::Vector) -> Self::Frame {
         normal
-    }
-    #[inline(always)]
-    fn normal(frame: &Self::Frame) -> Self::Vector {
-        *frame
     }
     #[inline(always)]
     fn tangent(n: &Self::Frame) -> Self::Vector {
         [-n[1], n[0]].into()
     }
-    const FRAME: usize = 2;
-    fn write_frame(n: &Self::Frame, out: &mut Vec<f64>) {
-        out.extend_from_slice(n.as_slice());
+    #[inline(always)]
+    fn tangents(_: &Self::Frame) -> Self::Tangents {
+        V0::zero()
     }
-    fn read_frame(numbers: &[f64]) -> Self::Frame {
-        Vect::from_slice(numbers)
+    #[inline(always)]
+    fn with_tangents(normal: Self::Vector, _: &Self::Tangents) -> Self::Frame {
+        normal
     }
     #[inline(always)]
     fn split(n: &Self::Frame, v: Self::Vector) -> (f64, Self::Tangent) {
@@ -332,6 +394,7 @@ where
     type Tangent = SVector<f64, 2>;
     type Moment = SVector<f64, MOMENTS>;
     type Frame = Frame3;
+    type Tangents = SVector<f64, 6>;
     type Orientation = SVector<f64, 4>;
 
     /// Branch-light orthonormal basis: Duff et al., *Building an orthonormal basis, revisited*, JCGT 6(1), 2017.
@@ -343,8 +406,9 @@ where
         let t2: Self::Vector = [b, sign + n[1] * n[1] * a, -n[1]].into();
         Frame3 { n, t: [t1, t2] }
     }
-    fn transported(old: &Self::Frame, n: Self::Vector) -> Self::Frame {
-        let flat = old.t[0] - n * n.dot(&old.t[0]);
+    fn transported(old: &Self::Tangents, n: Self::Vector) -> Self::Frame {
+        let old: Self::Vector = resized(*old);
+        let flat = old - n * n.dot(&old);
         let norm = flat.norm();
         if norm < 0.5 {
             return Self::frame(n);
@@ -353,22 +417,15 @@ where
         Frame3 { n, t: [t1, n.cross(&t1)] }
     }
     #[inline(always)]
-    fn normal(frame: &Self::Frame) -> Self::Vector {
-        frame.n
-    }
-    #[inline(always)]
     fn tangent(frame: &Self::Frame) -> Self::Vector {
         frame.t[0]
     }
-    const FRAME: usize = 9;
-    fn write_frame(f: &Self::Frame, out: &mut Vec<f64>) {
-        for v in [f.n, f.t[0], f.t[1]] {
-            out.extend_from_slice(v.as_slice());
-        }
+    fn tangents(f: &Self::Frame) -> Self::Tangents {
+        let [a, b] = f.t;
+        [a[0], a[1], a[2], b[0], b[1], b[2]].into()
     }
-    fn read_frame(numbers: &[f64]) -> Self::Frame {
-        let vector = |k: usize| Vect::from_slice(&numbers[3 * k..3 * k + 3]);
-        Frame3 { n: vector(0), t: [vector(1), vector(2)] }
+    fn with_tangents(n: Self::Vector, t: &Self::Tangents) -> Self::Frame {
+        Frame3 { n, t: [[t[0], t[1], t[2]].into(), [t[3], t[4], t[5]].into()] }
     }
     #[inline(always)]
     fn split(f: &Self::Frame, v: Self::Vector) -> (f64, Self::Tangent) {

@@ -61,7 +61,7 @@ fn keeps_momentum<D: Dim>(bonded: bool) {
         "{}",
         (end.angular - start.angular).norm()
     );
-    assert!(w.touches.iter().any(|t| t.reaction.n > 0.0) || bonded);
+    assert!(w.touches().any(|t| t.reaction.n > 0.0) || bonded);
 }
 
 #[test]

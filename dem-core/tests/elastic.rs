@@ -276,7 +276,7 @@ fn a_row_twists_by_its_springs() {
 
 /// The energy that the bonds of a world store, from their reactions.
 fn stored<D: Dim>(w: &World<D>) -> f64 {
-    let intact = w.touches.iter().filter_map(|t| Some((t, &w.bonds[t.bond? as usize])));
+    let intact = w.touches().filter_map(|t| Some((t, &w.bonds[t.bond? as usize])));
     intact
         .filter(|(_, bond)| bond.status == BondStatus::Intact)
         .map(|(t, bond)| {
@@ -358,8 +358,7 @@ fn never_grows<D: Dim>(periods: f64) {
     let (mut last, first) = (w.kinetic_energy(), w.kinetic_energy());
     for _ in 0..40 {
         let (before, spins, damped) = (w.grains.velocity.clone(), w.grains.spin.clone(), w.ledger.damping);
-        let old: Vec<_> =
-            w.bonds.iter().map(|b| w.touches.iter().find(|t| t.pair == b.pair).map(|t| t.reaction)).collect();
+        let old: Vec<_> = w.bonds.iter().map(|b| w.touches().find(|t| t.pair == b.pair).map(|t| t.reaction)).collect();
         let report = w.step().unwrap();
         assert!(report.status == SolveStatus::Converged && report.work.newton <= 15, "{report:?}");
         assert!(report.breaks.is_empty());
@@ -372,7 +371,7 @@ fn never_grows<D: Dim>(periods: f64) {
             lost += 0.5 * (w.grains.mass[k] * dv.dot(&dv) + w.grains.inertia[k] * ds.dot(&ds));
         }
         for (bond, old) in w.bonds.iter().zip(old) {
-            let (k, t) = (bond.stiffness.unwrap(), w.touches.iter().find(|t| t.pair == bond.pair).unwrap());
+            let (k, t) = (bond.stiffness.unwrap(), w.touches().find(|t| t.pair == bond.pair).unwrap());
             let change = old.map_or(t.reaction, |old| t.reaction - old);
             let parts = change.n.powi(2) / k.normal + change.t.dot(&change.t) / k.tangential;
             lost += 0.5 * (parts + change.m.dot(&change.m) / k.rolling);
@@ -543,13 +542,13 @@ fn held_block() -> World<D2> {
 fn stiff_bonds_tend_to_the_stiff_limit() {
     let mut rigid = held_block();
     rigid.step().unwrap();
-    let size = rigid.touches.iter().map(|t| t.reaction.dot(&t.reaction)).sum::<f64>().sqrt();
+    let size = rigid.touches().map(|t| t.reaction.dot(&t.reaction)).sum::<f64>().sqrt();
     let distances: Vec<f64> = (6..=12)
         .map(|decade| {
             let mut w = held_block();
             w.make_bonds_elastic(springs(10f64.powi(decade), 1.0));
             w.step().unwrap();
-            let pairs = w.touches.iter().zip(&rigid.touches).map(|(a, b)| a.reaction - b.reaction);
+            let pairs = w.touches().zip(rigid.touches()).map(|(a, b)| a.reaction - b.reaction);
             pairs.map(|d| d.dot(&d)).sum::<f64>().sqrt() / size
         })
         .collect();

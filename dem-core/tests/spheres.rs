@@ -91,9 +91,9 @@ fn assert_twins(mut plane: World<D2>, mut space: World<D3>, most: usize, rounds:
             // counter-clockwise from the first axis to the last is about the second axis, turned round
             near(p.spin[k][0] * p.radius[k], -s.spin[k][1] * p.radius[k], fastest);
         }
-        assert_eq!(plane.touches.len(), space.touches.len());
-        let largest = plane.touches.iter().map(|t| t.reaction.n.abs()).fold(0.0, f64::max);
-        for (p, s) in plane.touches.iter().zip(&space.touches) {
+        assert_eq!(plane.touches().len(), space.touches().len());
+        let largest = plane.touches().map(|t| t.reaction.n.abs()).fold(0.0, f64::max);
+        for (p, s) in plane.touches().zip(space.touches()) {
             assert_eq!(p.pair, s.pair);
             let near = |a: f64, b: f64| assert!((a - b).abs() <= 1e-8 * largest, "step {step}: {a} and {b}");
             near(p.reaction.n, s.reaction.n);
@@ -240,7 +240,7 @@ fn a_cantilever_of_spheres_carries_its_load_at_the_root() {
     let mut world = World::new(grains, Vec::new(), vec![load], Settings { solver: newton, ..settings(1e-4) });
     world.form_bonds(1e-6, |_| 1e3, 0.3);
     common::run(&mut world, 3);
-    for (k, touch) in world.touches.iter().enumerate() {
+    for (k, touch) in world.touches().enumerate() {
         // from the contact point to the load
         let length = r * (2 * (count - 1 - k) - 1) as f64;
         assert!((touch.reaction.t.norm() - force).abs() < 1e-9 * force, "shear in bond {k}");
@@ -273,7 +273,7 @@ fn an_arm_twists_the_row_that_carries_it() {
     for solver in [SolverSettings::Newton(stiff), solver(1e-13)] {
         let mut world = bent_arm(solver);
         common::run(&mut world, 3);
-        for touch in &world.touches {
+        for touch in world.touches() {
             let along_row = touch.point[1].abs() < 1e-9;
             // the load is 80 mm off the row, and 100 mm from its root
             let twist = if along_row { ARM_FORCE * 0.08 } else { 0.0 };

@@ -131,7 +131,7 @@ impl<D: Dim> Recorder<D> {
         let mut rows = ContactRows::default();
         let grains = world.grains.len() as i32;
         let bonded = !world.bonds.is_empty();
-        for touch in &world.touches {
+        for touch in world.touches() {
             let [i, j] = touch.pair.map(|k| k as i32);
             rows.pair.push([i, if j < grains { j } else { grains - 1 - j }]);
             rows.point.extend_from_slice(touch.point.as_slice());

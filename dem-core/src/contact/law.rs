@@ -12,7 +12,7 @@
 //! same fixed points.
 
 use super::cone::{Cone, Local, Weights};
-use crate::dim::{Moments, V0, V1, Vect, resized};
+use crate::dim::{Axes, Dim, Moments, V0, V1, Vect, resized};
 use std::marker::PhantomData;
 
 /// How one contact is bettered within a sweep.
@@ -57,6 +57,8 @@ pub trait Law: Copy + Send + Sync + 'static {
     type T: Vect;
     /// Moment rows.
     type B: Moments;
+    /// The axes that these rows need.
+    type Axes<D: Dim>: Axes<D>;
 
     /// A better impulse for this contact alone, from its impulse `r` (N s) and relative velocity `u` (m/s).
     fn improve(
@@ -152,6 +154,7 @@ impl Frictionless {
 impl Law for Frictionless {
     type T = V0;
     type B = V0;
+    type Axes<D: Dim> = D::Vector;
 
     // the projection on a half line is exact: predictor–corrector and exact solve are one
     #[inline(always)]
@@ -202,6 +205,7 @@ impl<T: Vect> Coulomb<T> {
 impl<T: Vect> Law for Coulomb<T> {
     type T = T;
     type B = V0;
+    type Axes<D: Dim> = D::Frame;
 
     /// Exact: n and t are not coupled, so Signorini's r_n comes first and Coulomb clips r_t to its disk.
     #[inline(always)]
@@ -331,6 +335,7 @@ impl<T: Vect, B: Moments> Bonded<T, B> {
 impl<A: Vect, B: Moments> Law for Bonded<A, B> {
     type T = A;
     type B = B;
+    type Axes<D: Dim> = D::Frame;
 
     #[inline(always)]
     fn improve(&self, local: LocalSolve, r: Local<A, B>, mut u: Local<A, B>) -> Local<A, B> {
@@ -472,6 +477,7 @@ impl<T: Vect, B: Moments> Elastic<T, B> {
 impl<A: Vect, B: Moments> Law for Elastic<A, B> {
     type T = A;
     type B = B;
+    type Axes<D: Dim> = D::Frame;
 
     #[inline(always)]
     fn improve(&self, local: LocalSolve, r: Local<A, B>, u: Local<A, B>) -> Local<A, B> {

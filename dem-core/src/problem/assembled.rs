@@ -459,7 +459,7 @@ struct List<D: Dim>(Vec<Item<D>>);
 impl<D: Dim> Visitor<D> for List<D> {
     fn visit<L: Law>(&mut self, _: &Nodes<D>, c: &Contact<D, L>) {
         self.0.push(Item {
-            link: c.link,
+            link: c.link.whole(),
             arms: c.law.arms(),
             tangents: L::T::LEN,
             moments: L::B::LEN,

@@ -8,7 +8,8 @@ pub(crate) mod blocks;
 pub mod residual;
 
 use crate::contact::{Arms, Block, Bonded, Coulomb, Elastic, Frictionless, Law, Local};
-use crate::dim::{Dim, Moments, Vect, resized};
+use crate::dim::{Axes, Dim, Moments, Vect, resized};
+use std::marker::PhantomData;
 use std::sync::Arc;
 
 /// The velocity unknowns of one body, and what an impulse does to them.
@@ -26,25 +27,36 @@ pub struct Node<D: Dim> {
 
 /// Geometry of a contact between node i and node j: the linear map between node velocities and relative velocity.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Link<D: Dim> {
+pub struct Link<D: Dim, A: Axes<D> = <D as Dim>::Frame> {
     /// Nodes i and j; the normal points from j to i. `j` may be a wall.
     pub nodes: [u32; 2],
-    /// Orthonormal frame (n, t…).
-    pub frame: D::Frame,
+    /// Axes: an orthonormal frame (n, t…), or n alone.
+    pub axes: A,
+    dim: PhantomData<D>,
 }
 
 /// One contact of the problem: its geometry, its law and its impulse.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact<D: Dim, L: Law> {
-    /// Nodes and frame.
-    pub link: Link<D>,
+    /// Nodes and axes.
+    pub link: Link<D, L::Axes<D>>,
     /// Law with the constants of the local solve.
     pub law: L,
     /// Impulse of j on i in the contact frame (N s).
     pub r: Local<L::T, L::B>,
 }
 
-impl<D: Dim> Link<D> {
+impl<D: Dim, A: Axes<D>> Link<D, A> {
+    /// Between these nodes, with the axes of `frame` that are needed.
+    pub fn new(nodes: [u32; 2], frame: D::Frame) -> Self {
+        Self { nodes, axes: A::of(frame), dim: PhantomData }
+    }
+
+    /// The same with a whole frame: where the axes are a normal alone, any with this normal.
+    pub fn whole(&self) -> Link<D> {
+        Link::new(self.nodes, self.axes.frame().copied().unwrap_or_else(|| D::frame(self.axes.normal())))
+    }
+
     /// Local Delassus block for two nodes. `drive` is the direction of the one degree of freedom of a force-driven wall j, if
     /// it is one.
     pub fn block(&self, i: &Node<D>, j: &Node<D>, arms: Arms, drive: Option<D::Vector>) -> Block {
@@ -59,7 +71,7 @@ impl<D: Dim> Link<D> {
         };
         if let Some(d) = drive {
             // the wall yields along d alone: a diagonal that dominates (n·d)², (t·d)² and their coupling
-            let (along, across) = D::split(&self.frame, d);
+            let (along, across) = D::split(&self.whole().axes, d);
             let across = across.norm();
             let coupling = (along * across).abs();
             block.n = i.inverse_mass + j.inverse_mass * (along * along + coupling);
@@ -128,14 +140,14 @@ pub(crate) struct Span<'a, D: Dim> {
 impl<D: Dim> Nodes<D> {
     /// Relative velocity u = Hᵀ v of node i with respect to node j at the contact point.
     #[inline(always)]
-    pub fn relative_velocity<T: Vect, B: Moments>(&self, link: &Link<D>, arms: Arms) -> Local<T, B> {
+    pub fn relative_velocity<T: Vect, B: Moments>(&self, link: &Link<D, impl Axes<D>>, arms: Arms) -> Local<T, B> {
         let [i, j] = link.nodes.map(|node| self.all[node as usize].motion());
         link.relative_velocity(arms, i, j)
     }
 
     /// Add the impulse r of node j on node i: v += M⁻¹ H r.
     #[inline(always)]
-    pub fn apply<T: Vect, B: Moments>(&mut self, link: &Link<D>, arms: Arms, r: Local<T, B>) {
+    pub fn apply<T: Vect, B: Moments>(&mut self, link: &Link<D, impl Axes<D>>, arms: Arms, r: Local<T, B>) {
         self.span().apply(link, arms, r);
     }
 
@@ -151,7 +163,7 @@ impl<D: Dim> Node<D> {
     }
 }
 
-impl<D: Dim> Link<D> {
+impl<D: Dim, A: Axes<D>> Link<D, A> {
     /// Relative velocity of a body with this velocity and spin, i, with respect to another, j, at the contact point.
     #[inline(always)]
     pub(crate) fn relative_velocity<T: Vect, B: Moments>(
@@ -160,12 +172,16 @@ impl<D: Dim> Link<D> {
         (velocity_i, spin_i): (D::Vector, D::Spin),
         (velocity_j, spin_j): (D::Vector, D::Spin),
     ) -> Local<T, B> {
-        let (n, t) = D::split(&self.frame, velocity_i - velocity_j);
+        let velocity = velocity_i - velocity_j;
+        let Some(frame) = self.axes.frame() else {
+            return Local { n: self.axes.normal().dot(&velocity), ..Local::zero() };
+        };
+        let (n, t) = D::split(frame, velocity);
         if T::LEN == 0 {
             return Local { n, ..Local::zero() };
         }
-        let turn = D::spin_rows(&self.frame, spin_i * arms.lever[0] + spin_j * arms.lever[1]);
-        let moment = |spin: D::Spin| resized(D::moment_rows(&self.frame, spin * arms.bending));
+        let turn = D::spin_rows(frame, spin_i * arms.lever[0] + spin_j * arms.lever[1]);
+        let moment = |spin: D::Spin| resized(D::moment_rows(frame, spin * arms.bending));
         let m = if B::LEN == 0 { B::zero() } else { moment(spin_i - spin_j) };
         Local { n, t: resized(t - turn), m }
     }
@@ -174,25 +190,26 @@ impl<D: Dim> Link<D> {
 impl<D: Dim> Span<'_, D> {
     /// As [`Nodes::relative_velocity`].
     #[inline(always)]
-    pub fn relative_velocity<T: Vect, B: Moments>(&self, link: &Link<D>, arms: Arms) -> Local<T, B> {
+    pub fn relative_velocity<T: Vect, B: Moments>(&self, link: &Link<D, impl Axes<D>>, arms: Arms) -> Local<T, B> {
         let [i, j] = link.nodes.map(|node| self.all[node as usize - self.first].motion());
         link.relative_velocity(arms, i, j)
     }
 
     /// As [`Nodes::apply`].
     #[inline(always)]
-    pub fn apply<T: Vect, B: Moments>(&mut self, link: &Link<D>, arms: Arms, r: Local<T, B>) {
+    pub fn apply<T: Vect, B: Moments>(&mut self, link: &Link<D, impl Axes<D>>, arms: Arms, r: Local<T, B>) {
         let [i, j] = link.nodes.map(|node| node as usize - self.first);
         let (t, m): (D::Tangent, D::Moment) = (resized(r.t), resized(r.m));
-        let impulse = if T::LEN > 0 { D::compose(&link.frame, r.n, t) } else { D::normal(&link.frame) * r.n };
-        let turn = |lever: f64, arm: f64| match B::LEN {
-            0 => D::spin_rows_transposed(&link.frame, t * -lever),
-            _ => D::torque_of_rows(&link.frame, t * -lever, m * arm),
+        let frame = link.axes.frame().filter(|_| T::LEN > 0);
+        let impulse = frame.map_or_else(|| link.axes.normal() * r.n, |frame| D::compose(frame, r.n, t));
+        let turn = |frame: &D::Frame, lever: f64, arm: f64| match B::LEN {
+            0 => D::spin_rows_transposed(frame, t * -lever),
+            _ => D::torque_of_rows(frame, t * -lever, m * arm),
         };
         let node = &mut self.all[i];
         node.velocity += impulse * node.inverse_mass;
-        if T::LEN > 0 {
-            node.spin += turn(arms.lever[0], arms.bending) * node.inverse_inertia;
+        if let Some(frame) = frame {
+            node.spin += turn(frame, arms.lever[0], arms.bending) * node.inverse_inertia;
         }
         let node = &mut self.all[j];
         if j >= self.grains {
@@ -201,8 +218,8 @@ impl<D: Dim> Span<'_, D> {
             return;
         }
         node.velocity -= impulse * node.inverse_mass;
-        if T::LEN > 0 {
-            node.spin += turn(arms.lever[1], -arms.bending) * node.inverse_inertia;
+        if let Some(frame) = frame {
+            node.spin += turn(frame, arms.lever[1], -arms.bending) * node.inverse_inertia;
         }
     }
 }

@@ -1,8 +1,8 @@
 //! From bodies to the contact problem and back: detection with warm start, assembly, reading of the result.
 
 use super::World;
-use super::touch::{Touch, TouchStatus};
-use crate::body::direction;
+use super::touch::{Kept, Touch, TouchStatus};
+use crate::body::{Grains, Wall, direction};
 use crate::bond::{Bond, BondStatus};
 use crate::contact::{Arms, Bonded, Coulomb, Elastic, Frictionless, Law, Local};
 use crate::dim::{Dim, Moments, Vect};
@@ -16,13 +16,19 @@ const TOUCHING: f64 = 1e-9;
 /// Gap over the radius of the grain below which a contact that does not close is part of the problem.
 const NEAR: f64 = 1e-3;
 
-/// The configuration at mid-step, where contacts are looked for.
+/// The configuration at mid-step, where contacts are looked for (m).
+#[derive(Clone)]
 pub(super) struct Midpoint<D: Dim> {
     pub grains: Vec<D::Vector>,
     pub walls: Vec<D::Vector>,
 }
 
 impl<D: Dim> Midpoint<D> {
+    /// Where the bodies are now.
+    pub fn of(grains: &Grains<D>, walls: &[Wall<D>]) -> Self {
+        Self { grains: grains.position.clone(), walls: walls.iter().map(|w| w.position).collect() }
+    }
+
     /// The place of a body (m), grains first.
     pub fn place(&self, body: usize) -> D::Vector {
         body.checked_sub(self.grains.len()).map_or_else(|| self.grains[body], |wall| self.walls[wall])
@@ -68,27 +74,20 @@ impl<D: Dim> World<D> {
         (gap, normal, x - normal * (r + 0.5 * gap))
     }
 
-    /// A contact without reaction at the geometry of mid-step.
-    pub(super) fn new_touch(&self, mid: &Midpoint<D>, pair: [u32; 2], bond: Option<u32>) -> Touch<D> {
-        let (gap, normal, point) = self.geometry(mid, pair);
-        Touch {
-            pair,
-            frame: D::frame(normal),
-            point,
-            gap,
-            bond,
-            reaction: Local::zero(),
-            status: if bond.is_some() { TouchStatus::Bonded } else { TouchStatus::Open },
-        }
+    /// A contact with its geometry at mid-step.
+    pub(super) fn touch(&self, mid: &Midpoint<D>, kept: &Kept<D>) -> Touch<D> {
+        let (gap, normal, point) = self.geometry(mid, kept.pair);
+        let frame = D::with_tangents(normal, &kept.tangents);
+        Touch { pair: kept.pair, frame, point, gap, bond: kept.bond(), reaction: kept.reaction, status: kept.status }
     }
 
     /// All contacts of the step, sorted by pair, with the reactions of the last step as a start.
-    pub(super) fn detect(&mut self, mid: &Midpoint<D>, motion: &Motion<D>, h: f64) -> Vec<Touch<D>> {
+    pub(super) fn detect(&mut self, mid: &Midpoint<D>, motion: &Motion<D>, h: f64) -> Vec<Kept<D>> {
         self.refresh_candidates(mid, motion, h);
-        let mut touches: Vec<Touch<D>> = Vec::with_capacity(self.touches.len() + self.touches.len() / 8 + 16);
+        let mut touches: Vec<Kept<D>> = Vec::with_capacity(self.kept.len() + self.kept.len() / 8 + 16);
         let intact = |b: &Bond| b.status == BondStatus::Intact;
         for (k, bond) in self.bonds.iter().enumerate().filter(|(_, b)| intact(b)) {
-            touches.push(self.new_touch(mid, bond.pair, Some(k as u32)));
+            touches.push(Kept::new(bond.pair, Some(k as u32)));
         }
         let mut bonded = self.bonds.iter().filter(|b| intact(b)).map(|b| b.pair).peekable();
         for &pair in &self.candidates.pairs {
@@ -96,26 +95,31 @@ impl<D: Dim> World<D> {
             if bonded.peek() == Some(&pair) || pair.iter().all(|k| self.immovable(*k as usize)) {
                 continue;
             }
-            let touch = self.new_touch(mid, pair, None);
+            let (gap, normal, _) = self.geometry(mid, pair);
             let approach = pair.map(|k| motion.free[k as usize].0);
-            let closing = -(approach[0] - approach[1]).dot(&D::normal(&touch.frame));
+            let closing = -(approach[0] - approach[1]).dot(&normal);
             let near = NEAR * self.grains.radius[pair[0] as usize];
-            if touch.gap <= near + 2.0 * h * closing.max(0.0) {
-                touches.push(touch);
+            if gap <= near + 2.0 * h * closing.max(0.0) {
+                touches.push(Kept { odd: self.is_odd(pair, gap), ..Kept::new(pair, None) });
             }
         }
         touches.sort_by_key(|t| t.pair);
-        self.recall_reactions(&mut touches);
+        self.recall(mid, &mut touches);
         touches
     }
 
     /// Carry the reactions of the last step over, in the frame that turned with the contact.
-    fn recall_reactions(&self, touches: &mut [Touch<D>]) {
-        let mut old = self.touches.iter().peekable();
+    fn recall(&self, mid: &Midpoint<D>, touches: &mut [Kept<D>]) {
+        let mut old = self.kept.iter().peekable();
         for touch in touches {
             while old.next_if(|o| o.pair < touch.pair).is_some() {}
-            if let Some(o) = old.peek().filter(|o| o.pair == touch.pair && o.bond == touch.bond) {
-                touch.frame = D::transported(&o.frame, D::normal(&touch.frame));
+            let same = old.peek().filter(|o| o.pair == touch.pair && o.bond() == touch.bond());
+            if D::Tangents::LEN > 0 {
+                let (_, normal, _) = self.geometry(mid, touch.pair);
+                let frame = same.map_or_else(|| D::frame(normal), |o| D::transported(&o.tangents, normal));
+                touch.tangents = D::tangents(&frame);
+            }
+            if let Some(o) = same {
                 touch.reaction = o.reaction;
             }
         }
@@ -123,13 +127,13 @@ impl<D: Dim> World<D> {
 
     /// Reactions (N, N m) that the elastic bonds carry as a step begins, by the number of the bond; empty where bonds are
     /// rigid.
-    pub(super) fn carried(&self, touches: &[Touch<D>]) -> Vec<Local<D::Tangent, D::Moment>> {
+    pub(super) fn carried(&self, touches: &[Kept<D>]) -> Vec<Local<D::Tangent, D::Moment>> {
         if self.bonds.iter().all(|b| b.stiffness.is_none()) {
             return Vec::new();
         }
         let mut carried = vec![Local::zero(); self.bonds.len()];
         for touch in touches {
-            if let Some(bond) = touch.bond {
+            if let Some(bond) = touch.bond() {
                 carried[bond as usize] = touch.reaction;
             }
         }
@@ -147,13 +151,7 @@ impl<D: Dim> World<D> {
     }
 
     /// Contacts that the step left out and that its velocities would close: they are added, and the step is solved again.
-    pub(super) fn missed(
-        &mut self,
-        mid: &Midpoint<D>,
-        touches: &[Touch<D>],
-        nodes: &Nodes<D>,
-        h: f64,
-    ) -> Vec<Touch<D>> {
+    pub(super) fn missed(&mut self, mid: &Midpoint<D>, touches: &[Kept<D>], nodes: &Nodes<D>, h: f64) -> Vec<Kept<D>> {
         let way = |k: usize| h * nodes.all[k].velocity.norm();
         self.candidates.cover(&self.grains, &mid.grains, &self.walls, &mid.walls, way, |k| 0.5 * way(k));
         let mut present = touches.iter().peekable();
@@ -163,10 +161,11 @@ impl<D: Dim> World<D> {
             if present.peek().is_some_and(|t| t.pair == pair) || pair.iter().all(|k| self.immovable(*k as usize)) {
                 continue;
             }
-            let touch = self.new_touch(mid, pair, None);
+            let (gap, normal, _) = self.geometry(mid, pair);
             let [i, j] = pair.map(|k| nodes.all[k as usize].velocity);
-            if touch.gap + h * (i - j).dot(&D::normal(&touch.frame)) < 0.0 && self.restitution_of(pair) == 0.0 {
-                missed.push(touch);
+            if gap + h * (i - j).dot(&normal) < 0.0 && self.restitution_of(pair) == 0.0 {
+                let (odd, tangents) = (self.is_odd(pair, gap), D::tangents(&D::frame(normal)));
+                missed.push(Kept { odd, tangents, ..Kept::new(pair, None) });
             }
         }
         missed
@@ -224,7 +223,8 @@ impl<D: Dim> World<D> {
     /// The contact problem of these contacts, started from their reactions, and the place of each contact in it.
     pub(super) fn assemble(
         &self,
-        touches: &[Touch<D>],
+        mid: &Midpoint<D>,
+        touches: &[Kept<D>],
         motion: &Motion<D>,
         carried: &[Local<D::Tangent, D::Moment>],
         applied: f64,
@@ -245,8 +245,8 @@ impl<D: Dim> World<D> {
         let order = blocks::order(touches.iter().map(|t| t.pair), self.grains.len());
         for k in 0..touches.len() {
             let place = order.as_ref().map_or(k, |order| order[k] as usize);
-            let touch = &touches[place];
-            let link = Link { nodes: touch.pair, frame: touch.frame };
+            let touch = &self.touch(mid, &touches[place]);
+            let link = Link::<D>::new(touch.pair, touch.frame);
             let lever = self.levers(touch);
             let [i, j] = link.nodes.map(|k| &problem.nodes.all[k as usize]);
             let drive =
@@ -276,7 +276,7 @@ impl<D: Dim> World<D> {
                     places.dry.push(place as u32);
                 } else {
                     problem.frictionless.push(Contact {
-                        link,
+                        link: Link::new(link.nodes, link.axes),
                         law: Frictionless::new(block, bias),
                         r: start.resized(),
                     });
@@ -288,12 +288,17 @@ impl<D: Dim> World<D> {
     }
 
     /// Room for these contacts, and no more: lists that grow by doubling would take twice the memory of a large problem.
-    fn reserve(&self, touches: &[Touch<D>], problem: &mut ContactProblem<D>, places: &mut Places) {
-        let number = |law: fn(&Self, &Touch<D>) -> bool| touches.iter().filter(|t| law(self, t)).count();
-        let bonded = number(|world, t| t.bond.is_some_and(|b| world.bonds[b as usize].stiffness.is_none()));
-        let elastic = number(|_, t| t.bond.is_some()) - bonded;
-        let dry = number(|world, t| t.bond.is_none() && world.friction_of(t.pair) > 0.0);
-        let frictionless = touches.len() - bonded - elastic - dry;
+    fn reserve(&self, touches: &[Kept<D>], problem: &mut ContactProblem<D>, places: &mut Places) {
+        let [mut bonded, mut elastic, mut dry, mut frictionless] = [0; 4];
+        for touch in touches {
+            let count = match touch.bond() {
+                Some(bond) if self.bonds[bond as usize].stiffness.is_some() => &mut elastic,
+                Some(_) => &mut bonded,
+                None if self.friction_of(touch.pair) > 0.0 => &mut dry,
+                None => &mut frictionless,
+            };
+            *count += 1;
+        }
         problem.bonded.reserve_exact(bonded);
         problem.elastic.reserve_exact(elastic);
         problem.dry.reserve_exact(dry);
@@ -319,7 +324,7 @@ impl<D: Dim> World<D> {
 fn turning<D: Dim>(link: &Link<D>, motion: &Motion<D>, h: f64) -> f64 {
     let [(v_i, spin_i), (v_j, spin_j)] = link.nodes.map(|k| motion.before[k as usize]);
     // spins follow the tangential row at mid-step, where they are sin φ / h of the angle φ between two of them
-    -0.5 * D::normal(&link.frame).dot(&D::swing(v_i - v_j, (spin_i + spin_j) * (0.5 * h)))
+    -0.5 * D::normal(&link.axes).dot(&D::swing(v_i - v_j, (spin_i + spin_j) * (0.5 * h)))
 }
 
 /// Moments over the mean diameter.
@@ -328,13 +333,13 @@ fn over_arm<T: Vect, B: Moments>(r: Local<T, B>, arm: f64) -> Local<T, B> {
 }
 
 /// Write the impulses of a group back to the contacts as forces.
-pub(super) fn read_back<D: Dim, L: Law>(touches: &mut [Touch<D>], group: &Group<D, L>, places: &[u32], h: f64) {
+pub(super) fn read_back<D: Dim, L: Law>(touches: &mut [Kept<D>], group: &Group<D, L>, places: &[u32], h: f64) {
     for (contact, place) in group.iter().zip(places) {
         let touch = &mut touches[*place as usize];
         let arm = contact.law.arms().bending;
         let r: Local<D::Tangent, D::Moment> = contact.r.resized();
         touch.reaction = Local { n: r.n / h, t: r.t * (1.0 / h), m: r.m * (arm / h) };
-        touch.status = if touch.bond.is_some() {
+        touch.status = if touch.bond().is_some() {
             TouchStatus::Bonded
         } else if r.n == 0.0 {
             TouchStatus::Open

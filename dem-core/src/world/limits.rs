@@ -10,6 +10,8 @@
 //!
 //! The step asks for none of this where overlaps are pushed out: the speeds of that preparation mean nothing.
 
+use super::assembly::Midpoint;
+use super::touch::Kept;
 use super::{Touch, World};
 use crate::body::Shape;
 use crate::bond::failure;
@@ -53,11 +55,27 @@ impl<D: Dim> World<D> {
         self.candidates.pairs.iter().find(too_deep).copied()
     }
 
+    /// Whether the gap (m) of a pair is one that what follows has to look at.
+    pub(super) fn is_odd(&self, pair: [u32; 2], gap: f64) -> bool {
+        let smaller = self.smaller(pair);
+        gap < -DEEP * smaller || gap > PASSING * smaller
+    }
+
     /// A pair of grains that pushes though it would pass at a distance: only its tangent plane was in the way.
-    pub(super) fn pushes_from_afar(&self, touches: &[Touch<D>], nodes: &Nodes<D>, h: f64) -> Option<[u32; 2]> {
-        let far = |t: &&Touch<D>| {
+    pub(super) fn pushes_from_afar(
+        &self,
+        mid: &Midpoint<D>,
+        touches: &[Kept<D>],
+        nodes: &Nodes<D>,
+        h: f64,
+    ) -> Option<[u32; 2]> {
+        let far = |kept: &&Kept<D>| {
+            if !kept.odd || kept.bond().is_some() || kept.reaction.n <= 0.0 {
+                return false;
+            }
+            let t = self.touch(mid, kept);
             let margin = PASSING * self.smaller(t.pair);
-            if t.bond.is_some() || t.reaction.n <= 0.0 || t.gap <= margin {
+            if t.gap <= margin {
                 return false;
             }
             let [i, j] = t.pair.map(|k| k as usize);
@@ -70,19 +88,25 @@ impl<D: Dim> World<D> {
 
     /// The contact of a solution that yields most, if it does so too far, and how far it would in a whole step (–, over the
     /// smaller radius).
-    pub(super) fn yielding(&self, touches: &[Touch<D>], problem: &ContactProblem<D>) -> Option<([u32; 2], f64)> {
+    pub(super) fn yielding(
+        &self,
+        mid: &Midpoint<D>,
+        touches: &[Kept<D>],
+        problem: &ContactProblem<D>,
+    ) -> Option<([u32; 2], f64)> {
         let mut worst = Yielding { world: self, pair: [0; 2], share: 0.0 };
         problem.visit(&mut worst);
         if worst.share > YIELDING {
             return Some((worst.pair, worst.share));
         }
         // little by little is too far in the end
-        let deep = |t: &&Touch<D>| t.bond.is_none() && t.reaction.n > 0.0 && t.gap < -DEEP * self.smaller(t.pair);
-        let closing = |t: &Touch<D>| {
+        let pressed = touches.iter().filter(|t| t.odd && t.bond().is_none() && t.reaction.n > 0.0);
+        let deep = pressed.map(|t| self.touch(mid, t)).filter(|t| t.gap < -DEEP * self.smaller(t.pair));
+        let closing = |t: Touch<D>| {
             let [i, j] = t.pair.map(|k| problem.nodes.all[k as usize].velocity);
-            -(i - j).dot(&D::normal(&t.frame)) * self.settings.step / self.smaller(t.pair)
+            (t.pair, -(i - j).dot(&D::normal(&t.frame)) * self.settings.step / self.smaller(t.pair))
         };
-        touches.iter().filter(deep).map(|t| (t.pair, closing(t))).find(|(_, share)| *share > SQUEEZING)
+        deep.map(closing).find(|(_, share)| *share > SQUEEZING)
     }
 
     /// The place of a body (m), grains first.

@@ -16,6 +16,9 @@ pub use ledger::{Ledger, Momentum};
 pub use step::{StepError, StepReport};
 pub use touch::{Break, Counts, Touch, TouchStatus};
 
+use assembly::Midpoint;
+use touch::Kept;
+
 use crate::body::{Grains, Load, Wall};
 use crate::bond::{Bond, BondStatus, Rupture, Stiffness};
 use crate::contact::BondFlow;
@@ -76,10 +79,12 @@ pub struct World<D: Dim> {
     pub time: f64,
     /// Number of accepted steps.
     pub steps: u64,
-    /// Contacts of the last accepted step, sorted by pair, with their reactions.
-    pub touches: Vec<Touch<D>>,
     /// Energy since the start.
     pub ledger: Ledger,
+    /// Contacts of the last accepted step, sorted by pair, with their reactions.
+    kept: Vec<Kept<D>>,
+    /// Where the bodies were in the middle of that step: the geometry of its contacts.
+    mid: Midpoint<D>,
     candidates: Candidates<D>,
     solver: Box<dyn ContactSolver<D>>,
     reference: Vec<D::Vector>,
@@ -91,7 +96,8 @@ struct State<D: Dim> {
     grains: Grains<D>,
     walls: Vec<Wall<D>>,
     bonds: Vec<Bond>,
-    touches: Vec<Touch<D>>,
+    kept: Vec<Kept<D>>,
+    mid: Midpoint<D>,
     ledger: Ledger,
     time: f64,
 }
@@ -106,7 +112,8 @@ impl<D: Dim> World<D> {
             volume,
             solver: settings.solver.build(),
             candidates: Candidates::default(),
-            touches: Vec::new(),
+            kept: Vec::new(),
+            mid: Midpoint::of(&grains, &walls),
             bonds: Vec::new(),
             ledger: Ledger::default(),
             time: 0.0,
@@ -167,7 +174,8 @@ impl<D: Dim> World<D> {
             grains: self.grains.clone(),
             walls: self.walls.clone(),
             bonds: self.bonds.clone(),
-            touches: self.touches.clone(),
+            kept: self.kept.clone(),
+            mid: self.mid.clone(),
             ledger: self.ledger,
             time: self.time,
         }
@@ -177,7 +185,8 @@ impl<D: Dim> World<D> {
         self.grains = state.grains;
         self.walls = state.walls;
         self.bonds = state.bonds;
-        self.touches = state.touches;
+        self.kept = state.kept;
+        self.mid = state.mid;
         self.ledger = state.ledger;
         self.time = state.time;
     }

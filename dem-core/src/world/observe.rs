@@ -35,9 +35,9 @@ impl<D: Dim> World<D> {
     /// Love and Weber. ℓ joins the centres, or at a wall the contact point to the centre; V is the box around the sample at time zero.
     pub fn stress(&self) -> Vec<f64> {
         let mut sum = vec![0.0; D::N * D::N];
-        for touch in &self.touches {
+        for touch in self.touches() {
             let force = D::compose(&touch.frame, touch.reaction.n, touch.reaction.t);
-            let branch = self.branch(touch);
+            let branch = self.branch(&touch);
             for row in 0..D::N {
                 for col in 0..D::N {
                     sum[row * D::N + col] += branch[row] * force[col];
@@ -46,6 +46,11 @@ impl<D: Dim> World<D> {
         }
         sum.iter_mut().for_each(|s| *s /= self.volume);
         sum
+    }
+
+    /// Contacts of the last accepted step, sorted by pair, with their reactions.
+    pub fn touches(&self) -> impl ExactSizeIterator<Item = Touch<D>> {
+        self.kept.iter().map(|kept| self.touch(&self.mid, kept))
     }
 
     fn branch(&self, touch: &Touch<D>) -> D::Vector {

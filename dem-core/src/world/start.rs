@@ -1,6 +1,8 @@
 //! The reactions that a run starts from.
 
-use super::{Touch, TouchStatus, World};
+use super::World;
+use super::assembly::Midpoint;
+use super::touch::Kept;
 use crate::body::direction;
 use crate::bond::{Bond, BondStatus};
 use crate::contact::Local;
@@ -13,21 +15,16 @@ impl<D: Dim> World<D> {
     /// A start is where a solver begins, not a load: what the solver makes of it is up to the solver. In a rigid sample,
     /// whose reactions are not unique, different starts lead to different reactions that are all solutions.
     pub fn start_from(&mut self, mut reaction: impl FnMut(&Bond) -> Local<D::Tangent, D::Moment>) {
-        self.touches.clear();
+        self.kept.clear();
+        self.mid = Midpoint::of(&self.grains, &self.walls);
         for (k, bond) in self.bonds.iter().enumerate().filter(|(_, b)| b.status == BondStatus::Intact) {
             let [i, j] = bond.pair.map(|k| k as usize);
             let apart = self.grains.position[i] - self.grains.position[j];
-            let distance = apart.norm();
-            let normal = direction::<D>(apart, distance);
-            let (radius, gap) = (self.grains.radius[i], distance - bond.mean_diameter);
-            self.touches.push(Touch {
-                pair: bond.pair,
-                frame: D::frame(normal),
-                point: self.grains.position[i] - normal * (radius + 0.5 * gap),
-                gap,
-                bond: Some(k as u32),
+            let frame = D::frame(direction::<D>(apart, apart.norm()));
+            self.kept.push(Kept {
+                tangents: D::tangents(&frame),
                 reaction: reaction(bond),
-                status: TouchStatus::Bonded,
+                ..Kept::new(bond.pair, Some(k as u32))
             });
         }
     }

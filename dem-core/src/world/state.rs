@@ -3,7 +3,9 @@
 //! What the scene gives is not part of it: shapes and drives of walls, loads, settings. Nor is the list of candidate
 //! pairs, which may be any that covers a step.
 
-use super::{Ledger, Settings, Touch, TouchStatus, World};
+use super::assembly::Midpoint;
+use super::touch::Kept;
+use super::{Ledger, Settings, TouchStatus, World};
 use crate::body::{Grains, Load, Wall};
 use crate::bond::{Bond, BondStatus, Stiffness};
 use crate::contact::Local;
@@ -74,8 +76,10 @@ impl<D: Dim> World<D> {
         }
         to.count(self.bonds.len());
         self.bonds.iter().for_each(|bond| save_bond(bond, to));
-        to.count(self.touches.len());
-        self.touches.iter().for_each(|touch| save_touch(touch, to));
+        to.vectors(&self.mid.grains);
+        to.vectors(&self.mid.walls);
+        to.count(self.kept.len());
+        self.kept.iter().for_each(|kept| save_kept(kept, to));
         let l = &self.ledger;
         to.reals.extend([l.kinetic, l.external_work, l.impact, l.friction, l.bonds]);
         to.reals.extend([l.elastic, l.damping, l.fracture, l.remainder]);
@@ -108,8 +112,8 @@ impl<D: Dim> World<D> {
         }
         world.bonds = (0..from.number_of()?).map(|_| restored_bond(n, from)).collect::<Result<_, _>>()?;
         let (bodies, bonds) = (n + world.walls.len(), world.bonds.len());
-        world.touches =
-            (0..from.number_of()?).map(|_| restored_touch(bodies, bonds, from)).collect::<Result<_, _>>()?;
+        world.mid = Midpoint { grains: from.vectors(n)?, walls: from.vectors(bodies - n)? };
+        world.kept = (0..from.number_of()?).map(|_| restored_kept(bodies, bonds, from)).collect::<Result<_, _>>()?;
         let mut next = || from.real();
         world.ledger = Ledger {
             kinetic: next()?,
@@ -161,27 +165,24 @@ fn restored_bond(grains: usize, from: &mut Reader) -> Result<Bond, Mismatch> {
     Ok(Bond { pair, rest_gap, mean_diameter, strength, friction, twist, stiffness, status })
 }
 
-fn save_touch<D: Dim>(touch: &Touch<D>, to: &mut Saved) {
-    save_pair(touch.pair, to);
-    D::write_frame(&touch.frame, &mut to.reals);
-    to.vector(&touch.point);
-    to.counts.push(touch.bond.map_or(NONE, u64::from));
-    to.reals.extend([touch.gap, touch.reaction.n]);
-    to.vector(&touch.reaction.t);
-    to.vector(&touch.reaction.m);
-    to.count(code(&TOUCHES, &touch.status));
+fn save_kept<D: Dim>(kept: &Kept<D>, to: &mut Saved) {
+    save_pair(kept.pair, to);
+    to.vector(&kept.tangents);
+    to.counts.push(kept.bond().map_or(NONE, u64::from));
+    to.real(kept.reaction.n);
+    to.vector(&kept.reaction.t);
+    to.vector(&kept.reaction.m);
+    to.count(code(&TOUCHES, &kept.status));
 }
 
-fn restored_touch<D: Dim>(bodies: usize, bonds: usize, from: &mut Reader) -> Result<Touch<D>, Mismatch> {
+fn restored_kept<D: Dim>(bodies: usize, bonds: usize, from: &mut Reader) -> Result<Kept<D>, Mismatch> {
     let pair = restored_pair(bodies, from)?;
-    let frame = D::read_frame(from.reals(D::FRAME)?);
-    let point = from.vector()?;
+    let tangents = from.vector()?;
     let bond = match from.count()? {
         none if none as u64 == NONE => None,
         bond if bond < bonds => Some(bond as u32),
         _ => return Err(Mismatch),
     };
-    let (gap, n) = (from.real()?, from.real()?);
-    let reaction = Local { n, t: from.vector()?, m: from.vector()? };
-    Ok(Touch { pair, frame, point, gap, bond, reaction, status: coded(&TOUCHES, from)? })
+    let reaction = Local { n: from.real()?, t: from.vector()?, m: from.vector()? };
+    Ok(Kept { tangents, reaction, status: coded(&TOUCHES, from)?, ..Kept::new(pair, bond) })
 }

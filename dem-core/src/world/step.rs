@@ -2,7 +2,7 @@
 
 use super::assembly::{Midpoint, Motion, Places, read_back};
 use super::ledger::{elastic_energy, group_losses};
-use super::touch::{Break, Touch, TouchStatus};
+use super::touch::{Break, Kept, TouchStatus};
 use super::{Counts, World};
 use crate::body::Drive;
 use crate::bond::{Rupture, failure};
@@ -139,12 +139,12 @@ impl<D: Dim> World<D> {
         let mut done = Solves::default();
         let mut breaks: Vec<Break<D>> = Vec::new();
         let problem = loop {
-            let (mut problem, places) = self.assemble(&touches, &motion, &carried, applied, h);
+            let (mut problem, places) = self.assemble(&mid, &touches, &motion, &carried, applied, h);
             let solve = self.solver.solve(&mut problem);
             done.add(solve);
             self.refuse_unaccepted(solve, &problem, h)?;
             write_reactions(&mut touches, &problem, &places, h);
-            if limited && let Some((pair, share)) = self.yielding(&touches, &problem) {
+            if limited && let Some((pair, share)) = self.yielding(&mid, &touches, &problem) {
                 return Err(StepError::Yielded { time: self.time, pair, share });
             }
             let missed = self.missed(&mid, &touches, &problem.nodes, h);
@@ -153,7 +153,7 @@ impl<D: Dim> World<D> {
                 touches.sort_by_key(|t| t.pair);
                 continue;
             }
-            let failed = self.at_limit(&touches, &problem, &places, breaks.last().map_or(0, |b| b.round + 1));
+            let failed = self.at_limit(&mid, &touches, &problem, &places, breaks.last().map_or(0, |b| b.round + 1));
             let again = !failed.is_empty() && self.settings.rupture != Rupture::EndOfStep;
             if again {
                 forget_bonds(&mut touches, &failed);
@@ -165,12 +165,11 @@ impl<D: Dim> World<D> {
         };
         if limited {
             let velocity = |k: usize| problem.nodes.all[k].velocity;
-            self.refuse_crossing(self.pushes_from_afar(&touches, &problem.nodes, h))?;
+            self.refuse_crossing(self.pushes_from_afar(&mid, &touches, &problem.nodes, h))?;
             self.refuse_crossing(self.crossing(|k| mid.place(k), velocity, 0.5 * h))?;
         }
-        let report = self.report(&touches, &motion, &problem, done, breaks, h);
-        self.settle(h, &mid, &motion, &problem, touches, &report.breaks);
-        Ok(report)
+        self.settle(h, mid, &motion, &problem, touches, &breaks);
+        Ok(self.report(&motion, &problem, done, breaks))
     }
 
     /// The contact problem that the next step would start from, for export and for benchmarks. The world does not move.
@@ -179,7 +178,7 @@ impl<D: Dim> World<D> {
         let (mid, motion) = (self.midpoint(h), self.free_motion(h));
         let touches = self.detect(&mid, &motion, h);
         let carried = self.carried(&touches);
-        self.assemble(&touches, &motion, &carried, self.applied_impulse(h), h).0
+        self.assemble(&mid, &touches, &motion, &carried, self.applied_impulse(h), h).0
     }
 
     /// Half a step in position at the old velocities.
@@ -266,13 +265,14 @@ impl<D: Dim> World<D> {
     /// The bonds that the accepted solve left at their limit, as many as the scene's rule lets break in one round.
     fn at_limit(
         &self,
-        touches: &[Touch<D>],
+        mid: &Midpoint<D>,
+        touches: &[Kept<D>],
         problem: &ContactProblem<D>,
         places: &Places,
         round: u32,
     ) -> Vec<Break<D>> {
-        let mut found = self.group_at_limit(touches, &problem.nodes, &problem.bonded, &places.bonded, round);
-        found.extend(self.group_at_limit(touches, &problem.nodes, &problem.elastic, &places.elastic, round));
+        let mut found = self.group_at_limit(mid, touches, &problem.nodes, &problem.bonded, &places.bonded, round);
+        found.extend(self.group_at_limit(mid, touches, &problem.nodes, &problem.elastic, &places.elastic, round));
         if self.settings.rupture == Rupture::CascadeWorst {
             let worst = found.iter().map(|(flow, _)| *flow).fold(f64::NEG_INFINITY, f64::max);
             let first = found.iter().position(|(flow, _)| *flow == worst);
@@ -284,7 +284,8 @@ impl<D: Dim> World<D> {
     /// The bonds of a group that are at their limit, each with the square of its flow.
     fn group_at_limit<L: Law<T = D::Tangent, B = D::Moment>>(
         &self,
-        touches: &[Touch<D>],
+        mid: &Midpoint<D>,
+        touches: &[Kept<D>],
         nodes: &Nodes<D>,
         group: &Group<D, L>,
         places: &[u32],
@@ -294,7 +295,7 @@ impl<D: Dim> World<D> {
         for (contact, place) in group.iter().zip(places) {
             let law = &contact.law;
             let Some(mode) = failure(&contact.r, law.shift(), law.cone()) else { continue };
-            let touch = &touches[*place as usize];
+            let touch = self.touch(mid, &touches[*place as usize]);
             let mut u = nodes.relative_velocity::<D::Tangent, D::Moment>(&contact.link, law.arms());
             u.n += law.bias();
             let flow = u + law.compliance().times(&(contact.r - law.carried()));
@@ -314,10 +315,10 @@ impl<D: Dim> World<D> {
     fn settle(
         &mut self,
         h: f64,
-        mid: &Midpoint<D>,
+        mid: Midpoint<D>,
         motion: &Motion<D>,
         problem: &ContactProblem<D>,
-        touches: Vec<Touch<D>>,
+        touches: Vec<Kept<D>>,
         breaks: &[Break<D>],
     ) {
         self.book(h, motion, problem, breaks);
@@ -335,15 +336,16 @@ impl<D: Dim> World<D> {
             wall.applied = if let Drive::Force { force, .. } = &wall.drive { force(self.time + 0.5 * h) } else { 0.0 };
             wall.reaction = D::Vector::zero();
         }
-        for touch in &touches {
-            if let Some(wall) = (touch.pair[1] as usize).checked_sub(n) {
+        for kept in &touches {
+            if let Some(wall) = (kept.pair[1] as usize).checked_sub(n) {
+                let touch = self.touch(&mid, kept);
                 self.walls[wall].reaction -= D::compose(&touch.frame, touch.reaction.n, touch.reaction.t);
             }
         }
         for failed in breaks {
             self.bonds[failed.bond as usize].status = failed.mode;
         }
-        self.touches = touches;
+        (self.kept, self.mid) = (touches, mid);
         self.time += h;
     }
 
@@ -410,23 +412,21 @@ impl<D: Dim> World<D> {
         work
     }
 
+    /// What the step did, after it.
     fn report(
         &self,
-        touches: &[Touch<D>],
         motion: &Motion<D>,
         problem: &ContactProblem<D>,
         done: Solves,
         breaks: Vec<Break<D>>,
-        h: f64,
     ) -> StepReport<D> {
         let mut change = 0.0;
         for (k, mass) in self.grains.mass.iter().enumerate().filter(|(k, _)| !self.grains.fixed[*k]) {
             let dv = (problem.nodes.all[k].velocity - motion.before[k].0) * *mass;
             change += dv.dot(&dv);
         }
-        let dry = touches.iter().filter(|t| t.bond.is_none());
         StepReport {
-            time: self.time + h,
+            time: self.time,
             status: done.status(),
             work: done.work,
             residual: done.residual,
@@ -435,9 +435,9 @@ impl<D: Dim> World<D> {
             } else {
                 0.0
             }),
-            counts: Counts::of(touches),
+            counts: Counts::of(self.kept.iter().map(|t| t.status)),
             breaks,
-            penetration: dry.map(|t| -t.gap).fold(0.0, f64::max),
+            penetration: self.touches().filter(|t| t.bond.is_none()).map(|t| -t.gap).fold(0.0, f64::max),
             rejected: 0,
         }
     }
@@ -452,13 +452,13 @@ fn wall_impulses<D: Dim>(problem: &ContactProblem<D>, walls: usize) -> Vec<D::Ve
             sums[wall] -= impulse;
         }
     };
-    problem.dry.iter().for_each(|c| add(c.link.nodes, D::compose(&c.link.frame, c.r.n, c.r.t)));
-    problem.frictionless.iter().for_each(|c| add(c.link.nodes, D::compose(&c.link.frame, c.r.n, D::Tangent::zero())));
+    problem.dry.iter().for_each(|c| add(c.link.nodes, D::compose(&c.link.axes, c.r.n, c.r.t)));
+    problem.frictionless.iter().for_each(|c| add(c.link.nodes, c.link.axes * c.r.n));
     sums
 }
 
 /// Write the impulses of the problem back to the contacts of the step, as forces.
-fn write_reactions<D: Dim>(touches: &mut [Touch<D>], problem: &ContactProblem<D>, places: &Places, h: f64) {
+fn write_reactions<D: Dim>(touches: &mut [Kept<D>], problem: &ContactProblem<D>, places: &Places, h: f64) {
     for touch in touches.iter_mut() {
         touch.reaction = Local::zero();
         touch.status = TouchStatus::Open;
@@ -470,12 +470,11 @@ fn write_reactions<D: Dim>(touches: &mut [Touch<D>], problem: &ContactProblem<D>
 }
 
 /// Turn the contacts of broken bonds into dry ones that start without reaction.
-fn forget_bonds<D: Dim>(touches: &mut [Touch<D>], broken: &[Break<D>]) {
+fn forget_bonds<D: Dim>(touches: &mut [Kept<D>], broken: &[Break<D>]) {
     for failed in broken {
         if let Ok(place) = touches.binary_search_by_key(&failed.pair, |t| t.pair) {
-            touches[place].bond = None;
-            touches[place].reaction = Local::zero();
-            touches[place].status = TouchStatus::Open;
+            let Kept { tangents, odd, .. } = touches[place];
+            touches[place] = Kept { tangents, odd, ..Kept::new(failed.pair, None) };
         }
     }
 }

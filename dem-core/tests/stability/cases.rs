@@ -178,7 +178,7 @@ fn a_fragment_that_flies_away_costs_no_memory() {
     let mut heap = Heap { side: 10, gravity: 0.0, floor: false, speed: 0.0, ..Heap::default() }.world::<D2>();
     let calm = {
         heap.step().unwrap();
-        heap.touches.len()
+        heap.touches().len()
     };
     for k in 0..50 {
         heap.grains.velocity[k] = at::<D2>(&[0.0, 0.0]);
@@ -186,7 +186,7 @@ fn a_fragment_that_flies_away_costs_no_memory() {
     }
     let out = watch(&mut heap, 100, 1e-4);
     assert_eq!(out.stopped, None);
-    assert!(heap.touches.len() <= calm);
+    assert!(heap.touches().len() <= calm);
 }
 
 #[test]
@@ -395,7 +395,7 @@ fn tower(count: usize, hanging: bool, kind: Kind) -> f64 {
     }
     let out = watch(&mut w, 3, 1e-6);
     assert_eq!(out.stopped, None);
-    let bears = w.touches.iter().map(|t| t.reaction.n.abs()).fold(0.0, f64::max);
+    let bears = w.touches().map(|t| t.reaction.n.abs()).fold(0.0, f64::max);
     bears / (mass * 9.81)
 }
 

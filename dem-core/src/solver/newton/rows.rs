@@ -388,21 +388,21 @@ impl<D: Dim> Flatten<'_, D> {
         let sign = if side == 0 { 1.0 } else { -1.0 };
         let zero = D::Moment::zero();
         if k >= nodes.grains {
-            let (n, t) = D::split(&link.frame, nodes.drives[k - nodes.grains]);
+            let (n, t) = D::split(&link.axes, nodes.drives[k - nodes.grains]);
             table.add(-n, -t, zero, self.unknowns.root(node.inverse_mass));
             return 1;
         }
         for axis in 0..D::N {
             let mut e = D::Vector::zero();
             e[axis] = sign;
-            let (n, t) = D::split(&link.frame, e);
+            let (n, t) = D::split(&link.axes, e);
             table.add(n, t, zero, self.unknowns.root(node.inverse_mass));
         }
         for axis in 0..D::Spin::LEN {
             let mut e = D::Spin::zero();
             e[axis] = 1.0;
-            let turn = D::spin_rows(&link.frame, e) * -arms.lever[side];
-            let moment = D::moment_rows(&link.frame, e) * (sign * arms.bending);
+            let turn = D::spin_rows(&link.axes, e) * -arms.lever[side];
+            let moment = D::moment_rows(&link.axes, e) * (sign * arms.bending);
             table.add(0.0, turn, moment, self.unknowns.root(node.inverse_inertia));
         }
         D::N + D::Spin::LEN
@@ -414,8 +414,9 @@ impl<D: Dim> Visitor<D> for Flatten<'_, D> {
         let rows = places(L::T::LEN, L::B::LEN);
         let (arms, unit) = (c.law.arms(), self.unknowns.unit);
         let mut table = Table { rows: [[0.0; PAIR]; PADDED], tangents: L::T::LEN, moments: L::B::LEN, width: 0 };
-        let first = self.node(&c.link, arms, 0, &mut table);
-        let second = self.node(&c.link, arms, 1, &mut table);
+        let link = c.link.whole();
+        let first = self.node(&link, arms, 0, &mut table);
+        let second = self.node(&link, arms, 1, &mut table);
         let start = self.rows.coefficients.len();
         for row in &table.rows[..rows.len()] {
             self.rows.coefficients.extend_from_slice(&row[..table.width]);
