@@ -191,3 +191,35 @@ fn a_rigid_block_does_not_move_before_it_breaks() {
     let strain = w.strain();
     assert!(strain.iter().all(|e| e.abs() <= 1e-9), "{strain:?}");
 }
+
+/// The forces (N) between a floor and five bonded disks in a row on it, and those in the step after the row was tilted, so
+/// that each disk lies `tilt` (–) of a radius higher than the one before.
+fn forces_of_a_tilted_row(tilt: f64) -> [Vec<f64>; 2] {
+    let mut set = settings(1e-5);
+    set.gravity = down::<D2>(9.81);
+    set.solver = newton(1e-10, Start::StiffLimit);
+    let r = 0.01;
+    let row: Vec<_> = (0..5).map(|k| grain::<D2>(&[2.0 * r * f64::from(k), r], r)).collect();
+    let mut w = world(row, vec![floor(0.2)], set);
+    w.form_bonds(1e-6, |_| 1e3, 0.3);
+    let forces = |w: &World<D2>| w.touches().filter(|t| t.bond.is_none()).map(|t| t.reaction.n).collect::<Vec<_>>();
+    w.step().unwrap();
+    let before = forces(&w);
+    for (k, place) in w.grains.position.iter_mut().enumerate() {
+        place[1] += tilt * r * k as f64;
+    }
+    w.step().unwrap();
+    [before, forces(&w)]
+}
+
+#[test]
+fn a_contact_that_pushed_keeps_its_force_until_it_is_open() {
+    // the errors of many solves: ten times what counts as no gap where nothing pushed before
+    let [before, after] = forces_of_a_tilted_row(1e-8);
+    assert!(before.len() == 5 && before.iter().all(|f| *f > 0.0), "{before:?}");
+    let close = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-6 * b;
+    assert!(after.len() == 5 && after.iter().zip(&before).all(close), "{after:?} {before:?}");
+    // a gap: the row stands on its first disk
+    let [_, after] = forces_of_a_tilted_row(1e-4);
+    assert!(after[0] > 0.0 && after[1..].iter().all(|f| *f == 0.0), "{after:?}");
+}

@@ -63,8 +63,8 @@ def cost(program):
 
 
 # Instructions and bytes of a contact without friction over those of a dry one, and of that over those of a bond. In space a
-# dry contact has two rows of friction, and all have a frame of three vectors.
-LIMITS = {"disks": [0.5, 0.6, 0.7, 0.7], "spheres": [0.3, 0.7, 0.85, 0.72]}
+# dry contact has two rows of friction and a frame of three vectors, where one without friction has a normal.
+LIMITS = {"disks": [0.5, 0.6, 0.7, 0.7], "spheres": [0.3, 0.6, 0.85, 0.72]}
 
 
 @pytest.mark.parametrize("grains", LIMITS)

@@ -56,7 +56,9 @@ impl<D: Dim, A: Axes<D>> Link<D, A> {
     pub fn whole(&self) -> Link<D> {
         Link::new(self.nodes, self.axes.frame().copied().unwrap_or_else(|| D::frame(self.axes.normal())))
     }
+}
 
+impl<D: Dim> Link<D> {
     /// Local Delassus block for two nodes. `drive` is the direction of the one degree of freedom of a force-driven wall j, if
     /// it is one.
     pub fn block(&self, i: &Node<D>, j: &Node<D>, arms: Arms, drive: Option<D::Vector>) -> Block {
@@ -71,7 +73,7 @@ impl<D: Dim, A: Axes<D>> Link<D, A> {
         };
         if let Some(d) = drive {
             // the wall yields along d alone: a diagonal that dominates (n·d)², (t·d)² and their coupling
-            let (along, across) = D::split(&self.whole().axes, d);
+            let (along, across) = D::split(&self.axes, d);
             let across = across.norm();
             let coupling = (along * across).abs();
             block.n = i.inverse_mass + j.inverse_mass * (along * along + coupling);

@@ -13,6 +13,10 @@ use std::sync::Arc;
 /// rigid contacts, to which stiff ones answer with forces.
 const TOUCHING: f64 = 1e-9;
 
+/// The same where the contact pushed in the step before. It was closed then: what opened it since are the errors of many
+/// solves, and a stiff contact would lose its force to them at once.
+const CLOSED: f64 = 1e-6;
+
 /// Gap over the radius of the grain below which a contact that does not close is part of the problem.
 const NEAR: f64 = 1e-3;
 
@@ -60,7 +64,7 @@ impl<D: Dim> World<D> {
     }
 
     /// Gap, normal and contact point of a pair at mid-step; the point is mid-gap, the same for both bodies.
-    fn geometry(&self, mid: &Midpoint<D>, pair: [u32; 2]) -> (f64, D::Vector, D::Vector) {
+    pub(super) fn geometry(&self, mid: &Midpoint<D>, pair: [u32; 2]) -> (f64, D::Vector, D::Vector) {
         let [i, j] = pair.map(|k| k as usize);
         let (x, r) = (mid.grains[i], self.grains.radius[i]);
         let (gap, normal) = match j.checked_sub(self.grains.len()) {
@@ -100,7 +104,7 @@ impl<D: Dim> World<D> {
             let closing = -(approach[0] - approach[1]).dot(&normal);
             let near = NEAR * self.grains.radius[pair[0] as usize];
             if gap <= near + 2.0 * h * closing.max(0.0) {
-                touches.push(Kept { odd: self.is_odd(pair, gap), ..Kept::new(pair, None) });
+                touches.push(Kept { deep_or_wide: self.is_deep_or_wide(pair, gap), ..Kept::new(pair, None) });
             }
         }
         touches.sort_by_key(|t| t.pair);
@@ -113,7 +117,9 @@ impl<D: Dim> World<D> {
         let mut old = self.kept.iter().peekable();
         for touch in touches {
             while old.next_if(|o| o.pair < touch.pair).is_some() {}
-            let same = old.peek().filter(|o| o.pair == touch.pair && o.bond() == touch.bond());
+            let last = old.peek().filter(|o| o.pair == touch.pair);
+            touch.closed = last.is_some_and(|o| o.reaction.n > 0.0);
+            let same = last.filter(|o| o.bond() == touch.bond());
             if D::Tangents::LEN > 0 {
                 let (_, normal, _) = self.geometry(mid, touch.pair);
                 let frame = same.map_or_else(|| D::frame(normal), |o| D::transported(&o.tangents, normal));
@@ -164,8 +170,8 @@ impl<D: Dim> World<D> {
             let (gap, normal, _) = self.geometry(mid, pair);
             let [i, j] = pair.map(|k| nodes.all[k as usize].velocity);
             if gap + h * (i - j).dot(&normal) < 0.0 && self.restitution_of(pair) == 0.0 {
-                let (odd, tangents) = (self.is_odd(pair, gap), D::tangents(&D::frame(normal)));
-                missed.push(Kept { odd, tangents, ..Kept::new(pair, None) });
+                let (deep_or_wide, tangents) = (self.is_deep_or_wide(pair, gap), D::tangents(&D::frame(normal)));
+                missed.push(Kept { deep_or_wide, tangents, ..Kept::new(pair, None) });
             }
         }
         missed
@@ -181,10 +187,11 @@ impl<D: Dim> World<D> {
     }
 
     /// What is added to the normal velocity of a dry contact before Signorini's law (m/s); none if it cannot act in this step.
-    fn bias(&self, touch: &Touch<D>, motion: &Motion<D>, h: f64) -> Option<f64> {
+    fn bias(&self, touch: &Touch<D>, closed: bool, motion: &Motion<D>, h: f64) -> Option<f64> {
         let e = self.restitution_of(touch.pair);
         if e == 0.0 {
-            let touching = touch.gap <= TOUCHING * self.grains.radius[touch.pair[0] as usize];
+            let none = if closed { CLOSED } else { TOUCHING };
+            let touching = touch.gap <= none * self.grains.radius[touch.pair[0] as usize];
             let gap = if self.settings.expel_overlaps || !touching { touch.gap } else { 0.0 };
             return Some(gap / h);
         }
@@ -245,7 +252,8 @@ impl<D: Dim> World<D> {
         let order = blocks::order(touches.iter().map(|t| t.pair), self.grains.len());
         for k in 0..touches.len() {
             let place = order.as_ref().map_or(k, |order| order[k] as usize);
-            let touch = &self.touch(mid, &touches[place]);
+            let kept = &touches[place];
+            let touch = &self.touch(mid, kept);
             let link = Link::<D>::new(touch.pair, touch.frame);
             let lever = self.levers(touch);
             let [i, j] = link.nodes.map(|k| &problem.nodes.all[k as usize]);
@@ -268,7 +276,7 @@ impl<D: Dim> World<D> {
                     problem.bonded.push(Contact { link, law, r });
                     places.bonded.push(place as u32);
                 }
-            } else if let Some(bias) = self.bias(touch, motion, h) {
+            } else if let Some(bias) = self.bias(touch, kept.closed, motion, h) {
                 let block = link.block(i, j, Arms { lever, bending: 0.0 }, drive.map(|(d, _)| d));
                 let mu = self.friction_of(touch.pair);
                 if mu > 0.0 {

@@ -55,8 +55,8 @@ impl<D: Dim> World<D> {
         self.candidates.pairs.iter().find(too_deep).copied()
     }
 
-    /// Whether the gap (m) of a pair is one that what follows has to look at.
-    pub(super) fn is_odd(&self, pair: [u32; 2], gap: f64) -> bool {
+    /// Whether a gap (m) is beyond [`DEEP`] or [`PASSING`].
+    pub(super) fn is_deep_or_wide(&self, pair: [u32; 2], gap: f64) -> bool {
         let smaller = self.smaller(pair);
         gap < -DEEP * smaller || gap > PASSING * smaller
     }
@@ -70,7 +70,7 @@ impl<D: Dim> World<D> {
         h: f64,
     ) -> Option<[u32; 2]> {
         let far = |kept: &&Kept<D>| {
-            if !kept.odd || kept.bond().is_some() || kept.reaction.n <= 0.0 {
+            if !kept.deep_or_wide || kept.bond().is_some() || kept.reaction.n <= 0.0 {
                 return false;
             }
             let t = self.touch(mid, kept);
@@ -100,7 +100,7 @@ impl<D: Dim> World<D> {
             return Some((worst.pair, worst.share));
         }
         // little by little is too far in the end
-        let pressed = touches.iter().filter(|t| t.odd && t.bond().is_none() && t.reaction.n > 0.0);
+        let pressed = touches.iter().filter(|t| t.deep_or_wide && t.bond().is_none() && t.reaction.n > 0.0);
         let deep = pressed.map(|t| self.touch(mid, t)).filter(|t| t.gap < -DEEP * self.smaller(t.pair));
         let closing = |t: Touch<D>| {
             let [i, j] = t.pair.map(|k| problem.nodes.all[k as usize].velocity);

@@ -48,7 +48,8 @@ impl<D: Dim> World<D> {
         sum
     }
 
-    /// Contacts of the last accepted step, sorted by pair, with their reactions.
+    /// Contacts of the last accepted step, sorted by pair, with their reactions. Gaps and points are those of mid-step, with the
+    /// radii, shapes and numbers of bodies as they are now.
     pub fn touches(&self) -> impl ExactSizeIterator<Item = Touch<D>> {
         self.kept.iter().map(|kept| self.touch(&self.mid, kept))
     }

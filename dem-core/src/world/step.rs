@@ -425,6 +425,7 @@ impl<D: Dim> World<D> {
             let dv = (problem.nodes.all[k].velocity - motion.before[k].0) * *mass;
             change += dv.dot(&dv);
         }
+        let dry = self.kept.iter().filter(|t| t.bond().is_none());
         StepReport {
             time: self.time,
             status: done.status(),
@@ -437,7 +438,7 @@ impl<D: Dim> World<D> {
             }),
             counts: Counts::of(self.kept.iter().map(|t| t.status)),
             breaks,
-            penetration: self.touches().filter(|t| t.bond.is_none()).map(|t| -t.gap).fold(0.0, f64::max),
+            penetration: dry.map(|t| -self.geometry(&self.mid, t.pair).0).fold(0.0, f64::max),
             rejected: 0,
         }
     }
@@ -473,8 +474,8 @@ fn write_reactions<D: Dim>(touches: &mut [Kept<D>], problem: &ContactProblem<D>,
 fn forget_bonds<D: Dim>(touches: &mut [Kept<D>], broken: &[Break<D>]) {
     for failed in broken {
         if let Ok(place) = touches.binary_search_by_key(&failed.pair, |t| t.pair) {
-            let Kept { tangents, odd, .. } = touches[place];
-            touches[place] = Kept { tangents, odd, ..Kept::new(failed.pair, None) };
+            let Kept { tangents, deep_or_wide, closed, .. } = touches[place];
+            touches[place] = Kept { tangents, deep_or_wide, closed, ..Kept::new(failed.pair, None) };
         }
     }
 }

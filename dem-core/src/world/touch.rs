@@ -23,11 +23,13 @@ pub enum TouchStatus {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Kept<D: Dim> {
     pub pair: [u32; 2],
-    /// Number of the bond that ties it, counted from one: four bytes, no bond included.
-    pub number: Option<NonZeroU32>,
+    /// The bond that ties it, counted from one: four bytes, no bond included.
+    pub bond_from_one: Option<NonZeroU32>,
     pub status: TouchStatus,
-    /// Whether its gap may be deep or wide enough for the limits of a step to look at it; of a bond nobody asked yet.
-    pub odd: bool,
+    /// Whether its gap is so deep or so wide that the limits of the step look at it; taken as true of bonds.
+    pub deep_or_wide: bool,
+    /// Whether it pushed in the step before.
+    pub closed: bool,
     /// What its frame has beside the normal.
     pub tangents: D::Tangents,
     pub reaction: Local<D::Tangent, D::Moment>,
@@ -38,9 +40,10 @@ impl<D: Dim> Kept<D> {
     pub fn new(pair: [u32; 2], bond: Option<u32>) -> Self {
         Self {
             pair,
-            number: bond.and_then(|bond| NonZeroU32::new(bond + 1)),
+            bond_from_one: bond.and_then(|bond| NonZeroU32::new(bond + 1)),
             status: if bond.is_some() { TouchStatus::Bonded } else { TouchStatus::Open },
-            odd: bond.is_some(),
+            deep_or_wide: bond.is_some(),
+            closed: false,
             tangents: D::Tangents::zero(),
             reaction: Local::zero(),
         }
@@ -48,7 +51,7 @@ impl<D: Dim> Kept<D> {
 
     /// Index of the bond that ties the pair, if it holds.
     pub fn bond(&self) -> Option<u32> {
-        self.number.map(|number| number.get() - 1)
+        self.bond_from_one.map(|bond| bond.get() - 1)
     }
 }
 
