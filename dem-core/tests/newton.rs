@@ -11,6 +11,7 @@ use dem_core::problem::ContactProblem;
 use dem_core::problem::residual::residual;
 use dem_core::solver::{NewtonSettings, SolveStatus, SolverSettings, Start};
 use dem_core::world::World;
+use nalgebra::Vector2;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use std::sync::Arc;
@@ -34,6 +35,82 @@ fn weight_at_the_bottom_of_a_column_of_500() {
     }
     // the state of the step before shows the active set
     assert!(w.step().unwrap().work.newton <= 10);
+}
+
+/// Disks of 1 cm under gravity between these walls.
+fn dry_disks(centres: impl Iterator<Item = [f64; 2]>, walls: Vec<Wall<D2>>) -> World<D2> {
+    let mut set = settings(1e-3);
+    set.gravity = down::<D2>(9.81);
+    world(centres.map(|x| grain::<D2>(&x, 0.01)).collect(), walls, set)
+}
+
+/// The problem as Newton solves it from no reactions at all, to a residual of 1e-10 and a load error of 1e-9, in at most
+/// thirty iterations.
+fn solved_cold<D: Dim>(world: &mut World<D>) -> ContactProblem<D> {
+    let mut problem = world.contact_problem();
+    let settings = SolverSettings::Newton(common::newton(1e-10, 1e-10, 1e-9));
+    let report = settings.build::<D>().solve(&mut problem);
+    assert_eq!(report.status, SolveStatus::Converged, "{report:?}");
+    assert!(report.work.newton <= 30, "{report:?}");
+    problem
+}
+
+#[test]
+fn a_column_of_2000_from_no_reactions() {
+    let mut world = dry_disks((0..2000).map(|k| [0.0, 0.01 + 0.02 * f64::from(k)]), vec![floor(0.2)]);
+    let problem = solved_cold(&mut world);
+    let weight: f64 = 9.81e-3 * world.grains.mass.iter().sum::<f64>();
+    let on_the_floor = problem.dry.iter().map(|c| c.r.n).fold(0.0, f64::max);
+    assert!((on_the_floor / weight - 1.0).abs() <= 1e-6, "{:e}", on_the_floor / weight - 1.0);
+}
+
+/// Disks along the line of thrust of their weight: each contact bears the same horizontal force, and no friction.
+#[test]
+fn an_arch_from_no_reactions() {
+    let (count, rise) = (41, 0.1);
+    // slope of the line from disk k to the next, from the left wall to the right one
+    let slope = |k: i32| rise * (f64::from(count) / 2.0 - f64::from(k));
+    let along = |k: i32| Vector2::new(1.0, slope(k)).normalize();
+    let mut centres = vec![Vector2::new(0.0, 1.0)];
+    for k in 1..count {
+        centres.push(centres[k as usize - 1] + along(k) * 0.02);
+    }
+    let wall = |normal: Vector2<f64>, disk: &Vector2<f64>| {
+        Wall::<D2>::fixed(Shape::Plane { normal }, disk - normal * 0.01, 0.2)
+    };
+    let walls = vec![wall(along(0), &centres[0]), wall(-along(count), &centres[count as usize - 1])];
+    let mut world = dry_disks(centres.iter().map(|x| [x[0], x[1]]), walls);
+    let problem = solved_cold(&mut world);
+    let thrust = 9.81e-3 * world.grains.mass[0] / rise;
+    let mut found: Vec<f64> = problem.dry.iter().map(|c| c.r.n / thrust).collect();
+    let mut wanted: Vec<f64> = (0..=count).map(|k| 1f64.hypot(slope(k))).collect();
+    found.sort_by(f64::total_cmp);
+    wanted.sort_by(f64::total_cmp);
+    assert_eq!(found.len(), wanted.len());
+    for (found, wanted) in found.iter().zip(wanted) {
+        assert!((found - wanted).abs() <= 1e-6, "{found} {wanted}");
+    }
+}
+
+/// A dry hexagonal block in a box, under a lid. What each contact bears is not unique, what the floor bears is.
+#[test]
+fn a_pressed_hexagonal_block_from_no_reactions() {
+    let (rows, columns, r) = (40, 40, 0.01);
+    let centre = |k: i32| {
+        let (row, column) = (k / columns, k % columns);
+        [r * f64::from(1 + 2 * column + row % 2), r * (1.0 + 3f64.sqrt() * f64::from(row))]
+    };
+    let (width, height) = (r * f64::from(2 * columns + 1), r * (2.0 + 3f64.sqrt() * f64::from(rows - 1)));
+    let side =
+        |normal: f64, x: f64| Wall::<D2>::fixed(Shape::Plane { normal: [normal, 0.0].into() }, [x, 0.0].into(), 0.2);
+    let lid = force_driven::<D2>([0.0, -1.0].into(), [0.0, height].into(), 100.0, 5e3);
+    let mut world =
+        dry_disks((0..rows * columns).map(centre), vec![floor(0.2), side(1.0, 0.0), side(-1.0, width), lid]);
+    let problem = solved_cold(&mut world);
+    let fastest = problem.nodes.all.iter().map(|n| n.velocity.norm()).fold(0.0, f64::max);
+    // the lid would else fall by this
+    let free = 1e-3 * (5e3 / 100.0 + 9.81);
+    assert!(fastest <= 1e-9 * free, "{:e}", fastest / free);
 }
 
 /// A box of bonded and dry grains with random radii, pressed from above and sheared from the side: all kinds of rows.

@@ -8,7 +8,8 @@
 use super::guess::{Guess, Slips};
 use super::inner::Iterate;
 use super::rows::Rows;
-use super::{Newton, relative_change};
+use super::solvable::Solvable;
+use super::{Newton, Shrinking, SolveReport, SolveStatus, Stall, load_change, relative_change};
 
 /// Most solves, and Newton iterations of each: without progress, and all of them.
 const MOST_SOLVES: usize = 20;
@@ -16,6 +17,8 @@ const PATIENCE: u64 = 30;
 const MOST: u64 = 60;
 /// Change of the reactions, over them, from which Newton goes on without a held term.
 const NEAR: f64 = 1e-2;
+/// Proximal rounds in which neither error halves.
+const ROUNDS_IN_VAIN: u64 = 2;
 
 impl Newton {
     /// The guess to which the held terms lead from that of `guess`; none where they lead nowhere.
@@ -38,5 +41,47 @@ impl Newton {
             }
         }
         Some(guess)
+    }
+
+    /// Proximal rounds with these terms of dry friction, from the active set of `guess`: two where nothing slips. Where they
+    /// leave something the terms follow the slips. None where an inner problem is not solved, or the rounds lead nowhere.
+    pub(super) fn rounds_of_held_terms(
+        &mut self,
+        problem: &mut impl Solvable,
+        base: &Rows,
+        terms: &[f64],
+        mut guess: Guess,
+        iterations: &mut u64,
+    ) -> Option<SolveReport> {
+        let mut rows = base.clone();
+        rows.hold(terms);
+        let mut shrinking = Shrinking::default();
+        let mut stall = Stall::after(ROUNDS_IN_VAIN, 0.5);
+        let mut last = f64::INFINITY;
+        loop {
+            let mut state = Iterate::from_reactions(&rows, &guess.reactions);
+            let (made, solved) = self.inner(&rows, &mut state, Some(&guess), PATIENCE, MOST);
+            *iterations += made;
+            if !solved {
+                return None;
+            }
+            self.slips = Slips::of(&rows, &state);
+            problem.write_back(&state.reactions);
+            let load_error = shrinking.error(load_change(&rows, &state.reactions));
+            let error = problem.residual();
+            let report = self.report(*iterations, error, load_error);
+            if report.status == SolveStatus::Converged {
+                return Some(report);
+            }
+            if stall.at(error.max(load_error)) {
+                return None;
+            }
+            rows.move_multipliers(&state.reactions);
+            if error > self.settings.tolerance.max(0.5 * last) {
+                rows.follow_slips(&state.y, &state.reactions, 1.0);
+            }
+            last = error;
+            guess = Guess { beyond: self.slips.in_rows(&rows), reactions: state.reactions };
+        }
     }
 }

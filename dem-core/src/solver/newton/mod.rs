@@ -113,6 +113,8 @@ pub struct Newton {
     made_before: u64,
     /// Rest of the guess of the active set.
     rest: Rest,
+    /// Rest of paths that hold the term of dry friction, as those do where nearly nothing slips.
+    quiet: Rest,
 }
 
 /// Solves for which something that failed is not tried: steps that are alike fail alike.
@@ -217,6 +219,7 @@ impl Newton {
             dry: 0,
             made_before: 0,
             rest: Rest::NONE,
+            quiet: Rest::NONE,
         }
     }
 
@@ -332,8 +335,10 @@ impl Newton {
         }
         let mut iterations = 0;
         let changed = rows.dry() != std::mem::replace(&mut self.dry, rows.dry());
-        if self.rest.is_over() {
-            if let Some(report) = self.try_guess(problem, &rows, changed, &mut iterations) {
+        let cold = rows.list.iter().all(|row| row.multiplier.n == 0.0);
+        // which dry contacts slip shows late
+        if !(cold && rows.mostly_dry()) && self.rest.is_over() {
+            if let Some(report) = self.try_guess(problem, &rows, cold, changed, &mut iterations) {
                 self.rest.forget();
                 return report;
             }
@@ -358,10 +363,10 @@ impl Newton {
         &mut self,
         problem: &mut impl Solvable,
         rows: &Rows,
+        cold: bool,
         changed: bool,
         iterations: &mut u64,
     ) -> Option<SolveReport> {
-        let cold = rows.list.iter().all(|row| row.multiplier.n == 0.0);
         let sweeps = match rows.in_space() {
             _ if cold => COLD_SWEEPS,
             true => 0,
@@ -447,8 +452,10 @@ impl Newton {
         for count in [self.distrust, self.floor, self.wasted] {
             to.count(count);
         }
-        to.count(self.rest.left as usize);
-        to.count(self.rest.next as usize);
+        for rest in [self.rest, self.quiet] {
+            to.count(rest.left as usize);
+            to.count(rest.next as usize);
+        }
         to.count(self.dry);
         self.slips.save(to);
         self.factor.save(to);
@@ -460,7 +467,9 @@ impl Newton {
         for count in [&mut self.distrust, &mut self.floor, &mut self.wasted] {
             *count = from.count()?;
         }
-        self.rest = Rest { left: from.count()? as u64, next: from.count()? as u64 };
+        for rest in [&mut self.rest, &mut self.quiet] {
+            *rest = Rest { left: from.count()? as u64, next: from.count()? as u64 };
+        }
         self.dry = from.count()?;
         self.slips = Slips::restored(from)?;
         self.factor = Factor::restored(from)?;

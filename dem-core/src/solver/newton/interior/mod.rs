@@ -11,7 +11,7 @@
 //!
 //! The term μ‖u_t‖ of dry friction is held along the path: where nearly nothing slips it would else move the path faster
 //! than the path closes in. Only where the term that was held turns out wrong, as at a collapse, does it follow the slips
-//! from iteration to iteration, and if that does not settle from path to path.
+//! from iteration to iteration, at once where the last solves came to that, and if it does not settle from path to path.
 //!
 //! The metric hardens as the gap closes. A hard one all along would lead to the middle of the many reactions that balance the
 //! load, from where the least of them is a long way at a small gap: there, bonds stand that the stiff limit breaks. How hard
@@ -50,8 +50,9 @@ const EARLY: f64 = 1e-14;
 /// Share of the change of that term that is followed, and the sweeps that show where it goes.
 const SHARE: f64 = 0.5;
 const SWEEPS: usize = 10;
-/// Residual at the end of a path beyond which its term of dry friction was wrong.
+/// Residual at the end of a path beyond which its term of dry friction was wrong; and beyond which it moved in vain.
 const WRONG: f64 = 1e-5;
+const IN_VAIN: f64 = 1e-4;
 /// Load error of reactions that were compared with none.
 const UNKNOWN: f64 = 1.0;
 /// Defect of the momenta, over their change, that rounding may leave: this, or a share of the tolerance of the residual.
@@ -121,6 +122,17 @@ impl<P> Clone for Aim<'_, P> {
 }
 
 impl<P> Copy for Aim<'_, P> {}
+
+/// What a path does with the term of dry friction.
+#[derive(Clone, Copy)]
+enum Term {
+    /// Holds the one that was found last.
+    Held,
+    /// Lets it follow the slips from iteration to iteration.
+    Moving,
+    /// Holds the one that the path before left, with half its change.
+    Halved,
+}
 
 /// A point on the way.
 struct Point<S: Site> {
@@ -240,6 +252,9 @@ struct Path<S: Site> {
     /// How much softer the metric is, and the least that rounding allows.
     softness: f64,
     least: f64,
+    /// The greatest scale of the gap so far (N s m/s): soft dry contacts bear nearly nothing, and their scale would shrink with
+    /// the gap.
+    scale: f64,
     /// The last softness that was much more than the least, and the reactions there.
     softer: Option<(f64, Vec<Padded>)>,
 }
@@ -253,7 +268,7 @@ impl<S: Site> Path<S> {
         let hardest = rows.list.iter().map(|row| row.weights).collect();
         let own = rows.list.iter().map(|row| row.weights.n / yields(row)).fold(0.0, f64::max);
         let (sites, at) = Self::inside(&rows, reactions);
-        Self { rows, sites, at, hardest, own, softness: f64::INFINITY, least: 1.0, softer: None }
+        Self { rows, sites, at, hardest, own, softness: f64::INFINITY, least: 1.0, scale: 0.0, softer: None }
     }
 
     /// A point well inside, at the velocities that `reactions` give.
@@ -267,7 +282,7 @@ impl<S: Site> Path<S> {
     /// Begin anew, as softly as at first.
     fn begin_again(&mut self, reactions: &[Padded]) {
         (self.sites, self.at) = Self::inside(&self.rows, reactions);
-        (self.softness, self.softer) = (f64::INFINITY, None);
+        (self.softness, self.scale, self.softer) = (f64::INFINITY, 0.0, None);
     }
 
     /// The gap over what the reactions and the velocities that they give multiply to.
@@ -277,7 +292,9 @@ impl<S: Site> Path<S> {
 
     /// Make the metric as soft as the gap is wide.
     fn harden(&mut self) {
-        let softness = (self.gap().min(1.0) / self.own).min(self.softness).max(self.least);
+        self.scale = self.scale.max(self.at.scale(&self.rows, &self.sites));
+        let gap = self.at.gap(&self.sites) / self.scale;
+        let softness = (gap.min(1.0) / self.own).min(self.softness).max(self.least);
         if softness == self.softness {
             return;
         }
@@ -286,6 +303,11 @@ impl<S: Site> Path<S> {
             row.weights = *w * self.softness;
         }
         self.sites = self.rows.list.iter().map(S::new).collect();
+    }
+
+    /// The terms of dry friction.
+    fn terms(&self) -> Vec<f64> {
+        self.rows.list.iter().map(|row| row.lag.unwrap_or(0.0)).collect()
     }
 
     /// The change of momentum that the velocities of the point stand for.
@@ -330,18 +352,22 @@ impl Newton {
     ) -> Option<SolveReport> {
         let mut path = Path::<S>::new(base, &self.slips.speeds(base), swept);
         let (mut best, mut shrinking): (Option<Found>, _) = (None, Shrinking::default());
-        // whether the term of dry friction seems right, how often it was wrong, and whether Newton was tried from there
-        let (mut right, mut wrong, mut tried) = (true, 0, base.mostly_dry());
+        // whether the term of dry friction seems right, and whether Newton was tried from there
+        let (mut right, mut tried) = (true, base.mostly_dry());
         let dry = path.rows.list.iter().any(|row| row.lag.is_some());
+        // steps that are alike slip alike
+        let mut moves_first = dry && !self.quiet.is_over();
+        let mut term = if moves_first { Term::Moving } else { Term::Held };
+        let mut last = f64::INFINITY;
         for round in 0..ROUNDS {
             if round > 0 {
                 path.begin_again(swept);
             }
             // what is accepted and has nothing yet to be compared with
             let alone = best.as_ref().is_some_and(|b| b.residual <= self.settings.accept && b.load_error >= UNKNOWN);
-            match wrong {
-                0 => {
-                    if base.in_space() {
+            match term {
+                Term::Held => {
+                    if base.in_space() || base.mostly_dry() {
                         self.follow_fixed(&mut path, NEARLY, iterations);
                         let exact = self.answer_within(problem, base, &path, iterations);
                         if exact.is_some() {
@@ -351,8 +377,8 @@ impl Newton {
                     self.follow_fixed(&mut path, END, iterations)
                 }
                 // once it moves it moves: what creeps would else be given other reactions
-                _ if right || wrong == 1 || alone => self.follow_moving(&mut path, problem, iterations),
-                _ => self.follow_fixed(&mut path, EARLY, iterations),
+                Term::Halved if !right && !alone => self.follow_fixed(&mut path, EARLY, iterations),
+                _ => self.follow_moving(&mut path, problem, iterations),
             }
             let mut guess = path.snapped();
             let mut reactions = guess.reactions.clone();
@@ -360,14 +386,28 @@ impl Newton {
             self.slips = Slips::of_guess(&path.rows, &guess);
             problem.write_back(&reactions);
             let mut residual = problem.residual();
+            if std::mem::take(&mut moves_first) && residual > IN_VAIN {
+                path.rows.hold(&self.slips.speeds(base));
+                term = Term::Held;
+                continue;
+            }
             let mut load_error = path.load_error(&reactions).min(shrinking.error(load_change(&path.rows, &reactions)));
             if let Some(found) = best.as_mut().filter(|_| right || alone) {
                 // these are nearer to those of a rigid metric
                 found.load_error = found.load_error.min(net_change(&path.rows, &found.reactions, &reactions));
             }
             let converged = self.report(*iterations, residual, load_error).status == SolveStatus::Converged;
-            let near = if wrong == 0 { WRONG } else { self.settings.accept };
+            let near = match term {
+                Term::Held => WRONG,
+                // multipliers do not settle what a moving term leaves
+                _ => self.settings.tolerance,
+            };
             right = converged || round < EXACT_ROUNDS && (residual <= near || !dry);
+            match term {
+                Term::Held if residual <= near => self.quiet.forget(),
+                Term::Held => self.quiet.lengthen(),
+                _ => {}
+            }
             // where nothing moves many reactions balance the load: the term of what creeps chooses, and is Newton's to find
             if right && !std::mem::replace(&mut tried, true) {
                 let exact = self.rounds(problem, &mut base.clone(), &mut guess, converged, iterations);
@@ -380,6 +420,7 @@ impl Newton {
             if converged {
                 return Some(self.report(*iterations, residual, load_error));
             }
+            let halved = matches!(term, Term::Halved);
             if right {
                 path.rows.move_multipliers(&reactions);
             } else {
@@ -388,7 +429,7 @@ impl Newton {
                 load_error += net_change(&path.rows, &reactions, &settled);
                 reactions = settled;
                 residual = problem.residual();
-                wrong += 1;
+                term = if matches!(term, Term::Held) { Term::Moving } else { Term::Halved };
             }
             path.rows.follow_slips(&path.rows.given_by(&reactions), &reactions, SHARE);
             if residual.is_finite() && best.as_ref().is_none_or(|b| residual < b.residual) {
@@ -396,7 +437,12 @@ impl Newton {
             }
             // what is only accepted is taken once the term has moved, and the load error is known
             let known = best.as_ref().is_some_and(|b| b.residual <= self.settings.accept && b.load_error < UNKNOWN);
-            if !right && (known && wrong > 1 || !dry) {
+            if !right && (known && matches!(term, Term::Halved) || !dry) {
+                break;
+            }
+            // the paths that are left shorten the residual as this one did
+            let shrinkage = (residual / std::mem::replace(&mut last, residual)).min(1.0);
+            if halved && residual * shrinkage.powi((ROUNDS - 1 - round) as i32) > self.settings.accept {
                 break;
             }
         }
@@ -415,8 +461,11 @@ impl Newton {
         let guess = path.snapped();
         self.slips = Slips::of_guess(&path.rows, &guess);
         problem.write_back(&guess.reactions);
-        if problem.residual() > WRONG || base.mostly_dry() {
+        if problem.residual() > WRONG {
             return None;
+        }
+        if base.mostly_dry() {
+            return self.rounds_of_held_terms(problem, base, &path.terms(), guess, iterations);
         }
         let mut guess = self.by_held_terms(base, guess, iterations)?;
         let exact = self.rounds(problem, &mut base.clone(), &mut guess, true, iterations)?;
