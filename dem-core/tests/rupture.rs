@@ -169,6 +169,16 @@ fn the_rules_of_rupture_differ_as_they_say() {
 }
 
 #[test]
+fn a_cascade_tells_how_far_it_has_come() {
+    for (rule, rounds) in [(Rupture::Cascade, vec![4]), (Rupture::CascadeWorst, vec![1]), (Rupture::EndOfStep, vec![])]
+    {
+        let mut told = Vec::new();
+        chain(rule).step_watched(&mut |broken| told.push(broken)).unwrap();
+        assert_eq!(told, rounds, "{rule:?}");
+    }
+}
+
+#[test]
 fn bonds_never_form_again() {
     let mut w = pair::<D2>(&[20.0, 0.0], &[0.0]);
     assert_eq!(w.step().unwrap().breaks.len(), 1);

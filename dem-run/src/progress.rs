@@ -137,6 +137,21 @@ impl Progress {
         }
     }
 
+    /// Tells how many bonds the step in hand has broken so far; shown when it is due. A step that breaks thousands takes long.
+    pub fn cascade(&mut self, step: u64, broken: usize) {
+        if !self.due() {
+            return;
+        }
+        self.shown = Some(Instant::now());
+        let text = format!("step {step} goes on: {broken} {} broken in it so far", bonds(broken));
+        match &mut self.sink {
+            Sink::Bar(bar) => bar.set_message(text),
+            Sink::Plain(out) => line(out, &format!("       {text}")),
+            Sink::Json(out) => json_line(out, &Event::Cascade { step, broken_in_step: broken }),
+            Sink::None => {}
+        }
+    }
+
     /// Tells where a family of runs stands; shown when it is due, or when it is the `last`.
     pub fn runs(&mut self, runs: &RunsProgress, last: bool) {
         if !self.due() && !last {
@@ -216,7 +231,7 @@ impl StepProgress {
 
     fn describe(&self, left: Option<f64>) -> String {
         let Self { step, time, end, residual, iterations, broken } = self;
-        let bonds = if *broken == 1 { "bond" } else { "bonds" };
+        let bonds = bonds(*broken);
         let left = left.map_or("?".to_string(), duration);
         format!(
             "t {time:.4} of {end} s  step {step}  residual {residual:.1e} ({iterations} iterations)  \
@@ -249,6 +264,10 @@ enum Event<'a> {
         #[serde(rename = "left_s")]
         left: Option<f64>,
     },
+    Cascade {
+        step: u64,
+        broken_in_step: usize,
+    },
     Runs {
         #[serde(flatten)]
         runs: &'a RunsProgress,
@@ -280,6 +299,10 @@ fn json_line(out: &mut dyn Write, event: &Event<'_>) {
     if let Ok(text) = serde_json::to_string(event) {
         line(out, &text);
     }
+}
+
+fn bonds(count: usize) -> &'static str {
+    if count == 1 { "bond" } else { "bonds" }
 }
 
 /// A duration in s as a person reads it.
@@ -339,6 +362,8 @@ mod tests {
         );
         progress.step(&at(2));
         assert!(out.lines()[3].ends_with(" s left"), "{:?}", out.lines());
+        progress.cascade(3, 187);
+        assert_eq!(out.lines()[4], "       step 3 goes on: 187 bonds broken in it so far");
     }
 
     #[test]
@@ -365,12 +390,14 @@ mod tests {
         progress.phase("compaction", 2.0);
         progress.step(&StepProgress { residual: f64::NAN, ..at(1) });
         progress.note("a \"note\"");
+        progress.cascade(2, 1);
         let events: Vec<serde_json::Value> =
             out.lines().iter().map(|line| serde_json::from_str(line).expect("JSON")).collect();
         assert_eq!(events[0], serde_json::json!({"event": "phase", "message": "compaction", "fraction": 1.0}));
         assert_eq!((&events[1]["event"], &events[1]["step"]), (&"step".into(), &1.into()));
         assert!(events[1]["residual"].is_null() && events[1]["elapsed_s"].is_number());
         assert_eq!(events[2], serde_json::json!({"event": "note", "message": "a \"note\""}));
+        assert_eq!(events[3], serde_json::json!({"event": "cascade", "step": 2, "broken_in_step": 1}));
     }
 
     #[test]

@@ -199,7 +199,8 @@ impl<D: Dim> Run<'_, D> {
     pub fn step_on(&mut self, interrupt: &Interrupt, progress: &mut Progress) -> Result<Ending, RunError> {
         let steps = self.scene.time.steps();
         while self.state.world.steps < steps {
-            let report = match self.state.world.step() {
+            let step = self.state.world.steps + 1;
+            let report = match self.state.world.step_watched(&mut |broken| progress.cascade(step, broken)) {
                 Ok(report) => report,
                 Err(error) => return self.failed(error),
             };

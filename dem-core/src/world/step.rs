@@ -94,7 +94,13 @@ const PARTS: u32 = 4096;
 impl<D: Dim> World<D> {
     /// Carry the world on by one time step. An error leaves the world as it was.
     pub fn step(&mut self) -> Result<StepReport<D>, StepError> {
-        let mut report = self.advance(self.settings.step, 0, 1)?;
+        self.step_watched(&mut |_| {})
+    }
+
+    /// The same; `watch` is told after each round of a cascade how many bonds have broken in it so far. A step that is made
+    /// anew in halves begins to count anew.
+    pub fn step_watched(&mut self, watch: &mut dyn FnMut(usize)) -> Result<StepReport<D>, StepError> {
+        let mut report = self.advance(self.settings.step, 0, 1, watch)?;
         self.steps += 1;
         // a product, not a sum: the clock does not drift
         self.time = self.steps as f64 * self.settings.step;
@@ -104,8 +110,14 @@ impl<D: Dim> World<D> {
 
     /// One step of length `h`, or two of half that length if its solve is not accepted, or if bodies are too fast for it;
     /// `parts` of its length were the step.
-    fn advance(&mut self, h: f64, halvings: u32, parts: u32) -> Result<StepReport<D>, StepError> {
-        let refused = match self.attempt(h) {
+    fn advance(
+        &mut self,
+        h: f64,
+        halvings: u32,
+        parts: u32,
+        watch: &mut dyn FnMut(usize),
+    ) -> Result<StepReport<D>, StepError> {
+        let refused = match self.attempt(h, watch) {
             Err(StepError::NotAccepted { .. } | StepError::Yielded { .. }) if halvings < self.settings.max_halvings => {
                 1
             }
@@ -113,8 +125,8 @@ impl<D: Dim> World<D> {
             outcome => return outcome,
         };
         let before = self.state();
-        let first = self.advance(0.5 * h, halvings + refused, 2 * parts)?;
-        match self.advance(0.5 * h, halvings + refused, 2 * parts) {
+        let first = self.advance(0.5 * h, halvings + refused, 2 * parts, watch)?;
+        match self.advance(0.5 * h, halvings + refused, 2 * parts, watch) {
             Ok(second) => Ok(first.followed_by(second, refused)),
             Err(error) => {
                 // half a step that stands alone would be neither the old state nor the new one
@@ -125,7 +137,7 @@ impl<D: Dim> World<D> {
     }
 
     /// One step of length `h`. An error leaves the world as it was.
-    fn attempt(&mut self, h: f64) -> Result<StepReport<D>, StepError> {
+    fn attempt(&mut self, h: f64, watch: &mut dyn FnMut(usize)) -> Result<StepReport<D>, StepError> {
         let mid = self.midpoint(h);
         let motion = self.free_motion(h);
         let applied = self.applied_impulse(h);
@@ -162,6 +174,7 @@ impl<D: Dim> World<D> {
             if !again {
                 break problem;
             }
+            watch(breaks.len());
         };
         if limited {
             let velocity = |k: usize| problem.nodes.all[k].velocity;
