@@ -223,13 +223,20 @@ impl Newton {
         }
     }
 
-    /// Gauss–Seidel from the impulses at hand, up to what is accepted. It cannot tell its load error.
-    fn swept(&self, problem: &mut impl Solvable, rows: &Rows, iterations: u64, max_sweeps: u64) -> SolveReport {
+    /// Gauss–Seidel from the impulses at hand, that aims at this residual. It cannot tell its load error.
+    fn swept(
+        &self,
+        problem: &mut impl Solvable,
+        rows: &Rows,
+        aim: f64,
+        iterations: u64,
+        max_sweeps: u64,
+    ) -> SolveReport {
         let NewtonSettings { tolerance, accept, .. } = self.settings;
         problem.forget_what_is_not_finite();
         let settings = GaussSeidelSettings {
             local: LocalSolve::Exact,
-            tolerance: accept,
+            tolerance: aim,
             accept,
             max_sweeps,
             // where contacts slip the acceleration takes more sweeps than it saves
@@ -345,7 +352,9 @@ impl Newton {
             self.rest.lengthen();
         }
         if rows.mostly_dry() {
-            let swept = self.swept(problem, &rows, iterations, FIRST_SWEEPS);
+            // half the way from what is accepted to the tolerance: beyond that sweeps converge slowly
+            let aim = (self.settings.tolerance * self.settings.accept).sqrt();
+            let swept = self.swept(problem, &rows, aim, iterations, FIRST_SWEEPS);
             if swept.status != SolveStatus::Failed {
                 return swept;
             }
@@ -353,7 +362,7 @@ impl Newton {
         if let Some(report) = self.come_from_afar(problem, &rows, &mut iterations) {
             return report;
         }
-        self.swept(problem, &rows, iterations, MOST_SWEEPS)
+        self.swept(problem, &rows, self.settings.accept, iterations, MOST_SWEEPS)
     }
 
     /// Rounds at the largest penalty, from the active set of the reactions that the problem brought along, bettered by
@@ -411,7 +420,7 @@ impl Newton {
             // less was left before: some sweeps may do from there
             let left = problem.swept(0);
             problem.write_back(&reached);
-            let swept = self.swept(problem, rows, *iterations, FIRST_SWEEPS);
+            let swept = self.swept(problem, rows, self.settings.accept, *iterations, FIRST_SWEEPS);
             if swept.status == SolveStatus::Failed {
                 problem.write_back(&left);
                 return None;
