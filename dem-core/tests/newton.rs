@@ -48,7 +48,8 @@ fn dry_disks(centres: impl Iterator<Item = [f64; 2]>, walls: Vec<Wall<D2>>) -> W
 /// thirty iterations.
 fn solved_cold<D: Dim>(world: &mut World<D>) -> ContactProblem<D> {
     let mut problem = world.contact_problem();
-    let settings = SolverSettings::Newton(common::newton(1e-10, 1e-10, 1e-9));
+    // sweeps that are accepted would end far from the answer
+    let settings = SolverSettings::Newton(common::newton(1e-10, 1e-3, 1e-9));
     let report = settings.build::<D>().solve(&mut problem);
     assert_eq!(report.status, SolveStatus::Converged, "{report:?}");
     assert!(report.work.newton <= 30, "{report:?}");

@@ -7,7 +7,7 @@ use crate::history::{Checkpoint, HistoryError};
 use crate::output::{WriteError, print_result};
 use crate::progress::{Progress, ProgressMode, StepProgress};
 use crate::record::Recorder;
-use crate::scene::{Scene, SceneError};
+use crate::scene::{Scene, SceneError, SolverKind};
 use crate::signals::{self, INTERRUPTED, Interrupt};
 use crate::summary::{Ending, Summary};
 use dem_core::dim::{D2, D3, D3Twist, Dim};
@@ -236,9 +236,14 @@ impl<D: Dim> Run<'_, D> {
     }
 
     fn failed(&mut self, error: StepError) -> Result<Ending, RunError> {
-        Err(RunError::NoConvergence(format!(
-            "{error}\nthe history is complete up to there; a smaller time.step, more max_sweeps or a larger solver.accept may help"
-        )))
+        let help = match (&error, &self.scene.solver.kind) {
+            (StepError::NotAccepted { .. }, SolverKind::GaussSeidel(_)) => {
+                "a smaller time.step, more max_sweeps or a larger solver.accept may help"
+            }
+            (StepError::NotAccepted { .. }, _) => "a smaller time.step or a larger solver.accept may help",
+            _ => "a smaller time.step may help",
+        };
+        Err(RunError::NoConvergence(format!("{error}\nthe history is complete up to there; {help}")))
     }
 
     fn standing(&self, report: &StepReport<D>) -> StepProgress {

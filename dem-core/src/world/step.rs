@@ -23,8 +23,8 @@ pub struct StepReport<D: Dim> {
     pub work: Work,
     /// Largest residual of its accepted solves (–).
     pub residual: f64,
-    /// ‖M (v⁺ − v⁻)/h‖ / ‖F_ext‖ over the grains that are free to move (–): in a static scene a false acceleration force over the load. Zero
-    /// without load.
+    /// Largest load error of its solves (–) where the last of them told one, as Newton's do; else ‖M (v⁺ − v⁻)/h‖ / ‖F_ext‖ over
+    /// the grains that are free to move, in a static scene a false acceleration force over the load, and zero without load.
     pub load_error: f64,
     /// Contacts by what they did.
     pub counts: Counts,
@@ -126,7 +126,8 @@ impl<D: Dim> World<D> {
         };
         let before = self.state();
         let first = self.advance(0.5 * h, halvings + refused, 2 * parts, watch)?;
-        match self.advance(0.5 * h, halvings + refused, 2 * parts, watch) {
+        let mut watch_second = |broken| watch(first.breaks.len() + broken);
+        match self.advance(0.5 * h, halvings + refused, 2 * parts, &mut watch_second) {
             Ok(second) => Ok(first.followed_by(second, refused)),
             Err(error) => {
                 // half a step that stands alone would be neither the old state nor the new one
@@ -444,11 +445,11 @@ impl<D: Dim> World<D> {
             status: done.status(),
             work: done.work,
             residual: done.residual,
-            load_error: done.load_error.unwrap_or(if problem.applied > 0.0 {
-                change.sqrt() / problem.applied
-            } else {
-                0.0
-            }),
+            load_error: match problem.applied {
+                _ if done.load_error_told => done.load_error,
+                applied if applied > 0.0 => change.sqrt() / applied,
+                _ => 0.0,
+            },
             counts: Counts::of(self.kept.iter().map(|t| t.status)),
             breaks,
             penetration: dry.map(|t| -self.geometry(&self.mid, t.pair).0).fold(0.0, f64::max),
@@ -498,7 +499,9 @@ fn forget_bonds<D: Dim>(touches: &mut [Kept<D>], broken: &[Break<D>]) {
 struct Solves {
     work: Work,
     residual: f64,
-    load_error: Option<f64>,
+    /// The worst that was told, and whether the last solve told it.
+    load_error: f64,
+    load_error_told: bool,
     missed_aim: bool,
 }
 
@@ -506,7 +509,8 @@ impl Solves {
     fn add(&mut self, solve: SolveReport) {
         self.work = self.work + solve.work;
         self.residual = self.residual.max(solve.residual);
-        self.load_error = solve.load_error.map(|e| self.load_error.map_or(e, |worst: f64| worst.max(e)));
+        self.load_error = self.load_error.max(solve.load_error.unwrap_or(0.0));
+        self.load_error_told = solve.load_error.is_some();
         self.missed_aim |= solve.status != SolveStatus::Converged;
     }
 

@@ -21,23 +21,32 @@ pub(super) struct Guess {
     pub reactions: Vec<Padded>,
     /// How far each contact is beyond its limits; none where that is not known.
     pub beyond: Vec<Beyond>,
+    /// Whether all that is at a limit sticks there.
+    pub sticks: bool,
 }
 
 impl Guess {
     /// The active set of these reactions.
     pub fn of(reactions: Vec<Padded>) -> Self {
-        Self { reactions, beyond: Vec::new() }
+        Self { reactions, beyond: Vec::new(), sticks: false }
+    }
+
+    /// The same reactions, and nothing slips any more.
+    pub fn at_rest(reactions: Vec<Padded>) -> Self {
+        Self { sticks: true, ..Self::of(reactions) }
     }
 
     /// The velocity at which the corrector of contact `k` gives the guessed reaction. One at its limit is moved beyond it,
-    /// where rounding cannot make it stick.
+    /// where rounding cannot make it stick, or inside, where it cannot make it slip.
     pub fn velocity(&self, k: usize, row: &Row) -> Padded {
         let guess = &self.reactions[k];
         let beyond = self.beyond.get(k).copied().unwrap_or_default();
         let (limit, w) = (guess.n + row.shift, row.metric());
         // how far the rows of one group are beyond their limit; zero for those that the guess lets stick
-        let at_limit = |c: f64, size: f64, known: f64| {
-            if size >= (1.0 - BEYOND) * c * limit { known.max(2.0 * BEYOND) } else { 0.0 }
+        let at_limit = |c: f64, size: f64, known: f64| match size >= (1.0 - BEYOND) * c * limit {
+            true if self.sticks => -2.0 * BEYOND,
+            true => known.max(2.0 * BEYOND),
+            false => 0.0,
         };
         let slip = at_limit(row.cone.mu, Vect::norm(&guess.t), beyond[0]);
         let bend = at_limit(row.cone.nu, guess.m.bending(), beyond[1]);

@@ -13,19 +13,31 @@ use super::{Newton, Shrinking, SolveReport, SolveStatus, Stall, load_change, rel
 
 /// Most solves, and Newton iterations of each: without progress, and all of them.
 const MOST_SOLVES: usize = 20;
-const PATIENCE: u64 = 30;
-const MOST: u64 = 60;
-/// Change of the reactions, over them, from which Newton goes on without a held term.
-const NEAR: f64 = 1e-2;
-/// Proximal rounds in which neither error halves.
-const ROUNDS_IN_VAIN: u64 = 2;
+const PATIENCE: u64 = 12;
+const MOST: u64 = 40;
+/// Change of the reactions, over them, from which Newton is tried without a held term, and that which serves where it failed so.
+pub(super) const ABOUT: f64 = 0.08;
+pub(super) const NEAR: f64 = 1e-2;
+/// Solves in which that change does not halve, and proximal rounds in which neither error does.
+const IN_VAIN: u64 = 2;
 
 impl Newton {
-    /// The guess to which the held terms lead from that of `guess`; none where they lead nowhere.
-    pub(super) fn by_held_terms(&mut self, base: &Rows, mut guess: Guess, iterations: &mut u64) -> Option<Guess> {
+    /// The guess to which the held terms lead from that of `guess`, where the reactions change by no more than `least`; none
+    /// where they lead nowhere, and then not in all of the solve of the problem.
+    pub(super) fn by_held_terms(
+        &mut self,
+        base: &Rows,
+        mut guess: Guess,
+        least: f64,
+        iterations: &mut u64,
+    ) -> Option<Guess> {
+        if std::mem::replace(&mut self.astray, true) {
+            return None;
+        }
+        let mut stall = Stall::after(IN_VAIN, 0.5);
         let mut rows = base.clone();
         rows.hold(&self.slips.speeds(base));
-        for _ in 0..MOST_SOLVES {
+        for solve in 0..MOST_SOLVES {
             let mut state = Iterate::from_reactions(&rows, &guess.reactions);
             let (made, solved) = self.inner(&rows, &mut state, Some(&guess), PATIENCE, MOST);
             *iterations += made;
@@ -35,12 +47,17 @@ impl Newton {
             self.slips = Slips::of(&rows, &state);
             rows.follow_slips(&state.y, &state.reactions, 1.0);
             let change = relative_change(&guess.reactions, &state.reactions);
-            guess = Guess { beyond: self.slips.in_rows(&rows), reactions: state.reactions };
-            if change <= NEAR {
+            guess = Guess { beyond: self.slips.in_rows(&rows), ..Guess::of(state.reactions) };
+            // in the first it is mostly that of what is solved
+            if change <= if solve == 0 { NEAR } else { least } {
+                self.astray = false;
+                return Some(guess);
+            }
+            if stall.at(change) {
                 break;
             }
         }
-        Some(guess)
+        None
     }
 
     /// Proximal rounds with these terms of dry friction, from the active set of `guess`: two where nothing slips. Where they
@@ -56,7 +73,7 @@ impl Newton {
         let mut rows = base.clone();
         rows.hold(terms);
         let mut shrinking = Shrinking::default();
-        let mut stall = Stall::after(ROUNDS_IN_VAIN, 0.5);
+        let mut stall = Stall::after(IN_VAIN, 0.5);
         let mut last = f64::INFINITY;
         loop {
             let mut state = Iterate::from_reactions(&rows, &guess.reactions);
@@ -81,7 +98,7 @@ impl Newton {
                 rows.follow_slips(&state.y, &state.reactions, 1.0);
             }
             last = error;
-            guess = Guess { beyond: self.slips.in_rows(&rows), reactions: state.reactions };
+            guess = Guess { beyond: self.slips.in_rows(&rows), ..Guess::of(state.reactions) };
         }
     }
 }

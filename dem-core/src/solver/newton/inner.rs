@@ -23,6 +23,9 @@ const ROUGH: f64 = 1e5;
 const TIGHT: f64 = 1e-12;
 const FAIR: f64 = 1e-3;
 const LOOSE: f64 = 1e-2;
+/// What a linear solve with a fresh factor may leave before its step is none, and how far F may grow.
+const LOST: f64 = 0.1;
+const DIVERGED: f64 = 1e6;
 /// Most GMRES iterations of one linear solve, and in space with a kept factor.
 const MOST_KRYLOV: usize = 80;
 const MOST_KEPT_IN_SPACE: usize = 15;
@@ -74,15 +77,20 @@ impl Newton {
         most: u64,
     ) -> (u64, bool) {
         let mut stall = Stall::after(patience, 0.9);
+        let begun = state.norm;
         for iteration in 0..most {
             let guessed = guess.filter(|_| iteration == 0);
             let target = self.target(rows, state);
-            if guessed.is_none() && (state.norm <= target || stall.at(state.norm)) {
+            let lost = state.norm > DIVERGED * stall.mark;
+            if guessed.is_none() && (state.norm <= target || stall.at(state.norm) || lost) {
                 return (iteration, state.norm <= target);
             }
             let Some(direction) = self.direction(rows, state, guessed, target) else { return (iteration + 1, false) };
             let before = direction.norm;
             advance(rows, state, &direction.step, guessed.is_some());
+            if guessed.is_some_and(|guess| guess.sticks) && state.norm > begun {
+                return (1, false);
+            }
             // a factor that was trusted blindly has to earn it
             if self.trusted && state.norm > (TRUST * before).max(target) {
                 self.trusted = false;
@@ -140,7 +148,7 @@ impl Newton {
             self.renew = self.wasted > waste;
             self.distrust = self.distrust.saturating_sub(1);
             self.trusted = self.distrust == 0 && report.plain <= TRUST;
-            if report.residual <= tolerance || fresh {
+            if report.residual <= tolerance || fresh && report.residual <= LOST {
                 return Some(Direction { step, norm });
             }
         }

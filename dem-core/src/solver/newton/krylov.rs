@@ -22,7 +22,10 @@ fn axpy(k: f64, x: &[f64], y: &mut [f64]) {
     y.iter_mut().zip(x).for_each(|(y, x)| *y += k * x);
 }
 
-/// Solve A x = b from x = 0 up to `tolerance`, in at most `most` iterations; `apply` is x ← A x, `precondition` its
+/// Iterations after which those are given up that will not end in time.
+const FORECAST: usize = 4;
+
+/// Solve A x = b from x = 0 up to `tolerance`, in at most `most` iterations, or fewer where those will not do; `apply` is x ← A x, `precondition` its
 /// approximate inverse.
 pub(super) fn gmres(
     b: &[f64],
@@ -46,6 +49,11 @@ pub(super) fn gmres(
     let mut rhs = vec![norm];
     let (mut residual, mut plain) = (1.0, f64::INFINITY);
     while columns.len() < most && residual > tolerance {
+        // at the rate so far
+        let made = columns.len();
+        if made >= FORECAST && residual.powf(most as f64 / made as f64) > tolerance {
+            break;
+        }
         let mut z = basis[columns.len()].clone();
         precondition(&mut z);
         let mut w = vec![0.0; n];

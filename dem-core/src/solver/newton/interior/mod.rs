@@ -25,6 +25,7 @@ mod rays;
 
 use super::factor::Factor;
 use super::guess::{Beyond, Guess, Slips};
+use super::held::ABOUT;
 use super::inner::{distance, norm2};
 use super::rows::{Operator, Row, Rows};
 use super::solvable::Solvable;
@@ -130,7 +131,7 @@ enum Term {
     Held,
     /// Lets it follow the slips from iteration to iteration.
     Moving,
-    /// Holds the one that the path before left, with half its change.
+    /// Holds the one that the path before left, with half its change; moves likewise where only the load error is left.
     Halved,
 }
 
@@ -328,7 +329,7 @@ impl<S: Site> Path<S> {
     fn snapped(&self) -> Guess {
         let all = self.rows.list.iter().zip(&self.sites).zip(&self.at.pairs);
         let (reactions, beyond) = all.map(|((row, site), pair)| site.snapped(row, pair)).unzip();
-        Guess { reactions, beyond }
+        Guess { beyond, ..Guess::of(reactions) }
     }
 
     /// How far the net impulses still are from those of a rigid metric: as far as the metric is soft. Infinite where no
@@ -358,7 +359,7 @@ impl Newton {
         // steps that are alike slip alike
         let mut moves_first = dry && !self.quiet.is_over();
         let mut term = if moves_first { Term::Moving } else { Term::Held };
-        let mut last = f64::INFINITY;
+        let (mut moved_in_vain, mut last) = (false, f64::INFINITY);
         for round in 0..ROUNDS {
             if round > 0 {
                 path.begin_again(swept);
@@ -371,6 +372,7 @@ impl Newton {
                         self.follow_fixed(&mut path, NEARLY, iterations);
                         let exact = self.answer_within(problem, base, &path, iterations);
                         if exact.is_some() {
+                            self.quiet.forget();
                             return exact;
                         }
                     }
@@ -386,9 +388,9 @@ impl Newton {
             self.slips = Slips::of_guess(&path.rows, &guess);
             problem.write_back(&reactions);
             let mut residual = problem.residual();
-            if std::mem::take(&mut moves_first) && residual > IN_VAIN {
+            if std::mem::take(&mut moves_first) && residual > IN_VAIN.max(self.settings.accept) {
                 path.rows.hold(&self.slips.speeds(base));
-                term = Term::Held;
+                (term, moved_in_vain) = (Term::Held, true);
                 continue;
             }
             let mut load_error = path.load_error(&reactions).min(shrinking.error(load_change(&path.rows, &reactions)));
@@ -398,18 +400,19 @@ impl Newton {
             }
             let converged = self.report(*iterations, residual, load_error).status == SolveStatus::Converged;
             let near = match term {
-                Term::Held => WRONG,
+                Term::Held => WRONG.max(self.settings.tolerance),
                 // multipliers do not settle what a moving term leaves
                 _ => self.settings.tolerance,
             };
             right = converged || round < EXACT_ROUNDS && (residual <= near || !dry);
             match term {
+                _ if !dry => {}
                 Term::Held if residual <= near => self.quiet.forget(),
                 Term::Held => self.quiet.lengthen(),
                 _ => {}
             }
             // where nothing moves many reactions balance the load: the term of what creeps chooses, and is Newton's to find
-            if right && !std::mem::replace(&mut tried, true) {
+            if right && !self.astray && !std::mem::replace(&mut tried, true) {
                 let exact = self.rounds(problem, &mut base.clone(), &mut guess, converged, iterations);
                 if exact.is_some() {
                     return exact;
@@ -429,20 +432,27 @@ impl Newton {
                 load_error += net_change(&path.rows, &reactions, &settled);
                 reactions = settled;
                 residual = problem.residual();
-                term = if matches!(term, Term::Held) { Term::Moving } else { Term::Halved };
+                term = if matches!(term, Term::Held) && !moved_in_vain { Term::Moving } else { Term::Halved };
             }
             path.rows.follow_slips(&path.rows.given_by(&reactions), &reactions, SHARE);
             if residual.is_finite() && best.as_ref().is_none_or(|b| residual < b.residual) {
                 best = Some(Found { reactions, residual, load_error });
             }
             // what is only accepted is taken once the term has moved, and the load error is known
-            let known = best.as_ref().is_some_and(|b| b.residual <= self.settings.accept && b.load_error < UNKNOWN);
+            let accepted = best.as_ref().filter(|b| b.residual <= self.settings.accept);
+            let known = accepted.is_some_and(|b| b.load_error < UNKNOWN);
+            let small = accepted.is_some_and(|b| b.load_error <= self.settings.load_tolerance);
             if !right && (known && matches!(term, Term::Halved) || !dry) {
                 break;
             }
             // the paths that are left shorten the residual as this one did
             let shrinkage = (residual / std::mem::replace(&mut last, residual)).min(1.0);
-            if halved && residual * shrinkage.powi((ROUNDS - 1 - round) as i32) > self.settings.accept {
+            let reached = |rounds: usize| residual * shrinkage.powi(rounds.saturating_sub(1 + round) as i32);
+            if halved && accepted.is_none() && reached(ROUNDS) > self.settings.accept {
+                break;
+            }
+            // what these terms of dry friction leave multipliers will not settle, and the load error is small enough
+            if right && small && round > 0 && reached(EXACT_ROUNDS) > self.settings.tolerance {
                 break;
             }
         }
@@ -467,7 +477,7 @@ impl Newton {
         if base.mostly_dry() {
             return self.rounds_of_held_terms(problem, base, &path.terms(), guess, iterations);
         }
-        let mut guess = self.by_held_terms(base, guess, iterations)?;
+        let mut guess = self.by_held_terms(base, guess, ABOUT, iterations)?;
         let exact = self.rounds(problem, &mut base.clone(), &mut guess, true, iterations)?;
         // the next active set is near this one
         self.rest.forget();
@@ -488,13 +498,13 @@ impl Newton {
     fn follow_moving<S: Site>(&mut self, path: &mut Path<S>, problem: &mut impl Solvable, iterations: &mut u64) {
         let mut stall = Stall::after(MOVING_PATIENCE, 0.5);
         let tolerance = self.settings.tolerance;
-        let mut best: Option<(f64, Point<S>)> = None;
+        let mut best: Option<(f64, f64, Point<S>)> = None;
         self.follow(path, iterations, |path| {
             let reactions = path.snapped().reactions;
             problem.write_back(&reactions);
             let residual = problem.residual();
-            if best.as_ref().is_none_or(|(least, _)| residual < *least) {
-                best = Some((residual, Point { y: path.at.y.clone(), pairs: path.at.pairs.clone() }));
+            if best.as_ref().is_none_or(|(least, ..)| residual < *least) {
+                best = Some((residual, path.softness, Point { y: path.at.y.clone(), pairs: path.at.pairs.clone() }));
             }
             let arrived = residual <= tolerance || stall.at(residual);
             if !arrived {
@@ -502,8 +512,12 @@ impl Newton {
             }
             arrived
         });
-        if let Some((_, at)) = best {
+        if let Some((_, softness, at)) = best {
             path.at = at;
+            if softness != path.softness {
+                // the softer point that is kept may come after it
+                path.softer = None;
+            }
         }
     }
 
