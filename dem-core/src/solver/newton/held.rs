@@ -18,7 +18,7 @@ const MOST: u64 = 40;
 /// Change of the reactions, over them, from which Newton is tried without a held term, and that which serves where it failed so.
 pub(super) const ABOUT: f64 = 0.08;
 pub(super) const NEAR: f64 = 1e-2;
-/// Solves in which that change does not halve, and proximal rounds in which neither error does.
+/// Solves in which that change does not halve, and proximal rounds in which the greater error does not.
 const IN_VAIN: u64 = 2;
 
 impl Newton {

@@ -139,7 +139,7 @@ impl Newton {
             }
             let apply = |x: &[f64], out: &mut [f64]| multiply(rows, &exact, x, out);
             let most = if fresh { MOST_KRYLOV } else { most };
-            let (step, report) = gmres(&right, tolerance, most, apply, |x| self.factor.solve(x));
+            let (step, report) = gmres(&right, tolerance, most, in_space && !fresh, apply, |x| self.factor.solve(x));
             if fresh {
                 // what even a fresh factor needs is the part that is not symmetric
                 (self.floor, self.wasted) = (report.iterations, 0);

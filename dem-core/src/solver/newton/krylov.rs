@@ -22,15 +22,16 @@ fn axpy(k: f64, x: &[f64], y: &mut [f64]) {
     y.iter_mut().zip(x).for_each(|(y, x)| *y += k * x);
 }
 
-/// Iterations after which those are given up that will not end in time.
+/// Iterations whose rate tells whether the solve will end in time.
 const FORECAST: usize = 4;
 
-/// Solve A x = b from x = 0 up to `tolerance`, in at most `most` iterations, or fewer where those will not do; `apply` is x ← A x, `precondition` its
+/// Solve A x = b from x = 0 up to `tolerance`, in at most `most` iterations, or with a `forecast` in fewer where those will not do; `apply` is x ← A x, `precondition` its
 /// approximate inverse.
 pub(super) fn gmres(
     b: &[f64],
     tolerance: f64,
     most: usize,
+    forecast: bool,
     mut apply: impl FnMut(&[f64], &mut [f64]),
     precondition: impl Fn(&mut [f64]),
 ) -> (Vec<f64>, Krylov) {
@@ -51,7 +52,7 @@ pub(super) fn gmres(
     while columns.len() < most && residual > tolerance {
         // at the rate so far
         let made = columns.len();
-        if made >= FORECAST && residual.powf(most as f64 / made as f64) > tolerance {
+        if forecast && made >= FORECAST && residual.powf(most as f64 / made as f64) > tolerance {
             break;
         }
         let mut z = basis[columns.len()].clone();

@@ -296,9 +296,13 @@ impl<S: Site> Path<S> {
         self.scale = self.scale.max(self.at.scale(&self.rows, &self.sites));
         let gap = self.at.gap(&self.sites) / self.scale;
         let softness = (gap.min(1.0) / self.own).min(self.softness).max(self.least);
-        if softness == self.softness {
-            return;
+        if softness != self.softness {
+            self.soften(softness);
         }
+    }
+
+    /// Make the metric so much softer than where the path ends.
+    fn soften(&mut self, softness: f64) {
         self.softness = softness;
         for (row, w) in self.rows.list.iter_mut().zip(&self.hardest) {
             row.weights = *w * self.softness;
@@ -498,13 +502,15 @@ impl Newton {
     fn follow_moving<S: Site>(&mut self, path: &mut Path<S>, problem: &mut impl Solvable, iterations: &mut u64) {
         let mut stall = Stall::after(MOVING_PATIENCE, 0.5);
         let tolerance = self.settings.tolerance;
-        let mut best: Option<(f64, f64, Point<S>)> = None;
+        // the least residual so far, and the point that it belongs to with its softness and the softer one before it
+        let (mut least, mut best) = (f64::INFINITY, None);
         self.follow(path, iterations, |path| {
             let reactions = path.snapped().reactions;
             problem.write_back(&reactions);
             let residual = problem.residual();
-            if best.as_ref().is_none_or(|(least, ..)| residual < *least) {
-                best = Some((residual, path.softness, Point { y: path.at.y.clone(), pairs: path.at.pairs.clone() }));
+            if best.is_none() || residual < least {
+                let at = Point { y: path.at.y.clone(), pairs: path.at.pairs.clone() };
+                (least, best) = (residual, Some((at, path.softness, path.softer.clone())));
             }
             let arrived = residual <= tolerance || stall.at(residual);
             if !arrived {
@@ -512,12 +518,9 @@ impl Newton {
             }
             arrived
         });
-        if let Some((_, softness, at)) = best {
-            path.at = at;
-            if softness != path.softness {
-                // the softer point that is kept may come after it
-                path.softer = None;
-            }
+        if let Some((at, softness, softer)) = best {
+            (path.at, path.softer) = (at, softer);
+            path.soften(softness);
         }
     }
 
