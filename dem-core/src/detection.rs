@@ -47,7 +47,7 @@ impl<D: Dim> Candidates<D> {
             return;
         }
         let skin: Vec<f64> = (0..bodies).map(|k| reach(k) + spare(k)).collect();
-        self.pairs = pairs_within(grains, position, &skin);
+        self.pairs = Grids::new(grains, position, &skin).pairs();
         let first_wall = grains.len();
         for (w, (wall, place)) in walls.iter().zip(wall_position).enumerate() {
             for (i, x) in position.iter().enumerate() {
@@ -56,7 +56,7 @@ impl<D: Dim> Candidates<D> {
                 }
             }
         }
-        self.pairs.sort_unstable();
+        self.pairs.par_sort_unstable();
         self.then.clear();
         self.then.extend(now());
         self.skin = skin;
@@ -85,13 +85,7 @@ struct Grids<'a, D: Dim> {
 
 /// All pairs of grains whose gap is at most the sum of their skins (m), sorted.
 pub fn pairs_within<D: Dim>(grains: &Grains<D>, position: &[D::Vector], skin: &[f64]) -> Vec<[u32; 2]> {
-    let grids = Grids::new(grains, position, skin);
-    // chunks of a fixed length, joined in order: the same list for any number of threads
-    let mut pairs: Vec<[u32; 2]> = grids
-        .entries
-        .par_chunks(256)
-        .flat_map_iter(|chunk| chunk.iter().flat_map(|entry| grids.neighbours(entry)))
-        .collect();
+    let mut pairs = Grids::new(grains, position, skin).pairs();
     pairs.par_sort_unstable();
     pairs
 }
@@ -122,33 +116,60 @@ impl<'a, D: Dim> Grids<'a, D> {
         key
     }
 
-    /// Pairs of a grain with those of higher index in its own level, and with all in levels of larger cells.
-    fn neighbours(&self, entry: &Entry) -> Vec<[u32; 2]> {
+    /// All pairs whose gap is at most the sum of their skins, each once.
+    fn pairs(&self) -> Vec<[u32; 2]> {
+        // chunks of a fixed length, joined in order: the same list for any number of threads
+        self.entries.par_chunks(256).flat_map_iter(|chunk| self.pairs_of(chunk)).collect()
+    }
+
+    /// Pairs of these grains with those of their own level that come after them, and with all in levels of larger cells.
+    fn pairs_of(&self, chunk: &[Entry]) -> Vec<[u32; 2]> {
         let mut found = Vec::new();
-        let me = entry.grain as usize;
-        let span = |axis: usize| if axis < D::N { -1..=1 } else { 0..=0 };
-        for &level in self.levels.iter().take_while(|level| **level <= entry.level) {
-            let key = if level == entry.level { entry.key } else { self.cell(me, level) };
-            for dx in span(0) {
-                for dy in span(1) {
+        let deep = D::N > 2;
+        let finest = chunk.last().map_or(0, |entry| entry.level);
+        for &level in self.levels.iter().take_while(|level| **level <= finest) {
+            for (dx, dy) in [(0, 0), (0, 1), (1, -1), (1, 0), (1, 1), (0, -1), (-1, -1), (-1, 0), (-1, 1)] {
+                let ahead = (dx, dy) >= (0, 0);
+                // grains come in the order of their cells, so that the next run begins near the last
+                let mut start = 0;
+                for entry in chunk.iter().filter(|entry| level < entry.level || level == entry.level && ahead) {
+                    let own = level == entry.level;
+                    let key = if own { entry.key } else { self.cell(entry.grain as usize, level) };
+                    let (Some(x), Some(y)) = (key[0].checked_add(dx), key[1].checked_add(dy)) else { continue };
                     // cells are ordered by their last key last: one run of the sorted list holds all of dz
-                    let last = if D::N == 3 { 1 } else { 0 };
-                    let low = [key[0].saturating_add(dx), key[1].saturating_add(dy), key[2].saturating_sub(last)];
-                    let high = [low[0], low[1], key[2].saturating_add(last)];
-                    let start = self.entries.partition_point(|e| (e.level, e.key) < (level, low));
-                    let cells = self.entries[start..].iter().take_while(|e| (e.level, e.key) <= (level, high));
-                    for other in cells.filter(|e| level < entry.level || e.grain > entry.grain) {
-                        let j = other.grain as usize;
-                        let limit = self.grains.radius[me] + self.grains.radius[j] + self.skin[me] + self.skin[j];
-                        let apart = self.position[me] - self.position[j];
-                        if apart.dot(&apart) <= limit * limit {
-                            found.push([entry.grain.min(other.grain), entry.grain.max(other.grain)]);
-                        }
+                    let below = deep && !(own && (dx, dy) == (0, 0));
+                    let low = [x, y, key[2].saturating_sub(below.into())];
+                    let high = [x, y, key[2].saturating_add(deep.into())];
+                    start = self.first_from(start, (level, low));
+                    let run = self.entries[start..].iter().take_while(|e| (e.level, e.key) <= (level, high));
+                    // of two in one cell the first finds the other
+                    for other in run.filter(|e| !own || e.key != key || e.grain > entry.grain) {
+                        self.add_if_near(entry.grain, other.grain, &mut found);
                     }
                 }
             }
         }
         found
+    }
+
+    /// The first entry that is not before a cell of a level, looked for from `near` on.
+    fn first_from(&self, near: usize, cell: (u16, [i64; 3])) -> usize {
+        let before = |e: &Entry| (e.level, e.key) < cell;
+        let (passed, coming) = self.entries.split_at(near);
+        if passed.last().is_some_and(|e| !before(e)) {
+            return passed.partition_point(before);
+        }
+        let next = coming.iter().take(16).position(|e| !before(e));
+        near + next.unwrap_or_else(|| coming.partition_point(before))
+    }
+
+    fn add_if_near(&self, a: u32, b: u32, found: &mut Vec<[u32; 2]>) {
+        let [i, j] = [a, b].map(|k| k as usize);
+        let limit = self.grains.radius[i] + self.grains.radius[j] + self.skin[i] + self.skin[j];
+        let apart = self.position[i] - self.position[j];
+        if apart.dot(&apart) <= limit * limit {
+            found.push([a.min(b), a.max(b)]);
+        }
     }
 }
 

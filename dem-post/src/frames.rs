@@ -8,7 +8,7 @@ use clap::ValueEnum;
 use dem_run::history::{BondStatus, History, RuptureMode};
 use serde::Serialize;
 
-use crate::chains::pictures::{force_legend, links};
+use crate::chains::pictures::{behind_lines, force_legend, links};
 use crate::chains::{require_reactions, statistics};
 use crate::map::{Colour, Key, Link, Panel, Ramp, Sample, Scale, View, draw_view};
 use crate::output::{Folder, PostError, Result, facts, number, progress, quantity, short};
@@ -132,7 +132,7 @@ pub fn write(history: &History, report: &Report, folder: &mut Folder, quiet: boo
 
 /// The part of the plane that shows all frames.
 fn shown(history: &History, report: &Report) -> Result<(Sample, View)> {
-    let sample = Sample::read(history)?;
+    let sample = Sample::with_depth(history)?;
     let mut view = View::EMPTY;
     for &frame in &report.frames {
         let (grains, walls) = (history.grain_state(frame)?, history.wall_state(frame)?);
@@ -159,7 +159,8 @@ fn picture(history: &History, report: &Report, frame: usize) -> Result<(Panel, V
             let contacts = history.contacts(frame)?;
             panel.links = links(&contacts, &panel.grains.position, scale, history.dimension());
             panel.caption.push(format!("⟨f⟩ = {} N, the greatest mean of the series", short(scale)));
-            force_legend()
+            panel.fills = behind_lines(number_of_grains, history.dimension());
+            force_legend(history.dimension())
         }
         Subject::Speed => {
             let scale = Scale { title: "speed (m/s)".into(), low: 0.0, high: scale, ramp: Ramp::Areas };
@@ -191,19 +192,7 @@ fn bonds(history: &History, frame: usize, panel: &mut Panel) -> Result<Vec<Key>>
             panel.links.push(Link { from, to, width: CRACK, colour });
         }
     }
-    let holding = |&(_, status): &(&[i32; 2], &BondStatus)| *status == BondStatus::Intact;
-    let intact: Vec<Link> = (bonds.pair.iter().zip(&status).filter(holding))
-        .map(|(pair, _)| Link {
-            from: centre(panel, pair[0]),
-            to: centre(panel, pair[1]),
-            width: BOND,
-            colour: "#9a9a9a".into(),
-        })
-        .collect();
-    panel.links.splice(0..0, intact);
-    panel.caption.push(format!("{} of {} bonds broken", modes.total(), bonds.len()));
     let mut keys = vec![
-        Key::Line("#9a9a9a", BOND, "bond".into()),
         Key::Line(colour::BLUE, CRACK, "broken in tension".into()),
         Key::Line(colour::VERMILLION, CRACK, "in shear".into()),
         Key::Line(colour::GREEN, CRACK, "by rolling".into()),
@@ -211,6 +200,19 @@ fn bonds(history: &History, frame: usize, panel: &mut Panel) -> Result<Vec<Key>>
     if modes.twist > 0 {
         keys.push(Key::Line(colour::PURPLE, CRACK, "by twist".into()));
     }
+    // in space bonds lie behind each other, and behind grains
+    if d == 2 {
+        let holding = |&(_, status): &(&[i32; 2], &BondStatus)| *status == BondStatus::Intact;
+        let (width, colour) = (BOND, "#9a9a9a");
+        let line = |(pair, _): (&[i32; 2], &BondStatus)| {
+            let [from, to] = pair.map(|grain| centre(panel, grain));
+            Link { from, to, width, colour: colour.into() }
+        };
+        let intact: Vec<Link> = bonds.pair.iter().zip(&status).filter(holding).map(line).collect();
+        panel.links.splice(0..0, intact);
+        keys.insert(0, Key::Line(colour, width, "bond".into()));
+    }
+    panel.caption.push(format!("{} of {} bonds broken", modes.total(), bonds.len()));
     Ok(keys)
 }
 

@@ -166,6 +166,8 @@ pub fn write(history: &History, report: &Report, folder: &mut Folder) -> Result<
 /// Those of reading the history.
 pub fn map(history: &History, report: &Report) -> Result<Drawing> {
     let scale = |title: &str, high: f64| Scale { title: title.into(), low: 0.0, high, ramp: Ramp::Areas };
+    // of spheres the arrows of a square would be those of all depths
+    let flat = history.dimension() == 2;
     let mut panels = vec![];
     for field in &report.fields {
         let usual = scale("", usual_speed(field.speed.clone()));
@@ -178,45 +180,44 @@ pub fn map(history: &History, report: &Report) -> Result<Drawing> {
             walls: history.wall_state(field.frame)?,
             fills: field.speed.iter().map(|&speed| usual.colour(speed)).collect(),
             outline: colour::GREY,
-            arrows: arrows(&field.state, history.dimension()),
+            arrows: if flat { arrows(&field.state) } else { vec![] },
             ..Panel::default()
         });
     }
-    let legend = [Key::Bar(scale("speed over v", 1.0)), Key::Arrow("mean velocity of a square".into())];
-    Ok(draw(&Sample::read(history)?, &panels, &legend))
+    let mut legend = vec![Key::Bar(scale("speed over v", 1.0))];
+    if flat {
+        legend.push(Key::Arrow("mean velocity of a square".into()));
+    }
+    Ok(draw(&Sample::with_depth(history)?, &panels, &legend))
 }
 
-/// The mean velocities of the squares of a grid as arrows, the longest as long as a square is wide.
-fn arrows(state: &GrainState, d: usize) -> Vec<Arrow> {
-    let axes = [0, d - 1];
-    let range = axes.map(|k| {
-        let values = || state.position.chunks(d).map(|x| x[k]);
+/// The mean velocities of the squares of a grid over disks as arrows, the longest as long as a square is wide.
+fn arrows(state: &GrainState) -> Vec<Arrow> {
+    let range = [0, 1].map(|k| {
+        let values = || state.position.chunks(2).map(|x| x[k]);
         (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max))
     });
     let side = range.iter().map(|(low, high)| high - low).fold(0.0, f64::max) / SQUARES;
     if side <= 0.0 || !side.is_finite() {
         return vec![];
     }
-    let square = |x: &[f64]| [0, 1].map(|k| ((x[axes[k]] - range[k].0) / side) as i64);
-    let mut grains: Vec<usize> = (0..state.position.len() / d).collect();
-    let place = |grain: usize| &state.position[grain * d..(grain + 1) * d];
-    grains.sort_by_key(|&grain| square(place(grain)));
-    let mean = |group: &[usize], all: &[f64]| -> Vec<f64> {
-        (0..d).map(|k| group.iter().map(|&grain| all[grain * d + k]).sum::<f64>() / group.len() as f64).collect()
+    let square = |grain: &usize| [0, 1].map(|k| ((state.position[2 * grain + k] - range[k].0) / side) as i64);
+    let mut grains: Vec<usize> = (0..state.position.len() / 2).collect();
+    grains.sort_by_key(square);
+    let mean = |group: &[usize], all: &[f64]| {
+        [0, 1].map(|k| group.iter().map(|&grain| all[2 * grain + k]).sum::<f64>() / group.len() as f64)
     };
-    let means: Vec<[Vec<f64>; 2]> = grains
-        .chunk_by(|&a, &b| square(place(a)) == square(place(b)))
+    let means: Vec<[[f64; 2]; 2]> = grains
+        .chunk_by(|a, b| square(a) == square(b))
         .map(|group| [mean(group, &state.position), mean(group, &state.velocity)])
         .collect();
-    // what points at the reader has no length
-    let length = |v: &[f64]| v[axes[0]].hypot(v[axes[1]]);
-    let longest = means.iter().map(|[_, v]| length(v)).fold(0.0, f64::max);
+    let longest = means.iter().map(|[_, v]| v[0].hypot(v[1])).fold(0.0, f64::max);
     if longest == 0.0 {
         return vec![];
     }
-    let arrow = |[from, v]: [Vec<f64>; 2]| Arrow {
-        to: from.iter().zip(v).map(|(x, v)| x + v * side / longest).collect(),
-        from,
+    let arrow = |[from, v]: [[f64; 2]; 2]| Arrow {
+        from: from.to_vec(),
+        to: [0, 1].map(|k| from[k] + v[k] * side / longest).to_vec(),
     };
     means.into_iter().map(arrow).collect()
 }
@@ -247,7 +248,7 @@ mod tests {
 
     #[test]
     fn the_longest_arrow_is_one_square_long() {
-        let arrows = arrows(&turning(), 2);
+        let arrows = arrows(&turning());
         assert_eq!(arrows.len(), 4);
         let rise: Vec<f64> = arrows.iter().map(|a| a.to[1] - a.from[1]).collect();
         let side = 6.0 / SQUARES;
@@ -259,8 +260,8 @@ mod tests {
     #[test]
     fn grains_at_rest_have_no_arrows() {
         let still = GrainState { velocity: vec![0.0; 8], ..turning() };
-        assert!(arrows(&still, 2).is_empty());
-        assert!(arrows(&GrainState::default(), 2).is_empty());
+        assert!(arrows(&still).is_empty());
+        assert!(arrows(&GrainState::default()).is_empty());
     }
 
     #[test]

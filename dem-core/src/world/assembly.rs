@@ -20,6 +20,9 @@ const CLOSED: f64 = 1e-6;
 /// Gap over the radius of the grain below which a contact that does not close is part of the problem.
 const NEAR: f64 = 1e-3;
 
+/// What a grain may move, over its radius, before the list of candidates is built anew.
+const SPARE: f64 = 0.15;
+
 /// The configuration at mid-step, where contacts are looked for (m).
 #[derive(Clone)]
 pub(super) struct Midpoint<D: Dim> {
@@ -148,18 +151,19 @@ impl<D: Dim> World<D> {
 
     /// Make the list of candidates valid for this step.
     fn refresh_candidates(&mut self, mid: &Midpoint<D>, motion: &Motion<D>, h: f64) {
-        let radius = |k: usize| self.grains.radius.get(k).copied().unwrap_or(0.0);
         let way = |k: usize| h * motion.free[k].0.norm().max(motion.before[k].0.norm());
-        let reach = |k: usize| NEAR * radius(k) + 2.0 * way(k);
+        let reach = |k: usize| NEAR * radius_of(&self.grains, k) + 2.0 * way(k);
         // some of its size, or three steps at its speed
-        let spare = |k: usize| (0.15 * radius(k)).max(3.0 * way(k));
+        let spare = |k: usize| (SPARE * radius_of(&self.grains, k)).max(3.0 * way(k));
         self.candidates.cover(&self.grains, &mid.grains, &self.walls, &mid.walls, reach, spare);
     }
 
     /// Contacts that the step left out and that its velocities would close: they are added, and the step is solved again.
     pub(super) fn missed(&mut self, mid: &Midpoint<D>, touches: &[Kept<D>], nodes: &Nodes<D>, h: f64) -> Vec<Kept<D>> {
         let way = |k: usize| h * nodes.all[k].velocity.norm();
-        self.candidates.cover(&self.grains, &mid.grains, &self.walls, &mid.walls, way, |k| 0.5 * way(k));
+        // as much as serves the next step too
+        let spare = |k: usize| (SPARE * radius_of(&self.grains, k)).max(0.5 * way(k));
+        self.candidates.cover(&self.grains, &mid.grains, &self.walls, &mid.walls, way, spare);
         let mut present = touches.iter().peekable();
         let mut missed = Vec::new();
         for &pair in &self.candidates.pairs {
@@ -321,6 +325,11 @@ impl<D: Dim> World<D> {
     fn levers(&self, touch: &Touch<D>) -> [f64; 2] {
         touch.pair.map(|k| self.grains.radius.get(k as usize).map_or(0.0, |r| r + 0.5 * touch.gap))
     }
+}
+
+/// Radius of a grain (m); none of a wall.
+fn radius_of<D: Dim>(grains: &Grains<D>, body: usize) -> f64 {
+    grains.radius.get(body).copied().unwrap_or(0.0)
 }
 
 /// What is added to the normal velocity of a rigid bond before its law, so that a bond that turns keeps its length (m/s).

@@ -3,27 +3,36 @@
 use dem_run::history::{ContactRows, History};
 
 use super::{CARRIES, Report};
-use crate::map::{Key, Link, Panel, Sample, draw};
+use crate::map::{Colour, Key, Link, Panel, Sample, draw};
 use crate::output::{Result, number, short};
 use crate::plot::{Chart, Drawing, Style, colour};
 
-/// Width of a line that carries ⟨f⟩, and the greatest width, units of the drawing.
-const WIDTH: (f64, f64) = (1.3, 8.0);
+/// Width of a line that carries ⟨f⟩, and the greatest width, units of the drawing: of disks, and of spheres.
+const WIDTH: [(f64, f64); 2] = [(1.3, 8.0), (0.6, 4.0)];
 /// Colours of the weak network, compression and tension; of grains in chains, too.
 const PALE: [&str; 2] = ["#9cc9e3", "#f0b27a"];
 /// Fill and outline of other grains.
 const GRAIN: [&str; 2] = ["#f4f4f4", "#c4c4c4"];
-/// Width of the line of a chain.
-const CHAIN: f64 = 3.0;
+/// Width of the line of a chain: of disks, and of spheres.
+const CHAIN: [f64; 2] = [3.0, 2.4];
 
 /// The lines that a map of forces needs in its legend.
-pub fn force_legend() -> Vec<Key> {
-    vec![
-        Key::Line(colour::BLUE, 3.0 * WIDTH.0, "compression, 3⟨f⟩".into()),
-        Key::Line(colour::VERMILLION, 3.0 * WIDTH.0, "tension, 3⟨f⟩".into()),
-        Key::Line(PALE[0], 0.7 * WIDTH.0, "weak compression".into()),
-        Key::Line(PALE[1], 0.7 * WIDTH.0, "weak tension".into()),
-    ]
+pub fn force_legend(d: usize) -> Vec<Key> {
+    let width = WIDTH[d - 2].0;
+    let mut legend = vec![
+        Key::Line(colour::BLUE, 3.0 * width, "compression, 3⟨f⟩".into()),
+        Key::Line(colour::VERMILLION, 3.0 * width, "tension, 3⟨f⟩".into()),
+    ];
+    if d == 2 {
+        legend.push(Key::Line(PALE[0], 0.7 * width, "weak compression".into()));
+        legend.push(Key::Line(PALE[1], 0.7 * width, "weak tension".into()));
+    }
+    legend
+}
+
+/// Fills of the grains behind lines; of spheres none, for they would hide those.
+pub fn behind_lines(grains: usize, d: usize) -> Vec<Colour> {
+    if d == 2 { vec![GRAIN[0].into(); grains] } else { vec![] }
 }
 
 /// How many chains have at least so many grains, at each moment: a chart for each kind of
@@ -65,15 +74,19 @@ pub fn chain_map(history: &History, report: &Report) -> Result<Drawing> {
     for network in &report.networks {
         let state = history.grain_state(network.frame)?;
         let centre = |grain: usize| state.position[grain * d..(grain + 1) * d].to_vec();
-        let (mut fills, mut links) = (vec![GRAIN[0].into(); grains], vec![]);
+        let (mut fills, mut links) = (behind_lines(grains, d), vec![]);
         for (k, chains) in network.chains.iter().enumerate() {
             for chain in &chains.chains {
-                chain.iter().for_each(|&grain| fills[grain] = PALE[k].into());
+                for &grain in chain {
+                    if let Some(fill) = fills.get_mut(grain) {
+                        *fill = PALE[k].into();
+                    }
+                }
                 let colour = [colour::BLUE, colour::VERMILLION][k];
                 links.extend(chain.windows(2).map(|pair| Link {
                     from: centre(pair[0]),
                     to: centre(pair[1]),
-                    width: CHAIN,
+                    width: CHAIN[d - 2],
                     colour: colour.into(),
                 }));
             }
@@ -93,10 +106,10 @@ pub fn chain_map(history: &History, report: &Report) -> Result<Drawing> {
         });
     }
     let legend = [
-        Key::Line(colour::BLUE, CHAIN, "chain in compression".into()),
-        Key::Line(colour::VERMILLION, CHAIN, "chain in tension".into()),
+        Key::Line(colour::BLUE, CHAIN[d - 2], "chain in compression".into()),
+        Key::Line(colour::VERMILLION, CHAIN[d - 2], "chain in tension".into()),
     ];
-    Ok(draw(&Sample::read(history)?, &panels, &legend))
+    Ok(draw(&Sample::with_depth(history)?, &panels, &legend))
 }
 
 /// The distributions of the forces at each moment.
@@ -116,7 +129,7 @@ pub fn distribution_chart(report: &Report) -> Chart {
 /// # Errors
 /// Those of reading the history.
 pub fn network_map(history: &History, report: &Report) -> Result<Drawing> {
-    let sample = Sample::read(history)?;
+    let (sample, d) = (Sample::with_depth(history)?, history.dimension());
     let grains = history.grains()?.radius.len();
     let mut panels = vec![];
     for network in &report.networks {
@@ -124,22 +137,24 @@ pub fn network_map(history: &History, report: &Report) -> Result<Drawing> {
         let s = network.statistics;
         panels.push(Panel {
             caption: vec![format!("t = {} s", number(network.time)), format!("⟨f⟩ = {} N", short(s.mean))],
-            links: links(&network.contacts, &state.position, s.mean, history.dimension()),
+            links: links(&network.contacts, &state.position, s.mean, d),
             grains: state,
             walls: history.wall_state(network.frame)?,
-            fills: vec![GRAIN[0].into(); grains],
+            fills: behind_lines(grains, d),
             outline: GRAIN[1],
             ..Panel::default()
         });
     }
-    Ok(draw(&sample, &panels, &force_legend()))
+    Ok(draw(&sample, &panels, &force_legend(d)))
 }
 
-/// The lines of a network, the strongest last, so that they lie on top.
+/// The lines of a network, the strongest last, so that they lie on top; of spheres only those above the mean, for so many
+/// more lie behind each other.
 pub fn links(contacts: &ContactRows, position: &[f64], mean: f64, d: usize) -> Vec<Link> {
     let centre = |grain: i32| position[grain as usize * d..(grain as usize + 1) * d].to_vec();
-    let mut order: Vec<usize> =
-        (0..contacts.len()).filter(|&c| contacts.normal_force(c).abs() > CARRIES * mean).collect();
+    let (width, greatest) = WIDTH[d - 2];
+    let least = if d == 2 { CARRIES * mean } else { mean };
+    let mut order: Vec<usize> = (0..contacts.len()).filter(|&c| contacts.normal_force(c).abs() > least).collect();
     order.sort_by(|&a, &b| contacts.normal_force(a).abs().total_cmp(&contacts.normal_force(b).abs()));
     let link = |c: usize| {
         let ([i, j], force) = (contacts.pair[c], contacts.normal_force(c));
@@ -147,7 +162,7 @@ pub fn links(contacts: &ContactRows, position: &[f64], mean: f64, d: usize) -> V
         Link {
             from: centre(i),
             to: if j < 0 { contacts.point[c * d..(c + 1) * d].to_vec() } else { centre(j) },
-            width: (WIDTH.0 * ratio).min(WIDTH.1),
+            width: (width * ratio).min(greatest),
             colour: if ratio > 1.0 { [colour::BLUE, colour::VERMILLION][tension] } else { PALE[tension] }.into(),
         }
     };
@@ -170,5 +185,17 @@ mod tests {
         // the stronger one comes last
         assert_eq!((lines[0].from.as_slice(), lines[0].to.as_slice()), (&[1.0, 0.0][..], &[1.0, -0.5][..]));
         assert_eq!((lines[1].to.as_slice(), &*lines[1].colour), (&[1.0, 0.0][..], colour::VERMILLION));
+    }
+    #[test]
+    fn of_spheres_lines_that_carry_less_than_the_mean_are_left_out() {
+        let contacts = ContactRows {
+            pair: vec![[0, 1], [1, -1]],
+            point: vec![0.5, 0.0, 0.0, 1.0, 0.0, -0.5],
+            reaction: vec![-3.0, 0.0, 0.0, 1.0, 0.0, 0.0],
+            ..ContactRows::default()
+        };
+        let lines = links(&contacts, &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0], 2.0, 3);
+        assert_eq!(lines.len(), 1);
+        assert_eq!((lines[0].to.as_slice(), &*lines[0].colour), (&[1.0, 0.0, 0.0][..], colour::VERMILLION));
     }
 }

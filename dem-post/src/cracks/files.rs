@@ -46,7 +46,7 @@ pub fn write(history: &History, report: &Report, times: &[f64], folder: &mut Fol
     folder.draw("broken", &Chart::draw(vec![broken_chart(&curve, end)]))?;
     folder.draw("fragments", &Chart::draw(fragment_charts(&report.fragments)))?;
     let in_space = history.dimension() == 3;
-    let sample = if in_space { Sample::in_perspective(history)? } else { Sample::read(history)? };
+    let sample = Sample::with_depth(history)?;
     folder.draw("fragment-map", &fragment_map(history, &sample, &frames, &fragments)?)?;
     folder.draw("decohesion", &decohesion(history, &sample, &frames)?)?;
     if in_space {

@@ -54,11 +54,11 @@ pub struct Panel {
     pub grains: GrainState,
     /// The walls.
     pub walls: WallState,
-    /// Fill of each grain.
+    /// Fill of each grain; none where only walls and lines are drawn.
     pub fills: Vec<Colour>,
     /// Colour of the outlines of grains.
     pub outline: &'static str,
-    /// Lines on top, in the order in which they are drawn.
+    /// Lines on top, in the order in which they are drawn; in perspective the nearest last.
     pub links: Vec<Link>,
     /// Arrows on top of all.
     pub arrows: Vec<Arrow>,
@@ -128,11 +128,14 @@ impl Sample {
         Self::seen(history, Eye::Along([1, 2]))
     }
 
-    /// As [`Sample::read`], of spheres seen in perspective; what is farther is paler.
+    /// As [`Sample::read`] of disks; spheres are seen in perspective, and what is farther is paler.
     ///
     /// # Errors
     /// As [`Sample::read`].
-    pub fn in_perspective(history: &History) -> Result<Self> {
+    pub fn with_depth(history: &History) -> Result<Self> {
+        if history.dimension() < 3 {
+            return Self::read(history);
+        }
         let first = history.grain_state(0)?;
         Self::seen(history, Eye::At(Place::of(first.position.chunks(3))))
     }
@@ -321,6 +324,7 @@ fn draw_panel(canvas: &mut Canvas, sample: &Sample, panel: &Panel, frame: &Frame
         let depth = |grain: usize| sample.eye.depth(&panel.grains.position[grain * 3..]);
         order.sort_by(|&a, &b| depth(b).total_cmp(&depth(a)));
     }
+    order.truncate(panel.fills.len());
     for grain in order {
         draw_grain(canvas, sample, panel, grain, frame);
     }
@@ -343,17 +347,33 @@ fn draw_panel(canvas: &mut Canvas, sample: &Sample, panel: &Panel, frame: &Frame
         let corners: Vec<_> = patch.corners.iter().map(|x| frame.at(sample.flat(x))).collect();
         canvas.polygon(&corners, &patch.colour, "#ffffff", 0.3);
     }
-    for link in &panel.links {
-        let ends = [&link.from, &link.to].map(|point| frame.at(sample.flat(point)));
-        if ends.iter().all(|&end| frame.shows(end, 2.0)) {
-            canvas.line(ends[0], ends[1], &link.colour, link.width.min(widest));
-        }
-    }
+    draw_links(canvas, sample, &panel.links, frame, widest);
     for arrow in &panel.arrows {
         let [from, to] = [&arrow.from, &arrow.to].map(|point| frame.at(sample.flat(point)));
         draw_arrow(canvas, from, to);
     }
     canvas.end_clip();
+}
+
+/// Lines no wider than `widest`; in perspective the nearest last, the farther the thinner and paler.
+fn draw_links(canvas: &mut Canvas, sample: &Sample, links: &[Link], frame: &Frame, widest: f64) {
+    let mut line = |link: &Link, width: f64, colour: &str| {
+        let ends = [&link.from, &link.to].map(|point| frame.at(sample.flat(point)));
+        if ends.iter().all(|&end| frame.shows(end, 2.0)) {
+            canvas.line(ends[0], ends[1], colour, width.min(widest));
+        }
+    };
+    let Some(place) = sample.eye.place() else {
+        links.iter().for_each(|link| line(link, link.width, &link.colour));
+        return;
+    };
+    let middle = |link: &Link| [0, 1, 2].map(|k| 0.5 * (link.from[k] + link.to[k]));
+    let mut order: Vec<(f64, &Link)> = links.iter().map(|link| (sample.eye.depth(&middle(link)), link)).collect();
+    order.sort_by(|a, b| b.0.total_cmp(&a.0));
+    for (_, link) in order {
+        let middle = middle(link);
+        line(link, link.width * sample.eye.magnified(&middle), &place.hazy(&link.colour, &middle));
+    }
 }
 
 /// A grain as a disk; in perspective the paler the farther, and lit from above and the left.

@@ -49,7 +49,11 @@ impl Factor {
 
     /// Factorise I + Σ H̃ A H̃ᵀ for these (symmetric) operators; false if it is not positive definite to rounding.
     pub fn renew(&mut self, rows: &Rows, operators: &[Option<Operator>]) -> bool {
-        self.numeric = None;
+        // the room of a large factor is taken over: from the system it comes page by page
+        let (room, made_of) = match self.numeric.take() {
+            Some(Numeric::Sparse(factor, values)) => (factor, values),
+            _ => Default::default(),
+        };
         if rows.list.iter().any(|r| r.count[0] + r.count[1] > PAIR) {
             self.made += 1;
             let matrix = dense(rows, operators);
@@ -62,7 +66,7 @@ impl Factor {
             self.pattern = Pattern::new(rows.unknowns, blocks);
         }
         let Some(pattern) = &self.pattern else { return false };
-        let factor = pattern.factorised(values(rows, operators));
+        let factor = pattern.factorised(values(rows, operators, made_of), room);
         self.made += u64::from(factor.is_some());
         self.numeric = factor.flatten();
         self.numeric.is_some()
@@ -105,7 +109,7 @@ impl Factor {
         let count = from.number_of()?;
         let values = from.reals(count)?.to_vec();
         let pattern = Pattern::new(unknowns, blocks).filter(|p| p.entries == count).ok_or(Mismatch)?;
-        factor.numeric = pattern.factorised(values).flatten();
+        factor.numeric = pattern.factorised(values, Vec::new()).flatten();
         factor.pattern = Some(pattern);
         if factor.numeric.is_some() { Ok(factor) } else { Err(Mismatch) }
     }
@@ -154,11 +158,12 @@ impl Pattern {
         Some(Self { blocks, unknowns, entries: indices.len(), matrix, order, symbolic })
     }
 
-    /// The factor of the matrix with these entries; `Some(None)` if it is not positive definite to rounding.
-    fn factorised(&self, values: Vec<f64>) -> Option<Option<Numeric>> {
+    /// The factor of the matrix with these entries, in `room`; `Some(None)` if it is not positive definite to rounding.
+    fn factorised(&self, values: Vec<f64>, room: Vec<f64>) -> Option<Option<Numeric>> {
         let matrix = SparseColMat::new_from_argsort(self.matrix.clone(), &self.order, &values).ok()?;
         let (symbolic, par) = (&self.symbolic, Par::Seq);
-        let mut factor = vec![0.0; symbolic.len_val()];
+        let mut factor = room;
+        factor.resize(symbolic.len_val(), 0.0);
         let mut scratch = MemBuffer::new(symbolic.factorize_numeric_llt_scratch::<f64>(par, Default::default()));
         let made = symbolic.factorize_numeric_llt(
             &mut factor,
@@ -173,9 +178,10 @@ impl Pattern {
     }
 }
 
-/// The values of the entries, in the order of [`Pattern::new`].
-fn values(rows: &Rows, operators: &[Option<Operator>]) -> Vec<f64> {
-    let mut values = vec![1.0; rows.unknowns];
+/// The values of the entries, in the order of [`Pattern::new`], written over `values`.
+fn values(rows: &Rows, operators: &[Option<Operator>], mut values: Vec<f64>) -> Vec<f64> {
+    values.clear();
+    values.resize(rows.unknowns, 1.0);
     for (row, operator) in rows.list.iter().zip(operators) {
         let width = row.count[0] + row.count[1];
         let h = |k: usize, c: usize| rows.coefficients[row.start + k * width + c];

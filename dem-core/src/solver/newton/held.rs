@@ -37,7 +37,7 @@ impl Newton {
         let mut stall = Stall::after(IN_VAIN, 0.5);
         let mut rows = base.clone();
         rows.hold(&self.slips.speeds(base));
-        for solve in 0..MOST_SOLVES {
+        for _ in 0..MOST_SOLVES {
             let mut state = Iterate::from_reactions(&rows, &guess.reactions);
             let (made, solved) = self.inner(&rows, &mut state, Some(&guess), PATIENCE, MOST);
             *iterations += made;
@@ -48,8 +48,7 @@ impl Newton {
             rows.follow_slips(&state.y, &state.reactions, 1.0);
             let change = relative_change(&guess.reactions, &state.reactions);
             guess = Guess { beyond: self.slips.in_rows(&rows), ..Guess::of(state.reactions) };
-            // in the first it is mostly that of what is solved
-            if change <= if solve == 0 { NEAR } else { least } {
+            if change <= least {
                 self.astray = false;
                 return Some(guess);
             }

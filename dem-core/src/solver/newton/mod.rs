@@ -288,6 +288,8 @@ impl Newton {
         let mut shrinking = Shrinking::default();
         let (mut last_error, mut softened, mut made_in_all) = (f64::INFINITY, 0, 0);
         loop {
+            // the kept factor is one of contacts that slip
+            self.renew |= guess.sticks;
             let mut state = Iterate::from_reactions(rows, &guess.reactions);
             let (mut made, mut solved) = self.inner(rows, &mut state, Some(guess), patience, MOST_INNER);
             if !solved && std::mem::take(&mut guess.sticks) {
