@@ -277,7 +277,7 @@ pub fn decohesion(history: &History, sample: &Sample, frames: &[usize]) -> Resul
         panels.push(filled_panel(history, frame, fills, what)?);
     }
     let legend = [
-        Key::Disk(BONDED, OUTLINE, "all bonds intact".into()),
+        Key::Disk(BONDED, OUTLINE, "lost no bond".into()),
         Key::Disk(RELEASED, OUTLINE, "lost at least one bond".into()),
     ];
     Ok(draw(sample, &panels, &legend))
