@@ -17,7 +17,7 @@ use crate::row;
 /// to `times` (s), or chosen ones. Where cracks were found, also `cracks.csv`, `crack-growth.csv`, and the drawings `cracks`
 /// and, where one grew step by step or round by round, `crack-front`; in the plane `crack-segments.csv`, `crack-front.csv`
 /// and, where the cracks fill a small part of the sample, the drawing `cracks-near`; in space `crack-facets.csv`, their
-/// corners in `crack-facets.vtk`, and the drawing `cracks-side`.
+/// corners in `crack-facets.vtk`, and the drawings `cracks-along-y` and `cracks-along-x`.
 ///
 /// # Errors
 /// [`crate::output::PostError::Write`], and [`crate::output::PostError::Usage`] for times outside the history.
@@ -65,9 +65,10 @@ pub fn write(history: &History, report: &Report, times: &[f64], folder: &mut Fol
     } else if !report.surfaces.is_empty() {
         write_surfaces(report, folder)?;
         write_facets(report, folder)?;
-        let [front, side] = surface_maps(history, report)?;
-        folder.draw("cracks", &front)?;
-        folder.draw("cracks-side", &side)?;
+        let [whole, front, side] = surface_maps(history, report)?;
+        folder.draw("cracks", &whole)?;
+        folder.draw("cracks-along-y", &front)?;
+        folder.draw("cracks-along-x", &side)?;
         ["area_m2", "largest_m2"]
     } else {
         return Ok(());

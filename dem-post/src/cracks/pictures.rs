@@ -179,19 +179,21 @@ fn pale_panel(history: &History, report: &Report, cracks: usize) -> Result<Panel
     })
 }
 
-/// The facets of cracks in space over the grains of the first frame, coloured by the time at which each bond broke, or by the
-/// round of the cascade where all broke in one step; seen along y and against x.
+/// The facets of cracks in space, coloured by the time at which each bond broke, or by the round of the cascade where all broke
+/// in one step: in perspective, and over the grains of the first frame along y and against x.
 ///
 /// # Errors
 /// Those of reading the history.
-pub fn surface_maps(history: &History, report: &Report) -> Result<[Drawing; 2]> {
+pub fn surface_maps(history: &History, report: &Report) -> Result<[Drawing; 3]> {
     let when = When::of(report);
     let mut panel = pale_panel(history, report, report.surfaces.len())?;
     let patch = |facet: &Facet| Patch { corners: facet.corners.clone(), colour: when.colour(facet.event) };
     panel.patches = report.faces.seen().map(patch).collect();
     let legend: Vec<Key> = when.key().into_iter().collect();
-    let panels = [panel];
-    Ok([draw(&Sample::read(history)?, &panels, &legend), draw(&Sample::from_the_side(history)?, &panels, &legend)])
+    let map = |sample: &Sample, panel: &Panel| draw(sample, std::slice::from_ref(panel), &legend);
+    let [front, side] = [Sample::read(history)?, Sample::from_the_side(history)?].map(|sample| map(&sample, &panel));
+    panel.fills.clear();
+    Ok([map(&Sample::with_depth(history)?, &panel), front, side])
 }
 
 /// The cracks over the grains of the first frame, coloured by the time at which each bond broke, or by the round of the

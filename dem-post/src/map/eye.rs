@@ -31,6 +31,8 @@ const ASIDE: f64 = 0.45;
 const ABOVE: f64 = 0.3;
 /// Share of white over what is farthest.
 const HAZE: f64 = 0.6;
+/// Share of white over what the light passes by.
+const SHADE: f64 = 0.6;
 /// How much larger than the sample planes are drawn.
 const BEYOND: f64 = 1.15;
 
@@ -79,6 +81,14 @@ impl Place {
     /// The box in the picture around some points, m.
     pub fn shows(&self, points: &[[f64; 3]]) -> Box2 {
         points.iter().fold(EMPTY, |found, point| union(found, around(self.flat(point), 0.0)))
+    }
+
+    /// A colour as it looks on a flat polygon: the paler the less it faces the light, which comes from above and the left.
+    pub fn lit(&self, colour: &str, corners: &[[f64; 3]]) -> Colour {
+        let [a, b, c] = [0, 1, 2].map(|k| corners.get(k).map_or_else(Vector3::default, |x| Vector3::from(*x)));
+        let light = (self.up - self.right - 1.5 * self.ahead).normalize();
+        let facing = (b - a).cross(&(c - a)).try_normalize(0.0).map_or(1.0, |normal| normal.dot(&light).abs());
+        mixed(colour, SHADE * (1.0 - facing))
     }
 
     /// A colour as it looks from here at a point: the paler the farther.
@@ -156,6 +166,16 @@ mod tests {
         assert!(eye.depth(&near) < eye.depth(&far));
         assert!(eye.magnified(&near) > 1.0 && eye.magnified(&far) < 1.0);
         assert!(place().hazy("#000000", &near) < place().hazy("#000000", &far));
+    }
+
+    #[test]
+    fn what_faces_the_light_keeps_its_colour() {
+        let place = place();
+        let light = (place.up - place.right - 1.5 * place.ahead).normalize();
+        let s = light.cross(&place.up).normalize();
+        let seen = |a: Vector3<f64>, b: Vector3<f64>| place.lit("#000000", &[[0.0; 3], a.into(), b.into()]);
+        assert_eq!(seen(s, light.cross(&s)), "#000000");
+        assert_eq!(seen(s, light), mixed("#000000", SHADE));
     }
 
     #[test]

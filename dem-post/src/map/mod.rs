@@ -345,7 +345,8 @@ fn draw_panel(canvas: &mut Canvas, sample: &Sample, panel: &Panel, frame: &Frame
     patches.sort_by(|a, b| b.0.total_cmp(&a.0));
     for (_, patch) in patches {
         let corners: Vec<_> = patch.corners.iter().map(|x| frame.at(sample.flat(x))).collect();
-        canvas.polygon(&corners, &patch.colour, "#ffffff", 0.3);
+        let lit = sample.eye.place().map(|place| place.lit(&patch.colour, &patch.corners));
+        canvas.polygon(&corners, lit.as_ref().unwrap_or(&patch.colour), "#ffffff", 0.3);
     }
     draw_links(canvas, sample, &panel.links, frame, widest);
     for arrow in &panel.arrows {

@@ -137,9 +137,10 @@ fn cracks(history: &History, report: &Report, found: &Cracks) -> Result<Section>
     }
     if !found.surfaces.is_empty() {
         let alt =
-            "Facets of broken bonds over the grains of the first frame, coloured by the time at which they broke.";
-        let [front, side] = surface_maps(history, found)?;
-        figures.push(map(&front, alt, "Cracks by the time at which each bond broke, seen along y.")?);
+            "Facets of broken bonds at their places in the first frame, coloured by the time at which they broke.";
+        let [whole, front, side] = surface_maps(history, found)?;
+        figures.push(map(&whole, alt, "Cracks by the time at which each bond broke.")?);
+        figures.push(map(&front, alt, "The same, seen along y.")?);
         figures.push(map(&side, alt, "The same, seen against x.")?);
     }
     for field in &report.velocities.fields {

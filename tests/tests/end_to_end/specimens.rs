@@ -56,9 +56,14 @@ fn a_cylinder_of_spheres_breaks_and_its_cracks_are_surfaces() {
     assert_eq!(bonds, found["events"].as_array().expect("events").len() as u64);
     let facets = String::from_utf8(here.read("views/crack-facets.vtk")).expect("text");
     assert!(facets.starts_with("# vtk DataFile Version 3.0\n") && facets.contains("\nPOLYGONS "), "{facets}");
-    for name in
-        ["cracks.csv", "crack-facets.csv", "crack-growth.csv", "cracks.png", "cracks-side.png", "decohesion-inside.png"]
-    {
+    for name in [
+        "cracks.csv",
+        "crack-facets.csv",
+        "crack-growth.csv",
+        "cracks.png",
+        "cracks-along-x.png",
+        "decohesion-inside.png",
+    ] {
         assert!(here.path("views").join(name).exists(), "{name}");
     }
     here.dem_post(&["report", "cylinder.h5", "-o", "views"]).succeeds();
