@@ -8,7 +8,7 @@ use clap::ValueEnum;
 use dem_run::history::{BondStatus, History, RuptureMode};
 use serde::Serialize;
 
-use crate::chains::pictures::{behind_lines, force_legend, links};
+use crate::chains::pictures::{force_legend, links};
 use crate::chains::{require_reactions, statistics};
 use crate::map::{Colour, Key, Link, Panel, Ramp, Sample, Scale, View, draw_view};
 use crate::output::{Folder, PostError, Result, facts, number, progress, quantity, short};
@@ -159,7 +159,10 @@ fn picture(history: &History, report: &Report, frame: usize) -> Result<(Panel, V
             let contacts = history.contacts(frame)?;
             panel.links = links(&contacts, &panel.grains.position, scale, history.dimension());
             panel.caption.push(format!("⟨f⟩ = {} N, the greatest mean of the series", short(scale)));
-            panel.fills = behind_lines(number_of_grains, history.dimension());
+            if history.dimension() == 3 {
+                // they would hide the lines
+                panel.fills.clear();
+            }
             force_legend(history.dimension())
         }
         Subject::Speed => {

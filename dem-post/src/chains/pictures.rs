@@ -31,7 +31,7 @@ pub fn force_legend(d: usize) -> Vec<Key> {
 }
 
 /// Fills of the grains behind lines; of spheres none, for they would hide those.
-pub fn behind_lines(grains: usize, d: usize) -> Vec<Colour> {
+fn behind_lines(grains: usize, d: usize) -> Vec<Colour> {
     if d == 2 { vec![GRAIN[0].into(); grains] } else { vec![] }
 }
 
@@ -186,6 +186,7 @@ mod tests {
         assert_eq!((lines[0].from.as_slice(), lines[0].to.as_slice()), (&[1.0, 0.0][..], &[1.0, -0.5][..]));
         assert_eq!((lines[1].to.as_slice(), &*lines[1].colour), (&[1.0, 0.0][..], colour::VERMILLION));
     }
+
     #[test]
     fn of_spheres_lines_that_carry_less_than_the_mean_are_left_out() {
         let contacts = ContactRows {

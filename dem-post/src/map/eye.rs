@@ -86,9 +86,13 @@ impl Place {
     /// A colour as it looks on a flat polygon: the paler the less it faces the light, which comes from above and the left.
     pub fn lit(&self, colour: &str, corners: &[[f64; 3]]) -> Colour {
         let [a, b, c] = [0, 1, 2].map(|k| corners.get(k).map_or_else(Vector3::default, |x| Vector3::from(*x)));
-        let light = (self.up - self.right - 1.5 * self.ahead).normalize();
-        let facing = (b - a).cross(&(c - a)).try_normalize(0.0).map_or(1.0, |normal| normal.dot(&light).abs());
+        let facing = (b - a).cross(&(c - a)).try_normalize(0.0).map_or(1.0, |normal| normal.dot(&self.light()).abs());
         mixed(colour, SHADE * (1.0 - facing))
+    }
+
+    /// Unit vector to where the light comes from.
+    fn light(&self) -> Vector3<f64> {
+        (self.up - self.right - 1.5 * self.ahead).normalize()
     }
 
     /// A colour as it looks from here at a point: the paler the farther.
@@ -171,7 +175,7 @@ mod tests {
     #[test]
     fn what_faces_the_light_keeps_its_colour() {
         let place = place();
-        let light = (place.up - place.right - 1.5 * place.ahead).normalize();
+        let light = place.light();
         let s = light.cross(&place.up).normalize();
         let seen = |a: Vector3<f64>, b: Vector3<f64>| place.lit("#000000", &[[0.0; 3], a.into(), b.into()]);
         assert_eq!(seen(s, light.cross(&s)), "#000000");

@@ -318,13 +318,10 @@ fn draw_panel(canvas: &mut Canvas, sample: &Sample, panel: &Panel, frame: &Frame
     for (wall, position) in sample.walls.iter().zip(panel.walls.position.chunks(sample.dimension)) {
         draw_wall(canvas, sample, wall, position, frame);
     }
-    let mut order: Vec<usize> = (0..sample.radius.len()).collect();
+    let mut order: Vec<usize> = (0..panel.fills.len()).collect();
     if sample.dimension == 3 {
-        // what is further away is drawn first
-        let depth = |grain: usize| sample.eye.depth(&panel.grains.position[grain * 3..]);
-        order.sort_by(|&a, &b| depth(b).total_cmp(&depth(a)));
+        farthest_first(&mut order, |grain| sample.eye.depth(&panel.grains.position[grain * 3..]));
     }
-    order.truncate(panel.fills.len());
     for grain in order {
         draw_grain(canvas, sample, panel, grain, frame);
     }
@@ -338,12 +335,11 @@ fn draw_panel(canvas: &mut Canvas, sample: &Sample, panel: &Panel, frame: &Frame
     // lines between grains that are drawn tiny must not run into one another
     let diameter = 2.0 * frame.scale * sample.radius.iter().sum::<f64>() / sample.radius.len() as f64;
     let widest = (0.6 * diameter).max(1.0);
-    let middle = |patch: &Patch| {
+    let mut patches: Vec<&Patch> = panel.patches.iter().collect();
+    farthest_first(&mut patches, |patch| {
         patch.corners.iter().map(|x| sample.eye.depth(x)).sum::<f64>() / patch.corners.len().max(1) as f64
-    };
-    let mut patches: Vec<(f64, &Patch)> = panel.patches.iter().map(|patch| (middle(patch), patch)).collect();
-    patches.sort_by(|a, b| b.0.total_cmp(&a.0));
-    for (_, patch) in patches {
+    });
+    for patch in patches {
         let corners: Vec<_> = patch.corners.iter().map(|x| frame.at(sample.flat(x))).collect();
         let lit = sample.eye.place().map(|place| place.lit(&patch.colour, &patch.corners));
         canvas.polygon(&corners, lit.as_ref().unwrap_or(&patch.colour), "#ffffff", 0.3);
@@ -354,6 +350,11 @@ fn draw_panel(canvas: &mut Canvas, sample: &Sample, panel: &Panel, frame: &Frame
         draw_arrow(canvas, from, to);
     }
     canvas.end_clip();
+}
+
+/// The order in which things are drawn so that what is nearer to the eye covers what is farther.
+fn farthest_first<T: Copy>(things: &mut [T], depth: impl Fn(T) -> f64) {
+    things.sort_by(|&a, &b| depth(b).total_cmp(&depth(a)));
 }
 
 /// Lines no wider than `widest`; in perspective the nearest last, the farther the thinner and paler.
@@ -369,9 +370,9 @@ fn draw_links(canvas: &mut Canvas, sample: &Sample, links: &[Link], frame: &Fram
         return;
     };
     let middle = |link: &Link| [0, 1, 2].map(|k| 0.5 * (link.from[k] + link.to[k]));
-    let mut order: Vec<(f64, &Link)> = links.iter().map(|link| (sample.eye.depth(&middle(link)), link)).collect();
-    order.sort_by(|a, b| b.0.total_cmp(&a.0));
-    for (_, link) in order {
+    let mut order: Vec<&Link> = links.iter().collect();
+    farthest_first(&mut order, |link| sample.eye.depth(&middle(link)));
+    for link in order {
         let middle = middle(link);
         line(link, link.width * sample.eye.magnified(&middle), &place.hazy(&link.colour, &middle));
     }
