@@ -204,8 +204,10 @@ impl<D: Dim> Span<'_, D> {
         let (t, m): (D::Tangent, D::Moment) = (resized(r.t), resized(r.m));
         let frame = link.axes.frame().filter(|_| T::LEN > 0);
         let impulse = frame.map_or_else(|| link.axes.normal() * r.n, |frame| D::compose(frame, r.n, t));
+        // without moment rows both torques are multiples of one
+        let slide = frame.filter(|_| B::LEN == 0).map_or_else(D::Spin::zero, |frame| D::spin_rows_transposed(frame, t));
         let turn = |frame: &D::Frame, lever: f64, arm: f64| match B::LEN {
-            0 => D::spin_rows_transposed(frame, t * -lever),
+            0 => slide * -lever,
             _ => D::torque_of_rows(frame, t * -lever, m * arm),
         };
         let node = &mut self.all[i];

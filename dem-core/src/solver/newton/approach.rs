@@ -88,7 +88,7 @@ impl Newton {
     /// One inner problem with a new factor, from the velocities that the reactions give.
     fn attempt(&mut self, rows: &Rows, reactions: &[Padded], state: &mut Iterate, patience: u64) -> (u64, bool) {
         let mut next = Iterate::from_reactions(rows, reactions);
-        self.renew = true;
+        self.kept().renew = true;
         let (made, solved) = self.inner(rows, &mut next, None, patience, patience);
         if solved {
             *state = next;

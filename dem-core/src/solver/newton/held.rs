@@ -7,9 +7,10 @@
 
 use super::guess::{Guess, Slips};
 use super::inner::Iterate;
+use super::patience::{Shrinking, Stall};
 use super::rows::Rows;
 use super::solvable::Solvable;
-use super::{Newton, Shrinking, SolveReport, SolveStatus, Stall, load_change, relative_change};
+use super::{Newton, SolveReport, SolveStatus, load_change, relative_change};
 
 /// Most solves, and Newton iterations of each: without progress, and all of them.
 const MOST_SOLVES: usize = 20;

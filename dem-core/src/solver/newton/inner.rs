@@ -1,10 +1,11 @@
 //! The inner problem F(y) = 0 for fixed multipliers: state, Newton direction, line search.
 
+use super::Newton;
 use super::corrector::{correct, operator};
 use super::guess::Guess;
 use super::krylov::gmres;
+use super::patience::Stall;
 use super::rows::{Operator, Row, Rows};
-use super::{Newton, Stall};
 use crate::contact::Padded;
 
 /// GMRES iterations beyond those of a fresh factor that a kept one may cost in all before it is renewed; in space, where
@@ -23,6 +24,8 @@ const ROUGH: f64 = 1e5;
 const TIGHT: f64 = 1e-12;
 const FAIR: f64 = 1e-3;
 const LOOSE: f64 = 1e-2;
+/// The same where only the size of the solution is asked for.
+const ROUGHLY: f64 = 0.03;
 /// What a linear solve with a fresh factor may leave before its step is none, and how far F may grow.
 const LOST: f64 = 0.1;
 const DIVERGED: f64 = 1e6;
@@ -92,9 +95,10 @@ impl Newton {
                 return (1, false);
             }
             // a factor that was trusted blindly has to earn it
-            if self.trusted && state.norm > (TRUST * before).max(target) {
-                self.trusted = false;
-                self.distrust = DISTRUST;
+            let kept = self.kept();
+            if kept.trusted && state.norm > (TRUST * before).max(target) {
+                kept.trusted = false;
+                kept.distrust = DISTRUST;
             }
         }
         (most, state.norm <= self.target(rows, state))
@@ -117,6 +121,19 @@ impl Newton {
         wanted.max(4.0 * f64::EPSILON * rounding.sqrt())
     }
 
+    /// The load error of the reactions that the multipliers of `rows` are, and so are those of `guess`: how far the velocities
+    /// will move in the next proximal round, over how far they are from the free ones. A linear solve to a few digits tells;
+    /// none where the factor at hand does not serve for it.
+    pub(super) fn load_error_ahead(&mut self, rows: &Rows, guess: &Guess) -> Option<f64> {
+        let begun = Iterate::from_reactions(rows, &guess.reactions);
+        let (right, points) = linearise(rows, &begun, Some(guess));
+        let exact = operators(rows, &points, false);
+        let apply = |x: &[f64], out: &mut [f64]| multiply(rows, &exact, x, out);
+        let factor = &self.kept().factor;
+        let (step, report) = gmres(&right, ROUGHLY, MOST_KRYLOV, false, apply, |x| factor.solve(x));
+        (report.residual <= ROUGHLY).then(|| norm2(&step).sqrt() / distance(&begun.y, &rows.free))
+    }
+
     /// The Newton direction −J⁻¹ F, by the factor at hand or GMRES on it, renewed if it serves badly.
     fn direction(&mut self, rows: &Rows, state: &Iterate, guess: Option<&Guess>, target: f64) -> Option<Direction> {
         let (mut right, points) = linearise(rows, state, guess);
@@ -127,27 +144,28 @@ impl Newton {
         let in_space = rows.in_space();
         let tolerance = if in_space && guess.is_none() { LOOSE } else { (left * target / norm).clamp(TIGHT, FAIR) };
         let (most, waste) = if in_space { (MOST_KEPT_IN_SPACE, WASTE_IN_SPACE) } else { (MOST_KRYLOV, WASTE) };
-        let serves = !self.renew && self.factor.serves(rows.unknowns);
-        if serves && self.trusted {
-            self.factor.solve(&mut right);
+        let kept = self.kept();
+        let serves = kept.serves(rows.unknowns);
+        if serves && kept.trusted {
+            kept.factor.solve(&mut right);
             return Some(Direction { step: right, norm });
         }
         let exact = operators(rows, &points, false);
         for fresh in [!serves, true] {
-            if fresh && !self.factor.renew(rows, &operators(rows, &points, true)) {
+            if fresh && !kept.factor.renew(rows, &operators(rows, &points, true)) {
                 return None;
             }
             let apply = |x: &[f64], out: &mut [f64]| multiply(rows, &exact, x, out);
             let most = if fresh { MOST_KRYLOV } else { most };
-            let (step, report) = gmres(&right, tolerance, most, in_space && !fresh, apply, |x| self.factor.solve(x));
+            let (step, report) = gmres(&right, tolerance, most, in_space && !fresh, apply, |x| kept.factor.solve(x));
             if fresh {
                 // what even a fresh factor needs is the part that is not symmetric
-                (self.floor, self.wasted) = (report.iterations, 0);
+                (kept.floor, kept.wasted) = (report.iterations, 0);
             }
-            self.wasted += report.iterations.saturating_sub(self.floor);
-            self.renew = self.wasted > waste;
-            self.distrust = self.distrust.saturating_sub(1);
-            self.trusted = self.distrust == 0 && report.plain <= TRUST;
+            kept.wasted += report.iterations.saturating_sub(kept.floor);
+            kept.renew = kept.wasted > waste;
+            kept.distrust = kept.distrust.saturating_sub(1);
+            kept.trusted = kept.distrust == 0 && report.plain <= TRUST;
             if report.residual <= tolerance || fresh && report.residual <= LOST {
                 return Some(Direction { step, norm });
             }

@@ -25,8 +25,11 @@ mod guess;
 mod held;
 mod inner;
 mod interior;
+mod kept;
 mod krylov;
 mod order;
+mod patience;
+mod rounds;
 mod rows;
 mod solvable;
 
@@ -37,10 +40,11 @@ use crate::dim::Dim;
 use crate::problem::ContactProblem;
 use crate::problem::assembled::Assembled;
 use crate::saved::{Mismatch, Reader, Saved};
-use factor::Factor;
 use guess::{Guess, Slips};
-use inner::{Iterate, distance, norm2};
+use inner::norm2;
 use interior::{Bending, Rays, Twisting};
+use kept::Kept;
+use patience::Rest;
 use rows::Rows;
 use solvable::Solvable;
 
@@ -75,13 +79,6 @@ pub struct NewtonSettings {
 
 /// Penalty at the start, over the inverse of the mean normal entry of W.
 const KAPPA: f64 = 1e9;
-/// Newton iterations of one inner problem before it is given up: those in which F shrinks by less than a tenth, fewer in space
-/// where each is dear, and all of them.
-const PATIENCE: u64 = 8;
-const PATIENCE_IN_SPACE: u64 = 4;
-const MOST_INNER: u64 = 30;
-/// How often the penalty may be lowered a hundredfold in one solve.
-const MOST_SOFTENED: u32 = 4;
 /// Sweeps that look for the active set: at every step, from zero reactions, and where Newton stalls.
 const SWEEPS: usize = 5;
 const COLD_SWEEPS: usize = 100;
@@ -91,22 +88,15 @@ const FIRST_SWEEPS: u64 = 2_000;
 const MOST_SWEEPS: u64 = 200_000;
 /// Iterations of the interior-point method that mostly dry contacts take.
 const PATH: f64 = 100.0;
-/// Most solves for which something that failed is not tried again.
-const LONGEST_REST: u64 = 64;
 
 /// Augmented-Lagrangian semismooth Newton.
 pub struct Newton {
     settings: NewtonSettings,
-    factor: Factor,
-    /// Whether the factor must be made anew.
-    renew: bool,
-    /// Whether the factor alone gave the last direction well enough.
-    trusted: bool,
-    /// Linear solves before it can be trusted again.
-    distrust: usize,
-    /// GMRES iterations with a fresh factor, and those beyond it since.
-    floor: usize,
-    wasted: usize,
+    /// The factor of first proximal rounds and of all that leads to them, and in space one of later rounds: what crept in the
+    /// first hardly slips in those, and neither factor serves the other.
+    kept: [Kept; 2],
+    /// Whether a later round is solved.
+    later: bool,
     /// How far contacts slipped in the last solve.
     slips: Slips,
     /// Dry contacts in the last solve.
@@ -119,84 +109,6 @@ pub struct Newton {
     quiet: Rest,
     /// Whether held terms led nowhere in this solve.
     astray: bool,
-}
-
-/// Solves for which something that failed is not tried: steps that are alike fail alike.
-#[derive(Clone, Copy)]
-struct Rest {
-    left: u64,
-    next: u64,
-}
-
-impl Rest {
-    const NONE: Self = Self { left: 0, next: 0 };
-
-    /// Whether it is time to try again; else one solve of it passes.
-    fn is_over(&mut self) -> bool {
-        let over = self.left == 0;
-        self.left = self.left.saturating_sub(1);
-        over
-    }
-
-    /// It failed: one failure is forgiven, after the next it rests for one solve, then for twice as many each time.
-    fn lengthen(&mut self) {
-        self.left = self.next;
-        self.next = (2 * self.next).clamp(1, LONGEST_REST);
-    }
-
-    /// Whether it did not fail the last time.
-    fn served(&self) -> bool {
-        self.next == 0
-    }
-
-    /// It served.
-    fn forget(&mut self) {
-        *self = Self::NONE;
-    }
-}
-
-/// The changes of proximal rounds.
-struct Shrinking {
-    last: f64,
-}
-
-impl Default for Shrinking {
-    fn default() -> Self {
-        Self { last: 1.0 }
-    }
-}
-
-impl Shrinking {
-    /// Enter the next change: the error that is left, for rounds that shorten it by c leave c/(1 − c) of the last change.
-    fn error(&mut self, change: f64) -> f64 {
-        let shrinkage = (change / self.last).min(0.5);
-        self.last = change;
-        change * shrinkage / (1.0 - shrinkage)
-    }
-}
-
-/// Whether a quantity that should shrink no longer does.
-struct Stall {
-    mark: f64,
-    since: u64,
-    patience: u64,
-    share: f64,
-}
-
-impl Stall {
-    /// To less than this share of what it was in so many values.
-    fn after(patience: u64, share: f64) -> Self {
-        Self { mark: f64::INFINITY, since: 0, patience, share }
-    }
-
-    /// Enter the next value: whether it has not shrunk for too long, or is no number.
-    fn at(&mut self, value: f64) -> bool {
-        self.since += 1;
-        if value < self.share * self.mark {
-            (self.mark, self.since) = (value, 0);
-        }
-        self.since >= self.patience || !value.is_finite()
-    }
 }
 
 /// What was found without a guess of the active set.
@@ -213,12 +125,8 @@ impl Newton {
     pub fn new(settings: NewtonSettings) -> Self {
         Self {
             settings,
-            factor: Factor::default(),
-            renew: true,
-            trusted: false,
-            distrust: 0,
-            floor: 0,
-            wasted: 0,
+            kept: Default::default(),
+            later: false,
             slips: Slips::default(),
             dry: 0,
             made_before: 0,
@@ -264,85 +172,17 @@ impl Newton {
 
     /// The work of this solve so far.
     fn work(&self, newton: u64) -> Work {
-        Work { sweeps: 0, newton, factorisations: self.factor.made - self.made_before }
+        Work { sweeps: 0, newton, factorisations: self.made() - self.made_before }
     }
 
-    /// Proximal rounds at the largest penalty, each begun with the active set of `guess`; none if an inner problem is
-    /// not solved, where `held` not by way of held terms either: the problem then holds the reactions of the last one
-    /// that was.
-    fn rounds(
-        &mut self,
-        problem: &mut impl Solvable,
-        rows: &mut Rows,
-        guess: &mut Guess,
-        held: bool,
-        iterations: &mut u64,
-    ) -> Option<SolveReport> {
-        // held terms, or a path, have led to what knows how far it is beyond its limits
-        let led = !guess.beyond.is_empty();
-        if !led {
-            guess.beyond = self.slips.in_rows(rows);
-        }
-        let patience = if rows.in_space() { PATIENCE_IN_SPACE } else { PATIENCE };
-        let mut first = true;
-        let mut shrinking = Shrinking::default();
-        let (mut last_error, mut softened, mut made_in_all) = (f64::INFINITY, 0, 0);
-        loop {
-            // the kept factor is one of contacts that slip
-            self.renew |= guess.sticks;
-            let mut state = Iterate::from_reactions(rows, &guess.reactions);
-            let (mut made, mut solved) = self.inner(rows, &mut state, Some(guess), patience, MOST_INNER);
-            if !solved && std::mem::take(&mut guess.sticks) {
-                // or it does slip
-                state = Iterate::from_reactions(rows, &guess.reactions);
-                let (more, now) = self.inner(rows, &mut state, Some(guess), patience, MOST_INNER);
-                (made, solved) = (made + more, now);
-            }
-            *iterations += made.max(1);
-            if !solved && made > 1 && last_error <= self.settings.tolerance {
-                // what the round before left is good enough, and this was to tell its load error: the velocities show it
-                let begun = rows.given_by(&guess.reactions);
-                let load_error = distance(&begun, &state.y) / distance(&begun, &rows.free);
-                let report = self.report(*iterations, last_error, load_error);
-                if report.status == SolveStatus::Converged {
-                    return Some(report);
-                }
-            }
-            if !solved && held {
-                let begun = Guess::of(std::mem::take(&mut guess.reactions));
-                *guess = self.by_held_terms(rows, begun, held::NEAR, iterations)?;
-                state = Iterate::from_reactions(rows, &guess.reactions);
-                (made, solved) = self.inner(rows, &mut state, Some(guess), patience, MOST_INNER);
-                *iterations += made;
-            }
-            if !solved {
-                return None;
-            }
-            if std::mem::take(&mut first) {
-                self.slips = Slips::of(rows, &state);
-            }
-            problem.write_back(&state.reactions);
-            let load_error = shrinking.error(load_change(rows, &state.reactions));
-            let error = problem.residual();
-            rows.move_multipliers(&state.reactions);
-            // what crept in one round hardly slips in the next
-            *guess = if held && led { Guess::at_rest(state.reactions) } else { Guess::of(state.reactions) };
-            let report = self.report(*iterations, error, load_error);
-            if report.status == SolveStatus::Converged {
-                return Some(report);
-            }
-            made_in_all += made;
-            let stuck = softened == MOST_SOFTENED && error > 0.5 * last_error;
-            if stuck || made_in_all >= self.settings.max_iterations {
-                return (report.status == SolveStatus::Accepted).then_some(report);
-            }
-            if error > 0.5 * last_error && softened < MOST_SOFTENED {
-                // what moves fast is rounded by ρ u: a smaller ρ hears less of it, and takes more rounds
-                rows.soften(100.0);
-                softened += 1;
-            }
-            last_error = error;
-        }
+    /// Factorisations so far.
+    fn made(&self) -> u64 {
+        self.kept.iter().map(|kept| kept.factor.made).sum()
+    }
+
+    /// The factor in use.
+    fn kept(&mut self) -> &mut Kept {
+        &mut self.kept[usize::from(self.later)]
     }
 
     /// Solve a problem with its matrix, from the reactions that it holds.
@@ -352,7 +192,7 @@ impl Newton {
 
     fn iterate(&mut self, problem: &mut impl Solvable) -> SolveReport {
         problem.velocities_from_reactions();
-        self.made_before = self.factor.made;
+        self.made_before = self.made();
         self.astray = false;
         let rows = problem.rows(KAPPA, self.settings.stiffness);
         if rows.unknowns == 0 || rows.list.is_empty() {
@@ -429,11 +269,11 @@ impl Newton {
         let held = rows.in_space() && !rows.mostly_dry() && self.rest.served();
         if held && changed && !cold {
             // more has changed than the iterations of one solve can make good
-            self.renew = true;
+            self.kept().renew = true;
             guess = guess.and_then(|guess| self.by_held_terms(&started, guess, held::ABOUT, iterations));
         }
         let report = guess.and_then(|mut guess| self.rounds(problem, &mut started, &mut guess, held, iterations));
-        self.renew |= report.is_none();
+        self.kept().renew |= report.is_none();
         // that they led nowhere from no reactions tells nothing
         self.astray &= !cold;
         report
@@ -502,32 +342,23 @@ impl Newton {
 
     /// Write what is kept from one solve to the next.
     pub(super) fn save_state(&self, to: &mut Saved) {
-        to.flag(self.renew);
-        to.flag(self.trusted);
-        for count in [self.distrust, self.floor, self.wasted] {
-            to.count(count);
-        }
         for rest in [self.rest, self.quiet] {
             to.count(rest.left as usize);
             to.count(rest.next as usize);
         }
         to.count(self.dry);
         self.slips.save(to);
-        self.factor.save(to);
+        self.kept.iter().for_each(|kept| kept.save(to));
     }
 
     /// Take up what [`Newton::save_state`] wrote.
     pub(super) fn restore_state(&mut self, from: &mut Reader) -> Result<(), Mismatch> {
-        (self.renew, self.trusted) = (from.flag()?, from.flag()?);
-        for count in [&mut self.distrust, &mut self.floor, &mut self.wasted] {
-            *count = from.count()?;
-        }
         for rest in [&mut self.rest, &mut self.quiet] {
             *rest = Rest { left: from.count()? as u64, next: from.count()? as u64 };
         }
         self.dry = from.count()?;
         self.slips = Slips::restored(from)?;
-        self.factor = Factor::restored(from)?;
+        self.kept = [Kept::restored(from)?, Kept::restored(from)?];
         Ok(())
     }
 

@@ -27,9 +27,10 @@ mod rays;
 use super::guess::{Beyond, Slips};
 use super::held::ABOUT;
 use super::inner::norm2;
+use super::patience::{Shrinking, Stall};
 use super::rows::{Operator, Row, Rows};
 use super::solvable::Solvable;
-use super::{Found, Newton, Shrinking, SolveReport, SolveStatus, Stall, load_change, net_change};
+use super::{Found, Newton, SolveReport, SolveStatus, load_change, net_change};
 use crate::contact::Padded;
 pub(super) use disks::{Bending, Twisting};
 use path::{Defect, Path, Point, step};
@@ -321,7 +322,7 @@ impl Newton {
         iterations: &mut u64,
         mut arrived: impl FnMut(&mut Path<S>) -> bool,
     ) {
-        self.renew = true;
+        self.kept().renew = true;
         let mut last = f64::INFINITY;
         for _ in 0..MOST {
             *iterations += 1;
@@ -339,14 +340,14 @@ impl Newton {
             let scalings: Vec<_> = sites.iter().zip(&at.pairs).map(|(site, pair)| site.scaling(pair)).collect();
             let operators: Vec<_> =
                 sites.iter().zip(&scalings).map(|(site, scaling)| Some(site.operator(scaling))).collect();
-            if !self.factor.renew(rows, &operators) {
+            if !self.kept().factor.renew(rows, &operators) {
                 break;
             }
-            let affine = step(rows, sites, &scalings, &self.factor, at, &defect, |_| Aim::Boundary);
+            let affine = step(rows, sites, &scalings, &self.kept().factor, at, &defect, |_| Aim::Boundary);
             let reach = at.longest(&affine, sites);
             let centring = (at.moved(&affine, reach).gap(sites) / gap).powi(3).min(1.0);
             let middle = |c: usize| Aim::Middle(centring * gap, &affine.pairs[c]);
-            let direction = step(rows, sites, &scalings, &self.factor, at, &defect, middle);
+            let direction = step(rows, sites, &scalings, &self.kept().factor, at, &defect, middle);
             let next = at.moved(&direction, at.longest(&direction, sites));
             if !next.gap(sites).is_finite() {
                 break;
