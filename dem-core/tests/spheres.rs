@@ -4,9 +4,11 @@ mod common;
 
 use common::{DENSITY, down, floor, force_driven, newton, settings, solver};
 use dem_core::body::{Drive, Grain, Grains, Load, Shape, Wall};
-use dem_core::bond::{BondStatus, Stiffness};
+use dem_core::bond::{BondStatus, Stiffness, failure};
+use dem_core::contact::Law;
 use dem_core::dim::{D2, D3, D3Twist, Dim, Moments, Space, Vect};
-use dem_core::solver::{SolverSettings, Start};
+use dem_core::problem::{Bond, Contact, ContactProblem};
+use dem_core::solver::{ContactSolver, Newton, SolveStatus, SolverSettings, Start};
 use dem_core::world::{Break, Settings, World};
 use nalgebra::{Matrix3, Rotation3, SVector, Unit, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -284,4 +286,46 @@ fn an_arm_twists_the_row_that_carries_it() {
             assert!((touch.reaction.t.norm() - ARM_FORCE).abs() < 1e-9 * ARM_FORCE);
         }
     }
+}
+
+/// A cube of cemented spheres of many sizes, held at its lowest layer, under forces on its highest that grow.
+fn cemented() -> World<D3> {
+    let mut rng = Pcg64::seed_from_u64(3);
+    let side = 5;
+    let (mut grains, mut loads) = (Vec::new(), Vec::new());
+    for k in 0..side * side * side {
+        let x = [k % side, k / side % side, k / side / side].map(|c| 0.02 * c as f64);
+        let mut g = common::grain::<D3>(&x, 0.01 * (0.98 + 0.02 * rng.random::<f64>()));
+        g.fixed = k < side * side;
+        grains.push(g);
+        if k >= side * side * (side - 1) {
+            let force = [rng.random::<f64>() - 0.5, rng.random::<f64>() - 0.5, -1.0].into();
+            loads.push(Load { grain: k, force, torque: SVector::zeros(), factor: Arc::new(|t| 1e5 * t) });
+        }
+    }
+    let mut w = World::new(grains.into_iter().collect(), Vec::new(), loads, settings(1e-5));
+    w.set_solver(SolverSettings::Newton(newton(1e-8, 1e-6, 1e-5)));
+    w.form_bonds(0.05, |_| 20.0, 0.3);
+    w
+}
+
+#[test]
+fn the_first_round_tells_what_breaks() {
+    let mut w = cemented();
+    let problem = (0..100).find_map(|_| {
+        let problem = w.contact_problem();
+        (!w.step().unwrap().breaks.is_empty()).then_some(problem)
+    });
+    let problem = problem.expect("a bond that breaks");
+    let solved = |cascades: bool| {
+        let mut problem = ContactProblem { cascades, ..problem.clone() };
+        let report = Newton::new(newton(1e-8, 1e-6, 1e-5)).solve(&mut problem);
+        assert_eq!(report.status, SolveStatus::Converged);
+        let breaks = |c: &Contact<D3, Bond<D3>>| failure(&c.r, c.law.shift(), c.law.cone()).is_some();
+        (report, problem.bonded.iter().filter(|c| breaks(c)).map(|c| c.link.nodes).collect::<Vec<_>>())
+    };
+    let ((first, early), (last, late)) = (solved(true), solved(false));
+    assert!(!early.is_empty() && early == late, "{early:?} or {late:?}");
+    assert!(first.work.newton < last.work.newton && first.work.factorisations < last.work.factorisations);
+    assert!(last.load_error < first.load_error, "{:?} and {:?}", first.load_error, last.load_error);
 }

@@ -3,7 +3,7 @@
 use super::World;
 use super::touch::{Kept, Touch, TouchStatus};
 use crate::body::{Grains, Wall, direction};
-use crate::bond::{Bond, BondStatus};
+use crate::bond::{Bond, BondStatus, Rupture};
 use crate::contact::{Arms, Bonded, Coulomb, Elastic, Frictionless, Law, Local};
 use crate::dim::{Dim, Moments, Vect};
 use crate::problem::{Contact, ContactProblem, Group, Link, Node, Nodes, blocks};
@@ -250,6 +250,7 @@ impl<D: Dim> World<D> {
             frictionless: Vec::new(),
             radii: if D::N > 2 { self.grains.radius.clone() } else { Vec::new() },
             applied,
+            cascades: self.settings.rupture == Rupture::Cascade,
         };
         let mut places = Places::default();
         self.reserve(touches, &mut problem, &mut places);

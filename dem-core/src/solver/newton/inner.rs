@@ -121,17 +121,27 @@ impl Newton {
         wanted.max(4.0 * f64::EPSILON * rounding.sqrt())
     }
 
-    /// The load error of the reactions that the multipliers of `rows` are, and so are those of `guess`: how far the velocities
-    /// will move in the next proximal round, over how far they are from the free ones. A linear solve to a few digits tells;
-    /// none where the factor at hand does not serve for it.
-    pub(super) fn load_error_ahead(&mut self, rows: &Rows, guess: &Guess) -> Option<f64> {
-        let begun = Iterate::from_reactions(rows, &guess.reactions);
-        let (right, points) = linearise(rows, &begun, Some(guess));
+    /// The load error of these reactions, which are also the multipliers of `rows`: how far the velocities will move in the
+    /// next proximal round, over how far they are from the free ones. A linear solve to a few digits tells.
+    pub(super) fn load_error_ahead(&mut self, rows: &Rows, reactions: &[Padded]) -> Option<f64> {
+        let guess = Guess::of(reactions.to_vec());
+        let begun = Iterate::from_reactions(rows, reactions);
+        let (right, points) = linearise(rows, &begun, Some(&guess));
         let exact = operators(rows, &points, false);
-        let apply = |x: &[f64], out: &mut [f64]| multiply(rows, &exact, x, out);
-        let factor = &self.kept().factor;
-        let (step, report) = gmres(&right, ROUGHLY, MOST_KRYLOV, false, apply, |x| factor.solve(x));
-        (report.residual <= ROUGHLY).then(|| norm2(&step).sqrt() / distance(&begun.y, &rows.free))
+        let kept = self.kept();
+        for fresh in [false, true] {
+            if fresh && !kept.factor.renew(rows, &operators(rows, &points, true)) {
+                kept.renew = true;
+                return None;
+            }
+            let apply = |x: &[f64], out: &mut [f64]| multiply(rows, &exact, x, out);
+            let most = if fresh { MOST_KRYLOV } else { MOST_KEPT_IN_SPACE };
+            let (step, report) = gmres(&right, ROUGHLY, most, !fresh, apply, |x| kept.factor.solve(x));
+            if report.residual <= ROUGHLY {
+                return Some(norm2(&step).sqrt() / distance(&begun.y, &rows.free));
+            }
+        }
+        None
     }
 
     /// The Newton direction −J⁻¹ F, by the factor at hand or GMRES on it, renewed if it serves badly.

@@ -1,4 +1,4 @@
-//! Semismooth Newton on the augmented Lagrangian, in the velocities, with one sparse Cholesky factor.
+//! Semismooth Newton on the augmented Lagrangian, in the velocities, with a sparse Cholesky factor that is kept.
 //!
 //! For multipliers r̂ (N s) and a penalty ρ the inner problem is
 //!

@@ -3,10 +3,11 @@
 use super::guess::{Guess, Slips};
 use super::inner::{Iterate, distance};
 use super::patience::Shrinking;
-use super::rows::Rows;
+use super::rows::{Row, Rows};
 use super::solvable::Solvable;
-use super::{Newton, SolveReport, SolveStatus, held, load_change};
+use super::{Newton, SolveReport, SolveStatus, Start, held, load_change};
 use crate::bond::failure;
+use crate::contact::Padded;
 
 /// Newton iterations of one inner problem before it is given up: those in which F shrinks by less than a tenth, fewer in space
 /// where each is dear, and all of them.
@@ -15,11 +16,13 @@ const PATIENCE_IN_SPACE: u64 = 4;
 const MOST_INNER: u64 = 30;
 /// How often the penalty may be lowered a hundredfold in one solve.
 const MOST_SOFTENED: u32 = 4;
+/// Load error up to which the first round is near enough to the stiff limit to tell what breaks; 2e-6 is usual.
+const SMALL: f64 = 1e-4;
 
 impl Newton {
-    /// Proximal rounds at the largest penalty, each begun with the active set of `guess`; none if an inner problem is
-    /// not solved, where `held` not by way of held terms either: the problem then holds the reactions of the last one
-    /// that was.
+    /// Proximal rounds at the largest penalty, each begun with the active set of `guess`: in space one alone where it tells what
+    /// breaks. None if an inner problem is not solved, where `held` not by way of held terms either: the problem then holds
+    /// the reactions of the last one that was.
     pub(super) fn rounds(
         &mut self,
         problem: &mut impl Solvable,
@@ -29,7 +32,9 @@ impl Newton {
         iterations: &mut u64,
     ) -> Option<SolveReport> {
         let report = self.each_round(problem, rows, guess, held, iterations);
-        self.later = false;
+        if std::mem::take(&mut self.later) && report.is_none() {
+            self.kept[1].renew = true;
+        }
         report
     }
 
@@ -79,17 +84,18 @@ impl Newton {
             rows.move_multipliers(&state.reactions);
             // what crept in one round hardly slips in the next
             *guess = if held && led { Guess::at_rest(state.reactions) } else { Guess::of(state.reactions) };
-            let alone = std::mem::take(&mut first) && rows.in_space() && error <= self.settings.tolerance;
-            if alone
-                && leaves_a_bond_at_its_limit(rows, guess)
-                && let Some(load_error) = self.load_error_ahead(rows, guess)
-            {
-                // this is the stiff limit: another round would take what creeps inside its limit, by the error that it removes
-                return Some(self.report(*iterations, error, load_error));
-            }
             let report = self.report(*iterations, error, load_error);
             if report.status == SolveStatus::Converged {
                 return Some(report);
+            }
+            if std::mem::take(&mut first)
+                && error <= self.settings.tolerance
+                && self.tells_what_breaks(rows, &guess.reactions)
+                && let Some(load_error) = self.load_error_ahead(rows, &guess.reactions)
+                && load_error <= SMALL.max(self.settings.load_tolerance)
+            {
+                // another round would take what creeps inside its limit, by the error that it removes
+                return Some(self.report(*iterations, error, load_error));
             }
             made_in_all += made;
             let stuck = softened == MOST_SOFTENED && error > 0.5 * last_error;
@@ -102,7 +108,11 @@ impl Newton {
                 softened += 1;
             }
             last_error = error;
-            self.later = rows.in_space();
+            if rows.in_space() && !self.later {
+                self.later = true;
+                // it may be many solves old
+                self.kept().trusted = false;
+            }
         }
     }
 
@@ -110,7 +120,7 @@ impl Newton {
     /// iterations, and whether it is solved.
     fn solve_from(&mut self, rows: &Rows, guess: &mut Guess) -> (Iterate, u64, bool) {
         let patience = if rows.in_space() { PATIENCE_IN_SPACE } else { PATIENCE };
-        // the kept factor is one of contacts that slip
+        // the kept factor may be one of contacts that slip
         self.kept().renew |= guess.sticks;
         let mut state = Iterate::from_reactions(rows, &guess.reactions);
         let (mut made, mut solved) = self.inner(rows, &mut state, Some(guess), patience, MOST_INNER);
@@ -122,9 +132,11 @@ impl Newton {
         }
         (state, made, solved)
     }
-}
 
-/// Whether one of these reactions is that of a bond at its limit.
-fn leaves_a_bond_at_its_limit(rows: &Rows, guess: &Guess) -> bool {
-    rows.list.iter().zip(&guess.reactions).any(|(row, r)| row.shift > 0.0 && failure(r, row.shift, row.cone).is_some())
+    /// Whether the reactions of a first round are the stiff limit, leave a bond at its limit, and nothing will move by them.
+    fn tells_what_breaks(&self, rows: &Rows, reactions: &[Padded]) -> bool {
+        let at_limit = |(row, r): (&Row, &Padded)| row.shift > 0.0 && failure(r, row.shift, row.cone).is_some();
+        let stiff_limit = self.settings.start == Start::StiffLimit;
+        rows.in_space() && rows.cascades && stiff_limit && rows.list.iter().zip(reactions).any(at_limit)
+    }
 }

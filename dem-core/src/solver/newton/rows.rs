@@ -104,6 +104,8 @@ pub(super) struct Rows {
     pub unknowns: usize,
     /// Free velocities in the scaled unknowns.
     pub free: Vec<f64>,
+    /// Whether a solution that leaves bonds at their limit moves nothing ([`ContactProblem::cascades`]).
+    pub cascades: bool,
 }
 
 /// First unknown of each node.
@@ -196,7 +198,7 @@ impl Rows {
         for (k, (v, w)) in problem.free.iter().enumerate() {
             write_scaled(&problem.nodes, &unknowns, k, v, w, &mut free);
         }
-        let rows = Rows { unknowns: unknowns.total, free, ..Rows::default() };
+        let rows = Rows { unknowns: unknowns.total, free, cascades: problem.cascades, ..Rows::default() };
         let mut still = problem.nodes.clone();
         for (node, free) in still.all.iter_mut().zip(problem.free.iter()) {
             let moves = node.inverse_mass > 0.0;
