@@ -92,8 +92,8 @@ const PATH: f64 = 100.0;
 /// Augmented-Lagrangian semismooth Newton.
 pub struct Newton {
     settings: NewtonSettings,
-    /// The factor of first proximal rounds and of all that leads to them, and in space one of later rounds: what crept in the
-    /// first hardly slips in those, and neither factor serves the other.
+    /// The factor of first proximal rounds and of all that leads to them, and in space one of later rounds from a guess: what
+    /// crept in the first hardly slips in those, and neither factor serves the other.
     kept: [Kept; 2],
     /// Whether a later round is solved.
     later: bool,

@@ -108,7 +108,7 @@ impl Newton {
                 softened += 1;
             }
             last_error = error;
-            if rows.in_space() && !self.later {
+            if held && !self.later {
                 self.later = true;
                 // it may be many solves old
                 self.kept().trusted = false;
