@@ -31,21 +31,6 @@ impl Newton {
         held: bool,
         iterations: &mut u64,
     ) -> Option<SolveReport> {
-        let report = self.each_round(problem, rows, guess, held, iterations);
-        if std::mem::take(&mut self.later) && report.is_none() {
-            self.kept[1].renew = true;
-        }
-        report
-    }
-
-    fn each_round(
-        &mut self,
-        problem: &mut impl Solvable,
-        rows: &mut Rows,
-        guess: &mut Guess,
-        held: bool,
-        iterations: &mut u64,
-    ) -> Option<SolveReport> {
         // held terms, or a path, have led to what knows how far it is beyond its limits
         let led = !guess.beyond.is_empty();
         if !led {
@@ -54,7 +39,7 @@ impl Newton {
         let mut first = true;
         let mut shrinking = Shrinking::default();
         let (mut last_error, mut softened, mut made_in_all) = (f64::INFINITY, 0, 0);
-        loop {
+        let report = loop {
             let (mut state, mut made, mut solved) = self.solve_from(rows, guess);
             *iterations += made.max(1);
             if !solved && made > 1 && last_error <= self.settings.tolerance {
@@ -63,17 +48,18 @@ impl Newton {
                 let load_error = distance(&begun, &state.y) / distance(&begun, &rows.free);
                 let report = self.report(*iterations, last_error, load_error);
                 if report.status == SolveStatus::Converged {
-                    return Some(report);
+                    break Some(report);
                 }
             }
             if !solved && held {
                 let begun = Guess::of(std::mem::take(&mut guess.reactions));
-                *guess = self.by_held_terms(rows, begun, held::NEAR, iterations)?;
+                let Some(nearer) = self.by_held_terms(rows, begun, held::NEAR, iterations) else { break None };
+                *guess = nearer;
                 (state, made, solved) = self.solve_from(rows, guess);
                 *iterations += made;
             }
             if !solved {
-                return None;
+                break None;
             }
             if first {
                 self.slips = Slips::of(rows, &state);
@@ -86,7 +72,7 @@ impl Newton {
             *guess = if held && led { Guess::at_rest(state.reactions) } else { Guess::of(state.reactions) };
             let report = self.report(*iterations, error, load_error);
             if report.status == SolveStatus::Converged {
-                return Some(report);
+                break Some(report);
             }
             if std::mem::take(&mut first)
                 && error <= self.settings.tolerance
@@ -95,12 +81,12 @@ impl Newton {
                 && load_error <= SMALL.max(self.settings.load_tolerance)
             {
                 // another round would take what creeps inside its limit, by the error that it removes
-                return Some(self.report(*iterations, error, load_error));
+                break Some(self.report(*iterations, error, load_error));
             }
             made_in_all += made;
             let stuck = softened == MOST_SOFTENED && error > 0.5 * last_error;
             if stuck || made_in_all >= self.settings.max_iterations {
-                return (report.status == SolveStatus::Accepted).then_some(report);
+                break (report.status == SolveStatus::Accepted).then_some(report);
             }
             if error > 0.5 * last_error && softened < MOST_SOFTENED {
                 // what moves fast is rounded by ρ u: a smaller ρ hears less of it, and takes more rounds
@@ -113,7 +99,11 @@ impl Newton {
                 // it may be many solves old
                 self.kept().trusted = false;
             }
+        };
+        if std::mem::take(&mut self.later) && report.is_none() {
+            self.kept[1].renew = true;
         }
+        report
     }
 
     /// The inner problem from the active set of `guess`, first as if nothing slipped where it says so: the last state, the
