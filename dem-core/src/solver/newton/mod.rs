@@ -32,10 +32,10 @@ mod patience;
 mod rounds;
 mod rows;
 mod solvable;
+mod sweeps;
 
-use super::gauss_seidel::MEMORY;
-use super::{ContactSolver, GaussSeidelSettings, SolveReport, SolveStatus, Work};
-use crate::contact::{Local, LocalSolve, Padded};
+use super::{ContactSolver, SolveReport, SolveStatus, Work};
+use crate::contact::{Local, Padded};
 use crate::dim::Dim;
 use crate::problem::ContactProblem;
 use crate::problem::assembled::Assembled;
@@ -83,11 +83,6 @@ const KAPPA: f64 = 1e9;
 const SWEEPS: usize = 5;
 const COLD_SWEEPS: usize = 100;
 const STALL_SWEEPS: usize = 50;
-/// Most sweeps of Gauss–Seidel where it is tried first, and where nothing else is left.
-const FIRST_SWEEPS: u64 = 2_000;
-const MOST_SWEEPS: u64 = 200_000;
-/// Iterations of the interior-point method that mostly dry contacts take.
-const PATH: f64 = 100.0;
 
 /// Augmented-Lagrangian semismooth Newton.
 pub struct Newton {
@@ -101,8 +96,9 @@ pub struct Newton {
     slips: Slips,
     /// Dry contacts in the last solve.
     dry: usize,
-    /// Factorisations before this solve.
+    /// Factorisations before this solve, and sweeps in it that were to bring an answer.
     made_before: u64,
+    sweeps: u64,
     /// Rest of the guess of the active set.
     rest: Rest,
     /// Rest of paths that hold the term of dry friction, as those do where nearly nothing slips.
@@ -130,34 +126,11 @@ impl Newton {
             slips: Slips::default(),
             dry: 0,
             made_before: 0,
+            sweeps: 0,
             rest: Rest::NONE,
             quiet: Rest::NONE,
             astray: false,
         }
-    }
-
-    /// Gauss–Seidel from the impulses at hand, that aims at this residual. It cannot tell its load error.
-    fn swept(
-        &self,
-        problem: &mut impl Solvable,
-        rows: &Rows,
-        aim: f64,
-        iterations: u64,
-        max_sweeps: u64,
-    ) -> SolveReport {
-        let NewtonSettings { tolerance, accept, .. } = self.settings;
-        problem.forget_what_is_not_finite();
-        let settings = GaussSeidelSettings {
-            local: LocalSolve::Exact,
-            tolerance: aim,
-            accept,
-            max_sweeps,
-            // where contacts slip the acceleration takes more sweeps than it saves
-            acceleration: if rows.mostly_dry() { 0 } else { MEMORY },
-        };
-        let swept = problem.gauss_seidel(settings);
-        let status = SolveStatus::of(swept.residual, tolerance, accept);
-        SolveReport { status, work: swept.work + self.work(iterations), ..swept }
     }
 
     fn report(&self, iterations: u64, residual: f64, load_error: f64) -> SolveReport {
@@ -172,7 +145,7 @@ impl Newton {
 
     /// The work of this solve so far.
     fn work(&self, newton: u64) -> Work {
-        Work { sweeps: 0, newton, factorisations: self.made() - self.made_before }
+        Work { sweeps: self.sweeps, newton, factorisations: self.made() - self.made_before }
     }
 
     /// Factorisations so far.
@@ -193,6 +166,7 @@ impl Newton {
     fn iterate(&mut self, problem: &mut impl Solvable) -> SolveReport {
         problem.velocities_from_reactions();
         self.made_before = self.made();
+        self.sweeps = 0;
         self.astray = false;
         let rows = problem.rows(KAPPA, self.settings.stiffness);
         if rows.unknowns == 0 || rows.list.is_empty() {
@@ -205,11 +179,12 @@ impl Newton {
         if !(cold && rows.mostly_dry()) && self.rest.is_over() {
             if let Some(report) = self.try_guess(problem, &rows, cold, changed, &mut iterations) {
                 self.rest.forget();
+                self.quiet.forget();
                 return report;
             }
             self.rest.lengthen();
         }
-        if rows.mostly_dry()
+        if (rows.mostly_dry() || rows.in_space() && self.comes_apart())
             && let Some(swept) = self.swept_first(problem, &rows, cold, iterations)
         {
             return swept;
@@ -217,36 +192,12 @@ impl Newton {
         if let Some(report) = self.come_from_afar(problem, &rows, &mut iterations) {
             return report;
         }
-        self.swept(problem, &rows, self.settings.accept, iterations, MOST_SWEEPS)
+        self.swept_last(problem, &rows, iterations)
     }
 
-    /// What sweeps over mostly dry contacts come to, if that is accepted: some, and as many more as cost less than half a path.
-    /// From no reactions, where a sweep carries a load by one contact, only what meets the tolerance.
-    fn swept_first(
-        &self,
-        problem: &mut impl Solvable,
-        rows: &Rows,
-        cold: bool,
-        iterations: u64,
-    ) -> Option<SolveReport> {
-        let NewtonSettings { tolerance, accept, .. } = self.settings;
-        if cold {
-            let swept = self.swept(problem, rows, tolerance, iterations, FIRST_SWEEPS);
-            return (swept.status == SolveStatus::Converged).then_some(swept);
-        }
-        // half the way from what is accepted to the tolerance: beyond that sweeps converge slowly
-        let swept = self.swept(problem, rows, (tolerance * accept).sqrt(), iterations, FIRST_SWEEPS);
-        if swept.status != SolveStatus::Failed {
-            return Some(swept);
-        }
-        // the residual of contacts that slip falls as one over the number of sweeps
-        let enough = swept.work.sweeps as f64 * swept.residual / accept;
-        if enough > 0.5 * PATH * sweeps_for_an_iteration(rows) {
-            return None;
-        }
-        let more = self.swept(problem, rows, accept, iterations, (2.0 * enough) as u64);
-        let work = Work { sweeps: swept.work.sweeps + more.work.sweeps, ..more.work };
-        (more.status != SolveStatus::Failed).then_some(SolveReport { work, ..more })
+    /// Whether since a guess served a path that held the term of dry friction did not: much slips fast.
+    fn comes_apart(&self) -> bool {
+        !self.quiet.served()
     }
 
     /// Rounds at the largest penalty, from the active set of the reactions that the problem brought along, bettered by
@@ -298,20 +249,16 @@ impl Newton {
         };
         report.or_else(|| {
             problem.forget_what_is_not_finite();
+            if let Some(swept) = self.swept_on(problem, rows, *iterations) {
+                return Some(swept);
+            }
             let (reached, residual) = (problem.swept(0), problem.residual());
             let report = self.penalised(problem, rows, reached.clone(), iterations);
-            if report.is_some() || problem.residual() <= residual {
-                return report;
+            if report.is_none() && residual < problem.residual() {
+                // less was left before
+                problem.write_back(&reached);
             }
-            // less was left before: some sweeps may do from there
-            let left = problem.swept(0);
-            problem.write_back(&reached);
-            let swept = self.swept(problem, rows, self.settings.accept, *iterations, FIRST_SWEEPS);
-            if swept.status == SolveStatus::Failed {
-                problem.write_back(&left);
-                return None;
-            }
-            Some(swept)
+            report
         })
     }
 
@@ -384,13 +331,6 @@ impl<D: Dim> ContactSolver<D> for Newton {
     fn restore(&mut self, from: &mut Reader) -> Result<(), Mismatch> {
         self.restore_state(from)
     }
-}
-
-/// How many sweeps over all contacts cost as much as one iteration of the interior-point method. Fitted to 600 to 43,000 contacts of
-/// disks (70 to 470 sweeps) and to 2,000 and 14,000 of spheres (150, 700): no clock is looked at.
-fn sweeps_for_an_iteration(rows: &Rows) -> f64 {
-    let contacts = rows.list.len() as f64;
-    if rows.in_space() { 0.4 * contacts.powf(0.8) } else { 6.0 * contacts.powf(0.4) }
 }
 
 /// How much the net impulses on the bodies changed in the proximal step to these reactions: with a contraction far below

@@ -48,9 +48,8 @@ const MOVING_PATIENCE: u64 = 45;
 const END: f64 = 1e-24;
 const NEARLY: f64 = 1e-17;
 const EARLY: f64 = 1e-14;
-/// Share of the change of that term that is followed, and the sweeps that show where it goes.
+/// Share of the change of that term that is followed.
 const SHARE: f64 = 0.5;
-const SWEEPS: usize = 10;
 /// Residual at the end of a path beyond which its term of dry friction was wrong; and beyond which it moved in vain.
 const WRONG: f64 = 1e-5;
 const IN_VAIN: f64 = 1e-4;
@@ -183,11 +182,7 @@ impl Newton {
             self.slips = Slips::of_guess(&path.rows, &guess);
             problem.write_back(&reactions);
             let mut residual = problem.residual();
-            if std::mem::take(&mut moves_first) && residual > IN_VAIN.max(self.settings.accept) {
-                path.rows.hold(&self.slips.speeds(base));
-                (term, moved_in_vain) = (Term::Held, true);
-                continue;
-            }
+            let far = std::mem::take(&mut moves_first) && residual > IN_VAIN.max(self.settings.accept);
             let mut load_error = path.load_error(&reactions).min(shrinking.error(load_change(&path.rows, &reactions)));
             if let Some(found) = best.as_mut().filter(|_| right || alone) {
                 // these are nearer to those of a rigid metric
@@ -223,10 +218,15 @@ impl Newton {
                 path.rows.move_multipliers(&reactions);
             } else {
                 // sweeps settle what single contacts disagree about
-                let settled = problem.swept(SWEEPS);
+                residual = self.settle(problem, base);
+                if far && residual > WRONG.max(self.settings.accept) {
+                    path.rows.hold(&self.slips.speeds(base));
+                    (term, moved_in_vain) = (Term::Held, true);
+                    continue;
+                }
+                let settled = problem.swept(0);
                 load_error += net_change(&path.rows, &reactions, &settled);
                 reactions = settled;
-                residual = problem.residual();
                 term = if matches!(term, Term::Held) && !moved_in_vain { Term::Moving } else { Term::Halved };
             }
             path.rows.follow_slips(&path.rows.given_by(&reactions), &reactions, SHARE);
@@ -293,7 +293,7 @@ impl Newton {
     fn follow_moving<S: Site>(&mut self, path: &mut Path<S>, problem: &mut impl Solvable, iterations: &mut u64) {
         let mut stall = Stall::after(MOVING_PATIENCE, 0.5);
         let tolerance = self.settings.tolerance;
-        // the least residual so far, and the point that it belongs to with its softness and the softer one before it
+        // the least residual so far, and the point that it belongs to with its softness and the number of softer ones before it
         let (mut least, mut best) = (f64::INFINITY, None);
         self.follow(path, iterations, |path| {
             let reactions = path.snapped().reactions;
@@ -301,7 +301,7 @@ impl Newton {
             let residual = problem.residual();
             if best.is_none() || residual < least {
                 let at = Point { y: path.at.y.clone(), pairs: path.at.pairs.clone() };
-                (least, best) = (residual, Some((at, path.softness, path.softer.clone())));
+                (least, best) = (residual, Some((at, path.softness, path.softer.len())));
             }
             let arrived = residual <= tolerance || stall.at(residual);
             if !arrived {
@@ -310,7 +310,8 @@ impl Newton {
             arrived
         });
         if let Some((at, softness, softer)) = best {
-            (path.at, path.softer) = (at, softer);
+            path.at = at;
+            path.softer.truncate(softer);
             path.soften(softness);
         }
     }

@@ -10,8 +10,10 @@ use crate::contact::{Padded, Weights};
 
 /// How much harder the metric is than Newton's where the path ends.
 const HARDER: f64 = 10.0;
-/// How much softer a metric must be for its reactions to be compared with those at the end.
+/// How much softer a metric must be for its reactions to be compared with those at the end, and the share by which one of those
+/// that are kept is harder than the one before.
 const SOFTER: f64 = 100.0;
+const KEPT: f64 = 0.3;
 /// How near the boundary a step may go.
 const NEAR: f64 = 0.995;
 
@@ -131,8 +133,8 @@ pub(super) struct Path<S: Site> {
     /// The greatest scale of the gap so far (N s m/s): soft dry contacts bear nearly nothing, and their scale would shrink with
     /// the gap.
     scale: f64,
-    /// The last softness that was much more than the least, and the reactions there.
-    pub softer: Option<(f64, Vec<Padded>)>,
+    /// Softnesses on the way, and the reactions there.
+    pub softer: Vec<(f64, Vec<Padded>)>,
 }
 
 impl<S: Site> Path<S> {
@@ -144,7 +146,7 @@ impl<S: Site> Path<S> {
         let hardest = rows.list.iter().map(|row| row.weights).collect();
         let own = rows.list.iter().map(|row| row.weights.n / yields(row)).fold(0.0, f64::max);
         let (sites, at) = Self::inside(&rows, reactions);
-        Self { rows, sites, at, hardest, own, softness: f64::INFINITY, least: 1.0, scale: 0.0, softer: None }
+        Self { rows, sites, at, hardest, own, softness: f64::INFINITY, least: 1.0, scale: 0.0, softer: Vec::new() }
     }
 
     /// A point well inside, at the velocities that `reactions` give.
@@ -158,7 +160,8 @@ impl<S: Site> Path<S> {
     /// Begin anew, as softly as at first.
     pub fn begin_again(&mut self, reactions: &[Padded]) {
         (self.sites, self.at) = Self::inside(&self.rows, reactions);
-        (self.softness, self.scale, self.softer) = (f64::INFINITY, 0.0, None);
+        (self.softness, self.scale) = (f64::INFINITY, 0.0);
+        self.softer.clear();
     }
 
     /// The gap over what the reactions and the velocities that they give multiply to.
@@ -198,9 +201,9 @@ impl<S: Site> Path<S> {
     /// Go to the next point.
     pub fn advance(&mut self, next: Point<S>) {
         self.at = next;
-        if self.softness >= SOFTER * self.least {
+        if self.softer.last().is_none_or(|(softness, _)| self.softness <= KEPT * softness) {
             let all = self.sites.iter().zip(&self.rows.list).zip(&self.at.pairs);
-            self.softer = Some((self.softness, all.map(|((site, row), pair)| site.reaction(row, pair)).collect()));
+            self.softer.push((self.softness, all.map(|((site, row), pair)| site.reaction(row, pair)).collect()));
         }
     }
 
@@ -214,8 +217,9 @@ impl<S: Site> Path<S> {
     /// How far the net impulses still are from those of a rigid metric: as far as the metric is soft. Infinite where no
     /// point was much softer.
     pub fn load_error(&self, reactions: &[Padded]) -> f64 {
-        self.softer.as_ref().map_or(f64::INFINITY, |(softness, softer)| {
-            net_change(&self.rows, softer, reactions) / (softness / self.softness - 1.0).max(0.0)
+        let softer = self.softer.iter().rfind(|(softness, _)| *softness >= SOFTER * self.softness);
+        softer.map_or(f64::INFINITY, |(softness, softer)| {
+            net_change(&self.rows, softer, reactions) / (softness / self.softness - 1.0)
         })
     }
 }
