@@ -249,16 +249,9 @@ impl Newton {
         };
         report.or_else(|| {
             problem.forget_what_is_not_finite();
-            if let Some(swept) = self.swept_on(problem, rows, *iterations) {
-                return Some(swept);
-            }
-            let (reached, residual) = (problem.swept(0), problem.residual());
-            let report = self.penalised(problem, rows, reached.clone(), iterations);
-            if report.is_none() && residual < problem.residual() {
-                // less was left before
-                problem.write_back(&reached);
-            }
-            report
+            let reached = problem.swept(0);
+            let swept = self.swept_on(problem, rows, *iterations);
+            swept.or_else(|| self.penalised(problem, rows, reached, iterations))
         })
     }
 

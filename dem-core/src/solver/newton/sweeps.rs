@@ -42,22 +42,29 @@ impl Newton {
         (swept.status != SolveStatus::Failed).then_some(swept)
     }
 
-    /// The residual that sweeps leave from where a path ends, which are as many as bring what is accepted, if they cost less than
-    /// another path.
-    pub(super) fn settle(&mut self, problem: &mut impl Solvable, rows: &Rows) -> f64 {
+    /// The residual that some sweeps leave from where a path ends, where `more` may follow as many as bring what is accepted and misses
+    /// the tolerance, if they cost less than another path: they move the net impulses, and what meets the tolerance has a small
+    /// load error too.
+    pub(super) fn settle(&mut self, problem: &mut impl Solvable, rows: &Rows, more: bool) -> f64 {
         problem.swept(SETTLING);
         self.sweeps += SETTLING as u64;
+        if !more || self.settings.accept <= self.settings.tolerance {
+            return problem.residual();
+        }
         let most = BETWEEN * sweeps_for_an_iteration(rows);
         self.as_many_as_will_do(problem, self.settings.accept, (0.1 * most) as u64, most, 0).residual
     }
 
-    /// What sweeps come to from the best that paths have found, if that is accepted.
+    /// What sweeps over contacts of which some are dry come to from the best that paths have found, if that is accepted.
     pub(super) fn swept_on(
         &mut self,
         problem: &mut impl Solvable,
         rows: &Rows,
         iterations: u64,
     ) -> Option<SolveReport> {
+        if rows.dry() == 0 {
+            return None;
+        }
         let most = AFTER * sweeps_for_an_iteration(rows);
         let swept = self.as_many_as_will_do(problem, self.settings.accept, FIRST, most, iterations);
         (swept.status != SolveStatus::Failed).then_some(swept)

@@ -218,7 +218,8 @@ impl Newton {
                 path.rows.move_multipliers(&reactions);
             } else {
                 // sweeps settle what single contacts disagree about
-                residual = self.settle(problem, base);
+                // where the term was held it moves next, and that brings more
+                residual = self.settle(problem, base, !matches!(term, Term::Held));
                 if far && residual > WRONG.max(self.settings.accept) {
                     path.rows.hold(&self.slips.speeds(base));
                     (term, moved_in_vain) = (Term::Held, true);
