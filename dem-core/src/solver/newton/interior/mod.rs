@@ -217,8 +217,7 @@ impl Newton {
             if right {
                 path.rows.move_multipliers(&reactions);
             } else {
-                // sweeps settle what single contacts disagree about
-                // where the term was held it moves next, and that brings more
+                // sweeps settle what single contacts disagree about; a term that was held moves next, which brings more than they do
                 residual = self.settle(problem, base, !matches!(term, Term::Held));
                 if far && residual > WRONG.max(self.settings.accept) {
                     path.rows.hold(&self.slips.speeds(base));
