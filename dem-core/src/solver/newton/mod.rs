@@ -184,7 +184,9 @@ impl Newton {
             }
             self.rest.lengthen();
         }
-        if (rows.mostly_dry() || rows.in_space() && self.comes_apart())
+        // since a guess served a path that held the term of dry friction did not: much slips fast
+        let comes_apart = rows.in_space() && !self.quiet.served();
+        if (rows.mostly_dry() || comes_apart)
             && let Some(swept) = self.swept_first(problem, &rows, cold, iterations)
         {
             return swept;
@@ -193,11 +195,6 @@ impl Newton {
             return report;
         }
         self.swept_last(problem, &rows, iterations)
-    }
-
-    /// Whether since a guess served a path that held the term of dry friction did not: much slips fast.
-    fn comes_apart(&self) -> bool {
-        !self.quiet.served()
     }
 
     /// Rounds at the largest penalty, from the active set of the reactions that the problem brought along, bettered by

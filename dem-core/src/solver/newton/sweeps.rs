@@ -22,8 +22,8 @@ const BETWEEN: f64 = 25.0;
 const AFTER: f64 = 100.0;
 
 impl Newton {
-    /// What sweeps over mostly dry contacts come to, if that is accepted. From no reactions, where a sweep carries a load by one
-    /// contact, only what meets the tolerance.
+    /// What sweeps over contacts that slip come to before a path is followed, if that is accepted. From no reactions, where a sweep
+    /// carries a load by one contact, only what meets the tolerance.
     pub(super) fn swept_first(
         &mut self,
         problem: &mut impl Solvable,
@@ -42,9 +42,8 @@ impl Newton {
         (swept.status != SolveStatus::Failed).then_some(swept)
     }
 
-    /// The residual that some sweeps leave from where a path ends, where `more` may follow as many as bring what is accepted and misses
-    /// the tolerance, if they cost less than another path: they move the net impulses, and what meets the tolerance has a small
-    /// load error too.
+    /// The residual that some sweeps leave from where a path ends. `more` may follow: as many as bring what is accepted, if they cost
+    /// less than another path. They move the net impulses, so none do where only what meets the tolerance is accepted.
     pub(super) fn settle(&mut self, problem: &mut impl Solvable, rows: &Rows, more: bool) -> f64 {
         problem.swept(SETTLING);
         self.sweeps += SETTLING as u64;
