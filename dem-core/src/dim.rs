@@ -52,8 +52,19 @@ pub trait Vect:
     /// The nearest vector of norm at most `limit` (projection on a ball; `limit` ≥ 0).
     #[inline(always)]
     fn clipped(self, limit: f64) -> Self {
-        let norm = self.norm();
-        if norm <= limit { self } else { self * (limit / norm) }
+        if Self::LEN < 2 {
+            let norm = self.norm();
+            return if norm <= limit { self } else { self * (limit / norm) };
+        }
+        // the next contact waits for this one: no square root within the ball, and none for what carries nothing
+        let square = self.dot(&self);
+        if square <= limit * limit {
+            self
+        } else if limit == 0.0 {
+            Self::zero()
+        } else {
+            self * (limit / square.sqrt())
+        }
     }
 }
 
