@@ -45,6 +45,7 @@ impl Newton {
     /// The residual that some sweeps leave from where a path ends. `more` may follow: as many as bring what is accepted, if they cost
     /// less than another path. They move the net impulses, so none do where only what meets the tolerance is accepted.
     pub(super) fn settle(&mut self, problem: &mut impl Solvable, rows: &Rows, more: bool) -> f64 {
+        problem.forget_what_is_not_finite();
         problem.swept(SETTLING);
         self.sweeps += SETTLING as u64;
         if !more || self.settings.accept <= self.settings.tolerance {

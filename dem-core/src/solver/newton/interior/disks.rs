@@ -298,8 +298,10 @@ impl<const R: usize, const C: usize> Site for Disks<R, C> {
         for (k, Disk { coefficient, first, rows }) in self.cones().filter(|(_, disk)| disk.rows > 0) {
             let size = r.rows(first, rows).fold(0.0, f64::hypot);
             let limit = coefficient * r[0];
-            if size > 0.0 && (limit - size) * measure < at.lambda[k][0] {
-                r.rows_mut(first, rows).scale_mut(limit / size);
+            // what is nearly nothing has no direction
+            let outward = limit / size;
+            if outward.is_finite() && (limit - size) * measure < at.lambda[k][0] {
+                r.rows_mut(first, rows).scale_mut(outward);
                 beyond[first / 2] = at.lambda[k][1].hypot(at.lambda[k][2]) / (self.metric[first] * limit);
             }
         }

@@ -298,7 +298,7 @@ impl Newton {
         self.follow(path, iterations, |path| {
             let reactions = path.snapped().reactions;
             problem.write_back(&reactions);
-            let residual = problem.residual();
+            let residual = Some(problem.residual()).filter(|r| r.is_finite()).unwrap_or(f64::INFINITY);
             if best.is_none() || residual < least {
                 let at = Point { y: path.at.y.clone(), pairs: path.at.pairs.clone() };
                 (least, best) = (residual, Some((at, path.softness, path.softer.len())));
