@@ -132,7 +132,7 @@ pub struct Files {
     /// The history.
     #[arg(value_name = "FILE.h5")]
     pub history: PathBuf,
-    /// Folder for the results, created if need be [default: FILE-post].
+    /// Folder for the results, created if need be [default: FILE-post, of `frames` FILE-frames, in the current folder].
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
 }

@@ -1,5 +1,7 @@
 //! What is read off a curve: where it gives way, where it peaks, the work under it.
 
+use serde_json::Value;
+
 /// A maximum is a peak if the load falls at least this share below it afterwards.
 const PEAK_DROP: f64 = 0.05;
 
@@ -7,6 +9,16 @@ const PEAK_DROP: f64 = 0.05;
 pub fn last_step_below(strain: &[f64], threshold: f64) -> Option<usize> {
     let above = strain.iter().position(|e| e.abs() > threshold)?;
     Some(above.saturating_sub(1))
+}
+
+/// Whether no bond had broken where `strain` passed its threshold, a step after `step`: `broken` counts them step by step.
+pub fn whole_at(broken: &[f64], step: usize) -> bool {
+    broken.get(step + 1).or(broken.last()).is_some_and(|&n| n == 0.0)
+}
+
+/// Whether the bonds of a scene yield before they break.
+pub fn is_elastic(scene: &str) -> bool {
+    serde_json::from_str::<Value>(scene).is_ok_and(|scene| !scene["bonds"]["stiffness"].is_null())
 }
 
 /// Where the load is greatest, if it falls by at least 5 % afterwards.

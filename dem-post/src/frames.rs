@@ -4,12 +4,14 @@
 //! stands for a value, the same meaning of it. They are read, drawn and written one by one, so a long series needs no
 //! more memory than a short one.
 
+use std::path::Path;
+
 use clap::ValueEnum;
 use dem_run::history::{BondStatus, History, RuptureMode};
 use serde::Serialize;
 
 use crate::chains::pictures::{force_legend, links};
-use crate::chains::{require_reactions, statistics};
+use crate::chains::{normal_forces, require_reactions, statistics};
 use crate::map::{Colour, Key, Link, Panel, Ramp, Sample, Scale, View, draw_view};
 use crate::output::{Folder, PostError, Result, facts, number, progress, quantity, short};
 use crate::plot::colour;
@@ -78,7 +80,7 @@ pub fn read(history: &History, subject: Subject, every: usize, times: &[f64]) ->
         Subject::Bonds => None,
         Subject::Forces => Some(greatest(&frames, |frame| {
             let contacts = history.contacts(frame)?;
-            Ok(statistics(&(0..contacts.len()).map(|c| contacts.normal_force(c)).collect::<Vec<_>>()).mean)
+            Ok(statistics(&normal_forces(&contacts)).mean)
         })?),
         Subject::Speed => {
             Some(greatest(&frames, |frame| Ok(usual_speed(speeds(&history.grain_state(frame)?, history.dimension()))))?)
@@ -121,13 +123,26 @@ pub fn write(history: &History, report: &Report, folder: &mut Folder, quiet: boo
     let bar = progress(report.frames.len() as u64, quiet, "{bar:24} {pos} of {len} pictures, {eta} left");
     for (k, &frame) in report.frames.iter().enumerate() {
         let (panel, legend) = picture(history, report, frame)?;
-        let name = format!("frame-{k:05}.png");
+        let name = picture_name(k);
         let png = draw_view(&sample, view, &[panel], &legend).png_scaled(PIXELS);
         folder.write(&name, &png.map_err(|why| PostError::Usage(format!("{name}: {why}")))?)?;
         bar.inc(1);
     }
     bar.finish_and_clear();
+    remove_longer(folder.path(), report.frames.len());
     Ok(())
+}
+
+/// Remove the pictures that a longer series has left: a film would show them after these.
+fn remove_longer(folder: &Path, count: usize) {
+    (count..)
+        .map(|k| folder.join(picture_name(k)))
+        .take_while(|path| std::fs::remove_file(path).is_ok())
+        .for_each(drop);
+}
+
+fn picture_name(k: usize) -> String {
+    format!("frame-{k:05}.png")
 }
 
 /// The part of the plane that shows all frames.

@@ -10,7 +10,8 @@
 //! The applied force is the prescribed one, or, where the motion is prescribed, what it takes against the grains.
 //!
 //! **Collapse load** (under an ever-growing force there is no peak): the applied force at the last step before the
-//! strain fitted to the grains exceeds 1e-4; also reported at 1e-3.
+//! strain fitted to the grains exceeds 1e-4; also reported at 1e-3. Of rigid bonds none of which has broken by then the
+//! strain is the solver's, and the load says nothing: the tables say so, and the drawings leave it out.
 
 use std::path::Path;
 
@@ -18,7 +19,7 @@ use dem_run::history::{History, Series, Wall, WallDrive};
 use serde::Serialize;
 
 use crate::chains::stress::thickness;
-use crate::collapse::{last_step_below, peak, work};
+use crate::collapse::{is_elastic, last_step_below, peak, whole_at, work};
 use crate::output::{Folder, PostError, Result, cell, facts, quantity, short};
 use crate::plot::{Chart, Style, colour};
 
@@ -34,6 +35,8 @@ const LEAST_STRAIN: f64 = 1e-9;
 pub struct Summary {
     /// The driven wall.
     pub wall: String,
+    /// Applied force at the first break, N.
+    pub first_break: Option<f64>,
     /// Height of the sample along the drive, m.
     pub height: f64,
     /// Cross-section of the sample, m².
@@ -44,6 +47,8 @@ pub struct Summary {
     pub collapse_time: Option<f64>,
     /// Applied force before the fitted strain exceeds 1e-3, N.
     pub collapse_load_1e3: Option<f64>,
+    /// Whether no bond had broken by each of the two, so that the strain is the solver's own.
+    pub collapse_early: [bool; 2],
     /// Applied force when 5 % of the bonds have broken, N.
     pub load_at_5_percent_broken: Option<f64>,
     /// Greatest applied force where the load falls afterwards, N.
@@ -120,7 +125,8 @@ pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
         step: motion.step,
         time: motion.time,
     };
-    report.summarise(&history.bonds()?.strength, history.observable("solver_residual")?);
+    let elastic = is_elastic(&history.parameters()?.scene);
+    report.summarise(&history.bonds()?.strength, elastic, history.observable("solver_residual")?);
     Ok(report)
 }
 
@@ -246,10 +252,25 @@ fn sample_size(history: &History, wall: usize, axis: usize, drive: f64) -> Resul
     Ok(([extents[axis], area], push))
 }
 
+impl Summary {
+    /// The collapse load at one of the two strains in words.
+    pub fn collapse(&self, k: usize) -> String {
+        let load = quantity([self.collapse_load, self.collapse_load_1e3][k], "N");
+        if self.collapse_early[k] { load + ", before any bond broke: the solver's own strain" } else { load }
+    }
+
+    /// The collapse load to draw (N): that at 1e-4, if it is the sample's.
+    fn level(&self) -> Option<f64> {
+        self.collapse_load.filter(|_| !self.collapse_early[0])
+    }
+}
+
 impl Report {
-    fn summarise(&mut self, strengths: &[f64], residual: Option<Series>) {
+    fn summarise(&mut self, strengths: &[f64], elastic: bool, residual: Option<Series>) {
         let at = |step: Option<usize>| step.and_then(|k| self.load.get(k).copied());
-        let [collapse, collapse_1e3] = COLLAPSE.map(|threshold| last_step_below(&self.strain, threshold));
+        let steps = COLLAPSE.map(|threshold| last_step_below(&self.strain, threshold));
+        let [collapse, collapse_1e3] = steps;
+        let rigid = !strengths.is_empty() && !elastic;
         let limit = BROKEN * strengths.len() as f64;
         let five = if strengths.is_empty() { None } else { self.broken.iter().position(|&n| n >= limit) };
         let top = peak(&self.load);
@@ -257,11 +278,13 @@ impl Report {
         let maximum = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
         let summary = Summary {
             wall: std::mem::take(&mut self.summary.wall),
+            first_break: at(self.broken.iter().position(|&n| n > 0.0)),
             height: self.summary.height,
             area: self.summary.area,
             collapse_load: at(collapse),
             collapse_time: collapse.and_then(|k| self.time.get(k).copied()),
             collapse_load_1e3: at(collapse_1e3),
+            collapse_early: steps.map(|step| rigid && step.is_some_and(|step| whole_at(&self.broken, step))),
             load_at_5_percent_broken: at(five),
             peak_load: at(top),
             peak_strain: top.and_then(|k| self.strain.get(k).copied()),
@@ -284,8 +307,9 @@ impl Report {
         facts(&[
             ("driven wall", s.wall.clone()),
             ("sample", format!("{} high, section {}", quantity(Some(s.height), "m"), quantity(Some(s.area), "m²"))),
-            ("collapse load (strain 1e-4)", quantity(s.collapse_load, "N")),
-            ("collapse load (strain 1e-3)", quantity(s.collapse_load_1e3, "N")),
+            ("first break", quantity(s.first_break, "N")),
+            ("collapse load (strain 1e-4)", s.collapse(0)),
+            ("collapse load (strain 1e-3)", s.collapse(1)),
             ("load with 5 % of bonds broken", quantity(s.load_at_5_percent_broken, "N")),
             ("collapse load / cohesion", quantity(s.collapse_over_cohesion, "")),
             ("collapse at", quantity(s.collapse_time, "s")),
@@ -355,7 +379,7 @@ pub fn force_displacement(report: &Report) -> Chart {
     }
     let points = pairs(&report.displacement, 1e3, &report.load, 1.0);
     chart = chart.curve("applied force", colour::BLUE, Style::Line, points);
-    if let Some(load) = report.summary.collapse_load {
+    if let Some(load) = report.summary.level() {
         chart.levels.push((load, format!("at strain 10⁻⁴: {} N", short(load))));
     }
     chart
@@ -373,7 +397,7 @@ pub fn onset(report: &Report) -> Option<Chart> {
     chart = chart.curve("applied force", colour::BLUE, Style::Line, points);
     chart.log_x = true;
     chart.moments = COLLAPSE.to_vec();
-    if let Some(load) = report.summary.collapse_load {
+    if let Some(load) = report.summary.level() {
         chart.levels.push((load, format!("at strain 10⁻⁴: {} N", short(load))));
     }
     Some(chart)
@@ -393,7 +417,7 @@ pub fn stress_strain(report: &Report) -> Chart {
     if !points.is_empty() {
         chart = chart.curve("from particles", colour::BLUE, Style::Thin, points);
     }
-    if let Some(load) = report.summary.collapse_load {
+    if let Some(load) = report.summary.level() {
         chart.levels.push((load * wall_stress, format!("at strain 10⁻⁴: {} kPa", short(load * wall_stress))));
     }
     chart

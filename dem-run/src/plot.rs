@@ -276,8 +276,9 @@ impl Chart {
             } else if low <= high {
                 // within a decade there may be no tick at all: show the whole decade
                 let decade = |x: f64| 10f64.powf(x);
-                layout =
-                    layout.with_y_axis_min(decade(low.log10().floor())).with_y_axis_max(decade(high.log10().ceil()));
+                // a point on the edge would be cut in half
+                let (below, above) = ((0.8 * low).log10().floor(), (1.25 * high).log10().ceil());
+                layout = layout.with_y_axis_min(decade(below)).with_y_axis_max(decade(above));
             }
         } else if self.counts {
             let whole = |value: f64| if value.fract() == 0.0 { format!("{value}") } else { String::new() };
@@ -296,7 +297,7 @@ impl Chart {
 fn power_of_ten(value: f64) -> String {
     let exponent = value.log10();
     let whole = (exponent - exponent.round()).abs() < 1e-6;
-    if (!whole && exponent > -6.0) || (-0.5..1.5).contains(&exponent) {
+    if (!whole && exponent > -3.0) || (-0.5..1.5).contains(&exponent) {
         // what was computed as 4.9999999e-6 is 5e-6
         let rounded = format!("{value:.3e}").parse().unwrap_or(value);
         return format!("{rounded}");

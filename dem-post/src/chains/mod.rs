@@ -127,7 +127,8 @@ pub fn read(history: &History, times: &[f64]) -> Result<Report> {
     }
     if networks.iter().all(|network| network.statistics.contacts == 0) {
         let moments: Vec<String> = networks.iter().map(|network| format!("{} s", number(network.time))).collect();
-        let what = format!("no contact carries a force at {}: choose other moments by --times", moments.join(", "));
+        let what =
+            format!("no contact carries a normal force at {}: choose other moments by --times", moments.join(", "));
         return Err(PostError::Lacking { path: history.path().into(), what });
     }
     Ok(Report { networks })
@@ -148,7 +149,7 @@ pub fn require_reactions(history: &History) -> Result<()> {
 /// The network at frame `frame`.
 fn network(history: &History, frame: usize) -> Result<Network> {
     let (contacts, d) = (history.contacts(frame)?, history.dimension());
-    let forces: Vec<f64> = (0..contacts.len()).map(|c| contacts.normal_force(c)).collect();
+    let forces = normal_forces(&contacts);
     let statistics = statistics(&forces);
     let (radius, position) = (history.grains()?.radius, history.grain_state(frame)?.position);
     let stress = grain_stress(&contacts, &position, &radius, d, thickness(history)?);
@@ -163,6 +164,14 @@ fn network(history: &History, frame: usize) -> Result<Network> {
         chains,
         contacts,
     })
+}
+
+/// Normal force of each contact, N, positive in compression; zero where it is nothing beside the tangential ones, which is what
+/// the solver leaves of it.
+pub fn normal_forces(contacts: &ContactRows) -> Vec<f64> {
+    let greatest = (0..contacts.len()).map(|c| contacts.tangential_force(c)).fold(0.0, f64::max);
+    let force = |c| Some(contacts.normal_force(c)).filter(|f| f.abs() > CARRIES * greatest).unwrap_or(0.0);
+    (0..contacts.len()).map(force).collect()
 }
 
 /// The chains in numbers, in a sample of `grains` grains.
@@ -383,6 +392,17 @@ mod tests {
         assert_eq!((s.mean, s.greatest_compression, s.greatest_tension), (2.0, 2.0, 4.0));
         assert_eq!(s.strong_share, 0.5);
         assert!((s.spread - 1.5f64.sqrt() / 2.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn what_the_solver_leaves_beside_tangential_forces_is_no_normal_force() {
+        let contacts = ContactRows {
+            pair: vec![[0, 1], [1, 2], [2, 3]],
+            reaction: vec![1e-10, 1.0, 1e-3, 0.5, 0.0, 0.0],
+            normal: vec![0.0; 6],
+            ..ContactRows::default()
+        };
+        assert_eq!(normal_forces(&contacts), [0.0, 1e-3, 0.0]);
     }
 
     #[test]

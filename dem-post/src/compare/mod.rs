@@ -97,6 +97,8 @@ pub struct Report {
     pub scene: Vec<Difference>,
     /// Whether the grains have the same radii, and the same bonds were formed.
     pub same_sample: bool,
+    /// Where the two runs end, s: breaks are compared up to the earlier of the two.
+    pub ends: [f64; 2],
     /// How far the runs are apart, at each time that both have.
     pub gaps: Vec<Gap>,
     /// The first of these that differs by more than the tolerance.
@@ -141,7 +143,10 @@ pub fn read(a: &History, b: &History, tolerance: f64) -> Result<Report> {
     if gaps.is_empty() {
         return Err(differs("no frame of one has the time of a frame of the other".into()));
     }
-    let breaks = [breaks(&a.ruptures()?), breaks(&b.ruptures()?)];
+    let mut breaks = [breaks(&a.ruptures()?), breaks(&b.ruptures()?)];
+    let ends = [end(a, &breaks[0]), end(b, &breaks[1])];
+    let both = ends[0].min(ends[1]) * (1.0 + SAME_TIME);
+    breaks.iter_mut().for_each(|list| list.retain(|found| found.time <= both));
     let fates = fates(&breaks);
     let count = |kind: fn(&Fate) -> bool| fates.iter().filter(|fate| kind(fate)).count();
     let same_bonds = a.bonds()?.pair == b.bonds()?.pair;
@@ -150,6 +155,7 @@ pub fn read(a: &History, b: &History, tolerance: f64) -> Result<Report> {
         tolerance,
         scene: differences(&a.parameters()?.scene, &b.parameters()?.scene),
         same_sample: radii[0] == radii[1] && same_bonds,
+        ends,
         first_difference: gaps.iter().copied().find(|gap| gap.greatest > tolerance),
         gaps,
         broken: [
@@ -192,6 +198,12 @@ fn gap(time: f64, frames: [usize; 2], [a, b]: &[Vec<f64>; 2], radius: &[f64], d:
         grain,
         rms: (squares.iter().sum::<f64>() / squares.len() as f64).sqrt(),
     }
+}
+
+/// The time of the last frame or break, s.
+fn end(history: &History, breaks: &[Break]) -> f64 {
+    let frame = history.times().last().copied().unwrap_or(0.0);
+    breaks.last().map_or(frame, |found| found.time.max(frame))
 }
 
 fn breaks(ruptures: &[Rupture]) -> Vec<Break> {
@@ -240,6 +252,7 @@ impl Report {
             ("scenes", format!("differ in {} places", self.scene.len())),
             ("sample", if self.same_sample { "the same radii and bonds" } else { "other radii or other bonds" }.into()),
             ("common times", self.gaps.len().to_string()),
+            ("compared until", self.until()),
             ("tolerance", tolerance),
             ("frames differ from", self.first_difference.as_ref().map_or_else(|| "never".into(), gap_line)),
             ("at the last common time", last.map_or_else(|| "–".into(), gap_line)),
@@ -260,6 +273,18 @@ impl Report {
             }
         }
         out
+    }
+}
+
+impl Report {
+    /// Up to when breaks are compared, in words.
+    fn until(&self) -> String {
+        let [a, b] = self.ends;
+        let time = quantity(Some(a.min(b)), "s");
+        match a - b {
+            apart if apart.abs() <= SAME_TIME * a.max(b) => format!("{time}, the end of both"),
+            apart => format!("{time}, the end of {}", if apart < 0.0 { "A" } else { "B" }),
+        }
     }
 }
 

@@ -43,7 +43,7 @@ pub fn broken_chart(curve: &[(f64, [usize; 4])], end: f64) -> Chart {
     if curve.last().is_some_and(|(_, n)| n[3] > 0) {
         chart = chart.curve("twist", colour::PURPLE, Style::Steps, points(&|n| n[3]));
     }
-    chart.counts = true;
+    (chart.counts, chart.set_off) = (true, true);
     chart
 }
 
@@ -53,13 +53,14 @@ pub fn fragment_charts(pieces: &[Pieces]) -> Vec<Chart> {
     let mut number = Chart::new("time (s)", "number of fragments")
         .curve("all", colour::BLACK, Style::Steps, points(&|f| f.count as f64))
         .curve("single grains", colour::VERMILLION, Style::Steps, points(&|f| f.singles as f64));
-    number.counts = true;
-    let largest = Chart::new("time (s)", "largest fragment (% of the mass)").curve(
+    (number.counts, number.set_off) = (true, true);
+    let mut largest = Chart::new("time (s)", "largest fragment (% of the mass)").curve(
         "largest fragment",
         colour::BLUE,
         Style::Steps,
         points(&|f| 100.0 * f.largest_mass_fraction),
     );
+    largest.set_off = true;
     vec![number, largest]
 }
 

@@ -24,7 +24,8 @@ pub enum Key {
 
 /// A bar of a round length, at most a third of the panel.
 pub(super) fn scale_bar(canvas: &mut Canvas, (x, y): (f64, f64), scale: f64, width: f64) {
-    let longest = width / 3.0 / scale;
+    // beside a narrow panel the sheet has room
+    let longest = (width / 3.0).max(BAR / 2.0) / scale;
     let power = 10f64.powf(longest.log10().floor());
     let length = [5.0, 2.0, 1.0].into_iter().map(|m| m * power).find(|l| *l <= longest).unwrap_or(power);
     let (from, to) = (x + 2.0 * HATCH, x + 2.0 * HATCH + length * scale);

@@ -140,7 +140,8 @@ impl Sample {
         Self::seen(history, Eye::At(Place::of(first.position.chunks(3))))
     }
 
-    /// As [`Sample::read`], of spheres cut open along the plane through the middle of their first places.
+    /// As [`Sample::read`], of spheres cut open along the plane through the middle of their first places, or of the grain
+    /// nearest to it where it cuts none.
     ///
     /// # Errors
     /// As [`Sample::read`].
@@ -149,7 +150,10 @@ impl Sample {
         let first = history.grain_state(0)?;
         let depths = || first.position.chunks(sample.dimension).map(|x| sample.eye.depth(x));
         let middle = 0.5 * (depths().fold(f64::INFINITY, f64::min) + depths().fold(f64::NEG_INFINITY, f64::max));
-        sample.slice = Some(middle);
+        let off = |depth: &f64| (depth - middle).abs();
+        let cuts = depths().zip(&sample.radius).any(|(depth, radius)| off(&depth) < *radius);
+        let nearest = depths().min_by(|a, b| off(a).total_cmp(&off(b)));
+        sample.slice = if cuts { Some(middle) } else { nearest };
         Ok(sample)
     }
 

@@ -69,7 +69,10 @@ impl Report {
         let a = &self.accuracy;
         let broken = self.cracks.as_ref().map_or_else(
             || "no bonds".into(),
-            |c| format!("{} of {}, {} cracks", c.broken.total(), c.bonds, c.cracks.len()),
+            |c| {
+                let cracks = c.cracks.len() + c.surfaces.len();
+                format!("{} of {}, {cracks} crack{}", c.broken.total(), c.bonds, if cracks == 1 { "" } else { "s" })
+            },
         );
         let percent = |value: Option<f64>| value.map_or_else(|| "–".into(), number);
         let missed = a.missed.map_or_else(|| "–".into(), |n| n.to_string());
@@ -79,7 +82,7 @@ impl Report {
             ("bonds broken", broken),
             ("worst residual", percent(a.residual.map(|r| r.worst))),
             ("worst load error", percent(a.load_error.map(|r| r.worst))),
-            ("steps that missed the tolerance", missed),
+            ("steps whose residual missed it", missed),
         ])
     }
 }

@@ -104,8 +104,9 @@ fn load(found: &StressStrain) -> Section {
     let s = &found.summary;
     let facts = [
         ("Driven wall", s.wall.clone()),
-        ("Collapse load (strain 1e-4)", quantity(s.collapse_load, "N")),
-        ("Collapse load (strain 1e-3)", quantity(s.collapse_load_1e3, "N")),
+        ("First break", quantity(s.first_break, "N")),
+        ("Collapse load (strain 1e-4)", s.collapse(0)),
+        ("Collapse load (strain 1e-3)", s.collapse(1)),
         ("Load with 5 % of the bonds broken", quantity(s.load_at_5_percent_broken, "N")),
         ("Collapse load over cohesion", quantity(s.collapse_over_cohesion, "")),
         ("Greatest load", quantity(Some(s.greatest_load), "N")),
@@ -239,16 +240,21 @@ fn energy(history: &History) -> Result<Section> {
     ];
     let mut facts = vec![];
     let mut curves = Chart::new("time (s)", "energy (J)");
-    for (k, (name, label)) in books.into_iter().enumerate() {
+    for (name, label) in books {
         let points = points(history.observable(name)?);
         let Some(&(_, end)) = points.last() else {
             continue;
         };
         facts.push((capitalised(label), format!("{} J at the end", number(end))));
-        if k < colour::CYCLE.len() {
-            curves = curves.curve(label, colour::CYCLE[k], Style::Line, points);
+        // what should be zero is no line of its own beside the others
+        let drawn = !name.ends_with("_remainder") && points.iter().any(|(_, energy)| *energy != 0.0);
+        if drawn {
+            let colours = colour::CYCLE.iter().chain([&colour::BLACK, &colour::GREY]);
+            let colour = colours.copied().nth(curves.curves.len()).unwrap_or(colour::BLACK);
+            curves = curves.curve(label, colour, Style::Line, points);
         }
     }
+    curves.set_off = true;
     let alt = "Work from outside, kinetic energy and losses over time.";
     let figures = if curves.curves.is_empty() { vec![] } else { vec![chart(curves, alt, alt)] };
     Ok(Section { id: "energy", title: "Energy", facts, figures, ..Section::default() })

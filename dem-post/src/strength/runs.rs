@@ -11,7 +11,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::LeftOut;
-use crate::collapse::{last_step_below, peak};
+use crate::collapse::{is_elastic, last_step_below, peak, whole_at};
 use crate::output::{PostError, Result, quantity};
 use crate::stress_strain;
 
@@ -128,9 +128,8 @@ pub fn read(path: &Path, measure: Measure, wall: Option<&str>) -> Result<Found> 
         return Err(PostError::Lacking { path: path.into(), what });
     }
     let step = course.gives_way(path, measure, bonds.len())?;
-    // the bonds are looked at when the strain has passed its limit, which is a step later
-    let whole = |step: usize| course.broken.get(step + 1).or(course.broken.last()).is_some_and(|&n| n == 0.0);
-    let early = |step| measure == Measure::Collapse && !bonds.is_empty() && !is_elastic(&scene) && whole(step);
+    let rigid = !bonds.is_empty() && !is_elastic(&scene);
+    let early = |step| measure == Measure::Collapse && rigid && whole_at(&course.broken, step);
     let strength = match step {
         Some(step) => Ok(Strength { load: course.load[step], time: course.time[step], early: early(step) }),
         None => Err(course.how_far(measure, bonds.len())),
@@ -231,10 +230,6 @@ impl Course {
             Measure::Peak => format!("its load never falls by 5 %; it comes to {greatest}"),
         }
     }
-}
-
-fn is_elastic(scene: &str) -> bool {
-    serde_json::from_str::<Value>(scene).is_ok_and(|scene| !scene["bonds"]["stiffness"].is_null())
 }
 
 #[cfg(test)]

@@ -236,7 +236,7 @@ fn an_open_history_is_checked_to_its_last_frame() {
     let path = folder.path().join("run.h5");
     let l = layout(2);
     let mut writer = Writer::create(&path, &l, false).unwrap();
-    frame(&mut writer, &l, 0, 4e-3);
+    frame(&mut writer, &l, COURSE, 0, 4e-3);
     let copy = folder.path().join("copy.h5");
     std::fs::copy(&path, &copy).unwrap();
     let (output, found) = check(&copy);

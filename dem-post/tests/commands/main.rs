@@ -8,7 +8,14 @@ use dem_run::history::*;
 mod check;
 mod view;
 
-const STEPS: i64 = 100;
+/// How long a run goes on, and when its bonds 0 and 1 break, in steps.
+#[derive(Clone, Copy)]
+struct Course {
+    steps: i64,
+    breaks: [i64; 2],
+}
+
+const COURSE: Course = Course { steps: 100, breaks: [30, 60] };
 
 /// A square of four bonded grains of radius 1 mm between two walls.
 fn layout(dimension: usize) -> Layout {
@@ -62,18 +69,23 @@ fn tensor(d: usize, yy: f64) -> Vec<f64> {
 /// Load 1 N a step up to 100 N; the sample gives way by 1e-3 of its height a step from step 41 on; bond 0 breaks at
 /// step 30 and bond 1 at step 60.
 fn write(path: &Path, l: &Layout) {
+    write_course(path, l, COURSE);
+}
+
+fn write_course(path: &Path, l: &Layout, course: Course) {
+    let [first, second] = course.breaks;
     let (d, walled, bonded) = (l.dimension, !l.walls.is_empty(), !l.bonds.is_empty());
     let mut writer = Writer::create(path, l, false).unwrap();
-    for step in 0..=STEPS {
+    for step in 0..=course.steps {
         let (time, load) = (step as f64 * 1e-3, step as f64);
         let strain = -1e-3 * (step - 40).max(0) as f64;
         let top = 4e-3 * (1.0 + strain);
-        for (at, bond, mode) in [(30, 0, RuptureMode::Shear), (60, 1, RuptureMode::Tension)] {
+        for (at, bond, mode) in [(first, 0, RuptureMode::Shear), (second, 1, RuptureMode::Tension)] {
             if step == at && bonded {
                 writer.rupture(&rupture(step, time, bond, l.bonds.pair[bond], mode)).unwrap();
             }
         }
-        let broken = f64::from(u8::from(step >= 30) + u8::from(step >= 60));
+        let broken = f64::from(u8::from(step >= first) + u8::from(step >= second));
         let values = [
             vector(d, 0.0),
             vector(d, top),
@@ -88,7 +100,7 @@ fn write(path: &Path, l: &Layout) {
             writer.observe(step, time, &values.concat()).unwrap();
         }
         if step % 10 == 0 {
-            frame(&mut writer, l, step, top);
+            frame(&mut writer, l, course, step, top);
         }
     }
     assert!(walled || l.observables.is_empty());
@@ -111,7 +123,7 @@ fn rupture(step: i64, time: f64, bond: usize, pair: [i32; 2], mode: RuptureMode)
     }
 }
 
-fn frame(writer: &mut Writer, l: &Layout, step: i64, top: f64) {
+fn frame(writer: &mut Writer, l: &Layout, course: Course, step: i64, top: f64) {
     let (d, w, load) = (l.dimension, l.walls.len(), step as f64);
     let centre = |x: f64, y: f64| if d == 2 { vec![x, y] } else { vec![x, y, 0.0] };
     let places = [centre(1e-3, 1e-3), centre(3e-3, 1e-3), centre(3e-3, top - 1e-3), centre(1e-3, top - 1e-3)];
@@ -138,7 +150,8 @@ fn frame(writer: &mut Writer, l: &Layout, step: i64, top: f64) {
         pair,
     };
     let mut bonds = vec![BondStatus::Intact; l.bonds.len()];
-    for (at, bond, status) in [(30, 0, BondStatus::Shear), (60, 1, BondStatus::Tension)] {
+    let [first, second] = course.breaks;
+    for (at, bond, status) in [(first, 0, BondStatus::Shear), (second, 1, BondStatus::Tension)] {
         if bonded && step >= at {
             bonds[bond] = status;
         }
@@ -232,6 +245,38 @@ fn collapse_is_read_off_the_curve() {
 }
 
 #[test]
+fn a_collapse_before_any_break_is_the_solver_s() {
+    let (_folder, path) = sample(&layout(2));
+    let collapse = |path: &Path| {
+        let found = json(&dem_post(path, &["stress-strain", "--json"]));
+        (found["first_break"].as_f64(), found["collapse_early"].clone(), dem_post(path, &["stress-strain"]).stdout)
+    };
+    let own = |text: &[u8]| String::from_utf8_lossy(text).matches("before any bond broke").count();
+    let (first, early, text) = collapse(&path);
+    assert_eq!((first, early, own(&text)), (Some(30.0), serde_json::json!([false, false]), 0));
+
+    // it gives way at step 41, and by 1e-3 at step 42
+    let late = |elastic: bool, breaks: [i64; 2]| {
+        let path = path.with_file_name("late.h5");
+        std::fs::remove_file(&path).ok();
+        let mut l = layout(2);
+        if elastic {
+            l.parameters.scene = r#"{"thickness": 0.5, "bonds": {"stiffness": {"young": {}}}}"#.into();
+        }
+        write_course(&path, &l, Course { breaks, ..COURSE });
+        collapse(&path)
+    };
+    let (first, early, text) = late(false, [42, 60]);
+    assert_eq!((first, early, own(&text)), (Some(42.0), serde_json::json!([true, false]), 1));
+    let level = |name: &str| std::fs::read_to_string(path.with_file_name("late-post").join(name)).unwrap();
+    assert!(!level("force-displacement.svg").contains("at strain"));
+    // elastic bonds yield before they break
+    let (_, early, _) = late(true, [50, 60]);
+    assert_eq!(early, serde_json::json!([false, false]));
+    assert!(level("force-displacement.svg").contains("at strain"));
+}
+
+#[test]
 fn a_wall_that_moves_needs_no_prescribed_force() {
     let mut moved = layout(2);
     moved.walls[1].drive = WallDrive::Velocity;
@@ -271,7 +316,7 @@ fn what_a_scene_lacks_is_named() {
     let free = Layout { walls: vec![], observables: vec![], ..layout(2) };
     let (folder, path) = sample(&free);
     refused(&dem_post(&path, &["stress-strain"]), 2, &["driven wall"]);
-    refused(&dem_post(&path, &["chains", "--times", "0"]), 2, &["no contact carries a force"]);
+    refused(&dem_post(&path, &["chains", "--times", "0"]), 2, &["no contact carries a normal force"]);
     // nothing was left behind
     assert!(!folder.path().join("run-post").exists());
     let unobserved = Layout { observables: vec![], ..layout(2) };
@@ -366,6 +411,11 @@ fn frames_are_numbered_and_alike() {
         let sizes: Vec<_> = (0..4).map(|k| size(folder.join(format!("frame-{k:05}.png")))).collect();
         assert!(sizes.iter().all(|size| *size == sizes[0] && size[0] % 2 == 0 && size[1] % 2 == 0), "{sizes:?}");
     }
+    // a shorter series leaves no pictures of the longer one behind
+    let pictures = || std::fs::read_dir(path.with_file_name("speed")).unwrap().count();
+    assert_eq!(pictures(), 4);
+    let shorter = dem_post(&path, &["frames", "--draw", "speed", "--times", "0.05", "-o", "speed", "--quiet"]);
+    assert_eq!((shorter.status.code(), pictures()), (Some(0), 1));
     refused(&dem_post(&path, &["frames", "--every", "0"]), 2, &["--every"]);
     refused(&dem_post(&path, &["frames", "--every", "2", "--times", "0.1"]), 2, &["--times"]);
     let mut loose = layout(2);
@@ -402,6 +452,18 @@ fn runs_part_where_one_gives_way_more() {
     for file in ["scene.csv", "distance.csv", "bonds.csv", "distance.png", "broken.png", "bonds.png", "load.png"] {
         assert!(folder.path().join("here").join(file).exists(), "{file}");
     }
+}
+
+#[test]
+fn breaks_after_the_end_of_the_shorter_run_are_not_compared() {
+    let (_folder, path) = sample(&layout(2));
+    write_course(&path.with_file_name("short.h5"), &layout(2), Course { steps: 50, ..COURSE });
+    let found = json(&dem_post(&path, &["compare", "short.h5", "--json"]));
+    assert_eq!(found["ends"], serde_json::json!([0.1, 0.05]));
+    assert_eq!(found["broken"], serde_json::json!([1, 0, 0]));
+    assert!(found["parting"].is_null(), "{found}");
+    let text = dem_post(&path, &["compare", "short.h5"]).stdout;
+    assert!(String::from_utf8_lossy(&text).contains("0.05 s, the end of B"));
 }
 
 #[test]
