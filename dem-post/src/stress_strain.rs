@@ -67,7 +67,7 @@ pub struct Summary {
     pub bonds_broken: Option<f64>,
     /// Mean cohesion of the bonds, N.
     pub cohesion: Option<f64>,
-    /// Collapse load over cohesion.
+    /// Collapse load over cohesion; none where it is the solver's own.
     pub collapse_over_cohesion: Option<f64>,
     /// Greatest residual that was accepted.
     pub worst_residual: Option<f64>,
@@ -271,6 +271,7 @@ impl Report {
         let steps = COLLAPSE.map(|threshold| last_step_below(&self.strain, threshold));
         let [collapse, collapse_1e3] = steps;
         let rigid = !strengths.is_empty() && !elastic;
+        let early = steps.map(|step| rigid && step.is_some_and(|step| whole_at(&self.broken, step)));
         let limit = BROKEN * strengths.len() as f64;
         let five = if strengths.is_empty() { None } else { self.broken.iter().position(|&n| n >= limit) };
         let top = peak(&self.load);
@@ -284,7 +285,7 @@ impl Report {
             collapse_load: at(collapse),
             collapse_time: collapse.and_then(|k| self.time.get(k).copied()),
             collapse_load_1e3: at(collapse_1e3),
-            collapse_early: steps.map(|step| rigid && step.is_some_and(|step| whole_at(&self.broken, step))),
+            collapse_early: early,
             load_at_5_percent_broken: at(five),
             peak_load: at(top),
             peak_strain: top.and_then(|k| self.strain.get(k).copied()),
@@ -294,7 +295,10 @@ impl Report {
             work: work(&self.load, &self.displacement),
             bonds_broken: self.broken.last().copied(),
             cohesion,
-            collapse_over_cohesion: at(collapse).zip(cohesion).map(|(load, cohesion)| load / cohesion),
+            collapse_over_cohesion: at(collapse)
+                .filter(|_| !early[0])
+                .zip(cohesion)
+                .map(|(load, cohesion)| load / cohesion),
             worst_residual: residual.map(|series| maximum(&series.value)),
         };
         self.summary = summary;
