@@ -87,7 +87,7 @@ fn grains<D: Dim>(scene: &Scene, watch: Watch) -> Result<(Grains<D>, Option<f64>
         grains.velocity[k] = D::Vector::zero();
         grains.spin[k] = D::Spin::zero();
     }
-    refuse_coincident(&grains)?;
+    refuse_overlapping(&grains)?;
     Ok((grains, fraction))
 }
 
@@ -120,14 +120,24 @@ fn listed<D: Dim>(spec: &scene::GrainSpec, scene: &Scene) -> Grain<D> {
     grain
 }
 
-/// Two grains at one place have no normal between them.
-fn refuse_coincident<D: Dim>(grains: &Grains<D>) -> Result<(), RunError> {
+/// Overlap of two rigid grains, over the smaller radius, up to which it may be an error of where they came from.
+const DEEPEST: f64 = 0.1;
+
+/// Two grains at one place have no normal between them, and rigid ones do not overlap.
+fn refuse_overlapping<D: Dim>(grains: &Grains<D>) -> Result<(), RunError> {
     for [i, j] in pairs_within(grains, &grains.position, &vec![0.0; grains.len()]) {
         let apart = (grains.position[i as usize] - grains.position[j as usize]).norm();
         let smaller = grains.radius[i as usize].min(grains.radius[j as usize]);
         if apart <= TOUCHING * smaller {
             return Err(RunError::Sample(format!(
                 "sample: the centres of grains {i} and {j} coincide; move one of them"
+            )));
+        }
+        let overlap = grains.radius[i as usize] + grains.radius[j as usize] - apart;
+        if overlap > DEEPEST * smaller {
+            return Err(RunError::Sample(format!(
+                "sample: grains {i} and {j} overlap by {overlap:.3e} m, more than a tenth of the smaller radius; rigid grains do \
+                 not: move one of them, or make it smaller"
             )));
         }
     }

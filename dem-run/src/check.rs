@@ -6,6 +6,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
+use crate::output::number;
 use crate::run::RunError;
 use crate::scene::{Drive, Lattice, Precision, Sample, Scene, Shape};
 
@@ -108,7 +109,10 @@ impl fmt::Display for Check {
         let walls: Vec<String> =
             self.walls.iter().map(|wall| format!("{} ({}, {})", wall.name, wall.shape, wall.drive)).collect();
         writeln!(f, "walls      {}", if walls.is_empty() { "none".to_string() } else { walls.join(", ") })?;
-        writeln!(f, "steps      {} of {} s, to {} s", self.steps, self.step, self.end)?;
+        let last = self.steps as f64 * self.step;
+        let beyond =
+            if last > self.end * (1.0 + 1e-9) { format!("; the last ends at {}", number(last)) } else { String::new() };
+        writeln!(f, "steps      {} of {} s, to {} s{beyond}", self.steps, self.step, self.end)?;
         writeln!(f, "frames     {}, one every {} steps", self.frames, self.steps_per_frame)?;
         writeln!(f, "file       about {}", size(self.file_bytes))?;
         write!(f, "free disk  {}", self.free_bytes.map_or("unknown".to_string(), size))

@@ -12,6 +12,7 @@ use crate::accuracy::trial::SolverName;
 use crate::accuracy::{self, AccuracyOptions};
 use crate::check::Check;
 use crate::export::{self, ExportOptions};
+use crate::history::refuse_busy;
 use crate::output::{default_folder, print_json, print_result};
 use crate::progress::ProgressMode;
 use crate::resume::{self, ResumeOptions};
@@ -423,6 +424,10 @@ fn check(args: &CheckArgs) -> Result<(), RunError> {
             print_json(&serde_json::json!({ "problems": error.problems() }))?;
             return Err(error.into());
         }
+        Err(SceneError::Syntax { name, line, column, message, excerpt }) if args.json => {
+            print_json(&serde_json::json!({ "problems": [{ "line": line, "column": column, "message": message }] }))?;
+            return Err(SceneError::Syntax { name, line, column, message, excerpt }.into());
+        }
         result => result?,
     };
     let check = Check::new(&scene)?;
@@ -548,7 +553,7 @@ fn apart(path: &Path, scene: &Scene, options: &RunOptions) -> Result<(), RunErro
     Ok(())
 }
 
-/// Refuses, before any work is done, a file that exists or whose folder does not.
+/// Refuses, before any work is done, a file that exists or is being written, or whose folder does not exist.
 fn writable(path: &Path, option: &str, overwrite: bool) -> Result<(), RunError> {
     let shown = path.display();
     if path.is_dir() {
@@ -562,6 +567,7 @@ fn writable(path: &Path, option: &str, overwrite: bool) -> Result<(), RunError> 
         let remedy = format!("--force overwrites it, {option} names another");
         return Err(RunError::InputOutput(format!("{shown} exists: {remedy}")));
     }
+    refuse_busy(path)?;
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => {
             let folder = folder.display();

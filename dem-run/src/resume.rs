@@ -1,8 +1,8 @@
 //! A run that goes on from its history, to the bit as if it had never stopped.
 
 use crate::check::{free_space, size};
-use crate::history::{Checkpoint, History, HistoryError, Kept};
-use crate::output::print_line;
+use crate::history::{Checkpoint, History, HistoryError, Kept, refuse_busy};
+use crate::output::{number, print_json, print_line};
 use crate::record::Recorder;
 use crate::run::{Execution, Run, RunError, RunOptions, State, handle_signals, run_in};
 use crate::scene::{self, Scene, differences};
@@ -45,9 +45,7 @@ pub fn resume(options: &ResumeOptions) -> Result<(), RunError> {
     let interrupt = handle_signals()?;
     options.execution.start_threads()?;
     let history = History::open(&options.history)?;
-    if let Some(process) = history.writer()? {
-        return Err(HistoryError::Busy { path: options.history.clone(), process }.into());
-    }
+    refuse_busy(&options.history)?;
     let scene = scene_of(&history, options)?;
     match scene.dimension {
         2 => resume_in::<D2>(&scene, &history, options, &interrupt),
@@ -121,8 +119,12 @@ fn resume_in<D: Dim>(
         .map_err(|mismatch| RunError::InputOutput(format!("{shown}: {mismatch}; run the scene again")))?;
     if state.world.steps >= scene.time.steps() || state.course.ending(&state.world).is_some() {
         let time = state.world.time;
+        if options.json {
+            return Ok(print_json(&serde_json::json!({ "history": path, "time": time, "steps_made": 0 }))?);
+        }
         return Ok(print_line(&format!(
-            "nothing to do: the run ended at t = {time} s; --until T goes on to a later end, --set stop=null beyond a stop"
+            "nothing to do: the run ended at t = {} s; --until T goes on to a later end, --set stop=null beyond a stop",
+            number(time)
         ))?);
     }
     let kept = kept(history, scene, &checkpoint)?;

@@ -236,6 +236,7 @@ impl<D: Dim> Run<'_, D> {
     }
 
     fn failed(&mut self, error: StepError) -> Result<Ending, RunError> {
+        self.state.course.rejected += u64::from(matches!(error, StepError::NotAccepted { .. }));
         let help = match (&error, &self.scene.solver.kind) {
             (StepError::NotAccepted { .. }, SolverKind::GaussSeidel(_)) => {
                 "a smaller time.step, more max_sweeps or a larger solver.accept may help"
@@ -306,6 +307,7 @@ impl<D: Dim> State<D> {
             grains: world.grains.len(),
             solid_fraction,
             bonds: world.bonds.len(),
+            gap_tolerance: scene.bonds.as_ref().filter(|bonds| bonds.bear()).map(|bonds| bonds.gap_tolerance),
             elastic: world.bonds.iter().any(|b| b.stiffness.is_some()),
             broken: course.broken,
             twists: scene.twists(),

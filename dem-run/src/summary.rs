@@ -43,6 +43,9 @@ pub struct Summary {
     pub solid_fraction: Option<f64>,
     /// Bonds at the start.
     pub bonds: usize,
+    /// Where the scene asks for bonds that bear anything, the gap up to which it bonds grains, over their mean diameter (–).
+    #[serde(skip)]
+    pub gap_tolerance: Option<f64>,
     /// Whether they are elastic: then the sample may deform before any breaks.
     pub elastic: bool,
     /// Bonds broken in tension, shear, rolling and twist.
@@ -90,9 +93,32 @@ impl fmt::Display for Summary {
             Some(fraction) => writeln!(f, "sample           {} grains, solid fraction {fraction:.4}", self.grains)?,
             None => writeln!(f, "sample           {} grains", self.grains)?,
         }
-        if self.bonds > 0 {
-            self.write_bonds(f)?;
+        match self.gap_tolerance {
+            _ if self.bonds > 0 => self.write_bonds(f)?,
+            Some(gap) => writeln!(
+                f,
+                "bonds            none, though the scene asks for them: no two grains are within bonds.gap_tolerance, {gap} mean \
+                 diameters"
+            )?,
+            None => {}
         }
+        if self.steps > 0 {
+            self.write_solves(f)?;
+        }
+        writeln!(f, "CPU time         {:.1} s", self.cpu_time)?;
+        let file = self.history.display();
+        writeln!(f, "history          {file}\n\nlook at it with")?;
+        write!(f, "  dem-post info {file}")?;
+        let more = [("report", true), ("cracks", self.bonds > 0), ("chains", true), ("stress-strain", self.driven)];
+        for (command, _) in more.into_iter().filter(|(_, there)| *there && self.steps > 0) {
+            write!(f, "\n  dem-post {command} {file}")?;
+        }
+        Ok(())
+    }
+}
+
+impl Summary {
+    fn write_solves(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Work { sweeps, newton, factorisations } = self.work;
         let rate = |count: u64| count as f64 / self.steps.max(1) as f64;
         let took: Vec<String> = [(newton, "Newton iterations"), (factorisations, "factorisations"), (sweeps, "sweeps")]
@@ -118,23 +144,9 @@ impl fmt::Display for Summary {
         if self.bonds > 0 && !self.elastic {
             writeln!(f, "bond remainder   {:.2e} J, the work of intact bonds: it should be zero", self.bond_remainder)?;
         }
-        writeln!(f, "CPU time         {:.1} s", self.cpu_time)?;
-        let file = self.history.display();
-        writeln!(f, "history          {file}\n\nlook at it with")?;
-        writeln!(f, "  dem-post info {file}")?;
-        writeln!(f, "  dem-post report {file}")?;
-        if self.bonds > 0 {
-            writeln!(f, "  dem-post cracks {file}")?;
-        }
-        write!(f, "  dem-post chains {file}")?;
-        match self.driven {
-            true => write!(f, "\n  dem-post stress-strain {file}"),
-            false => Ok(()),
-        }
+        Ok(())
     }
-}
 
-impl Summary {
     fn write_bonds(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let broken: usize = self.broken.iter().sum();
         let [tension, shear, rolling, twist] = self.broken;

@@ -154,7 +154,8 @@ pub struct Report {
 pub fn read(history: &History, quiet: bool) -> Result<Report> {
     let bonds = history.bonds()?;
     if bonds.is_empty() {
-        let what = "cracks need bonds, and this scene has none: add `bonds` to the scene".into();
+        let what =
+            "cracks need bonds, and none was formed: add `bonds` to the scene, or raise its bonds.gap_tolerance".into();
         return Err(PostError::Lacking { path: history.path().into(), what });
     }
     let ruptures = history.ruptures()?;

@@ -10,6 +10,7 @@ use crate::replace::replace;
 
 use super::codes::{BondCode, ContactCode};
 use super::error::{HistoryError, Result, refused, while_writing};
+use super::lock;
 use super::reader::History;
 use super::schema::RuptureRow;
 use super::source::Source;
@@ -175,12 +176,11 @@ pub enum CopyAs {
 /// by false. Returns the length of the copy, bytes.
 ///
 /// # Errors
-/// [`HistoryError::Busy`] where the history is being written, and what reading and writing may fail of; `path` is then
+/// [`HistoryError::Busy`] where the history, or what stands at `path`, is being written, and what reading and writing may fail of; `path` is then
 /// as it was.
 pub fn copy(history: &History, path: &Path, how: CopyAs, tell: &mut dyn FnMut(f64) -> bool) -> Result<u64> {
-    if let Some(process) = history.writer()? {
-        return Err(HistoryError::Busy { path: history.path().into(), process });
-    }
+    lock::refuse_busy(history.path())?;
+    lock::refuse_busy(path)?;
     replace(path, refused(path), |part| copy_to(history, part, how, tell))
 }
 

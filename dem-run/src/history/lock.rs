@@ -8,6 +8,8 @@ use std::path::Path;
 use rustix::fs::{FlockOperation, fcntl_lock};
 use rustix::process::{Flock, FlockType, fcntl_getlk};
 
+use super::error::{HistoryError, Result, refused};
+
 /// Locks the file at `path` until the value is dropped. A process must not open it a second time and close it again
 /// meanwhile: that would end the lock.
 pub(super) fn hold(path: &Path) -> io::Result<File> {
@@ -16,6 +18,20 @@ pub(super) fn hold(path: &Path) -> io::Result<File> {
         // a file system without locks: the run must not fail for that
         Ok(()) | Err(rustix::io::Errno::NOLCK | rustix::io::Errno::NOTSUP | rustix::io::Errno::INVAL) => Ok(file),
         Err(error) => Err(error.into()),
+    }
+}
+
+/// Refuses the file at `path`, if there is one, while another process writes it.
+///
+/// # Errors
+/// [`HistoryError::Busy`]; [`HistoryError::Io`] where the file cannot be read.
+pub fn refuse_busy(path: &Path) -> Result<()> {
+    if !path.is_file() {
+        return Ok(());
+    }
+    match holder(path).map_err(|error| refused(path)("read", error))? {
+        Some(process) => Err(HistoryError::Busy { path: path.into(), process }),
+        None => Ok(()),
     }
 }
 

@@ -72,6 +72,7 @@ pub use codes::{BondStatus, ContactStatus, RuptureMode, WallDrive, WallKind};
 pub use copy::{CopyAs, Kept, copy};
 pub(crate) use error::reason;
 pub use error::{HistoryError, Result};
+pub use lock::refuse_busy;
 pub use reader::{History, Series};
 pub use schema::SCHEMA_VERSION;
 pub use writer::Writer;

@@ -64,7 +64,7 @@ impl Writer {
     /// does not harm a file that stood there.
     ///
     /// # Errors
-    /// [`HistoryError::Exists`] where `path` stands and `overwrite` is false; [`HistoryError::Io`] and
+    /// [`HistoryError::Exists`] where `path` stands and `overwrite` is false; [`HistoryError::Busy`] while another process writes it; [`HistoryError::Io`] and
     /// [`HistoryError::Write`] where the file cannot be made; [`HistoryError::Shape`] where `layout` contradicts itself.
     pub fn create(path: &Path, layout: &Layout, overwrite: bool) -> Result<Self> {
         if path.exists() && !overwrite {
@@ -96,6 +96,7 @@ impl Writer {
 
     /// Makes the file beside `path`, fills it by `fill`, turns to HDF5's single-writer mode and moves it to `path`.
     fn begin(path: &Path, layout: &Layout, fill: impl FnOnce(&mut Self) -> Result<()>) -> Result<Self> {
+        lock::refuse_busy(path)?;
         let failed = refused(path);
         replace(path, &failed, |part| {
             let mut writer = Self::build(path, part, layout, false)?;

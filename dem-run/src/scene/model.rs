@@ -353,6 +353,12 @@ impl Time {
 }
 
 impl Bonds {
+    /// Whether a bond bears anything.
+    #[must_use]
+    pub fn bear(&self) -> bool {
+        self.strength.or(self.stress).is_some_and(|limit| limit > 0.0)
+    }
+
     /// Tensile strength r_coh (N) of the bond between two grains of mean diameter `mean_diameter` (m):
     /// the force given, or σ·a·t in 2D, σ·π·a²/4 in 3D, t the `thickness` (m).
     #[must_use]

@@ -162,6 +162,8 @@ fn an_interrupted_run_goes_on_from_its_last_step() {
     let before = here.read("a.h5");
     let told = here.dem_run(&["resume", "a.h5", "--quiet"]).succeeds();
     assert!(told.stdout.contains("nothing to do"), "{}", told.stdout);
+    let told = here.dem_run(&["resume", "a.h5", "--quiet", "--json"]).json();
+    assert_eq!(told["steps_made"], 0);
     assert_eq!(here.read("a.h5"), before);
 }
 
@@ -237,7 +239,14 @@ fn files_that_cannot_go_on_are_left_as_they_are() {
 fn a_history_that_is_being_written_is_refused() {
     let here = Folder::new();
     let endless = Endless::start(&here, "a.h5", 0);
-    here.dem_run(&["resume", "a.h5"]).fails(4, &["being written by process", &endless.id().to_string()]);
+    let words = ["a.h5", "being written by process", &endless.id().to_string()];
+    here.dem_run(&["resume", "a.h5"]).fails(4, &words);
+    // nor does another run take its place
+    let scene = config("two-grains.json");
+    here.dem_run(&["run", &scene, "-o", "a.h5", "--force"]).fails(4, &words);
+    here.run_config("two-grains.json", &["-o", "b.h5", "--quiet"]);
+    here.dem_post(&["pack", "b.h5", "-o", "a.h5", "--force"]).fails(4, &words);
+    assert!(here.history("a.h5").writer().expect("a lock").is_some());
 }
 
 #[test]

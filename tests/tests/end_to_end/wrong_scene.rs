@@ -34,6 +34,8 @@ fn wrong_values_are_refused_with_their_place_and_the_remedy() {
         ("two-grains.json", "sample.grains.1.center=[0, 0]", &["sample.grains.1.center", "the centre of grain 0"]),
         // nearly: the direction between them would be noise
         ("two-grains.json", "sample.grains.1.center=[1e-12, 0]", &["grains 0 and 1 coincide", "move one"]),
+        ("two-grains.json", "sample.grains.1.center=[1e-3, 0]", &["grains 0 and 1 overlap by 3.000e-3 m", "move one"]),
+        ("two-grains.json", "time.step=1", &["time.step", "at most time.end (0.15 s)"]),
         (
             "column.json",
             "walls.bottom.shape.plane.place={\"at\": [0, 1e-3]}",
@@ -180,4 +182,45 @@ fn a_run_that_does_not_converge_is_exit_3_and_keeps_its_history() {
         assert_eq!((history.steps().last(), history.observed_steps()), (Some(&(steps as i64)), steps));
         here.dem_post(&["info", "a.h5"]).succeeds();
     }
+}
+
+#[test]
+fn what_check_finds_is_json_where_that_is_asked_for() {
+    let here = Folder::new();
+    here.write("comma.json", "{ \"dimension\": 2,\n  \"seed\" 1 }");
+    let outcome = here.dem_run(&["check", "comma.json", "--json"]);
+    let found: serde_json::Value = serde_json::from_str(&outcome.stdout).expect("JSON");
+    assert_eq!((&found["problems"][0]["line"], &found["problems"][0]["column"]), (&2.into(), &10.into()), "{found}");
+    outcome.fails(2, &["line 2, column 10"]);
+}
+
+#[test]
+fn check_tells_where_the_last_step_ends() {
+    let here = Folder::new();
+    let scene = config("two-grains.json");
+    let told = here.dem_run(&["check", &scene, "--set", "time.step=0.1"]).succeeds().stdout;
+    assert!(told.contains("2 of 0.1 s, to 0.15 s; the last ends at 0.2"), "{told}");
+    assert!(!here.dem_run(&["check", &scene]).succeeds().stdout.contains("the last ends"));
+}
+
+#[test]
+fn bonds_that_were_not_formed_are_told() {
+    let here = Folder::new();
+    let far = ["--set", "sample.grains.1.center=[5e-3, 0]", "--quiet", "-o", "far.h5"];
+    let told = here.dem_run(&[&["run", &config("two-grains.json")], &far[..]].concat()).succeeds().stdout;
+    assert!(told.contains("no two grains are within bonds.gap_tolerance, 0.001 mean diameters"), "{told}");
+    here.dem_post(&["cracks", "far.h5"]).fails(2, &["none was formed", "bonds.gap_tolerance"]);
+    let none = here.dem_run(&["run", &config("column.json"), "--set", "time.end=1e-3", "--quiet"]).succeeds().stdout;
+    assert!(!none.contains("bonds  "), "{none}");
+}
+
+#[test]
+fn a_run_without_a_step_claims_nothing() {
+    let here = Folder::new();
+    let weak = ["--set", "solver.kind={\"gauss_seidel\": {\"max_sweeps\": 3}}", "--quiet"];
+    let outcome = here.dem_run(&[&["run", &config("column.json")], &weak[..]].concat());
+    for claim in ["nothing to solve", "worst residual", "dem-post chains"] {
+        assert!(!outcome.stdout.contains(claim), "{}", outcome.stdout);
+    }
+    outcome.fails(3, &["no convergence at t = 0"]);
 }

@@ -155,6 +155,9 @@ fn time_and_output(report: &mut Report, scene: &Scene) {
     report.positive("time.step", time.step, "s");
     report.positive("time.end", time.end, "s");
     let steps = time.end / time.step;
+    if report.problems.len() == before && time.step > time.end {
+        report.wrong("time.step", format!("{:?}", time.step), format!("at most time.end ({:?} s)", time.end));
+    }
     if report.problems.len() == before && steps > MAX_STEPS {
         let found = format!("{:?}, which makes {steps:.1e} steps", time.step);
         report.wrong("time.step", found, format!("at most {MAX_STEPS:.0e} steps to time.end"));
