@@ -240,9 +240,24 @@ impl Document {
             let path = error.path().iter().filter_map(segment).fold(String::new(), |path, key| join(&path, &key));
             match self.non_finite.get(&path) {
                 Some(literal) => overflow(&path, literal),
-                None => explain(path, &error.into_inner().to_string()),
+                None => {
+                    let kinds = self.kinds::<T>(&path);
+                    explain(path, &error.into_inner().to_string(), &kinds)
+                }
             }
         })
+    }
+
+    /// The kinds that may stand at `path`, none where it is no place for one: what an unknown one would be told.
+    fn kinds<T: DeserializeOwned>(&self, path: &str) -> Vec<String> {
+        let mut root = self.root.clone();
+        let Some(place) = root.pointer_mut(&format!("/{}", path.replace('.', "/"))) else { return Vec::new() };
+        *place = Value::String("?".into());
+        let told = T::deserialize(root).err().map_or(String::new(), |error| error.to_string());
+        match told.strip_prefix("unknown variant `?`, ") {
+            Some(expected) => quoted(expected).map(String::from).collect(),
+            None => Vec::new(),
+        }
     }
 }
 
@@ -260,7 +275,7 @@ fn segment(segment: &Segment) -> Option<String> {
 }
 
 /// Serde's message about the value at `path`, in the terms of a scene.
-fn explain(path: String, message: &str) -> Problem {
+fn explain(path: String, message: &str, kinds: &[String]) -> Problem {
     for start in ["unknown field ", "unknown variant "] {
         if let Some((wrong, expected)) = message.strip_prefix(start).and_then(|rest| rest.split_once(", ")) {
             return unknown_name(path, wrong.trim_matches('`'), expected);
@@ -271,8 +286,15 @@ fn explain(path: String, message: &str) -> Problem {
     }
     for start in ["invalid type: ", "invalid value: ", "invalid length "] {
         if let Some((found, expected)) = message.strip_prefix(start).and_then(|rest| rest.rsplit_once(", expected ")) {
-            let found = if start == "invalid length " { format!("{found} values") } else { shorten(found) };
-            return Problem::new(path, found, plain_type(expected));
+            let found = if start == "invalid length " { format!("{found} values") } else { plain_value(found) };
+            let allowed = match path.rsplit('.').next() {
+                Some(kind) if expected == "newtype variant" => {
+                    format!("an object with its settings: {{ \"{kind}\": {{ … }} }}")
+                }
+                _ => plain_type(expected),
+            };
+            let which = if kinds.is_empty() { String::new() } else { format!("; the kinds are {}", kinds.join(", ")) };
+            return Problem::new(path, found, allowed + &which);
         }
     }
     Problem::new(path, "a value that does not fit", shorten(message))
@@ -280,13 +302,30 @@ fn explain(path: String, message: &str) -> Problem {
 
 /// A name that the model does not have, where serde lists those it `expected`.
 fn unknown_name(path: String, wrong: &str, expected: &str) -> Problem {
-    // names stand between backquotes: "one of `a`, `b`", "`a` or `b`"
-    let names: Vec<&str> = expected.split('`').skip(1).step_by(2).collect();
+    let names: Vec<&str> = quoted(expected).collect();
     let inside = path.rsplit('.').next() == Some(wrong);
     let place = if inside { path } else { join(&path, wrong) };
     let allowed = if names.is_empty() { "no name here".to_string() } else { names.join(", ") };
     Problem::new(place, format!("the unknown name \"{}\"", shorten(wrong)), allowed)
         .with_nearest(nearest(wrong, names.iter().copied()))
+}
+
+/// The names between backquotes, as in "one of `a`, `b`" and "`a` or `b`".
+fn quoted(text: &str) -> impl Iterator<Item = &str> {
+    text.split('`').skip(1).step_by(2)
+}
+
+/// What serde found, in the terms of JSON.
+fn plain_value(found: &str) -> String {
+    match found {
+        "unit variant" => "the name alone".to_string(),
+        "newtype variant" | "struct variant" | "map" => "an object { … }".to_string(),
+        "sequence" => "an array [ … ]".to_string(),
+        other => match other.split_once('`') {
+            Some(("floating point " | "integer " | "boolean ", value)) => value.trim_end_matches('`').to_string(),
+            _ => shorten(other),
+        },
+    }
 }
 
 /// What serde expected, in the terms of JSON.

@@ -337,7 +337,7 @@ mod tests {
             (r#""vary": []"#, &["vary (line 1", "an empty list", "at least one object"][..]),
             (r#""vary": [{}]"#, &["vary.0", "an empty object"]),
             (r#""vary": [{"seed": []}]"#, &["vary.0.seed (line 1", "an empty list", "at least one value"]),
-            (r#""vary": [{"seed": 3}]"#, &["vary.0.seed", "integer `3`", "a list [ … ], or a range"]),
+            (r#""vary": [{"seed": 3}]"#, &["vary.0.seed", "found    3", "a list [ … ], or a range"]),
             (r#""vary": [{"seed": {"from": 1, "cuont": 2}}]"#, &["vary.0.seed.cuont", "nearest  count"]),
             (r#""vary": [{"seed": {"from": 1, "count": 0}}]"#, &["vary.0.seed.count", "at least 1"]),
             (r#""vary": [{"time.end": {"from": 0, "to": 1, "count": 3, "spacing": "geometric"}}]"#, &["not zero"]),

@@ -16,7 +16,10 @@ fn wrong_values_are_refused_with_their_place_and_the_remedy() {
         ("column.json", "material.density=1", &["material", "nearest  materials"]),
         ("compression.json", "bonds.strenght=5", &["bonds.strenght", "nearest  bonds.strength"]),
         ("column.json", "time.step=\"short\"", &["time.step", "found    string \"short\"", "a number"]),
-        ("column.json", "dimension=[2]", &["dimension", "allowed"]),
+        ("column.json", "dimension=[2]", &["dimension", "found    an array", "allowed"]),
+        ("column.json", "solver.kind=newton", &["solver.kind", "the name alone", "{ \"newton\": { … } }"]),
+        ("compression.json", "walls.top.velocity=0.1", &["found    0.1\n", "the kinds are constant, ramp"]),
+        ("compression.json", "bonds.stiffness=true", &["found    true\n", "the kinds are springs, young"]),
         ("two-grains.json", "bonds.twist=0.1", &["bonds.twist", "dimension 2", "disks do not twist"]),
         ("bent-arm.json", "bonds.twist=0", &["bonds.twist", "> 0", "free to spin"]),
         (

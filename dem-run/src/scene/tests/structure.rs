@@ -98,7 +98,7 @@ const WRONG_TYPES: &[(&str, &str, &str, &str, &str)] = &[
     ("{ \"constant\": -1 }", "-1", "walls.roller.velocity", "-1", "by its name"),
     ("{ \"constant\": -1 }", "{ \"ramp\": 1 }", "walls.roller.velocity.ramp", "1", "an object"),
     ("{ \"constant\": -1 }", "{ \"table\": [[1, 2], [3]] }", "walls.roller.velocity.table.1", "1", "2 values"),
-    ("{ \"constant\": -1 }", "{ \"constant\": -1, \"table\": [] }", "walls.roller.velocity", "map", "one name"),
+    ("{ \"constant\": -1 }", "{ \"constant\": -1, \"table\": [] }", "walls.roller.velocity", "an object", "one name"),
     ("\"every_steps\": 10", "\"every_steps\": null", "output", "neither", "exactly one"),
 ];
 
