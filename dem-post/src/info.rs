@@ -1,10 +1,12 @@
 //! What a history holds, in about twenty lines.
 
+use std::path::Path;
+
 use dem_run::history::{History, RuptureMode, Series, WallDrive};
 use serde::Serialize;
 
 use crate::cracks::Modes;
-use crate::output::{Result, facts, number, quantity};
+use crate::output::{Result, facts, in_shell, number, quantity};
 
 /// What a history holds.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -43,6 +45,8 @@ pub struct Report {
     pub last: Option<(i64, f64)>,
     /// Number of observed steps.
     pub observed: usize,
+    /// Whether frames hold the reactions of the contacts.
+    pub reactions: bool,
     /// Contacts at the last frame.
     pub contacts: Option<usize>,
     /// Greatest residual, and the time at which it occurred (s).
@@ -99,6 +103,7 @@ pub fn read(history: &History) -> Result<Report> {
         last: (frames > 0).then(|| moment(frames - 1)),
         observed: history.observed_steps(),
         contacts: if frames > 0 { Some(history.contacts(frames - 1)?.len()) } else { None },
+        reactions: history.has_reactions(),
         observables: history.observable_names()?,
         ..Report::default()
     };
@@ -143,12 +148,16 @@ impl Report {
     /// The report as lines.
     pub fn table(&self) -> String {
         let mut lines = self.facts();
-        let hint = if self.bonds > 0 {
-            "cracks|chains|velocities|stress-strain|frames|report"
-        } else {
-            "chains|velocities|stress-strain|report"
-        };
-        lines.push(("look further", format!("dem-post {hint} {}", self.file)));
+        let hints = [
+            ("cracks", self.bonds > 0),
+            ("chains", self.reactions),
+            ("velocities", true),
+            ("stress-strain", true),
+            ("frames", self.bonds > 0),
+            ("report", true),
+        ];
+        let hints: Vec<&str> = hints.iter().filter(|(_, there)| *there).map(|(name, _)| *name).collect();
+        lines.push(("look further", format!("dem-post {} {}", hints.join("|"), in_shell(Path::new(&self.file)))));
         facts(&lines)
     }
 

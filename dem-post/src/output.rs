@@ -6,7 +6,9 @@ use dem_run::history::HistoryError;
 use dem_run::run::RunError;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-pub use dem_run::output::{Folder, Text, WriteError, cell, default_folder, facts, number, print, quantity, short};
+pub use dem_run::output::{
+    Folder, Text, WriteError, cell, default_folder, facts, in_shell, number, print, quantity, short,
+};
 
 /// What can go wrong in an analysis.
 #[derive(Debug, thiserror::Error)]

@@ -86,7 +86,8 @@ Example:
   dem-run resume compression.h5 --until 0.6";
 
 const CHECK_EXAMPLE: &str = "\
-All wrong values are told at once, each with its place, what stood there and what is allowed.
+All values out of range are told at once, each with its place, what stood there and what is allowed; wrong syntax, names and
+types before them, one at a time.
 
 Example:
   dem-run check configs/compression.json --set time.step=5e-5";
@@ -553,7 +554,7 @@ fn apart(path: &Path, scene: &Scene, options: &RunOptions) -> Result<(), RunErro
     Ok(())
 }
 
-/// Refuses, before any work is done, a file that exists or is being written, or whose folder does not exist.
+/// Refuses, before any work is done, a file that exists or is being written, or whose folder is not there or takes no files.
 fn writable(path: &Path, option: &str, overwrite: bool) -> Result<(), RunError> {
     let shown = path.display();
     if path.is_dir() {
@@ -568,12 +569,14 @@ fn writable(path: &Path, option: &str, overwrite: bool) -> Result<(), RunError> 
         return Err(RunError::InputOutput(format!("{shown} exists: {remedy}")));
     }
     refuse_busy(path)?;
-    match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => {
-            let folder = folder.display();
-            Err(RunError::InputOutput(format!("{shown} cannot be written: there is no folder {folder}; make it first")))
-        }
-        _ => Ok(()),
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let refused = |why: String| Err(RunError::InputOutput(format!("{shown} cannot be written: {why}")));
+    if !folder.is_dir() {
+        return refused(format!("there is no folder {}; make it first", folder.display()));
+    }
+    match tempfile::tempfile_in(folder) {
+        Ok(_) => Ok(()),
+        Err(why) => refused(format!("no file can be made in {}: {why}", folder.display())),
     }
 }
 

@@ -102,6 +102,14 @@ pub fn default_folder(input: &Path, suffix: &str) -> PathBuf {
     name.into()
 }
 
+/// A path as a shell takes it: between quotes where it has more than letters, digits and what names usually have.
+#[must_use]
+pub fn in_shell(path: &Path) -> String {
+    let shown = path.display().to_string();
+    let plain = |c: char| c.is_alphanumeric() || "/._-+=:@%,".contains(c);
+    if !shown.is_empty() && shown.chars().all(plain) { shown } else { format!("'{}'", shown.replace('\'', r"'\''")) }
+}
+
 /// A row of a CSV file from numbers and words.
 #[macro_export]
 macro_rules! row {
@@ -250,6 +258,15 @@ mod tests {
         let mut text = Text::new(&["mode", "bonds"]);
         text.row(vec!["TENSION".into(), "7".into()]);
         assert_eq!(text.lines(), "mode     bonds\nTENSION      7\n");
+    }
+
+    #[test]
+    fn a_path_is_quoted_where_a_shell_would_part_it() {
+        for (path, text) in
+            [("runs/µ=0.3.h5", "runs/µ=0.3.h5"), ("my run.h5", "'my run.h5'"), ("a'b.h5", r"'a'\''b.h5'")]
+        {
+            assert_eq!(in_shell(Path::new(path)), text);
+        }
     }
 
     #[test]

@@ -303,6 +303,7 @@ impl<D: Dim> State<D> {
             ending,
             steps: world.steps,
             driven: course.driven.is_some(),
+            carries: scene.output.reactions && world.touches().any(|t| t.reaction.n != 0.0),
             time: world.time,
             grains: world.grains.len(),
             solid_fraction,

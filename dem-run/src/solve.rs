@@ -6,13 +6,16 @@ use std::path::PathBuf;
 use dem_core::contact::LocalSolve;
 use dem_core::problem::assembled::Assembled;
 use dem_core::solver::assembled::gauss_seidel;
-use dem_core::solver::{GaussSeidelSettings, Newton, NewtonSettings, SolveReport, SolveStatus, Start, StiffnessRatio};
+use dem_core::solver::{
+    GaussSeidelSettings, Newton, NewtonSettings, SolveReport, SolveStatus, Start, StiffnessRatio, Work,
+};
 use serde::Serialize;
 
 use crate::fclib::Problem;
 use crate::output::print_result;
 use crate::run::{RunError, cpu_time};
 use crate::scene;
+use crate::summary::told;
 
 /// A solver of problems from files.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum, Serialize)]
@@ -55,6 +58,8 @@ struct Solved {
     solver: Solver,
     converged: bool,
     iterations: u64,
+    #[serde(skip)]
+    work: Work,
     tolerance: f64,
     residual: f64,
     siconos_error: f64,
@@ -84,6 +89,7 @@ pub fn solve(options: &SolveOptions) -> Result<(), RunError> {
         solver: options.solver,
         converged: report.status == SolveStatus::Converged,
         iterations: report.work.iterations(),
+        work: report.work,
         tolerance: options.tolerance,
         residual: report.residual,
         siconos_error: at.siconos_error(),
@@ -92,11 +98,11 @@ pub fn solve(options: &SolveOptions) -> Result<(), RunError> {
     let printed = print_result(&solved, options.json);
     if !solved.converged {
         return Err(RunError::NoConvergence(format!(
-            "{}: residual {:.2e} after {} iterations, and {:.0e} was asked for; a larger --max-iterations, another \
+            "{}: residual {:.2e} after {}, and {:.0e} was asked for; a larger --max-iterations, another \
              --solver or a larger --tolerance may help",
             options.problem.display(),
             solved.residual,
-            solved.iterations,
+            solved.took(),
             solved.tolerance
         )));
     }
@@ -132,6 +138,12 @@ fn iterate(problem: &mut Assembled, options: &SolveOptions) -> SolveReport {
     }
 }
 
+impl Solved {
+    fn took(&self) -> String {
+        told(self.work, |count| count.to_string()).unwrap_or_else(|| "nothing to do".into())
+    }
+}
+
 impl fmt::Display for Solved {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "problem          {}", self.problem.display())?;
@@ -148,7 +160,7 @@ impl fmt::Display for Solved {
             Solver::GaussSeidel => "Gauss–Seidel",
             Solver::Newton => "Newton",
         };
-        writeln!(f, "status           {status} by {solver}, {} iterations", self.iterations)?;
+        writeln!(f, "status           {status} by {solver}, {}", self.took())?;
         writeln!(f, "residual         {:.2e} (tolerance {:.0e})", self.residual, self.tolerance)?;
         writeln!(f, "Siconos's error  {:.2e} (natural map with ρ = 1: depends on the units)", self.siconos_error)?;
         write!(f, "CPU time         {:.3} s", self.cpu_time)

@@ -1,7 +1,7 @@
 //! What a run tells at its end, on stdout.
 
 use crate::collapse::{Failure, STRAINS};
-use crate::output::number;
+use crate::output::{in_shell, number};
 use dem_core::solver::Work;
 use serde::Serialize;
 use std::fmt;
@@ -35,6 +35,9 @@ pub struct Summary {
     /// Whether a wall is driven: then there is a curve of stress and strain.
     #[serde(skip)]
     pub driven: bool,
+    /// Whether contacts carry normal forces at the end, and the history has them: then there are chains.
+    #[serde(skip)]
+    pub carries: bool,
     /// Simulated time (s).
     pub time: f64,
     /// Grains.
@@ -106,10 +109,11 @@ impl fmt::Display for Summary {
             self.write_solves(f)?;
         }
         writeln!(f, "CPU time         {:.1} s", self.cpu_time)?;
-        let file = self.history.display();
-        writeln!(f, "history          {file}\n\nlook at it with")?;
+        writeln!(f, "history          {}\n\nlook at it with", self.history.display())?;
+        let file = in_shell(&self.history);
         write!(f, "  dem-post info {file}")?;
-        let more = [("report", true), ("cracks", self.bonds > 0), ("chains", true), ("stress-strain", self.driven)];
+        let more =
+            [("report", true), ("cracks", self.bonds > 0), ("chains", self.carries), ("stress-strain", self.driven)];
         for (command, _) in more.into_iter().filter(|(_, there)| *there && self.steps > 0) {
             write!(f, "\n  dem-post {command} {file}")?;
         }
@@ -117,16 +121,19 @@ impl fmt::Display for Summary {
     }
 }
 
+/// The kinds of work that were done, each as `count` tells it; none where nothing was.
+pub(crate) fn told(work: Work, count: impl Fn(u64) -> String) -> Option<String> {
+    let Work { sweeps, newton, factorisations } = work;
+    let kinds = [(newton, "Newton iterations"), (factorisations, "factorisations"), (sweeps, "sweeps")];
+    let done = kinds.into_iter().filter(|(done, _)| *done > 0);
+    let words: Vec<String> = done.map(|(done, name)| format!("{} {name}", count(done))).collect();
+    (!words.is_empty()).then(|| words.join(", "))
+}
+
 impl Summary {
     fn write_solves(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Work { sweeps, newton, factorisations } = self.work;
-        let rate = |count: u64| count as f64 / self.steps.max(1) as f64;
-        let took: Vec<String> = [(newton, "Newton iterations"), (factorisations, "factorisations"), (sweeps, "sweeps")]
-            .into_iter()
-            .filter(|(count, _)| *count > 0)
-            .map(|(count, name)| format!("{:.2} {name}", rate(count)))
-            .collect();
-        let took = if took.is_empty() { "nothing to solve".into() } else { took.join(", ") + " a step" };
+        let rate = |count: u64| format!("{:.2}", count as f64 / self.steps.max(1) as f64);
+        let took = told(self.work, rate).map_or_else(|| "nothing to solve".into(), |took| took + " a step");
         writeln!(f, "solver           {took}")?;
         writeln!(
             f,

@@ -57,7 +57,7 @@ pub enum HistoryError {
         why: String,
     },
     /// Written by a newer program.
-    #[error("{} has schema version {found}, and this program reads up to {known}: use a newer dem-post",
+    #[error("{} has schema version {found}, and this program reads up to {known}: use a newer version of this program",
         .path.display())]
     Newer {
         /// The file.
