@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Measures what docs/cost.md says of spheres: `.venv/bin/python scripts/measure_spheres.py`, an hour and 1 GB.
+"""Measures what docs/cost.md says of spheres: `.venv/bin/python scripts/measure_spheres.py`, forty minutes and 1 GB.
 
 Cemented cylinders of 500 to 10,000 spheres, the scene cylinder-compression at other sizes, with each solver over the
 first steps, in which nothing breaks: CPU time of a step, memory, and what was reached. Draws docs/images/cost-spheres.png.
