@@ -167,13 +167,26 @@ pub fn resized<A: Vect, B: Vect>(rows: A) -> B {
     out
 }
 
+/// The tangential rows in a frame of what a law holds: these rows, a vector along the contact, or nothing.
+#[inline(always)]
+pub(crate) fn tangential<D: Dim, T: Vect>(frame: &D::Frame, held: T) -> D::Tangent {
+    if T::LEN == D::N { D::split(frame, resized(held)).1 } else { resized(held) }
+}
+
+/// The inverse of [`tangential`].
+#[inline(always)]
+pub(crate) fn held<D: Dim, T: Vect>(frame: &D::Frame, tangential: D::Tangent) -> T {
+    if T::LEN == D::N { resized(D::compose(frame, 0.0, tangential)) } else { resized(tangential) }
+}
+
 /// 1 − cos φ for s = sin φ, with all digits where φ is small.
 fn versine(s: f64) -> f64 {
     let square = s * s;
     square / (1.0 + (1.0 - square).max(0.0).sqrt())
 }
 
-/// The axes of a contact that its rows need: the whole frame, or the normal alone where nothing rubs.
+/// The axes of a contact that its rows need: the whole frame, or in space the normal alone where nothing rubs or rolls, or what rubs
+/// is a vector.
 pub trait Axes<D: Dim>: Copy + Debug + PartialEq + Send + Sync + 'static {
     /// Those of a frame.
     fn of(frame: D::Frame) -> Self;
@@ -195,6 +208,9 @@ pub trait Dim: Copy + Debug + Default + Send + Sync + 'static {
     type Tangent: Vect;
     /// Moment rows of a bond.
     type Moment: Moments;
+    /// What the tangential rows of a dry contact are held as: in the plane those of its frame, in space a vector along the contact,
+    /// which needs no tangents.
+    type Slide: Vect;
     /// Orthonormal frame (n, t…) of a contact.
     type Frame: Axes<Self>;
     /// The tangents of a frame as numbers, where the normal does not give them: none in the plane.
@@ -240,6 +256,8 @@ pub trait Dim: Copy + Debug + Default + Send + Sync + 'static {
     fn about_axes(frame: &Self::Frame, torque: Self::Spin) -> Self::Moment;
     /// The torque x × f of a force with lever x.
     fn torque(lever: Self::Vector, force: Self::Vector) -> Self::Spin;
+    /// The velocity ω × x of a point at x of a body that turns.
+    fn velocity(spin: Self::Spin, place: Self::Vector) -> Self::Vector;
     /// The orientation of a body that has not turned.
     fn unturned() -> Self::Orientation;
     /// The orientation after turning by the rotation vector `turn` (rad).
@@ -332,6 +350,7 @@ impl Dim for D2 {
     type Spin = SVector<f64, 1>;
     type Tangent = SVector<f64, 1>;
     type Moment = SVector<f64, 1>;
+    type Slide = SVector<f64, 1>;
     type Frame = SVector<f64, 2>;
     type Tangents = V0;
     type Orientation = SVector<f64, 1>;
@@ -378,6 +397,9 @@ impl Dim for D2 {
     fn torque(x: Self::Vector, f: Self::Vector) -> Self::Spin {
         [x[0] * f[1] - x[1] * f[0]].into()
     }
+    fn velocity(spin: Self::Spin, x: Self::Vector) -> Self::Vector {
+        [-spin[0] * x[1], spin[0] * x[0]].into()
+    }
     fn unturned() -> Self::Orientation {
         [0.0].into()
     }
@@ -404,6 +426,7 @@ where
     type Spin = SVector<f64, 3>;
     type Tangent = SVector<f64, 2>;
     type Moment = SVector<f64, MOMENTS>;
+    type Slide = SVector<f64, 3>;
     type Frame = Frame3;
     type Tangents = SVector<f64, 6>;
     type Orientation = SVector<f64, 4>;
@@ -475,8 +498,13 @@ where
         }
         about
     }
+    #[inline(always)]
     fn torque(x: Self::Vector, f: Self::Vector) -> Self::Spin {
         x.cross(&f)
+    }
+    #[inline(always)]
+    fn velocity(spin: Self::Spin, x: Self::Vector) -> Self::Vector {
+        spin.cross(&x)
     }
     fn unturned() -> Self::Orientation {
         [1.0, 0.0, 0.0, 0.0].into()

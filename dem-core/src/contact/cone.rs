@@ -7,7 +7,7 @@
 //! Source: the cone of Coulomb with rolling resistance, Guessasma & Fortin 2011 with the rolling of Taboada,
 //! Estrada & Radjaï 2006.
 
-use crate::dim::{Moments, Vect, resized};
+use crate::dim::{Moments, Vect};
 use nalgebra::SVector;
 use std::ops::{Add, AddAssign, Mul, Sub};
 
@@ -36,12 +36,6 @@ impl<T: Vect, B: Moments> Local<T, B> {
     #[inline(always)]
     pub fn dot(&self, other: &Self) -> f64 {
         self.n * other.n + self.t.dot(&other.t) + self.m.dot(&other.m)
-    }
-
-    /// The same rows in groups of other lengths: those that only one of the two has are zero, or left out.
-    #[inline(always)]
-    pub(crate) fn resized<U: Vect, C: Moments>(&self) -> Local<U, C> {
-        Local { n: self.n, t: resized(self.t), m: resized(self.m) }
     }
 }
 

@@ -180,7 +180,8 @@ impl Law for Frictionless {
     }
 }
 
-/// Signorini–Coulomb: a normal and the tangential rows.
+/// Signorini–Coulomb: a normal row, and the tangential rows or, since Coulomb's disk looks alike from every tangent, a tangential
+/// vector.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coulomb<T> {
     inverse_n: f64,
@@ -205,7 +206,8 @@ impl<T: Vect> Coulomb<T> {
 impl<T: Vect> Law for Coulomb<T> {
     type T = T;
     type B = V0;
-    type Axes<D: Dim> = D::Frame;
+    // in the plane the normal is the whole frame
+    type Axes<D: Dim> = D::Vector;
 
     /// Exact: n and t are not coupled, so Signorini's r_n comes first and Coulomb clips r_t to its disk.
     #[inline(always)]

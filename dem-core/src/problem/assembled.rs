@@ -461,15 +461,15 @@ impl<D: Dim> Visitor<D> for List<D> {
         self.0.push(Item {
             link: c.link.whole(),
             arms: c.law.arms(),
-            tangents: L::T::LEN,
+            tangents: L::T::LEN.min(D::Tangent::LEN),
             moments: L::B::LEN,
             cone: c.law.cone(),
             associated: c.law.associated(),
             shift: c.law.shift(),
             bias: c.law.bias(),
             compliance: c.law.compliance(),
-            carried: c.law.carried().resized(),
-            r: c.r.resized(),
+            carried: c.link.in_frame(&c.law.carried()),
+            r: c.link.in_frame(&c.r),
         });
     }
 }

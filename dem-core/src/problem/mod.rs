@@ -7,8 +7,8 @@ pub mod assembled;
 pub(crate) mod blocks;
 pub mod residual;
 
-use crate::contact::{Arms, Block, Bonded, Coulomb, Elastic, Frictionless, Law, Local};
-use crate::dim::{Axes, Dim, Moments, Vect, resized};
+use crate::contact::{Arms, Block, Bonded, Coulomb, Elastic, Frictionless, Law, Local, Padded};
+use crate::dim::{Axes, Dim, Moments, Vect, held, resized, tangential};
 use std::marker::PhantomData;
 use std::sync::Arc;
 
@@ -54,7 +54,34 @@ impl<D: Dim, A: Axes<D>> Link<D, A> {
 
     /// The same with a whole frame: where the axes are a normal alone, any with this normal.
     pub fn whole(&self) -> Link<D> {
-        Link::new(self.nodes, self.axes.frame().copied().unwrap_or_else(|| D::frame(self.axes.normal())))
+        Link::new(self.nodes, self.frame())
+    }
+
+    fn frame(&self) -> D::Frame {
+        self.axes.frame().copied().unwrap_or_else(|| D::frame(self.axes.normal()))
+    }
+
+    /// The rows of the contact in its [whole](Link::whole) frame.
+    #[inline]
+    pub(crate) fn in_frame<T: Vect, B: Moments>(&self, r: &Local<T, B>) -> Padded {
+        let t = tangential::<D, T>(&self.frame(), r.t);
+        Local { n: r.n, t: resized(t), m: resized(r.m) }
+    }
+
+    /// The inverse of [`Link::in_frame`].
+    #[inline]
+    pub(crate) fn held<T: Vect, B: Moments>(&self, r: &Padded) -> Local<T, B> {
+        Local { n: r.n, t: held::<D, T>(&self.frame(), resized(r.t)), m: resized(r.m) }
+    }
+
+    /// The impulse on node i as a vector.
+    #[inline(always)]
+    pub(crate) fn impulse<T: Vect, B: Moments>(&self, r: &Local<T, B>) -> D::Vector {
+        match self.axes.frame() {
+            Some(frame) if T::LEN > 0 => D::compose(frame, r.n, resized(r.t)),
+            None if T::LEN > 0 => self.axes.normal() * r.n + resized::<T, D::Vector>(r.t),
+            _ => self.axes.normal() * r.n,
+        }
     }
 }
 
@@ -91,7 +118,7 @@ impl<D: Dim> Link<D> {
 pub type Group<D, L> = Vec<Contact<D, L>>;
 
 /// The law of a dry contact in dimension D.
-pub type Dry<D> = Coulomb<<D as Dim>::Tangent>;
+pub type Dry<D> = Coulomb<<D as Dim>::Slide>;
 /// The law of an intact rigid bond in dimension D.
 pub type Bond<D> = Bonded<<D as Dim>::Tangent, <D as Dim>::Moment>;
 /// The law of an intact elastic bond in dimension D.
@@ -178,7 +205,14 @@ impl<D: Dim, A: Axes<D>> Link<D, A> {
     ) -> Local<T, B> {
         let velocity = velocity_i - velocity_j;
         let Some(frame) = self.axes.frame() else {
-            return Local { n: self.axes.normal().dot(&velocity), ..Local::zero() };
+            let normal = self.axes.normal();
+            let n = normal.dot(&velocity);
+            if T::LEN == 0 {
+                return Local { n, ..Local::zero() };
+            }
+            debug_assert_eq!(T::LEN, D::N, "tangential rows without a frame");
+            let turn = D::velocity(spin_i * arms.lever[0] + spin_j * arms.lever[1], normal);
+            return Local { n, t: resized(velocity - normal * n - turn), ..Local::zero() };
         };
         let (n, t) = D::split(frame, velocity);
         if T::LEN == 0 {
@@ -203,19 +237,23 @@ impl<D: Dim> Span<'_, D> {
     #[inline(always)]
     pub fn apply<T: Vect, B: Moments>(&mut self, link: &Link<D, impl Axes<D>>, arms: Arms, r: Local<T, B>) {
         let [i, j] = link.nodes.map(|node| node as usize - self.first);
+        let impulse = link.impulse(&r);
         let (t, m): (D::Tangent, D::Moment) = (resized(r.t), resized(r.m));
-        let frame = link.axes.frame().filter(|_| T::LEN > 0);
-        let impulse = frame.map_or_else(|| link.axes.normal() * r.n, |frame| D::compose(frame, r.n, t));
         // without moment rows both torques are multiples of one
-        let slide = frame.filter(|_| B::LEN == 0).map_or_else(D::Spin::zero, |frame| D::spin_rows_transposed(frame, t));
-        let turn = |frame: &D::Frame, lever: f64, arm: f64| match B::LEN {
-            0 => slide * -lever,
-            _ => D::torque_of_rows(frame, t * -lever, m * arm),
+        let slide = match link.axes.frame() {
+            Some(frame) if B::LEN == 0 => D::spin_rows_transposed(frame, t),
+            None if T::LEN > 0 => D::torque(link.axes.normal(), resized(r.t)),
+            _ => D::Spin::zero(),
+        };
+        let turn = |lever: f64, arm: f64, inverse: f64| match link.axes.frame() {
+            Some(frame) if B::LEN > 0 => D::torque_of_rows(frame, t * -lever, m * arm) * inverse,
+            Some(_) => slide * -lever * inverse,
+            None => slide * (-lever * inverse),
         };
         let node = &mut self.all[i];
         node.velocity += impulse * node.inverse_mass;
-        if let Some(frame) = frame {
-            node.spin += turn(frame, arms.lever[0], arms.bending) * node.inverse_inertia;
+        if T::LEN > 0 {
+            node.spin += turn(arms.lever[0], arms.bending, node.inverse_inertia);
         }
         let node = &mut self.all[j];
         if j >= self.grains {
@@ -224,8 +262,8 @@ impl<D: Dim> Span<'_, D> {
             return;
         }
         node.velocity -= impulse * node.inverse_mass;
-        if let Some(frame) = frame {
-            node.spin += turn(frame, arms.lever[1], -arms.bending) * node.inverse_inertia;
+        if T::LEN > 0 {
+            node.spin += turn(arms.lever[1], -arms.bending, node.inverse_inertia);
         }
     }
 }

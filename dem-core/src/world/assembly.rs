@@ -5,7 +5,7 @@ use super::touch::{Kept, Touch, TouchStatus};
 use crate::body::{Grains, Wall, direction};
 use crate::bond::{Bond, BondStatus, Rupture};
 use crate::contact::{Arms, Bonded, Coulomb, Elastic, Frictionless, Law, Local};
-use crate::dim::{Dim, Moments, Vect};
+use crate::dim::{Axes, Dim, Moments, Vect, held, resized, tangential};
 use crate::problem::{Contact, ContactProblem, Group, Link, Node, Nodes, blocks};
 use std::sync::Arc;
 
@@ -285,13 +285,17 @@ impl<D: Dim> World<D> {
                 let block = link.block(i, j, Arms { lever, bending: 0.0 }, drive.map(|(d, _)| d));
                 let mu = self.friction_of(touch.pair);
                 if mu > 0.0 {
-                    problem.dry.push(Contact { link, law: Coulomb::new(block, lever, mu, bias), r: start.resized() });
+                    problem.dry.push(Contact {
+                        link: Link::new(link.nodes, link.axes),
+                        law: Coulomb::new(block, lever, mu, bias),
+                        r: Local { n: start.n, t: held::<D, _>(&link.axes, start.t), ..Local::zero() },
+                    });
                     places.dry.push(place as u32);
                 } else {
                     problem.frictionless.push(Contact {
                         link: Link::new(link.nodes, link.axes),
                         law: Frictionless::new(block, bias),
-                        r: start.resized(),
+                        r: Local { n: start.n, ..Local::zero() },
                     });
                     places.frictionless.push(place as u32);
                 }
@@ -355,8 +359,9 @@ pub(super) fn read_back<D: Dim, L: Law>(touches: &mut [Kept<D>], group: &Group<D
     for (contact, place) in group.iter().zip(places) {
         let touch = &mut touches[*place as usize];
         let arm = contact.law.arms().bending;
-        let r: Local<D::Tangent, D::Moment> = contact.r.resized();
-        touch.reaction = Local { n: r.n / h, t: r.t * (1.0 / h), m: r.m * (arm / h) };
+        let frame = D::with_tangents(contact.link.axes.normal(), &touch.tangents);
+        let (r, t) = (&contact.r, tangential::<D, _>(&frame, contact.r.t));
+        touch.reaction = Local { n: r.n / h, t: t * (1.0 / h), m: resized::<_, D::Moment>(r.m) * (arm / h) };
         touch.status = if touch.bond().is_some() {
             TouchStatus::Bonded
         } else if r.n == 0.0 {

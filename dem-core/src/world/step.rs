@@ -469,8 +469,8 @@ fn wall_impulses<D: Dim>(problem: &ContactProblem<D>, walls: usize) -> Vec<D::Ve
             sums[wall] -= impulse;
         }
     };
-    problem.dry.iter().for_each(|c| add(c.link.nodes, D::compose(&c.link.axes, c.r.n, c.r.t)));
-    problem.frictionless.iter().for_each(|c| add(c.link.nodes, c.link.axes * c.r.n));
+    problem.dry.iter().for_each(|c| add(c.link.nodes, c.link.impulse(&c.r)));
+    problem.frictionless.iter().for_each(|c| add(c.link.nodes, c.link.impulse(&c.r)));
     sums
 }
 

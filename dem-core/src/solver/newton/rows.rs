@@ -415,7 +415,12 @@ impl<D: Dim> Visitor<D> for Flatten<'_, D> {
     fn visit<L: Law>(&mut self, _: &Nodes<D>, c: &Contact<D, L>) {
         let rows = places(L::T::LEN, L::B::LEN);
         let (arms, unit) = (c.law.arms(), self.unknowns.unit);
-        let mut table = Table { rows: [[0.0; PAIR]; PADDED], tangents: L::T::LEN, moments: L::B::LEN, width: 0 };
+        let mut table = Table {
+            rows: [[0.0; PAIR]; PADDED],
+            tangents: L::T::LEN.min(D::Tangent::LEN),
+            moments: L::B::LEN,
+            width: 0,
+        };
         let link = c.link.whole();
         let first = self.node(&link, arms, 0, &mut table);
         let second = self.node(&link, arms, 1, &mut table);
@@ -424,7 +429,7 @@ impl<D: Dim> Visitor<D> for Flatten<'_, D> {
             self.rows.coefficients.extend_from_slice(&row[..table.width]);
         }
         // what the given velocities of nodes that cannot move do
-        let mut given: Padded = self.still.relative_velocity::<L::T, L::B>(&c.link, arms).resized();
+        let mut given = c.link.in_frame(&self.still.relative_velocity::<L::T, L::B>(&c.link, arms));
         given.n += c.law.bias();
         let normal: f64 = table.rows[0][..table.width].iter().map(|h| h * h).sum();
         self.normal.push(normal);
@@ -441,9 +446,9 @@ impl<D: Dim> Visitor<D> for Flatten<'_, D> {
             shift: c.law.shift() / unit,
             given,
             weights: self.ratio.weights(soft),
-            multiplier: c.r.resized() * (1.0 / unit),
+            multiplier: c.link.in_frame(&c.r) * (1.0 / unit),
             compliance: c.law.compliance() * unit,
-            carried: c.law.carried().resized() * (1.0 / unit),
+            carried: c.link.in_frame(&c.law.carried()) * (1.0 / unit),
             lag: None,
             size: table.rows[..rows.len()].iter().flat_map(|row| &row[..table.width]).map(|h| h * h).sum(),
         });

@@ -46,10 +46,10 @@ impl<D: Dim> Solvable for ContactProblem<D> {
             sweep(self, LocalSolve::Exact);
         }
         let mut reactions = Vec::with_capacity(self.len());
-        reactions.extend(self.bonded.iter().map(|c| c.r.resized()));
-        reactions.extend(self.elastic.iter().map(|c| c.r.resized()));
-        reactions.extend(self.dry.iter().map(|c| c.r.resized()));
-        reactions.extend(self.frictionless.iter().map(|c| c.r.resized()));
+        reactions.extend(self.bonded.iter().map(|c| c.link.in_frame(&c.r)));
+        reactions.extend(self.elastic.iter().map(|c| c.link.in_frame(&c.r)));
+        reactions.extend(self.dry.iter().map(|c| c.link.in_frame(&c.r)));
+        reactions.extend(self.frictionless.iter().map(|c| c.link.in_frame(&c.r)));
         let unit = mass_unit(&self.nodes);
         reactions.iter_mut().for_each(|r| *r = *r * (1.0 / unit));
         reactions
@@ -58,7 +58,7 @@ impl<D: Dim> Solvable for ContactProblem<D> {
     fn write_back(&mut self, reactions: &[Padded]) {
         fn group<D: Dim, L: Law>(group: &mut Group<D, L>, list: &[Padded], unit: f64) {
             for (c, r) in group.iter_mut().zip(list) {
-                c.r = (*r * unit).resized();
+                c.r = c.link.held(&(*r * unit));
             }
         }
         let unit = mass_unit(&self.nodes);
