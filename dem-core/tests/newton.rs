@@ -201,7 +201,8 @@ fn a_struck_beam_is_solved_from_no_guess() {
 fn gauss_seidel_approaches_newton_in_3d() {
     // a million sweeps come to 1e-7 here: what can be seen is that they head for the same velocities
     let problem = pressed::<D3>(0, true).contact_problem();
-    let found = solved(&problem, newton(1e-10, Start::StiffLimit));
+    // the last path leaves a load error of 3e-8 or 4e-6, as it is rounded: nothing beside the thousandth that is asked for
+    let found = solved(&problem, SolverSettings::Newton(common::newton(1e-10, 1e-10, 1e-5)));
     let [coarse, fine] = [1e-5, 1e-7].map(|tolerance| apart(&problem, &found, tolerance));
     assert!(fine <= 0.1 * coarse && fine <= 1e-3, "{coarse:e}, then {fine:e}");
 }
