@@ -167,16 +167,28 @@ pub fn resized<A: Vect, B: Vect>(rows: A) -> B {
     out
 }
 
-/// The tangential rows in a frame of what a law holds: these rows, a vector along the contact, or nothing.
+/// Whether `T` is a vector in the tangent plane ([`Dim::Slide`] in space), and not rows of a frame.
 #[inline(always)]
-pub(crate) fn tangential<D: Dim, T: Vect>(frame: &D::Frame, held: T) -> D::Tangent {
-    if T::LEN == D::N { D::split(frame, resized(held)).1 } else { resized(held) }
+pub(crate) fn is_vector<D: Dim, T: Vect>() -> bool {
+    D::Slide::LEN != D::Tangent::LEN && T::LEN == D::Slide::LEN
 }
 
-/// The inverse of [`tangential`].
+/// Tangential rows in a frame of what a law holds as `T`: how many.
 #[inline(always)]
-pub(crate) fn held<D: Dim, T: Vect>(frame: &D::Frame, tangential: D::Tangent) -> T {
-    if T::LEN == D::N { resized(D::compose(frame, 0.0, tangential)) } else { resized(tangential) }
+pub(crate) fn tangential_rows<D: Dim, T: Vect>() -> usize {
+    if is_vector::<D, T>() { D::Tangent::LEN } else { T::LEN }
+}
+
+/// These rows, of what a law holds: the rows themselves, a vector in the tangent plane, or nothing.
+#[inline(always)]
+pub(crate) fn in_frame<D: Dim, T: Vect>(frame: &D::Frame, t: T) -> D::Tangent {
+    if is_vector::<D, T>() { D::split(frame, resized(t)).1 } else { resized(t) }
+}
+
+/// The inverse of [`in_frame`].
+#[inline(always)]
+pub(crate) fn from_frame<D: Dim, T: Vect>(frame: &D::Frame, rows: D::Tangent) -> T {
+    if is_vector::<D, T>() { resized(D::compose(frame, 0.0, rows)) } else { resized(rows) }
 }
 
 /// 1 − cos φ for s = sin φ, with all digits where φ is small.
@@ -185,8 +197,8 @@ fn versine(s: f64) -> f64 {
     square / (1.0 + (1.0 - square).max(0.0).sqrt())
 }
 
-/// The axes of a contact that its rows need: the whole frame, or in space the normal alone where nothing rubs or rolls, or what rubs
-/// is a vector.
+/// The axes of a contact that its rows need: the whole frame; in space the normal alone where nothing rubs, or where friction is a
+/// vector.
 pub trait Axes<D: Dim>: Copy + Debug + PartialEq + Send + Sync + 'static {
     /// Those of a frame.
     fn of(frame: D::Frame) -> Self;
@@ -204,12 +216,12 @@ pub trait Dim: Copy + Debug + Default + Send + Sync + 'static {
     type Vector: Vect + Axes<Self>;
     /// Angular velocity, torque: one component in 2D, three in 3D.
     type Spin: Vect;
-    /// Tangential rows of a contact.
+    /// Tangential rows of a contact in a frame.
     type Tangent: Vect;
     /// Moment rows of a bond.
     type Moment: Moments;
-    /// What the tangential rows of a dry contact are held as: in the plane those of its frame, in space a vector along the contact,
-    /// which needs no tangents.
+    /// What the tangential rows of a dry contact are held as: in the plane the row of its frame, in space a vector in the tangent
+    /// plane, which needs no tangents.
     type Slide: Vect;
     /// Orthonormal frame (n, t…) of a contact.
     type Frame: Axes<Self>;

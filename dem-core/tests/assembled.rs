@@ -4,7 +4,7 @@ mod common;
 
 use common::{pressed, solver};
 use dem_core::contact::{BondFlow, Law, LocalSolve};
-use dem_core::dim::{D2, D3, D3Twist, Dim};
+use dem_core::dim::{D2, D3, D3Twist, Dim, V0, Vect};
 use dem_core::problem::ContactProblem;
 use dem_core::problem::assembled::{Assembled, AssemblyError, BlockMatrix, ContactRows, Parts};
 use dem_core::problem::residual::residual;
@@ -38,7 +38,13 @@ fn same<D: Dim>(mut problem: ContactProblem<D>) {
             let link = contact.link.whole();
             let found = problem.nodes.relative_velocity::<D::Tangent, D::Moment>(&link, contact.law.arms());
             assert!((u[at] - found.n).abs() <= 1e-12 * scale || contact.link.nodes[1] as usize >= problem.nodes.grains);
-            assert!((u[at + 1] - found.t[0]).abs() <= 1e-12 * scale);
+            let rows = u[at + 1..].iter().zip(found.t.as_slice());
+            assert!(rows.into_iter().all(|(a, b)| (a - b).abs() <= 1e-12 * scale));
+            // and what sweeps see of it, in space a vector
+            let held = problem.nodes.relative_velocity::<D::Slide, V0>(&contact.link, contact.law.arms());
+            assert!(
+                (held.n - found.n).abs() <= 1e-12 * scale && (held.t.norm() - found.t.norm()).abs() <= 1e-12 * scale
+            );
         }
         let (a, b) = (residual(&problem), assembled.residual());
         // the block of a contact with a driven wall is only estimated in the matrix-free problem

@@ -73,10 +73,13 @@ proptest! {
 
     /// The exact local solve of a dry contact satisfies the bipotential's fixed point, and its steps lead there.
     #[test]
-    fn dry_local_solves_agree(mu in 0.0..2.0f64, n in 0.3..3.0f64, t in 0.3..3.0f64, q in local(vect::<2>(), Just(V0::zeros()))) {
+    fn dry_local_solves_agree(
+        mu in 0.0..2.0f64, n in 0.3..3.0f64, t in 0.3..3.0f64,
+        row in local(vect::<1>(), Just(V0::zeros())), vector in local(vect::<3>(), Just(V0::zeros())),
+    ) {
         let block = Block { n, t, m: 1.0, w: 1.0, tm: 0.0 };
-        let velocity = |r: Local<SVector<f64, 2>, V0>| Local { n: n * r.n + q.n, t: r.t * t + q.t, m: r.m };
-        agree(Coulomb::<SVector<f64, 2>>::new(block, [0.5; 2], mu, 0.0), velocity);
+        dry_agree(block, mu, row);
+        dry_agree(block, mu, vector);
     }
 
     /// The same for bonds of either flow, with t and m coupled as for grains of different size.
@@ -97,6 +100,11 @@ proptest! {
         };
         agree(Bonded::new(block, Arms { lever: [0.5; 2], bending: 1.0 }, shift, k, flow), velocity);
     }
+}
+
+fn dry_agree<T: Vect>(block: Block, mu: f64, q: Local<T, V0>) {
+    let velocity = |r: Local<T, V0>| Local { n: block.n * r.n + q.n, t: r.t * block.t + q.t, m: r.m };
+    agree(Coulomb::<T>::new(block, [0.5; 2], mu, 0.0), velocity);
 }
 
 /// Iterate both local solves of a contact alone to their fixed points, and compare.

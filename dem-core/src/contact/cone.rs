@@ -16,16 +16,13 @@ use std::ops::{Add, AddAssign, Mul, Sub};
 pub struct Local<T, B> {
     /// Normal component.
     pub n: f64,
-    /// Tangential components; no rows without friction.
+    /// Tangential components, or a vector in the tangent plane; no rows without friction.
     pub t: T,
     /// Moment components, scaled by the mean diameter: bending, then twist; no rows without a bond.
     pub m: B,
 }
 
 impl<T: Vect, B: Moments> Local<T, B> {
-    /// Number of rows.
-    pub const ROWS: usize = 1 + T::LEN + B::LEN;
-
     /// All rows zero.
     #[inline(always)]
     pub fn zero() -> Self {

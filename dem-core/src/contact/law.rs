@@ -53,7 +53,7 @@ pub struct Arms {
 
 /// The law of one contact, with the constants that its local solve needs.
 pub trait Law: Copy + Send + Sync + 'static {
-    /// Tangential rows.
+    /// Tangential rows, or a vector in the tangent plane.
     type T: Vect;
     /// Moment rows.
     type B: Moments;

@@ -12,7 +12,7 @@ use super::residual::relative;
 use super::{Contact, ContactProblem, Link, Nodes, Visitor};
 use crate::contact::law::predict_correct;
 use crate::contact::{Arms, Cone, Law, Local, PADDED, Padded, Weights};
-use crate::dim::{Dim, Vect};
+use crate::dim::{Dim, Vect, tangential_rows};
 use thiserror::Error;
 
 /// Relative asymmetry of W that is put down to rounding.
@@ -461,7 +461,7 @@ impl<D: Dim> Visitor<D> for List<D> {
         self.0.push(Item {
             link: c.link.whole(),
             arms: c.law.arms(),
-            tangents: L::T::LEN.min(D::Tangent::LEN),
+            tangents: tangential_rows::<D, L::T>(),
             moments: L::B::LEN,
             cone: c.law.cone(),
             associated: c.law.associated(),

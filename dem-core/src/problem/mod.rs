@@ -8,7 +8,7 @@ pub(crate) mod blocks;
 pub mod residual;
 
 use crate::contact::{Arms, Block, Bonded, Coulomb, Elastic, Frictionless, Law, Local, Padded};
-use crate::dim::{Axes, Dim, Moments, Vect, held, resized, tangential};
+use crate::dim::{Axes, Dim, Moments, Vect, from_frame, in_frame, is_vector, resized};
 use std::marker::PhantomData;
 use std::sync::Arc;
 
@@ -42,7 +42,7 @@ pub struct Contact<D: Dim, L: Law> {
     pub link: Link<D, L::Axes<D>>,
     /// Law with the constants of the local solve.
     pub law: L,
-    /// Impulse of j on i in the contact frame (N s).
+    /// Impulse of j on i (N s), in the frame of the contact; where its axes are a normal alone, the tangential part is a vector.
     pub r: Local<L::T, L::B>,
 }
 
@@ -52,7 +52,7 @@ impl<D: Dim, A: Axes<D>> Link<D, A> {
         Self { nodes, axes: A::of(frame), dim: PhantomData }
     }
 
-    /// The same with a whole frame: where the axes are a normal alone, any with this normal.
+    /// The same with a whole frame: where the axes are a normal alone, the one that [`Dim::frame`] makes of it.
     pub fn whole(&self) -> Link<D> {
         Link::new(self.nodes, self.frame())
     }
@@ -61,24 +61,24 @@ impl<D: Dim, A: Axes<D>> Link<D, A> {
         self.axes.frame().copied().unwrap_or_else(|| D::frame(self.axes.normal()))
     }
 
-    /// The rows of the contact in its [whole](Link::whole) frame.
+    /// A reaction or a velocity of the contact as rows of its [whole](Link::whole) frame.
     #[inline]
     pub(crate) fn in_frame<T: Vect, B: Moments>(&self, r: &Local<T, B>) -> Padded {
-        let t = tangential::<D, T>(&self.frame(), r.t);
+        let t = in_frame::<D, T>(&self.frame(), r.t);
         Local { n: r.n, t: resized(t), m: resized(r.m) }
     }
 
     /// The inverse of [`Link::in_frame`].
     #[inline]
-    pub(crate) fn held<T: Vect, B: Moments>(&self, r: &Padded) -> Local<T, B> {
-        Local { n: r.n, t: held::<D, T>(&self.frame(), resized(r.t)), m: resized(r.m) }
+    pub(crate) fn from_frame<T: Vect, B: Moments>(&self, r: &Padded) -> Local<T, B> {
+        Local { n: r.n, t: from_frame::<D, T>(&self.frame(), resized(r.t)), m: resized(r.m) }
     }
 
-    /// The same without what the rounding of many sweeps has left of a tangential vector along the normal: where grains are fast and
+    /// This reaction without what the rounding of many sweeps has left of a tangential vector along the normal: where grains are fast and
     /// reactions small, it would be an impulse that no law knows of.
     #[inline(always)]
     fn without_drift<T: Vect, B: Moments>(&self, mut r: Local<T, B>) -> Local<T, B> {
-        if T::LEN == D::N {
+        if is_vector::<D, T>() {
             let (normal, t) = (self.axes.normal(), resized::<T, D::Vector>(r.t));
             r.t = resized(t - normal * normal.dot(&t));
         }
@@ -90,8 +90,11 @@ impl<D: Dim, A: Axes<D>> Link<D, A> {
     pub(crate) fn impulse<T: Vect, B: Moments>(&self, r: &Local<T, B>) -> D::Vector {
         match self.axes.frame() {
             Some(frame) if T::LEN > 0 => D::compose(frame, r.n, resized(r.t)),
-            None if T::LEN > 0 => self.axes.normal() * r.n + resized::<T, D::Vector>(r.t),
-            _ => self.axes.normal() * r.n,
+            _ if is_vector::<D, T>() => self.axes.normal() * r.n + resized::<T, D::Vector>(r.t),
+            _ => {
+                debug_assert_eq!(T::LEN, 0, "tangential rows without a frame");
+                self.axes.normal() * r.n
+            }
         }
     }
 }
@@ -218,10 +221,10 @@ impl<D: Dim, A: Axes<D>> Link<D, A> {
         let Some(frame) = self.axes.frame() else {
             let normal = self.axes.normal();
             let n = normal.dot(&velocity);
-            if T::LEN == 0 {
+            if !is_vector::<D, T>() {
+                debug_assert_eq!(T::LEN, 0, "tangential rows without a frame");
                 return Local { n, ..Local::zero() };
             }
-            debug_assert_eq!(T::LEN, D::N, "tangential rows without a frame");
             let turn = D::velocity(spin_i * arms.lever[0] + spin_j * arms.lever[1], normal);
             return Local { n, t: resized(velocity - normal * n - turn), ..Local::zero() };
         };
@@ -253,7 +256,7 @@ impl<D: Dim> Span<'_, D> {
         // without moment rows both torques are multiples of one
         let slide = match link.axes.frame() {
             Some(frame) if B::LEN == 0 => D::spin_rows_transposed(frame, t),
-            None if T::LEN > 0 => D::torque(link.axes.normal(), resized(r.t)),
+            None if is_vector::<D, T>() => D::torque(link.axes.normal(), resized(r.t)),
             _ => D::Spin::zero(),
         };
         let turn = |lever: f64, arm: f64, inverse: f64| match link.axes.frame() {

@@ -5,7 +5,7 @@ use super::touch::{Kept, Touch, TouchStatus};
 use crate::body::{Grains, Wall, direction};
 use crate::bond::{Bond, BondStatus, Rupture};
 use crate::contact::{Arms, Bonded, Coulomb, Elastic, Frictionless, Law, Local};
-use crate::dim::{Axes, Dim, Moments, Vect, held, resized, tangential};
+use crate::dim::{Axes, Dim, Moments, Vect, from_frame, in_frame, resized};
 use crate::problem::{Contact, ContactProblem, Group, Link, Node, Nodes, blocks};
 use std::sync::Arc;
 
@@ -288,7 +288,7 @@ impl<D: Dim> World<D> {
                     problem.dry.push(Contact {
                         link: Link::new(link.nodes, link.axes),
                         law: Coulomb::new(block, lever, mu, bias),
-                        r: Local { n: start.n, t: held::<D, _>(&link.axes, start.t), ..Local::zero() },
+                        r: Local { n: start.n, t: from_frame::<D, _>(&link.axes, start.t), ..Local::zero() },
                     });
                     places.dry.push(place as u32);
                 } else {
@@ -360,7 +360,7 @@ pub(super) fn read_back<D: Dim, L: Law>(touches: &mut [Kept<D>], group: &Group<D
         let touch = &mut touches[*place as usize];
         let arm = contact.law.arms().bending;
         let frame = D::with_tangents(contact.link.axes.normal(), &touch.tangents);
-        let (r, t) = (&contact.r, tangential::<D, _>(&frame, contact.r.t));
+        let (r, t) = (&contact.r, in_frame::<D, _>(&frame, contact.r.t));
         touch.reaction = Local { n: r.n / h, t: t * (1.0 / h), m: resized::<_, D::Moment>(r.m) * (arm / h) };
         touch.status = if touch.bond().is_some() {
             TouchStatus::Bonded

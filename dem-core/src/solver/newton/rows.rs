@@ -6,7 +6,7 @@
 //! u = Hᵀ v = Σ h y + u₀, where u₀ comes from nodes whose velocity is given.
 
 use crate::contact::{Arms, Cone, Law, PADDED, Padded, Weights};
-use crate::dim::{Dim, Moments, Vect};
+use crate::dim::{Dim, Moments, Vect, tangential_rows};
 use crate::problem::{Contact, ContactProblem, Link, Nodes, Visitor};
 use nalgebra::SMatrix;
 
@@ -413,14 +413,10 @@ impl<D: Dim> Flatten<'_, D> {
 
 impl<D: Dim> Visitor<D> for Flatten<'_, D> {
     fn visit<L: Law>(&mut self, _: &Nodes<D>, c: &Contact<D, L>) {
-        let rows = places(L::T::LEN, L::B::LEN);
+        let tangents = tangential_rows::<D, L::T>();
+        let rows = places(tangents, L::B::LEN);
         let (arms, unit) = (c.law.arms(), self.unknowns.unit);
-        let mut table = Table {
-            rows: [[0.0; PAIR]; PADDED],
-            tangents: L::T::LEN.min(D::Tangent::LEN),
-            moments: L::B::LEN,
-            width: 0,
-        };
+        let mut table = Table { rows: [[0.0; PAIR]; PADDED], tangents, moments: L::B::LEN, width: 0 };
         let link = c.link.whole();
         let first = self.node(&link, arms, 0, &mut table);
         let second = self.node(&link, arms, 1, &mut table);
