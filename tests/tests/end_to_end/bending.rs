@@ -97,6 +97,17 @@ fn a_rigid_beam_under_a_slow_force_breaks_first_at_its_lower_face() {
     assert!(first.len() == 4 && sum.abs() < 1e-9, "{first:?}");
     let concentrated = concentration(&history, history.frame_at(0.12).expect("a frame"));
     assert!(concentrated.iter().all(|c| *c > 3.0), "{concentrated:?}");
+    // every step before it was solved, nearly all with the factor of another
+    let before = |name: &str| {
+        let all = history.observable(name).expect("read").expect("an observable").value;
+        all[..first[0].step as usize - 1].to_vec()
+    };
+    let largest = |name: &str| before(name).into_iter().fold(0.0, f64::max);
+    assert!(largest("solver_residual") <= 1e-8, "{:e}", largest("solver_residual"));
+    assert!(largest("solver_load_error") <= 1e-4, "{:e}", largest("solver_load_error"));
+    let factorisations = before("solver_factorisations");
+    let made: f64 = factorisations.iter().sum();
+    assert!(made <= 0.2 * factorisations.len() as f64, "{made} in {} steps", factorisations.len());
 }
 
 /// A sixth of the shipped scene: the whole of it takes minutes to pack.

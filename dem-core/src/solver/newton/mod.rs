@@ -198,7 +198,7 @@ impl Newton {
     }
 
     /// Rounds at the largest penalty, from the active set of the reactions that the problem brought along, bettered by
-    /// some sweeps in the plane; none if they run in circles. In space sweeps that have not converged spoil the
+    /// some sweeps in the plane, or as it was where those mislead; none if they run in circles. In space sweeps that have not converged spoil the
     /// directions of slip; where the last guess served, held terms help, at once where bonds have broken since.
     fn try_guess(
         &mut self,
@@ -220,8 +220,14 @@ impl Newton {
             self.kept().renew = true;
             guess = guess.and_then(|guess| self.by_held_terms(&started, guess, held::ABOUT, iterations));
         }
-        let report = guess.and_then(|mut guess| self.rounds(problem, &mut started, &mut guess, held, iterations));
+        let mut report = guess.and_then(|mut guess| self.rounds(problem, &mut started, &mut guess, held, iterations));
         self.kept().renew |= report.is_none();
+        if report.is_none() && !rows.in_space() && !cold && !changed && self.rest.served() {
+            // sweeps that have not converged may let slip what sticks: the active set of the last solve, as it was
+            let mut last = Guess::of(rows.list.iter().map(|row| row.multiplier).collect());
+            report = self.rounds(problem, &mut self.started(rows), &mut last, false, iterations);
+            self.kept().renew |= report.is_none();
+        }
         // that they led nowhere from no reactions tells nothing
         self.astray &= !cold;
         report
