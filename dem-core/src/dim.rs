@@ -187,7 +187,7 @@ pub(crate) fn in_frame<D: Dim, T: Vect>(frame: &D::Frame, t: T) -> D::Tangent {
 
 /// The inverse of [`in_frame`].
 #[inline(always)]
-pub(crate) fn from_frame<D: Dim, T: Vect>(frame: &D::Frame, rows: D::Tangent) -> T {
+pub(crate) fn of_frame<D: Dim, T: Vect>(frame: &D::Frame, rows: D::Tangent) -> T {
     if is_vector::<D, T>() { resized(D::compose(frame, 0.0, rows)) } else { resized(rows) }
 }
 

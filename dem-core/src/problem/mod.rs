@@ -8,7 +8,7 @@ pub(crate) mod blocks;
 pub mod residual;
 
 use crate::contact::{Arms, Block, Bonded, Coulomb, Elastic, Frictionless, Law, Local, Padded};
-use crate::dim::{Axes, Dim, Moments, Vect, from_frame, in_frame, is_vector, resized};
+use crate::dim::{Axes, Dim, Moments, Vect, in_frame, is_vector, of_frame, resized};
 use std::marker::PhantomData;
 use std::sync::Arc;
 
@@ -70,8 +70,8 @@ impl<D: Dim, A: Axes<D>> Link<D, A> {
 
     /// The inverse of [`Link::in_frame`].
     #[inline]
-    pub(crate) fn from_frame<T: Vect, B: Moments>(&self, r: &Padded) -> Local<T, B> {
-        Local { n: r.n, t: from_frame::<D, T>(&self.frame(), resized(r.t)), m: resized(r.m) }
+    pub(crate) fn of_frame<T: Vect, B: Moments>(&self, r: &Padded) -> Local<T, B> {
+        Local { n: r.n, t: of_frame::<D, T>(&self.frame(), resized(r.t)), m: resized(r.m) }
     }
 
     /// This reaction without what the rounding of many sweeps has left of a tangential vector along the normal: where grains are fast and

@@ -5,7 +5,7 @@ use super::touch::{Kept, Touch, TouchStatus};
 use crate::body::{Grains, Wall, direction};
 use crate::bond::{Bond, BondStatus, Rupture};
 use crate::contact::{Arms, Bonded, Coulomb, Elastic, Frictionless, Law, Local};
-use crate::dim::{Axes, Dim, Moments, Vect, from_frame, in_frame, resized};
+use crate::dim::{Axes, Dim, Moments, Vect, in_frame, of_frame, resized};
 use crate::problem::{Contact, ContactProblem, Group, Link, Node, Nodes, blocks};
 use std::sync::Arc;
 
@@ -288,7 +288,7 @@ impl<D: Dim> World<D> {
                     problem.dry.push(Contact {
                         link: Link::new(link.nodes, link.axes),
                         law: Coulomb::new(block, lever, mu, bias),
-                        r: Local { n: start.n, t: from_frame::<D, _>(&link.axes, start.t), ..Local::zero() },
+                        r: Local { n: start.n, t: of_frame::<D, _>(&link.axes, start.t), ..Local::zero() },
                     });
                     places.dry.push(place as u32);
                 } else {

@@ -58,7 +58,7 @@ impl<D: Dim> Solvable for ContactProblem<D> {
     fn write_back(&mut self, reactions: &[Padded]) {
         fn group<D: Dim, L: Law>(group: &mut Group<D, L>, list: &[Padded], unit: f64) {
             for (c, r) in group.iter_mut().zip(list) {
-                c.r = c.link.from_frame(&(*r * unit));
+                c.r = c.link.of_frame(&(*r * unit));
             }
         }
         let unit = mass_unit(&self.nodes);
