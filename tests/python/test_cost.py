@@ -62,15 +62,16 @@ def cost(program):
     return cost
 
 
-# Instructions and bytes of a contact without friction over those of a dry one, and of that over those of a bond.
-LIMITS = [0.5, 0.6, 0.7, 0.7]
+# Instructions and bytes of a contact without friction over those of a dry one, and of that over those of a bond. Of spheres they
+# are smaller than asked for, and held near what was counted.
+LIMITS = {"disks": [0.5, 0.6, 0.7, 0.7], "spheres": [0.31, 0.6, 0.7, 0.55]}
 
 
-@pytest.mark.parametrize("grains", ["disks", "spheres"])
+@pytest.mark.parametrize("grains", LIMITS)
 def test_rows_that_a_contact_lacks_are_not_paid_for(cost, grains):
     smooth, dry, bonded = (cost[grains][feature] for feature in ["frictionless", "dry", "bonded"])
     shares = [less[what] / more[what] for less, more in [(smooth, dry), (dry, bonded)] for what in ["sweep", "bytes"]]
-    assert all(share <= limit for share, limit in zip(shares, LIMITS)), shares
+    assert all(share <= limit for share, limit in zip(shares, LIMITS[grains])), shares
 
 
 def test_nothing_costs_more_than_it_did(cost):
