@@ -10,7 +10,7 @@ use dem_core::dim::{D2, D3, Dim, Vect};
 use dem_core::problem::ContactProblem;
 use dem_core::problem::residual::residual;
 use dem_core::solver::{NewtonSettings, SolveStatus, SolverSettings, Start};
-use dem_core::world::World;
+use dem_core::world::{StepReport, World};
 use nalgebra::Vector2;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -218,6 +218,11 @@ fn dry_and_bonded_problems_reach_the_residual() {
 
 /// A hexagonal block between two plates: hyperstatic, so that reactions are many and velocities are one.
 fn block() -> World<D2> {
+    pressed_block(|_| 50.0)
+}
+
+/// The same under a force (N) that follows the time (s).
+fn pressed_block(force: impl Fn(f64) -> f64 + Send + Sync + 'static) -> World<D2> {
     let r = 2e-3;
     let mut disks = Vec::new();
     for row in 0..9 {
@@ -227,7 +232,10 @@ fn block() -> World<D2> {
         }
     }
     let top = disks.iter().map(|d| d.position[1] + r).fold(0.0, f64::max);
-    let lid = force_driven::<D2>([0.0, -1.0].into(), [0.0, top].into(), 1.0, 50.0);
+    let mut lid = force_driven::<D2>([0.0, -1.0].into(), [0.0, top].into(), 1.0, 0.0);
+    if let Drive::Force { force: given, .. } = &mut lid.drive {
+        *given = Arc::new(force);
+    }
     let mut w = world(disks, vec![floor(0.2), lid], settings(1e-4));
     w.form_bonds(1e-6, |_| 100.0, 0.3);
     w
@@ -269,6 +277,39 @@ fn a_rigid_block_does_not_move_before_it_breaks() {
     }
     let strain = w.strain();
     assert!(strain.iter().all(|e| e.abs() <= 1e-9), "{strain:?}");
+}
+
+#[test]
+fn steps_that_are_predicted_are_those_that_a_solve_finds() {
+    // a kink of the load, and then on until it breaks
+    let force = |t: f64| if t < 0.02 { 5e3 * t } else { 100.0 + 2e4 * (t - 0.02) };
+    let (mut w, mut solved) = (pressed_block(force), pressed_block(force));
+    w.set_solver(newton(1e-8, Start::StiffLimit));
+    let (mut predicted, mut steps) = (0, 0);
+    loop {
+        // a new solver knows of no step before
+        solved.set_solver(newton(1e-8, Start::StiffLimit));
+        let (report, other) = (w.step().unwrap(), solved.step().unwrap());
+        steps += 1;
+        predicted += u64::from(report.work.iterations() == 0);
+        assert!(other.work.newton > 0 && report.load_error <= 1e-6);
+        assert_eq!(report.status, SolveStatus::Converged);
+        let (mut off, mut size) = (0.0, 0.0);
+        for (a, b) in w.touches().zip(solved.touches()) {
+            assert_eq!((a.pair, a.bond), (b.pair, b.bond), "step {steps}");
+            off += (a.reaction - b.reaction).dot(&(a.reaction - b.reaction));
+            size += b.reaction.dot(&b.reaction);
+        }
+        assert!(off <= 1e-16 * size, "step {steps}: {:e}", (off / size).sqrt());
+        let breaks = |report: &StepReport<D2>| report.breaks.iter().map(|b| (b.bond, b.mode)).collect::<Vec<_>>();
+        assert_eq!(breaks(&report), breaks(&other), "step {steps}");
+        if !report.breaks.is_empty() {
+            assert!(report.work.newton > 0, "what breaks is solved");
+            break;
+        }
+        assert!(steps < 10_000, "it should break");
+    }
+    assert!(2 * predicted > steps, "{predicted} of {steps}");
 }
 
 /// The forces (N) between a floor and five bonded disks in a row on it, and those in the step after the row was tilted, so

@@ -7,6 +7,7 @@ use dem_core::body::{Drive, Grain, Load, Shape, Wall};
 use dem_core::bond::{Rupture, Stiffness};
 use dem_core::contact::BondFlow;
 use dem_core::dim::{D2, D3, D3Twist, Dim, Vect};
+use dem_core::solver::{GaussSeidelSettings, SolverSettings};
 use dem_core::world::{Restitution, Settings, World};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -48,8 +49,21 @@ impl Dice {
     }
 }
 
-/// A random scene of at most `most` grains, and what its solver accepts.
-fn scene<D: Dim>(dice: &mut Dice, most: f64) -> (World<D>, f64) {
+/// Sweeps of Gauss–Seidel after which a solve is refused: those of the other stability tests, and so many that no scene of twenty
+/// thousand takes minutes. A scene that stops for want of sweeps says so, and has kept what must hold until then.
+const SWEEPS: u64 = 100_000;
+const FEW_SWEEPS: u64 = 10_000;
+
+/// How large and how long random scenes are.
+#[derive(Clone, Copy)]
+struct Size {
+    grains: f64,
+    steps: usize,
+    sweeps: u64,
+}
+
+/// A random scene, and what its solver accepts.
+fn scene<D: Dim>(dice: &mut Dice, Size { grains: most, sweeps, .. }: Size) -> (World<D>, f64) {
     let count = dice.decade(2.0, most).round();
     let side = count.powf(1.0 / D::N as f64).ceil() as usize;
     let size = dice.decade(1e-6, 1e2);
@@ -127,7 +141,12 @@ fn scene<D: Dim>(dice: &mut Dice, most: f64) -> (World<D>, f64) {
         restitution: None,
         bond_flow: dice.pick(&[BondFlow::Associated, BondFlow::Associated, BondFlow::Bipotential]),
         rupture: dice.pick(&[Rupture::Cascade, Rupture::Cascade, Rupture::CascadeWorst, Rupture::EndOfStep]),
-        solver: dice.pick(&Kind::ALL).settings(1e-8, accept),
+        solver: match dice.pick(&Kind::ALL).settings(1e-8, accept) {
+            SolverSettings::GaussSeidel(given) => {
+                SolverSettings::GaussSeidel(GaussSeidelSettings { max_sweeps: sweeps, ..given })
+            }
+            other => other,
+        },
         max_halvings: dice.pick(&[0, 4]),
         thickness: 1.0,
         expel_overlaps: false,
@@ -156,31 +175,35 @@ fn scene<D: Dim>(dice: &mut Dice, most: f64) -> (World<D>, f64) {
     (world, accept)
 }
 
-/// Make scene `seed` and carry it on.
-fn scene_holds(seed: u64, most: f64, steps: usize) {
+/// Make scene `seed` and carry it on: whether it stopped before its end, with an error.
+fn scene_holds(seed: u64, size: Size) -> bool {
+    fn stops<D: Dim + PartialEq>(mut dice: Dice, size: Size) -> bool {
+        let (mut world, accept) = scene::<D>(&mut dice, size);
+        watch(&mut world, size.steps, accept).stopped.is_some()
+    }
     let mut dice = Dice(Pcg64::seed_from_u64(seed));
-    if dice.one_in(2) {
-        let (mut world, accept) = scene::<D2>(&mut dice, most);
-        watch(&mut world, steps, accept);
-    } else if seed.is_multiple_of(3) {
-        let (mut world, accept) = scene::<D3Twist>(&mut dice, most);
-        watch(&mut world, steps, accept);
-    } else {
-        let (mut world, accept) = scene::<D3>(&mut dice, most);
-        watch(&mut world, steps, accept);
+    match dice.one_in(2) {
+        true => stops::<D2>(dice, size),
+        false if seed.is_multiple_of(3) => stops::<D3Twist>(dice, size),
+        false => stops::<D3>(dice, size),
     }
 }
 
-/// The scenes that fail, of these.
-fn failures(seeds: std::ops::Range<u64>, most: f64, steps: usize) -> Vec<u64> {
-    let fails = |seed: &u64| catch_unwind(AssertUnwindSafe(|| scene_holds(*seed, most, steps))).is_err();
-    seeds.into_par_iter().filter(fails).collect()
+/// The scenes that fail, of these, and how many stop before their end.
+fn failures(seeds: std::ops::Range<u64>, size: Size) -> (Vec<u64>, usize) {
+    let outcome = |seed: u64| (seed, catch_unwind(AssertUnwindSafe(|| scene_holds(seed, size))).ok());
+    let outcomes: Vec<_> = seeds.into_par_iter().map(outcome).collect();
+    let failed = outcomes.iter().filter(|(_, stopped)| stopped.is_none()).map(|(seed, _)| *seed).collect();
+    (failed, outcomes.iter().filter(|(_, stopped)| *stopped == Some(true)).count())
 }
 
 #[test]
 fn random_scenes_keep_what_must_hold() {
-    assert_eq!(failures(0..100, 30.0, 20), [], "seeds of scenes that fail");
-    REGRESSIONS.into_iter().for_each(|seed| scene_holds(seed, 200.0, 200));
+    let size = Size { grains: 30.0, steps: 20, sweeps: SWEEPS };
+    assert_eq!(failures(0..100, size).0, [], "seeds of scenes that fail");
+    REGRESSIONS.into_iter().for_each(|seed| {
+        scene_holds(seed, Size { grains: 200.0, steps: 200, sweeps: SWEEPS });
+    });
 }
 
 /// `STABILITY_SCENES=0..20000 cargo test --release -p dem-core --test stability twenty_thousand -- --ignored --nocapture`
@@ -191,11 +214,18 @@ fn twenty_thousand_random_scenes() {
         let (first, end) = text.split_once("..").expect("seeds FIRST..END");
         first.parse().expect("a first seed")..end.parse().expect("an end of seeds")
     });
-    let mut failed = Vec::new();
+    let size = Size { grains: 200.0, steps: 200, sweeps: FEW_SWEEPS };
+    let (mut failed, mut stopped) = (Vec::new(), 0);
     for first in seeds.clone().step_by(100) {
         let end = seeds.end.min(first + 100);
-        failed.extend(failures(first..end, 200.0, 200));
-        eprintln!("seeds {}..{end}: {} failed {failed:?}", seeds.start, failed.len());
+        let (fail, stop) = failures(first..end, size);
+        failed.extend(fail);
+        stopped += stop;
+        eprintln!(
+            "seeds {}..{end}: {stopped} stopped before their end, {} failed {failed:?}",
+            seeds.start,
+            failed.len()
+        );
     }
     assert_eq!(failed, [], "seeds of scenes that fail");
 }

@@ -29,6 +29,7 @@ mod kept;
 mod krylov;
 mod order;
 mod patience;
+mod predictor;
 mod rounds;
 mod rows;
 mod solvable;
@@ -45,6 +46,7 @@ use inner::norm2;
 use interior::{Bending, Rays, Twisting};
 use kept::Kept;
 use patience::Rest;
+use predictor::Predictor;
 use rows::Rows;
 use solvable::Solvable;
 
@@ -105,6 +107,8 @@ pub struct Newton {
     quiet: Rest,
     /// Whether held terms led nowhere in this solve.
     astray: bool,
+    /// What quiet steps add to the reactions.
+    predictor: Predictor,
 }
 
 /// What was found without a guess of the active set.
@@ -130,6 +134,7 @@ impl Newton {
             rest: Rest::NONE,
             quiet: Rest::NONE,
             astray: false,
+            predictor: Predictor::default(),
         }
     }
 
@@ -291,6 +296,7 @@ impl Newton {
         }
         to.count(self.dry);
         self.slips.save(to);
+        self.predictor.save(to);
         self.kept.iter().for_each(|kept| kept.save(to));
     }
 
@@ -301,6 +307,7 @@ impl Newton {
         }
         self.dry = from.count()?;
         self.slips = Slips::restored(from)?;
+        self.predictor = Predictor::restored(from)?;
         self.kept = [Kept::restored(from)?, Kept::restored(from)?];
         Ok(())
     }
@@ -317,7 +324,17 @@ impl Newton {
 
 impl<D: Dim> ContactSolver<D> for Newton {
     fn solve(&mut self, problem: &mut ContactProblem<D>) -> SolveReport {
-        self.iterate(problem)
+        let NewtonSettings { tolerance, load_tolerance, .. } = self.settings;
+        if let Some((residual, load_error)) = self.predictor.predict(problem, tolerance, load_tolerance) {
+            let status = SolveStatus::Converged;
+            return SolveReport { status, work: Work::default(), residual, load_error: Some(load_error) };
+        }
+        let report = self.iterate(problem);
+        match report.status {
+            SolveStatus::Converged => self.predictor.learn(problem),
+            _ => self.predictor.forget(),
+        }
+        report
     }
 
     fn save(&self, to: &mut Saved) {
