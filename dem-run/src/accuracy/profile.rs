@@ -8,6 +8,7 @@ use super::trial::{Posed, SolverName, Way, thread_time};
 use crate::build::settings;
 use crate::scene::Scene;
 use dem_core::dim::Dim;
+use dem_core::saved::Saved;
 use serde::Serialize;
 
 /// Solves of one problem, of which the fastest counts: the others were disturbed.
@@ -87,8 +88,12 @@ impl Profile {
                 }
                 let mut cpu_time = f64::INFINITY;
                 let mut solve = None;
+                let mut state = Saved::default();
+                built.save(&mut state);
                 for _ in 0..REPEATS {
                     let mut problem = posed.problem.clone();
+                    // what it learnt from this very problem would serve no run
+                    built.restore(&mut state.read()).expect("its own state");
                     let began = thread_time();
                     solve = Some(built.solve(&mut problem));
                     cpu_time = cpu_time.min(thread_time() - began);
