@@ -107,8 +107,9 @@ pub struct Newton {
     quiet: Rest,
     /// Whether held terms led nowhere in this solve.
     astray: bool,
-    /// What quiet steps add to the reactions.
+    /// What quiet steps add to the reactions, and how far contacts are from another status in the first round of this solve.
     predictor: Predictor,
+    margins: Vec<f64>,
 }
 
 /// What was found without a guess of the active set.
@@ -131,10 +132,11 @@ impl Newton {
             dry: 0,
             made_before: 0,
             sweeps: 0,
-            rest: Rest::NONE,
-            quiet: Rest::NONE,
+            rest: Rest::default(),
+            quiet: Rest::default(),
             astray: false,
             predictor: Predictor::default(),
+            margins: Vec::new(),
         }
     }
 
@@ -290,10 +292,7 @@ impl Newton {
 
     /// Write what is kept from one solve to the next.
     pub(super) fn save_state(&self, to: &mut Saved) {
-        for rest in [self.rest, self.quiet] {
-            to.count(rest.left as usize);
-            to.count(rest.next as usize);
-        }
+        [self.rest, self.quiet].iter().for_each(|rest| rest.save(to));
         to.count(self.dry);
         self.slips.save(to);
         self.predictor.save(to);
@@ -302,9 +301,7 @@ impl Newton {
 
     /// Take up what [`Newton::save_state`] wrote.
     pub(super) fn restore_state(&mut self, from: &mut Reader) -> Result<(), Mismatch> {
-        for rest in [&mut self.rest, &mut self.quiet] {
-            *rest = Rest { left: from.count()? as u64, next: from.count()? as u64 };
-        }
+        (self.rest, self.quiet) = (Rest::restored(from)?, Rest::restored(from)?);
         self.dry = from.count()?;
         self.slips = Slips::restored(from)?;
         self.predictor = Predictor::restored(from)?;
@@ -329,9 +326,12 @@ impl<D: Dim> ContactSolver<D> for Newton {
             let status = SolveStatus::Converged;
             return SolveReport { status, work: Work::default(), residual, load_error: Some(load_error) };
         }
+        self.margins.clear();
         let report = self.iterate(problem);
         match report.status {
-            SolveStatus::Converged => self.predictor.learn(problem),
+            SolveStatus::Converged if self.margins.len() == problem.len() => {
+                self.predictor.learn(problem, &self.margins, load_tolerance);
+            }
             _ => self.predictor.forget(),
         }
         report

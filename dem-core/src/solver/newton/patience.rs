@@ -1,18 +1,18 @@
 //! When to go on, to give up, and to try again.
 
+use crate::saved::{Mismatch, Reader, Saved};
+
 /// Most solves for which something that failed is not tried again.
 const LONGEST_REST: u64 = 64;
 
 /// Solves for which something that failed is not tried: steps that are alike fail alike.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub(super) struct Rest {
     pub left: u64,
     pub next: u64,
 }
 
 impl Rest {
-    pub const NONE: Self = Self { left: 0, next: 0 };
-
     /// Whether it is time to try again; else one solve of it passes.
     pub fn is_over(&mut self) -> bool {
         let over = self.left == 0;
@@ -33,7 +33,19 @@ impl Rest {
 
     /// It served.
     pub fn forget(&mut self) {
-        *self = Self::NONE;
+        *self = Self::default();
+    }
+
+    /// Write it.
+    pub fn save(&self, to: &mut Saved) {
+        to.count(self.left as usize);
+        to.count(self.next as usize);
+    }
+
+    /// What [`Rest::save`] wrote.
+    pub fn restored(from: &mut Reader) -> Result<Self, Mismatch> {
+        let rest = Self { left: from.count()? as u64, next: from.count()? as u64 };
+        if rest.left.max(rest.next) <= LONGEST_REST { Ok(rest) } else { Err(Mismatch) }
     }
 }
 

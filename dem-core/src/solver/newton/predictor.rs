@@ -1,13 +1,16 @@
 //! Steps without a linear solve: while a sample at rest is loaded evenly and no contact changes its status, each step adds the same to
-//! the reactions. What two solves on end have added is added again, and taken where the contact laws and the balance hold better
-//! than the tolerances ask and no bond is at its limit.
+//! the reactions. What two solves on end have added is added again, and taken where the contact laws hold better than the
+//! tolerance asks, the balance as well as after the last solve, and no bond is at its limit.
 //!
-//! Laws and balance do not tell how the contacts of a rigid network share the load. So the next solve is compared with what was
-//! predicted: where it is the same more steps may follow, else none.
+//! Laws and balance do not tell how the contacts of a rigid network share the load. What sticks shows a change of status by itself: its
+//! reaction leaves the cone. What is open or slips does not, and so the distance to closing or sticking is predicted with the
+//! reactions. And from time to time a solve is compared with what was predicted.
 
+use super::patience::Rest;
+use super::rows::{Row, Rows, mass_unit};
 use crate::bond::failure;
-use crate::contact::{Law, Local};
-use crate::dim::{Dim, Vect};
+use crate::contact::{Law, Local, Padded};
+use crate::dim::{Dim, Moments, Vect};
 use crate::problem::residual::residual;
 use crate::problem::{ContactProblem, Group};
 use crate::saved::{Mismatch, Reader, Saved};
@@ -16,7 +19,7 @@ use crate::saved::{Mismatch, Reader, Saved};
 const FIRST: u64 = 4;
 const MOST: u64 = 32;
 /// Share of the tolerances that a prediction may take, and how much more momentum it may leave than the solve before it.
-const SHARE: f64 = 1e-3;
+const SHARE: f64 = 1e-2;
 const MORE: f64 = 2.0;
 /// By how much a solve may differ from what was predicted: over what the reactions have grown by, and over the reactions.
 const SAME: f64 = 1e-6;
@@ -30,49 +33,60 @@ pub(super) struct Predictor {
     /// Reactions of a solve, and what each step since has added to them (N s).
     base: Vec<f64>,
     rate: Vec<f64>,
+    /// The same for the [margins](margins) of the contacts.
+    margins: Vec<f64>,
+    margin_rate: Vec<f64>,
     /// Steps since.
     steps: u64,
     /// Steps that may be predicted between solves, none while the growth is not known to be even, and those that are left.
     most: u64,
     left: u64,
-    /// Load error of the last solve (–).
-    load_error: f64,
+    /// Share of the impulses that the solve left as momentum (–).
+    moves: f64,
     /// Whether the last step was predicted: what it left of momentum is in the reactions of the next solve, which tell nothing of
     /// the growth.
     kicked: bool,
+    /// Rest where predictions are in vain.
+    rest: Rest,
 }
 
 impl Predictor {
-    /// Set the reactions of a problem to what is predicted, if that solves it: its residual and load error. Else the problem is
-    /// left as it was.
+    /// Set the reactions of a problem to what is predicted, if that solves it: its residual and load error. Else the reactions are
+    /// left as they were.
     pub fn predict<D: Dim>(
         &mut self,
         problem: &mut ContactProblem<D>,
         tolerance: f64,
         load_tolerance: f64,
     ) -> Option<(f64, f64)> {
-        if self.left == 0 || self.shape != shape(problem) {
+        if self.left == 0 || self.shape != shape(problem) || !self.rest.is_over() {
             return None;
         }
         let brought = reactions(problem);
-        write(problem, &self.predicted());
+        write(problem, &self.grown(&self.base, &self.rate));
+        problem.velocities_from_reactions();
         let (residual, load_error) = (residual(problem), motion(problem));
-        let allowed = load_tolerance.min((MORE * self.load_error).max(SHARE * load_tolerance));
-        let holds = residual <= SHARE * tolerance && load_error <= allowed;
+        let allowed = load_tolerance.min((MORE * self.moves).max(SHARE * load_tolerance));
+        let holds = residual <= SHARE * tolerance && load_error <= allowed && self.keeps_status();
         if holds && !at_limit(&problem.bonded) && !at_limit(&problem.elastic) {
             (self.steps, self.left, self.kicked) = (self.steps + 1, self.left - 1, true);
+            self.rest.forget();
             return Some((residual, load_error));
         }
         write(problem, &brought);
         self.left = 0;
+        self.rest.lengthen();
         None
     }
 
-    /// Compare a solution with what was predicted.
-    pub fn learn<D: Dim>(&mut self, problem: &ContactProblem<D>) {
-        if std::mem::replace(&mut self.shape, shape(problem)) != self.shape || self.base.is_empty() {
-            let base = reactions(problem);
-            *self = Self { shape: self.shape, rate: vec![0.0; base.len()], base, ..Self::default() };
+    /// Compare a solution, and the [margins](margins) of its contacts, with what was predicted.
+    pub fn learn<D: Dim>(&mut self, problem: &ContactProblem<D>, margins: &[f64], load_tolerance: f64) {
+        let unit = mass_unit(&problem.nodes);
+        let (solution, margins) = (reactions(problem), margins.iter().map(|m| m * unit).collect::<Vec<_>>());
+        if self.shape != shape(problem) || self.base.is_empty() {
+            let (rate, margin_rate) = (vec![0.0; solution.len()], vec![0.0; margins.len()]);
+            let (shape, rest) = (shape(problem), self.rest);
+            *self = Self { shape, base: solution, rate, margins, margin_rate, rest, ..Self::default() };
             return;
         }
         if std::mem::take(&mut self.kicked) {
@@ -80,40 +94,53 @@ impl Predictor {
             self.left = 0;
             return;
         }
-        let (solution, predicted) = (reactions(problem), self.predicted());
         let (mut off, mut grown, mut size) = (0.0, 0.0, 0.0);
-        for ((now, base), predicted) in solution.iter().zip(&self.base).zip(&predicted) {
+        for ((now, base), predicted) in solution.iter().zip(&self.base).zip(self.grown(&self.base, &self.rate)) {
             off += (now - predicted) * (now - predicted);
             grown += (now - base) * (now - base);
             size += now * now;
         }
-        let even = off <= (SAME * SAME * grown).max(ROUNDING * ROUNDING * size);
+        self.moves = motion(problem);
+        let at_limits = |margins: &[f64]| margins.iter().map(|m| m.is_finite()).collect::<Vec<_>>();
+        let even = off <= (SAME * SAME * grown).max(ROUNDING * ROUNDING * size)
+            && self.moves <= load_tolerance
+            && at_limits(&margins) == at_limits(&self.margins);
         self.most = if even { (2 * self.most).clamp(FIRST, MOST) } else { 0 };
         let steps = (self.steps + 1) as f64;
-        self.rate = solution.iter().zip(&self.base).map(|(now, base)| (now - base) / steps).collect();
-        (self.base, self.steps, self.left) = (solution, 0, self.most);
-        self.load_error = motion(problem);
+        let rate = |now: &[f64], base: &[f64]| now.iter().zip(base).map(|(now, base)| (now - base) / steps).collect();
+        (self.rate, self.margin_rate) = (rate(&solution, &self.base), rate(&margins, &self.margins));
+        (self.base, self.margins, self.steps, self.left) = (solution, margins, 0, self.most);
     }
 
     /// Nothing is known any more.
     pub fn forget(&mut self) {
-        *self = Self::default();
+        *self = Self { rest: self.rest, ..Self::default() };
     }
 
-    /// The reactions of the next step.
-    fn predicted(&self) -> Vec<f64> {
+    /// What has grown from `base` at this rate until the next step.
+    fn grown(&self, base: &[f64], rate: &[f64]) -> Vec<f64> {
         let steps = (self.steps + 1) as f64;
-        self.base.iter().zip(&self.rate).map(|(base, rate)| base + steps * rate).collect()
+        base.iter().zip(rate).map(|(base, rate)| base + steps * rate).collect()
+    }
+
+    /// Whether all that is open or slips does so in the next step too.
+    fn keeps_status(&self) -> bool {
+        let size = self.base.iter().map(|r| r * r).sum::<f64>().sqrt();
+        let stays = |margin: f64| margin.is_nan() || margin >= -ROUNDING * size;
+        self.grown(&self.margins, &self.margin_rate).into_iter().all(stays)
     }
 
     pub fn save(&self, to: &mut Saved) {
         self.shape.iter().for_each(|n| to.count(*n));
         [self.steps, self.most, self.left].iter().for_each(|n| to.count(*n as usize));
         to.flag(self.kicked);
-        to.real(self.load_error);
-        to.count(self.base.len());
-        to.reals.extend_from_slice(&self.base);
-        to.reals.extend_from_slice(&self.rate);
+        self.rest.save(to);
+        to.real(self.moves);
+        for (base, rate) in [(&self.base, &self.rate), (&self.margins, &self.margin_rate)] {
+            to.count(base.len());
+            to.reals.extend_from_slice(base);
+            to.reals.extend_from_slice(rate);
+        }
     }
 
     pub fn restored(from: &mut Reader) -> Result<Self, Mismatch> {
@@ -122,11 +149,37 @@ impl Predictor {
             *count = from.count()?;
         }
         let [a, b, c, d, steps, most, left] = counts;
-        let (kicked, load_error, n) = (from.flag()?, from.real()?, from.number_of()?);
-        let (base, rate) = (from.reals(n)?.to_vec(), from.reals(n)?.to_vec());
         let [steps, most, left] = [steps, most, left].map(|n| n as u64);
-        Ok(Self { shape: [a, b, c, d], base, rate, steps, most, left, load_error, kicked })
+        if most > MOST || left > most || steps > MOST + 1 {
+            return Err(Mismatch);
+        }
+        let (kicked, rest, moves) = (from.flag()?, Rest::restored(from)?, from.real()?);
+        let mut pair = || {
+            let n = from.number_of()?;
+            Ok((from.reals(n)?.to_vec(), from.reals(n)?.to_vec()))
+        };
+        let ((base, rate), (margins, margin_rate)) = (pair()?, pair()?);
+        Ok(Self { shape: [a, b, c, d], base, rate, margins, margin_rate, steps, most, left, moves, kicked, rest })
     }
+}
+
+/// By how much each contact is beyond its limits at these velocities, as a reaction (N s over the unit of mass): what an open one
+/// would have to be pushed to close, and what one that slips, to stick. Infinite for one that does neither.
+pub(super) fn margins(rows: &Rows, velocities: &[Padded], reactions: &[Padded]) -> Vec<f64> {
+    let beyond = |norm: f64, weight: f64, limit: f64| match norm / weight - limit {
+        beyond if beyond > 0.0 => beyond,
+        _ => f64::INFINITY,
+    };
+    let margin = |((row, u), r): ((&Row, &Padded), &Padded)| {
+        let (q, w, limit) = (row.form(u), row.metric(), r.n + row.shift);
+        if limit <= 0.0 {
+            return q.n / w.n - row.shift;
+        }
+        let slip = beyond(q.t.norm(), w.t, row.cone.mu * limit);
+        let bend = beyond(q.m.bending(), w.m, row.cone.nu * limit);
+        slip.min(bend).min(beyond(q.m.twist(), w.w, row.cone.xi * limit))
+    };
+    rows.list.iter().zip(velocities).zip(reactions).map(margin).collect()
 }
 
 fn shape<D: Dim>(problem: &ContactProblem<D>) -> [usize; 4] {
@@ -142,7 +195,9 @@ fn reactions<D: Dim>(problem: &ContactProblem<D>) -> Vec<f64> {
             to.extend_from_slice(m.as_slice());
         }
     }
-    let mut all = Vec::new();
+    // as much as a contact of the widest kind at hand has
+    let mut all =
+        Vec::with_capacity(problem.len() * if problem.bonded.len() + problem.elastic.len() > 0 { 6 } else { 4 });
     group(&problem.bonded, &mut all);
     group(&problem.elastic, &mut all);
     group(&problem.dry, &mut all);
@@ -150,7 +205,7 @@ fn reactions<D: Dim>(problem: &ContactProblem<D>) -> Vec<f64> {
     all
 }
 
-/// Set all reactions, and the velocities that they give.
+/// Set all reactions.
 fn write<D: Dim>(problem: &mut ContactProblem<D>, all: &[f64]) {
     fn group<D: Dim, L: Law>(group: &mut Group<D, L>, from: &mut impl Iterator<Item = f64>) {
         let mut next = || from.next().unwrap_or_default();
@@ -165,7 +220,6 @@ fn write<D: Dim>(problem: &mut ContactProblem<D>, all: &[f64]) {
     group(&mut problem.elastic, &mut from);
     group(&mut problem.dry, &mut from);
     group(&mut problem.frictionless, &mut from);
-    problem.velocities_from_reactions();
 }
 
 /// Whether one of these bonds is at its limit.
@@ -173,7 +227,7 @@ fn at_limit<D: Dim, L: Law<T = D::Tangent, B = D::Moment>>(group: &Group<D, L>) 
     group.iter().any(|c| failure(&c.r, c.law.shift(), c.law.cone()).is_some())
 }
 
-/// Momentum that is left over what the contacts have taken, both over the roots of the masses: the load error of a sample at rest (–).
+/// What is left of momentum over what the contacts have taken, both over the roots of the masses: the load error of a sample at rest (–).
 fn motion<D: Dim>(problem: &ContactProblem<D>) -> f64 {
     let (mut left, mut taken) = (0.0, 0.0);
     for (node, (velocity, spin)) in problem.nodes.all.iter().zip(problem.free.iter()) {

@@ -3,6 +3,7 @@
 use super::guess::{Guess, Slips};
 use super::inner::{Iterate, distance};
 use super::patience::Shrinking;
+use super::predictor::margins;
 use super::rows::{Row, Rows};
 use super::solvable::Solvable;
 use super::{Newton, SolveReport, SolveStatus, Start, held, load_change};
@@ -63,6 +64,7 @@ impl Newton {
             }
             if first {
                 self.slips = Slips::of(rows, &state);
+                self.margins = margins(rows, &state.velocities, &state.reactions);
             }
             problem.write_back(&state.reactions);
             let load_error = shrinking.error(load_change(rows, &state.reactions));
@@ -100,8 +102,10 @@ impl Newton {
                 self.kept().trusted = false;
             }
         };
-        if std::mem::take(&mut self.later) && report.is_none() {
-            self.kept[1].renew = true;
+        let later = std::mem::take(&mut self.later);
+        if report.is_none() {
+            self.kept[1].renew |= later;
+            self.margins.clear();
         }
         report
     }
