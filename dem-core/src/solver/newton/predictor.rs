@@ -107,7 +107,9 @@ impl Predictor {
             && at_limits(&margins) == at_limits(&self.margins);
         self.most = if even { (2 * self.most).clamp(FIRST, MOST) } else { 0 };
         let steps = (self.steps + 1) as f64;
-        let rate = |now: &[f64], base: &[f64]| now.iter().zip(base).map(|(now, base)| (now - base) / steps).collect();
+        let finite = |change: f64| if change.is_finite() { change } else { 0.0 };
+        let rate =
+            |now: &[f64], base: &[f64]| now.iter().zip(base).map(|(now, base)| finite((now - base) / steps)).collect();
         (self.rate, self.margin_rate) = (rate(&solution, &self.base), rate(&margins, &self.margins));
         (self.base, self.margins, self.steps, self.left) = (solution, margins, 0, self.most);
     }
@@ -126,8 +128,7 @@ impl Predictor {
     /// Whether all that is open or slips does so in the next step too.
     fn keeps_status(&self) -> bool {
         let size = self.base.iter().map(|r| r * r).sum::<f64>().sqrt();
-        let stays = |margin: f64| margin.is_nan() || margin >= -ROUNDING * size;
-        self.grown(&self.margins, &self.margin_rate).into_iter().all(stays)
+        self.grown(&self.margins, &self.margin_rate).into_iter().all(|margin| margin >= -ROUNDING * size)
     }
 
     pub fn save(&self, to: &mut Saved) {
