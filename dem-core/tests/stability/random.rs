@@ -2,7 +2,7 @@
 
 use crate::common::DENSITY;
 use crate::harness::watch;
-use crate::scene::Kind;
+use crate::scene::{Kind, SWEEPS};
 use dem_core::body::{Drive, Grain, Load, Shape, Wall};
 use dem_core::bond::{Rupture, Stiffness};
 use dem_core::contact::BondFlow;
@@ -49,9 +49,8 @@ impl Dice {
     }
 }
 
-/// Sweeps of Gauss–Seidel after which a solve is refused: those of the other stability tests, and so many that no scene of twenty
-/// thousand takes minutes. A scene that stops for want of sweeps says so, and has kept what must hold until then.
-const SWEEPS: u64 = 100_000;
+/// Sweeps of Gauss–Seidel after which a solve is refused, so many that no scene of twenty thousand takes minutes. A scene that stops
+/// for want of sweeps says so, and has kept what must hold until then.
 const FEW_SWEEPS: u64 = 10_000;
 
 /// How large and how long random scenes are.

@@ -20,6 +20,9 @@ pub enum Kind {
     Auto,
 }
 
+/// Sweeps of Gauss–Seidel after which a solve is refused.
+pub const SWEEPS: u64 = 100_000;
+
 impl Kind {
     pub const ALL: [Self; 3] = [Self::GaussSeidel, Self::Newton, Self::Auto];
 
@@ -30,7 +33,7 @@ impl Kind {
                 local: LocalSolve::Exact,
                 tolerance,
                 accept,
-                max_sweeps: 100_000,
+                max_sweeps: SWEEPS,
                 acceleration: 0,
             }),
             Self::Newton => SolverSettings::Newton(newton),

@@ -8,8 +8,8 @@ const LONGEST_REST: u64 = 64;
 /// Solves for which something that failed is not tried: steps that are alike fail alike.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Rest {
-    pub left: u64,
-    pub next: u64,
+    left: u64,
+    next: u64,
 }
 
 impl Rest {

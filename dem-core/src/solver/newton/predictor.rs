@@ -9,10 +9,10 @@
 use super::patience::Rest;
 use super::rows::{Row, Rows, mass_unit};
 use crate::bond::failure;
-use crate::contact::{Law, Local, Padded};
+use crate::contact::{Law, PADDED, Padded};
 use crate::dim::{Dim, Moments, Vect};
 use crate::problem::residual::residual;
-use crate::problem::{ContactProblem, Group};
+use crate::problem::{Contact, ContactProblem, Group, Nodes, Visitor};
 use crate::saved::{Mismatch, Reader, Saved};
 
 /// Steps that are predicted on end: at first, and at most.
@@ -101,10 +101,9 @@ impl Predictor {
             size += now * now;
         }
         self.moves = motion(problem);
-        let at_limits = |margins: &[f64]| margins.iter().map(|m| m.is_finite()).collect::<Vec<_>>();
-        let even = off <= (SAME * SAME * grown).max(ROUNDING * ROUNDING * size)
-            && self.moves <= load_tolerance
-            && at_limits(&margins) == at_limits(&self.margins);
+        let same_limits = margins.iter().zip(&self.margins).all(|(now, base)| now.is_finite() == base.is_finite());
+        let even =
+            off <= (SAME * SAME * grown).max(ROUNDING * ROUNDING * size) && self.moves <= load_tolerance && same_limits;
         self.most = if even { (2 * self.most).clamp(FIRST, MOST) } else { 0 };
         let steps = (self.steps + 1) as f64;
         let finite = |change: f64| if change.is_finite() { change } else { 0.0 };
@@ -189,21 +188,17 @@ fn shape<D: Dim>(problem: &ContactProblem<D>) -> [usize; 4] {
 
 /// All reactions, row by row.
 fn reactions<D: Dim>(problem: &ContactProblem<D>) -> Vec<f64> {
-    fn group<D: Dim, L: Law>(group: &Group<D, L>, to: &mut Vec<f64>) {
-        for Local { n, t, m } in group.iter().map(|c| c.r) {
-            to.push(n);
-            to.extend_from_slice(t.as_slice());
-            to.extend_from_slice(m.as_slice());
+    struct Listed(Vec<f64>);
+    impl<D: Dim> Visitor<D> for Listed {
+        fn visit<L: Law>(&mut self, _: &Nodes<D>, contact: &Contact<D, L>) {
+            self.0.push(contact.r.n);
+            self.0.extend_from_slice(contact.r.t.as_slice());
+            self.0.extend_from_slice(contact.r.m.as_slice());
         }
     }
-    // as much as a contact of the widest kind at hand has
-    let mut all =
-        Vec::with_capacity(problem.len() * if problem.bonded.len() + problem.elastic.len() > 0 { 6 } else { 4 });
-    group(&problem.bonded, &mut all);
-    group(&problem.elastic, &mut all);
-    group(&problem.dry, &mut all);
-    group(&problem.frictionless, &mut all);
-    all
+    let mut listed = Listed(Vec::with_capacity(problem.len() * PADDED));
+    problem.visit(&mut listed);
+    listed.0
 }
 
 /// Set all reactions.
