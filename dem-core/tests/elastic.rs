@@ -346,7 +346,8 @@ fn never_grows<D: Dim>(periods: f64) {
     let omega = (K / grains[0].mass).sqrt();
     let h = periods * 2.0 * PI / omega;
     let mut set = settings(h);
-    set.solver = newton(1e-10, 1e-10);
+    // at rest bonds that turned keep forces that balance each other: the load error is relative to what still moves
+    set.solver = newton(1e-10, 1e-6);
     let mut w = world(grains, vec![], set);
     // by a thousandth of the radius in a step, or in a period
     let slow = 1e-3 * R * omega.min(1.0 / h);
