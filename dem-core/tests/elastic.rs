@@ -357,7 +357,7 @@ fn never_grows<D: Dim>(periods: f64) {
     w.form_bonds(1e-6, |_| strength, 0.3);
     w.make_bonds_elastic(springs(K, 0.7));
     let (mut last, first) = (w.kinetic_energy(), w.kinetic_energy());
-    let (steps, mut iterations) = (40, 0);
+    let (steps, mut iterations, mut exchanged) = (40, 0, 0.0);
     for _ in 0..steps {
         let (before, spins, damped) = (w.grains.velocity.clone(), w.grains.spin.clone(), w.ledger.damping);
         let places = w.grains.position.clone();
@@ -369,7 +369,7 @@ fn never_grows<D: Dim>(periods: f64) {
         let energy = w.ledger.kinetic + w.ledger.elastic;
         assert!(energy <= last + 1e-6 * first, "{energy:e} after {last:e}");
         last = energy;
-        let (mut lost, mut exchanged) = (0.0, 0.0);
+        let mut lost = 0.0;
         for k in 0..w.grains.len() {
             let (dv, ds) = (w.grains.velocity[k] - before[k], w.grains.spin[k] - spins[k]);
             lost += 0.5 * (w.grains.mass[k] * dv.dot(&dv) + w.grains.inertia[k] * ds.dot(&ds));
@@ -390,7 +390,7 @@ fn never_grows<D: Dim>(periods: f64) {
             lost += t.reaction.n * (way.dot(&way) - along * along) / (now.norm() + length + along);
         }
         let damping = w.ledger.damping - damped;
-        // the laws hold as well as the solver's tolerance says, 1e-10 of what the reactions change
+        // the laws hold as well as the solver's tolerance says, 1e-10 of what the reactions have exchanged
         let allowed = 1e-12 * first + 1e-10 * exchanged;
         assert!((damping - lost).abs() <= allowed, "{damping:e} against {lost:e} of {first:e}");
     }
