@@ -139,7 +139,7 @@ fn cut(text: &str, limit: usize) -> String {
 }
 
 /// A blank for what would move the cursor of a terminal.
-pub(super) fn printable(c: char) -> char {
+pub(crate) fn printable(c: char) -> char {
     if c.is_control() { ' ' } else { c }
 }
 

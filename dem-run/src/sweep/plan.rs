@@ -10,7 +10,7 @@ use sha2::{Digest, Sha256};
 use super::model::{Range, Spacing, Sweep, Values};
 use crate::run::RunError;
 use crate::scene::parse::{self, Document};
-use crate::scene::{Base, Change, Origin, Problem, Sample, Scene, SceneError, shorten};
+use crate::scene::{self, Base, Change, Origin, Problem, Sample, Scene, SceneError, shorten};
 
 /// Runs of a sweep, at most: each is a file.
 const MOST_RUNS: u64 = 100_000;
@@ -53,9 +53,8 @@ impl Plan {
     /// # Errors
     /// [`RunError::Scene`] with all that is wrong; [`RunError::InputOutput`] for files that cannot be read.
     pub fn read(path: &Path) -> Result<Self, RunError> {
-        let unreadable =
-            |error| RunError::InputOutput(format!("{}: the sweep cannot be read: {error}", path.display()));
-        let text = std::fs::read_to_string(path).map_err(unreadable)?;
+        let text = scene::text(path)
+            .map_err(|error| RunError::InputOutput(format!("{}: the sweep cannot be read: {error}", path.display())))?;
         let document = parse::parse(&path.display().to_string(), &text)?;
         let sweep: Sweep = document.decode().map_err(|problem| wrong(&document, vec![problem]))?;
         let problems = document.merge_non_finite(validate(&sweep));

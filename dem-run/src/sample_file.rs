@@ -1,0 +1,237 @@
+//! Samples as CSV tables: the grains that a scene reads, and those that a run writes.
+
+use crate::prepare::Ball;
+use crate::run::RunError;
+use crate::scene::{LARGEST, MAX_GRAINS, open_regular, shorten};
+use dem_core::body::Grains;
+use dem_core::dim::{Dim, Vect};
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read};
+use std::path::Path;
+
+/// Wrong lines that are told one by one.
+const MOST_TOLD: usize = 20;
+/// Longest line (bytes): a file without line breaks would be read into memory as one.
+const LONGEST_LINE: usize = 4096;
+
+fn header<D: Dim>() -> &'static [&'static str] {
+    if D::N == 2 { &["x", "y", "radius"] } else { &["x", "y", "z", "radius"] }
+}
+
+fn open(path: &Path) -> Result<File, RunError> {
+    let unreadable = |e| RunError::InputOutput(format!("sample.file.path: {} cannot be read: {e}", path.display()));
+    open_regular(path).map_err(unreadable)
+}
+
+/// Number of grains in a sample file, without reading them: of its lines that are neither the header, empty nor a comment.
+///
+/// # Errors
+/// [`RunError::InputOutput`].
+pub fn count(path: &Path) -> Result<usize, RunError> {
+    let mut lines = BufReader::with_capacity(1 << 16, open(path)?);
+    let (mut count, mut at_start) = (0_usize, true);
+    loop {
+        let bytes = lines.fill_buf().map_err(|e| RunError::InputOutput(format!("{}: {e}", path.display())))?;
+        if bytes.is_empty() {
+            return Ok(count.saturating_sub(1));
+        }
+        for byte in bytes {
+            let ends = matches!(byte, b'\n' | b'\r');
+            count += usize::from(at_start && !ends && *byte != b'#');
+            at_start = ends;
+        }
+        let read = bytes.len();
+        lines.consume(read);
+    }
+}
+
+/// The grains of a CSV file with the header `x,y,radius` or `x,y,z,radius` (m).
+///
+/// # Errors
+/// [`RunError::InputOutput`] for a file that cannot be read, [`RunError::Sample`] with all lines that are wrong.
+pub fn read<D: Dim>(path: &Path) -> Result<Vec<Ball<D>>, RunError> {
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .comment(Some(b'#'))
+        .from_reader(ShortLines { inner: open(path)?, since_break: 0 });
+    let mut wrong = Wrong { name: path.display().to_string(), told: vec![], count: 0 };
+    let header = header::<D>();
+    match reader.headers() {
+        Err(error) => wrong.tell(1, reason(&error)),
+        Ok(found) if found.iter().ne(header.iter().copied()) => {
+            let found = shorten(&found.iter().collect::<Vec<_>>().join(","));
+            let commas = if found.contains([';', '\t']) { ", between commas" } else { "" };
+            wrong.tell(1, format!("the header is {found}, it must be {}{commas}", header.join(",")));
+        }
+        Ok(_) => {}
+    }
+    // what stands below a wrong header cannot be judged
+    wrong.end()?;
+    let mut balls = Vec::new();
+    for row in reader.records() {
+        match row {
+            Ok(row) => match ball::<D>(&row) {
+                Ok(ball) => balls.push(ball),
+                Err(what) => wrong.tell(row.position().map_or(0, csv::Position::line), what),
+            },
+            Err(error) => {
+                wrong.tell(error.position().map_or(0, csv::Position::line), reason(&error));
+                if error.is_io_error() {
+                    break;
+                }
+            }
+        }
+        if balls.len() > MAX_GRAINS {
+            wrong.tell(0, format!("there are more than {MAX_GRAINS} grains"));
+            break;
+        }
+    }
+    wrong.end()?;
+    if balls.is_empty() {
+        wrong.tell(1, "there are no grains in the file".into());
+    }
+    wrong.end()?;
+    Ok(balls)
+}
+
+/// The grain of a row, or what is wrong with it.
+fn ball<D: Dim>(row: &csv::StringRecord) -> Result<Ball<D>, String> {
+    let mut numbers = [0.0; 4];
+    let mut wrong = vec![];
+    for (k, (field, name)) in row.iter().zip(header::<D>()).enumerate() {
+        match field.parse::<f64>() {
+            Ok(x) if x.abs() <= LARGEST => numbers[k] = x,
+            _ => wrong.push(format!("{name} is {:?}, it must be a finite number (m)", shorten(field))),
+        }
+    }
+    let radius = numbers[D::N];
+    if wrong.is_empty() && radius < 1.0 / LARGEST {
+        wrong.push(format!("radius is {radius}, it must be above zero"));
+    }
+    if wrong.is_empty() { Ok((D::Vector::from_slice(&numbers[..D::N]), radius)) } else { Err(wrong.join("; ")) }
+}
+
+/// The reader's error, without the place, which is told before it.
+fn reason(error: &csv::Error) -> String {
+    match error.kind() {
+        csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
+            let values = if *len == 1 { "value" } else { "values" };
+            format!("it has {len} {values}, the header has {expected_len}")
+        }
+        csv::ErrorKind::Utf8 { .. } => "it is not UTF-8 text".into(),
+        csv::ErrorKind::Io(error) => error.to_string(),
+        _ => error.to_string(),
+    }
+}
+
+/// What is wrong with a file.
+struct Wrong {
+    name: String,
+    told: Vec<String>,
+    count: usize,
+}
+
+impl Wrong {
+    fn tell(&mut self, line: u64, what: String) {
+        self.count += 1;
+        if self.told.len() < MOST_TOLD {
+            let place = if line == 0 { String::new() } else { format!(", line {line}") };
+            self.told.push(format!("{}{place}: {what}", self.name));
+        }
+    }
+
+    /// Ends the reading where something is wrong.
+    fn end(&mut self) -> Result<(), RunError> {
+        if self.count == 0 {
+            return Ok(());
+        }
+        let more = self.count - self.told.len();
+        if more > 0 {
+            self.told.push(format!("{}: {more} more lines are wrong", self.name));
+        }
+        Err(RunError::Sample(std::mem::take(&mut self.told)))
+    }
+}
+
+/// A reader that refuses a line longer than [`LONGEST_LINE`].
+struct ShortLines<R> {
+    inner: R,
+    /// Bytes since the last line break.
+    since_break: usize,
+}
+
+impl<R: Read> Read for ShortLines<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let read = self.inner.read(buffer)?;
+        for byte in &buffer[..read] {
+            self.since_break = if matches!(byte, b'\n' | b'\r') { 0 } else { self.since_break + 1 };
+            if self.since_break > LONGEST_LINE {
+                let message = format!("a line has more than {LONGEST_LINE} bytes: write one grain a line");
+                return Err(io::Error::other(message));
+            }
+        }
+        Ok(read)
+    }
+}
+
+/// Write the grains as a CSV file that [`read`] reads back bit for bit.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write<D: Dim>(grains: &Grains<D>, path: &Path) -> Result<(), csv::Error> {
+    let mut writer = csv::Writer::from_path(path)?;
+    writer.write_record(header::<D>())?;
+    for (x, r) in grains.position.iter().zip(&grains.radius) {
+        writer.write_record(x.as_slice().iter().chain([r]).map(f64::to_string))?;
+    }
+    writer.flush()?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dem_core::dim::{D2, D3};
+
+    fn file(text: &str) -> (tempfile::TempDir, std::path::PathBuf) {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("sample.csv");
+        std::fs::write(&path, text).expect("write");
+        (folder, path)
+    }
+
+    fn refused(text: &str) -> Vec<String> {
+        let (_folder, path) = file(text);
+        let Err(RunError::Sample(told)) = read::<D2>(&path) else { panic!("not refused: {text}") };
+        told
+    }
+
+    #[test]
+    fn all_wrong_lines_are_told_at_once() {
+        let told = refused("x,y,radius\n0,0,1\n0,nan,1\n1,x,-1\n2,0\n3,0,-1\n# 4\n5,0,0\n6,0,1e-70\n");
+        let lines = [3, 4, 5, 6, 8, 9].map(|line| format!("line {line}: "));
+        assert_eq!(told.len(), lines.len(), "{told:?}");
+        assert!(told.iter().zip(lines).all(|(told, line)| told.contains(&line)), "{told:?}");
+        let many = refused(&format!("x,y,radius\n{}", "0,0,-1\n".repeat(100)));
+        assert_eq!((many.len(), many[MOST_TOLD].ends_with("80 more lines are wrong")), (MOST_TOLD + 1, true));
+    }
+
+    #[test]
+    fn a_header_says_what_it_should_be_and_a_line_has_an_end() {
+        assert!(refused("x;y;radius\n0;0;1\n")[0].ends_with("it must be x,y,radius, between commas"));
+        assert!(refused("")[0].contains("the header is , it must be x,y,radius"));
+        assert!(refused("x,y,radius\n")[0].contains("no grains"));
+        for text in ["0".repeat(100_000), format!("x,y,radius\n{}", "0".repeat(100_000))] {
+            let told = refused(&text);
+            assert!(told[0].contains("a line has more than 4096 bytes"), "{told:?}");
+        }
+    }
+
+    #[test]
+    fn lines_are_counted_as_they_are_read() {
+        for text in ["x,y,z,radius\n# two grains\n0,0,0,1\n\n2,0,0,1", "x,y,z,radius\r\n0,0,0,1\r\n2,0,0,1\r\n"] {
+            let (_folder, path) = file(text);
+            assert_eq!((count(&path).expect("count"), read::<D3>(&path).expect("grains").len()), (2, 2));
+        }
+    }
+}
