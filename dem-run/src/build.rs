@@ -44,7 +44,7 @@ pub(crate) const TOUCHING: f64 = 1e-6;
 /// Overlap of two rigid grains, over the smaller radius, up to which it may be an error of where they came from: soft
 /// grains of other programs overlap.
 const DEEPEST: f64 = 0.1;
-/// Pairs and walls of one kind that are told one by one.
+/// Pairs of grains that are told one by one.
 const MOST_TOLD: usize = 10;
 
 /// Prepare the sample of a scene and put the world together. `watch` is told how far the preparation is.
@@ -185,19 +185,26 @@ fn refuse_other_units<D: Dim>(grains: &Grains<D>) -> Result<(), RunError> {
 ///
 /// Two grains at one place have no normal between them, and rigid ones do not overlap.
 fn overlapping<D: Dim>(grains: &Grains<D>) -> (Vec<String>, Option<String>) {
-    let mut wrong = vec![];
+    let (mut wrong, mut deep) = (vec![], 0);
     let (mut shallow, mut deepest) = (0, ([0, 0], 0.0, 0.0));
     for [i, j] in pairs_within(grains, &grains.position, &vec![0.0; grains.len()]) {
         let apart = (grains.position[i as usize] - grains.position[j as usize]).norm();
         let smaller = grains.radius[i as usize].min(grains.radius[j as usize]);
         let overlap = grains.radius[i as usize] + grains.radius[j as usize] - apart;
-        if apart <= TOUCHING * smaller {
-            wrong.push(format!("sample: the centres of grains {i} and {j} coincide; move one of them"));
-        } else if overlap > DEEPEST * smaller {
-            wrong.push(format!(
-                "sample: grains {i} and {j} overlap by {overlap:.3e} m, more than a tenth of the smaller radius; rigid grains do \
-                 not: move one of them, or make it smaller"
-            ));
+        let coincide = apart <= TOUCHING * smaller;
+        if coincide || overlap > DEEPEST * smaller {
+            deep += 1;
+            if deep > MOST_TOLD {
+                continue;
+            }
+            wrong.push(if coincide {
+                format!("sample: the centres of grains {i} and {j} coincide; move one of them")
+            } else {
+                format!(
+                    "sample: grains {i} and {j} overlap by {overlap:.3e} m, more than a tenth of the smaller radius; rigid \
+                     grains do not: move one of them, or make it smaller"
+                )
+            });
         } else if overlap > TOUCHING * smaller {
             shallow += 1;
             if overlap / smaller > deepest.2 {
@@ -205,6 +212,7 @@ fn overlapping<D: Dim>(grains: &Grains<D>) -> (Vec<String>, Option<String>) {
             }
         }
     }
+    wrong.extend((deep > MOST_TOLD).then(|| format!("sample: {} more pairs of grains overlap", deep - MOST_TOLD)));
     let ([i, j], overlap, share) = deepest;
     let word = (shallow > 0).then(|| {
         let pairs = if shallow == 1 { "one pair of grains overlaps".into() } else { format!("{shallow} pairs of grains overlap") };
@@ -214,15 +222,7 @@ fn overlapping<D: Dim>(grains: &Grains<D>) -> (Vec<String>, Option<String>) {
             100.0 * share
         )
     });
-    (first_few(wrong, "pairs of grains overlap"), word)
-}
-
-/// The first of many lines of one kind, and how many more there are.
-fn first_few(mut lines: Vec<String>, what: &str) -> Vec<String> {
-    let more = lines.len().saturating_sub(MOST_TOLD);
-    lines.truncate(MOST_TOLD);
-    lines.extend((more > 0).then(|| format!("sample: {more} more {what}")));
-    lines
+    (wrong, word)
 }
 
 fn unit<D: Dim>(components: &[f64]) -> D::Vector {

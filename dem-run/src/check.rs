@@ -233,7 +233,8 @@ fn over_time(function: &Function, unit: &str, end: f64) -> String {
     match function {
         Function::Constant(value) => format!("{} {unit} at all times", number(*value)),
         Function::Ramp(Ramp { rate, start }) => {
-            format!("0 {unit} until {start} s, then growing by {} {unit} a second: {}", number(*rate), last())
+            let until = if *start > 0.0 { format!("until {start} s, then ") } else { String::new() };
+            format!("0 {unit} {until}growing by {} {unit} a second: {}", number(*rate), last())
         }
         Function::Table(rows) => {
             let values = rows.iter().map(|row| row[1]);
@@ -327,7 +328,7 @@ mod tests {
     fn the_compression_run_is_told() {
         let check = Check::new(&config("compression.json", &[])).expect("check");
         assert_eq!((check.grains, check.steps, check.frames, check.bonds), (430, 5000, 501, true));
-        let course = "0 N until 0 s, then growing by 200 N a second: 100 N at 0.5 s".to_string();
+        let course = "0 N growing by 200 N a second: 100 N at 0.5 s".to_string();
         let top = CheckedWall { name: "top".into(), shape: "plane", drive: "force", course: Some(course) };
         assert_eq!(check.walls[1], top);
         // 501 frames of 430 grains and about 950 contacts

@@ -355,10 +355,22 @@ fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
+/// The arguments, or what is wrong with them, without the control characters that they may hold.
+fn arguments() -> Cli {
+    Cli::try_parse().unwrap_or_else(|error| {
+        let text = error.render().to_string();
+        if !error.use_stderr() || text == plain(&text) {
+            error.exit()
+        }
+        let _ = write!(std::io::stderr(), "{}", plain(&text));
+        std::process::exit(error.exit_code())
+    })
+}
+
 /// The command: reads the arguments, runs, and gives the exit code.
 #[must_use]
 pub fn main() -> ExitCode {
-    let result = match Cli::parse().command {
+    let result = match arguments().command {
         Command::Run(args) => run(args),
         Command::Resume(args) => resume(args),
         Command::Check(args) => check(&args),

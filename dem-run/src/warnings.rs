@@ -50,6 +50,7 @@ pub(crate) fn of_scene(scene: &Scene) -> Vec<String> {
     told
 }
 
+/// The first of many lines of one kind, and how many more there are.
 fn first_few(mut lines: Vec<String>, what: &str) -> Vec<String> {
     let more = lines.len().saturating_sub(MOST_TOLD);
     lines.truncate(MOST_TOLD);
@@ -90,7 +91,7 @@ fn others_push(scene: &Scene) -> bool {
 pub(crate) fn leaves<D: Dim>(wall: &Wall<D>, end: f64, grains: &Grains<D>) -> bool {
     let (Some(course), Some(towards)) = (Course::of(wall, end), towards(wall, grains)) else { return false };
     let sign = course.direction.dot(&towards);
-    course.range.0 * sign <= 0.0 && course.range.1 * sign <= 0.0
+    !course.along && course.range.0 * sign <= 0.0 && course.range.1 * sign <= 0.0
 }
 
 /// The way on which its drive alone leads a wall.
@@ -203,4 +204,93 @@ fn apart<D: Dim>(wall: &Wall<D>, course: &Course<D>, grains: &Grains<D>) -> Opti
             number(near.max(0.0))
         )
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::build::place;
+    use crate::scene::from_text;
+    use dem_core::dim::D2;
+
+    /// What is told of two grains on a floor below a lid, with one change.
+    fn told(lid: &str, sets: &[&str]) -> Vec<String> {
+        let text = format!(
+            r#"{{ "dimension": 2,
+                "sample": {{ "grains": [{{ "center": [0, 1], "radius": 1 }}, {{ "center": [2, 1], "radius": 1 }}] }},
+                "materials": {{ "density": 1, "friction": {{ "grain_grain": 0.3, "grain_wall": 0.3 }} }},
+                "grains": {{ "fixed": [], "loads": [] }},
+                "walls": {{ "floor": {{ "shape": {{ "plane": {{ "normal": [0, 1], "place": "seated" }} }} }}, "lid": {lid} }},
+                "time": {{ "step": 0.1, "end": 1 }}, "output": {{ "every_steps": 1 }} }}"#
+        );
+        let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
+        let scene = from_text("test", &text, &sets).unwrap_or_else(|error| panic!("{error}"));
+        place::<D2>(&scene, &mut |_| true).unwrap_or_else(|error| panic!("{error}")).warnings
+    }
+
+    fn lid(place: &str, drive: &str) -> String {
+        format!(r#"{{ "shape": {{ "plane": {{ "normal": [0, -1], "place": {place} }} }}, {drive} }}"#)
+    }
+
+    #[test]
+    fn a_wall_that_cannot_carry_anything_is_told() {
+        let (seated, high) = (r#""seated""#, r#"{ "at": [0, 3] }"#);
+        let pulled = r#""mass": "sample", "force": { "constant": -22 }"#;
+        for (place, drive, parts) in [
+            (
+                seated,
+                r#""direction": [1, 0], "velocity": { "constant": 1 }"#,
+                &["along its own surface", "nothing in this scene"][..],
+            ),
+            (seated, r#""friction": 0, "direction": [1, 0], "velocity": { "constant": 1 }"#, &["without friction"]),
+            (seated, pulled, &["-22 N, pulls it away", "the other sign"]),
+            (seated, r#""mass": "sample", "direction": [0, 1], "force_rate": 3"#, &["3 N, pulls it away"]),
+            (high, r#""velocity": { "constant": 0.5 }"#, &["touches nothing", "is 1 m away", "at most 0.5 m nearer"]),
+            (high, r#""velocity": { "constant": -2 }"#, &["touches nothing", "at most 0 m nearer"]),
+            (high, r#""mass": { "kg": 1 }, "force": { "constant": 1 }"#, &["touches nothing", "m nearer"]),
+        ] {
+            let told = told(&lid(place, drive), &[]);
+            assert_eq!(told.len(), 1, "{drive}: {told:?}");
+            for part in [&["walls.lid: "], parts].concat() {
+                assert!(told[0].contains(part), "{part} is not in\n{}", told[0]);
+            }
+        }
+        // what presses, leads to the grains, is taken away, or may be met by grains that move
+        for (place, drive, sets) in [
+            (seated, r#""velocity": { "constant": 1 }"#, &[][..]),
+            (seated, r#""velocity": { "constant": -1 }"#, &[]),
+            (seated, r#""mass": "sample", "force_rate": 3"#, &[]),
+            (seated, r#""mass": "sample", "force": { "table": [[0, -1], [1, 1]] }"#, &[]),
+            (high, r#""velocity": { "constant": 1.5 }"#, &[]),
+            (high, r#""mass": { "kg": 1 }, "force": { "constant": 3 }"#, &[]),
+            (seated, r#""direction": [1, 0], "velocity": { "constant": 1 }"#, &["gravity=[0, -9.81]"]),
+            (high, r#""velocity": { "constant": 0.1 }"#, &["gravity=[0, 9.81]"]),
+        ] {
+            assert_eq!(told(&lid(place, drive), sets), [""; 0], "{drive}");
+        }
+    }
+
+    #[test]
+    fn what_is_ignored_is_told() {
+        let lid = lid(r#""seated""#, r#""velocity": { "constant": 1 }"#);
+        for (sets, parts) in [
+            (
+                &["grains.fixed=[1]", "sample.grains.1.velocity=[0, 2]"][..],
+                &["sample.grains.1.velocity: it is ignored, as grains.fixed holds grain 1"][..],
+            ),
+            (&["grains.fixed=[0]", "sample.grains.0.spin=[2]"], &["sample.grains.0.spin: it is ignored"]),
+            (
+                &["grains.fixed=[1]", r#"grains.loads=[{"grain": 1, "force": [1, 0]}]"#],
+                &["grains.loads.0: it moves nothing, as grains.fixed holds grain 1"],
+            ),
+            (
+                &["time.end=1.05"],
+                &["time.end: 1.05 s is not a multiple of time.step, 0.1 s", "ends at 1 s; 1 or 1.1 would be"],
+            ),
+        ] {
+            let told = told(&lid, sets);
+            assert_eq!(told.len(), 1, "{told:?}");
+            parts.iter().for_each(|part| assert!(told[0].contains(part), "{part} is not in\n{}", told[0]));
+        }
+        assert_eq!(told(&lid, &["grains.fixed=[1]", "sample.grains.1.velocity=[0, 0]"]), [""; 0]);
+    }
 }

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fmt::Write as _;
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
@@ -271,6 +272,13 @@ pub fn describe(values: &BTreeMap<String, Value>) -> String {
         .join(", ")
 }
 
+/// What a sample file holds.
+fn content(path: &Path) -> std::io::Result<Vec<u8>> {
+    let mut bytes = vec![];
+    scene::open_regular(path)?.read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
 /// SHA-256 of all that a scene's history depends on: the scene without its title, and the grains of its sample file in
 /// place of the file's name.
 fn digest(scene: &Scene, samples: &mut HashMap<PathBuf, Vec<u8>>) -> String {
@@ -279,7 +287,7 @@ fn digest(scene: &Scene, samples: &mut HashMap<PathBuf, Vec<u8>>) -> String {
     if let Sample::File(file) = &mut plain.sample {
         let path = std::mem::take(&mut file.path);
         // one that cannot be read is told when all else is known to be right
-        hash.update(samples.entry(path).or_insert_with_key(|path| std::fs::read(path).unwrap_or_default()));
+        hash.update(samples.entry(path).or_insert_with_key(|path| content(path).unwrap_or_default()));
     }
     hash.update(plain.to_json().unwrap_or_default());
     hash.finalize().iter().fold(String::new(), |mut text, byte| {
