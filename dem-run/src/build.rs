@@ -44,6 +44,8 @@ pub(crate) const TOUCHING: f64 = 1e-6;
 /// Overlap of two rigid grains, over the smaller radius, up to which it may be an error of where they came from: soft
 /// grains of other programs overlap.
 const DEEPEST: f64 = 0.1;
+/// Overlap of two grains, over the smaller radius, that a table of few decimals brings: no word about it.
+const ROUNDED: f64 = 1e-3;
 /// Pairs of grains that are told one by one.
 const MOST_TOLD: usize = 10;
 
@@ -181,7 +183,7 @@ fn refuse_other_units<D: Dim>(grains: &Grains<D>) -> Result<(), RunError> {
     )]))
 }
 
-/// The pairs of grains that overlap too deeply, each told; and a word about those that overlap beyond rounding.
+/// The pairs of grains that overlap too deeply, each told; and a word about those that overlap by more than decimals bring.
 ///
 /// Two grains at one place have no normal between them, and rigid ones do not overlap.
 fn overlapping<D: Dim>(grains: &Grains<D>) -> (Vec<String>, Option<String>) {
@@ -205,7 +207,7 @@ fn overlapping<D: Dim>(grains: &Grains<D>) -> (Vec<String>, Option<String>) {
                      grains do not: move one of them, or make it smaller"
                 )
             });
-        } else if overlap > TOUCHING * smaller {
+        } else if overlap > ROUNDED * smaller {
             shallow += 1;
             if overlap / smaller > deepest.2 {
                 deepest = ([i, j], overlap, overlap / smaller);
@@ -217,9 +219,9 @@ fn overlapping<D: Dim>(grains: &Grains<D>) -> (Vec<String>, Option<String>) {
     let word = (shallow > 0).then(|| {
         let pairs = if shallow == 1 { "one pair of grains overlaps".into() } else { format!("{shallow} pairs of grains overlap") };
         format!(
-            "sample: {pairs}, most of all {i} and {j}, by {overlap:.3e} m ({:.2} % of the smaller radius); rigid grains do not: \
+            "sample: {pairs}, most of all {i} and {j}, by {overlap:.3e} m ({} % of the smaller radius); rigid grains do not: \
              such a pair is not pushed apart, its gap counts from there",
-            100.0 * share
+            number(100.0 * share)
         )
     });
     (wrong, word)

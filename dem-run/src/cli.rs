@@ -358,11 +358,11 @@ fn positive(text: &str) -> Result<f64, String> {
 /// The arguments, or what is wrong with them, without the control characters that they may hold.
 fn arguments() -> Cli {
     Cli::try_parse().unwrap_or_else(|error| {
-        let text = error.render().to_string();
-        if !error.use_stderr() || text == plain(&text) {
+        let controls = |argument: std::ffi::OsString| argument.to_string_lossy().contains(char::is_control);
+        if !error.use_stderr() || !std::env::args_os().any(controls) {
             error.exit()
         }
-        let _ = write!(std::io::stderr(), "{}", plain(&text));
+        let _ = write!(std::io::stderr(), "{}", plain(&error.render().to_string()));
         std::process::exit(error.exit_code())
     })
 }

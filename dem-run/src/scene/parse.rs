@@ -2,13 +2,14 @@
 
 use std::collections::HashSet;
 use std::collections::hash_map::{Entry, HashMap};
+use std::fmt;
 use std::sync::Arc;
 
 use jsonc_parser::ast::{Object, ObjectPropName, Value as Node};
 use jsonc_parser::common::Ranged;
 use jsonc_parser::errors::ParseErrorKind;
-use jsonc_parser::{CollectOptions, ParseOptions, parse_to_ast};
-use serde::de::DeserializeOwned;
+use jsonc_parser::{CollectOptions, ParseOptions, parse_to_ast, parse_to_serde_value};
+use serde::de::{self, Deserialize, DeserializeOwned, Deserializer, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Number, Value};
 use serde_path_to_error::Segment;
 
@@ -53,6 +54,17 @@ fn options() -> ParseOptions {
 pub(crate) fn parse(name: &str, text: &str) -> Result<Document, SceneError> {
     // a byte order mark, as some editors write it, is not part of the text
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let (root, non_finite) = match parse_to_serde_value(text, &options()) {
+        // an empty text is null to this reader
+        Ok(Tree(root)) if !root.is_null() => (root, HashMap::new()),
+        _ => by_syntax(name, text)?,
+    };
+    let (name, text) = (name.to_string(), Arc::from(text));
+    Ok(Document { name, text, root, replaced: HashMap::new(), non_finite })
+}
+
+/// The tree and the numbers that overflow, by way of the syntax tree, which knows the places of what is wrong.
+fn by_syntax(name: &str, text: &str) -> Result<(Value, HashMap<String, String>), SceneError> {
     let parsed = parse_to_ast(text, &CollectOptions::default(), &options())
         .map_err(|error| syntax(name, text, error.line_display(), error.column_display(), &error.kind().to_string()))?;
     let Some(node) = parsed.value else {
@@ -63,8 +75,7 @@ pub(crate) fn parse(name: &str, text: &str) -> Result<Document, SceneError> {
     if !walk.twice.is_empty() {
         return Err(SceneError::Wrong { name: name.to_string(), problems: given_twice(text, &walk.twice) });
     }
-    let (name, text) = (name.to_string(), Arc::from(text));
-    Ok(Document { name, text, root, replaced: HashMap::new(), non_finite: walk.non_finite })
+    Ok((root, walk.non_finite))
 }
 
 /// The problems of names that an object has twice.
@@ -102,6 +113,68 @@ fn with_remedy(message: &str, rest: &str) -> String {
     match remedies.iter().find(|(kind, _)| kind.to_string() == message) {
         Some((_, remedy)) => format!("{message}: {remedy}"),
         None => message.to_string(),
+    }
+}
+
+/// A JSON tree of a text where nothing is wrong: no name is given twice and no number overflows. It is read without the
+/// syntax tree, which for millions of grains is larger.
+struct Tree(Value);
+
+impl<'de> Deserialize<'de> for Tree {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(TreeVisitor).map(Tree)
+    }
+}
+
+struct TreeVisitor;
+
+impl<'de> Visitor<'de> for TreeVisitor {
+    type Value = Value;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("JSON")
+    }
+
+    fn visit_unit<E: de::Error>(self) -> Result<Value, E> {
+        Ok(Value::Null)
+    }
+
+    fn visit_bool<E: de::Error>(self, value: bool) -> Result<Value, E> {
+        Ok(Value::Bool(value))
+    }
+
+    fn visit_i64<E: de::Error>(self, value: i64) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_u64<E: de::Error>(self, value: u64) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_f64<E: de::Error>(self, value: f64) -> Result<Value, E> {
+        Number::from_f64(value).map(Value::Number).ok_or_else(|| E::custom("not finite"))
+    }
+
+    fn visit_str<E: de::Error>(self, value: &str) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<Value, A::Error> {
+        let mut list = vec![];
+        while let Some(Tree(item)) = items.next_element()? {
+            list.push(item);
+        }
+        Ok(Value::Array(list))
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut entries: A) -> Result<Value, A::Error> {
+        let mut map = Map::new();
+        while let Some((name, Tree(value))) = entries.next_entry::<String, _>()? {
+            if map.insert(name, value).is_some() {
+                return Err(de::Error::custom("a name a second time"));
+            }
+        }
+        Ok(Value::Object(map))
     }
 }
 
@@ -163,7 +236,7 @@ struct Twice {
     second: usize,
 }
 
-/// One pass over the syntax tree, which is taken apart on the way: a scene of millions of grains is in memory once.
+/// One pass over the syntax tree.
 struct Walk {
     /// The path of the value in hand.
     path: String,
@@ -428,6 +501,21 @@ mod tests {
         let found = in_order(text.char_indices().inspect(|_| looked_at += 1), &offsets);
         assert!(found.iter().zip(&offsets).all(|(place, offset)| *place == (1, offset + 1)));
         assert!(looked_at <= text.len(), "{looked_at} characters of {}", text.len());
+    }
+
+    #[test]
+    fn both_ways_to_read_give_the_same_tree() {
+        let numbers =
+            "[0, -7, 18446744073709551615, 18446744073709551616, 1e5, 0.1, -0.0, 5e-324, 1.7976931348623157e308]";
+        let quirks = r#"{ "a\u0041\n": [true, null, "é\ud83d\ude00"], // a comment
+            "b": { /* and another */ "c": [] , "d": {} } }"#;
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
+        let entries = std::fs::read_dir(folder).expect("configs").map(|entry| entry.expect("entry").path());
+        let texts = entries.map(|path| std::fs::read_to_string(path).expect("text"));
+        for text in texts.chain([numbers.to_string(), quirks.to_string()]) {
+            let Tree(quick) = parse_to_serde_value(&text, &options()).expect("JSON");
+            assert_eq!((quick, HashMap::new()), by_syntax("test", &text).expect("JSON"), "{text}");
+        }
     }
 
     #[test]

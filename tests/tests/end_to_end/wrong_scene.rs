@@ -323,7 +323,7 @@ fn control_characters_do_not_reach_the_terminal() {
         &["run", &scene, "-o", name],
         &["run", &scene, "-o", name],
         &["check", "a\u{1b}[31m.json"],
-        &["check", &scene, "--threads\u{1b}[31m"],
+        &["check", &scene, "--threads[31m\u{1b}"],
         &["check", &scene, "--set", "title\u{1b}[31m=1"],
     ] {
         let Outcome { stdout, stderr, .. } = here.dem_run(args);
