@@ -197,7 +197,7 @@ pub(crate) fn count(scene: &Scene) -> Result<usize, RunError> {
 /// The sizes of a scene, and what it may not mean as it says it.
 fn look<D: Dim>(scene: &Scene, enough_memory: bool) -> Result<(Option<Sizes>, Vec<String>), RunError> {
     let sizes = match &scene.sample {
-        Sample::Random(random) => random_sizes::<D>(scene, random),
+        Sample::Random(random) if enough_memory => Some(random_sizes::<D>(scene, random)),
         _ if enough_memory => {
             let Placed { grains, warnings, .. } = place::<D>(scene, &mut |_| true)?;
             let (low, high) = grains.bounds();
@@ -212,11 +212,11 @@ fn look<D: Dim>(scene: &Scene, enough_memory: bool) -> Result<(Option<Sizes>, Ve
     Ok((sizes, told))
 }
 
-fn random_sizes<D: Dim>(scene: &Scene, random: &RandomSample) -> Option<Sizes> {
+fn random_sizes<D: Dim>(scene: &Scene, random: &RandomSample) -> Sizes {
     let radii = prepare::radii(random, scene.seed);
     let corners = [vec![0.0; D::N], prepare::sides::<D>(random, &radii)];
     let volume: f64 = radii.iter().map(|r| D::volume(*r)).sum();
-    Some(Sizes::of(&radii, corners, volume * scene.materials.density * scene.thickness()))
+    Sizes::of(&radii, corners, volume * scene.materials.density * scene.thickness())
 }
 
 impl Sizes {
@@ -314,11 +314,11 @@ pub(crate) fn size(bytes: u64) -> String {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::scene::load;
 
-    fn config(name: &str, sets: &[&str]) -> Scene {
+    pub(crate) fn config(name: &str, sets: &[&str]) -> Scene {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs").join(name);
         let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
         load(&path, &sets).unwrap_or_else(|error| panic!("{error}"))

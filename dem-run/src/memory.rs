@@ -112,13 +112,7 @@ fn process() -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::load;
-
-    fn config(name: &str, sets: &[&str]) -> Scene {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs").join(name);
-        let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
-        load(&path, &sets).unwrap_or_else(|error| panic!("{error}"))
-    }
+    use crate::check::tests::config;
 
     #[test]
     fn the_estimate_is_near_what_was_measured() {

@@ -6,7 +6,7 @@ use crate::scene::{LARGEST, MAX_GRAINS, open_regular, shorten};
 use dem_core::body::Grains;
 use dem_core::dim::{Dim, Vect};
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
 /// Wrong lines that are told one by one.
@@ -18,31 +18,17 @@ fn header<D: Dim>() -> &'static [&'static str] {
     if D::N == 2 { &["x", "y", "radius"] } else { &["x", "y", "z", "radius"] }
 }
 
-fn open(path: &Path) -> Result<File, RunError> {
-    let unreadable = |e| RunError::InputOutput(format!("sample.file.path: {} cannot be read: {e}", path.display()));
-    open_regular(path).map_err(unreadable)
-}
-
 /// Number of grains in a sample file, without reading them: of its lines that are neither the header, empty nor a comment.
 ///
 /// # Errors
-/// [`RunError::InputOutput`].
+/// [`RunError::InputOutput`], [`RunError::Sample`].
 pub fn count(path: &Path) -> Result<usize, RunError> {
-    let mut lines = BufReader::with_capacity(1 << 16, open(path)?);
-    let (mut count, mut at_start) = (0_usize, true);
-    loop {
-        let bytes = lines.fill_buf().map_err(|e| RunError::InputOutput(format!("{}: {e}", path.display())))?;
-        if bytes.is_empty() {
-            return Ok(count.saturating_sub(1));
-        }
-        for byte in bytes {
-            let ends = matches!(byte, b'\n' | b'\r');
-            count += usize::from(at_start && !ends && *byte != b'#');
-            at_start = ends;
-        }
-        let read = bytes.len();
-        lines.consume(read);
+    let mut lines = Lines::open(path)?;
+    let mut count = 0_usize;
+    while lines.next()? {
+        count += 1;
     }
+    Ok(count.saturating_sub(1))
 }
 
 /// The grains of a CSV file with the header `x,y,radius` or `x,y,z,radius` (m).
@@ -50,55 +36,50 @@ pub fn count(path: &Path) -> Result<usize, RunError> {
 /// # Errors
 /// [`RunError::InputOutput`] for a file that cannot be read, [`RunError::Sample`] with all lines that are wrong.
 pub fn read<D: Dim>(path: &Path) -> Result<Vec<Ball<D>>, RunError> {
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .comment(Some(b'#'))
-        .from_reader(ShortLines { inner: open(path)?, since_break: 0 });
+    let mut lines = Lines::open(path)?;
     let mut wrong = Wrong { name: path.display().to_string(), told: vec![], count: 0 };
-    let header = header::<D>();
-    match reader.headers() {
-        Err(error) => wrong.tell(1, reason(&error)),
-        Ok(found) if found.iter().ne(header.iter().copied()) => {
-            let found = shorten(&found.iter().collect::<Vec<_>>().join(","));
+    let header = header::<D>().join(",");
+    lines.next()?;
+    match lines.fields().map(|fields| fields.collect::<Vec<_>>().join(",")) {
+        Ok(found) if found == header => {}
+        Ok(found) => {
             let commas = if found.contains([';', '\t']) { ", between commas" } else { "" };
-            wrong.tell(1, format!("the header is {found}, it must be {}{commas}", header.join(",")));
+            let found = shorten(&found);
+            wrong.tell(lines.number.max(1), format!("the header is {found}, it must be {header}{commas}"));
         }
-        Ok(_) => {}
+        Err(what) => wrong.tell(lines.number, what),
     }
     // what stands below a wrong header cannot be judged
     wrong.end()?;
     let mut balls = Vec::new();
-    for row in reader.records() {
-        match row {
-            Ok(row) => match ball::<D>(&row) {
-                Ok(ball) => balls.push(ball),
-                Err(what) => wrong.tell(row.position().map_or(0, csv::Position::line), what),
-            },
-            Err(error) => {
-                wrong.tell(error.position().map_or(0, csv::Position::line), reason(&error));
-                if error.is_io_error() {
-                    break;
-                }
-            }
+    while lines.next()? {
+        match lines.fields().and_then(|fields| ball::<D>(&fields.collect::<Vec<_>>())) {
+            Ok(ball) => balls.push(ball),
+            Err(what) => wrong.tell(lines.number, what),
         }
         if balls.len() > MAX_GRAINS {
-            wrong.tell(0, format!("there are more than {MAX_GRAINS} grains"));
+            wrong.tell(lines.number, format!("there are more than {MAX_GRAINS} grains"));
             break;
         }
     }
     wrong.end()?;
     if balls.is_empty() {
-        wrong.tell(1, "there are no grains in the file".into());
+        wrong.tell(lines.number, "there are no grains in the file".into());
     }
     wrong.end()?;
     Ok(balls)
 }
 
-/// The grain of a row, or what is wrong with it.
-fn ball<D: Dim>(row: &csv::StringRecord) -> Result<Ball<D>, String> {
+/// The grain of a line, or what is wrong with it.
+fn ball<D: Dim>(fields: &[&str]) -> Result<Ball<D>, String> {
+    let header = header::<D>();
+    if fields.len() != header.len() {
+        let values = if fields.len() == 1 { "value" } else { "values" };
+        return Err(format!("it has {} {values}, the header has {}", fields.len(), header.len()));
+    }
     let mut numbers = [0.0; 4];
     let mut wrong = vec![];
-    for (k, (field, name)) in row.iter().zip(header::<D>()).enumerate() {
+    for (k, (field, name)) in fields.iter().zip(header).enumerate() {
         match field.parse::<f64>() {
             Ok(x) if x.abs() <= LARGEST => numbers[k] = x,
             _ => wrong.push(format!("{name} is {:?}, it must be a finite number (m)", shorten(field))),
@@ -106,21 +87,58 @@ fn ball<D: Dim>(row: &csv::StringRecord) -> Result<Ball<D>, String> {
     }
     let radius = numbers[D::N];
     if wrong.is_empty() && radius < 1.0 / LARGEST {
-        wrong.push(format!("radius is {radius}, it must be above zero"));
+        wrong.push(format!("radius is {radius:?}, it must be above zero"));
     }
     if wrong.is_empty() { Ok((D::Vector::from_slice(&numbers[..D::N]), radius)) } else { Err(wrong.join("; ")) }
 }
 
-/// The reader's error, without the place, which is told before it.
-fn reason(error: &csv::Error) -> String {
-    match error.kind() {
-        csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
-            let values = if *len == 1 { "value" } else { "values" };
-            format!("it has {len} {values}, the header has {expected_len}")
+/// The lines of a table that are neither empty nor a comment.
+struct Lines {
+    name: String,
+    inner: BufReader<File>,
+    line: Vec<u8>,
+    /// Number of the line in hand, from 1.
+    number: u64,
+}
+
+impl Lines {
+    fn open(path: &Path) -> Result<Self, RunError> {
+        let unreadable = |e| RunError::InputOutput(format!("sample.file.path: {} cannot be read: {e}", path.display()));
+        let inner = BufReader::new(open_regular(path).map_err(unreadable)?);
+        Ok(Self { name: path.display().to_string(), inner, line: vec![], number: 0 })
+    }
+
+    /// Goes to the next line; false at the end.
+    fn next(&mut self) -> Result<bool, RunError> {
+        loop {
+            self.line.clear();
+            let most = LONGEST_LINE as u64 + 1;
+            let unreadable = |e| RunError::InputOutput(format!("{} cannot be read: {e}", self.name));
+            self.inner.by_ref().take(most).read_until(b'\n', &mut self.line).map_err(unreadable)?;
+            if self.line.is_empty() {
+                return Ok(false);
+            }
+            self.number += 1;
+            if self.line.len() > LONGEST_LINE {
+                let Self { name, number, .. } = self;
+                return Err(RunError::Sample(vec![format!(
+                    "{name}, line {number}: it has more than {LONGEST_LINE} bytes: write one grain a line"
+                )]));
+            }
+            if self.number == 1 && self.line.starts_with("\u{feff}".as_bytes()) {
+                self.line.drain(..3);
+            }
+            let text = self.line.trim_ascii();
+            if !text.is_empty() && text[0] != b'#' {
+                return Ok(true);
+            }
         }
-        csv::ErrorKind::Utf8 { .. } => "it is not UTF-8 text".into(),
-        csv::ErrorKind::Io(error) => error.to_string(),
-        _ => error.to_string(),
+    }
+
+    /// What stands between the commas of the line in hand, which some programs write between quotes.
+    fn fields(&self) -> Result<impl Iterator<Item = &str>, String> {
+        let text = std::str::from_utf8(&self.line).map_err(|_| "it is not UTF-8 text".to_string())?;
+        Ok(text.split(',').map(|field| field.trim().trim_matches('"')))
     }
 }
 
@@ -135,8 +153,7 @@ impl Wrong {
     fn tell(&mut self, line: u64, what: String) {
         self.count += 1;
         if self.told.len() < MOST_TOLD {
-            let place = if line == 0 { String::new() } else { format!(", line {line}") };
-            self.told.push(format!("{}{place}: {what}", self.name));
+            self.told.push(format!("{}, line {line}: {what}", self.name));
         }
     }
 
@@ -150,27 +167,6 @@ impl Wrong {
             self.told.push(format!("{}: {more} more lines are wrong", self.name));
         }
         Err(RunError::Sample(std::mem::take(&mut self.told)))
-    }
-}
-
-/// A reader that refuses a line longer than [`LONGEST_LINE`].
-struct ShortLines<R> {
-    inner: R,
-    /// Bytes since the last line break.
-    since_break: usize,
-}
-
-impl<R: Read> Read for ShortLines<R> {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let read = self.inner.read(buffer)?;
-        for byte in &buffer[..read] {
-            self.since_break = if matches!(byte, b'\n' | b'\r') { 0 } else { self.since_break + 1 };
-            if self.since_break > LONGEST_LINE {
-                let message = format!("a line has more than {LONGEST_LINE} bytes: write one grain a line");
-                return Err(io::Error::other(message));
-            }
-        }
-        Ok(read)
     }
 }
 
@@ -223,13 +219,16 @@ mod tests {
         assert!(refused("x,y,radius\n")[0].contains("no grains"));
         for text in ["0".repeat(100_000), format!("x,y,radius\n{}", "0".repeat(100_000))] {
             let told = refused(&text);
-            assert!(told[0].contains("a line has more than 4096 bytes"), "{told:?}");
+            assert!(told[0].contains("it has more than 4096 bytes"), "{told:?}");
         }
     }
 
     #[test]
     fn lines_are_counted_as_they_are_read() {
-        for text in ["x,y,z,radius\n# two grains\n0,0,0,1\n\n2,0,0,1", "x,y,z,radius\r\n0,0,0,1\r\n2,0,0,1\r\n"] {
+        for text in [
+            "x,y,z,radius\n# two grains\n0,0,0,1\n\n2,0,0,1",
+            "\u{feff}\"x\", \"y\",\"z\",\"radius\"\r\n0, 0,0,1\r\n2,0,0,1\r\n",
+        ] {
             let (_folder, path) = file(text);
             assert_eq!((count(&path).expect("count"), read::<D3>(&path).expect("grains").len()), (2, 2));
         }

@@ -265,7 +265,7 @@ fn a_scene_has_an_end() {
     here.dem_run(&["check", "big.json"]).fails(4, &["big.json", "more than 256 MiB", "sample.file"]);
     let set = format!("sample={{\"file\": {{\"path\": {:?}}}}}", here.path("big.csv"));
     here.write("big.csv", "1".repeat(1 << 20));
-    here.dem_run(&["check", &config("column.json"), "--set", &set]).fails(2, &["a line has more than 4096 bytes"]);
+    here.dem_run(&["check", &config("column.json"), "--set", &set]).fails(2, &["it has more than 4096 bytes"]);
 }
 
 #[test]
