@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use crate::plot::Drawing;
+use crate::scene::printable;
 
 /// A result that cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -160,12 +161,18 @@ pub fn facts(facts: &[(&str, String)]) -> String {
     facts.iter().map(|(name, value)| format!("{name:<width$}  {value}\n")).collect()
 }
 
-/// Prints results on stdout. A reader that closes the pipe early is no error.
+/// A text as a terminal may have it: blanks for control characters, which titles and file names may hold, but line breaks.
+#[must_use]
+pub fn plain(text: &str) -> String {
+    text.chars().map(|c| if c == '\n' { c } else { printable(c) }).collect()
+}
+
+/// Prints results on stdout, as [`plain`] text. A reader that closes the pipe early is no error.
 ///
 /// # Errors
 /// [`WriteError`].
 pub fn print(text: &str) -> Result<()> {
-    match std::io::stdout().lock().write_all(text.as_bytes()) {
+    match std::io::stdout().lock().write_all(plain(text).as_bytes()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => {
             Err(WriteError { path: "standard output".into(), why: error.to_string() })
         }
