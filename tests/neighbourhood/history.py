@@ -193,9 +193,11 @@ def enum_names(dataset, count=None):
 def sums(index, values, count):
     """Sums of the rows of `values` [M,…] that have the same `index`, [count,…]."""
     values = np.asarray(values, float)
-    flat = values.reshape(len(values), -1)
-    columns = [np.bincount(index, column, minlength=count) for column in flat.T]
-    return np.stack(columns, 1).reshape((count,) + values.shape[1:]) if columns else np.zeros((count,) + values.shape[1:])
+    out = np.zeros((count,) + values.shape[1:])
+    if out.size and len(values):
+        columns = [np.bincount(index, column, minlength=count) for column in values.reshape(len(values), -1).T]
+        out = np.stack(columns, 1).reshape(out.shape)
+    return out
 
 
 def cross(a, b):
