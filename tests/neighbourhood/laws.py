@@ -158,7 +158,9 @@ class Solved:
         load = np.sqrt((norm(outer[:, ~h.fixed]) ** 2).sum(1) + (h.wall_drive_force() ** 2).sum(1))
         square = np.bincount(h.row_step, (self.r**2).sum(1), minlength=h.S)
         self.scale = np.maximum(np.sqrt(square), h.h * load)
-        self.delta = (h.observed["solver_residual"] * self.scale)[h.row_step] + self.rounding
+        # a map that is as small as the rounding of all velocities counts as zero, in the sum over all contacts
+        self.rounded = np.sqrt(np.bincount(h.row_step, self.rounding**2, minlength=h.S))
+        self.delta = (h.observed["solver_residual"] * self.scale + self.rounded)[h.row_step]
 
     def _natural(self, h, shifts):
         """r̂ − P_K(r̂ − ũ/D); inside the cone ũ/D itself, free of the rounding of the shift."""
@@ -233,8 +235,7 @@ def check(h, c, p, report):
 def check_residual(h, p, report):
     """The natural maps of all contacts together, over the reactions or the load, are what the history says, or less."""
     total = np.sqrt(np.bincount(h.row_step, (p.map**2).sum(1), minlength=h.S))
-    rounded = np.sqrt(np.bincount(h.row_step, p.rounding**2, minlength=h.S))
-    allowed = h.observed["solver_residual"] * p.scale + rounded
+    allowed = h.observed["solver_residual"] * p.scale + p.rounded
     report.expect("residual", np.where(h.single, total, 0.0), allowed, lambda s: f"step {s + 1}: norm of the natural maps (N s)")
     accept = h.scene["solver"].get("accept") or (1e-6 if h.K else 1e-4)
     accept = max(accept, h.scene["solver"]["tolerance"])

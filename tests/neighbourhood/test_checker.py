@@ -189,7 +189,7 @@ SPOILT = [
     ("pressed", "the prescribed force", observed("applied_force"), "applied_force"),
     ("beam", "the force of a wall that moves as prescribed", observed("applied_force", relative=0.0, absolute=1e-3), "wall_force_or_applied"),
     ("pressed", "a pair", put("contacts/pair", lambda g: (any_row(g), 0), lambda i: i - 1 if i else i + 1), "gap"),
-    ("pressed", "the order of pairs", put("contacts/pair", lambda g: (int(g.h.M // 2), 0), 0), "contacts sorted"),
+    ("pressed", "the order of pairs", put("contacts/pair", lambda g: (int(np.argmax(g.h.i)), 0), 0), "contacts sorted"),
     ("pressed", "a gap", add("contacts/gap", any_row, 0, 1e-12), "gap"),
     ("pressed", "a normal", add("contacts/normal", lambda g: (any_row(g), 0), 1e-9, 1e-9), "normal"),
     ("pressed", "a point", add("contacts/point", lambda g: (any_row(g), 1), 0, 1e-12), "point"),
