@@ -116,9 +116,20 @@ def check_books(h, report, sizes):
     terms = [o["external_work"], start - o["kinetic_energy"], -o.get("elastic_energy", zero)] + [-o.get(name, zero) for name in lost]
     left = sum(terms)
     size = np.cumsum(sum(np.abs(np.diff(np.append(t[:1] * 0, t))) for t in terms)) + start
-    allowed = tolerances.value("books") * size + tolerances.rounding(np.cumsum(sizes))
+    allowed = tolerances.value("books") * size + tolerances.rounding(np.cumsum(sizes + kicks(h)))
     report.expect("energy_remainder", np.abs(o["energy_remainder"] - left), allowed, of_step("energy_remainder (J) against the other entries"))
     report.expect("energy_remainder", np.abs(o["energy_remainder"]), allowed, of_step("energy_remainder (J)"))
+
+
+def kicks(h):
+    """Σ (h Σ|f|)²/m over bodies (J) [S]: energies that their velocities, differences of impulses, are rounded against."""
+    bodies = h.N + h.W
+    size = norm(h.force)
+    total = sum(np.bincount(h.row_step * bodies + k, size, minlength=h.S * bodies) for k in (h.i, h.j)).reshape(h.S, bodies)
+    outer, _ = h.external()
+    total = h.h * (total + np.concatenate([norm(outer), np.abs(h.wall_drive_force())], 1))
+    inverse = np.concatenate([h.inverse_mass[: h.N], np.where(np.isfinite(h.wall_mass), 1 / h.wall_mass, 0.0)])
+    return (total**2 * inverse).sum(1)
 
 
 def check_momentum(h, report):

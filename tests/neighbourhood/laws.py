@@ -95,21 +95,25 @@ class Solved:
         slow = np.abs(before) < (h.scene["materials"].get("restitution") or {}).get("threshold_speed", 0.0)
         bounce = np.where(slow, 0.0, restitution * before)
         self.pushed = pushed_before(h)
-        larger = np.maximum(h.radius[h.i], np.where(h.on_wall, 0.0, h.body_radius[h.j]))
-        may_touch = np.where(self.pushed, tolerances.value("closed"), tolerances.value("touching")) * larger
+        may_touch = np.where(self.pushed, tolerances.value("closed"), tolerances.value("touching")) * c.smaller
+        at_rest = h.h * np.abs(before) <= may_touch
         may_touch = may_touch + tolerances.rounding(c.place)
         must_touch = tolerances.value("touching") * c.smaller - tolerances.rounding(c.place)
         near = (c.gap > 0) & (c.gap <= may_touch)
         bouncy = restitution > 0
         self.bias = np.where(bouncy, bounce, np.maximum(c.gap, 0.0) / h.h)
-        self.other = np.where(near & ~bouncy, 0.0, self.bias)
+        self.other = np.where((near & ~bouncy) | (at_rest & bouncy), 0.0, self.bias)
         # with restitution a contact acts where it touches; nearer than a rounding it must, farther than the limit it must not
         self.acts = ~bouncy | (c.gap <= may_touch)
         self.idle_too = bouncy & (c.gap > must_touch) & self.acts
         rigid = self.bonds if h.K and h.stiffness is None else np.zeros(h.M, bool)
-        self.bias = np.where(rigid, turning(h, c), np.where(self.bonds, 0.0, self.bias))
+        of_bond = turning(h, c) if h.K and h.stiffness is None else lengthening(h, c)
+        self.bias = np.where(self.bonds, of_bond, self.bias)
         self.other = np.where(self.bonds, self.bias, self.other)
         self.rigid = rigid
+        # where the last mid-step of a step in parts was, no frame tells
+        after_parts = np.append(False, ~h.single[:-1])[h.row_step]
+        self.unknown = self.bonds & ~rigid & after_parts
 
     def _elastic(self, h):
         """u + C (r − r₀) in place of u, C = 1/(k h²)."""
@@ -145,7 +149,7 @@ class Solved:
             else:
                 better = (found**2).sum(1) < (best**2).sum(1)
                 best, chosen = np.where(better[:, None], found, best), np.where(better, bias, chosen)
-        idle = ~self.acts | (self.idle_too & (self.r[:, 0] == 0))
+        idle = ~self.acts | (self.idle_too & (self.r[:, 0] == 0)) | self.unknown
         self.judged = ~idle
         self.bias, self.u[:, 0] = chosen, self.raw + chosen
         self.map = np.where(idle[:, None], 0.0, best)
@@ -210,6 +214,21 @@ def turning(h, c):
         angle = np.minimum(size, 1)
         away = np.cross(axis, u) * angle[:, None] - flat * versine(angle)[:, None]
     return -0.5 * (c.n * away).sum(1)
+
+
+def lengthening(h, c):
+    """What an elastic bond grew since the last mid-step beyond its way along the normal of then, over h (m/s).
+
+    Its force follows its length: with the way d between two mid-steps, ℓ' − ℓ − d_n = d_t² / (ℓ' + ℓ + d_n) is what the
+    normal velocity has not told it."""
+    s, i, j = h.row_step, h.i, h.j
+    last = np.where((s > 0)[:, None], h.mid[s - 1, i] - h.mid[s - 1, j], h.body_x[0, i] - h.body_x[0, j])
+    now = h.mid[s, i] - h.mid[s, j]
+    length = norm(last)
+    n = last / length[:, None]
+    along = ((now - last) * n).sum(1)
+    across = now - last - along[:, None] * n
+    return (across**2).sum(1) / (norm(now) + length + along) / h.h
 
 
 def versine(sine):
@@ -301,15 +320,31 @@ def check_status(h, p, report, rows):
 
 
 def check_closing(h, c, p, report):
-    """No step closes a pair, or stretches a rigid bond, beyond its law by more than a share of its radius, nor all together."""
+    """No step closes a pair, or stretches a rigid bond, beyond its law by more than a share of its radius; nor what adds up."""
     intact = np.ones(h.M, bool)
     if h.K:
         intact = p.bonds & (h.bond_status[h.row_step + 1, h.bond] == "INTACT")
-    beyond = np.where(p.bonds, np.where(p.rigid & intact, np.abs(p.raw + p.bias), 0.0), np.maximum(-p.u[:, 0], 0.0))
-    share = np.where(p.judged & h.row_single, h.h * beyond / c.smaller, 0.0)
-    report.expect("closing", share, tolerances.value("closing"), where(h))
+    # a bond that breaks at the end of the step flows in it, as its law says
+    counts = p.judged & h.row_single & np.where(p.bonds, p.rigid & intact, True)
+    closing = np.where(counts, -(p.raw + p.bias) * h.h / c.smaller, 0.0)
+    beyond = np.where(p.bonds, np.abs(closing), closing)
+    usual = 1e-6 if h.K else 1e-4
+    # a coarser tolerance than the usual one loosens both in proportion
+    loose = max(1.0, (h.scene["solver"].get("accept") or usual) / usual)
+    report.expect("closing", beyond, loose * tolerances.value("closing"), where(h))
     bodies = h.N + h.W
-    pair = h.i * bodies + h.j
-    total = np.bincount(pair, share, minlength=1) if h.M else np.zeros(1)
-    report.expect("closed in all", total, tolerances.value("closed in all"), lambda k: f"pair {k // bodies}-{k % bodies}")
-    report.figures["closed in all (radii)"] = float(total.max())
+    pair, total, most = h.i * bodies + h.j, np.zeros(bodies**2), np.zeros(bodies**2)
+    bond = np.zeros(bodies**2, bool)
+    begin = np.searchsorted(h.row_step, np.arange(h.S + 1))
+    for s in range(h.S):
+        rows = slice(begin[s], begin[s + 1])
+        k = pair[rows]
+        # what opens again is free to; a broken bond begins anew
+        last = np.where(bond[k] == p.bonds[rows], total[k], 0.0) + closing[rows]
+        now = np.where(p.bonds[rows], last, np.maximum(last, 0.0))
+        total[:], bond[:] = 0.0, False
+        total[k], bond[k] = now, p.bonds[rows]
+        most[k] = np.maximum(most[k], np.abs(now))
+    allowed = loose * tolerances.value("closed in all")
+    report.expect("closed in all", most, allowed, lambda k: f"pair {k // bodies}-{k % bodies}")
+    report.figures["closed in all (radii)"] = float(most.max(initial=0.0))

@@ -55,9 +55,9 @@ def sources():
     return "".join((here / name).read_text() for name in sorted(p.name for p in here.glob("*.py") if not p.name.startswith("test_")))
 
 
-def sample_of(scene, folder, program):
-    """The grains of a scene as rows of centre and radius: prepared once for each sample."""
-    plain = {**scenes.BASES[scene["base"]]()}
+def sample_of(base, folder, program):
+    """The grains of a base (a function) as rows of centre and radius: prepared once for each sample."""
+    plain = base()
     key = digest(json.dumps([plain["dimension"], plain.get("seed"), plain["sample"]]))
     path = folder / f"sample-{key}.csv"
     if not path.exists():
@@ -69,15 +69,20 @@ def sample_of(scene, folder, program):
     return np.loadtxt(path, delimiter=",", skiprows=1)
 
 
+def write_sample(scene, points, path):
+    """Writes grains (rows of centre and radius) to a file, from which the scene then takes them."""
+    header = ",".join(("x", "y", "z")[: scene["dimension"]] + ("radius",))
+    rows = "\n".join(",".join(map(repr, map(float, row))) for row in points)
+    path.write_text(f"{header}\n{rows}\n")
+    scene["sample"] = {"file": {"path": path.name}}
+
+
 def written(scene, base, folder, key, program):
     """Writes the scene, and its sample where it comes from a file."""
     if "as file" in scene:
-        points = sample_of(scene | {"base": base}, folder, program)
+        points = sample_of(scenes.BASES[base], folder, program)
         scene, points, _ = scenes.transformed(scene, points, **scene["as file"])
-        header = ",".join(("x", "y", "z")[: scene["dimension"]] + ("radius",))
-        rows = "\n".join(",".join(map(repr, map(float, row))) for row in points)
-        (folder / f"{key}.csv").write_text(f"{header}\n{rows}\n")
-        scene["sample"] = {"file": {"path": f"{key}.csv"}}
+        write_sample(scene, points, folder / f"{key}.csv")
     (folder / f"{key}.json").write_text(json.dumps(scene, indent=1))
 
 
@@ -243,9 +248,8 @@ def main():
     arguments = parser.parse_args()
     folder = arguments.folder.resolve()
     folder.mkdir(parents=True, exist_ok=True)
-    names = scenes.neighbours(arguments.seed)
-    if arguments.quick:
-        names = {name: names[name] for name in list(scenes.BASES) + QUICK if name in names}
+    quick = lambda: {name: scenes.neighbour(name) for name in list(scenes.BASES) + QUICK}
+    names = quick() if arguments.quick else scenes.neighbours(arguments.seed)
     if arguments.only:
         names = {name: scene for name, scene in names.items() if arguments.only in name}
     found = all_neighbours(arguments, names, folder, programs.dem_run(), time.monotonic() + arguments.time)

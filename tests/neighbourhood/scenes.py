@@ -296,8 +296,8 @@ CHANGES = {
 def neighbours(seed):
     """Neighbours by name: the bases, each single change of each, and pairs of changes drawn with the seed."""
     out = {}
-    for base, scene in BASES.items():
-        out[base] = ready(scene(), [])
+    for base in BASES:
+        out[base] = neighbour(base)
         for name in CHANGES:
             put(out, base, [name])
     draw = random.Random(seed)
@@ -315,18 +315,20 @@ PAIRS = 140
 
 def put(out, base, names):
     """Adds a neighbour, where its changes apply."""
+    name = ", ".join([base] + names)
     try:
-        out[", ".join([base] + names)] = ready(BASES[base](), names)
+        out[name] = neighbour(name)
     except Inapplicable:
         pass
 
 
-def ready(scene, names):
-    """The scene with these changes, each once its kind allows: the strength before what is scaled by it."""
-    order = ["cohesion", "springs"]
-    rank = lambda name: order.index(CHANGES[name][0]) if CHANGES[name][0] in order else len(order)
-    late = [name for name in names if name == "strength as stress"]
-    for name in sorted((n for n in names if n not in late), key=rank) + late:
+def neighbour(name):
+    """The neighbour of this name: a base and its changes, which are made in an order in which each finds what it scales by."""
+    base, *names = name.split(", ")
+    scene = BASES[base]()
+    # loads and springs follow the strength, which `stress` then takes away
+    rank = lambda name: 0 if CHANGES[name][0] == "cohesion" and name != "strength as stress" else 2 if name == "strength as stress" else 1
+    for name in sorted(names, key=rank):
         CHANGES[name][1](scene)
     travel = (scene.get("stop") or {}).get("wall_travel")
     if travel and not any(key in scene["walls"][travel["wall"]] for key in ("force", "force_rate", "velocity")):
@@ -346,62 +348,83 @@ def may_have_no_motion(scene):
     return driven and (sides or bool(scene.get("bonds")))
 
 
-def transformed(scene, points, turn=0.0, mirror=False, permute=None, units=None, shift=None):
-    """The scene and its sample (rows of centre and radius) turned about the first two axes, mirrored, shifted, in an order
-    drawn with the seed `permute`, with units `units` times smaller (length, mass, time).
+class Transform:
+    """How a scene is turned about the vertical plane (rad), mirrored, shifted (m), in an order drawn with the seed `permute`, and
+    with units `units` times smaller (length, mass, time)."""
 
-    Returns the scene without its sample, the points, and a dictionary: the matrix `R` that turned it, and the `order`."""
-    scene = copy.deepcopy({key: value for key, value in scene.items() if key != "as file"})
-    D = scene["dimension"]
-    length, mass, time = units or (1.0, 1.0, 1.0)
-    R = np.eye(D)
-    # vertical is the last axis
-    a, b = 0, D - 1
-    exact = np.isclose(turn, np.pi / 2)
-    c, s = (0.0, 1.0) if exact else (np.cos(turn), np.sin(turn))
-    R[np.ix_([a, b], [a, b])] = [[c, -s], [s, c]]
-    if mirror:
-        R = R @ np.diag([-1.0] + [1.0] * (D - 1))
-    move = np.zeros(D) + (shift or 0.0)
-    place = lambda x: (length * (R @ np.asarray(x, float) + move)).tolist()
-    along = lambda x, unit=1.0: (unit * (R @ np.asarray(x, float))).tolist()
-    order = np.arange(len(points))
-    if permute is not None:
-        order = np.random.default_rng(permute).permutation(len(points))
-    points = np.asarray(points, float)[order]
-    points = np.column_stack([np.array([place(x) for x in points[:, :D]]), length * points[:, D]])
-    force, speed = mass * length / time**2, length / time
-    for wall in scene["walls"].values():
+    def __init__(self, dimension, turn=0.0, mirror=False, permute=None, units=None, shift=None):
+        self.length, self.mass, self.time = units or (1.0, 1.0, 1.0)
+        self.force = self.mass * self.length / self.time**2
+        self.permute, self.move = permute, np.full(dimension, shift or 0.0)
+        c, s = (0.0, 1.0) if np.isclose(turn, np.pi / 2) else (np.cos(turn), np.sin(turn))
+        # vertical is the last axis
+        plane_of_turn = np.ix_([0, dimension - 1], [0, dimension - 1])
+        self.R = np.eye(dimension)
+        self.R[plane_of_turn] = [[c, -s], [s, c]]
+        if mirror:
+            self.R = self.R @ np.diag([-1.0] + [1.0] * (dimension - 1))
+
+    def place(self, x):
+        """Of a point (m)."""
+        return (self.length * (self.R @ np.asarray(x, float) + self.move)).tolist()
+
+    def along(self, x, unit=1.0):
+        """Of a vector in a unit."""
+        return (unit * (self.R @ np.asarray(x, float))).tolist()
+
+    def points(self, points):
+        """Of grains, rows of centre and radius, and their numbers as they were."""
+        order = np.arange(len(points))
+        if self.permute is not None:
+            order = np.random.default_rng(self.permute).permutation(len(points))
+        points = np.asarray(points, float)[order]
+        return np.column_stack([[self.place(x) for x in points[:, :-1]], self.length * points[:, -1]]), order
+
+    def wall(self, wall):
+        """Alters a wall of a scene."""
         for shape in wall["shape"].values():
-            for key, how in (("normal", along), ("axis", along), ("center", place), ("seated", along)):
+            for key, how in (("normal", self.along), ("axis", self.along), ("center", self.place), ("seated", self.along)):
                 if isinstance(shape.get(key), list):
                     shape[key] = how(shape[key])
             if isinstance(shape.get("place"), dict):
-                shape["place"]["at"] = place(shape["place"]["at"])
+                shape["place"]["at"] = self.place(shape["place"]["at"])
             if "radius" in shape:
-                shape["radius"] *= length
+                shape["radius"] *= self.length
         if "direction" in wall:
-            wall["direction"] = along(wall["direction"])
+            wall["direction"] = self.along(wall["direction"])
         if "force_rate" in wall:
-            wall["force_rate"] *= force / time
-        if "force" in wall:
-            wall["force"] = scaled(wall["force"], force, time)
-        if "velocity" in wall:
-            wall["velocity"] = scaled(wall["velocity"], speed, time)
+            wall["force_rate"] *= self.force / self.time
+        for drive, unit in (("force", self.force), ("velocity", self.length / self.time)):
+            if drive in wall:
+                wall[drive] = scaled(wall[drive], unit, self.time)
+
+    def bonds(self, fields):
+        """Alters the bonds of a scene."""
+        for key, unit in (("strength", self.force), ("stress", self.force / self.length**2)):
+            if key in fields:
+                fields[key] *= unit
+        stiffness = fields.get("stiffness", {})
+        for key in stiffness.get("springs", {}):
+            stiffness["springs"][key] *= self.force / self.length if key in ("normal", "tangential") else self.force * self.length
+        if "young" in stiffness:
+            stiffness["young"]["modulus"] *= self.force / self.length**2
+
+
+def transformed(scene, points, **way):
+    """The scene and its sample, rows of centre and radius, turned and so on as `Transform` says.
+
+    Returns the scene without its sample, the points, and a dictionary: the matrix `R` that turned it, the `order` in which the
+    grains stand now, and the units of `force` and `length`."""
+    scene = copy.deepcopy({key: value for key, value in scene.items() if key != "as file"})
+    how = Transform(scene["dimension"], **way)
+    points, order = how.points(points)
+    for wall in scene["walls"].values():
+        how.wall(wall)
     if "gravity" in scene:
-        scene["gravity"] = along(scene["gravity"], length / time**2)
-    scene["materials"]["density"] *= mass / length**3
+        scene["gravity"] = how.along(scene["gravity"], how.length / how.time**2)
+    scene["materials"]["density"] *= how.mass / how.length**3
     if "thickness" in scene:
-        scene["thickness"] *= length
-    scene["time"] = {key: value * time for key, value in scene["time"].items()}
-    bonds = scene.get("bonds") or {}
-    for key, unit in (("strength", force), ("stress", force / length**2)):
-        if key in bonds:
-            bonds[key] *= unit
-    if "stiffness" in bonds:
-        springs = bonds["stiffness"].get("springs", {})
-        for key in springs:
-            springs[key] *= force / length if key in ("normal", "tangential") else force * length
-        if "young" in bonds["stiffness"]:
-            bonds["stiffness"]["young"]["modulus"] *= force / length**2
-    return scene, points, {"R": R, "order": order, "force": force, "length": length}
+        scene["thickness"] *= how.length
+    scene["time"] = {key: value * how.time for key, value in scene["time"].items()}
+    how.bonds(scene.get("bonds") or {})
+    return scene, points, {"R": how.R, "order": order, "force": how.force, "length": how.length}

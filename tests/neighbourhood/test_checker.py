@@ -95,11 +95,22 @@ class Good:
         return self.row((h.bond >= 0) & (h.bond_status[h.row_step + 1, h.bond] == "INTACT"))
 
 
+class Runs(dict):
+    """Good runs by the name of their scene, each made when it is first asked for."""
+
+    def __init__(self, folder):
+        super().__init__()
+        self.folder = folder
+
+    def __missing__(self, name):
+        self[name] = Good(*programs.run(SCENES[name](), self.folder, name, text=True))
+        return self[name]
+
+
 @pytest.fixture(scope="session")
 def good(tmp_path_factory):
-    """Good runs by the name of their scene."""
-    folder = tmp_path_factory.mktemp("good")
-    return {name: Good(*programs.run(scene(), folder, name, text=True)) for name, scene in SCENES.items()}
+    """Good runs."""
+    return Runs(tmp_path_factory.mktemp("good"))
 
 
 def add(name, at, relative=1e-5, absolute=0.0):
@@ -255,6 +266,9 @@ SPOILT = [
     ("pressed", "a wall's place as observed", observed("wall_position", -1, 1e-12), "wall_position"),
     ("pressed", "a wall's force in a frame", put("walls/force/value", lambda g: (-1, 0, 1), lambda f: f * (1 + 1e-9)), "force of walls in frames"),
     ("pressed", "a force on a wall", put("contacts/reaction", lambda g: (on_wall(g), 0), lambda r: r * (1 + 1e-6)), "stress against walls"),
+    ("pressed", "the force at the limit where nothing broke", observed("wall_force_at_limit", 20), "wall_force_at_limit"),
+    ("pressed", "the elongation", observed("bond_elongation", -1, 1e-5, 1e-12), "bond_elongation"),
+    ("pressed", "half a part", observed("substeps", -1, 0, 0.5), "counts"),
     ("pressed", "half an iteration", observed("solver_iterations", -1, 0, 0.5), "counts"),
     ("pressed", "time that runs back", observed("cpu_time", 60, -0.9), "counts"),
     ("beam", "elastic energy", observed("elastic_energy", 20), "elastic_energy"),

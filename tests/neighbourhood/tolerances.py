@@ -20,7 +20,7 @@ TABLE = {
     "closed in all": (1e-3, "the same summed over the run"),
     "crossing": (0.5, "overlap, over the smaller radius, that half a step may add"),
     "rigid length": (1e-3, "change of the length of an intact rigid bond, over the smaller radius, beside the chord of its turn in a step"),
-    "elastic length": (1e-3, "length of an intact elastic bond beside rest length + force over stiffness, over the length, likewise"),
+    "elastic length": (1e-5, "length of an intact elastic bond beside rest length + force over stiffness, over the length, likewise"),
     "printed": (0.5, "units in the last digit of a number in the summary's text"),
 }
 
