@@ -244,7 +244,7 @@ def check(h, c, p, report):
     dry = rows[~p.bonds[rows] & p.judged[rows]]
     check_signorini(h, p, report, dry)
     check_coulomb(h, p, report, dry)
-    check_bonds(h, p, report, rows[p.bonds[rows]])
+    check_bonds(h, p, report, rows[p.bonds[rows] & p.judged[rows]])
     idle = rows[~p.bonds[rows] & ~p.acts[rows]]
     report.expect("contacts that do not touch", norm(p.r[idle]), 0.0, where(h, idle))
     check_status(h, p, report, rows)
