@@ -151,10 +151,16 @@ def judged(name, scene, folder, key, program, limit):
     return known
 
 
-def silent(known, scene):
-    """What is wrong with how a scene ended that nothing can solve: it must stop, and name who closes in on whom."""
-    if known["exit"] == 3 and scenes.may_have_no_motion(scene) and not known.get("named"):
-        return ["it stopped without a name of who is squeezed: " + known["message"].splitlines()[0] if known["message"] else "no message"]
+def told_rightly(known, scene):
+    """What is wrong with what a run says that stopped: whoever is squeezed has a name, and that no motion exists is true."""
+    if known["exit"] != 3:
+        return None
+    first = (known["message"].splitlines() or ["no message"])[0]
+    if "no motion" in first and not scenes.moves_walls(scene):
+        # what no wall pushes at a prescribed velocity can stay where it is
+        return ["no wall moves at a prescribed velocity, and it says: " + first]
+    if scenes.may_have_no_motion(scene) and not known.get("named"):
+        return ["it stopped without the names of who is squeezed: " + first]
     return None
 
 
@@ -172,9 +178,9 @@ def all_neighbours(arguments, names, folder, program, until):
         if time.monotonic() > until:
             continue
         known = judged(name, scene, folder, key, program, arguments.cpu)
-        reason = silent(known, scene)
+        reason = told_rightly(known, scene)
         if reason:
-            known["wrong"]["silence"] = reason
+            known["wrong"]["why it stopped"] = reason
         kept.write_text(json.dumps(known))
         out[name] = known
         print(f"{count + 1}/{len(names)} {name}: {verdict(known)} ({known['cpu']:.1f} s)", flush=True)
@@ -208,7 +214,8 @@ def page(found, names, seed, arguments):
         "## What is checked", "", *checks(found), "", "Tolerances:", "", "```text", *tolerances.lines(), "```", "",
         "## All of them", "",
         "*CPU* is processor time a step over that of the base; *missed* the share of steps that missed the tolerance; *parts* that of steps made in parts, of which only what holds",
-        "without the parts is checked.", "",
+        "without the parts is checked. A run that stopped because a step was not solved is right where all up to there is, where it names who is squeezed, and where it says that no motion exists",
+        "only with a wall that moves at a prescribed velocity.", "",
         "| neighbour | verdict | steps | CPU | missed | parts | ended |", "|---|---|---|---|---|---|---|",
     ]
     for name, known in found.items():

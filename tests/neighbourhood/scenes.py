@@ -341,11 +341,15 @@ def base_of(name):
     return name.split(", ")[0]
 
 
+def moves_walls(scene):
+    """Whether a wall moves at a prescribed velocity."""
+    return any("velocity" in wall for wall in scene["walls"].values())
+
+
 def may_have_no_motion(scene):
-    """Whether nothing can give way to a wall that closes in at a prescribed velocity: walls on all sides, or rigid bonds."""
-    driven = any("velocity" in wall for wall in scene["walls"].values())
+    """Whether nothing may give way to a wall that closes in: between walls on all sides, or held by bonds."""
     sides = any(name.startswith("side_") for name in scene["walls"])
-    return driven and (sides or bool(scene.get("bonds")))
+    return moves_walls(scene) and (sides or bool(scene.get("bonds")))
 
 
 class Transform:
