@@ -37,18 +37,26 @@ def kinetic(h):
 def check_kinetic(h, report):
     """Kinetic energy from velocities."""
     told = kinetic(h)[1:]
-    report.expect("kinetic_energy", np.abs(h.observed["kinetic_energy"] - told), tolerances.rounding(told), of_step("kinetic_energy (J)"))
+    report.expect(
+        "kinetic_energy",
+        np.abs(h.observed["kinetic_energy"] - told),
+        tolerances.rounding(told),
+        of_step("kinetic_energy (J)"),
+    )
 
 
 def works(h, c, p):
-    """Work of each step (J) [S] and the size of its summands: external, and what rows took from the bodies."""
+    """Work of each step (J) [S] and the size of its summands: external, and what rows took from the
+    bodies."""
     mean = tuple(0.5 * (a + b) for a, b in zip(c.before, c.after))
     un, ut, turn, spin = mean
     rn, rt = h.rn * un, (h.rt * ut).sum(1)
     moment = (h.bending * turn).sum(1) + h.twist * spin
     dry, bonds = ~p.bonds, p.bonds
     parts = {
-        "impact": np.where(dry, rn, 0.0), "friction": np.where(dry, rt, 0.0), "bonds": np.where(bonds, rn + rt + moment, 0.0),
+        "impact": np.where(dry, rn, 0.0),
+        "friction": np.where(dry, rt, 0.0),
+        "bonds": np.where(bonds, rn + rt + moment, 0.0),
     }
     # rounding of velocities shows in a work as if it were done with them
     reach = c.speed + norm(h.body_v[h.row_step, h.i]) + norm(h.body_v[h.row_step, h.j])
@@ -98,34 +106,52 @@ def check_elastic(h, losses, sizes, report):
     freed = np.bincount(np.clip(h.events["step"].astype(int) - 1, 0, None), h.events["energy"], minlength=h.S)[: h.S]
     increment = np.diff(np.append(0.0, h.observed["fracture_energy"]))
     scale = np.abs(h.observed["fracture_energy"]) + freed
-    report.expect("fracture_energy", np.abs(increment - freed), tolerances.rounding(scale), of_step("increment of fracture_energy (J)"))
+    report.expect(
+        "fracture_energy",
+        np.abs(increment - freed),
+        tolerances.rounding(scale),
+        of_step("increment of fracture_energy (J)"),
+    )
     told = losses - np.diff(np.append(0.0, seen)) - freed
     damping = h.observed["dissipation_damping"]
     off = np.where(h.single, np.abs(np.diff(np.append(0.0, damping)) - told), 0.0)
     scale = sizes + np.abs(damping) + seen + np.append(0.0, seen[:-1]) + freed
-    report.expect("dissipation_damping", off, tolerances.rounding(scale), of_step("increment of dissipation_damping (J)"))
+    report.expect(
+        "dissipation_damping", off, tolerances.rounding(scale), of_step("increment of dissipation_damping (J)")
+    )
 
 
 def check_books(h, report, sizes):
-    """work = change of kinetic energy + all that was lost or stored + remainder, and the remainder is rounding.
+    """work = change of kinetic energy + all that was lost or stored + remainder, and the remainder is
+    rounding.
 
     `sizes` are the sums of the absolute values of what the works of each step are summed from (J)."""
     o, zero = h.observed, np.zeros(h.S)
     start = kinetic(h)[0]
     lost = ["dissipation_impact", "dissipation_friction", "bond_remainder", "dissipation_damping", "fracture_energy"]
-    terms = [o["external_work"], start - o["kinetic_energy"], -o.get("elastic_energy", zero)] + [-o.get(name, zero) for name in lost]
+    terms = [o["external_work"], start - o["kinetic_energy"], -o.get("elastic_energy", zero)] + [
+        -o.get(name, zero) for name in lost
+    ]
     left = sum(terms)
     size = np.cumsum(sum(np.abs(np.diff(np.append(t[:1] * 0, t))) for t in terms)) + start
     allowed = tolerances.value("books") * size + tolerances.rounding(np.cumsum(sizes + kicks(h)))
-    report.expect("energy_remainder", np.abs(o["energy_remainder"] - left), allowed, of_step("energy_remainder (J) against the other entries"))
+    report.expect(
+        "energy_remainder",
+        np.abs(o["energy_remainder"] - left),
+        allowed,
+        of_step("energy_remainder (J) against the other entries"),
+    )
     report.expect("energy_remainder", np.abs(o["energy_remainder"]), allowed, of_step("energy_remainder (J)"))
 
 
 def kicks(h):
-    """Σ (h Σ|f|)²/m over bodies (J) [S]: energies that their velocities, differences of impulses, are rounded against."""
+    """Σ (h Σ|f|)²/m over bodies (J) [S]: energies that their velocities, differences of impulses, are
+    rounded against."""
     bodies = h.N + h.W
     size = norm(h.force)
-    total = sum(np.bincount(h.row_step * bodies + k, size, minlength=h.S * bodies) for k in (h.i, h.j)).reshape(h.S, bodies)
+    total = sum(np.bincount(h.row_step * bodies + k, size, minlength=h.S * bodies) for k in (h.i, h.j)).reshape(
+        h.S, bodies
+    )
     outer, _ = h.external()
     total = h.h * (total + np.concatenate([norm(outer), np.abs(h.wall_drive_force())], 1))
     inverse = np.concatenate([h.inverse_mass[: h.N], np.where(np.isfinite(h.wall_mass), 1 / h.wall_mass, 0.0)])
@@ -136,11 +162,18 @@ def check_momentum(h, report):
     """Linear and angular momentum of the grains that are not fixed."""
     free = ~h.fixed
     p = (h.mass[:, None] * h.v)[1:, free]
-    report.expect("momentum", norm(h.observed["momentum"] - p.sum(1)), tolerances.rounding(norm(p).sum(1)), of_step("momentum"))
+    report.expect(
+        "momentum", norm(h.observed["momentum"] - p.sum(1)), tolerances.rounding(norm(p).sum(1)), of_step("momentum")
+    )
     spin = h.inertia[:, None] * h.w
     angular = (cross(h.x, h.mass[:, None] * h.v) + spin)[1:, free]
     size = (norm(h.x) * h.mass * norm(h.v) + norm(spin))[1:, free].sum(1)
-    report.expect("angular_momentum", norm(h.observed["angular_momentum"] - angular.sum(1)), tolerances.rounding(size), of_step("angular momentum"))
+    report.expect(
+        "angular_momentum",
+        norm(h.observed["angular_momentum"] - angular.sum(1)),
+        tolerances.rounding(size),
+        of_step("angular momentum"),
+    )
 
 
 def wall_forces(h):
@@ -177,7 +210,8 @@ def reference_volume(h):
 
 
 def check_stress(h, c, report):
-    """Love and Weber: Σ ℓ ⊗ f over contacts; ℓ joins the centres, at a wall the contact point to the centre."""
+    """Love and Weber: Σ ℓ ⊗ f over contacts; ℓ joins the centres, at a wall the contact point to the
+    centre."""
     single = h.row_single
     branch = c.n * (c.lever_i + c.lever_j)[:, None]
     tensor = branch[:, :, None] * h.force[:, None, :]
@@ -189,7 +223,8 @@ def check_stress(h, c, report):
 
 
 def check_virial(h, c, report):
-    """V σ = Σ x_g ⊗ (m a − F) − Σ p ⊗ f over wall contacts: the stress against forces at the walls and accelerations."""
+    """V σ = Σ x_g ⊗ (m a − F) − Σ p ⊗ f over wall contacts: the stress against forces at the walls and
+    accelerations."""
     outer, _ = h.external()
     moved = h.mass[:, None] * (h.v[1:] - h.v[:-1]) / h.h - outer
     held = np.zeros((h.S, h.N, h.D))
@@ -209,11 +244,14 @@ def check_virial(h, c, report):
     size = forces + (norm(middle) * (h.mass * (norm(h.v[1:]) + norm(h.v[:-1])) / h.h + norm(outer))).sum(1)
     off = np.abs(h.observed["stress"] - total).max((1, 2), initial=0.0)
     allowed = tolerances.rounding(size) / reference_volume(h)
-    report.expect("stress against walls", np.where(h.single, off, 0.0), allowed, of_step("stress by walls and accelerations (Pa)"))
+    report.expect(
+        "stress against walls", np.where(h.single, off, 0.0), allowed, of_step("stress by walls and accelerations (Pa)")
+    )
 
 
 def fitted_strain(h):
-    """Displacement gradients [S,D,D] of the affine motion that fits that of all grains since time zero best."""
+    """Displacement gradients [S,D,D] of the affine motion that fits that of all grains since time zero
+    best."""
     x = h.x[0] - h.x[0].mean(0)
     moved = h.x[1:] - h.x[0]
     moved = moved - moved.mean(1, keepdims=True)
@@ -245,7 +283,13 @@ def check_penetration(h, c, report):
 
 def check_counts(h, report):
     """Numbers of what was done are whole and not negative; processor time does not run back."""
-    for name in ("solver_iterations", "solver_newton_iterations", "solver_factorisations", "solver_rejected", "substeps"):
+    for name in (
+        "solver_iterations",
+        "solver_newton_iterations",
+        "solver_factorisations",
+        "solver_rejected",
+        "substeps",
+    ):
         if name in h.observed:
             value = h.observed[name]
             off = np.abs(value - np.round(value)) + np.maximum(-value, 0.0)

@@ -3,7 +3,8 @@
 
     check.py run.h5 [--summary run.json] [--text run.txt]
 
-`run.json` is what `dem-run run --json` printed, `run.txt` what it prints without. Exit code: 0 right, 1 wrong, 2 unfit.
+`run.json` is what `dem-run run --json` printed, `run.txt` what it prints without. Exit code: 0 right, 1
+wrong, 2 unfit.
 """
 
 import argparse
@@ -25,7 +26,8 @@ from report import Report
 
 
 def check(path, told=None, text=None):
-    """The report on the history at `path`, on its summary `told` (a dictionary) and on the summary's text."""
+    """The report on the history at `path`, on its summary `told` (a dictionary) and on the summary's
+    text."""
     h, report = History(path), Report()
     report.figures["steps"] = h.S
     if h.S == 0:
@@ -52,7 +54,14 @@ def check(path, told=None, text=None):
 
 def check_finite(h, report):
     """Every number is finite."""
-    arrays = {"positions": h.x, "velocities": h.v, "spins": h.w, "walls": h.X, "reactions": h.force, "moments": h.moment}
+    arrays = {
+        "positions": h.x,
+        "velocities": h.v,
+        "spins": h.w,
+        "walls": h.X,
+        "reactions": h.force,
+        "moments": h.moment,
+    }
     arrays |= {"gaps": h.gap, "points": h.point, "normals": h.normal, **h.observed}
     for name, array in arrays.items():
         report.require("finite numbers", bool(np.isfinite(array).all()), f"{name} hold what is not finite")

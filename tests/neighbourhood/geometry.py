@@ -1,4 +1,5 @@
-"""Geometry and relative velocities of contacts at mid-step, recomputed from positions and radii; and the checks of it."""
+"""Geometry and relative velocities of contacts at mid-step, recomputed from positions and radii; and the
+checks of it."""
 
 import numpy as np
 
@@ -7,7 +8,8 @@ from history import cross, norm, sums, turning_velocity
 
 
 def gap_and_normal(h, i, j, xi, xj):
-    """Gap (m) and unit normal from j to i, of grains `i` at `xi` and bodies `j` at `xj` (arrays of one length)."""
+    """Gap (m) and unit normal from j to i, of grains `i` at `xi` and bodies `j` at `xj` (arrays of one
+    length)."""
     apart = xi - xj
     normal, gap = np.zeros(apart.shape), np.zeros(len(apart))
     grains = j < h.N
@@ -36,7 +38,8 @@ def gap_and_normal(h, i, j, xi, xj):
 
 
 class Contacts:
-    """What the rows of contacts mean at mid-step. Rows are n, t (one or two), bending (likewise), twist; moments over a."""
+    """What the rows of contacts mean at mid-step. Rows are n, t (one or two), bending (likewise), twist;
+    moments over a."""
 
     def __init__(self, h):
         s, i, j = h.row_step, h.i, h.j
@@ -51,12 +54,15 @@ class Contacts:
         self.before = self.relative(h, h.body_v[s, i], h.body_v[s, j], h.body_w[s, i], h.body_w[s, j])
         self.after = self.relative(h, h.body_v[s + 1, i], h.body_v[s + 1, j], h.body_w[s + 1, i], h.body_w[s + 1, j])
         self.speed = (
-            norm(h.body_v[s + 1, i]) + norm(h.body_v[s + 1, j])
-            + self.lever_i * norm(h.body_w[s + 1, i]) + self.lever_j * norm(h.body_w[s + 1, j])
+            norm(h.body_v[s + 1, i])
+            + norm(h.body_v[s + 1, j])
+            + self.lever_i * norm(h.body_w[s + 1, i])
+            + self.lever_j * norm(h.body_w[s + 1, j])
         )
 
     def relative(self, h, vi, vj, wi, wj):
-        """u_n [M], u_t [M,D-1], Δω along the axes of the moments: bending [M,1 or 2] and twist [M] (m/s, rad/s)."""
+        """u_n [M], u_t [M,D-1], Δω along the axes of the moments: bending [M,1 or 2] and twist [M] (m/s,
+        rad/s)."""
         at_i = vi + turning_velocity(wi, -self.n * self.lever_i[:, None])
         at_j = vj + turning_velocity(wj, self.n * self.lever_j[:, None])
         u, turn = at_i - at_j, wi - wj
@@ -88,7 +94,9 @@ def where(h, rows=None):
 def check(h, c, report):
     """Rows of contacts are sorted pairs with the geometry of mid-step."""
     order = (h.row_step * (h.N + h.W) + h.i) * (h.N + h.W) + h.j
-    report.require("contacts sorted", bool(np.all(np.diff(order) > 0)), "pairs of a frame are not sorted, or twice there")
+    report.require(
+        "contacts sorted", bool(np.all(np.diff(order) > 0)), "pairs of a frame are not sorted, or twice there"
+    )
     report.require("contacts sorted", bool(np.all(h.i < h.j)), "a pair does not begin with the smaller number")
     rows = np.flatnonzero(h.row_single)
     describe, r = where(h, rows), tolerances.rounding
@@ -104,7 +112,8 @@ def check(h, c, report):
 
 
 def check_left_out(h, c, report):
-    """Pairs that are not among the contacts do not close; with restitution those that touch are among them."""
+    """Pairs that are not among the contacts do not close; with restitution those that touch are among
+    them."""
     report.margins.setdefault("pairs left out", 0.0)
     bodies = h.N + h.W
     i, j = np.triu_indices(bodies, 1)
@@ -165,7 +174,9 @@ def check_crossing(h, report):
     i, j = i[keep], j[keep]
     smallest = h.radius.min() if h.N else 0.0
     speed = norm(h.body_v).max(1) if bodies else np.zeros(h.S + 1)
-    for s in np.flatnonzero(h.single & (h.h * np.maximum(speed[:-1], speed[1:]) > tolerances.value("crossing") * smallest)):
+    for s in np.flatnonzero(
+        h.single & (h.h * np.maximum(speed[:-1], speed[1:]) > tolerances.value("crossing") * smallest)
+    ):
         for begin, end in ((h.body_x[s], h.mid[s]), (h.mid[s], h.body_x[s + 1])):
             depth = -smallest_gap(h, i, j, begin, end)
             before = np.maximum(-gap_and_normal(h, i, j, begin[i], begin[j])[0], 0.0)
@@ -179,6 +190,8 @@ def smallest_gap(h, i, j, begin, end):
     square = (way * way).sum(1)
     at = np.clip(np.divide(-(x * way).sum(1), square, out=np.zeros(len(i)), where=square > 0), 0.0, 1.0)
     round_bodies = np.concatenate([np.ones(h.N, bool), np.array([k != "PLANE" for k in h.wall_kind], bool)])[j]
-    ends = [gap_and_normal(h, i, j, (begin + t * (end - begin))[i], (begin + t * (end - begin))[j])[0] for t in (0.0, 1.0)]
+    ends = [
+        gap_and_normal(h, i, j, (begin + t * (end - begin))[i], (begin + t * (end - begin))[j])[0] for t in (0.0, 1.0)
+    ]
     nearest = gap_and_normal(h, i, j, x + at[:, None] * way, np.zeros_like(x))[0]
     return np.where(round_bodies, np.minimum(np.minimum(*ends), nearest), np.minimum(*ends))

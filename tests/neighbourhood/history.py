@@ -1,7 +1,7 @@
 """A history with a frame at every step, as arrays.
 
-Bodies are grains, then walls. `step` s leads from frame s to frame s + 1; rows of contacts stand behind each other, and
-`row_step` says to which step each belongs. SI units throughout.
+Bodies are grains, then walls. `step` s leads from frame s to frame s + 1; rows of contacts stand behind
+each other, and `row_step` says to which step each belongs. SI units throughout.
 """
 
 import json
@@ -19,7 +19,8 @@ class Unfit(Exception):
 class History:
     """All of a history that the checks read.
 
-    N grains, W walls, B bodies (N + W), S steps, M rows of contacts, D dimensions, Q components of a spin (1 or 3).
+    N grains, W walls, B bodies (N + W), S steps, M rows of contacts, D dimensions, Q components of a spin
+    (1 or 3).
     """
 
     def __init__(self, path):
@@ -32,7 +33,9 @@ class History:
             self._walls(file.get("walls"))
             self._rows(file["contacts"])
             self._bonds(file)
-            self.observed = {name: group["value"][: self.S] for name, group in file["observables"].items() if "value" in group}
+            self.observed = {
+                name: group["value"][: self.S] for name, group in file["observables"].items() if "value" in group
+            }
             self.observed_step = file["observables/step"][: self.S]
             self.observed_time = file["observables/time"][: self.S]
         self._bodies()
@@ -139,7 +142,9 @@ class History:
     def _bodies(self):
         scene, N, W = self.scene, self.N, self.W
         self.drives = [prescribed.drive(wall) for _, wall in self.scene_walls]
-        self.wall_direction = np.array([prescribed.direction(w, self.D) for _, w in self.scene_walls]).reshape(W, self.D)
+        self.wall_direction = np.array([prescribed.direction(w, self.D) for _, w in self.scene_walls]).reshape(
+            W, self.D
+        )
         self.wall_mass = np.array([prescribed.wall_mass(w, self.mass) for _, w in self.scene_walls])
         self.wall_friction = prescribed.wall_friction(scene)
         still = np.zeros((self.S + 1, W, self.Q))
@@ -157,7 +162,8 @@ class History:
         self._parts()
 
     def _parts(self):
-        """Steps that one solve made, and not parts of it: only there the frames before and after tell what was solved."""
+        """Steps that one solve made, and not parts of it: only there the frames before and after tell what
+        was solved."""
         if "substeps" in self.observed:
             self.single = self.observed["substeps"] == 1
         else:
@@ -165,7 +171,8 @@ class History:
         self.row_single = self.single[self.row_step]
 
     def external(self):
-        """Prescribed forces (N) [S,N,D] and torques (N m) [S,N,Q] on the grains at the middle of each step."""
+        """Prescribed forces (N) [S,N,D] and torques (N m) [S,N,Q] on the grains at the middle of each
+        step."""
         force = np.broadcast_to(self.mass[:, None] * self.gravity, (self.S, self.N, self.D)).copy()
         torque = np.zeros((self.S, self.N, self.Q))
         for load in (self.scene.get("grains") or {}).get("loads", []):
@@ -175,7 +182,8 @@ class History:
         return force, torque
 
     def wall_drive_force(self):
-        """Prescribed forces (N) [S,W] on the walls that a force drives, at the middle of each step; 0 for the others."""
+        """Prescribed forces (N) [S,W] on the walls that a force drives, at the middle of each step; 0 for
+        the others."""
         middle = self.times[:-1] + 0.5 * self.h
         columns = [prescribed.at(f, middle) if kind == "force" else np.zeros(self.S) for kind, f in self.drives]
         return np.stack(columns, 1) if columns else np.zeros((self.S, 0))

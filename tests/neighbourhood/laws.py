@@ -1,9 +1,11 @@
-"""The contact law: cones, Signorini, Coulomb, bonds, with velocities and geometry recomputed from positions.
+"""The contact law: cones, Signorini, Coulomb, bonds, with velocities and geometry recomputed from
+positions.
 
-A contact obeys K ∋ r̂ ⊥ ũ ∈ K* (docs/theory/contact-law.md, (2)). With D, the largest diagonal entry of its Delassus block,
-its natural map is r̂ − P_K(r̂ − ũ/D), and the residual of a step is the norm of all maps over that of the reactions or the load.
-So the recorded residual bounds each map: by δ = residual × scale + rounding. Let p = P_K(r̂ − ũ/D), ũ' = ũ + D (p − r̂). Then p
-and ũ' obey the law to the last bit, ‖p − r̂‖ ≤ δ and ‖ũ' − ũ‖ ≤ D δ, and what the checks allow follows:
+A contact obeys K ∋ r̂ ⊥ ũ ∈ K* (docs/theory/contact-law.md, (2)). With D, the largest diagonal entry of its
+Delassus block, its natural map is r̂ − P_K(r̂ − ũ/D), and the residual of a step is the norm of all maps
+over that of the reactions or the load. So the recorded residual bounds each map: by δ = residual × scale +
+rounding. Let p = P_K(r̂ − ũ/D), ũ' = ũ + D (p − r̂). Then p and ũ' obey the law to the last bit, ‖p − r̂‖ ≤
+δ and ‖ũ' − ũ‖ ≤ D δ, and what the checks allow follows:
 
 * the distance of r̂ from K is at most δ;
 * u_n ≥ −(1 + μ) D δ, since ũ'_n ≥ μ ‖ũ'_t‖; where r_n > δ also u_n ≤ (1 + μ) D δ;
@@ -21,7 +23,8 @@ from history import norm
 
 
 def project(x, mu, nu, xi, d):
-    """The points of the cones K nearest to rows `x` [M,R]: n, t (d of them), bending (d), twist where there is one more."""
+    """The points of the cones K nearest to rows `x` [M,R]: n, t (d of them), bending (d), twist where there
+    is one more."""
     t, b = x[:, 1 : 1 + d], x[:, 1 + d : 1 + 2 * d]
     w = x[:, 1 + 2 * d :]
     pulls = [(mu, norm(t)), (nu, norm(b)), (xi, norm(w))]
@@ -38,7 +41,8 @@ def project(x, mu, nu, xi, d):
 
 
 class Solved:
-    """The contact problem of every step as the history shows it: reactions as impulses, velocities, biases, D and δ."""
+    """The contact problem of every step as the history shows it: reactions as impulses, velocities, biases,
+    D and δ."""
 
     def __init__(self, h, c):
         self.bonds = h.bond >= 0
@@ -62,8 +66,11 @@ class Solved:
         return np.concatenate([n[:, None], t, b] + ([w[:, None]] if self.twists else []), 1)
 
     def _coefficients(self, h):
-        dry = np.where(h.on_wall, np.append(h.wall_friction, 0)[np.where(h.on_wall, h.j - h.N, -1)],
-                       h.scene["materials"]["friction"]["grain_grain"])
+        dry = np.where(
+            h.on_wall,
+            np.append(h.wall_friction, 0)[np.where(h.on_wall, h.j - h.N, -1)],
+            h.scene["materials"]["friction"]["grain_grain"],
+        )
         bond = h.bond_friction[h.bond] if h.K else np.zeros(h.M)
         self.mu = np.where(self.bonds, bond, dry)
         self.nu = np.where(self.bonds, bond, 0.0)
@@ -88,7 +95,8 @@ class Solved:
         self.entries = np.stack([n, t, bend, bend], 1)
 
     def _bias(self, h, c):
-        """What is added to u_n: of gaps, restitution, bonds that turn. `other` is a second value that the law admits."""
+        """What is added to u_n: of gaps, restitution, bonds that turn. `other` is a second value that the
+        law admits."""
         self.acts = np.ones(h.M, bool)
         before = c.before[0]
         restitution = np.where(self.bonds, 0.0, restitution_of(h, h.j))
@@ -103,7 +111,8 @@ class Solved:
         bouncy = restitution > 0
         self.bias = np.where(bouncy, bounce, np.maximum(c.gap, 0.0) / h.h)
         self.other = np.where((near & ~bouncy) | (at_rest & bouncy), 0.0, self.bias)
-        # with restitution a contact acts where it touches; nearer than a rounding it must, farther than the limit it must not
+        # with restitution a contact acts where it touches; nearer than a rounding it must,
+        # farther than the limit it must not
         self.acts = ~bouncy | (c.gap <= may_touch)
         self.idle_too = bouncy & (c.gap > must_touch) & self.acts
         rigid = self.bonds if h.K and h.stiffness is None else np.zeros(h.M, bool)
@@ -162,7 +171,8 @@ class Solved:
         load = np.sqrt((norm(outer[:, ~h.fixed]) ** 2).sum(1) + (h.wall_drive_force() ** 2).sum(1))
         square = np.bincount(h.row_step, (self.r**2).sum(1), minlength=h.S)
         self.scale = np.maximum(np.sqrt(square), h.h * load)
-        # a map that is as small as the rounding of all velocities counts as zero, in the sum over all contacts
+        # a map that is as small as the rounding of all velocities counts as zero, in the sum over
+        # all contacts
         self.rounded = np.sqrt(np.bincount(h.row_step, self.rounding**2, minlength=h.S))
         self.delta = (h.observed["solver_residual"] * self.scale + self.rounded)[h.row_step]
 
@@ -170,15 +180,21 @@ class Solved:
         """r̂ − P_K(r̂ − ũ/D); inside the cone ũ/D itself, free of the rounding of the shift."""
         d = h.D - 1
         slip = self.u.copy()
-        extra = self.mu * norm(slip[:, 1 : 1 + d]) + self.nu * norm(slip[:, 1 + d : 1 + 2 * d]) + self.xi * norm(slip[:, 1 + 2 * d :])
+        extra = (
+            self.mu * norm(slip[:, 1 : 1 + d])
+            + self.nu * norm(slip[:, 1 + d : 1 + 2 * d])
+            + self.xi * norm(slip[:, 1 + 2 * d :])
+        )
         slip[:, 0] += np.where(shifts, extra, 0.0)
         change = slip / self.D[:, None]
         shifted = self.r.copy()
         shifted[:, 0] += self.shift
         x = shifted - change
         self.sticks = (
-            (x[:, 0] >= 0) & (norm(x[:, 1 : 1 + d]) <= self.mu * x[:, 0])
-            & (norm(x[:, 1 + d : 1 + 2 * d]) <= self.nu * x[:, 0]) & (norm(x[:, 1 + 2 * d :]) <= self.xi * x[:, 0])
+            (x[:, 0] >= 0)
+            & (norm(x[:, 1 : 1 + d]) <= self.mu * x[:, 0])
+            & (norm(x[:, 1 + d : 1 + 2 * d]) <= self.nu * x[:, 0])
+            & (norm(x[:, 1 + 2 * d :]) <= self.xi * x[:, 0])
         )
         return np.where(self.sticks[:, None], change, shifted - project(x, self.mu, self.nu, self.xi, d))
 
@@ -217,7 +233,8 @@ def turning(h, c):
 
 
 def lengthening(h, c):
-    """What an elastic bond grew since the last mid-step beyond its way along the normal of then, over h (m/s).
+    """What an elastic bond grew since the last mid-step beyond its way along the normal of then, over h
+    (m/s).
 
     Its force follows its length: with the way d between two mid-steps, ℓ' − ℓ − d_n = d_t² / (ℓ' + ℓ + d_n) is what the
     normal velocity has not told it."""
@@ -252,17 +269,21 @@ def check(h, c, p, report):
 
 
 def check_residual(h, p, report):
-    """The natural maps of all contacts together, over the reactions or the load, are what the history says, or less."""
+    """The natural maps of all contacts together, over the reactions or the load, are what the history says,
+    or less."""
     total = np.sqrt(np.bincount(h.row_step, (p.map**2).sum(1), minlength=h.S))
     allowed = h.observed["solver_residual"] * p.scale + p.rounded
-    report.expect("residual", np.where(h.single, total, 0.0), allowed, lambda s: f"step {s + 1}: norm of the natural maps (N s)")
+    report.expect(
+        "residual", np.where(h.single, total, 0.0), allowed, lambda s: f"step {s + 1}: norm of the natural maps (N s)"
+    )
     accept = h.scene["solver"].get("accept") or (1e-6 if h.K else 1e-4)
     accept = max(accept, h.scene["solver"]["tolerance"])
     report.expect("residual accepted", h.observed["solver_residual"], accept, lambda s: f"step {s + 1}")
 
 
 def check_cones(h, p, report, rows):
-    """Reactions are in their cones: Coulomb's, and the shifted ones of bonds with limits of bending and twist."""
+    """Reactions are in their cones: Coulomb's, and the shifted ones of bonds with limits of bending and
+    twist."""
     shifted = p.r[rows].copy()
     shifted[:, 0] += p.shift[rows]
     off = norm(shifted - project(shifted, p.mu[rows], p.nu[rows], p.xi[rows], h.D - 1))
@@ -309,7 +330,8 @@ def check_bonds(h, p, report, rows):
 
 
 def check_status(h, p, report, rows):
-    """The status is that of the reaction: nothing carried is OPEN, within the cone STICK, on it SLIP; bonds are BONDED."""
+    """The status is that of the reaction: nothing carried is OPEN, within the cone STICK, on it SLIP; bonds
+    are BONDED."""
     status, open_ = h.status[rows], h.rn[rows] == 0
     size, limit = norm(h.rt[rows]), p.mu[rows] * h.rn[rows]
     near = np.abs(size - limit) <= 2e-9 * limit + tolerances.rounding(limit)
@@ -320,7 +342,8 @@ def check_status(h, p, report, rows):
 
 
 def check_closing(h, c, p, report):
-    """No step closes a pair, or stretches a rigid bond, beyond its law by more than a share of its radius; nor what adds up."""
+    """No step closes a pair, or stretches a rigid bond, beyond its law by more than a share of its radius;
+    nor what adds up."""
     intact = np.ones(h.M, bool)
     if h.K:
         intact = p.bonds & (h.bond_status[h.row_step + 1, h.bond] == "INTACT")

@@ -1,4 +1,5 @@
-"""Checks of motion: positions from velocities, Newton's law of every grain and wall, prescribed motion, time."""
+"""Checks of motion: positions from velocities, Newton's law of every grain and wall, prescribed motion,
+time."""
 
 import numpy as np
 
@@ -42,8 +43,15 @@ def check_positions(h, report):
     off = norm(h.body_x[1:] - h.body_x[:-1] - way)
     scale = norm(h.body_x[1:]) + norm(h.body_x[:-1]) + norm(way)
     single = h.single[:, None]
-    report.expect("positions", np.where(single, off, 0)[:, : h.N], tolerances.rounding(scale)[:, : h.N], of_grain("position (m)"))
-    report.expect("wall positions", np.where(single, off, 0)[:, h.N :], tolerances.rounding(scale)[:, h.N :], of_wall(h, "position (m)"))
+    report.expect(
+        "positions", np.where(single, off, 0)[:, : h.N], tolerances.rounding(scale)[:, : h.N], of_grain("position (m)")
+    )
+    report.expect(
+        "wall positions",
+        np.where(single, off, 0)[:, h.N :],
+        tolerances.rounding(scale)[:, h.N :],
+        of_wall(h, "position (m)"),
+    )
 
 
 def check_orientations(h, report):
@@ -56,7 +64,9 @@ def check_orientations(h, report):
         scale = np.abs(h.turned[1:]) + np.abs(h.turned[:-1]) + np.abs(turn[..., 0])
     else:
         off, scale = norm(h.turned[1:] - turned(h.turned[:-1], turn)), 1.0
-        report.expect("orientations", np.abs(norm(h.turned) - 1), tolerances.rounding(1.0), of_grain("norm of the quaternion"))
+        report.expect(
+            "orientations", np.abs(norm(h.turned) - 1), tolerances.rounding(1.0), of_grain("norm of the quaternion")
+        )
     off = np.where(h.single[:, None], off, 0.0)
     report.expect("orientations", off, tolerances.rounding(scale), of_grain("orientation"))
 
@@ -67,12 +77,15 @@ def turned(q, turn):
     half = np.divide(np.sin(angle / 2), angle, out=np.full(angle.shape, 0.5), where=angle > 0)
     c, p = np.cos(angle / 2)[..., 0], turn * half
     w, v = q[..., 0], q[..., 1:]
-    out = np.concatenate([(c * w - (p * v).sum(-1))[..., None], v * c[..., None] + p * w[..., None] + np.cross(p, v)], -1)
+    out = np.concatenate(
+        [(c * w - (p * v).sum(-1))[..., None], v * c[..., None] + p * w[..., None] + np.cross(p, v)], -1
+    )
     return out / norm(out)[..., None]
 
 
 def contact_sums(h):
-    """Sums over contacts, step by step and body by body: forces and their sizes, torques and their sizes."""
+    """Sums over contacts, step by step and body by body: forces and their sizes, torques and their
+    sizes."""
     bodies = h.N + h.W
     s, i, j = h.row_step, h.i, h.j
     count = h.S * bodies
@@ -97,7 +110,9 @@ def check_grains(h, report, forces, torques):
     (force, size), (torque, turn) = forces, torques
     off = norm(h.mass[:, None] * dv - h.h * (outer + force[:, : h.N]))
     scale = h.mass * (norm(h.v[1:]) + norm(h.v[:-1])) + h.h * (norm(outer) + size[:, : h.N])
-    report.expect("Newton's law", np.where(single & free, off, 0), tolerances.rounding(scale), of_grain("m Δv − h ΣF (N s)"))
+    report.expect(
+        "Newton's law", np.where(single & free, off, 0), tolerances.rounding(scale), of_grain("m Δv − h ΣF (N s)")
+    )
     off = norm(h.inertia[:, None] * dw - h.h * (outer_torque + torque[:, : h.N]))
     scale = h.inertia * (norm(h.w[1:]) + norm(h.w[:-1])) + h.h * (norm(outer_torque) + turn[:, : h.N])
     # where nothing can turn the file has no spins
@@ -108,7 +123,8 @@ def check_grains(h, report, forces, torques):
 
 
 def check_walls(h, report, forces):
-    """Walls: a force drives m Δv·d = h (F + ΣR·d); a velocity is that of the step's end; a fixed one does not move."""
+    """Walls: a force drives m Δv·d = h (F + ΣR·d); a velocity is that of the step's end; a fixed one does
+    not move."""
     drive = h.wall_drive_force()
     force, size = (part[:, h.N :] for part in forces)
     for k, (kind, function) in enumerate(h.drives):
@@ -127,7 +143,9 @@ def check_walls(h, report, forces):
         report.expect("wall motion", across, tolerances.rounding(norm(v) + np.cumsum(given)), describe)
         if kind == "velocity":
             told = prescribed.at(function, h.times)
-            report.expect("wall motion", np.abs(along - told), tolerances.rounding(np.abs(told) + slope(function, h)), describe)
+            report.expect(
+                "wall motion", np.abs(along - told), tolerances.rounding(np.abs(told) + slope(function, h)), describe
+            )
             continue
         off = h.wall_mass[k] * np.diff(along) - h.h * (drive[:, k] + force[:, k] @ d)
         scale = h.wall_mass[k] * (np.abs(along[1:]) + np.abs(along[:-1])) + h.h * (np.abs(drive[:, k]) + size[:, k])

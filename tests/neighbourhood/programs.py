@@ -18,11 +18,14 @@ def dem_run():
 
 
 def run(scene, folder, name="run", text=False):
-    """Runs a scene (a dictionary) in `folder`: the history's path, the summary from --json, its text if asked for."""
+    """Runs a scene (a dictionary) in `folder`: the history's path, the summary from --json, its text if
+    asked for."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / f"{name}.json").write_text(json.dumps(scene, indent=1))
     command = [dem_run(), "run", f"{name}.json", "-o", f"{name}.h5", "--force", "--quiet", "--threads", "1"]
-    call = lambda *more: subprocess.run(command + list(more), cwd=folder, check=True, capture_output=True, text=True, timeout=300)
+    call = lambda *more: subprocess.run(
+        command + list(more), cwd=folder, check=True, capture_output=True, text=True, timeout=300
+    )
     # the second run makes the same history again, to the bit but for its clock
     printed = call().stdout if text else None
     told = json.loads(call("--json").stdout)

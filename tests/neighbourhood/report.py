@@ -19,7 +19,8 @@ class Report:
     figures: dict = field(default_factory=dict)
 
     def expect(self, check, measured, allowed, describe):
-        """`measured` ≤ `allowed`, element by element; not a number is a violation. `describe(index)` says where."""
+        """`measured` ≤ `allowed`, element by element; not a number is a violation. `describe(index)` says
+        where."""
         measured, allowed = np.broadcast_arrays(np.asarray(measured, float), np.asarray(allowed, float))
         self.margins.setdefault(check, 0.0)
         if measured.size == 0:

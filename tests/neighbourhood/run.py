@@ -3,9 +3,10 @@
 
     .venv/bin/python tests/neighbourhood/run.py [--seed N] [--folder DIR] [--page FILE.md] [--only TEXT] [--quick]
 
-What is known of a neighbour is kept in the folder under a digest of its scene, the program and the checker, so a call that
-was cut goes on, and after a change what it concerns is done anew. Histories of wrong neighbours stay in the folder.
-Exit code: 0 all right, 1 something is wrong, 3 the time was up and neighbours are left.
+What is known of a neighbour is kept in the folder under a digest of its scene, the program and the checker,
+so a call that was cut goes on, and after a change what it concerns is done anew. Histories of wrong
+neighbours stay in the folder. Exit code: 0 all right, 1 something is wrong, 3 the time was up and
+neighbours are left.
 """
 
 import argparse
@@ -34,10 +35,25 @@ CPU, GRACE = 60.0, 30.0
 CALL = 2 * 3600.0
 # neighbours of the quick part: the bases, and these
 QUICK = [
-    "disks, restitution 0.001", "disks, restitution 0.5, turned by 0.3", "disks, lid velocity", "disks, friction 0.0",
-    "disks, cohesion 10000", "disks, end of step", "disks, cascade worst", "spheres, twist", "spheres, permuted",
-    "beam, lid velocity ramp", "beam, mirrored", "heap, rough side walls", "heap, restitution 0.5", "heap, lid ramp",
-    "heap, other units", "elastic, gravity", "elastic, turned by 90°", "elastic, end of step", "elastic, confined",
+    "disks, restitution 0.001",
+    "disks, restitution 0.5, turned by 0.3",
+    "disks, lid velocity",
+    "disks, friction 0.0",
+    "disks, cohesion 10000",
+    "disks, end of step",
+    "disks, cascade worst",
+    "spheres, twist",
+    "spheres, permuted",
+    "beam, lid velocity ramp",
+    "beam, mirrored",
+    "heap, rough side walls",
+    "heap, restitution 0.5",
+    "heap, lid ramp",
+    "heap, other units",
+    "elastic, gravity",
+    "elastic, turned by 90°",
+    "elastic, end of step",
+    "elastic, confined",
 ]
 
 
@@ -52,7 +68,10 @@ def digest(*parts):
 def sources():
     """What the checker and the generator are, for the digest."""
     here = Path(__file__).parent
-    return "".join((here / name).read_text() for name in sorted(p.name for p in here.glob("*.py") if not p.name.startswith("test_")))
+    return "".join(
+        (here / name).read_text()
+        for name in sorted(p.name for p in here.glob("*.py") if not p.name.startswith("test_"))
+    )
 
 
 def sample_of(base, folder, program):
@@ -64,7 +83,17 @@ def sample_of(base, folder, program):
         plain |= {"walls": {}, "time": {"step": 1e-9, "end": 1e-9}}
         plain.pop("stop", None)
         (folder / f"sample-{key}.json").write_text(json.dumps(plain))
-        command = [program, "run", f"sample-{key}.json", "-o", f"sample-{key}.h5", "--force", "--quiet", "--threads", "1"]
+        command = [
+            program,
+            "run",
+            f"sample-{key}.json",
+            "-o",
+            f"sample-{key}.h5",
+            "--force",
+            "--quiet",
+            "--threads",
+            "1",
+        ]
         subprocess.run(command + ["--write-sample", path.name], cwd=folder, check=True, stdout=subprocess.DEVNULL)
     return np.loadtxt(path, delimiter=",", skiprows=1)
 
@@ -121,13 +150,24 @@ def judged(name, scene, folder, key, program, limit):
     """Runs and checks a neighbour: what is known of it, as it is kept."""
     written(scene, scenes.base_of(name), folder, key, program)
     code, printed, complaint, cut, cpu = execute(folder, key, program, limit)
-    known = {"name": name, "key": key, "exit": code, "cut": cut, "cpu": cpu, "wrong": {}, "steps": 0, "message": complaint.strip()[:600]}
+    known = {
+        "name": name,
+        "key": key,
+        "exit": code,
+        "cut": cut,
+        "cpu": cpu,
+        "wrong": {},
+        "steps": 0,
+        "message": complaint.strip()[:600],
+    }
     told = json.loads(printed) if printed.strip().startswith("{") else None
     expected = {0, 3, 130} if cut else {0, 3}
     if code not in expected:
         known["wrong"]["exit code"] = [f"{code}: {complaint.strip()[:300]}"]
     if code == 3:
-        known["named"] = bool(re.search(r"grains? \d+", complaint)) and bool(re.search(r"(body|wall|grains?) \S+", complaint))
+        known["named"] = bool(re.search(r"grains? \d+", complaint)) and bool(
+            re.search(r"(body|wall|grains?) \S+", complaint)
+        )
     if told is None and not cut:
         return known
     try:
@@ -152,7 +192,8 @@ def judged(name, scene, folder, key, program, limit):
 
 
 def told_rightly(known, scene):
-    """What is wrong with what a run says that stopped: whoever is squeezed has a name, and that no motion exists is true."""
+    """What is wrong with what a run says that stopped: whoever is squeezed has a name, and that no motion
+    exists is true."""
     if known["exit"] != 3:
         return None
     first = (known["message"].splitlines() or ["no message"])[0]
@@ -199,35 +240,76 @@ def per_step(known):
     return known["cpu"] / known["steps"] if known["steps"] else float("nan")
 
 
-def page(found, names, seed, arguments):
+PAGE = """\
+# Neighbours of the shipped scenes
+
+Each row is a small scene, one or two changes away from a base. It is run, and its history is checked step by step by a
+program that knows the theory and not the code ([tests/neighbourhood](../tests/neighbourhood)). *Wrong* means that a
+check failed; steps that missed the solver's tolerance are counted. This page is written by
+
+```sh
+.venv/bin/python tests/neighbourhood/run.py --seed {seed} --page docs/neighbourhood.md
+```
+
+which goes on where an earlier call stopped.
+
+**{found} neighbours of {all} with seed {seed}: {right} right, {wrong} wrong.** {cut} were cut off after {cpu:g} s of
+processor time and checked up to there; {stopped} stopped because a step was not solved (exit code 3), {named} of them
+with the names of the bodies.
+
+A run that stopped is right where all up to there is, where it names who is squeezed, and where it says that no motion
+exists only with a wall that moves at a prescribed velocity.
+
+## What is checked
+
+{checks}
+
+A step that was made in parts has one frame for all of them: of it only what holds without the parts is checked.
+
+```text
+{tolerances}
+```
+
+## All of them
+
+*CPU* is processor time a step over that of the base; *missed* is the share of steps that missed the tolerance, *parts*
+that of steps made in parts.
+
+| neighbour | verdict | steps | CPU | missed | parts | ended |
+|---|---|---|---|---|---|---|
+{rows}
+"""
+
+
+def page(found, names, seed, cpu):
     """The page: how many, what is checked, a row each."""
-    wrong = [name for name, known in found.items() if known["wrong"]]
-    cut = sum(known["cut"] for known in found.values())
     stopped = [known for known in found.values() if known["exit"] == 3]
-    lines = [
-        "# Neighbours of the shipped scenes", "",
-        "Each row is a small scene, one or two changes away from a base, run and then checked step by step by a program that knows the theory and not the code",
-        "(`tests/neighbourhood/`). *Wrong* means that a check failed; steps that missed the solver's tolerance are counted. This page is written by", "",
-        "```sh", f".venv/bin/python tests/neighbourhood/run.py --seed {seed} --page docs/neighbourhood.md", "```", "",
-        f"{len(found)} neighbours of {len(names)} with seed {seed}: {len(found) - len(wrong)} right, {len(wrong)} wrong; {cut} were cut off after {arguments.cpu:g} s of processor time and checked up to",
-        f"there; {len(stopped)} stopped because a step was not solved (exit code 3), {sum(bool(k.get('named')) for k in stopped)} of them with the names of the bodies.", "",
-        "## What is checked", "", *checks(found), "", "Tolerances:", "", "```text", *tolerances.lines(), "```", "",
-        "## All of them", "",
-        "*CPU* is processor time a step over that of the base; *missed* the share of steps that missed the tolerance; *parts* that of steps made in parts, of which only what holds",
-        "without the parts is checked. A run that stopped because a step was not solved is right where all up to there is, where it names who is squeezed, and where it says that no motion exists",
-        "only with a wall that moves at a prescribed velocity.", "",
-        "| neighbour | verdict | steps | CPU | missed | parts | ended |", "|---|---|---|---|---|---|---|",
-    ]
-    for name, known in found.items():
-        base = found.get(scenes.base_of(name))
-        cost = per_step(known) / per_step(base) if base else float("nan")
-        steps = max(known["steps"], 1)
-        ended = "cut off" if known["cut"] else {0: "", 3: "stopped"}.get(known["exit"], f"exit code {known['exit']}")
-        ratio = "–" if np.isnan(cost) else f"{cost:.2g}"
-        result = "right" if not known["wrong"] else "**wrong**: " + ", ".join(sorted(known["wrong"]))
-        share = lambda key: f"{100 * known.get(key, 0) / steps:.3g} %" if known.get(key) else "0"
-        lines.append(f"| {name} | {result} | {known['steps']} | {ratio} | {share('missed')} | {share('parts')} | {ended} |")
-    return "\n".join(lines) + "\n"
+    wrong = sum(bool(known["wrong"]) for known in found.values())
+    return PAGE.format(
+        seed=seed,
+        found=len(found),
+        all=len(names),
+        right=len(found) - wrong,
+        wrong=wrong,
+        cut=sum(known["cut"] for known in found.values()),
+        cpu=cpu,
+        stopped=len(stopped),
+        named=sum(bool(known.get("named")) for known in stopped),
+        checks="\n".join(checks(found)),
+        tolerances="\n".join(tolerances.lines()),
+        rows="\n".join(row(name, known, found.get(scenes.base_of(name))) for name, known in found.items()),
+    )
+
+
+def row(name, known, base):
+    """The row of a neighbour; `base` is what is known of its base."""
+    cost = per_step(known) / per_step(base) if base else float("nan")
+    ended = "cut off" if known["cut"] else {0: "", 3: "stopped"}.get(known["exit"], f"exit code {known['exit']}")
+    result = "right" if not known["wrong"] else "**wrong**: " + ", ".join(sorted(known["wrong"]))
+    share = lambda key: f"{100 * known.get(key, 0) / max(known['steps'], 1):.3g} %" if known.get(key) else "0"
+    ratio = "–" if np.isnan(cost) else f"{cost:.2g}"
+    cells = [name, result, known["steps"], ratio, share("missed"), share("parts"), ended]
+    return "| " + " | ".join(map(str, cells)) + " |"
 
 
 def checks(found):
@@ -261,7 +343,7 @@ def main():
         names = {name: scene for name, scene in names.items() if arguments.only in name}
     found = all_neighbours(arguments, names, folder, programs.dem_run(), time.monotonic() + arguments.time)
     if arguments.page:
-        arguments.page.write_text(page(found, names, arguments.seed, arguments))
+        arguments.page.write_text(page(found, names, arguments.seed, arguments.cpu))
     wrong = {name: known for name, known in found.items() if known["wrong"]}
     for name, known in wrong.items():
         for check_name, examples in known["wrong"].items():

@@ -37,7 +37,10 @@ def check_formed(h, report):
     a = h.radius[bi] + h.radius[bj]
     mu = h.scene["bonds"].get("friction")
     mu = h.scene["materials"]["friction"]["grain_grain"] if mu is None else mu
-    told = {"rest_gap": (h.rest_gap, rest, norm(h.x[0, bi]) + norm(h.x[0, bj]) + a), "mean_diameter": (h.mean_diameter, a, a)}
+    told = {
+        "rest_gap": (h.rest_gap, rest, norm(h.x[0, bi]) + norm(h.x[0, bj]) + a),
+        "mean_diameter": (h.mean_diameter, a, a),
+    }
     told["strength"] = (h.strength, prescribed.strength(h.scene, a), np.abs(h.strength))
     told["friction"] = (h.bond_friction, np.full(h.K, mu), np.full(h.K, mu))
     for name, (found, expected, scale) in told.items():
@@ -47,11 +50,13 @@ def check_formed(h, report):
 
 
 def check_lengths(h, p, report):
-    """An intact rigid bond keeps its length; an elastic one is as long as its force says. At mid-step, where bonds act.
+    """An intact rigid bond keeps its length; an elastic one is as long as its force says. At mid-step,
+    where bonds act.
 
-    A bond that turns by θ in a step is longer at mid-step by the chord, θ²/2 of its length: half of what a step along the
-    tangent adds is given back by the next (docs/theory/time-stepping.md, bonds that turn), so it does not add up. By what the
-    solves miss the law of a spring, which `elastic bonds` bounds in each step, force and length part over the run.
+    A bond that turns by θ in a step is longer at mid-step by the chord, θ²/2 of its length: half of what a
+    step along the tangent adds is given back by the next (docs/theory/time-stepping.md, bonds that turn),
+    so it does not add up. By what the solves miss the law of a spring, which `elastic bonds` bounds in each
+    step, force and length part over the run.
     """
     bi, bj = h.bond_pair.T
     gap, tangential = np.zeros((h.S, h.K)), np.zeros((h.S, h.K))
@@ -66,7 +71,9 @@ def check_lengths(h, p, report):
     # intact when the step began
     intact = h.bond_status[:-1] == "INTACT"
     smaller = np.minimum(h.radius[bi], h.radius[bj])
-    report.figures["largest change of the length of an intact bond (m)"] = float(np.abs(np.where(intact, longer, 0)).max(initial=0))
+    report.figures["largest change of the length of an intact bond (m)"] = float(
+        np.abs(np.where(intact, longer, 0)).max(initial=0)
+    )
     if h.stiffness is None:
         describe = lambda s, b: f"step {s + 1}, bond {b}: change of length (m)"
         off = np.where(intact, np.abs(longer), 0.0)
@@ -96,19 +103,27 @@ def check_elongation(h, longer, report):
 
 
 def failure(n, t, b, w, strength, mu, a, xi):
-    """Distance to rupture of reactions (N, N m): r̂_n, and the largest of ‖r_t‖/μ, ‖m‖/(μ a), |τ|/(ξ a) with its mode."""
+    """Distance to rupture of reactions (N, N m): r̂_n, and the largest of ‖r_t‖/μ, ‖m‖/(μ a), |τ|/(ξ a)
+    with its mode."""
     over = lambda size, c: np.divide(size, c, out=np.zeros_like(size), where=c > 0)
     ratios = np.stack([over(t, mu), over(b, mu * a), over(w, xi * a)])
     return n + strength, ratios.max(0), np.array(["SHEAR", "ROLLING", "TWIST"])[ratios.argmax(0)], ratios
 
 
 def check_intact(h, p, report):
-    """After a step no intact bond is at its limit; with `end_of_step` those that are break, and no others."""
+    """After a step no intact bond is at its limit; with `end_of_step` those that are break, and no
+    others."""
     rows = np.flatnonzero(h.bond >= 0)
     b, s = h.bond[rows], h.row_step[rows]
     n, ratio, _, _ = failure(
-        h.rn[rows], norm(h.rt[rows]), norm(h.bending[rows]), np.abs(h.twist[rows]),
-        h.strength[b], h.bond_friction[b], h.mean_diameter[b], np.full(len(b), h.xi),
+        h.rn[rows],
+        norm(h.rt[rows]),
+        norm(h.bending[rows]),
+        np.abs(h.twist[rows]),
+        h.strength[b],
+        h.bond_friction[b],
+        h.mean_diameter[b],
+        np.full(len(b), h.xi),
     )
     eps = tolerances.value("limit")
     slack = tolerances.rounding(np.abs(h.rn[rows]) + h.strength[b] + ratio)
@@ -123,18 +138,28 @@ def check_intact(h, p, report):
 
 
 def check_statuses(h, report):
-    """Statuses, events and contacts say the same: a bond breaks once, at its event, and has contacts as a bond before."""
+    """Statuses, events and contacts say the same: a bond breaks once, at its event, and has contacts as a
+    bond before."""
     broke_at = np.full(h.K, h.S + 1)
     mode = np.full(h.K, "INTACT", dtype=object)
     for event, name in zip(h.events, h.event_mode):
         bond = int(event["bond"])
-        report.require("each bond breaks once", 0 <= bond < h.K and broke_at[bond] > h.S, f"an event names bond {bond}, again or not there")
+        report.require(
+            "each bond breaks once",
+            0 <= bond < h.K and broke_at[bond] > h.S,
+            f"an event names bond {bond}, again or not there",
+        )
         if 0 <= bond < h.K:
             broke_at[bond], mode[bond] = int(event["step"]), name
     step = np.arange(h.S + 1)[:, None]
     told = np.where(step < broke_at, "INTACT", np.broadcast_to(mode, (h.S + 1, h.K)))
     off = (told != h.bond_status).astype(float)
-    report.expect("statuses are those of events", off, 0.0, lambda s, b: f"step {s}, bond {b} is {h.bond_status[s, b]}, told {told[s, b]}")
+    report.expect(
+        "statuses are those of events",
+        off,
+        0.0,
+        lambda s, b: f"step {s}, bond {b} is {h.bond_status[s, b]}, told {told[s, b]}",
+    )
     broken = h.observed["bonds_broken"]
     count = (np.arange(1, h.S + 1)[:, None] >= broke_at).sum(1)
     report.expect("bonds_broken", np.abs(broken - count), 0.0, lambda s: f"step {s + 1}: bonds_broken")
@@ -162,8 +187,17 @@ def check_events(h, c, p, report):
     report.require("events", bool(inside.all()), "an event names a bond or a step that is not there")
     if not inside.all():
         return
-    report.require("events", np.array_equal(h.bond_pair[b], np.stack([e["i"], e["j"]], 1)), "an event does not name the grains of its bond")
-    report.expect("events", np.abs(e["time"] - h.times[step]), tolerances.rounding(h.times[step]), lambda k: f"event {k}: time (s)")
+    report.require(
+        "events",
+        np.array_equal(h.bond_pair[b], np.stack([e["i"], e["j"]], 1)),
+        "an event does not name the grains of its bond",
+    )
+    report.expect(
+        "events",
+        np.abs(e["time"] - h.times[step]),
+        tolerances.rounding(h.times[step]),
+        lambda k: f"event {k}: time (s)",
+    )
     i, j = h.bond_pair[b].T
     xi, xj = h.mid[step - 1, i], h.mid[step - 1, j]
     gap, n = gap_and_normal(h, i, j, xi, xj)
@@ -181,7 +215,8 @@ def check_events(h, c, p, report):
 
 
 def stored_energy(h, b, step):
-    """½ Σ f²/k of bonds `b` that broke in steps `step`: what they held as it began, or at its end with `end_of_step`."""
+    """½ Σ f²/k of bonds `b` that broke in steps `step`: what they held as it began, or at its end with
+    `end_of_step`."""
     if h.stiffness is None:
         return np.zeros(len(b)), np.zeros(len(b))
     late = h.scene.get("rupture") == "end_of_step"
@@ -215,7 +250,9 @@ def check_limits_of_events(h, report):
     twist = np.abs(e["twist"]) if two_columns else np.zeros(len(e))
     # before version 3 `m` is the norm of bending and twist together: less is said of both
     mixed = h.moment.shape[1] > 2 and not two_columns
-    n, ratio, mode, ratios = failure(e["rn"], e["rt"], e["m"], twist, strength, h.bond_friction[b], h.mean_diameter[b], np.full(len(b), h.xi))
+    n, ratio, mode, ratios = failure(
+        e["rn"], e["rt"], e["m"], twist, strength, h.bond_friction[b], h.mean_diameter[b], np.full(len(b), h.xi)
+    )
     slack = tolerances.rounding(np.abs(e["rn"]) + strength + ratio)
     describe = lambda k: f"event {k} ({h.event_mode[k]}) at step {e['step'][k]}, bond {e['bond'][k]}"
     tension = n <= eps * strength + slack
@@ -238,13 +275,16 @@ def check_limits_of_events(h, report):
     tied = np.zeros(len(e), bool)
     for row, name in enumerate(("SHEAR", "ROLLING", "TWIST")):
         tied |= (h.event_mode == name) & (ratios[row] >= ratios.max(0) - slack)
-    off = (expected != h.event_mode) & ~tied & ~(tension & (ratio >= (1 - eps) * n - slack) & (h.event_mode == "TENSION"))
+    off = (
+        (expected != h.event_mode) & ~tied & ~(tension & (ratio >= (1 - eps) * n - slack) & (h.event_mode == "TENSION"))
+    )
     off |= tension & (n <= eps * strength - slack) & (h.event_mode != "TENSION")
     report.expect("mode of events", off.astype(float), 0.0, describe)
 
 
 def largest_reaction(h):
-    """Norm of all reactions (N) of each step or of the one before, whichever is larger: what residuals are relative to."""
+    """Norm of all reactions (N) of each step or of the one before, whichever is larger: what residuals are
+    relative to."""
     square = np.bincount(h.row_step, h.rn**2 + (h.rt**2).sum(1), minlength=h.S)
     outer, _ = h.external()
     load = np.sqrt((outer**2).sum((1, 2)) + (h.wall_drive_force() ** 2).sum(1))
@@ -253,7 +293,8 @@ def largest_reaction(h):
 
 
 def check_order_of_events(h, report):
-    """Events stand by step and round; rounds of a step begin at 0 and leave none out; in a round as the rule says."""
+    """Events stand by step and round; rounds of a step begin at 0 and leave none out; in a round as the
+    rule says."""
     e = h.events
     report.margins.setdefault("order of events", 0.0)
     steps = e["step"].astype(int)

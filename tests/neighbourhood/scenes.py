@@ -1,7 +1,8 @@
 """Small scenes, and what is changed of them: the neighbours of the shipped scenes.
 
-A *base* is a scene that runs in a second or two. A *change* alters one thing of a base, a *pair* two. The same seed gives the
-same neighbours. All scenes are dictionaries in SI units; `transformed` turns, mirrors, shifts or rescales one with its sample.
+A *base* is a scene that runs in a second or two. A *change* alters one thing of a base, a *pair* two. The
+same seed gives the same neighbours. All scenes are dictionaries in SI units; `transformed` turns, mirrors,
+shifts or rescales one with its sample.
 """
 
 import copy
@@ -31,17 +32,31 @@ def up(dimension, sign=1.0):
 def packing(count, diameters, fraction, **box):
     """A random packing between walls."""
     low, high = diameters
-    return {"random": {"count": count, "diameter": {"uniform": {"min": low, "max": high}}, **box,
-                       "preparation": {"compaction": {"solid_fraction": fraction}}}}
+    return {
+        "random": {
+            "count": count,
+            "diameter": {"uniform": {"min": low, "max": high}},
+            **box,
+            "preparation": {"compaction": {"solid_fraction": fraction}},
+        }
+    }
 
 
 def compression(dimension, sample, rate, step, end):
     """A cemented sample on a plate, under another with a force that grows."""
     return {
-        "dimension": dimension, "seed": 1, "thickness": 1.0, "sample": sample, "materials": materials(),
+        "dimension": dimension,
+        "seed": 1,
+        "thickness": 1.0,
+        "sample": sample,
+        "materials": materials(),
         "bonds": {"strength": COHESION, "gap_tolerance": 1e-3},
-        "walls": {"bottom": plane(up(dimension)), "top": plane(up(dimension, -1.0)) | {"mass": "sample", "force_rate": rate}},
-        "time": {"step": step, "end": end}, "output": {"every_steps": 1},
+        "walls": {
+            "bottom": plane(up(dimension)),
+            "top": plane(up(dimension, -1.0)) | {"mass": "sample", "force_rate": rate},
+        },
+        "time": {"step": step, "end": end},
+        "output": {"every_steps": 1},
         "stop": {"wall_travel": {"wall": "top", "fraction_of_height": 0.005, "after": "first_break"}},
     }
 
@@ -63,11 +78,18 @@ def beam():
     """A beam of three rows on two supports, under a round wall with a force that grows."""
     seat = lambda x, y, to: {"shape": {"circle": {"center": [x, y], "radius": 0.01, "seated": [0.0, to]}}}
     return {
-        "dimension": 2, "thickness": 1.0, "sample": {"lattice": {"hexagonal": {"diameter": 4e-3, "rows": 3, "columns": 21}}},
-        "materials": materials(), "bonds": {"strength": 100.0, "gap_tolerance": 1e-6},
-        "walls": {"left": seat(0.01, -0.1, 1.0), "right": seat(0.07, -0.1, 1.0),
-                  "top": seat(0.04, 0.1, -1.0) | {"direction": [0.0, -1.0], "mass": "sample", "force_rate": 8000.0}},
-        "time": {"step": 1e-4, "end": 0.025}, "output": {"every_steps": 1},
+        "dimension": 2,
+        "thickness": 1.0,
+        "sample": {"lattice": {"hexagonal": {"diameter": 4e-3, "rows": 3, "columns": 21}}},
+        "materials": materials(),
+        "bonds": {"strength": 100.0, "gap_tolerance": 1e-6},
+        "walls": {
+            "left": seat(0.01, -0.1, 1.0),
+            "right": seat(0.07, -0.1, 1.0),
+            "top": seat(0.04, 0.1, -1.0) | {"direction": [0.0, -1.0], "mass": "sample", "force_rate": 8000.0},
+        },
+        "time": {"step": 1e-4, "end": 0.025},
+        "output": {"every_steps": 1},
         "stop": {"wall_travel": {"wall": "top", "fraction_of_height": 0.05, "after": "first_break"}},
     }
 
@@ -75,9 +97,15 @@ def beam():
 def heap():
     """A dry heap of 80 disks that spreads on a floor."""
     return {
-        "dimension": 2, "seed": 2, "thickness": 0.01, "sample": packing(80, (2e-3, 4e-3), 0.76, width=0.02),
-        "materials": materials(0.5, 0.5), "walls": {"bottom": plane(up(2))}, "gravity": [0.0, -9.81],
-        "time": {"step": 2e-4, "end": 0.05}, "output": {"every_steps": 1},
+        "dimension": 2,
+        "seed": 2,
+        "thickness": 0.01,
+        "sample": packing(80, (2e-3, 4e-3), 0.76, width=0.02),
+        "materials": materials(0.5, 0.5),
+        "walls": {"bottom": plane(up(2))},
+        "gravity": [0.0, -9.81],
+        "time": {"step": 2e-4, "end": 0.05},
+        "output": {"every_steps": 1},
     }
 
 
@@ -153,7 +181,10 @@ def lid(drive):
         drives = {
             "force": {"mass": "sample", "force": {"constant": load}},
             "ramp": {"mass": "sample", "force": {"ramp": {"rate": 100 * load, "start": 1e-3}}},
-            "table": {"mass": "sample", "force": {"table": [[0.0, 0.0], [0.005, load], [0.01, 0.2 * load], [0.02, 2 * load]]}},
+            "table": {
+                "mass": "sample",
+                "force": {"table": [[0.0, 0.0], [0.005, load], [0.01, 0.2 * load], [0.02, 2 * load]]},
+            },
             "velocity": {"velocity": {"constant": 0.02}},
             "velocity ramp": {"velocity": {"ramp": {"rate": 2.0}}},
         }
@@ -224,7 +255,9 @@ def stress(scene):
     needs(scene.get("bonds"))
     strength = scene["bonds"].pop("strength")
     width = 2.5e-3
-    scene["bonds"]["stress"] = strength / (width * scene.get("thickness", 1.0) if scene["dimension"] == 2 else np.pi * width**2 / 4)
+    scene["bonds"]["stress"] = strength / (
+        width * scene.get("thickness", 1.0) if scene["dimension"] == 2 else np.pi * width**2 / 4
+    )
 
 
 def rupture(rule):
@@ -241,7 +274,14 @@ def springs(scene):
     """Elastic bonds, or other springs."""
     needs(scene.get("bonds"))
     stiffness = 1e6 * scene["bonds"].get("strength", COHESION) / COHESION
-    scene["bonds"]["stiffness"] = {"springs": {"normal": stiffness, "tangential": 0.4 * stiffness, "rolling": stiffness * 1e-6, "twist": stiffness * 1e-6}}
+    scene["bonds"]["stiffness"] = {
+        "springs": {
+            "normal": stiffness,
+            "tangential": 0.4 * stiffness,
+            "rolling": stiffness * 1e-6,
+            "twist": stiffness * 1e-6,
+        }
+    }
     if scene["dimension"] == 2 or "twist" not in scene["bonds"]:
         del scene["bonds"]["stiffness"]["springs"]["twist"]
 
@@ -272,29 +312,45 @@ def as_file(turn=0.0, mirror=False, permute=None, units=None, shift=None):
 
 # name: (kind, change); of a pair both are of different kinds
 CHANGES = {
-    "gravity": ("gravity", gravity(0.0, -1.0)), "gravity aside": ("gravity", gravity(0.6, -0.8)),
+    "gravity": ("gravity", gravity(0.0, -1.0)),
+    "gravity aside": ("gravity", gravity(0.6, -0.8)),
     "no gravity": ("gravity", lambda scene: (needs(scene.get("gravity")), scene.pop("gravity"))),
-    "smooth side walls": ("sides", side_walls(0.0)), "rough side walls": ("sides", side_walls(0.5)),
+    "smooth side walls": ("sides", side_walls(0.0)),
+    "rough side walls": ("sides", side_walls(0.5)),
     "confined": ("sides", confined),
-    "lid force": ("lid", lid("force")), "lid ramp": ("lid", lid("ramp")), "lid table": ("lid", lid("table")),
-    "lid velocity": ("lid", lid("velocity")), "lid velocity ramp": ("lid", lid("velocity ramp")),
-    "restitution 0.001": ("restitution", restitution(0.001)), "restitution 0.5": ("restitution", restitution(0.5)),
+    "lid force": ("lid", lid("force")),
+    "lid ramp": ("lid", lid("ramp")),
+    "lid table": ("lid", lid("table")),
+    "lid velocity": ("lid", lid("velocity")),
+    "lid velocity ramp": ("lid", lid("velocity ramp")),
+    "restitution 0.001": ("restitution", restitution(0.001)),
+    "restitution 0.5": ("restitution", restitution(0.5)),
     **{f"friction {mu}": ("friction", friction(mu)) for mu in (0.0, 0.05, 0.8, 1.5)},
     **{f"cohesion {c:g}": ("cohesion", cohesion(c)) for c in (1e-3, 0.1, 1e2, 1e4)},
     "strength as stress": ("cohesion", stress),
-    "bipotential": ("flow", bonds(flow="bipotential")), "associated": ("flow", bonds(flow="associated")),
-    "smooth bonds": ("bond friction", bonds(friction=0.0)), "rough bonds": ("bond friction", bonds(friction=0.9)),
-    "cascade worst": ("rupture", rupture("cascade_worst")), "end of step": ("rupture", rupture("end_of_step")),
-    "twist": ("twist", bonds(twist=0.2)), "springs": ("springs", springs),
-    "step x 10": ("step", step(10.0)), "step / 10": ("step", step(0.1)),
-    "file": ("file", as_file()), "mirrored": ("file", as_file(mirror=True)), "turned by 0.3": ("file", as_file(turn=0.3)),
-    "turned by 90°": ("file", as_file(turn=np.pi / 2)), "permuted": ("file", as_file(permute=7)),
-    "other units": ("file", as_file(units=(1e3, 1e3, 1e3))), "shifted": ("file", as_file(shift=0.1)),
+    "bipotential": ("flow", bonds(flow="bipotential")),
+    "associated": ("flow", bonds(flow="associated")),
+    "smooth bonds": ("bond friction", bonds(friction=0.0)),
+    "rough bonds": ("bond friction", bonds(friction=0.9)),
+    "cascade worst": ("rupture", rupture("cascade_worst")),
+    "end of step": ("rupture", rupture("end_of_step")),
+    "twist": ("twist", bonds(twist=0.2)),
+    "springs": ("springs", springs),
+    "step x 10": ("step", step(10.0)),
+    "step / 10": ("step", step(0.1)),
+    "file": ("file", as_file()),
+    "mirrored": ("file", as_file(mirror=True)),
+    "turned by 0.3": ("file", as_file(turn=0.3)),
+    "turned by 90°": ("file", as_file(turn=np.pi / 2)),
+    "permuted": ("file", as_file(permute=7)),
+    "other units": ("file", as_file(units=(1e3, 1e3, 1e3))),
+    "shifted": ("file", as_file(shift=0.1)),
 }
 
 
 def neighbours(seed):
-    """Neighbours by name: the bases, each single change of each, and pairs of changes drawn with the seed."""
+    """Neighbours by name: the bases, each single change of each, and pairs of changes drawn with the
+    seed."""
     out = {}
     for base in BASES:
         out[base] = neighbour(base)
@@ -323,11 +379,16 @@ def put(out, base, names):
 
 
 def neighbour(name):
-    """The neighbour of this name: a base and its changes, which are made in an order in which each finds what it scales by."""
+    """The neighbour of this name: a base and its changes, which are made in an order in which each finds
+    what it scales by."""
     base, *names = name.split(", ")
     scene = BASES[base]()
     # loads and springs follow the strength, which `stress` then takes away
-    rank = lambda name: 0 if CHANGES[name][0] == "cohesion" and name != "strength as stress" else 2 if name == "strength as stress" else 1
+    rank = lambda name: (
+        0
+        if CHANGES[name][0] == "cohesion" and name != "strength as stress"
+        else 2 if name == "strength as stress" else 1
+    )
     for name in sorted(names, key=rank):
         CHANGES[name][1](scene)
     travel = (scene.get("stop") or {}).get("wall_travel")
@@ -347,14 +408,15 @@ def moves_walls(scene):
 
 
 def may_have_no_motion(scene):
-    """Whether nothing may give way to a wall that closes in: between walls on all sides, or held by bonds."""
+    """Whether nothing may give way to a wall that closes in: between walls on all sides, or held by
+    bonds."""
     sides = any(name.startswith("side_") for name in scene["walls"])
     return moves_walls(scene) and (sides or bool(scene.get("bonds")))
 
 
 class Transform:
-    """How a scene is turned about the vertical plane (rad), mirrored, shifted (m), in an order drawn with the seed `permute`, and
-    with units `units` times smaller (length, mass, time)."""
+    """How a scene is turned about the vertical plane (rad), mirrored, shifted (m), in an order drawn with
+    the seed `permute`, and with units `units` times smaller (length, mass, time)."""
 
     def __init__(self, dimension, turn=0.0, mirror=False, permute=None, units=None, shift=None):
         self.length, self.mass, self.time = units or (1.0, 1.0, 1.0)
@@ -387,7 +449,12 @@ class Transform:
     def wall(self, wall):
         """Alters a wall of a scene."""
         for shape in wall["shape"].values():
-            for key, how in (("normal", self.along), ("axis", self.along), ("center", self.place), ("seated", self.along)):
+            for key, how in (
+                ("normal", self.along),
+                ("axis", self.along),
+                ("center", self.place),
+                ("seated", self.along),
+            ):
                 if isinstance(shape.get(key), list):
                     shape[key] = how(shape[key])
             if isinstance(shape.get("place"), dict):
@@ -409,7 +476,9 @@ class Transform:
                 fields[key] *= unit
         stiffness = fields.get("stiffness", {})
         for key in stiffness.get("springs", {}):
-            stiffness["springs"][key] *= self.force / self.length if key in ("normal", "tangential") else self.force * self.length
+            stiffness["springs"][key] *= (
+                self.force / self.length if key in ("normal", "tangential") else self.force * self.length
+            )
         if "young" in stiffness:
             stiffness["young"]["modulus"] *= self.force / self.length**2
 
@@ -417,8 +486,8 @@ class Transform:
 def transformed(scene, points, **way):
     """The scene and its sample, rows of centre and radius, turned and so on as `Transform` says.
 
-    Returns the scene without its sample, the points, and a dictionary: the matrix `R` that turned it, the `order` in which the
-    grains stand now, and the units of `force` and `length`."""
+    Returns the scene without its sample, the points, and a dictionary: the matrix `R` that turned it, the
+    `order` in which the grains stand now, and the units of `force` and `length`."""
     scene = copy.deepcopy({key: value for key, value in scene.items() if key != "as file"})
     how = Transform(scene["dimension"], **way)
     points, order = how.points(points)

@@ -24,7 +24,9 @@ def check(h, report, told, text=None):
     report.require("summary", not unknown, f"keys that the checker does not know: {', '.join(unknown)}")
     check_ending(h, report, told)
     last = float(h.observed["cpu_time"][-1]) if h.S else 0.0
-    report.require("summary", told["cpu_time"] >= last, f"cpu_time {told['cpu_time']} is less than that of the last step, {last}")
+    report.require(
+        "summary", told["cpu_time"] >= last, f"cpu_time {told['cpu_time']} is less than that of the last step, {last}"
+    )
     if text is not None:
         check_text(h, report, told, text)
 
@@ -32,16 +34,22 @@ def check(h, report, told, text=None):
 def compare(report, check, name, found, expected):
     """`found` is `expected`: the same structure, numbers within rounding or within a pair of bounds."""
     if isinstance(expected, dict):
-        report.require(check, isinstance(found, dict) and set(found) == set(expected), f"{name} is {found}, expected {expected}")
+        report.require(
+            check, isinstance(found, dict) and set(found) == set(expected), f"{name} is {found}, expected {expected}"
+        )
         for key in expected if isinstance(found, dict) else ():
             compare(report, check, f"{name}.{key}", found.get(key), expected[key])
     elif isinstance(expected, list):
-        report.require(check, isinstance(found, list) and len(found) == len(expected), f"{name} is {found}, expected {expected}")
+        report.require(
+            check, isinstance(found, list) and len(found) == len(expected), f"{name} is {found}, expected {expected}"
+        )
         for k, value in enumerate(expected if isinstance(found, list) else ()):
             compare(report, check, f"{name}[{k}]", found[k] if k < len(found) else None, value)
     elif isinstance(expected, tuple):
         low, high = expected
-        report.require(check, found is not None and low <= found <= high, f"{name} is {found}, expected {low} to {high}")
+        report.require(
+            check, found is not None and low <= found <= high, f"{name} is {found}, expected {low} to {high}"
+        )
     elif isinstance(expected, float) and isinstance(found, (int, float)) and not isinstance(found, bool):
         slack = tolerances.rounding(abs(expected))
         report.require(check, abs(found - expected) <= slack, f"{name} is {found!r}, recomputed {expected!r}")
@@ -64,8 +72,13 @@ def recomputed(h, told):
     failed = told.get("ending") == "no_convergence"
     newton_iterations = int(o["solver_newton_iterations"].sum())
     out = {
-        "steps": h.S, "time": float(h.frame_time[-1]), "grains": h.N, "bonds": h.K, "tolerance": float(tolerance),
-        "elastic": bool(h.K and h.stiffness is not None), "twists": h.D == 3 and (h.scene.get("bonds") or {}).get("twist") is not None,
+        "steps": h.S,
+        "time": float(h.frame_time[-1]),
+        "grains": h.N,
+        "bonds": h.K,
+        "tolerance": float(tolerance),
+        "elastic": bool(h.K and h.stiffness is not None),
+        "twists": h.D == 3 and (h.scene.get("bonds") or {}).get("twist") is not None,
         "broken": [modes.count(mode) for mode in MODES],
         "worst_residual": float(residual.max(initial=0.0)),
         # Newton's solves also count where the load error missed its own tolerance
@@ -73,9 +86,12 @@ def recomputed(h, told):
         "rejected": (rejected, rejected + 1) if failed else rejected,
         "penetration": float(o["penetration"].max(initial=0.0)),
         "mean_diameter": float(2 * h.radius.mean()),
-        "external_work": last("external_work"), "energy_remainder": last("energy_remainder"), "bond_remainder": last("bond_remainder"),
+        "external_work": last("external_work"),
+        "energy_remainder": last("energy_remainder"),
+        "bond_remainder": last("bond_remainder"),
         "work": {
-            "newton_iterations": newton_iterations, "factorisations": int(o["solver_factorisations"].sum()),
+            "newton_iterations": newton_iterations,
+            "factorisations": int(o["solver_factorisations"].sum()),
             "sweeps": int(o["solver_iterations"].sum()) - newton_iterations,
         },
         "solid_fraction": None if h.packed is None else float(h.packed),
@@ -101,15 +117,18 @@ def loads(h, told):
         chosen = next(iter(walls))
     of_chosen = walls.get(chosen, {"failure": none, "peak_load": None, "peak_displacement": None})
     return {
-        "load_wall": chosen if chosen in walls else None, "failure": of_chosen["failure"],
-        "peak_load": of_chosen["peak_load"], "peak_displacement": of_chosen["peak_displacement"],
+        "load_wall": chosen if chosen in walls else None,
+        "failure": of_chosen["failure"],
+        "peak_load": of_chosen["peak_load"],
+        "peak_displacement": of_chosen["peak_displacement"],
         "driven_walls": [{"wall": name, **values} for name, values in walls.items()],
         "splitting": None,
     }
 
 
 def load_of(h, k):
-    """Load (N) of the driven wall `k` in every step: prescribed, or what it took against the grains before a bond broke."""
+    """Load (N) of the driven wall `k` in every step: prescribed, or what it took against the grains before
+    a bond broke."""
     kind, function = h.drives[k]
     if kind == "force":
         parts = h.observed.get("substeps")
@@ -138,7 +157,12 @@ def wall_loads(h, k, new):
         if new and (collapse[n] == 0 or (elastic and early[n])):
             collapse[n] = None
     share = first(broken >= BROKEN_SHARE * h.K) if h.K else None
-    failure = {"first_break": value(first(broken > 0)), "collapse": collapse, "early": early, "broken_share": value(share)}
+    failure = {
+        "first_break": value(first(broken > 0)),
+        "collapse": collapse,
+        "early": early,
+        "broken_share": value(share),
+    }
     out = {"failure": failure}
     if new:
         peak = int(np.argmax(np.abs(load))) if h.S else None
@@ -161,13 +185,21 @@ def check_ending(h, report, told):
         d = h.wall_direction[k]
         reach = lambda sign: (sign * (h.x[0] @ d) + h.radius).max()
         distance = travel["fraction_of_height"] * (reach(1) + reach(-1))
-        begin = 0 if travel.get("after", "start") == "start" else (int(np.argmax(broken > 0)) + 1 if (broken > 0).any() else h.S)
+        begin = (
+            0
+            if travel.get("after", "start") == "start"
+            else (int(np.argmax(broken > 0)) + 1 if (broken > 0).any() else h.S)
+        )
         way = np.abs((h.X[1:, k] - h.X[begin, k]) @ d)
         holds["wall_travel"] = (way >= distance * (1 - 1e-12)) & (np.arange(h.S) >= begin)
     for name, held in holds.items():
         report.require("ending", not held[:-1].any(), f"{name} held before the last step, and the run went on")
     if ending in ("broken_fraction", "wall_travel"):
-        report.require("ending", ending in holds and h.S > 0 and bool(holds[ending][-1]), f"{ending} does not hold in the last step")
+        report.require(
+            "ending",
+            ending in holds and h.S > 0 and bool(holds[ending][-1]),
+            f"{ending} does not hold in the last step",
+        )
     if ending == "time":
         end = h.scene["time"]["end"]
         report.require("ending", abs(h.frame_time[-1] - end) < h.h, f"ended at {h.frame_time[-1]} s, not {end} s")
@@ -179,14 +211,18 @@ def text_lines(h, told):
     per_step = lambda n: n / max(told["steps"], 1)
     work = told["work"]
     lines = [("ended", [told["time"], told["steps"]])]
-    lines.append(("sample", [told["grains"]] + ([told["solid_fraction"]] if told["solid_fraction"] is not None else [])))
+    lines.append(
+        ("sample", [told["grains"]] + ([told["solid_fraction"]] if told["solid_fraction"] is not None else []))
+    )
     counts = [told["broken"][k] for k in range(4 if told["twists"] else 3)]
     if K:
         lines.append(("bonds", [K, sum(counts), 100.0 * sum(counts) / K] + counts))
     if h.S:
         took = [per_step(work[k]) for k in ("newton_iterations", "factorisations", "sweeps") if work[k] > 0]
         lines.append(("solver", took))
-        lines.append(("accuracy", [told["worst_residual"], told["tolerance"], told["missed_tolerance"], told["rejected"]]))
+        lines.append(
+            ("accuracy", [told["worst_residual"], told["tolerance"], told["missed_tolerance"], told["rejected"]])
+        )
         lines.append(("penetration", [told["penetration"], told["penetration"] / told["mean_diameter"]]))
         lines.append(("external work", [told["external_work"]]))
         lines.append(("energy remainder", [told["energy_remainder"]]))
@@ -205,7 +241,9 @@ def load_lines(h, told, failure):
         return [line for line in lines if line[1]]
     if told["bonds"] and h.drives and any(kind != "fixed" for kind, _ in h.drives):
         lines.append(("first break", [failure["first_break"]]))
-        lines += [("collapse load", [load, strain]) for load, strain in zip(failure["collapse"], STRAINS) if load is not None]
+        lines += [
+            ("collapse load", [load, strain]) for load, strain in zip(failure["collapse"], STRAINS) if load is not None
+        ]
         lines.append(("5 % broken", [failure["broken_share"]]))
     if told.get("peak_load") is not None:
         lines.append(("peak load", [told["peak_load"], told["peak_displacement"]]))
@@ -246,7 +284,9 @@ def match_line(report, label, rest, numbers):
     found = [m.group() for m in NUMBER.finditer(plain)]
     for number in numbers:
         if number is None:
-            report.require("summary's text", "none" in plain or "–" in plain, f"{label!r} says {rest.strip()!r}, expected none")
+            report.require(
+                "summary's text", "none" in plain or "–" in plain, f"{label!r} says {rest.strip()!r}, expected none"
+            )
             continue
         if not found:
             report.require("summary's text", False, f"{label!r} says {rest.strip()!r}, {number} is missing")

@@ -1,7 +1,8 @@
-"""One sample as it is, turned, mirrored, shifted, in other units and in other orders breaks the same bond in the same step.
+"""One sample as it is, turned, mirrored, shifted, in other units and in other orders breaks the same bond
+in the same step.
 
-The forces of the step before are the same within 1e-6 of the largest: positions differ by rounding, and reactions are those of
-the stiff limit, which is unique.
+The forces of the step before are the same within 1e-6 of the largest: positions differ by rounding, and
+reactions are those of the stiff limit, which is unique.
 """
 
 import json
@@ -15,8 +16,14 @@ import scenes
 from history import History
 
 WAYS = {
-    "turned by 0.3": {"turn": 0.3}, "turned by 90°": {"turn": np.pi / 2}, "mirrored": {"mirror": True}, "shifted": {"shift": 0.37},
-    "in mm, g, ms": {"units": (1e3, 1e3, 1e3)}, "in order 1": {"permute": 1}, "in order 2": {"permute": 2}, "in order 3": {"permute": 3},
+    "turned by 0.3": {"turn": 0.3},
+    "turned by 90°": {"turn": np.pi / 2},
+    "mirrored": {"mirror": True},
+    "shifted": {"shift": 0.37},
+    "in mm, g, ms": {"units": (1e3, 1e3, 1e3)},
+    "in order 1": {"permute": 1},
+    "in order 2": {"permute": 2},
+    "in order 3": {"permute": 3},
 }
 SAME = 1e-6
 
@@ -30,7 +37,8 @@ def scene_of(dimension, restitution):
 
 
 class FirstBreak:
-    """Step and pairs of the first break, and the forces of all pairs in the step before, turned back to the sample as it is."""
+    """Step and pairs of the first break, and the forces of all pairs in the step before, turned back to the
+    sample as it is."""
 
     def __init__(self, path, how):
         h = History(path)
@@ -90,7 +98,9 @@ def test_the_same_sample_breaks_alike(plain, dimension, way, restitution):
     # pairs that only one of them lists touch within rounding, and carry nothing
     nothing = np.zeros_like(scales(as_it_is))
     pairs = set(as_it_is.forces) | set(other.forces)
-    off = max((np.abs(as_it_is.forces.get(p, nothing) - other.forces.get(p, nothing)) / scales(as_it_is)).max() for p in pairs)
+    off = max(
+        (np.abs(as_it_is.forces.get(p, nothing) - other.forces.get(p, nothing)) / scales(as_it_is)).max() for p in pairs
+    )
     assert off <= SAME, f"forces differ by {off:.2e} of the largest"
 
 
