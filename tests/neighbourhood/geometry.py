@@ -4,7 +4,7 @@ checks of it."""
 import numpy as np
 
 import tolerances
-from history import cross, norm, sums, turning_velocity
+from history import norm, turning_velocity
 
 
 def gap_and_normal(h, i, j, xi, xj):
@@ -119,7 +119,6 @@ def check_left_out(h, c, report):
     i, j = np.triu_indices(bodies, 1)
     keep = (i < h.N) & ~(h.immovable[i] & h.immovable[j])
     i, j = i[keep], j[keep]
-    # with rotation without contacts a grain in flight has nothing to check
     present = np.unique((h.row_step * bodies + h.i) * bodies + h.j)
     for begin in range(0, h.S, 32):
         steps = np.arange(begin, min(begin + 32, h.S))

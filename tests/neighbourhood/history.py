@@ -140,7 +140,7 @@ class History:
         self.event_mode = np.array([by_number.get(int(m), f"unknown {m}") for m in self.events["mode"]], dtype=object)
 
     def _bodies(self):
-        scene, N, W = self.scene, self.N, self.W
+        scene, W = self.scene, self.W
         self.drives = [prescribed.drive(wall) for _, wall in self.scene_walls]
         self.wall_direction = np.array([prescribed.direction(w, self.D) for _, w in self.scene_walls]).reshape(
             W, self.D

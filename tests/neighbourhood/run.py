@@ -14,7 +14,6 @@ import hashlib
 import json
 import re
 import resource
-import shutil
 import signal
 import subprocess
 import sys

@@ -7,7 +7,6 @@ import numpy as np
 import prescribed
 import tolerances
 from balance import fitted_strain
-from history import norm
 
 STRAINS = (1e-4, 1e-3)
 BROKEN_SHARE = 0.05

@@ -5,8 +5,6 @@ The forces of the step before are the same within 1e-6 of the largest: positions
 reactions are those of the stiff limit, which is unique.
 """
 
-import json
-
 import numpy as np
 import pytest
 
