@@ -10,6 +10,7 @@ pub mod export;
 pub mod fclib;
 pub mod history;
 pub mod output;
+mod owner;
 pub mod plot;
 pub mod prepare;
 pub mod progress;
