@@ -7,7 +7,7 @@ use dem_run::history::sound::{Surroundings, is_huge, is_plausible, median};
 use dem_run::history::{BondStatus, RuptureMode};
 use hdf5::H5Type;
 
-use super::{Checker, Sizes};
+use super::{Checker, Sizes, schema};
 
 const STEP: &str = "particles/grains/position/step";
 const TIME: &str = "particles/grains/position/time";
@@ -41,6 +41,13 @@ struct Event {
     i: i32,
     j: i32,
     mode: i32,
+}
+
+/// Its twisting moment, which layouts before version 3 lack.
+#[derive(Clone, Copy, H5Type)]
+#[repr(C)]
+struct Twist {
+    twist: f64,
 }
 
 /// When and how a bond broke, by its states: the first frame that does not show it intact.
@@ -385,6 +392,15 @@ fn events(c: &mut Checker, steps: &[i64], pairs: &[[i32; 2]], broken: &Broken) {
             }
         }
     });
+    if c.sound.get(RUPTURE).is_some_and(|[_, members]| *members == schema::RUPTURE.len()) {
+        c.blocks::<Twist>(RUPTURE, |c, start, events| {
+            // copies of histories that lack it have not a number there
+            let wrong = |event: &&Twist| !event.twist.is_nan() && !is_plausible(event.twist);
+            for (k, event) in events.iter().enumerate().filter(|(_, event)| wrong(event)) {
+                c.wrong(RUPTURE, Some(start + k), no_number(event.twist));
+            }
+        });
+    }
     for (bond, (frame, _)) in broken.iter().filter(|(bond, _)| !told.contains_key(bond)) {
         c.wrong(STATUS, Some(*frame), format!("bond {bond} is broken, and no event in /{RUPTURE} tells of it"));
     }

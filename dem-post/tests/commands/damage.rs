@@ -13,6 +13,7 @@ use super::check::{damaged, member, put};
 use super::*;
 
 member!(EventX, x, f64);
+member!(EventTwist, twist, f64);
 member!(EventOther, j, i32);
 
 /// A value that is put at an index of a dataset.
@@ -43,6 +44,7 @@ fn spoils(place: &str, kind: &TypeDescriptor) -> Vec<(String, Spoil)> {
             ("time of the next year".into(), spoil(EventTime { time: 3e7 })),
             ("x".into(), spoil(EventX { x: f64::INFINITY })),
             ("force".into(), spoil(EventForce { rn: 1e300 })),
+            ("twist".into(), spoil(EventTwist { twist: f64::INFINITY })),
             ("round".into(), spoil(EventRound { round: i32::MIN })),
             ("bond".into(), spoil(EventBond { bond: 100_000_000 })),
             ("no bond".into(), spoil(EventBond { bond: -1 })),

@@ -463,8 +463,10 @@ impl History {
             return Ok(vec![]);
         }
         let (_, events) = RuptureRow::read(&self.source, path::RUPTURE, 0..self.events)?;
-        let known: Option<Vec<Rupture>> = events.iter().map(RuptureRow::event).collect();
-        let known = known.ok_or_else(|| self.source.damaged(path::RUPTURE, "a mode that is none"))?;
+        let event = |(k, row): (usize, &RuptureRow)| {
+            row.event().ok_or_else(|| sound::row(&self.source, path::RUPTURE, k, "a mode that is none"))
+        };
+        let known: Vec<Rupture> = events.iter().enumerate().map(event).collect::<Result<_>>()?;
         let (counts, last) = ([self.bonds()?.len(), self.grains], self.steps.last().copied().unwrap_or(i64::MAX));
         sound::ruptures(&self.source, path::RUPTURE, &known, counts, last)?;
         Ok(known)

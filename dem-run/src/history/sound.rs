@@ -114,7 +114,10 @@ pub(super) fn ruptures(
     let mut last = (i64::MIN, f64::NEG_INFINITY);
     for (k, e) in events.iter().enumerate() {
         let [x, y, z] = e.point;
-        reals(source, place, k, 9, &[e.time, x, y, z, e.normal_force, e.tangential_force, e.moment, e.energy])?;
+        // histories of before version 3 have none
+        let twist = if e.twist.is_nan() { 0.0 } else { e.twist };
+        let numbers = [e.time, x, y, z, e.normal_force, e.tangential_force, e.moment, twist, e.energy];
+        reals(source, place, k, numbers.len(), &numbers)?;
         let what = if !known(e.bond, bonds) {
             format!("{} is none of {bonds} bonds", e.bond)
         } else if !e.pair.iter().all(|grain| known(*grain, grains)) {
