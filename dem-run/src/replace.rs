@@ -6,10 +6,24 @@ use std::fs::{self, File};
 use std::io::{Error, ErrorKind, Result};
 use std::path::{Path, PathBuf};
 
-/// Makes a file by `make`, which is given the name of an empty file beside `path`, and moves it to `path`. Where that
-/// fails, nothing is left behind and what stood at `path` stands. `failed` tells of what the operating system refused,
-/// as in "create".
+/// Makes a file by `make`, which is given the name of an empty file beside `path`, and moves it to `path` once its content
+/// is on the disk. Where that fails, nothing is left behind and what stood at `path` stands. `failed` tells of what the
+/// operating system refused, as in "create".
 pub(crate) fn replace<T, E>(
+    path: &Path,
+    failed: impl Fn(&'static str, Error) -> E,
+    make: impl FnOnce(&Path) -> std::result::Result<T, E>,
+) -> std::result::Result<T, E> {
+    replace_synced(path, &failed, |part| {
+        let made = make(part)?;
+        sync(part).map_err(|error| failed("write", error))?;
+        Ok(made)
+    })
+}
+
+/// As [`replace`], of a file that `make` itself has synced: a process that locks a file loses the lock as soon as it closes
+/// any descriptor of it, so a file that is locked cannot be opened to be synced.
+pub(crate) fn replace_synced<T, E>(
     path: &Path,
     failed: impl Fn(&'static str, Error) -> E,
     make: impl FnOnce(&Path) -> std::result::Result<T, E>,
@@ -19,7 +33,7 @@ pub(crate) fn replace<T, E>(
     // HDF5 would not say why a file cannot be created; the operating system does
     File::create(&part).map_err(|error| failed("create", error))?;
     let made = make(&part).and_then(|made| {
-        move_to(&part, path).map_err(|error| failed("replace", error))?;
+        rename(&part, path).map_err(|error| failed("replace", error))?;
         Ok(made)
     });
     if made.is_err() {
@@ -46,7 +60,19 @@ pub(crate) fn write(path: &Path, content: &[u8]) -> Result<()> {
 /// # Errors
 /// Those of the operating system.
 pub(crate) fn move_to(part: &Path, path: &Path) -> Result<()> {
-    File::open(part)?.sync_all()?;
+    sync(part)?;
+    rename(part, path)
+}
+
+/// Waits until the content of a file is on the disk.
+///
+/// # Errors
+/// Those of the operating system.
+pub(crate) fn sync(path: &Path) -> Result<()> {
+    File::open(path)?.sync_all()
+}
+
+fn rename(part: &Path, path: &Path) -> Result<()> {
     fs::rename(part, path)?;
     // not every file system can sync a folder; the file is complete under one of its two names
     let _ = File::open(folder_of(path)).and_then(|folder| folder.sync_all());

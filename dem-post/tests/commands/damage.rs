@@ -202,9 +202,12 @@ fn no_spoilt_value_makes_an_analysis_panic_or_pass_unseen() {
     assert!(count > 150, "{count}");
 }
 
+/// A command, the words of its error, and the damage.
+type Refused<'a> = (&'a str, &'a [&'a str], &'a dyn Fn(&File));
+
 #[test]
 fn a_command_names_file_dataset_and_row_of_what_is_wrong() {
-    let spoilt: [(&str, &[&str], &dyn Fn(&File)); 5] = [
+    let spoilt: [Refused; 5] = [
         ("cracks", &["/events/rupture", "row 1", "100000000 is none of 4 bonds"], &|file| {
             put(file, "events/rupture", &[1], EventBond { bond: 100_000_000 });
         }),
