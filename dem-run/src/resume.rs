@@ -141,7 +141,8 @@ fn resume_in<D: Dim>(
         HistoryError::Interrupted => RunError::Interrupted("the history is as it was"),
         error => error.into(),
     })?;
-    let mut run = Run { scene, state, recorder, solid_fraction: history.parameters()?.solid_fraction };
+    // what acted on the walls before is not looked at again
+    let mut run = Run { scene, state, recorder, solid_fraction: history.parameters()?.solid_fraction, idle: vec![] };
     let outcome = run.step_on(interrupt, &mut progress);
     run.conclude(path, outcome, options.json, progress)
 }
@@ -154,6 +155,7 @@ fn anew(options: &ResumeOptions) -> RunOptions {
         execution: options.execution,
         json: options.json,
         write_sample: None,
+        ignore_memory: true,
     }
 }
 

@@ -201,7 +201,7 @@ pub struct Load {
 pub struct Time {
     /// Time step (s).
     pub step: f64,
-    /// End of the run (s).
+    /// End of the run (s): no step ends after it. The last one ends before it where it is not a multiple of the step.
     pub end: f64,
 }
 
@@ -343,12 +343,24 @@ impl Scene {
 }
 
 impl Time {
-    /// Number of steps to the end: `end / step`, rounded up unless it is whole to rounding.
+    /// Number of steps to the end: `end / step`, rounded down unless it is whole to rounding.
     #[must_use]
     pub fn steps(&self) -> u64 {
         let ratio = self.end / self.step;
-        let whole = ratio.round();
-        if (ratio - whole).abs() <= 1e-9 * whole { whole as u64 } else { ratio.ceil() as u64 }
+        if self.is_multiple() { ratio.round() as u64 } else { ratio.floor() as u64 }
+    }
+
+    /// Whether the end is a multiple of the step, to rounding.
+    #[must_use]
+    pub fn is_multiple(&self) -> bool {
+        let ratio = self.end / self.step;
+        (ratio - ratio.round()).abs() <= 1e-9 * ratio.round()
+    }
+
+    /// End of the last step (s).
+    #[must_use]
+    pub fn last(&self) -> f64 {
+        self.steps() as f64 * self.step
     }
 }
 
@@ -380,7 +392,11 @@ mod tests {
     fn steps_are_whole_where_the_ratio_is_whole_to_rounding() {
         assert_eq!(Time { step: 1e-4, end: 0.5 }.steps(), 5000);
         assert_eq!(Time { step: 0.1, end: 0.3 }.steps(), 3);
-        assert_eq!(Time { step: 0.1, end: 0.31 }.steps(), 4);
+        assert_eq!(Time { step: 0.1, end: 0.31 }.steps(), 3);
+        assert_eq!(Time { step: 0.1, end: 0.39 }.steps(), 3);
+        // it was 34, to 0.102 s
+        assert_eq!(Time { step: 3e-3, end: 0.1 }.steps(), 33);
+        assert!(Time { step: 0.1, end: 0.3 }.is_multiple() && !Time { step: 3e-3, end: 0.1 }.is_multiple());
         assert_eq!(Time { step: 0.1, end: 0.0 }.steps(), 0);
     }
 
