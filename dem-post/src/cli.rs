@@ -74,6 +74,9 @@ pub enum Command {
         /// Folder for the results, created if need be [default: A-compare].
         #[arg(short, long, value_name = "DIR")]
         output: Option<PathBuf>,
+        /// Take the folder over from the history that it belongs to: its results are removed.
+        #[arg(long)]
+        force: bool,
     },
     /// The run on one HTML page that needs nothing else: pictures, curves, tables, accuracy, energy, scene.
     Report(Moments),
@@ -96,6 +99,9 @@ pub enum Command {
         /// Folder for the results, created if need be [default: RUNS-strength].
         #[arg(short, long, value_name = "DIR")]
         output: Option<PathBuf>,
+        /// Take the folder over from the history that it belongs to: its results are removed.
+        #[arg(long)]
+        force: bool,
     },
     /// Small files that show the history in ParaView, VTK and MDAnalysis, and copy almost nothing of it.
     ///
@@ -135,6 +141,9 @@ pub struct Files {
     /// Folder for the results, created if need be [default: FILE-post, of `frames` FILE-frames, in the current folder].
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
+    /// Take the folder over from the history that it belongs to: its results are removed.
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// Files, and the moments to draw.

@@ -13,7 +13,7 @@ use crate::accuracy::{self, AccuracyOptions};
 use crate::check::Check;
 use crate::export::{self, ExportOptions};
 use crate::history::refuse_busy;
-use crate::output::{default_folder, plain, print_json, print_result};
+use crate::output::{default_folder, escaped, print_json, print_result};
 use crate::progress::ProgressMode;
 use crate::resume::{self, ResumeOptions};
 use crate::run::{self, Execution, RunError, RunOptions};
@@ -362,7 +362,7 @@ fn arguments() -> Cli {
         if !error.use_stderr() || !std::env::args_os().any(controls) {
             error.exit()
         }
-        let _ = write!(std::io::stderr(), "{}", plain(&error.render().to_string()));
+        let _ = write!(std::io::stderr(), "{}", escaped(&error.render().to_string()));
         std::process::exit(error.exit_code())
     })
 }
@@ -387,7 +387,7 @@ pub fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             // with stderr closed there is nobody to tell
-            let _ = writeln!(std::io::stderr(), "error: {}", plain(&error.to_string()));
+            let _ = writeln!(std::io::stderr(), "error: {}", escaped(&error.to_string()));
             ExitCode::from(error.exit_code())
         }
     }

@@ -11,6 +11,7 @@ pub mod fclib;
 pub mod history;
 pub mod memory;
 pub mod output;
+mod owner;
 pub mod plot;
 pub mod prepare;
 pub mod progress;

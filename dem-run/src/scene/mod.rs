@@ -33,8 +33,8 @@ use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
 pub use difference::{Difference, differences};
+pub(crate) use error::shorten;
 pub use error::{Origin, Problem, SceneError};
-pub(crate) use error::{printable, shorten};
 pub use function::{Function, Ramp};
 pub use model::{
     Bonds, Flow, Friction, Grains, Load, Materials, Output, Precision, Restitution, Rupture, Scene, Springs, Stiffness,
