@@ -223,7 +223,7 @@ fn runs(sweep: &Sweep, base: &Base, scene: &Path) -> Result<Vec<PlannedRun>, Vec
         }
     }
     if problems.is_empty() {
-        problems.extend(same_scene(&runs));
+        problems.extend(same_scene(&runs).or_else(|| load_unknown(&runs)));
     }
     if problems.is_empty() { Ok(runs) } else { Err(problems) }
 }
@@ -261,6 +261,13 @@ fn same_scene(runs: &[PlannedRun]) -> Option<Problem> {
         let found = if a == b { format!("{a} twice") } else { format!("the same scene for {a} and for {b}") };
         Some(Problem::new("vary", found, "values that make every run another (a title does not)"))
     })
+}
+
+/// A run whose table of results could not say what the load is.
+fn load_unknown(runs: &[PlannedRun]) -> Option<Problem> {
+    let (run, why) = runs.iter().find_map(|run| Some((run, run.scene.load_unknown()?)))?;
+    let allowed = "one driven wall, or the name of one as load_wall: \"set\": { \"load_wall\": … } in the sweep, or in its scene";
+    Some(Problem::new("scene", format!("{why}; where {}", describe(&run.values)), allowed))
 }
 
 /// The values of a run in a line: `bonds.strength = 5, seed = 1`.
