@@ -182,13 +182,7 @@ mod tests {
         let mut collapse = Collapse::default();
         for (k, load) in loads.iter().enumerate() {
             let displacement = 1e-3 * k as f64;
-            collapse.push(LoadStep {
-                load: *load,
-                displacement,
-                strain: strains[k],
-                broken: broken[k],
-                bonds: 100,
-            });
+            collapse.push(LoadStep { load: *load, displacement, strain: strains[k], broken: broken[k], bonds: 100 });
         }
         collapse
     }

@@ -59,9 +59,8 @@ impl<D: Dim> Course<D> {
     /// The course of a run that begins with `world`.
     pub fn new(scene: &Scene, world: &World<D>) -> Self {
         let driven = world.walls.iter().enumerate().filter(|(_, w)| drive_direction(w).is_some());
-        let driven: Vec<Driven<D>> = driven
-            .map(|(wall, w)| Driven { wall, collapse: Collapse::default(), start: w.position })
-            .collect();
+        let driven: Vec<Driven<D>> =
+            driven.map(|(wall, w)| Driven { wall, collapse: Collapse::default(), start: w.position }).collect();
         let number = scene.load_wall().and_then(|name| scene.walls.keys().position(|other| other == name));
         Self {
             load_wall: driven.iter().position(|at| Some(at.wall) == number),

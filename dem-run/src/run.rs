@@ -340,7 +340,10 @@ impl<D: Dim> State<D> {
             failure: chosen.map_or_else(Failure::default, |loads| loads.failure),
             peak_load: chosen.and_then(|loads| loads.peak_load),
             peak_displacement: chosen.and_then(|loads| loads.peak_displacement),
-            splitting: chosen.zip(disk).map(|(loads, disk)| Splitting::of(disk, loads)),
+            splitting: chosen.zip(disk).map(|(loads, disk)| {
+                let collapse = loads.failure.collapse[0].filter(|_| !loads.failure.early[0]);
+                Splitting::of(disk, collapse, loads.peak_load)
+            }),
             driven_walls,
             tolerance: scene.solver.tolerance,
             worst_residual: course.worst_residual,

@@ -154,16 +154,12 @@ pub struct Splitting {
 }
 
 impl Splitting {
-    /// The splitting strength of a disk under these loads.
+    /// The splitting strength of a disk, from its collapse load and its greatest load (N).
     #[must_use]
-    pub fn of(disk: Disk, loads: &WallLoads) -> Self {
-        let collapse = loads.failure.collapse[0].filter(|_| !loads.failure.early[0]);
-        Self {
-            diameter: disk.diameter,
-            length: disk.length,
-            collapse: collapse.map(|load| disk.stress(load)),
-            peak: loads.peak_load.map(|load| disk.stress(load)),
-        }
+    pub fn of(disk: Disk, collapse: Option<f64>, peak: Option<f64>) -> Self {
+        let stress = |load: f64| disk.stress(load);
+        let Disk { diameter, length } = disk;
+        Self { diameter, length, collapse: collapse.map(stress), peak: peak.map(stress) }
     }
 }
 

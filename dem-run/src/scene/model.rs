@@ -333,7 +333,10 @@ impl Scene {
         let driven = self.driven_walls();
         let unknown = driven.len() > 1 && self.load_wall().is_none();
         unknown.then(|| {
-            format!("several walls are driven, {}: name the one that loads the sample as load_wall in the scene", driven.join(", "))
+            format!(
+                "several walls are driven, {}: name the one that loads the sample as load_wall in the scene",
+                driven.join(", ")
+            )
         })
     }
 

@@ -266,7 +266,8 @@ fn same_scene(runs: &[PlannedRun]) -> Option<Problem> {
 /// A run whose table of results could not say what the load is.
 fn load_unknown(runs: &[PlannedRun]) -> Option<Problem> {
     let (run, why) = runs.iter().find_map(|run| Some((run, run.scene.load_unknown()?)))?;
-    let allowed = "one driven wall, or the name of one as load_wall: \"set\": { \"load_wall\": … } in the sweep, or in its scene";
+    let allowed =
+        "one driven wall, or the name of one as load_wall: \"set\": { \"load_wall\": … } in the sweep, or in its scene";
     Some(Problem::new("scene", format!("{why}; where {}", describe(&run.values)), allowed))
 }
 
