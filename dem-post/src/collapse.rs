@@ -71,7 +71,7 @@ impl Collapse {
                 true => (step, true, "before any bond broke: the solver's own strain"),
                 false => (step, true, "before any bond broke: not all grains are bonded to one piece"),
             },
-            _ if step.is_none() => (None, false, "no load acted before the sample strained"),
+            _ if step.is_none() => (None, false, "no load acted in the step before"),
             _ => (step, false, ""),
         };
         Self { step, early, note }
@@ -110,7 +110,7 @@ mod tests {
         let rigid = |one_piece| Bonding::Rigid { one_piece };
         // nothing comes before the first step
         assert_eq!(Collapse::read(&[5.0], &[1.0], &[0.0], 1e-4, rigid(true)).step, None);
-        assert_eq!(read(-0.0, 1.0, rigid(true)).note, "no load acted before the sample strained");
+        assert_eq!(read(-0.0, 1.0, rigid(true)).note, "no load acted in the step before");
         assert_eq!((read(5.0, 0.0, Bonding::Elastic).step, read(5.0, 1.0, Bonding::Elastic).step), (None, Some(0)));
         assert_eq!(read(5.0, 1.0, rigid(true)), Collapse { step: Some(0), early: false, note: "" });
         for (one_piece, told) in [(true, true), (false, false)] {

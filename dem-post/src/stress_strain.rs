@@ -15,7 +15,7 @@
 //! bond broke in the step (`wall_force_at_limit`; of histories without it `wall_force`, what was left after the breaks).
 //!
 //! **Collapse load** (under an ever-growing force there is no peak): the load at the last step before the strain fitted to
-//! the grains exceeds 1e-4; also reported at 1e-3. There is none where no load acted before, nor where elastic bonds strained
+//! the grains exceeds 1e-4; also reported at 1e-3. There is none where none acted in that step, nor where elastic bonds strained
 //! so before any broke. Of rigid bonds that join all grains to one piece, none of which has broken by then, the strain is the
 //! solver's, and the load says nothing: the tables say so, and the drawings leave it out.
 

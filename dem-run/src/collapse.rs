@@ -16,7 +16,7 @@ pub const BROKEN_SHARE: f64 = 0.05;
 pub struct Failure {
     /// Load at the step of the first break.
     pub first_break: Option<f64>,
-    /// Load at the last step before the axial strain exceeded each of [`STRAINS`]; none where no load acted by then.
+    /// Load at the last step before the axial strain exceeded each of [`STRAINS`]; none where none acted in that step.
     pub collapse: [Option<f64>; 2],
     /// Whether no bond had broken when the strain exceeded each of [`STRAINS`].
     pub early: [bool; 2],

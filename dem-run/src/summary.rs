@@ -98,7 +98,7 @@ pub struct Summary {
 pub struct WallLoads {
     /// Its name.
     pub wall: String,
-    /// Loads at which the sample failed (N). There is no collapse load where no load acted before the strain, nor where
+    /// Loads at which the sample failed (N). There is no collapse load where none acted in the step before the strain, nor where
     /// elastic bonds strained so before any broke.
     pub failure: Failure,
     /// Greatest load (N), where the wall is driven by a velocity or bonds are elastic.
@@ -291,7 +291,7 @@ impl Summary {
                 None if self.elastic && failure.early[k] => {
                     without.push((strain, "elastically, before any bond broke"));
                 }
-                None => without.push((strain, "before any load acted")),
+                None => without.push((strain, "while no load acted")),
             }
         }
         for (strain, when) in without {

@@ -56,8 +56,11 @@ pub struct AccuracyOptions {
 /// [`RunError`], as for a scene that drives several walls and does not say which loads the sample; what was measured before an interruption is written all the same. A run that does not converge is a row of
 /// the table, no error.
 pub fn accuracy(scene: &Scene, options: &AccuracyOptions) -> Result<(), RunError> {
-    if let Some(why) = scene.load_unknown() {
-        return Err(RunError::Usage(format!("{why}; --set load_wall=NAME does so too")));
+    if let Some(names) = scene.load_unknown() {
+        return Err(RunError::Usage(format!(
+            "several walls are driven, {names}: name the one that loads the sample as load_wall in the scene, or by \
+             --set load_wall=NAME"
+        )));
     }
     let interrupt = handle_signals()?;
     let mut folder = Folder::create(options.folder.clone())?;

@@ -327,17 +327,12 @@ impl Scene {
         choose_load_wall([self.load_wall.as_deref(), travels], &self.driven_walls())
     }
 
-    /// Why a result cannot say what the load is: several walls are driven, and the scene does not say which loads the sample.
+    /// Names of the driven walls where there are several and the scene does not say which loads the
+    /// sample: then no result can say what the load is.
     #[must_use]
     pub fn load_unknown(&self) -> Option<String> {
         let driven = self.driven_walls();
-        let unknown = driven.len() > 1 && self.load_wall().is_none();
-        unknown.then(|| {
-            format!(
-                "several walls are driven, {}: name the one that loads the sample as load_wall in the scene",
-                driven.join(", ")
-            )
-        })
+        (driven.len() > 1 && self.load_wall().is_none()).then(|| driven.join(", "))
     }
 
     /// Thickness of the disks (m): 1 where the scene is silent, and in 3D, where it has no meaning.

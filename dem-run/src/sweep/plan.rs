@@ -265,10 +265,11 @@ fn same_scene(runs: &[PlannedRun]) -> Option<Problem> {
 
 /// A run whose table of results could not say what the load is.
 fn load_unknown(runs: &[PlannedRun]) -> Option<Problem> {
-    let (run, why) = runs.iter().find_map(|run| Some((run, run.scene.load_unknown()?)))?;
-    let allowed =
-        "one driven wall, or the name of one as load_wall: \"set\": { \"load_wall\": … } in the sweep, or in its scene";
-    Some(Problem::new("scene", format!("{why}; where {}", describe(&run.values)), allowed))
+    let (run, names) = runs.iter().find_map(|run| Some((run, run.scene.load_unknown()?)))?;
+    let found =
+        format!("several driven walls, {names}, and none named as the load wall, where {}", describe(&run.values));
+    let allowed = "one of them as load_wall, in the scene or in the sweep: \"set\": { \"load_wall\": … }";
+    Some(Problem::new("scene", found, allowed))
 }
 
 /// The values of a run in a line: `bonds.strength = 5, seed = 1`.
