@@ -195,7 +195,7 @@ impl<D: Dim> Course<D> {
 fn load<D: Dim>(wall: &Wall<D>) -> f64 {
     match wall.drive {
         Drive::Fixed => 0.0,
-        Drive::Velocity { direction, .. } => -direction.dot(&wall.reaction),
+        Drive::Velocity { direction, .. } => -direction.dot(&wall.reaction_at_limit),
         Drive::Force { .. } => wall.applied,
     }
 }
