@@ -233,3 +233,32 @@ fn travel_stop<D: Dim>(scene: &Scene, world: &World<D>) -> Option<TravelStop<D>>
     let from = (travel.after == TravelFrom::Start).then(|| world.walls[wall].position);
     Some(TravelStop { wall, direction, distance: travel.fraction_of_height * (along(1.0) + along(-1.0)), from })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::build::build;
+    use dem_core::contact::Local;
+    use dem_core::dim::D2;
+    use dem_core::world::Break;
+
+    const TWO_GRAINS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../configs/two-grains.json");
+
+    #[test]
+    fn each_mode_of_rupture_is_counted_by_itself() {
+        let scene = crate::scene::load(TWO_GRAINS.as_ref(), &[]).expect("scene");
+        let mut world = build::<D2>(&scene, &mut |_| true).expect("world").world;
+        let mut course = Course::new(&scene, &world);
+        let mut report = world.step().expect("a step");
+        use BondStatus::{Intact, Rolling, Shear, Tension, Twist};
+        report.breaks = [Intact, Tension, Shear, Rolling, Twist, Intact]
+            .map(|mode| {
+                let (point, reaction) = (Vect::zero(), Local::zero());
+                Break { bond: 0, pair: [0, 1], mode, round: 0, point, reaction, energy: 0.0 }
+            })
+            .into();
+        course.count(&world, &report);
+        // before, what is no mode counted as tension: 3
+        assert_eq!(course.broken, [1, 1, 1, 1]);
+    }
+}

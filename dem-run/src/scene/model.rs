@@ -413,6 +413,17 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_load_wall_is_named_or_that_of_the_travel_or_the_only_driven_one() {
+        let driven = ["left", "top"];
+        assert_eq!(choose_load_wall([Some("top"), Some("left")], &driven), Some("top"));
+        assert_eq!(choose_load_wall([None, Some("left")], &driven), Some("left"));
+        assert_eq!(choose_load_wall([None, None], &driven), None);
+        // a wall that is not driven loads nothing
+        assert_eq!(choose_load_wall([Some("floor"), None], &["top"]), Some("top"));
+        assert_eq!(choose_load_wall([None, None], &[]), None);
+    }
+
+    #[test]
     fn steps_are_whole_where_the_ratio_is_whole_to_rounding() {
         assert_eq!(Time { step: 1e-4, end: 0.5 }.steps(), 5000);
         assert_eq!(Time { step: 0.1, end: 0.3 }.steps(), 3);

