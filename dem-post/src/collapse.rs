@@ -48,17 +48,19 @@ impl Bonding {
 /// Where a sample collapses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Collapse {
-    /// The last step before the strain exceeds its limit; `None` if it never does, and where there is no collapse load.
+    /// The last step before the strain exceeds its limit; `None` if it never does, and where there
+    /// is no collapse load.
     pub step: Option<usize>,
     /// Whether no rigid bond had broken when it did.
     pub early: bool,
-    /// What there is to know of the load, or why there is none; empty if the strain never exceeds its limit.
+    /// What there is to know of the load, or why there is none; empty if the strain never exceeds
+    /// its limit.
     pub note: &'static str,
 }
 
 impl Collapse {
-    /// Reads it off the curves, which have an entry for each step: `load` (N), `strain` (–), `broken` bonds; `limit` is that
-    /// of the strain (–).
+    /// Reads it off the curves, which have an entry for each step: `load` (N), `strain` (–),
+    /// `broken` bonds; `limit` is that of the strain (–).
     pub fn read(load: &[f64], strain: &[f64], broken: &[f64], limit: f64, bonds: Bonding) -> Self {
         let Some(passed) = strain.iter().position(|e| e.abs() > limit) else {
             return Self { step: None, early: false, note: "" };
@@ -85,8 +87,8 @@ pub fn peak(load: &[f64]) -> Option<usize> {
     (load[top] > 0.0 && lowest < (1.0 - PEAK_DROP) * load[top]).then_some(top)
 }
 
-/// Work of a force along a way from zero (J): `force` is the mean of each step (N), `way` its end (m). It is the sum of the
-/// run's own energy balance.
+/// Work of a force along a way from zero (J): `force` is the mean of each step (N), `way` its end
+/// (m). It is the sum of the run's own energy balance.
 pub fn work(force: &[f64], way: &[f64]) -> f64 {
     let from = [0.0].into_iter().chain(way.iter().copied());
     force.iter().zip(way).zip(from).map(|((force, to), from)| force * (to - from)).sum()

@@ -32,7 +32,8 @@ pub struct Report {
     pub mass: f64,
     /// The walls: name, shape and drive.
     pub walls: Vec<[String; 3]>,
-    /// The wall that loads the sample; `None` where no wall is driven, or where several are and the scene does not say which.
+    /// The wall that loads the sample; `None` where no wall is driven, or where several are and the
+    /// scene does not say which.
     pub load_wall: Option<String>,
     /// How many walls are driven.
     #[serde(skip)]

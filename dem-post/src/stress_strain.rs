@@ -1,23 +1,27 @@
-//! Force and displacement of the load wall; axial stress and strain, from the walls and from the particles.
+//! Force and displacement of the load wall; axial stress and strain, from the walls and from the
+//! particles.
 //!
-//! **The load wall** is the one that is asked for, else the scene's `load_wall`, else the wall of its `stop.wall_travel`, else
-//! the only driven one.
+//! **The load wall** is the one that is asked for, else the scene's `load_wall`, else the wall of
+//! its `stop.wall_travel`, else the only driven one.
 //!
 //! **Signs.** Everything counts positive along the load: the displacement of the wall in the sense in which its force
 //! does work, compressive stress and shortening under a wall that pushes, tensile stress and elongation under one that
 //! pulls. The history has stress positive in compression and strain positive in elongation.
 //!
-//! **Size of the sample.** Height H along the drive and cross-section A across it are those of the box around all
-//! grains at the first frame; in 2D, A is the width times the scene's `thickness`. Only a plane that moves along its normal
-//! has a section: of a round loader no stress or strain is reported from the walls.
+//! **Size of the sample.** Height H along the drive and cross-section A across it are those of the
+//! box around all grains at the first frame; in 2D, A is the width times the scene's `thickness`.
+//! Only a plane that moves along its normal has a section: of a round loader no stress or strain is
+//! reported from the walls.
 //!
-//! **The load** is the prescribed force, or, where the motion is prescribed, what the wall took against the grains before any
-//! bond broke in the step (`wall_force_at_limit`; of histories without it `wall_force`, what was left after the breaks).
+//! **The load** is the prescribed force, or, where the motion is prescribed, what the wall took
+//! against the grains before any bond broke in the step (`wall_force_at_limit`; of histories
+//! without it `wall_force`, what was left after the breaks).
 //!
-//! **Collapse load** (under an ever-growing force there is no peak): the load at the last step before the strain fitted to
-//! the grains exceeds 1e-4; also reported at 1e-3. There is none where none acted in that step, nor where elastic bonds strained
-//! so before any broke. Of rigid bonds that join all grains to one piece, none of which has broken by then, the strain is the
-//! solver's, and the load says nothing: the tables say so, and the drawings leave it out.
+//! **Collapse load** (under an ever-growing force there is no peak): the load at the last step
+//! before the strain fitted to the grains exceeds 1e-4; also reported at 1e-3. There is none where
+//! none acted in that step, nor where elastic bonds strained so before any broke. Of rigid bonds
+//! that join all grains to one piece, none of which has broken by then, the strain is the solver's,
+//! and the load says nothing: the tables say so, and the drawings leave it out.
 
 use std::path::Path;
 
@@ -49,7 +53,8 @@ pub struct Summary {
     pub first_break: Option<f64>,
     /// Height of the sample along the drive, m.
     pub height: f64,
-    /// Cross-section of the sample, m²; `None` unless the wall is a plane that moves along its normal.
+    /// Cross-section of the sample, m²; `None` unless the wall is a plane that moves along its
+    /// normal.
     pub area: Option<f64>,
     /// Load before the fitted strain exceeds 1e-4, N.
     pub collapse_load: Option<f64>,
@@ -116,9 +121,9 @@ pub struct Report {
 /// Reads the curves of the wall `wall`, or of the load wall.
 ///
 /// # Errors
-/// [`PostError::Lacking`] for a scene without a driven wall or without its force and place at every step;
-/// [`PostError::Usage`] for a wall that is none, or where several are driven and the scene does not say which is the load
-/// wall.
+/// [`PostError::Lacking`] for a scene without a driven wall or without its force and place at every
+/// step; [`PostError::Usage`] for a wall that is none, or where several are driven and the scene
+/// does not say which is the load wall.
 pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
     let walls = history.walls()?;
     let scene = history.parameters()?.scene;

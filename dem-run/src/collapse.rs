@@ -1,4 +1,5 @@
-//! The loads that mark the failure of a sample, the greatest load, and the strength of a disk that plates split.
+//! The loads that mark the failure of a sample, the greatest load, and the strength of a disk that
+//! plates split.
 
 use crate::scene::{Cut, Drive, Sample, Scene, Section, Shape};
 use dem_core::saved::{Mismatch, Reader, Saved};
@@ -16,7 +17,8 @@ pub const BROKEN_SHARE: f64 = 0.05;
 pub struct Failure {
     /// Load at the step of the first break.
     pub first_break: Option<f64>,
-    /// Load at the last step before the axial strain exceeded each of [`STRAINS`]; none where none acted in that step.
+    /// Load at the last step before the axial strain exceeded each of [`STRAINS`]; none where none
+    /// acted in that step.
     pub collapse: [Option<f64>; 2],
     /// Whether no bond had broken when the strain exceeded each of [`STRAINS`].
     pub early: [bool; 2],
@@ -116,7 +118,8 @@ impl Collapse {
     }
 }
 
-/// Whether bonds join all of `grains` grains to one piece: then rigid bonds let none of them move until one breaks.
+/// Whether bonds join all of `grains` grains to one piece: then rigid bonds let none of them move
+/// until one breaks.
 #[must_use]
 pub fn in_one_piece(grains: usize, bonds: impl Iterator<Item = [u32; 2]>) -> bool {
     let mut pieces = UnionFind::<u32>::new(grains);
@@ -133,9 +136,9 @@ pub struct Disk {
 }
 
 impl Disk {
-    /// The disk of a scene whose wall `wall` loads it across its axis, against another plane wall; none for another test.
-    /// The diameter is that of the scene; the length is the thickness in 2D and in 3D the `extents` of the sample (m)
-    /// along the axis, at the start.
+    /// The disk of a scene whose wall `wall` loads it across its axis, against another plane wall;
+    /// none for another test. The diameter is that of the scene; the length is the thickness in 2D
+    /// and in 3D the `extents` of the sample (m) along the axis, at the start.
     #[must_use]
     pub fn of(scene: &Scene, wall: &str, extents: &[f64]) -> Option<Self> {
         let Sample::Random(random) = &scene.sample else { return None };
@@ -157,7 +160,8 @@ impl Disk {
         Some(Self { diameter, length })
     }
 
-    /// Tensile stress 2P/(πDt) across the loaded diameter of an elastic disk (Pa) under the load P (N).
+    /// Tensile stress 2P/(πDt) across the loaded diameter of an elastic disk (Pa) under the load P
+    /// (N).
     #[must_use]
     pub fn stress(&self, load: f64) -> f64 {
         2.0 * load / (PI * self.diameter * self.length)

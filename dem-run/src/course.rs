@@ -14,7 +14,8 @@ use dem_core::world::{StepReport, World};
 pub struct Course<D: Dim> {
     /// The driven walls with their loads, in the order of the walls.
     pub driven: Vec<Driven<D>>,
-    /// Which of them loads the sample, as the scene has it; none where it has none, or does not say which.
+    /// Which of them loads the sample, as the scene has it; none where it has none, or does not say
+    /// which.
     pub load_wall: Option<usize>,
     /// Lengths of the box around all grains at the start (m), one for each axis.
     pub extents: Vec<f64>,
@@ -32,6 +33,8 @@ pub struct Course<D: Dim> {
     pub rejected: u64,
     /// Deepest overlap (m).
     pub penetration: f64,
+    /// Largest difference between the length of an intact bond and its length at rest (m).
+    pub bond_elongation: f64,
     stop: Option<TravelStop<D>>,
     /// Share of broken bonds (–) that ends the run.
     broken_limit: Option<f64>,
@@ -73,6 +76,7 @@ impl<D: Dim> Course<D> {
             missed_tolerance: 0,
             rejected: 0,
             penetration: 0.0,
+            bond_elongation: 0.0,
             stop: travel_stop(scene, world),
             broken_limit: scene.stop.as_ref().and_then(|s| s.broken_fraction),
         }
@@ -88,7 +92,7 @@ impl<D: Dim> Course<D> {
         }
         to.reals.extend(&self.extents);
         self.broken.into_iter().for_each(|broken| to.count(broken));
-        to.reals.extend([self.worst_residual, self.penetration]);
+        to.reals.extend([self.worst_residual, self.penetration, self.bond_elongation]);
         let Work { sweeps, newton, factorisations } = self.work;
         to.counts.extend([sweeps, newton, factorisations, self.missed_tolerance, self.rejected]);
         to.flag(self.stop.is_some());
@@ -115,6 +119,7 @@ impl<D: Dim> Course<D> {
         course.extents = from.reals(D::N)?.to_vec();
         course.broken = [from.count()?, from.count()?, from.count()?, from.count()?];
         (course.worst_residual, course.penetration) = (from.real()?, from.real()?);
+        course.bond_elongation = from.real()?;
         let mut count = || from.count().map(|n| n as u64);
         course.work = Work { sweeps: count()?, newton: count()?, factorisations: count()? };
         (course.missed_tolerance, course.rejected) = (count()?, count()?);
@@ -160,6 +165,7 @@ impl<D: Dim> Course<D> {
         self.missed_tolerance += u64::from(report.status == SolveStatus::Accepted);
         self.rejected += u64::from(report.rejected);
         self.penetration = self.penetration.max(report.penetration);
+        self.bond_elongation = self.bond_elongation.max(report.bond_elongation);
         if self.driven.is_empty() {
             return;
         }
@@ -190,8 +196,8 @@ impl<D: Dim> Course<D> {
     }
 }
 
-/// The load of a driven wall in the last step (N): the force prescribed, or what a wall of prescribed velocity took against
-/// the grains before any bond broke in the step.
+/// The load of a driven wall in the last step (N): the force prescribed, or what a wall of
+/// prescribed velocity took against the grains before any bond broke in the step.
 fn load<D: Dim>(wall: &Wall<D>) -> f64 {
     match wall.drive {
         Drive::Fixed => 0.0,

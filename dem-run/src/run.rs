@@ -351,6 +351,7 @@ impl<D: Dim> State<D> {
             missed_tolerance: course.missed_tolerance,
             rejected: course.rejected,
             penetration: course.penetration,
+            bond_elongation: course.bond_elongation,
             mean_diameter: 2.0 * world.grains.radius.iter().sum::<f64>() / world.grains.len() as f64,
             external_work: world.ledger.external_work,
             energy_remainder: world.ledger.remainder,

@@ -55,8 +55,8 @@ pub struct Summary {
     /// Whether the bonds joined all grains to one piece at the start.
     #[serde(skip)]
     pub one_piece: bool,
-    /// Name of the wall that loads the sample; none where no wall is driven, or where several are and the scene does not say
-    /// which.
+    /// Name of the wall that loads the sample; none where no wall is driven, or where several are
+    /// and the scene does not say which.
     pub load_wall: Option<String>,
     /// Loads of this wall at which the sample failed (N).
     pub failure: Failure,
@@ -81,6 +81,8 @@ pub struct Summary {
     pub rejected: u64,
     /// Deepest overlap (m).
     pub penetration: f64,
+    /// Largest difference between the length of an intact bond and its length at rest (m).
+    pub bond_elongation: f64,
     /// Mean diameter of the grains (m).
     pub mean_diameter: f64,
     /// Work of forces and drives (J).
@@ -98,8 +100,8 @@ pub struct Summary {
 pub struct WallLoads {
     /// Its name.
     pub wall: String,
-    /// Loads at which the sample failed (N). There is no collapse load where none acted in the step before the strain, nor where
-    /// elastic bonds strained so before any broke.
+    /// Loads at which the sample failed (N). There is no collapse load where none acted in the step
+    /// before the strain, nor where elastic bonds strained so before any broke.
     pub failure: Failure,
     /// Greatest load (N), where the wall is driven by a velocity or bonds are elastic.
     pub peak_load: Option<f64>,
@@ -114,7 +116,8 @@ pub struct WallLoads {
 }
 
 impl WallLoads {
-    /// What a run tells of the wall `wall`: whether it is driven by a velocity, whether bonds are elastic, and its loads.
+    /// What a run tells of the wall `wall`: whether it is driven by a velocity, whether bonds are
+    /// elastic, and its loads.
     #[must_use]
     pub fn of(wall: &str, velocity: bool, elastic: bool, found: &Collapse) -> Self {
         let &Collapse { mut failure, passed, peak, rising, .. } = found;
@@ -239,6 +242,9 @@ impl Summary {
             self.penetration,
             self.penetration / self.mean_diameter
         )?;
+        if self.bonds > 0 {
+            writeln!(f, "bond elongation  {:.2e} m at most, of bonds that held", self.bond_elongation)?;
+        }
         writeln!(f, "external work    {:.4e} J", self.external_work)?;
         writeln!(f, "energy remainder {:.2e} J", self.energy_remainder)?;
         if self.bonds > 0 && !self.elastic {
@@ -260,7 +266,8 @@ impl Summary {
         Ok(())
     }
 
-    /// The loads of the load wall; where several walls are driven and none is chosen, those of each.
+    /// The loads of the load wall; where several walls are driven and none is chosen, those of
+    /// each.
     fn write_loads(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let chosen = self.driven_walls.iter().find(|loads| Some(&loads.wall) == self.load_wall.as_ref());
         let Some(loads) = chosen else { return self.write_walls(f) };

@@ -1,8 +1,9 @@
 //! A run on one page: an HTML file that needs nothing else, with pictures, curves, tables, the solver's own measures of
 //! its accuracy, the energy books and the scene.
 //!
-//! Curves are SVG, maps are PNG (a map of thousands of grains is far smaller so), all of them inside the page as `data:`
-//! addresses. Long curves are thinned as all charts are. A section that a scene has nothing for says why.
+//! Curves are SVG, maps are PNG (a map of thousands of grains is far smaller so), all of them
+//! inside the page as `data:` addresses. Long curves are thinned as all charts are. A section that
+//! a scene has nothing for says why.
 
 use dem_run::history::History;
 use serde::Serialize;
@@ -45,12 +46,13 @@ pub struct LeftOut {
     pub why: String,
 }
 
-/// Reads all that the page tells; maps show the frames nearest to `times` (s), or chosen ones, and the load is that of `wall`,
-/// or of the scene's load wall.
+/// Reads all that the page tells; maps show the frames nearest to `times` (s), or chosen ones, and
+/// the load is that of `wall`, or of the scene's load wall.
 ///
 /// # Errors
-/// [`PostError::Usage`] for times outside the history, for a wall that is not driven, and where several walls are driven and
-/// none is chosen; [`PostError::Lacking`] for a history without frames.
+/// [`PostError::Usage`] for times outside the history, for a wall that is not driven, and where
+/// several walls are driven and none is chosen; [`PostError::Lacking`] for a history without
+/// frames.
 pub fn read(history: &History, times: &[f64], wall: Option<&str>, quiet: bool) -> Result<Report> {
     // the first to say that a time is wrong or that there is no frame
     let velocities = velocities::read(history, times)?;

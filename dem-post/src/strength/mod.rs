@@ -1,11 +1,13 @@
 //! Strength against a field of the scene, over many runs: the paper's figure 9, strength against cohesion, and the like for
 //! rates, sizes, friction.
 //!
-//! **Strength** of a run is the load at a step that [`Measure`] names, each as the run's own summary and `stress-strain`
-//! define it. The load is that of the load wall or, without a driven wall, the only force on a grain. The measure is 5 %
-//! of the bonds broken unless told otherwise: it is an event of the bonds, so it means the same for rigid and elastic bonds,
-//! under a prescribed force and a prescribed motion. A strain of 1e-4 may be the solver's own where its tolerance is coarse,
-//! and elastic bonds come to it whole; the first break is one weak bond; a peak needs a load that can fall.
+//! **Strength** of a run is the load at a step that [`Measure`] names, each as the run's own
+//! summary and `stress-strain` define it. The load is that of the load wall or, without a driven
+//! wall, the only force on a grain. The measure is 5 % of the bonds broken unless told otherwise:
+//! it is an event of the bonds, so it means the same for rigid and elastic bonds, under a
+//! prescribed force and a prescribed motion. A strain of 1e-4 may be the solver's own where its
+//! tolerance is coarse, and elastic bonds come to it whole; the first break is one weak bond; a
+//! peak needs a load that can fall.
 //!
 //! **Samples.** Runs are grouped by the value of the varied field and by sample ([`scenes`] says how both are found). Runs of
 //! one sample are not independent of each other: they are the same grains again. So beside the line through all points, whose
@@ -60,7 +62,8 @@ pub struct Run {
     pub time: f64,
     /// Strength over the field's value; `None` where that is zero.
     pub ratio: Option<f64>,
-    /// Whether no rigid bond had broken by the collapse: of grains in one piece the strain is the solver's.
+    /// Whether no rigid bond had broken by the collapse: of grains in one piece the strain is the
+    /// solver's.
     pub early: bool,
 }
 
@@ -395,8 +398,8 @@ impl Report {
         if intercept.abs() < ROUNDING * greatest { 0.0 } else { intercept }
     }
 
-    /// How much of the variance the line explains: over all runs, where R² is below 1 by the scatter of samples, and the least
-    /// of the samples' own lines, which have none of it.
+    /// How much of the variance the line explains: over all runs, where R² is below 1 by the
+    /// scatter of samples, and the least of the samples' own lines, which have none of it.
     fn explained(&self, line: &Line) -> Option<String> {
         let all = line.r_squared.map(share)?;
         let lines = self.samples.iter().filter_map(|sample| sample.line);

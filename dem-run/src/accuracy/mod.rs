@@ -53,8 +53,9 @@ pub struct AccuracyOptions {
 /// Measure the accuracy of a scene, print the tables, and write them with their pictures.
 ///
 /// # Errors
-/// [`RunError`], as for a scene that drives several walls and does not say which loads the sample; what was measured before an interruption is written all the same. A run that does not converge is a row of
-/// the table, no error.
+/// [`RunError`], as for a scene that drives several walls and does not say which loads the sample;
+/// what was measured before an interruption is written all the same. A run that does not converge
+/// is a row of the table, no error.
 pub fn accuracy(scene: &Scene, options: &AccuracyOptions) -> Result<(), RunError> {
     if let Some(names) = scene.load_unknown() {
         return Err(RunError::Usage(format!(

@@ -41,8 +41,9 @@ pub struct Scene {
     /// Walls, by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub walls: BTreeMap<String, Wall>,
-    /// Name of the driven wall whose force is the load of the sample: of the first break, of the collapse, and the greatest.
-    /// Where it is absent, the wall of `stop.wall_travel`, else the only driven one.
+    /// Name of the driven wall whose force is the load of the sample: of the first break, of the
+    /// collapse, and the greatest. Where it is absent, the wall of `stop.wall_travel`, else the
+    /// only driven one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub load_wall: Option<String>,
     /// Gravity: one number for each dimension (m/s²); none where it is absent.
@@ -302,8 +303,8 @@ fn one() -> Function {
     Function::Constant(1.0)
 }
 
-/// The wall that loads the sample: the first of `named` that is among the `driven` ones, else the only driven one. `named`
-/// are the scene's `load_wall` and the wall of its `stop.wall_travel`.
+/// The wall that loads the sample: the first of `named` that is among the `driven` ones, else the
+/// only driven one. `named` are the scene's `load_wall` and the wall of its `stop.wall_travel`.
 #[must_use]
 pub fn choose_load_wall<'a>(named: [Option<&str>; 2], driven: &[&'a str]) -> Option<&'a str> {
     let find = |name: &str| driven.iter().copied().find(|other| *other == name);
@@ -319,8 +320,8 @@ impl Scene {
         driven.map(|(name, _)| name.as_str()).collect()
     }
 
-    /// The wall that loads the sample ([`choose_load_wall`]); none where no wall is driven, or where several are and the
-    /// scene does not say which.
+    /// The wall that loads the sample ([`choose_load_wall`]); none where no wall is driven, or
+    /// where several are and the scene does not say which.
     #[must_use]
     pub fn load_wall(&self) -> Option<&str> {
         let travels = self.stop.as_ref().and_then(|stop| stop.wall_travel.as_ref()).map(|travel| travel.wall.as_str());

@@ -1,4 +1,5 @@
-//! The load that a run reports: of the right wall, of the right moment, and in the terms of its test.
+//! The load that a run reports: of the right wall, of the right moment, and in the terms of its
+//! test.
 
 use crate::common::{Folder, config};
 use dem_run::history::History;
@@ -201,6 +202,8 @@ fn the_load_of_a_wall_that_moves_is_the_force_that_broke_the_bond() {
     assert!((load - 3.190).abs() < 1e-3, "{load} N");
     assert!(-left[last] < 1e-3 * load, "{} N after the break", -left[last]);
     assert_eq!(number(&summary["failure"]["broken_share"]), load);
+    let elongations = series(&history, "bond_elongation", &[]);
+    assert_eq!(number(&summary["bond_elongation"]), elongations.into_iter().fold(0.0, f64::max));
     assert_eq!(number(&summary["peak_load"]), load);
     let way = series(&history, "wall_position", &[0, 1])[last] - history.wall_state(0).expect("walls").position[1];
     assert_eq!(number(&summary["peak_displacement"]), way);
