@@ -115,6 +115,7 @@ fn rupture(step: i64, time: f64, bond: usize, pair: [i32; 2], mode: RuptureMode)
         normal_force: -1.0,
         tangential_force: 3.0,
         moment: 0.0,
+        twist: 0.0,
         energy: 0.0,
         round: 0,
         bond: bond as i32,
