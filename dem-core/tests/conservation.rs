@@ -134,7 +134,8 @@ fn losses_are_booked_where_they_belong() {
         let mut set = settings(1e-4);
         set.restitution = (e > 0.0).then_some(Restitution { grain_grain: e, grain_wall: e, threshold_speed: 0.0 });
         let mut place = vec![0.0; D::N];
-        place[D::N - 1] = 0.0102;
+        // touches in the middle of the second step
+        place[D::N - 1] = 0.01 + 3e-4 - 1e-13;
         let mut grain = grain::<D>(&place, 0.01);
         grain.velocity[0] = 1.0;
         grain.velocity[D::N - 1] = -2.0;
@@ -151,9 +152,9 @@ fn losses_are_booked_where_they_belong() {
             [(case::<D2>(0.0, e), case::<D2>(mu, e), 1.0 / 3.0), (case::<D3>(0.0, e), case::<D3>(mu, e), 2.0 / 7.0)]
         {
             let slip = impulse * (2.0 - impulse / mass);
-            assert!((smooth[0] - straight).abs() < 1e-12 && smooth[1] == 0.0, "e = {e}: {smooth:?}");
-            assert!((rough[0] - straight).abs() < 1e-12, "e = {e}: {rough:?} against {straight}");
-            assert!((rough[1] - slip).abs() < 1e-12, "e = {e}: {rough:?} against {slip}");
+            assert!((smooth[0] - straight).abs() < 1e-9 && smooth[1] == 0.0, "e = {e}: {smooth:?}");
+            assert!((rough[0] - straight).abs() < 1e-9, "e = {e}: {rough:?} against {straight}");
+            assert!((rough[1] - slip).abs() < 1e-9, "e = {e}: {rough:?} against {slip}");
         }
     }
 }

@@ -283,7 +283,7 @@ fn rounds_of_a_step_in_halves_are_counted_on() {
         let wall = Wall::fixed(Shape::Plane { normal: [-1.0, 0.0].into() }, [1.0, 0.0].into(), 0.0);
         w.walls.push(wall);
         let mut bullet = grain::<D2>(&[1.0 - 0.5 * A, 100.0 * A], 0.5 * A);
-        bullet.velocity = [0.3 * A / 1e-4, 0.0].into();
+        bullet.velocity = [0.75 * A / 1e-4, 0.0].into();
         w.grains.push(bullet);
         let mut told = Vec::new();
         let report = w.step_watched(&mut |broken| told.push(broken)).unwrap();

@@ -123,6 +123,7 @@ fn walls_that_cannot_yield_stop_the_run_and_say_so() {
         let mut w = world::<D>(vec![grain(&[R])], vec![plane(&[1.0], &[], 0.3), press], settings(1e-3, kind));
         let out = watch(&mut w, 20, 1e-6);
         let error = out.stopped.expect("nothing can obey both walls");
+        println!("XX {kind:?} {}D {error:?} {}", D::N, out.steps);
         assert!(
             matches!(error, StepError::NotAccepted { .. } | StepError::Yielded { .. } | StepError::TooFast { .. }),
             "{error}"
