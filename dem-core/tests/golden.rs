@@ -8,7 +8,7 @@ mod common;
 use common::pressed;
 use dem_core::body::Drive;
 use dem_core::contact::BondFlow;
-use dem_core::dim::{D2, Vect};
+use dem_core::dim::D2;
 use dem_core::world::World;
 use std::sync::Arc;
 
