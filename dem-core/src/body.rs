@@ -220,8 +220,10 @@ pub struct Wall<D: Dim> {
     pub drive: Drive<D>,
     /// Friction coefficient with grains (–).
     pub friction: f64,
-    /// Force of the grains on the wall at the last step (N).
+    /// Force of the grains on the wall at the end of the last step (N), after all that broke in it.
     pub reaction: D::Vector,
+    /// The same before anything broke in the step (N): the equilibrium that broke, where something did.
+    pub reaction_at_limit: D::Vector,
     /// Force prescribed at the last step (N); zero for a wall that is not driven by a force.
     pub applied: f64,
 }
@@ -230,7 +232,16 @@ impl<D: Dim> Wall<D> {
     /// A fixed wall.
     pub fn fixed(shape: Shape<D>, position: D::Vector, friction: f64) -> Self {
         let zero = D::Vector::zero();
-        Self { shape, position, velocity: zero, drive: Drive::Fixed, friction, reaction: zero, applied: 0.0 }
+        Self {
+            shape,
+            position,
+            velocity: zero,
+            drive: Drive::Fixed,
+            friction,
+            reaction: zero,
+            reaction_at_limit: zero,
+            applied: 0.0,
+        }
     }
 
     /// Direction and mass (kg) of the degree of freedom of a force-driven wall.

@@ -8,7 +8,7 @@ use crate::history::{
 use crate::scene::{Precision, Scene};
 use dem_core::body::{Drive, Shape, Wall};
 use dem_core::bond;
-use dem_core::dim::{Dim, Vect};
+use dem_core::dim::{Dim, Moments, Vect};
 use dem_core::world::{Break, StepReport, TouchStatus, World};
 use std::path::Path;
 
@@ -212,7 +212,8 @@ fn rupture<D: Dim>(failed: &Break<D>, step: i64, time: f64) -> Rupture {
         point: padded::<D>(failed.point),
         normal_force: failed.reaction.n,
         tangential_force: failed.reaction.t.norm(),
-        moment: failed.reaction.m.norm(),
+        moment: failed.reaction.m.bending(),
+        twist: failed.reaction.m.twist(),
         energy: failed.energy,
         round: failed.round as i32,
         bond: failed.bond as i32,
@@ -314,6 +315,7 @@ fn observables<D: Dim>(world: &World<D>) -> Vec<(Observable, Measure<D>)> {
     add("solver_newton_iterations", "", scalar, |_, r, out| out.push(r.work.newton as f64));
     add("solver_factorisations", "", scalar, |_, r, out| out.push(r.work.factorisations as f64));
     add("solver_rejected", "", scalar, |_, r, out| out.push(f64::from(r.rejected)));
+    add("substeps", "", scalar, |_, r, out| out.push(f64::from(r.substeps)));
     add("penetration", "m", scalar, |_, r, out| out.push(r.penetration));
     add("stress", "Pa", &[d, d], |w, _, out| out.extend(w.stress()));
     add("strain", "", &[d, d], |w, _, out| out.extend(w.strain()));
@@ -325,6 +327,7 @@ fn observables<D: Dim>(world: &World<D>) -> Vec<(Observable, Measure<D>)> {
         } else {
             add("bond_remainder", "J", scalar, |w, _, out| out.push(w.ledger.bonds));
         }
+        add("bond_elongation", "m", scalar, |_, r, out| out.push(r.bond_elongation));
         add("bonds_broken", "", scalar, |w, _, out| out.push((w.bonds.len() - w.intact_bonds()) as f64));
     }
     if walls > 0 {
@@ -332,6 +335,9 @@ fn observables<D: Dim>(world: &World<D>) -> Vec<(Observable, Measure<D>)> {
             w.walls.iter().for_each(|x| out.extend(x.position.as_slice()))
         });
         add("wall_force", "N", &[walls, d], |w, _, out| w.walls.iter().for_each(|x| out.extend(x.reaction.as_slice())));
+        add("wall_force_at_limit", "N", &[walls, d], |w, _, out| {
+            w.walls.iter().for_each(|x| out.extend(x.reaction_at_limit.as_slice()))
+        });
         add("applied_force", "N", &[walls], |w, _, out| out.extend(w.walls.iter().map(applied_force)));
     }
     list

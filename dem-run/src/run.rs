@@ -155,7 +155,7 @@ pub(crate) struct State<D: Dim> {
 }
 
 /// The form of what [`State::save`] writes; another form has another number.
-const FORM: usize = 4;
+const FORM: usize = 5;
 
 impl<D: Dim> State<D> {
     /// The state as numbers. The processor time is not among them: two runs of a scene write the same file.
@@ -239,12 +239,25 @@ impl<D: Dim> Run<'_, D> {
         self.state.course.rejected += u64::from(matches!(error, StepError::NotAccepted { .. }));
         let help = match (&error, &self.scene.solver.kind) {
             (StepError::NotAccepted { .. }, SolverKind::GaussSeidel(_)) => {
-                "a smaller time.step, more max_sweeps or a larger solver.accept may help"
+                "; a smaller time.step, more max_sweeps or a larger solver.accept may help"
             }
-            (StepError::NotAccepted { .. }, _) => "a smaller time.step or a larger solver.accept may help",
-            _ => "a smaller time.step may help",
+            (StepError::NotAccepted { .. }, _) => "; a smaller time.step or a larger solver.accept may help",
+            (StepError::NotFinite { .. }, _) => "; a smaller time.step may help",
+            // their messages name the remedy
+            (StepError::TooFast { .. } | StepError::Yielded { .. }, _) => "",
         };
-        Err(RunError::NoConvergence(format!("{error}\nthe history is complete up to there; {help}")))
+        let error = error.message(&|body| self.name(body));
+        Err(RunError::NoConvergence(format!("{error}\nthe history is complete up to there{help}")))
+    }
+
+    /// What a person calls a body: grains by number, walls by their name in the scene.
+    fn name(&self, body: u32) -> String {
+        match (body as usize).checked_sub(self.state.world.grains.len()) {
+            None => format!("grain {body}"),
+            Some(wall) => {
+                self.scene.walls.keys().nth(wall).map_or_else(|| format!("wall {wall}"), |name| format!("wall {name}"))
+            }
+        }
     }
 
     fn standing(&self, report: &StepReport<D>) -> StepProgress {

@@ -474,6 +474,12 @@ impl<T: Vect, B: Moments> Elastic<T, B> {
         let bond = Bonded::new(block, arms, shift, cone, flow);
         Self { bond, soft: [n, t, m], soft_w: only_twist::<B>(w), carried }
     }
+
+    /// The same bond with something added to the normal velocity before the law (m/s).
+    #[must_use]
+    pub fn with_bias(self, bias: f64) -> Self {
+        Self { bond: self.bond.with_bias(bias), ..self }
+    }
 }
 
 impl<A: Vect, B: Moments> Law for Elastic<A, B> {
@@ -489,6 +495,10 @@ impl<A: Vect, B: Moments> Law for Elastic<A, B> {
     #[inline(always)]
     fn natural_map(&self, r: Local<A, B>, u: Local<A, B>) -> Local<A, B> {
         self.bond.natural_map(r, u + self.compliance().times(&(r - self.carried)))
+    }
+
+    fn bias(&self) -> f64 {
+        self.bond.bias
     }
 
     fn gamma(&self) -> f64 {

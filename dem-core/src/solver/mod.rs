@@ -112,6 +112,14 @@ pub enum SolverSettings {
 }
 
 impl SolverSettings {
+    /// Largest residual that is accepted (–).
+    pub fn accept(&self) -> f64 {
+        match self {
+            Self::GaussSeidel(settings) => settings.accept,
+            Self::Newton(settings) | Self::Auto(settings) => settings.accept,
+        }
+    }
+
     /// The solver with these settings.
     pub fn build<D: Dim>(&self) -> Box<dyn ContactSolver<D>> {
         match *self {

@@ -9,8 +9,9 @@ use crate::dim::{Axes, Dim, Moments, Vect, in_frame, of_frame, resized};
 use crate::problem::{Contact, ContactProblem, Group, Link, Node, Nodes, blocks};
 use std::sync::Arc;
 
-/// Gap over the radius of the grain below which a contact touches. The rounding of positions would else be a misfit of
-/// rigid contacts, to which stiff ones answer with forces.
+/// Gap over the smaller radius of a pair up to which a contact touches, and way of its bodies in a step up to which they are at
+/// rest to each other. The rounding of positions would else be a misfit of rigid contacts, to which stiff ones answer with
+/// forces; with restitution it would decide which contacts act.
 const TOUCHING: f64 = 1e-9;
 
 /// The same where the contact pushed in the step before. It was closed then: what opened it since are the errors of many
@@ -105,9 +106,9 @@ impl<D: Dim> World<D> {
             let (gap, normal, _) = self.geometry(mid, pair);
             let approach = pair.map(|k| motion.free[k as usize].0);
             let closing = -(approach[0] - approach[1]).dot(&normal);
-            let near = NEAR * self.grains.radius[pair[0] as usize];
+            let near = NEAR * self.smaller(pair);
             if gap <= near + 2.0 * h * closing.max(0.0) {
-                touches.push(Kept { deep_or_wide: self.is_deep_or_wide(pair, gap), ..Kept::new(pair, None) });
+                touches.push(Kept { wide: self.is_wide(pair, gap), ..Kept::new(pair, None) });
             }
         }
         touches.sort_by_key(|t| t.pair);
@@ -129,7 +130,7 @@ impl<D: Dim> World<D> {
                 touch.tangents = D::tangents(&frame);
             }
             if let Some(o) = same {
-                touch.reaction = o.reaction;
+                (touch.reaction, touch.yielded) = (o.reaction, o.yielded);
             }
         }
     }
@@ -174,8 +175,8 @@ impl<D: Dim> World<D> {
             let (gap, normal, _) = self.geometry(mid, pair);
             let [i, j] = pair.map(|k| nodes.all[k as usize].velocity);
             if gap + h * (i - j).dot(&normal) < 0.0 && self.restitution_of(pair) == 0.0 {
-                let (deep_or_wide, tangents) = (self.is_deep_or_wide(pair, gap), D::tangents(&D::frame(normal)));
-                missed.push(Kept { deep_or_wide, tangents, ..Kept::new(pair, None) });
+                let (wide, tangents) = (self.is_wide(pair, gap), D::tangents(&D::frame(normal)));
+                missed.push(Kept { wide, tangents, ..Kept::new(pair, None) });
             }
         }
         missed
@@ -193,16 +194,32 @@ impl<D: Dim> World<D> {
     /// What is added to the normal velocity of a dry contact before Signorini's law (m/s); none if it cannot act in this step.
     fn bias(&self, touch: &Touch<D>, closed: bool, motion: &Motion<D>, h: f64) -> Option<f64> {
         let e = self.restitution_of(touch.pair);
+        let none = self.smaller(touch.pair) * if closed { CLOSED } else { TOUCHING };
+        let touching = touch.gap <= none;
         if e == 0.0 {
-            let none = if closed { CLOSED } else { TOUCHING };
-            let touching = touch.gap <= none * self.grains.radius[touch.pair[0] as usize];
             let gap = if self.settings.expel_overlaps || !touching { touch.gap } else { 0.0 };
             return Some(gap / h);
         }
         let [i, j] = touch.pair.map(|k| motion.before[k as usize].0);
         let approach = (i - j).dot(&D::normal(&touch.frame));
-        let slow = self.settings.restitution.is_some_and(|r| approach.abs() < r.threshold_speed);
-        (touch.gap <= 0.0).then_some(if slow { 0.0 } else { e * approach })
+        let threshold = self.settings.restitution.map_or(0.0, |r| r.threshold_speed);
+        let at_rest = approach.abs() < threshold || h * approach.abs() <= none;
+        touching.then_some(if at_rest { 0.0 } else { e * approach })
+    }
+
+    /// By how much two grains moved apart since the last mid-step beyond their way along the normal of then (m), the part of an
+    /// elongation that the force of an elastic bond, which grows by the normal velocity alone, has not been told.
+    ///
+    /// With the way d between two mid-steps and the part d_t of it across the normal, ℓ' − ℓ − d_n = d_t² / (ℓ' + ℓ + d_n): second order
+    /// in the way, so differences of positions have digits enough. See docs/theory/elastic-bonds.md.
+    fn lengthening(&self, mid: &Midpoint<D>, pair: [u32; 2]) -> f64 {
+        let apart = |mid: &Midpoint<D>| mid.place(pair[0] as usize) - mid.place(pair[1] as usize);
+        let (before, now) = (apart(&self.mid), apart(mid));
+        let (length, way) = (before.norm(), now - before);
+        let normal = direction::<D>(before, length);
+        let along = way.dot(&normal);
+        let across = way - normal * along;
+        across.dot(&across) / (now.norm() + length + along)
     }
 
     /// Friction coefficient of a dry contact (–).
@@ -273,7 +290,8 @@ impl<D: Dim> World<D> {
                 let (shift, cone, flow) = (h * bond.strength, bond.cone(), self.settings.bond_flow);
                 if let Some(compliance) = bond.compliance(h) {
                     let carried = over_arm(carried[number] * h, arm);
-                    let law = Elastic::new(block, compliance, carried, arms, shift, cone, flow);
+                    let bias = self.lengthening(mid, touch.pair) / h;
+                    let law = Elastic::new(block, compliance, carried, arms, shift, cone, flow).with_bias(bias);
                     problem.elastic.push(Contact { link, law, r });
                     places.elastic.push(place as u32);
                 } else {

@@ -6,13 +6,16 @@
 //! the fastest body goes further than a quarter of the smallest grain: slow scenes pay one look at the velocities.
 //!
 //! *Contacts that yield.* The residual is relative to all reactions. Where a light grain is pressed between heavy ones, an
-//! error that is small beside their weight is a great velocity of the light one.
+//! error that is small beside their weight is a large velocity of the light one; and where no velocities satisfy the contact laws,
+//! as between two walls that close on a grain, reactions grow until any error is small beside them. So velocities are
+//! measured too: in each step, and summed over the run for each pair, since an error of one sign adds up.
 //!
 //! The step asks for none of this where overlaps are pushed out: the speeds of that preparation mean nothing.
 
-use super::assembly::Midpoint;
+use super::World;
+use super::assembly::{Midpoint, Places};
+use super::report::Violation;
 use super::touch::Kept;
-use super::{Touch, World};
 use crate::body::Shape;
 use crate::bond::failure;
 use crate::contact::Law;
@@ -25,11 +28,22 @@ const DEEP: f64 = 0.5;
 /// Distance, over the smaller radius, at which a grain passes another.
 const PASSING: f64 = 0.05;
 
-/// Way, over the smaller radius, that the error of a solve may close a contact or stretch a rigid bond in a step.
-const YIELDING: f64 = 1e-2;
+/// Way, over the smaller radius, that a solve may let a pair move beyond its law in a step: close a dry contact, or change the
+/// length of a rigid bond.
+const YIELDING: f64 = 1e-4;
 
-/// The same where a contact has already given way by half a radius.
-const SQUEEZING: f64 = 1e-5;
+/// The same, added up over the run.
+const YIELDED: f64 = 1e-3;
+
+/// The `accept` of a solver for which these two hold; a larger one loosens both in proportion.
+const USUAL_ACCEPT: f64 = 1e-6;
+
+/// Share of the closing power of the free velocities that reactions leave where no velocities satisfy the laws: all of it where
+/// they only balance each other, none in a solution.
+const UNOPPOSED: f64 = 0.5;
+
+/// Share of the largest reaction from which a wall counts among those that carry it.
+const CARRIES: f64 = 1e-3;
 
 impl<D: Dim> World<D> {
     /// A pair that goes too deep into one another, or through, within `time` (s) from these places at these velocities; of
@@ -55,10 +69,9 @@ impl<D: Dim> World<D> {
         self.candidates.pairs.iter().find(too_deep).copied()
     }
 
-    /// Whether a gap (m) is beyond [`DEEP`] or [`PASSING`].
-    pub(super) fn is_deep_or_wide(&self, pair: [u32; 2], gap: f64) -> bool {
-        let smaller = self.smaller(pair);
-        gap < -DEEP * smaller || gap > PASSING * smaller
+    /// Whether a gap (m) is beyond [`PASSING`].
+    pub(super) fn is_wide(&self, pair: [u32; 2], gap: f64) -> bool {
+        gap > PASSING * self.smaller(pair)
     }
 
     /// A pair of grains that pushes though it would pass at a distance: only its tangent plane was in the way.
@@ -70,7 +83,7 @@ impl<D: Dim> World<D> {
         h: f64,
     ) -> Option<[u32; 2]> {
         let far = |kept: &&Kept<D>| {
-            if !kept.deep_or_wide || kept.bond().is_some() || kept.reaction.n <= 0.0 {
+            if !kept.wide || kept.bond().is_some() || kept.reaction.n <= 0.0 {
                 return false;
             }
             let t = self.touch(mid, kept);
@@ -86,27 +99,71 @@ impl<D: Dim> World<D> {
         touches.iter().filter(|t| (t.pair[1] as usize) < self.grains.len()).find(far).map(|t| t.pair)
     }
 
-    /// The contact of a solution that yields most, if it does so too far, and how far it would in a whole step (–, over the
-    /// smaller radius).
-    pub(super) fn yielding(
-        &self,
-        mid: &Midpoint<D>,
-        touches: &[Kept<D>],
-        problem: &ContactProblem<D>,
-    ) -> Option<([u32; 2], f64)> {
+    /// The pair that a solution lets move furthest beyond its law, if that is too far; ways are those of a whole step.
+    pub(super) fn yielding(&self, problem: &ContactProblem<D>) -> Option<Violation> {
         let mut worst = Yielding { world: self, pair: [0; 2], share: 0.0 };
         problem.visit(&mut worst);
-        if worst.share > YIELDING {
-            return Some((worst.pair, worst.share));
-        }
-        // little by little is too far in the end
-        let pressed = touches.iter().filter(|t| t.deep_or_wide && t.bond().is_none() && t.reaction.n > 0.0);
-        let deep = pressed.map(|t| self.touch(mid, t)).filter(|t| t.gap < -DEEP * self.smaller(t.pair));
-        let closing = |t: Touch<D>| {
-            let [i, j] = t.pair.map(|k| problem.nodes.all[k as usize].velocity);
-            (t.pair, -(i - j).dot(&D::normal(&t.frame)) * self.settings.step / self.smaller(t.pair))
+        let Yielding { pair, share, .. } = worst;
+        (share > YIELDING * self.looseness()).then(|| Violation {
+            pair,
+            share,
+            accumulated: false,
+            infeasible: self.infeasible(problem),
+        })
+    }
+
+    /// Add the ways that this solution lets each contact move beyond its law to those of the steps before; the pair with the
+    /// longest sum, if that is too far.
+    pub(super) fn accumulate(
+        &self,
+        touches: &mut [Kept<D>],
+        problem: &ContactProblem<D>,
+        places: &Places,
+        h: f64,
+    ) -> Option<Violation> {
+        let mut worst = ([0; 2], 0.0);
+        let mut add = |place: u32, speed: f64| {
+            let kept = &mut touches[place as usize];
+            let sum = kept.yielded + h * speed;
+            // what opens is free to
+            kept.yielded = if kept.bond().is_some() { sum } else { sum.max(0.0) };
+            let share = kept.yielded.abs() / self.smaller(kept.pair);
+            if share > worst.1 {
+                worst = (kept.pair, share);
+            }
         };
-        deep.map(closing).find(|(_, share)| *share > SQUEEZING)
+        let nodes = &problem.nodes;
+        problem.bonded.iter().zip(&places.bonded).for_each(|(c, place)| add(*place, beyond_law(nodes, c)));
+        problem.dry.iter().zip(&places.dry).for_each(|(c, place)| add(*place, beyond_law(nodes, c)));
+        problem.frictionless.iter().zip(&places.frictionless).for_each(|(c, place)| add(*place, beyond_law(nodes, c)));
+        let (pair, share) = worst;
+        (share > YIELDED * self.looseness()).then(|| Violation {
+            pair,
+            share,
+            accumulated: true,
+            infeasible: self.infeasible(problem),
+        })
+    }
+
+    /// By how much the bounds on what yields are loosened for the solver.
+    fn looseness(&self) -> f64 {
+        (self.settings.solver.accept() / USUAL_ACCEPT).max(1.0)
+    }
+
+    /// Whether the reactions only balance each other, as where two walls close on a grain: the walls that carry them. In a solution
+    /// they take as much power from the bodies as the free velocities would put into closing contacts.
+    fn infeasible(&self, problem: &ContactProblem<D>) -> Option<Vec<u32>> {
+        let mut powers = Powers { problem, asked: 0.0, left: 0.0, largest: 0.0 };
+        problem.visit(&mut powers);
+        let Powers { asked, left, largest, .. } = powers;
+        if asked <= 0.0 || left < UNOPPOSED * asked {
+            return None;
+        }
+        let mut carrying = Carrying { first: problem.nodes.grains as u32, least: CARRIES * largest, walls: Vec::new() };
+        problem.visit(&mut carrying);
+        carrying.walls.sort_unstable();
+        carrying.walls.dedup();
+        Some(carrying.walls)
     }
 
     /// The place of a body (m), grains first.
@@ -123,7 +180,7 @@ impl<D: Dim> World<D> {
     }
 
     /// The radius of the smaller body of a pair (m); that of the grain at a plane.
-    fn smaller(&self, pair: [u32; 2]) -> f64 {
+    pub(super) fn smaller(&self, pair: [u32; 2]) -> f64 {
         let [i, j] = pair.map(|k| k as usize);
         let other = match self.surface(j) {
             Shape::Plane { .. } => f64::INFINITY,
@@ -131,6 +188,11 @@ impl<D: Dim> World<D> {
         };
         self.grains.radius[i].min(other)
     }
+}
+
+/// Speed (m/s) at which the bodies of a contact close beyond its law; of a rigid bond, at which it gets shorter.
+fn beyond_law<D: Dim, L: Law>(nodes: &Nodes<D>, c: &Contact<D, L>) -> f64 {
+    -(nodes.relative_velocity::<L::T, L::B>(&c.link, c.law.arms()).n + c.law.bias())
 }
 
 /// Looks for the contact that yields most.
@@ -149,12 +211,48 @@ impl<D: Dim> Visitor<D> for Yielding<'_, D> {
             return;
         }
         let dry = law.shift() == 0.0;
-        let opening = nodes.relative_velocity::<L::T, L::B>(&c.link, law.arms()).n + law.bias();
-        let speed = if dry { -opening } else { opening.abs() };
+        let closing = beyond_law(nodes, c);
+        let speed = if dry { closing } else { closing.abs() };
         let share = self.world.settings.step * speed / self.world.smaller(c.link.nodes);
         // a bond at its limit is about to break
         if share > self.share && (dry || failure(&c.r, law.shift(), law.cone()).is_none()) {
             (self.pair, self.share) = (c.link.nodes, share);
+        }
+    }
+}
+
+/// Sums the power that the reactions of a solution would take from the free velocities (N s times m/s), and what is left of it.
+struct Powers<'a, D: Dim> {
+    problem: &'a ContactProblem<D>,
+    asked: f64,
+    left: f64,
+    largest: f64,
+}
+
+impl<D: Dim> Visitor<D> for Powers<'_, D> {
+    fn visit<L: Law>(&mut self, nodes: &Nodes<D>, c: &Contact<D, L>) {
+        let arms = c.law.arms();
+        let [i, j] = c.link.nodes.map(|k| self.problem.free[k as usize]);
+        let free = c.link.relative_velocity::<L::T, L::B>(arms, i, j);
+        let after = nodes.relative_velocity::<L::T, L::B>(&c.link, arms);
+        let bias = c.r.n * c.law.bias();
+        self.asked -= c.r.dot(&free) + bias;
+        self.left -= c.r.dot(&after) + bias;
+        self.largest = self.largest.max(c.r.n.abs());
+    }
+}
+
+/// Lists the walls that carry more than the least reaction.
+struct Carrying {
+    first: u32,
+    least: f64,
+    walls: Vec<u32>,
+}
+
+impl<D: Dim> Visitor<D> for Carrying {
+    fn visit<L: Law>(&mut self, _: &Nodes<D>, c: &Contact<D, L>) {
+        if c.link.nodes[1] >= self.first && c.r.n >= self.least {
+            self.walls.push(c.link.nodes[1]);
         }
     }
 }

@@ -7,13 +7,14 @@ mod assembly;
 mod ledger;
 mod limits;
 mod observe;
+mod report;
 mod start;
 mod state;
 mod step;
 mod touch;
 
 pub use ledger::{Ledger, Momentum};
-pub use step::{StepError, StepReport};
+pub use report::{StepError, StepReport, Violation};
 pub use touch::{Break, Counts, Touch, TouchStatus};
 
 use assembly::Midpoint;

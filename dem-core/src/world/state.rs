@@ -71,7 +71,7 @@ impl<D: Dim> World<D> {
         to.vectors(&self.reference);
         to.count(self.walls.len());
         for wall in &self.walls {
-            to.vectors(&[wall.position, wall.velocity, wall.reaction]);
+            to.vectors(&[wall.position, wall.velocity, wall.reaction, wall.reaction_at_limit]);
             to.real(wall.applied);
         }
         to.count(self.bonds.len());
@@ -107,7 +107,8 @@ impl<D: Dim> World<D> {
             return Err(Mismatch);
         }
         for wall in &mut world.walls {
-            (wall.position, wall.velocity, wall.reaction) = (from.vector()?, from.vector()?, from.vector()?);
+            (wall.position, wall.velocity) = (from.vector()?, from.vector()?);
+            (wall.reaction, wall.reaction_at_limit) = (from.vector()?, from.vector()?);
             wall.applied = from.real()?;
         }
         world.bonds = (0..from.number_of()?).map(|_| restored_bond(n, from)).collect::<Result<_, _>>()?;
@@ -172,6 +173,7 @@ fn save_kept<D: Dim>(kept: &Kept<D>, to: &mut Saved) {
     to.real(kept.reaction.n);
     to.vector(&kept.reaction.t);
     to.vector(&kept.reaction.m);
+    to.real(kept.yielded);
     to.count(code(&TOUCHES, &kept.status));
 }
 
@@ -184,5 +186,6 @@ fn restored_kept<D: Dim>(bodies: usize, bonds: usize, from: &mut Reader) -> Resu
         _ => return Err(Mismatch),
     };
     let reaction = Local { n: from.real()?, t: from.vector()?, m: from.vector()? };
-    Ok(Kept { tangents, reaction, status: coded(&TOUCHES, from)?, ..Kept::new(pair, bond) })
+    let yielded = from.real()?;
+    Ok(Kept { tangents, reaction, yielded, status: coded(&TOUCHES, from)?, ..Kept::new(pair, bond) })
 }

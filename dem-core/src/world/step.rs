@@ -2,94 +2,18 @@
 
 use super::assembly::{Midpoint, Motion, Places, read_back};
 use super::ledger::{elastic_energy, group_losses};
+use super::report::{Solves, StepError, StepReport, Violation};
 use super::touch::{Break, Kept, TouchStatus};
 use super::{Counts, World};
 use crate::body::Drive;
-use crate::bond::{Rupture, failure};
+use crate::bond::{BondStatus, Rupture, failure};
 use crate::contact::{Law, Local};
 use crate::dim::{Dim, Vect};
 use crate::problem::{ContactProblem, Group, Nodes};
-use crate::solver::{SolveReport, SolveStatus, Work};
-use thiserror::Error;
-
-/// What one step did.
-#[derive(Clone, Debug)]
-pub struct StepReport<D: Dim> {
-    /// Time at its end (s).
-    pub time: f64,
-    /// How the worst of its solves ended; never `Failed`.
-    pub status: SolveStatus,
-    /// What all its solves took.
-    pub work: Work,
-    /// Largest residual of its accepted solves (–).
-    pub residual: f64,
-    /// Largest load error of its solves (–) where the last of them told one, as Newton's do; else ‖M (v⁺ − v⁻)/h‖ / ‖F_ext‖ over
-    /// the grains that are free to move, in a static scene a false acceleration force over the load, and zero without load.
-    pub load_error: f64,
-    /// Contacts by what they did.
-    pub counts: Counts,
-    /// Bonds that broke, in the order of the cascade's rounds.
-    pub breaks: Vec<Break<D>>,
-    /// Deepest overlap of a dry contact at mid-step (m).
-    pub penetration: f64,
-    /// Number of solves that were not accepted and made the step shorter.
-    pub rejected: u32,
-}
-
-/// Why a step could not be made. The world stands as it did after the last accepted step.
-#[derive(Clone, Copy, Debug, Error, PartialEq)]
-pub enum StepError {
-    /// No solve was accepted, down to the shortest step that the settings allow.
-    #[error(
-        "no convergence at t = {time:.6e} s: residual {residual:.2e} after {iterations} iterations, with the step cut to {step:.2e} s"
-    )]
-    NotAccepted {
-        /// Time at which the step that failed began (s), or its half.
-        time: f64,
-        /// The shortest step tried (s).
-        step: f64,
-        /// Residual of its solve (–).
-        residual: f64,
-        /// Iterations of its solve.
-        iterations: u64,
-    },
-    /// A grain would pass through another body, or be pushed by one it passes, in the shortest part of a step.
-    #[error(
-        "grain {} is too fast for the step at t = {time:.6e} s: even in {PARTS} parts it would pass through body {} (walls \
-         follow the grains): shorten time.step, or look why it is so fast", pair[0], pair[1]
-    )]
-    TooFast {
-        /// Time at which the part of the step that failed began (s).
-        time: f64,
-        /// Grain, and grain or wall (walls follow the grains).
-        pair: [u32; 2],
-    },
-    /// A contact yields though the residual is small enough.
-    #[error(
-        "the contact of grain {} with body {} (walls follow the grains) yields at t = {time:.6e} s, by {share:.1e} of a \
-         radius a step, though the residual is small enough: look for bodies that squeeze it, lower solver.tolerance and \
-         solver.accept, or shorten time.step", pair[0], pair[1]
-    )]
-    Yielded {
-        /// Time at which the step that failed began (s), or its half.
-        time: f64,
-        /// Grain, and grain or wall (walls follow the grains).
-        pair: [u32; 2],
-        /// How far in the step, over the smaller radius (–).
-        share: f64,
-    },
-    /// A velocity or a reaction is not a finite number.
-    #[error(
-        "a velocity is not a finite number at t = {time:.6e} s: look for grains squeezed between bodies that cannot yield"
-    )]
-    NotFinite {
-        /// Time of the last accepted state (s).
-        time: f64,
-    },
-}
+use crate::solver::{SolveReport, SolveStatus};
 
 /// Parts into which a step is divided at most where bodies are fast.
-const PARTS: u32 = 4096;
+pub(super) const PARTS: u32 = 4096;
 
 impl<D: Dim> World<D> {
     /// Carry the world on by one time step. An error leaves the world as it was.
@@ -118,7 +42,10 @@ impl<D: Dim> World<D> {
         watch: &mut dyn FnMut(usize),
     ) -> Result<StepReport<D>, StepError> {
         let refused = match self.attempt(h, watch) {
-            Err(StepError::NotAccepted { .. } | StepError::Yielded { .. }) if halvings < self.settings.max_halvings => {
+            Err(StepError::NotAccepted { .. }) if halvings < self.settings.max_halvings => 1,
+            Err(StepError::Yielded { violation, .. })
+                if violation.is_of_the_solve() && halvings < self.settings.max_halvings =>
+            {
                 1
             }
             Err(StepError::TooFast { .. }) if parts < PARTS => 0,
@@ -126,9 +53,16 @@ impl<D: Dim> World<D> {
         };
         let before = self.state();
         let first = self.advance(0.5 * h, halvings + refused, 2 * parts, watch)?;
+        let at_limit = self.walls.iter().map(|w| w.reaction_at_limit).collect::<Vec<_>>();
         let mut watch_second = |broken| watch(first.breaks.len() + broken);
         match self.advance(0.5 * h, halvings + refused, 2 * parts, &mut watch_second) {
-            Ok(second) => Ok(first.followed_by(second, refused)),
+            Ok(second) => {
+                // the equilibrium that broke first is that of the step
+                if !first.breaks.is_empty() {
+                    self.walls.iter_mut().zip(at_limit).for_each(|(wall, reaction)| wall.reaction_at_limit = reaction);
+                }
+                Ok(first.followed_by(second, refused))
+            }
             Err(error) => {
                 // half a step that stands alone would be neither the old state nor the new one
                 self.restore(before);
@@ -151,14 +85,15 @@ impl<D: Dim> World<D> {
         let carried = self.carried(&touches);
         let mut done = Solves::default();
         let mut breaks: Vec<Break<D>> = Vec::new();
-        let problem = loop {
+        let mut walls_at_limit = None;
+        let (problem, places) = loop {
             let (mut problem, places) = self.assemble(&mid, &touches, &motion, &carried, applied, h);
             let solve = self.solver.solve(&mut problem);
             done.add(solve);
             self.refuse_unaccepted(solve, &problem, h)?;
             write_reactions(&mut touches, &problem, &places, h);
-            if limited && let Some((pair, share)) = self.yielding(&mid, &touches, &problem) {
-                return Err(StepError::Yielded { time: self.time, pair, share });
+            if limited {
+                self.refuse_violation(self.yielding(&problem))?;
             }
             let missed = self.missed(&mid, &touches, &problem.nodes, h);
             if !missed.is_empty() {
@@ -169,11 +104,12 @@ impl<D: Dim> World<D> {
             let failed = self.at_limit(&mid, &touches, &problem, &places, breaks.last().map_or(0, |b| b.round + 1));
             let again = !failed.is_empty() && self.settings.rupture != Rupture::EndOfStep;
             if again {
+                walls_at_limit.get_or_insert_with(|| self.wall_forces(&mid, &touches));
                 forget_bonds(&mut touches, &failed);
             }
             breaks.extend(failed);
             if !again {
-                break problem;
+                break (problem, places);
             }
             watch(breaks.len());
         };
@@ -181,8 +117,12 @@ impl<D: Dim> World<D> {
             let velocity = |k: usize| problem.nodes.all[k].velocity;
             self.refuse_crossing(self.pushes_from_afar(&mid, &touches, &problem.nodes, h))?;
             self.refuse_crossing(self.crossing(|k| mid.place(k), velocity, 0.5 * h))?;
+            self.refuse_violation(self.accumulate(&mut touches, &problem, &places, h))?;
         }
         self.settle(h, mid, &motion, &problem, touches, &breaks);
+        if let Some(forces) = walls_at_limit {
+            self.walls.iter_mut().zip(forces).for_each(|(wall, force)| wall.reaction_at_limit = force);
+        }
         Ok(self.report(&motion, &problem, done, breaks))
     }
 
@@ -274,6 +214,10 @@ impl<D: Dim> World<D> {
         Ok(())
     }
 
+    fn refuse_violation(&self, found: Option<Violation>) -> Result<(), StepError> {
+        found.map_or(Ok(()), |violation| Err(StepError::Yielded { time: self.time, violation }))
+    }
+
     fn refuse_crossing(&self, found: Option<[u32; 2]>) -> Result<(), StepError> {
         found.map_or(Ok(()), |pair| Err(StepError::TooFast { time: self.time, pair }))
     }
@@ -350,19 +294,28 @@ impl<D: Dim> World<D> {
             wall.velocity = problem.nodes.all[n + w].velocity;
             wall.position = mid.walls[w] + wall.velocity * (0.5 * h);
             wall.applied = if let Drive::Force { force, .. } = &wall.drive { force(self.time + 0.5 * h) } else { 0.0 };
-            wall.reaction = D::Vector::zero();
         }
-        for kept in &touches {
-            if let Some(wall) = (kept.pair[1] as usize).checked_sub(n) {
-                let touch = self.touch(&mid, kept);
-                self.walls[wall].reaction -= D::compose(&touch.frame, touch.reaction.n, touch.reaction.t);
-            }
+        let forces = self.wall_forces(&mid, &touches);
+        for (wall, force) in self.walls.iter_mut().zip(forces) {
+            (wall.reaction, wall.reaction_at_limit) = (force, force);
         }
         for failed in breaks {
             self.bonds[failed.bond as usize].status = failed.mode;
         }
         (self.kept, self.mid) = (touches, mid);
         self.time += h;
+    }
+
+    /// Force of the grains on each wall (N).
+    fn wall_forces(&self, mid: &Midpoint<D>, touches: &[Kept<D>]) -> Vec<D::Vector> {
+        let mut forces = vec![D::Vector::zero(); self.walls.len()];
+        for kept in touches {
+            if let Some(wall) = (kept.pair[1] as usize).checked_sub(self.grains.len()) {
+                let touch = self.touch(mid, kept);
+                forces[wall] -= D::compose(&touch.frame, touch.reaction.n, touch.reaction.t);
+            }
+        }
+        forces
     }
 
     /// Enter the step in the energy ledger.
@@ -441,7 +394,17 @@ impl<D: Dim> World<D> {
             let dv = (problem.nodes.all[k].velocity - motion.before[k].0) * *mass;
             change += dv.dot(&dv);
         }
-        let dry = self.kept.iter().filter(|t| t.bond().is_none());
+        let (mut penetration, mut bond_elongation) = (0.0, 0.0);
+        for kept in &self.kept {
+            let gap = self.geometry(&self.mid, kept.pair).0;
+            match kept.bond().map(|bond| &self.bonds[bond as usize]) {
+                None => penetration = f64::max(penetration, -gap),
+                Some(bond) if bond.status == BondStatus::Intact => {
+                    bond_elongation = f64::max(bond_elongation, (gap - bond.rest_gap).abs());
+                }
+                Some(_) => {}
+            }
+        }
         StepReport {
             time: self.time,
             status: done.status(),
@@ -454,8 +417,10 @@ impl<D: Dim> World<D> {
             },
             counts: Counts::of(self.kept.iter().map(|t| t.status)),
             breaks,
-            penetration: dry.map(|t| -self.geometry(&self.mid, t.pair).0).fold(0.0, f64::max),
+            penetration,
+            bond_elongation,
             rejected: 0,
+            substeps: 1,
         }
     }
 }
@@ -490,53 +455,8 @@ fn write_reactions<D: Dim>(touches: &mut [Kept<D>], problem: &ContactProblem<D>,
 fn forget_bonds<D: Dim>(touches: &mut [Kept<D>], broken: &[Break<D>]) {
     for failed in broken {
         if let Ok(place) = touches.binary_search_by_key(&failed.pair, |t| t.pair) {
-            let Kept { tangents, deep_or_wide, closed, .. } = touches[place];
-            touches[place] = Kept { tangents, deep_or_wide, closed, ..Kept::new(failed.pair, None) };
-        }
-    }
-}
-
-/// The solves of one step taken together.
-#[derive(Clone, Copy, Default)]
-struct Solves {
-    work: Work,
-    residual: f64,
-    /// The worst that was told, and whether the last solve told it.
-    load_error: f64,
-    load_error_told: bool,
-    missed_aim: bool,
-}
-
-impl Solves {
-    fn add(&mut self, solve: SolveReport) {
-        self.work = self.work + solve.work;
-        self.residual = self.residual.max(solve.residual);
-        self.load_error = self.load_error.max(solve.load_error.unwrap_or(0.0));
-        self.load_error_told = solve.load_error.is_some();
-        self.missed_aim |= solve.status != SolveStatus::Converged;
-    }
-
-    fn status(&self) -> SolveStatus {
-        if self.missed_aim { SolveStatus::Accepted } else { SolveStatus::Converged }
-    }
-}
-
-impl<D: Dim> StepReport<D> {
-    /// Two half steps as one, made because `refused` solves were not accepted.
-    fn followed_by(self, second: Self, refused: u32) -> Self {
-        let mut breaks = self.breaks;
-        let rounds = breaks.last().map_or(0, |b| b.round + 1);
-        breaks.extend(second.breaks.into_iter().map(|b| Break { round: b.round + rounds, ..b }));
-        let missed = [self.status, second.status].contains(&SolveStatus::Accepted);
-        Self {
-            status: if missed { SolveStatus::Accepted } else { SolveStatus::Converged },
-            work: self.work + second.work,
-            residual: self.residual.max(second.residual),
-            load_error: self.load_error.max(second.load_error),
-            breaks,
-            penetration: self.penetration.max(second.penetration),
-            rejected: self.rejected + second.rejected + refused,
-            ..second
+            let Kept { tangents, wide, closed, .. } = touches[place];
+            touches[place] = Kept { tangents, wide, closed, ..Kept::new(failed.pair, None) };
         }
     }
 }

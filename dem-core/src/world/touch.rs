@@ -26,26 +26,30 @@ pub(super) struct Kept<D: Dim> {
     /// The bond that ties it, counted from one: four bytes, no bond included.
     pub bond_from_one: Option<NonZeroU32>,
     pub status: TouchStatus,
-    /// Whether its gap is so deep or so wide that the limits of the step look at it; taken as true of bonds.
-    pub deep_or_wide: bool,
+    /// Whether its gap is so wide that the limits of the step look at it; taken as true of bonds.
+    pub wide: bool,
     /// Whether it pushed in the step before.
     pub closed: bool,
     /// What its frame has beside the normal.
     pub tangents: D::Tangents,
     pub reaction: Local<D::Tangent, D::Moment>,
+    /// How far its bodies have closed beyond its law since they touched (m), summed over the steps: the errors of their solves. Of a
+    /// rigid bond, by how much these have shortened it.
+    pub yielded: f64,
 }
 
 impl<D: Dim> Kept<D> {
-    /// A contact without reaction, tied by this bond, or by none and of an ordinary gap.
+    /// A contact without reaction, tied by this bond or by none, of an ordinary gap.
     pub fn new(pair: [u32; 2], bond: Option<u32>) -> Self {
         Self {
             pair,
             bond_from_one: bond.and_then(|bond| NonZeroU32::new(bond + 1)),
             status: if bond.is_some() { TouchStatus::Bonded } else { TouchStatus::Open },
-            deep_or_wide: bond.is_some(),
+            wide: bond.is_some(),
             closed: false,
             tangents: D::Tangents::zero(),
             reaction: Local::zero(),
+            yielded: 0.0,
         }
     }
 

@@ -257,6 +257,7 @@ fn write_ruptures(report: &Report, folder: &mut Folder) -> Result<()> {
         "normal_force_N",
         "tangential_force_N",
         "moment_Nm",
+        "twist_Nm",
         "energy_J",
     ];
     let rows = report.events.iter().map(|e| {
@@ -274,6 +275,7 @@ fn write_ruptures(report: &Report, folder: &mut Folder) -> Result<()> {
             e.normal_force,
             e.tangential_force,
             e.moment,
+            e.twist.map_or(String::new(), |twist| twist.to_string()),
             e.energy
         ]
     });

@@ -110,8 +110,10 @@ pub struct Event {
     pub normal_force: f64,
     /// Tangential force, N.
     pub tangential_force: f64,
-    /// Moment, N m.
+    /// Bending moment, N m; in histories of before version 3 the norm of all moments.
     pub moment: f64,
+    /// Twisting moment, N m; unknown in histories of before version 3.
+    pub twist: Option<f64>,
     /// Energy released, J.
     pub energy: f64,
 }
@@ -220,6 +222,7 @@ impl From<&Rupture> for Event {
             normal_force: r.normal_force,
             tangential_force: r.tangential_force,
             moment: r.moment,
+            twist: r.twist.is_finite().then_some(r.twist),
             energy: r.energy,
         }
     }
@@ -350,6 +353,7 @@ mod tests {
             normal_force: 0.0,
             tangential_force: 0.0,
             moment: 0.0,
+            twist: 0.0,
             energy: 0.0,
             round: 0,
             bond: 0,

@@ -31,8 +31,13 @@ pub struct Kept {
 }
 
 /// What a table may hold, and whether two values of it are the same to the bit.
-pub(super) trait Stored: H5Type {
+pub(super) trait Stored: H5Type + Sized {
     fn same(&self, other: &Self) -> bool;
+
+    /// Rows `range` of a dataset, with the shape of one row.
+    fn read(source: &Source, place: &str, range: Range<usize>) -> Result<(Vec<usize>, Vec<Self>)> {
+        source.read(place, range)
+    }
 }
 
 macro_rules! stored {
@@ -53,9 +58,18 @@ stored!(
     i32: |a, b| a == b,
     u32: |a, b| a == b,
     BondCode: |a, b| a == b,
-    ContactCode: |a, b| a == b,
-    RuptureRow: RuptureRow::same
+    ContactCode: |a, b| a == b
 );
+
+impl Stored for RuptureRow {
+    fn same(&self, other: &Self) -> bool {
+        self.same(other)
+    }
+
+    fn read(source: &Source, place: &str, range: Range<usize>) -> Result<(Vec<usize>, Vec<Self>)> {
+        RuptureRow::read(source, place, range)
+    }
+}
 
 /// Something that is done to every table of a history.
 pub(super) trait Visit {
@@ -87,7 +101,7 @@ impl Extract {
     }
 
     fn read<T: Stored>(&self, source: &Source, range: Range<usize>) -> Result<Vec<T>> {
-        let (row, values) = source.read::<T>(&self.place, range)?;
+        let (row, values) = T::read(source, &self.place, range)?;
         if row == self.row {
             return Ok(values);
         }

@@ -33,7 +33,7 @@
 //!     gap [M], status (enum OPEN, STICK, SLIP, BONDED) [M], bond i32[M] (−1 for none)        bond: if bonds
 //! /bonds/                  pair i32[B,2]; rest_gap, strength, friction, mean_diameter [B]    m, N, –, m
 //!     status               {step, time, value[T,B]}: enum INTACT, TENSION, SHEAR, ROLLING, TWIST
-//! /events/rupture          compound [E]: step i64; time, x, y, z, rn, rt, m, energy f64; round, bond, i, j i32;
+//! /events/rupture          compound [E]: step i64; time, x, y, z, rn, rt, m, twist, energy f64; round, bond, i, j i32;
 //!                          mode i32 enum TENSION, SHEAR, ROLLING, TWIST; pad i32 (0)
 //! /observables/            step i64[S], time [S], shared by all (hard links, as H5MD allows)
 //!     NAME                 {step, time, value[S,…]}
@@ -312,8 +312,10 @@ pub struct Rupture {
     pub normal_force: f64,
     /// Magnitude of the tangential force at rupture, N.
     pub tangential_force: f64,
-    /// Magnitude of the moment at rupture, N m.
+    /// Magnitude of the bending moment at rupture, N m; in histories of before version 3 that of all moments.
     pub moment: f64,
+    /// Magnitude of the twisting moment at rupture, N m; not a number in histories of before version 3.
+    pub twist: f64,
     /// Elastic energy released, J; 0 for a rigid bond.
     pub energy: f64,
     /// Round of the cascade within the step, from 0.

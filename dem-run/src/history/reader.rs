@@ -411,11 +411,7 @@ impl History {
         if !self.source.has(path::RUPTURE) {
             return Ok(vec![]);
         }
-        let found = self.source.dataset(path::RUPTURE)?.dtype().and_then(|dtype| dtype.to_descriptor());
-        if !RuptureRow::is_read_from(&found.map_err(while_reading(&self.source.path, path::RUPTURE))?) {
-            return Err(self.source.damaged(path::RUPTURE, "its members are others"));
-        }
-        let (_, events) = self.source.read::<RuptureRow>(path::RUPTURE, 0..self.events)?;
+        let (_, events) = RuptureRow::read(&self.source, path::RUPTURE, 0..self.events)?;
         let known: Option<Vec<Rupture>> = events.iter().map(RuptureRow::event).collect();
         known.ok_or_else(|| self.source.damaged(path::RUPTURE, "a mode that is none"))
     }

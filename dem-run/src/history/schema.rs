@@ -3,11 +3,16 @@
 use hdf5::H5Type;
 use hdf5::types::TypeDescriptor;
 
+use std::ops::Range;
+
 use super::codes::{Coded, ModeCode};
+use super::error::{Result, while_reading};
+use super::source::Source;
 use super::{Rupture, RuptureMode};
 
-/// Version of the layout. It grows with every change that an older reader would misread. 2: bonds break in twist, too.
-pub const SCHEMA_VERSION: u32 = 2;
+/// Version of the layout. It grows with every change that an older reader would misread. 2: bonds break in twist, too. 3: a
+/// rupture has its twisting moment apart from the bending moment.
+pub const SCHEMA_VERSION: u32 = 3;
 
 /// The program's name as `/h5md/creator` records it.
 pub(super) const CREATOR: &str = "dem-run";
@@ -81,6 +86,7 @@ pub(super) struct RuptureRow {
     rn: f64,
     rt: f64,
     m: f64,
+    twist: f64,
     energy: f64,
     round: i32,
     bond: i32,
@@ -88,6 +94,34 @@ pub(super) struct RuptureRow {
     j: i32,
     mode: ModeCode,
     pad: i32,
+}
+
+/// The same in histories of versions 1 and 2: `m` is the norm of all moments.
+#[derive(Clone, Copy, Debug, H5Type)]
+#[repr(C)]
+struct OldRuptureRow {
+    step: i64,
+    time: f64,
+    x: f64,
+    y: f64,
+    z: f64,
+    rn: f64,
+    rt: f64,
+    m: f64,
+    energy: f64,
+    round: i32,
+    bond: i32,
+    i: i32,
+    j: i32,
+    mode: ModeCode,
+    pad: i32,
+}
+
+impl From<OldRuptureRow> for RuptureRow {
+    fn from(old: OldRuptureRow) -> Self {
+        let OldRuptureRow { step, time, x, y, z, rn, rt, m, energy, round, bond, i, j, mode, pad } = old;
+        Self { step, time, x, y, z, rn, rt, m, twist: f64::NAN, energy, round, bond, i, j, mode, pad }
+    }
 }
 
 impl From<&Rupture> for RuptureRow {
@@ -102,6 +136,7 @@ impl From<&Rupture> for RuptureRow {
             rn: r.normal_force,
             rt: r.tangential_force,
             m: r.moment,
+            twist: r.twist,
             energy: r.energy,
             round: r.round,
             bond: r.bond,
@@ -114,21 +149,31 @@ impl From<&Rupture> for RuptureRow {
 }
 
 impl RuptureRow {
-    /// Whether events are read from rows of this type: histories from before there was twist lack that mode.
-    pub(super) fn is_read_from(found: &TypeDescriptor) -> bool {
-        let (now, mut before) = (Self::type_descriptor(), Self::type_descriptor());
-        if let TypeDescriptor::Compound(row) = &mut before
+    /// The rows `range` of the dataset, with the shape of one; those of older versions lack the column of twist, and in
+    /// version 1 its mode.
+    pub(super) fn read(source: &Source, place: &str, range: Range<usize>) -> Result<(Vec<usize>, Vec<Self>)> {
+        let found = source.dataset(place)?.dtype().and_then(|dtype| dtype.to_descriptor());
+        let found = found.map_err(while_reading(&source.path, place))?;
+        let (second, mut first) = (OldRuptureRow::type_descriptor(), OldRuptureRow::type_descriptor());
+        if let TypeDescriptor::Compound(row) = &mut first
             && let Some(TypeDescriptor::Enum(modes)) =
                 row.fields.iter_mut().find(|f| f.name == "mode").map(|f| &mut f.ty)
         {
             modes.members.retain(|mode| mode.name != RuptureMode::Twist.label());
         }
-        [now, before].contains(found)
+        if found == Self::type_descriptor() {
+            return source.read(place, range);
+        }
+        if ![first, second].contains(&found) {
+            return Err(source.damaged(place, "its members are others"));
+        }
+        let (row, old) = source.read::<OldRuptureRow>(place, range)?;
+        Ok((row, old.into_iter().map(Self::from).collect()))
     }
 
     /// Whether two rows are alike to the bit.
     pub(super) fn same(&self, other: &Self) -> bool {
-        let reals = |r: &Self| [r.time, r.x, r.y, r.z, r.rn, r.rt, r.m, r.energy].map(f64::to_bits);
+        let reals = |r: &Self| [r.time, r.x, r.y, r.z, r.rn, r.rt, r.m, r.twist, r.energy].map(f64::to_bits);
         let integers = |r: &Self| [r.round, r.bond, r.i, r.j, r.pad];
         (self.step, reals(self), integers(self), self.mode) == (other.step, reals(other), integers(other), other.mode)
     }
@@ -142,6 +187,7 @@ impl RuptureRow {
             normal_force: self.rn,
             tangential_force: self.rt,
             moment: self.m,
+            twist: self.twist,
             energy: self.energy,
             round: self.round,
             bond: self.bond,

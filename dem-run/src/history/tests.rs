@@ -119,6 +119,7 @@ fn rupture(k: usize) -> Rupture {
         normal_force: -5.0,
         tangential_force: 2.0,
         moment: 0.25,
+        twist: 0.125,
         energy: 0.125,
         round: 3,
         bond: 1,

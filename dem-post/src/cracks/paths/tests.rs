@@ -61,6 +61,7 @@ fn rupture(bond: usize, step: i64, round: i32) -> Rupture {
         normal_force: 0.0,
         tangential_force: 0.0,
         moment: 0.0,
+        twist: 0.0,
         energy: 0.0,
         round,
         bond: bond as i32,

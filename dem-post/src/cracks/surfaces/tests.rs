@@ -56,6 +56,7 @@ impl Lattice {
             normal_force: 0.0,
             tangential_force: 0.0,
             moment: 0.0,
+            twist: 0.0,
             energy: 0.0,
             round: 0,
             bond: bond as i32,

@@ -1,0 +1,193 @@
+//! What a step did, and why one could not be made.
+
+use super::{Break, Counts};
+use crate::dim::Dim;
+use crate::solver::{SolveReport, SolveStatus, Work};
+use std::fmt;
+
+/// What one step did.
+#[derive(Clone, Debug)]
+pub struct StepReport<D: Dim> {
+    /// Time at its end (s).
+    pub time: f64,
+    /// How the worst of its solves ended; never `Failed`.
+    pub status: SolveStatus,
+    /// What all its solves took.
+    pub work: Work,
+    /// Largest residual of its accepted solves (–).
+    pub residual: f64,
+    /// Largest load error of its solves (–) where the last of them told one, as Newton's do; else ‖M (v⁺ − v⁻)/h‖ / ‖F_ext‖ over
+    /// the grains that are free to move, in a static scene a false acceleration force over the load, and zero without load.
+    pub load_error: f64,
+    /// Contacts by what they did.
+    pub counts: Counts,
+    /// Bonds that broke, in the order of the cascade's rounds.
+    pub breaks: Vec<Break<D>>,
+    /// Deepest overlap of a dry contact at mid-step (m).
+    pub penetration: f64,
+    /// Largest difference between the length of an intact bond at mid-step and its length at rest (m).
+    pub bond_elongation: f64,
+    /// Number of solves that were not accepted and made the step shorter.
+    pub rejected: u32,
+    /// Number of parts that the step was made in: 1, or more where a solve was not accepted or a body was too fast.
+    pub substeps: u32,
+}
+
+impl<D: Dim> StepReport<D> {
+    /// Two half steps as one, made because `refused` solves were not accepted.
+    pub(super) fn followed_by(self, second: Self, refused: u32) -> Self {
+        let mut breaks = self.breaks;
+        let rounds = breaks.last().map_or(0, |b| b.round + 1);
+        breaks.extend(second.breaks.into_iter().map(|b| Break { round: b.round + rounds, ..b }));
+        let missed = [self.status, second.status].contains(&SolveStatus::Accepted);
+        Self {
+            status: if missed { SolveStatus::Accepted } else { SolveStatus::Converged },
+            work: self.work + second.work,
+            residual: self.residual.max(second.residual),
+            load_error: self.load_error.max(second.load_error),
+            breaks,
+            penetration: self.penetration.max(second.penetration),
+            bond_elongation: self.bond_elongation.max(second.bond_elongation),
+            rejected: self.rejected + second.rejected + refused,
+            substeps: self.substeps + second.substeps,
+            ..second
+        }
+    }
+}
+
+/// The solves of one step taken together.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Solves {
+    pub work: Work,
+    pub residual: f64,
+    /// The worst that was told, and whether the last solve told it.
+    pub load_error: f64,
+    pub load_error_told: bool,
+    missed_aim: bool,
+}
+
+impl Solves {
+    pub fn add(&mut self, solve: SolveReport) {
+        self.work = self.work + solve.work;
+        self.residual = self.residual.max(solve.residual);
+        self.load_error = self.load_error.max(solve.load_error.unwrap_or(0.0));
+        self.load_error_told = solve.load_error.is_some();
+        self.missed_aim |= solve.status != SolveStatus::Converged;
+    }
+
+    pub fn status(&self) -> SolveStatus {
+        if self.missed_aim { SolveStatus::Accepted } else { SolveStatus::Converged }
+    }
+}
+
+/// Why a step could not be made. The world stands as it did after the last accepted step.
+#[derive(Clone, Debug, PartialEq)]
+pub enum StepError {
+    /// No solve was accepted, down to the shortest step that the settings allow.
+    NotAccepted {
+        /// Time at which the step that failed began (s), or its half.
+        time: f64,
+        /// The shortest step tried (s).
+        step: f64,
+        /// Residual of its solve (–).
+        residual: f64,
+        /// Iterations of its solve.
+        iterations: u64,
+    },
+    /// A grain would pass through another body, or be pushed by one it passes, in the shortest part of a step.
+    TooFast {
+        /// Time at which the part of the step that failed began (s).
+        time: f64,
+        /// Grain, and grain or wall (walls follow the grains).
+        pair: [u32; 2],
+    },
+    /// Two bodies move beyond the law of their contact though the residual is small enough.
+    Yielded {
+        /// Time at which the step that failed began (s), or its half.
+        time: f64,
+        /// Which, and how far.
+        violation: Violation,
+    },
+    /// A velocity or a reaction is not a finite number.
+    NotFinite {
+        /// Time of the last accepted state (s).
+        time: f64,
+    },
+}
+
+/// A pair that a solve lets move beyond its law: a dry contact closes, a rigid bond changes its length.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Violation {
+    /// Grain, and grain or wall (walls follow the grains).
+    pub pair: [u32; 2],
+    /// How far, over the smaller radius (–).
+    pub share: f64,
+    /// Whether it is the sum over the run so far; else it is the way of one step.
+    pub accumulated: bool,
+    /// Where the reactions balance each other without stopping the bodies, so that no velocities satisfy the contact laws:
+    /// the walls that carry them (walls follow the grains), often none.
+    pub infeasible: Option<Vec<u32>>,
+}
+
+impl StepError {
+    /// The message, with bodies called by `name`, which is given a number: grains first, then walls.
+    pub fn message(&self, name: &dyn Fn(u32) -> String) -> String {
+        match self {
+            Self::NotAccepted { time, step, residual, iterations } => format!(
+                "no convergence at t = {time:.6e} s: residual {residual:.2e} after {iterations} iterations, with the step cut to \
+                 {step:.2e} s"
+            ),
+            Self::TooFast { time, pair } => format!(
+                "{} is too fast for the step at t = {time:.6e} s: even in {} parts it would pass through {}: shorten the step, \
+                 or look why it is so fast",
+                name(pair[0]),
+                super::step::PARTS,
+                name(pair[1])
+            ),
+            Self::Yielded { time, violation } => violation.message(*time, name),
+            Self::NotFinite { time } => format!(
+                "a velocity is not a finite number at t = {time:.6e} s: look for grains squeezed between bodies that cannot \
+                 yield"
+            ),
+        }
+    }
+}
+
+impl Violation {
+    /// Whether a better solve, or a shorter step, may do without it.
+    pub(super) fn is_of_the_solve(&self) -> bool {
+        !self.accumulated && self.infeasible.is_none()
+    }
+
+    fn message(&self, time: f64, name: &dyn Fn(u32) -> String) -> String {
+        let [i, j] = self.pair.map(name);
+        let span = if self.accumulated { "since the start of the run" } else { "in one step" };
+        let what = format!("{i} and {j} move {:.1e} of a radius beyond their contact law {span}", self.share);
+        match &self.infeasible {
+            None => format!(
+                "{what} at t = {time:.6e} s, though the residual is small enough: a smaller tolerance of the solver, or a shorter \
+                 step, may help"
+            ),
+            Some(walls) => {
+                let names: Vec<String> = walls.iter().map(|wall| name(*wall)).collect();
+                let bodies = match names.as_slice() {
+                    [] => "the fixed and driven bodies".to_string(),
+                    [only] => only.clone(),
+                    [first @ .., last] => format!("{} and {last}", first.join(", ")),
+                };
+                format!(
+                    "no motion satisfies {bodies} at t = {time:.6e} s: {what}, and the reactions only balance each other; nothing \
+                     can give way: let a wall be driven by a force, end its motion earlier, or leave room"
+                )
+            }
+        }
+    }
+}
+
+impl fmt::Display for StepError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message(&|body| format!("body {body} (grains first, then walls)")))
+    }
+}
+
+impl std::error::Error for StepError {}
