@@ -123,11 +123,15 @@ fn walls_that_cannot_yield_stop_the_run_and_say_so() {
         let mut w = world::<D>(vec![grain(&[R])], vec![plane(&[1.0], &[], 0.3), press], settings(1e-3, kind));
         let out = watch(&mut w, 20, 1e-6);
         let error = out.stopped.expect("nothing can obey both walls");
-        assert!(
-            matches!(error, StepError::NotAccepted { .. } | StepError::Yielded { .. } | StepError::TooFast { .. }),
-            "{error}"
-        );
-        assert!(out.penetration < 0.2);
+        // Newton solves the problem but for an error that closes the contact; Gauss–Seidel does not converge
+        let why = match kind {
+            Kind::GaussSeidel => matches!(error, StepError::NotAccepted { time: 0.0, .. }),
+            _ => matches!(error, StepError::Yielded { time: 0.0, pair: [0, 1 | 2], .. }),
+        };
+        assert!(why, "{kind:?}: {error:?}");
+        // the first step is refused, and nothing has moved in it
+        assert_eq!(out.steps, 0);
+        assert_eq!((w.grains.position[0], w.walls[1].position), (at::<D>(&[R]), at::<D>(&[2.0 * R])));
     }
     everywhere!(case);
 }
