@@ -306,7 +306,9 @@ impl<D: Dim> Run<'_, D> {
         mut progress: Progress,
     ) -> Result<(), RunError> {
         progress.finish();
-        for wall in self.idle.iter().filter_map(|wall| self.scene.walls.keys().nth(*wall)) {
+        // a run without a step says nothing of them
+        let idle = self.idle.iter().filter(|_| self.state.world.steps > 0);
+        for wall in idle.filter_map(|wall| self.scene.walls.keys().nth(*wall)) {
             progress.note(&format!(
                 "warning: walls.{wall}: no force ever acted on this driven wall: it touched no grain, or slid along grains that \
                  nothing pressed on it; look at its place and its direction"

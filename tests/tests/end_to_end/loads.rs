@@ -85,7 +85,7 @@ fn a_biaxial_test_reports_the_load_of_its_lid_whatever_the_walls_are_called() {
         assert!(found.iter().all(|load| *load > 16.0), "{found:?} with {sides:?}");
         loads.push(found);
         assert_eq!((&summary["peak_load"], &summary["splitting"]), (&Value::Null, &Value::Null));
-        let post = here.dem_post(&["stress-strain", "a.h5", "--json", "--quiet"]).json();
+        let post = here.dem_post(&["stress-strain", "a.h5", "--json", "--quiet", "--force"]).json();
         assert_eq!((&post["wall"], number(&post["first_break"])), (&json!("top"), found[0]));
         assert_eq!(number(&post["collapse_load"]), found[1]);
     }
@@ -145,7 +145,7 @@ fn where_the_load_wall_is_unknown_every_driven_wall_is_listed_and_what_needs_one
     // the scene may say so, and what reads its history follows it
     let named = [&open[..], &["--set", "load_wall=left"]].concat();
     assert_eq!(loads_in(&run(&here, "biaxial.json", &named)["failure"]), [8.0; 4]);
-    let post = here.dem_post(&["stress-strain", "a.h5", "--json", "--quiet"]).json();
+    let post = here.dem_post(&["stress-strain", "a.h5", "--json", "--quiet", "--force"]).json();
     assert_eq!((&post["wall"], number(&post["first_break"])), (&json!("left"), 8.0));
     here.dem_run(&["check", "biaxial.json", "--set", "load_wall=tpo"])
         .fails(2, &["load_wall", "\"tpo\"", "nearest  top"]);
