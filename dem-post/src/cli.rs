@@ -74,9 +74,19 @@ pub enum Command {
         /// Folder for the results, created if need be [default: A-compare].
         #[arg(short, long, value_name = "DIR")]
         output: Option<PathBuf>,
+        /// Take the folder over from the history that it belongs to: its results are removed.
+        #[arg(long)]
+        force: bool,
     },
     /// The run on one HTML page that needs nothing else: pictures, curves, tables, accuracy, energy, scene.
-    Report(Moments),
+    Report {
+        /// Files and moments.
+        #[command(flatten)]
+        moments: Moments,
+        /// The load wall [default: that of the scene, else the only driven one].
+        #[arg(long, value_name = "NAME")]
+        wall: Option<String>,
+    },
     /// Strength against a field of the scene over many runs, as against cohesion: a line, its errors, the scatter of samples.
     ///
     /// The exit code is 1 where runs were left out because they did not give way, or are not done.
@@ -90,12 +100,15 @@ pub enum Command {
         /// What counts as the strength: the load at …
         #[arg(long, value_enum, default_value_t)]
         measure: Measure,
-        /// The driven wall, where there are several.
+        /// The load wall [default: that of the scene, else the only driven one].
         #[arg(long, value_name = "NAME")]
         wall: Option<String>,
         /// Folder for the results, created if need be [default: RUNS-strength].
         #[arg(short, long, value_name = "DIR")]
         output: Option<PathBuf>,
+        /// Take the folder over from the history that it belongs to: its results are removed.
+        #[arg(long)]
+        force: bool,
     },
     /// Small files that show the history in ParaView, VTK and MDAnalysis, and copy almost nothing of it.
     ///
@@ -120,7 +133,7 @@ pub enum Command {
         /// The files.
         #[command(flatten)]
         files: Files,
-        /// The driven wall, where there are several.
+        /// The load wall [default: that of the scene, else the only driven one].
         #[arg(long, value_name = "NAME")]
         wall: Option<String>,
     },
@@ -135,6 +148,9 @@ pub struct Files {
     /// Folder for the results, created if need be [default: FILE-post, of `frames` FILE-frames, in the current folder].
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
+    /// Take the folder over from the history that it belongs to: its results are removed.
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// Files, and the moments to draw.

@@ -4,8 +4,6 @@
 //! stands for a value, the same meaning of it. They are read, drawn and written one by one, so a long series needs no
 //! more memory than a short one.
 
-use std::path::Path;
-
 use clap::ValueEnum;
 use dem_run::history::{BondStatus, History, RuptureMode};
 use serde::Serialize;
@@ -121,28 +119,16 @@ impl Report {
 pub fn write(history: &History, report: &Report, folder: &mut Folder, quiet: bool) -> Result<()> {
     let (sample, view) = shown(history, report)?;
     let bar = progress(report.frames.len() as u64, quiet, "{bar:24} {pos} of {len} pictures, {eta} left");
-    for (k, &frame) in report.frames.iter().enumerate() {
+    let names: Vec<String> = (0..report.frames.len()).map(|k| format!("frame-{k:05}.png")).collect();
+    folder.announce(&names)?;
+    for (name, &frame) in names.iter().zip(&report.frames) {
         let (panel, legend) = picture(history, report, frame)?;
-        let name = picture_name(k);
         let png = draw_view(&sample, view, &[panel], &legend).png_scaled(PIXELS);
-        folder.write(&name, &png.map_err(|why| PostError::Usage(format!("{name}: {why}")))?)?;
+        folder.write(name, &png.map_err(|why| PostError::Usage(format!("{name}: {why}")))?)?;
         bar.inc(1);
     }
     bar.finish_and_clear();
-    remove_longer(folder.path(), report.frames.len());
     Ok(())
-}
-
-/// Remove the pictures that a longer series has left: a film would show them after these.
-fn remove_longer(folder: &Path, count: usize) {
-    (count..)
-        .map(|k| folder.join(picture_name(k)))
-        .take_while(|path| std::fs::remove_file(path).is_ok())
-        .for_each(drop);
-}
-
-fn picture_name(k: usize) -> String {
-    format!("frame-{k:05}.png")
 }
 
 /// The part of the plane that shows all frames.

@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 
-use dem_run::history::HistoryError;
+use dem_run::history::{History, HistoryError};
 use dem_run::run::RunError;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 pub use dem_run::output::{
-    Folder, Text, WriteError, cell, default_folder, facts, in_shell, number, print, quantity, short,
+    Folder, Source, Text, WriteError, cell, default_folder, escaped, facts, in_shell, number, print, quantity, short,
 };
 
 /// What can go wrong in an analysis.
@@ -63,6 +63,21 @@ pub(crate) fn progress(length: u64, quiet: bool, template: &str) -> ProgressBar 
         bar.set_style(style);
     }
     bar
+}
+
+/// A history as what results are made of: its place, and its run by what does not change while it goes on or when it is
+/// packed.
+///
+/// # Errors
+/// Those of reading it.
+pub fn source(history: &History) -> Result<Source> {
+    let p = history.parameters()?;
+    let revision = if p.git_revision.is_empty() { "unknown" } else { &p.git_revision };
+    let run = format!(
+        "begun {} on {}, seed {}, with dem-run {} (git {revision}, {})",
+        p.start, p.host, p.seed, p.version, p.build
+    );
+    Ok(Source::new(history.path(), Some(run)))
 }
 
 /// The result of an analysis.

@@ -1,8 +1,11 @@
 //! From a scene to a world: sample, walls, loads, bonds, settings.
 
+use crate::output::number;
 use crate::prepare::{self, Ball, PrepareError, Watch};
 use crate::run::RunError;
+use crate::sample_file;
 use crate::scene::{self, Drive as SceneDrive, Place, Sample, Scene, SolverKind, WallMass};
+use crate::warnings;
 use dem_core::body::{Drive, Grain, Grains, Load, Schedule, Shape, Wall};
 use dem_core::bond::{self, Rupture};
 use dem_core::contact::{BondFlow, LocalSolve};
@@ -12,7 +15,6 @@ use dem_core::saved::{Mismatch, Reader};
 use dem_core::solver::{GaussSeidelSettings, NewtonSettings, SolverSettings, Start, StiffnessRatio};
 use dem_core::world::{Restitution, Settings, World};
 use std::f64::consts::PI;
-use std::path::Path;
 use std::sync::Arc;
 
 /// A world at time zero, and what is told about its sample.
@@ -21,22 +23,38 @@ pub struct Built<D: Dim> {
     pub world: World<D>,
     /// Solid fraction of a random sample in its box (–).
     pub solid_fraction: Option<f64>,
+    /// What the scene may not mean as it says it.
+    pub warnings: Vec<String>,
 }
 
-/// Overlap with a wall, in radii, that still counts as touching: decimal coordinates are not exact.
-const TOUCHING: f64 = 1e-6;
+/// Grains and walls in their places.
+pub struct Placed<D: Dim> {
+    /// The grains.
+    pub grains: Grains<D>,
+    /// The walls, in the order of their names.
+    pub walls: Vec<Wall<D>>,
+    /// Solid fraction of a random sample in its box (–).
+    pub solid_fraction: Option<f64>,
+    /// What the scene may not mean as it says it.
+    pub warnings: Vec<String>,
+}
+
+/// Overlap, in radii, that still counts as touching: decimal coordinates are not exact.
+pub(crate) const TOUCHING: f64 = 1e-6;
+/// Overlap of two rigid grains, over the smaller radius, up to which it may be an error of where they came from: soft
+/// grains of other programs overlap.
+const DEEPEST: f64 = 0.1;
+/// Overlap of two grains, over the smaller radius, that a table of few decimals brings: no word about it.
+const ROUNDED: f64 = 1e-3;
+/// Pairs of grains that are told one by one.
+const MOST_TOLD: usize = 10;
 
 /// Prepare the sample of a scene and put the world together. `watch` is told how far the preparation is.
+///
+/// # Errors
+/// [`RunError`], with all that is wrong with the sample.
 pub fn build<D: Dim>(scene: &Scene, watch: Watch) -> Result<Built<D>, RunError> {
-    let (grains, solid_fraction) = grains::<D>(scene, watch)?;
-    for load in scene.grains.iter().flat_map(|g| &g.loads) {
-        if load.grain >= grains.len() {
-            return Err(missing_grain("grains.loads", load.grain, grains.len()));
-        }
-    }
-    refuse_unseated(scene, &grains)?;
-    let walls = walls(scene, &grains);
-    refuse_overlaps(scene, &walls, &grains)?;
+    let Placed { grains, walls, solid_fraction, warnings } = place::<D>(scene, watch)?;
     let mut world = World::new(grains, walls, loads(scene), settings(scene));
     if let Some(bonds) = &scene.bonds {
         let strength = |mean_diameter| bonds.cohesion(scene.dimension, mean_diameter, scene.thickness());
@@ -48,7 +66,32 @@ pub fn build<D: Dim>(scene: &Scene, watch: Watch) -> Result<Built<D>, RunError> 
             world.make_bonds_elastic(|a| bond_stiffness::<D>(stiffness, a, scene.thickness()));
         }
     }
-    Ok(Built { world, solid_fraction })
+    Ok(Built { world, solid_fraction, warnings })
+}
+
+/// Prepare the sample of a scene and put its walls in their places.
+///
+/// # Errors
+/// As [`build`].
+pub fn place<D: Dim>(scene: &Scene, watch: Watch) -> Result<Placed<D>, RunError> {
+    let (mut grains, solid_fraction) = grains::<D>(scene, watch)?;
+    refuse_other_units(&grains)?;
+    let mut wrong = hold_fixed(scene, &mut grains);
+    let loads = scene.grains.iter().flat_map(|g| &g.loads);
+    let lost = loads.filter(|load| load.grain >= grains.len());
+    wrong.extend(lost.map(|load| missing_grain("grains.loads", load.grain, grains.len())));
+    let (deep, shallow) = overlapping(&grains);
+    wrong.extend(deep);
+    wrong.extend(unseated(scene, &grains));
+    let walls = walls(scene, &grains);
+    wrong.extend(buried(scene, &walls, &grains));
+    if !wrong.is_empty() {
+        return Err(RunError::Sample(wrong));
+    }
+    let mut warnings = warnings::of_scene(scene);
+    warnings.extend(shallow);
+    warnings.extend(warnings::of_walls(scene, &walls, Some(&grains)));
+    Ok(Placed { grains, walls, solid_fraction, warnings })
 }
 
 /// The world of a scene that goes on from what was saved of it.
@@ -69,38 +112,43 @@ fn grains<D: Dim>(scene: &Scene, watch: Watch) -> Result<(Grains<D>, Option<f64>
     let density = scene.materials.density * scene.thickness();
     let at_rest =
         |balls: Vec<Ball<D>>| balls.into_iter().map(|(x, r)| Grain::at_rest(x, r, density)).collect::<Grains<D>>();
-    let (mut grains, fraction) = match &scene.sample {
+    Ok(match &scene.sample {
         Sample::Random(random) => {
             let packing = prepare::pack::<D>(random, scene.seed, watch).map_err(preparation_error)?;
             (at_rest(packing.balls), Some(packing.solid_fraction))
         }
         Sample::Lattice(lattice) => (at_rest(prepare::lattice::<D>(lattice)), None),
-        Sample::File(file) => (at_rest(read_sample::<D>(&file.path)?), None),
+        Sample::File(file) => (at_rest(sample_file::read::<D>(&file.path)?), None),
         Sample::Grains(list) => (list.iter().map(|spec| listed(spec, scene)).collect(), None),
-    };
+    })
+}
+
+/// Hold the grains of `grains.fixed`; returns those that are not there.
+fn hold_fixed<D: Dim>(scene: &Scene, grains: &mut Grains<D>) -> Vec<String> {
+    let mut wrong = vec![];
     for &k in scene.grains.iter().flat_map(|g| &g.fixed) {
-        let count = grains.len();
-        *grains.fixed.get_mut(k).ok_or_else(|| missing_grain("grains.fixed", k, count))? = true;
-    }
-    for k in (0..grains.len()).filter(|k| grains.fixed[*k]).collect::<Vec<_>>() {
-        // held fixed: whatever velocity the list gives it
+        if k >= grains.len() {
+            wrong.push(missing_grain("grains.fixed", k, grains.len()));
+            continue;
+        }
+        grains.fixed[k] = true;
+        // whatever velocity the list gives it
         grains.velocity[k] = D::Vector::zero();
         grains.spin[k] = D::Spin::zero();
     }
-    refuse_overlapping(&grains)?;
-    Ok((grains, fraction))
+    wrong
 }
 
 fn preparation_error(error: PrepareError) -> RunError {
     match error {
         PrepareError::Interrupted => RunError::Interrupted("the sample was not packed"),
         PrepareError::Step(step) => RunError::NoConvergence(format!("the sample was not packed: {step}")),
-        other => RunError::Sample(other.to_string()),
+        other => RunError::Sample(vec![other.to_string()]),
     }
 }
 
-fn missing_grain(place: &str, grain: usize, count: usize) -> RunError {
-    RunError::Sample(format!("{place}: there is no grain {grain}; the sample has {count}, counted from 0"))
+fn missing_grain(place: &str, grain: usize, count: usize) -> String {
+    format!("{place}: there is no grain {grain}; the sample has {count}, counted from 0")
 }
 
 fn listed<D: Dim>(spec: &scene::GrainSpec, scene: &Scene) -> Grain<D> {
@@ -120,73 +168,63 @@ fn listed<D: Dim>(spec: &scene::GrainSpec, scene: &Scene) -> Grain<D> {
     grain
 }
 
-/// Overlap of two rigid grains, over the smaller radius, up to which it may be an error of where they came from.
-const DEEPEST: f64 = 0.1;
+/// Radii in another unit than the centres make everything overlap everything: more pairs than can be listed.
+fn refuse_other_units<D: Dim>(grains: &Grains<D>) -> Result<(), RunError> {
+    let (low, high) = grains.bounds();
+    let space: f64 = (high - low).as_slice().iter().product();
+    let solid: f64 = grains.radius.iter().map(|r| D::volume(*r)).sum();
+    // grains that overlap by no more than is allowed fill less than 1.4 times their box
+    if grains.len() < 1000 || solid <= 2.0 * space {
+        return Ok(());
+    }
+    Err(RunError::Sample(vec![format!(
+        "sample: the grains fill the box around them {} times: are their radii in the same unit as their centres?",
+        number(solid / space)
+    )]))
+}
 
+/// The pairs of grains that overlap too deeply, each told; and a word about those that overlap by more than decimals bring.
+///
 /// Two grains at one place have no normal between them, and rigid ones do not overlap.
-fn refuse_overlapping<D: Dim>(grains: &Grains<D>) -> Result<(), RunError> {
+fn overlapping<D: Dim>(grains: &Grains<D>) -> (Vec<String>, Option<String>) {
+    let (mut wrong, mut deep) = (vec![], 0);
+    let (mut shallow, mut deepest) = (0, ([0, 0], 0.0, 0.0));
     for [i, j] in pairs_within(grains, &grains.position, &vec![0.0; grains.len()]) {
         let apart = (grains.position[i as usize] - grains.position[j as usize]).norm();
         let smaller = grains.radius[i as usize].min(grains.radius[j as usize]);
-        if apart <= TOUCHING * smaller {
-            return Err(RunError::Sample(format!(
-                "sample: the centres of grains {i} and {j} coincide; move one of them"
-            )));
-        }
         let overlap = grains.radius[i as usize] + grains.radius[j as usize] - apart;
-        if overlap > DEEPEST * smaller {
-            return Err(RunError::Sample(format!(
-                "sample: grains {i} and {j} overlap by {overlap:.3e} m, more than a tenth of the smaller radius; rigid grains do \
-                 not: move one of them, or make it smaller"
-            )));
+        let coincide = apart <= TOUCHING * smaller;
+        if coincide || overlap > DEEPEST * smaller {
+            deep += 1;
+            if deep > MOST_TOLD {
+                continue;
+            }
+            wrong.push(if coincide {
+                format!("sample: the centres of grains {i} and {j} coincide; move one of them")
+            } else {
+                format!(
+                    "sample: grains {i} and {j} overlap by {overlap:.3e} m, more than a tenth of the smaller radius; rigid \
+                     grains do not: move one of them, or make it smaller"
+                )
+            });
+        } else if overlap > ROUNDED * smaller {
+            shallow += 1;
+            if overlap / smaller > deepest.2 {
+                deepest = ([i, j], overlap, overlap / smaller);
+            }
         }
     }
-    Ok(())
-}
-
-/// Grains from a CSV file with the header `x,y,radius` or `x,y,z,radius` (m).
-fn read_sample<D: Dim>(path: &Path) -> Result<Vec<Ball<D>>, RunError> {
-    let shown = path.display();
-    let header: &[&str] = if D::N == 2 { &["x", "y", "radius"] } else { &["x", "y", "z", "radius"] };
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .from_path(path)
-        .map_err(|e| RunError::InputOutput(format!("sample.file.path: {shown} cannot be read: {e}")))?;
-    let wrong = |line: u64, what: String| RunError::Sample(format!("{shown}, line {line}: {what}"));
-    let found = reader.headers().map_err(|e| wrong(1, e.to_string()))?.clone();
-    if found.iter().ne(header.iter().copied()) {
-        let found: Vec<_> = found.iter().collect();
-        return Err(wrong(1, format!("the header is {}, it must be {}", found.join(","), header.join(","))));
-    }
-    let mut balls = Vec::new();
-    for row in reader.records() {
-        let row = row.map_err(|e| wrong(e.position().map_or(0, csv::Position::line), e.to_string()))?;
-        let line = row.position().map_or(0, csv::Position::line);
-        let number = |(field, name): (&str, &&str)| match field.parse::<f64>() {
-            Ok(x) if x.is_finite() => Ok(x),
-            _ => Err(wrong(line, format!("{name} is {field:?}, it must be a finite number (m)"))),
-        };
-        let numbers: Vec<f64> = row.iter().zip(header).map(number).collect::<Result<_, _>>()?;
-        if numbers[D::N] <= 0.0 {
-            return Err(wrong(line, format!("radius is {}, it must be above zero", numbers[D::N])));
-        }
-        balls.push((D::Vector::from_slice(&numbers[..D::N]), numbers[D::N]));
-    }
-    if balls.is_empty() {
-        return Err(wrong(1, "there are no grains in the file".into()));
-    }
-    Ok(balls)
-}
-
-/// Write the grains as a CSV file that [`scene::SampleFile`] reads back bit for bit.
-pub fn write_sample<D: Dim>(grains: &Grains<D>, path: &Path) -> Result<(), csv::Error> {
-    let mut writer = csv::Writer::from_path(path)?;
-    writer.write_record(if D::N == 2 { &["x", "y", "radius"][..] } else { &["x", "y", "z", "radius"] })?;
-    for (x, r) in grains.position.iter().zip(&grains.radius) {
-        writer.write_record(x.as_slice().iter().chain([r]).map(f64::to_string))?;
-    }
-    writer.flush()?;
-    Ok(())
+    wrong.extend((deep > MOST_TOLD).then(|| format!("sample: {} more pairs of grains overlap", deep - MOST_TOLD)));
+    let ([i, j], overlap, share) = deepest;
+    let word = (shallow > 0).then(|| {
+        let pairs = if shallow == 1 { "one pair of grains overlaps".into() } else { format!("{shallow} pairs of grains overlap") };
+        format!(
+            "sample: {pairs}, most of all {i} and {j}, by {overlap:.3e} m ({} % of the smaller radius); rigid grains do not: \
+             such a pair is not pushed apart, its gap counts from there",
+            number(100.0 * share)
+        )
+    });
+    (wrong, word)
 }
 
 fn unit<D: Dim>(components: &[f64]) -> D::Vector {
@@ -198,7 +236,7 @@ fn schedule(function: scene::Function) -> Schedule {
     Arc::new(move |t| function.at(t))
 }
 
-fn walls<D: Dim>(scene: &Scene, grains: &Grains<D>) -> Vec<Wall<D>> {
+pub(crate) fn walls<D: Dim>(scene: &Scene, grains: &Grains<D>) -> Vec<Wall<D>> {
     scene.walls.values().map(|wall| build_wall(scene, wall, grains)).collect()
 }
 
@@ -263,8 +301,9 @@ fn seat<D: Dim>(shape: &scene::Shape, center: D::Vector, grains: &Grains<D>) -> 
     grains.position.iter().zip(&grains.radius).filter_map(touch).min_by(f64::total_cmp)
 }
 
-/// A round wall that is to touch the sample must find it.
-fn refuse_unseated<D: Dim>(scene: &Scene, grains: &Grains<D>) -> Result<(), RunError> {
+/// The round walls that are to touch the sample and do not find it.
+fn unseated<D: Dim>(scene: &Scene, grains: &Grains<D>) -> Vec<String> {
+    let mut wrong = vec![];
     for (name, wall) in &scene.walls {
         let (scene::Shape::Circle(scene::Circle { center, .. }) | scene::Shape::Sphere(scene::Sphere { center, .. })) =
             &wall.shape
@@ -272,27 +311,41 @@ fn refuse_unseated<D: Dim>(scene: &Scene, grains: &Grains<D>) -> Result<(), RunE
             continue;
         };
         if wall.shape.seat().is_some() && seat(&wall.shape, D::Vector::from_slice(center), grains).is_none() {
-            return Err(RunError::Sample(format!(
-                "walls.{name}: no grain is in the way of the wall that is to be seated; move its centre, or turn its direction"
-            )));
+            let (low, high) = grains.bounds();
+            let corner = |x: D::Vector| x.as_slice().iter().map(|x| number(*x)).collect::<Vec<_>>().join(", ");
+            wrong.push(format!(
+                "walls.{name}: no grain is in the way of the wall that is to be seated; move its centre, or turn its direction: \
+                 the sample reaches from ({}) to ({}) m",
+                corner(low),
+                corner(high)
+            ));
         }
     }
-    Ok(())
+    wrong
 }
 
-fn refuse_overlaps<D: Dim>(scene: &Scene, walls: &[Wall<D>], grains: &Grains<D>) -> Result<(), RunError> {
+/// The walls that grains reach into, each with the grain that is deepest in it.
+fn buried<D: Dim>(scene: &Scene, walls: &[Wall<D>], grains: &Grains<D>) -> Vec<String> {
+    let mut wrong = vec![];
     for (name, wall) in scene.walls.keys().zip(walls) {
-        for (k, (x, r)) in grains.position.iter().zip(&grains.radius).enumerate() {
-            let gap = wall.shape.gap(*x - wall.position, *r).0;
-            if gap < -TOUCHING * r {
-                return Err(RunError::Sample(format!(
-                    "walls.{name}: the wall overlaps grain {k} by {:.3e} m; move the wall, or give a plane \"place\": \"seated\"",
-                    -gap
-                )));
+        let gaps = grains.position.iter().zip(&grains.radius).map(|(x, r)| wall.shape.gap(*x - wall.position, *r).0);
+        let within = gaps.enumerate().filter(|(k, gap)| *gap < -TOUCHING * grains.radius[*k]);
+        let (mut count, mut deepest) = (0, (0, 0.0));
+        for (k, gap) in within {
+            count += 1;
+            if gap < deepest.1 {
+                deepest = (k, gap);
             }
         }
+        if count > 0 {
+            let more = if count > 1 { format!(" and {} more", count - 1) } else { String::new() };
+            wrong.push(format!(
+                "walls.{name}: the wall overlaps grain {} by {:.3e} m{more}; move the wall, or give a plane \"place\": \"seated\"",
+                deepest.0, -deepest.1
+            ));
+        }
     }
-    Ok(())
+    wrong
 }
 
 fn loads<D: Dim>(scene: &Scene) -> Vec<Load<D>> {

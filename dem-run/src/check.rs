@@ -1,14 +1,21 @@
-//! What a run of a scene will be: grains, walls, steps, frames and the size of its history, without
-//! preparing the sample.
+//! What a run of a scene will be: grains and their sizes, walls and their drives, steps, frames, the size of its history and
+//! the memory that it takes. The sample is put in its place with the code of a run, but for a random one, which is not packed.
 
 use std::fmt;
 use std::path::Path;
 
+use dem_core::body::Grains;
+use dem_core::dim::{D2, D3, Dim, Vect};
 use serde::Serialize;
 
+use crate::build::{Placed, place, walls};
+use crate::memory;
 use crate::output::number;
+use crate::prepare;
 use crate::run::RunError;
-use crate::scene::{Drive, Lattice, Precision, Sample, Scene, Shape};
+use crate::sample_file;
+use crate::scene::{Drive, Function, Lattice, Precision, Ramp, RandomSample, Sample, Scene, Shape};
+use crate::warnings;
 
 /// What a run of a scene will be.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -22,6 +29,9 @@ pub struct Check {
     pub grains: usize,
     /// Where they come from.
     pub sample: &'static str,
+    /// Sizes of the grains and of the sample; none where there is not enough memory for them.
+    #[serde(flatten)]
+    pub sizes: Option<Sizes>,
     /// Whether there are bonds.
     pub bonds: bool,
     /// The walls.
@@ -32,14 +42,35 @@ pub struct Check {
     pub step: f64,
     /// End of the run (s).
     pub end: f64,
+    /// End of the last step (s).
+    pub last_step_ends: f64,
     /// Number of frames to the end.
     pub frames: u64,
     /// Number of steps from frame to frame.
     pub steps_per_frame: u64,
+    /// Memory that a run takes, roughly (bytes).
+    pub memory_bytes: u64,
+    /// Memory that is free (bytes), if known.
+    pub free_memory_bytes: Option<u64>,
     /// Size of the history, roughly (bytes).
     pub file_bytes: u64,
     /// Free space where the history would stand by default (bytes), if known.
     pub free_bytes: Option<u64>,
+    /// What the scene may not mean as it says it, and what the machine may not have.
+    pub warnings: Vec<String>,
+}
+
+/// Sizes of the grains and of the sample.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Sizes {
+    /// Smallest, mean and largest diameter of the grains (m).
+    pub diameters: [f64; 3],
+    /// Lowest corner of the box around the sample (m).
+    pub box_from: Vec<f64>,
+    /// Highest corner of the box around the sample (m): of a random one at the solid fraction that it asks for, before a cut.
+    pub box_to: Vec<f64>,
+    /// Mass of all grains (kg).
+    pub mass: f64,
 }
 
 /// A wall.
@@ -51,44 +82,61 @@ pub struct CheckedWall {
     pub shape: &'static str,
     /// How it is driven.
     pub drive: &'static str,
+    /// Force or velocity over time, of a wall that is driven.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub course: Option<String>,
 }
 
 impl Check {
     /// What a run of `scene` will be, its history in the current folder.
     ///
     /// # Errors
-    /// [`RunError::InputOutput`]: a sample file that cannot be read.
+    /// As the run would end before its first step, for a sample that is not random: [`RunError::InputOutput`],
+    /// [`RunError::Sample`].
     pub fn new(scene: &Scene) -> Result<Self, RunError> {
-        let grains = match &scene.sample {
-            Sample::File(file) => count_rows(&file.path)?,
-            // before the cut
-            Sample::Random(random) => random.count,
-            sample => sample.count().unwrap_or_default(),
+        let grains = count(scene)?;
+        let (memory_bytes, free_memory_bytes) = (memory::expected(scene, grains), memory::free());
+        let enough = free_memory_bytes.is_none_or(|free| memory_bytes <= free);
+        let (sizes, warnings) = match scene.dimension {
+            2 => look::<D2>(scene, enough)?,
+            _ => look::<D3>(scene, enough)?,
         };
-        let walls = scene.walls.iter().map(|(name, wall)| CheckedWall {
-            name: name.clone(),
-            shape: shape_name(&wall.shape),
-            drive: match wall.drive() {
-                Drive::Fixed => "fixed",
-                Drive::Velocity(_) => "velocity",
-                Drive::Force(_) => "force",
-            },
+        let end = scene.time.end;
+        let walls = scene.walls.iter().map(|(name, wall)| {
+            let (drive, course) = match wall.drive() {
+                Drive::Fixed => ("fixed", None),
+                Drive::Velocity(velocity) => ("velocity", Some(over_time(&velocity, "m/s", end))),
+                Drive::Force(force) => ("force", Some(over_time(&force, "N", end))),
+            };
+            CheckedWall { name: name.clone(), shape: shape_name(&wall.shape), drive, course }
         });
-        Ok(Self {
+        let mut check = Self {
             title: scene.title.clone(),
             dimension: scene.dimension,
             grains,
             sample: sample_name(&scene.sample),
+            sizes,
             bonds: has_bonds(scene),
             walls: walls.collect(),
             steps: scene.time.steps(),
             step: scene.time.step,
-            end: scene.time.end,
+            end,
+            last_step_ends: scene.time.last(),
             frames: scene.frames(),
             steps_per_frame: scene.steps_per_frame(),
+            memory_bytes,
+            free_memory_bytes,
             file_bytes: expected_bytes(scene, grains),
             free_bytes: free_space(Path::new(".")),
-        })
+            warnings,
+        };
+        if !enough {
+            check.warnings.push("the run needs more memory than is free: take fewer grains, or another machine".into());
+        }
+        if check.disk_is_too_small() {
+            check.warnings.push("the history will not fit on the disk of the current folder".into());
+        }
+        Ok(check)
     }
 
     /// Whether the history will not fit.
@@ -105,17 +153,94 @@ impl fmt::Display for Check {
         }
         writeln!(f, "dimension  {}", self.dimension)?;
         writeln!(f, "grains     {} ({})", self.grains, self.sample)?;
+        if let Some(Sizes { diameters: [min, mean, max], box_from, box_to, mass }) = &self.sizes {
+            writeln!(f, "diameters  {} to {} m, mean {} m", number(*min), number(*max), number(*mean))?;
+            let sides: Vec<String> = box_from.iter().zip(box_to).map(|(from, to)| number(to - from)).collect();
+            let corner: Vec<String> = box_from.iter().map(|x| number(*x)).collect();
+            writeln!(f, "box        {} m, from ({}) m", sides.join(" × "), corner.join(", "))?;
+            writeln!(f, "mass       {} kg", number(*mass))?;
+        }
         writeln!(f, "bonds      {}", if self.bonds { "yes" } else { "none" })?;
         let walls: Vec<String> =
             self.walls.iter().map(|wall| format!("{} ({}, {})", wall.name, wall.shape, wall.drive)).collect();
         writeln!(f, "walls      {}", if walls.is_empty() { "none".to_string() } else { walls.join(", ") })?;
-        let last = self.steps as f64 * self.step;
-        let beyond =
-            if last > self.end * (1.0 + 1e-9) { format!("; the last ends at {}", number(last)) } else { String::new() };
-        writeln!(f, "steps      {} of {} s, to {} s{beyond}", self.steps, self.step, self.end)?;
+        for (wall, course) in self.walls.iter().filter_map(|wall| Some((wall, wall.course.as_ref()?))) {
+            writeln!(f, "drive      {}: {} {course}", wall.name, wall.drive)?;
+        }
+        let (step, end, last) = (self.step, self.end, number(self.last_step_ends));
+        let early = if (self.last_step_ends - end).abs() > 1e-9 * end {
+            format!("; the last ends at {last}")
+        } else {
+            String::new()
+        };
+        writeln!(f, "steps      {} of {step} s, to {end} s{early}", self.steps)?;
         writeln!(f, "frames     {}, one every {} steps", self.frames, self.steps_per_frame)?;
+        let known = |free: Option<u64>| free.map_or("unknown".to_string(), size);
+        writeln!(f, "memory     about {}; free {}", size(self.memory_bytes), known(self.free_memory_bytes))?;
         writeln!(f, "file       about {}", size(self.file_bytes))?;
-        write!(f, "free disk  {}", self.free_bytes.map_or("unknown".to_string(), size))
+        write!(f, "free disk  {}", known(self.free_bytes))
+    }
+}
+
+/// Number of grains of a scene, before a cut.
+///
+/// # Errors
+/// [`RunError::InputOutput`]: a sample file that cannot be read.
+pub(crate) fn count(scene: &Scene) -> Result<usize, RunError> {
+    match &scene.sample {
+        Sample::File(file) => sample_file::count(&file.path),
+        Sample::Random(random) => Ok(random.count),
+        sample => Ok(sample.count().unwrap_or_default()),
+    }
+}
+
+/// The sizes of a scene, and what it may not mean as it says it.
+fn look<D: Dim>(scene: &Scene, enough_memory: bool) -> Result<(Option<Sizes>, Vec<String>), RunError> {
+    let sizes = match &scene.sample {
+        Sample::Random(random) if enough_memory => Some(random_sizes::<D>(scene, random)),
+        _ if enough_memory => {
+            let Placed { grains, warnings, .. } = place::<D>(scene, &mut |_| true)?;
+            let (low, high) = grains.bounds();
+            let corners = [low, high].map(|x| x.as_slice().to_vec());
+            return Ok((Some(Sizes::of(&grains.radius, corners, grains.mass.iter().sum())), warnings));
+        }
+        _ => None,
+    };
+    let nowhere = Grains::<D>::from_iter([]);
+    let mut told = warnings::of_scene(scene);
+    told.extend(warnings::of_walls(scene, &walls(scene, &nowhere), None));
+    Ok((sizes, told))
+}
+
+fn random_sizes<D: Dim>(scene: &Scene, random: &RandomSample) -> Sizes {
+    let radii = prepare::radii(random, scene.seed);
+    let corners = [vec![0.0; D::N], prepare::sides::<D>(random, &radii)];
+    let volume: f64 = radii.iter().map(|r| D::volume(*r)).sum();
+    Sizes::of(&radii, corners, volume * scene.materials.density * scene.thickness())
+}
+
+impl Sizes {
+    fn of(radii: &[f64], [box_from, box_to]: [Vec<f64>; 2], mass: f64) -> Self {
+        let (low, high) = radii.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), r| (low.min(*r), high.max(*r)));
+        let mean = radii.iter().sum::<f64>() / radii.len() as f64;
+        Self { diameters: [low, mean, high].map(|r| 2.0 * r), box_from, box_to, mass }
+    }
+}
+
+/// A function of time in words.
+fn over_time(function: &Function, unit: &str, end: f64) -> String {
+    let last = || format!("{} {unit} at {end} s", number(function.at(end)));
+    match function {
+        Function::Constant(value) => format!("{} {unit} at all times", number(*value)),
+        Function::Ramp(Ramp { rate, start }) => {
+            let until = if *start > 0.0 { format!("until {start} s, then ") } else { String::new() };
+            format!("0 {unit} {until}growing by {} {unit} a second: {}", number(*rate), last())
+        }
+        Function::Table(rows) => {
+            let values = rows.iter().map(|row| row[1]);
+            let (low, high) = values.fold((f64::MAX, f64::MIN), |(low, high), value| (low.min(value), high.max(value)));
+            format!("from {} to {} {unit}, by a table of {} rows: {}", number(low), number(high), rows.len(), last())
+        }
     }
 }
 
@@ -144,19 +269,6 @@ fn has_bonds(scene: &Scene) -> bool {
     scene.bonds.as_ref().is_some_and(|bonds| bonds.cohesion(scene.dimension, 1.0, 1.0) > 0.0)
 }
 
-/// Number of grains in a sample file: its lines after the header.
-fn count_rows(path: &Path) -> Result<usize, RunError> {
-    let unreadable = |error| RunError::InputOutput(format!("{}: the sample cannot be read: {error}", path.display()));
-    let mut reader =
-        csv::ReaderBuilder::new().comment(Some(b'#')).flexible(true).from_path(path).map_err(unreadable)?;
-    let mut count = 0;
-    let mut record = csv::ByteRecord::new();
-    while reader.read_byte_record(&mut record).map_err(unreadable)? {
-        count += 1;
-    }
-    Ok(count)
-}
-
 /// Size of the history of `grains` grains (bytes): the layout of `dem_run::history` row by row, with
 /// a typical number of contacts. Compare with a real file before relying on it to better than a half.
 fn expected_bytes(scene: &Scene, grains: usize) -> u64 {
@@ -167,12 +279,7 @@ fn expected_bytes(scene: &Scene, grains: usize) -> u64 {
     const FIXED: f64 = 512e3;
     let real = if scene.output.precision == Precision::Single { 4.0 } else { NUMBER };
     let (d, spins, angles, tangents) = if scene.dimension == 2 { (2.0, 1.0, 1.0, 0.0) } else { (3.0, 3.0, 4.0, 3.0) };
-    let contacts_per_grain = match scene.sample {
-        Sample::Lattice(Lattice::Square { .. }) => 2.0,
-        _ if scene.dimension == 2 => 2.2,
-        _ => 3.5,
-    };
-    let contacts = contacts_per_grain * grains as f64;
+    let contacts = memory::contacts_per_grain(scene) * grains as f64;
     let bonds = if has_bonds(scene) { contacts } else { 0.0 };
     // position, velocity, angular velocity, angle
     let grain_rows = grains as f64 * real * (2.0 * d + spins + angles);
@@ -207,11 +314,11 @@ pub(crate) fn size(bytes: u64) -> String {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::scene::load;
 
-    fn config(name: &str, sets: &[&str]) -> Scene {
+    pub(crate) fn config(name: &str, sets: &[&str]) -> Scene {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs").join(name);
         let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
         load(&path, &sets).unwrap_or_else(|error| panic!("{error}"))
@@ -221,7 +328,8 @@ mod tests {
     fn the_compression_run_is_told() {
         let check = Check::new(&config("compression.json", &[])).expect("check");
         assert_eq!((check.grains, check.steps, check.frames, check.bonds), (430, 5000, 501, true));
-        let top = CheckedWall { name: "top".into(), shape: "plane", drive: "force" };
+        let course = "0 N growing by 200 N a second: 100 N at 0.5 s".to_string();
+        let top = CheckedWall { name: "top".into(), shape: "plane", drive: "force", course: Some(course) };
         assert_eq!(check.walls[1], top);
         // 501 frames of 430 grains and about 950 contacts
         assert!((30e6..90e6).contains(&(check.file_bytes as f64)), "{}", check.file_bytes);
@@ -245,18 +353,54 @@ mod tests {
         assert!(Check { free_bytes: Some(10), ..check }.disk_is_too_small());
     }
 
-    #[test]
-    fn the_grains_of_a_sample_file_are_counted() {
+    fn with_sample(table: &str) -> Result<Check, RunError> {
         let folder = tempfile::tempdir().expect("folder");
         let path = folder.path().join("sample.csv");
+        if !table.is_empty() {
+            std::fs::write(&path, table).expect("write");
+        }
         let mut scene = config("column.json", &["sample={\"file\": {\"path\": \"sample.csv\"}}"]);
         let Sample::File(file) = &mut scene.sample else { panic!("not a file") };
-        file.path = path.clone();
-        let missing = Check::new(&scene).expect_err("no file");
+        file.path = path;
+        Check::new(&scene)
+    }
+
+    #[test]
+    fn the_grains_of_a_sample_file_are_measured() {
+        let missing = with_sample("").expect_err("no file");
         assert_eq!(missing.exit_code(), 4);
         assert!(missing.to_string().contains("sample.csv"), "{missing}");
-        std::fs::write(&path, "x,y,radius\n# two grains\n0,0,1\n2,0,1\n").expect("write");
-        assert_eq!(Check::new(&scene).expect("check").grains, 2);
+        let check = with_sample("x,y,radius\n# two grains\n0,1,1\n2.5,1,0.5\n").expect("check");
+        let sizes = check.sizes.clone().expect("sizes");
+        assert_eq!((check.grains, sizes.diameters), (2, [1.0, 1.5, 2.0]));
+        assert_eq!((sizes.box_from, sizes.box_to), (vec![-1.0, 0.0], vec![3.0, 2.0]));
+        let text = check.to_string();
+        for part in ["diameters  1 to 2 m, mean 1.5 m", "box        4 × 2 m, from (-1, 0) m", "mass       "] {
+            assert!(text.contains(part), "{part} in\n{text}");
+        }
+    }
+
+    #[test]
+    fn what_a_run_would_refuse_is_told_at_once() {
+        for (table, parts) in [
+            ("x,y,radius\n0,1,nan\n0,3,-1\n", &["line 2: radius is", "line 3: radius is -1"][..]),
+            ("x;y;radius\n0;0;1\n", &["line 1: the header is x;y;radius", "between commas"]),
+            ("x,y,radius\n", &["there are no grains"]),
+            (
+                "x,y,radius\n0,1,1\n1,1,1\n5,1,1\n5,2,1\n",
+                &["grains 0 and 1 overlap by 1", "grains 2 and 3 overlap by 1"],
+            ),
+            // a wall that stands in the sample as well
+            ("x,y,radius\n0,1,1\n1,1,1\n0,9,1\n", &["grains 0 and 1 overlap"]),
+        ] {
+            let error = with_sample(table).expect_err(table);
+            assert_eq!(error.exit_code(), 2);
+            for part in parts {
+                assert!(error.to_string().contains(part), "{part} in\n{error}");
+            }
+        }
+        let shallow = with_sample("x,y,radius\n0,1,1\n1.98,1,1\n").expect("a little overlap").warnings;
+        assert!(shallow[0].contains("one pair of grains overlaps, most of all 0 and 1, by 2.000e-2 m"), "{shallow:?}");
     }
 
     #[test]

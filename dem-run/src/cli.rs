@@ -13,7 +13,7 @@ use crate::accuracy::{self, AccuracyOptions};
 use crate::check::Check;
 use crate::export::{self, ExportOptions};
 use crate::history::refuse_busy;
-use crate::output::{default_folder, print_json, print_result};
+use crate::output::{default_folder, escaped, print_json, print_result};
 use crate::progress::ProgressMode;
 use crate::resume::{self, ResumeOptions};
 use crate::run::{self, Execution, RunError, RunOptions};
@@ -44,7 +44,7 @@ enum Command {
     /// Go on with a run that was interrupted or killed, or that is to end later, from its history.
     #[command(after_help = RESUME_EXAMPLE)]
     Resume(ResumeArgs),
-    /// Check a scene without running it; tell grains, walls, steps, frames and disk space.
+    /// Check a scene without running it; tell grains and their sizes, walls, steps, frames, memory and disk space.
     #[command(after_help = CHECK_EXAMPLE)]
     Check(CheckArgs),
     /// Write the contact problem of one step of a history in FCLIB's format, to be solved by other programs too.
@@ -87,7 +87,10 @@ Example:
 
 const CHECK_EXAMPLE: &str = "\
 All values out of range are told at once, each with its place, what stood there and what is allowed; wrong syntax, names and
-types before them, one at a time.
+types before them, one at a time. A sample file is read as a run reads it, and grains and walls are put in their places; a
+random sample is not packed. What the scene may not mean as it says it is a warning on stderr, in a run too.
+
+A scene is a regular file of at most 256 MiB; a sample file has at most 100,000,000 grains, in lines of at most 4096 bytes.
 
 Example:
   dem-run check configs/compression.json --set time.step=5e-5";
@@ -192,6 +195,9 @@ struct RunArgs {
     /// Write the prepared sample, to be read back as a sample file.
     #[arg(long, value_name = "FILE.csv")]
     write_sample: Option<PathBuf>,
+    /// Run the scene even though it needs more memory than is free.
+    #[arg(long)]
+    ignore_memory: bool,
     /// End when the process that started this one ends: a sweep that is killed takes its runs along.
     #[arg(long, hide = true)]
     end_with_parent: bool,
@@ -349,10 +355,22 @@ fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
+/// The arguments, or what is wrong with them, without the control characters that they may hold.
+fn arguments() -> Cli {
+    Cli::try_parse().unwrap_or_else(|error| {
+        let controls = |argument: std::ffi::OsString| argument.to_string_lossy().contains(char::is_control);
+        if !error.use_stderr() || !std::env::args_os().any(controls) {
+            error.exit()
+        }
+        let _ = write!(std::io::stderr(), "{}", escaped(&error.render().to_string()));
+        std::process::exit(error.exit_code())
+    })
+}
+
 /// The command: reads the arguments, runs, and gives the exit code.
 #[must_use]
 pub fn main() -> ExitCode {
-    let result = match Cli::parse().command {
+    let result = match arguments().command {
         Command::Run(args) => run(args),
         Command::Resume(args) => resume(args),
         Command::Check(args) => check(&args),
@@ -369,7 +387,7 @@ pub fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             // with stderr closed there is nobody to tell
-            let _ = writeln!(std::io::stderr(), "error: {error}");
+            let _ = writeln!(std::io::stderr(), "error: {}", escaped(&error.to_string()));
             ExitCode::from(error.exit_code())
         }
     }
@@ -398,6 +416,7 @@ fn run(args: RunArgs) -> Result<(), RunError> {
         execution: args.manner.execution.into(),
         json: args.json,
         write_sample: args.write_sample,
+        ignore_memory: args.ignore_memory,
     };
     apart(&args.scene.scene, &scene, &options)?;
     writable(&options.output, "-o FILE.h5", options.overwrite)?;
@@ -431,9 +450,16 @@ fn check(args: &CheckArgs) -> Result<(), RunError> {
         }
         result => result?,
     };
-    let check = Check::new(&scene)?;
-    if check.disk_is_too_small() {
-        let _ = writeln!(std::io::stderr(), "warning: the history will not fit on the disk of the current folder");
+    let check = match Check::new(&scene) {
+        Err(RunError::Sample(lines)) if args.json => {
+            let problems: Vec<_> = lines.iter().map(|line| serde_json::json!({ "message": line })).collect();
+            print_json(&serde_json::json!({ "problems": problems }))?;
+            return Err(RunError::Sample(lines));
+        }
+        result => result?,
+    };
+    for warning in &check.warnings {
+        let _ = writeln!(std::io::stderr(), "warning: {warning}");
     }
     Ok(print_result(&check, args.json)?)
 }
@@ -514,8 +540,10 @@ fn sweep(args: SweepArgs) -> Result<(), RunError> {
         None => Mode::All,
     };
     let ShowArgs { progress, quiet } = args.show;
+    let folder = args.output.unwrap_or_else(|| default_folder(&args.sweep, "-sweep"));
+    unicode(&folder, "-o DIR")?;
     sweep::sweep(&SweepOptions {
-        folder: args.output.unwrap_or_else(|| default_folder(&args.sweep, "-sweep")),
+        folder,
         sweep: args.sweep,
         mode,
         jobs: args.jobs.map(usize::from),
@@ -554,9 +582,18 @@ fn apart(path: &Path, scene: &Scene, options: &RunOptions) -> Result<(), RunErro
     Ok(())
 }
 
+/// Refuses a name that the HDF5 library and `dem-post` cannot open again.
+fn unicode(path: &Path, option: &str) -> Result<(), RunError> {
+    if path.to_str().is_some() {
+        return Ok(());
+    }
+    Err(RunError::Usage(format!("{} is not UTF-8: name another with {option}", path.display())))
+}
+
 /// Refuses, before any work is done, a file that exists or is being written, or whose folder is not there or takes no files.
 fn writable(path: &Path, option: &str, overwrite: bool) -> Result<(), RunError> {
     let shown = path.display();
+    unicode(path, option)?;
     if path.is_dir() {
         return Err(RunError::InputOutput(format!("{shown} is a folder: name a file with {option}")));
     }

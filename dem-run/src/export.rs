@@ -10,7 +10,7 @@ use dem_core::solver::SolveStatus;
 use crate::build::build;
 use crate::fclib::Problem;
 use crate::history::History;
-use crate::output::print_line;
+use crate::output::{escaped, print_line};
 use crate::progress::StepProgress;
 use crate::run::{Execution, RunError, handle_signals};
 use crate::scene::{self, Scene};
@@ -50,7 +50,7 @@ pub fn export(options: &ExportOptions) -> Result<(), RunError> {
     let (version, revision) = (env!("CARGO_PKG_VERSION"), option_env!("DEM_GIT_REVISION").unwrap_or_default());
     if !options.execution.quiet && (parameters.version != version || parameters.git_revision != revision) {
         let note = "it was written by another version of the program: the states of this run may differ from it";
-        let _ = writeln!(std::io::stderr(), "note: {shown}: {note}");
+        let _ = writeln!(std::io::stderr(), "{}", escaped(&format!("note: {shown}: {note}")));
     }
     match scene.dimension {
         2 => export_in::<D2>(&scene, options, &interrupt),

@@ -1,5 +1,6 @@
 //! Where results go: tables on stdout, files in one folder.
 
+use std::borrow::Cow;
 use std::fmt::Display;
 use std::fs;
 use std::io::{ErrorKind, Write};
@@ -7,7 +8,10 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use crate::owner::Owner;
+pub use crate::owner::Source;
 use crate::plot::Drawing;
+use crate::replace::{self, remove_orphans, replace};
 
 /// A result that cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -22,10 +26,11 @@ pub struct WriteError {
 /// Whether something was written.
 pub type Result<T> = std::result::Result<T, WriteError>;
 
-/// The folder that takes the files of a command, and what has been written there.
+/// The folder that takes the files of a command, and what has been written there. Every file comes into its place whole.
 pub struct Folder {
     path: PathBuf,
     written: Vec<PathBuf>,
+    owner: Option<Owner>,
 }
 
 impl Folder {
@@ -35,7 +40,34 @@ impl Folder {
     /// [`WriteError`].
     pub fn create(path: PathBuf) -> Result<Self> {
         fs::create_dir_all(&path).map_err(|error| WriteError { path: path.clone(), why: error.to_string() })?;
-        Ok(Self { path, written: vec![] })
+        remove_orphans(&path, None);
+        Ok(Self { path, written: vec![], owner: None })
+    }
+
+    /// As [`Folder::create`], for what `command` makes of `sources`: the folder takes results of no others, and a record
+    /// in it says which files are theirs. With `force` the folder is taken over, and what others wrote is removed.
+    ///
+    /// # Errors
+    /// [`WriteError`], also where the folder belongs to others, and later for a file that is in no record.
+    pub fn of(path: PathBuf, command: &str, sources: Vec<Source>, force: bool) -> Result<Self> {
+        let mut folder = Self::create(path)?;
+        let owner = Owner::claim(&folder.path, command, sources, force);
+        folder.owner = Some(owner.map_err(|why| WriteError { path: folder.path.clone(), why })?);
+        Ok(folder)
+    }
+
+    /// Files of others that were removed when the folder was taken over.
+    pub fn removed(&self) -> usize {
+        self.owner.as_ref().map_or(0, Owner::removed)
+    }
+
+    /// Removes what an earlier call of the command wrote and this one did not: the last thing to do.
+    ///
+    /// # Errors
+    /// [`WriteError`].
+    pub fn finish(&self) -> Result<()> {
+        let finished = self.owner.as_ref().map_or(Ok(()), |owner| owner.finish(&self.written));
+        finished.map_err(|why| WriteError { path: self.path.clone(), why })
     }
 
     /// The files written so far.
@@ -48,11 +80,20 @@ impl Folder {
         &self.path
     }
 
-    /// The path of a file that another library writes; it counts as written.
-    pub fn place(&mut self, name: &str) -> PathBuf {
-        let path = self.path.join(name);
-        self.written.push(path.clone());
-        path
+    /// A file by `make`, which is given the name under which it is made, beside its place.
+    ///
+    /// # Errors
+    /// [`WriteError`], and those of `make`; what stood in its place then stands.
+    pub fn make<T, E: From<WriteError>>(
+        &mut self,
+        name: &str,
+        make: impl FnOnce(&Path) -> std::result::Result<T, E>,
+    ) -> std::result::Result<T, E> {
+        let path = self.place(name)?;
+        let failed = |_, error: std::io::Error| WriteError { path: path.clone(), why: error.to_string() }.into();
+        let made = replace(&path, failed, make)?;
+        self.written.push(path);
+        Ok(made)
     }
 
     /// Writes a file.
@@ -60,10 +101,28 @@ impl Folder {
     /// # Errors
     /// [`WriteError`].
     pub fn write(&mut self, name: &str, content: &[u8]) -> Result<()> {
-        let path = self.path.join(name);
-        fs::write(&path, content).map_err(|error| WriteError { path: path.clone(), why: error.to_string() })?;
+        let path = self.place(name)?;
+        replace::write(&path, content).map_err(|error| WriteError { path: path.clone(), why: error.to_string() })?;
         self.written.push(path);
         Ok(())
+    }
+
+    /// Puts down the names of many files that will be written: one by one each would write the record anew.
+    ///
+    /// # Errors
+    /// [`WriteError`].
+    pub fn announce(&self, names: &[String]) -> Result<()> {
+        let registered = self.owner.as_ref().map_or(Ok(()), |owner| owner.register(names));
+        registered.map_err(|(name, why)| {
+            let path = name.map_or_else(|| self.path.clone(), |name| self.path.join(name));
+            WriteError { path, why }
+        })
+    }
+
+    /// The path of a file that may be written.
+    fn place(&self, name: &str) -> Result<PathBuf> {
+        self.announce(&[name.to_string()])?;
+        Ok(self.path.join(name))
     }
 
     /// Writes `NAME.svg` and `NAME.png`.
@@ -160,12 +219,23 @@ pub fn facts(facts: &[(&str, String)]) -> String {
     facts.iter().map(|(name, value)| format!("{name:<width$}  {value}\n")).collect()
 }
 
-/// Prints results on stdout. A reader that closes the pipe early is no error.
+/// A text in which a terminal obeys nothing but the ends of lines: other control characters are written as JSON escapes
+/// them, as in `\u001b`. In JSON they stand only within texts, so its meaning stays.
+#[must_use]
+pub fn escaped(text: &str) -> Cow<'_, str> {
+    let raw = |c: char| c.is_control() && c != '\n';
+    if !text.contains(raw) {
+        return text.into();
+    }
+    text.chars().map(|c| if raw(c) { format!("\\u{:04x}", u32::from(c)) } else { c.into() }).collect()
+}
+
+/// Prints results on stdout, [`escaped`]. A reader that closes the pipe early is no error.
 ///
 /// # Errors
 /// [`WriteError`].
 pub fn print(text: &str) -> Result<()> {
-    match std::io::stdout().lock().write_all(text.as_bytes()) {
+    match std::io::stdout().lock().write_all(escaped(text).as_bytes()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => {
             Err(WriteError { path: "standard output".into(), why: error.to_string() })
         }
@@ -251,6 +321,13 @@ mod tests {
         ] {
             assert_eq!(number(value), text);
         }
+    }
+
+    #[test]
+    fn control_characters_are_escaped() {
+        assert_eq!(escaped("\u{1b}[31mred\u{7}\r\nµ\t\u{9b}"), "\\u001b[31mred\\u0007\\u000d\nµ\\u0009\\u009b");
+        let json = format!("{:#}", serde_json::json!({ "wall": "\u{1b}\u{9b}2J" }));
+        assert_eq!(serde_json::from_str::<serde_json::Value>(&escaped(&json)).unwrap()["wall"], "\u{1b}\u{9b}2J");
     }
 
     #[test]

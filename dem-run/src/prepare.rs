@@ -212,6 +212,29 @@ fn unit<D: Dim>(axis: usize, length: f64) -> D::Vector {
     e
 }
 
+/// Radii of the grains of a random sample (m), before they are packed.
+pub(crate) fn radii(sample: &RandomSample, seed: u64) -> Vec<f64> {
+    draw_radii(&sample.diameter, sample.count, &mut Pcg64::seed_from_u64(seed))
+}
+
+/// Sides of the box of a random sample (m), as high as it is at the solid fraction that the sample asks for.
+pub(crate) fn sides<D: Dim>(sample: &RandomSample, radii: &[f64]) -> Vec<f64> {
+    let container = Container::of(sample);
+    let volume: f64 = radii.iter().map(|r| D::volume(*r)).sum();
+    let (fraction, _) = wanted(sample);
+    let mut sides = container.sides[..D::N - 1].to_vec();
+    sides.push(volume / (fraction * container.floor::<D>()));
+    sides
+}
+
+/// The solid fraction that a sample asks for (–), and whether a lid presses it together.
+fn wanted(sample: &RandomSample) -> (f64, bool) {
+    match &sample.preparation {
+        Preparation::Compaction(c) => (c.solid_fraction, true),
+        Preparation::Deposition(d) => (d.solid_fraction, false),
+    }
+}
+
 /// A random packing.
 pub fn pack<D: Dim>(sample: &RandomSample, seed: u64, watch: Watch) -> Result<Packing<D>, PrepareError> {
     let mut rng = Pcg64::seed_from_u64(seed);
@@ -223,10 +246,7 @@ pub fn pack<D: Dim>(sample: &RandomSample, seed: u64, watch: Watch) -> Result<Pa
             return Err(PrepareError::TooNarrow { width: *side, diameter: largest });
         }
     }
-    let (wanted, from_top) = match &sample.preparation {
-        Preparation::Compaction(c) => (c.solid_fraction, true),
-        Preparation::Deposition(d) => (d.solid_fraction, false),
-    };
+    let (wanted, from_top) = wanted(sample);
     let mut reached = 0.0;
     for attempt in 0..MOST_PACKINGS {
         radii.shuffle(&mut rng);

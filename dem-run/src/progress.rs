@@ -6,6 +6,8 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 
+use crate::output::escaped;
+
 /// How progress is shown.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum ProgressMode {
@@ -292,7 +294,7 @@ fn bar() -> ProgressBar {
 
 /// A closed stderr does not stop a run, so what cannot be written is lost.
 fn line(out: &mut dyn Write, text: &str) {
-    let _ = writeln!(out, "{text}");
+    let _ = writeln!(out, "{}", escaped(text));
 }
 
 fn json_line(out: &mut dyn Write, event: &Event<'_>) {

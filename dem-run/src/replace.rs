@@ -1,29 +1,86 @@
-//! Files that come into their place whole: made beside it under another name, then moved there.
+//! Files that come into their place whole: made beside it under another name, then moved there. A reader, or a crash of
+//! the system, finds the old content or the new one.
 
+use std::ffi::OsStr;
+use std::fs::{self, File};
 use std::io::{Error, ErrorKind, Result};
 use std::path::{Path, PathBuf};
 
-/// Makes a file by `make`, which is given the name of an empty file beside `path`, and moves it to `path`. Where that
-/// fails, nothing is left behind and what stood at `path` stands. `failed` tells of what the operating system refused,
-/// as in "create".
+/// Makes a file by `make`, which is given the name of an empty file beside `path`, and moves it to `path` once its content
+/// is on the disk. Where that fails, nothing is left behind and what stood at `path` stands. `failed` tells of what the
+/// operating system refused, as in "create".
 pub(crate) fn replace<T, E>(
     path: &Path,
     failed: impl Fn(&'static str, Error) -> E,
     make: impl FnOnce(&Path) -> std::result::Result<T, E>,
 ) -> std::result::Result<T, E> {
-    remove_orphans(path);
+    replace_synced(path, &failed, |part| {
+        let made = make(part)?;
+        sync(part).map_err(|error| failed("write", error))?;
+        Ok(made)
+    })
+}
+
+/// As [`replace`], of a file that `make` itself has synced: a process that locks a file loses the lock as soon as it closes
+/// any descriptor of it, so a file that is locked cannot be opened to be synced.
+pub(crate) fn replace_synced<T, E>(
+    path: &Path,
+    failed: impl Fn(&'static str, Error) -> E,
+    make: impl FnOnce(&Path) -> std::result::Result<T, E>,
+) -> std::result::Result<T, E> {
+    remove_orphans(folder_of(path), path.file_name());
     let part = partial(path).map_err(|error| failed("create", error))?;
     // HDF5 would not say why a file cannot be created; the operating system does
-    std::fs::File::create(&part).map_err(|error| failed("create", error))?;
+    File::create(&part).map_err(|error| failed("create", error))?;
     let made = make(&part).and_then(|made| {
-        std::fs::rename(&part, path).map_err(|error| failed("replace", error))?;
+        rename(&part, path).map_err(|error| failed("replace", error))?;
         Ok(made)
     });
     if made.is_err() {
         // the first error is the one to report
-        let _ = std::fs::remove_file(&part);
+        let _ = fs::remove_file(&part);
     }
     made
+}
+
+/// Writes a file beside its place and moves it there. What a killed process left beside it stays: of many files in one
+/// folder, [`remove_orphans`] looks for all at once.
+///
+/// # Errors
+/// Those of the operating system; what stood at `path` then stands.
+pub(crate) fn write(path: &Path, content: &[u8]) -> Result<()> {
+    let part = partial(path)?;
+    fs::write(&part, content).and_then(|()| move_to(&part, path)).inspect_err(|_| {
+        let _ = fs::remove_file(&part);
+    })
+}
+
+/// Moves a complete file to `path` in the same folder, once its content is on the disk.
+///
+/// # Errors
+/// Those of the operating system.
+pub(crate) fn move_to(part: &Path, path: &Path) -> Result<()> {
+    sync(part)?;
+    rename(part, path)
+}
+
+/// Waits until the content of a file is on the disk.
+///
+/// # Errors
+/// Those of the operating system.
+pub(crate) fn sync(path: &Path) -> Result<()> {
+    File::open(path)?.sync_all()
+}
+
+fn rename(part: &Path, path: &Path) -> Result<()> {
+    fs::rename(part, path)?;
+    // not every file system can sync a folder; the file is complete under one of its two names
+    let _ = File::open(folder_of(path)).and_then(|folder| folder.sync_all());
+    Ok(())
+}
+
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// The name under which a file is made: in the same folder, so that the move is atomic.
@@ -34,20 +91,85 @@ fn partial(path: &Path) -> Result<PathBuf> {
     Ok(path.with_file_name(format!(".{}.{}.part", name.to_string_lossy(), std::process::id())))
 }
 
-/// Removes what processes that were killed left of files that they made beside `path`.
-fn remove_orphans(path: &Path) {
-    let Some(name) = path.file_name() else { return };
-    let folder = path.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+/// Removes what processes that were killed left in a folder of files that they made: of the file `name`, or of all.
+pub(crate) fn remove_orphans(folder: &Path, name: Option<&OsStr>) {
+    let name = name.map(OsStr::to_string_lossy);
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let found = entry.file_name();
         let process = found
             .to_str()
-            .and_then(|found| found.strip_prefix(&format!(".{}.", name.to_string_lossy()))?.strip_suffix(".part"))
-            .and_then(|process| rustix::process::Pid::from_raw(process.parse().ok()?));
+            .and_then(|found| found.strip_prefix('.')?.strip_suffix(".part")?.rsplit_once('.'))
+            .filter(|(of, _)| name.as_ref().is_none_or(|name| name == of))
+            .and_then(|(_, process)| rustix::process::Pid::from_raw(process.parse().ok()?));
         let gone = |process| rustix::process::test_kill_process(process) == Err(rustix::io::Errno::SRCH);
         if process.is_some_and(gone) {
             // one that cannot be removed does no harm
-            let _ = std::fs::remove_file(entry.path());
+            let _ = fs::remove_file(entry.path());
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let mut names: Vec<String> =
+            fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn a_file_is_replaced_whole_or_not_at_all() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.csv");
+        write(&path, b"old").unwrap();
+        let failed = replace(
+            &path,
+            |_, error| error,
+            |part| {
+                fs::write(part, "half").unwrap();
+                assert_eq!(fs::read(&path).unwrap(), b"old");
+                Err::<(), _>(Error::other("no room"))
+            },
+        );
+        assert_eq!(failed.unwrap_err().to_string(), "no room");
+        assert_eq!((fs::read(&path).unwrap(), names(folder.path())), (b"old".to_vec(), vec!["a.csv".into()]));
+        write(&path, b"new").unwrap();
+        assert_eq!((fs::read(&path).unwrap(), names(folder.path())), (b"new".to_vec(), vec!["a.csv".into()]));
+        assert_eq!(write(folder.path(), b"").unwrap_err().kind(), ErrorKind::IsADirectory);
+    }
+
+    #[test]
+    fn a_name_that_cannot_be_taken_leaves_nothing_beside_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.csv");
+        let taken = replace(
+            &path,
+            |doing, error| format!("{doing}: {error}"),
+            |part| {
+                fs::create_dir(&path).unwrap();
+                fs::write(part, "whole").map_err(|error| error.to_string())
+            },
+        );
+        assert!(taken.unwrap_err().starts_with("replace: "));
+        assert_eq!(names(folder.path()), ["a.csv"]);
+    }
+
+    #[test]
+    fn what_killed_processes_left_is_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut child = std::process::Command::new("true").spawn().unwrap();
+        child.wait().unwrap();
+        let (dead, alive) = (child.id(), std::process::id());
+        let orphans = [format!(".a.csv.{dead}.part"), format!(".b.csv.{dead}.part")];
+        let kept = [format!(".a.csv.{alive}.part"), "a.part".into(), ".a.csv.part".into()];
+        orphans.iter().chain(&kept).for_each(|name| fs::write(folder.path().join(name), "x").unwrap());
+        remove_orphans(folder.path(), Some(OsStr::new("a.csv")));
+        assert!(!names(folder.path()).contains(&orphans[0]) && names(folder.path()).contains(&orphans[1]));
+        remove_orphans(folder.path(), None);
+        assert!(!names(folder.path()).contains(&orphans[1]));
+        assert!(kept.iter().all(|name| names(folder.path()).contains(name)));
     }
 }

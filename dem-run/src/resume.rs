@@ -30,7 +30,7 @@ pub struct ResumeOptions {
 }
 
 /// Fields that a run that has begun can change: nothing that came before them depends on them.
-const FREE: [&str; 4] = ["title", "$schema", "time.end", "stop"];
+const FREE: [&str; 5] = ["title", "$schema", "time.end", "stop", "load_wall"];
 /// Fields that it can change with `--force`: from then on it is another run than the scene alone would give.
 const OPEN: [&str; 7] =
     ["solver", "gravity", "rupture", "materials.friction", "materials.restitution", "grains.loads", "bonds.flow"];
@@ -141,7 +141,8 @@ fn resume_in<D: Dim>(
         HistoryError::Interrupted => RunError::Interrupted("the history is as it was"),
         error => error.into(),
     })?;
-    let mut run = Run { scene, state, recorder, solid_fraction: history.parameters()?.solid_fraction };
+    // what acted on the walls before is not looked at again
+    let mut run = Run { scene, state, recorder, solid_fraction: history.parameters()?.solid_fraction, idle: vec![] };
     let outcome = run.step_on(interrupt, &mut progress);
     run.conclude(path, outcome, options.json, progress)
 }
@@ -154,6 +155,7 @@ fn anew(options: &ResumeOptions) -> RunOptions {
         execution: options.execution,
         json: options.json,
         write_sample: None,
+        ignore_memory: true,
     }
 }
 

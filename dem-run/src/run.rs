@@ -1,16 +1,22 @@
 //! The run of a scene: prepare, step, record, sum up.
 
-use crate::build::{build, rebuild, write_sample};
+use crate::build::{build, rebuild};
+use crate::check;
+use crate::collapse::{Disk, Failure};
 use crate::course::Course;
 use crate::fclib::FclibError;
 use crate::history::{Checkpoint, HistoryError};
+use crate::memory;
 use crate::output::{WriteError, print_result};
 use crate::progress::{Progress, ProgressMode, StepProgress};
 use crate::record::Recorder;
+use crate::sample_file;
 use crate::scene::{Scene, SceneError, SolverKind};
 use crate::signals::{self, INTERRUPTED, Interrupt};
-use crate::summary::{Ending, Summary};
-use dem_core::dim::{D2, D3, D3Twist, Dim};
+use crate::summary::{Ending, Splitting, Summary, WallLoads};
+use crate::warnings;
+use dem_core::body::{Drive, Wall};
+use dem_core::dim::{D2, D3, D3Twist, Dim, Vect};
 use dem_core::saved::{Mismatch, Reader, Saved};
 use dem_core::world::{StepError, StepReport, World};
 use std::path::{Path, PathBuf};
@@ -28,6 +34,8 @@ pub struct RunOptions {
     pub json: bool,
     /// Where the prepared sample is written as CSV, if at all.
     pub write_sample: Option<PathBuf>,
+    /// Whether a scene is run that needs more memory than is free.
+    pub ignore_memory: bool,
 }
 
 /// How a command is carried out. No result depends on it.
@@ -62,9 +70,9 @@ pub enum RunError {
     /// The scene is wrong, or cannot be read.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// The sample cannot be made as the scene asks.
-    #[error("{0}")]
-    Sample(String),
+    /// The sample cannot be made as the scene asks: all that is wrong with it.
+    #[error("{}", .0.join("\n"))]
+    Sample(Vec<String>),
     /// A contact problem was not solved within the limits of the scene.
     #[error("{0}")]
     NoConvergence(String),
@@ -131,19 +139,26 @@ pub(crate) fn handle_signals() -> Result<Interrupt, RunError> {
 }
 
 pub(crate) fn run_in<D: Dim>(scene: &Scene, options: &RunOptions, interrupt: &Interrupt) -> Result<(), RunError> {
+    if !options.ignore_memory {
+        memory::refuse_too_large(scene, check::count(scene)?)?;
+    }
     let mut progress = options.execution.show();
     let built = build::<D>(scene, &mut |done| {
         progress.phase("packing the sample", done);
         !interrupt.requested()
     })?;
+    for warning in &built.warnings {
+        progress.note(&format!("warning: {warning}"));
+    }
     if let Some(path) = &options.write_sample {
-        write_sample(&built.world.grains, path)
+        sample_file::write(&built.world.grains, path)
             .map_err(|e| RunError::InputOutput(format!("{} cannot be written: {e}", path.display())))?;
     }
     let recorder = Recorder::create(&options.output, options.overwrite, scene, &built)?;
     let course = Course::new(scene, &built.world);
+    let idle = may_be_idle(scene, &built.world);
     let state = State { world: built.world, course };
-    let mut run = Run { scene, state, recorder, solid_fraction: built.solid_fraction };
+    let mut run = Run { scene, state, recorder, solid_fraction: built.solid_fraction, idle };
     let outcome = run.begin().and_then(|()| run.step_on(interrupt, &mut progress));
     run.conclude(&options.output, outcome, options.json, progress)
 }
@@ -187,6 +202,16 @@ pub(crate) struct Run<'a, D: Dim> {
     pub recorder: Recorder<D>,
     /// Solid fraction that the sample was packed to (–).
     pub solid_fraction: Option<f64>,
+    /// Driven walls on which no force has acted yet, by their place among the walls.
+    pub idle: Vec<usize>,
+}
+
+/// The driven walls of which it is told at the end if no force ever acted on them: not those that are taken away.
+fn may_be_idle<D: Dim>(scene: &Scene, world: &World<D>) -> Vec<usize> {
+    let driven = |wall: &Wall<D>| !matches!(wall.drive, Drive::Fixed);
+    let walls = world.walls.iter().enumerate();
+    let told = walls.filter(|(_, wall)| driven(wall) && !warnings::leaves(wall, scene.time.end, &world.grains));
+    told.map(|(k, _)| k).collect()
 }
 
 impl<D: Dim> Run<'_, D> {
@@ -207,6 +232,7 @@ impl<D: Dim> Run<'_, D> {
             let State { world, course, .. } = &mut self.state;
             self.recorder.step(world, &report)?;
             course.count(world, &report);
+            self.idle.retain(|wall| world.walls[*wall].reaction.norm() == 0.0);
             progress.step(&self.standing(&report));
             let [frame, checkpoint] = self.due();
             if frame {
@@ -264,7 +290,7 @@ impl<D: Dim> Run<'_, D> {
         StepProgress {
             step: self.state.world.steps,
             time: self.state.world.time,
-            end: self.scene.time.end,
+            end: self.scene.time.last(),
             residual: report.residual,
             iterations: report.work.iterations(),
             broken: self.state.course.broken(),
@@ -280,6 +306,12 @@ impl<D: Dim> Run<'_, D> {
         mut progress: Progress,
     ) -> Result<(), RunError> {
         progress.finish();
+        for wall in self.idle.iter().filter_map(|wall| self.scene.walls.keys().nth(*wall)) {
+            progress.note(&format!(
+                "warning: walls.{wall}: no force ever acted on this driven wall: it touched no grain, or slid along grains that \
+                 nothing pressed on it; look at its place and its direction"
+            ));
+        }
         let (ending, end) = match outcome {
             Ok(Ending::Interrupted) => {
                 let way = "the history is complete up to there; `dem-run resume` goes on with it";
@@ -311,27 +343,45 @@ impl<D: Dim> State<D> {
         cpu_time: f64,
     ) -> Summary {
         let (world, course) = (&self.world, &self.course);
+        let elastic = world.bonds.iter().any(|b| b.stiffness.is_some());
+        let names: Vec<&String> = scene.walls.keys().collect();
+        let loads = course.driven.iter().map(|driven| {
+            let velocity = matches!(world.walls[driven.wall].drive, Drive::Velocity { .. });
+            WallLoads::of(names[driven.wall], velocity, elastic, &driven.collapse)
+        });
+        let driven_walls: Vec<WallLoads> = loads.collect();
+        let chosen = course.load_wall.map(|at| &driven_walls[at]);
+        let disk = chosen.and_then(|loads| Disk::of(scene, &loads.wall, &course.extents));
         Summary {
             history: history.to_path_buf(),
             ending,
             steps: world.steps,
-            driven: course.driven.is_some(),
             carries: scene.output.reactions && world.touches().any(|t| t.reaction.n != 0.0),
             time: world.time,
             grains: world.grains.len(),
             solid_fraction,
             bonds: world.bonds.len(),
             gap_tolerance: scene.bonds.as_ref().filter(|bonds| bonds.bear()).map(|bonds| bonds.gap_tolerance),
-            elastic: world.bonds.iter().any(|b| b.stiffness.is_some()),
+            elastic,
             broken: course.broken,
             twists: scene.twists(),
-            failure: course.collapse.failure,
+            one_piece: course.one_piece,
+            load_wall: chosen.map(|loads| loads.wall.clone()),
+            failure: chosen.map_or_else(Failure::default, |loads| loads.failure),
+            peak_load: chosen.and_then(|loads| loads.peak_load),
+            peak_displacement: chosen.and_then(|loads| loads.peak_displacement),
+            splitting: chosen.zip(disk).map(|(loads, disk)| {
+                let collapse = loads.failure.collapse[0].filter(|_| !loads.failure.early[0]);
+                Splitting::of(disk, collapse, loads.peak_load)
+            }),
+            driven_walls,
             tolerance: scene.solver.tolerance,
             worst_residual: course.worst_residual,
             work: course.work,
             missed_tolerance: course.missed_tolerance,
             rejected: course.rejected,
             penetration: course.penetration,
+            bond_elongation: course.bond_elongation,
             mean_diameter: 2.0 * world.grains.radius.iter().sum::<f64>() / world.grains.len() as f64,
             external_work: world.ledger.external_work,
             energy_remainder: world.ledger.remainder,

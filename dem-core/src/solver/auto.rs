@@ -52,6 +52,12 @@ impl<D: Dim> ContactSolver<D> for Auto {
         SolveReport { work: fine.work + coarse.work + report.work, ..report }
     }
 
+    /// By Newton, where Gauss–Seidel solved it as well as is accepted and no better.
+    fn solve_finer(&mut self, problem: &mut ContactProblem<D>) -> Option<SolveReport> {
+        let dry = problem.bonded.is_empty() && problem.elastic.is_empty();
+        dry.then(|| self.newton.solve(problem))
+    }
+
     fn save(&self, to: &mut Saved) {
         self.newton.save_state(to);
     }

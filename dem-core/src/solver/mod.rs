@@ -88,6 +88,12 @@ pub trait ContactSolver<D: Dim>: Send {
     /// Better the impulses and node velocities of `problem` until the tolerance, or a limit, is reached.
     fn solve(&mut self, problem: &mut ContactProblem<D>) -> SolveReport;
 
+    /// Solve a problem once more whose solution is accepted, but lets bodies move too far beyond the laws of their contacts; none
+    /// where there is no other way to solve it.
+    fn solve_finer(&mut self, _problem: &mut ContactProblem<D>) -> Option<SolveReport> {
+        None
+    }
+
     /// Write what is kept from one solve to the next, if anything is.
     fn save(&self, _to: &mut Saved) {}
 
@@ -117,6 +123,14 @@ impl SolverSettings {
         match self {
             Self::GaussSeidel(settings) => settings.accept,
             Self::Newton(settings) | Self::Auto(settings) => settings.accept,
+        }
+    }
+
+    /// Residual that the solver aims at (–).
+    pub fn tolerance(&self) -> f64 {
+        match self {
+            Self::GaussSeidel(settings) => settings.tolerance,
+            Self::Newton(settings) | Self::Auto(settings) => settings.tolerance,
         }
     }
 

@@ -106,7 +106,7 @@ impl<D: Dim> World<D> {
             let (gap, normal, _) = self.geometry(mid, pair);
             let approach = pair.map(|k| motion.free[k as usize].0);
             let closing = -(approach[0] - approach[1]).dot(&normal);
-            let near = NEAR * self.smaller(pair);
+            let near = NEAR * self.grains.radius[pair[0] as usize];
             if gap <= near + 2.0 * h * closing.max(0.0) {
                 touches.push(Kept { wide: self.is_wide(pair, gap), ..Kept::new(pair, None) });
             }
@@ -131,6 +131,7 @@ impl<D: Dim> World<D> {
             }
             if let Some(o) = same {
                 (touch.reaction, touch.yielded) = (o.reaction, o.yielded);
+                touch.held = o.bond().is_some();
             }
         }
     }
@@ -207,19 +208,22 @@ impl<D: Dim> World<D> {
         touching.then_some(if at_rest { 0.0 } else { e * approach })
     }
 
-    /// By how much two grains moved apart since the last mid-step beyond their way along the normal of then (m), the part of an
-    /// elongation that the force of an elastic bond, which grows by the normal velocity alone, has not been told.
+    /// What is added to the normal velocity of a bond before its law, so that it keeps its length while it turns (m/s), where its grains
+    /// need not turn with it: where it is elastic, or has no friction.
     ///
-    /// With the way d between two mid-steps and the part d_t of it across the normal, ℓ' − ℓ − d_n = d_t² / (ℓ' + ℓ + d_n): second order
-    /// in the way, so differences of positions have digits enough. See docs/theory/elastic-bonds.md.
-    fn lengthening(&self, mid: &Midpoint<D>, pair: [u32; 2]) -> f64 {
-        let apart = |mid: &Midpoint<D>| mid.place(pair[0] as usize) - mid.place(pair[1] as usize);
-        let (before, now) = (apart(&self.mid), apart(mid));
-        let (length, way) = (before.norm(), now - before);
+    /// Between two mid-steps the grains moved by the way d apart, of which d_t across the normal of the first one. Their distance grew by
+    /// d_n and, because the bond turned, by ℓ' − ℓ − d_n = d_t² / (ℓ' + ℓ + d_n), of which its law, which knows normal velocities, is
+    /// not told; it is given back. In a steady turn that is what [`turning`] gives. See docs/theory/elastic-bonds.md.
+    fn lengthening(&self, mid: &Midpoint<D>, motion: &Motion<D>, pair: [u32; 2], h: f64) -> f64 {
+        let [i, j] = pair.map(|k| k as usize);
+        let (apart, way) = (mid.grains[i] - mid.grains[j], (motion.before[i].0 - motion.before[j].0) * h);
+        let before = apart - way;
+        let length = before.norm();
         let normal = direction::<D>(before, length);
         let along = way.dot(&normal);
         let across = way - normal * along;
-        across.dot(&across) / (now.norm() + length + along)
+        let square = across.dot(&across);
+        if square == 0.0 { 0.0 } else { square / (h * (apart.norm() + length + along)) }
     }
 
     /// Friction coefficient of a dry contact (–).
@@ -290,12 +294,22 @@ impl<D: Dim> World<D> {
                 let (shift, cone, flow) = (h * bond.strength, bond.cone(), self.settings.bond_flow);
                 if let Some(compliance) = bond.compliance(h) {
                     let carried = over_arm(carried[number] * h, arm);
-                    let bias = self.lengthening(mid, touch.pair) / h;
+                    let bias = self.lengthening(mid, motion, kept.pair, h);
                     let law = Elastic::new(block, compliance, carried, arms, shift, cone, flow).with_bias(bias);
                     problem.elastic.push(Contact { link, law, r });
                     places.elastic.push(place as u32);
                 } else {
-                    let law = Bonded::new(block, arms, shift, cone, flow).with_bias(turning(&link, motion, h));
+                    let bias = match kept.held {
+                        _ if bond.friction > 0.0 => turning(&link, motion, h),
+                        true => match self.lengthening(mid, motion, kept.pair, h) {
+                            // rigid bonds answer to any misfit with forces, to that of rounding too
+                            hidden if h * hidden <= f64::EPSILON * arm => 0.0,
+                            bias => bias,
+                        },
+                        // what moved before there was the bond did not move as it lets it
+                        false => 0.0,
+                    };
+                    let law = Bonded::new(block, arms, shift, cone, flow).with_bias(bias);
                     problem.bonded.push(Contact { link, law, r });
                     places.bonded.push(place as u32);
                 }

@@ -16,7 +16,7 @@ use super::World;
 use super::assembly::{Midpoint, Places};
 use super::report::Violation;
 use super::touch::Kept;
-use crate::body::Shape;
+use crate::body::{Drive, Shape};
 use crate::bond::failure;
 use crate::contact::Law;
 use crate::dim::{Dim, Vect};
@@ -35,8 +35,10 @@ const YIELDING: f64 = 1e-4;
 /// The same, added up over the run.
 const YIELDED: f64 = 1e-3;
 
-/// The `accept` of a solver for which these two hold; a larger one loosens both in proportion.
-const USUAL_ACCEPT: f64 = 1e-6;
+/// The largest tolerance of a solver, and the largest residual that it accepts, for which these two hold; larger ones, which ask for
+/// less, loosen both in proportion.
+const FINE: f64 = 1e-6;
+const ACCEPTED: f64 = 1e-4;
 
 /// Share of the closing power of the free velocities that reactions leave where no velocities satisfy the laws: all of it where
 /// they only balance each other, none in a solution.
@@ -122,7 +124,8 @@ impl<D: Dim> World<D> {
         h: f64,
     ) -> Option<Violation> {
         let mut worst = ([0; 2], 0.0);
-        let mut add = |place: u32, speed: f64| {
+        let mut add = |place: u32, speed: Option<f64>| {
+            let Some(speed) = speed else { return };
             let kept = &mut touches[place as usize];
             let sum = kept.yielded + h * speed;
             // what opens is free to
@@ -147,11 +150,12 @@ impl<D: Dim> World<D> {
 
     /// By how much the bounds on what yields are loosened for the solver.
     fn looseness(&self) -> f64 {
-        (self.settings.solver.accept() / USUAL_ACCEPT).max(1.0)
+        let solver = &self.settings.solver;
+        (solver.tolerance() / FINE).max(solver.accept() / ACCEPTED).max(1.0)
     }
 
-    /// Whether the reactions only balance each other, as where two walls close on a grain: the walls that carry them. In a solution
-    /// they take as much power from the bodies as the free velocities would put into closing contacts.
+    /// Whether the reactions only balance each other, as where a wall that is moved closes on a grain: the walls that carry them. In a
+    /// solution they take as much power from the bodies as the free velocities would put into closing contacts.
     fn infeasible(&self, problem: &ContactProblem<D>) -> Option<Vec<u32>> {
         let mut powers = Powers { problem, asked: 0.0, left: 0.0, largest: 0.0 };
         problem.visit(&mut powers);
@@ -163,7 +167,13 @@ impl<D: Dim> World<D> {
         problem.visit(&mut carrying);
         carrying.walls.sort_unstable();
         carrying.walls.dedup();
-        Some(carrying.walls)
+        // where nothing is made to move, rest is a motion that satisfies the laws
+        let driven = |wall: &u32| {
+            let node = *wall as usize;
+            matches!(self.walls[node - problem.nodes.grains].drive, Drive::Velocity { .. })
+                && problem.free[node].0.norm() > 0.0
+        };
+        carrying.walls.iter().any(driven).then_some(carrying.walls)
     }
 
     /// The place of a body (m), grains first.
@@ -190,9 +200,13 @@ impl<D: Dim> World<D> {
     }
 }
 
-/// Speed (m/s) at which the bodies of a contact close beyond its law; of a rigid bond, at which it gets shorter.
-fn beyond_law<D: Dim, L: Law>(nodes: &Nodes<D>, c: &Contact<D, L>) -> f64 {
-    -(nodes.relative_velocity::<L::T, L::B>(&c.link, c.law.arms()).n + c.law.bias())
+/// Speed (m/s) at which the bodies of a contact close beyond its law; of a rigid bond, at which it gets shorter. None where the law
+/// sets no bound: a spring yields, and a bond at its limit flows and is about to break.
+fn beyond_law<D: Dim, L: Law>(nodes: &Nodes<D>, c: &Contact<D, L>) -> Option<f64> {
+    let law = &c.law;
+    let free = law.compliance().n > 0.0 || (law.shift() > 0.0 && failure(&c.r, law.shift(), law.cone()).is_some());
+    let closing = || -(nodes.relative_velocity::<L::T, L::B>(&c.link, law.arms()).n + law.bias());
+    (!free).then(closing)
 }
 
 /// Looks for the contact that yields most.
@@ -205,17 +219,10 @@ struct Yielding<'a, D: Dim> {
 impl<D: Dim> Visitor<D> for Yielding<'_, D> {
     #[inline(always)]
     fn visit<L: Law>(&mut self, nodes: &Nodes<D>, c: &Contact<D, L>) {
-        let law = &c.law;
-        // what is elastic yields by its spring
-        if law.compliance().n > 0.0 {
-            return;
-        }
-        let dry = law.shift() == 0.0;
-        let closing = beyond_law(nodes, c);
-        let speed = if dry { closing } else { closing.abs() };
+        let Some(closing) = beyond_law(nodes, c) else { return };
+        let speed = if c.law.shift() > 0.0 { closing.abs() } else { closing };
         let share = self.world.settings.step * speed / self.world.smaller(c.link.nodes);
-        // a bond at its limit is about to break
-        if share > self.share && (dry || failure(&c.r, law.shift(), law.cone()).is_none()) {
+        if share > self.share {
             (self.pair, self.share) = (c.link.nodes, share);
         }
     }

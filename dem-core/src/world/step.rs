@@ -88,13 +88,13 @@ impl<D: Dim> World<D> {
         let mut walls_at_limit = None;
         let (problem, places) = loop {
             let (mut problem, places) = self.assemble(&mid, &touches, &motion, &carried, applied, h);
-            let solve = self.solver.solve(&mut problem);
+            let solve = self.solve(&mut problem, limited);
             done.add(solve);
             self.refuse_unaccepted(solve, &problem, h)?;
-            write_reactions(&mut touches, &problem, &places, h);
             if limited {
                 self.refuse_violation(self.yielding(&problem))?;
             }
+            write_reactions(&mut touches, &problem, &places, h);
             let missed = self.missed(&mid, &touches, &problem.nodes, h);
             if !missed.is_empty() {
                 touches.extend(missed);
@@ -124,6 +124,16 @@ impl<D: Dim> World<D> {
             self.walls.iter_mut().zip(forces).for_each(|(wall, force)| wall.reaction_at_limit = force);
         }
         Ok(self.report(&motion, &problem, done, breaks))
+    }
+
+    /// Solve a contact problem; where `limited`, once more if its velocities are too far from the laws and there is another way.
+    fn solve(&mut self, problem: &mut ContactProblem<D>, limited: bool) -> SolveReport {
+        let solve = self.solver.solve(problem);
+        if !limited || solve.status != SolveStatus::Accepted || self.yielding(problem).is_none() {
+            return solve;
+        }
+        let finer = self.solver.solve_finer(problem);
+        finer.map_or(solve, |finer| SolveReport { work: solve.work + finer.work, ..finer })
     }
 
     /// The contact problem that the next step would start from, for export and for benchmarks. The world does not move.

@@ -30,6 +30,8 @@ pub(super) struct Kept<D: Dim> {
     pub wide: bool,
     /// Whether it pushed in the step before.
     pub closed: bool,
+    /// Whether its bond held in the step before.
+    pub held: bool,
     /// What its frame has beside the normal.
     pub tangents: D::Tangents,
     pub reaction: Local<D::Tangent, D::Moment>,
@@ -47,6 +49,7 @@ impl<D: Dim> Kept<D> {
             status: if bond.is_some() { TouchStatus::Bonded } else { TouchStatus::Open },
             wide: bond.is_some(),
             closed: false,
+            held: false,
             tangents: D::Tangents::zero(),
             reaction: Local::zero(),
             yielded: 0.0,

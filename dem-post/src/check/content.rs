@@ -3,18 +3,25 @@
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
+use dem_run::history::sound::{Surroundings, is_huge, is_plausible, median};
 use dem_run::history::{BondStatus, RuptureMode};
 use hdf5::H5Type;
 
-use super::{Checker, Sizes};
+use super::{Checker, Sizes, schema};
 
 const STEP: &str = "particles/grains/position/step";
 const TIME: &str = "particles/grains/position/time";
+const POSITION: &str = "particles/grains/position/value";
+const RADIUS: &str = "particles/grains/radius";
 const STATUS: &str = "bonds/status/value";
 const RUPTURE: &str = "events/rupture";
 /// Codes of an intact bond and of a contact that is one.
 const INTACT: u8 = 0;
 const BONDED: u8 = 3;
+/// Difference of the square of a unit vector from one: what single precision leaves.
+const UNIT: f64 = 1e-5;
+/// Share of a time by which that of a rupture may lie outside its frames.
+const SAME_TIME: f64 = 1e-9;
 
 /// A rupture with its mode as the number that stands there.
 #[derive(Clone, Copy, H5Type)]
@@ -29,10 +36,18 @@ struct Event {
     rt: f64,
     m: f64,
     energy: f64,
+    round: i32,
     bond: i32,
     i: i32,
     j: i32,
     mode: i32,
+}
+
+/// Its twisting moment, which layouts before version 3 lack.
+#[derive(Clone, Copy, H5Type)]
+#[repr(C)]
+struct Twist {
+    twist: f64,
 }
 
 /// When and how a bond broke, by its states: the first frame that does not show it intact.
@@ -45,7 +60,9 @@ pub(super) fn check(c: &mut Checker) {
     numbers(c);
     codes(c, "walls/kind", 4);
     codes(c, "walls/drive", 3);
-    positive(c);
+    signs(c);
+    places(c);
+    directions(c);
     let pairs = bond_pairs(c);
     let broken = states(c);
     contacts(c, &rows, &pairs, &broken);
@@ -57,6 +74,7 @@ fn order(c: &mut Checker) -> Vec<i64> {
     for (step, time) in [(STEP, TIME), ("observables/step", "observables/time")] {
         grows::<i64>(c, step);
         grows::<f64>(c, time);
+        keeps_time(c, step, time);
     }
     let places: Vec<String> = c.sound.keys().cloned().collect();
     for place in places {
@@ -69,6 +87,20 @@ fn order(c: &mut Checker) -> Vec<i64> {
         }
     }
     c.rows(STEP, 0..c.sizes.t).unwrap_or_default()
+}
+
+/// The time of a step is its number times the time step.
+fn keeps_time(c: &mut Checker, step: &str, time: &str) {
+    let Some(&[rows, _]) = c.sound.get(step) else { return };
+    let steps = c.rows::<i64>(step, 0..rows).unwrap_or_default();
+    let times = c.rows::<f64>(time, 0..rows).unwrap_or_default();
+    let pairs = || steps.iter().map(|step| *step as f64).zip(times.iter().copied());
+    let h = median(pairs().filter(|(step, _)| *step != 0.0).map(|(step, time)| time / step).collect());
+    for (k, (number, at)) in pairs().enumerate() {
+        if (at - h * number).abs() > SAME_TIME * (at.abs() + (h * number).abs()) {
+            c.wrong(step, Some(k), format!("step {} at {at} s, where most steps take {h} s", steps[k]));
+        }
+    }
 }
 
 fn grows<T: H5Type + PartialOrd + Copy + std::fmt::Display>(c: &mut Checker, place: &str) {
@@ -133,7 +165,7 @@ fn committed(c: &mut Checker) -> Vec<[u64; 2]> {
     found
 }
 
-/// Every number of every dataset of floats is finite.
+/// Every number of every dataset of floats is finite, and of a magnitude that something may have.
 fn numbers(c: &mut Checker) {
     let whole = |place: &str| {
         ["step", "start", "count", "pair", "id", "bond"].contains(&place.rsplit('/').next().unwrap_or(""))
@@ -151,8 +183,8 @@ fn numbers(c: &mut Checker) {
         }
         let width = c.sound[&place][1].max(1);
         c.blocks::<f64>(&place, |c, start, values| {
-            for (k, value) in values.iter().enumerate().filter(|(_, value)| !value.is_finite()) {
-                c.wrong(&place, Some(start + k / width), format!("{value} is no finite number"));
+            for (k, value) in values.iter().enumerate().filter(|(_, value)| !is_plausible(**value)) {
+                c.wrong(&place, Some(start + k / width), no_number(*value));
             }
         });
     }
@@ -167,14 +199,75 @@ fn codes(c: &mut Checker, place: &str, many: u8) {
     });
 }
 
-fn positive(c: &mut Checker) {
-    for name in ["radius", "mass"] {
-        let place = format!("particles/grains/{name}");
-        c.blocks::<f64>(&place, |c, start, values| {
-            for (k, value) in values.iter().enumerate().filter(|(_, value)| **value <= 0.0) {
-                c.wrong(&place, Some(start + k), format!("{value} is not positive"));
+fn no_number(value: f64) -> String {
+    if value.is_finite() { format!("{value:e} is no plausible number") } else { format!("{value} is no finite number") }
+}
+
+/// What is a size is above zero, and what may be nothing is not below; no radius is of another scale than all others.
+fn signs(c: &mut Checker) {
+    for place in [RADIUS, "particles/grains/mass", "bonds/mean_diameter"] {
+        every(c, place, |value| (value <= 0.0).then(|| format!("{value} is not positive")));
+    }
+    for place in ["particles/grains/inertia", "bonds/strength", "bonds/friction"] {
+        every(c, place, |value| (value < 0.0).then(|| format!("{value} is negative")));
+    }
+    if c.sizes.n == 0 {
+        c.wrong("particles/grains/id", None, "there is no grain");
+    }
+    let usual = median(c.rows::<f64>(RADIUS, 0..c.sizes.n).unwrap_or_default());
+    let huge = |value| is_huge(value, usual) && is_plausible(value);
+    every(c, RADIUS, |value| huge(value).then(|| format!("{value:e}, where half the grains have at most {usual:e}")));
+}
+
+/// Names the rows of a list of which `wrong` says what is wrong.
+fn every(c: &mut Checker, place: &str, wrong: impl Fn(f64) -> Option<String>) {
+    c.blocks::<f64>(place, |c, start, values| {
+        for (k, what) in values.iter().enumerate().filter_map(|(k, value)| Some((k, wrong(*value)?))) {
+            c.wrong(place, Some(start + k), what);
+        }
+    });
+}
+
+/// Every grain is somewhere near the sample.
+fn places(c: &mut Checker) {
+    let Sizes { d, n, t, .. } = c.sizes;
+    if !c.is_sound(&[POSITION, RADIUS]) || n == 0 || t == 0 {
+        return;
+    }
+    let (Some(radius), Some(first)) = (c.rows(RADIUS, 0..n), c.rows(POSITION, 0..1)) else { return };
+    let surroundings = Surroundings::of(&radius, &first, d);
+    c.blocks::<f64>(POSITION, |c, start, values| {
+        for (k, centre) in values.chunks_exact(d).enumerate() {
+            // what is no number is named among the numbers
+            if centre.iter().all(|x| is_plausible(*x)) && !surroundings.hold(centre) {
+                let what = format!("grain {} is at {centre:?} m, far beyond a million sizes of the sample", k % n);
+                c.wrong(POSITION, Some(start + k / n), what);
+            }
+        }
+    });
+}
+
+/// Directions are unit vectors: of contacts, of planes and cylinders, of drives.
+fn directions(c: &mut Checker) {
+    let Sizes { d, w, .. } = c.sizes;
+    let is_unit = |v: &[f64]| (v.iter().map(|x| x * x).sum::<f64>() - 1.0).abs() <= UNIT;
+    let finite = |v: &[f64]| v.iter().all(|x| is_plausible(*x));
+    for place in ["contacts/normal", "contacts/tangent"] {
+        c.blocks::<f64>(place, |c, start, values| {
+            for (k, v) in values.chunks_exact(d).enumerate().filter(|(_, v)| finite(v) && !is_unit(v)) {
+                c.wrong(place, Some(start + k), format!("{v:?} is no unit vector"));
             }
         });
+    }
+    // codes of planes and cylinders, and of walls that are driven
+    for (place, of, codes) in [("walls/normal", "walls/kind", [0, 2]), ("walls/direction", "walls/drive", [1, 2])] {
+        let vectors = c.rows::<f64>(place, 0..w).unwrap_or_default();
+        let kinds = c.rows::<u8>(of, 0..w).unwrap_or_default();
+        for (k, (v, kind)) in vectors.chunks_exact(d).zip(kinds).enumerate() {
+            if codes.contains(&kind) && finite(v) && !is_unit(v) {
+                c.wrong(place, Some(k), format!("{v:?} is no unit vector"));
+            }
+        }
     }
 }
 
@@ -262,6 +355,7 @@ fn contacts(c: &mut Checker, rows: &[[u64; 2]], pairs: &[[i32; 2]], broken: &Bro
 /// where its state changes.
 fn events(c: &mut Checker, steps: &[i64], pairs: &[[i32; 2]], broken: &Broken) {
     let complete = c.rows::<u64>("commit_rows/events", 0..c.sizes.t).unwrap_or_default();
+    let times = c.rows::<f64>(TIME, 0..c.sizes.t).unwrap_or_default();
     if !c.is_sound(&[RUPTURE, STEP, "bonds/pair", STATUS, "commit_rows/events"]) {
         return;
     }
@@ -276,17 +370,37 @@ fn events(c: &mut Checker, steps: &[i64], pairs: &[[i32; 2]], broken: &Broken) {
             let numbers = [event.time, event.x, event.y, event.z, event.rn, event.rt, event.m, event.energy];
             if numbers.iter().any(|value| !value.is_finite()) {
                 c.wrong(RUPTURE, Some(row), "a member is no finite number");
+            } else if let Some(value) = numbers.iter().find(|value| !is_plausible(**value)) {
+                c.wrong(RUPTURE, Some(row), no_number(*value));
+            }
+            if event.round < 0 {
+                c.wrong(RUPTURE, Some(row), format!("{} is no round of a cascade", event.round));
             }
             let frame = steps.partition_point(|step| *step < event.step);
             let seen = complete.partition_point(|rows| *rows <= row as u64);
             if frame != seen {
                 c.wrong(RUPTURE, Some(row), format!("step {} is complete with frame {seen}", event.step));
             }
+            let [after, until] = [frame.checked_sub(1), Some(frame)].map(|frame| times.get(frame?).copied());
+            if after.is_some_and(|t| event.time < t * (1.0 - SAME_TIME))
+                || until.is_some_and(|t| event.time > t * (1.0 + SAME_TIME))
+            {
+                c.wrong(RUPTURE, Some(row), format!("{} s is not the time of step {}", event.time, event.step));
+            }
             if let Some(what) = disagreement(event, frame, pairs, broken, &mut told, row) {
                 c.wrong(RUPTURE, Some(row), what);
             }
         }
     });
+    if c.sound.get(RUPTURE).is_some_and(|[_, members]| *members == schema::RUPTURE.len()) {
+        c.blocks::<Twist>(RUPTURE, |c, start, events| {
+            // copies of histories that lack it have not a number there
+            let wrong = |event: &&Twist| !event.twist.is_nan() && !is_plausible(event.twist);
+            for (k, event) in events.iter().enumerate().filter(|(_, event)| wrong(event)) {
+                c.wrong(RUPTURE, Some(start + k), no_number(event.twist));
+            }
+        });
+    }
     for (bond, (frame, _)) in broken.iter().filter(|(bond, _)| !told.contains_key(bond)) {
         c.wrong(STATUS, Some(*frame), format!("bond {bond} is broken, and no event in /{RUPTURE} tells of it"));
     }

@@ -14,9 +14,9 @@ const U32: TypeDescriptor = TypeDescriptor::Unsigned(IntSize::U4);
 const U64: TypeDescriptor = TypeDescriptor::Unsigned(IntSize::U8);
 const TEXT: TypeDescriptor = TypeDescriptor::VarLenUnicode;
 
-/// Members of a rupture: 64-bit integers and floats, then 32-bit integers.
-const RUPTURE: [&str; 15] =
-    ["step", "time", "x", "y", "z", "rn", "rt", "m", "energy", "round", "bond", "i", "j", "mode", "pad"];
+/// Members of a rupture: 64-bit integers and floats, then 32-bit integers. Layouts before version 3 have no `twist`.
+pub(super) const RUPTURE: [&str; 16] =
+    ["step", "time", "x", "y", "z", "rn", "rt", "m", "twist", "energy", "round", "bond", "i", "j", "mode", "pad"];
 
 /// Checks names, types, shapes and units; what is as promised is put down as sound, to be read afterwards.
 pub(super) fn check(c: &mut Checker) {
@@ -260,25 +260,28 @@ fn events(c: &mut Checker) {
     };
     let modes = codes(IntSize::U4, true, 1, RuptureMode::ALL.iter().map(|mode| mode.label()));
     let expected = RUPTURE.iter().enumerate().map(|(k, name)| match (k, *name) {
-        (0, name) => (name.to_string(), I64),
-        (1..9, name) => (name.to_string(), F64),
-        (_, "mode") => ("mode".to_string(), modes.clone()),
-        (_, name) => (name.to_string(), I32),
+        (0, name) => (name, I64),
+        (1..10, name) => (name, F64),
+        (_, "mode") => ("mode", modes.clone()),
+        (_, name) => (name, I32),
     });
-    let fits = dataset.dtype().and_then(|dtype| dtype.to_descriptor()).is_ok_and(|found| match found {
-        TypeDescriptor::Compound(found) => {
-            let same = |f: &CompoundField, (name, kind): (String, _)| f.name == name && is_read_as(&f.ty, &kind);
-            found.fields.len() == RUPTURE.len() && found.fields.iter().zip(expected).all(|(f, known)| same(f, known))
-        }
-        _ => false,
-    });
+    let expected: Vec<(&str, TypeDescriptor)> = expected.collect();
+    let before: Vec<_> = expected.iter().filter(|(name, _)| *name != "twist").cloned().collect();
+    let members = match dataset.dtype().and_then(|dtype| dtype.to_descriptor()) {
+        Ok(TypeDescriptor::Compound(found)) => found.fields,
+        _ => vec![],
+    };
+    let is = |known: &[(&str, TypeDescriptor)]| {
+        let same = |(f, (name, kind)): (&CompoundField, &(&str, _))| f.name == *name && is_read_as(&f.ty, kind);
+        members.len() == known.len() && members.iter().zip(known).all(same)
+    };
     let shape = dataset.shape();
-    if !fits {
+    if !is(&expected) && !is(&before) {
         c.wrong(PLACE, None, format!("is no compound of {} with their types", RUPTURE.join(", ")));
     } else if shape.len() != 1 || shape[0] < c.sizes.e {
         c.wrong(PLACE, None, format!("has shape {shape:?} in place of [{}]", c.sizes.e));
     } else {
-        c.sound.insert(PLACE.into(), [c.sizes.e, RUPTURE.len()]);
+        c.sound.insert(PLACE.into(), [c.sizes.e, members.len()]);
     }
 }
 

@@ -14,6 +14,7 @@ pub use files::write;
 
 mod files;
 pub mod front;
+mod longest;
 pub mod parts;
 pub mod paths;
 pub mod pictures;

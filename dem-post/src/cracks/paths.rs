@@ -10,18 +10,17 @@
 //!   pair's mean diameter from the point of contact, perpendicular to the bond.
 //! * **Crack**: segments that meet in a void. Two broken bonds of one grain with an intact bond between them on either
 //!   side do not meet: the material between them holds.
-//! * **Path** of a crack: the longest of the shortest ways through it, found from end to end by two searches; exact for
-//!   cracks without loops. Branches count in the length of the crack, not in that of its path.
+//! * **Path** of a crack: the longest of the shortest ways through it, over all pairs of its voids and free ends; of equally
+//!   long ones the one whose ends are farthest apart. Branches count in the length of the crack, not in that of its path.
 //! * **Orientation**: of the line between the ends of the path, from 0° to 180°, counter-clockwise from the first axis.
 //!   **Tortuosity**: length of the path over the distance of its ends, at least 1.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
-
 use dem_run::history::{Bonds, Rupture};
+use petgraph::graph::NodeIndex;
 use serde::Serialize;
 
 use super::Modes;
+use super::longest::{Ways, longest};
 use super::parts::{Part, groups};
 use super::voids::Voids;
 
@@ -147,75 +146,33 @@ fn segments(position: &[[f64; 2]], radius: &[f64], bonds: &Bonds, ruptures: &[Ru
     segments
 }
 
-fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+pub(super) fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
     (b[0] - a[0]).hypot(b[1] - a[1])
 }
 
 /// The segments from one end of a crack to the other, each with whether it is passed from its first node to its second.
 fn longest_path(segments: &[Segment], group: &[usize]) -> Vec<(usize, bool)> {
-    let ways = Ways::new(segments, group);
-    let farthest =
-        |found: &Found| (0..ways.nodes.len()).max_by(|&a, &b| found.far[a].total_cmp(&found.far[b])).unwrap_or(0);
-    let start = farthest(&ways.from(0));
-    let found = ways.from(start);
-    let mut node = farthest(&found);
-    let mut path = vec![];
-    while let Some((before, segment)) = found.before[node] {
-        path.push((segment, segments[segment].nodes[0] == ways.nodes[before]));
-        node = before;
+    let mut nodes: Vec<usize> = group.iter().flat_map(|&k| segments[k].nodes).collect();
+    nodes.sort_unstable();
+    nodes.dedup();
+    let mut ways = Ways::default();
+    nodes.iter().for_each(|_| {
+        ways.add_node([0.0; 2]);
+    });
+    for segment in group.iter().map(|&k| &segments[k]) {
+        let ends = segment.nodes.map(|node| NodeIndex::new(nodes.partition_point(|&other| other < node)));
+        (ways[ends[0]], ways[ends[1]]) = (segment.line[0], segment.line[2]);
+        ways.add_edge(ends[0], ends[1], segment.length);
     }
-    path.reverse();
+    let Some((start, edges)) = longest(&ways) else { return vec![] };
+    let (mut node, mut path) = (nodes[start.index()], vec![]);
+    for edge in edges {
+        let segment = group[edge.index()];
+        let [from, to] = segments[segment].nodes;
+        path.push((segment, from == node));
+        node = if from == node { to } else { from };
+    }
     path
-}
-
-/// The graph of one crack, its nodes numbered from 0.
-struct Ways {
-    nodes: Vec<usize>,
-    /// From each node: the node that is reached, the length (m), the segment.
-    next: Vec<Vec<(usize, f64, usize)>>,
-}
-
-/// The shortest ways from one node: their lengths (m), and the node and segment before each.
-struct Found {
-    far: Vec<f64>,
-    before: Vec<Option<(usize, usize)>>,
-}
-
-impl Ways {
-    fn new(segments: &[Segment], group: &[usize]) -> Self {
-        let mut nodes: Vec<usize> = group.iter().flat_map(|&k| segments[k].nodes).collect();
-        nodes.sort_unstable();
-        nodes.dedup();
-        let mut next = vec![vec![]; nodes.len()];
-        for &k in group {
-            let [a, b] = segments[k].nodes.map(|node| nodes.partition_point(|&other| other < node));
-            next[a].push((b, segments[k].length, k));
-            next[b].push((a, segments[k].length, k));
-        }
-        Self { nodes, next }
-    }
-
-    /// Dijkstra's search.
-    fn from(&self, start: usize) -> Found {
-        let mut found = Found { far: vec![f64::INFINITY; self.nodes.len()], before: vec![None; self.nodes.len()] };
-        found.far[start] = 0.0;
-        // lengths are not negative, so their bits are in the order of their values
-        let mut queue = BinaryHeap::from([(Reverse(0u64), start)]);
-        while let Some((Reverse(bits), node)) = queue.pop() {
-            let far = f64::from_bits(bits);
-            if far > found.far[node] {
-                continue;
-            }
-            for &(other, length, segment) in &self.next[node] {
-                if far + length < found.far[other] {
-                    found.far[other] = far + length;
-                    found.before[other] = Some((node, segment));
-                    queue.push((Reverse((far + length).to_bits()), other));
-                }
-            }
-        }
-        found
-    }
 }
 
 fn crack(number: usize, segments: &[Segment], group: &[usize], path: &[(usize, bool)], ruptures: &[Rupture]) -> Crack {

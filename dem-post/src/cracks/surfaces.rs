@@ -12,7 +12,7 @@
 //!   the plane.
 //! * **Normal**: the direction to which the facets, weighed by their areas, are most perpendicular. **Flatness**: the mean of
 //!   cos², weighed alike, of the angle between the normals of the facets and it, 1 for a plane and 1/3 for a sphere.
-//! * **Extent**: the distance of two far corners: the farthest from the one that is farthest from the first.
+//! * **Extent**: the greatest distance of two corners.
 //!
 //! Source of the diagram: F. Aurenhammer, *Power diagrams*, SIAM J. Comput. 16, 1987.
 
@@ -61,7 +61,7 @@ pub struct Surface {
     pub bonds: usize,
     /// Area of all its facets, m².
     pub area: f64,
-    /// Distance of two far corners, m.
+    /// Greatest distance of two corners, m.
     pub extent: f64,
     /// Unit normal; its last component is not negative.
     pub normal: [f64; 3],
@@ -125,20 +125,41 @@ fn surface(number: usize, facets: &[Facet], group: &[usize], ruptures: &[Rupture
     let area: f64 = members().map(|facet| facet.area).sum();
     let (greatest, normal) = major(&fabric, 3);
     let corners: Vec<Point> = members().flat_map(|facet| facet.corners.iter().map(|x| Point::from(*x))).collect();
-    let farthest = |from: Point| corners.iter().copied().max_by(|a, b| (a - from).norm().total_cmp(&(b - from).norm()));
-    let ends = corners.first().and_then(|first| farthest(*first)).and_then(|end| Some((end, farthest(end)?)));
     let (first, last) = (&facets[group[0]], &facets[group[group.len() - 1]]);
     Surface {
         number,
         bonds: group.len(),
         area,
-        extent: ends.map_or(0.0, |(a, b)| (a - b).norm()),
+        extent: extent(corners),
         normal: if normal[2] < 0.0 { normal.map(|x| -x) } else { normal },
         flatness: if area > 0.0 { greatest / area } else { 1.0 },
         first: ruptures[first.event].time,
         last: ruptures[last.event].time,
         modes,
     }
+}
+
+/// The greatest distance of two points, m; 0 of none.
+fn extent(points: Vec<Point>) -> f64 {
+    let farthest = |from: Point| points.iter().copied().max_by(|a, b| (a - from).norm().total_cmp(&(b - from).norm()));
+    let ends = points.first().and_then(|first| farthest(*first)).and_then(|end| Some((end, farthest(end)?)));
+    let Some((a, b)) = ends else { return 0.0 };
+    // two points are at most as far apart as both are from the middle, together
+    let (middle, mut greatest) = (0.5 * (a + b), (a - b).norm());
+    let mut outwards: Vec<(f64, Point)> = points.iter().map(|x| ((x - middle).norm(), *x)).collect();
+    outwards.sort_by(|a, b| b.0.total_cmp(&a.0));
+    for (k, (far, x)) in outwards.iter().enumerate() {
+        if far + outwards[0].0 <= greatest {
+            break;
+        }
+        for (other, y) in &outwards[..k] {
+            if far + other <= greatest {
+                break;
+            }
+            greatest = greatest.max((x - y).norm());
+        }
+    }
+    greatest
 }
 
 /// The grains, in the order of their first coordinates.

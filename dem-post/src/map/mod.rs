@@ -453,11 +453,13 @@ fn draw_plane(canvas: &mut Canvas, point: [f64; 2], normal: [f64; 2], frame: &Fr
     let length = normal[0].hypot(normal[1]);
     // on the sheet y points down
     let (n, t) = ((normal[0] / length, -normal[1] / length), (normal[1] / length, normal[0] / length));
-    let centre = frame.at(point);
+    // from the place on the line that is nearest to the middle of the panel, in whole lines of the hatching
+    let (from, middle) = (frame.at(point), [0.5 * frame.size.0, 0.5 * frame.size.1]);
+    let off = [frame.corner.0 + middle[0] - from.0, frame.corner.1 + middle[1] - from.1];
+    let nearest = HATCH * ((off[0] * t.0 + off[1] * t.1) / HATCH).round();
+    let centre = (from.0 + nearest * t.0, from.1 + nearest * t.1);
     let at = |s: f64| (centre.0 + s * t.0, centre.1 + s * t.1);
-    let reach =
-        2.0 * (frame.size.0 + frame.size.1) + (centre.0 - frame.corner.0).abs() + (centre.1 - frame.corner.1).abs();
-    let steps = (reach / HATCH) as i64;
+    let steps = ((frame.size.0 + frame.size.1) / HATCH) as i64;
     let inside: Vec<f64> = (-steps..=steps).map(|k| k as f64 * HATCH).filter(|&s| frame.shows(at(s), 0.0)).collect();
     let (Some(&first), Some(&last)) = (inside.first(), inside.last()) else {
         return;

@@ -48,7 +48,7 @@ impl Rows {
 }
 
 impl<'a> Companion<'a> {
-    /// Replaces the file at `path`. Viewers that hold the old one keep it.
+    /// Makes the file at `path`.
     pub fn create(path: &Path, history: &'a File, link: &str) -> hdf5::Result<Self> {
         // the oldest format that knows virtual datasets
         let file = File::with_options().with_fapl(|fapl| fapl.libver_v110()).create(path)?;

@@ -8,7 +8,7 @@ mod companion;
 mod h5md;
 mod vtk;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use dem_run::history::History;
 use serde::Serialize;
@@ -156,17 +156,11 @@ pub fn write(history: &History, report: &mut Report, folder: &mut Folder, quiet:
     if NAMES.iter().any(|name| home.join(name) == source) {
         return Err(PostError::Usage(format!("{} would be overwritten: choose another folder with -o", report.file)));
     }
-    // what an earlier history had and this one lacks would show nonsense
-    for path in NAMES.map(|name| home.join(name)).iter().filter(|path| path.exists()) {
-        std::fs::remove_file(path).map_err(|error| failed(path, &error))?;
-    }
     let file = hdf5::File::open(&source).map_err(|error| failed(&source, &error))?;
     for companion in &mut report.companions {
-        let path = folder.place(companion.name);
-        let made = make(companion.name, &path, &file, link, history, &report.outline, quiet);
-        companion.bytes = made.and_then(|()| length(&path)).inspect_err(|_| {
-            // the first error is the one to report
-            let _ = std::fs::remove_file(&path);
+        companion.bytes = folder.make(companion.name, |path| {
+            make(companion.name, path, &file, link, history, &report.outline, quiet)?;
+            length(path)
         })?;
     }
     Ok(())
@@ -206,7 +200,7 @@ fn make(
     })
 }
 
-fn length(path: &PathBuf) -> Result<u64> {
+fn length(path: &Path) -> Result<u64> {
     Ok(std::fs::metadata(path).map_err(|error| failed(path, &error))?.len())
 }
 

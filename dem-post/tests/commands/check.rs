@@ -5,10 +5,10 @@ use hdf5::{File, H5Type, Hyperslab, SliceOrIndex};
 
 use super::*;
 
-/// A byte where one of an enumeration should stand: 0 for the states of bonds, 1 for contacts, 2 for walls.
+/// A byte where one of an enumeration should stand: 0 for the states of bonds, 1 for contacts, 2 for walls, 3 for drives.
 #[derive(Clone, Copy)]
 #[repr(transparent)]
-struct Code<const OF: usize>(u8);
+pub struct Code<const OF: usize>(pub u8);
 
 // Sound: transparent over the integer that is the enumeration's base type.
 unsafe impl<const OF: usize> H5Type for Code<OF> {
@@ -16,7 +16,8 @@ unsafe impl<const OF: usize> H5Type for Code<OF> {
         let names: Vec<&str> = match OF {
             0 => BondStatus::ALL.iter().map(|status| status.label()).collect(),
             1 => ContactStatus::ALL.iter().map(|status| status.label()).collect(),
-            _ => WallKind::ALL.iter().map(|kind| kind.label()).collect(),
+            2 => WallKind::ALL.iter().map(|kind| kind.label()).collect(),
+            _ => WallDrive::ALL.iter().map(|drive| drive.label()).collect(),
         };
         let members = names.iter().zip(0..).map(|(name, value)| EnumMember { name: name.to_string(), value }).collect();
         TypeDescriptor::Enum(EnumType { size: IntSize::U1, signed: false, members })
@@ -28,12 +29,15 @@ macro_rules! member {
     ($name:ident, $member:ident, $kind:ty) => {
         #[derive(Clone, Copy, H5Type)]
         #[repr(C)]
-        struct $name {
-            $member: $kind,
+        pub struct $name {
+            pub $member: $kind,
         }
     };
 }
+pub(super) use member;
 member!(EventStep, step, i64);
+member!(EventTime, time, f64);
+member!(EventRound, round, i32);
 member!(EventForce, rn, f64);
 member!(EventBond, bond, i32);
 member!(EventGrain, i, i32);
@@ -41,7 +45,7 @@ member!(EventMode, mode, Mode);
 
 #[derive(Clone, Copy)]
 #[repr(transparent)]
-struct Mode(i32);
+pub struct Mode(pub i32);
 
 // Sound: as above.
 unsafe impl H5Type for Mode {
@@ -53,7 +57,7 @@ unsafe impl H5Type for Mode {
 }
 
 /// Puts `value` at `index` of a dataset.
-fn put<T: H5Type>(file: &File, place: &str, index: &[usize], value: T) {
+pub fn put<T: H5Type>(file: &File, place: &str, index: &[usize], value: T) {
     let slices: Vec<SliceOrIndex> = index.iter().map(|&k| SliceOrIndex::from(k..k + 1)).collect();
     let one = ndarray::ArrayD::from_shape_vec(vec![1; index.len()], vec![value]).unwrap();
     file.dataset(place).unwrap().write_slice(one.view(), Hyperslab::from(slices)).unwrap();
@@ -123,6 +127,34 @@ const DAMAGES: &[Damage] = &[
     ("contacts/reaction", Some(9), "NaN", |f| put(f, "contacts/reaction", &[9, 1], f64::NAN)),
     ("events/rupture", Some(1), "no finite number", |f| put(f, "events/rupture", &[1], EventForce { rn: f64::NAN })),
     ("particles/grains/radius", Some(1), "not positive", |f| put(f, "particles/grains/radius", &[1], -1.0)),
+    ("particles/grains/radius", Some(2), "half the grains have at most 1e-3", |f| {
+        put(f, "particles/grains/radius", &[2], 2e3);
+    }),
+    ("particles/grains/mass", Some(0), "1e300 is no plausible number", |f| {
+        put(f, "particles/grains/mass", &[0], 1e300);
+    }),
+    ("particles/grains/inertia", Some(3), "-1 is negative", |f| put(f, "particles/grains/inertia", &[3], -1.0)),
+    ("particles/grains/position/value", Some(7), "1e300 is no plausible number", |f| {
+        put(f, "particles/grains/position/value", &[7, 2, 1], 1e300);
+    }),
+    ("particles/grains/position/value", Some(0), "1e300 is no plausible number", |f| {
+        put(f, "particles/grains/position/value", &[0, 0, 0], 1e300);
+    }),
+    ("particles/grains/position/value", Some(9), "grain 3 is at [9000.0,", |f| {
+        put(f, "particles/grains/position/value", &[9, 3, 0], 9e3);
+    }),
+    ("walls/normal", Some(1), "no unit vector", |f| put(f, "walls/normal", &[1, 1], 0.0)),
+    ("walls/direction", Some(1), "no unit vector", |f| put(f, "walls/direction", &[1, 0], 1.0)),
+    ("contacts/normal", Some(8), "no unit vector", |f| put(f, "contacts/normal", &[8, 0], 0.5)),
+    ("bonds/mean_diameter", Some(2), "not positive", |f| put(f, "bonds/mean_diameter", &[2], 0.0)),
+    ("bonds/strength", Some(2), "-1 is negative", |f| put(f, "bonds/strength", &[2], -1.0)),
+    ("events/rupture", Some(1), "1e300 is no plausible number", |f| {
+        put(f, "events/rupture", &[1], EventForce { rn: 1e300 });
+    }),
+    ("events/rupture", Some(1), "0.03 s is not the time of step 60", |f| {
+        put(f, "events/rupture", &[1], EventTime { time: 0.03 });
+    }),
+    ("events/rupture", Some(0), "-1 is no round", |f| put(f, "events/rupture", &[0], EventRound { round: -1 })),
     // enumerations
     ("walls/kind", Some(1), "9 names nothing", |f| put(f, "walls/kind", &[1], Code::<2>(9))),
     ("contacts/status", Some(6), "9 names nothing", |f| put(f, "contacts/status", &[6], Code::<1>(9))),
@@ -153,6 +185,9 @@ const DAMAGES: &[Damage] = &[
     ("events/rupture", Some(1), "bond 0 broke before, in row 0", |f| {
         put(f, "events/rupture", &[1], EventBond { bond: 0 });
     }),
+    ("events/rupture", Some(1), "100000000 is none of 4 bonds", |f| {
+        put(f, "events/rupture", &[1], EventBond { bond: 100_000_000 });
+    }),
     ("events/rupture", Some(1), "5 is none of 4 bonds", |f| put(f, "events/rupture", &[1], EventBond { bond: 5 })),
     ("events/rupture", Some(0), "joins other grains, 0 and 1", |f| put(f, "events/rupture", &[0], EventGrain { i: 2 })),
     ("events/rupture", Some(0), "bond 0 broke by mode 1, its state is 2", |f| {
@@ -165,14 +200,14 @@ const DAMAGES: &[Damage] = &[
 ];
 
 /// Damages a file, and copies it: programs that other tests start meanwhile inherit the file and HDF5's lock on it.
-fn damaged(path: &Path, damage: impl Fn(&File)) -> PathBuf {
+pub fn damaged(path: &Path, damage: impl Fn(&File)) -> PathBuf {
     damage(&File::open_rw(path).unwrap());
     let copy = path.with_extension("damaged.h5");
     std::fs::copy(path, &copy).unwrap();
     copy
 }
 
-fn check(path: &Path) -> (Output, serde_json::Value) {
+pub fn check(path: &Path) -> (Output, serde_json::Value) {
     let output = dem_post(path, &["info", "--check", "--json"]);
     let found = serde_json::from_slice(&output.stdout);
     let found = found.unwrap_or_else(|_| panic!("{}", String::from_utf8_lossy(&output.stderr)));

@@ -114,7 +114,7 @@ fn companions_map_the_history() {
         let names: Vec<&str> =
             found["companions"].as_array().unwrap().iter().map(|c| c["name"].as_str().unwrap()).collect();
         assert_eq!(names.contains(&"bonds.vtkhdf"), !l.bonds.is_empty());
-        assert_eq!(std::fs::read_dir(&folder).unwrap().count(), names.len());
+        assert_eq!(super::names(&folder).len(), names.len());
         let h = History::open(&path).unwrap();
         check_grains(&folder, &h);
         check_contacts(&folder, &h);
@@ -189,7 +189,7 @@ fn what_is_not_there_is_not_mapped() {
     }
     // the companions of the history that stood there before are gone
     let folder = folder.path().join("post/deep");
-    assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 2);
+    assert_eq!(names(&folder).len(), 2);
     check_grains(&folder, &History::open(&path).unwrap());
 }
 

@@ -68,7 +68,8 @@ pub enum HistoryError {
         known: u32,
     },
     /// The file does not hold what its schema promises.
-    #[error("{} is damaged at /{place} ({why}): copy it again, or run the scene again", .path.display())]
+    #[error("{} is damaged at /{place} ({why}): `dem-post info --check` lists all that is wrong with it; copy it again, \
+        or run the scene again", .path.display())]
     Damaged {
         /// The file.
         path: PathBuf,

@@ -60,6 +60,7 @@ mod error;
 mod lock;
 mod reader;
 mod schema;
+pub mod sound;
 mod source;
 mod table;
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! Reading a history, one frame or one observable at a time.
 
+use std::cell::OnceCell;
 use std::ops::Range;
 use std::path::Path;
 
@@ -10,6 +11,7 @@ use super::codes::{BondCode, BondStatus, ContactCode, WallDriveCode, WallKindCod
 use super::copy::Kept;
 use super::error::{HistoryError, Result, refused, while_reading};
 use super::schema::{RuptureRow, path};
+use super::sound::{self, Surroundings};
 use super::source::Source;
 use super::{Bonds, ContactRows, GrainState, Grains, Layout, Observable, Parameters, Rupture, Wall, WallState};
 use super::{checkpoint, lock};
@@ -27,6 +29,8 @@ pub struct History {
     /// Complete rows of ruptures and of observables.
     events: usize,
     observed: usize,
+    /// Where grains may be, once it was asked.
+    surroundings: OnceCell<Surroundings>,
 }
 
 /// One observable over the whole run.
@@ -63,10 +67,31 @@ impl History {
     /// [`HistoryError::Missing`], [`HistoryError::Io`], [`HistoryError::NotHdf5`], [`HistoryError::Truncated`],
     /// [`HistoryError::Foreign`], [`HistoryError::Newer`] or [`HistoryError::Damaged`], as the file deserves.
     pub fn open(path: &Path) -> Result<Self> {
+        let history = Self::open_as_is(path)?;
+        let place = |name: &str| format!("{}/position/{name}", path::GRAINS);
+        sound::growing(&history.source, &place("step"), &history.steps)?;
+        sound::reals(&history.source, &place("time"), 0, 1, &history.times)?;
+        sound::growing(&history.source, &place("time"), &history.times)?;
+        Ok(history)
+    }
+
+    /// As [`History::open`], of a file whose frames may be in no order: to be checked.
+    ///
+    /// # Errors
+    /// As [`History::open`].
+    pub fn open_as_is(path: &Path) -> Result<Self> {
         hdf5::silence_errors(true);
-        let source = Source::open(path)?;
-        let mut history =
-            Self { source, dimension: 0, grains: 0, walls: 0, steps: vec![], times: vec![], events: 0, observed: 0 };
+        let mut history = Self {
+            source: Source::open(path)?,
+            dimension: 0,
+            grains: 0,
+            walls: 0,
+            steps: vec![],
+            times: vec![],
+            events: 0,
+            observed: 0,
+            surroundings: OnceCell::new(),
+        };
         history.read_commit()?;
         Ok(history)
     }
@@ -244,8 +269,15 @@ impl History {
     /// [`HistoryError::Damaged`].
     pub fn grains(&self) -> Result<Grains> {
         let id: Vec<i32> = self.source.whole(&format!("{}/id", path::GRAINS), 1)?;
-        let column = |name: &str| self.source.column(&format!("{}/{name}", path::GRAINS), self.grains);
-        Ok(Grains { radius: column("radius")?, mass: column("mass")?, inertia: column("inertia")?, id })
+        let place = |name: &str| format!("{}/{name}", path::GRAINS);
+        let column = |name: &str| self.source.column(&place(name), self.grains);
+        let grains = Grains { radius: column("radius")?, mass: column("mass")?, inertia: column("inertia")?, id };
+        if grains.id.is_empty() {
+            return Err(self.source.damaged(&place("id"), "there is no grain"));
+        }
+        sound::radii(&self.source, &place("radius"), &grains.radius)?;
+        sound::positive(&self.source, &place("mass"), &grains.mass)?;
+        Ok(grains)
     }
 
     /// The walls; empty for a scene without any.
@@ -290,17 +322,20 @@ impl History {
         }
         let place = |name: &str| format!("{}/{name}", path::BONDS);
         let pair = pairs(&self.source.whole::<i32>(&place("pair"), 2)?);
-        if pair.as_flattened().iter().any(|grain| !(0..self.grains as i32).contains(grain)) {
-            return Err(self.source.damaged(&place("pair"), "a bond names a grain that is not there"));
+        let unknown = |pair: &[i32; 2]| pair.iter().any(|grain| !(0..self.grains as i32).contains(grain));
+        if let Some(bond) = pair.iter().position(unknown) {
+            return Err(sound::row(&self.source, &place("pair"), bond, "a bond names a grain that is not there"));
         }
         let column = |name: &str| self.source.column(&place(name), pair.len());
-        Ok(Bonds {
+        let bonds = Bonds {
             rest_gap: column("rest_gap")?,
             strength: column("strength")?,
             friction: column("friction")?,
             mean_diameter: column("mean_diameter")?,
             pair,
-        })
+        };
+        sound::positive(&self.source, &place("mean_diameter"), &bonds.mean_diameter)?;
+        Ok(bonds)
     }
 
     /// The grains at frame `frame`.
@@ -311,8 +346,15 @@ impl History {
         let orientation = if self.dimension == 2 { "angle" } else { "orientation" };
         let (n, d) = (self.grains, self.dimension);
         let column = |name: &str, width| self.frame_values(frame, &format!("{}/{name}", path::GRAINS), n * width);
+        let position = column("position", d)?;
+        let surroundings = self.surroundings()?;
+        if let Some(grain) = position.chunks(d).position(|centre| !surroundings.hold(centre)) {
+            let centre = &position[grain * d..(grain + 1) * d];
+            let why = format!("grain {grain} is at {centre:?} m, far beyond a million sizes of the sample");
+            return Err(sound::row(&self.source, &format!("{}/position/value", path::GRAINS), frame, why));
+        }
         Ok(GrainState {
-            position: column("position", d)?,
+            position,
             velocity: column("velocity", d)?,
             angular_velocity: column("angular_velocity", if d == 2 { 1 } else { 3 })?,
             orientation: column(orientation, if d == 2 { 1 } else { 4 })?,
@@ -340,8 +382,8 @@ impl History {
             return Ok(vec![]);
         }
         let (_, codes) = self.source.read::<BondCode>(&place, frame..frame + 1)?;
-        let count = codes.len();
-        self.source.coded(&place, codes, count)
+        let bonds = self.source.count(&format!("{}/pair", path::BONDS))?;
+        self.source.coded(&place, codes, bonds)
     }
 
     /// The rows of `/contacts` that belong to frame `frame`.
@@ -356,10 +398,14 @@ impl History {
         };
         let count = format!("{}/count", path::CONTACTS);
         let (start, rows) = (number(&format!("{}/start", path::CONTACTS))?, number(&count)?);
-        match start.checked_add(rows) {
-            Some(end) if end <= number(path::COMMIT_CONTACTS)? => Ok(start as usize..end as usize),
-            _ => Err(self.source.damaged(&count, "it points beyond the complete rows")),
+        // the frames stand behind each other without gaps
+        let complete = self.source.read::<u64>(path::COMMIT_CONTACTS, frame.saturating_sub(1)..frame + 1)?.1;
+        let (before, end) = (if frame == 0 { 0 } else { complete[0] }, complete[complete.len() - 1]);
+        if start != before || start.checked_add(rows) != Some(end) {
+            let why = format!("{rows} rows from {start} on, where those from {before} to {end} belong to the frame");
+            return Err(sound::row(&self.source, &count, frame, why));
         }
+        Ok(start as usize..end as usize)
     }
 
     /// The bodies of the contacts at frame `frame`: grains i and j as indices; j < 0 is wall −1−j.
@@ -388,8 +434,13 @@ impl History {
         let column = |name: &str, widths: &[usize]| self.reals_in(range.clone(), name, widths);
         let d = self.dimension;
         let codes = self.source.read::<ContactCode>(&place("status"), range.clone())?.1;
-        let bond =
-            if self.source.has(&place("bond")) { self.source.read(&place("bond"), range.clone())?.1 } else { vec![] };
+        let bond = self.bonds_in(range.clone())?;
+        let required = ["point", "normal", "gap"].iter().find(|name| !self.source.has(&place(name)));
+        let tangential = d == 3 && self.has_reactions() && self.source.read::<f64>(&place("reaction"), 0..0)?.0 == [3];
+        let required = required.or((tangential && !self.source.has(&place("tangent"))).then_some(&"tangent"));
+        if let Some(missing) = required {
+            return Err(self.source.damaged(&place(missing), "it is missing"));
+        }
         Ok(ContactRows {
             pair: self.pairs_in(range.clone())?,
             point: column("point", &[d])?,
@@ -412,8 +463,13 @@ impl History {
             return Ok(vec![]);
         }
         let (_, events) = RuptureRow::read(&self.source, path::RUPTURE, 0..self.events)?;
-        let known: Option<Vec<Rupture>> = events.iter().map(RuptureRow::event).collect();
-        known.ok_or_else(|| self.source.damaged(path::RUPTURE, "a mode that is none"))
+        let event = |(k, row): (usize, &RuptureRow)| {
+            row.event().ok_or_else(|| sound::row(&self.source, path::RUPTURE, k, "a mode that is none"))
+        };
+        let known: Vec<Rupture> = events.iter().enumerate().map(event).collect::<Result<_>>()?;
+        let (counts, last) = ([self.bonds()?.len(), self.grains], self.steps.last().copied().unwrap_or(i64::MAX));
+        sound::ruptures(&self.source, path::RUPTURE, &known, counts, last)?;
+        Ok(known)
     }
 
     /// The names of what was observed, sorted.
@@ -445,6 +501,7 @@ impl History {
             return Ok(None);
         }
         let (shape, value) = self.source.read(&place, rows.clone())?;
+        sound::reals(&self.source, &place, rows.start, shape.iter().product(), &value)?;
         let unit = match self.source.dataset(&place)?.attr("unit") {
             Ok(unit) => {
                 unit.read_scalar::<VarLenUnicode>().map_err(while_reading(&self.source.path, &place))?.to_string()
@@ -452,7 +509,9 @@ impl History {
             Err(_) => String::new(),
         };
         let step = self.source.read(&format!("{}/step", path::OBSERVABLES), rows.clone())?.1;
-        let time = self.source.read(&format!("{}/time", path::OBSERVABLES), rows)?.1;
+        let times = format!("{}/time", path::OBSERVABLES);
+        let time = self.source.read(&times, rows.clone())?.1;
+        sound::reals(&self.source, &times, rows.start, 1, &time)?;
         Ok(Some(Series { unit, shape, step, time, value }))
     }
 }
@@ -466,43 +525,82 @@ impl History {
         Err(HistoryError::NoFrame { path: self.source.path.clone(), frame, frames: self.frames() })
     }
 
-    /// What H5MD element `place` holds at one frame, `expected` numbers; empty if it is absent.
+    /// Where the grains may be, from the first frame.
+    fn surroundings(&self) -> Result<&Surroundings> {
+        if let Some(known) = self.surroundings.get() {
+            return Ok(known);
+        }
+        let (radius, d) = (self.grains()?.radius, self.dimension);
+        let first = self.frame_values(0, &format!("{}/position", path::GRAINS), self.grains * d)?;
+        Ok(self.surroundings.get_or_init(|| Surroundings::of(&radius, &first, d)))
+    }
+
+    /// What H5MD element `place` holds at one frame, `expected` numbers; of what grains that do not turn lack, none.
     fn frame_values(&self, frame: usize, place: &str, expected: usize) -> Result<Vec<f64>> {
         self.check_frame(frame)?;
-        if expected == 0 || !self.source.has(place) {
+        let turning = ["angular_velocity", "angle", "orientation"].iter().any(|name| place.ends_with(name));
+        if expected == 0 || (turning && !self.source.has(place)) {
             return Ok(vec![]);
         }
-        let (_, values) = self.source.read(&format!("{place}/value"), frame..frame + 1)?;
+        let place = format!("{place}/value");
+        let (_, values) = self.source.read(&place, frame..frame + 1)?;
         if values.len() != expected {
-            return Err(self.source.damaged(place, &format!("it has {} values instead of {expected}", values.len())));
+            return Err(self.source.damaged(&place, &format!("it has {} values instead of {expected}", values.len())));
         }
+        sound::reals(&self.source, &place, frame, expected, &values)?;
         Ok(values)
     }
 
-    /// Pairs of contacts, whose grains and walls must all be there.
+    /// The bond of each contact; empty without bonds.
+    fn bonds_in(&self, range: Range<usize>) -> Result<Vec<i32>> {
+        let place = format!("{}/bond", path::CONTACTS);
+        if !self.source.has(&place) {
+            return Ok(vec![]);
+        }
+        let bonds: Vec<i32> = self.source.read(&place, range.clone())?.1;
+        let known = self.source.count(&format!("{}/pair", path::BONDS))? as i32;
+        match bonds.iter().position(|bond| !(-1..known).contains(bond)) {
+            Some(k) => {
+                let why = format!("{} is none of {known} bonds", bonds[k]);
+                Err(sound::row(&self.source, &place, range.start + k, why))
+            }
+            None => Ok(bonds),
+        }
+    }
+
     /// A column of the contacts; one that the scene lacks is empty, the others have rows of one of the lengths allowed.
     fn reals_in(&self, range: Range<usize>, name: &str, widths: &[usize]) -> Result<Vec<f64>> {
         let place = format!("{}/{name}", path::CONTACTS);
         if !self.source.has(&place) {
             return Ok(vec![]);
         }
-        let (row, values) = self.source.read::<f64>(&place, range)?;
+        let (row, values) = self.source.read::<f64>(&place, range.clone())?;
         if !widths.contains(&row.iter().product()) {
             return Err(self.source.damaged(&place, "its rows have another length"));
         }
+        sound::reals(&self.source, &place, range.start, row.iter().product(), &values)?;
         Ok(values)
     }
 
+    /// Pairs of contacts, whose grains and walls must all be there.
     fn pairs_in(&self, range: Range<usize>) -> Result<Vec<[i32; 2]>> {
         let place = format!("{}/pair", path::CONTACTS);
-        let (row, flat) = self.source.read::<i32>(&place, range)?;
+        let (row, flat) = self.source.read::<i32>(&place, range.clone())?;
+        if row != [2] {
+            return Err(self.source.damaged(&place, "its rows have another length"));
+        }
         let (grains, walls) = (self.grains as i32, self.walls as i32);
         let pairs = pairs(&flat);
         let known = |&[i, j]: &[i32; 2]| (0..grains).contains(&i) && (-walls..grains).contains(&j);
-        if row != [2] || !pairs.iter().all(known) {
-            return Err(self.source.damaged(&place, "a contact names a body that is not there"));
+        match pairs.iter().position(|pair| !known(pair)) {
+            Some(k) => {
+                let [i, j] = pairs[k];
+                let why =
+                    format!("{i}, {j} are not a grain and another, or a wall, of {grains} grains and {walls} walls");
+                Err(sound::row(&self.source, &place, range.start + k, why))
+            }
+            None => Ok(pairs),
         }
-        Ok(pairs)
     }
 }
 

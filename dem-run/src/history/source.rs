@@ -11,6 +11,7 @@ use hdf5::{Dataset, File, H5Type, OpenMode};
 use super::codes::Coded;
 use super::error::{HistoryError, Result, reason, refused, while_reading};
 use super::schema::{CREATOR, SCHEMA_VERSION, path};
+use super::sound;
 use super::table::rows;
 
 /// Deflate cannot shrink anything further than this, so no honest dataset is larger than this many file lengths.
@@ -56,7 +57,8 @@ impl Source {
             return Err(self.damaged(place, &format!("it has {count} rows, and {} are promised", range.end)));
         }
         // a forged shape must not ask for more memory than the file can fill
-        let bytes = row.iter().fold((range.len() * size_of::<T>()) as u64, |b, &n| b.saturating_mul(n as u64));
+        let bytes = row.iter().fold(range.len() as u64, |b, &n| b.saturating_mul(n as u64));
+        let bytes = bytes.saturating_mul(size_of::<T>() as u64);
         if bytes > self.length.saturating_mul(GREATEST_COMPRESSION) {
             return Err(self.damaged(place, "it claims to be larger than the file"));
         }
@@ -76,10 +78,11 @@ impl Source {
 
     /// A whole dataset of doubles that must have `expected` numbers.
     pub fn column(&self, place: &str, expected: usize) -> Result<Vec<f64>> {
-        let values = self.read::<f64>(place, 0..self.count(place)?)?.1;
+        let (row, values) = self.read::<f64>(place, 0..self.count(place)?)?;
         if values.len() != expected {
             return Err(self.damaged(place, &format!("it has {} values instead of {expected}", values.len())));
         }
+        sound::reals(self, place, 0, row.iter().product(), &values)?;
         Ok(values)
     }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use hdf5::File;
 
-use crate::replace::replace;
+use crate::replace::{replace_synced, sync};
 
 use super::checkpoint::{Checkpoint, Slots};
 use super::codes::{BondCode, Coded};
@@ -98,12 +98,13 @@ impl Writer {
     fn begin(path: &Path, layout: &Layout, fill: impl FnOnce(&mut Self) -> Result<()>) -> Result<Self> {
         lock::refuse_busy(path)?;
         let failed = refused(path);
-        replace(path, &failed, |part| {
+        replace_synced(path, &failed, |part| {
             let mut writer = Self::build(path, part, layout, false)?;
             fill(&mut writer)?;
             writer.flush()?;
             // from here on no object can be created, and the file is readable at any time
             writer.file.start_swmr().map_err(while_writing(path))?;
+            sync(part).map_err(|error| failed("write", error))?;
             writer.lock = Some(lock::hold(part).map_err(|error| failed("lock", error))?);
             writer.keep_head().map_err(|error| failed("read", error))?;
             writer.identity = identity(part);

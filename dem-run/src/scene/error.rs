@@ -139,19 +139,25 @@ fn cut(text: &str, limit: usize) -> String {
 }
 
 /// A blank for what would move the cursor of a terminal.
-pub(super) fn printable(c: char) -> char {
+pub(crate) fn printable(c: char) -> char {
     if c.is_control() { ' ' } else { c }
 }
 
-/// All problems under one heading.
+/// Problems that are told one by one: lists of grains may be long.
+const MOST_TOLD: usize = 100;
+
+/// The problems under one heading.
 fn render(name: &str, problems: &[Problem]) -> String {
     let mut text = match problems.len() {
         1 => format!("{name} is wrong at one place"),
         count => format!("{name} is wrong at {count} places"),
     };
-    for problem in problems {
+    for problem in &problems[..problems.len().min(MOST_TOLD)] {
         // writing to a string cannot fail
         let _ = write!(text, "\n  {problem}");
+    }
+    if problems.len() > MOST_TOLD {
+        let _ = write!(text, "\n  and {} more", problems.len() - MOST_TOLD);
     }
     text
 }

@@ -28,6 +28,8 @@ mod wall;
 #[cfg(test)]
 mod tests;
 
+use std::fs::File;
+use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
 pub use difference::{Difference, differences};
@@ -36,7 +38,7 @@ pub use error::{Origin, Problem, SceneError};
 pub use function::{Function, Ramp};
 pub use model::{
     Bonds, Flow, Friction, Grains, Load, Materials, Output, Precision, Restitution, Rupture, Scene, Springs, Stiffness,
-    Stop, Time, TravelFrom, WallTravel, Young,
+    Stop, Time, TravelFrom, WallTravel, Young, choose_load_wall,
 };
 pub use sample::{
     Compaction, Cut, Deposition, Diameters, GrainSpec, Lattice, Preparation, RandomSample, Sample, SampleFile, Section,
@@ -44,6 +46,7 @@ pub use sample::{
 };
 pub use solver::{GaussSeidel, LocalSolve, Newton, Solver, SolverKind, Start};
 pub use validate::validate;
+pub(crate) use validate::{LARGEST, MAX_GRAINS};
 pub use wall::{Circle, Cylinder, Drive, Place, Plane, Shape, Sphere, Wall, WallMass};
 
 /// Reads the scene in the file `path`, applies the `--set` assignments and validates the result.
@@ -56,16 +59,52 @@ pub use wall::{Circle, Cylinder, Drive, Place, Plane, Shape, Sphere, Wall, WallM
 pub fn load(path: &Path, assignments: &[String]) -> Result<Scene, SceneError> {
     let mut document = parse::parse(&path.display().to_string(), &read(path)?)?;
     set::apply(&mut document, assignments).map_err(|problems| document.wrong(problems))?;
-    let mut scene = finish(&document).map_err(|problems| document.wrong(problems))?;
+    let mut scene = finish(&mut document).map_err(|problems| document.wrong(problems))?;
     join_sample(&mut scene, path);
     Ok(scene)
 }
 
-/// The text of a file.
+/// Largest text of a scene or a sweep (bytes): some seven million grains listed one by one.
+const MAX_TEXT: u64 = 256 << 20;
+
 fn read(path: &Path) -> Result<String, SceneError> {
-    let unreadable = |source| SceneError::Read { path: path.to_path_buf(), source };
-    let bytes = std::fs::read(path).map_err(unreadable)?;
-    String::from_utf8(bytes).map_err(|error| unreadable(std::io::Error::new(std::io::ErrorKind::InvalidData, error)))
+    text(path).map_err(|source| SceneError::Read { path: path.to_path_buf(), source })
+}
+
+/// The text of a scene or a sweep: a regular file of at most [`MAX_TEXT`].
+pub(crate) fn text(path: &Path) -> io::Result<String> {
+    let too_long = || io::Error::other(format!("it has more than {} MiB: {MANY_GRAINS}", MAX_TEXT >> 20));
+    let file = open_regular(path)?;
+    if file.metadata()?.len() > MAX_TEXT {
+        return Err(too_long());
+    }
+    let mut bytes = Vec::new();
+    // the length of some files, as in /proc, is not that of what is read
+    file.take(MAX_TEXT + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > MAX_TEXT {
+        return Err(too_long());
+    }
+    if bytes.starts_with(b"\x89HDF\r\n\x1a\n") {
+        return Err(io::Error::other(
+            "it is an HDF5 file: `dem-run resume` goes on with a history, `dem-post` reads it",
+        ));
+    }
+    String::from_utf8(bytes).map_err(|error| {
+        let before = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
+        io::Error::new(io::ErrorKind::InvalidData, format!("line {line} is not UTF-8 text: save it as UTF-8"))
+    })
+}
+
+const MANY_GRAINS: &str = "list its grains in a CSV file (sample.file)";
+
+/// Opens a file that is one: opening a pipe would wait for its writer, and a device has no end.
+pub(crate) fn open_regular(path: &Path) -> io::Result<File> {
+    match std::fs::metadata(path)?.file_type() {
+        kind if kind.is_file() => File::open(path),
+        kind if kind.is_dir() => Err(io::Error::other("it is a folder: name a file in it")),
+        _ => Err(io::Error::other("it is not a regular file: save what a pipe or a device gives as a file first")),
+    }
 }
 
 /// A sample file is sought beside the scene.
@@ -85,12 +124,15 @@ fn join_sample(scene: &mut Scene, path: &Path) {
 pub fn from_text(name: &str, text: &str, assignments: &[String]) -> Result<Scene, SceneError> {
     let mut document = parse::parse(name, text)?;
     set::apply(&mut document, assignments).map_err(|problems| document.wrong(problems))?;
-    finish(&document).map_err(|problems| document.wrong(problems))
+    finish(&mut document).map_err(|problems| document.wrong(problems))
 }
 
 /// The scene that a tree describes, or all that is wrong with it.
-fn finish(document: &parse::Document) -> Result<Scene, Vec<Problem>> {
+///
+/// It leaves nothing of the tree, which for millions of grains is larger than all that comes after it.
+fn finish(document: &mut parse::Document) -> Result<Scene, Vec<Problem>> {
     let mut scene: Scene = document.decode().map_err(|problem| vec![problem])?;
+    document.root.take();
     let accept = solver::default_accept(scene.solver.tolerance, scene.bonds.is_some());
     scene.solver.accept.get_or_insert(accept);
     let problems = document.merge_non_finite(validate(&scene));
@@ -132,12 +174,7 @@ impl Base {
             set::put(&mut document, path, value.clone(), place)
                 .map_err(|problem| vec![problem.with_origin(Origin::Sweep(place.as_str().into()))])?;
         }
-        let located = |problem: Problem| match document.origin(&problem.path) {
-            Some(origin) => problem.with_origin(origin),
-            None => problem,
-        };
-        let mut scene =
-            finish(&document).map_err(|problems| problems.into_iter().map(located).collect::<Vec<Problem>>())?;
+        let mut scene = finish(&mut document).map_err(|problems| document.located(problems))?;
         join_sample(&mut scene, &self.path);
         Ok(scene)
     }

@@ -1,27 +1,32 @@
 //! From text to a JSON tree that knows its lines, and from the tree to what it describes: a scene, or a sweep.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
+use std::collections::hash_map::{Entry, HashMap};
+use std::fmt;
+use std::sync::Arc;
 
 use jsonc_parser::ast::{Object, ObjectPropName, Value as Node};
 use jsonc_parser::common::Ranged;
 use jsonc_parser::errors::ParseErrorKind;
-use jsonc_parser::{CollectOptions, ParseOptions, parse_to_ast};
-use serde::de::DeserializeOwned;
+use jsonc_parser::{CollectOptions, ParseOptions, parse_to_ast, parse_to_serde_value};
+use serde::de::{self, Deserialize, DeserializeOwned, Deserializer, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Number, Value};
 use serde_path_to_error::Segment;
 
 use super::error::{Origin, Problem, SceneError, printable, shorten};
 use super::suggest::nearest;
 
-/// A JSON tree, with the places where its values were written.
+/// A JSON tree, with the text that it was read from.
 #[derive(Debug, Clone)]
 pub(crate) struct Document {
     /// Where the text comes from, for messages.
     name: String,
+    /// The text without its byte order mark. The places of wrong values are sought in it when there are some.
+    text: Arc<str>,
     /// The tree, with ±`f64::MAX` in place of numbers that overflow.
     pub(super) root: Value,
-    /// Where each value was written, by path.
-    origins: HashMap<String, Origin>,
+    /// Where values that are not from the text come from, by path.
+    replaced: HashMap<String, Origin>,
     /// Numbers that overflow, as they were written, by path.
     non_finite: HashMap<String, String>,
 }
@@ -49,17 +54,38 @@ fn options() -> ParseOptions {
 pub(crate) fn parse(name: &str, text: &str) -> Result<Document, SceneError> {
     // a byte order mark, as some editors write it, is not part of the text
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let (root, non_finite) = match parse_to_serde_value(text, &options()) {
+        // an empty text is null to this reader
+        Ok(Tree(root)) if !root.is_null() => (root, HashMap::new()),
+        _ => by_syntax(name, text)?,
+    };
+    let (name, text) = (name.to_string(), Arc::from(text));
+    Ok(Document { name, text, root, replaced: HashMap::new(), non_finite })
+}
+
+/// The tree and the numbers that overflow, by way of the syntax tree, which knows the places of what is wrong.
+fn by_syntax(name: &str, text: &str) -> Result<(Value, HashMap<String, String>), SceneError> {
     let parsed = parse_to_ast(text, &CollectOptions::default(), &options())
         .map_err(|error| syntax(name, text, error.line_display(), error.column_display(), &error.kind().to_string()))?;
     let Some(node) = parsed.value else {
         return Err(syntax(name, text, 1, 1, "The text is empty: an object { … } is expected"));
     };
-    let mut walk = Walk { lines: Lines::new(text), origins: HashMap::new(), non_finite: HashMap::new(), twice: vec![] };
-    let root = walk.value(String::new(), &node);
+    let mut walk = Walk { path: String::new(), non_finite: HashMap::new(), twice: vec![] };
+    let root = walk.value(node);
     if !walk.twice.is_empty() {
-        return Err(SceneError::Wrong { name: name.to_string(), problems: walk.twice });
+        return Err(SceneError::Wrong { name: name.to_string(), problems: given_twice(text, &walk.twice) });
     }
-    Ok(Document { name: name.to_string(), root, origins: walk.origins, non_finite: walk.non_finite })
+    Ok((root, walk.non_finite))
+}
+
+/// The problems of names that an object has twice.
+fn given_twice(text: &str, twice: &[Twice]) -> Vec<Problem> {
+    let places = places(text, twice.iter().flat_map(|twice| [twice.first, twice.second]));
+    let problem = |Twice { path, first, second }: &Twice| {
+        let found = format!("the name a second time (first on line {})", places[first].0);
+        Problem::new(path, found, "each name once").with_origin(in_text(places[second]))
+    };
+    twice.iter().map(problem).collect()
 }
 
 fn syntax(name: &str, text: &str, line: usize, column: usize, message: &str) -> SceneError {
@@ -90,85 +116,190 @@ fn with_remedy(message: &str, rest: &str) -> String {
     }
 }
 
-/// Line and column of byte offsets.
-struct Lines<'a> {
-    text: &'a str,
-    starts: Vec<usize>,
+/// A JSON tree of a text where nothing is wrong: no name is given twice and no number overflows. It is read without the
+/// syntax tree, which for millions of grains is larger.
+struct Tree(Value);
+
+impl<'de> Deserialize<'de> for Tree {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(TreeVisitor).map(Tree)
+    }
 }
 
-impl<'a> Lines<'a> {
-    fn new(text: &'a str) -> Self {
-        let starts = std::iter::once(0).chain(text.match_indices('\n').map(|(at, _)| at + 1)).collect();
-        Self { text, starts }
+struct TreeVisitor;
+
+impl<'de> Visitor<'de> for TreeVisitor {
+    type Value = Value;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("JSON")
     }
 
-    /// Line and column of the byte `offset`, both from 1.
-    fn at(&self, offset: usize) -> (usize, usize) {
-        let line = self.starts.partition_point(|start| *start <= offset);
-        let start = self.starts[line - 1];
-        (line, self.text[start..offset].chars().count() + 1)
+    fn visit_unit<E: de::Error>(self) -> Result<Value, E> {
+        Ok(Value::Null)
     }
+
+    fn visit_bool<E: de::Error>(self, value: bool) -> Result<Value, E> {
+        Ok(Value::Bool(value))
+    }
+
+    fn visit_i64<E: de::Error>(self, value: i64) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_u64<E: de::Error>(self, value: u64) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_f64<E: de::Error>(self, value: f64) -> Result<Value, E> {
+        Number::from_f64(value).map(Value::Number).ok_or_else(|| E::custom("not finite"))
+    }
+
+    fn visit_str<E: de::Error>(self, value: &str) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<Value, A::Error> {
+        let mut list = vec![];
+        while let Some(Tree(item)) = items.next_element()? {
+            list.push(item);
+        }
+        Ok(Value::Array(list))
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut entries: A) -> Result<Value, A::Error> {
+        let mut map = Map::new();
+        while let Some((name, Tree(value))) = entries.next_entry::<String, _>()? {
+            if map.insert(name, value).is_some() {
+                return Err(de::Error::custom("a name a second time"));
+            }
+        }
+        Ok(Value::Object(map))
+    }
+}
+
+/// Line and column, both from 1, of byte offsets in `text`.
+fn places(text: &str, offsets: impl Iterator<Item = usize>) -> HashMap<usize, (usize, usize)> {
+    let mut sorted: Vec<usize> = offsets.collect();
+    sorted.sort_unstable();
+    let found = in_order(text.char_indices(), &sorted);
+    sorted.into_iter().zip(found).collect()
+}
+
+/// Line and column of offsets that do not decrease, in one pass: counting from the start of its line for each of them would
+/// be quadratic in a long line.
+fn in_order(chars: impl Iterator<Item = (usize, char)>, offsets: &[usize]) -> Vec<(usize, usize)> {
+    let (mut line, mut column) = (1, 1);
+    let mut chars = chars.peekable();
+    let place = |offset: &usize| {
+        while let Some((_, c)) = chars.next_if(|(at, _)| at < offset) {
+            (line, column) = if c == '\n' { (line + 1, 1) } else { (line, column + 1) };
+        }
+        (line, column)
+    };
+    offsets.iter().map(place).collect()
+}
+
+fn in_text((line, column): (usize, usize)) -> Origin {
+    Origin::Text { line, column }
+}
+
+/// Where the value at `path` begins in the text, or else the nearest thing around it (bytes).
+fn offset(node: &Node<'_>, path: &str) -> usize {
+    let below = match node {
+        _ if path.is_empty() => None,
+        Node::Array(array) => {
+            let (index, rest) = path.split_once('.').unwrap_or((path, ""));
+            index.parse().ok().and_then(|k: usize| array.elements.get(k)).map(|node| (node, rest))
+        }
+        // a name may hold a full stop
+        Node::Object(object) => object.properties.iter().find_map(|property| {
+            let rest = path.strip_prefix(key(&property.name))?;
+            if rest.is_empty() { Some(rest) } else { rest.strip_prefix('.') }.map(|rest| (&property.value, rest))
+        }),
+        _ => None,
+    };
+    below.map_or(node.start(), |(node, rest)| offset(node, rest))
+}
+
+fn key<'a>(name: &'a ObjectPropName<'_>) -> &'a str {
+    match name {
+        ObjectPropName::String(lit) => lit.value.as_ref(),
+        ObjectPropName::Word(lit) => lit.value,
+    }
+}
+
+/// A name that an object has twice: its path, and where it stands (bytes).
+struct Twice {
+    path: String,
+    first: usize,
+    second: usize,
 }
 
 /// One pass over the syntax tree.
-struct Walk<'a> {
-    lines: Lines<'a>,
-    origins: HashMap<String, Origin>,
+struct Walk {
+    /// The path of the value in hand.
+    path: String,
     non_finite: HashMap<String, String>,
-    twice: Vec<Problem>,
+    twice: Vec<Twice>,
 }
 
-impl Walk<'_> {
-    fn origin(&self, offset: usize) -> Origin {
-        let (line, column) = self.lines.at(offset);
-        Origin::Text { line, column }
-    }
-
-    fn value(&mut self, path: String, node: &Node<'_>) -> Value {
-        self.origins.insert(path.clone(), self.origin(node.start()));
+impl Walk {
+    fn value(&mut self, node: Node<'_>) -> Value {
         match node {
             Node::NullKeyword(_) => Value::Null,
             Node::BooleanLit(lit) => Value::Bool(lit.value),
-            Node::StringLit(lit) => Value::String(lit.value.to_string()),
-            Node::NumberLit(lit) => self.number(path, lit.value),
-            Node::Array(array) => array
-                .elements
-                .iter()
-                .enumerate()
-                .map(|(k, item)| self.value(join(&path, &k.to_string()), item))
-                .collect(),
-            Node::Object(object) => self.object(&path, object),
+            Node::StringLit(lit) => Value::String(lit.value.into_owned()),
+            Node::NumberLit(lit) => self.number(lit.value),
+            Node::Array(array) => {
+                let items = array.elements.into_iter().enumerate();
+                items.map(|(k, item)| self.below(&k.to_string(), |walk| walk.value(item))).collect()
+            }
+            Node::Object(object) => self.object(object),
         }
     }
 
-    fn number(&mut self, path: String, literal: &str) -> Value {
+    /// What `visit` makes of the value under `key`.
+    fn below<T>(&mut self, key: &str, visit: impl FnOnce(&mut Self) -> T) -> T {
+        let above = self.path.len();
+        if above > 0 {
+            self.path.push('.');
+        }
+        self.path.push_str(key);
+        let found = visit(self);
+        self.path.truncate(above);
+        found
+    }
+
+    fn number(&mut self, literal: &str) -> Value {
         // serde_json's own reading, so that a scene and its copy in a history agree to the bit
         match serde_json::from_str::<Number>(literal) {
             Ok(number) => Value::Number(number),
             Err(_) => {
-                self.non_finite.insert(path, literal.to_string());
+                self.non_finite.insert(self.path.clone(), literal.to_string());
                 Value::from(if literal.starts_with('-') { f64::MIN } else { f64::MAX })
             }
         }
     }
 
-    fn object(&mut self, path: &str, object: &Object<'_>) -> Value {
-        let mut map = Map::new();
+    fn object(&mut self, object: Object<'_>) -> Value {
         let mut first: HashMap<&str, usize> = HashMap::new();
         for property in &object.properties {
-            let key = match &property.name {
-                ObjectPropName::String(lit) => lit.value.as_ref(),
-                ObjectPropName::Word(lit) => lit.value,
-            };
-            let start = property.range.start;
-            let below = join(path, key);
-            if let Some(earlier) = first.insert(key, start) {
-                let found = format!("the name a second time (first on line {})", self.lines.at(earlier).0);
-                self.twice.push(Problem::new(below, found, "each name once").with_origin(self.origin(start)));
-                continue;
+            let (name, start) = (key(&property.name), property.range.start);
+            match first.entry(name) {
+                Entry::Vacant(entry) => _ = entry.insert(start),
+                Entry::Occupied(entry) => {
+                    self.twice.push(Twice { path: join(&self.path, name), first: *entry.get(), second: start });
+                }
             }
-            let value = self.value(below, &property.value);
-            map.insert(key.to_string(), value);
+        }
+        let mut map = Map::new();
+        for property in object.properties {
+            let name = property.name.into_string();
+            if !map.contains_key(&name) {
+                let value = self.below(&name, |walk| walk.value(property.value));
+                map.insert(name, value);
+            }
         }
         Value::Object(map)
     }
@@ -183,9 +314,9 @@ impl Document {
     /// Records that what stands at `path` comes from elsewhere.
     pub(super) fn mark_set(&mut self, path: &str, origin: Origin) {
         let below = format!("{path}.");
-        self.origins.retain(|key, _| key != path && !key.starts_with(&below));
+        self.replaced.retain(|key, _| key != path && !key.starts_with(&below));
         self.non_finite.retain(|key, _| key != path && !key.starts_with(&below));
-        self.origins.insert(path.to_string(), origin);
+        self.replaced.insert(path.to_string(), origin);
     }
 
     /// Records that a number at `path` overflows, written as `literal`.
@@ -198,27 +329,37 @@ impl Document {
         &self.non_finite
     }
 
-    /// Where the value at `path` was written, or else the nearest thing around it.
-    pub(super) fn origin(&self, path: &str) -> Option<Origin> {
+    /// Where the value at `path` comes from, if not from the text.
+    fn replacement(&self, path: &str) -> Option<Origin> {
         let mut path = path;
         loop {
-            if let Some(origin) = self.origins.get(path) {
+            if let Some(origin) = self.replaced.get(path) {
                 return Some(origin.clone());
             }
-            if path.is_empty() {
-                return None;
-            }
-            path = path.rfind('.').map_or("", |at| &path[..at]);
+            path = &path[..path.rfind('.')?];
         }
+    }
+
+    /// The problems, each with the place where it was written.
+    pub(super) fn located(&self, mut problems: Vec<Problem>) -> Vec<Problem> {
+        let parsed = parse_to_ast(&self.text, &CollectOptions::default(), &options());
+        // it was parsed before
+        let Some(node) = parsed.ok().and_then(|parsed| parsed.value) else { return problems };
+        let mut written = vec![];
+        for (k, problem) in problems.iter_mut().enumerate().filter(|(_, problem)| problem.origin.is_none()) {
+            problem.origin = self.replacement(&problem.path);
+            if problem.origin.is_none() {
+                written.push((k, offset(&node, &problem.path)));
+            }
+        }
+        let places = places(&self.text, written.iter().map(|(_, offset)| *offset));
+        written.iter().for_each(|(k, offset)| problems[*k].origin = Some(in_text(places[offset])));
+        problems
     }
 
     /// The error of these problems, each with the place where it was written.
     pub(crate) fn wrong(&self, problems: Vec<Problem>) -> SceneError {
-        let problems = problems
-            .into_iter()
-            .map(|problem| Problem { origin: problem.origin.clone().or_else(|| self.origin(&problem.path)), ..problem })
-            .collect();
-        SceneError::Wrong { name: self.name.clone(), problems }
+        SceneError::Wrong { name: self.name.clone(), problems: self.located(problems) }
     }
 
     /// The wrong values together with the numbers that overflow, which stand for anything found at their places.
@@ -345,5 +486,49 @@ fn plain_type(expected: &str) -> String {
             None if other.contains("struct") => "an object { … }".to_string(),
             None => other.to_string(),
         },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_places_in_one_long_line_are_found_in_one_pass() {
+        let text = format!("[{}]", ["[0, 1]"; 1000].join(", "));
+        let offsets: Vec<usize> = (0..1000).map(|k| 1 + 8 * k).collect();
+        let mut looked_at = 0;
+        let found = in_order(text.char_indices().inspect(|_| looked_at += 1), &offsets);
+        assert!(found.iter().zip(&offsets).all(|(place, offset)| *place == (1, offset + 1)));
+        assert!(looked_at <= text.len(), "{looked_at} characters of {}", text.len());
+    }
+
+    #[test]
+    fn both_ways_to_read_give_the_same_tree() {
+        let numbers =
+            "[0, -7, 18446744073709551615, 18446744073709551616, 1e5, 0.1, -0.0, 5e-324, 1.7976931348623157e308]";
+        let quirks = r#"{ "a\u0041\n": [true, null, "é\ud83d\ude00"], // a comment
+            "b": { /* and another */ "c": [] , "d": {} } }"#;
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
+        let entries = std::fs::read_dir(folder).expect("configs").map(|entry| entry.expect("entry").path());
+        let texts = entries.map(|path| std::fs::read_to_string(path).expect("text"));
+        for text in texts.chain([numbers.to_string(), quirks.to_string()]) {
+            let Tree(quick) = parse_to_serde_value(&text, &options()).expect("JSON");
+            assert_eq!((quick, HashMap::new()), by_syntax("test", &text).expect("JSON"), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_place_is_that_of_the_value_or_of_the_nearest_thing_around_it() {
+        let text = "{ \"a.b\": [0,\n  { \"é\": 1, \"c\": 2 }] }";
+        let document = parse("test", text).expect("JSON");
+        let paths = ["a.b.1.c", "a.b.0", "a.b.1.d.e", "a.c", "a.b.7", ""];
+        let problems = paths.map(|path| Problem::new(path, "", "")).to_vec();
+        let found = document.located(problems).into_iter().map(|problem| problem.origin.expect("a place"));
+        let text = |line, column| Origin::Text { line, column };
+        assert_eq!(
+            found.collect::<Vec<_>>(),
+            [text(2, 18), text(1, 11), text(2, 3), text(1, 1), text(1, 10), text(1, 1)]
+        );
     }
 }

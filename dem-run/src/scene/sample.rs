@@ -194,7 +194,8 @@ impl Lattice {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SampleFile {
-    /// CSV file with the header `x,y,radius` (2D) or `x,y,z,radius` (3D), all in m, sought beside the scene.
+    /// CSV file with the header `x,y,radius` (2D) or `x,y,z,radius` (3D), all in m, sought beside the scene. Lines that begin
+    /// with `#` are comments.
     pub path: PathBuf,
 }
 

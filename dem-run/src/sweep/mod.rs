@@ -210,11 +210,13 @@ fn failures(store: &Store, manifest: &Manifest) -> Result<(), RunError> {
     let failed: Vec<_> = manifest.runs.iter().filter(|run| run.state == State::Failed).collect();
     let code = failed.iter().map(|run| exit_code(store.outcome(&run.id).and_then(|outcome| outcome.exit_code))).max();
     let Some(code) = code else { return Ok(()) };
-    let message = format!(
-        "{} of {} runs failed; what each had written is in runs/NNNN.failed.h5; --retry runs them again",
-        failed.len(),
-        manifest.runs.len()
-    );
+    let left = failed.iter().filter(|run| store.path(&run.id, ".failed.h5").is_file()).count();
+    let left = match left {
+        0 => "none had begun its history, runs/NNNN.log says why".to_string(),
+        all if all == failed.len() => "what each had written is in runs/NNNN.failed.h5".to_string(),
+        some => format!("what {some} of them had written is in runs/NNNN.failed.h5"),
+    };
+    let message = format!("{} of {} runs failed; {left}; --retry runs them again", failed.len(), manifest.runs.len());
     Err(RunError::Runs { code, message })
 }
 

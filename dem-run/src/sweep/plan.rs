@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fmt::Write as _;
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
@@ -10,7 +11,7 @@ use sha2::{Digest, Sha256};
 use super::model::{Range, Spacing, Sweep, Values};
 use crate::run::RunError;
 use crate::scene::parse::{self, Document};
-use crate::scene::{Base, Change, Origin, Problem, Sample, Scene, SceneError, shorten};
+use crate::scene::{self, Base, Change, Origin, Problem, Sample, Scene, SceneError, shorten};
 
 /// Runs of a sweep, at most: each is a file.
 const MOST_RUNS: u64 = 100_000;
@@ -53,9 +54,8 @@ impl Plan {
     /// # Errors
     /// [`RunError::Scene`] with all that is wrong; [`RunError::InputOutput`] for files that cannot be read.
     pub fn read(path: &Path) -> Result<Self, RunError> {
-        let unreadable =
-            |error| RunError::InputOutput(format!("{}: the sweep cannot be read: {error}", path.display()));
-        let text = std::fs::read_to_string(path).map_err(unreadable)?;
+        let text = scene::text(path)
+            .map_err(|error| RunError::InputOutput(format!("{}: the sweep cannot be read: {error}", path.display())))?;
         let document = parse::parse(&path.display().to_string(), &text)?;
         let sweep: Sweep = document.decode().map_err(|problem| wrong(&document, vec![problem]))?;
         let problems = document.merge_non_finite(validate(&sweep));
@@ -223,7 +223,7 @@ fn runs(sweep: &Sweep, base: &Base, scene: &Path) -> Result<Vec<PlannedRun>, Vec
         }
     }
     if problems.is_empty() {
-        problems.extend(same_scene(&runs));
+        problems.extend(same_scene(&runs).or_else(|| load_unknown(&runs)));
     }
     if problems.is_empty() { Ok(runs) } else { Err(problems) }
 }
@@ -263,6 +263,15 @@ fn same_scene(runs: &[PlannedRun]) -> Option<Problem> {
     })
 }
 
+/// A run whose table of results could not say what the load is.
+fn load_unknown(runs: &[PlannedRun]) -> Option<Problem> {
+    let (run, names) = runs.iter().find_map(|run| Some((run, run.scene.load_unknown()?)))?;
+    let found =
+        format!("several driven walls, {names}, and none named as the load wall, where {}", describe(&run.values));
+    let allowed = "one of them as load_wall, in the scene or in the sweep: \"set\": { \"load_wall\": … }";
+    Some(Problem::new("scene", found, allowed))
+}
+
 /// The values of a run in a line: `bonds.strength = 5, seed = 1`.
 pub fn describe(values: &BTreeMap<String, Value>) -> String {
     values
@@ -270,6 +279,13 @@ pub fn describe(values: &BTreeMap<String, Value>) -> String {
         .map(|(path, value)| format!("{path} = {}", shorten(&value.to_string())))
         .collect::<Vec<_>>()
         .join(", ")
+}
+
+/// What a sample file holds.
+fn content(path: &Path) -> std::io::Result<Vec<u8>> {
+    let mut bytes = vec![];
+    scene::open_regular(path)?.read_to_end(&mut bytes)?;
+    Ok(bytes)
 }
 
 /// SHA-256 of all that a scene's history depends on: the scene without its title, and the grains of its sample file in
@@ -280,7 +296,7 @@ fn digest(scene: &Scene, samples: &mut HashMap<PathBuf, Vec<u8>>) -> String {
     if let Sample::File(file) = &mut plain.sample {
         let path = std::mem::take(&mut file.path);
         // one that cannot be read is told when all else is known to be right
-        hash.update(samples.entry(path).or_insert_with_key(|path| std::fs::read(path).unwrap_or_default()));
+        hash.update(samples.entry(path).or_insert_with_key(|path| content(path).unwrap_or_default()));
     }
     hash.update(plain.to_json().unwrap_or_default());
     hash.finalize().iter().fold(String::new(), |mut text, byte| {

@@ -15,7 +15,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{ErrorKind, Write as _};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -299,18 +299,6 @@ fn write_json(path: &Path, value: &impl Serialize) -> Result<(), RunError> {
 
 /// Writes a file so that a reader, or a crash, finds the old content or the new one.
 pub fn replace(path: &Path, content: &[u8]) -> Result<(), RunError> {
-    // two processes may do so at the same time
-    let mut part = path.as_os_str().to_owned();
-    part.push(format!(".{}.part", std::process::id()));
-    let write = || {
-        let mut file = File::create(&part)?;
-        file.write_all(content)?;
-        file.sync_all()?;
-        fs::rename(&part, path)
-    };
-    write().map_err(|error| {
-        // the first error is the one to tell
-        let _ = fs::remove_file(&part);
-        RunError::InputOutput(format!("{} cannot be written: {error}", path.display()))
-    })
+    crate::replace::write(path, content)
+        .map_err(|error| RunError::InputOutput(format!("{} cannot be written: {error}", path.display())))
 }

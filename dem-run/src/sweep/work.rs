@@ -14,6 +14,7 @@ use std::time::{Duration, Instant};
 use super::plan::PlannedRun;
 use super::store::{Outcome, State, Store};
 use crate::progress::{Progress, RunsProgress};
+use crate::replace::move_to;
 use crate::run::RunError;
 use crate::scene::Sample;
 use crate::signals::Interrupt;
@@ -142,7 +143,7 @@ impl Crew<'_> {
         let history = store.path(id, if outcome.state == State::Done { ".h5" } else { ".failed.h5" });
         // there is none where a run failed before its first frame
         if outcome.state == State::Done || part.is_file() {
-            fs::rename(&part, &history).map_err(|e| failed("put in its place", e))?;
+            move_to(&part, &history).map_err(|e| failed("put in its place", e))?;
         }
         if outcome.state == State::Done {
             let _ = fs::remove_file(store.path(id, ".failed.h5"));

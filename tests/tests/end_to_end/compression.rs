@@ -125,6 +125,8 @@ fn names_in(here: &Folder, folder: &str) -> Vec<String> {
     let entries = std::fs::read_dir(here.path(folder)).into_iter().flatten();
     let mut names: Vec<String> =
         entries.map(|entry| entry.expect("entry").file_name().into_string().expect("UTF-8")).collect();
+    // the record of whose results these are
+    names.retain(|name| name != ".dem-post.json");
     names.sort();
     names
 }

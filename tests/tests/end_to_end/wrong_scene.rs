@@ -1,6 +1,7 @@
 //! Wrong scenes and wrong use of `dem-run`: exit code, place and remedy, and no file left behind.
 
-use crate::common::{Folder, SMALL, config};
+use crate::common::{Folder, Outcome, SMALL, config, program};
+use std::process::Command;
 
 /// Run a scene of `configs/` with one assignment that is wrong; nothing must be left.
 fn refused(scene: &str, set: &str, code: i32, parts: &[&str]) {
@@ -60,7 +61,12 @@ fn texts_that_are_no_scene_are_refused_at_their_line() {
         (b"{}", 2, &["dimension"]),
         (b"[]", 2, &["the scene"]),
         // a history is not a scene
-        (b"\x89HDF\r\n\x1a\n\0\0", 4, &["scene.json", "cannot be read", "utf-8"]),
+        (b"\x89HDF\r\n\x1a\n\0\0", 4, &["scene.json", "cannot be read", "an HDF5 file", "dem-run resume"]),
+        (
+            b"{ \"dimension\": 2,\n  \"title\": \"caf\xe9\" }",
+            4,
+            &["scene.json", "line 2 is not UTF-8", "save it as UTF-8"],
+        ),
     ] {
         let here = Folder::new();
         here.write("scene.json", text);
@@ -76,7 +82,12 @@ fn files_that_cannot_be_read_or_written_are_exit_4() {
     here.write("column.h5", "precious");
     for (args, parts) in [
         (&["run", "missing.json"][..], &["missing.json", "cannot be read"][..]),
-        (&["run", "."], &["cannot be read"]),
+        (&["run", "."], &["cannot be read", "a folder"]),
+        (&["run", "/dev/zero"], &["/dev/zero", "not a regular file"]),
+        (
+            &["check", &column, "--set", r#"sample={"file": {"path": "/dev/zero"}}"#],
+            &["/dev/zero", "not a regular file"],
+        ),
         (&["run", &column], &["column.h5", "exists", "--force", "-o"]),
         (&["run", &column, "-o", "no/where.h5"], &["no/where.h5", "no folder no", "make it"]),
         (&["run", &column, "-o", "b.h5", "--write-sample", "no/where.csv"], &["no/where.csv", "make it"]),
@@ -143,13 +154,21 @@ fn a_sample_file_is_refused_at_its_line() {
         ("x,y,r\n0,0,1e-3\n", &["sample.csv, line 1", "x,y,radius"]),
         ("x,y,radius\n", &["sample.csv", "no grains"]),
         ("x,y,radius\n0,0,1e-3\n0,0,1e-3\n", &["grains 0 and 1 coincide"]),
+        ("x;y;radius\n0;0;1e-3\n", &["sample.csv, line 1", "x,y,radius, between commas"]),
+        ("x,y,radius\n0,1,1\n0,1,-2\nzero,1,1\n", &["line 3: radius is -2", "line 4: x is \"zero\""]),
+        ("x,y,radius\n0,1,1\n1,1,1\n9,1,1\n9,2,1\n", &["grains 0 and 1 overlap by 1.000e0 m", "grains 2 and 3"]),
     ] {
         let here = Folder::new();
         here.write("sample.csv", table);
         let path = here.path("sample.csv");
         let set = format!("sample={{\"file\": {{\"path\": {path:?}}}}}");
-        here.dem_run(&["run", &config("column.json"), "--set", &set]).fails(2, parts);
-        assert_eq!(here.names(), ["sample.csv"]);
+        for command in ["run", "check"] {
+            here.dem_run(&[command, &config("column.json"), "--set", &set]).fails(2, parts);
+            assert_eq!(here.names(), ["sample.csv"]);
+        }
+        let told = here.dem_run(&["check", &config("column.json"), "--set", &set, "--json"]).stdout;
+        let told: serde_json::Value = serde_json::from_str(&told).expect("JSON");
+        assert!(told["problems"][0]["message"].as_str().is_some_and(|text| text.contains(parts[0])), "{told}");
     }
 }
 
@@ -202,7 +221,7 @@ fn check_tells_where_the_last_step_ends() {
     let here = Folder::new();
     let scene = config("two-grains.json");
     let told = here.dem_run(&["check", &scene, "--set", "time.step=0.1"]).succeeds().stdout;
-    assert!(told.contains("2 of 0.1 s, to 0.15 s; the last ends at 0.2"), "{told}");
+    assert!(told.contains("1 of 0.1 s, to 0.15 s; the last ends at 0.1\n"), "{told}");
     assert!(!here.dem_run(&["check", &scene]).succeeds().stdout.contains("the last ends"));
 }
 
@@ -226,4 +245,137 @@ fn a_run_without_a_step_claims_nothing() {
         assert!(!outcome.stdout.contains(claim), "{}", outcome.stdout);
     }
     outcome.fails(3, &["no convergence at t = 0"]);
+}
+
+#[test]
+fn a_pipe_is_not_waited_for() {
+    let here = Folder::new();
+    assert!(Command::new("mkfifo").arg(here.path("pipe")).status().expect("mkfifo").success());
+    here.write("sweep.json", r#"{ "scene": "pipe", "vary": [{ "seed": [1, 2] }] }"#);
+    for args in [["check", "pipe"], ["run", "pipe"], ["sweep", "pipe"], ["sweep", "sweep.json"]] {
+        here.dem_run(&args).fails(4, &["pipe", "not a regular file", "as a file first"]);
+    }
+}
+
+#[test]
+fn a_scene_has_an_end() {
+    let here = Folder::new();
+    // a hole takes no room on the disk
+    std::fs::File::create(here.path("big.json")).and_then(|file| file.set_len(1 << 40)).expect("a hole");
+    here.dem_run(&["check", "big.json"]).fails(4, &["big.json", "more than 256 MiB", "sample.file"]);
+    let set = format!("sample={{\"file\": {{\"path\": {:?}}}}}", here.path("big.csv"));
+    here.write("big.csv", "1".repeat(1 << 20));
+    here.dem_run(&["check", &config("column.json"), "--set", &set]).fails(2, &["it has more than 4096 bytes"]);
+}
+
+#[test]
+fn a_scene_too_large_for_the_memory_is_refused() {
+    let here = Folder::new();
+    let sets = r#"--set 'sample={"lattice": {"square": {"diameter": 1e-3, "rows": 3000, "columns": 3000}}}'"#;
+    let within = |command: &str| {
+        let line =
+            format!("ulimit -v 1000000; exec {:?} {command} {:?} {sets}", program("dem-run"), config("column.json"));
+        Command::new("sh").args(["-c", &line]).current_dir(here.path("")).output().expect("sh")
+    };
+    let told = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
+    let run = within("run");
+    assert_eq!(run.status.code(), Some(4));
+    let error = told(run.stderr);
+    for part in
+        ["9000000 grains need about 18.0 GB of memory", "1.0 GB are free", "take fewer grains", "--ignore-memory"]
+    {
+        assert!(error.contains(part), "{part} is not in\n{error}");
+    }
+    assert_eq!(here.names(), [""; 0]);
+    let check = within("check");
+    assert_eq!(check.status.code(), Some(0));
+    assert!(told(check.stdout).contains("memory     about 18.0 GB; free 1.0 GB"));
+    assert!(told(check.stderr).contains("needs more memory than is free"));
+}
+
+#[test]
+fn a_name_that_is_not_utf_8_is_refused_at_once() {
+    use std::os::unix::ffi::OsStrExt;
+    let here = Folder::new();
+    let name = std::ffi::OsStr::from_bytes(b"a\xff.h5");
+    for command in ["run", "sweep"] {
+        let output = Command::new(program("dem-run"))
+            .args([command, &config("compression.json"), "-o"])
+            .arg(name)
+            .current_dir(here.path(""))
+            .output()
+            .expect("start");
+        let told = String::from_utf8(output.stderr).expect("UTF-8");
+        assert_eq!(output.status.code(), Some(2), "{told}");
+        assert!(told.contains("is not UTF-8: name another with -o") && !told.contains("packing"), "{told}");
+        assert_eq!(std::fs::read_dir(here.path("")).expect("folder").count(), 0);
+    }
+}
+
+#[test]
+fn control_characters_do_not_reach_the_terminal() {
+    let here = Folder::new();
+    let scene = config("two-grains.json");
+    here.write("a\u{1b}[31m.json", "{");
+    let name = "a\u{1b}[31m.h5";
+    for args in [
+        &["check", &scene, "--set", r#"title="\u001b[31mred\u0007""#][..],
+        &["run", &scene, "-o", name],
+        &["run", &scene, "-o", name],
+        &["check", "a\u{1b}[31m.json"],
+        &["check", &scene, "--threads[31m\u{1b}"],
+        &["check", &scene, "--set", "title\u{1b}[31m=1"],
+    ] {
+        let Outcome { stdout, stderr, .. } = here.dem_run(args);
+        let raw = |text: &str| text.chars().any(|c| c.is_control() && c != '\n');
+        assert!(!raw(&stdout) && !raw(&stderr), "{args:?}: {stdout:?} {stderr:?}");
+        assert!((stdout + &stderr).contains("[31m"), "{args:?}");
+    }
+}
+
+#[test]
+fn a_wall_that_carries_nothing_is_told_before_and_after() {
+    let here = Folder::new();
+    let box_of_shear = r#"{ "dimension": 2,
+        "sample": { "lattice": { "hexagonal": { "diameter": 2e-3, "rows": 4, "columns": 6 } } },
+        "materials": { "density": 2500, "friction": { "grain_grain": 0.3, "grain_wall": 0.3 } },
+        "bonds": { "strength": 10, "gap_tolerance": 1e-3 },
+        "walls": { "bottom": { "shape": { "plane": { "normal": [0, 1], "place": "seated" } } },
+                   "top": { "shape": { "plane": { "normal": [0, -1], "place": "seated" } },
+                            "direction": [1, 0], "velocity": { "constant": 0.01 } } },
+        "time": { "step": 1e-4, "end": 1e-2 }, "output": { "every_steps": 10 } }"#;
+    here.write("box.json", box_of_shear);
+    let before = "warning: walls.top: it is driven along its own surface";
+    let after = "warning: walls.top: no force ever acted on this driven wall";
+    let check = here.dem_run(&["check", "box.json"]).succeeds();
+    assert!(check.stderr.contains(before), "{}", check.stderr);
+    let run = here.dem_run(&["run", "box.json"]).succeeds();
+    assert!(run.stderr.contains(before) && run.stderr.contains(after), "{}", run.stderr);
+    let pressed = here.dem_run(&["run", "box.json", "--force", "--set", "walls.top.direction=[0, -1]"]);
+    assert!(!pressed.stderr.contains("warning"), "{}", pressed.stderr);
+    assert_eq!(here.dem_run(&["run", "box.json", "--force", "--quiet"]).succeeds().stderr, "");
+}
+
+#[test]
+fn the_history_of_a_failed_run_is_named_where_there_is_one() {
+    let here = Folder::new();
+    let sweep = serde_json::json!({
+        "scene": config("compression.json"),
+        "set": { "sample.random.count": 60, "sample.random.width": 0.014 },
+        "vary": [{ "sample.random.preparation.compaction.solid_fraction": [0.95] }],
+    });
+    here.write("sweep.json", sweep.to_string());
+    let told =
+        here.dem_run(&["sweep", "sweep.json"]).fails(2, &["1 of 1 runs failed", "runs/NNNN.log says why"]).stderr;
+    assert!(!told.contains("failed.h5"), "{told}");
+}
+
+#[test]
+fn a_run_does_not_go_beyond_its_end() {
+    let here = Folder::new();
+    let sets = ["--set", "time.step=3e-3", "--set", "time.end=0.1", "--set", "output.every_steps=1"];
+    let outcome = here.dem_run(&[&["run", &config("incline.json"), "--json", "-o", "a.h5"], &sets[..]].concat());
+    assert!(outcome.stderr.contains("time.end: 0.1 s is not a multiple of time.step, 0.003 s"), "{}", outcome.stderr);
+    assert!(outcome.stderr.contains("0.099 or 0.102 would be"), "{}", outcome.stderr);
+    assert_eq!(here.history("a.h5").steps().last(), Some(&33));
 }

@@ -1,5 +1,8 @@
 use dem_run::history::RuptureMode;
 
+use petgraph::algo::floyd_warshall;
+use petgraph::graph::UnGraph;
+
 use super::super::front::{fronts, growth};
 use super::*;
 
@@ -237,4 +240,40 @@ fn the_growth_ends_with_the_cracks_of_the_table() {
     for crack in &paths.cracks {
         assert!(crack.path_length <= crack.length * (1.0 + 1e-12) && crack.tortuosity >= 1.0 - 1e-12, "{crack:?}");
     }
+}
+
+#[test]
+fn the_path_of_a_crack_with_loops_is_the_longest_of_all_pairs() {
+    // five of six bonds, in two orders without sense: many loops
+    for (lattice, factor) in [(hexagonal(14, 11), 17), (square(16, 13), 29)] {
+        let count = lattice.bonds.len();
+        let ruptures = one_a_step(&(0..5 * count / 6).map(|k| (k * factor) % count).collect::<Vec<_>>());
+        let paths = lattice.paths(&ruptures);
+        let crack = &paths.cracks[0];
+        let members: Vec<&Segment> = paths.segments.iter().filter(|segment| segment.crack == 0).collect();
+        let edges: Vec<_> = members.iter().map(|s| (s.nodes[0] as u32, s.nodes[1] as u32, s.length)).collect();
+        let graph = UnGraph::<(), f64>::from_edges(&edges);
+        let all = floyd_warshall(&graph, |edge| *edge.weight()).unwrap();
+        // nodes of other cracks are never reached
+        let reached = all.iter().filter(|(_, length)| **length < 1.0);
+        let longest = reached.map(|(_, length)| *length).fold(0.0, f64::max);
+        assert!(close(crack.path_length, longest), "{} in place of {longest}", crack.path_length);
+        // the path is one line between two ends that are as far apart as told
+        let on_path: Vec<&&Segment> = members.iter().filter(|segment| segment.on_path).collect();
+        assert!(close(on_path.iter().map(|segment| segment.length).sum(), longest));
+        let mut ends: Vec<(usize, [f64; 2])> =
+            on_path.iter().flat_map(|s| [(s.nodes[0], s.line[0]), (s.nodes[1], s.line[2])]).collect();
+        ends.sort_by_key(|(node, _)| *node);
+        let ends: Vec<_> = ends.chunk_by(|a, b| a.0 == b.0).filter(|group| group.len() == 1).flatten().collect();
+        assert!(ends.len() == 2 && close(distance(ends[0].1, ends[1].1), crack.end_to_end), "{ends:?}");
+        let loops = members.len() + 1 - nodes_of(&members);
+        assert!(loops > 20, "{loops} loops");
+    }
+}
+
+fn nodes_of(segments: &[&Segment]) -> usize {
+    let mut nodes: Vec<usize> = segments.iter().flat_map(|segment| segment.nodes).collect();
+    nodes.sort_unstable();
+    nodes.dedup();
+    nodes.len()
 }

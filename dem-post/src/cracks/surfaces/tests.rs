@@ -130,3 +130,26 @@ fn between_unequal_spheres_the_facet_passes_the_point_of_contact() {
     let polygon = SIDES as f64 * (std::f64::consts::PI / SIDES as f64).tan() * 0.25 * 9e-6;
     assert!(close(facet.area, polygon) && close(found.cracks[0].extent, 3e-3 / (std::f64::consts::PI / 24.0).cos()));
 }
+
+#[test]
+fn the_extent_is_that_of_all_pairs_of_corners() {
+    // from the first corner the farthest is the third, and from that the first: the second and fourth are farther apart
+    let kite = [[0.0, 0.0], [2.0, -2.6], [5.0, 0.0], [2.0, 2.6]].map(|[x, y]| Point::new(x, y, 0.0));
+    assert!(close(extent(kite.to_vec()), 5.2), "{}", extent(kite.to_vec()));
+    assert_eq!((extent(vec![]), extent(vec![kite[0]])), (0.0, 0.0));
+    let mut state = 1u64;
+    let mut random = || {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+    };
+    for round in 0..50 {
+        // within a box, or on a sphere
+        let point = |random: &mut dyn FnMut() -> f64| Point::new(random(), random(), random());
+        let mut points: Vec<Point> = (0..40).map(|_| point(&mut random)).collect();
+        if round % 2 == 0 {
+            points.iter_mut().for_each(|x| *x = x.normalize());
+        }
+        let pairs = points.iter().flat_map(|a| points.iter().map(move |b| (a - b).norm()));
+        assert_eq!(extent(points.clone()), pairs.fold(0.0, f64::max));
+    }
+}

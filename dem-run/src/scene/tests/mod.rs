@@ -138,7 +138,7 @@ fn a_missing_file_and_one_that_is_not_text_are_told_apart() {
     assert!(missing.to_string().contains("scene.json"), "{missing}");
     std::fs::write(&path, [0xff, 0xfe, 0x00]).expect("write");
     let binary = load(&path, &[]).expect_err("not text");
-    assert!(binary.to_string().contains("utf-8"), "{binary}");
+    assert!(binary.to_string().contains("line 1 is not UTF-8"), "{binary}");
 }
 
 #[test]

@@ -6,11 +6,11 @@ use crate::scene::error::Problem;
 use crate::scene::function::Function;
 
 /// Grains are numbered by 32-bit signed integers in histories, and walls share them.
-pub(super) const MAX_GRAINS: usize = 100_000_000;
+pub(crate) const MAX_GRAINS: usize = 100_000_000;
 
 /// Largest magnitude of a number, and the inverse of the smallest one that must not be zero: masses and
 /// energies, products of a few such numbers, then neither overflow nor vanish.
-const LARGEST: f64 = 1e60;
+pub(crate) const LARGEST: f64 = 1e60;
 
 /// What was found so far.
 pub(super) struct Report {

@@ -1,0 +1,296 @@
+//! What a scene may not mean as it says it: no error, but a word before the run, with the place and the remedy.
+
+use crate::build::TOUCHING;
+use crate::output::number;
+use crate::scene::{Sample, Scene};
+use dem_core::body::{Drive, Grains, Shape, Wall};
+use dem_core::dim::{Dim, Vect};
+
+/// Grains and loads of one kind that are told one by one.
+const MOST_TOLD: usize = 5;
+/// Sine or cosine of an angle below which two directions are along or across each other: directions in decimals are not exact.
+const PARALLEL: f64 = 1e-6;
+/// Moments of a run at which a drive is looked at.
+const MOMENTS: usize = 1000;
+
+/// What the scene itself shows.
+pub(crate) fn of_scene(scene: &Scene) -> Vec<String> {
+    let mut told = vec![];
+    let time = &scene.time;
+    if !time.is_multiple() {
+        let (last, next) = (time.last(), (time.steps() + 1) as f64 * time.step);
+        told.push(format!(
+            "time.end: {} s is not a multiple of time.step, {} s: the last step ends at {} s; {} or {} would be",
+            time.end,
+            time.step,
+            number(last),
+            number(last),
+            number(next)
+        ));
+    }
+    let Some(held) = &scene.grains else { return told };
+    if let Sample::Grains(list) = &scene.sample {
+        let moves = |values: &Option<Vec<f64>>| values.iter().flatten().any(|value| *value != 0.0);
+        let lines = held.fixed.iter().filter_map(|&k| {
+            let grain = list.get(k).filter(|grain| moves(&grain.velocity) || moves(&grain.spin))?;
+            let name = if moves(&grain.velocity) { "velocity" } else { "spin" };
+            Some(format!(
+                "sample.grains.{k}.{name}: it is ignored, as grains.fixed holds grain {k}: take the grain from grains.fixed, or \
+                 its {name} away"
+            ))
+        });
+        told.extend(first_few(lines.collect(), "fixed grains have a velocity or a spin"));
+    }
+    let loads = held.loads.iter().enumerate().filter(|(_, load)| held.fixed.contains(&load.grain));
+    let lines = loads.map(|(k, load)| {
+        let grain = load.grain;
+        format!("grains.loads.{k}: it moves nothing, as grains.fixed holds grain {grain}: take it from one of them")
+    });
+    told.extend(first_few(lines.collect(), "loads are on fixed grains"));
+    told
+}
+
+/// The first of many lines of one kind, and how many more there are.
+fn first_few(mut lines: Vec<String>, what: &str) -> Vec<String> {
+    let more = lines.len().saturating_sub(MOST_TOLD);
+    lines.truncate(MOST_TOLD);
+    lines.extend((more > 0).then(|| format!("{more} more {what}")));
+    lines
+}
+
+/// What driven walls show, with the grains where they are in their places.
+pub(crate) fn of_walls<D: Dim>(scene: &Scene, walls: &[Wall<D>], grains: Option<&Grains<D>>) -> Vec<String> {
+    let pushes: Vec<bool> =
+        walls.iter().map(|wall| Course::of(wall, scene.time.end).is_some_and(|c| !c.along)).collect();
+    let mut told = vec![];
+    for (k, (name, wall)) in scene.walls.keys().zip(walls).enumerate() {
+        let Some(course) = Course::of(wall, scene.time.end) else { continue };
+        let alone = !others_push(scene) && !pushes.iter().enumerate().any(|(other, push)| *push && other != k);
+        let word = match grains {
+            _ if course.along => along(wall.friction, alone),
+            Some(grains) => {
+                pulled(wall, &course, grains).or_else(|| alone.then(|| apart(wall, &course, grains)).flatten())
+            }
+            None => pulled(wall, &course, &Grains::from_iter([])),
+        };
+        told.extend(word.map(|word| format!("walls.{name}: {word}")));
+    }
+    told
+}
+
+/// Whether something that is no wall may press grains together: gravity, a load, or a grain in motion.
+fn others_push(scene: &Scene) -> bool {
+    let nonzero = |values: &[f64]| values.iter().any(|value| *value != 0.0);
+    let moving = |values: &Option<Vec<f64>>| values.as_deref().is_some_and(nonzero);
+    scene.gravity.as_deref().is_some_and(nonzero)
+        || scene.grains.as_ref().is_some_and(|grains| !grains.loads.is_empty())
+        || matches!(&scene.sample, Sample::Grains(list) if list.iter().any(|g| moving(&g.velocity) || moving(&g.spin)))
+}
+
+/// Whether a wall is driven away from the grains at all times, as one that is taken away.
+pub(crate) fn leaves<D: Dim>(wall: &Wall<D>, end: f64, grains: &Grains<D>) -> bool {
+    let (Some(course), Some(towards)) = (Course::of(wall, end), towards(wall, grains)) else { return false };
+    let sign = course.direction.dot(&towards);
+    !course.along && course.range.0 * sign <= 0.0 && course.range.1 * sign <= 0.0
+}
+
+/// The way on which its drive alone leads a wall.
+struct Course<D: Dim> {
+    /// Unit direction.
+    direction: D::Vector,
+    /// Whether the direction is that of the surface.
+    along: bool,
+    /// Whether it is a force that drives the wall.
+    force: bool,
+    /// Least and largest value of the drive (N or m/s).
+    range: (f64, f64),
+    /// Least and largest displacement along the direction until the end of the run (m).
+    travel: (f64, f64),
+}
+
+impl<D: Dim> Course<D> {
+    /// None where the wall stands still at all times.
+    fn of(wall: &Wall<D>, end: f64) -> Option<Self> {
+        let (direction, mass, drive) = match &wall.drive {
+            Drive::Fixed => return None,
+            Drive::Velocity { direction, speed } => (*direction, None, speed),
+            Drive::Force { direction, mass, force } => (*direction, Some(*mass), force),
+        };
+        let (mut range, mut travel, mut place, mut speed) = ((0.0, 0.0), (0.0, 0.0), 0.0, 0.0);
+        let step = end / MOMENTS as f64;
+        for k in 0..=MOMENTS {
+            let value = drive(k as f64 * step);
+            range = widened(range, value);
+            speed = mass.map_or(value, |mass| speed + value / mass * step);
+            travel = widened(travel, place);
+            place += speed * step;
+        }
+        let along = match wall.shape {
+            Shape::Plane { normal } => direction.dot(&normal).abs() < PARALLEL,
+            Shape::Round { axis: Some(axis), .. } => (direction - axis * axis.dot(&direction)).norm() < PARALLEL,
+            Shape::Round { axis: None, .. } => false,
+        };
+        (range != (0.0, 0.0)).then_some(Self { direction, along, force: mass.is_some(), range, travel })
+    }
+}
+
+fn widened((low, high): (f64, f64), value: f64) -> (f64, f64) {
+    (value.min(low), value.max(high))
+}
+
+/// A wall that is driven along its own surface.
+fn along(friction: f64, alone: bool) -> Option<String> {
+    let way = "it is driven along its own surface";
+    if friction == 0.0 {
+        return Some(format!(
+            "{way}, without friction, so it carries nothing: give it friction, or a direction that is not across its normal"
+        ));
+    }
+    alone.then(|| {
+        format!(
+            "{way} and presses on nothing; friction carries a load only where something presses grains on it, and nothing in \
+             this scene does: drive another wall along its normal, or give gravity or a load"
+        )
+    })
+}
+
+/// Unit vector from a wall to the grains at it: that of its nearest grain; none inside a round wall.
+fn towards<D: Dim>(wall: &Wall<D>, grains: &Grains<D>) -> Option<D::Vector> {
+    match wall.shape {
+        Shape::Plane { normal } => Some(normal),
+        Shape::Round { inside: true, .. } => None,
+        Shape::Round { .. } => nearest(wall, grains).map(|(_, normal)| normal),
+    }
+}
+
+/// Gap (m) of the grain nearest to a wall, and the unit normal towards it.
+fn nearest<D: Dim>(wall: &Wall<D>, grains: &Grains<D>) -> Option<(f64, D::Vector)> {
+    let gaps = grains.position.iter().zip(&grains.radius).map(|(x, r)| wall.shape.gap(*x - wall.position, *r));
+    gaps.min_by(|a, b| a.0.total_cmp(&b.0))
+}
+
+/// A wall whose force pulls it away from the grains at all times: a confinement with the wrong sign.
+fn pulled<D: Dim>(wall: &Wall<D>, course: &Course<D>, grains: &Grains<D>) -> Option<String> {
+    let sign = course.direction.dot(&towards(wall, grains)?);
+    let (low, high) = course.range;
+    let away = course.force && (if sign > 0.0 { high <= 0.0 } else { low >= 0.0 }) && sign != 0.0;
+    let most = if sign > 0.0 { low } else { high };
+    away.then(|| {
+        format!(
+            "its force, {} N, pulls it away from the grains at all times, so it carries nothing: give the force the other sign \
+             to press on them, or turn its direction",
+            number(most)
+        )
+    })
+}
+
+/// A wall that touches nothing and that its drive does not bring to the grains.
+fn apart<D: Dim>(wall: &Wall<D>, course: &Course<D>, grains: &Grains<D>) -> Option<String> {
+    let (gap, _) = nearest(wall, grains)?;
+    let mean = grains.radius.iter().sum::<f64>() / grains.len() as f64;
+    let near = match wall.shape {
+        Shape::Plane { normal } => {
+            let sign = course.direction.dot(&normal);
+            (course.travel.0 * sign).max(course.travel.1 * sign)
+        }
+        // at most, whichever way it goes
+        Shape::Round { .. } => course.travel.1.max(-course.travel.0),
+    };
+    (gap > TOUCHING * mean && near < gap).then(|| {
+        format!(
+            "it touches nothing at the start: its nearest grain is {} m away, and its drive brings it at most {} m nearer by \
+             time.end, so it carries nothing: seat it (\"place\": \"seated\"), or turn its direction",
+            number(gap),
+            number(near.max(0.0))
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::build::place;
+    use crate::scene::from_text;
+    use dem_core::dim::D2;
+
+    /// What is told of two grains on a floor below a lid, with one change.
+    fn told(lid: &str, sets: &[&str]) -> Vec<String> {
+        let text = format!(
+            r#"{{ "dimension": 2,
+                "sample": {{ "grains": [{{ "center": [0, 1], "radius": 1 }}, {{ "center": [2, 1], "radius": 1 }}] }},
+                "materials": {{ "density": 1, "friction": {{ "grain_grain": 0.3, "grain_wall": 0.3 }} }},
+                "grains": {{ "fixed": [], "loads": [] }},
+                "walls": {{ "floor": {{ "shape": {{ "plane": {{ "normal": [0, 1], "place": "seated" }} }} }}, "lid": {lid} }},
+                "time": {{ "step": 0.1, "end": 1 }}, "output": {{ "every_steps": 1 }} }}"#
+        );
+        let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
+        let scene = from_text("test", &text, &sets).unwrap_or_else(|error| panic!("{error}"));
+        place::<D2>(&scene, &mut |_| true).unwrap_or_else(|error| panic!("{error}")).warnings
+    }
+
+    fn lid(place: &str, drive: &str) -> String {
+        format!(r#"{{ "shape": {{ "plane": {{ "normal": [0, -1], "place": {place} }} }}, {drive} }}"#)
+    }
+
+    #[test]
+    fn a_wall_that_cannot_carry_anything_is_told() {
+        let (seated, high) = (r#""seated""#, r#"{ "at": [0, 3] }"#);
+        let pulled = r#""mass": "sample", "force": { "constant": -22 }"#;
+        for (place, drive, parts) in [
+            (
+                seated,
+                r#""direction": [1, 0], "velocity": { "constant": 1 }"#,
+                &["along its own surface", "nothing in this scene"][..],
+            ),
+            (seated, r#""friction": 0, "direction": [1, 0], "velocity": { "constant": 1 }"#, &["without friction"]),
+            (seated, pulled, &["-22 N, pulls it away", "the other sign"]),
+            (seated, r#""mass": "sample", "direction": [0, 1], "force_rate": 3"#, &["3 N, pulls it away"]),
+            (high, r#""velocity": { "constant": 0.5 }"#, &["touches nothing", "is 1 m away", "at most 0.5 m nearer"]),
+            (high, r#""velocity": { "constant": -2 }"#, &["touches nothing", "at most 0 m nearer"]),
+            (high, r#""mass": { "kg": 1 }, "force": { "constant": 1 }"#, &["touches nothing", "m nearer"]),
+        ] {
+            let told = told(&lid(place, drive), &[]);
+            assert_eq!(told.len(), 1, "{drive}: {told:?}");
+            for part in [&["walls.lid: "], parts].concat() {
+                assert!(told[0].contains(part), "{part} is not in\n{}", told[0]);
+            }
+        }
+        // what presses, leads to the grains, is taken away, or may be met by grains that move
+        for (place, drive, sets) in [
+            (seated, r#""velocity": { "constant": 1 }"#, &[][..]),
+            (seated, r#""velocity": { "constant": -1 }"#, &[]),
+            (seated, r#""mass": "sample", "force_rate": 3"#, &[]),
+            (seated, r#""mass": "sample", "force": { "table": [[0, -1], [1, 1]] }"#, &[]),
+            (high, r#""velocity": { "constant": 1.5 }"#, &[]),
+            (high, r#""mass": { "kg": 1 }, "force": { "constant": 3 }"#, &[]),
+            (seated, r#""direction": [1, 0], "velocity": { "constant": 1 }"#, &["gravity=[0, -9.81]"]),
+            (high, r#""velocity": { "constant": 0.1 }"#, &["gravity=[0, 9.81]"]),
+        ] {
+            assert_eq!(told(&lid(place, drive), sets), [""; 0], "{drive}");
+        }
+    }
+
+    #[test]
+    fn what_is_ignored_is_told() {
+        let lid = lid(r#""seated""#, r#""velocity": { "constant": 1 }"#);
+        for (sets, parts) in [
+            (
+                &["grains.fixed=[1]", "sample.grains.1.velocity=[0, 2]"][..],
+                &["sample.grains.1.velocity: it is ignored, as grains.fixed holds grain 1"][..],
+            ),
+            (&["grains.fixed=[0]", "sample.grains.0.spin=[2]"], &["sample.grains.0.spin: it is ignored"]),
+            (
+                &["grains.fixed=[1]", r#"grains.loads=[{"grain": 1, "force": [1, 0]}]"#],
+                &["grains.loads.0: it moves nothing, as grains.fixed holds grain 1"],
+            ),
+            (
+                &["time.end=1.05"],
+                &["time.end: 1.05 s is not a multiple of time.step, 0.1 s", "ends at 1 s; 1 or 1.1 would be"],
+            ),
+        ] {
+            let told = told(&lid, sets);
+            assert_eq!(told.len(), 1, "{told:?}");
+            parts.iter().for_each(|part| assert!(told[0].contains(part), "{part} is not in\n{}", told[0]));
+        }
+        assert_eq!(told(&lid, &["grains.fixed=[1]", "sample.grains.1.velocity=[0, 0]"]), [""; 0]);
+    }
+}

@@ -1,0 +1,299 @@
+"""Observables recomputed from frames: energy, momentum, stress, strain, forces on walls, penetration."""
+
+import numpy as np
+
+import prescribed
+import tolerances
+from history import cross, norm, sums
+from rupture import energy_of_rows
+
+
+def check(h, c, p, report):
+    """All checks of this module."""
+    check_kinetic(h, report)
+    check_books(h, report, check_works(h, c, p, report))
+    check_momentum(h, report)
+    check_walls(h, report)
+    check_stress(h, c, report)
+    check_virial(h, c, report)
+    check_strain(h, report)
+    check_penetration(h, c, report)
+    check_counts(h, report)
+
+
+def of_step(what):
+    """Describes a step."""
+    return lambda s, *_: f"step {s + 1}: {what}"
+
+
+def kinetic(h):
+    """Kinetic energy (J) of grains that are not fixed and of walls that a force drives, at every frame."""
+    free = ~h.fixed
+    grains = 0.5 * (h.mass * (h.v**2).sum(2) + h.inertia * (h.w**2).sum(2))[:, free].sum(1)
+    mass = np.where(np.isfinite(h.wall_mass), h.wall_mass, 0.0)
+    return grains + 0.5 * ((h.V**2).sum(2) * mass).sum(1)
+
+
+def check_kinetic(h, report):
+    """Kinetic energy from velocities."""
+    told = kinetic(h)[1:]
+    report.expect(
+        "kinetic_energy",
+        np.abs(h.observed["kinetic_energy"] - told),
+        tolerances.rounding(told),
+        of_step("kinetic_energy (J)"),
+    )
+
+
+def works(h, c, p):
+    """Work of each step (J) [S] and the size of its summands: external, and what rows took from the
+    bodies."""
+    mean = tuple(0.5 * (a + b) for a, b in zip(c.before, c.after))
+    un, ut, turn, spin = mean
+    rn, rt = h.rn * un, (h.rt * ut).sum(1)
+    moment = (h.bending * turn).sum(1) + h.twist * spin
+    dry, bonds = ~p.bonds, p.bonds
+    parts = {
+        "impact": np.where(dry, rn, 0.0),
+        "friction": np.where(dry, rt, 0.0),
+        "bonds": np.where(bonds, rn + rt + moment, 0.0),
+    }
+    # rounding of velocities shows in a work as if it were done with them
+    reach = c.speed + norm(h.body_v[h.row_step, h.i]) + norm(h.body_v[h.row_step, h.j])
+    size = (norm(h.force) + norm(h.torque) / h.radius[h.i]) * reach if h.M else np.zeros(0)
+    total = {name: -h.h * np.bincount(h.row_step, part, minlength=h.S) for name, part in parts.items()}
+    sizes = h.h * np.bincount(h.row_step, size, minlength=h.S)
+    outer, torque = h.external()
+    free = ~h.fixed
+    v, w = 0.5 * (h.v[1:] + h.v[:-1]), 0.5 * (h.w[1:] + h.w[:-1])
+    total["external"] = h.h * ((outer * v).sum(2) + (torque * w).sum(2))[:, free].sum(1)
+    sizes = sizes + h.h * (norm(outer) * norm(v))[:, free].sum(1)
+    middle = 0.5 * (h.V[1:] + h.V[:-1])
+    drive, against = h.wall_drive_force(), wall_forces(h)[0]
+    for k, (kind, _) in enumerate(h.drives):
+        if kind == "force":
+            total["external"] = total["external"] + h.h * drive[:, k] * (middle[:, k] @ h.wall_direction[k])
+            sizes = sizes + h.h * np.abs(drive[:, k]) * norm(middle[:, k])
+        elif kind == "velocity":
+            total["external"] = total["external"] - h.h * (against[:, k] * middle[:, k]).sum(1)
+    return total, sizes
+
+
+def check_works(h, c, p, report):
+    """The increments of the books in every step, from forces and velocities of its two frames."""
+    total, sizes = works(h, c, p)
+    columns = {"external_work": "external", "dissipation_impact": "impact", "dissipation_friction": "friction"}
+    elastic = "elastic_energy" in h.observed
+    if "bond_remainder" in h.observed:
+        columns["bond_remainder"] = "bonds"
+    for name, part in columns.items():
+        seen = h.observed[name]
+        increment = np.diff(np.append(0.0, seen))
+        off = np.where(h.single, np.abs(increment - total[part]), 0.0)
+        report.expect(name, off, tolerances.rounding(sizes + np.abs(seen)), of_step(f"increment of {name} (J)"))
+    if elastic:
+        check_elastic(h, total["bonds"], sizes, report)
+    return sizes
+
+
+def check_elastic(h, losses, sizes, report):
+    """Energy stored in intact bonds, set free by those that broke, and the damping that is left."""
+    rows = np.flatnonzero(h.bond >= 0)
+    rows = rows[h.bond_status[h.row_step[rows] + 1, h.bond[rows]] == "INTACT"]
+    stored = np.bincount(h.row_step[rows], energy_of_rows(h, rows), minlength=h.S)
+    seen = h.observed["elastic_energy"]
+    report.expect("elastic_energy", np.abs(seen - stored), tolerances.rounding(stored), of_step("elastic_energy (J)"))
+    freed = np.bincount(np.clip(h.events["step"].astype(int) - 1, 0, None), h.events["energy"], minlength=h.S)[: h.S]
+    increment = np.diff(np.append(0.0, h.observed["fracture_energy"]))
+    scale = np.abs(h.observed["fracture_energy"]) + freed
+    report.expect(
+        "fracture_energy",
+        np.abs(increment - freed),
+        tolerances.rounding(scale),
+        of_step("increment of fracture_energy (J)"),
+    )
+    told = losses - np.diff(np.append(0.0, seen)) - freed
+    damping = h.observed["dissipation_damping"]
+    off = np.where(h.single, np.abs(np.diff(np.append(0.0, damping)) - told), 0.0)
+    scale = sizes + np.abs(damping) + seen + np.append(0.0, seen[:-1]) + freed
+    report.expect(
+        "dissipation_damping", off, tolerances.rounding(scale), of_step("increment of dissipation_damping (J)")
+    )
+
+
+def check_books(h, report, sizes):
+    """work = change of kinetic energy + all that was lost or stored + remainder, and the remainder is
+    rounding.
+
+    `sizes` are the sums of the absolute values of what the works of each step are summed from (J)."""
+    o, zero = h.observed, np.zeros(h.S)
+    start = kinetic(h)[0]
+    lost = ["dissipation_impact", "dissipation_friction", "bond_remainder", "dissipation_damping", "fracture_energy"]
+    terms = [o["external_work"], start - o["kinetic_energy"], -o.get("elastic_energy", zero)] + [
+        -o.get(name, zero) for name in lost
+    ]
+    left = sum(terms)
+    size = np.cumsum(sum(np.abs(np.diff(np.append(t[:1] * 0, t))) for t in terms)) + start
+    allowed = tolerances.value("books") * size + tolerances.rounding(np.cumsum(sizes + kicks(h)))
+    report.expect(
+        "energy_remainder",
+        np.abs(o["energy_remainder"] - left),
+        allowed,
+        of_step("energy_remainder (J) against the other entries"),
+    )
+    report.expect("energy_remainder", np.abs(o["energy_remainder"]), allowed, of_step("energy_remainder (J)"))
+
+
+def kicks(h):
+    """Σ (h Σ|f|)²/m over bodies (J) [S]: energies that their velocities, differences of impulses, are
+    rounded against."""
+    bodies = h.N + h.W
+    size = norm(h.force)
+    total = sum(np.bincount(h.row_step * bodies + k, size, minlength=h.S * bodies) for k in (h.i, h.j)).reshape(
+        h.S, bodies
+    )
+    outer, _ = h.external()
+    total = h.h * (total + np.concatenate([norm(outer), np.abs(h.wall_drive_force())], 1))
+    inverse = np.concatenate([h.inverse_mass[: h.N], np.where(np.isfinite(h.wall_mass), 1 / h.wall_mass, 0.0)])
+    return (total**2 * inverse).sum(1)
+
+
+def check_momentum(h, report):
+    """Linear and angular momentum of the grains that are not fixed."""
+    free = ~h.fixed
+    p = (h.mass[:, None] * h.v)[1:, free]
+    report.expect(
+        "momentum", norm(h.observed["momentum"] - p.sum(1)), tolerances.rounding(norm(p).sum(1)), of_step("momentum")
+    )
+    spin = h.inertia[:, None] * h.w
+    angular = (cross(h.x, h.mass[:, None] * h.v) + spin)[1:, free]
+    size = (norm(h.x) * h.mass * norm(h.v) + norm(spin))[1:, free].sum(1)
+    report.expect(
+        "angular_momentum",
+        norm(h.observed["angular_momentum"] - angular.sum(1)),
+        tolerances.rounding(size),
+        of_step("angular momentum"),
+    )
+
+
+def wall_forces(h):
+    """Forces of the grains on the walls (N) [S,W,D] by contacts, and the sums of their sizes [S,W]."""
+    rows = np.flatnonzero(h.on_wall)
+    index = h.row_step[rows] * h.W + h.j[rows] - h.N
+    force = -sums(index, h.force[rows], h.S * h.W).reshape(h.S, h.W, h.D)
+    return force, sums(index, norm(h.force[rows]), h.S * h.W).reshape(h.S, h.W)
+
+
+def check_walls(h, report):
+    """Forces on walls from contacts, in frames and observables; their places."""
+    if h.W == 0:
+        return
+    force, size = wall_forces(h)
+    describe = lambda s, k: f"step {s + 1}, wall {h.wall_names[k]} (N)"
+    report.expect("wall_force", norm(h.observed["wall_force"] - force), tolerances.rounding(size), describe)
+    report.expect("force of walls in frames", norm(h.wall_frame_force[1:] - force), tolerances.rounding(size), describe)
+    report.expect("wall_position", norm(h.observed["wall_position"] - h.X[1:]), 0.0, describe)
+    at_limit = h.observed.get("wall_force_at_limit")
+    if at_limit is not None:
+        broke = np.zeros(h.S, bool)
+        if h.K:
+            broke[np.clip(h.events["step"].astype(int) - 1, 0, h.S - 1)] = True
+        still = (h.single & ~broke)[:, None]
+        off = np.where(still, norm(at_limit - force), 0.0)
+        report.expect("wall_force_at_limit", off, tolerances.rounding(size), describe)
+
+
+def reference_volume(h):
+    """Volume (m³) of the box around the sample at time zero."""
+    low, high = (h.x[0] - h.radius[:, None]).min(0), (h.x[0] + h.radius[:, None]).max(0)
+    return float(np.prod(high - low)) * prescribed.thickness(h.scene)
+
+
+def check_stress(h, c, report):
+    """Love and Weber: Σ ℓ ⊗ f over contacts; ℓ joins the centres, at a wall the contact point to the
+    centre."""
+    single = h.row_single
+    branch = c.n * (c.lever_i + c.lever_j)[:, None]
+    tensor = branch[:, :, None] * h.force[:, None, :]
+    volume = reference_volume(h)
+    total = sums(h.row_step, tensor, h.S) / volume
+    size = sums(h.row_step, np.where(single, (c.lever_i + c.lever_j + c.place) * norm(h.force), 0.0), h.S) / volume
+    off = np.abs(h.observed["stress"] - total).max((1, 2), initial=0.0)
+    report.expect("stress", np.where(h.single, off, 0.0), tolerances.rounding(size), of_step("stress (Pa)"))
+
+
+def check_virial(h, c, report):
+    """V σ = Σ x_g ⊗ (m a − F) − Σ p ⊗ f over wall contacts: the stress against forces at the walls and
+    accelerations."""
+    outer, _ = h.external()
+    moved = h.mass[:, None] * (h.v[1:] - h.v[:-1]) / h.h - outer
+    held = np.zeros((h.S, h.N, h.D))
+    if h.fixed.any():
+        i, j, s = h.i, h.j, h.row_step
+        into = sums(s * h.N + i, h.force, h.S * h.N)
+        grains = ~h.on_wall
+        into -= sums((s * h.N + j)[grains], h.force[grains], h.S * h.N)
+        held = into.reshape(h.S, h.N, h.D)
+    moved = np.where(h.fixed[:, None], held, moved)
+    middle = h.mid[:, : h.N]
+    bodies = np.einsum("sna,snb->sab", middle, moved)
+    rows = np.flatnonzero(h.on_wall)
+    walls = sums(h.row_step[rows], h.point[rows][:, :, None] * h.force[rows][:, None, :], h.S)
+    total = (bodies - walls) / reference_volume(h)
+    forces = sums(h.row_step, norm(h.force) * c.place, h.S)
+    size = forces + (norm(middle) * (h.mass * (norm(h.v[1:]) + norm(h.v[:-1])) / h.h + norm(outer))).sum(1)
+    off = np.abs(h.observed["stress"] - total).max((1, 2), initial=0.0)
+    allowed = tolerances.rounding(size) / reference_volume(h)
+    report.expect(
+        "stress against walls", np.where(h.single, off, 0.0), allowed, of_step("stress by walls and accelerations (Pa)")
+    )
+
+
+def fitted_strain(h):
+    """Displacement gradients [S,D,D] of the affine motion that fits that of all grains since time zero
+    best."""
+    x = h.x[0] - h.x[0].mean(0)
+    moved = h.x[1:] - h.x[0]
+    moved = moved - moved.mean(1, keepdims=True)
+    if np.linalg.matrix_rank(x, tol=1e-6 * np.linalg.norm(x)) < h.D:
+        return np.zeros((h.S, h.D, h.D)), np.full(h.S, 0.0)
+    inverse = np.linalg.pinv(x)
+    size = (norm(h.x[1:]) + norm(h.x[0])).max(1) * np.linalg.norm(inverse, 2) * np.sqrt(h.N)
+    return np.einsum("snr,cn->src", moved, inverse), size * np.linalg.cond(x)
+
+
+def check_strain(h, report):
+    """The strain is the affine fit to the grains' displacements."""
+    told, size = fitted_strain(h)
+    off = np.abs(h.observed["strain"] - told).max((1, 2), initial=0.0)
+    report.expect("strain", off, tolerances.rounding(size), of_step("strain"))
+
+
+def check_penetration(h, c, report):
+    """Penetration is the deepest overlap of contacts that are not bonds."""
+    depth = np.where(h.bond >= 0, 0.0, np.maximum(-c.gap, 0.0))
+    deepest = np.zeros(h.S)
+    np.maximum.at(deepest, h.row_step, depth)
+    scale = np.zeros(h.S)
+    np.maximum.at(scale, h.row_step, c.place)
+    off = np.where(h.single, np.abs(h.observed["penetration"] - deepest), 0.0)
+    report.expect("penetration", off, tolerances.rounding(scale), of_step("penetration (m)"))
+    report.figures["deepest overlap (mean radii)"] = float(deepest.max(initial=0) / h.radius.mean())
+
+
+def check_counts(h, report):
+    """Numbers of what was done are whole and not negative; processor time does not run back."""
+    for name in (
+        "solver_iterations",
+        "solver_newton_iterations",
+        "solver_factorisations",
+        "solver_rejected",
+        "substeps",
+    ):
+        if name in h.observed:
+            value = h.observed[name]
+            off = np.abs(value - np.round(value)) + np.maximum(-value, 0.0)
+            report.expect("counts", off, 0.0, of_step(name))
+    report.expect("counts", -np.diff(np.append(0.0, h.observed["cpu_time"])), 0.0, of_step("cpu_time (s)"))
+    sweeps = h.observed["solver_iterations"] - h.observed["solver_newton_iterations"]
+    report.expect("counts", -sweeps, 0.0, of_step("sweeps"))

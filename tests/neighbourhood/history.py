@@ -1,0 +1,227 @@
+"""A history with a frame at every step, as arrays.
+
+Bodies are grains, then walls. `step` s leads from frame s to frame s + 1; rows of contacts stand behind
+each other, and `row_step` says to which step each belongs. SI units throughout.
+"""
+
+import json
+
+import h5py
+import numpy as np
+
+import prescribed
+
+
+class Unfit(Exception):
+    """A history that cannot be checked: not every step has its frame, or something is missing."""
+
+
+class History:
+    """All of a history that the checks read.
+
+    N grains, W walls, B bodies (N + W), S steps, M rows of contacts, D dimensions, Q components of a spin
+    (1 or 3).
+    """
+
+    def __init__(self, path):
+        with h5py.File(path, "r") as file:
+            self.version = int(file["parameters"].attrs["schema_version"])
+            self.packed = file["parameters"].attrs.get("solid_fraction")
+            self.scene = json.loads(file["parameters/scene"][()])
+            self._frames(file)
+            self._grains(file["particles/grains"])
+            self._walls(file.get("walls"))
+            self._rows(file["contacts"])
+            self._bonds(file)
+            self.observed = {
+                name: group["value"][: self.S] for name, group in file["observables"].items() if "value" in group
+            }
+            self.observed_step = file["observables/step"][: self.S]
+            self.observed_time = file["observables/time"][: self.S]
+        self._bodies()
+
+    def _frames(self, file):
+        frames = int(file["commit"][()])
+        self.frame_step = file["contacts/step"][:frames]
+        self.frame_time = file["contacts/time"][:frames]
+        if frames < 1 or not np.array_equal(self.frame_step, np.arange(frames)):
+            raise Unfit("the history does not have a frame at every step (output.every_steps: 1)")
+        self.S, self.D, self.h = frames - 1, self.scene["dimension"], self.scene["time"]["step"]
+        self.Q = 1 if self.D == 2 else 3
+
+    def _grains(self, group):
+        self.radius, self.mass, self.inertia = (group[name][:] for name in ("radius", "mass", "inertia"))
+        self.N = len(self.radius)
+        frames = self.S + 1
+        self.x, self.v = group["position/value"][:frames], group["velocity/value"][:frames]
+        self.turns = "angular_velocity" in group
+        spins = group["angular_velocity/value"][:frames] if self.turns else np.zeros((frames, self.N, self.Q))
+        self.w = spins.reshape(frames, self.N, self.Q)
+        self.turned = None
+        if self.turns:
+            self.turned = group["angle/value"][:frames] if self.D == 2 else group["orientation/value"][:frames]
+        self.fixed = np.zeros(self.N, bool)
+        self.fixed[(self.scene.get("grains") or {}).get("fixed", [])] = True
+
+    def _walls(self, group):
+        self.scene_walls = prescribed.walls(self.scene)
+        self.W, frames = len(self.scene_walls), self.S + 1
+        self.wall_names = [name for name, _ in self.scene_walls]
+        if self.W == 0:
+            self.X = self.V = self.wall_frame_force = np.zeros((frames, 0, self.D))
+            self.wall_normal, self.wall_radius = np.zeros((0, self.D)), np.zeros(0)
+            self.wall_kind = []
+            return
+        names = list(group["name"].asstr()[:])
+        if names != self.wall_names:
+            raise Unfit(f"the walls are {names}, those of the scene {self.wall_names}")
+        self.X, self.V = group["position/value"][:frames], group["velocity/value"][:frames]
+        self.wall_frame_force = group["force/value"][:frames]
+        self.wall_normal, self.wall_radius = group["normal"][:], group["radius"][:]
+        self.wall_kind = enum_names(group["kind"])
+
+    def _rows(self, group):
+        start, count = group["start"][: self.S + 1].astype(int), group["count"][: self.S + 1].astype(int)
+        if count[0] != 0 or not np.array_equal(start[1:], np.cumsum(count)[:-1]):
+            raise Unfit("rows of contacts do not stand behind each other")
+        self.M = int(count.sum())
+        self.row_step = np.repeat(np.arange(self.S + 1), count) - 1
+        pair = group["pair"][: self.M].astype(int)
+        self.i, self.j = pair[:, 0], np.where(pair[:, 1] < 0, self.N - 1 - pair[:, 1], pair[:, 1])
+        if self.M and (self.i.min() < 0 or self.i.max() >= self.N or self.j.max() >= self.N + self.W):
+            raise Unfit("a contact names a body that is not there")
+        self.on_wall = pair[:, 1] < 0
+        self.point, self.normal, self.gap = (group[k][: self.M] for k in ("point", "normal", "gap"))
+        reaction = group["reaction"][: self.M]
+        self.rn, self.rt = reaction[:, 0], reaction[:, 1:]
+        self.status = np.array(enum_names(group["status"], self.M))
+        self.bond = group["bond"][: self.M] if "bond" in group else np.full(self.M, -1)
+        self._frame_of_rows(group)
+
+    def _frame_of_rows(self, group):
+        n = self.normal
+        if self.D == 2:
+            self.tangents = np.stack([-n[:, 1], n[:, 0]], 1)[:, None, :]
+            moment = group["moment"][: self.M] if "moment" in group else np.zeros(self.M)
+            self.moment = moment.reshape(self.M, 1)
+            self.torque = self.moment
+            self.bending, self.twist = self.moment, np.zeros(self.M)
+        else:
+            first = group["tangent"][: self.M] if "tangent" in group else np.zeros((self.M, 3))
+            self.tangents = np.stack([first, np.cross(n, first)], 1)
+            self.moment = group["moment"][: self.M] if "moment" in group else np.zeros((self.M, 2))
+            self.bending = self.moment[:, :2]
+            self.twist = self.moment[:, 2] if self.moment.shape[1] > 2 else np.zeros(self.M)
+            self.torque = np.einsum("mk,mkd->md", self.bending, self.tangents) + self.twist[:, None] * n
+        if self.rt.shape[1] == 0:
+            self.rt = np.zeros((self.M, self.D - 1))
+        self.force_t = np.einsum("mk,mkd->md", self.rt, self.tangents)
+        self.force = self.rn[:, None] * n + self.force_t
+
+    def _bonds(self, file):
+        self.bonded = "bonds" in file
+        self.events = None
+        if not self.bonded:
+            self.K = 0
+            return
+        group = file["bonds"]
+        self.bond_pair = group["pair"][:].astype(int)
+        self.rest_gap, self.strength, self.bond_friction, self.mean_diameter = (
+            group[k][:] for k in ("rest_gap", "strength", "friction", "mean_diameter")
+        )
+        self.K = len(self.strength)
+        self.bond_status = np.array(enum_names(group["status/value"], self.S + 1)).reshape(self.S + 1, self.K)
+        self.xi = float(self.scene["bonds"].get("twist") or 0.0)
+        self.stiffness = prescribed.stiffness(self.scene, self.mean_diameter)
+        kept = int(file["commit_rows/events"][self.S]) if "commit_rows/events" in file else None
+        self.events = file["events/rupture"][:kept]
+        modes = h5py.check_enum_dtype(file["events/rupture"].dtype["mode"])
+        by_number = {number: name for name, number in modes.items()}
+        self.event_mode = np.array([by_number.get(int(m), f"unknown {m}") for m in self.events["mode"]], dtype=object)
+
+    def _bodies(self):
+        scene, W = self.scene, self.W
+        self.drives = [prescribed.drive(wall) for _, wall in self.scene_walls]
+        self.wall_direction = np.array([prescribed.direction(w, self.D) for _, w in self.scene_walls]).reshape(
+            W, self.D
+        )
+        self.wall_mass = np.array([prescribed.wall_mass(w, self.mass) for _, w in self.scene_walls])
+        self.wall_friction = prescribed.wall_friction(scene)
+        still = np.zeros((self.S + 1, W, self.Q))
+        self.body_x, self.body_v = np.concatenate([self.x, self.X], 1), np.concatenate([self.v, self.V], 1)
+        self.body_w = np.concatenate([self.w, still], 1)
+        # where contacts are solved: half a step on from the frame before
+        self.mid = self.body_x[:-1] + 0.5 * self.h * self.body_v[:-1]
+        self.inverse_mass = np.concatenate([np.where(self.fixed, 0.0, 1 / self.mass), np.zeros(W)])
+        self.inverse_inertia = np.concatenate([np.where(self.fixed, 0.0, 1 / self.inertia), np.zeros(W)])
+        self.body_radius = np.concatenate([self.radius, np.zeros(W)])
+        # bodies that no contact moves
+        self.immovable = np.concatenate([self.fixed, ~np.isfinite(self.wall_mass)])
+        self.times = self.h * np.arange(self.S + 1)
+        self.gravity = np.asarray(scene.get("gravity") or np.zeros(self.D), float)
+        self._parts()
+
+    def _parts(self):
+        """Steps that one solve made, and not parts of it: only there the frames before and after tell what
+        was solved."""
+        if "substeps" in self.observed:
+            self.single = self.observed["substeps"] == 1
+        else:
+            self.single = self.observed["solver_rejected"] == 0
+        self.row_single = self.single[self.row_step]
+
+    def external(self):
+        """Prescribed forces (N) [S,N,D] and torques (N m) [S,N,Q] on the grains at the middle of each
+        step."""
+        force = np.broadcast_to(self.mass[:, None] * self.gravity, (self.S, self.N, self.D)).copy()
+        torque = np.zeros((self.S, self.N, self.Q))
+        for load in (self.scene.get("grains") or {}).get("loads", []):
+            factor = prescribed.at(load.get("time") or {"constant": 1.0}, self.times[:-1] + 0.5 * self.h)[:, None]
+            force[:, load["grain"]] += factor * np.asarray(load.get("force") or np.zeros(self.D), float)
+            torque[:, load["grain"]] += factor * np.asarray(load.get("torque") or np.zeros(self.Q), float)
+        return force, torque
+
+    def wall_drive_force(self):
+        """Prescribed forces (N) [S,W] on the walls that a force drives, at the middle of each step; 0 for
+        the others."""
+        middle = self.times[:-1] + 0.5 * self.h
+        columns = [prescribed.at(f, middle) if kind == "force" else np.zeros(self.S) for kind, f in self.drives]
+        return np.stack(columns, 1) if columns else np.zeros((self.S, 0))
+
+
+def enum_names(dataset, count=None):
+    """The names of an array of enumerated values."""
+    numbers = h5py.check_enum_dtype(dataset.dtype)
+    names = {number: name for name, number in numbers.items()}
+    values = dataset[:] if count is None else dataset[:count]
+    table = np.array([names.get(k, f"unknown {k}") for k in range(256)], dtype=object)
+    return table[values]
+
+
+def sums(index, values, count):
+    """Sums of the rows of `values` [M,…] that have the same `index`, [count,…]."""
+    values = np.asarray(values, float)
+    out = np.zeros((count,) + values.shape[1:])
+    if out.size and len(values):
+        columns = [np.bincount(index, column, minlength=count) for column in values.reshape(len(values), -1).T]
+        out = np.stack(columns, 1).reshape(out.shape)
+    return out
+
+
+def cross(a, b):
+    """a × b: [M,1] in 2D, [M,3] in 3D."""
+    if a.shape[-1] == 2:
+        return (a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])[..., None]
+    return np.cross(a, b)
+
+
+def turning_velocity(spin, lever):
+    """ω × x, the velocity of a point at x of a body that turns."""
+    if lever.shape[-1] == 2:
+        return spin * np.stack([-lever[..., 1], lever[..., 0]], -1)
+    return np.cross(spin, lever)
+
+
+def norm(a):
+    """Norm along the last axis."""
+    return np.sqrt((a * a).sum(-1))

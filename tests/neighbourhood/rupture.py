@@ -1,0 +1,315 @@
+"""Bonds: how they form, their lengths, and that they break where equation (5) says and nowhere else."""
+
+import numpy as np
+
+import prescribed
+import tolerances
+from geometry import gap_and_normal, where
+from history import norm
+
+
+def check(h, c, p, report):
+    """All checks of this module; nothing without bonds."""
+    if not h.K:
+        return
+    check_formed(h, report)
+    check_lengths(h, p, report)
+    check_intact(h, p, report)
+    check_statuses(h, report)
+    check_events(h, c, p, report)
+    check_limits_of_events(h, report)
+    check_order_of_events(h, report)
+
+
+def check_formed(h, report):
+    """Bonds join the pairs that the scene says, with its strength, and none else."""
+    i, j = np.triu_indices(h.N, 1)
+    gap, _ = gap_and_normal(h, i, j, h.x[0, i], h.x[0, j])
+    a = h.radius[i] + h.radius[j]
+    tolerance = h.scene["bonds"]["gap_tolerance"] * a
+    slack = tolerances.rounding(norm(h.x[0, i]) + norm(h.x[0, j]) + a)
+    bonded = np.isin(i * h.N + j, h.bond_pair[:, 0] * h.N + h.bond_pair[:, 1])
+    held = h.fixed[i] & h.fixed[j]
+    off = np.where(bonded, gap - tolerance, np.where(held, -np.inf, tolerance - gap))
+    report.expect("bonds formed", off, slack, lambda m: f"pair {i[m]}-{j[m]}, bonded: {bool(bonded[m])}")
+    bi, bj = h.bond_pair.T
+    rest, _ = gap_and_normal(h, bi, bj, h.x[0, bi], h.x[0, bj])
+    a = h.radius[bi] + h.radius[bj]
+    mu = h.scene["bonds"].get("friction")
+    mu = h.scene["materials"]["friction"]["grain_grain"] if mu is None else mu
+    told = {
+        "rest_gap": (h.rest_gap, rest, norm(h.x[0, bi]) + norm(h.x[0, bj]) + a),
+        "mean_diameter": (h.mean_diameter, a, a),
+    }
+    told["strength"] = (h.strength, prescribed.strength(h.scene, a), np.abs(h.strength))
+    told["friction"] = (h.bond_friction, np.full(h.K, mu), np.full(h.K, mu))
+    for name, (found, expected, scale) in told.items():
+        off = np.abs(found - expected)
+        report.expect("bonds formed", off, tolerances.rounding(scale), lambda k, name=name: f"bond {k}: {name}")
+    report.require("bonds formed", bool((h.bond_status[0] == "INTACT").all()), "a bond is broken at time zero")
+
+
+def check_lengths(h, p, report):
+    """An intact rigid bond keeps its length; an elastic one is as long as its force says. At mid-step,
+    where bonds act.
+
+    A bond that turns by θ in a step is longer at mid-step by the chord, θ²/2 of its length: half of what a
+    step along the tangent adds is given back by the next (docs/theory/time-stepping.md, bonds that turn),
+    so it does not add up. By what the solves miss the law of a spring, which `elastic bonds` bounds in each
+    step, force and length part over the run.
+    """
+    bi, bj = h.bond_pair.T
+    gap, tangential = np.zeros((h.S, h.K)), np.zeros((h.S, h.K))
+    for s in range(h.S):
+        gap[s], n = gap_and_normal(h, bi, bj, h.mid[s, bi], h.mid[s, bj])
+        u = h.v[s + 1, bi] - h.v[s + 1, bj]
+        tangential[s] = norm(u - (u * n).sum(1)[:, None] * n)
+    length = h.mean_diameter + h.rest_gap
+    chord = 0.5 * (h.h * np.vstack([tangential[:1], tangential[:-1]])) ** 2 / length
+    chord = np.maximum.accumulate(chord, 0) if h.S else chord
+    longer = gap - h.rest_gap
+    # intact when the step began
+    intact = h.bond_status[:-1] == "INTACT"
+    smaller = np.minimum(h.radius[bi], h.radius[bj])
+    report.figures["largest change of the length of an intact bond (m)"] = float(
+        np.abs(np.where(intact, longer, 0)).max(initial=0)
+    )
+    if h.stiffness is None:
+        describe = lambda s, b: f"step {s + 1}, bond {b}: change of length (m)"
+        off = np.where(intact, np.abs(longer), 0.0)
+        report.expect("length of rigid bonds", off, tolerances.value("rigid length") * smaller + chord, describe)
+    else:
+        # what a bond carries after a step follows the length of the next mid-step
+        rows = np.flatnonzero((h.bond >= 0) & (h.row_step + 1 < h.S))
+        s, b = h.row_step[rows] + 1, h.bond[rows]
+        off = np.abs(longer[s, b] + h.rn[rows] / h.stiffness[0][b])
+        missed = np.zeros((h.S, h.K))
+        of_bonds = np.flatnonzero(p.bonds)
+        missed[h.row_step[of_bonds], h.bond[of_bonds]] = h.h * np.abs(p.u[of_bonds, 0])
+        allowed = tolerances.value("elastic length") * length[b] + chord[s, b] + np.cumsum(missed, 0)[s - 1, b]
+        report.expect("length of elastic bonds", np.where(intact[s, b], off, 0.0), allowed, where(h, rows))
+    check_elongation(h, longer, report)
+
+
+def check_elongation(h, longer, report):
+    """The observable `bond_elongation`, where the history has it."""
+    if "bond_elongation" not in h.observed:
+        return
+    left = h.bond_status[1:] == "INTACT"
+    told = np.abs(np.where(left, longer, 0.0)).max(1, initial=0.0)
+    scale = norm(h.x).max(initial=0) * 2 + h.mean_diameter.max()
+    off = np.where(h.single, np.abs(told - h.observed["bond_elongation"]), 0.0)
+    report.expect("bond_elongation", off, tolerances.rounding(scale), lambda s: f"step {s + 1}: bond_elongation (m)")
+
+
+def failure(n, t, b, w, strength, mu, a, xi):
+    """Distance to rupture of reactions (N, N m): r̂_n, and the largest of ‖r_t‖/μ, ‖m‖/(μ a), |τ|/(ξ a)
+    with its mode."""
+    over = lambda size, c: np.divide(size, c, out=np.zeros_like(size), where=c > 0)
+    ratios = np.stack([over(t, mu), over(b, mu * a), over(w, xi * a)])
+    return n + strength, ratios.max(0), np.array(["SHEAR", "ROLLING", "TWIST"])[ratios.argmax(0)], ratios
+
+
+def check_intact(h, p, report):
+    """After a step no intact bond is at its limit; with `end_of_step` those that are break, and no
+    others."""
+    rows = np.flatnonzero(h.bond >= 0)
+    b, s = h.bond[rows], h.row_step[rows]
+    n, ratio, _, _ = failure(
+        h.rn[rows],
+        norm(h.rt[rows]),
+        norm(h.bending[rows]),
+        np.abs(h.twist[rows]),
+        h.strength[b],
+        h.bond_friction[b],
+        h.mean_diameter[b],
+        np.full(len(b), h.xi),
+    )
+    eps = tolerances.value("limit")
+    slack = tolerances.rounding(np.abs(h.rn[rows]) + h.strength[b] + ratio)
+    # positive where the bond is at its limit
+    over = np.maximum(eps * h.strength[b] - n, ratio - (1 - eps) * n)
+    over = np.where((n > eps * h.strength[b]) & (ratio == 0), -np.inf, over)
+    intact = h.bond_status[s + 1, b] == "INTACT"
+    report.expect("intact bonds within limits", np.where(intact, over, -np.inf), slack, where(h, rows))
+    if h.scene.get("rupture") == "end_of_step":
+        broke_now = ~intact & (h.bond_status[s, b] == "INTACT")
+        report.expect("only bonds at their limit break", np.where(broke_now, -over, -np.inf), slack, where(h, rows))
+
+
+def check_statuses(h, report):
+    """Statuses, events and contacts say the same: a bond breaks once, at its event, and has contacts as a
+    bond before."""
+    broke_at = np.full(h.K, h.S + 1)
+    mode = np.full(h.K, "INTACT", dtype=object)
+    for event, name in zip(h.events, h.event_mode):
+        bond = int(event["bond"])
+        report.require(
+            "each bond breaks once",
+            0 <= bond < h.K and broke_at[bond] > h.S,
+            f"an event names bond {bond}, again or not there",
+        )
+        if 0 <= bond < h.K:
+            broke_at[bond], mode[bond] = int(event["step"]), name
+    step = np.arange(h.S + 1)[:, None]
+    told = np.where(step < broke_at, "INTACT", np.broadcast_to(mode, (h.S + 1, h.K)))
+    off = (told != h.bond_status).astype(float)
+    report.expect(
+        "statuses are those of events",
+        off,
+        0.0,
+        lambda s, b: f"step {s}, bond {b} is {h.bond_status[s, b]}, told {told[s, b]}",
+    )
+    broken = h.observed["bonds_broken"]
+    count = (np.arange(1, h.S + 1)[:, None] >= broke_at).sum(1)
+    report.expect("bonds_broken", np.abs(broken - count), 0.0, lambda s: f"step {s + 1}: bonds_broken")
+    # one row for each bond that holds, and, where it breaks at the end of a step, for that step
+    late = 1 if h.scene.get("rupture") == "end_of_step" else 0
+    rows = np.flatnonzero(h.bond >= 0)
+    held = np.arange(1, h.S + 1)[:, None] < broke_at + late
+    seen = np.zeros((h.S, h.K), int)
+    np.add.at(seen, (h.row_step[rows], h.bond[rows]), 1)
+    # the last part of a step that was made in parts knows less bonds
+    off = np.where(h.single[:, None] | (late == 0), np.abs(seen - held), 0)
+    report.expect("contacts of bonds", off, 0.0, lambda s, b: f"step {s + 1}, bond {b}: {seen[s, b]} contacts")
+    pairs = (h.bond_pair[h.bond[rows]] != np.stack([h.i, h.j], 1)[rows]).any(1)
+    report.expect("contacts of bonds", pairs.astype(float), 0.0, where(h, rows))
+
+
+def check_events(h, c, p, report):
+    """Pair, time, place and energy of every event."""
+    e = h.events
+    if len(e) == 0:
+        report.margins.setdefault("events", 0.0)
+        return
+    b, step = e["bond"].astype(int), e["step"].astype(int)
+    inside = (b >= 0) & (b < h.K) & (step >= 1) & (step <= h.S)
+    report.require("events", bool(inside.all()), "an event names a bond or a step that is not there")
+    if not inside.all():
+        return
+    report.require(
+        "events",
+        np.array_equal(h.bond_pair[b], np.stack([e["i"], e["j"]], 1)),
+        "an event does not name the grains of its bond",
+    )
+    report.expect(
+        "events",
+        np.abs(e["time"] - h.times[step]),
+        tolerances.rounding(h.times[step]),
+        lambda k: f"event {k}: time (s)",
+    )
+    i, j = h.bond_pair[b].T
+    xi, xj = h.mid[step - 1, i], h.mid[step - 1, j]
+    gap, n = gap_and_normal(h, i, j, xi, xj)
+    point = xi - n * (h.radius[i] + 0.5 * gap)[:, None]
+    told = np.stack([e[k] for k in "xyz"], 1)
+    point = np.concatenate([point, np.zeros((len(e), 3 - h.D))], 1)
+    single = h.single[step - 1]
+    off = np.where(single, norm(told - point), 0.0)
+    # of a normal: the rounding of places over the distance, times the lever
+    scale = 2 * (norm(xi) + norm(xj) + h.radius[i])
+    report.expect("events", off, tolerances.rounding(scale), lambda k: f"event {k}: place (m)")
+    energy, size = stored_energy(h, b, step)
+    off = np.where(single, np.abs(e["energy"] - energy), 0.0)
+    report.expect("events", off, tolerances.rounding(size), lambda k: f"event {k}: energy (J)")
+
+
+def stored_energy(h, b, step):
+    """½ Σ f²/k of bonds `b` that broke in steps `step`: what they held as it began, or at its end with
+    `end_of_step`."""
+    if h.stiffness is None:
+        return np.zeros(len(b)), np.zeros(len(b))
+    late = h.scene.get("rupture") == "end_of_step"
+    rows = np.flatnonzero(h.bond >= 0)
+    row_of = {(int(h.row_step[m]), int(h.bond[m])): m for m in rows[np.isin(h.bond[rows], b)]}
+    out = np.zeros(len(b))
+    for k, (bond, s) in enumerate(zip(b, step - 1 if late else step - 2)):
+        m = row_of.get((int(s), int(bond)))
+        out[k] = 0.0 if m is None else energy_of_rows(h, np.array([m]))[0]
+    return out, out
+
+
+def energy_of_rows(h, rows):
+    """½ Σ f²/k (J) of these rows of elastic bonds."""
+    b = h.bond[rows]
+    kn, kt, km, kw = (k[b] for k in h.stiffness)
+    sums = h.rn[rows] ** 2 / kn + (h.rt[rows] ** 2).sum(1) / kt + (h.bending[rows] ** 2).sum(1) / km
+    if h.moment.shape[1] > 2:
+        sums = sums + np.divide(h.twist[rows] ** 2, kw, out=np.zeros(len(rows)), where=kw > 0)
+    return 0.5 * sums
+
+
+def check_limits_of_events(h, report):
+    """Every event is at its limit, in its cone, and named by the row that is nearest to its limit."""
+    e = h.events
+    if len(e) == 0:
+        return
+    b = np.clip(e["bond"].astype(int), 0, h.K - 1)
+    eps, strength = tolerances.value("limit"), h.strength[b]
+    two_columns = "twist" in e.dtype.names
+    twist = np.abs(e["twist"]) if two_columns else np.zeros(len(e))
+    # before version 3 `m` is the norm of bending and twist together: less is said of both
+    mixed = h.moment.shape[1] > 2 and not two_columns
+    n, ratio, mode, ratios = failure(
+        e["rn"], e["rt"], e["m"], twist, strength, h.bond_friction[b], h.mean_diameter[b], np.full(len(b), h.xi)
+    )
+    slack = tolerances.rounding(np.abs(e["rn"]) + strength + ratio)
+    describe = lambda k: f"event {k} ({h.event_mode[k]}) at step {e['step'][k]}, bond {e['bond'][k]}"
+    tension = n <= eps * strength + slack
+    if mixed:
+        # ‖(m, τ)‖ is between the smaller limit and the root of the sum of both squares
+        moments = ~np.isin(h.event_mode, ["SHEAR", "TENSION"])
+        least, most = sorted((h.bond_friction[b].min(), h.xi))[0], np.hypot(h.bond_friction[b], h.xi)
+        of_moment = e["m"] / h.mean_diameter[b]
+        report.expect("events in their cone", np.where(moments, of_moment - most * n, 0.0), slack, describe)
+        ratio, mode = np.where(moments, of_moment / least, ratios[0]), h.event_mode
+    short = np.where(h.event_mode == "TENSION", n - eps * strength, (1 - eps) * n - ratio)
+    report.expect("events at their limit", short, slack, describe)
+    accepted = h.scene["solver"].get("accept") or 1e-6
+    # reactions lie in their cones, but for what the solver's acceptance leaves
+    judged = (h.event_mode != "TENSION") & ~(moments if mixed else np.zeros(len(e), bool))
+    beyond = np.maximum(-n, np.where(judged, ratio - n, 0.0))
+    size = largest_reaction(h)[np.clip(e["step"].astype(int) - 1, 0, max(h.S - 1, 0))] + np.abs(e["rn"])
+    report.expect("events in their cone", beyond, accepted * size + slack, describe)
+    expected = np.where(tension & (h.event_mode == "TENSION"), "TENSION", mode)
+    tied = np.zeros(len(e), bool)
+    for row, name in enumerate(("SHEAR", "ROLLING", "TWIST")):
+        tied |= (h.event_mode == name) & (ratios[row] >= ratios.max(0) - slack)
+    off = (
+        (expected != h.event_mode) & ~tied & ~(tension & (ratio >= (1 - eps) * n - slack) & (h.event_mode == "TENSION"))
+    )
+    off |= tension & (n <= eps * strength - slack) & (h.event_mode != "TENSION")
+    report.expect("mode of events", off.astype(float), 0.0, describe)
+
+
+def largest_reaction(h):
+    """Norm of all reactions (N) of each step or of the one before, whichever is larger: what residuals are
+    relative to."""
+    square = np.bincount(h.row_step, h.rn**2 + (h.rt**2).sum(1), minlength=h.S)
+    outer, _ = h.external()
+    load = np.sqrt((outer**2).sum((1, 2)) + (h.wall_drive_force() ** 2).sum(1))
+    size = np.maximum(np.sqrt(square), load)
+    return np.maximum(size, np.append(0.0, size[:-1]))
+
+
+def check_order_of_events(h, report):
+    """Events stand by step and round; rounds of a step begin at 0 and leave none out; in a round as the
+    rule says."""
+    e = h.events
+    report.margins.setdefault("order of events", 0.0)
+    steps = e["step"].astype(int)
+    report.require("order of events", bool((np.diff(steps) >= 0).all()), "events are not in the order of steps")
+    rule = h.scene.get("rupture", "cascade")
+    for s in np.unique(steps):
+        part = e[steps == s]
+        rounds = part["round"].astype(int)
+        good = rounds[0] == 0 and bool(np.isin(np.diff(rounds), (0, 1)).all())
+        single = 1 <= s <= h.S and h.single[s - 1]
+        if rule == "end_of_step" and single:
+            good &= rounds[-1] == 0
+        if rule == "cascade_worst":
+            good &= len(np.unique(rounds)) == len(rounds)
+        pairs = part["i"].astype(int) * h.N + part["j"]
+        same = np.diff(rounds) == 0
+        good &= bool((np.diff(pairs)[same] > 0).all())
+        report.require("order of events", bool(good), f"step {s}: rounds {rounds.tolist()[:12]}")

@@ -1,0 +1,299 @@
+"""Every number of a run's summary, as JSON and as text, recomputed from its history."""
+
+import re
+
+import numpy as np
+
+import prescribed
+import tolerances
+from balance import fitted_strain
+
+STRAINS = (1e-4, 1e-3)
+BROKEN_SHARE = 0.05
+MODES = ("TENSION", "SHEAR", "ROLLING", "TWIST")
+NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
+
+
+def check(h, report, told, text=None):
+    """The summary `told` (from --json), and `text` (without it) where there is one."""
+    expected = recomputed(h, told)
+    for name, value in expected.items():
+        compare(report, "summary", name, told.get(name), value)
+    unknown = sorted(set(told) - set(expected) - {"history", "cpu_time", "ending"})
+    report.require("summary", not unknown, f"keys that the checker does not know: {', '.join(unknown)}")
+    check_ending(h, report, told)
+    last = float(h.observed["cpu_time"][-1]) if h.S else 0.0
+    report.require(
+        "summary", told["cpu_time"] >= last, f"cpu_time {told['cpu_time']} is less than that of the last step, {last}"
+    )
+    if text is not None:
+        check_text(h, report, told, text)
+
+
+def compare(report, check, name, found, expected):
+    """`found` is `expected`: the same structure, numbers within rounding or within a pair of bounds."""
+    if isinstance(expected, dict):
+        report.require(
+            check, isinstance(found, dict) and set(found) == set(expected), f"{name} is {found}, expected {expected}"
+        )
+        for key in expected if isinstance(found, dict) else ():
+            compare(report, check, f"{name}.{key}", found.get(key), expected[key])
+    elif isinstance(expected, list):
+        report.require(
+            check, isinstance(found, list) and len(found) == len(expected), f"{name} is {found}, expected {expected}"
+        )
+        for k, value in enumerate(expected if isinstance(found, list) else ()):
+            compare(report, check, f"{name}[{k}]", found[k] if k < len(found) else None, value)
+    elif isinstance(expected, tuple):
+        low, high = expected
+        report.require(
+            check, found is not None and low <= found <= high, f"{name} is {found}, expected {low} to {high}"
+        )
+    elif isinstance(expected, float) and isinstance(found, (int, float)) and not isinstance(found, bool):
+        slack = tolerances.rounding(abs(expected))
+        report.require(check, abs(found - expected) <= slack, f"{name} is {found!r}, recomputed {expected!r}")
+    else:
+        report.require(check, found == expected, f"{name} is {found!r}, recomputed {expected!r}")
+
+
+def recomputed(h, told):
+    """What the summary must say; pairs of numbers are bounds."""
+    o = h.observed
+    last = lambda name: float(o[name][-1]) if h.S and name in o else 0.0
+    modes = list(h.event_mode) if h.K else []
+    residual, tolerance = o["solver_residual"], h.scene["solver"]["tolerance"]
+    beyond = int((residual > tolerance).sum())
+    kind = h.scene["solver"]["kind"]
+    newton = next(iter(kind.values())) if "gauss_seidel" not in kind else {}
+    unsettled = (o["solver_load_error"] > newton.get("load_tolerance", np.inf)) & (o["solver_newton_iterations"] > 0)
+    unsettled = int(((residual > tolerance) | unsettled).sum())
+    rejected = int(o["solver_rejected"].sum())
+    failed = told.get("ending") == "no_convergence"
+    newton_iterations = int(o["solver_newton_iterations"].sum())
+    out = {
+        "steps": h.S,
+        "time": float(h.frame_time[-1]),
+        "grains": h.N,
+        "bonds": h.K,
+        "tolerance": float(tolerance),
+        "elastic": bool(h.K and h.stiffness is not None),
+        "twists": h.D == 3 and (h.scene.get("bonds") or {}).get("twist") is not None,
+        "broken": [modes.count(mode) for mode in MODES],
+        "worst_residual": float(residual.max(initial=0.0)),
+        # Newton's solves also count where the load error missed its own tolerance
+        "missed_tolerance": (beyond, max(unsettled, beyond)),
+        "rejected": (rejected, rejected + 1) if failed else rejected,
+        "penetration": float(o["penetration"].max(initial=0.0)),
+        "mean_diameter": float(2 * h.radius.mean()),
+        "external_work": last("external_work"),
+        "energy_remainder": last("energy_remainder"),
+        "bond_remainder": last("bond_remainder"),
+        "work": {
+            "newton_iterations": newton_iterations,
+            "factorisations": int(o["solver_factorisations"].sum()),
+            "sweeps": int(o["solver_iterations"].sum()) - newton_iterations,
+        },
+        "solid_fraction": None if h.packed is None else float(h.packed),
+    }
+    if "bond_elongation" in told:
+        out["bond_elongation"] = float(o["bond_elongation"].max(initial=0.0)) if "bond_elongation" in o else 0.0
+    out.update(loads(h, told))
+    return out
+
+
+def loads(h, told):
+    """The loads of driven walls, as the summary has them."""
+    driven = [k for k, (kind, _) in enumerate(h.drives) if kind != "fixed"]
+    walls = {h.wall_names[k]: wall_loads(h, k, "driven_walls" in told) for k in driven}
+    none = {"first_break": None, "collapse": [None, None], "early": [False, False], "broken_share": None}
+    if "driven_walls" not in told:
+        first = next(iter(walls.values()), {"failure": none})
+        return {"failure": first["failure"]}
+    chosen = h.scene.get("load_wall")
+    if chosen is None and ((h.scene.get("stop") or {}).get("wall_travel")):
+        chosen = h.scene["stop"]["wall_travel"]["wall"]
+    if chosen is None and len(walls) == 1:
+        chosen = next(iter(walls))
+    of_chosen = walls.get(chosen, {"failure": none, "peak_load": None, "peak_displacement": None})
+    return {
+        "load_wall": chosen if chosen in walls else None,
+        "failure": of_chosen["failure"],
+        "peak_load": of_chosen["peak_load"],
+        "peak_displacement": of_chosen["peak_displacement"],
+        "driven_walls": [{"wall": name, **values} for name, values in walls.items()],
+        "splitting": None,
+    }
+
+
+def load_of(h, k):
+    """Load (N) of the driven wall `k` in every step: prescribed, or what it took against the grains before
+    a bond broke."""
+    kind, function = h.drives[k]
+    if kind == "force":
+        parts = h.observed.get("substeps")
+        middle = h.times[1:] - 0.5 * h.h
+        load = prescribed.at(function, middle)
+        # a step in parts has the load of its last part
+        return load if parts is None else np.where(parts > 1, h.observed["applied_force"][:, k], load)
+    at_limit = h.observed.get("wall_force_at_limit", h.observed["wall_force"])
+    return -at_limit[:, k] @ h.wall_direction[k]
+
+
+def wall_loads(h, k, new):
+    """First break, collapse, 5 % broken and peak of one wall."""
+    load, d = load_of(h, k), h.wall_direction[k]
+    strain = np.abs(np.einsum("a,sab,b->s", d, fitted_strain(h)[0], d)) if h.S else np.zeros(0)
+    broken = h.observed["bonds_broken"] if h.K else np.zeros(h.S)
+    first = lambda holds: int(np.argmax(holds)) if holds.any() else None
+    value = lambda s: None if s is None else float(load[s])
+    elastic = bool(h.K and h.stiffness is not None)
+    collapse, early = [None, None], [False, False]
+    for n, limit in enumerate(STRAINS):
+        s = first(strain > limit)
+        if s is None:
+            continue
+        collapse[n], early[n] = (float(load[s - 1]) if s else 0.0), bool(broken[s] == 0)
+        if new and (collapse[n] == 0 or (elastic and early[n])):
+            collapse[n] = None
+    share = first(broken >= BROKEN_SHARE * h.K) if h.K else None
+    failure = {
+        "first_break": value(first(broken > 0)),
+        "collapse": collapse,
+        "early": early,
+        "broken_share": value(share),
+    }
+    out = {"failure": failure}
+    if new:
+        peak = int(np.argmax(np.abs(load))) if h.S else None
+        told = peak is not None and (h.drives[k][0] == "velocity" or elastic) and load[peak] != 0
+        out["peak_load"] = float(load[peak]) if told else None
+        out["peak_displacement"] = float((h.X[peak + 1, k] - h.X[0, k]) @ d) if told else None
+    return out
+
+
+def check_ending(h, report, told):
+    """Why the run ended: at its time, or at the first step in which a condition of the scene holds."""
+    stop, ending = h.scene.get("stop") or {}, told["ending"]
+    holds = {}
+    broken = h.observed["bonds_broken"] if h.K else np.zeros(h.S)
+    if stop.get("broken_fraction") is not None and h.K:
+        holds["broken_fraction"] = broken >= stop["broken_fraction"] * h.K
+    travel = stop.get("wall_travel")
+    if travel:
+        k = h.wall_names.index(travel["wall"])
+        d = h.wall_direction[k]
+        reach = lambda sign: (sign * (h.x[0] @ d) + h.radius).max()
+        distance = travel["fraction_of_height"] * (reach(1) + reach(-1))
+        begin = (
+            0
+            if travel.get("after", "start") == "start"
+            else (int(np.argmax(broken > 0)) + 1 if (broken > 0).any() else h.S)
+        )
+        way = np.abs((h.X[1:, k] - h.X[begin, k]) @ d)
+        holds["wall_travel"] = (way >= distance * (1 - 1e-12)) & (np.arange(h.S) >= begin)
+    for name, held in holds.items():
+        report.require("ending", not held[:-1].any(), f"{name} held before the last step, and the run went on")
+    if ending in ("broken_fraction", "wall_travel"):
+        report.require(
+            "ending",
+            ending in holds and h.S > 0 and bool(holds[ending][-1]),
+            f"{ending} does not hold in the last step",
+        )
+    if ending == "time":
+        end = h.scene["time"]["end"]
+        report.require("ending", abs(h.frame_time[-1] - end) < h.h, f"ended at {h.frame_time[-1]} s, not {end} s")
+
+
+def text_lines(h, told):
+    """The numbers that each line of the text shows, by its label; nothing for a line without one."""
+    f, K = told["failure"], told["bonds"]
+    per_step = lambda n: n / max(told["steps"], 1)
+    work = told["work"]
+    lines = [("ended", [told["time"], told["steps"]])]
+    lines.append(
+        ("sample", [told["grains"]] + ([told["solid_fraction"]] if told["solid_fraction"] is not None else []))
+    )
+    counts = [told["broken"][k] for k in range(4 if told["twists"] else 3)]
+    if K:
+        lines.append(("bonds", [K, sum(counts), 100.0 * sum(counts) / K] + counts))
+    if h.S:
+        took = [per_step(work[k]) for k in ("newton_iterations", "factorisations", "sweeps") if work[k] > 0]
+        lines.append(("solver", took))
+        lines.append(
+            ("accuracy", [told["worst_residual"], told["tolerance"], told["missed_tolerance"], told["rejected"]])
+        )
+        lines.append(("penetration", [told["penetration"], told["penetration"] / told["mean_diameter"]]))
+        lines.append(("external work", [told["external_work"]]))
+        lines.append(("energy remainder", [told["energy_remainder"]]))
+        if K and not told["elastic"]:
+            lines.append(("bond remainder", [told["bond_remainder"]]))
+        if K and "bond_elongation" in told:
+            lines.append(("bond elongation", [told["bond_elongation"]]))
+    return lines, load_lines(h, told, f)
+
+
+def load_lines(h, told, failure):
+    """The numbers of the lines of loads, of the wall that loads the sample."""
+    lines = []
+    if "driven_walls" in told and told["load_wall"] is None and told["driven_walls"]:
+        lines = [(f"wall {wall['wall']}"[:16], line_of_wall(told, wall)) for wall in told["driven_walls"]]
+        return [line for line in lines if line[1]]
+    if told["bonds"] and h.drives and any(kind != "fixed" for kind, _ in h.drives):
+        lines.append(("first break", [failure["first_break"]]))
+        lines += [
+            ("collapse load", [load, strain]) for load, strain in zip(failure["collapse"], STRAINS) if load is not None
+        ]
+        lines.append(("5 % broken", [failure["broken_share"]]))
+    if told.get("peak_load") is not None:
+        lines.append(("peak load", [told["peak_load"], told["peak_displacement"]]))
+    return lines
+
+
+def line_of_wall(told, wall):
+    """The numbers of the line of one of several driven walls; none that is a dash is looked for."""
+    numbers, failure = [], wall["failure"]
+    if told["bonds"]:
+        numbers += [failure["first_break"]]
+        for load, strain in zip(failure["collapse"], STRAINS):
+            numbers += [load, strain]
+        numbers += [5, failure["broken_share"]]
+    if wall.get("peak_load") is not None:
+        numbers += [wall["peak_load"], wall["peak_displacement"]]
+    return numbers
+
+
+def check_text(h, report, told, text):
+    """Every number of the text is that of the JSON, as far as it is printed."""
+    lines, of_loads = text_lines(h, told)
+    by_label = {}
+    for line in text.splitlines():
+        if not line.strip() or line.startswith("look at it"):
+            break
+        by_label.setdefault(line[:17].strip(), []).append(line[17:])
+    for label, numbers in lines + of_loads:
+        rest = by_label.get(label, [])
+        report.require("summary's text", bool(rest), f"there is no line {label!r}")
+        if rest:
+            match_line(report, label, rest.pop(0), numbers)
+
+
+def match_line(report, label, rest, numbers):
+    """The numbers of a line, in order, to the digits that it prints. Names of walls are no numbers."""
+    plain = re.sub(r"\(?\bwall [\w-]+\)?", "", rest)
+    found = [m.group() for m in NUMBER.finditer(plain)]
+    for number in numbers:
+        if number is None:
+            report.require(
+                "summary's text", "none" in plain or "–" in plain, f"{label!r} says {rest.strip()!r}, expected none"
+            )
+            continue
+        if not found:
+            report.require("summary's text", False, f"{label!r} says {rest.strip()!r}, {number} is missing")
+            return
+        printed = found.pop(0)
+        mantissa, _, power = printed.lower().partition("e")
+        unit = 10.0 ** (-(len(mantissa.partition(".")[2])) + int(power or 0))
+        # trailing zeros are left out
+        off = abs(float(printed) - number)
+        allowed = tolerances.value("printed") * unit * (1 + 1e-9) + tolerances.rounding(abs(number))
+        report.require("summary's text", off <= allowed, f"{label!r} prints {printed}, it is {number!r}")

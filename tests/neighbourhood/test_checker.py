@@ -1,0 +1,606 @@
+"""The checker finds what is spoilt: one number of a good history is altered, and the check that it concerns
+must fail."""
+
+import copy
+import re
+import shutil
+
+import h5py
+import numpy as np
+import pytest
+
+import programs
+import summary
+from check import check
+from history import History
+from report import Report
+
+OUTPUT = {"every_steps": 1}
+DRY = {"density": 2500, "friction": {"grain_grain": 0.3, "grain_wall": 0.2}}
+
+
+def pressed(**changes):
+    """A few cemented disks of several sizes under a plate, until most bonds are broken; side walls are far
+    away."""
+    scene = {
+        "dimension": 2,
+        "seed": 3,
+        "thickness": 0.01,
+        "sample": {
+            "random": {
+                "count": 24,
+                "diameter": {"uniform": {"min": 2e-3, "max": 4e-3}},
+                "width": 0.012,
+                "preparation": {"compaction": {"solid_fraction": 0.7}},
+            }
+        },
+        "materials": DRY,
+        "bonds": {"strength": 10, "gap_tolerance": 1e-3},
+        "gravity": [0, -9.81],
+        "walls": {
+            "bottom": {"shape": {"plane": {"normal": [0, 1], "place": "seated"}}},
+            "top": {"shape": {"plane": {"normal": [0, -1], "place": "seated"}}, "mass": "sample", "force_rate": 5000},
+        },
+        "time": {"step": 1e-4, "end": 0.012},
+        "output": OUTPUT,
+    }
+    return scene | changes
+
+
+def beam():
+    """A small beam with elastic bonds under a wall that moves."""
+    seat = lambda x, y, up: {"circle": {"center": [x, y], "radius": 0.004, "seated": [0, up]}}
+    return {
+        "dimension": 2,
+        "thickness": 1,
+        "sample": {"lattice": {"hexagonal": {"diameter": 4e-3, "rows": 2, "columns": 9}}},
+        "materials": DRY,
+        "bonds": {
+            "strength": 100,
+            "gap_tolerance": 1e-6,
+            "stiffness": {"young": {"modulus": 1e8, "poisson_ratio": 0.2}},
+        },
+        "walls": {
+            "left": {"shape": seat(0.006, -0.1, 1)},
+            "right": {"shape": seat(0.03, -0.1, 1)},
+            "loader": {"shape": seat(0.018, 0.1, -1), "direction": [0, -1], "velocity": {"ramp": {"rate": 0.5}}},
+        },
+        "time": {"step": 1e-4, "end": 0.02},
+        "output": OUTPUT,
+        "stop": {"broken_fraction": 0.15},
+    }
+
+
+def arm():
+    """configs/bent-arm.json with a frame at every step: spheres, a fixed one, a load, twist."""
+    centres = [[0, 0, 0], [4, 0, 0], [8, 0, 0], [12, 0, 0], [12, 4, 0], [12, 8, 0], [12, 12, 0]]
+    return {
+        "dimension": 3,
+        "sample": {"grains": [{"center": [1e-3 * x for x in c], "radius": 2e-3} for c in centres]},
+        "materials": DRY,
+        "bonds": {"strength": 100, "gap_tolerance": 1e-3, "twist": 0.1},
+        "grains": {"fixed": [0], "loads": [{"grain": 6, "force": [0, 0, 1], "time": {"ramp": {"rate": 1000}}}]},
+        "time": {"step": 1e-4, "end": 0.006},
+        "solver": {"tolerance": 1e-10},
+        "output": OUTPUT,
+    }
+
+
+def bouncing():
+    """Three disks that fall on a floor and bounce."""
+    grains = [
+        {"center": [0, 1.002e-3], "radius": 1e-3, "velocity": [0.05, 0]},
+        {"center": [1e-4, 3.1e-3], "radius": 1e-3},
+        {"center": [3e-3, 1.5e-3], "radius": 1e-3, "spin": [50.0]},
+    ]
+    return {
+        "dimension": 2,
+        "thickness": 0.01,
+        "sample": {"grains": grains},
+        "gravity": [0, -9.81],
+        "materials": DRY | {"restitution": {"grain_grain": 0.5, "grain_wall": 0.5}},
+        "walls": {"floor": {"shape": {"plane": {"normal": [0, 1], "place": {"at": [0, 0]}}}}},
+        "time": {"step": 1e-4, "end": 0.03},
+        "output": OUTPUT,
+    }
+
+
+SCENES = {
+    "pressed": pressed,
+    "late": lambda: pressed(rupture="end_of_step"),
+    "beam": beam,
+    "arm": arm,
+    "bouncing": bouncing,
+}
+
+
+class Good:
+    """A good run, and where in it there is something to spoil."""
+
+    def __init__(self, path, told, text):
+        self.path, self.told, self.text = path, told, text
+        self.h = History(path)
+
+    def row(self, holds):
+        """A row of contacts for which `holds` (an array) is true: the one that carries most."""
+        return int(np.argmax(np.where(holds, np.abs(self.h.rn) + 1e-300, -1.0)))
+
+    def slipping(self):
+        """A row that slips under a force."""
+        return self.row(self.h.status == "SLIP")
+
+    def sticking(self):
+        """A dry row that sticks under a force."""
+        return self.row(self.h.status == "STICK")
+
+    def bonded(self):
+        """A row of a bond that holds."""
+        h = self.h
+        return self.row((h.bond >= 0) & (h.bond_status[h.row_step + 1, h.bond] == "INTACT"))
+
+
+class Runs(dict):
+    """Good runs by the name of their scene, each made when it is first asked for."""
+
+    def __init__(self, folder):
+        super().__init__()
+        self.folder = folder
+
+    def __missing__(self, name):
+        self[name] = Good(*programs.run(SCENES[name](), self.folder, name, text=True))
+        return self[name]
+
+
+@pytest.fixture(scope="session")
+def good(tmp_path_factory):
+    """Good runs."""
+    return Runs(tmp_path_factory.mktemp("good"))
+
+
+def add(name, at, relative=1e-5, absolute=0.0):
+    """Alters one number of a dataset: `at(good)` is its index."""
+
+    def spoil(file, good):
+        index = at(good)
+        value = file[name][index]
+        file[name][index] = value * (1 + relative) + absolute
+
+    return spoil
+
+
+def put(name, at, value):
+    """Replaces one number of a dataset."""
+
+    def spoil(file, good):
+        file[name][at(good)] = value(file[name][at(good)]) if callable(value) else value
+
+    return spoil
+
+
+def event(column, value):
+    """Alters one column of one rupture, the second where there are several."""
+
+    def spoil(file, good):
+        events = file["events/rupture"]
+        k = min(1, len(events) - 1)
+        row = events[k]
+        row[column] = value(row[column])
+        events[k] = row
+
+    return spoil
+
+
+def observed(name, step=40, relative=1e-5, absolute=0.0):
+    """Alters an observable in one step."""
+
+    def spoil(file, good):
+        data = file[f"observables/{name}/value"]
+        row = np.array(data[step], float)
+        row.flat[-1] = row.flat[-1] * (1 + relative) + absolute
+        data[step] = row
+
+    return spoil
+
+
+G = "particles/grains/"
+step_of = lambda pick: lambda good: int(good.h.row_step[pick(good)]) + 1
+grain_of = lambda pick: lambda good: (int(good.h.row_step[pick(good)]) + 1, int(good.h.i[pick(good)]))
+component = lambda pick, k: lambda good: grain_of(pick)(good) + (k,)
+SLIPS, STICKS, BONDED = Good.slipping, Good.sticking, Good.bonded
+any_row = lambda good: good.row(good.h.rn > 0)
+on_wall = lambda good: good.row(good.h.on_wall & (good.h.rn > 0))
+
+
+def broken_late(good):
+    """A row of a bond that broke at the end of that step."""
+    h = good.h
+    return good.row((h.bond >= 0) & (h.bond_status[h.row_step + 1, h.bond] != "INTACT"))
+
+
+def apart(good):
+    """A row with restitution that does not touch."""
+    return int(np.flatnonzero((good.h.rn == 0) & (good.h.gap > 1e-5 * 1e-3))[0])
+
+
+other_mode = lambda mode: 1 if mode != 1 else 2
+
+# scene, what is spoilt, how, the check that must fail
+SPOILT = (
+    [
+        ("pressed", "a frame's time", add("contacts/time", lambda g: 30), "time"),
+        ("pressed", "an observation's time", add("observables/time", lambda g: 30), "time"),
+        ("pressed", "a position", add(G + "position/value", lambda g: (50, 3, 1)), "positions"),
+        ("pressed", "the last position", add(G + "position/value", lambda g: (-1, 0, 0), 1e-9), "positions"),
+        ("pressed", "a velocity", add(G + "velocity/value", component(any_row, 0)), "Newton's law"),
+        ("arm", "a velocity in space", add(G + "velocity/value", lambda g: (-1, 6, 2)), "Newton's law"),
+        ("pressed", "a spin", add(G + "angular_velocity/value", grain_of(SLIPS)), "law of spins"),
+        ("arm", "a spin in space", add(G + "angular_velocity/value", lambda g: (-1, 6, 0), 1e-4), "law of spins"),
+        ("pressed", "an angle", add(G + "angle/value", lambda g: (-1, 3), 1e-6, 1e-9), "orientations"),
+        ("arm", "a quaternion", add(G + "orientation/value", lambda g: (-1, 6, 1), 0, 1e-9), "orientations"),
+        ("arm", "a fixed grain", add(G + "velocity/value", lambda g: (20, 0, 0), 0, 1e-12), "fixed grains"),
+        ("pressed", "a fixed wall", add("walls/position/value", lambda g: (20, 0, 1), 1e-12, 1e-15), "fixed walls"),
+        ("pressed", "a driven wall's velocity", add("walls/velocity/value", lambda g: (-1, 1, 1)), "wall motion"),
+        (
+            "beam",
+            "the speed of a wall that moves as prescribed",
+            add("walls/velocity/value", lambda g: (30, 1, 1)),
+            "wall motion",
+        ),
+        ("pressed", "a driven wall's place", add("walls/position/value", lambda g: (-1, 1, 1)), "wall positions"),
+        ("pressed", "the prescribed force", observed("applied_force"), "applied_force"),
+        (
+            "beam",
+            "the force of a wall that moves as prescribed",
+            observed("applied_force", relative=0.0, absolute=1e-3),
+            "wall_force_or_applied",
+        ),
+        ("pressed", "a pair", put("contacts/pair", lambda g: (any_row(g), 0), lambda i: i - 1 if i else i + 1), "gap"),
+        (
+            "pressed",
+            "the order of pairs",
+            put("contacts/pair", lambda g: (int(np.argmax(g.h.i)), 0), 0),
+            "contacts sorted",
+        ),
+        ("pressed", "a gap", add("contacts/gap", any_row, 0, 1e-12), "gap"),
+        ("pressed", "a normal", add("contacts/normal", lambda g: (any_row(g), 0), 1e-9, 1e-9), "normal"),
+        ("pressed", "a point", add("contacts/point", lambda g: (any_row(g), 1), 0, 1e-12), "point"),
+        ("arm", "a tangent", add("contacts/tangent", lambda g: (BONDED(g), 2), 0, 1e-9), "tangent"),
+        (
+            "pressed",
+            "a velocity towards grains that are no neighbours yet",
+            put(G + "velocity/value", lambda g: (60, 5, 0), 20.0),
+            "pairs left out",
+        ),
+        (
+            "pressed",
+            "a velocity that leads through others",
+            put(G + "velocity/value", lambda g: (60, 5, 0), 1e3),
+            "crossing",
+        ),
+        (
+            "pressed",
+            "a residual that is not as small",
+            put("observables/solver_residual/value", lambda g: worst(g), 0.0),
+            "residual",
+        ),
+        (
+            "pressed",
+            "a residual beyond acceptance",
+            put("observables/solver_residual/value", lambda g: 40, 1e-3),
+            "residual accepted",
+        ),
+        (
+            "pressed",
+            "a normal reaction of a dry contact",
+            put("contacts/reaction", lambda g: (STICKS(g), 0), lambda r: -r),
+            "cone",
+        ),
+        (
+            "pressed",
+            "a pull between dry grains",
+            put("contacts/reaction", lambda g: (STICKS(g), 0), lambda r: -r),
+            "Signorini",
+        ),
+        (
+            "pressed",
+            "a tangential reaction",
+            put("contacts/reaction", lambda g: (SLIPS(g), 1), lambda r: 1.01 * r),
+            "cone",
+        ),
+        (
+            "pressed",
+            "a friction that pushes along",
+            put("contacts/reaction", lambda g: (SLIPS(g), 1), lambda r: -r),
+            "slip",
+        ),
+        (
+            "pressed",
+            "a reaction that a contact lacks",
+            put("contacts/reaction", lambda g: (STICKS(g), 0), lambda r: 1.001 * r),
+            "Newton's law",
+        ),
+        (
+            "pressed",
+            "a contact that parts and pushes",
+            add(G + "velocity/value", component(on_wall, 1), 0, 1e-3),
+            "complementarity",
+        ),
+        (
+            "pressed",
+            "a contact that closes",
+            add(G + "velocity/value", component(on_wall, 1), 0, -1e-3),
+            "closing_or_signorini",
+        ),
+        ("pressed", "a contact that closes far", add(G + "velocity/value", component(any_row, 1), 0, -0.1), "closing"),
+        (
+            "pressed",
+            "a contact that closes farther",
+            add(G + "velocity/value", component(any_row, 1), 0, -0.5),
+            "closed in all",
+        ),
+        (
+            "pressed",
+            "a spin where contacts stick",
+            add(G + "angular_velocity/value", grain_of(STICKS), 0, 0.5),
+            "stick",
+        ),
+        (
+            "pressed",
+            "a spin where bonds hold",
+            add(G + "angular_velocity/value", grain_of(BONDED), 0, 1.0),
+            "rigid bonds",
+        ),
+        (
+            "beam",
+            "a spin where springs hold",
+            add(G + "angular_velocity/value", grain_of(BONDED), 0, 0.01),
+            "elastic bonds",
+        ),
+        (
+            "beam",
+            "a force of a spring",
+            put("contacts/reaction", lambda g: (BONDED(g), 1), lambda r: 1.001 * r + 1e-3),
+            "elastic bonds",
+        ),
+        (
+            "bouncing",
+            "a reaction of what does not touch",
+            put("contacts/reaction", lambda g: (apart(g), 0), 1e-4),
+            "contacts that do not touch",
+        ),
+        (
+            "bouncing",
+            "a velocity after a bounce",
+            add(G + "velocity/value", component(any_row, 1)),
+            "Signorini_or_complementarity",
+        ),
+        ("pressed", "a contact's status", put("contacts/status", STICKS, 0), "status"),
+        ("pressed", "a bond's moment", put("contacts/moment", BONDED, lambda m: m + 1.0), "cone of bonds"),
+        ("pressed", "a moment a little off", put("contacts/moment", BONDED, lambda m: m + 1e-9), "law of spins"),
+        (
+            "arm",
+            "a twisting moment",
+            put("contacts/moment", lambda g: (BONDED(g), 2), lambda m: m + 1e-7),
+            "law of spins",
+        ),
+        (
+            "pressed",
+            "the bond of a contact",
+            put("contacts/bond", BONDED, lambda b: b - 1 if b else b + 1),
+            "contacts of bonds",
+        ),
+        ("pressed", "a bond's rest gap", add("bonds/rest_gap", lambda g: 3, 0, 1e-12), "bonds formed"),
+        ("pressed", "a bond's strength", add("bonds/strength", lambda g: 3), "bonds formed"),
+        ("pressed", "a bond's pair", put("bonds/pair", lambda g: (3, 1), lambda j: j - 1), "bonds formed"),
+        (
+            "pressed",
+            "a place that stretches a bond",
+            add(G + "position/value", lambda g: (20, int(g.h.bond_pair[5, 0]), 0), 0, 1e-4),
+            "length of rigid bonds",
+        ),
+        (
+            "beam",
+            "a place that stretches a spring",
+            add(G + "position/value", component(BONDED, 0), 0, 1e-4),
+            "length of elastic bonds",
+        ),
+        (
+            "pressed",
+            "an intact bond beyond its limit",
+            put("contacts/reaction", lambda g: (BONDED(g), 1), lambda r: 1e3),
+            "intact bonds within limits",
+        ),
+        (
+            "pressed",
+            "an intact bond pulled too much",
+            put("contacts/reaction", lambda g: (BONDED(g), 0), lambda r: -11.0),
+            "intact bonds within limits",
+        ),
+        (
+            "late",
+            "a bond that broke within its limit",
+            put("contacts/reaction", lambda g: (broken_late(g), slice(0, 2)), lambda r: r * [1, 0] + [10, 0]),
+            "only bonds at their limit break",
+        ),
+        (
+            "pressed",
+            "a broken bond's status",
+            put("bonds/status/value", lambda g: (-1, int(np.argmax(g.h.bond_status[-1] != "INTACT"))), 0),
+            "statuses are those of events",
+        ),
+        (
+            "pressed",
+            "an intact bond's status",
+            put("bonds/status/value", lambda g: (-1, int(np.argmax(g.h.bond_status[-1] == "INTACT"))), 1),
+            "statuses are those of events",
+        ),
+        ("pressed", "the number of broken bonds", observed("bonds_broken", -1, 0, 1), "bonds_broken"),
+        ("pressed", "an event's bond", event("bond", lambda b: b + 1), "statuses are those of events"),
+        (
+            "pressed",
+            "a bond that breaks twice",
+            lambda file, g: event("bond", lambda b: file["events/rupture"][0]["bond"])(file, g),
+            "each bond breaks once",
+        ),
+        ("pressed", "an event's grain", event("i", lambda i: i + 1), "events"),
+        ("pressed", "an event's time", event("time", lambda t: t * (1 + 1e-9)), "events"),
+        ("pressed", "an event's place", event("y", lambda y: y + 1e-12), "events"),
+        ("pressed", "an event's energy", event("energy", lambda e: e + 1e-12), "events"),
+        ("beam", "an elastic event's energy", event("energy", lambda e: e * (1 + 1e-9)), "fracture_energy"),
+        ("pressed", "an event's normal force", event("rn", lambda n: n + 0.1), "events at their limit"),
+        ("pressed", "an event beyond its cone", event("rn", lambda n: n - 1.0), "events in their cone"),
+        ("pressed", "an event's tangential force", event("rt", lambda t: 0.9 * t), "rt_or_mode"),
+        ("pressed", "an event's mode", event("mode", other_mode), "mode of events"),
+        ("pressed", "an event's round", event("round", lambda r: r + 7), "order of events"),
+        ("late", "an event's round", event("round", lambda r: r + 1), "order of events"),
+        ("arm", "an event's moment", event("m", lambda m: m + 1.0), "events in their cone"),
+    ]
+    + [
+        ("pressed", name, observed(name, -1), name)
+        for name in (
+            "kinetic_energy",
+            "external_work",
+            "dissipation_impact",
+            "dissipation_friction",
+            "momentum",
+            "stress",
+            "wall_force",
+        )
+    ]
+    + [
+        ("pressed", "the bond remainder", observed("bond_remainder", -1, 1e-5, 1e-15), "bond_remainder"),
+        ("pressed", "the energy remainder", observed("energy_remainder", -1, 0, 1e-10), "energy_remainder"),
+        ("pressed", "angular momentum", observed("angular_momentum", -1), "angular_momentum"),
+        ("pressed", "the strain", observed("strain", -1), "strain"),
+        ("pressed", "the penetration", observed("penetration", -1, 0, 1e-10), "penetration"),
+        ("pressed", "a wall's place as observed", observed("wall_position", -1, 1e-12), "wall_position"),
+        (
+            "pressed",
+            "a wall's force in a frame",
+            put("walls/force/value", lambda g: (-1, 0, 1), lambda f: f * (1 + 1e-9)),
+            "force of walls in frames",
+        ),
+        (
+            "pressed",
+            "a force on a wall",
+            put("contacts/reaction", lambda g: (on_wall(g), 0), lambda r: r * (1 + 1e-6)),
+            "stress against walls",
+        ),
+        (
+            "pressed",
+            "the force at the limit where nothing broke",
+            observed("wall_force_at_limit", 20),
+            "wall_force_at_limit",
+        ),
+        ("pressed", "the elongation", observed("bond_elongation", -1, 1e-5, 1e-12), "bond_elongation"),
+        ("pressed", "half a part", observed("substeps", -1, 0, 0.5), "counts"),
+        ("pressed", "half an iteration", observed("solver_iterations", -1, 0, 0.5), "counts"),
+        ("pressed", "time that runs back", observed("cpu_time", 60, -0.9), "counts"),
+        ("beam", "elastic energy", observed("elastic_energy", 20), "elastic_energy"),
+        ("beam", "damping", observed("dissipation_damping", -1), "dissipation_damping"),
+        ("beam", "fracture energy", observed("fracture_energy", -1), "fracture_energy"),
+        ("pressed", "a number that is none", put(G + "velocity/value", lambda g: (40, 1, 0), np.nan), "finite numbers"),
+    ]
+)
+
+# where one of two checks must fail
+EITHER = {
+    "wall_force_or_applied": {"applied_force"},
+    "closing_or_signorini": {"Signorini"},
+    "Signorini_or_complementarity": {"Signorini", "complementarity"},
+    "rt_or_mode": {"events at their limit", "mode of events"},
+}
+
+
+def worst(good):
+    """The step of the largest residual."""
+    return int(np.argmax(good.h.observed["solver_residual"]))
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_good_history_is_right(good, name):
+    g = good[name]
+    report = check(g.path, g.told, g.text)
+    assert not report.wrong, "\n".join(report.lines())
+    if g.h.K:
+        assert len(g.h.events), "the scene is to break bonds"
+
+
+@pytest.mark.parametrize("scene, what, spoil, expected", SPOILT, ids=[f"{s}: {w}" for s, w, _, _ in SPOILT])
+def test_a_spoilt_number_is_found(good, tmp_path, scene, what, spoil, expected):
+    path = tmp_path / "spoilt.h5"
+    shutil.copy(good[scene].path, path)
+    with h5py.File(path, "r+") as file:
+        spoil(file, good[scene])
+    wrong = set(check(path).wrong)
+    assert wrong & EITHER.get(
+        expected, {expected}
+    ), f"{what} was altered, {expected} found nothing; found: {sorted(wrong)}"
+
+
+def numbers(value, path=()):
+    """The places of all numbers in a summary."""
+    if isinstance(value, dict):
+        return [p for key, inner in value.items() for p in numbers(inner, path + (key,))]
+    if isinstance(value, list):
+        return [p for k, inner in enumerate(value) for p in numbers(inner, path + (k,))]
+    return [path] if isinstance(value, (int, float)) and not isinstance(value, bool) else []
+
+
+def wrong_in_summary(good, told, text=None):
+    """Whether the checks of the summary alone fail."""
+    report = Report()
+    summary.check(good.h, report, told, text)
+    return set(report.wrong)
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_every_number_of_a_summary_is_checked(good, scene):
+    g = good[scene]
+    for path in numbers(g.told):
+        told = copy.deepcopy(g.told)
+        place = told
+        for key in path[:-1]:
+            place = place[key]
+        old = place[path[-1]]
+        place[path[-1]] = old + 1 if isinstance(old, int) else old * (1 + 1e-9) + 1e-12
+        if path == ("cpu_time",):
+            place[path[-1]] = 0.0
+        assert "summary" in wrong_in_summary(g, told), f"{path} was altered from {old} to {place[path[-1]]}"
+
+
+def test_an_ending_that_is_none_is_found(good):
+    told = good["beam"].told
+    assert told["ending"] == "broken_fraction"
+    assert "ending" in wrong_in_summary(good["beam"], told | {"ending": "time"})
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_every_number_of_a_summary_in_words_is_checked(good, scene):
+    g = good[scene]
+    end = g.text.index("CPU time")
+    lines = list(
+        re.finditer(
+            r"(?<=[ (])(\d+\.?\d*)(e-?\d+)?(?= N|\)| J| m|,| s | steps| grains| %| Newton| fact| sweeps)", g.text[:end]
+        )
+    )
+    assert len(lines) > 5
+    for match in lines:
+        digits, power = match.group(1), match.group(2) or ""
+        other = digits[:-1] + str((int(digits[-1]) + 4) % 10)
+        text = g.text[: match.start()] + other + power + g.text[match.end() :]
+        context = g.text[g.text.rfind("\n", 0, match.start()) + 1 : g.text.find("\n", match.start())]
+        if "strain" in context and power:
+            continue
+        assert "summary's text" in wrong_in_summary(
+            g, g.told, text
+        ), f"{match.group()} became {other}{power} in {context!r}"
+
+
+def test_every_check_has_a_history_that_it_fails(good):
+    names = set()
+    for name in SCENES:
+        names |= set(check(good[name].path, good[name].told, good[name].text).margins)
+    spoilt = {expected for _, _, _, expected in SPOILT if expected not in EITHER} | set().union(*EITHER.values())
+    spoilt |= {"summary", "summary's text", "ending"}
+    assert names <= spoilt, f"nothing is spoilt for {sorted(names - spoilt)}"
