@@ -3,9 +3,11 @@
 mod common;
 
 use common::{bonded_pair, down, floor, grain, run, settings, solver, world};
+use dem_core::body::{Drive, Shape, Wall};
 use dem_core::bond::BondStatus;
 use dem_core::dim::{D2, D3, Dim, Vect};
 use dem_core::world::{Restitution, World};
+use std::sync::Arc;
 
 const G: f64 = 9.81;
 
@@ -58,8 +60,70 @@ fn a_bounce_returns_the_fraction_e_of_the_speed() {
     }
 }
 
-/// A grain set sliding at `v` over a rough floor; returns the slid distance until it rolls, and its final speed.
-fn slide<D: Dim>(v: f64, mu: f64) -> (f64, f64) {
+#[test]
+fn restitution_begins_at_its_threshold() {
+    fn rebound<D: Dim>(speed: f64) -> f64 {
+        let mut set = settings(1e-4);
+        set.restitution = Some(Restitution { grain_grain: 0.5, grain_wall: 0.5, threshold_speed: 1.0 });
+        let mut start = above::<D>(0.0105);
+        start.velocity[D::N - 1] = -speed;
+        let mut w = world(vec![start], vec![floor(0.0)], set);
+        run(&mut w, 300);
+        last::<D>(&w.grains.velocity[0])
+    }
+    for (speed, expected) in [(0.99, 0.0), (1.01, 0.505), (2.0, 1.0)] {
+        for found in [rebound::<D2>(speed), rebound::<D3>(speed)] {
+            assert!((found - expected).abs() < 1e-14, "{speed} m/s: {found} against {expected}");
+        }
+    }
+}
+
+/// A wall that pushes a grain along the first axis, its speed growing by 2 m/s².
+fn pushed<D: Dim>() -> World<D> {
+    let mut first = D::Vector::zero();
+    first[0] = 1.0;
+    let mut centre = vec![0.0; D::N];
+    centre[0] = 0.01;
+    let mut wall = Wall::fixed(Shape::Plane { normal: first }, D::Vector::zero(), 0.0);
+    wall.drive = Drive::Velocity { direction: first, speed: Arc::new(|t| 2.0 * t) };
+    world(vec![grain(&centre, 0.01)], vec![wall], settings(1e-3))
+}
+
+#[test]
+fn a_wall_has_the_speed_of_the_end_of_the_step() {
+    fn case<D: Dim>() {
+        let mut w = pushed::<D>();
+        for _ in 0..50 {
+            w.step().unwrap();
+            let (speed, way) = (2.0 * w.time, w.time * w.time);
+            // θ = 1/2 integrates a speed that is linear in time exactly
+            assert!((w.walls[0].velocity[0] - speed).abs() < 1e-15, "{} against {speed}", w.walls[0].velocity[0]);
+            assert!((w.walls[0].position[0] - way).abs() < 1e-15, "{} against {way}", w.walls[0].position[0]);
+            assert!((w.grains.velocity[0][0] - speed).abs() < 1e-14);
+            // the grain's inertia
+            let force = -w.walls[0].reaction[0];
+            assert!((force / (2.0 * w.grains.mass[0]) - 1.0).abs() < 1e-9, "{force}");
+        }
+        let kinetic = 0.5 * w.grains.mass[0] * w.grains.velocity[0][0].powi(2);
+        assert!((w.ledger.external_work / kinetic - 1.0).abs() < 1e-12);
+    }
+    case::<D2>();
+    case::<D3>();
+}
+
+/// What a grain does that is set sliding over a rough floor.
+struct Slide {
+    /// Way of its centre until it rolls (m).
+    travelled: f64,
+    /// Way that its contact point slips until then (m).
+    slid: f64,
+    /// Its speed as it rolls (m/s).
+    rolling: f64,
+    /// Work of friction (J) and the energy that the normal rows lost, over the weight (m).
+    lost: [f64; 2],
+}
+
+fn slide<D: Dim>(v: f64, mu: f64) -> Slide {
     let mut set = settings(1e-5);
     set.gravity = down::<D>(G);
     let mut start = above::<D>(0.0);
@@ -79,19 +143,26 @@ fn slide<D: Dim>(v: f64, mu: f64) -> (f64, f64) {
     }
     let travelled = w.grains.position[0][0];
     run(&mut w, 1000);
-    let _ = slid;
-    (travelled, w.grains.velocity[0][0])
+    let lost = [w.ledger.friction, w.ledger.impact].map(|energy| energy / (w.grains.mass[0] * G));
+    Slide { travelled, slid, rolling: w.grains.velocity[0][0], lost }
 }
 
 #[test]
 fn a_free_grain_slides_and_then_rolls() {
     let (v, mu) = (0.3, 0.25);
-    let (slid, rolling) = slide::<D2>(v, mu);
-    assert!((slid / (5.0 * v * v / (18.0 * mu * G)) - 1.0).abs() < 2e-3, "{slid}");
-    assert!((rolling - 2.0 * v / 3.0).abs() < 1e-9 * v);
-    let (slid, rolling) = slide::<D3>(v, mu);
-    assert!((slid / (12.0 * v * v / (49.0 * mu * G)) - 1.0).abs() < 2e-3, "{slid}");
-    assert!((rolling - 5.0 * v / 7.0).abs() < 1e-9 * v);
+    // the contact point slows down by μ g (1 + m R²/I), the centre by μ g: until v/(3 μ g) in 2D and v/(3.5 μ g) in 3D
+    let unit = v * v / (mu * G);
+    for (found, way, slip, speed) in [
+        (slide::<D2>(v, mu), 5.0 / 18.0, 1.0 / 6.0, 2.0 / 3.0),
+        (slide::<D3>(v, mu), 12.0 / 49.0, 1.0 / 7.0, 5.0 / 7.0),
+    ] {
+        let Slide { travelled, slid, rolling, lost: [friction, impact] } = found;
+        assert!((travelled / (way * unit) - 1.0).abs() < 2e-3, "{travelled}");
+        assert!((slid / (slip * unit) - 1.0).abs() < 2e-3, "{slid}");
+        assert!((rolling - speed * v).abs() < 1e-9 * v);
+        // friction takes μ m g for each metre of slip, to the half step in which it stops
+        assert!((friction / (mu * slid) - 1.0).abs() < 1e-3 && impact.abs() < 1e-12 * friction, "{friction} {impact}");
+    }
 }
 
 #[test]

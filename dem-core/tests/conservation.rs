@@ -127,3 +127,34 @@ fn the_ledger_closes_under_gravity_loads_and_drives() {
     assert!(l.remainder.abs() <= 1e-12 * l.external_work, "{l:?}");
     assert!((l.kinetic - w.kinetic_energy()).abs() <= 1e-12 * l.external_work);
 }
+
+#[test]
+fn losses_are_booked_where_they_belong() {
+    fn case<D: Dim>(friction: f64, e: f64) -> [f64; 2] {
+        let mut set = settings(1e-4);
+        set.restitution = (e > 0.0).then_some(Restitution { grain_grain: e, grain_wall: e, threshold_speed: 0.0 });
+        let mut place = vec![0.0; D::N];
+        // touches in the middle of the second step
+        place[D::N - 1] = 0.01 + 3e-4 - 1e-13;
+        let mut grain = grain::<D>(&place, 0.01);
+        grain.velocity[0] = 1.0;
+        grain.velocity[D::N - 1] = -2.0;
+        let mut w = world(vec![grain], vec![floor(friction)], set);
+        run(&mut w, 20);
+        [w.ledger.impact, w.ledger.friction].map(|energy| energy / (0.5 * w.grains.mass[0]))
+    }
+    for e in [0.0, 0.5] {
+        // a blow of 2 m/s straight on loses (1 − e²) 4 m²/s²; friction slows the slip of 1 m/s by μ times its impulse, for
+        // which a disk is a third of its mass, a sphere two sevenths
+        let (straight, mu) = (4.0 * (1.0 - e * e), 0.05);
+        let impulse = mu * 2.0 * (1.0 + e);
+        for (smooth, rough, mass) in
+            [(case::<D2>(0.0, e), case::<D2>(mu, e), 1.0 / 3.0), (case::<D3>(0.0, e), case::<D3>(mu, e), 2.0 / 7.0)]
+        {
+            let slip = impulse * (2.0 - impulse / mass);
+            assert!((smooth[0] - straight).abs() < 1e-9 && smooth[1] == 0.0, "e = {e}: {smooth:?}");
+            assert!((rough[0] - straight).abs() < 1e-9, "e = {e}: {rough:?} against {straight}");
+            assert!((rough[1] - slip).abs() < 1e-9, "e = {e}: {rough:?} against {slip}");
+        }
+    }
+}

@@ -3,7 +3,7 @@
 mod common;
 
 use common::{grain, settings, world};
-use dem_core::body::{Grains, Load};
+use dem_core::body::{Grains, Load, Shape, Wall};
 use dem_core::bond::{BondStatus, Rupture};
 use dem_core::dim::{D2, D3, D3Twist, Dim, Vect};
 use dem_core::solver::{GaussSeidelSettings, SolverSettings};
@@ -242,4 +242,59 @@ fn a_force_driven_wall_on_a_fixed_grain_carries_its_force() {
     let mut w = world(vec![held], vec![lid], settings(1e-4));
     w.step().unwrap();
     assert!((w.walls[0].reaction[1] - 10.0).abs() < 1e-9, "{}", w.walls[0].reaction[1]);
+}
+
+/// Pairs of grains that touch, far from each other: the first grain of each is fixed, the second is pulled by a force (N) from
+/// a time on (s).
+fn pairs(rule: Rupture, pulls: &[(f64, f64)]) -> World<D2> {
+    let (mut grains, mut loads) = (Vec::new(), Vec::new());
+    for (k, &(force, from)) in pulls.iter().enumerate() {
+        let y = 10.0 * A * k as f64;
+        let mut held = grain::<D2>(&[0.0, y], 0.5 * A);
+        held.fixed = true;
+        grains.extend([held, grain(&[A, y], 0.5 * A)]);
+        let factor = Arc::new(move |t| if t > from { 1.0 } else { 0.0 });
+        loads.push(Load { grain: 2 * k + 1, force: [force, 0.0].into(), torque: [0.0].into(), factor });
+    }
+    let mut set = settings(1e-4);
+    set.rupture = rule;
+    let mut w = World::new(grains.into_iter().collect(), Vec::new(), loads, set);
+    w.form_bonds(1e-6, |_| R_COH, MU);
+    assert_eq!(w.bonds.len(), pulls.len());
+    w
+}
+
+#[test]
+fn the_worst_bond_breaks_first() {
+    // beyond the limit by 5, 25, 15 and not at all
+    let mut w = pairs(Rupture::CascadeWorst, &[(15.0, 0.0), (35.0, 0.0), (25.0, 0.0), (5.0, 0.0)]);
+    let mut told = Vec::new();
+    let breaks = w.step_watched(&mut |broken| told.push(broken)).unwrap().breaks;
+    assert_eq!(breaks.iter().map(|b| (b.bond, b.round)).collect::<Vec<_>>(), [(1, 0), (2, 1), (0, 2)]);
+    assert_eq!(told, [1, 2, 3]);
+}
+
+#[test]
+fn rounds_of_a_step_in_halves_are_counted_on() {
+    // a grain that would pass through another in the whole step, but not in half of it; one bond fails in each half, at the
+    // middles of which loads are taken: 0.25e-4 and 0.75e-4 s
+    for rule in [Rupture::Cascade, Rupture::CascadeWorst] {
+        let mut w = pairs(rule, &[(15.0, 0.0), (25.0, 0.5e-4), (35.0, 0.5e-4)]);
+        let wall = Wall::fixed(Shape::Plane { normal: [-1.0, 0.0].into() }, [1.0, 0.0].into(), 0.0);
+        w.walls.push(wall);
+        let mut bullet = grain::<D2>(&[1.0 - 0.5 * A, 100.0 * A], 0.5 * A);
+        bullet.velocity = [0.75 * A / 1e-4, 0.0].into();
+        w.grains.push(bullet);
+        let mut told = Vec::new();
+        let report = w.step_watched(&mut |broken| told.push(broken)).unwrap();
+        let found: Vec<_> = report.breaks.iter().map(|b| (b.bond, b.round)).collect();
+        let (expected, counts): (&[_], &[_]) = match rule {
+            Rupture::Cascade => (&[(0, 0), (1, 1), (2, 1)], &[1, 3]),
+            _ => (&[(0, 0), (2, 1), (1, 2)], &[1, 2, 3]),
+        };
+        assert_eq!(found, expected, "{rule:?}");
+        // the whole step began to count, too, before it was given up: what it told came before
+        assert!(told.ends_with(counts), "{told:?}");
+        assert_eq!((report.rejected, w.time), (0, 1e-4));
+    }
 }

@@ -79,7 +79,14 @@ pub enum Command {
         force: bool,
     },
     /// The run on one HTML page that needs nothing else: pictures, curves, tables, accuracy, energy, scene.
-    Report(Moments),
+    Report {
+        /// Files and moments.
+        #[command(flatten)]
+        moments: Moments,
+        /// The load wall [default: that of the scene, else the only driven one].
+        #[arg(long, value_name = "NAME")]
+        wall: Option<String>,
+    },
     /// Strength against a field of the scene over many runs, as against cohesion: a line, its errors, the scatter of samples.
     ///
     /// The exit code is 1 where runs were left out because they did not give way, or are not done.
@@ -93,7 +100,7 @@ pub enum Command {
         /// What counts as the strength: the load at …
         #[arg(long, value_enum, default_value_t)]
         measure: Measure,
-        /// The driven wall, where there are several.
+        /// The load wall [default: that of the scene, else the only driven one].
         #[arg(long, value_name = "NAME")]
         wall: Option<String>,
         /// Folder for the results, created if need be [default: RUNS-strength].
@@ -126,7 +133,7 @@ pub enum Command {
         /// The files.
         #[command(flatten)]
         files: Files,
-        /// The driven wall, where there are several.
+        /// The load wall [default: that of the scene, else the only driven one].
         #[arg(long, value_name = "NAME")]
         wall: Option<String>,
     },

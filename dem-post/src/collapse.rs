@@ -1,24 +1,83 @@
 //! What is read off a curve: where it gives way, where it peaks, the work under it.
 
+use dem_run::collapse::in_one_piece;
+use dem_run::history::History;
 use serde_json::Value;
+
+use crate::output::Result;
 
 /// A maximum is a peak if the load falls at least this share below it afterwards.
 const PEAK_DROP: f64 = 0.05;
 
-/// The last step before `strain` exceeds `threshold` in magnitude; `None` if it never does.
-pub fn last_step_below(strain: &[f64], threshold: f64) -> Option<usize> {
-    let above = strain.iter().position(|e| e.abs() > threshold)?;
-    Some(above.saturating_sub(1))
+/// How the bonds of a sample hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bonding {
+    /// There are none.
+    None,
+    /// They yield before they break.
+    Elastic,
+    /// They do not yield.
+    Rigid {
+        /// Whether they joined all grains to one piece at the start.
+        one_piece: bool,
+    },
 }
 
-/// Whether no bond had broken where `strain` passed its threshold, a step after `step`: `broken` counts them step by step.
-pub fn whole_at(broken: &[f64], step: usize) -> bool {
-    broken.get(step + 1).or(broken.last()).is_some_and(|&n| n == 0.0)
+impl Bonding {
+    /// That of a run.
+    ///
+    /// # Errors
+    /// Those of reading the history.
+    pub fn of(history: &History) -> Result<Self> {
+        let bonds = history.bonds()?;
+        if bonds.is_empty() {
+            return Ok(Self::None);
+        }
+        let scene = serde_json::from_str::<Value>(&history.parameters()?.scene).unwrap_or_default();
+        if !scene["bonds"]["stiffness"].is_null() {
+            return Ok(Self::Elastic);
+        }
+        let grains = history.grains()?.radius.len();
+        // a damaged file may name others
+        let grain = |k: i32| u32::try_from(k).ok().filter(|&k| (k as usize) < grains);
+        let pairs = bonds.pair.iter().filter_map(|[i, j]| Some([grain(*i)?, grain(*j)?]));
+        Ok(Self::Rigid { one_piece: in_one_piece(grains, pairs) })
+    }
 }
 
-/// Whether the bonds of a scene yield before they break.
-pub fn is_elastic(scene: &str) -> bool {
-    serde_json::from_str::<Value>(scene).is_ok_and(|scene| !scene["bonds"]["stiffness"].is_null())
+/// Where a sample collapses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Collapse {
+    /// The last step before the strain exceeds its limit; `None` if it never does, and where there
+    /// is no collapse load.
+    pub step: Option<usize>,
+    /// Whether no rigid bond had broken when it did.
+    pub early: bool,
+    /// What there is to know of the load, or why there is none; empty if the strain never exceeds
+    /// its limit.
+    pub note: &'static str,
+}
+
+impl Collapse {
+    /// Reads it off the curves, which have an entry for each step: `load` (N), `strain` (–),
+    /// `broken` bonds; `limit` is that of the strain (–).
+    pub fn read(load: &[f64], strain: &[f64], broken: &[f64], limit: f64, bonds: Bonding) -> Self {
+        let Some(passed) = strain.iter().position(|e| e.abs() > limit) else {
+            return Self { step: None, early: false, note: "" };
+        };
+        let step = passed.checked_sub(1).filter(|&step| load.get(step).is_some_and(|load| *load != 0.0));
+        let whole = broken.get(passed).or(broken.last()).is_some_and(|&n| n == 0.0);
+        let (step, early, note) = match bonds {
+            Bonding::Elastic if whole => (None, false, "the sample strained elastically, before any bond broke"),
+            Bonding::Rigid { one_piece } if whole && step.is_some() => match one_piece {
+                true => (step, true, "before any bond broke: the solver's own strain"),
+                false => (step, true, "before any bond broke: not all grains are bonded to one piece"),
+            },
+            _ if step.is_none() => (None, false, "no load acted in the step before"),
+            _ => (step, false, ""),
+        };
+        Self { step, early, note }
+    }
 }
 
 /// Where the load is greatest, if it falls by at least 5 % afterwards.
@@ -28,14 +87,11 @@ pub fn peak(load: &[f64]) -> Option<usize> {
     (load[top] > 0.0 && lowest < (1.0 - PEAK_DROP) * load[top]).then_some(top)
 }
 
-/// Work of a force along a way, by trapezoids, J; from zero force at way zero.
-pub fn work(load: &[f64], way: &[f64]) -> f64 {
-    let (mut sum, mut last) = (0.0, (0.0, 0.0));
-    for now in load.iter().copied().zip(way.iter().copied()) {
-        sum += 0.5 * (now.0 + last.0) * (now.1 - last.1);
-        last = now;
-    }
-    sum
+/// Work of a force along a way from zero (J): `force` is the mean of each step (N), `way` its end
+/// (m). It is the sum of the run's own energy balance.
+pub fn work(force: &[f64], way: &[f64]) -> f64 {
+    let from = [0.0].into_iter().chain(way.iter().copied());
+    force.iter().zip(way).zip(from).map(|((force, to), from)| force * (to - from)).sum()
 }
 
 #[cfg(test)]
@@ -43,12 +99,27 @@ mod tests {
     use super::*;
 
     #[test]
-    fn collapse_is_the_last_step_before_the_strain_exceeds_its_threshold() {
-        let strain = [0.0, 5e-5, 1e-4, -2e-4, 0.0, 2e-3];
-        assert_eq!(last_step_below(&strain, 1e-4), Some(2));
-        assert_eq!(last_step_below(&strain, 1e-3), Some(4));
-        assert_eq!(last_step_below(&strain, 1.0), None);
-        assert_eq!(last_step_below(&[1.0], 1e-4), Some(0));
+    fn collapse_is_the_last_step_before_the_strain_exceeds_its_limit() {
+        let (strain, load) = ([0.0, 5e-5, 1e-4, -2e-4, 0.0, 2e-3], [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+        let step = |limit| Collapse::read(&load, &strain, &[0.0, 0.0, 1.0], limit, Bonding::None).step;
+        assert_eq!([1e-4, 1e-3, 1.0].map(step), [Some(2), Some(4), None]);
+    }
+
+    #[test]
+    fn there_is_no_collapse_load_before_a_load_or_by_elastic_strain() {
+        let read =
+            |load: f64, broken: f64, bonds| Collapse::read(&[load, 9.0], &[0.0, 2e-4], &[0.0, broken], 1e-4, bonds);
+        let rigid = |one_piece| Bonding::Rigid { one_piece };
+        // nothing comes before the first step
+        assert_eq!(Collapse::read(&[5.0], &[1.0], &[0.0], 1e-4, rigid(true)).step, None);
+        assert_eq!(read(-0.0, 1.0, rigid(true)).note, "no load acted in the step before");
+        assert_eq!((read(5.0, 0.0, Bonding::Elastic).step, read(5.0, 1.0, Bonding::Elastic).step), (None, Some(0)));
+        assert_eq!(read(5.0, 1.0, rigid(true)), Collapse { step: Some(0), early: false, note: "" });
+        for (one_piece, told) in [(true, true), (false, false)] {
+            let found = read(5.0, 0.0, rigid(one_piece));
+            assert_eq!((found.step, found.early), (Some(0), true));
+            assert_eq!(found.note.contains("solver's own"), told, "{}", found.note);
+        }
     }
 
     #[test]
@@ -60,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn work_is_the_area_under_the_curve() {
-        assert!((work(&[1.0, 2.0, 2.0], &[1.0, 2.0, 4.0]) - (0.5 + 1.5 + 4.0)).abs() < 1e-15);
+    fn work_is_force_times_the_way_of_its_step() {
+        assert_eq!(work(&[1.0, 2.0, 2.0], &[1.0, 2.0, 4.0]), 1.0 + 2.0 + 4.0);
     }
 }

@@ -2,11 +2,12 @@
 
 use std::path::Path;
 
-use dem_run::history::{History, RuptureMode, Series, WallDrive};
+use dem_run::history::{History, RuptureMode, Series, Wall, WallDrive};
 use serde::Serialize;
 
 use crate::cracks::Modes;
 use crate::output::{Result, facts, in_shell, number, quantity};
+use crate::stress_strain;
 
 /// What a history holds.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -31,6 +32,12 @@ pub struct Report {
     pub mass: f64,
     /// The walls: name, shape and drive.
     pub walls: Vec<[String; 3]>,
+    /// The wall that loads the sample; `None` where no wall is driven, or where several are and the
+    /// scene does not say which.
+    pub load_wall: Option<String>,
+    /// How many walls are driven.
+    #[serde(skip)]
+    pub driven: usize,
     /// Bonds at the start.
     pub bonds: usize,
     /// Least and greatest cohesion, N.
@@ -79,6 +86,8 @@ pub fn read(history: &History) -> Result<Report> {
     };
     let mut broken = Modes::default();
     history.ruptures()?.iter().for_each(|rupture| broken.add(rupture.mode));
+    let listed = history.walls()?;
+    let (driven, load_wall) = stress_strain::load_wall(&listed, &parameters.scene);
     let frames = history.frames();
     let moment = |frame: usize| (history.steps()[frame], history.times()[frame]);
     let mut report = Report {
@@ -94,7 +103,9 @@ pub fn read(history: &History) -> Result<Report> {
         grains: grains.radius.len(),
         diameters: range(&grains.radius).map(|r| 2.0 * r),
         mass: grains.mass.iter().sum(),
-        walls: walls(history)?,
+        walls: walls(&listed),
+        load_wall: load_wall.map(String::from),
+        driven: driven.len(),
         bonds: bonds.len(),
         cohesion: (!bonds.is_empty()).then(|| range(&bonds.strength)),
         broken,
@@ -112,16 +123,13 @@ pub fn read(history: &History) -> Result<Report> {
 }
 
 /// Name, shape and drive of each wall.
-fn walls(history: &History) -> Result<Vec<[String; 3]>> {
+fn walls(walls: &[Wall]) -> Vec<[String; 3]> {
     let drive = |drive| match drive {
         WallDrive::Fixed => "fixed",
         WallDrive::Velocity => "driven by a velocity",
         WallDrive::Force => "driven by a force",
     };
-    let walls = history.walls()?;
-    let words =
-        walls.iter().map(|wall| [wall.name.clone(), wall.kind.label().to_lowercase(), drive(wall.drive).into()]);
-    Ok(words.collect())
+    walls.iter().map(|wall| [wall.name.clone(), wall.kind.label().to_lowercase(), drive(wall.drive).into()]).collect()
 }
 
 impl Report {
@@ -152,7 +160,7 @@ impl Report {
             ("cracks", self.bonds > 0),
             ("chains", self.reactions),
             ("velocities", true),
-            ("stress-strain", true),
+            ("stress-strain", self.driven > 0),
             ("frames", self.bonds > 0),
             ("report", true),
         ];
@@ -175,7 +183,8 @@ impl Report {
             lines.push(("walls", "none".into()));
         }
         for [name, kind, drive] in &self.walls {
-            lines.push(("wall", format!("{name}: {kind}, {drive}")));
+            let load = if self.driven > 1 && self.load_wall.as_ref() == Some(name) { ", the load wall" } else { "" };
+            lines.push(("wall", format!("{name}: {kind}, {drive}{load}")));
         }
         lines.push(("bonds", self.bond_line()));
         lines.extend([

@@ -75,9 +75,9 @@ fn run(cli: &Cli) -> Result<()> {
             compare::write(&first, &report, &mut folder)?;
             report_on(cli, &report, || report.table(), Some(&folder))
         }
-        Command::Report(moments) => {
+        Command::Report { moments, wall } => {
             let history = History::open(&moments.files.history)?;
-            let found = report::read(&history, &moments.times, cli.quiet)?;
+            let found = report::read(&history, &moments.times, wall.as_deref(), cli.quiet)?;
             let mut folder = folder(&history, &moments.files, "report")?;
             report::write(&history, &found, &mut folder)?;
             report_on(cli, &found, || found.table(), Some(&folder))

@@ -1,25 +1,39 @@
-//! Force and displacement of the driven wall; axial stress and strain, from the walls and from the particles.
+//! Force and displacement of the load wall; axial stress and strain, from the walls and from the
+//! particles.
+//!
+//! **The load wall** is the one that is asked for, else the scene's `load_wall`, else the wall of
+//! its `stop.wall_travel`, else the only driven one.
 //!
 //! **Signs.** Everything counts positive along the load: the displacement of the wall in the sense in which its force
 //! does work, compressive stress and shortening under a wall that pushes, tensile stress and elongation under one that
 //! pulls. The history has stress positive in compression and strain positive in elongation.
 //!
-//! **Size of the sample.** Height H along the drive and cross-section A across it are those of the box around all
-//! grains at the first frame; in 2D, A is the width times the scene's `thickness`.
+//! **Size of the sample.** Height H along the drive and cross-section A across it are those of the
+//! box around all grains at the first frame; in 2D, A is the width times the scene's `thickness`.
+//! Only a plane that moves along its normal has a section: of a round loader no stress or strain is
+//! reported from the walls.
 //!
-//! The applied force is the prescribed one, or, where the motion is prescribed, what it takes against the grains.
+//! **The load** is the prescribed force, or, where the motion is prescribed, what the wall took
+//! against the grains before any bond broke in the step (`wall_force_at_limit`; of histories
+//! without it `wall_force`, what was left after the breaks).
 //!
-//! **Collapse load** (under an ever-growing force there is no peak): the applied force at the last step before the
-//! strain fitted to the grains exceeds 1e-4; also reported at 1e-3. Of rigid bonds none of which has broken by then the
-//! strain is the solver's, and the load says nothing: the tables say so, and the drawings leave it out.
+//! **Collapse load** (under an ever-growing force there is no peak): the load at the last step
+//! before the strain fitted to the grains exceeds 1e-4; also reported at 1e-3. There is none where
+//! none acted in that step, nor where elastic bonds strained so before any broke. Of rigid bonds
+//! that join all grains to one piece, none of which has broken by then, the strain is the solver's,
+//! and the load says nothing: the tables say so, and the drawings leave it out.
 
 use std::path::Path;
 
-use dem_run::history::{History, Series, Wall, WallDrive};
+use dem_run::collapse::Disk;
+use dem_run::history::{History, Series, Wall, WallDrive, WallKind};
+use dem_run::scene::{Scene, choose_load_wall};
+use dem_run::summary::Splitting;
 use serde::Serialize;
+use serde_json::Value;
 
 use crate::chains::stress::thickness;
-use crate::collapse::{is_elastic, last_step_below, peak, whole_at, work};
+use crate::collapse::{Bonding, Collapse, peak, work};
 use crate::output::{Folder, PostError, Result, cell, facts, quantity, short};
 use crate::plot::{Chart, Style, colour};
 
@@ -33,35 +47,43 @@ const LEAST_STRAIN: f64 = 1e-9;
 /// The numbers that the analysis ends with. `None`: it did not happen, or was not recorded.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Summary {
-    /// The driven wall.
+    /// The load wall.
     pub wall: String,
-    /// Applied force at the first break, N.
+    /// Load at the first break, N.
     pub first_break: Option<f64>,
     /// Height of the sample along the drive, m.
     pub height: f64,
-    /// Cross-section of the sample, m².
-    pub area: f64,
-    /// Applied force before the fitted strain exceeds 1e-4, N.
+    /// Cross-section of the sample, m²; `None` unless the wall is a plane that moves along its
+    /// normal.
+    pub area: Option<f64>,
+    /// Load before the fitted strain exceeds 1e-4, N.
     pub collapse_load: Option<f64>,
     /// Time of that step, s.
     pub collapse_time: Option<f64>,
-    /// Applied force before the fitted strain exceeds 1e-3, N.
+    /// Load before the fitted strain exceeds 1e-3, N.
     pub collapse_load_1e3: Option<f64>,
-    /// Whether no bond had broken by each of the two, so that the strain is the solver's own.
+    /// Whether no rigid bond had broken by each of the two.
     pub collapse_early: [bool; 2],
-    /// Applied force when 5 % of the bonds have broken, N.
+    /// What there is to know of each of the two, or why there is none.
+    #[serde(skip)]
+    pub collapse_note: [&'static str; 2],
+    /// Load when 5 % of the bonds have broken, N.
     pub load_at_5_percent_broken: Option<f64>,
-    /// Greatest applied force where the load falls afterwards, N.
+    /// Greatest load where it falls by 5 % afterwards, N.
     pub peak_load: Option<f64>,
+    /// Displacement of the wall at the peak, m.
+    pub peak_displacement: Option<f64>,
     /// Strain fitted to the grains at the peak.
     pub peak_strain: Option<f64>,
-    /// Greatest applied force, N.
+    /// Greatest load, N.
     pub greatest_load: f64,
+    /// The splitting strength of a disk between plates.
+    pub splitting: Option<Splitting>,
     /// Displacement of the wall at the end, m.
     pub final_displacement: f64,
     /// Strain fitted to the grains at the end.
     pub final_strain: Option<f64>,
-    /// Work that the applied force has done, J.
+    /// Work that the wall has done, J.
     pub work: f64,
     /// Bonds broken at the end.
     pub bonds_broken: Option<f64>,
@@ -82,7 +104,7 @@ pub struct Report {
     pub time: Vec<f64>,
     /// Displacement of the wall, m.
     pub displacement: Vec<f64>,
-    /// Applied force, N.
+    /// Load, N.
     pub load: Vec<f64>,
     /// Reaction of the grains on the wall, N; empty if not recorded.
     pub reaction: Vec<f64>,
@@ -96,23 +118,30 @@ pub struct Report {
     pub summary: Summary,
 }
 
-/// Reads the curves of the wall `wall`, or of the only driven one.
+/// Reads the curves of the wall `wall`, or of the load wall.
 ///
 /// # Errors
-/// [`PostError::Lacking`] for a scene without a driven wall or without its force and place at every step;
-/// [`PostError::Usage`] for a wall that is none.
+/// [`PostError::Lacking`] for a scene without a driven wall or without its force and place at every
+/// step; [`PostError::Usage`] for a wall that is none, or where several are driven and the scene
+/// does not say which is the load wall.
 pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
     let walls = history.walls()?;
-    let k = driven(history.path(), &walls, wall)?;
+    let scene = history.parameters()?.scene;
+    let k = driven(history.path(), &walls, &scene, wall)?;
     let direction = walls[k].direction;
-    let size = |&d: &usize| direction[d].abs();
-    let axis = (0..history.dimension()).max_by(|a, b| size(a).total_cmp(&size(b))).unwrap_or(0);
+    // the axis along which a direction points most
+    let axis_of = |direction: &[f64; 3]| {
+        let size = |&d: &usize| direction[d].abs();
+        (0..history.dimension()).max_by(|a, b| size(a).total_cmp(&size(b))).unwrap_or(0)
+    };
+    let axis = axis_of(&direction);
     let motion = motion(history, &walls[k], k)?;
     let tensor = |name: &str| -> Result<Vec<f64>> {
         let series = history.observable(name)?;
         series.map_or_else(|| Ok(vec![]), |series| component(history, &series, &[axis, axis], name))
     };
-    let (sample, push) = sample_size(history, k, axis, motion.sense * direction[axis])?;
+    let (size, push) = sample_size(history, k, axis, motion.sense * direction[axis])?;
+    let plate = walls[k].kind == WallKind::Plane && axis_of(&walls[k].normal) == axis;
     let mut report = Report {
         displacement: motion.way.iter().map(|x| motion.sense * x).collect(),
         load: motion.load.iter().map(|f| motion.sense * f).collect(),
@@ -121,12 +150,23 @@ pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
         strain: tensor("strain")?.iter().map(|e| -push * e).collect(),
         stress: tensor("stress")?.iter().map(|s| push * s).collect(),
         broken: history.observable("bonds_broken")?.map(|series| series.value).unwrap_or_default(),
-        summary: Summary { wall: walls[k].name.clone(), height: sample[0], area: sample[1], ..Summary::default() },
+        summary: Summary {
+            wall: walls[k].name.clone(),
+            height: size.height,
+            area: Some(size.area).filter(|_| plate),
+            ..Summary::default()
+        },
         step: motion.step,
         time: motion.time,
     };
-    let elastic = is_elastic(&history.parameters()?.scene);
-    report.summarise(&history.bonds()?.strength, elastic, history.observable("solver_residual")?);
+    let bonds = Bonding::of(history)?;
+    report.summarise(&history.bonds()?.strength, bonds, history.observable("solver_residual")?);
+    let s = &mut report.summary;
+    s.work =
+        work(if walls[k].drive == WallDrive::Force { &report.load } else { &report.reaction }, &report.displacement);
+    let disk = serde_json::from_str::<Scene>(&scene).ok().and_then(|scene| Disk::of(&scene, &s.wall, &size.extents));
+    let collapse = s.collapse_load.filter(|_| !s.collapse_early[0]);
+    s.splitting = disk.map(|disk| Splitting::of(disk, collapse, s.peak_load));
     Ok(report)
 }
 
@@ -138,7 +178,7 @@ struct Motion {
     way: Vec<f64>,
     /// Force of the grains on the wall, N; empty if not recorded.
     reaction: Vec<f64>,
-    /// Force on the wall from outside, N.
+    /// The load, N.
     load: Vec<f64>,
     /// The sign that makes the load positive.
     sense: f64,
@@ -156,7 +196,14 @@ fn motion(history: &History, wall: &Wall, k: usize) -> Result<Motion> {
     // the load is counted in the sense of the prescribed force, or of the prescribed motion
     let load = match wall.drive {
         WallDrive::Force => component(history, &required(history, "applied_force")?, &[k], "applied_force")?,
-        _ => required(history, "wall_force").map(|_| reaction.iter().map(|f| -f).collect())?,
+        _ => {
+            let at_limit = history.observable("wall_force_at_limit")?.filter(|series| !series.step.is_empty());
+            let (series, name) = match at_limit {
+                Some(series) => (series, "wall_force_at_limit"),
+                None => (required(history, "wall_force")?, "wall_force"),
+            };
+            along(history, &series, k, direction, name)?.iter().map(|f| -f).collect()
+        }
     };
     let sense = sense(if wall.drive == WallDrive::Force { &load } else { &way });
     Ok(Motion { step: position.step, time: position.time, way, reaction, load, sense })
@@ -181,22 +228,36 @@ fn lacking(path: &Path, what: String) -> PostError {
     PostError::Lacking { path: path.into(), what }
 }
 
-/// The driven wall: the one named, or the only one.
-fn driven(path: &Path, walls: &[Wall], name: Option<&str>) -> Result<usize> {
-    let moving: Vec<usize> = (0..walls.len()).filter(|&k| walls[k].drive != WallDrive::Fixed).collect();
-    let names = || moving.iter().map(|&k| walls[k].name.as_str()).collect::<Vec<_>>().join(", ");
-    match (name, moving.as_slice()) {
-        (_, []) => {
+/// Names of the driven walls, and which of them loads the sample of a scene (JSON).
+pub(crate) fn load_wall<'a>(walls: &'a [Wall], scene: &str) -> (Vec<&'a str>, Option<&'a str>) {
+    let moving = walls.iter().filter(|wall| wall.drive != WallDrive::Fixed);
+    let driven: Vec<&str> = moving.map(|wall| wall.name.as_str()).collect();
+    let scene: Value = serde_json::from_str(scene).unwrap_or_default();
+    let named = ["/load_wall", "/stop/wall_travel/wall"].map(|place| scene.pointer(place).and_then(Value::as_str));
+    let chosen = choose_load_wall(named, &driven);
+    (driven, chosen)
+}
+
+/// The load wall: the one asked for, or that of the scene.
+fn driven(path: &Path, walls: &[Wall], scene: &str, asked: Option<&str>) -> Result<usize> {
+    let (driven, chosen) = load_wall(walls, scene);
+    let names = || driven.join(", ");
+    let name = match asked {
+        _ if driven.is_empty() => {
             let what = "stress and strain need a driven wall, and this scene has none: \
                         give one of its walls a velocity or a force";
-            Err(lacking(path, what.into()))
+            return Err(lacking(path, what.into()));
         }
-        (Some(name), moving) => moving.iter().copied().find(|&k| walls[k].name == name).ok_or_else(|| {
-            PostError::Usage(format!("--wall {name}: no driven wall has this name; there is {}", names()))
-        }),
-        (None, [k]) => Ok(*k),
-        (None, _) => Err(PostError::Usage(format!("several walls are driven: choose one by --wall: {}", names()))),
-    }
+        Some(name) if driven.contains(&name) => name,
+        Some(name) => {
+            return Err(PostError::Usage(format!("--wall {name}: no driven wall has this name; there is {}", names())));
+        }
+        None => chosen.ok_or_else(|| {
+            let shown = path.display();
+            PostError::Usage(format!("{shown}: several walls are driven: choose one by --wall: {}", names()))
+        })?,
+    };
+    Ok(walls.iter().position(|wall| wall.name == name).unwrap_or(0))
 }
 
 fn required(history: &History, name: &str) -> Result<Series> {
@@ -227,8 +288,18 @@ fn start_of(history: &History, k: usize, direction: &[f64; 3]) -> Result<f64> {
     Ok(position.get(k * d..(k + 1) * d).into_iter().flatten().zip(direction).map(|(x, n)| x * n).sum())
 }
 
-/// Height and cross-section of the sample at the first frame (m, m²), and whether the load pushes (1) or pulls (−1).
-fn sample_size(history: &History, wall: usize, axis: usize, drive: f64) -> Result<([f64; 2], f64)> {
+/// The sample at the first frame.
+struct Size {
+    /// Along the drive, m.
+    height: f64,
+    /// Across it, m².
+    area: f64,
+    /// Of the box around all grains along each axis, m.
+    extents: Vec<f64>,
+}
+
+/// The size of the sample, and whether the load pushes (1) or pulls (−1).
+fn sample_size(history: &History, wall: usize, axis: usize, drive: f64) -> Result<(Size, f64)> {
     let d = history.dimension();
     let (radius, position) = (history.grains()?.radius, history.grain_state(0)?.position);
     let mut extents = vec![];
@@ -249,14 +320,34 @@ fn sample_size(history: &History, wall: usize, axis: usize, drive: f64) -> Resul
     let area = if d == 2 { across * thickness(history)? } else { across };
     // a wall above that moves down pushes, one that moves up pulls
     let push = if drive * (place - middle) > 0.0 { -1.0 } else { 1.0 };
-    Ok(([extents[axis], area], push))
+    Ok((Size { height: extents[axis], area, extents }, push))
 }
 
 impl Summary {
     /// The collapse load at one of the two strains in words.
     pub fn collapse(&self, k: usize) -> String {
-        let load = quantity([self.collapse_load, self.collapse_load_1e3][k], "N");
-        if self.collapse_early[k] { load + ", before any bond broke: the solver's own strain" } else { load }
+        let note = self.collapse_note[k];
+        match [self.collapse_load, self.collapse_load_1e3][k] {
+            None if note.is_empty() => "–".into(),
+            None => format!("none: {note}"),
+            load if note.is_empty() => quantity(load, "N"),
+            load => format!("{}, {note}", quantity(load, "N")),
+        }
+    }
+
+    /// The sample in words: its height, and its section under a plate.
+    pub fn sample(&self) -> String {
+        let section = self.area.map_or_else(String::new, |area| format!(", section {}", quantity(Some(area), "m²")));
+        format!("{} high{section}", quantity(Some(self.height), "m"))
+    }
+
+    /// The peak in words.
+    pub fn peak(&self) -> String {
+        let at = self.peak_displacement.map(|way| format!(" at a displacement of {}", quantity(Some(way), "m")));
+        match self.peak_load {
+            Some(load) => quantity(Some(load), "N") + &at.unwrap_or_default(),
+            None => "none: the load never falls by 5 %".into(),
+        }
     }
 
     /// The collapse load to draw (N): that at 1e-4, if it is the sample's.
@@ -266,12 +357,11 @@ impl Summary {
 }
 
 impl Report {
-    fn summarise(&mut self, strengths: &[f64], elastic: bool, residual: Option<Series>) {
+    fn summarise(&mut self, strengths: &[f64], bonds: Bonding, residual: Option<Series>) {
         let at = |step: Option<usize>| step.and_then(|k| self.load.get(k).copied());
-        let steps = COLLAPSE.map(|threshold| last_step_below(&self.strain, threshold));
-        let [collapse, collapse_1e3] = steps;
-        let rigid = !strengths.is_empty() && !elastic;
-        let early = steps.map(|step| rigid && step.is_some_and(|step| whole_at(&self.broken, step)));
+        let found = COLLAPSE.map(|limit| Collapse::read(&self.load, &self.strain, &self.broken, limit, bonds));
+        let [collapse, collapse_1e3] = found.map(|found| found.step);
+        let early = found.map(|found| found.early);
         let limit = BROKEN * strengths.len() as f64;
         let five = if strengths.is_empty() { None } else { self.broken.iter().position(|&n| n >= limit) };
         let top = peak(&self.load);
@@ -286,13 +376,14 @@ impl Report {
             collapse_time: collapse.and_then(|k| self.time.get(k).copied()),
             collapse_load_1e3: at(collapse_1e3),
             collapse_early: early,
+            collapse_note: found.map(|found| found.note),
             load_at_5_percent_broken: at(five),
             peak_load: at(top),
+            peak_displacement: top.and_then(|k| self.displacement.get(k).copied()),
             peak_strain: top.and_then(|k| self.strain.get(k).copied()),
             greatest_load: maximum(&self.load),
             final_displacement: self.displacement.last().copied().unwrap_or(0.0),
             final_strain: self.strain.last().copied(),
-            work: work(&self.load, &self.displacement),
             bonds_broken: self.broken.last().copied(),
             cohesion,
             collapse_over_cohesion: at(collapse)
@@ -300,6 +391,7 @@ impl Report {
                 .zip(cohesion)
                 .map(|(load, cohesion)| load / cohesion),
             worst_residual: residual.map(|series| maximum(&series.value)),
+            ..Summary::default()
         };
         self.summary = summary;
     }
@@ -308,16 +400,16 @@ impl Report {
     pub fn table(&self) -> String {
         let s = &self.summary;
         let bonds = s.bonds_broken.map_or_else(|| "–".into(), |n| format!("{n:.0}"));
-        facts(&[
+        let mut lines = vec![
             ("driven wall", s.wall.clone()),
-            ("sample", format!("{} high, section {}", quantity(Some(s.height), "m"), quantity(Some(s.area), "m²"))),
+            ("sample", s.sample()),
             ("first break", quantity(s.first_break, "N")),
             ("collapse load (strain 1e-4)", s.collapse(0)),
             ("collapse load (strain 1e-3)", s.collapse(1)),
             ("load with 5 % of bonds broken", quantity(s.load_at_5_percent_broken, "N")),
             ("collapse load / cohesion", quantity(s.collapse_over_cohesion, "")),
             ("collapse at", quantity(s.collapse_time, "s")),
-            ("peak load", s.peak_load.map_or_else(|| "none: the load never falls".into(), |f| quantity(Some(f), "N"))),
+            ("peak load", s.peak()),
             ("strain at the peak", quantity(s.peak_strain, "")),
             ("greatest load", quantity(Some(s.greatest_load), "N")),
             ("displacement at the end", quantity(Some(s.final_displacement), "m")),
@@ -325,7 +417,11 @@ impl Report {
             ("work of the wall", quantity(Some(s.work), "J")),
             ("bonds broken", bonds),
             ("worst residual accepted", quantity(s.worst_residual, "")),
-        ])
+        ];
+        if let Some(splitting) = &s.splitting {
+            lines.insert(10, ("splitting strength", splitting.to_string()));
+        }
+        facts(&lines)
     }
 }
 
@@ -355,8 +451,8 @@ pub fn write(report: &Report, folder: &mut Folder) -> Result<()> {
             report.displacement[k].to_string(),
             report.load[k].to_string(),
             cell(at(&report.reaction, k)),
-            (report.displacement[k] / height).to_string(),
-            cell(at(&report.reaction, k).map(|f| f / area)),
+            cell(area.map(|_| report.displacement[k] / height)),
+            cell(at(&report.reaction, k).zip(area).map(|(f, area)| f / area)),
             cell(at(&report.strain, k)),
             cell(at(&report.stress, k)),
             cell(at(&report.broken, k)),
@@ -412,8 +508,8 @@ pub fn stress_strain(report: &Report) -> Chart {
     let mut chart = Chart::new("axial strain (%)", "axial stress (kPa)");
     chart.set_off = true;
     let wall_strain = 1e2 / report.summary.height;
-    let wall_stress = 1e-3 / report.summary.area;
-    if !report.reaction.is_empty() {
+    let wall_stress = report.summary.area.map(|area| 1e-3 / area);
+    if let Some(wall_stress) = wall_stress.filter(|_| !report.reaction.is_empty()) {
         let points = pairs(&report.displacement, wall_strain, &report.reaction, wall_stress);
         chart = chart.curve("from walls", colour::ORANGE, Style::Thin, points);
     }
@@ -421,7 +517,7 @@ pub fn stress_strain(report: &Report) -> Chart {
     if !points.is_empty() {
         chart = chart.curve("from particles", colour::BLUE, Style::Thin, points);
     }
-    if let Some(load) = report.summary.level() {
+    if let Some((load, wall_stress)) = report.summary.level().zip(wall_stress) {
         chart.levels.push((load * wall_stress, format!("at strain 10⁻⁴: {} kPa", short(load * wall_stress))));
     }
     chart

@@ -178,6 +178,13 @@ fn samples_have_lines_and_their_slopes_an_interval() {
     for part in ["bonds.strength (N), 3 values", "3, by seed", "slope over samples", "y = 1 x + 1"] {
         assert!(table.contains(part), "{table} lacks {part}");
     }
+    // each sample lies on its own line: what is short of 1 over all runs is the scatter of samples
+    let line = table.lines().find(|line| line.contains("R²")).unwrap();
+    assert!(
+        line.contains("over all runs, with the scatter of samples; 1 at least in each sample's own line"),
+        "{line}"
+    );
+    assert!(!line.contains(" 1 over all runs"), "{line}");
 }
 
 #[test]

@@ -439,3 +439,34 @@ fn bond_stiffness<D: Dim>(stiffness: scene::Stiffness, a: f64, thickness: f64) -
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dem_core::dim::{D2, D3Twist};
+
+    fn assert_near(found: bond::Stiffness, expected: [f64; 4]) {
+        for (found, expected) in [found.normal, found.tangential, found.rolling, found.twist].into_iter().zip(expected)
+        {
+            assert!((found / expected - 1.0).abs() < 1e-14, "{found} against {expected}");
+        }
+    }
+
+    #[test]
+    fn a_bond_is_as_stiff_as_a_bar_of_its_size() {
+        let (young, poisson, a, thickness) = (2e9, 0.25, 4e-3, 0.01);
+        let shear = young / (2.0 * (1.0 + poisson));
+        let bar = scene::Stiffness::Young(scene::Young { modulus: young, poisson_ratio: poisson });
+        // round: A = π a²/4, I = π a⁴/64 and the polar J = π a⁴/32
+        let round =
+            [young * PI * a / 4.0, shear * PI * a / 4.0, young * PI * a.powi(3) / 64.0, shear * PI * a.powi(3) / 32.0];
+        assert_near(bond_stiffness::<D3Twist>(bar, a, 1.0), round);
+        // a plate as long as wide: A = a t, I = t a³/12; nothing twists in the plane
+        let plate = bond_stiffness::<D2>(bar, a, thickness);
+        let expected = [young * thickness, shear * thickness, young * thickness * a * a / 12.0];
+        assert_near(bond::Stiffness { twist: 1.0, ..plate }, [expected[0], expected[1], expected[2], 1.0]);
+        // springs are what the scene says, whatever the size
+        let springs = scene::Springs { normal: 1.0, tangential: 2.0, rolling: 3.0, twist: Some(4.0) };
+        assert_near(bond_stiffness::<D3Twist>(scene::Stiffness::Springs(springs), a, 1.0), [1.0, 2.0, 3.0, 4.0]);
+    }
+}

@@ -1,7 +1,11 @@
-//! The collapse load, and the load at which a share of the bonds has broken.
+//! The loads that mark the failure of a sample, the greatest load, and the strength of a disk that
+//! plates split.
 
+use crate::scene::{Cut, Drive, Sample, Scene, Section, Shape};
 use dem_core::saved::{Mismatch, Reader, Saved};
+use petgraph::unionfind::UnionFind;
 use serde::Serialize;
+use std::f64::consts::PI;
 
 /// Axial strains (–) at which the collapse load is told.
 pub const STRAINS: [f64; 2] = [1e-4, 1e-3];
@@ -11,27 +15,59 @@ pub const BROKEN_SHARE: f64 = 0.05;
 /// Loads (N) that mark the failure of a sample; none where it did not come to that.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Failure {
-    /// Applied force at the step of the first break.
+    /// Load at the step of the first break.
     pub first_break: Option<f64>,
-    /// Applied force at the last step before the axial strain exceeded each of [`STRAINS`].
+    /// Load at the last step before the axial strain exceeded each of [`STRAINS`]; none where none
+    /// acted in that step.
     pub collapse: [Option<f64>; 2],
-    /// Whether no bond had broken by then: the strain is the solver's, not the sample's.
+    /// Whether no bond had broken when the strain exceeded each of [`STRAINS`].
     pub early: [bool; 2],
-    /// Applied force at the step by whose end [`BROKEN_SHARE`] of the bonds had broken.
+    /// Load at the step by whose end [`BROKEN_SHARE`] of the bonds had broken.
     pub broken_share: Option<f64>,
 }
 
-/// Follows a run step by step.
+/// The load of greatest magnitude.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Peak {
+    /// The load (N); zero where none ever acted.
+    pub load: f64,
+    /// Displacement of the wall along its direction at the end of that step (m).
+    pub displacement: f64,
+}
+
+/// A wall and its sample after a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LoadStep {
+    /// The load of the step (N).
+    pub load: f64,
+    /// Displacement of the wall along its direction since the start (m).
+    pub displacement: f64,
+    /// Strain of the sample along that direction (–), of either sign.
+    pub strain: f64,
+    /// Bonds broken so far.
+    pub broken: usize,
+    /// Bonds at the start.
+    pub bonds: usize,
+}
+
+/// Follows the load of one wall step by step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Collapse {
     /// What was found so far.
     pub failure: Failure,
+    /// Whether the strain has exceeded each of [`STRAINS`].
+    pub passed: [bool; 2],
+    /// The greatest load so far.
+    pub peak: Peak,
+    /// Whether the last step brought it.
+    pub rising: bool,
     last_load: f64,
 }
 
 impl Collapse {
-    /// Enter one step: the applied force (N), the axial strain (–, either sign) and the bonds broken so far, of how many.
-    pub fn push(&mut self, load: f64, strain: f64, broken: usize, bonds: usize) {
+    /// Enter one step.
+    pub fn push(&mut self, step: LoadStep) {
+        let LoadStep { load, displacement, strain, broken, bonds } = step;
         let failure = &mut self.failure;
         if broken > 0 {
             failure.first_break.get_or_insert(load);
@@ -40,10 +76,15 @@ impl Collapse {
             failure.broken_share.get_or_insert(load);
         }
         for (k, limit) in STRAINS.into_iter().enumerate() {
-            if strain.abs() > limit && failure.collapse[k].is_none() {
-                failure.collapse[k] = Some(self.last_load);
+            if strain.abs() > limit && !self.passed[k] {
+                self.passed[k] = true;
+                failure.collapse[k] = Some(self.last_load).filter(|load| *load != 0.0);
                 failure.early[k] = broken == 0;
             }
+        }
+        self.rising = load.abs() > self.peak.load.abs();
+        if self.rising {
+            self.peak = Peak { load, displacement };
         }
         self.last_load = load;
     }
@@ -55,8 +96,8 @@ impl Collapse {
             to.flag(load.is_some());
             to.real(load.unwrap_or(0.0));
         }
-        early.into_iter().for_each(|early| to.flag(early));
-        to.real(self.last_load);
+        early.into_iter().chain(self.passed).chain([self.rising]).for_each(|flag| to.flag(flag));
+        to.reals.extend([self.peak.load, self.peak.displacement, self.last_load]);
     }
 
     /// What [`Collapse::save`] wrote.
@@ -71,22 +112,89 @@ impl Collapse {
         let (first_break, a, b, broken_share) = (load()?, load()?, load()?, load()?);
         let early = [from.flag()?, from.flag()?];
         let failure = Failure { first_break, collapse: [a, b], early, broken_share };
-        Ok(Self { failure, last_load: from.real()? })
+        let (passed, rising) = ([from.flag()?, from.flag()?], from.flag()?);
+        let peak = Peak { load: from.real()?, displacement: from.real()? };
+        Ok(Self { failure, passed, peak, rising, last_load: from.real()? })
     }
+}
+
+/// Whether bonds join all of `grains` grains to one piece: then rigid bonds let none of them move
+/// until one breaks.
+#[must_use]
+pub fn in_one_piece(grains: usize, bonds: impl Iterator<Item = [u32; 2]>) -> bool {
+    let mut pieces = UnionFind::<u32>::new(grains);
+    bonds.filter(|[i, j]| pieces.union(*i, *j)).count() + 1 == grains
+}
+
+/// A disk, or a cylinder, that two plates split.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Disk {
+    /// Diameter D (m).
+    pub diameter: f64,
+    /// Length t along its axis (m).
+    pub length: f64,
+}
+
+impl Disk {
+    /// The disk of a scene whose wall `wall` loads it across its axis, against another plane wall;
+    /// none for another test. The diameter is that of the scene; the length is the thickness in 2D
+    /// and in 3D the `extents` of the sample (m) along the axis, at the start.
+    #[must_use]
+    pub fn of(scene: &Scene, wall: &str, extents: &[f64]) -> Option<Self> {
+        let Sample::Random(random) = &scene.sample else { return None };
+        let (diameter, axis) = match (random.cut, random.section, scene.dimension) {
+            (Some(Cut::Circle(diameter)), _, 2) => (diameter, None),
+            (Some(Cut::Circle(diameter)), _, _) => (diameter, Some(1)),
+            (None, Section::Circle, 3) => (random.width, Some(2)),
+            _ => return None,
+        };
+        let load = scene.walls.get(wall).filter(|wall| wall.drive() != Drive::Fixed)?;
+        let (normal, across) = (normal(&load.shape)?, only_axis(load.drive_direction()?)?);
+        let faces = |shape: &Shape| {
+            self::normal(shape).is_some_and(|n| only_axis(n) == Some(across) && n[across] * normal[across] < 0.0)
+        };
+        if only_axis(normal) != Some(across) || axis == Some(across) || !scene.walls.values().any(|w| faces(&w.shape)) {
+            return None;
+        }
+        let length = axis.map_or(Some(scene.thickness()), |axis| extents.get(axis).copied())?;
+        Some(Self { diameter, length })
+    }
+
+    /// Tensile stress 2P/(πDt) across the loaded diameter of an elastic disk (Pa) under the load P
+    /// (N).
+    #[must_use]
+    pub fn stress(&self, load: f64) -> f64 {
+        2.0 * load / (PI * self.diameter * self.length)
+    }
+}
+
+fn normal(shape: &Shape) -> Option<&[f64]> {
+    if let Shape::Plane(plane) = shape { Some(&plane.normal) } else { None }
+}
+
+/// The axis along which a vector points, where it points along one.
+fn only_axis(vector: &[f64]) -> Option<usize> {
+    let axis = vector.iter().position(|x| *x != 0.0)?;
+    vector[axis + 1..].iter().all(|x| *x == 0.0).then_some(axis)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn follow(loads: &[f64], strains: &[f64], broken: &[usize]) -> Collapse {
+        let mut collapse = Collapse::default();
+        for (k, load) in loads.iter().enumerate() {
+            let displacement = 1e-3 * k as f64;
+            collapse.push(LoadStep { load: *load, displacement, strain: strains[k], broken: broken[k], bonds: 100 });
+        }
+        collapse
+    }
+
     #[test]
     fn the_collapse_load_is_that_of_the_step_before_the_strain_passes_its_limit() {
-        let mut collapse = Collapse::default();
         let strains = [0.0, 5e-5, -2e-4, -5e-4, -2e-3, 0.0];
-        let broken = [0, 1, 2, 5, 9, 9];
-        for k in 0..6 {
-            collapse.push(10.0 * k as f64, strains[k], broken[k], 100);
-        }
+        let collapse = follow(&[0.0, 10.0, 20.0, 30.0, 40.0, 35.0], &strains, &[0, 1, 2, 5, 9, 9]);
         let expected = Failure {
             first_break: Some(10.0),
             collapse: [Some(10.0), Some(30.0)],
@@ -94,8 +202,54 @@ mod tests {
             broken_share: Some(30.0),
         };
         assert_eq!(collapse.failure, expected);
+        assert_eq!((collapse.peak, collapse.rising), (Peak { load: 40.0, displacement: 4e-3 }, false));
         let mut saved = Saved::default();
         collapse.save(&mut saved);
         assert_eq!(Collapse::restored(&mut saved.read()), Ok(collapse));
+    }
+
+    #[test]
+    fn a_strain_that_passes_before_any_load_acts_has_no_collapse_load() {
+        let collapse = follow(&[30.0, 20.0], &[2e-4, 2e-3], &[5, 6]);
+        assert_eq!((collapse.failure.collapse, collapse.passed), ([None, Some(30.0)], [true, true]));
+        assert_eq!(follow(&[-0.0, -0.0], &[0.0, 2e-3], &[0, 0]).failure.collapse, [None, None]);
+    }
+
+    #[test]
+    fn the_peak_is_the_load_of_greatest_magnitude() {
+        let collapse = follow(&[0.0, -3.0, 2.0], &[0.0; 3], &[0; 3]);
+        assert_eq!((collapse.peak, collapse.rising), (Peak { load: -3.0, displacement: 1e-3 }, false));
+        assert!(follow(&[0.0, 1.0], &[0.0; 2], &[0; 2]).rising);
+    }
+
+    #[test]
+    fn a_piece_has_no_loose_grain() {
+        assert!(in_one_piece(3, [[0, 1], [1, 2], [0, 2]].into_iter()));
+        assert!(!in_one_piece(4, [[0, 1], [1, 2], [0, 2]].into_iter()));
+        assert!(!in_one_piece(4, [[0, 1], [2, 3]].into_iter()));
+        assert!(in_one_piece(1, [].into_iter()));
+    }
+
+    fn disk(config: &str, set: &[&str]) -> Option<Disk> {
+        let path = format!("{}/../configs/{config}", env!("CARGO_MANIFEST_DIR"));
+        let set: Vec<String> = set.iter().map(ToString::to_string).collect();
+        let scene = crate::scene::load(path.as_ref(), &set).expect("scene");
+        Disk::of(&scene, "top", &[0.04, 0.015, 0.039])
+    }
+
+    #[test]
+    fn only_a_disk_that_is_loaded_across_its_axis_splits() {
+        assert_eq!(disk("brazilian-2d.json", &[]), Some(Disk { diameter: 0.041, length: 1.0 }));
+        assert_eq!(disk("brazilian-3d.json", &[]), Some(Disk { diameter: 0.041, length: 0.015 }));
+        // along its axis, or not cut at all
+        let along = r#"walls.top.shape.plane.normal=[0, -1, 0]"#;
+        assert_eq!(disk("brazilian-3d.json", &[along, "walls.bottom.shape.plane.normal=[0, 1, 0]"]), None);
+        assert_eq!(disk("brazilian-2d.json", &["sample.random.cut=null"]), None);
+        assert_eq!(disk("brazilian-2d.json", &["walls.bottom.shape.plane.normal=[1, 0]"]), None);
+        assert_eq!(disk("cylinder-compression.json", &[]), None);
+        assert_eq!(disk("compression.json", &[]), None);
+        // 2P/(πDt)
+        let stress = Disk { diameter: 0.5, length: 2.0 }.stress(PI);
+        assert!((stress - 2.0).abs() < 1e-15, "{stress} Pa");
     }
 }

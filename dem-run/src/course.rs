@@ -1,7 +1,6 @@
 //! The course of a run: what is counted from step to step, and what ends it.
 
-use crate::collapse::Collapse;
-use crate::record::applied_force;
+use crate::collapse::{Collapse, LoadStep, in_one_piece};
 use crate::scene::{Scene, TravelFrom};
 use crate::summary::Ending;
 use dem_core::body::{Drive, Wall};
@@ -13,10 +12,15 @@ use dem_core::world::{StepReport, World};
 
 /// Counts of a run, and its stop conditions.
 pub struct Course<D: Dim> {
-    /// Loads at failure.
-    pub collapse: Collapse,
-    /// The wall whose force loads the sample: the first that is driven.
-    pub driven: Option<usize>,
+    /// The driven walls with their loads, in the order of the walls.
+    pub driven: Vec<Driven<D>>,
+    /// Which of them loads the sample, as the scene has it; none where it has none, or does not say
+    /// which.
+    pub load_wall: Option<usize>,
+    /// Lengths of the box around all grains at the start (m), one for each axis.
+    pub extents: Vec<f64>,
+    /// Whether the bonds joined all grains to one piece at the start.
+    pub one_piece: bool,
     /// Bonds broken in tension, shear, rolling and twist.
     pub broken: [usize; 4],
     /// Largest residual of an accepted solve (–).
@@ -29,9 +33,21 @@ pub struct Course<D: Dim> {
     pub rejected: u64,
     /// Deepest overlap (m).
     pub penetration: f64,
+    /// Largest difference between the length of an intact bond and its length at rest (m).
+    pub bond_elongation: f64,
     stop: Option<TravelStop<D>>,
     /// Share of broken bonds (–) that ends the run.
     broken_limit: Option<f64>,
+}
+
+/// A driven wall and its load.
+pub struct Driven<D: Dim> {
+    /// Its number among the walls.
+    pub wall: usize,
+    /// Loads at failure, and the greatest.
+    pub collapse: Collapse,
+    /// Its place at the start (m).
+    start: D::Vector,
 }
 
 /// The travel of a wall that ends a run.
@@ -45,15 +61,22 @@ struct TravelStop<D: Dim> {
 impl<D: Dim> Course<D> {
     /// The course of a run that begins with `world`.
     pub fn new(scene: &Scene, world: &World<D>) -> Self {
+        let driven = world.walls.iter().enumerate().filter(|(_, w)| drive_direction(w).is_some());
+        let driven: Vec<Driven<D>> =
+            driven.map(|(wall, w)| Driven { wall, collapse: Collapse::default(), start: w.position }).collect();
+        let number = scene.load_wall().and_then(|name| scene.walls.keys().position(|other| other == name));
         Self {
-            collapse: Collapse::default(),
-            driven: world.walls.iter().position(|w| drive_direction(w).is_some()),
+            load_wall: driven.iter().position(|at| Some(at.wall) == number),
+            extents: extents(world),
+            one_piece: in_one_piece(world.grains.len(), world.bonds.iter().map(|bond| bond.pair)),
+            driven,
             broken: [0; 4],
             worst_residual: 0.0,
             work: Work::default(),
             missed_tolerance: 0,
             rejected: 0,
             penetration: 0.0,
+            bond_elongation: 0.0,
             stop: travel_stop(scene, world),
             broken_limit: scene.stop.as_ref().and_then(|s| s.broken_fraction),
         }
@@ -61,9 +84,15 @@ impl<D: Dim> Course<D> {
 
     /// Write the course so far.
     pub fn save(&self, to: &mut Saved) {
-        self.collapse.save(to);
+        to.count(self.driven.len());
+        for Driven { wall, collapse, start } in &self.driven {
+            to.count(*wall);
+            to.vector(start);
+            collapse.save(to);
+        }
+        to.reals.extend(&self.extents);
         self.broken.into_iter().for_each(|broken| to.count(broken));
-        to.reals.extend([self.worst_residual, self.penetration]);
+        to.reals.extend([self.worst_residual, self.penetration, self.bond_elongation]);
         let Work { sweeps, newton, factorisations } = self.work;
         to.counts.extend([sweeps, newton, factorisations, self.missed_tolerance, self.rejected]);
         to.flag(self.stop.is_some());
@@ -80,9 +109,17 @@ impl<D: Dim> Course<D> {
     /// [`Mismatch`].
     pub fn restored(scene: &Scene, world: &World<D>, from: &mut Reader) -> Result<Self, Mismatch> {
         let mut course = Self::new(scene, world);
-        course.collapse = Collapse::restored(from)?;
+        for _ in 0..from.count()? {
+            let (wall, start, collapse) = (from.count()?, from.vector()?, Collapse::restored(from)?);
+            // a wall that is no longer driven is forgotten
+            if let Some(driven) = course.driven.iter_mut().find(|driven| driven.wall == wall) {
+                *driven = Driven { wall, start, collapse };
+            }
+        }
+        course.extents = from.reals(D::N)?.to_vec();
         course.broken = [from.count()?, from.count()?, from.count()?, from.count()?];
         (course.worst_residual, course.penetration) = (from.real()?, from.real()?);
+        course.bond_elongation = from.real()?;
         let mut count = || from.count().map(|n| n as u64);
         course.work = Work { sweeps: count()?, newton: count()?, factorisations: count()? };
         (course.missed_tolerance, course.rejected) = (count()?, count()?);
@@ -101,31 +138,43 @@ impl<D: Dim> Course<D> {
         self.broken.iter().sum()
     }
 
-    /// The force that drives the sample (N), where a wall is driven.
+    /// What the load wall did, where the scene has one.
+    pub fn loads(&self) -> Option<&Collapse> {
+        Some(&self.driven[self.load_wall?].collapse)
+    }
+
+    /// The load of the last step on the load wall (N).
     pub fn load(&self, world: &World<D>) -> Option<f64> {
-        self.driven.map(|wall| applied_force(&world.walls[wall]))
+        Some(load(&world.walls[self.driven[self.load_wall?].wall]))
     }
 
     /// Enter a step; `world` is the state after it.
     pub fn count(&mut self, world: &World<D>, report: &StepReport<D>) {
         for failed in &report.breaks {
-            let mode = match failed.mode {
-                BondStatus::Shear => 1,
-                BondStatus::Rolling => 2,
-                BondStatus::Twist => 3,
-                _ => 0,
-            };
-            self.broken[mode] += 1;
+            match failed.mode {
+                BondStatus::Tension => self.broken[0] += 1,
+                BondStatus::Shear => self.broken[1] += 1,
+                BondStatus::Rolling => self.broken[2] += 1,
+                BondStatus::Twist => self.broken[3] += 1,
+                // no break: a bond that holds counts under no mode
+                BondStatus::Intact => {}
+            }
         }
         self.worst_residual = self.worst_residual.max(report.residual);
         self.work = self.work + report.work;
         self.missed_tolerance += u64::from(report.status == SolveStatus::Accepted);
         self.rejected += u64::from(report.rejected);
         self.penetration = self.penetration.max(report.penetration);
-        if let Some(wall) = self.driven {
-            let wall = &world.walls[wall];
-            let strain = axial(&world.strain(), drive_direction(wall).unwrap_or(D::Vector::zero()));
-            self.collapse.push(applied_force(wall), strain, self.broken(), world.bonds.len());
+        self.bond_elongation = self.bond_elongation.max(report.bond_elongation);
+        if self.driven.is_empty() {
+            return;
+        }
+        let (strain, broken, bonds) = (world.strain(), self.broken(), world.bonds.len());
+        for Driven { wall, collapse, start } in &mut self.driven {
+            let wall = &world.walls[*wall];
+            let direction = drive_direction(wall).unwrap_or(D::Vector::zero());
+            let (displacement, strain) = ((wall.position - *start).dot(&direction), axial(&strain, direction));
+            collapse.push(LoadStep { load: load(wall), displacement, strain, broken, bonds });
         }
     }
 
@@ -145,6 +194,25 @@ impl<D: Dim> Course<D> {
         let enough = |limit: f64| bonds > 0.0 && broken as f64 >= limit * bonds;
         self.broken_limit.is_some_and(enough).then_some(Ending::BrokenFraction)
     }
+}
+
+/// The load of a driven wall in the last step (N): the force prescribed, or what a wall of
+/// prescribed velocity took against the grains before any bond broke in the step.
+fn load<D: Dim>(wall: &Wall<D>) -> f64 {
+    match wall.drive {
+        Drive::Fixed => 0.0,
+        Drive::Velocity { direction, .. } => -direction.dot(&wall.reaction_at_limit),
+        Drive::Force { .. } => wall.applied,
+    }
+}
+
+/// Lengths of the box around all grains (m), one for each axis.
+fn extents<D: Dim>(world: &World<D>) -> Vec<f64> {
+    let reach = |axis: usize, sign: f64| {
+        let places = world.grains.position.iter().zip(&world.grains.radius);
+        places.map(|(x, r)| sign * x[axis] + r).fold(f64::NEG_INFINITY, f64::max)
+    };
+    (0..D::N).map(|axis| reach(axis, 1.0) + reach(axis, -1.0)).collect()
 }
 
 fn drive_direction<D: Dim>(wall: &Wall<D>) -> Option<D::Vector> {
@@ -170,4 +238,33 @@ fn travel_stop<D: Dim>(scene: &Scene, world: &World<D>) -> Option<TravelStop<D>>
     };
     let from = (travel.after == TravelFrom::Start).then(|| world.walls[wall].position);
     Some(TravelStop { wall, direction, distance: travel.fraction_of_height * (along(1.0) + along(-1.0)), from })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::build::build;
+    use dem_core::contact::Local;
+    use dem_core::dim::D2;
+    use dem_core::world::Break;
+
+    const TWO_GRAINS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../configs/two-grains.json");
+
+    #[test]
+    fn each_mode_of_rupture_is_counted_by_itself() {
+        let scene = crate::scene::load(TWO_GRAINS.as_ref(), &[]).expect("scene");
+        let mut world = build::<D2>(&scene, &mut |_| true).expect("world").world;
+        let mut course = Course::new(&scene, &world);
+        let mut report = world.step().expect("a step");
+        use BondStatus::{Intact, Rolling, Shear, Tension, Twist};
+        report.breaks = [Intact, Tension, Shear, Rolling, Twist, Intact]
+            .map(|mode| {
+                let (point, reaction) = (Vect::zero(), Local::zero());
+                Break { bond: 0, pair: [0, 1], mode, round: 0, point, reaction, energy: 0.0 }
+            })
+            .into();
+        course.count(&world, &report);
+        // before, what is no mode counted as tension: 3
+        assert_eq!(course.broken, [1, 1, 1, 1]);
+    }
 }

@@ -30,7 +30,7 @@ pub struct ResumeOptions {
 }
 
 /// Fields that a run that has begun can change: nothing that came before them depends on them.
-const FREE: [&str; 4] = ["title", "$schema", "time.end", "stop"];
+const FREE: [&str; 5] = ["title", "$schema", "time.end", "stop", "load_wall"];
 /// Fields that it can change with `--force`: from then on it is another run than the scene alone would give.
 const OPEN: [&str; 7] =
     ["solver", "gravity", "rupture", "materials.friction", "materials.restitution", "grains.loads", "bonds.flow"];

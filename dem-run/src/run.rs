@@ -2,6 +2,7 @@
 
 use crate::build::{build, rebuild};
 use crate::check;
+use crate::collapse::{Disk, Failure};
 use crate::course::Course;
 use crate::fclib::FclibError;
 use crate::history::{Checkpoint, HistoryError};
@@ -12,7 +13,7 @@ use crate::record::Recorder;
 use crate::sample_file;
 use crate::scene::{Scene, SceneError, SolverKind};
 use crate::signals::{self, INTERRUPTED, Interrupt};
-use crate::summary::{Ending, Summary};
+use crate::summary::{Ending, Splitting, Summary, WallLoads};
 use crate::warnings;
 use dem_core::body::{Drive, Wall};
 use dem_core::dim::{D2, D3, D3Twist, Dim, Vect};
@@ -342,27 +343,45 @@ impl<D: Dim> State<D> {
         cpu_time: f64,
     ) -> Summary {
         let (world, course) = (&self.world, &self.course);
+        let elastic = world.bonds.iter().any(|b| b.stiffness.is_some());
+        let names: Vec<&String> = scene.walls.keys().collect();
+        let loads = course.driven.iter().map(|driven| {
+            let velocity = matches!(world.walls[driven.wall].drive, Drive::Velocity { .. });
+            WallLoads::of(names[driven.wall], velocity, elastic, &driven.collapse)
+        });
+        let driven_walls: Vec<WallLoads> = loads.collect();
+        let chosen = course.load_wall.map(|at| &driven_walls[at]);
+        let disk = chosen.and_then(|loads| Disk::of(scene, &loads.wall, &course.extents));
         Summary {
             history: history.to_path_buf(),
             ending,
             steps: world.steps,
-            driven: course.driven.is_some(),
             carries: scene.output.reactions && world.touches().any(|t| t.reaction.n != 0.0),
             time: world.time,
             grains: world.grains.len(),
             solid_fraction,
             bonds: world.bonds.len(),
             gap_tolerance: scene.bonds.as_ref().filter(|bonds| bonds.bear()).map(|bonds| bonds.gap_tolerance),
-            elastic: world.bonds.iter().any(|b| b.stiffness.is_some()),
+            elastic,
             broken: course.broken,
             twists: scene.twists(),
-            failure: course.collapse.failure,
+            one_piece: course.one_piece,
+            load_wall: chosen.map(|loads| loads.wall.clone()),
+            failure: chosen.map_or_else(Failure::default, |loads| loads.failure),
+            peak_load: chosen.and_then(|loads| loads.peak_load),
+            peak_displacement: chosen.and_then(|loads| loads.peak_displacement),
+            splitting: chosen.zip(disk).map(|(loads, disk)| {
+                let collapse = loads.failure.collapse[0].filter(|_| !loads.failure.early[0]);
+                Splitting::of(disk, collapse, loads.peak_load)
+            }),
+            driven_walls,
             tolerance: scene.solver.tolerance,
             worst_residual: course.worst_residual,
             work: course.work,
             missed_tolerance: course.missed_tolerance,
             rejected: course.rejected,
             penetration: course.penetration,
+            bond_elongation: course.bond_elongation,
             mean_diameter: 2.0 * world.grains.radius.iter().sum::<f64>() / world.grains.len() as f64,
             external_work: world.ledger.external_work,
             energy_remainder: world.ledger.remainder,

@@ -62,9 +62,15 @@ struct Solved {
     work: Work,
     tolerance: f64,
     residual: f64,
+    velocity_error: f64,
     siconos_error: f64,
     cpu_time: f64,
 }
+
+/// Velocity error (–) up to which a problem counts as solved where the tolerance is at most `FINE`, and in proportion where it is larger.
+/// In problems with a solution it is up to some hundred times the residual.
+const VELOCITY_ERROR: f64 = 1e-3;
+const FINE: f64 = 1e-6;
 
 /// Sweeps of Gauss–Seidel after which it gives up.
 const MOST_SWEEPS: u64 = 100_000;
@@ -80,6 +86,8 @@ pub fn solve(options: &SolveOptions) -> Result<(), RunError> {
     let mut at = problem.assembled.clone();
     let report = iterate(&mut at, options);
     let parts = at.parts();
+    let velocity_error = at.velocity_error();
+    let allowed = VELOCITY_ERROR * (options.tolerance / FINE).max(1.0);
     let solved = Solved {
         problem: options.problem.clone(),
         title: problem.title.clone(),
@@ -87,15 +95,25 @@ pub fn solve(options: &SolveOptions) -> Result<(), RunError> {
         rows: parts.rows.count(),
         associated: parts.associated.iter().filter(|flag| **flag).count(),
         solver: options.solver,
-        converged: report.status == SolveStatus::Converged,
+        converged: report.status == SolveStatus::Converged && velocity_error <= allowed,
         iterations: report.work.iterations(),
         work: report.work,
         tolerance: options.tolerance,
         residual: report.residual,
+        velocity_error,
         siconos_error: at.siconos_error(),
         cpu_time: cpu_time() - began,
     };
     let printed = print_result(&solved, options.json);
+    if report.status == SolveStatus::Converged && !solved.converged {
+        return Err(RunError::NoConvergence(format!(
+            "{}: not solved: the residual is {:.2e} only because the reactions are as large as they are, the contacts still move at {:.2e} of \
+             the free velocities against their laws; most likely no velocities satisfy these laws",
+            options.problem.display(),
+            solved.residual,
+            solved.velocity_error
+        )));
+    }
     if !solved.converged {
         return Err(RunError::NoConvergence(format!(
             "{}: residual {:.2e} after {}, and {:.0e} was asked for; a larger --max-iterations, another \
@@ -162,6 +180,7 @@ impl fmt::Display for Solved {
         };
         writeln!(f, "status           {status} by {solver}, {}", self.took())?;
         writeln!(f, "residual         {:.2e} (tolerance {:.0e})", self.residual, self.tolerance)?;
+        writeln!(f, "velocity error   {:.2e} (of the free velocities)", self.velocity_error)?;
         writeln!(f, "Siconos's error  {:.2e} (natural map with ρ = 1: depends on the units)", self.siconos_error)?;
         write!(f, "CPU time         {:.3} s", self.cpu_time)
     }

@@ -1,7 +1,7 @@
 //! What a run tells at its end, on stdout.
 
-use crate::collapse::{Failure, STRAINS};
-use crate::output::{in_shell, number};
+use crate::collapse::{Collapse, Disk, Failure, STRAINS};
+use crate::output::{in_shell, number, quantity};
 use dem_core::solver::Work;
 use serde::Serialize;
 use std::fmt;
@@ -32,9 +32,6 @@ pub struct Summary {
     pub ending: Ending,
     /// Steps made.
     pub steps: u64,
-    /// Whether a wall is driven: then there is a curve of stress and strain.
-    #[serde(skip)]
-    pub driven: bool,
     /// Whether contacts carry normal forces at the end, and the history has them: then there are chains.
     #[serde(skip)]
     pub carries: bool,
@@ -55,8 +52,22 @@ pub struct Summary {
     pub broken: [usize; 4],
     /// Whether bonds resist twist.
     pub twists: bool,
-    /// Loads at which the sample failed (N).
+    /// Whether the bonds joined all grains to one piece at the start.
+    #[serde(skip)]
+    pub one_piece: bool,
+    /// Name of the wall that loads the sample; none where no wall is driven, or where several are
+    /// and the scene does not say which.
+    pub load_wall: Option<String>,
+    /// Loads of this wall at which the sample failed (N).
     pub failure: Failure,
+    /// Its greatest load (N), where it is driven by a velocity or bonds are elastic.
+    pub peak_load: Option<f64>,
+    /// Its displacement along its direction at the end of that step (m).
+    pub peak_displacement: Option<f64>,
+    /// The splitting strength, where it splits a disk.
+    pub splitting: Option<Splitting>,
+    /// The loads of all driven walls.
+    pub driven_walls: Vec<WallLoads>,
     /// Tolerance of the solver (–).
     pub tolerance: f64,
     /// Largest residual of an accepted solve (–).
@@ -70,6 +81,8 @@ pub struct Summary {
     pub rejected: u64,
     /// Deepest overlap (m).
     pub penetration: f64,
+    /// Largest difference between the length of an intact bond and its length at rest (m).
+    pub bond_elongation: f64,
     /// Mean diameter of the grains (m).
     pub mean_diameter: f64,
     /// Work of forces and drives (J).
@@ -80,6 +93,87 @@ pub struct Summary {
     pub bond_remainder: f64,
     /// Processor time of the whole program (s).
     pub cpu_time: f64,
+}
+
+/// The loads of a driven wall.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct WallLoads {
+    /// Its name.
+    pub wall: String,
+    /// Loads at which the sample failed (N). There is no collapse load where none acted in the step
+    /// before the strain, nor where elastic bonds strained so before any broke.
+    pub failure: Failure,
+    /// Greatest load (N), where the wall is driven by a velocity or bonds are elastic.
+    pub peak_load: Option<f64>,
+    /// Displacement along its direction at the end of that step (m).
+    pub peak_displacement: Option<f64>,
+    /// Whether the strain has exceeded each of [`STRAINS`].
+    #[serde(skip)]
+    pub passed: [bool; 2],
+    /// Whether the greatest load is that of the last step.
+    #[serde(skip)]
+    pub rising: bool,
+}
+
+impl WallLoads {
+    /// What a run tells of the wall `wall`: whether it is driven by a velocity, whether bonds are
+    /// elastic, and its loads.
+    #[must_use]
+    pub fn of(wall: &str, velocity: bool, elastic: bool, found: &Collapse) -> Self {
+        let &Collapse { mut failure, passed, peak, rising, .. } = found;
+        for (load, early) in failure.collapse.iter_mut().zip(failure.early) {
+            *load = load.filter(|_| !(elastic && early));
+        }
+        let peak = Some(peak).filter(|peak| (velocity || elastic) && peak.load != 0.0);
+        Self {
+            wall: wall.into(),
+            failure,
+            peak_load: peak.map(|peak| peak.load),
+            peak_displacement: peak.map(|peak| peak.displacement),
+            passed,
+            rising,
+        }
+    }
+
+    /// The greatest load in words, where there is one.
+    fn peak(&self) -> Option<String> {
+        let (load, displacement) = (self.peak_load?, self.peak_displacement?);
+        let end = if self.rising { ", at the end of the run" } else { "" };
+        Some(format!("{} N at a displacement of {} m{end}", number(load), number(displacement)))
+    }
+}
+
+/// Tensile stress 2P/(πDt) across the loaded diameter of a disk (Pa).
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Splitting {
+    /// Diameter D (m).
+    pub diameter: f64,
+    /// Length t (m).
+    pub length: f64,
+    /// Stress at the collapse load of the strain 1e-4, where bonds had broken by then (Pa).
+    pub collapse: Option<f64>,
+    /// Stress at the greatest load (Pa).
+    pub peak: Option<f64>,
+}
+
+impl Splitting {
+    /// The splitting strength of a disk, from its collapse load and its greatest load (N).
+    #[must_use]
+    pub fn of(disk: Disk, collapse: Option<f64>, peak: Option<f64>) -> Self {
+        let stress = |load: f64| disk.stress(load);
+        let Disk { diameter, length } = disk;
+        Self { diameter, length, collapse: collapse.map(stress), peak: peak.map(stress) }
+    }
+}
+
+impl fmt::Display for Splitting {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let at = |stress: Option<f64>, what: &str| Some(format!("{} Pa {what}", number(stress?)));
+        let told = [at(self.collapse, "at collapse (strain 1e-4)"), at(self.peak, "at the peak load")];
+        let told: Vec<String> = told.into_iter().flatten().collect();
+        let told = if told.is_empty() { "none".into() } else { told.join(", ") };
+        write!(f, "{told}: 2P/(πDt), D = {} m, t = {} m", number(self.diameter), number(self.length))
+    }
 }
 
 impl fmt::Display for Summary {
@@ -106,16 +200,18 @@ impl fmt::Display for Summary {
             None => {}
         }
         if self.steps > 0 {
+            self.write_loads(f)?;
             self.write_solves(f)?;
         }
         writeln!(f, "CPU time         {:.1} s", self.cpu_time)?;
         writeln!(f, "history          {}\n\nlook at it with", self.history.display())?;
         let file = in_shell(&self.history);
         write!(f, "  dem-post info {file}")?;
-        let more =
-            [("report", true), ("cracks", self.bonds > 0), ("chains", self.carries), ("stress-strain", self.driven)];
+        let driven = !self.driven_walls.is_empty();
+        let more = [("report", true), ("cracks", self.bonds > 0), ("chains", self.carries), ("stress-strain", driven)];
         for (command, _) in more.into_iter().filter(|(_, there)| *there && self.steps > 0) {
-            write!(f, "\n  dem-post {command} {file}")?;
+            let choose = driven && self.load_wall.is_none() && matches!(command, "report" | "stress-strain");
+            write!(f, "\n  dem-post {command} {file}{}", if choose { " --wall NAME" } else { "" })?;
         }
         Ok(())
     }
@@ -146,6 +242,9 @@ impl Summary {
             self.penetration,
             self.penetration / self.mean_diameter
         )?;
+        if self.bonds > 0 {
+            writeln!(f, "bond elongation  {:.2e} m at most, of bonds that held", self.bond_elongation)?;
+        }
         writeln!(f, "external work    {:.4e} J", self.external_work)?;
         writeln!(f, "energy remainder {:.2e} J", self.energy_remainder)?;
         if self.bonds > 0 && !self.elastic {
@@ -164,22 +263,93 @@ impl Summary {
             self.bonds,
             100.0 * broken as f64 / self.bonds as f64
         )?;
-        let Failure { first_break, collapse, early, broken_share } = self.failure;
-        if broken > 0 && first_break.is_none() {
-            return writeln!(f, "                 no wall is driven: there is no applied force to tell");
+        Ok(())
+    }
+
+    /// The loads of the load wall; where several walls are driven and none is chosen, those of
+    /// each.
+    fn write_loads(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let chosen = self.driven_walls.iter().find(|loads| Some(&loads.wall) == self.load_wall.as_ref());
+        let Some(loads) = chosen else { return self.write_walls(f) };
+        if self.bonds > 0 {
+            self.write_failure(f, loads)?;
         }
-        let load = |load: Option<f64>| load.map_or("none".into(), |n| format!("{} N", number(n)));
-        writeln!(f, "first break      {}", load(first_break))?;
-        for ((collapse, early), strain) in collapse.into_iter().zip(early).zip(STRAINS) {
-            // rigid grains and bonds: before the first break nothing can have moved
-            let note = if early && !self.elastic {
-                ", before any bond broke: the solver's own strain, not the sample's"
-            } else {
-                ""
+        if let Some(peak) = loads.peak() {
+            writeln!(f, "peak load        {peak} (wall {})", loads.wall)?;
+        }
+        if let Some(splitting) = &self.splitting {
+            writeln!(f, "splitting        {splitting}")?;
+        }
+        Ok(())
+    }
+
+    fn write_failure(&self, f: &mut fmt::Formatter<'_>, loads: &WallLoads) -> fmt::Result {
+        let WallLoads { wall, failure, passed, .. } = loads;
+        let load = |load: Option<f64>| load.map_or("none".into(), |n| format!("{} N (wall {wall})", number(n)));
+        writeln!(f, "first break      {}", load(failure.first_break))?;
+        let mut without: Vec<(f64, &str)> = vec![];
+        for (k, strain) in STRAINS.into_iter().enumerate() {
+            match failure.collapse[k] {
+                Some(load) => {
+                    let note = self.early_note(failure.early[k]);
+                    writeln!(f, "collapse load    {} N (strain {strain:.0e}{note}; wall {wall})", number(load))?;
+                }
+                None if !passed[k] => writeln!(f, "collapse load    none (strain {strain:.0e})")?,
+                None if self.elastic && failure.early[k] => {
+                    without.push((strain, "elastically, before any bond broke"));
+                }
+                None => without.push((strain, "while no load acted")),
+            }
+        }
+        for (strain, when) in without {
+            writeln!(f, "strain           {strain:.0e} passed {when}: no collapse load")?;
+        }
+        writeln!(f, "5 % broken       {}", load(failure.broken_share))
+    }
+
+    /// What is said of a collapse load by which no bond of a rigid sample had broken.
+    fn early_note(&self, early: bool) -> &'static str {
+        match (early, self.one_piece) {
+            (false, _) => "",
+            // rigid grains and bonds in one piece: before the first break nothing can have moved
+            (true, true) => ", before any bond broke: the solver's own strain, not the sample's",
+            (true, false) => ", before any bond broke: not all grains are bonded to one piece",
+        }
+    }
+
+    /// The loads of each driven wall.
+    fn write_walls(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let lines: Vec<(&str, String)> =
+            self.driven_walls.iter().map(|loads| (loads.wall.as_str(), self.wall_line(loads))).collect();
+        if lines.is_empty() && self.bonds > 0 {
+            return match self.broken {
+                [0, 0, 0, 0] => self.write_failure(f, &WallLoads::of("", false, false, &Collapse::default())),
+                _ => writeln!(f, "                 no wall is driven: there is no applied force to tell"),
             };
-            writeln!(f, "collapse load    {} (strain {strain:.0e}{note})", load(collapse))?;
         }
-        writeln!(f, "5 % broken       {}", load(broken_share))
+        if lines.iter().all(|(_, line)| line.is_empty()) {
+            return Ok(());
+        }
+        let names: Vec<&str> = lines.iter().map(|(wall, _)| *wall).collect();
+        writeln!(f, "load wall        none: name one of {} as load_wall in the scene", names.join(", "))?;
+        for (wall, line) in lines {
+            writeln!(f, "{:<16} {line}", format!("wall {wall}"))?;
+        }
+        Ok(())
+    }
+
+    fn wall_line(&self, loads: &WallLoads) -> String {
+        let load = |load: Option<f64>| quantity(load, "N");
+        let mut parts = vec![];
+        if self.bonds > 0 {
+            let failure = &loads.failure;
+            let collapse = |k: usize| format!("{} (strain {:.0e})", load(failure.collapse[k]), STRAINS[k]);
+            parts.push(format!("first break {}", load(failure.first_break)));
+            parts.push(format!("collapse {}, {}", collapse(0), collapse(1)));
+            parts.push(format!("5 % broken {}", load(failure.broken_share)));
+        }
+        parts.extend(loads.peak().map(|peak| format!("peak {peak}")));
+        parts.join("; ")
     }
 }
 

@@ -116,7 +116,7 @@ class Solved:
         self.acts = ~bouncy | (c.gap <= may_touch)
         self.idle_too = bouncy & (c.gap > must_touch) & self.acts
         rigid = self.bonds if h.K and h.stiffness is None else np.zeros(h.M, bool)
-        of_bond = turning(h, c) if h.K and h.stiffness is None else lengthening(h, c)
+        of_bond = turned(h, c) if h.K and h.stiffness is None else lengthening(h, c)
         self.bias = np.where(self.bonds, of_bond, self.bias)
         self.other = np.where(self.bonds, self.bias, self.other)
         self.rigid = rigid
@@ -230,6 +230,14 @@ def turning(h, c):
         angle = np.minimum(size, 1)
         away = np.cross(axis, u) * angle[:, None] - flat * versine(angle)[:, None]
     return -0.5 * (c.n * away).sum(1)
+
+
+def turned(h, c):
+    """What a rigid bond that turned is given back (m/s). The spins of bonds without friction do not tell that they
+    turn: their length does, from the second step on, and as far as rounding does not hide it."""
+    longer = np.where(h.row_step > 0, lengthening(h, c), 0.0)
+    longer[h.h * longer <= np.finfo(float).eps * h.mean_diameter[h.bond]] = 0.0
+    return np.where(h.bond_friction[h.bond] > 0, turning(h, c), longer)
 
 
 def lengthening(h, c):

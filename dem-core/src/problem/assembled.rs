@@ -367,6 +367,23 @@ impl Assembled {
         relative(map.sqrt(), rounding.sqrt(), scale)
     }
 
+    /// The natural map as velocities, of the contact where it is largest, over the largest velocity without cohesion and contact
+    /// reactions (–). Where reactions diverge because there is no solution, it stays near one while the residual vanishes.
+    #[must_use]
+    pub fn velocity_error(&self) -> f64 {
+        let size = self.parts.rows.count();
+        let mut free = self.clone();
+        free.r.iter_mut().for_each(|r| *r = 0.0);
+        self.parts.shift.iter().enumerate().for_each(|(c, shift)| free.r[c * size] = *shift);
+        let speed = free.velocities().iter().map(|u| u.abs()).fold(0.0, f64::max);
+        let map = |(c, d): (usize, f64)| {
+            let change = self.correction(c, 1.0 / d, self.reaction(c), self.velocity(c));
+            d * change.dot(&change).sqrt()
+        };
+        let largest = self.scales().into_iter().enumerate().map(map).fold(0.0, f64::max);
+        if largest == 0.0 { 0.0 } else { largest / speed }
+    }
+
     /// Sum of the squares of what is added up to the velocity of a contact: what that is rounded against.
     fn summands(&self, contact: usize) -> f64 {
         let size = self.parts.rows.count();

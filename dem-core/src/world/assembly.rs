@@ -106,7 +106,7 @@ impl<D: Dim> World<D> {
             let (gap, normal, _) = self.geometry(mid, pair);
             let approach = pair.map(|k| motion.free[k as usize].0);
             let closing = -(approach[0] - approach[1]).dot(&normal);
-            let near = NEAR * self.smaller(pair);
+            let near = NEAR * self.grains.radius[pair[0] as usize];
             if gap <= near + 2.0 * h * closing.max(0.0) {
                 touches.push(Kept { wide: self.is_wide(pair, gap), ..Kept::new(pair, None) });
             }

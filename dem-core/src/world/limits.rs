@@ -16,7 +16,7 @@ use super::World;
 use super::assembly::{Midpoint, Places};
 use super::report::Violation;
 use super::touch::Kept;
-use crate::body::Shape;
+use crate::body::{Drive, Shape};
 use crate::bond::failure;
 use crate::contact::Law;
 use crate::dim::{Dim, Vect};
@@ -154,8 +154,8 @@ impl<D: Dim> World<D> {
         (solver.tolerance() / FINE).max(solver.accept() / ACCEPTED).max(1.0)
     }
 
-    /// Whether the reactions only balance each other, as where two walls close on a grain: the walls that carry them. In a solution
-    /// they take as much power from the bodies as the free velocities would put into closing contacts.
+    /// Whether the reactions only balance each other, as where a wall that is moved closes on a grain: the walls that carry them. In a
+    /// solution they take as much power from the bodies as the free velocities would put into closing contacts.
     fn infeasible(&self, problem: &ContactProblem<D>) -> Option<Vec<u32>> {
         let mut powers = Powers { problem, asked: 0.0, left: 0.0, largest: 0.0 };
         problem.visit(&mut powers);
@@ -167,7 +167,13 @@ impl<D: Dim> World<D> {
         problem.visit(&mut carrying);
         carrying.walls.sort_unstable();
         carrying.walls.dedup();
-        Some(carrying.walls)
+        // where nothing is made to move, rest is a motion that satisfies the laws
+        let driven = |wall: &u32| {
+            let node = *wall as usize;
+            matches!(self.walls[node - problem.nodes.grains].drive, Drive::Velocity { .. })
+                && problem.free[node].0.norm() > 0.0
+        };
+        carrying.walls.iter().any(driven).then_some(carrying.walls)
     }
 
     /// The place of a body (m), grains first.

@@ -125,7 +125,7 @@ pub struct Violation {
     /// Whether it is the sum over the run so far; else it is the way of one step.
     pub accumulated: bool,
     /// Where the reactions balance each other without stopping the bodies, so that no velocities satisfy the contact laws:
-    /// the walls that carry them (walls follow the grains), often none.
+    /// the walls that carry them (walls follow the grains), one of which is moved.
     pub infeasible: Option<Vec<u32>>,
 }
 
@@ -171,9 +171,8 @@ impl Violation {
             Some(walls) => {
                 let names: Vec<String> = walls.iter().map(|wall| name(*wall)).collect();
                 let bodies = match names.as_slice() {
-                    [] => "the fixed and driven bodies".to_string(),
-                    [only] => only.clone(),
-                    [first @ .., last] => format!("{} and {last}", first.join(", ")),
+                    [first @ .., last] if !first.is_empty() => format!("{} and {last}", first.join(", ")),
+                    names => names.concat(),
                 };
                 format!(
                     "no motion satisfies {bodies} at t = {time:.6e} s: {what}, and the reactions only balance each other; nothing \

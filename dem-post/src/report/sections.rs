@@ -14,21 +14,35 @@ use crate::plot::{Chart, Style, colour};
 use crate::stress_strain::{Report as StressStrain, force_displacement, onset, stress_strain};
 use crate::velocities::{self, Report as Velocities};
 
-/// All that the history has something for.
+/// Heads of the sections that a scene may have nothing for.
+const LOAD: &str = "Load and displacement";
+const CRACKS: &str = "Cracks";
+const CHAINS: &str = "Forces and chains";
+
+/// All sections; one that the history has nothing for says why.
 ///
 /// # Errors
 /// Those of reading the history and of drawing.
 pub fn all(history: &History, report: &Report) -> Result<Vec<Section>> {
+    let missing = |id: &'static str, title: &'static str| {
+        let why = report.left_out.iter().find(|out| out.section == id);
+        Section {
+            id,
+            title,
+            text: why.map_or_else(String::new, |out| format!("None: {}.", out.why)),
+            ..Section::default()
+        }
+    };
     let mut sections = vec![run(report), accuracy(history, report)?];
-    if let Some(found) = &report.stress_strain {
-        sections.push(load(found));
-    }
-    if let Some(found) = &report.cracks {
-        sections.push(cracks(history, report, found)?);
-    }
-    if let Some(found) = &report.chains {
-        sections.push(chains(history, found)?);
-    }
+    sections.push(report.stress_strain.as_ref().map_or_else(|| missing("load", LOAD), load));
+    sections.push(match &report.cracks {
+        Some(found) => cracks(history, report, found)?,
+        None => missing("cracks", CRACKS),
+    });
+    sections.push(match &report.chains {
+        Some(found) => chains(history, found)?,
+        None => missing("chains", CHAINS),
+    });
     sections.push(motion(history, &report.velocities)?);
     sections.push(energy(history)?);
     Ok(sections)
@@ -102,24 +116,28 @@ fn load(found: &StressStrain) -> Section {
         chart(onset, alt, "The onset of collapse: force over the logarithm of the strain.")
     }));
     let s = &found.summary;
-    let facts = [
+    let mut facts = vec![
         ("Driven wall", s.wall.clone()),
+        ("Sample", s.sample()),
         ("First break", quantity(s.first_break, "N")),
         ("Collapse load (strain 1e-4)", s.collapse(0)),
         ("Collapse load (strain 1e-3)", s.collapse(1)),
         ("Load with 5 % of the bonds broken", quantity(s.load_at_5_percent_broken, "N")),
         ("Collapse load over cohesion", quantity(s.collapse_over_cohesion, "")),
+        ("Peak load", s.peak()),
         ("Greatest load", quantity(Some(s.greatest_load), "N")),
         ("Work of the wall", quantity(Some(s.work), "J")),
     ];
+    facts.extend(s.splitting.as_ref().map(|splitting| ("Splitting strength", splitting.to_string())));
     Section {
         id: "load",
-        title: "Load and displacement",
+        title: LOAD,
         text:
-            "Of rigid grains a strain before the first bond breaks is solver error: believe a collapse load only where \
-               it lies above the load of the first break."
+            "Of rigid grains that bonds join to one piece a strain before the first bond breaks is solver error: believe a \
+               collapse load only where it lies above the load of the first break. A wall that moves at a prescribed \
+               velocity loads the sample with the force that acted before any bond broke in the step."
                 .into(),
-        facts: facts.map(|(name, value)| (name.into(), value)).into(),
+        facts: facts.into_iter().map(|(name, value)| (name.into(), value)).collect(),
         figures,
         ..Section::default()
     }
@@ -190,7 +208,7 @@ fn cracks(history: &History, report: &Report, found: &Cracks) -> Result<Section>
         "A crack is a set of broken bonds whose facets, the faces that the cells of two grains share, meet in the voids between the \
          grains. Places are those of the first frame."
     };
-    Ok(Section { id: "cracks", title: "Cracks", text: text.into(), facts, figures, tables })
+    Ok(Section { id: "cracks", title: CRACKS, text: text.into(), facts, figures, tables })
 }
 
 fn chains(history: &History, found: &Chains) -> Result<Section> {
@@ -212,7 +230,7 @@ fn chains(history: &History, found: &Chains) -> Result<Section> {
     let text = "A chain is a line of at least three grains whose greatest principal stress exceeds the mean, each \
                 within 45° of the direction of that stress (Peters et al., Phys. Rev. E 72, 041307, 2005).";
     let tables = vec![Table::new("Force chains", &CHAIN_HEAD, found.chain_rows())];
-    Ok(Section { id: "chains", title: "Forces and chains", text: text.into(), figures, tables, ..Section::default() })
+    Ok(Section { id: "chains", title: CHAINS, text: text.into(), figures, tables, ..Section::default() })
 }
 
 fn motion(history: &History, found: &Velocities) -> Result<Section> {

@@ -1,11 +1,13 @@
 //! Strength against a field of the scene, over many runs: the paper's figure 9, strength against cohesion, and the like for
 //! rates, sizes, friction.
 //!
-//! **Strength** of a run is the load at a step that [`Measure`] names, each as the run's own summary and `stress-strain`
-//! define it. The load is the applied force of the driven wall or, without one, the only force on a grain. The measure is 5 %
-//! of the bonds broken unless told otherwise: it is an event of the bonds, so it means the same for rigid and elastic bonds,
-//! under a prescribed force and a prescribed motion. A strain of 1e-4 may be the solver's own where its tolerance is coarse,
-//! and elastic bonds come to it whole; the first break is one weak bond; a peak needs a load that can fall.
+//! **Strength** of a run is the load at a step that [`Measure`] names, each as the run's own
+//! summary and `stress-strain` define it. The load is that of the load wall or, without a driven
+//! wall, the only force on a grain. The measure is 5 % of the bonds broken unless told otherwise:
+//! it is an event of the bonds, so it means the same for rigid and elastic bonds, under a
+//! prescribed force and a prescribed motion. A strain of 1e-4 may be the solver's own where its
+//! tolerance is coarse, and elastic bonds come to it whole; the first break is one weak bond; a
+//! peak needs a load that can fall.
 //!
 //! **Samples.** Runs are grouped by the value of the varied field and by sample ([`scenes`] says how both are found). Runs of
 //! one sample are not independent of each other: they are the same grains again. So beside the line through all points, whose
@@ -41,7 +43,7 @@ pub struct Options {
     pub against: Option<String>,
     /// What counts as the strength.
     pub measure: Measure,
-    /// The driven wall, where there are several.
+    /// The load wall; that of the scenes where it is absent.
     pub wall: Option<String>,
 }
 
@@ -60,7 +62,8 @@ pub struct Run {
     pub time: f64,
     /// Strength over the field's value; `None` where that is zero.
     pub ratio: Option<f64>,
-    /// Whether no rigid bond had broken by then, so that the strain of the collapse is the solver's.
+    /// Whether no rigid bond had broken by the collapse: of grains in one piece the strain is the
+    /// solver's.
     pub early: bool,
 }
 
@@ -302,7 +305,8 @@ impl Report {
         let early = self.runs.iter().filter(|run| run.early).count();
         if early > 0 {
             notes.push(format!(
-                "in {early} runs no bond had broken by the collapse: the strain is the solver's own, not the sample's"
+                "in {early} runs no bond had broken by the collapse: where bonds join all grains to one piece, the strain is the \
+                 solver's own"
             ));
         }
         notes
@@ -333,6 +337,7 @@ impl Report {
                 ("  slope", estimate(&line.slope, &slope_unit)),
                 ("  intercept", estimate(&Estimate { value: self.plain(line.intercept.value), ..line.intercept }, "N")),
             ]);
+            lines.extend(self.explained(line).map(|told| ("  R²", told)));
         }
         let over = &self.over_samples;
         let intercept = over.intercept.map(|found| Spread { mean: self.plain(found.mean), ..found });
@@ -393,15 +398,33 @@ impl Report {
         if intercept.abs() < ROUNDING * greatest { 0.0 } else { intercept }
     }
 
-    /// The line in numbers of the units on the axes, with R².
+    /// How much of the variance the line explains: over all runs, where R² is below 1 by the
+    /// scatter of samples, and the least of the samples' own lines, which have none of it.
+    fn explained(&self, line: &Line) -> Option<String> {
+        let all = line.r_squared.map(share)?;
+        let lines = self.samples.iter().filter_map(|sample| sample.line);
+        // two points lie on any line
+        let own = lines.filter(|line| line.points > 2).filter_map(|line| line.r_squared).reduce(f64::min);
+        Some(match (self.samples.len(), own) {
+            (1, _) => all,
+            (_, None) => format!("{all} over all runs, with the scatter of samples"),
+            (_, Some(own)) => {
+                format!(
+                    "{all} over all runs, with the scatter of samples; {} at least in each sample's own line",
+                    share(own)
+                )
+            }
+        })
+    }
+
+    /// The line in numbers of the units on the axes.
     pub fn equation(&self, line: &Line) -> String {
         let intercept = match self.plain(line.intercept.value) {
             0.0 => String::new(),
             value if value < 0.0 => format!(" − {}", number(-value)),
             value => format!(" + {}", number(value)),
         };
-        let r_squared = line.r_squared.map_or_else(String::new, |r| format!(", R² = {}", share(r)));
-        format!("y = {} x{intercept}{r_squared}", number(line.slope.value))
+        format!("y = {} x{intercept}", number(line.slope.value))
     }
 }
 

@@ -11,7 +11,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::LeftOut;
-use crate::collapse::{is_elastic, last_step_below, peak, whole_at};
+use crate::collapse::{Bonding, Collapse, peak};
 use crate::output::{PostError, Result, quantity};
 use crate::stress_strain;
 
@@ -62,7 +62,7 @@ pub struct Strength {
     pub load: f64,
     /// When, s.
     pub time: f64,
-    /// Whether rigid bonds were still whole, so that the strain which counts as collapse is the solver's.
+    /// Whether rigid bonds were still whole when the strain counted as collapse.
     pub early: bool,
 }
 
@@ -114,7 +114,7 @@ pub fn name(path: &Path) -> String {
     path.display().to_string()
 }
 
-/// Reads where a run gave way; `wall` is the driven wall, where there are several.
+/// Reads where a run gave way; `wall` is the load wall, that of the scene where it is absent.
 ///
 /// # Errors
 /// [`PostError::Lacking`] for a run without a load, or without what the measure needs; those of reading it.
@@ -127,12 +127,13 @@ pub fn read(path: &Path, measure: Measure, wall: Option<&str>) -> Result<Found> 
         let what = "it has no bonds that could break: choose --measure collapse or peak".into();
         return Err(PostError::Lacking { path: path.into(), what });
     }
-    let step = course.gives_way(path, measure, bonds.len())?;
-    let rigid = !bonds.is_empty() && !is_elastic(&scene);
-    let early = |step| measure == Measure::Collapse && rigid && whole_at(&course.broken, step);
-    let strength = match step {
-        Some(step) => Ok(Strength { load: course.load[step], time: course.time[step], early: early(step) }),
-        None => Err(course.how_far(measure, bonds.len())),
+    let strength = if measure == Measure::Collapse {
+        course.collapse(path, Bonding::of(&history)?)?
+    } else {
+        match course.gives_way(path, measure, bonds.len())? {
+            Some(step) => Ok(Strength { load: course.load[step], time: course.time[step], early: false }),
+            None => Err(course.how_far(measure, bonds.len())),
+        }
     };
     Ok(Found { path: path.into(), scene, strength, grains: (history.grains()?.radius, bonds.pair) })
 }
@@ -193,26 +194,25 @@ impl Course {
         Ok(Self { time: steps.time, load, strain, broken: steps.value })
     }
 
-    /// The step at which the sample gives way; `None` if it does not.
+    /// Where the sample collapses, or why it does not.
+    fn collapse(&self, path: &Path, bonds: Bonding) -> Result<std::result::Result<Strength, String>> {
+        recorded(path, &self.strain, "strain")?;
+        let found = Collapse::read(&self.load, &self.strain, &self.broken, STRAINS[0], bonds);
+        Ok(match found.step {
+            Some(step) => Ok(Strength { load: self.load[step], time: self.time[step], early: found.early }),
+            None if found.note.is_empty() => Err(self.how_far(Measure::Collapse, 0)),
+            None => Err(format!("it has no collapse load: {}", found.note)),
+        })
+    }
+
+    /// The step at which the sample gives way by another measure; `None` if it does not.
     fn gives_way(&self, path: &Path, measure: Measure, bonds: usize) -> Result<Option<usize>> {
-        let recorded = |values: &[f64], name: &str| match values {
-            [] => {
-                Err(PostError::Lacking { path: path.into(), what: format!("it has no steps of /observables/{name}") })
-            }
-            _ => Ok(()),
-        };
-        let step = match measure {
-            Measure::FirstBreak | Measure::Broken => {
-                recorded(&self.broken, "bonds_broken")?;
-                let share = if measure == Measure::Broken { BROKEN_SHARE * bonds as f64 } else { 0.0 };
-                self.broken.iter().position(|&n| n > 0.0 && n >= share)
-            }
-            Measure::Collapse => {
-                recorded(&self.strain, "strain")?;
-                last_step_below(&self.strain, STRAINS[0])
-            }
-            Measure::Peak => peak(&self.load),
-        };
+        if measure == Measure::Peak {
+            return Ok(peak(&self.load));
+        }
+        recorded(path, &self.broken, "bonds_broken")?;
+        let share = if measure == Measure::Broken { BROKEN_SHARE * bonds as f64 } else { 0.0 };
+        let step = self.broken.iter().position(|&n| n > 0.0 && n >= share);
         Ok(step.filter(|&step| step < self.load.len()))
     }
 
@@ -232,18 +232,29 @@ impl Course {
     }
 }
 
+/// What was not observed cannot be measured.
+fn recorded(path: &Path, values: &[f64], name: &str) -> Result<()> {
+    if !values.is_empty() {
+        return Ok(());
+    }
+    Err(PostError::Lacking { path: path.into(), what: format!("it has no steps of /observables/{name}") })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn step(measure: Measure, bonds: usize) -> Option<usize> {
-        let course = Course {
+    fn course() -> Course {
+        Course {
             time: (0..6).map(f64::from).collect(),
             load: vec![0.0, 10.0, 20.0, 30.0, 40.0, 12.0],
             strain: vec![0.0, 0.0, 0.0, -5e-5, -2e-4, -2e-3],
             broken: vec![0.0, 0.0, 1.0, 1.0, 5.0, 9.0],
-        };
-        course.gives_way(Path::new("run.h5"), measure, bonds).unwrap()
+        }
+    }
+
+    fn step(measure: Measure, bonds: usize) -> Option<usize> {
+        course().gives_way(Path::new("run.h5"), measure, bonds).unwrap()
     }
 
     #[test]
@@ -253,8 +264,9 @@ mod tests {
             (step(Measure::Broken, 100), step(Measure::Broken, 20), step(Measure::Broken, 200)),
             (Some(4), Some(2), None)
         );
-        assert_eq!(step(Measure::Collapse, 100), Some(3));
+        let collapse = |bonds| course().collapse(Path::new("run.h5"), bonds).unwrap();
+        assert_eq!(collapse(Bonding::None), Ok(Strength { load: 30.0, time: 3.0, early: false }));
         assert_eq!(step(Measure::Peak, 100), Some(4));
-        assert!(Course::default().gives_way(Path::new("a.h5"), Measure::Collapse, 1).is_err());
+        assert!(Course::default().collapse(Path::new("a.h5"), Bonding::None).is_err());
     }
 }

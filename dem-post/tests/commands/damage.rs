@@ -88,7 +88,7 @@ fn reads(good: &Path) -> Vec<Command<'_>> {
         command("cracks", |h, _| cracks::read(h, true).map(|report| drop(report.table()))),
         command("chains", |h, _| chains::read(h, &[]).map(|report| drop(report.table()))),
         command("velocities", |h, _| velocities::read(h, &[]).map(|report| drop(report.table()))),
-        command("report", |h, _| report::read(h, &[], true).map(|report| drop(report.table()))),
+        command("report", |h, _| report::read(h, &[], None, true).map(|report| drop(report.table()))),
         command("stress-strain", |h, _| stress_strain::read(h, None).map(|report| drop(report.table()))),
         command("frames", |h, _| frames::read(h, frames::Subject::Forces, 1, &[]).map(drop)),
         command("compare", |h, _| compare::read(h, &History::open(good)?, 0.0).map(|report| drop(report.table()))),
@@ -108,7 +108,7 @@ fn writes(good: &Path) -> Vec<Command<'_>> {
         command("cracks", |h, folder| cracks::write(h, &cracks::read(h, true)?, &[], folder)),
         command("chains", |h, folder| chains::write(h, &chains::read(h, &[])?, folder)),
         command("velocities", |h, folder| velocities::write(h, &velocities::read(h, &[])?, folder)),
-        command("report", |h, folder| report::write(h, &report::read(h, &[], true)?, folder)),
+        command("report", |h, folder| report::write(h, &report::read(h, &[], None, true)?, folder)),
         command("stress-strain", |h, folder| stress_strain::write(&stress_strain::read(h, None)?, folder)),
         command("frames", |h, folder| {
             frames::write(h, &frames::read(h, frames::Subject::Bonds, 10, &[])?, folder, true)

@@ -53,9 +53,16 @@ pub struct AccuracyOptions {
 /// Measure the accuracy of a scene, print the tables, and write them with their pictures.
 ///
 /// # Errors
-/// [`RunError`]; what was measured before an interruption is written all the same. A run that does not converge is a row of
-/// the table, no error.
+/// [`RunError`], as for a scene that drives several walls and does not say which loads the sample;
+/// what was measured before an interruption is written all the same. A run that does not converge
+/// is a row of the table, no error.
 pub fn accuracy(scene: &Scene, options: &AccuracyOptions) -> Result<(), RunError> {
+    if let Some(names) = scene.load_unknown() {
+        return Err(RunError::Usage(format!(
+            "several walls are driven, {names}: name the one that loads the sample as load_wall in the scene, or by \
+             --set load_wall=NAME"
+        )));
+    }
     let interrupt = handle_signals()?;
     let mut folder = Folder::create(options.folder.clone())?;
     let report = match scene.dimension {

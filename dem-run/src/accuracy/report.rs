@@ -4,7 +4,8 @@ use super::AccuracyOptions;
 use super::profile::Profile;
 use super::spread::{Spread, Varied, jaccard};
 use super::trial::{Outcome, Sample, SolverName, Way};
-use crate::scene::{Drive, Scene};
+use crate::collapse::in_one_piece;
+use crate::scene::Scene;
 use dem_core::dim::Dim;
 use serde::Serialize;
 
@@ -152,8 +153,12 @@ pub struct Report {
     pub elastic: bool,
     /// Solid fraction of a random sample (–).
     pub solid_fraction: Option<f64>,
+    /// Whether bonds join all grains to one piece.
+    pub one_piece: bool,
     /// Whether a wall is driven: then there are loads.
     pub driven: bool,
+    /// The wall whose loads are told, where one is driven.
+    pub load_wall: Option<String>,
     /// Time step of the scene (s).
     pub step: f64,
     /// What was asked for.
@@ -182,7 +187,9 @@ impl Report {
             bonds: sample.bonds.len(),
             elastic: sample.elastic(),
             solid_fraction: sample.solid_fraction,
-            driven: scene.walls.values().any(|wall| wall.drive() != Drive::Fixed),
+            one_piece: in_one_piece(sample.grains.len(), sample.bonds.iter().map(|bond| bond.pair)),
+            driven: !scene.driven_walls().is_empty(),
+            load_wall: scene.load_wall().map(String::from),
             step: scene.time.step,
             asked: asked.clone(),
             interrupted: false,

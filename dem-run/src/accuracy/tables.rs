@@ -34,7 +34,8 @@ fn tolerance(value: f64) -> String {
 fn head(report: &Report) -> String {
     let mut text = report.title.as_ref().map_or(String::new(), |title| format!("{title}\n"));
     let bonds = if report.bonds > 0 { format!(", {}", counted(report.bonds, "bond")) } else { String::new() };
-    text += &format!("{}{bonds}, time step {} s\n", counted(report.grains, "grain"), tolerance(report.step));
+    let wall = report.load_wall.as_ref().map_or(String::new(), |name| format!(", loads of wall {name}"));
+    text += &format!("{}{bonds}, time step {} s{wall}\n", counted(report.grains, "grain"), tolerance(report.step));
     match report.reference.map(|k| &report.runs[k]) {
         Some(Row { way, step, outcome, .. }) => {
             text += &format!(
@@ -160,9 +161,10 @@ fn notes(report: &Report) -> String {
         text += "load error means something only where the sample should be at rest\n";
     }
     if report.runs.iter().any(|row| row.outcome.failure.early.contains(&true)) {
-        text += match report.elastic {
-            true => "* before any bond broke: what the bonds yielded, and the solver\n",
-            false => "* before any bond broke: the solver's own strain, not the sample's\n",
+        text += match (report.elastic, report.one_piece) {
+            (true, _) => "* before any bond broke: what the bonds yielded, and the solver\n",
+            (false, true) => "* before any bond broke: the solver's own strain, not the sample's\n",
+            (false, false) => "* before any bond broke: not all grains are bonded to one piece\n",
         };
     }
     for row in &report.runs {

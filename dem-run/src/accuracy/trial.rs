@@ -1,7 +1,7 @@
 //! One run of the command: a scene stepped without a history, and what is read off it.
 
 use crate::build::{Built, settings};
-use crate::collapse::Failure;
+use crate::collapse::{Collapse, Failure};
 use crate::course::Course;
 use crate::record::applied_force;
 use crate::scene::{GaussSeidel, Newton, Scene, SolverKind};
@@ -256,7 +256,7 @@ impl Serialize for End {
 /// The first bond that broke.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FirstBreak {
-    /// Applied force (N), where a wall is driven.
+    /// Load (N), where the scene has a load wall.
     pub load: Option<f64>,
     /// Time at the end of the step (s).
     pub time: f64,
@@ -307,7 +307,7 @@ pub struct Outcome {
     pub bond_remainder: f64,
     /// The first break.
     pub first_break: Option<FirstBreak>,
-    /// Loads at failure (N).
+    /// Loads of the load wall at failure (N).
     pub failure: Failure,
     /// Numbers of the broken bonds, sorted.
     pub broken: Vec<u32>,
@@ -359,8 +359,8 @@ impl<D: Dim> Trial<'_, D> {
             if let Some(ending) = state.course.ending(&world) {
                 break End::Scene(ending);
             }
-            let failure = &state.course.collapse.failure;
-            if !self.whole && failure.collapse[1].is_some() && failure.broken_share.is_some() {
+            let failed = |loads: &Collapse| loads.passed[1] && loads.failure.broken_share.is_some();
+            if !self.whole && state.course.loads().is_some_and(failed) {
                 break End::Collapsed;
             }
         };
@@ -444,7 +444,7 @@ impl<D: Dim> Followed<D> {
             energy_remainder: world.ledger.remainder,
             bond_remainder: world.ledger.bonds,
             first_break: self.first,
-            failure: self.course.collapse.failure,
+            failure: self.course.loads().map_or_else(Failure::default, |loads| loads.failure),
             broken,
         }
     }

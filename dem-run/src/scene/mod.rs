@@ -38,7 +38,7 @@ pub use error::{Origin, Problem, SceneError};
 pub use function::{Function, Ramp};
 pub use model::{
     Bonds, Flow, Friction, Grains, Load, Materials, Output, Precision, Restitution, Rupture, Scene, Springs, Stiffness,
-    Stop, Time, TravelFrom, WallTravel, Young,
+    Stop, Time, TravelFrom, WallTravel, Young, choose_load_wall,
 };
 pub use sample::{
     Compaction, Cut, Deposition, Diameters, GrainSpec, Lattice, Preparation, RandomSample, Sample, SampleFile, Section,

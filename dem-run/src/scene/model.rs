@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::function::Function;
 use super::sample::Sample;
 use super::solver::Solver;
-use super::wall::Wall;
+use super::wall::{Drive, Wall};
 
 /// A scene: what is simulated, in SI units.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -41,6 +41,11 @@ pub struct Scene {
     /// Walls, by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub walls: BTreeMap<String, Wall>,
+    /// Name of the driven wall whose force is the load of the sample: of the first break, of the
+    /// collapse, and the greatest. Where it is absent, the wall of `stop.wall_travel`, else the
+    /// only driven one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub load_wall: Option<String>,
     /// Gravity: one number for each dimension (m/s²); none where it is absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gravity: Option<Vec<f64>>,
@@ -298,7 +303,39 @@ fn one() -> Function {
     Function::Constant(1.0)
 }
 
+/// The wall that loads the sample: the first of `named` that is among the `driven` ones, else the
+/// only driven one. `named` are the scene's `load_wall` and the wall of its `stop.wall_travel`.
+#[must_use]
+pub fn choose_load_wall<'a>(named: [Option<&str>; 2], driven: &[&'a str]) -> Option<&'a str> {
+    let find = |name: &str| driven.iter().copied().find(|other| *other == name);
+    let only = if let [only] = driven { Some(*only) } else { None };
+    named.into_iter().flatten().find_map(find).or(only)
+}
+
 impl Scene {
+    /// Names of the driven walls, in order.
+    #[must_use]
+    pub fn driven_walls(&self) -> Vec<&str> {
+        let driven = self.walls.iter().filter(|(_, wall)| wall.drive() != Drive::Fixed);
+        driven.map(|(name, _)| name.as_str()).collect()
+    }
+
+    /// The wall that loads the sample ([`choose_load_wall`]); none where no wall is driven, or
+    /// where several are and the scene does not say which.
+    #[must_use]
+    pub fn load_wall(&self) -> Option<&str> {
+        let travels = self.stop.as_ref().and_then(|stop| stop.wall_travel.as_ref()).map(|travel| travel.wall.as_str());
+        choose_load_wall([self.load_wall.as_deref(), travels], &self.driven_walls())
+    }
+
+    /// Names of the driven walls where there are several and the scene does not say which loads the
+    /// sample: then no result can say what the load is.
+    #[must_use]
+    pub fn load_unknown(&self) -> Option<String> {
+        let driven = self.driven_walls();
+        (driven.len() > 1 && self.load_wall().is_none()).then(|| driven.join(", "))
+    }
+
     /// Thickness of the disks (m): 1 where the scene is silent, and in 3D, where it has no meaning.
     #[must_use]
     pub fn thickness(&self) -> f64 {
@@ -387,6 +424,17 @@ impl Bonds {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_load_wall_is_named_or_that_of_the_travel_or_the_only_driven_one() {
+        let driven = ["left", "top"];
+        assert_eq!(choose_load_wall([Some("top"), Some("left")], &driven), Some("top"));
+        assert_eq!(choose_load_wall([None, Some("left")], &driven), Some("left"));
+        assert_eq!(choose_load_wall([None, None], &driven), None);
+        // a wall that is not driven loads nothing
+        assert_eq!(choose_load_wall([Some("floor"), None], &["top"]), Some("top"));
+        assert_eq!(choose_load_wall([None, None], &[]), None);
+    }
 
     #[test]
     fn steps_are_whole_where_the_ratio_is_whole_to_rounding() {

@@ -223,7 +223,7 @@ fn runs(sweep: &Sweep, base: &Base, scene: &Path) -> Result<Vec<PlannedRun>, Vec
         }
     }
     if problems.is_empty() {
-        problems.extend(same_scene(&runs));
+        problems.extend(same_scene(&runs).or_else(|| load_unknown(&runs)));
     }
     if problems.is_empty() { Ok(runs) } else { Err(problems) }
 }
@@ -261,6 +261,15 @@ fn same_scene(runs: &[PlannedRun]) -> Option<Problem> {
         let found = if a == b { format!("{a} twice") } else { format!("the same scene for {a} and for {b}") };
         Some(Problem::new("vary", found, "values that make every run another (a title does not)"))
     })
+}
+
+/// A run whose table of results could not say what the load is.
+fn load_unknown(runs: &[PlannedRun]) -> Option<Problem> {
+    let (run, names) = runs.iter().find_map(|run| Some((run, run.scene.load_unknown()?)))?;
+    let found =
+        format!("several driven walls, {names}, and none named as the load wall, where {}", describe(&run.values));
+    let allowed = "one of them as load_wall, in the scene or in the sweep: \"set\": { \"load_wall\": … }";
+    Some(Problem::new("scene", found, allowed))
 }
 
 /// The values of a run in a line: `bonds.strength = 5, seed = 1`.

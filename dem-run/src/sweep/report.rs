@@ -12,7 +12,7 @@ use crate::output::number;
 use crate::run::RunError;
 
 /// Columns of the table that come from the summary of a run: name, and place in the summary.
-const MEASURED: [(&str, &str); 12] = [
+const MEASURED: [(&str, &str); 15] = [
     ("ending", "/ending"),
     ("steps", "/steps"),
     ("time", "/time"),
@@ -23,6 +23,9 @@ const MEASURED: [(&str, &str); 12] = [
     ("collapse_1e-4", "/failure/collapse/0"),
     ("collapse_1e-3", "/failure/collapse/1"),
     ("broken_5_percent", "/failure/broken_share"),
+    ("load_wall", "/load_wall"),
+    ("peak_load", "/peak_load"),
+    ("peak_displacement", "/peak_displacement"),
     ("worst_residual", "/worst_residual"),
     ("missed_tolerance", "/missed_tolerance"),
 ];

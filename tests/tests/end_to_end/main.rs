@@ -8,6 +8,7 @@ mod compression;
 mod elastic;
 mod fclib;
 mod interrupt;
+mod loads;
 mod pack;
 mod resume;
 mod specimens;

@@ -109,3 +109,7 @@ fn block(
         }
     }
 }
+
+#[cfg(test)]
+#[path = "corrector_tests.rs"]
+mod tests;

@@ -76,6 +76,8 @@ const FLAT_CASES: &[(&str, &str)] = &[
     ("solver.max_step_halvings=31", "solver.max_step_halvings"),
     ("solver.kind.gauss_seidel.max_sweeps=0", "solver.kind.gauss_seidel.max_sweeps"),
     // stop
+    ("load_wall=tpo", "load_wall"),
+    ("load_wall=bottom", "load_wall"),
     ("stop.wall_travel.wall=tpo", "stop.wall_travel.wall"),
     ("stop.wall_travel.wall=bottom", "stop.wall_travel.wall"),
     ("stop.wall_travel.fraction_of_height=0", "stop.wall_travel.fraction_of_height"),

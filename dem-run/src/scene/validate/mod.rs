@@ -43,6 +43,9 @@ pub fn validate(scene: &Scene) -> Vec<Problem> {
     for (name, wall) in &scene.walls {
         wall::wall(&mut report, name, wall);
     }
+    if let Some(name) = &scene.load_wall {
+        driven_wall(&mut report, scene, "load_wall", name);
+    }
     if let Some(gravity) = &scene.gravity {
         report.vector("gravity", gravity);
     }
@@ -206,29 +209,30 @@ fn solver(report: &mut Report, scene: &Scene) {
     }
 }
 
+/// Checks that `name`, which stands at `path`, is that of a driven wall.
+fn driven_wall(report: &mut Report, scene: &Scene, path: &str, name: &str) {
+    match scene.walls.get(name) {
+        None => {
+            let names: Vec<&str> = scene.walls.keys().map(String::as_str).collect();
+            let allowed = match names.is_empty() {
+                true => "a wall of the scene: it has none".to_string(),
+                false => format!("the name of a wall: {}", names.join(", ")),
+            };
+            let problem = Problem::new(path, format!("\"{name}\""), allowed);
+            report.problems.push(problem.with_nearest(nearest(name, names)));
+        }
+        Some(wall) if wall.drive() == Drive::Fixed => {
+            report.wrong(path, format!("\"{name}\", which is fixed"), "a wall that is driven");
+        }
+        Some(_) => {}
+    }
+}
+
 fn stop(report: &mut Report, scene: &Scene) {
     let Some(stop) = &scene.stop else { return };
     let bonds_needed = "bonds in the scene: it has none";
     if let Some(travel) = &stop.wall_travel {
-        match scene.walls.get(&travel.wall) {
-            None => {
-                let names: Vec<&str> = scene.walls.keys().map(String::as_str).collect();
-                let allowed = match names.is_empty() {
-                    true => "a wall of the scene: it has none".to_string(),
-                    false => format!("the name of a wall: {}", names.join(", ")),
-                };
-                let problem = Problem::new("stop.wall_travel.wall", format!("\"{}\"", travel.wall), allowed);
-                report.problems.push(problem.with_nearest(nearest(&travel.wall, names)));
-            }
-            Some(wall) if wall.drive() == Drive::Fixed => {
-                report.wrong(
-                    "stop.wall_travel.wall",
-                    format!("\"{}\", which is fixed", travel.wall),
-                    "a wall that is driven",
-                );
-            }
-            Some(_) => {}
-        }
+        driven_wall(report, scene, "stop.wall_travel.wall", &travel.wall);
         report.positive("stop.wall_travel.fraction_of_height", travel.fraction_of_height, "no unit");
         if travel.after == TravelFrom::FirstBreak && scene.bonds.is_none() {
             report.wrong("stop.wall_travel.after", "first_break", bonds_needed);

@@ -1,0 +1,150 @@
+//! What is measured on a world, against closed forms: stress, strain, volume.
+
+mod common;
+
+use common::{down, floor, force_driven, grain, run, settings, world};
+use dem_core::body::{Grains, Shape, Wall};
+use dem_core::dim::{D2, D3, Dim, Vect};
+use dem_core::world::World;
+
+const G: f64 = 9.81;
+
+/// The tensor Σ ℓ ⊗ f of the contacts (N m) where the stress times the volume should be that.
+fn assert_stress<D: Dim>(w: &World<D>, expected: impl Fn(usize, usize) -> f64, tolerance: f64) {
+    let stress = w.stress();
+    assert_eq!(stress.len(), D::N * D::N);
+    let size = (0..D::N * D::N).map(|k| expected(k / D::N, k % D::N).abs()).fold(0.0, f64::max);
+    for row in 0..D::N {
+        for col in 0..D::N {
+            let (found, expected) = (stress[row * D::N + col] * w.reference_volume(), expected(row, col));
+            assert!((found - expected).abs() <= tolerance * size, "{row} {col}: {found} against {expected}");
+        }
+    }
+}
+
+/// A grain that slides over a floor: the branch stands on the floor, the force leans back.
+fn sliding<D: Dim>() {
+    let (r, mu) = (0.01, 0.25);
+    let mut place = vec![0.0; D::N];
+    place[D::N - 1] = r;
+    let mut set = settings(1e-5);
+    set.gravity = down::<D>(G);
+    set.thickness = if D::N == 2 { 0.4 } else { 1.0 };
+    let mut start = grain::<D>(&place, r);
+    start.velocity[0] = 1.0;
+    let mut w = world(vec![start], vec![floor(mu)], set);
+    run(&mut w, 3);
+    let volume = if D::N == 2 { 4.0 * r * r * 0.4 } else { 8.0 * r * r * r };
+    assert!((w.reference_volume() / volume - 1.0).abs() < 1e-14);
+    let weight = w.grains.mass[0] * G;
+    let (last, force) = (D::N - 1, [-mu * weight, weight]);
+    // ℓ = R e_last, f = −μ m g e_0 + m g e_last: the row is that of the branch, the column that of the force
+    let expected = |row: usize, col: usize| match (row == last, col) {
+        (true, 0) => r * force[0],
+        (true, col) if col == last => r * force[1],
+        _ => 0.0,
+    };
+    assert_stress(&w, expected, 1e-9);
+}
+
+#[test]
+fn the_stress_of_a_sliding_grain_has_the_branch_in_its_rows() {
+    sliding::<D2>();
+    sliding::<D3>();
+}
+
+/// A column of grains of several sizes between a floor and a lid: Σ ℓ f is the force times the height.
+fn column<D: Dim>() {
+    let radii = [0.01, 0.006, 0.008, 0.005];
+    let (mut grains, mut top) = (Vec::new(), 0.0);
+    for r in radii {
+        let mut place = vec![0.0; D::N];
+        place[D::N - 1] = top + r;
+        grains.push(grain::<D>(&place, r));
+        top += 2.0 * r;
+    }
+    let mut normal = D::Vector::zero();
+    normal[D::N - 1] = -1.0;
+    let lid = force_driven::<D>(normal, normal * -top, 1.0, 7.0);
+    let mut w = world(grains, vec![floor(0.2), lid], settings(1e-4));
+    run(&mut w, 2);
+    let last = D::N - 1;
+    assert_stress(&w, |row, col| if row == last && col == last { 7.0 * top } else { 0.0 }, 1e-9);
+}
+
+#[test]
+fn the_stress_of_a_column_is_its_load() {
+    column::<D2>();
+    column::<D3>();
+}
+
+/// Grains inside a ring that shrinks onto them from one side: the branch at a wall begins at the contact point.
+#[test]
+fn the_branch_at_a_round_wall_begins_at_the_contact_point() {
+    let (r, ring) = (0.01, 0.05);
+    let mut set = settings(1e-4);
+    set.gravity = down::<D2>(G);
+    let wall = Wall::fixed(Shape::Round { radius: ring, inside: true, axis: None }, [0.0, 0.0].into(), 0.0);
+    let mut w = world(vec![grain::<D2>(&[0.0, r - ring], r)], vec![wall], set);
+    run(&mut w, 2);
+    let weight = w.grains.mass[0] * G;
+    assert_stress(&w, |row, col| if row == 1 && col == 1 { r * weight } else { 0.0 }, 1e-9);
+}
+
+/// Grains moved by an affine map.
+fn strained<D: Dim>() {
+    let side: usize = 3;
+    let grains: Grains<D> = (0..side.pow(D::N as u32))
+        .map(|k| {
+            let x: Vec<f64> = (0..D::N).map(|c| 0.3 + 0.021 * ((k / side.pow(c as u32)) % side) as f64).collect();
+            grain::<D>(&x, 0.01)
+        })
+        .collect();
+    let mut w = World::new(grains, Vec::new(), Vec::new(), settings(1e-3));
+    let gradient = |row: usize, col: usize| 1e-3 * (1.0 + row as f64) - 3e-4 * (col as f64) * (2.0 - row as f64);
+    for x in &mut w.grains.position {
+        let before = *x;
+        for row in 0..D::N {
+            x[row] += 0.05 + (0..D::N).map(|col| gradient(row, col) * before[col]).sum::<f64>();
+        }
+    }
+    for (k, found) in w.strain().into_iter().enumerate() {
+        let expected = gradient(k / D::N, k % D::N);
+        assert!((found - expected).abs() < 1e-13, "{k}: {found} against {expected}");
+    }
+}
+
+#[test]
+fn the_strain_is_the_gradient_of_the_displacements() {
+    strained::<D2>();
+    strained::<D3>();
+    // grains in a row span one direction only
+    let row = (0..4).map(|k| grain::<D2>(&[0.02 * f64::from(k), 0.0], 0.01)).collect();
+    let mut w = world(row, Vec::new(), settings(1e-3));
+    w.grains.position[3][0] += 1e-3;
+    assert_eq!(w.strain(), [0.0; 4]);
+}
+
+#[test]
+fn kinetic_energy_and_momentum_are_sums_over_what_moves() {
+    let mut w = world(
+        vec![grain::<D2>(&[0.0, 0.0], 0.01), grain(&[0.1, 0.2], 0.02), grain(&[0.0, 0.3], 0.01)],
+        vec![force_driven::<D2>([0.0, -1.0].into(), [0.0, 1.0].into(), 3.0, 0.0), floor(0.0)],
+        settings(1e-3),
+    );
+    w.grains.fixed[2] = true;
+    let g = &mut w.grains;
+    (g.velocity[0], g.velocity[1], g.velocity[2]) = ([1.0, 2.0].into(), [-3.0, 0.5].into(), [9.0, 9.0].into());
+    (g.spin[0], g.spin[1], g.spin[2]) = ([10.0].into(), [-20.0].into(), [5.0].into());
+    w.walls[0].velocity = [0.0, 0.7].into();
+    let (m, i) = (w.grains.mass.clone(), w.grains.inertia.clone());
+    assert_eq!(i[1], 0.5 * m[1] * 0.02 * 0.02);
+    let kinetic = 0.5 * (5.0 * m[0] + 9.25 * m[1] + 100.0 * i[0] + 400.0 * i[1] + 3.0 * 0.49);
+    assert!((w.kinetic_energy() / kinetic - 1.0).abs() < 1e-14);
+    let momentum = w.momentum();
+    let linear = [m[0] - 3.0 * m[1], 2.0 * m[0] + 0.5 * m[1]];
+    assert!((0..2).all(|c| (momentum.linear[c] - linear[c]).abs() < 1e-14 * m[1]));
+    // x v_y − y v_x of the second grain, and the spins
+    let angular = m[1] * (0.1 * 0.5 + 0.2 * 3.0) + 10.0 * i[0] - 20.0 * i[1];
+    assert!((momentum.angular[0] / angular - 1.0).abs() < 1e-14);
+}

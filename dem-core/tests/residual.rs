@@ -1,0 +1,85 @@
+//! The residual against its definition, at a pair of grains: what it is relative to, and below which rounding it is zero.
+
+mod common;
+
+use common::{grain, settings, world};
+use dem_core::contact::Law;
+use dem_core::dim::{D2, D3, Dim, Vect};
+use dem_core::problem::ContactProblem;
+use dem_core::problem::residual::residual;
+
+const MU: f64 = 0.3;
+/// Normal impulse (N s), so large that the contact sticks.
+const PUSH: f64 = 1e3;
+
+/// Two grains that touch, the second three times as large, at these velocities (m/s) along their line and spins (rad/s).
+fn pair<D: Dim>(speeds: [f64; 2], spins: [f64; 2]) -> ContactProblem<D> {
+    let mut second = vec![0.0; D::N];
+    second[0] = 0.04;
+    let mut w = world(vec![grain::<D>(&vec![0.0; D::N], 0.01), grain(&second, 0.03)], vec![], settings(1e-3));
+    w.settings.friction = MU;
+    let mut problem = w.contact_problem();
+    assert_eq!((problem.len(), problem.dry.len()), (1, 1));
+    for (node, (speed, spin)) in problem.nodes.all.iter_mut().zip(speeds.into_iter().zip(spins)) {
+        node.velocity[0] = speed;
+        node.spin[D::Spin::LEN - 1] = spin;
+    }
+    problem.dry[0].r.n = PUSH;
+    problem
+}
+
+fn definition<D: Dim>() {
+    // the first moves along the normal, away from the second, at 0.1 m/s: the map is γ u_n, whatever is applied
+    let mut problem = pair::<D>([-0.1, 0.0], [0.0; 2]);
+    let gamma = problem.dry[0].law.gamma();
+    for (applied, scale) in [(0.0, PUSH), (0.5 * PUSH, PUSH), (7.0 * PUSH, 7.0 * PUSH)] {
+        problem.applied = applied;
+        let (found, expected) = (residual(&problem), gamma * 0.1 / scale);
+        assert!((found / expected - 1.0).abs() < 1e-9, "{found:e} against {expected:e}");
+    }
+    // they slip by 0.01 × 20 + 0.03 × 10 m/s: γ (μ |u_t|, u_t)
+    let problem = pair::<D>([0.0; 2], [20.0, 10.0]);
+    let (found, expected) = (residual(&problem), gamma * 0.5 * (1.0 + MU * MU).sqrt() / PUSH);
+    assert!((found / expected - 1.0).abs() < 1e-9, "{found:e} against {expected:e}");
+}
+
+/// A map of half of what counts as rounding is none, one of twice as much is one.
+fn rounding<D: Dim>() {
+    const ROUNDING: f64 = 64.0 * f64::EPSILON;
+    let gamma = pair::<D>([0.0; 2], [0.0; 2]).dry[0].law.gamma();
+    for (share, counts) in [(0.5, false), (2.0, true)] {
+        // both at 3 m/s but for a small difference: √2 × 3 m/s is what the map is rounded against
+        let part = share * ROUNDING * 2f64.sqrt() * 3.0;
+        let found = residual(&pair::<D>([3.0 - part, 3.0], [0.0; 2]));
+        assert_eq!(found > 0.0, counts, "{share}: {found:e}");
+        // spins that roll on each other but for a small slip: √2 × 0.01 × 900 m/s
+        let part = share * ROUNDING * 2f64.sqrt() * 9.0 / (1.0 + MU * MU).sqrt();
+        let found = residual(&pair::<D>([0.0; 2], [900.0, -300.0 + part / 0.03]));
+        assert_eq!(found > 0.0, counts, "{share}: {found:e}");
+        if counts {
+            assert!((found / (gamma * share * ROUNDING * 2f64.sqrt() * 9.0 / PUSH) - 1.0).abs() < 0.1, "{found:e}");
+        }
+    }
+}
+
+#[test]
+fn the_residual_is_the_natural_map_over_the_larger_of_reactions_and_load() {
+    definition::<D2>();
+    definition::<D3>();
+}
+
+#[test]
+fn a_map_that_is_rounding_is_none() {
+    rounding::<D2>();
+    rounding::<D3>();
+}
+
+#[test]
+fn a_problem_without_contacts_is_empty() {
+    let mut alone = world(vec![grain::<D2>(&[0.0, 0.0], 0.01)], vec![], settings(1e-3)).contact_problem();
+    assert!(alone.is_empty() && alone.contact_bytes() == 0);
+    alone.applied = 1.0;
+    assert_eq!(residual(&alone), 0.0);
+    let two = pair::<D2>([0.0; 2], [0.0; 2]);
+    assert!(!two.is_empty() && two.contact_bytes() == size_of_val(&two.dry[0]));
+}
