@@ -65,6 +65,7 @@ mod source;
 mod table;
 #[cfg(test)]
 mod tests;
+mod texts;
 mod writer;
 
 pub use background::{Background, Batch};

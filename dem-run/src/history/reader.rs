@@ -252,7 +252,7 @@ impl History {
         let text =
             |name| Ok::<_, HistoryError>(self.source.attribute::<VarLenUnicode>(path::PARAMETERS, name)?.to_string());
         Ok(Parameters {
-            scene: self.source.scalar::<VarLenUnicode>(path::SCENE)?.to_string(),
+            scene: self.source.texts(path::SCENE)?.concat(),
             seed: self.source.attribute(path::PARAMETERS, "seed")?,
             version: text("version")?,
             git_revision: text("git_revision")?,
@@ -289,7 +289,10 @@ impl History {
             return Ok(vec![]);
         }
         let place = |name: &str| format!("{}/{name}", path::WALLS);
-        let names: Vec<VarLenUnicode> = self.source.whole(&place("name"), 1)?;
+        let names = self.source.texts(&place("name"))?;
+        if names.len() != self.walls {
+            return Err(self.source.damaged(&place("name"), "it is no list of names"));
+        }
         let (w, d) = (self.walls, self.dimension);
         let kinds = self.source.coded(&place("kind"), self.source.whole::<WallKindCode>(&place("kind"), 1)?, w)?;
         let drives = self.source.coded(&place("drive"), self.source.whole::<WallDriveCode>(&place("drive"), 1)?, w)?;
@@ -302,7 +305,7 @@ impl History {
             vector
         };
         let wall = |k: usize| Wall {
-            name: names[k].to_string(),
+            name: names[k].clone(),
             kind: kinds[k],
             normal: vector(&normals, k),
             radius: radii[k],

@@ -13,6 +13,7 @@ use super::error::{HistoryError, Result, reason, refused, while_reading};
 use super::schema::{CREATOR, SCHEMA_VERSION, path};
 use super::sound;
 use super::table::rows;
+use super::texts::Texts;
 
 /// Deflate cannot shrink anything further than this, so no honest dataset is larger than this many file lengths.
 const GREATEST_COMPRESSION: u64 = 1032;
@@ -23,15 +24,19 @@ pub(super) struct Source {
     pub file: File,
     pub length: u64,
     pub open_ended: bool,
+    texts: Texts,
 }
 
 impl Source {
     /// Opens a file and checks that it is a history that this program can read.
     pub fn open(path: &Path) -> Result<Self> {
         let (length, open_ended) = check_superblock(path)?;
+        let texts = Texts::find(path).map_err(|error| refused(path)("read", error))?;
+        let damaged = |why| HistoryError::Damaged { path: path.into(), place: String::new(), why };
+        let texts = texts.map_err(damaged)?;
         let file = open_file(path, open_ended)?;
         check_identity(path, &file)?;
-        Ok(Self { path: path.into(), file, length, open_ended })
+        Ok(Self { path: path.into(), file, length, open_ended, texts })
     }
 
     pub fn damaged(&self, place: &str, why: &str) -> HistoryError {
@@ -84,6 +89,19 @@ impl Source {
         }
         sound::reals(self, place, 0, row.iter().product(), &values)?;
         Ok(values)
+    }
+
+    /// A dataset of texts, whole.
+    pub fn texts(&self, place: &str) -> Result<Vec<String>> {
+        let dataset = self.dataset(place)?;
+        if let Some(offset) = dataset.offset() {
+            let held = self.texts.hold(&self.path, offset, dataset.size().min(self.length as usize));
+            if !held.map_err(|error| refused(&self.path)("read", error))? {
+                return Err(self.damaged(place, "it names a text that is not there"));
+            }
+        }
+        let texts = dataset.read_raw::<VarLenUnicode>().map_err(while_reading(&self.path, place))?;
+        Ok(texts.iter().map(ToString::to_string).collect())
     }
 
     pub fn scalar<T: H5Type>(&self, place: &str) -> Result<T> {
