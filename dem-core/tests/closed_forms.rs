@@ -61,6 +61,28 @@ fn a_bounce_returns_the_fraction_e_of_the_speed() {
 }
 
 #[test]
+fn pairs_and_walls_have_their_own_restitution() {
+    fn case<D: Dim>() {
+        let mut set = settings(1e-4);
+        set.restitution = Some(Restitution { grain_grain: 0.2, grain_wall: 0.7, threshold_speed: 0.0 });
+        let mut start = above::<D>(0.0105);
+        start.velocity[D::N - 1] = -1.0;
+        // another one falls onto one that is fixed, far from the first
+        let (mut held, mut falling) = (above::<D>(0.2), above::<D>(0.2305));
+        (held.position[0], falling.position[0]) = (1.0, 1.0);
+        held.fixed = true;
+        falling.velocity[D::N - 1] = -1.0;
+        let mut w = world(vec![start, held, falling], vec![floor(0.0)], set);
+        w.settings.friction = 0.0;
+        run(&mut w, 300);
+        let [wall, pair] = [0, 2].map(|k: usize| last::<D>(&w.grains.velocity[k]));
+        assert!((wall - 0.7).abs() < 1e-12 && (pair - 0.2).abs() < 1e-12, "{wall} {pair}");
+    }
+    case::<D2>();
+    case::<D3>();
+}
+
+#[test]
 fn restitution_begins_at_its_threshold() {
     fn rebound<D: Dim>(speed: f64) -> f64 {
         let mut set = settings(1e-4);

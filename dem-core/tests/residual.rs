@@ -6,6 +6,7 @@ use common::{grain, settings, world};
 use dem_core::contact::Law;
 use dem_core::dim::{D2, D3, Dim, Vect};
 use dem_core::problem::ContactProblem;
+use dem_core::problem::assembled::{Assembled, BlockMatrix, ContactRows, Parts};
 use dem_core::problem::residual::residual;
 
 const MU: f64 = 0.3;
@@ -72,6 +73,41 @@ fn the_residual_is_the_natural_map_over_the_larger_of_reactions_and_load() {
 fn a_map_that_is_rounding_is_none() {
     rounding::<D2>();
     rounding::<D3>();
+}
+
+/// One contact with its matrix: W = diag(w, w/2), q = −w r − `push` in the normal row, so that u_n is −`push`.
+fn assembled(w: f64, r: f64, push: f64, shift: f64, applied: f64) -> Assembled {
+    let parts = Parts {
+        rows: ContactRows { tangents: 1, moments: 0 },
+        matrix: BlockMatrix::from_entries(1, 2, &[(0, 0, w), (1, 1, 0.5 * w)]),
+        q: vec![-w * r - push, 0.0],
+        mu: vec![MU],
+        nu: vec![0.0],
+        xi: vec![0.0],
+        associated: vec![false],
+        shift: vec![shift],
+        applied,
+    };
+    let mut problem = Assembled::new(parts).expect("parts of a problem");
+    problem.r[0] = r;
+    problem
+}
+
+#[test]
+fn with_its_matrix_the_residual_is_the_same_measure() {
+    // reactions count without their shift
+    for (shift, applied, scale) in [(0.0, 0.0, 30.0), (12.0, 0.0, 18.0), (12.0, 70.0, 70.0)] {
+        let (found, expected) = (assembled(0.1, 30.0, 0.2, shift, applied).residual(), 0.2 / 0.1 / scale);
+        assert!((found / expected - 1.0).abs() < 1e-12, "{found:e} against {expected:e}");
+    }
+    // rounded against q and W r, which are opposite: √2 w r
+    for (w, r) in [(0.1, 30.0), (7.0, 0.3)] {
+        for (share, counts) in [(0.8, false), (1.25, true)] {
+            let push = share * 64.0 * f64::EPSILON * 2f64.sqrt() * w * r;
+            let found = assembled(w, r, push, 0.0, 0.0).residual();
+            assert_eq!(found > 0.0, counts, "{w} {r} {share}: {found:e}");
+        }
+    }
 }
 
 #[test]
