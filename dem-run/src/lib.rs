@@ -6,6 +6,7 @@ pub mod check;
 pub mod cli;
 pub mod collapse;
 pub mod course;
+mod destination;
 pub mod export;
 pub mod fclib;
 pub mod history;

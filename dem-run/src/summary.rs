@@ -248,7 +248,11 @@ impl Summary {
         writeln!(f, "external work    {:.4e} J", self.external_work)?;
         writeln!(f, "energy remainder {:.2e} J", self.energy_remainder)?;
         if self.bonds > 0 && !self.elastic {
-            writeln!(f, "bond remainder   {:.2e} J, the work of intact bonds: it should be zero", self.bond_remainder)?;
+            writeln!(
+                f,
+                "bond remainder   {:.2e} J, work of intact rigid bonds: solver error and finite rotations",
+                self.bond_remainder
+            )?;
         }
         Ok(())
     }

@@ -1,0 +1,76 @@
+//! Which files results may be written to: what is refused before any work is done.
+
+use std::path::Path;
+
+use crate::history::refuse_busy;
+use crate::run::{RunError, RunOptions};
+use crate::scene::{Sample, Scene};
+
+/// Refuses, `--force` or not, to write over what is read.
+pub(crate) fn not_itself(read: &Path, written: &Path) -> Result<(), RunError> {
+    if !same_file(read, written) {
+        return Ok(());
+    }
+    let shown = written.display();
+    Err(RunError::InputOutput(format!("-o {shown} would overwrite what the command reads: name another file")))
+}
+
+fn same_file(a: &Path, b: &Path) -> bool {
+    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+}
+
+/// Refuses, `--force` or not, to write over what the run reads, or two results into one file.
+pub(crate) fn apart(path: &Path, scene: &Scene, options: &RunOptions) -> Result<(), RunError> {
+    let mut read = vec![path];
+    if let Sample::File(file) = &scene.sample {
+        read.push(&file.path);
+    }
+    for (written, option) in [(Some(&options.output), "-o"), (options.write_sample.as_ref(), "--write-sample")] {
+        let Some(written) = written else { continue };
+        if read.iter().any(|read| same_file(read, written)) {
+            let shown = written.display();
+            let message = format!("{option} {shown} would overwrite what the run reads: name another file");
+            return Err(RunError::InputOutput(message));
+        }
+    }
+    if options.write_sample.as_ref() == Some(&options.output) {
+        let message = "-o and --write-sample name the same file: name two".into();
+        return Err(RunError::InputOutput(message));
+    }
+    Ok(())
+}
+
+/// Refuses a name that the HDF5 library and `dem-post` cannot open again.
+pub(crate) fn unicode(path: &Path, option: &str) -> Result<(), RunError> {
+    if path.to_str().is_some() {
+        return Ok(());
+    }
+    Err(RunError::Usage(format!("{} is not UTF-8: name another with {option}", path.display())))
+}
+
+/// Refuses, before any work is done, a file that exists or is being written, or whose folder is not there or takes no files.
+pub(crate) fn writable(path: &Path, option: &str, overwrite: bool) -> Result<(), RunError> {
+    let shown = path.display();
+    unicode(path, option)?;
+    if path.is_dir() {
+        return Err(RunError::InputOutput(format!("{shown} is a folder: name a file with {option}")));
+    }
+    // a history comes into its place by renaming, which would put a file where a device was, /dev/null for one
+    if path.exists() && !path.is_file() {
+        return Err(RunError::InputOutput(format!("{shown} is not a regular file: name another with {option}")));
+    }
+    if path.exists() && !overwrite {
+        let remedy = format!("--force overwrites it, {option} names another");
+        return Err(RunError::InputOutput(format!("{shown} exists: {remedy}")));
+    }
+    refuse_busy(path)?;
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let refused = |why: String| Err(RunError::InputOutput(format!("{shown} cannot be written: {why}")));
+    if !folder.is_dir() {
+        return refused(format!("there is no folder {}; make it first", folder.display()));
+    }
+    match tempfile::tempfile_in(folder) {
+        Ok(_) => Ok(()),
+        Err(why) => refused(format!("no file can be made in {}: {why}", folder.display())),
+    }
+}
