@@ -12,6 +12,7 @@ pub mod bond;
 pub mod contact;
 pub mod detection;
 pub mod dim;
+mod linear;
 pub mod problem;
 pub mod saved;
 pub mod solver;

@@ -4,11 +4,16 @@ mod anderson;
 pub mod assembled;
 mod auto;
 mod gauss_seidel;
+mod assembled_rows;
+mod interior;
 mod newton;
+mod rows;
+mod solvable;
 
 pub use auto::Auto;
 pub use gauss_seidel::{GaussSeidel, GaussSeidelSettings, sweep};
-pub use newton::{Newton, NewtonSettings, Start, StiffnessRatio};
+pub use newton::{Newton, NewtonSettings, Start};
+pub use rows::StiffnessRatio;
 
 use crate::dim::Dim;
 use crate::problem::ContactProblem;

@@ -7,8 +7,8 @@
 //! near, Newton with the friction in it is tried first, which needs no lag.
 
 use super::inner::Iterate;
-use super::rows::Rows;
-use super::solvable::Solvable;
+use crate::solver::rows::Rows;
+use crate::solver::solvable::Solvable;
 use super::{Found, Newton, load_change};
 use crate::contact::Padded;
 

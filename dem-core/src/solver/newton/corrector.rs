@@ -6,7 +6,7 @@
 //! negative derivative A = −∂r/∂q is what a contact adds to the matrix of the Newton step; it is symmetric where the
 //! law is associated.
 
-use super::rows::{Operator, Row, TWIST};
+use crate::solver::rows::{Operator, Row, TWIST};
 use crate::contact::{Local, PADDED, Padded, Weights};
 use crate::dim::{Moments, Vect};
 use nalgebra::{SMatrix, SVector, Vector2};

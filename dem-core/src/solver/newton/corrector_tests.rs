@@ -1,6 +1,6 @@
 //! The corrector's derivative against differences of the corrector, for every law, in 2D and 3D.
 
-use super::super::rows::{Operator, Row, places};
+use crate::solver::rows::{Operator, Row, places};
 use super::{correct, operator};
 use crate::contact::{Cone, PADDED, Padded, Weights};
 use nalgebra::{SMatrix, SVector};

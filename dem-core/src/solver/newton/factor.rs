@@ -2,7 +2,7 @@
 //! rows come from pairs of bodies, dense where they come from the factor of a matrix.
 
 use super::order::dissected;
-use super::rows::{Operator, PAIR, Rows};
+use crate::solver::rows::{Operator, PAIR, Rows};
 use crate::contact::PADDED;
 use crate::saved::{Mismatch, Reader, Saved};
 use faer::dyn_stack::{MemBuffer, MemStack};

@@ -4,7 +4,7 @@
 //! far that was in the last solve is nearly the one that the factor was made of.
 
 use super::inner::Iterate;
-use super::rows::{Row, Rows};
+use crate::solver::rows::{Row, Rows};
 use crate::contact::{Local, Padded};
 use crate::dim::{Moments, Vect};
 use crate::saved::{Mismatch, Reader, Saved};

@@ -8,8 +8,8 @@
 use super::guess::{Guess, Slips};
 use super::inner::Iterate;
 use super::patience::{Shrinking, Stall};
-use super::rows::Rows;
-use super::solvable::Solvable;
+use crate::solver::rows::Rows;
+use crate::solver::solvable::Solvable;
 use super::{Newton, SolveReport, SolveStatus, load_change, relative_change};
 
 /// Most solves, and Newton iterations of each: without progress, and all of them.

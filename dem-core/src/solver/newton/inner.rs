@@ -5,7 +5,7 @@ use super::corrector::{correct, operator};
 use super::guess::Guess;
 use super::krylov::gmres;
 use super::patience::Stall;
-use super::rows::{Operator, Row, Rows};
+use crate::solver::rows::{Operator, Row, Rows};
 use crate::contact::Padded;
 
 /// GMRES iterations beyond those of a fresh factor that a kept one may cost in all before it is renewed; in space, where

@@ -18,7 +18,7 @@
 //! Newton); Olsen & Kamrin, arXiv 1805.07437 (the stiff limit).
 
 mod approach;
-mod assembled;
+
 mod corrector;
 mod factor;
 mod guess;
@@ -31,8 +31,7 @@ mod order;
 mod patience;
 mod predictor;
 mod rounds;
-mod rows;
-mod solvable;
+
 mod sweeps;
 
 use super::{ContactSolver, SolveReport, SolveStatus, Work};
@@ -47,10 +46,10 @@ use interior::{Bending, Rays, Twisting};
 use kept::Kept;
 use patience::Rest;
 use predictor::Predictor;
-use rows::Rows;
-use solvable::Solvable;
+use super::rows::Rows;
+use super::solvable::Solvable;
 
-pub use rows::StiffnessRatio;
+use super::rows::StiffnessRatio;
 
 /// Where the reactions start from in every step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -110,6 +109,8 @@ pub struct Newton {
     /// What quiet steps add to the reactions, and how far contacts are from another status in the first round of this solve.
     predictor: Predictor,
     margins: Vec<f64>,
+    interior: crate::solver::interior::Interior,
+    made_ip: u64,
 }
 
 /// What was found without a guess of the active set.
@@ -137,6 +138,8 @@ impl Newton {
             astray: false,
             predictor: Predictor::default(),
             margins: Vec::new(),
+            interior: Default::default(),
+            made_ip: 0,
         }
     }
 
@@ -157,7 +160,7 @@ impl Newton {
 
     /// Factorisations so far.
     fn made(&self) -> u64 {
-        self.kept.iter().map(|kept| kept.factor.made).sum()
+        self.made_ip + self.kept.iter().map(|kept| kept.factor.made).sum::<u64>()
     }
 
     /// The factor in use.
@@ -171,6 +174,12 @@ impl Newton {
     }
 
     fn iterate(&mut self, problem: &mut impl Solvable) -> SolveReport {
+        if std::env::var("IPONLY").is_ok() {
+            let rows = problem.rows(KAPPA, self.settings.stiffness);
+            let begun = self.started(&rows);
+            let found = self.interior.solve(problem, &begun, None, self.settings.tolerance, 60).unwrap();
+            return self.report(found.iterations, found.residual, found.change);
+        }
         problem.velocities_from_reactions();
         self.made_before = self.made();
         self.sweeps = 0;
@@ -191,12 +200,29 @@ impl Newton {
             }
             self.rest.lengthen();
         }
+        if std::env::var("NEWIP").is_err() {
         // since a guess served a path that held the term of dry friction did not: much slips fast
         let comes_apart = rows.in_space() && !self.quiet.served();
         if (rows.mostly_dry() || comes_apart)
             && let Some(swept) = self.swept_first(problem, &rows, cold, iterations)
         {
             return swept;
+        }
+        }
+        if std::env::var("NEWIP").is_ok() {
+            let begun = self.started(&rows);
+            let start: Vec<Padded> = rows.list.iter().map(|row| row.multiplier).collect();
+            let warm = (!cold).then_some(&start[..]);
+            let before = self.interior.made;
+            let found = self.interior.solve(problem, &begun, warm, self.settings.tolerance, 60);
+            self.made_ip += self.interior.made - before;
+            if let Some(found) = found {
+                iterations += found.iterations;
+                if found.residual <= self.settings.accept {
+                    return self.report(iterations, found.residual, found.change);
+                }
+                if std::env::var("IPM").is_ok() { eprintln!("interior failed {:.2e} after {}", found.residual, found.iterations); }
+            }
         }
         if let Some(report) = self.come_from_afar(problem, &rows, &mut iterations) {
             return report;

@@ -7,7 +7,7 @@
 //! reactions. And from time to time a solve is compared with what was predicted.
 
 use super::patience::Rest;
-use super::rows::{Row, Rows, mass_unit};
+use crate::solver::rows::{Row, Rows, mass_unit};
 use crate::bond::failure;
 use crate::contact::{Law, PADDED, Padded};
 use crate::dim::{Dim, Moments, Vect};

@@ -3,8 +3,8 @@
 //!
 //! The residual of contacts that slip falls as one over the number of sweeps: some tell how many will do.
 
-use super::rows::Rows;
-use super::solvable::Solvable;
+use crate::solver::rows::Rows;
+use crate::solver::solvable::Solvable;
 use super::{Newton, NewtonSettings};
 use crate::contact::LocalSolve;
 use crate::solver::gauss_seidel::MEMORY;

@@ -7,7 +7,7 @@
 //! friction a ray is left, Q of one component.
 
 use super::super::guess::Beyond;
-use super::super::rows::{Operator, Row, TWIST};
+use crate::solver::rows::{Operator, Row, TWIST};
 use super::{Aim, Site, yields};
 use crate::contact::{PADDED, Padded};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector2, Vector3};

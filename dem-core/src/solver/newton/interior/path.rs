@@ -4,7 +4,7 @@ use super::super::factor::Factor;
 use super::super::guess::Guess;
 use super::super::inner::distance;
 use super::super::net_change;
-use super::super::rows::{Row, Rows};
+use crate::solver::rows::{Row, Rows};
 use super::{Aim, Site, yields};
 use crate::contact::{Padded, Weights};
 

@@ -3,7 +3,7 @@
 //! r̂ = Σ λ e with λ ≥ 0, and z ∈ K* where w = Eᵀ z ≥ 0; λ w = 0. D⁻¹ is E (w/λ + Eᵀ(1/ρ + C)E)⁻¹ Eᵀ.
 
 use super::super::guess::Beyond;
-use super::super::rows::{Operator, Row};
+use crate::solver::rows::{Operator, Row};
 use super::{Aim, Site, yields};
 use crate::contact::{PADDED, Padded};
 use nalgebra::{SMatrix, SVector};

@@ -69,6 +69,8 @@ pub(super) struct Row {
     pub carried: Padded,
     /// What is added to u_n in place of μ‖u_t‖ where the law is taken as associated for a round.
     pub lag: Option<f64>,
+    /// Normal entry of W (1/kg).
+    pub normal: f64,
     /// Σ h² over all coefficients: how much a unit of velocity and of reaction weigh (1/kg).
     pub size: f64,
 }
@@ -104,6 +106,8 @@ pub(super) struct Rows {
     pub unknowns: usize,
     /// Free velocities in the scaled unknowns.
     pub free: Vec<f64>,
+    /// Norm of the applied impulses (N s).
+    pub applied: f64,
     /// Whether a solution that leaves bonds at their limit moves nothing ([`ContactProblem::cascades`]).
     pub cascades: bool,
 }
@@ -198,7 +202,7 @@ impl Rows {
         for (k, (v, w)) in problem.free.iter().enumerate() {
             write_scaled(&problem.nodes, &unknowns, k, v, w, &mut free);
         }
-        let rows = Rows { unknowns: unknowns.total, free, cascades: problem.cascades, ..Rows::default() };
+        let rows = Rows { unknowns: unknowns.total, free, applied: problem.applied / unknowns.unit, cascades: problem.cascades, ..Rows::default() };
         let mut still = problem.nodes.clone();
         for (node, free) in still.all.iter_mut().zip(problem.free.iter()) {
             let moves = node.inverse_mass > 0.0;
@@ -446,6 +450,7 @@ impl<D: Dim> Visitor<D> for Flatten<'_, D> {
             compliance: c.law.compliance() * unit,
             carried: c.link.in_frame(&c.law.carried()) * (1.0 / unit),
             lag: None,
+            normal,
             size: table.rows[..rows.len()].iter().flat_map(|row| &row[..table.width]).map(|h| h * h).sum(),
         });
     }

@@ -65,7 +65,7 @@ impl Solvable for Assembled {
         // without the shift, u = W r + q
         let mut shifts = vec![0.0; self.r.len()];
         (0..self.len()).for_each(|c| shifts[c * size] = parts.shift[c]);
-        let mut out = Rows { unknowns: rank, free: vec![0.0; rank], ..Rows::default() };
+        let mut out = Rows { unknowns: rank, free: vec![0.0; rank], applied: parts.applied, ..Rows::default() };
         for c in 0..self.len() {
             let mut given = parts.q[c * size..(c + 1) * size].to_vec();
             parts.matrix.multiply_row(c, &shifts, &mut given);
@@ -84,12 +84,17 @@ impl Solvable for Assembled {
                 compliance: Weights::default(),
                 carried: Padded::zero(),
                 lag: None,
+                normal: parts.matrix.diagonal(c)[0],
                 // the trace of the block
                 size: parts.matrix.diagonal(c).iter().step_by(size + 1).sum(),
             });
         }
         out.coefficients = (0..self.r.len()).flat_map(|row| columns.iter().map(move |l| l[row])).collect();
         out
+    }
+
+    fn matrix(&self) -> Option<&BlockMatrix> {
+        Some(&self.parts().matrix)
     }
 
     fn velocities_from_reactions(&mut self) {}

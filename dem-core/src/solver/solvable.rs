@@ -4,6 +4,7 @@ use super::rows::{Rows, StiffnessRatio, mass_unit};
 use crate::contact::{Law, LocalSolve, Padded};
 use crate::dim::{Dim, Vect};
 use crate::problem::residual::residual;
+use crate::problem::assembled::BlockMatrix;
 use crate::problem::{ContactProblem, Group};
 use crate::solver::{ContactSolver, GaussSeidel, GaussSeidelSettings, SolveReport, sweep};
 
@@ -11,6 +12,10 @@ use crate::solver::{ContactSolver, GaussSeidel, GaussSeidelSettings, SolveReport
 pub(super) trait Solvable {
     /// The problem as rows; ρ is `kappa` over the mean normal entry of W.
     fn rows(&self, kappa: f64, ratio: StiffnessRatio) -> Rows;
+    /// Its matrix, where there is one.
+    fn matrix(&self) -> Option<&BlockMatrix> {
+        None
+    }
     /// Set the velocities to what the reactions make of them, free of the rounding of increments.
     fn velocities_from_reactions(&mut self);
     /// The residual of the reactions at hand (–).

@@ -1,0 +1,201 @@
+//! How contacts move each other: W = H̃ᵀ H̃ through the bodies, or as a matrix, and the linear systems with it.
+
+use super::sites::{ROWS, Sites};
+use crate::linear::{Lu, Tree};
+use crate::problem::assembled::BlockMatrix;
+use crate::solver::rows::Rows;
+
+/// The Delassus operator over the rows of [`Sites`], in their units.
+pub(super) enum Coupling<'a> {
+    /// Through the unknowns of the bodies. The matrix of a step is 1 + Σ H̃ D⁻¹ H̃ᵀ, of the size of the bodies.
+    Bodies {
+        rows: &'a Rows,
+        /// Coefficients over those of `rows`.
+        scale: f64,
+        /// The contact of each element.
+        contacts: Vec<usize>,
+    },
+    /// A matrix over the contacts. That of a step is 1 + W D⁻¹.
+    Matrix {
+        matrix: &'a BlockMatrix,
+        scale: f64,
+        /// The contacts of each element, one of them twice for a block of the diagonal.
+        pairs: Vec<[usize; 2]>,
+    },
+}
+
+impl<'a> Coupling<'a> {
+    /// Through the bodies of `rows`, and the tree of their matrix, the last one where it still serves.
+    pub fn bodies(rows: &'a Rows, speed_over_force: f64, tree: &mut Option<Tree>) -> Option<Self> {
+        let nodes = nodes(rows);
+        let node = |first: usize| nodes.partition_point(|(start, _)| *start < first);
+        let (mut elements, mut contacts) = (Vec::with_capacity(rows.list.len()), Vec::with_capacity(rows.list.len()));
+        for (c, row) in rows.list.iter().enumerate() {
+            let element = match row.count {
+                [0, 0] => continue,
+                [0, _] => [node(row.at[1]); 2],
+                [_, 0] => [node(row.at[0]); 2],
+                _ => row.at.map(node),
+            };
+            elements.push(element);
+            contacts.push(c);
+        }
+        renewed(tree, nodes.into_iter().map(|(_, size)| size).collect(), elements)?;
+        Some(Self::Bodies { rows, scale: 1.0 / speed_over_force.sqrt(), contacts })
+    }
+
+    /// By a matrix.
+    pub fn matrix(
+        matrix: &'a BlockMatrix,
+        sites: &Sites,
+        speed_over_force: f64,
+        tree: &mut Option<Tree>,
+    ) -> Option<Self> {
+        let mut pairs = Vec::new();
+        for c in 0..matrix.contacts() {
+            pairs.extend(matrix.row(c).filter(|(d, _)| *d >= c).map(|(d, _)| [c, d]));
+        }
+        renewed(tree, sites.list.iter().map(|site| site.rows).collect(), pairs.clone())?;
+        Some(Self::Matrix { matrix, scale: 1.0 / speed_over_force, pairs })
+    }
+
+    /// W r.
+    pub fn velocity(&self, sites: &Sites, r: &[f64]) -> Vec<f64> {
+        match self {
+            Self::Bodies { .. } => self.pulled(sites, &self.pushed(sites, r)),
+            Self::Matrix { matrix, scale, .. } => {
+                let mut u = vec![0.0; sites.rows];
+                for (c, site) in sites.list.iter().enumerate() {
+                    for (d, block) in matrix.row(c) {
+                        let other = &sites.list[d];
+                        for i in 0..site.rows {
+                            let line = &block[site.of[i] * matrix.size()..][..matrix.size()];
+                            let own = other.of[..other.rows].iter().zip(other.part(r));
+                            u[site.at + i] += scale * own.map(|(k, r)| line[*k] * r).sum::<f64>();
+                        }
+                    }
+                }
+                u
+            }
+        }
+    }
+
+    /// H̃ r, in the unknowns of the bodies.
+    fn pushed(&self, sites: &Sites, r: &[f64]) -> Vec<f64> {
+        let Self::Bodies { rows, scale, .. } = self else { return Vec::new() };
+        let mut y = vec![0.0; rows.unknowns];
+        for (site, row) in sites.list.iter().zip(&rows.list) {
+            let width = row.count[0] + row.count[1];
+            for (k, r) in site.of.iter().zip(site.part(r)) {
+                let h = &rows.coefficients[row.start + k * width..][..width];
+                let (first, second) = h.split_at(row.count[0]);
+                first.iter().zip(&mut y[row.at[0]..]).for_each(|(h, y)| *y += scale * h * r);
+                second.iter().zip(&mut y[row.at[1]..]).for_each(|(h, y)| *y += scale * h * r);
+            }
+        }
+        y
+    }
+
+    /// H̃ᵀ y.
+    fn pulled(&self, sites: &Sites, y: &[f64]) -> Vec<f64> {
+        let Self::Bodies { rows, scale, .. } = self else { return Vec::new() };
+        let mut u = vec![0.0; sites.rows];
+        for (site, row) in sites.list.iter().zip(&rows.list) {
+            let width = row.count[0] + row.count[1];
+            for (k, u) in site.of.iter().zip(site.part_mut(&mut u)) {
+                let h = &rows.coefficients[row.start + k * width..][..width];
+                let (first, second) = h.split_at(row.count[0]);
+                let sum = |h: &[f64], y: &[f64]| h.iter().zip(y).map(|(h, y)| h * y).sum::<f64>();
+                *u = scale * (sum(first, &y[row.at[0]..]) + sum(second, &y[row.at[1]..]));
+            }
+        }
+        u
+    }
+
+    /// Factorise the matrix of a step, whose D⁻¹ stands in the upper left corners of the local matrices.
+    pub fn factorise(&self, sites: &Sites, inverses: &[f64], tree: &Tree, lu: &mut Lu) -> bool {
+        match self {
+            Self::Bodies { rows, scale, contacts } => lu.factorise(tree, |e, out| {
+                let (row, site) = (&rows.list[contacts[e]], &sites.list[contacts[e]]);
+                let width = row.count[0] + row.count[1];
+                let h = |k: usize| &rows.coefficients[row.start + site.of[k] * width..][..width];
+                let (own, square) = (&inverses[site.matrix..], scale * scale);
+                for i in 0..site.rows {
+                    // D⁻¹ H̃ᵀ
+                    let mut line = [0.0; 2 * ROWS];
+                    for j in 0..site.rows {
+                        let d = square * own[i * site.order() + j];
+                        line.iter_mut().zip(h(j)).for_each(|(x, h)| *x += d * h);
+                    }
+                    for (out, h) in out.chunks_exact_mut(width).zip(h(i)) {
+                        out.iter_mut().zip(&line).for_each(|(out, x)| *out += h * x);
+                    }
+                }
+            }),
+            Self::Matrix { matrix, scale, pairs } => lu.factorise(tree, |e, out| {
+                let [c, d] = pairs[e];
+                let first = sites.list[c].rows;
+                let width = if c == d { first } else { first + sites.list[d].rows };
+                let mut add = |c: usize, d: usize, row: usize, column: usize| {
+                    let Some((_, block)) = matrix.row(c).find(|(k, _)| *k == d) else { return };
+                    let (site, other) = (&sites.list[c], &sites.list[d]);
+                    let own = &inverses[other.matrix..];
+                    for i in 0..site.rows {
+                        let line = &block[site.of[i] * matrix.size()..][..matrix.size()];
+                        for k in 0..other.rows {
+                            let w = scale * line[other.of[k]];
+                            for j in 0..other.rows {
+                                out[(row + i) * width + column + j] += w * own[k * other.order() + j];
+                            }
+                        }
+                    }
+                };
+                add(c, d, 0, if c == d { 0 } else { first });
+                if c != d {
+                    add(d, c, first, 0);
+                }
+            }),
+        }
+    }
+
+    /// The velocities that reactions `r` would give the contacts if these did not yield, as they are when they do.
+    pub fn yielded(&self, sites: &Sites, r: &[f64], tree: &Tree, lu: &Lu) -> Vec<f64> {
+        match self {
+            Self::Bodies { .. } => {
+                let mut y = self.pushed(sites, r);
+                lu.solve(tree, &mut y);
+                self.pulled(sites, &y)
+            }
+            Self::Matrix { .. } => {
+                let mut u = self.velocity(sites, r);
+                lu.solve(tree, &mut u);
+                u
+            }
+        }
+    }
+}
+
+/// The tree of these nodes and elements, the last one where it still serves.
+fn renewed(tree: &mut Option<Tree>, sizes: Vec<usize>, elements: Vec<[usize; 2]>) -> Option<()> {
+    if !tree.as_ref().is_some_and(|tree| tree.is_of(&sizes, &elements)) {
+        *tree = Tree::new(sizes, elements);
+    }
+    tree.as_ref().map(|_| ())
+}
+
+/// First unknown of each node, and how many it has, in rising order; unknowns without a contact stand alone.
+fn nodes(rows: &Rows) -> Vec<(usize, usize)> {
+    let mut counts = vec![1; rows.unknowns];
+    for row in &rows.list {
+        for side in (0..2).filter(|side| row.count[*side] > 0) {
+            counts[row.at[side]] = row.count[side];
+        }
+    }
+    let mut nodes = Vec::new();
+    let mut next = 0;
+    while next < rows.unknowns {
+        nodes.push((next, counts[next]));
+        next += counts[next];
+    }
+    nodes
+}

@@ -1,0 +1,172 @@
+//! The equations of one contact in a step, and their inverse.
+//!
+//! Of a step (dr, dz), with t what the bodies add to the contact's velocity,
+//!
+//! C dr − Bᵀ dz = a − t,     Arw(z) G dr + Arw(x) dz = b.
+//!
+//! The inverse of this small matrix holds in its upper left corner D⁻¹ of docs/theory/interior-point.md. D itself, with
+//! Arw(x)⁻¹ Arw(z), would lose the digits of what sticks beside what slips.
+
+use super::cones::{Point, dot};
+use super::sites::{CONES, Cone, ROWS, Sites};
+
+/// Largest order of a local matrix.
+pub(super) const ORDER: usize = ROWS + CONES;
+
+/// A point, or a step of it.
+#[derive(Clone, Debug, Default)]
+pub(super) struct State {
+    /// Reactions without the shift, of all rows.
+    pub r: Vec<f64>,
+    /// Of all cones.
+    pub x: Vec<Point>,
+    pub z: Vec<Point>,
+}
+
+/// What the complementarity equations of a cone are divided by.
+#[inline]
+fn scale(x: &Point, z: &Point) -> f64 {
+    1.0 / (x[0] + z[0])
+}
+
+/// The inverses of all local matrices at a point, with the compliance of each row; false if one has none.
+pub(super) fn invert(sites: &Sites, at: &State, compliance: &[f64], inverses: &mut Vec<f64>) -> bool {
+    inverses.clear();
+    inverses.resize(sites.matrices, 0.0);
+    for site in &sites.list {
+        let order = site.order();
+        let mut a = [[0.0; 2 * ORDER]; ORDER];
+        for (k, c) in site.part(compliance).iter().enumerate() {
+            a[k][k] = *c;
+        }
+        let mut first = site.rows;
+        for c in site.cones.clone() {
+            let (Cone { slope, rows, tangents, opens }, x, z) = (&sites.cones[c], &at.x[c], &at.z[c]);
+            let scale = scale(x, z);
+            if *opens {
+                a[0][first] = -slope;
+            }
+            a[first][0] = scale * slope * z[0];
+            a[first][first] = scale * x[0];
+            for (k, row) in rows[..*tangents].iter().enumerate() {
+                let (at, k) = (first + 1 + k, 1 + k);
+                a[*row][at] = -1.0;
+                a[first][*row] = scale * z[k];
+                a[first][at] = scale * x[k];
+                a[at][0] = scale * slope * z[k];
+                a[at][*row] = scale * z[0];
+                a[at][first] = scale * x[k];
+                a[at][at] = scale * x[0];
+            }
+            first += 1 + tangents;
+        }
+        if !gauss_jordan(&mut a, order) {
+            return false;
+        }
+        for (row, out) in a.iter().zip(inverses[site.matrix..].chunks_exact_mut(order).take(order)) {
+            out.copy_from_slice(&row[order..2 * order]);
+        }
+    }
+    true
+}
+
+/// Leaves the inverse in the right half, with pivots chosen in their column.
+fn gauss_jordan(a: &mut [[f64; 2 * ORDER]; ORDER], order: usize) -> bool {
+    for k in 0..order {
+        a[k][order + k] = 1.0;
+    }
+    for k in 0..order {
+        let mut pivot = k;
+        for row in k + 1..order {
+            pivot = if a[row][k].abs() > a[pivot][k].abs() { row } else { pivot };
+        }
+        a.swap(k, pivot);
+        let inverse = 1.0 / a[k][k];
+        if !inverse.is_finite() {
+            return false;
+        }
+        a[k][k..2 * order].iter_mut().for_each(|x| *x *= inverse);
+        let line = a[k];
+        for row in (0..order).filter(|row| *row != k) {
+            let factor = a[row][k];
+            if factor != 0.0 {
+                a[row][k..2 * order].iter_mut().zip(&line[k..2 * order]).for_each(|(x, l)| *x -= factor * l);
+            }
+        }
+    }
+    true
+}
+
+/// The step for these right sides, where nothing moves the bodies: its `r` and `z` alone.
+pub(super) fn solve(sites: &Sites, at: &State, inverses: &[f64], a: &[f64], b: &[Point]) -> State {
+    let mut step = State { r: vec![0.0; sites.rows], x: Vec::new(), z: vec![[0.0; 3]; sites.cones.len()] };
+    for site in &sites.list {
+        let order = site.order();
+        let mut right = [0.0; ORDER];
+        right[..site.rows].copy_from_slice(site.part(a));
+        let mut first = site.rows;
+        for c in site.cones.clone() {
+            let (scale, tangents) = (scale(&at.x[c], &at.z[c]), sites.cones[c].tangents);
+            for k in 0..1 + tangents {
+                right[first + k] = scale * b[c][k];
+            }
+            first += 1 + tangents;
+        }
+        let line = |row: usize| &inverses[site.matrix + row * order..][..order];
+        let sum = |row: usize| line(row).iter().zip(&right).map(|(a, x)| a * x).sum::<f64>();
+        site.part_mut(&mut step.r).iter_mut().enumerate().for_each(|(k, r)| *r = sum(k));
+        let mut row = site.rows;
+        for c in site.cones.clone() {
+            for k in 0..1 + sites.cones[c].tangents {
+                step.z[c][k] = sum(row);
+                row += 1;
+            }
+        }
+    }
+    step
+}
+
+/// Take out of a step what the bodies' velocities `t` do to it.
+pub(super) fn yield_to(sites: &Sites, inverses: &[f64], t: &[f64], step: &mut State) {
+    for site in &sites.list {
+        let order = site.order();
+        let own = site.part(t);
+        let sum = |row: usize| inverses[site.matrix + row * order..].iter().zip(own).map(|(a, t)| a * t).sum::<f64>();
+        site.part_mut(&mut step.r).iter_mut().enumerate().for_each(|(k, r)| *r -= sum(k));
+        let mut row = site.rows;
+        for c in site.cones.clone() {
+            for k in 0..1 + sites.cones[c].tangents {
+                step.z[c][k] -= sum(row);
+                row += 1;
+            }
+        }
+    }
+}
+
+/// Set the `x` of a step to G r.
+pub(super) fn follow(sites: &Sites, step: &mut State) {
+    step.x.resize(sites.cones.len(), [0.0; 3]);
+    for site in &sites.list {
+        let r = site.part(&step.r);
+        for c in site.cones.clone() {
+            step.x[c] = sites.cones[c].primal(r);
+        }
+    }
+}
+
+/// Σ Bᵀ z of all contacts.
+pub(super) fn opened(sites: &Sites, z: &[Point]) -> Vec<f64> {
+    let mut u = vec![0.0; sites.rows];
+    for site in &sites.list {
+        let own = site.part_mut(&mut u);
+        for c in site.cones.clone() {
+            sites.cones[c].add_velocity(&z[c], own);
+        }
+    }
+    u
+}
+
+/// Mean of x·z over all cones.
+pub(super) fn gap(at: &State) -> f64 {
+    at.x.iter().zip(&at.z).map(|(x, z)| dot(x, z)).sum::<f64>() / at.x.len() as f64
+}

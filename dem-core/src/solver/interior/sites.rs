@@ -1,0 +1,206 @@
+//! The contacts of a problem as cone pairs, whatever their laws.
+//!
+//! A contact has rows r (its reaction, without the shift s of the normal row) and a list of cones, each with
+//!
+//! x = G r̂ = (slope · (r_n + s), r_t…) ∈ Q   ⊥   z ∈ Q,      u + C (r − r₀) = Σ Bᵀ z.
+//!
+//! An associated law has one cone for each group of rows, with B = G. Any other has a ray for Signorini's condition, and for each group
+//! one whose z₀ acts on no row: B is G without its normal column, and z₀ is the slip speed.
+
+use super::cones::Point;
+use crate::contact::Padded;
+use crate::solver::rows::{Row, Rows, TWIST, entry};
+use std::ops::Range;
+
+/// Most rows of a contact, and most unknowns of its cones.
+pub(super) const ROWS: usize = 6;
+pub(super) const CONES: usize = 9;
+
+/// One cone of a contact.
+#[derive(Clone, Debug)]
+pub(super) struct Cone {
+    /// x₀ over the normal reaction with its shift.
+    pub slope: f64,
+    /// The contact's rows that follow x₀, as many as `tangents`.
+    pub rows: [usize; 2],
+    pub tangents: usize,
+    /// Whether z₀ acts on the normal row.
+    pub opens: bool,
+}
+
+/// One contact.
+#[derive(Clone, Debug)]
+pub(super) struct Site {
+    /// Places in a padded vector of the rows that it has here: a group with a limit of zero has none.
+    pub places: [usize; ROWS],
+    /// Which rows of the problem these are.
+    pub of: [usize; ROWS],
+    pub rows: usize,
+    /// Where they begin in a list of all rows.
+    pub at: usize,
+    /// Its cones, and how many unknowns these have.
+    pub cones: Range<usize>,
+    pub duals: usize,
+    /// Where the local matrix begins in a list of all.
+    pub matrix: usize,
+}
+
+impl Site {
+    /// Order of the local matrix.
+    pub fn order(&self) -> usize {
+        self.rows + self.duals
+    }
+
+    /// Its part of a list of all rows.
+    #[inline]
+    pub fn part<'a>(&self, list: &'a [f64]) -> &'a [f64] {
+        &list[self.at..self.at + self.rows]
+    }
+
+    #[inline]
+    pub fn part_mut<'a>(&self, list: &'a mut [f64]) -> &'a mut [f64] {
+        &mut list[self.at..self.at + self.rows]
+    }
+}
+
+impl Cone {
+    /// G r: the change of x with the reaction.
+    #[inline]
+    pub fn primal(&self, r: &[f64]) -> Point {
+        let mut x = [self.slope * r[0], 0.0, 0.0];
+        for k in 0..self.tangents {
+            x[1 + k] = r[self.rows[k]];
+        }
+        x
+    }
+
+    /// u += Bᵀ z.
+    #[inline]
+    pub fn add_velocity(&self, z: &Point, u: &mut [f64]) {
+        if self.opens {
+            u[0] += self.slope * z[0];
+        }
+        for k in 0..self.tangents {
+            u[self.rows[k]] += z[1 + k];
+        }
+    }
+}
+
+/// The contacts of a problem, in units in which reactions and velocities are of order one.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Sites {
+    pub list: Vec<Site>,
+    pub cones: Vec<Cone>,
+    /// Number of all rows.
+    pub rows: usize,
+    /// Unit of reactions (N s, over the unit of mass), and of velocities (m/s).
+    pub force: f64,
+    pub speed: f64,
+    /// For each contact: the shift of its normal reaction.
+    pub shift: Vec<f64>,
+    /// For each row: the velocity without reactions, the compliance of an elastic bond and the reaction at which it is at rest, and
+    /// the compliance that stands for the limit of stiff contacts, where κ is one.
+    pub free: Vec<f64>,
+    pub compliance: Vec<f64>,
+    pub carried: Vec<f64>,
+    pub metric: Vec<f64>,
+    /// Length of the list of local matrices.
+    pub matrices: usize,
+}
+
+impl Sites {
+    /// The contacts of `rows`; `applied` is the norm of the applied impulses in their unit.
+    pub fn of(rows: &Rows, reactions: &[Padded]) -> Self {
+        let mut sites = Self::default();
+        let velocities: Vec<Padded> = rows.list.iter().map(|row| rows.velocity(row, &rows.free)).collect();
+        let count = rows.list.len().max(1) as f64;
+        let mean = |sum: f64| sum / count;
+        let normal = mean(rows.list.iter().map(|row| row.normal).sum());
+        // reactions that would stop the bodies, those at hand, or what is applied
+        let stopping = (mean(velocities.iter().map(|u| u.dot(u)).sum())).sqrt() / normal;
+        let at_hand = mean(reactions.iter().map(|r| r.dot(r)).sum()).sqrt();
+        sites.force = stopping.max(at_hand).max(rows.applied / count.sqrt());
+        sites.speed = normal * sites.force;
+        let soft = mean(rows.list.iter().map(|row| row.weights.n).sum());
+        for (row, u) in rows.list.iter().zip(&velocities) {
+            sites.add(row, u, normal, soft);
+        }
+        sites
+    }
+
+    fn add(&mut self, row: &Row, u: &Padded, normal: f64, soft: f64) {
+        let (mu, nu, xi) = (row.cone.mu, row.cone.nu, row.cone.xi);
+        let limit = |place: usize| match place {
+            0 => f64::INFINITY,
+            1 | 2 => mu,
+            TWIST => xi,
+            _ => nu,
+        };
+        let mut site = Site {
+            places: [0; ROWS],
+            of: [0; ROWS],
+            rows: 0,
+            at: self.rows,
+            cones: self.cones.len()..0,
+            duals: 0,
+            matrix: self.matrices,
+        };
+        for (k, place) in row.rows.iter().enumerate().filter(|(_, place)| limit(**place) > 0.0) {
+            (site.places[site.rows], site.of[site.rows]) = (*place, k);
+            site.rows += 1;
+        }
+        let own = |places: Range<usize>| {
+            let mut rows = [0; 2];
+            let mut count = 0;
+            for (k, _) in site.places[..site.rows].iter().enumerate().filter(|(_, place)| places.contains(*place)) {
+                rows[count] = k;
+                count += 1;
+            }
+            (rows, count)
+        };
+        let groups = [(mu, 1..3), (nu, 3..TWIST), (xi, TWIST..TWIST + 1)].map(|(slope, places)| (slope, own(places)));
+        let groups = groups.into_iter().filter(|(_, (_, count))| *count > 0);
+        let before = self.cones.len();
+        for (slope, (rows, tangents)) in groups {
+            self.cones.push(Cone { slope, rows, tangents, opens: row.associated });
+        }
+        if !row.associated || self.cones.len() == before {
+            self.cones.push(Cone { slope: 1.0, rows: [0; 2], tangents: 0, opens: true });
+        }
+        site.cones.end = self.cones.len();
+        site.duals = self.cones[before..].iter().map(|cone| 1 + cone.tangents).sum();
+        self.rows += site.rows;
+        self.matrices += site.order() * site.order();
+        let weights = [row.weights.n, row.weights.t, row.weights.m, row.weights.w].map(|w| w / soft);
+        let soft = [row.compliance.n, row.compliance.t, row.compliance.m, row.compliance.w].map(|c| c / normal);
+        let group = |place: usize| [0, 1, 1, 2, 2, 3][place];
+        for place in &site.places[..site.rows] {
+            self.free.push(*entry(&mut u.clone(), *place) / self.speed);
+            self.compliance.push(soft[group(*place)]);
+            self.carried.push(*entry(&mut row.carried.clone(), *place) / self.force);
+            self.metric.push(weights[group(*place)]);
+        }
+        self.shift.push(row.shift / self.force);
+        self.list.push(site);
+    }
+
+    /// Reactions of the problem as a list of all rows.
+    pub fn gathered(&self, reactions: &[Padded]) -> Vec<f64> {
+        let mut list = Vec::with_capacity(self.rows);
+        for (site, r) in self.list.iter().zip(reactions) {
+            list.extend(site.places[..site.rows].iter().map(|place| *entry(&mut r.clone(), *place) / self.force));
+        }
+        list
+    }
+
+    /// The inverse of [`Sites::gathered`].
+    pub fn scattered(&self, list: &[f64]) -> Vec<Padded> {
+        let one = |site: &Site| {
+            let mut r = Padded::zero();
+            let own = site.places.iter().zip(site.part(list));
+            own.for_each(|(place, value)| *entry(&mut r, *place) = value * self.force);
+            r
+        };
+        self.list.iter().map(one).collect()
+    }
+}
