@@ -12,7 +12,7 @@ use dem_core::contact::{BondFlow, LocalSolve};
 use dem_core::detection::pairs_within;
 use dem_core::dim::{Dim, Vect};
 use dem_core::saved::{Mismatch, Reader};
-use dem_core::solver::{GaussSeidelSettings, NewtonSettings, SolverSettings, Start, StiffnessRatio};
+use dem_core::solver::{GaussSeidelSettings, SolverSettings, StagedSettings, Stages, Start, StiffnessRatio};
 use dem_core::world::{Restitution, Settings, World};
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -400,13 +400,15 @@ fn solver(solver: &scene::Solver) -> SolverSettings {
             max_sweeps: gs.max_sweeps,
             acceleration: gs.acceleration,
         }),
-        SolverKind::Newton(newton) => SolverSettings::Newton(newton_settings(newton, tolerance, accept)),
-        SolverKind::Auto(newton) => SolverSettings::Auto(newton_settings(newton, tolerance, accept)),
+        SolverKind::Auto(newton) => SolverSettings::Staged(staged(newton, Stages::All, tolerance, accept)),
+        SolverKind::Newton(newton) => SolverSettings::Staged(staged(newton, Stages::Newton, tolerance, accept)),
+        SolverKind::Interior(newton) => SolverSettings::Staged(staged(newton, Stages::Interior, tolerance, accept)),
     }
 }
 
-fn newton_settings(newton: &scene::Newton, tolerance: f64, accept: f64) -> NewtonSettings {
-    NewtonSettings {
+fn staged(newton: &scene::Newton, stages: Stages, tolerance: f64, accept: f64) -> StagedSettings {
+    StagedSettings {
+        stages,
         tolerance,
         accept,
         load_tolerance: newton.load_tolerance,

@@ -17,7 +17,7 @@ pub fn expected(scene: &Scene, grains: usize) -> u64 {
     let bonded = scene.bonds.as_ref().is_some_and(|bonds| bonds.bear());
     let contacts = contacts_per_grain(scene) * grains as f64;
     let newton = match scene.solver.kind {
-        SolverKind::Newton(_) => true,
+        SolverKind::Newton(_) | SolverKind::Interior(_) => true,
         SolverKind::Auto(_) => bonded,
         SolverKind::GaussSeidel(_) => false,
     };

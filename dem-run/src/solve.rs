@@ -7,7 +7,7 @@ use dem_core::contact::LocalSolve;
 use dem_core::problem::assembled::Assembled;
 use dem_core::solver::assembled::gauss_seidel;
 use dem_core::solver::{
-    GaussSeidelSettings, Newton, NewtonSettings, SolveReport, SolveStatus, Start, StiffnessRatio, Work,
+    GaussSeidelSettings, SolveReport, SolveStatus, Staged, StagedSettings, Stages, Start, StiffnessRatio, Work,
 };
 use serde::Serialize;
 
@@ -26,6 +26,8 @@ pub enum Solver {
     GaussSeidel,
     /// Semismooth Newton on the augmented Lagrangian, with a dense factorisation of W: for some thousand rows.
     Newton,
+    /// The interior-point method, with a sparse factorisation.
+    Interior,
 }
 
 /// What is solved, and how.
@@ -140,9 +142,11 @@ fn iterate(problem: &mut Assembled, options: &SolveOptions) -> SolveReport {
             let settings = GaussSeidelSettings { local, tolerance, accept, max_sweeps, acceleration };
             gauss_seidel(problem, &settings)
         }
-        Solver::Newton => {
+        Solver::Newton | Solver::Interior => {
+            let stages = if options.solver == Solver::Newton { Stages::Newton } else { Stages::Interior };
             let scene = scene::Newton::default();
-            let settings = NewtonSettings {
+            let settings = StagedSettings {
+                stages,
                 tolerance,
                 accept: tolerance,
                 // a file tells no load: only the residual counts
@@ -151,7 +155,7 @@ fn iterate(problem: &mut Assembled, options: &SolveOptions) -> SolveReport {
                 stiffness: StiffnessRatio { tangential: scene.tangential_stiffness, rolling: scene.rolling_stiffness },
                 max_iterations: options.max_iterations.unwrap_or(scene.max_iterations),
             };
-            Newton::new(settings).solve_assembled(problem)
+            Staged::new(settings).solve_assembled(problem)
         }
     }
 }
@@ -177,6 +181,7 @@ impl fmt::Display for Solved {
         let solver = match self.solver {
             Solver::GaussSeidel => "Gauss–Seidel",
             Solver::Newton => "Newton",
+            Solver::Interior => "the interior-point method",
         };
         writeln!(f, "status           {status} by {solver}, {}", self.took())?;
         writeln!(f, "residual         {:.2e} (tolerance {:.0e})", self.residual, self.tolerance)?;

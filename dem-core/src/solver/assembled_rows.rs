@@ -6,8 +6,8 @@ use super::rows::{Row, Rows, StiffnessRatio, places};
 use super::solvable::Solvable;
 use crate::contact::{Local, LocalSolve, Padded, Weights};
 use crate::problem::assembled::{Assembled, BlockMatrix};
-use crate::solver::assembled::{Sites, gauss_seidel};
-use crate::solver::{GaussSeidelSettings, SolveReport};
+use super::assembled::{Sites, gauss_seidel};
+use super::{GaussSeidelSettings, SolveReport};
 
 /// The columns of L with W = L Lᵀ, up to what rounding leaves of the diagonal.
 fn root(matrix: &BlockMatrix) -> Vec<Vec<f64>> {
@@ -55,24 +55,34 @@ impl Assembled {
 
 impl Solvable for Assembled {
     fn rows(&self, kappa: f64, ratio: StiffnessRatio) -> Rows {
+        let (mut out, size) = (self.laws(kappa, ratio), self.parts().rows.count());
+        let columns = root(&self.parts().matrix);
+        let rank = columns.len();
+        (out.unknowns, out.free) = (rank, vec![0.0; rank]);
+        for (c, row) in out.list.iter_mut().enumerate() {
+            (row.count, row.start) = ([rank, 0], c * size * rank);
+        }
+        out.coefficients = (0..self.r.len()).flat_map(|row| columns.iter().map(move |l| l[row])).collect();
+        out
+    }
+
+    fn laws(&self, kappa: f64, ratio: StiffnessRatio) -> Rows {
         let parts = self.parts();
         let (rows, size) = (parts.rows, parts.rows.count());
-        let columns = root(&parts.matrix);
-        let rank = columns.len();
         let normal: f64 = (0..self.len()).map(|c| parts.matrix.diagonal(c)[0]).sum();
         let soft = normal / (self.len().max(1) as f64 * kappa);
         let weights = ratio.weights(soft);
         // without the shift, u = W r + q
         let mut shifts = vec![0.0; self.r.len()];
         (0..self.len()).for_each(|c| shifts[c * size] = parts.shift[c]);
-        let mut out = Rows { unknowns: rank, free: vec![0.0; rank], applied: parts.applied, ..Rows::default() };
+        let mut out = Rows { applied: parts.applied, ..Rows::default() };
         for c in 0..self.len() {
             let mut given = parts.q[c * size..(c + 1) * size].to_vec();
             parts.matrix.multiply_row(c, &shifts, &mut given);
             out.list.push(Row {
                 at: [0, 0],
-                count: [rank, 0],
-                start: c * size * rank,
+                count: [0, 0],
+                start: 0,
                 rows: places(rows.tangents, rows.moments),
                 cone: self.cone(c),
                 associated: parts.associated[c],
@@ -83,13 +93,11 @@ impl Solvable for Assembled {
                 // the compliance of elastic bonds is inside W and q
                 compliance: Weights::default(),
                 carried: Padded::zero(),
-                lag: None,
                 normal: parts.matrix.diagonal(c)[0],
                 // the trace of the block
                 size: parts.matrix.diagonal(c).iter().step_by(size + 1).sum(),
             });
         }
-        out.coefficients = (0..self.r.len()).flat_map(|row| columns.iter().map(move |l| l[row])).collect();
         out
     }
 
@@ -119,13 +127,9 @@ impl Solvable for Assembled {
         }
     }
 
-    fn forget_reactions(&mut self) {
-        self.r.fill(0.0);
-    }
-
     fn forget_what_is_not_finite(&mut self) {
         if !self.r.iter().all(|r| r.is_finite()) {
-            self.forget_reactions();
+            self.r.fill(0.0);
         }
     }
 

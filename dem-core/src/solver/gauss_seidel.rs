@@ -6,7 +6,7 @@
 //! Anderson's acceleration of bursts of sweeps, an option, takes ten times fewer of them where bonds abound.
 
 use super::anderson::Anderson;
-use super::{ContactSolver, SolveReport, SolveStatus, Work};
+use super::{ContactSolver, Route, SolveReport, SolveStatus, Work};
 use crate::contact::{Law, LocalSolve};
 use crate::dim::{Dim, Vect};
 use crate::problem::residual::residual;
@@ -34,7 +34,6 @@ const LOOK: u64 = 4;
 /// Plain sweeps before the acceleration begins: easy problems need no more.
 const PLAIN: u64 = 32;
 /// Steps for the acceleration to remember that serve well.
-pub(super) const MEMORY: usize = 8;
 
 /// Non-linear Gauss–Seidel on node velocities.
 #[derive(Clone, Copy, Debug)]
@@ -200,7 +199,8 @@ pub(super) fn iterate(problem: &mut impl Sweepable, settings: &GaussSeidelSettin
         _ => accelerated(problem, settings),
     };
     let status = SolveStatus::of(residual, settings.tolerance, settings.accept);
-    SolveReport { status, work: Work { sweeps, ..Work::default() }, residual, load_error: None }
+    let route = Route::Sweeps;
+    SolveReport { status, route, work: Work { sweeps, ..Work::default() }, residual, load_error: None }
 }
 
 impl<D: Dim> ContactSolver<D> for GaussSeidel {

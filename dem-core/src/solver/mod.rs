@@ -2,18 +2,20 @@
 
 mod anderson;
 pub mod assembled;
-mod auto;
-mod gauss_seidel;
 mod assembled_rows;
+mod extrapolation;
+mod gauss_seidel;
 mod interior;
 mod newton;
+mod rest;
 mod rows;
 mod solvable;
+mod stages;
+mod stall;
 
-pub use auto::Auto;
 pub use gauss_seidel::{GaussSeidel, GaussSeidelSettings, sweep};
-pub use newton::{Newton, NewtonSettings, Start};
 pub use rows::StiffnessRatio;
+pub use stages::{Route, Staged, StagedSettings, Stages, Start};
 
 use crate::dim::Dim;
 use crate::problem::ContactProblem;
@@ -80,6 +82,8 @@ impl Add for Work {
 pub struct SolveReport {
     /// How it ended.
     pub status: SolveStatus,
+    /// The method that brought the solution.
+    pub route: Route,
     /// What it took.
     pub work: Work,
     /// Residual reached (–), see [`crate::problem::residual`].
@@ -116,10 +120,8 @@ pub trait ContactSolver<D: Dim>: Send {
 pub enum SolverSettings {
     /// Non-linear Gauss–Seidel, the paper's method of successive equilibria.
     GaussSeidel(GaussSeidelSettings),
-    /// Augmented-Lagrangian semismooth Newton with a sparse factorisation.
-    Newton(NewtonSettings),
-    /// Newton for bonds, Gauss–Seidel for dry contacts.
-    Auto(NewtonSettings),
+    /// The methods of [`Staged`], one after the other.
+    Staged(StagedSettings),
 }
 
 impl SolverSettings {
@@ -127,7 +129,7 @@ impl SolverSettings {
     pub fn accept(&self) -> f64 {
         match self {
             Self::GaussSeidel(settings) => settings.accept,
-            Self::Newton(settings) | Self::Auto(settings) => settings.accept,
+            Self::Staged(settings) => settings.accept,
         }
     }
 
@@ -135,7 +137,7 @@ impl SolverSettings {
     pub fn tolerance(&self) -> f64 {
         match self {
             Self::GaussSeidel(settings) => settings.tolerance,
-            Self::Newton(settings) | Self::Auto(settings) => settings.tolerance,
+            Self::Staged(settings) => settings.tolerance,
         }
     }
 
@@ -143,8 +145,7 @@ impl SolverSettings {
     pub fn build<D: Dim>(&self) -> Box<dyn ContactSolver<D>> {
         match *self {
             Self::GaussSeidel(settings) => Box::new(GaussSeidel::new(settings)),
-            Self::Newton(settings) => Box::new(Newton::new(settings)),
-            Self::Auto(settings) => Box::new(Auto::new(settings)),
+            Self::Staged(settings) => Box::new(Staged::new(settings)),
         }
     }
 }

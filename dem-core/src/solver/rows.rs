@@ -6,7 +6,7 @@
 //! u = Hᵀ v = Σ h y + u₀, where u₀ comes from nodes whose velocity is given.
 
 use crate::contact::{Arms, Cone, Law, PADDED, Padded, Weights};
-use crate::dim::{Dim, Moments, Vect, tangential_rows};
+use crate::dim::{Dim, Vect, tangential_rows};
 use crate::problem::{Contact, ContactProblem, Link, Nodes, Visitor};
 use nalgebra::SMatrix;
 
@@ -67,8 +67,6 @@ pub(super) struct Row {
     pub compliance: Weights,
     /// Reaction that an elastic bond carried when the step began (N s).
     pub carried: Padded,
-    /// What is added to u_n in place of μ‖u_t‖ where the law is taken as associated for a round.
-    pub lag: Option<f64>,
     /// Normal entry of W (1/kg).
     pub normal: f64,
     /// Σ h² over all coefficients: how much a unit of velocity and of reaction weigh (1/kg).
@@ -85,15 +83,7 @@ impl Row {
     /// q = u − r/ρ − C r₀, the linear form of the corrector for reactions without the shift at the velocity `u`.
     #[inline]
     pub fn form(&self, u: &Padded) -> Padded {
-        let mut q = *u - self.weights.times(&self.multiplier) - self.compliance.times(&self.carried);
-        q.n += self.lag.unwrap_or(0.0);
-        q
-    }
-
-    /// Whether the corrector is the gradient of a convex function.
-    #[inline]
-    pub fn convex(&self) -> bool {
-        self.associated || self.lag.is_some()
+        *u - self.weights.times(&self.multiplier) - self.compliance.times(&self.carried)
     }
 }
 
@@ -108,8 +98,6 @@ pub(super) struct Rows {
     pub free: Vec<f64>,
     /// Norm of the applied impulses (N s).
     pub applied: f64,
-    /// Whether a solution that leaves bonds at their limit moves nothing ([`ContactProblem::cascades`]).
-    pub cascades: bool,
 }
 
 /// First unknown of each node.
@@ -202,7 +190,7 @@ impl Rows {
         for (k, (v, w)) in problem.free.iter().enumerate() {
             write_scaled(&problem.nodes, &unknowns, k, v, w, &mut free);
         }
-        let rows = Rows { unknowns: unknowns.total, free, applied: problem.applied / unknowns.unit, cascades: problem.cascades, ..Rows::default() };
+        let rows = Rows { unknowns: unknowns.total, free, applied: problem.applied / unknowns.unit, ..Rows::default() };
         let mut still = problem.nodes.clone();
         for (node, free) in still.all.iter_mut().zip(problem.free.iter()) {
             let moves = node.inverse_mass > 0.0;
@@ -216,16 +204,6 @@ impl Rows {
         let scale = mean(normal.iter().sum()) / (soft * kappa);
         rows.soften(scale);
         rows
-    }
-
-    /// Whether most contacts follow Coulomb's law, which is not the gradient of a convex function.
-    pub fn mostly_dry(&self) -> bool {
-        2 * self.dry() > self.list.len()
-    }
-
-    /// Number of contacts that follow Coulomb's law.
-    pub fn dry(&self) -> usize {
-        self.list.iter().filter(|row| !row.associated).count()
     }
 
     /// Whether a contact has rows in two tangential directions.
@@ -256,36 +234,6 @@ impl Rows {
     /// Begin the next proximal step at these reactions.
     pub fn move_multipliers(&mut self, reactions: &[Padded]) {
         self.list.iter_mut().zip(reactions).for_each(|(row, r)| row.multiplier = *r);
-    }
-
-    /// Hold these terms of dry friction, one for each contact.
-    pub fn hold(&mut self, terms: &[f64]) {
-        for (row, term) in self.list.iter_mut().zip(terms).filter(|(row, _)| !row.associated) {
-            row.lag = Some(*term);
-        }
-    }
-
-    /// Let the term of dry friction follow the slips at the velocities of `y` by a `share` of their change: wholly where
-    /// none was held.
-    pub fn follow_slips(&mut self, y: &[f64], reactions: &[Padded], share: f64) {
-        for (k, r) in reactions.iter().enumerate() {
-            if !self.list[k].associated {
-                let slip = self.slip(&self.list[k], y, r);
-                let lag = &mut self.list[k].lag;
-                *lag = Some(lag.map_or(slip, |last| last + share * (slip - last)));
-            }
-        }
-    }
-
-    /// Whether a contact resists twist.
-    pub fn twist(&self) -> bool {
-        self.list.iter().any(|row| row.rows.contains(&TWIST))
-    }
-
-    /// μ‖s_t‖ + ν‖s_m‖ + ξ|s_τ| with the slip s = u + C (r − r₀) of the law of contact `row`.
-    pub fn slip(&self, row: &Row, y: &[f64], r: &Padded) -> f64 {
-        let slip = self.velocity(row, y) + row.compliance.times(&(*r - row.carried));
-        row.cone.mu * slip.t.norm() + row.cone.nu * slip.m.bending() + row.cone.xi * slip.m.twist()
     }
 
     /// H̃ᵀ y for one contact.
@@ -320,6 +268,19 @@ impl Rows {
             }
         }
     }
+}
+
+/// By how much the net impulses on the bodies differ between two sets of reactions, over those of the second.
+pub(super) fn net_change(rows: &Rows, from: &[Padded], to: &[Padded]) -> f64 {
+    let mut change = vec![0.0; rows.unknowns];
+    let mut total = vec![0.0; rows.unknowns];
+    for ((row, from), to) in rows.list.iter().zip(from).zip(to) {
+        rows.apply(row, &(*to - *from), &mut change);
+        rows.apply(row, to, &mut total);
+    }
+    let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let (change, total) = (norm(&change), norm(&total));
+    if change == 0.0 { 0.0 } else { change / total }
 }
 
 /// The unit of mass (kg), 1 or 2: the heaviest grain has an even binary exponent in it, and roots of masses that are scaled by
@@ -449,7 +410,6 @@ impl<D: Dim> Visitor<D> for Flatten<'_, D> {
             multiplier: c.link.in_frame(&c.r) * (1.0 / unit),
             compliance: c.law.compliance() * unit,
             carried: c.link.in_frame(&c.law.carried()) * (1.0 / unit),
-            lag: None,
             normal,
             size: table.rows[..rows.len()].iter().flat_map(|row| &row[..table.width]).map(|h| h * h).sum(),
         });

@@ -6,12 +6,16 @@ use crate::dim::{Dim, Vect};
 use crate::problem::residual::residual;
 use crate::problem::assembled::BlockMatrix;
 use crate::problem::{ContactProblem, Group};
-use crate::solver::{ContactSolver, GaussSeidel, GaussSeidelSettings, SolveReport, sweep};
+use super::{ContactSolver, GaussSeidel, GaussSeidelSettings, SolveReport, sweep};
 
 /// A problem that can be put into rows over scaled unknowns, swept and measured.
 pub(super) trait Solvable {
     /// The problem as rows; ρ is `kappa` over the mean normal entry of W.
     fn rows(&self, kappa: f64, ratio: StiffnessRatio) -> Rows;
+    /// The same, where a matrix stands for the coefficients without these.
+    fn laws(&self, kappa: f64, ratio: StiffnessRatio) -> Rows {
+        self.rows(kappa, ratio)
+    }
     /// Its matrix, where there is one.
     fn matrix(&self) -> Option<&BlockMatrix> {
         None
@@ -24,8 +28,6 @@ pub(super) trait Solvable {
     fn swept(&mut self, sweeps: usize) -> Vec<Padded>;
     /// Take over reactions in the unit of the rows, and the velocities that they give.
     fn write_back(&mut self, reactions: &[Padded]);
-    /// Set the reactions to zero.
-    fn forget_reactions(&mut self);
     /// Set the reactions to zero if one of them is not finite.
     fn forget_what_is_not_finite(&mut self);
     /// Gauss–Seidel from the reactions at hand.
@@ -75,10 +77,6 @@ impl<D: Dim> Solvable for ContactProblem<D> {
         group(&mut self.dry, &reactions[elastic..dry], unit);
         group(&mut self.frictionless, &reactions[dry..], unit);
         self.velocities_from_reactions();
-    }
-
-    fn forget_reactions(&mut self) {
-        self.forget_reactions();
     }
 
     fn forget_what_is_not_finite(&mut self) {

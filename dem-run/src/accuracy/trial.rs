@@ -24,13 +24,15 @@ const START_SHARE: f64 = 0.1;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum SolverName {
-    /// Newton for bonds, Gauss–Seidel for dry contacts.
+    /// One method after the other, until one solves the problem.
     Auto,
     /// Non-linear Gauss–Seidel.
     #[value(alias = "gauss_seidel")]
     GaussSeidel,
-    /// Semismooth Newton.
+    /// Semismooth Newton, then the interior-point method.
     Newton,
+    /// The interior-point method.
+    Interior,
 }
 
 impl SolverName {
@@ -41,19 +43,21 @@ impl SolverName {
             Self::Auto => "auto",
             Self::GaussSeidel => "gauss-seidel",
             Self::Newton => "newton",
+            Self::Interior => "interior",
         }
     }
 
     fn kind(self, scene: &SolverKind) -> SolverKind {
+        let newton = match scene {
+            SolverKind::Auto(newton) | SolverKind::Newton(newton) | SolverKind::Interior(newton) => newton.clone(),
+            SolverKind::GaussSeidel(_) => Newton::default(),
+        };
         match (self, scene) {
-            (Self::Auto, SolverKind::Auto(_))
-            | (Self::GaussSeidel, SolverKind::GaussSeidel(_))
-            | (Self::Newton, SolverKind::Newton(_)) => scene.clone(),
-            (Self::Auto, SolverKind::Newton(newton)) => SolverKind::Auto(newton.clone()),
-            (Self::Newton, SolverKind::Auto(newton)) => SolverKind::Newton(newton.clone()),
-            (Self::Auto, _) => SolverKind::Auto(Newton::default()),
+            (Self::Auto, _) => SolverKind::Auto(newton),
+            (Self::Newton, _) => SolverKind::Newton(newton),
+            (Self::Interior, _) => SolverKind::Interior(newton),
+            (Self::GaussSeidel, SolverKind::GaussSeidel(_)) => scene.clone(),
             (Self::GaussSeidel, _) => SolverKind::GaussSeidel(GaussSeidel::default()),
-            (Self::Newton, _) => SolverKind::Newton(Newton::default()),
         }
     }
 }

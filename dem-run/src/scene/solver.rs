@@ -29,12 +29,16 @@ pub struct Solver {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SolverKind {
-    /// Newton for bonds, Gauss–Seidel for dry contacts, and Newton where that does not do.
+    /// One method after the other, until one solves the problem: Gauss–Seidel where all contacts are dry, Newton from the active set of the
+    /// last step where there are bonds, the interior-point method.
     Auto(Newton),
     /// Non-linear Gauss–Seidel: one contact after the other, until none changes.
     GaussSeidel(GaussSeidel),
-    /// Semismooth Newton on the augmented Lagrangian, with a sparse factorisation: all contacts at once.
+    /// Semismooth Newton on the augmented Lagrangian from the active set of the last step, with a sparse factorisation: all contacts at
+    /// once; the interior-point method where that fails.
     Newton(Newton),
+    /// The interior-point method in every step.
+    Interior(Newton),
 }
 
 /// Non-linear Gauss–Seidel.
@@ -50,7 +54,7 @@ pub struct GaussSeidel {
     pub acceleration: usize,
 }
 
-/// Semismooth Newton on the augmented Lagrangian.
+/// Settings of the methods that solve for all contacts at once.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Newton {
@@ -62,7 +66,7 @@ pub struct Newton {
     pub tangential_stiffness: f64,
     /// Bending stiffness over the normal one times the square of the mean diameter, in the metric of the stiff limit.
     pub rolling_stiffness: f64,
-    /// Newton iterations after which a solve gives up.
+    /// Iterations of one of these methods after which it gives up.
     pub max_iterations: u64,
 }
 

@@ -16,10 +16,11 @@ mod local;
 mod sites;
 
 use crate::contact::Padded;
+use super::stall::Stall;
 use crate::linear::{Lu, Tree};
 use crate::solver::rows::Rows;
 use crate::solver::solvable::Solvable;
-use cones::{Point, correction, dot, eigenvalues, moved, product, reach};
+use cones::{Point, correction, dot, moved, product, reach};
 use coupling::Coupling;
 use local::{State, follow, gap, invert, opened, solve, yield_to};
 use sites::Sites;
@@ -39,6 +40,8 @@ const SHORT: f64 = 0.5;
 const TO_THE_MIDDLE: [f64; 2] = [0.2, 0.7];
 /// How near the boundary a step may go.
 const NEAR: f64 = 0.99;
+/// Iterations in which the residual or the gap must halve.
+const PATIENCE: u64 = 8;
 /// How far inside its cone a start is moved, over the mean reaction.
 const INSIDE: f64 = 0.1;
 
@@ -47,9 +50,9 @@ const INSIDE: f64 = 0.1;
 pub(super) struct Found {
     /// Reactions without the shift, in the unit of the rows.
     pub reactions: Vec<Padded>,
-    /// Their residual (–), and by how much the net impulses changed in the last iteration, over themselves.
+    /// Their residual (–), and their load error (–).
     pub residual: f64,
-    pub change: f64,
+    pub load_error: f64,
     /// Iterations made.
     pub iterations: u64,
 }
@@ -65,14 +68,14 @@ pub(super) struct Interior {
 }
 
 impl Interior {
-    /// Follow the path from these reactions, moved inside their cones, or from a cold start, to where the residual is at most
-    /// `tolerance`. The metric is anchored at the multipliers of `rows`. The problem holds the best reactions on the way.
+    /// Follow the path from these reactions, moved inside their cones, or from a cold start, to where the residual and the load error
+    /// are within their tolerances. The metric is anchored at the multipliers of `rows`. The problem holds the best reactions on the way.
     pub fn solve(
         &mut self,
         problem: &mut impl Solvable,
         rows: &Rows,
         start: Option<&[Padded]>,
-        tolerance: f64,
+        (tolerance, load_tolerance): (f64, f64),
         most: u64,
     ) -> Option<Found> {
         let anchor: Vec<Padded> = rows.list.iter().map(|row| row.multiplier).collect();
@@ -90,15 +93,20 @@ impl Interior {
             None => cold(&sites),
         };
         let mut best: Option<Found> = None;
-        let mut change = 1.0;
+        let (mut change, mut last) = (1.0, f64::INFINITY);
+        let mut stall = Stall::after(PATIENCE, 0.5);
         for iterations in 0..=most {
             let reactions = sites.scattered(&at.r);
             problem.write_back(&reactions);
             let residual = problem.residual();
+            // what is left of the net impulses shrinks with the residual
+            let load_error = change * (residual / last).min(1.0);
+            last = residual;
             if best.as_ref().is_none_or(|best| residual < best.residual) {
-                best = Some(Found { reactions, residual, change, iterations });
+                best = Some(Found { reactions, residual, load_error, iterations });
             }
-            if residual <= tolerance || iterations == most || !residual.is_finite() {
+            let arrived = residual <= tolerance && load_error <= load_tolerance || residual == 0.0;
+            if arrived || iterations == most || stall.at(residual.min(gap(&at))) {
                 break;
             }
             let weight = coupling.velocity(&sites, &at.r);
@@ -111,12 +119,18 @@ impl Interior {
             if !coupling.factorise(&sites, &self.inverses, tree, &mut self.lu) {
                 break;
             }
-            let system = System { sites: &sites, coupling: &coupling, at: &at, lack, compliance: &compliance, inverses: &self.inverses, tree, lu: &self.lu };
+            let system = System {
+                sites: &sites,
+                coupling: &coupling,
+                at: &at,
+                lack,
+                compliance: &compliance,
+                inverses: &self.inverses,
+                tree,
+                lu: &self.lu,
+            };
             let (step, far) = direction(&system);
             let length = (NEAR * far).min(1.0);
-            if std::env::var("IPM").is_ok() {
-                eprintln!("{iterations} gap {:.2e} res {residual:.2e} lack {:.1e} far {far:.2e}", gap(&at), norm(&system.lack));
-            }
             let moving = coupling.velocity(&sites, &step.r);
             let square = |r: &[f64], u: &[f64]| r.iter().zip(u).map(|(r, u)| r * u).sum::<f64>().abs();
             change = length * (square(&step.r, &moving) / square(&at.r, &weight).max(f64::MIN_POSITIVE)).sqrt();
@@ -230,10 +244,6 @@ fn direction(system: &System) -> (State, f64) {
     (step, far)
 }
 
-fn norm(x: &[f64]) -> f64 {
-    x.iter().map(|x| x * x).sum::<f64>().sqrt()
-}
-
 /// u + C (r − r₀) − Σ Bᵀ z, with the metric among the compliances.
 fn lack(sites: &Sites, weight: &[f64], at: &State, anchor: &[f64]) -> Vec<f64> {
     let opened = opened(sites, &at.z);
@@ -298,6 +308,5 @@ fn warm(sites: &Sites, coupling: &Coupling, reactions: &[f64]) -> State {
             z[c][0] = INSIDE * mean + if cone.tangents == 0 { z[c][0].max(0.0) } else { z[c][1].hypot(z[c][2]) };
         }
     }
-    let _ = eigenvalues;
     State { x: primal(sites, &r), r, z }
 }

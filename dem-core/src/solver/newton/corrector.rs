@@ -22,7 +22,7 @@ pub(super) fn correct(row: &Row, u: &Padded) -> Padded {
     if cone.contains(&Local { n: stuck.n + shift, ..stuck }) {
         return stuck;
     }
-    let mut r = if row.convex() {
+    let mut r = if row.associated {
         q.n -= w.n * shift;
         cone.minimise(w, q)
     } else {
@@ -58,19 +58,19 @@ pub(super) fn operator(row: &Row, u: &Padded, r: &Padded, symmetric: bool) -> Op
     let mut stiffness = w.n;
     if let Some((direction, _)) = slip {
         drag.fixed_rows_mut::<2>(1).copy_from(&(direction * -cone.mu));
-        stiffness += if row.convex() { cone.mu * cone.mu * w.t } else { 0.0 };
+        stiffness += if row.associated { cone.mu * cone.mu * w.t } else { 0.0 };
     }
     if let Some((direction, _)) = bend {
         drag.fixed_rows_mut::<2>(3).copy_from(&(direction * -cone.nu));
-        stiffness += if row.convex() { cone.nu * cone.nu * w.m } else { 0.0 };
+        stiffness += if row.associated { cone.nu * cone.nu * w.m } else { 0.0 };
     }
     if twists {
         drag[TWIST] = -cone.xi.copysign(q.m[2]);
-        stiffness += if row.convex() { cone.xi * cone.xi * w.w } else { 0.0 };
+        stiffness += if row.associated { cone.xi * cone.xi * w.w } else { 0.0 };
     } else {
         a[(TWIST, TWIST)] = 1.0 / w.w;
     }
-    if row.convex() {
+    if row.associated {
         a += drag * drag.transpose() / stiffness;
     } else if symmetric {
         a[(0, 0)] += 1.0 / w.n;

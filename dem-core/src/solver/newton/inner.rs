@@ -4,8 +4,8 @@ use super::Newton;
 use super::corrector::{correct, operator};
 use super::guess::Guess;
 use super::krylov::gmres;
-use super::patience::Stall;
-use crate::solver::rows::{Operator, Row, Rows};
+use crate::solver::stall::Stall;
+use crate::solver::rows::{Operator, Rows};
 use crate::contact::Padded;
 
 /// GMRES iterations beyond those of a fresh factor that a kept one may cost in all before it is renewed; in space, where
@@ -16,16 +16,12 @@ const WASTE_IN_SPACE: usize = 12;
 const TRUST: f64 = 1e-3;
 /// Linear solves by GMRES after one that the factor alone was trusted with and failed.
 const DISTRUST: usize = 100;
-/// What a linear solve may leave of F, over what is small enough: where one may suffice, and where it only has to find the
-/// active set.
+/// What a linear solve may leave of F, over what is small enough.
 const SMALL: f64 = 0.1;
-const ROUGH: f64 = 1e5;
 /// Tolerance of a linear solve: the least and the largest where one may suffice, and where another must follow.
 const TIGHT: f64 = 1e-12;
 const FAIR: f64 = 1e-3;
 const LOOSE: f64 = 1e-2;
-/// The same where only the size of the solution is asked for.
-const ROUGHLY: f64 = 0.03;
 /// What a linear solve with a fresh factor may leave before its step is none, and how far F may grow.
 const LOST: f64 = 0.1;
 const DIVERGED: f64 = 1e6;
@@ -80,7 +76,6 @@ impl Newton {
         most: u64,
     ) -> (u64, bool) {
         let mut stall = Stall::after(patience, 0.9);
-        let begun = state.norm;
         for iteration in 0..most {
             let guessed = guess.filter(|_| iteration == 0);
             let target = self.target(rows, state);
@@ -91,11 +86,8 @@ impl Newton {
             let Some(direction) = self.direction(rows, state, guessed, target) else { return (iteration + 1, false) };
             let before = direction.norm;
             advance(rows, state, &direction.step, guessed.is_some());
-            if guessed.is_some_and(|guess| guess.sticks) && state.norm > begun {
-                return (1, false);
-            }
             // a factor that was trusted blindly has to earn it
-            let kept = self.kept();
+            let kept = &mut self.kept;
             if kept.trusted && state.norm > (TRUST * before).max(target) {
                 kept.trusted = false;
                 kept.distrust = DISTRUST;
@@ -121,40 +113,15 @@ impl Newton {
         wanted.max(4.0 * f64::EPSILON * rounding.sqrt())
     }
 
-    /// The load error of these reactions, which are also the multipliers of `rows`: how far the velocities will move in the
-    /// next proximal round, over how far they are from the free ones. A linear solve to a few digits tells.
-    pub(super) fn load_error_ahead(&mut self, rows: &Rows, reactions: &[Padded]) -> Option<f64> {
-        let guess = Guess::of(reactions.to_vec());
-        let begun = Iterate::from_reactions(rows, reactions);
-        let (right, points) = linearise(rows, &begun, Some(&guess));
-        let exact = operators(rows, &points, false);
-        let kept = self.kept();
-        for fresh in [false, true] {
-            if fresh && !kept.factor.renew(rows, &operators(rows, &points, true)) {
-                kept.renew = true;
-                return None;
-            }
-            let apply = |x: &[f64], out: &mut [f64]| multiply(rows, &exact, x, out);
-            let most = if fresh { MOST_KRYLOV } else { MOST_KEPT_IN_SPACE };
-            let (step, report) = gmres(&right, ROUGHLY, most, !fresh, apply, |x| kept.factor.solve(x));
-            if report.residual <= ROUGHLY {
-                return Some(norm2(&step).sqrt() / distance(&begun.y, &rows.free));
-            }
-        }
-        None
-    }
-
     /// The Newton direction −J⁻¹ F, by the factor at hand or GMRES on it, renewed if it serves badly.
     fn direction(&mut self, rows: &Rows, state: &Iterate, guess: Option<&Guess>, target: f64) -> Option<Direction> {
         let (mut right, points) = linearise(rows, state, guess);
         right.iter_mut().for_each(|f| *f = -*f);
         let norm = norm2(&right).sqrt();
-        // in space slips turn with every iteration, and no linear solve can foresee by how much
-        let left = if guess.is_some() && self.slips.any() { ROUGH } else { SMALL };
         let in_space = rows.in_space();
-        let tolerance = if in_space && guess.is_none() { LOOSE } else { (left * target / norm).clamp(TIGHT, FAIR) };
+        let tolerance = if in_space && guess.is_none() { LOOSE } else { (SMALL * target / norm).clamp(TIGHT, FAIR) };
         let (most, waste) = if in_space { (MOST_KEPT_IN_SPACE, WASTE_IN_SPACE) } else { (MOST_KRYLOV, WASTE) };
-        let kept = self.kept();
+        let kept = &mut self.kept;
         let serves = kept.serves(rows.unknowns);
         if serves && kept.trusted {
             kept.factor.solve(&mut right);
@@ -162,7 +129,7 @@ impl Newton {
         }
         let exact = operators(rows, &points, false);
         for fresh in [!serves, true] {
-            if fresh && !kept.factor.renew(rows, &operators(rows, &points, true)) {
+            if fresh && kept.factor.made >= self.most_made || fresh && !kept.factor.renew(rows, &operators(rows, &points, true)) {
                 return None;
             }
             let apply = |x: &[f64], out: &mut [f64]| multiply(rows, &exact, x, out);
@@ -244,7 +211,7 @@ fn advance(rows: &Rows, state: &mut Iterate, direction: &[f64], whole: bool) {
         Iterate::at(rows, y)
     };
     let slope = |at: &Iterate| at.gradient.iter().zip(direction).map(|(f, d)| f * d).sum::<f64>();
-    let convex = rows.list.iter().all(Row::convex);
+    let convex = rows.list.iter().all(|row| row.associated);
     let full = step(1.0);
     let start = slope(state);
     let good = if convex { slope(&full).abs() <= 0.5 * start.abs() } else { full.norm <= 0.9 * state.norm };

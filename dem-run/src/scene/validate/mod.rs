@@ -195,8 +195,12 @@ fn solver(report: &mut Report, scene: &Scene) {
     }
     let limit = match &solver.kind {
         SolverKind::GaussSeidel(gs) => ("solver.kind.gauss_seidel.max_sweeps".to_string(), gs.max_sweeps),
-        SolverKind::Newton(newton) | SolverKind::Auto(newton) => {
-            let kind = if matches!(solver.kind, SolverKind::Auto(_)) { "auto" } else { "newton" };
+        SolverKind::Newton(newton) | SolverKind::Interior(newton) | SolverKind::Auto(newton) => {
+            let kind = match solver.kind {
+                SolverKind::Auto(_) => "auto",
+                SolverKind::Interior(_) => "interior",
+                _ => "newton",
+            };
             let path = |name: &str| format!("solver.kind.{kind}.{name}");
             report.positive(path("load_tolerance"), newton.load_tolerance, "no unit");
             report.positive(path("tangential_stiffness"), newton.tangential_stiffness, "no unit");

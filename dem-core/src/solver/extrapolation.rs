@@ -6,8 +6,8 @@
 //! reaction leaves the cone. What is open or slips does not, and so the distance to closing or sticking is predicted with the
 //! reactions. And from time to time a solve is compared with what was predicted.
 
-use super::patience::Rest;
-use crate::solver::rows::{Row, Rows, mass_unit};
+use super::rest::Rest;
+use super::rows::{Row, Rows, mass_unit};
 use crate::bond::failure;
 use crate::contact::{Law, PADDED, Padded};
 use crate::dim::{Dim, Moments, Vect};
@@ -27,7 +27,7 @@ const ROUNDING: f64 = 1e-12;
 
 /// How the reactions grow.
 #[derive(Default)]
-pub(super) struct Predictor {
+pub(super) struct Extrapolation {
     /// Numbers of contacts of each kind.
     shape: [usize; 4],
     /// Reactions of a solve, and what each step since has added to them (N s).
@@ -50,7 +50,7 @@ pub(super) struct Predictor {
     rest: Rest,
 }
 
-impl Predictor {
+impl Extrapolation {
     /// Set the reactions of a problem to what is predicted, if that solves it: its residual and load error. Else the reactions are
     /// left as they were.
     pub fn predict<D: Dim>(

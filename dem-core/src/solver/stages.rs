@@ -1,0 +1,249 @@
+//! What solves a problem: one method after the other, the cheapest first, until one solves it.
+//!
+//! | stage | what it does | where it is tried |
+//! |---|---|---|
+//! | [`Route::Extrapolation`] | adds to the reactions what each of the last steps has added | bonds, while a sample at rest is loaded evenly |
+//! | [`Route::Sweeps`] | Gauss–Seidel from the last reactions | all contacts are dry |
+//! | [`Route::ActiveSet`] | Newton from the active set of the last step | bonds |
+//! | [`Route::InteriorPoint`] | follows the central path, with Coulomb's law exact | always |
+//! | [`Route::Sweeps`] | Gauss–Seidel from where the path ended | where the path folds |
+//!
+//! What none of them brings to the tolerance is taken at [`StagedSettings::accept`] or refused. No clock is looked at, and nothing is
+//! left out because it failed in an earlier step, so a solve depends on its problem, the last reactions and what is known of their growth.
+
+use super::extrapolation::Extrapolation;
+use super::interior::Interior;
+use super::newton::Newton;
+use super::rows::{Rows, StiffnessRatio};
+use super::solvable::Solvable;
+use super::{ContactSolver, GaussSeidel, GaussSeidelSettings, SolveReport, SolveStatus, Work};
+use crate::contact::{Local, LocalSolve};
+use crate::dim::Dim;
+use crate::problem::ContactProblem;
+use crate::problem::assembled::Assembled;
+use crate::saved::{Mismatch, Reader, Saved};
+
+/// Penalty of Newton's rows, over the inverse of the mean normal entry of W.
+const KAPPA: f64 = 1e9;
+/// Sweeps over dry contacts that aim at the tolerance, and those beyond that aim at what is accepted.
+const FINE_SWEEPS: u64 = 2_000;
+const COARSE_SWEEPS: u64 = 20_000;
+/// Sweeps from where a path ended.
+const LAST_SWEEPS: u64 = 2_000;
+
+/// The method that brought a solution.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Route {
+    /// The reactions grew as in the steps before.
+    #[default]
+    Extrapolation,
+    /// Newton from the active set of the last step.
+    ActiveSet,
+    /// The interior-point method.
+    InteriorPoint,
+    /// Sweeps of Gauss–Seidel.
+    Sweeps,
+}
+
+/// Where the reactions start from in every step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Start {
+    /// From zero: the stiff limit, one answer where rigidity leaves many.
+    #[default]
+    StiffLimit,
+    /// From the reactions of the last step: they keep their history.
+    LastStep,
+}
+
+/// Which stages are tried.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Stages {
+    /// All of them.
+    #[default]
+    All,
+    /// No sweeps over dry contacts before the others.
+    Newton,
+    /// The interior-point method, and sweeps from where its path ends.
+    Interior,
+}
+
+/// Settings of [`Staged`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StagedSettings {
+    /// Which stages are tried.
+    pub stages: Stages,
+    /// Residual that the solver aims at (–).
+    pub tolerance: f64,
+    /// Largest residual that is accepted (–), at least `tolerance`.
+    pub accept: f64,
+    /// Load error that the solver aims at (–).
+    pub load_tolerance: f64,
+    /// Where the reactions start from.
+    pub start: Start,
+    /// Stiffness of the rows in the metric of the stiff limit.
+    pub stiffness: StiffnessRatio,
+    /// Most Newton iterations in one solve.
+    pub max_iterations: u64,
+}
+
+impl StagedSettings {
+    /// What a solve with this residual and load error amounts to.
+    pub(super) fn report(&self, work: Work, residual: f64, load_error: f64) -> SolveReport {
+        // a residual of zero is rounding, and rounding is all that still changes
+        let settled = load_error <= self.load_tolerance || residual == 0.0;
+        let status = match SolveStatus::of(residual, self.tolerance, self.accept) {
+            SolveStatus::Converged if !settled => SolveStatus::Accepted,
+            status => status,
+        };
+        SolveReport { status, route: Route::ActiveSet, work, residual, load_error: Some(load_error) }
+    }
+}
+
+/// One method after the other.
+pub struct Staged {
+    settings: StagedSettings,
+    extrapolation: Extrapolation,
+    newton: Newton,
+    interior: Interior,
+}
+
+impl Staged {
+    /// A solver with these settings.
+    pub fn new(settings: StagedSettings) -> Self {
+        Self {
+            settings,
+            extrapolation: Extrapolation::default(),
+            newton: Newton::new(settings),
+            interior: Interior::default(),
+        }
+    }
+
+    /// Solve a problem with its matrix, from the reactions that it holds.
+    pub fn solve_assembled(&mut self, problem: &mut Assembled) -> SolveReport {
+        self.newton.margins.clear();
+        self.directly(problem)
+    }
+
+    /// By the stages that solve linear systems, and sweeps from where these end.
+    fn directly(&mut self, problem: &mut impl Solvable) -> SolveReport {
+        let StagedSettings { tolerance, accept, load_tolerance, max_iterations, .. } = self.settings;
+        problem.velocities_from_reactions();
+        let rows = match self.settings.stages {
+            Stages::Interior => problem.laws(KAPPA, self.settings.stiffness),
+            _ => problem.rows(KAPPA, self.settings.stiffness),
+        };
+        if rows.list.is_empty() || rows.list.iter().all(|row| row.normal == 0.0) {
+            return self.settings.report(Work::default(), problem.residual(), 0.0);
+        }
+        let begun: Vec<_> = rows.list.iter().map(|row| row.multiplier).collect();
+        let cold = begun.iter().all(|r| r.n == 0.0);
+        let (mut newton, made) = (0, self.newton.made() + self.interior.made);
+        if self.settings.stages != Stages::Interior
+            && let Some(report) = self.newton.solve(problem, &mut self.anchored(&rows), cold, &mut newton)
+            && report.status == SolveStatus::Converged
+        {
+            let factorisations = self.newton.made() + self.interior.made - made;
+            if std::env::var("IPM").is_ok() { eprintln!("newton {newton} fac {factorisations}"); }
+            return SolveReport { work: Work { factorisations, ..report.work }, ..report };
+        }
+        let t0 = std::time::Instant::now(); let n_made = self.newton.made() + self.interior.made - made;
+        let start = (!cold).then_some(&begun[..]);
+        let aims = (tolerance, load_tolerance);
+        let found = self.interior.solve(problem, &self.anchored(&rows), start, aims, max_iterations);
+        let factorisations = self.newton.made() + self.interior.made - made;
+        let work = |sweeps: u64, more: u64| Work { sweeps, newton: newton + more, factorisations };
+        let (mut residual, mut load_error, mut iterations) = (f64::NAN, 1.0, 0);
+        if let Some(found) = found {
+            (residual, load_error, iterations) = (found.residual, found.load_error, found.iterations);
+            if std::env::var("IPM").is_ok() { eprintln!("newton {newton} fac {n_made} then interior {iterations} res {residual:.1e} load {load_error:.1e} cold {cold} t {:?}", t0.elapsed()); }
+            if residual <= tolerance {
+                let report = self.settings.report(work(0, iterations), residual, load_error);
+                return SolveReport { route: Route::InteriorPoint, ..report };
+            }
+        }
+        problem.forget_what_is_not_finite();
+        let local = LocalSolve::Exact;
+        let settings = GaussSeidelSettings { local, tolerance, accept, max_sweeps: LAST_SWEEPS, acceleration: 0 };
+        let swept = problem.gauss_seidel(settings);
+        if residual <= swept.residual {
+            let report = self.settings.report(work(swept.work.sweeps, iterations), residual, load_error);
+            return SolveReport { route: Route::InteriorPoint, ..report };
+        }
+        SolveReport { route: Route::Sweeps, work: work(swept.work.sweeps, iterations), ..swept }
+    }
+
+    /// The rows with the multipliers that the reactions start from.
+    fn anchored(&self, rows: &Rows) -> Rows {
+        let mut rows = rows.clone();
+        if self.settings.start == Start::StiffLimit {
+            rows.list.iter_mut().for_each(|row| row.multiplier = Local::zero());
+        }
+        rows
+    }
+
+    /// By sweeps over dry contacts: for the tolerance, then for what is accepted.
+    fn swept<D: Dim>(&self, problem: &mut ContactProblem<D>) -> SolveReport {
+        let StagedSettings { tolerance, accept, .. } = self.settings;
+        let by = |tolerance, max_sweeps| {
+            let local = LocalSolve::Exact;
+            GaussSeidel::new(GaussSeidelSettings { local, tolerance, accept, max_sweeps, acceleration: 0 })
+        };
+        let fine = by(tolerance, FINE_SWEEPS).solve(problem);
+        if fine.status != SolveStatus::Failed {
+            return fine;
+        }
+        let coarse = by(accept, COARSE_SWEEPS).solve(problem);
+        let work = fine.work + coarse.work;
+        match coarse.status {
+            // it aimed at less than the tolerance
+            SolveStatus::Converged => SolveReport { status: SolveStatus::Accepted, work, ..coarse },
+            _ => SolveReport { work, ..coarse },
+        }
+    }
+}
+
+impl<D: Dim> ContactSolver<D> for Staged {
+    fn solve(&mut self, problem: &mut ContactProblem<D>) -> SolveReport {
+        let StagedSettings { tolerance, load_tolerance, stages, .. } = self.settings;
+        let dry = problem.bonded.is_empty() && problem.elastic.is_empty();
+        let mut before = Work::default();
+        if stages == Stages::All && dry {
+            let swept = self.swept(problem);
+            if swept.status != SolveStatus::Failed {
+                return swept;
+            }
+            before = swept.work;
+        }
+        if stages != Stages::Interior
+            && let Some((residual, load_error)) = self.extrapolation.predict(problem, tolerance, load_tolerance)
+        {
+            let (status, route) = (SolveStatus::Converged, Route::Extrapolation);
+            return SolveReport { status, route, work: before, residual, load_error: Some(load_error) };
+        }
+        self.newton.margins.clear();
+        let report = self.directly(problem);
+        match report.status {
+            SolveStatus::Converged if self.newton.margins.len() == problem.len() => {
+                self.extrapolation.learn(problem, &self.newton.margins, load_tolerance);
+            }
+            _ => self.extrapolation.forget(),
+        }
+        SolveReport { work: before + report.work, ..report }
+    }
+
+    /// Without sweeps before the other stages.
+    fn solve_finer(&mut self, problem: &mut ContactProblem<D>) -> Option<SolveReport> {
+        let dry = problem.bonded.is_empty() && problem.elastic.is_empty();
+        (self.settings.stages == Stages::All && dry).then(|| self.directly(problem))
+    }
+
+    fn save(&self, to: &mut Saved) {
+        self.extrapolation.save(to);
+        self.newton.save(to);
+    }
+
+    fn restore(&mut self, from: &mut Reader) -> Result<(), Mismatch> {
+        self.extrapolation = Extrapolation::restored(from)?;
+        self.newton.restore(from)
+    }
+}
