@@ -77,6 +77,16 @@ impl Tree {
         self.unknowns
     }
 
+    /// Unknowns of an element.
+    pub fn width(&self, element: usize) -> usize {
+        self.widths(element).iter().sum()
+    }
+
+    /// Number of unknowns of each node, and the nodes of each element.
+    pub fn nodes_and_elements(&self) -> (&[usize], &[[usize; 2]]) {
+        (&self.sizes, &self.elements)
+    }
+
     /// Unknowns of the two nodes of an element: how many; none for a second node that is the first.
     pub(super) fn widths(&self, element: usize) -> [usize; 2] {
         let [a, b] = self.elements[element];

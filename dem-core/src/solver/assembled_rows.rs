@@ -9,42 +9,6 @@ use crate::problem::assembled::{Assembled, BlockMatrix};
 use super::assembled::{Sites, gauss_seidel};
 use super::{GaussSeidelSettings, SolveReport};
 
-/// The columns of L with W = L Lᵀ, up to what rounding leaves of the diagonal.
-fn root(matrix: &BlockMatrix) -> Vec<Vec<f64>> {
-    let n = matrix.contacts() * matrix.size();
-    let mut lines = vec![Vec::new(); n];
-    for (row, column, w) in matrix.entries() {
-        lines[row].push((column, w));
-    }
-    let mut left: Vec<f64> =
-        lines.iter().enumerate().map(|(k, line)| line.iter().find(|e| e.0 == k).map_or(0.0, |e| e.1)).collect();
-    let least = n as f64 * f64::EPSILON * left.iter().copied().fold(0.0, f64::max);
-    let mut columns: Vec<Vec<f64>> = Vec::new();
-    loop {
-        let mut pivot = 0;
-        for k in 1..n {
-            pivot = if left[k] > left[pivot] { k } else { pivot };
-        }
-        if left[pivot] <= least {
-            return columns;
-        }
-        let mut column = vec![0.0; n];
-        lines[pivot].iter().for_each(|(k, w)| column[*k] = *w);
-        for other in &columns {
-            let factor = other[pivot];
-            if factor != 0.0 {
-                column.iter_mut().zip(other).for_each(|(x, l)| *x -= factor * l);
-            }
-        }
-        let scale = 1.0 / left[pivot].sqrt();
-        column.iter_mut().for_each(|x| *x *= scale);
-        left.iter_mut().zip(&column).for_each(|(left, l)| *left -= l * l);
-        // it is eliminated, whatever rounding leaves of it
-        left[pivot] = f64::NEG_INFINITY;
-        columns.push(column);
-    }
-}
-
 impl Assembled {
     /// The reaction of a contact without the shift.
     fn own_reaction(&self, c: usize) -> Padded {
@@ -55,18 +19,6 @@ impl Assembled {
 
 impl Solvable for Assembled {
     fn rows(&self, kappa: f64, ratio: StiffnessRatio) -> Rows {
-        let (mut out, size) = (self.laws(kappa, ratio), self.parts().rows.count());
-        let columns = root(&self.parts().matrix);
-        let rank = columns.len();
-        (out.unknowns, out.free) = (rank, vec![0.0; rank]);
-        for (c, row) in out.list.iter_mut().enumerate() {
-            (row.count, row.start) = ([rank, 0], c * size * rank);
-        }
-        out.coefficients = (0..self.r.len()).flat_map(|row| columns.iter().map(move |l| l[row])).collect();
-        out
-    }
-
-    fn laws(&self, kappa: f64, ratio: StiffnessRatio) -> Rows {
         let parts = self.parts();
         let (rows, size) = (parts.rows, parts.rows.count());
         let normal: f64 = (0..self.len()).map(|c| parts.matrix.diagonal(c)[0]).sum();

@@ -5,6 +5,7 @@ pub mod assembled;
 mod assembled_rows;
 mod extrapolation;
 mod gauss_seidel;
+mod graph;
 mod interior;
 mod newton;
 mod rest;

@@ -26,11 +26,6 @@ impl Rest {
         self.next = (2 * self.next).clamp(1, LONGEST_REST);
     }
 
-    /// Whether it did not fail the last time.
-    pub fn served(&self) -> bool {
-        self.next == 0
-    }
-
     /// It served.
     pub fn forget(&mut self) {
         *self = Self::default();

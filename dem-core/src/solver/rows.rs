@@ -241,6 +241,9 @@ impl Rows {
     pub fn pulled(&self, row: &Row, y: &[f64]) -> Padded {
         let mut u = Padded::zero();
         let width = row.count[0] + row.count[1];
+        if width == 0 {
+            return u;
+        }
         let coefficients = &self.coefficients[row.start..][..row.rows.len() * width];
         let (first, second) = (&y[row.at[0]..][..row.count[0]], &y[row.at[1]..][..row.count[1]]);
         for (place, h) in row.rows.iter().zip(coefficients.chunks_exact(width)) {
@@ -255,6 +258,9 @@ impl Rows {
     #[inline]
     pub fn apply(&self, row: &Row, r: &Padded, y: &mut [f64]) {
         let width = row.count[0] + row.count[1];
+        if width == 0 {
+            return;
+        }
         let mut r = *r;
         let coefficients = &self.coefficients[row.start..][..row.rows.len() * width];
         for (place, h) in row.rows.iter().zip(coefficients.chunks_exact(width)) {

@@ -10,12 +10,8 @@ use super::{ContactSolver, GaussSeidel, GaussSeidelSettings, SolveReport, sweep}
 
 /// A problem that can be put into rows over scaled unknowns, swept and measured.
 pub(super) trait Solvable {
-    /// The problem as rows; ρ is `kappa` over the mean normal entry of W.
+    /// The problem as rows, without coefficients where it has a matrix; ρ is `kappa` over the mean normal entry of W.
     fn rows(&self, kappa: f64, ratio: StiffnessRatio) -> Rows;
-    /// The same, where a matrix stands for the coefficients without these.
-    fn laws(&self, kappa: f64, ratio: StiffnessRatio) -> Rows {
-        self.rows(kappa, ratio)
-    }
     /// Its matrix, where there is one.
     fn matrix(&self) -> Option<&BlockMatrix> {
         None

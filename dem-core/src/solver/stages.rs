@@ -128,10 +128,7 @@ impl Staged {
     fn directly(&mut self, problem: &mut impl Solvable) -> SolveReport {
         let StagedSettings { tolerance, accept, load_tolerance, max_iterations, .. } = self.settings;
         problem.velocities_from_reactions();
-        let rows = match self.settings.stages {
-            Stages::Interior => problem.laws(KAPPA, self.settings.stiffness),
-            _ => problem.rows(KAPPA, self.settings.stiffness),
-        };
+        let rows = problem.rows(KAPPA, self.settings.stiffness);
         if rows.list.is_empty() || rows.list.iter().all(|row| row.normal == 0.0) {
             return self.settings.report(Work::default(), problem.residual(), 0.0);
         }
@@ -139,6 +136,7 @@ impl Staged {
         let cold = begun.iter().all(|r| r.n == 0.0);
         let (mut newton, made) = (0, self.newton.made() + self.interior.made);
         if self.settings.stages != Stages::Interior
+            && problem.matrix().is_none()
             && let Some(report) = self.newton.solve(problem, &mut self.anchored(&rows), cold, &mut newton)
             && report.status == SolveStatus::Converged
         {

@@ -3,6 +3,7 @@
 use super::sites::{ROWS, Sites};
 use crate::linear::{Lu, Tree};
 use crate::problem::assembled::BlockMatrix;
+use crate::solver::graph::Graph;
 use crate::solver::rows::Rows;
 
 /// The Delassus operator over the rows of [`Sites`], in their units.
@@ -12,8 +13,7 @@ pub(super) enum Coupling<'a> {
         rows: &'a Rows,
         /// Coefficients over those of `rows`.
         scale: f64,
-        /// The contact of each element.
-        contacts: Vec<usize>,
+        graph: &'a Graph,
     },
     /// A matrix over the contacts. That of a step is 1 + W D⁻¹.
     Matrix {
@@ -21,42 +21,31 @@ pub(super) enum Coupling<'a> {
         scale: f64,
         /// The contacts of each element, one of them twice for a block of the diagonal.
         pairs: Vec<[usize; 2]>,
+        tree: Tree,
     },
 }
 
 impl<'a> Coupling<'a> {
-    /// Through the bodies of `rows`, and the tree of their matrix, the last one where it still serves.
-    pub fn bodies(rows: &'a Rows, speed_over_force: f64, tree: &mut Option<Tree>) -> Option<Self> {
-        let nodes = nodes(rows);
-        let node = |first: usize| nodes.partition_point(|(start, _)| *start < first);
-        let (mut elements, mut contacts) = (Vec::with_capacity(rows.list.len()), Vec::with_capacity(rows.list.len()));
-        for (c, row) in rows.list.iter().enumerate() {
-            let element = match row.count {
-                [0, 0] => continue,
-                [0, _] => [node(row.at[1]); 2],
-                [_, 0] => [node(row.at[0]); 2],
-                _ => row.at.map(node),
-            };
-            elements.push(element);
-            contacts.push(c);
-        }
-        renewed(tree, nodes.into_iter().map(|(_, size)| size).collect(), elements)?;
-        Some(Self::Bodies { rows, scale: 1.0 / speed_over_force.sqrt(), contacts })
+    /// Through the bodies of `rows`.
+    pub fn bodies(rows: &'a Rows, speed_over_force: f64, graph: &'a Graph) -> Self {
+        Self::Bodies { rows, scale: 1.0 / speed_over_force.sqrt(), graph }
     }
 
     /// By a matrix.
-    pub fn matrix(
-        matrix: &'a BlockMatrix,
-        sites: &Sites,
-        speed_over_force: f64,
-        tree: &mut Option<Tree>,
-    ) -> Option<Self> {
+    pub fn matrix(matrix: &'a BlockMatrix, sites: &Sites, speed_over_force: f64) -> Option<Self> {
         let mut pairs = Vec::new();
         for c in 0..matrix.contacts() {
             pairs.extend(matrix.row(c).filter(|(d, _)| *d >= c).map(|(d, _)| [c, d]));
         }
-        renewed(tree, sites.list.iter().map(|site| site.rows).collect(), pairs.clone())?;
-        Some(Self::Matrix { matrix, scale: 1.0 / speed_over_force, pairs })
+        let tree = Tree::new(sites.list.iter().map(|site| site.rows).collect(), pairs.clone())?;
+        Some(Self::Matrix { matrix, scale: 1.0 / speed_over_force, pairs, tree })
+    }
+
+    fn tree(&self) -> &Tree {
+        match self {
+            Self::Bodies { graph, .. } => &graph.tree,
+            Self::Matrix { tree, .. } => tree,
+        }
     }
 
     /// W r.
@@ -113,10 +102,11 @@ impl<'a> Coupling<'a> {
     }
 
     /// Factorise the matrix of a step, whose D⁻¹ stands in the upper left corners of the local matrices.
-    pub fn factorise(&self, sites: &Sites, inverses: &[f64], tree: &Tree, lu: &mut Lu) -> bool {
+    pub fn factorise(&self, sites: &Sites, inverses: &[f64], lu: &mut Lu) -> bool {
         match self {
-            Self::Bodies { rows, scale, contacts } => lu.factorise(tree, |e, out| {
-                let (row, site) = (&rows.list[contacts[e]], &sites.list[contacts[e]]);
+            Self::Bodies { rows, scale, graph } => lu.factorise(self.tree(), |e, out| {
+                let c = graph.contacts[e];
+                let (row, site) = (&rows.list[c], &sites.list[c]);
                 let width = row.count[0] + row.count[1];
                 let h = |k: usize| &rows.coefficients[row.start + site.of[k] * width..][..width];
                 let (own, square) = (&inverses[site.matrix..], scale * scale);
@@ -132,7 +122,7 @@ impl<'a> Coupling<'a> {
                     }
                 }
             }),
-            Self::Matrix { matrix, scale, pairs } => lu.factorise(tree, |e, out| {
+            Self::Matrix { matrix, scale, pairs, tree } => lu.factorise(tree, |e, out| {
                 let [c, d] = pairs[e];
                 let first = sites.list[c].rows;
                 let width = if c == d { first } else { first + sites.list[d].rows };
@@ -159,43 +149,18 @@ impl<'a> Coupling<'a> {
     }
 
     /// The velocities that reactions `r` would give the contacts if these did not yield, as they are when they do.
-    pub fn yielded(&self, sites: &Sites, r: &[f64], tree: &Tree, lu: &Lu) -> Vec<f64> {
+    pub fn yielded(&self, sites: &Sites, r: &[f64], lu: &Lu) -> Vec<f64> {
         match self {
             Self::Bodies { .. } => {
                 let mut y = self.pushed(sites, r);
-                lu.solve(tree, &mut y);
+                lu.solve(self.tree(), &mut y);
                 self.pulled(sites, &y)
             }
             Self::Matrix { .. } => {
                 let mut u = self.velocity(sites, r);
-                lu.solve(tree, &mut u);
+                lu.solve(self.tree(), &mut u);
                 u
             }
         }
     }
-}
-
-/// The tree of these nodes and elements, the last one where it still serves.
-fn renewed(tree: &mut Option<Tree>, sizes: Vec<usize>, elements: Vec<[usize; 2]>) -> Option<()> {
-    if !tree.as_ref().is_some_and(|tree| tree.is_of(&sizes, &elements)) {
-        *tree = Tree::new(sizes, elements);
-    }
-    tree.as_ref().map(|_| ())
-}
-
-/// First unknown of each node, and how many it has, in rising order; unknowns without a contact stand alone.
-fn nodes(rows: &Rows) -> Vec<(usize, usize)> {
-    let mut counts = vec![1; rows.unknowns];
-    for row in &rows.list {
-        for side in (0..2).filter(|side| row.count[*side] > 0) {
-            counts[row.at[side]] = row.count[side];
-        }
-    }
-    let mut nodes = Vec::new();
-    let mut next = 0;
-    while next < rows.unknowns {
-        nodes.push((next, counts[next]));
-        next += counts[next];
-    }
-    nodes
 }

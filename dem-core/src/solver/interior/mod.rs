@@ -17,13 +17,15 @@ mod sites;
 
 use crate::contact::Padded;
 use super::stall::Stall;
-use crate::linear::{Lu, Tree};
+use crate::linear::Lu;
+use crate::solver::graph::Graph;
 use crate::solver::rows::Rows;
 use crate::solver::solvable::Solvable;
 use cones::{Point, correction, dot, moved, product, reach};
 use coupling::Coupling;
 use local::{State, follow, gap, invert, opened, solve, yield_to};
 use sites::Sites;
+use std::sync::Arc;
 
 /// Stiffness of the metric over the inverse of the mean normal entry of W: what it leaves of the residual is its inverse.
 const KAPPA: f64 = 3e8;
@@ -57,10 +59,10 @@ pub(super) struct Found {
     pub iterations: u64,
 }
 
-/// The method, and what it keeps from one solve to the next: the tree of its matrix, and room.
+/// The method, and what it keeps from one solve to the next: the graph of the bodies, and room.
 #[derive(Default)]
 pub(super) struct Interior {
-    tree: Option<Tree>,
+    graph: Option<Arc<Graph>>,
     lu: Lu,
     inverses: Vec<f64>,
     /// Factorisations so far.
@@ -82,10 +84,12 @@ impl Interior {
         let sites = Sites::of(rows, start.unwrap_or(&anchor));
         let ratio = sites.speed / sites.force;
         let matrix = problem.matrix().cloned();
-        let coupling = match &matrix {
-            Some(matrix) => Coupling::matrix(matrix, &sites, ratio, &mut self.tree),
-            None => Coupling::bodies(rows, ratio, &mut self.tree),
-        }?;
+        let graph = if matrix.is_none() { Graph::of(rows, &mut self.graph) } else { None };
+        let coupling = match (&matrix, &graph) {
+            (Some(matrix), _) => Coupling::matrix(matrix, &sites, ratio)?,
+            (None, Some(graph)) => Coupling::bodies(rows, ratio, graph),
+            (None, None) => return None,
+        };
         let anchor = sites.gathered(&anchor);
         let compliance: Vec<f64> = sites.compliance.iter().zip(&sites.metric).map(|(c, w)| c + w / KAPPA).collect();
         let mut at = match start {
@@ -114,9 +118,8 @@ impl Interior {
             if !invert(&sites, &at, &compliance, &mut self.inverses) {
                 break;
             }
-            let tree = self.tree.as_ref()?;
             self.made += 1;
-            if !coupling.factorise(&sites, &self.inverses, tree, &mut self.lu) {
+            if !coupling.factorise(&sites, &self.inverses, &mut self.lu) {
                 break;
             }
             let system = System {
@@ -126,7 +129,6 @@ impl Interior {
                 lack,
                 compliance: &compliance,
                 inverses: &self.inverses,
-                tree,
                 lu: &self.lu,
             };
             let (step, far) = direction(&system);
@@ -151,7 +153,6 @@ struct System<'a> {
     lack: Vec<f64>,
     compliance: &'a [f64],
     inverses: &'a [f64],
-    tree: &'a Tree,
     lu: &'a Lu,
 }
 
@@ -159,8 +160,12 @@ impl System<'_> {
     /// The step after which x ∘ z has changed by `by`, to first order.
     fn step(&self, by: &[Point]) -> State {
         let right: Vec<f64> = self.lack.iter().map(|x| -x).collect();
-        let mut step = self.solved(&right, by);
-        // once more for what rounding has left
+        self.solved(&right, by)
+    }
+
+    /// The same without what rounding has left.
+    fn refined(&self, mut step: State, by: &[Point]) -> State {
+        let right: Vec<f64> = self.lack.iter().map(|x| -x).collect();
         let (left, missing) = self.left(&right, by, &step);
         let more = self.solved(&left, &missing);
         step.r.iter_mut().zip(&more.r).for_each(|(r, d)| *r += d);
@@ -171,7 +176,7 @@ impl System<'_> {
 
     fn solved(&self, right: &[f64], by: &[Point]) -> State {
         let mut step = solve(self.sites, self.at, self.inverses, right, by);
-        let yielded = self.coupling.yielded(self.sites, &step.r, self.tree, self.lu);
+        let yielded = self.coupling.yielded(self.sites, &step.r, self.lu);
         yield_to(self.sites, self.inverses, &yielded, &mut step);
         follow(self.sites, &mut step);
         step
@@ -229,6 +234,7 @@ fn direction(system: &System) -> (State, f64) {
         }
         (step, far, by) = (other, reached, more);
     }
+    let mut chosen = by;
     if far < SHORT {
         // at the boundary: towards the middle instead, without the second order
         for share in TO_THE_MIDDLE {
@@ -238,9 +244,12 @@ fn direction(system: &System) -> (State, f64) {
             let reached = system.longest(&other);
             if reached > 1.5 * far {
                 (step, far) = (other, reached);
+                chosen = by;
             }
         }
     }
+    let step = system.refined(step, &chosen);
+    let far = system.longest(&step);
     (step, far)
 }
 

@@ -34,9 +34,7 @@ pub(super) fn correct(row: &Row, u: &Padded) -> Padded {
 }
 
 /// A = −∂r/∂q at the velocity `u`, where the corrector gave `r`; nothing where the contact is open.
-///
-/// `symmetric` leaves out how the threshold of Coulomb's law follows r_n.
-pub(super) fn operator(row: &Row, u: &Padded, r: &Padded, symmetric: bool) -> Option<Operator> {
+pub(super) fn operator(row: &Row, u: &Padded, r: &Padded) -> Option<Operator> {
     let limit = r.n + row.shift;
     if limit <= 0.0 {
         return None;
@@ -72,8 +70,6 @@ pub(super) fn operator(row: &Row, u: &Padded, r: &Padded, symmetric: bool) -> Op
     }
     if row.associated {
         a += drag * drag.transpose() / stiffness;
-    } else if symmetric {
-        a[(0, 0)] += 1.0 / w.n;
     } else {
         a += drag * SVector::<f64, PADDED>::ith(0, 1.0).transpose() / w.n;
     }

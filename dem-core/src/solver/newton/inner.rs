@@ -3,31 +3,23 @@
 use super::Newton;
 use super::corrector::{correct, operator};
 use super::guess::Guess;
-use super::krylov::gmres;
-use crate::solver::stall::Stall;
-use crate::solver::rows::{Operator, Rows};
 use crate::contact::Padded;
+use crate::solver::graph::Graph;
+use crate::solver::rows::{Operator, Rows};
+use crate::solver::stall::Stall;
 
-/// GMRES iterations beyond those of a fresh factor that a kept one may cost in all before it is renewed; in space, where
-/// fifteen take as long as a factorisation.
-const WASTE: usize = 20;
-const WASTE_IN_SPACE: usize = 12;
-/// Error of a linear solve with the factor alone up to which the next is left to it.
-const TRUST: f64 = 1e-3;
-/// Linear solves by GMRES after one that the factor alone was trusted with and failed.
-const DISTRUST: usize = 100;
 /// What a linear solve may leave of F, over what is small enough.
 const SMALL: f64 = 0.1;
 /// Tolerance of a linear solve: the least and the largest where one may suffice, and where another must follow.
 const TIGHT: f64 = 1e-12;
 const FAIR: f64 = 1e-3;
 const LOOSE: f64 = 1e-2;
-/// What a linear solve with a fresh factor may leave before its step is none, and how far F may grow.
+/// What a linear solve with fresh factors may leave before its step is none, and how far F may grow.
 const LOST: f64 = 0.1;
 const DIVERGED: f64 = 1e6;
-/// Most GMRES iterations of one linear solve, and in space with a kept factor.
-const MOST_KRYLOV: usize = 80;
-const MOST_KEPT_IN_SPACE: usize = 15;
+/// Most rounds of refinement of a linear solve, and the share that one must bring what is left down to.
+const REFINED: usize = 8;
+const SHRUNK: f64 = 0.5;
 
 /// State of one solve.
 pub(super) struct Iterate {
@@ -84,14 +76,7 @@ impl Newton {
                 return (iteration, state.norm <= target);
             }
             let Some(direction) = self.direction(rows, state, guessed, target) else { return (iteration + 1, false) };
-            let before = direction.norm;
-            advance(rows, state, &direction.step, guessed.is_some());
-            // a factor that was trusted blindly has to earn it
-            let kept = &mut self.kept;
-            if kept.trusted && state.norm > (TRUST * before).max(target) {
-                kept.trusted = false;
-                kept.distrust = DISTRUST;
-            }
+            advance(rows, state, &direction, guessed.is_some());
         }
         (most, state.norm <= self.target(rows, state))
     }
@@ -113,48 +98,41 @@ impl Newton {
         wanted.max(4.0 * f64::EPSILON * rounding.sqrt())
     }
 
-    /// The Newton direction −J⁻¹ F, by the factor at hand or GMRES on it, renewed if it serves badly.
-    fn direction(&mut self, rows: &Rows, state: &Iterate, guess: Option<&Guess>, target: f64) -> Option<Direction> {
+    /// The Newton direction −J⁻¹ F, by the factors at hand where a few rounds of refinement make it exact enough, else by new ones.
+    fn direction(&mut self, rows: &Rows, state: &Iterate, guess: Option<&Guess>, target: f64) -> Option<Vec<f64>> {
         let (mut right, points) = linearise(rows, state, guess);
         right.iter_mut().for_each(|f| *f = -*f);
         let norm = norm2(&right).sqrt();
-        let in_space = rows.in_space();
-        let tolerance = if in_space && guess.is_none() { LOOSE } else { (SMALL * target / norm).clamp(TIGHT, FAIR) };
-        let (most, waste) = if in_space { (MOST_KEPT_IN_SPACE, WASTE_IN_SPACE) } else { (MOST_KRYLOV, WASTE) };
-        let kept = &mut self.kept;
-        let serves = kept.serves(rows.unknowns);
-        if serves && kept.trusted {
-            kept.factor.solve(&mut right);
-            return Some(Direction { step: right, norm });
-        }
-        let exact = operators(rows, &points, false);
-        for fresh in [!serves, true] {
-            if fresh && kept.factor.made >= self.most_made || fresh && !kept.factor.renew(rows, &operators(rows, &points, true)) {
-                return None;
-            }
-            let apply = |x: &[f64], out: &mut [f64]| multiply(rows, &exact, x, out);
-            let most = if fresh { MOST_KRYLOV } else { most };
-            let (step, report) = gmres(&right, tolerance, most, in_space && !fresh, apply, |x| kept.factor.solve(x));
+        let least = (SMALL * target / norm).clamp(TIGHT, if guess.is_none() { LOOSE } else { FAIR });
+        let exact = operators(rows, &points);
+        for fresh in [!self.factor.serves(rows.unknowns), true] {
             if fresh {
-                // what even a fresh factor needs is the part that is not symmetric
-                (kept.floor, kept.wasted) = (report.iterations, 0);
+                let graph = Graph::of(rows, &mut self.graph)?;
+                if self.factor.made >= self.most_made || !self.factor.renew(rows, &exact, graph) {
+                    return None;
+                }
             }
-            kept.wasted += report.iterations.saturating_sub(kept.floor);
-            kept.renew = kept.wasted > waste;
-            kept.distrust = kept.distrust.saturating_sub(1);
-            kept.trusted = kept.distrust == 0 && report.plain <= TRUST;
-            if report.residual <= tolerance || fresh && report.residual <= LOST {
-                return Some(Direction { step, norm });
+            let (mut step, mut left, mut last) = (vec![0.0; right.len()], right.clone(), 1.0);
+            for _ in 0..REFINED {
+                self.factor.solve(&mut left);
+                step.iter_mut().zip(&left).for_each(|(x, d)| *x += d);
+                multiply(rows, &exact, &step, &mut left);
+                left.iter_mut().zip(&right).for_each(|(l, r)| *l = r - *l);
+                let share = norm2(&left).sqrt() / norm;
+                if share <= least || fresh && share <= LOST && share > SHRUNK * last {
+                    return Some(step);
+                }
+                if share > SHRUNK * last || !share.is_finite() {
+                    break;
+                }
+                last = share;
+            }
+            if fresh && last <= LOST {
+                return Some(step);
             }
         }
         None
     }
-}
-
-/// A Newton step, and the norm of F that it is to remove.
-struct Direction {
-    step: Vec<f64>,
-    norm: f64,
 }
 
 pub(super) fn norm2(x: &[f64]) -> f64 {
@@ -179,7 +157,7 @@ fn linearise(rows: &Rows, state: &Iterate, guess: Option<&Guess>) -> (Vec<f64>, 
         let from = guess.velocity(k, row);
         let at = correct(row, &from);
         let mut r = at;
-        if let Some(a) = operator(row, &from, &at, false) {
+        if let Some(a) = operator(row, &from, &at) {
             r += a.times(&(from - *u));
         }
         rows.apply(row, &(r * -1.0), &mut gradient);
@@ -188,9 +166,9 @@ fn linearise(rows: &Rows, state: &Iterate, guess: Option<&Guess>) -> (Vec<f64>, 
     (gradient, points)
 }
 
-/// A of every contact, or its symmetric part for the factor.
-fn operators(rows: &Rows, points: &[(Padded, Padded)], symmetric: bool) -> Vec<Option<Operator>> {
-    rows.list.iter().zip(points).map(|(row, (u, r))| operator(row, u, r, symmetric)).collect()
+/// A of every contact.
+fn operators(rows: &Rows, points: &[(Padded, Padded)]) -> Vec<Option<Operator>> {
+    rows.list.iter().zip(points).map(|(row, (u, r))| operator(row, u, r)).collect()
 }
 
 /// out ← (I + Σ H̃ A H̃ᵀ) x.

@@ -7,8 +7,7 @@
 //! for associated laws the gradient of a convex function of v. Its derivative M + H A Hᵀ is sparse, and symmetric but
 //! for the slipping dry contacts. The outer iteration is r̂ ← P(r̂ − ρ (Hᵀv + b)), a proximal step of size ρ on the
 //! reactions; with a large ρ two or three suffice, and nearly always the active set of the last step still holds, so
-//! each costs one linear solve. The Cholesky factor of the symmetric part is kept over steps as the preconditioner of
-//! GMRES and renewed when that needs too many iterations. Where the active set runs in circles it gives up: the interior-point method
+//! each costs one linear solve. Its factors are kept over steps and renewed when refinement with them no longer converges. Where the active set runs in circles it gives up: the interior-point method
 //! does without a guess.
 //!
 //! Started from zero reactions the first proximal step is the stiff limit: the reactions of least Σ r²/ρ among all
@@ -21,18 +20,17 @@ mod corrector;
 mod factor;
 mod guess;
 mod inner;
-mod kept;
-mod krylov;
-mod order;
 
 mod rounds;
 
+use super::graph::Graph;
 use super::rows::Rows;
 use super::solvable::Solvable;
 use super::{SolveReport, StagedSettings};
 use crate::saved::{Mismatch, Reader, Saved};
 use guess::Guess;
-use kept::Kept;
+use factor::Factor;
+use std::sync::Arc;
 
 /// Sweeps that look for the active set: at every step, and from zero reactions.
 const SWEEPS: usize = 5;
@@ -41,7 +39,9 @@ const COLD_SWEEPS: usize = 100;
 /// Augmented-Lagrangian semismooth Newton.
 pub(super) struct Newton {
     settings: StagedSettings,
-    kept: Kept,
+    factor: Factor,
+    /// The graph of the last problem.
+    graph: Option<Arc<Graph>>,
     /// Factorisations after which this solve is given up.
     most_made: u64,
     /// How far contacts are from another status in the first round of the last solve.
@@ -51,12 +51,12 @@ pub(super) struct Newton {
 impl Newton {
     /// A solver with these settings.
     pub fn new(settings: StagedSettings) -> Self {
-        Self { settings, kept: Kept::default(), most_made: 0, margins: Vec::new() }
+        Self { settings, factor: Factor::default(), graph: None, most_made: 0, margins: Vec::new() }
     }
 
     /// Factorisations so far.
     pub fn made(&self) -> u64 {
-        self.kept.factor.made
+        self.factor.made
     }
 
     /// Rounds from the active set of the reactions that the problem brought along, bettered by some sweeps in the plane, or as it was in
@@ -76,18 +76,18 @@ impl Newton {
         self.most_made = self.made() + std::env::var("NMAX").ok().and_then(|v| v.parse().ok()).unwrap_or(3);
         let guess = Guess::of(problem.swept(sweeps));
         let report = self.rounds(problem, rows, guess, iterations);
-        self.kept.renew |= report.is_none();
+        self.factor.stale |= report.is_none();
         report
     }
 
     /// Write what is kept from one solve to the next.
     pub fn save(&self, to: &mut Saved) {
-        self.kept.save(to);
+        self.factor.save(to);
     }
 
     /// Take up what [`Newton::save`] wrote.
     pub fn restore(&mut self, from: &mut Reader) -> Result<(), Mismatch> {
-        self.kept = Kept::restored(from)?;
+        self.factor = Factor::restored(from)?;
         Ok(())
     }
 }
