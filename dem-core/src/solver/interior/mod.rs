@@ -27,8 +27,12 @@ use local::{State, follow, gap, invert, opened, solve, yield_to};
 use sites::Sites;
 use std::sync::Arc;
 
-/// Stiffness of the metric over the inverse of the mean normal entry of W: what it leaves of the residual is its inverse.
-const KAPPA: f64 = 3e8;
+/// Stiffness of the metric over the inverse of the mean normal entry of W.
+const KAPPA: f64 = 1e7;
+/// The same where any reactions will do: what it leaves of the residual is its inverse.
+const ANY: f64 = 3e8;
+/// What the gaps of all pairs may be beside the energy of the metric for reactions to count as those of least energy.
+const LEAST: f64 = 0.01;
 /// Least centring, as a share of the gap.
 const CENTRING: f64 = 0.1;
 /// Most of Gondzio's correctors in an iteration, by how much a step is tried longer, the share by which it must grow, and how far products
@@ -46,6 +50,18 @@ const NEAR: f64 = 0.99;
 const PATIENCE: u64 = 8;
 /// How far inside its cone a start is moved, over the mean reaction.
 const INSIDE: f64 = 0.1;
+
+/// What is asked of a solution.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Aims {
+    /// Residual and load error (–).
+    pub tolerance: f64,
+    pub load_tolerance: f64,
+    /// Whether of all reactions those of least energy in the metric are wanted.
+    pub least: bool,
+    /// Most iterations.
+    pub most: u64,
+}
 
 /// What the path came to.
 #[derive(Clone, Debug)]
@@ -70,15 +86,15 @@ pub(super) struct Interior {
 }
 
 impl Interior {
-    /// Follow the path from these reactions, moved inside their cones, or from a cold start, to where the residual and the load error
-    /// are within their tolerances. The metric is anchored at the multipliers of `rows`. The problem holds the best reactions on the way.
+    /// Follow the path from these reactions, moved inside their cones, or from a cold start, to a solution. The metric is anchored at the
+    /// multipliers of `rows`: with its compliance the path ends at the reactions of least energy, and without it, from where both
+    /// weigh alike, next to those. The problem holds what was found.
     pub fn solve(
         &mut self,
         problem: &mut impl Solvable,
         rows: &Rows,
         start: Option<&[Padded]>,
-        (tolerance, load_tolerance): (f64, f64),
-        most: u64,
+        aims: Aims,
     ) -> Option<Found> {
         let anchor: Vec<Padded> = rows.list.iter().map(|row| row.multiplier).collect();
         let sites = Sites::of(rows, start.unwrap_or(&anchor));
@@ -90,50 +106,53 @@ impl Interior {
             (None, Some(graph)) => Coupling::bodies(rows, ratio, graph),
             (None, None) => return None,
         };
-        let anchor = sites.gathered(&anchor);
-        let compliance: Vec<f64> = sites.compliance.iter().zip(&sites.metric).map(|(c, w)| c + w / KAPPA).collect();
+        let kappa = if aims.least { KAPPA } else { ANY };
+        let mut metric = Metric::new(&sites, sites.gathered(&anchor), kappa);
         let mut at = match start {
             Some(reactions) => warm(&sites, &coupling, &sites.gathered(reactions)),
             None => cold(&sites),
         };
-        let mut best: Option<Found> = None;
+        let (mut best, mut selects, mut turn): (Option<Found>, _, _) = (None, aims.least, None);
         let (mut change, mut last) = (1.0, f64::INFINITY);
         let mut stall = Stall::after(PATIENCE, 0.5);
-        for iterations in 0..=most {
-            let reactions = sites.scattered(&at.r);
+        for iterations in 0..=aims.most {
+            let reactions = sites.snapped(&at);
             problem.write_back(&reactions);
             let residual = problem.residual();
             // what is left of the net impulses shrinks with the residual
             let load_error = change * (residual / last).min(1.0);
             last = residual;
-            if best.as_ref().is_none_or(|best| residual < best.residual) {
+            let solved = residual <= aims.tolerance && load_error <= aims.load_tolerance || residual == 0.0;
+            let gaps = gap(&at) * at.x.len() as f64 / metric.energy(&at.r);
+            let arrived = solved && !(selects && gaps > LEAST);
+            if arrived || best.as_ref().is_none_or(|best| residual < best.residual) {
                 best = Some(Found { reactions, residual, load_error, iterations });
             }
-            let arrived = residual <= tolerance && load_error <= load_tolerance || residual == 0.0;
-            if arrived || iterations == most || stall.at(residual.min(gap(&at))) {
+            if arrived || iterations == aims.most || stall.at(residual.min(gap(&at))) {
                 break;
             }
+            if selects && gaps <= 1.0 && turn.is_none() {
+                turn = Some(at.clone());
+            }
+            if selects && gaps <= LEAST {
+                metric.anchor = std::mem::replace(&mut at, turn.take()?).r;
+                (selects, stall) = (false, Stall::after(PATIENCE, 0.5));
+            }
             let weight = coupling.velocity(&sites, &at.r);
-            let lack = lack(&sites, &weight, &at, &anchor);
-            if !invert(&sites, &at, &compliance, &mut self.inverses) {
+            let lack = lack(&sites, &weight, &at, &metric);
+            if !invert(&sites, &at, &metric.compliance, &mut self.inverses) {
                 break;
             }
             self.made += 1;
             if !coupling.factorise(&sites, &self.inverses, &mut self.lu) {
                 break;
             }
-            let system = System {
-                sites: &sites,
-                coupling: &coupling,
-                at: &at,
-                lack,
-                compliance: &compliance,
-                inverses: &self.inverses,
-                lu: &self.lu,
-            };
+            let (inverses, compliance) = (&self.inverses, &metric.compliance);
+            let (sites, coupling, at_hand, lu) = (&sites, &coupling, &at, &self.lu);
+            let system = System { sites, coupling, at: at_hand, lack, compliance, inverses, lu };
             let (step, far) = direction(&system);
             let length = (NEAR * far).min(1.0);
-            let moving = coupling.velocity(&sites, &step.r);
+            let moving = coupling.velocity(sites, &step.r);
             let square = |r: &[f64], u: &[f64]| r.iter().zip(u).map(|(r, u)| r * u).sum::<f64>().abs();
             change = length * (square(&step.r, &moving) / square(&at.r, &weight).max(f64::MIN_POSITIVE)).sqrt();
             advance(&mut at, length, &step);
@@ -141,6 +160,27 @@ impl Interior {
         let best = best?;
         problem.write_back(&best.reactions);
         Some(best)
+    }
+}
+
+/// A compliance that draws reactions to given ones.
+struct Metric {
+    anchor: Vec<f64>,
+    /// Of each row, and with that of elastic bonds.
+    own: Vec<f64>,
+    compliance: Vec<f64>,
+}
+
+impl Metric {
+    fn new(sites: &Sites, anchor: Vec<f64>, kappa: f64) -> Self {
+        let own: Vec<f64> = sites.metric.iter().map(|w| w / kappa).collect();
+        let compliance = own.iter().zip(&sites.compliance).map(|(own, c)| own + c).collect();
+        Self { anchor, own, compliance }
+    }
+
+    /// Σ (r − r₀)²/ρ.
+    fn energy(&self, r: &[f64]) -> f64 {
+        r.iter().zip(&self.anchor).zip(&self.own).map(|((r, r0), c)| c * (r - r0) * (r - r0)).sum()
     }
 }
 
@@ -254,10 +294,10 @@ fn direction(system: &System) -> (State, f64) {
 }
 
 /// u + C (r − r₀) − Σ Bᵀ z, with the metric among the compliances.
-fn lack(sites: &Sites, weight: &[f64], at: &State, anchor: &[f64]) -> Vec<f64> {
+fn lack(sites: &Sites, weight: &[f64], at: &State, metric: &Metric) -> Vec<f64> {
     let opened = opened(sites, &at.z);
     let row = |k: usize| {
-        let soft = sites.compliance[k] * (at.r[k] - sites.carried[k]) + sites.metric[k] / KAPPA * (at.r[k] - anchor[k]);
+        let soft = sites.compliance[k] * (at.r[k] - sites.carried[k]) + metric.own[k] * (at.r[k] - metric.anchor[k]);
         sites.free[k] + weight[k] + soft - opened[k]
     };
     (0..sites.rows).map(row).collect()

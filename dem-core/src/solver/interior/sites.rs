@@ -7,7 +7,8 @@
 //! An associated law has one cone for each group of rows, with B = G. Any other has a ray for Signorini's condition, and for each group
 //! one whose z₀ acts on no row: B is G without its normal column, and z₀ is the slip speed.
 
-use super::cones::Point;
+use super::cones::{Point, eigenvalues};
+use super::local::State;
 use crate::contact::Padded;
 use crate::solver::rows::{Row, Rows, TWIST, entry};
 use std::ops::Range;
@@ -193,14 +194,29 @@ impl Sites {
         list
     }
 
-    /// The inverse of [`Sites::gathered`].
-    pub fn scattered(&self, list: &[f64]) -> Vec<Padded> {
-        let one = |site: &Site| {
+    /// The reactions of the problem at a point, each at the limits that it is nearer to than its z is to its own.
+    pub fn snapped(&self, at: &State) -> Vec<Padded> {
+        let one = |(site, shift): (&Site, &f64)| {
+            let mut own = [0.0; ROWS];
+            own[..site.rows].copy_from_slice(site.part(&at.r));
+            let pairs = site.cones.clone().map(|c| (&self.cones[c], eigenvalues(&at.x[c]), eigenvalues(&at.z[c])));
+            if pairs.clone().any(|(cone, x, z)| cone.opens && x[0] < z[1]) {
+                // at the apex: nothing is carried but what the shift stands for
+                own = [0.0; ROWS];
+                own[0] = -shift;
+            } else {
+                for (cone, ..) in pairs.filter(|(cone, x, z)| cone.tangents > 0 && x[1] < z[0]) {
+                    let x = cone.primal(&own);
+                    let length = x[1].hypot(x[2]);
+                    let scale = if length > 0.0 { cone.slope * (own[0] + shift) / length } else { 1.0 };
+                    cone.rows[..cone.tangents].iter().for_each(|row| own[*row] *= scale);
+                }
+            }
             let mut r = Padded::zero();
-            let own = site.places.iter().zip(site.part(list));
-            own.for_each(|(place, value)| *entry(&mut r, *place) = value * self.force);
+            let rows = site.places.iter().zip(&own[..site.rows]);
+            rows.for_each(|(place, value)| *entry(&mut r, *place) = value * self.force);
             r
         };
-        self.list.iter().map(one).collect()
+        self.list.iter().zip(&self.shift).map(one).collect()
     }
 }

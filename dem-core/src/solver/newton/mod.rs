@@ -73,7 +73,7 @@ impl Newton {
             true => 0,
             false => SWEEPS,
         };
-        self.most_made = self.made() + std::env::var("NMAX").ok().and_then(|v| v.parse().ok()).unwrap_or(3);
+        self.most_made = self.made() + std::env::var("NMAX").ok().and_then(|v| v.parse().ok()).unwrap_or(8);
         let guess = Guess::of(problem.swept(sweeps));
         let report = self.rounds(problem, rows, guess, iterations);
         self.factor.stale |= report.is_none();
