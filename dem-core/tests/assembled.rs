@@ -9,7 +9,7 @@ use dem_core::problem::assembled::{Assembled, AssemblyError, BlockMatrix, Contac
 use dem_core::problem::residual::residual;
 use dem_core::problem::{Contact, ContactProblem, Nodes, Visitor};
 use dem_core::solver::assembled::gauss_seidel;
-use dem_core::solver::{ContactSolver, GaussSeidelSettings, Newton, SolveStatus};
+use dem_core::solver::{ContactSolver, GaussSeidelSettings, SolveStatus, Staged};
 
 fn settings(local: LocalSolve, tolerance: f64) -> GaussSeidelSettings {
     GaussSeidelSettings { local, tolerance, accept: tolerance, max_sweeps: 200_000, acceleration: 0 }
@@ -129,9 +129,9 @@ fn newton_finds_the_same_velocities() {
 fn newton_is_newton<D: Dim>(mut problem: ContactProblem<D>, tolerance: f64) {
     let settings = common::newton(tolerance, tolerance, 1e-6);
     let mut assembled = Assembled::of(&problem);
-    let report = Newton::new(settings).solve_assembled(&mut assembled);
+    let report = Staged::new(settings).solve_assembled(&mut assembled);
     assert_eq!(report.status, SolveStatus::Converged, "{report:?}");
-    let report = Newton::new(settings).solve(&mut problem);
+    let report = Staged::new(settings).solve(&mut problem);
     assert_eq!(report.status, SolveStatus::Converged, "{report:?}");
     if assembled.parts().associated.iter().all(|a| *a) {
         let expected = Assembled::of(&problem).velocities();

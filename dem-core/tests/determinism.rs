@@ -83,7 +83,7 @@ fn blocks_swept_at_once_solve_the_problem() {
         assert_eq!(report.status, SolveStatus::Converged);
         w.grains.velocity
     };
-    let (swept, newton) = (settled(solver(1e-10)), settled(SolverSettings::Newton(common::newton(1e-12, 1e-12, 1e-9))));
+    let (swept, newton) = (settled(solver(1e-10)), settled(SolverSettings::Staged(common::newton(1e-12, 1e-12, 1e-9))));
     let fastest = newton.iter().map(|v| v.norm()).fold(0.0, f64::max);
     let apart = swept.iter().zip(&newton).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
     assert!(apart <= 1e-7 * fastest, "{apart:e} of {fastest:e} m/s");

@@ -24,7 +24,7 @@ const K: f64 = 1e6;
 const UNBREAKABLE: f64 = 1e3;
 
 fn newton(tolerance: f64, load_tolerance: f64) -> SolverSettings {
-    SolverSettings::Newton(common::newton(tolerance, 100.0 * tolerance, load_tolerance))
+    SolverSettings::Staged(common::newton(tolerance, 100.0 * tolerance, load_tolerance))
 }
 
 /// Springs with the tangential stiffness over the normal one, that bend as a bar as wide as long does.

@@ -9,7 +9,7 @@ use dem_core::contact::Law;
 use dem_core::dim::{D2, D3, Dim, Vect};
 use dem_core::problem::ContactProblem;
 use dem_core::problem::residual::residual;
-use dem_core::solver::{NewtonSettings, SolveStatus, SolverSettings, Start};
+use dem_core::solver::{SolveStatus, SolverSettings, StagedSettings, Start};
 use dem_core::world::{StepReport, World};
 use nalgebra::Vector2;
 use rand::{RngExt, SeedableRng};
@@ -17,7 +17,7 @@ use rand_pcg::Pcg64;
 use std::sync::Arc;
 
 fn newton(tolerance: f64, start: Start) -> SolverSettings {
-    SolverSettings::Newton(NewtonSettings { start, ..common::newton(tolerance, tolerance, 1e-6) })
+    SolverSettings::Staged(StagedSettings { start, ..common::newton(tolerance, tolerance, 1e-6) })
 }
 
 #[test]
@@ -49,7 +49,7 @@ fn dry_disks(centres: impl Iterator<Item = [f64; 2]>, walls: Vec<Wall<D2>>) -> W
 fn solved_cold<D: Dim>(world: &mut World<D>) -> ContactProblem<D> {
     let mut problem = world.contact_problem();
     // sweeps that are accepted would end far from the answer
-    let settings = SolverSettings::Newton(common::newton(1e-10, 1e-3, 1e-9));
+    let settings = SolverSettings::Staged(common::newton(1e-10, 1e-3, 1e-9));
     let report = settings.build::<D>().solve(&mut problem);
     assert_eq!(report.status, SolveStatus::Converged, "{report:?}");
     assert!(report.work.newton <= 30, "{report:?}");
@@ -202,7 +202,7 @@ fn gauss_seidel_approaches_newton_in_3d() {
     // a million sweeps come to 1e-7 here: what can be seen is that they head for the same velocities
     let problem = pressed::<D3>(0, true).contact_problem();
     // the last path leaves a load error of 3e-8 or 4e-6, as it is rounded: nothing beside the thousandth that is asked for
-    let found = solved(&problem, SolverSettings::Newton(common::newton(1e-10, 1e-10, 1e-5)));
+    let found = solved(&problem, SolverSettings::Staged(common::newton(1e-10, 1e-10, 1e-5)));
     let [coarse, fine] = [1e-5, 1e-7].map(|tolerance| apart(&problem, &found, tolerance));
     assert!(fine <= 0.1 * coarse && fine <= 1e-3, "{coarse:e}, then {fine:e}");
 }

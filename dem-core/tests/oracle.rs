@@ -87,7 +87,7 @@ fn interior_point(problem: &Assembled) -> Vec<f64> {
 }
 
 fn newton() -> SolverSettings {
-    SolverSettings::Newton(common::newton(1e-11, 1e-11, 1e-6))
+    SolverSettings::Staged(common::newton(1e-11, 1e-11, 1e-6))
 }
 
 /// Largest difference of the relative velocities, over the largest of them.

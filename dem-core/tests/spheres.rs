@@ -8,7 +8,7 @@ use dem_core::bond::{BondStatus, Stiffness, failure};
 use dem_core::contact::Law;
 use dem_core::dim::{D2, D3, D3Twist, Dim, Moments, Space, Vect};
 use dem_core::problem::{Bond, Contact, ContactProblem};
-use dem_core::solver::{ContactSolver, Newton, SolveStatus, SolverSettings, Start};
+use dem_core::solver::{ContactSolver, SolveStatus, SolverSettings, Staged, Start};
 use dem_core::world::{Break, Settings, World};
 use nalgebra::{Matrix3, Rotation3, SVector, Unit, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -113,7 +113,7 @@ fn centres_in_a_plane_move_as_their_flat_twin() {
 
 #[test]
 fn bonds_in_a_plane_carry_and_break_as_in_their_flat_twin() {
-    let newton = SolverSettings::Newton(newton(1e-12, 1e-12, 1e-9));
+    let newton = SolverSettings::Staged(newton(1e-12, 1e-12, 1e-9));
     // in the fifth round all falls and much slips: Newton then comes to other solutions in space than in the plane
     for (solver, rounds) in [(solver(1e-12), u32::MAX), (newton, 4)] {
         let first = assert_twins(sheared::<D2>(solver), sheared::<D3>(solver), 400, rounds);
@@ -149,7 +149,7 @@ where
     let set = Settings { gravity: Some(by * Vector3::z() * -9.81), solver: solver(1e-12), ..settings(1e-4) };
     let mut world = World::new(list.into_iter().collect(), walls, Vec::new(), set);
     if bonds {
-        world.set_solver(SolverSettings::Newton(newton(1e-12, 1e-12, 1e-9)));
+        world.set_solver(SolverSettings::Staged(newton(1e-12, 1e-12, 1e-9)));
         world.form_bonds(1e-6, |_| 1.5, 0.3);
         world.limit_twist(0.1);
         let rolling = |a: f64| 1e4 * a * a;
@@ -235,7 +235,7 @@ fn a_cantilever_of_spheres_carries_its_load_at_the_root() {
         factor: Arc::new(|_| 1.0),
     };
     let grains: Grains<D3> = list.into_iter().collect();
-    let newton = SolverSettings::Newton(dem_core::solver::NewtonSettings {
+    let newton = SolverSettings::Staged(dem_core::solver::StagedSettings {
         start: Start::StiffLimit,
         ..newton(1e-13, 1e-13, 1e-12)
     });
@@ -271,8 +271,8 @@ const ARM_FORCE: f64 = 0.05;
 
 #[test]
 fn an_arm_twists_the_row_that_carries_it() {
-    let stiff = dem_core::solver::NewtonSettings { start: Start::StiffLimit, ..newton(1e-13, 1e-13, 1e-12) };
-    for solver in [SolverSettings::Newton(stiff), solver(1e-13)] {
+    let stiff = dem_core::solver::StagedSettings { start: Start::StiffLimit, ..newton(1e-13, 1e-13, 1e-12) };
+    for solver in [SolverSettings::Staged(stiff), solver(1e-13)] {
         let mut world = bent_arm(solver);
         common::run(&mut world, 3);
         for touch in world.touches() {
@@ -304,7 +304,7 @@ fn cemented() -> World<D3> {
         }
     }
     let mut w = World::new(grains.into_iter().collect(), Vec::new(), loads, settings(1e-5));
-    w.set_solver(SolverSettings::Newton(newton(1e-8, 1e-6, 1e-5)));
+    w.set_solver(SolverSettings::Staged(newton(1e-8, 1e-6, 1e-5)));
     w.form_bonds(0.05, |_| 20.0, 0.3);
     w
 }
@@ -319,7 +319,7 @@ fn the_first_round_tells_what_breaks() {
     let problem = problem.expect("a bond that breaks");
     let solved = |cascades: bool| {
         let mut problem = ContactProblem { cascades, ..problem.clone() };
-        let report = Newton::new(newton(1e-8, 1e-6, 1e-5)).solve(&mut problem);
+        let report = Staged::new(newton(1e-8, 1e-6, 1e-5)).solve(&mut problem);
         assert_eq!(report.status, SolveStatus::Converged);
         let breaks = |c: &Contact<D3, Bond<D3>>| failure(&c.r, c.law.shift(), c.law.cone()).is_some();
         (report, problem.bonded.iter().filter(|c| breaks(c)).map(|c| c.link.nodes).collect::<Vec<_>>())

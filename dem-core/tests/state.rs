@@ -8,12 +8,12 @@ use dem_core::bond::Stiffness;
 use dem_core::contact::BondFlow;
 use dem_core::dim::{D2, D3, D3Twist, Dim, Vect};
 use dem_core::saved::{Mismatch, Saved};
-use dem_core::solver::{NewtonSettings, SolverSettings, StiffnessRatio};
+use dem_core::solver::{SolverSettings, StagedSettings, Stages, StiffnessRatio};
 use dem_core::world::World;
 
-fn settings() -> NewtonSettings {
+fn settings() -> StagedSettings {
     let stiffness = StiffnessRatio { tangential: 0.5, rolling: 0.1 };
-    NewtonSettings { stiffness, ..common::newton(1e-8, 1e-4, 1e-5) }
+    StagedSettings { stiffness, ..common::newton(1e-8, 1e-4, 1e-5) }
 }
 
 fn saved<D: Dim>(world: &World<D>) -> Saved {
@@ -109,7 +109,8 @@ fn goes_on<D: Dim>(mut world: World<D>, solver: SolverSettings) -> World<D> {
 
 #[test]
 fn a_state_goes_on_to_the_bit_with_every_solver() {
-    let (newton, auto) = (SolverSettings::Newton(settings()), SolverSettings::Auto(settings()));
+    let [newton, auto] =
+        [Stages::Newton, Stages::All].map(|stages| SolverSettings::Staged(StagedSettings { stages, ..settings() }));
     for solver in [newton, auto, common::solver(1e-6)] {
         let world = goes_on(pressed::<D2>(3, 8, 0.3, Some(BondFlow::Associated)), solver);
         assert!(world.intact_bonds() > 0 && world.intact_bonds() < world.bonds.len(), "some bonds broke");
@@ -132,7 +133,7 @@ fn a_state_goes_on_between_steps_that_are_predicted() {
     // a bonded row at rest on a floor
     let mut set = common::settings(1e-3);
     set.gravity = common::down::<D2>(9.81);
-    set.solver = SolverSettings::Newton(settings());
+    set.solver = SolverSettings::Staged(settings());
     let row = (0..5).map(|k| common::grain::<D2>(&[0.02 * f64::from(k), 0.01], 0.01)).collect();
     let mut world = common::world(row, vec![common::floor(0.2)], set);
     world.form_bonds(1e-6, |_| 1e3, 0.3);
@@ -151,7 +152,7 @@ fn a_state_goes_on_between_steps_that_are_predicted() {
 #[test]
 fn numbers_that_do_not_fit_are_refused() {
     let mut world = pressed::<D2>(3, 6, 0.3, Some(BondFlow::Associated));
-    world.set_solver(SolverSettings::Newton(settings()));
+    world.set_solver(SolverSettings::Staged(settings()));
     common::run(&mut world, 5);
     let state = saved(&world);
     // cut short anywhere, at either end of either list

@@ -9,7 +9,7 @@ mod common;
 use common::{grain, newton, settings};
 use dem_core::body::{Grain, Grains, Load};
 use dem_core::dim::{D2, D3, D3Twist, Dim, Moments, Vect};
-use dem_core::solver::{NewtonSettings, SolverSettings, StiffnessRatio};
+use dem_core::solver::{SolverSettings, StagedSettings, StiffnessRatio};
 use dem_core::world::World;
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 use std::sync::Arc;
@@ -91,7 +91,7 @@ fn shares<D: Dim>(force: [f64; 3], torque: [f64; 3]) {
     let mut w = World::new(grains, Vec::new(), vec![load], settings(1e-4));
     w.form_bonds(1e-6, |_| 1e3, 0.3);
     w.limit_twist(0.3);
-    w.set_solver(SolverSettings::Newton(NewtonSettings { stiffness: RATIO, ..newton(1e-12, 1e-12, 1e-11) }));
+    w.set_solver(SolverSettings::Staged(StagedSettings { stiffness: RATIO, ..newton(1e-12, 1e-12, 1e-11) }));
     assert!(w.step().unwrap().breaks.is_empty());
     let expected = by_springs::<D>(&force, &torque);
     let largest = expected.iter().map(|(f, _)| f.norm()).fold(0.0, f64::max);

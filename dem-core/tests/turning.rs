@@ -20,7 +20,7 @@ fn dumbbell<D: Dim>(stiffness: Option<f64>, friction: f64) -> (f64, f64, f64) {
         grain.spin[D::Spin::LEN - 1] = if friction > 0.0 { rate } else { 0.0 };
     }
     let mut set = settings(h);
-    set.solver = SolverSettings::Newton(newton(1e-10, 1e-8, 1e-6));
+    set.solver = SolverSettings::Staged(newton(1e-10, 1e-8, 1e-6));
     let mut w = world(pair, vec![], set);
     w.form_bonds(1e-6, |_| 1e6, friction);
     if let Some(k) = stiffness {

@@ -1,10 +1,10 @@
 //! LU factors over the fronts of a [`Tree`], with pivots chosen within each front.
 
 use super::tree::{Front, Tree};
+use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::lu::partial_pivoting::factor::{lu_in_place, lu_in_place_scratch};
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_unit_lower_triangular_in_place};
-use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::{Accum, MatMut, Par};
 
 /// The factors of a matrix; their room is taken over from one to the next.
@@ -204,7 +204,13 @@ mod tests {
         let mut lu = Lu::default();
         assert!(lu.factorise(&tree, fill));
         let n: usize = sizes.iter().sum();
-        let firsts: Vec<usize> = sizes.iter().scan(0, |at, s| { *at += s; Some(*at - s) }).collect();
+        let firsts: Vec<usize> = sizes
+            .iter()
+            .scan(0, |at, s| {
+                *at += s;
+                Some(*at - s)
+            })
+            .collect();
         let mut dense = vec![vec![0.0; n]; n];
         (0..n).for_each(|k| dense[k][k] = 1.0);
         for (e, [a, b]) in elements.iter().enumerate() {

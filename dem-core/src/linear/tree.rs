@@ -202,7 +202,8 @@ impl Tree {
         let mut at = vec![usize::MAX; self.unknowns];
         for k in 0..fronts.len() {
             fronts[k].unknowns.iter().enumerate().for_each(|(place, unknown)| at[*unknown] = place);
-            let places = |e: usize| self.elements[e].map(|node| if self.sizes[node] > 0 { at[firsts[node]] } else { 0 });
+            let places =
+                |e: usize| self.elements[e].map(|node| if self.sizes[node] > 0 { at[firsts[node]] } else { 0 });
             fronts[k].elements = elements[k].iter().map(|e| Place { element: *e, at: places(*e) }).collect();
             for child in std::mem::take(&mut children[k]) {
                 let border = &fronts[child].unknowns[fronts[child].pivots..];

@@ -2,12 +2,12 @@
 //! that u = L y + q and y = Lᵀ r, as if there were bodies of unit mass behind it. L is full: every contact has as many
 //! coefficients as W has rank.
 
+use super::assembled::{Sites, gauss_seidel};
 use super::rows::{Row, Rows, StiffnessRatio, places};
 use super::solvable::Solvable;
+use super::{GaussSeidelSettings, SolveReport};
 use crate::contact::{Local, LocalSolve, Padded, Weights};
 use crate::problem::assembled::{Assembled, BlockMatrix};
-use super::assembled::{Sites, gauss_seidel};
-use super::{GaussSeidelSettings, SolveReport};
 
 impl Assembled {
     /// The reaction of a contact without the shift.

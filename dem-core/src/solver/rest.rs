@@ -43,4 +43,3 @@ impl Rest {
         if rest.left.max(rest.next) <= LONGEST_REST { Ok(rest) } else { Err(Mismatch) }
     }
 }
-

@@ -1,12 +1,12 @@
 //! What the Newton solver asks of a problem, matrix-free or with its matrix.
 
 use super::rows::{Rows, StiffnessRatio, mass_unit};
+use super::{ContactSolver, GaussSeidel, GaussSeidelSettings, SolveReport, sweep};
 use crate::contact::{Law, LocalSolve, Padded};
 use crate::dim::{Dim, Vect};
-use crate::problem::residual::residual;
 use crate::problem::assembled::BlockMatrix;
+use crate::problem::residual::residual;
 use crate::problem::{ContactProblem, Group};
-use super::{ContactSolver, GaussSeidel, GaussSeidelSettings, SolveReport, sweep};
 
 /// A problem that can be put into rows over scaled unknowns, swept and measured.
 pub(super) trait Solvable {

@@ -141,10 +141,8 @@ impl Staged {
             && report.status == SolveStatus::Converged
         {
             let factorisations = self.newton.made() + self.interior.made - made;
-            if std::env::var("IPM").is_ok() { eprintln!("newton {newton} fac {factorisations}"); }
             return SolveReport { work: Work { factorisations, ..report.work }, ..report };
         }
-        let t0 = std::time::Instant::now(); let n_made = self.newton.made() + self.interior.made - made;
         let start = (!cold).then_some(&begun[..]);
         // what breaks a bond is the load that it bears, and of dry contacts any that balances will do
         let least = problem.matrix().is_none() && rows.list.iter().any(|row| row.shift > 0.0);
@@ -155,7 +153,6 @@ impl Staged {
         let (mut residual, mut load_error, mut iterations) = (f64::NAN, 1.0, 0);
         if let Some(found) = found {
             (residual, load_error, iterations) = (found.residual, found.load_error, found.iterations);
-            if std::env::var("IPM").is_ok() { eprintln!("newton {newton} fac {n_made} then interior {iterations} res {residual:.1e} load {load_error:.1e} cold {cold} t {:?}", t0.elapsed()); }
             if residual <= tolerance {
                 let report = self.settings.report(work(0, iterations), residual, load_error);
                 return SolveReport { route: Route::InteriorPoint, ..report };

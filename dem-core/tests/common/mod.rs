@@ -7,7 +7,7 @@ use dem_core::body::{Drive, Grain, Grains, Load, Shape, Wall};
 use dem_core::bond::Rupture;
 use dem_core::contact::{BondFlow, LocalSolve};
 use dem_core::dim::{D2, Dim, Vect};
-use dem_core::solver::{GaussSeidelSettings, NewtonSettings, SolverSettings, Start, StiffnessRatio};
+use dem_core::solver::{GaussSeidelSettings, SolverSettings, StagedSettings, Stages, Start, StiffnessRatio};
 use dem_core::world::{Settings, World};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -26,8 +26,9 @@ pub fn solver(tolerance: f64) -> SolverSettings {
 }
 
 /// Newton from the stiff limit, with the settings that a scene has by default but for its tolerances.
-pub fn newton(tolerance: f64, accept: f64, load_tolerance: f64) -> NewtonSettings {
-    NewtonSettings {
+pub fn newton(tolerance: f64, accept: f64, load_tolerance: f64) -> StagedSettings {
+    StagedSettings {
+        stages: Stages::Newton,
         tolerance,
         accept,
         load_tolerance,

@@ -4,7 +4,7 @@ use crate::common;
 use dem_core::body::{Grain, Shape, Wall};
 use dem_core::contact::LocalSolve;
 use dem_core::dim::{Dim, Vect};
-use dem_core::solver::{GaussSeidelSettings, SolverSettings};
+use dem_core::solver::{GaussSeidelSettings, SolverSettings, StagedSettings, Stages};
 use dem_core::world::{Restitution, Settings, World};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -36,8 +36,8 @@ impl Kind {
                 max_sweeps: SWEEPS,
                 acceleration: 0,
             }),
-            Self::Newton => SolverSettings::Newton(newton),
-            Self::Auto => SolverSettings::Auto(newton),
+            Self::Newton => SolverSettings::Staged(newton),
+            Self::Auto => SolverSettings::Staged(StagedSettings { stages: Stages::All, ..newton }),
         }
     }
 }

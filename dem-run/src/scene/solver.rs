@@ -108,7 +108,7 @@ impl Default for Newton {
         let rolling_stiffness = 1.0 / 12.0;
         Self {
             load_tolerance: 1e-5,
-            start: Start::StiffLimit,
+            start: Start::LastStep,
             tangential_stiffness: 1.0,
             rolling_stiffness,
             max_iterations: 300,

@@ -4,7 +4,7 @@ use crate::common::{Folder, SMALL, problems};
 use dem_core::contact::LocalSolve;
 use dem_core::problem::assembled::Assembled;
 use dem_core::solver::assembled::gauss_seidel;
-use dem_core::solver::{GaussSeidelSettings, Newton, NewtonSettings, SolveStatus, Start, StiffnessRatio};
+use dem_core::solver::{GaussSeidelSettings, SolveStatus, Staged, StagedSettings, Stages, Start, StiffnessRatio};
 use dem_run::fclib::Problem;
 use hdf5::File;
 use std::path::Path;
@@ -174,7 +174,8 @@ fn wrong_exports_are_refused() {
 const TOLERANCE: f64 = 1e-8;
 
 fn newton(problem: &mut Assembled) -> SolveStatus {
-    let settings = NewtonSettings {
+    let settings = StagedSettings {
+        stages: Stages::Interior,
         tolerance: TOLERANCE,
         accept: TOLERANCE,
         load_tolerance: f64::INFINITY,
@@ -182,7 +183,7 @@ fn newton(problem: &mut Assembled) -> SolveStatus {
         stiffness: StiffnessRatio { tangential: 1.0, rolling: 1.0 / 12.0 },
         max_iterations: 300,
     };
-    Newton::new(settings).solve_assembled(problem).status
+    Staged::new(settings).solve_assembled(problem).status
 }
 
 fn swept(problem: &mut Assembled, local: LocalSolve, acceleration: usize) -> SolveStatus {

@@ -15,8 +15,8 @@ mod coupling;
 mod local;
 mod sites;
 
-use crate::contact::Padded;
 use super::stall::Stall;
+use crate::contact::Padded;
 use crate::linear::Lu;
 use crate::solver::graph::Graph;
 use crate::solver::rows::Rows;
@@ -29,8 +29,8 @@ use std::sync::Arc;
 
 /// Stiffness of the metric over the inverse of the mean normal entry of W.
 const KAPPA: f64 = 1e7;
-/// The same where any reactions will do: what it leaves of the residual is its inverse.
-const ANY: f64 = 3e8;
+/// Share of the tolerance that its compliance may leave of the residual where any reactions will do.
+const SOFT: f64 = 0.3;
 /// What the gaps of all pairs may be beside the energy of the metric for reactions to count as those of least energy.
 const LEAST: f64 = 0.01;
 /// Least centring, as a share of the gap.
@@ -106,7 +106,7 @@ impl Interior {
             (None, Some(graph)) => Coupling::bodies(rows, ratio, graph),
             (None, None) => return None,
         };
-        let kappa = if aims.least { KAPPA } else { ANY };
+        let kappa = if aims.least { KAPPA } else { 1.0 / (SOFT * aims.tolerance) };
         let mut metric = Metric::new(&sites, sites.gathered(&anchor), kappa);
         let mut at = match start {
             Some(reactions) => warm(&sites, &coupling, &sites.gathered(reactions)),
@@ -257,7 +257,8 @@ fn direction(system: &System) -> (State, f64) {
     // corrector, of second order
     let barrier = centring * gap;
     let second = predictor.x.iter().zip(&predictor.z).map(|(dx, dz)| product(dx, dz));
-    let mut by: Vec<Point> = products.iter().zip(second).map(|(p, s)| [barrier - p[0] - s[0], -p[1] - s[1], -p[2] - s[2]]).collect();
+    let mut by: Vec<Point> =
+        products.iter().zip(second).map(|(p, s)| [barrier - p[0] - s[0], -p[1] - s[1], -p[2] - s[2]]).collect();
     let mut step = system.step(&by);
     let mut far = system.longest(&step);
     for _ in 0..CORRECTORS {

@@ -6,9 +6,9 @@
 //! negative derivative A = −∂r/∂q is what a contact adds to the matrix of the Newton step; it is symmetric where the
 //! law is associated.
 
-use crate::solver::rows::{Operator, Row, TWIST};
 use crate::contact::{Local, PADDED, Padded, Weights};
 use crate::dim::{Moments, Vect};
+use crate::solver::rows::{Operator, Row, TWIST};
 use nalgebra::{SMatrix, SVector, Vector2};
 
 /// The corrected reaction for the relative velocity `u`, without the shift: a reaction that is small beside the

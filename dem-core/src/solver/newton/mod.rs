@@ -28,13 +28,15 @@ use super::rows::Rows;
 use super::solvable::Solvable;
 use super::{SolveReport, StagedSettings};
 use crate::saved::{Mismatch, Reader, Saved};
-use guess::Guess;
 use factor::Factor;
+use guess::Guess;
 use std::sync::Arc;
 
 /// Sweeps that look for the active set: at every step, and from zero reactions.
 const SWEEPS: usize = 5;
 const COLD_SWEEPS: usize = 100;
+/// Most factorisations of a solve: the interior-point method takes 8 to 20.
+const MOST_MADE: u64 = 8;
 
 /// Augmented-Lagrangian semismooth Newton.
 pub(super) struct Newton {
@@ -73,7 +75,7 @@ impl Newton {
             true => 0,
             false => SWEEPS,
         };
-        self.most_made = self.made() + std::env::var("NMAX").ok().and_then(|v| v.parse().ok()).unwrap_or(8);
+        self.most_made = self.made() + MOST_MADE;
         let guess = Guess::of(problem.swept(sweeps));
         let report = self.rounds(problem, rows, guess, iterations);
         self.factor.stale |= report.is_none();

@@ -2,11 +2,11 @@
 
 use super::guess::Guess;
 use super::inner::{Iterate, distance};
-use crate::solver::stall::Shrinking;
 use super::{Newton, SolveReport};
 use crate::solver::extrapolation::margins;
 use crate::solver::rows::{Rows, net_change};
 use crate::solver::solvable::Solvable;
+use crate::solver::stall::Shrinking;
 use crate::solver::{SolveStatus, Work};
 
 /// Newton iterations of one inner problem before it is given up: those in which F shrinks by less than a tenth, fewer in space
