@@ -157,8 +157,6 @@ pub struct ContactProblem<D: Dim> {
     pub radii: Vec<f64>,
     /// Euclidean norm of the applied impulses h F_ext (N s), one scale of the residual.
     pub applied: f64,
-    /// Whether a solution that leaves bonds at their limit moves nothing: the problem is then solved again without all of them.
-    pub cascades: bool,
 }
 
 /// Node velocities: grains first, then walls.

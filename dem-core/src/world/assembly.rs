@@ -3,7 +3,7 @@
 use super::World;
 use super::touch::{Kept, Touch, TouchStatus};
 use crate::body::{Grains, Wall, direction};
-use crate::bond::{Bond, BondStatus, Rupture};
+use crate::bond::{Bond, BondStatus};
 use crate::contact::{Arms, Bonded, Coulomb, Elastic, Frictionless, Law, Local};
 use crate::dim::{Axes, Dim, Moments, Vect, in_frame, of_frame, resized};
 use crate::problem::{Contact, ContactProblem, Group, Link, Node, Nodes, blocks};
@@ -271,7 +271,6 @@ impl<D: Dim> World<D> {
             frictionless: Vec::new(),
             radii: if D::N > 2 { self.grains.radius.clone() } else { Vec::new() },
             applied,
-            cascades: self.settings.rupture == Rupture::Cascade,
         };
         let mut places = Places::default();
         self.reserve(touches, &mut problem, &mut places);

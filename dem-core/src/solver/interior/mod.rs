@@ -29,10 +29,14 @@ use std::sync::Arc;
 
 /// Stiffness of the metric over the inverse of the mean normal entry of W.
 const KAPPA: f64 = 1e7;
-/// Share of the tolerance that its compliance may leave of the residual where any reactions will do.
-const SOFT: f64 = 0.3;
+/// The same where any reactions will do: its compliance is far below every tolerance.
+const ANY: f64 = 1e12;
 /// What the gaps of all pairs may be beside the energy of the metric for reactions to count as those of least energy.
-const LEAST: f64 = 0.01;
+const LEAST: f64 = 1e-3;
+/// From where the path goes on without the compliance, over that: nearer to the boundary steps would be short.
+const BACK: f64 = 30.0;
+/// Share of its compliance that a metric keeps for each round after the second.
+const HARDER: f64 = 0.01;
 /// Least centring, as a share of the gap.
 const CENTRING: f64 = 0.1;
 /// Most of Gondzio's correctors in an iteration, by how much a step is tried longer, the share by which it must grow, and how far products
@@ -68,7 +72,7 @@ pub(super) struct Aims {
 pub(super) struct Found {
     /// Reactions without the shift, in the unit of the rows.
     pub reactions: Vec<Padded>,
-    /// Their residual (–), and their load error (–).
+    /// Their residual (–), and their load error (–): how much the net impulses changed in the last iteration.
     pub residual: f64,
     pub load_error: f64,
     /// Iterations made.
@@ -106,37 +110,45 @@ impl Interior {
             (None, Some(graph)) => Coupling::bodies(rows, ratio, graph),
             (None, None) => return None,
         };
-        let kappa = if aims.least { KAPPA } else { 1.0 / (SOFT * aims.tolerance) };
+        let kappa = if aims.least { KAPPA } else { ANY };
         let mut metric = Metric::new(&sites, sites.gathered(&anchor), kappa);
         let mut at = match start {
             Some(reactions) => warm(&sites, &coupling, &sites.gathered(reactions)),
             None => cold(&sites),
         };
-        let (mut best, mut selects, mut turn): (Option<Found>, _, _) = (None, aims.least, None);
-        let (mut change, mut last) = (1.0, f64::INFINITY);
+        let (mut best, mut turn): (Option<Found>, Option<State>) = (None, None);
+        let (mut selects, mut limits, mut enough, mut rounds) = (aims.least, Vec::new(), f64::INFINITY, 0);
+        let mut change = 1.0;
         let mut stall = Stall::after(PATIENCE, 0.5);
         for iterations in 0..=aims.most {
-            let reactions = sites.snapped(&at);
+            let gaps = gap(&at) * at.x.len() as f64;
+            let least = LEAST * metric.energy(&at.r);
+            if selects && gaps <= least {
+                (selects, limits, enough) = (false, sites.limits(&at, &metric.own), least);
+            }
+            let reactions = sites.snapped(&at, &limits);
             problem.write_back(&reactions);
             let residual = problem.residual();
-            // what is left of the net impulses shrinks with the residual
-            let load_error = change * (residual / last).min(1.0);
-            last = residual;
-            let solved = residual <= aims.tolerance && load_error <= aims.load_tolerance || residual == 0.0;
-            let gaps = gap(&at) * at.x.len() as f64 / metric.energy(&at.r);
-            let arrived = solved && !(selects && gaps > LEAST);
+            let solved = residual <= aims.tolerance && change <= aims.load_tolerance || residual == 0.0;
+            let arrived = solved && !selects && gaps <= enough;
             if arrived || best.as_ref().is_none_or(|best| residual < best.residual) {
-                best = Some(Found { reactions, residual, load_error, iterations });
+                best = Some(Found { reactions, residual, load_error: change, iterations });
             }
-            if arrived || iterations == aims.most || stall.at(residual.min(gap(&at))) {
+            let inside = gap(&at) > 0.0;
+            if arrived || iterations == aims.most || !inside || stall.at(residual.min(gap(&at))) {
                 break;
             }
-            if selects && gaps <= 1.0 && turn.is_none() {
+            if gaps <= BACK * least && turn.is_none() {
                 turn = Some(at.clone());
             }
-            if selects && gaps <= LEAST {
-                metric.anchor = std::mem::replace(&mut at, turn.take()?).r;
-                (selects, stall) = (false, Stall::after(PATIENCE, 0.5));
+            if gaps <= least
+                && let Some(turn) = &turn
+            {
+                // the same metric once more, then harder ones
+                let share = if rounds == 0 { 1.0 } else { HARDER };
+                metric.anchor_at(std::mem::replace(&mut at, turn.clone()).r, share);
+                (rounds, enough) = (rounds + 1, share * enough);
+                stall = Stall::after(PATIENCE, 0.5);
             }
             let weight = coupling.velocity(&sites, &at.r);
             let lack = lack(&sites, &weight, &at, &metric);
@@ -176,6 +188,15 @@ impl Metric {
         let own: Vec<f64> = sites.metric.iter().map(|w| w / kappa).collect();
         let compliance = own.iter().zip(&sites.compliance).map(|(own, c)| own + c).collect();
         Self { anchor, own, compliance }
+    }
+
+    /// Draw to these reactions, by this share of the compliance.
+    fn anchor_at(&mut self, anchor: Vec<f64>, share: f64) {
+        self.anchor = anchor;
+        for (c, own) in self.compliance.iter_mut().zip(&mut self.own) {
+            *c += (share - 1.0) * *own;
+            *own *= share;
+        }
     }
 
     /// Σ (r − r₀)²/ρ.

@@ -17,6 +17,16 @@ use std::ops::Range;
 pub(super) const ROWS: usize = 6;
 pub(super) const CONES: usize = 9;
 
+/// How near a limit a reaction must be, over itself, to be at one that is known.
+const BESIDE: f64 = 1e-6;
+
+/// Whether a reaction is at the apex of its cone, or on its side.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Limit {
+    pub apex: bool,
+    pub side: bool,
+}
+
 /// One cone of a contact.
 #[derive(Clone, Debug)]
 pub(super) struct Cone {
@@ -194,18 +204,42 @@ impl Sites {
         list
     }
 
-    /// The reactions of the problem at a point, each at the limits that it is nearer to than its z is to its own.
-    pub fn snapped(&self, at: &State) -> Vec<Padded> {
+    /// Which cones reactions are at the limit of, where z is what the compliance of each row makes of how far they would be beyond.
+    pub fn limits(&self, at: &State, compliance: &[f64]) -> Vec<Limit> {
+        let mut limits = vec![Limit::default(); self.cones.len()];
+        for site in &self.list {
+            for c in site.cones.clone() {
+                let (x, z) = (eigenvalues(&at.x[c]), eigenvalues(&at.z[c]));
+                let soft = compliance[site.at + self.cones[c].rows[0]];
+                limits[c] = Limit { apex: soft * x[0] < z[1], side: soft * x[1] < z[0] };
+            }
+        }
+        limits
+    }
+
+    /// The reactions of the problem at a point, each at the limits that it is nearer to than its z is to its own, and at those that it is
+    /// known to be at where it is next to them.
+    pub fn snapped(&self, at: &State, known: &[Limit]) -> Vec<Padded> {
+        let limit = |c: usize| {
+            let (x, z) = (eigenvalues(&at.x[c]), eigenvalues(&at.z[c]));
+            let known = known.get(c).copied().unwrap_or_default();
+            Limit { apex: x[0] < z[1], side: x[1] < z[0] || known.side && x[1] <= BESIDE * x[0] }
+        };
+        let apex_beside = |c: usize, shift: f64| {
+            let known = known.get(c).copied().unwrap_or_default();
+            known.apex && at.x[c][0] <= BESIDE * self.cones[c].slope * shift
+        };
         let one = |(site, shift): (&Site, &f64)| {
             let mut own = [0.0; ROWS];
             own[..site.rows].copy_from_slice(site.part(&at.r));
-            let pairs = site.cones.clone().map(|c| (&self.cones[c], eigenvalues(&at.x[c]), eigenvalues(&at.z[c])));
-            if pairs.clone().any(|(cone, x, z)| cone.opens && x[0] < z[1]) {
+            let at_apex = |c: usize| self.cones[c].opens && (limit(c).apex || apex_beside(c, *shift));
+            if site.cones.clone().any(at_apex) {
                 // at the apex: nothing is carried but what the shift stands for
                 own = [0.0; ROWS];
                 own[0] = -shift;
             } else {
-                for (cone, ..) in pairs.filter(|(cone, x, z)| cone.tangents > 0 && x[1] < z[0]) {
+                for c in site.cones.clone().filter(|c| self.cones[*c].tangents > 0 && limit(*c).side) {
+                    let cone = &self.cones[c];
                     let x = cone.primal(&own);
                     let length = x[1].hypot(x[2]);
                     let scale = if length > 0.0 { cone.slope * (own[0] + shift) / length } else { 1.0 };
