@@ -198,7 +198,8 @@ mod tests {
             for (k, value) in m.iter_mut().enumerate() {
                 let (r, c) = (k / width, k % width);
                 // not symmetric, and large off the diagonal, so that pivots change places
-                *value = (1.0 + ((7 * e + 3 * r + 5 * c) % 11) as f64) * if (r + c + e) % 3 == 0 { -10.0 } else { 1.0 };
+                *value = (1.0 + ((7 * e + 3 * r + 5 * c) % 11) as f64)
+                    * if (r + c + e).is_multiple_of(3) { -10.0 } else { 1.0 };
             }
         };
         let mut lu = Lu::default();

@@ -33,7 +33,6 @@ const BURST: u64 = 4;
 const LOOK: u64 = 4;
 /// Plain sweeps before the acceleration begins: easy problems need no more.
 const PLAIN: u64 = 32;
-/// Steps for the acceleration to remember that serve well.
 
 /// Non-linear Gauss–Seidel on node velocities.
 #[derive(Clone, Copy, Debug)]

@@ -126,59 +126,64 @@ impl Staged {
 
     /// By the stages that solve linear systems, and sweeps from where these end.
     fn directly(&mut self, problem: &mut impl Solvable) -> SolveReport {
-        let StagedSettings { tolerance, accept, load_tolerance, max_iterations, .. } = self.settings;
         problem.velocities_from_reactions();
         let rows = problem.rows(KAPPA, self.settings.stiffness);
-        if rows.list.is_empty() || rows.list.iter().all(|row| row.normal == 0.0) {
+        if rows.list.iter().all(|row| row.normal == 0.0) {
             return self.settings.report(Work::default(), problem.residual(), 0.0);
         }
-        let begun: Vec<_> = rows.list.iter().map(|row| row.multiplier).collect();
-        let cold = begun.iter().all(|r| r.n == 0.0);
-        let (mut newton, made) = (0, self.newton.made() + self.interior.made);
-        if self.settings.stages != Stages::Interior
-            && problem.matrix().is_none()
-            && let Some(report) = self.newton.solve(problem, &mut self.anchored(&rows), cold, &mut newton)
-            && report.status == SolveStatus::Converged
-        {
-            let factorisations = self.newton.made() + self.interior.made - made;
-            return SolveReport { work: Work { factorisations, ..report.work }, ..report };
+        let made = self.newton.made() + self.interior.made;
+        let report = match self.by_the_active_set(problem, &rows) {
+            Ok(report) => report,
+            Err(before) => self.along_the_path(problem, &rows, before),
+        };
+        let factorisations = self.newton.made() + self.interior.made - made;
+        SolveReport { work: Work { factorisations, ..report.work }, ..report }
+    }
+
+    /// What Newton comes to; the iterations that it made where it does not reach the tolerance.
+    fn by_the_active_set(&mut self, problem: &mut impl Solvable, rows: &Rows) -> Result<SolveReport, u64> {
+        let mut iterations = 0;
+        if self.settings.stages == Stages::Interior || problem.matrix().is_some() {
+            return Err(iterations);
         }
-        let start = (!cold).then_some(&begun[..]);
-        // what breaks a bond is the load that it bears, and of dry contacts any that balances will do
+        let report = self.newton.solve(problem, &mut self.anchored(rows), is_cold(rows), &mut iterations);
+        report.filter(|report| report.status == SolveStatus::Converged).ok_or(iterations)
+    }
+
+    /// What the interior-point method comes to, and sweeps from where it ends.
+    fn along_the_path(&mut self, problem: &mut impl Solvable, rows: &Rows, mut newton: u64) -> SolveReport {
+        let StagedSettings { tolerance, accept, load_tolerance, max_iterations, .. } = self.settings;
+        let anchored = self.anchored(rows);
+        let begun: Vec<_> = rows.list.iter().map(|row| row.multiplier).collect();
+        let start = (!is_cold(rows)).then_some(&begun[..]);
+        // what breaks a bond is the load that it bears; of dry contacts any reactions that balance will do
         let least = problem.matrix().is_none() && rows.list.iter().any(|row| row.shift > 0.0);
         let aims = Aims { tolerance, load_tolerance, least, most: max_iterations };
-        let mut found = self.interior.solve(problem, &self.anchored(&rows), start, aims);
-        if found.as_ref().is_none_or(|found| found.residual > accept) {
-            // any reactions, from no start: the path is another
-            let again = self.interior.solve(problem, &self.anchored(&rows), None, Aims { least: false, ..aims });
-            let tried = found.as_ref().map_or(0, |found| found.iterations);
-            if let Some(again) = again {
-                let better = found.as_ref().is_none_or(|found| again.residual < found.residual);
-                let all = Some(tried + again.iterations);
-                found = if better { Some(again) } else { found };
-                found.iter_mut().for_each(|found| found.iterations = all.unwrap_or_default());
-            }
-            found.iter().for_each(|found| problem.write_back(&found.reactions));
+        let mut best = self.interior.solve(problem, &anchored, start, aims);
+        newton += best.as_ref().map_or(0, |found| found.iterations);
+        if best.as_ref().is_none_or(|found| found.residual > accept) {
+            // any reactions, from no start: another path
+            let other = self.interior.solve(problem, &anchored, None, Aims { least: false, ..aims });
+            newton += other.as_ref().map_or(0, |found| found.iterations);
+            best = best.into_iter().chain(other).min_by(|a, b| a.residual.total_cmp(&b.residual));
         }
-        let factorisations = self.newton.made() + self.interior.made - made;
-        let work = |sweeps: u64, more: u64| Work { sweeps, newton: newton + more, factorisations };
-        let (mut residual, mut load_error, mut iterations) = (f64::NAN, 1.0, 0);
-        if let Some(found) = found {
-            (residual, load_error, iterations) = (found.residual, found.load_error, found.iterations);
-            if residual <= tolerance {
-                let report = self.settings.report(work(0, iterations), residual, load_error);
-                return SolveReport { route: Route::InteriorPoint, ..report };
-            }
+        let residual = best.as_ref().map_or(f64::INFINITY, |found| found.residual);
+        let by_the_path = |problem: &mut _, sweeps| {
+            let load_error = best.as_ref().map_or(1.0, |found| found.load_error);
+            best.iter().for_each(|found| Solvable::write_back(problem, &found.reactions));
+            let report = self.settings.report(Work { sweeps, newton, factorisations: 0 }, residual, load_error);
+            SolveReport { route: Route::InteriorPoint, ..report }
+        };
+        if residual <= tolerance {
+            return by_the_path(problem, 0);
         }
+        best.iter().for_each(|found| problem.write_back(&found.reactions));
         problem.forget_what_is_not_finite();
-        let local = LocalSolve::Exact;
-        let settings = GaussSeidelSettings { local, tolerance, accept, max_sweeps: LAST_SWEEPS, acceleration: 0 };
-        let swept = problem.gauss_seidel(settings);
+        let swept = problem.gauss_seidel(self.sweeps(tolerance, LAST_SWEEPS));
         if residual <= swept.residual {
-            let report = self.settings.report(work(swept.work.sweeps, iterations), residual, load_error);
-            return SolveReport { route: Route::InteriorPoint, ..report };
+            return by_the_path(problem, swept.work.sweeps);
         }
-        SolveReport { route: Route::Sweeps, work: work(swept.work.sweeps, iterations), ..swept }
+        SolveReport { work: Work { newton, ..swept.work }, ..swept }
     }
 
     /// The rows with the multipliers that the reactions start from.
@@ -190,13 +195,16 @@ impl Staged {
         rows
     }
 
+    /// Gauss–Seidel that aims at this residual.
+    fn sweeps(&self, tolerance: f64, max_sweeps: u64) -> GaussSeidelSettings {
+        let (local, accept) = (LocalSolve::Exact, self.settings.accept);
+        GaussSeidelSettings { local, tolerance, accept, max_sweeps, acceleration: 0 }
+    }
+
     /// By sweeps over dry contacts: for the tolerance, then for what is accepted.
     fn swept<D: Dim>(&self, problem: &mut ContactProblem<D>) -> SolveReport {
         let StagedSettings { tolerance, accept, .. } = self.settings;
-        let by = |tolerance, max_sweeps| {
-            let local = LocalSolve::Exact;
-            GaussSeidel::new(GaussSeidelSettings { local, tolerance, accept, max_sweeps, acceleration: 0 })
-        };
+        let by = |tolerance, most| GaussSeidel::new(self.sweeps(tolerance, most));
         let fine = by(tolerance, FINE_SWEEPS).solve(problem);
         if fine.status != SolveStatus::Failed {
             return fine;
@@ -209,6 +217,11 @@ impl Staged {
             _ => SolveReport { work, ..coarse },
         }
     }
+}
+
+/// Whether no reactions are known to start from.
+fn is_cold(rows: &Rows) -> bool {
+    rows.list.iter().all(|row| row.multiplier.n == 0.0)
 }
 
 impl<D: Dim> ContactSolver<D> for Staged {
