@@ -330,7 +330,7 @@ struct SolveArgs {
     /// Residual to reach.
     #[arg(long, value_name = "T", default_value_t = 1e-8, value_parser = positive)]
     tolerance: f64,
-    /// Iterations after which the solver gives up [default: 100000 sweeps, 300 Newton iterations].
+    /// Iterations after which the solver gives up [default: 100000 sweeps, 300 of the interior-point method].
     #[arg(long, value_name = "N")]
     max_iterations: Option<u64>,
     /// Steps that the acceleration of Gauss–Seidel remembers, 8 for one; 0 for plain sweeps.

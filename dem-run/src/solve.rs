@@ -24,9 +24,8 @@ pub enum Solver {
     /// Non-linear Gauss–Seidel.
     #[default]
     GaussSeidel,
-    /// Semismooth Newton on the augmented Lagrangian, with a dense factorisation of W: for some thousand rows.
-    Newton,
-    /// The interior-point method, with a sparse factorisation.
+    /// The interior-point method, with a sparse factorisation of W.
+    #[value(alias = "newton")]
     Interior,
 }
 
@@ -142,11 +141,10 @@ fn iterate(problem: &mut Assembled, options: &SolveOptions) -> SolveReport {
             let settings = GaussSeidelSettings { local, tolerance, accept, max_sweeps, acceleration };
             gauss_seidel(problem, &settings)
         }
-        Solver::Newton | Solver::Interior => {
-            let stages = if options.solver == Solver::Newton { Stages::Newton } else { Stages::Interior };
+        Solver::Interior => {
             let scene = scene::Newton::default();
             let settings = StagedSettings {
-                stages,
+                stages: Stages::Interior,
                 tolerance,
                 accept: tolerance,
                 // a file tells no load: only the residual counts
@@ -180,7 +178,6 @@ impl fmt::Display for Solved {
         let status = if self.converged { "solved" } else { "not solved" };
         let solver = match self.solver {
             Solver::GaussSeidel => "Gauss–Seidel",
-            Solver::Newton => "Newton",
             Solver::Interior => "the interior-point method",
         };
         writeln!(f, "status           {status} by {solver}, {}", self.took())?;

@@ -8,8 +8,9 @@
 //! | [`Route::InteriorPoint`] | follows the central path, with Coulomb's law exact | always |
 //! | [`Route::Sweeps`] | Gauss–Seidel from where the path ended | where the path folds |
 //!
-//! What none of them brings to the tolerance is taken at [`StagedSettings::accept`] or refused. No clock is looked at, and nothing is
-//! left out because it failed in an earlier step, so a solve depends on its problem, the last reactions and what is known of their growth.
+//! What none of them brings to the tolerance is taken at [`StagedSettings::accept`] or refused. No clock is looked at, and nothing but the
+//! extrapolation is left out because it failed in an earlier step: a solve depends on its problem, the last reactions, Newton's last factors
+//! and what is known of the growth of reactions.
 
 use super::extrapolation::Extrapolation;
 use super::interior::{Aims, Interior};

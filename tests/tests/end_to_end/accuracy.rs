@@ -196,7 +196,7 @@ fn a_scene_without_bonds_has_no_failure() {
 fn wrong_options_are_told() {
     let here = Folder::new();
     let scene = config("column.json");
-    here.dem_run(&["accuracy", &scene, "--solvers", "newtn"]).fails(2, &["newtn", "gauss-seidel, newton"]);
+    here.dem_run(&["accuracy", &scene, "--solvers", "newtn"]).fails(2, &["newtn", "gauss-seidel, newton, interior"]);
     here.dem_run(&["accuracy", &scene, "--tolerances", "0"]).fails(2, &["--tolerances", "above zero"]);
     here.dem_run(&["accuracy", &scene, "--steps", "1,x"]).fails(2, &["--steps", "above zero"]);
     here.write("taken", "");

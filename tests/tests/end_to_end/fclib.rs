@@ -28,7 +28,7 @@ fn an_exported_problem_is_solved_by_both_solvers() {
     at.r = problem.solution.expect("a solution");
     // the scene's solver solved it, by a residual of its own that should be the same
     assert!(at.residual() <= 2e-9, "{:e}", at.residual());
-    for solver in ["newton", "gauss-seidel"] {
+    for solver in ["interior", "newton", "gauss-seidel"] {
         let answer = here.dem_run(&["solve", "a.hdf5", "--solver", solver, "--json", "--force", "-o", "b.hdf5"]).json();
         assert_eq!((&answer["converged"], &answer["rows"]), (&true.into(), &3.into()));
         assert!(answer["residual"].as_f64().expect("residual") <= 1e-8);
@@ -39,7 +39,7 @@ fn an_exported_problem_is_solved_by_both_solvers() {
         assert!(at.residual() <= 1e-8);
     }
     let outcome = here.dem_run(&["solve", "a.hdf5", "--solver", "newton"]).succeeds();
-    for part in ["status", "solved by Newton", "residual", "Siconos's error", "CPU time"] {
+    for part in ["status", "solved by the interior-point method", "residual", "Siconos's error", "CPU time"] {
         assert!(outcome.stdout.contains(part), "{part} in\n{}", outcome.stdout);
     }
     // the same file, byte for byte, however many threads
@@ -149,7 +149,7 @@ fn wrong_files_are_refused() {
     File::create(here.path("a.hdf5")).and_then(|file| file.create_group("fclib_global")).expect("create");
     here.dem_run(&["solve", "a.hdf5"]).fails(4, &["a.hdf5", "global problem", "/fclib_local"]);
     here.dem_run(&["solve", "a.hdf5", "--tolerance", "0"]).fails(2, &["--tolerance", "above zero"]);
-    here.dem_run(&["solve", "a.hdf5", "--solver", "magic"]).fails(2, &["magic", "gauss-seidel", "newton"]);
+    here.dem_run(&["solve", "a.hdf5", "--solver", "magic"]).fails(2, &["magic", "gauss-seidel", "interior"]);
     here.dem_run(&["solve", "a.hdf5", "-o", "a.hdf5", "--force"]).fails(4, &["overwrite", "another file"]);
 }
 
@@ -173,7 +173,7 @@ fn wrong_exports_are_refused() {
 
 const TOLERANCE: f64 = 1e-8;
 
-fn newton(problem: &mut Assembled) -> SolveStatus {
+fn interior_point(problem: &mut Assembled) -> SolveStatus {
     let settings = StagedSettings {
         stages: Stages::Interior,
         tolerance: TOLERANCE,
@@ -208,7 +208,7 @@ fn velocities_apart(a: &Assembled, b: &Assembled) -> f64 {
 
 /// Whether a solver cannot solve a problem: in the steps of a collapse 100,000 sweeps come to 6e-7.
 fn beyond(name: &str, solver: &str) -> bool {
-    ["sheared-collapse", "cube-collapse"].contains(&name) && solver != "newton"
+    ["sheared-collapse", "cube-collapse"].contains(&name) && solver != "interior"
 }
 
 #[test]
@@ -225,10 +225,10 @@ fn the_collection_is_solved_by_every_solver() {
         let mut start = problem.assembled;
         start.r.fill(0.0);
         let mut found: Vec<Assembled> = Vec::new();
-        for solver in ["newton", "exact", "predictor-corrector", "accelerated"] {
+        for solver in ["interior", "exact", "predictor-corrector", "accelerated"] {
             let mut at = start.clone();
             let status = match solver {
-                "newton" => newton(&mut at),
+                "interior" => interior_point(&mut at),
                 "exact" => swept(&mut at, LocalSolve::Exact, 0),
                 "accelerated" => swept(&mut at, LocalSolve::Exact, 8),
                 _ => swept(&mut at, LocalSolve::PredictorCorrector, 0),
