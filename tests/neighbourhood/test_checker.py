@@ -239,7 +239,12 @@ SPOILT = (
         ("arm", "a quaternion", add(G + "orientation/value", lambda g: (-1, 6, 1), 0, 1e-9), "orientations"),
         ("arm", "a fixed grain", add(G + "velocity/value", lambda g: (20, 0, 0), 0, 1e-12), "fixed grains"),
         ("pressed", "a fixed wall", add("walls/position/value", lambda g: (20, 0, 1), 1e-12, 1e-15), "fixed walls"),
-        ("pressed", "a driven wall's velocity", add("walls/velocity/value", lambda g: (-1, 1, 1)), "wall motion"),
+        (
+            "pressed",
+            "a driven wall's velocity",
+            add("walls/velocity/value", lambda g: (-1, 1, 1), absolute=1e-9),
+            "wall motion",
+        ),
         (
             "beam",
             "the speed of a wall that moves as prescribed",

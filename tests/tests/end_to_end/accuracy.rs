@@ -159,7 +159,9 @@ fn spheres_are_measured_as_disks_are() {
     assert!(number(&newton["false_strain"]) < 1e-2 * number(&swept["false_strain"]), "{swept}");
 
     let spreads = report["indeterminacy"]["spreads"].as_array().expect("spreads");
-    for spread in spreads.iter().filter(|spread| spread["solver"] == "newton") {
+    // reactions that a run starts from are a history that it keeps
+    let of_newton = |spread: &&serde_json::Value| spread["solver"] == "newton" && spread["varied"] == "order";
+    for spread in spreads.iter().filter(of_newton) {
         assert_eq!(spread["first_break"]["min"], spread["first_break"]["max"], "{spread}");
         assert_eq!(number(&spread["first_bonds"]), 1.0, "{spread}");
     }
