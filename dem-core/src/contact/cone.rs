@@ -112,6 +112,12 @@ pub struct Weights {
 }
 
 impl Weights {
+    /// The weight of each row in the order n, t, m.
+    #[inline]
+    pub(crate) fn in_order(&self) -> [f64; PADDED] {
+        [self.n, self.t, self.t, self.m, self.m, self.w]
+    }
+
     /// The weighted rows of `x`.
     #[inline(always)]
     pub fn times<T: Vect, B: Moments>(&self, x: &Local<T, B>) -> Local<T, B> {

@@ -34,13 +34,13 @@ impl Operator {
     pub fn entry(&self, r: usize, c: usize) -> f64 {
         match self {
             Self::Diagonal(_) if r != c => 0.0,
-            Self::Diagonal(w) => [w.n, w.t, w.t, w.m, w.m, w.w][r],
+            Self::Diagonal(w) => w.in_order()[r],
             Self::Full(a) => a[(r, c)],
         }
     }
 }
 
-/// Most unknowns that two bodies have; a contact with more has rows from the factor of a matrix.
+/// Most unknowns that two bodies have.
 pub(super) const PAIR: usize = 12;
 
 /// One contact.
@@ -74,6 +74,12 @@ pub(super) struct Row {
 }
 
 impl Row {
+    /// Number of unknowns of both nodes.
+    #[inline]
+    pub fn width(&self) -> usize {
+        self.count[0] + self.count[1]
+    }
+
     /// Weights of the corrector's quadratic form, 1/ρ + C.
     #[inline]
     pub fn metric(&self) -> Weights {
@@ -236,41 +242,62 @@ impl Rows {
         self.list.iter_mut().zip(reactions).for_each(|(row, r)| row.multiplier = *r);
     }
 
+    /// Coefficients of row `k` of a contact, over the unknowns of its first node and then its second.
+    #[inline]
+    fn coefficients(&self, row: &Row, k: usize) -> &[f64] {
+        &self.coefficients[row.start + k * row.width()..][..row.width()]
+    }
+
+    /// Row `k` of H̃ᵀ y for one contact.
+    #[inline]
+    pub fn pulled_by(&self, row: &Row, k: usize, y: &[f64]) -> f64 {
+        let (first, second) = self.coefficients(row, k).split_at(row.count[0]);
+        let sum = |h: &[f64], y: &[f64]| h.iter().zip(y).map(|(h, y)| h * y).sum::<f64>();
+        sum(first, &y[row.at[0]..]) + sum(second, &y[row.at[1]..])
+    }
+
+    /// y += scale · H̃ r for row `k` of one contact.
+    #[inline]
+    pub fn push_by(&self, row: &Row, k: usize, scale: f64, r: f64, y: &mut [f64]) {
+        let (first, second) = self.coefficients(row, k).split_at(row.count[0]);
+        first.iter().zip(&mut y[row.at[0]..]).for_each(|(h, y)| *y += scale * h * r);
+        second.iter().zip(&mut y[row.at[1]..]).for_each(|(h, y)| *y += scale * h * r);
+    }
+
     /// H̃ᵀ y for one contact.
     #[inline]
     pub fn pulled(&self, row: &Row, y: &[f64]) -> Padded {
-        let mut u = Padded::zero();
-        let width = row.count[0] + row.count[1];
-        if width == 0 {
-            return u;
+        let mut u = [0.0; PADDED];
+        for (k, place) in row.rows.iter().enumerate() {
+            u[*place] = self.pulled_by(row, k, y);
         }
-        let coefficients = &self.coefficients[row.start..][..row.rows.len() * width];
-        let (first, second) = (&y[row.at[0]..][..row.count[0]], &y[row.at[1]..][..row.count[1]]);
-        for (place, h) in row.rows.iter().zip(coefficients.chunks_exact(width)) {
-            let (a, b) = h.split_at(row.count[0]);
-            let sum = |h: &[f64], y: &[f64]| h.iter().zip(y).map(|(h, y)| h * y).sum::<f64>();
-            *entry(&mut u, *place) += sum(a, first) + sum(b, second);
-        }
-        u
+        Padded::from_order(&u.into())
     }
 
     /// y += H̃ r for one contact.
     #[inline]
     pub fn apply(&self, row: &Row, r: &Padded, y: &mut [f64]) {
-        let width = row.count[0] + row.count[1];
-        if width == 0 {
-            return;
+        let r = r.in_order();
+        for (k, place) in row.rows.iter().enumerate() {
+            self.push_by(row, k, 1.0, r[*place], y);
         }
-        let mut r = *r;
-        let coefficients = &self.coefficients[row.start..][..row.rows.len() * width];
-        for (place, h) in row.rows.iter().zip(coefficients.chunks_exact(width)) {
-            let value = *entry(&mut r, *place);
-            let (a, b) = h.split_at(row.count[0]);
-            for (h, y) in a.iter().zip(&mut y[row.at[0]..]) {
-                *y += h * value;
+    }
+
+    /// out += H̃ A H̃ᵀ for some rows of one contact, row by row over the unknowns of its pair; `a` gives the entries of A over those rows.
+    pub fn add_element(&self, row: &Row, of: &[usize], a: impl Fn(usize, usize) -> f64, out: &mut [f64]) {
+        let width = row.width();
+        let h = |k: usize| self.coefficients(row, of[k]);
+        for i in 0..of.len() {
+            // A H̃ᵀ
+            let mut line = [0.0; PAIR];
+            for j in 0..of.len() {
+                let entry = a(i, j);
+                if entry != 0.0 {
+                    line.iter_mut().zip(h(j)).for_each(|(x, h)| *x += entry * h);
+                }
             }
-            for (h, y) in b.iter().zip(&mut y[row.at[1]..]) {
-                *y += h * value;
+            for (out, h) in out.chunks_exact_mut(width).zip(h(i)) {
+                out.iter_mut().zip(&line).for_each(|(out, x)| *out += h * x);
             }
         }
     }
@@ -296,16 +323,6 @@ pub(super) fn mass_unit<D: Dim>(nodes: &Nodes<D>) -> f64 {
     let exponent = inverse.fold(f64::INFINITY, f64::min).to_bits() >> 52;
     // the exponent is stored with an odd offset
     if exponent % 2 == 0 { 2.0 } else { 1.0 }
-}
-
-/// A row of a padded vector by its place.
-#[inline]
-pub(super) fn entry(r: &mut Padded, place: usize) -> &mut f64 {
-    match place {
-        0 => &mut r.n,
-        1 | 2 => &mut r.t[place - 1],
-        _ => &mut r.m[place - 3],
-    }
 }
 
 fn write_scaled<D: Dim>(nodes: &Nodes<D>, unknowns: &Unknowns, k: usize, v: &D::Vector, w: &D::Spin, out: &mut [f64]) {

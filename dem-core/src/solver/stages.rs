@@ -18,7 +18,7 @@ use super::newton::Newton;
 use super::rows::{Rows, StiffnessRatio};
 use super::solvable::Solvable;
 use super::{ContactSolver, GaussSeidel, GaussSeidelSettings, SolveReport, SolveStatus, Work};
-use crate::contact::{Local, LocalSolve};
+use crate::contact::{LocalSolve, Padded};
 use crate::dim::Dim;
 use crate::problem::ContactProblem;
 use crate::problem::assembled::Assembled;
@@ -33,10 +33,9 @@ const COARSE_SWEEPS: u64 = 20_000;
 const LAST_SWEEPS: u64 = 2_000;
 
 /// The method that brought a solution.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Route {
     /// The reactions grew as in the steps before.
-    #[default]
     Extrapolation,
     /// Newton from the active set of the last step.
     ActiveSet,
@@ -47,20 +46,18 @@ pub enum Route {
 }
 
 /// Where the reactions start from in every step.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Start {
-    /// From zero: the stiff limit, one answer where rigidity leaves many.
-    #[default]
+    /// From zero: the stiff limit.
     StiffLimit,
     /// From the reactions of the last step: they keep their history.
     LastStep,
 }
 
 /// Which stages are tried.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stages {
     /// All of them.
-    #[default]
     All,
     /// No sweeps over dry contacts before the others.
     Newton,
@@ -83,7 +80,7 @@ pub struct StagedSettings {
     pub start: Start,
     /// Stiffness of the rows in the metric of the stiff limit.
     pub stiffness: StiffnessRatio,
-    /// Most Newton iterations in one solve.
+    /// Most iterations in one solve, of Newton and of the interior-point method.
     pub max_iterations: u64,
 }
 
@@ -149,24 +146,27 @@ impl Staged {
         if self.settings.stages == Stages::Interior || problem.matrix().is_some() {
             return Err(iterations);
         }
-        let report = self.newton.solve(problem, &mut self.anchored(rows), is_cold(rows), &mut iterations);
+        let mut anchored = rows.clone();
+        anchored.move_multipliers(&self.anchor(rows));
+        let report = self.newton.solve(problem, &mut anchored, is_cold(rows), &mut iterations);
         report.filter(|report| report.status == SolveStatus::Converged).ok_or(iterations)
     }
 
     /// What the interior-point method comes to, and sweeps from where it ends.
     fn along_the_path(&mut self, problem: &mut impl Solvable, rows: &Rows, mut newton: u64) -> SolveReport {
         let StagedSettings { tolerance, accept, load_tolerance, max_iterations, .. } = self.settings;
-        let anchored = self.anchored(rows);
-        let begun: Vec<_> = rows.list.iter().map(|row| row.multiplier).collect();
+        let (anchor, begun) = (self.anchor(rows), multipliers(rows));
         let start = (!is_cold(rows)).then_some(&begun[..]);
         // what breaks a bond is the load that it bears; of dry contacts any reactions that balance will do
         let least = problem.matrix().is_none() && rows.list.iter().any(|row| row.shift > 0.0);
         let aims = Aims { tolerance, load_tolerance, least, most: max_iterations };
-        let mut best = self.interior.solve(problem, &anchored, start, aims);
+        let graph = &mut self.newton.graph;
+        let mut best = self.interior.solve(problem, rows, graph, &anchor, start, aims);
         newton += best.as_ref().map_or(0, |found| found.iterations);
         if best.as_ref().is_none_or(|found| found.residual > accept) {
             // any reactions, from no start: another path
-            let other = self.interior.solve(problem, &anchored, None, Aims { least: false, ..aims });
+            let any = Aims { least: false, ..aims };
+            let other = self.interior.solve(problem, rows, graph, &anchor, None, any);
             newton += other.as_ref().map_or(0, |found| found.iterations);
             best = best.into_iter().chain(other).min_by(|a, b| a.residual.total_cmp(&b.residual));
         }
@@ -189,13 +189,12 @@ impl Staged {
         SolveReport { work: Work { newton, ..swept.work }, ..swept }
     }
 
-    /// The rows with the multipliers that the reactions start from.
-    fn anchored(&self, rows: &Rows) -> Rows {
-        let mut rows = rows.clone();
-        if self.settings.start == Start::StiffLimit {
-            rows.list.iter_mut().for_each(|row| row.multiplier = Local::zero());
+    /// The reactions that those of least energy are nearest to.
+    fn anchor(&self, rows: &Rows) -> Vec<Padded> {
+        match self.settings.start {
+            Start::StiffLimit => vec![Padded::zero(); rows.list.len()],
+            Start::LastStep => multipliers(rows),
         }
-        rows
     }
 
     /// Gauss–Seidel that aims at this residual.
@@ -222,6 +221,16 @@ impl Staged {
     }
 }
 
+/// The reactions that a problem brought along.
+fn multipliers(rows: &Rows) -> Vec<Padded> {
+    rows.list.iter().map(|row| row.multiplier).collect()
+}
+
+/// Whether all contacts are without a bond.
+fn is_dry<D: Dim>(problem: &ContactProblem<D>) -> bool {
+    problem.bonded.is_empty() && problem.elastic.is_empty()
+}
+
 /// Whether no reactions are known to start from.
 fn is_cold(rows: &Rows) -> bool {
     rows.list.iter().all(|row| row.multiplier.n == 0.0)
@@ -230,9 +239,8 @@ fn is_cold(rows: &Rows) -> bool {
 impl<D: Dim> ContactSolver<D> for Staged {
     fn solve(&mut self, problem: &mut ContactProblem<D>) -> SolveReport {
         let StagedSettings { tolerance, load_tolerance, stages, .. } = self.settings;
-        let dry = problem.bonded.is_empty() && problem.elastic.is_empty();
         let mut before = Work::default();
-        if stages == Stages::All && dry {
+        if stages == Stages::All && is_dry(problem) {
             let swept = self.swept(problem);
             if swept.status != SolveStatus::Failed {
                 return swept;
@@ -258,8 +266,7 @@ impl<D: Dim> ContactSolver<D> for Staged {
 
     /// Without sweeps before the other stages.
     fn solve_finer(&mut self, problem: &mut ContactProblem<D>) -> Option<SolveReport> {
-        let dry = problem.bonded.is_empty() && problem.elastic.is_empty();
-        (self.settings.stages == Stages::All && dry).then(|| self.directly(problem))
+        (self.settings.stages == Stages::All && is_dry(problem)).then(|| self.directly(problem))
     }
 
     fn save(&self, to: &mut Saved) {

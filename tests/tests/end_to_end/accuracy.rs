@@ -160,7 +160,7 @@ fn spheres_are_measured_as_disks_are() {
 
     let spreads = report["indeterminacy"]["spreads"].as_array().expect("spreads");
     // reactions that a run starts from are a history that it keeps
-    let of_newton = |spread: &&serde_json::Value| spread["solver"] == "newton" && spread["varied"] == "order";
+    let of_newton = |spread: &&Value| spread["solver"] == "newton" && spread["varied"] == "order";
     for spread in spreads.iter().filter(of_newton) {
         assert_eq!(spread["first_break"]["min"], spread["first_break"]["max"], "{spread}");
         assert_eq!(number(&spread["first_bonds"]), 1.0, "{spread}");

@@ -1,6 +1,6 @@
 //! How contacts move each other: W = H̃ᵀ H̃ through the bodies, or as a matrix, and the linear systems with it.
 
-use super::sites::{ROWS, Sites};
+use super::sites::Sites;
 use crate::linear::{Lu, Tree};
 use crate::problem::assembled::BlockMatrix;
 use crate::solver::graph::Graph;
@@ -74,13 +74,7 @@ impl<'a> Coupling<'a> {
         let Self::Bodies { rows, scale, .. } = self else { return Vec::new() };
         let mut y = vec![0.0; rows.unknowns];
         for (site, row) in sites.list.iter().zip(&rows.list) {
-            let width = row.count[0] + row.count[1];
-            for (k, r) in site.of.iter().zip(site.part(r)) {
-                let h = &rows.coefficients[row.start + k * width..][..width];
-                let (first, second) = h.split_at(row.count[0]);
-                first.iter().zip(&mut y[row.at[0]..]).for_each(|(h, y)| *y += scale * h * r);
-                second.iter().zip(&mut y[row.at[1]..]).for_each(|(h, y)| *y += scale * h * r);
-            }
+            site.of.iter().zip(site.part(r)).for_each(|(k, r)| rows.push_by(row, *k, *scale, *r, &mut y));
         }
         y
     }
@@ -90,13 +84,8 @@ impl<'a> Coupling<'a> {
         let Self::Bodies { rows, scale, .. } = self else { return Vec::new() };
         let mut u = vec![0.0; sites.rows];
         for (site, row) in sites.list.iter().zip(&rows.list) {
-            let width = row.count[0] + row.count[1];
-            for (k, u) in site.of.iter().zip(site.part_mut(&mut u)) {
-                let h = &rows.coefficients[row.start + k * width..][..width];
-                let (first, second) = h.split_at(row.count[0]);
-                let sum = |h: &[f64], y: &[f64]| h.iter().zip(y).map(|(h, y)| h * y).sum::<f64>();
-                *u = scale * (sum(first, &y[row.at[0]..]) + sum(second, &y[row.at[1]..]));
-            }
+            let own = site.of.iter().zip(site.part_mut(&mut u));
+            own.for_each(|(k, u)| *u = scale * rows.pulled_by(row, *k, y));
         }
         u
     }
@@ -107,20 +96,9 @@ impl<'a> Coupling<'a> {
             Self::Bodies { rows, scale, graph } => lu.factorise(self.tree(), |e, out| {
                 let c = graph.contacts[e];
                 let (row, site) = (&rows.list[c], &sites.list[c]);
-                let width = row.count[0] + row.count[1];
-                let h = |k: usize| &rows.coefficients[row.start + site.of[k] * width..][..width];
                 let (own, square) = (&inverses[site.matrix..], scale * scale);
-                for i in 0..site.rows {
-                    // D⁻¹ H̃ᵀ
-                    let mut line = [0.0; 2 * ROWS];
-                    for j in 0..site.rows {
-                        let d = square * own[i * site.order() + j];
-                        line.iter_mut().zip(h(j)).for_each(|(x, h)| *x += d * h);
-                    }
-                    for (out, h) in out.chunks_exact_mut(width).zip(h(i)) {
-                        out.iter_mut().zip(&line).for_each(|(out, x)| *out += h * x);
-                    }
-                }
+                let entry = |i: usize, j: usize| square * own[i * site.order() + j];
+                rows.add_element(row, &site.of[..site.rows], entry, out);
             }),
             Self::Matrix { matrix, scale, pairs, tree } => lu.factorise(tree, |e, out| {
                 let [c, d] = pairs[e];

@@ -33,7 +33,7 @@ const KAPPA: f64 = 1e7;
 const ANY: f64 = 1e12;
 /// What the gaps of all pairs may be beside the energy of the metric for reactions to count as those of least energy.
 const LEAST: f64 = 1e-3;
-/// From where the path goes on without the compliance, over that: nearer to the boundary steps would be short.
+/// From how much more than that the path goes on with another anchor: nearer to the boundary steps would be short.
 const BACK: f64 = 30.0;
 /// Share of its compliance that a metric keeps for each round after the second.
 const HARDER: f64 = 0.01;
@@ -45,9 +45,10 @@ const CORRECTORS: usize = 2;
 const LONGER: f64 = 0.3;
 const GROWN: f64 = 1.05;
 const APART: f64 = 10.0;
-/// A step shorter than this turns towards the middle, by these shares of the gap.
+/// A step shorter than this turns towards the middle, by these shares of the gap, where it grows by this factor.
 const SHORT: f64 = 0.5;
 const TO_THE_MIDDLE: [f64; 2] = [0.2, 0.7];
+const WORTH: f64 = 1.5;
 /// How near the boundary a step may go.
 const NEAR: f64 = 0.99;
 /// Iterations in which the residual or the gap must halve.
@@ -79,10 +80,9 @@ pub(super) struct Found {
     pub iterations: u64,
 }
 
-/// The method, and what it keeps from one solve to the next: the graph of the bodies, and room.
+/// The method, and the room that it keeps from one solve to the next.
 #[derive(Default)]
 pub(super) struct Interior {
-    graph: Option<Arc<Graph>>,
     lu: Lu,
     inverses: Vec<f64>,
     /// Factorisations so far.
@@ -90,28 +90,29 @@ pub(super) struct Interior {
 }
 
 impl Interior {
-    /// Follow the path from these reactions, moved inside their cones, or from a cold start, to a solution. The metric is anchored at the
-    /// multipliers of `rows`: with its compliance the path ends at the reactions of least energy, and without it, from where both
-    /// weigh alike, next to those. The problem holds what was found.
+    /// Follow the path from these reactions, moved inside their cones, or from a cold start, to a solution. With the compliance of a metric
+    /// anchored at `anchor` the path ends at the reactions of least energy; anchored there it is followed again, to a solution next to them.
+    /// `graph` is that of the last problem.
     pub fn solve(
         &mut self,
         problem: &mut impl Solvable,
         rows: &Rows,
+        graph: &mut Option<Arc<Graph>>,
+        anchor: &[Padded],
         start: Option<&[Padded]>,
         aims: Aims,
     ) -> Option<Found> {
-        let anchor: Vec<Padded> = rows.list.iter().map(|row| row.multiplier).collect();
-        let sites = Sites::of(rows, start.unwrap_or(&anchor));
+        let sites = Sites::of(rows, start.unwrap_or(anchor));
         let ratio = sites.speed / sites.force;
         let matrix = problem.matrix().cloned();
-        let graph = if matrix.is_none() { Graph::of(rows, &mut self.graph) } else { None };
+        let graph = if matrix.is_none() { Graph::of(rows, graph) } else { None };
         let coupling = match (&matrix, &graph) {
             (Some(matrix), _) => Coupling::matrix(matrix, &sites, ratio)?,
             (None, Some(graph)) => Coupling::bodies(rows, ratio, graph),
             (None, None) => return None,
         };
         let kappa = if aims.least { KAPPA } else { ANY };
-        let mut metric = Metric::new(&sites, sites.gathered(&anchor), kappa);
+        let mut metric = Metric::new(&sites, sites.gathered(anchor), kappa);
         let mut at = match start {
             Some(reactions) => warm(&sites, &coupling, &sites.gathered(reactions)),
             None => cold(&sites),
@@ -151,7 +152,7 @@ impl Interior {
                 stall = Stall::after(PATIENCE, 0.5);
             }
             let weight = coupling.velocity(&sites, &at.r);
-            let lack = lack(&sites, &weight, &at, &metric);
+            let right = lack(&sites, &weight, &at, &metric).into_iter().map(|x| -x).collect();
             if !invert(&sites, &at, &metric.compliance, &mut self.inverses) {
                 break;
             }
@@ -161,7 +162,7 @@ impl Interior {
             }
             let (inverses, compliance) = (&self.inverses, &metric.compliance);
             let (sites, coupling, at_hand, lu) = (&sites, &coupling, &at, &self.lu);
-            let system = System { sites, coupling, at: at_hand, lack, compliance, inverses, lu };
+            let system = System { sites, coupling, at: at_hand, right, compliance, inverses, lu };
             let (step, far) = direction(&system);
             let length = (NEAR * far).min(1.0);
             let moving = coupling.velocity(sites, &step.r);
@@ -169,9 +170,7 @@ impl Interior {
             change = length * (square(&step.r, &moving) / square(&at.r, &weight).max(f64::MIN_POSITIVE)).sqrt();
             advance(&mut at, length, &step);
         }
-        let best = best?;
-        problem.write_back(&best.reactions);
-        Some(best)
+        best
     }
 }
 
@@ -210,8 +209,8 @@ struct System<'a> {
     sites: &'a Sites,
     coupling: &'a Coupling<'a>,
     at: &'a State,
-    /// How far the contacts' velocities are from what z makes them.
-    lack: Vec<f64>,
+    /// By how much the contacts' velocities must change to be what z makes them.
+    right: Vec<f64>,
     compliance: &'a [f64],
     inverses: &'a [f64],
     lu: &'a Lu,
@@ -220,14 +219,12 @@ struct System<'a> {
 impl System<'_> {
     /// The step after which x ∘ z has changed by `by`, to first order.
     fn step(&self, by: &[Point]) -> State {
-        let right: Vec<f64> = self.lack.iter().map(|x| -x).collect();
-        self.solved(&right, by)
+        self.solved(&self.right, by)
     }
 
     /// The same without what rounding has left.
     fn refined(&self, mut step: State, by: &[Point]) -> State {
-        let right: Vec<f64> = self.lack.iter().map(|x| -x).collect();
-        let (left, missing) = self.left(&right, by, &step);
+        let (left, missing) = self.left(by, &step);
         let more = self.solved(&left, &missing);
         step.r.iter_mut().zip(&more.r).for_each(|(r, d)| *r += d);
         step.z.iter_mut().zip(&more.z).for_each(|(z, d)| *z = moved(z, 1.0, d));
@@ -244,10 +241,10 @@ impl System<'_> {
     }
 
     /// What a step leaves of the equations.
-    fn left(&self, right: &[f64], by: &[Point], step: &State) -> (Vec<f64>, Vec<Point>) {
+    fn left(&self, by: &[Point], step: &State) -> (Vec<f64>, Vec<Point>) {
         let moving = self.coupling.velocity(self.sites, &step.r);
         let opened = opened(self.sites, &step.z);
-        let left = (0..self.sites.rows).map(|k| right[k] - moving[k] - self.compliance[k] * step.r[k] + opened[k]);
+        let left = (0..self.sites.rows).map(|k| self.right[k] - moving[k] - self.compliance[k] * step.r[k] + opened[k]);
         let missing = |c: usize| {
             let (a, b) = (product(&self.at.z[c], &step.x[c]), product(&self.at.x[c], &step.z[c]));
             [by[c][0] - a[0] - b[0], by[c][1] - a[1] - b[1], by[c][2] - a[2] - b[2]]
@@ -304,7 +301,7 @@ fn direction(system: &System) -> (State, f64) {
             let by: Vec<Point> = products.iter().map(|p| [barrier - p[0], -p[1], -p[2]]).collect();
             let other = system.step(&by);
             let reached = system.longest(&other);
-            if reached > 1.5 * far {
+            if reached > WORTH * far {
                 (step, far) = (other, reached);
                 chosen = by;
             }

@@ -9,12 +9,12 @@
 
 use super::cones::{Point, eigenvalues};
 use super::local::State;
-use crate::contact::Padded;
-use crate::solver::rows::{Row, Rows, TWIST, entry};
+use crate::contact::{PADDED, Padded};
+use crate::solver::rows::{Row, Rows, TWIST};
 use std::ops::Range;
 
 /// Most rows of a contact, and most unknowns of its cones.
-pub(super) const ROWS: usize = 6;
+pub(super) const ROWS: usize = PADDED;
 pub(super) const CONES: usize = 9;
 
 /// How near a limit a reaction must be, over itself, to be at one that is known.
@@ -120,7 +120,7 @@ pub(super) struct Sites {
 }
 
 impl Sites {
-    /// The contacts of `rows`; `applied` is the norm of the applied impulses in their unit.
+    /// The contacts of `rows`, in units that these reactions have a part in.
     pub fn of(rows: &Rows, reactions: &[Padded]) -> Self {
         let mut sites = Self::default();
         let velocities: Vec<Padded> = rows.list.iter().map(|row| rows.velocity(row, &rows.free)).collect();
@@ -182,14 +182,13 @@ impl Sites {
         site.duals = self.cones[before..].iter().map(|cone| 1 + cone.tangents).sum();
         self.rows += site.rows;
         self.matrices += site.order() * site.order();
-        let weights = [row.weights.n, row.weights.t, row.weights.m, row.weights.w].map(|w| w / soft);
-        let soft = [row.compliance.n, row.compliance.t, row.compliance.m, row.compliance.w].map(|c| c / normal);
-        let group = |place: usize| [0, 1, 1, 2, 2, 3][place];
+        let (u, carried) = (u.in_order(), row.carried.in_order());
+        let (weights, compliance) = (row.weights.in_order(), row.compliance.in_order());
         for place in &site.places[..site.rows] {
-            self.free.push(*entry(&mut u.clone(), *place) / self.speed);
-            self.compliance.push(soft[group(*place)]);
-            self.carried.push(*entry(&mut row.carried.clone(), *place) / self.force);
-            self.metric.push(weights[group(*place)]);
+            self.free.push(u[*place] / self.speed);
+            self.compliance.push(compliance[*place] / normal);
+            self.carried.push(carried[*place] / self.force);
+            self.metric.push(weights[*place] / soft);
         }
         self.shift.push(row.shift / self.force);
         self.list.push(site);
@@ -199,7 +198,8 @@ impl Sites {
     pub fn gathered(&self, reactions: &[Padded]) -> Vec<f64> {
         let mut list = Vec::with_capacity(self.rows);
         for (site, r) in self.list.iter().zip(reactions) {
-            list.extend(site.places[..site.rows].iter().map(|place| *entry(&mut r.clone(), *place) / self.force));
+            let r = r.in_order();
+            list.extend(site.places[..site.rows].iter().map(|place| r[*place] / self.force));
         }
         list
     }
@@ -220,25 +220,23 @@ impl Sites {
     /// The reactions of the problem at a point, each at the limits that it is nearer to than its z is to its own, and at those that it is
     /// known to be at where it is next to them.
     pub fn snapped(&self, at: &State, known: &[Limit]) -> Vec<Padded> {
-        let limit = |c: usize| {
+        let limit = |c: usize, shift: f64| {
             let (x, z) = (eigenvalues(&at.x[c]), eigenvalues(&at.z[c]));
             let known = known.get(c).copied().unwrap_or_default();
-            Limit { apex: x[0] < z[1], side: x[1] < z[0] || known.side && x[1] <= BESIDE * x[0] }
-        };
-        let apex_beside = |c: usize, shift: f64| {
-            let known = known.get(c).copied().unwrap_or_default();
-            known.apex && at.x[c][0] <= BESIDE * self.cones[c].slope * shift
+            Limit {
+                apex: x[0] < z[1] || known.apex && at.x[c][0] <= BESIDE * self.cones[c].slope * shift,
+                side: x[1] < z[0] || known.side && x[1] <= BESIDE * x[0],
+            }
         };
         let one = |(site, shift): (&Site, &f64)| {
             let mut own = [0.0; ROWS];
             own[..site.rows].copy_from_slice(site.part(&at.r));
-            let at_apex = |c: usize| self.cones[c].opens && (limit(c).apex || apex_beside(c, *shift));
-            if site.cones.clone().any(at_apex) {
+            if site.cones.clone().any(|c| self.cones[c].opens && limit(c, *shift).apex) {
                 // at the apex: nothing is carried but what the shift stands for
                 own = [0.0; ROWS];
                 own[0] = -shift;
             } else {
-                for c in site.cones.clone().filter(|c| self.cones[*c].tangents > 0 && limit(*c).side) {
+                for c in site.cones.clone().filter(|c| self.cones[*c].tangents > 0 && limit(*c, *shift).side) {
                     let cone = &self.cones[c];
                     let x = cone.primal(&own);
                     let length = x[1].hypot(x[2]);
@@ -246,10 +244,10 @@ impl Sites {
                     cone.rows[..cone.tangents].iter().for_each(|row| own[*row] *= scale);
                 }
             }
-            let mut r = Padded::zero();
+            let mut r = [0.0; ROWS];
             let rows = site.places.iter().zip(&own[..site.rows]);
-            rows.for_each(|(place, value)| *entry(&mut r, *place) = value * self.force);
-            r
+            rows.for_each(|(place, value)| r[*place] = value * self.force);
+            Padded::from_order(&r.into())
         };
         self.list.iter().zip(&self.shift).map(one).collect()
     }

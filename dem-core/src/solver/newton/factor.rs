@@ -1,6 +1,5 @@
 //! The matrix I + Σ H̃ A H̃ᵀ of a Newton step and its factors, kept while they serve.
 
-use crate::contact::PADDED;
 use crate::linear::{Lu, Tree};
 use crate::saved::{Mismatch, Reader, Saved};
 use crate::solver::graph::Graph;
@@ -31,7 +30,13 @@ impl Factor {
         self.made += 1;
         self.elements.clear();
         for c in &graph.contacts {
-            add_element(rows, *c, operators[*c].as_ref(), &mut self.elements);
+            let (row, first) = (&rows.list[*c], self.elements.len());
+            self.elements.resize(first + row.width() * row.width(), 0.0);
+            if let Some(a) = &operators[*c] {
+                let all: Vec<usize> = (0..row.rows.len()).collect();
+                let entry = |i: usize, j: usize| a.entry(row.rows[i], row.rows[j]);
+                rows.add_element(row, &all, entry, &mut self.elements[first..]);
+            }
         }
         self.graph = Some(graph);
         self.factorise()
@@ -102,31 +107,5 @@ impl Factor {
         factor.elements = from.reals(values)?.to_vec();
         factor.graph = Some(Arc::new(Graph { tree, contacts }));
         if factor.factorise() { Ok(factor) } else { Err(Mismatch) }
-    }
-}
-
-/// H̃ A H̃ᵀ of one contact, row by row over the unknowns of its pair.
-fn add_element(rows: &Rows, c: usize, operator: Option<&Operator>, out: &mut Vec<f64>) {
-    let row = &rows.list[c];
-    let width = row.count[0] + row.count[1];
-    let first = out.len();
-    out.resize(first + width * width, 0.0);
-    let Some(a) = operator else { return };
-    let h = |k: usize| &rows.coefficients[row.start + k * width..][..width];
-    // A H̃ᵀ
-    let mut pulled = [[0.0; PAIR]; PADDED];
-    for (k, place) in row.rows.iter().enumerate() {
-        for (l, other) in row.rows.iter().enumerate() {
-            let entry = a.entry(*place, *other);
-            if entry != 0.0 {
-                pulled[k].iter_mut().zip(h(l)).for_each(|(x, h)| *x += entry * h);
-            }
-        }
-    }
-    for (r, line) in out[first..].chunks_exact_mut(width.max(1)).enumerate() {
-        for (k, pulled) in pulled.iter().enumerate().take(row.rows.len()) {
-            let h = h(k)[r];
-            line.iter_mut().zip(pulled).for_each(|(x, p)| *x += h * p);
-        }
     }
 }

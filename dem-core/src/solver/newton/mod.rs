@@ -7,8 +7,8 @@
 //! for associated laws the gradient of a convex function of v. Its derivative M + H A Hᵀ is sparse, and symmetric but
 //! for the slipping dry contacts. The outer iteration is r̂ ← P(r̂ − ρ (Hᵀv + b)), a proximal step of size ρ on the
 //! reactions; with a large ρ two or three suffice, and nearly always the active set of the last step still holds, so
-//! each costs one linear solve. Its factors are kept over steps and renewed when refinement with them no longer converges. Where the active set runs in circles it gives up: the interior-point method
-//! does without a guess.
+//! each costs one linear solve. Its factors are kept over steps and renewed when refinement with them no longer converges.
+//! Where the active set runs in circles it gives up: the interior-point method does without a guess.
 //!
 //! Started from zero reactions the first proximal step is the stiff limit: the reactions of least Σ r²/ρ among all
 //! that balance the load, the ones that elastic contacts with stiffnesses in the ratio of ρ would give.
@@ -20,7 +20,6 @@ mod corrector;
 mod factor;
 mod guess;
 mod inner;
-
 mod rounds;
 
 use super::graph::Graph;
@@ -43,7 +42,7 @@ pub(super) struct Newton {
     settings: StagedSettings,
     factor: Factor,
     /// The graph of the last problem.
-    graph: Option<Arc<Graph>>,
+    pub graph: Option<Arc<Graph>>,
     /// Factorisations after which this solve is given up.
     most_made: u64,
     /// How far contacts are from another status in the first round of the last solve.
