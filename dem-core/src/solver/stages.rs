@@ -155,6 +155,8 @@ impl Staged {
     /// What the interior-point method comes to, and sweeps from where it ends.
     fn along_the_path(&mut self, problem: &mut impl Solvable, rows: &Rows, mut newton: u64) -> SolveReport {
         let StagedSettings { tolerance, accept, load_tolerance, max_iterations, .. } = self.settings;
+        // what Newton has left of margins belongs to other reactions
+        self.newton.margins.clear();
         let (anchor, begun) = (self.anchor(rows), multipliers(rows));
         let start = (!is_cold(rows)).then_some(&begun[..]);
         // what breaks a bond is the load that it bears; of dry contacts any reactions that balance will do
