@@ -321,7 +321,8 @@ struct ExportArgs {
 
 #[derive(Debug, Args)]
 struct SolveArgs {
-    /// Problem: a file in FCLIB's format (HDF5), with the group /fclib_local.
+    /// Problem: a file in FCLIB's format (HDF5), with the group /fclib_local, /fclib_global or
+    /// /fclib_global_rolling.
     #[arg(value_name = "PROBLEM.hdf5")]
     problem: PathBuf,
     /// Solver.

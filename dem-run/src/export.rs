@@ -114,6 +114,7 @@ fn export_in<D: Dim>(scene: &Scene, options: &ExportOptions, interrupt: &Interru
         math_info: "W is symmetric and positive semi-definite".into(),
         solution: solved.then(|| Assembled::of(&contacts).r),
         assembled,
+        warnings: Vec::new(),
     };
     problem.write(&options.output)?;
     let shown = format!(

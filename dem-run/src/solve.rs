@@ -1,6 +1,7 @@
 //! `dem-run solve`: a contact problem from a file of FCLIB's format.
 
 use std::fmt;
+use std::io::Write;
 use std::path::PathBuf;
 
 use dem_core::contact::LocalSolve;
@@ -12,7 +13,7 @@ use dem_core::solver::{
 use serde::Serialize;
 
 use crate::fclib::Problem;
-use crate::output::print_result;
+use crate::output::{escaped, print_result};
 use crate::run::{RunError, cpu_time};
 use crate::scene;
 use crate::summary::told;
@@ -83,6 +84,10 @@ const MOST_SWEEPS: u64 = 100_000;
 /// tolerance was not reached.
 pub fn solve(options: &SolveOptions) -> Result<(), RunError> {
     let mut problem = Problem::read(&options.problem)?;
+    for warning in &problem.warnings {
+        let text = format!("warning: {}: {warning}", options.problem.display());
+        let _ = writeln!(std::io::stderr(), "{}", escaped(&text));
+    }
     let began = cpu_time();
     let mut at = problem.assembled.clone();
     let report = iterate(&mut at, options);

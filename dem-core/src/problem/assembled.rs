@@ -8,6 +8,7 @@
 //! W is made from the maps H and Hᵀ of the matrix-free problem, column by column: what a unit impulse does to the
 //! relative velocities around it. See docs/theory/fclib.md.
 
+pub use super::block_matrix::{Asymmetry, BlockMatrix};
 use super::residual::relative;
 use super::{Contact, ContactProblem, Link, Nodes, Visitor};
 use crate::contact::law::predict_correct;
@@ -15,8 +16,8 @@ use crate::contact::{Arms, Cone, Law, Local, PADDED, Padded, Weights};
 use crate::dim::{Dim, Vect, tangential_rows};
 use thiserror::Error;
 
-/// Relative asymmetry of W that is put down to rounding.
-const ASYMMETRY: f64 = 1e-6;
+/// Asymmetry of a matrix that is put down to rounding, as [`Asymmetry`] measures it (–).
+pub const ROUNDING: f64 = 1e-6;
 
 /// The rows that every contact of an assembled problem has, in the order n, t…, m….
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,18 +26,6 @@ pub struct ContactRows {
     pub tangents: usize,
     /// Moment rows: none, as many of bending as there are tangential ones, or those and one of twist.
     pub moments: usize,
-}
-
-/// A matrix of square blocks, one row and one column of them for each contact; diagonal blocks are always there.
-#[derive(Clone, Debug, PartialEq)]
-pub struct BlockMatrix {
-    size: usize,
-    /// Where the blocks of each contact's row start, and the end.
-    start: Vec<usize>,
-    /// The contact of each block's column, increasing within a row.
-    column: Vec<usize>,
-    /// The blocks, each row by row.
-    value: Vec<f64>,
 }
 
 /// What an assembled problem is made of. Lengths: C contacts of M rows.
@@ -138,102 +127,6 @@ impl ContactRows {
     }
 }
 
-impl BlockMatrix {
-    /// From entries of the full matrix, (row, column, value); those that share a place add up.
-    ///
-    /// # Panics
-    /// An entry lies outside the `contacts` × `size` rows or columns.
-    #[must_use]
-    pub fn from_entries(contacts: usize, size: usize, entries: &[(usize, usize, f64)]) -> Self {
-        let block = |entry: &(usize, usize, f64)| (entry.0 / size, entry.1 / size);
-        let mut places: Vec<(usize, usize)> = entries.iter().map(block).collect();
-        places.extend((0..contacts).map(|c| (c, c)));
-        places.sort_unstable();
-        places.dedup();
-        assert!(places.iter().all(|p| p.0 < contacts && p.1 < contacts), "an entry outside of the matrix");
-        let mut start = vec![0; contacts + 1];
-        for place in &places {
-            start[place.0 + 1] += 1;
-        }
-        for c in 0..contacts {
-            start[c + 1] += start[c];
-        }
-        let column: Vec<usize> = places.iter().map(|p| p.1).collect();
-        let mut matrix = Self { size, value: vec![0.0; column.len() * size * size], start, column };
-        for entry in entries {
-            let (row, column) = block(entry);
-            if let Some(at) = matrix.find(row, column) {
-                matrix.value[at + (entry.0 % size) * size + entry.1 % size] += entry.2;
-            }
-        }
-        matrix
-    }
-
-    /// Number of contacts.
-    #[must_use]
-    pub fn contacts(&self) -> usize {
-        self.start.len() - 1
-    }
-
-    /// Rows of a block.
-    #[must_use]
-    pub fn size(&self) -> usize {
-        self.size
-    }
-
-    /// Where the values of a block start.
-    fn find(&self, row: usize, column: usize) -> Option<usize> {
-        let columns = &self.column[self.start[row]..self.start[row + 1]];
-        let place = columns.binary_search(&column).ok()?;
-        Some((self.start[row] + place) * self.size * self.size)
-    }
-
-    /// The blocks in the row of a contact: their columns' contacts, and their values row by row.
-    pub fn row(&self, contact: usize) -> impl Iterator<Item = (usize, &[f64])> {
-        let (range, area) = (self.start[contact]..self.start[contact + 1], self.size * self.size);
-        range.map(move |k| (self.column[k], &self.value[k * area..(k + 1) * area]))
-    }
-
-    /// The diagonal block of a contact, row by row.
-    #[must_use]
-    pub fn diagonal(&self, contact: usize) -> &[f64] {
-        let at = self.find(contact, contact).unwrap_or_default();
-        &self.value[at..at + self.size * self.size]
-    }
-
-    /// Every entry that is not zero, (row, column, value), by row and column.
-    #[must_use]
-    pub fn entries(&self) -> Vec<(usize, usize, f64)> {
-        let size = self.size;
-        let mut entries = Vec::new();
-        for row in 0..self.contacts() * size {
-            for (column, block) in self.row(row / size) {
-                let line = &block[(row % size) * size..][..size];
-                let there = line.iter().enumerate().filter(|(_, w)| **w != 0.0);
-                entries.extend(there.map(|(k, w)| (row, column * size + k, *w)));
-            }
-        }
-        entries
-    }
-
-    /// Rows of one contact of the product with `x`, added to `out`.
-    #[inline]
-    pub(crate) fn multiply_row(&self, contact: usize, x: &[f64], out: &mut [f64]) {
-        let size = self.size;
-        for (column, block) in self.row(contact) {
-            let x = &x[column * size..(column + 1) * size];
-            for (out, row) in out.iter_mut().zip(block.chunks_exact(size)) {
-                *out += row.iter().zip(x).map(|(w, x)| w * x).sum::<f64>();
-            }
-        }
-    }
-
-    fn entry(&self, row: usize, column: usize) -> f64 {
-        let size = self.size;
-        self.find(row / size, column / size).map_or(0.0, |at| self.value[at + (row % size) * size + column % size])
-    }
-}
-
 impl Parts {
     fn check(&self) -> Result<(), AssemblyError> {
         let contacts = self.matrix.contacts();
@@ -241,7 +134,7 @@ impl Parts {
             true => Ok(()),
             false => Err(AssemblyError::Length { array, found, expected }),
         };
-        length("block of W", self.matrix.size, self.rows.count())?;
+        length("block of W", self.matrix.size(), self.rows.count())?;
         length("q", self.q.len(), contacts * self.rows.count())?;
         length("mu", self.mu.len(), contacts)?;
         length("mu_r", self.nu.len(), contacts)?;
@@ -253,21 +146,19 @@ impl Parts {
             wrong.map_or(Ok(()), |index| Err(AssemblyError::Value { array, index, value: values[index], allowed }))
         };
         let (finite, coefficient) = ("finite", "finite and not below zero");
-        values("W", &self.matrix.value, f64::NEG_INFINITY, finite)?;
+        values("W", self.matrix.values(), f64::NEG_INFINITY, finite)?;
         values("q", &self.q, f64::NEG_INFINITY, finite)?;
         values("mu", &self.mu, 0.0, coefficient)?;
         values("mu_r", &self.nu, 0.0, coefficient)?;
         values("mu_t", &self.xi, 0.0, coefficient)?;
         values("shift", &self.shift, 0.0, coefficient)?;
         values("applied", &[self.applied], 0.0, coefficient)?;
-        let largest = self.matrix.value.iter().fold(0.0, |most: f64, w| most.max(w.abs()));
-        for (row, column, entry) in self.matrix.entries() {
-            let mirrored = self.matrix.entry(column, row);
-            if (entry - mirrored).abs() > ASYMMETRY * largest {
-                return Err(AssemblyError::Asymmetric { row, column, entry, mirrored });
+        match self.matrix.asymmetry() {
+            Some(Asymmetry { relative, row, column, entry, mirrored }) if relative > ROUNDING => {
+                Err(AssemblyError::Asymmetric { row, column, entry, mirrored })
             }
+            _ => Ok(()),
         }
-        Ok(())
     }
 }
 

@@ -4,7 +4,9 @@
 //! matrix-free: the Delassus operator W = Hᵀ M⁻¹ H acts through the velocities of the nodes.
 
 pub mod assembled;
+mod block_matrix;
 pub(crate) mod blocks;
+pub mod global;
 pub mod residual;
 
 use crate::contact::{Arms, Block, Bonded, Coulomb, Elastic, Frictionless, Law, Local, Padded};

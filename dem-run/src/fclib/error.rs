@@ -24,9 +24,9 @@ pub enum FclibError {
         /// HDF5's reason.
         why: String,
     },
-    /// An HDF5 file without a local problem.
-    #[error("{} holds no local problem of FCLIB ({why}): give a file with the group /fclib_local, as `dem-run export` \
-             writes it", .path.display())]
+    /// An HDF5 file without a problem.
+    #[error("{} holds no problem of FCLIB ({why}): give a file with the group /fclib_local, as `dem-run export` writes \
+             it, or /fclib_global", .path.display())]
     Foreign {
         /// The file.
         path: PathBuf,

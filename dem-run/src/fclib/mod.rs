@@ -1,19 +1,24 @@
 //! Contact problems in FCLIB's format (HDF5), the exchange format of the field: `dem-run export` and `dem-run solve`.
 //!
-//! C contacts of M rows; every scalar is a dataset of one value, integers are 32 bits wide.
+//! C contacts of S rows, N unknowns of bodies; every scalar is a dataset of one value, integers are 32 bits wide.
 //!
 //! ```text
 //! /fclib_local/
-//!     spacedim             M: 2 (n, t), 3 (n, t1, t2); with mu_r 3 (n, t, m) or 5 (n, t1, t2, m1, m2); with mu_t, too,
+//!     spacedim             S: 2 (n, t), 3 (n, t1, t2); with mu_r 3 (n, t, m) or 5 (n, t1, t2, m1, m2); with mu_t, too,
 //!                          6 (…, twist), which other programs do not know
-//!     W/                   m, n, nzmax, nz, p, i, x: the matrix, C·M × C·M
+//!     W/                   m, n, nzmax, nz, p, i, x: the matrix, C·S × C·S
 //!         nz = −1          by columns: p[n + 1] where each starts, i[nzmax] rows, x[nzmax] values
 //!         nz = −2          by rows: p[m + 1] where each starts, i[nzmax] columns, x[nzmax] values
 //!         nz ≥ 0           nz triplets: i[nz] rows, p[nz] columns, x[nz] values
-//!     vectors/             q [C·M]; mu [C]; mu_r [C] where there are rolling rows; mu_t [C] where there is one of twist
+//!     vectors/             q [C·S]; mu [C]; mu_r [C] where there are rolling rows; mu_t [C] where there is one of twist
 //!     info/                title, description, math_info: text
-//! /guesses/                number_of_guesses; 1, 2, …: u, r [C·M]
-//! /solution/               u, r [C·M]
+//! /fclib_global/           or this, read but not written: M v = H r + f, u = Hᵀ v + w over the velocities v of the bodies
+//! /fclib_global_rolling/   the same, with mu_r
+//!     spacedim, info/      as above
+//!     M/, H/               N × N and N × C·S, stored as W is
+//!     vectors/             f [N]; w [C·S]; mu [C]; mu_r [C] where there are rolling rows
+//! /guesses/                number_of_guesses; 1, 2, …: u, r [C·S]
+//! /solution/               u, r [C·S]
 //! /cohesive_dem/           ours; other programs do not look for it
 //!     associated           i32 [C]: 1 where the flow of a contact is normal to its cone
 //!     shift                [C]: what r is above the reaction in the normal row (N s)
@@ -25,6 +30,7 @@
 
 mod error;
 mod reader;
+mod source;
 mod writer;
 
 pub use error::FclibError;
@@ -44,4 +50,6 @@ pub struct Problem {
     pub assembled: Assembled,
     /// Reactions r̂ (N s) that solve it, if they are known.
     pub solution: Option<Vec<f64>>,
+    /// What was changed in reading, in words.
+    pub warnings: Vec<String>,
 }

@@ -1,46 +1,45 @@
-//! Reading a problem. Whatever a file claims is checked before it is believed.
+//! Reading a problem, local or global. C contacts of S rows, N unknowns of bodies.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use dem_core::problem::assembled::{Assembled, AssemblyError, BlockMatrix, ContactRows, Parts};
-use hdf5::types::{FixedAscii, VarLenUnicode};
-use hdf5::{File, H5Type};
+use dem_core::problem::assembled::{Assembled, AssemblyError, BlockMatrix, ContactRows, Parts, ROUNDING};
+use dem_core::problem::global::Global;
 
+use super::source::{Entry, Source};
 use super::{FclibError, Problem};
-use crate::history::reason;
 
-/// Deflate cannot shrink anything further than this, so no honest dataset is larger than this many file lengths.
-const GREATEST_COMPRESSION: u64 = 1032;
-
-/// An open file, its name, and its length in bytes.
-struct Source {
-    path: PathBuf,
-    file: File,
-    length: u64,
-}
+/// The groups that a problem may be in, and whether it is over the velocities of bodies.
+const GROUPS: [(&str, bool); 3] = [("fclib_local", false), ("fclib_global", true), ("fclib_global_rolling", true)];
+/// Largest change of an entry that makes W symmetric, over the largest entry (–): beyond that W is
+/// refused.
+const MOST_ASYMMETRY: f64 = 1e-3;
 
 impl Problem {
-    /// Reads a local problem of FCLIB, whatever way its matrix is stored.
+    /// Reads a problem of FCLIB, whatever way its matrices are stored. A global one is made local.
     ///
     /// # Errors
     /// [`FclibError`], which names the dataset that is missing or wrong.
     pub fn read(path: &Path) -> Result<Self, FclibError> {
         hdf5::silence_errors(true);
         let source = Source::open(path)?;
-        let assembled = source.assembled()?;
+        let Some((group, global)) = GROUPS.into_iter().find(|(group, _)| source.has(group)) else {
+            return Err(source.foreign(match source.has("h5md") {
+                true => "it is a history: `dem-run export` takes a problem out of it",
+                false => "it has no group /fclib_local, /fclib_global or /fclib_global_rolling",
+            }));
+        };
+        let mut reader = Reader { source, group, warnings: Vec::new() };
+        let assembled = reader.assembled(global)?;
+        let Reader { source, warnings, .. } = reader;
         let rows = assembled.r.len();
         let reactions = |group: &str| match source.has(group) {
             true => source.finite(&format!("{group}/r"), rows).map(Some),
             false => Ok(None),
         };
         let (guess, solution) = (reactions("guesses/1")?, reactions("solution")?);
-        let mut problem = Self {
-            title: source.text("fclib_local/info/title"),
-            description: source.text("fclib_local/info/description"),
-            math_info: source.text("fclib_local/info/math_info"),
-            assembled,
-            solution,
-        };
+        let info = |name: &str| source.text(&format!("{group}/info/{name}"));
+        let (title, description, math_info) = (info("title"), info("description"), info("math_info"));
+        let mut problem = Self { title, description, math_info, assembled, solution, warnings };
         if let Some(guess) = guess {
             problem.assembled.r = guess;
         }
@@ -48,223 +47,161 @@ impl Problem {
     }
 }
 
-impl Source {
-    fn open(path: &Path) -> Result<Self, FclibError> {
-        let io = |source| FclibError::Io { path: path.into(), doing: "read", source };
-        let metadata = std::fs::metadata(path).map_err(io)?;
-        if metadata.is_dir() {
-            return Err(io(std::io::Error::new(std::io::ErrorKind::IsADirectory, "it is a folder, give a file")));
-        }
-        std::fs::File::open(path).map_err(io)?;
-        let unopened = |error| FclibError::NotHdf5 { path: path.into(), why: reason(&error) };
-        let file = File::open(path).map_err(unopened)?;
-        let source = Self { path: path.into(), file, length: metadata.len() };
-        if source.has("fclib_local") {
-            return Ok(source);
-        }
-        let why = match () {
-            () if source.has("fclib_global") || source.has("fclib_global_rolling") => {
-                "it holds a global problem, with M and H instead of W"
-            }
-            () if source.has("h5md") => "it is a history: `dem-run export` takes a problem out of it",
-            () => "it has no group /fclib_local",
-        };
-        Err(FclibError::Foreign { path: path.into(), why: why.into() })
+/// An open file, the group of its problem, and what was changed in reading.
+struct Reader {
+    source: Source,
+    group: &'static str,
+    warnings: Vec<String>,
+}
+
+impl Reader {
+    fn at(&self, name: &str) -> String {
+        format!("{}/{name}", self.group)
     }
 
-    fn wrong(&self, place: &str, why: impl Into<String>) -> FclibError {
-        FclibError::Wrong { path: self.path.clone(), place: place.into(), why: why.into() }
-    }
-
-    /// Whether there is such a link; each group on the way must be there, too.
-    fn has(&self, place: &str) -> bool {
-        let ends = place.match_indices('/').map(|(end, _)| end).chain([place.len()]);
-        ends.into_iter().all(|end| self.file.link_exists(&place[..end]))
-    }
-
-    /// All values of a dataset.
-    fn values<T: H5Type>(&self, place: &str) -> Result<Vec<T>, FclibError> {
-        if !self.has(place) {
-            return Err(self.wrong(place, "it is missing"));
-        }
-        let unreadable = |error| self.wrong(place, format!("it cannot be read ({})", reason(&error)));
-        let dataset = self.file.dataset(place).map_err(unreadable)?;
-        // a forged shape must not ask for more memory than the file can fill
-        if dataset.size() as u64 > self.length.saturating_mul(GREATEST_COMPRESSION) {
-            return Err(self.wrong(place, "it claims to be larger than the file"));
-        }
-        dataset.read_raw().map_err(unreadable)
-    }
-
-    fn counted<T: H5Type>(&self, place: &str, expected: usize) -> Result<Vec<T>, FclibError> {
-        let values = self.values(place)?;
-        match values.len() == expected {
-            true => Ok(values),
-            false => Err(self.wrong(place, format!("it has {} values instead of {expected}", values.len()))),
-        }
-    }
-
-    fn finite(&self, place: &str, expected: usize) -> Result<Vec<f64>, FclibError> {
-        let values: Vec<f64> = self.counted(place, expected)?;
-        match values.iter().position(|x| !x.is_finite()) {
-            None => Ok(values),
-            Some(at) => Err(self.wrong(place, format!("it is {} at index {at}, it must be finite", values[at]))),
-        }
-    }
-
-    fn integer(&self, place: &str) -> Result<i64, FclibError> {
-        Ok(self.counted(place, 1)?[0])
-    }
-
-    /// A number of rows, columns or entries.
-    fn count(&self, place: &str) -> Result<usize, FclibError> {
-        let found = self.integer(place)?;
-        usize::try_from(found).map_err(|_| self.wrong(place, format!("it is {found}, it must not be below zero")))
-    }
-
-    /// Indices from 0 to `limit`, exclusive.
-    fn indices(&self, place: &str, expected: usize, limit: usize) -> Result<Vec<usize>, FclibError> {
-        let found: Vec<i64> = self.counted(place, expected)?;
-        let index = |(at, index): (usize, &i64)| match usize::try_from(*index) {
-            Ok(index) if index < limit => Ok(index),
-            _ => Err(self.wrong(place, format!("it is {index} at index {at}, it must be from 0 to {}", limit - 1))),
-        };
-        found.iter().enumerate().map(index).collect()
-    }
-
-    /// A text; empty where there is none. It is shown and decides nothing.
-    fn text(&self, place: &str) -> String {
-        let dataset = if self.has(place) { self.file.dataset(place).ok() } else { None };
-        let read = |dataset: hdf5::Dataset| match dataset.read_scalar::<FixedAscii<1024>>() {
-            Ok(text) => Some(text.to_string()),
-            Err(_) => dataset.read_scalar::<VarLenUnicode>().ok().map(|text| text.to_string()),
-        };
-        dataset.and_then(read).unwrap_or_default()
-    }
-
-    fn assembled(&self) -> Result<Assembled, FclibError> {
-        for place in ["fclib_local/V", "fclib_local/R"] {
-            if self.has(place) {
-                return Err(self.wrong(place, "equality constraints are not read; eliminate them from the problem"));
+    fn assembled(&mut self, global: bool) -> Result<Assembled, FclibError> {
+        for name in ["V", "R", "G"] {
+            if self.source.has(&self.at(name)) {
+                let why = "equality constraints are not read; eliminate them from the problem";
+                return Err(self.source.wrong(&self.at(name), why));
             }
         }
-        let rolling = self.has("fclib_local/vectors/mu_r");
-        let dimension = self.integer("fclib_local/spacedim")?;
-        let rows = match (dimension, rolling) {
-            (2, false) => ContactRows { tangents: 1, moments: 0 },
-            (3, false) => ContactRows { tangents: 2, moments: 0 },
-            (3, true) => ContactRows { tangents: 1, moments: 1 },
-            (5, true) => ContactRows { tangents: 2, moments: 2 },
-            (6, true) => ContactRows { tangents: 2, moments: 3 },
-            (5 | 6, false) => {
-                let why = format!("it is missing, and spacedim is {dimension}");
-                return Err(self.wrong("fclib_local/vectors/mu_r", why));
-            }
-            _ => {
-                let allowed = if rolling { "3, 5 or 6, as there is a mu_r" } else { "2 or 3, or with mu_r 3, 5 or 6" };
-                return Err(self.wrong("fclib_local/spacedim", format!("it is {dimension}, it must be {allowed}")));
-            }
-        };
-        // q before the matrix: a forged m must not ask for memory
-        let total = self.order(rows.count())?;
-        let q = self.finite("fclib_local/vectors/q", total)?;
-        let matrix = self.matrix(total, rows.count())?;
-        let contacts = total / rows.count();
-        let ours = self.has("cohesive_dem");
-        let coefficients = |place: &str| self.finite(place, contacts);
-        let parts = Parts {
-            rows,
-            matrix,
-            q,
-            mu: coefficients("fclib_local/vectors/mu")?,
-            nu: if rolling { coefficients("fclib_local/vectors/mu_r")? } else { vec![0.0; contacts] },
-            xi: if rows.moments > rows.tangents {
-                coefficients("fclib_local/vectors/mu_t")?
-            } else {
-                vec![0.0; contacts]
-            },
-            associated: if ours {
-                self.indices("cohesive_dem/associated", contacts, 2)?.into_iter().map(|flag| flag == 1).collect()
-            } else {
-                vec![false; contacts]
-            },
-            shift: if ours { coefficients("cohesive_dem/shift")? } else { vec![0.0; contacts] },
-            applied: if ours { self.finite("cohesive_dem/applied", 1)?[0] } else { 0.0 },
-        };
+        let rows = self.rows()?;
+        let (matrix, q) = if global { self.condensed(rows.count())? } else { self.local(rows.count())? };
+        let matrix = self.symmetric(matrix)?;
+        let parts = self.parts(rows, matrix, q)?;
         Assembled::new(parts).map_err(|error| {
             let place = match &error {
                 AssemblyError::Length { array, .. } | AssemblyError::Value { array, .. } => match *array {
                     "shift" | "applied" | "associated" => format!("cohesive_dem/{array}"),
-                    "mu" | "mu_r" | "mu_t" | "q" => format!("fclib_local/vectors/{array}"),
-                    _ => "fclib_local/W/x".into(),
+                    "mu" | "mu_r" | "mu_t" => self.at(&format!("vectors/{array}")),
+                    "q" => self.at(if global { "vectors" } else { "vectors/q" }),
+                    _ => self.at(if global { "H" } else { "W/x" }),
                 },
-                AssemblyError::Asymmetric { .. } => "fclib_local/W".into(),
+                AssemblyError::Asymmetric { .. } => self.at("W"),
             };
-            self.wrong(&place, error.to_string())
+            self.source.wrong(&place, error.to_string())
         })
     }
 
-    /// The number of rows of W, of which each contact has `size`.
-    fn order(&self, size: usize) -> Result<usize, FclibError> {
-        let at = |name: &str| format!("fclib_local/W/{name}");
-        let (m, n) = (self.count(&at("m"))?, self.count(&at("n"))?);
-        if m != n {
-            return Err(self.wrong(&at("n"), format!("it is {n}, and m is {m}: W must be square")));
+    /// The rows of each contact.
+    fn rows(&self) -> Result<ContactRows, FclibError> {
+        let (spacedim, mu_r) = (self.at("spacedim"), self.at("vectors/mu_r"));
+        let dimension = self.source.integer(&spacedim)?;
+        let rolling = self.source.has(&mu_r);
+        if !rolling && (self.group == "fclib_global_rolling" || [5, 6].contains(&dimension)) {
+            return Err(self.source.wrong(&mu_r, format!("it is missing, and spacedim is {dimension}")));
         }
-        if m == 0 || m % size != 0 {
-            let why = format!("it is {m}, it must be a multiple of {size} above zero: {size} rows a contact");
-            return Err(self.wrong(&at("m"), why));
-        }
-        Ok(m)
-    }
-
-    /// The matrix W of `m` rows, in blocks of `size`.
-    fn matrix(&self, m: usize, size: usize) -> Result<BlockMatrix, FclibError> {
-        let at = |name: &str| format!("fclib_local/W/{name}");
-        let nz = self.integer(&at("nz"))?;
-        let entries: Vec<(usize, usize, f64)> = match nz {
-            -1 | -2 => {
-                let starts = self.starts(&at("p"), m)?;
-                let stored = starts[m];
-                let (index, x) = (self.leading::<i64>(&at("i"), stored)?, self.leading::<f64>(&at("x"), stored)?);
-                let line = (0..m).flat_map(|line| std::iter::repeat_n(line, starts[line + 1] - starts[line]));
-                let place = |(at_entry, (line, index)): (usize, (usize, i64))| match usize::try_from(index) {
-                    Ok(other) if other < m && nz == -1 => Ok((other, line, x[at_entry])),
-                    Ok(other) if other < m => Ok((line, other, x[at_entry])),
-                    _ => Err(self.wrong(&at("i"), format!("it is {index} at index {at_entry}, and W has {m} rows"))),
-                };
-                line.zip(index).enumerate().map(place).collect::<Result<_, _>>()?
-            }
+        match (dimension, rolling) {
+            (2, false) => Ok(ContactRows { tangents: 1, moments: 0 }),
+            (3, false) => Ok(ContactRows { tangents: 2, moments: 0 }),
+            (3, true) => Ok(ContactRows { tangents: 1, moments: 1 }),
+            (5, true) => Ok(ContactRows { tangents: 2, moments: 2 }),
+            (6, true) => Ok(ContactRows { tangents: 2, moments: 3 }),
             _ => {
-                let count = usize::try_from(nz).map_err(|_| {
-                    let meaning = "−1 (by columns), −2 (by rows), or the number of triplets";
-                    self.wrong(&at("nz"), format!("it is {nz}, it must be {meaning}"))
-                })?;
-                let (i, p) = (self.indices(&at("i"), count, m)?, self.indices(&at("p"), count, m)?);
-                // nzmax may leave room behind the last triplet
-                let x = self.leading::<f64>(&at("x"), count)?;
-                i.into_iter().zip(p).zip(x).map(|((i, p), x)| (i, p, x)).collect()
+                let allowed = if rolling { "3, 5 or 6, as there is a mu_r" } else { "2 or 3, or with mu_r 3, 5 or 6" };
+                Err(self.source.wrong(&spacedim, format!("it is {dimension}, it must be {allowed}")))
             }
-        };
-        Ok(BlockMatrix::from_entries(m / size, size, &entries))
+        }
     }
 
-    /// The first `count` values of a dataset that may be longer.
-    fn leading<T: H5Type>(&self, place: &str, count: usize) -> Result<Vec<T>, FclibError> {
-        let mut values = self.values(place)?;
-        if values.len() < count {
-            return Err(self.wrong(place, format!("it has {} values, and {count} are promised", values.len())));
-        }
-        values.truncate(count);
-        Ok(values)
+    /// W, in C × C blocks of `size` × `size`, and q (C·S) of a local problem.
+    fn local(&self, size: usize) -> Result<(BlockMatrix, Vec<f64>), FclibError> {
+        let place = self.at("W");
+        let total = self.multiple(&format!("{place}/m"), self.source.order(&place)?, size)?;
+        // q before the matrix: a forged m must not ask for memory
+        let q = self.source.finite(&self.at("vectors/q"), total)?;
+        let entries = self.source.entries(&place, total, total)?;
+        Ok((BlockMatrix::from_entries(total / size, size, &entries), q))
     }
 
-    /// Where each row or column starts: from zero, never falling.
-    fn starts(&self, place: &str, lines: usize) -> Result<Vec<usize>, FclibError> {
-        let starts = self.indices(place, lines + 1, usize::MAX)?;
-        if starts[0] != 0 || starts.windows(2).any(|pair| pair[0] > pair[1]) {
-            return Err(self.wrong(place, "it must start at 0 and never fall"));
+    /// The same of a global problem, from M (N × N), H (N × C·S), f (N) and w (C·S).
+    fn condensed(&mut self, size: usize) -> Result<(BlockMatrix, Vec<f64>), FclibError> {
+        let (m, h) = (self.at("M"), self.at("H"));
+        let unknowns = self.source.order(&m)?;
+        let (rows, columns) = self.source.shape(&h)?;
+        if rows != unknowns {
+            let why = format!("it is {rows}, and M has {unknowns} rows");
+            return Err(self.source.wrong(&format!("{h}/m"), why));
         }
-        Ok(starts)
+        let total = self.multiple(&format!("{h}/n"), columns, size)?;
+        // vectors before matrices: forged sizes must not ask for memory
+        let impulses = self.source.finite(&self.at("vectors/f"), unknowns)?;
+        let given = self.source.finite(&self.at("vectors/w"), total)?;
+        let (mass, directions) = (self.finite_entries(&m, unknowns, unknowns)?, self.finite_entries(&h, rows, total)?);
+        let global = Global { size, mass: &mass, directions: &directions, impulses: &impulses, given: &given };
+        let condensed = global.condensed().map_err(|error| self.source.wrong(self.group, error.to_string()))?;
+        if condensed.asymmetry > ROUNDING {
+            self.warnings.push(format!(
+                "M was made symmetric: entries changed by up to {:.1e} of the root of the product of their diagonal entries",
+                condensed.asymmetry
+            ));
+        }
+        Ok((condensed.matrix, condensed.q))
+    }
+
+    fn finite_entries(&self, matrix: &str, m: usize, n: usize) -> Result<Vec<Entry>, FclibError> {
+        let entries = self.source.entries(matrix, m, n)?;
+        match entries.iter().position(|(_, _, x)| !x.is_finite()) {
+            None => Ok(entries),
+            Some(at) => {
+                let why = format!("it is {} at index {at}, it must be finite", entries[at].2);
+                Err(self.source.wrong(&format!("{matrix}/x"), why))
+            }
+        }
+    }
+
+    /// W itself where it is symmetric up to rounding; made symmetric, with a warning, where it
+    /// nearly is.
+    fn symmetric(&mut self, matrix: BlockMatrix) -> Result<BlockMatrix, FclibError> {
+        let Some(worst) = matrix.asymmetry().filter(|worst| worst.relative > ROUNDING) else { return Ok(matrix) };
+        let (relative, row, column) = (worst.relative, worst.row, worst.column);
+        if relative > MOST_ASYMMETRY {
+            let why = format!(
+                "W is not symmetric: {:e} in row {row} and column {column}, {:e} in the place opposite; their mean differs by \
+                 {relative:.1e} of the largest entry, up to {MOST_ASYMMETRY:e} is made symmetric",
+                worst.entry, worst.mirrored
+            );
+            return Err(self.source.wrong(&self.at("W"), why));
+        }
+        self.warnings.push(format!(
+            "W was made symmetric: entries changed by up to {relative:.1e} of the largest; residuals are those of the \
+             symmetric W"
+        ));
+        Ok(matrix.symmetrised())
+    }
+
+    fn parts(&self, rows: ContactRows, matrix: BlockMatrix, q: Vec<f64>) -> Result<Parts, FclibError> {
+        let contacts = matrix.contacts();
+        let ours = self.source.has("cohesive_dem");
+        let zero = || Ok(vec![0.0; contacts]);
+        let vector = |place: &str| self.source.finite(place, contacts);
+        let coefficients = |name: &str| vector(&self.at(&format!("vectors/{name}")));
+        Ok(Parts {
+            mu: coefficients("mu")?,
+            nu: if rows.moments > 0 { coefficients("mu_r")? } else { zero()? },
+            xi: if rows.moments > rows.tangents { coefficients("mu_t")? } else { zero()? },
+            associated: match ours {
+                true => self.source.indices("cohesive_dem/associated", contacts, 2)?,
+                false => vec![0; contacts],
+            }
+            .into_iter()
+            .map(|flag| flag == 1)
+            .collect(),
+            shift: if ours { vector("cohesive_dem/shift")? } else { zero()? },
+            applied: if ours { self.source.finite("cohesive_dem/applied", 1)?[0] } else { 0.0 },
+            rows,
+            matrix,
+            q,
+        })
+    }
+
+    /// A number of rows of all contacts, of which each has `size`.
+    fn multiple(&self, place: &str, found: usize, size: usize) -> Result<usize, FclibError> {
+        if found == 0 || !found.is_multiple_of(size) {
+            let why = format!("it is {found}, it must be a multiple of {size} above zero: {size} rows a contact");
+            return Err(self.source.wrong(place, why));
+        }
+        Ok(found)
     }
 }

@@ -147,7 +147,7 @@ fn wrong_files_are_refused() {
     }
     std::fs::remove_file(here.path("a.hdf5")).expect("remove");
     File::create(here.path("a.hdf5")).and_then(|file| file.create_group("fclib_global")).expect("create");
-    here.dem_run(&["solve", "a.hdf5"]).fails(4, &["a.hdf5", "global problem", "/fclib_local"]);
+    here.dem_run(&["solve", "a.hdf5"]).fails(4, &["a.hdf5", "/fclib_global/spacedim", "missing"]);
     here.dem_run(&["solve", "a.hdf5", "--tolerance", "0"]).fails(2, &["--tolerance", "above zero"]);
     here.dem_run(&["solve", "a.hdf5", "--solver", "magic"]).fails(2, &["magic", "gauss-seidel", "interior"]);
     here.dem_run(&["solve", "a.hdf5", "-o", "a.hdf5", "--force"]).fails(4, &["overwrite", "another file"]);

@@ -7,6 +7,7 @@ mod common;
 mod compression;
 mod elastic;
 mod fclib;
+mod fclib_global;
 mod interrupt;
 mod loads;
 mod pack;
