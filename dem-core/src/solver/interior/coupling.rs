@@ -1,6 +1,6 @@
 //! How contacts move each other: W = H̃ᵀ H̃ through the bodies, or as a matrix, and the linear systems with it.
 
-use super::sites::Sites;
+use super::sites::{Site, Sites};
 use crate::linear::{Lu, Tree};
 use crate::problem::assembled::BlockMatrix;
 use crate::solver::graph::Graph;
@@ -15,14 +15,22 @@ pub(super) enum Coupling<'a> {
         scale: f64,
         graph: &'a Graph,
     },
-    /// A matrix over the contacts. That of a step is 1 + W D⁻¹.
+    /// A symmetric matrix over the contacts. That of a step is 1 + W D⁻¹.
     Matrix {
-        matrix: &'a BlockMatrix,
-        scale: f64,
-        /// The contacts of each element, one of them twice for a block of the diagonal.
-        pairs: Vec<[usize; 2]>,
+        /// The upper triangle, block by block: an element of `tree` each.
+        blocks: Vec<Block>,
+        /// Their values.
+        values: Vec<f64>,
         tree: Tree,
     },
+}
+
+/// A block of W in the units of [`Sites`]: the rows of the first contact, row by row over those of
+/// the second, which is the first for a block of the diagonal.
+pub(super) struct Block {
+    contacts: [usize; 2],
+    /// Where its values start.
+    start: usize,
 }
 
 impl<'a> Coupling<'a> {
@@ -31,14 +39,22 @@ impl<'a> Coupling<'a> {
         Self::Bodies { rows, scale: 1.0 / speed_over_force.sqrt(), graph }
     }
 
-    /// By a matrix.
-    pub fn matrix(matrix: &'a BlockMatrix, sites: &Sites, speed_over_force: f64) -> Option<Self> {
-        let mut pairs = Vec::new();
-        for c in 0..matrix.contacts() {
-            pairs.extend(matrix.row(c).filter(|(d, _)| *d >= c).map(|(d, _)| [c, d]));
+    /// By a symmetric matrix, of which the upper triangle is read.
+    pub fn matrix(matrix: &BlockMatrix, sites: &Sites, speed_over_force: f64) -> Option<Self> {
+        let (scale, size) = (1.0 / speed_over_force, matrix.size());
+        let (mut blocks, mut values) = (Vec::new(), Vec::new());
+        for (c, site) in sites.list.iter().enumerate() {
+            for (d, block) in matrix.row(c).filter(|(d, _)| *d >= c) {
+                blocks.push(Block { contacts: [c, d], start: values.len() });
+                let other = &sites.list[d];
+                for row in &site.of[..site.rows] {
+                    values.extend(other.of[..other.rows].iter().map(|k| scale * block[row * size + k]));
+                }
+            }
         }
-        let tree = Tree::new(sites.list.iter().map(|site| site.rows).collect(), pairs.clone())?;
-        Some(Self::Matrix { matrix, scale: 1.0 / speed_over_force, pairs, tree })
+        let sizes = sites.list.iter().map(|site| site.rows).collect();
+        let tree = Tree::new(sizes, blocks.iter().map(|block| block.contacts).collect())?;
+        Some(Self::Matrix { blocks, values, tree })
     }
 
     fn tree(&self) -> &Tree {
@@ -52,17 +68,10 @@ impl<'a> Coupling<'a> {
     pub fn velocity(&self, sites: &Sites, r: &[f64]) -> Vec<f64> {
         match self {
             Self::Bodies { .. } => self.pulled(sites, &self.pushed(sites, r)),
-            Self::Matrix { matrix, scale, .. } => {
+            Self::Matrix { blocks, values, .. } => {
                 let mut u = vec![0.0; sites.rows];
-                for (c, site) in sites.list.iter().enumerate() {
-                    for (d, block) in matrix.row(c) {
-                        let other = &sites.list[d];
-                        for i in 0..site.rows {
-                            let line = &block[site.of[i] * matrix.size()..][..matrix.size()];
-                            let own = other.of[..other.rows].iter().zip(other.part(r));
-                            u[site.at + i] += scale * own.map(|(k, r)| line[*k] * r).sum::<f64>();
-                        }
-                    }
+                for block in blocks {
+                    block.multiply(sites, values, r, &mut u);
                 }
                 u
             }
@@ -100,29 +109,9 @@ impl<'a> Coupling<'a> {
                 let entry = |i: usize, j: usize| square * own[i * site.order() + j];
                 rows.add_element(row, &site.of[..site.rows], entry, out);
             }),
-            Self::Matrix { matrix, scale, pairs, tree } => lu.factorise(tree, |e, out| {
-                let [c, d] = pairs[e];
-                let first = sites.list[c].rows;
-                let width = if c == d { first } else { first + sites.list[d].rows };
-                let mut add = |c: usize, d: usize, row: usize, column: usize| {
-                    let Some((_, block)) = matrix.row(c).find(|(k, _)| *k == d) else { return };
-                    let (site, other) = (&sites.list[c], &sites.list[d]);
-                    let own = &inverses[other.matrix..];
-                    for i in 0..site.rows {
-                        let line = &block[site.of[i] * matrix.size()..][..matrix.size()];
-                        for k in 0..other.rows {
-                            let w = scale * line[other.of[k]];
-                            for j in 0..other.rows {
-                                out[(row + i) * width + column + j] += w * own[k * other.order() + j];
-                            }
-                        }
-                    }
-                };
-                add(c, d, 0, if c == d { 0 } else { first });
-                if c != d {
-                    add(d, c, first, 0);
-                }
-            }),
+            Self::Matrix { blocks, values, tree } => {
+                lu.factorise(tree, |e, out| blocks[e].add_element(sites, values, inverses, out))
+            }
         }
     }
 
@@ -138,6 +127,40 @@ impl<'a> Coupling<'a> {
                 let mut u = self.velocity(sites, r);
                 lu.solve(self.tree(), &mut u);
                 u
+            }
+        }
+    }
+}
+
+impl Block {
+    /// u += W r for this block and the one that mirrors it.
+    fn multiply(&self, sites: &Sites, values: &[f64], r: &[f64], u: &mut [f64]) {
+        let [site, other] = self.contacts.map(|c| &sites.list[c]);
+        let block = values[self.start..].chunks_exact(other.rows).take(site.rows);
+        for (i, line) in block.enumerate() {
+            u[site.at + i] += line.iter().zip(other.part(r)).map(|(w, r)| w * r).sum::<f64>();
+            if self.contacts[0] != self.contacts[1] {
+                let own = r[site.at + i];
+                other.part_mut(u).iter_mut().zip(line).for_each(|(u, w)| *u += w * own);
+            }
+        }
+    }
+
+    /// W D⁻¹ of this block and the one that mirrors it, over the rows of both contacts.
+    fn add_element(&self, sites: &Sites, values: &[f64], inverses: &[f64], out: &mut [f64]) {
+        let [site, other] = self.contacts.map(|c| &sites.list[c]);
+        let apart = self.contacts[0] != self.contacts[1];
+        let (first, width) = if apart { (site.rows, site.rows + other.rows) } else { (0, site.rows) };
+        let line = |of: &Site, row: usize| &inverses[of.matrix + row * of.order()..][..of.rows];
+        let block = values[self.start..].chunks_exact(other.rows).take(site.rows);
+        for (i, values) in block.enumerate() {
+            for (k, w) in values.iter().enumerate() {
+                let right = &mut out[i * width + first..][..other.rows];
+                right.iter_mut().zip(line(other, k)).for_each(|(out, d)| *out += w * d);
+                if apart {
+                    let left = &mut out[(first + k) * width..][..site.rows];
+                    left.iter_mut().zip(line(site, i)).for_each(|(out, d)| *out += w * d);
+                }
             }
         }
     }
