@@ -529,6 +529,7 @@ fn the_route_is_an_enumeration_and_read_as_its_codes() {
     let packed = folder.path().join("packed.h5");
     let history = History::open(&path).unwrap();
     copy(&history, &packed, CopyAs::Packed, &mut |_| true).unwrap();
+    drop(history);
     for path in [&path, &packed] {
         let file = hdf5::File::open(path).unwrap();
         let descriptor = file.dataset("observables/solver_route/value").unwrap().dtype().unwrap().to_descriptor();
