@@ -2,10 +2,12 @@
 
 mod common;
 
-use common::{down, floor, force_driven, grain, run, settings, world};
-use dem_core::body::{Grains, Shape, Wall};
+use common::{down, floor, force_driven, grain, newton, run, settings, world};
+use dem_core::body::{Drive, Grains, Shape, Wall};
 use dem_core::dim::{D2, D3, Dim, Vect};
+use dem_core::solver::{Route, SolverSettings};
 use dem_core::world::World;
+use std::sync::Arc;
 
 const G: f64 = 9.81;
 
@@ -147,4 +149,41 @@ fn kinetic_energy_and_momentum_are_sums_over_what_moves() {
     // x v_y − y v_x of the second grain, and the spins
     let angular = m[1] * (0.1 * 0.5 + 0.2 * 3.0) + 10.0 * i[0] - 20.0 * i[1];
     assert!((momentum.angular[0] / angular - 1.0).abs() < 1e-14);
+}
+
+/// The false acceleration has one definition, whatever solver made the step; only Newton reports a
+/// load error beside it.
+#[test]
+fn the_false_acceleration_is_the_same_quantity_for_every_solver() {
+    for direct in [false, true] {
+        let mut set = settings(1e-4);
+        set.gravity = down::<D2>(G);
+        if direct {
+            set.solver = SolverSettings::Staged(newton(1e-10, 1e-10, 1e-9));
+        }
+        // one disk falls, another of the same mass lies on the floor: half of the squared load
+        // accelerates
+        let mut w = world(vec![grain::<D2>(&[0.0, 1.0], 0.01), grain(&[1.0, 0.01], 0.01)], vec![floor(0.2)], set);
+        let report = w.step().expect("a step");
+        let expected = f64::sqrt(0.5);
+        assert!((report.false_acceleration - expected).abs() < 1e-9, "{}", report.false_acceleration);
+        assert_eq!(report.load_error.is_some(), direct);
+        assert_eq!(report.route, if direct { Route::ActiveSet } else { Route::Sweeps });
+    }
+}
+
+/// A wall of prescribed velocity loads the sample with the force that it needs.
+#[test]
+fn the_force_of_a_wall_of_prescribed_velocity_is_a_load() {
+    let (r, speed, h) = (0.01, 0.5, 1e-4);
+    let direction: <D2 as Dim>::Vector = [1.0, 0.0].into();
+    let drive = Drive::Velocity { direction, speed: Arc::new(move |_| speed) };
+    let wall = Wall { drive, ..Wall::fixed(Shape::Plane { normal: direction }, [0.0, 0.0].into(), 0.0) };
+    let mut w = world(vec![grain::<D2>(&[r, 0.0], r)], vec![wall], settings(h));
+    let report = w.step().expect("a step");
+    // it pushes one grain, and all of its force accelerates that
+    assert!((w.grains.velocity[0][0] - speed).abs() < 1e-9 * speed, "{}", w.grains.velocity[0][0]);
+    assert!((report.false_acceleration - 1.0).abs() < 1e-9, "{}", report.false_acceleration);
+    // once it moves with the wall there is neither load nor acceleration
+    assert_eq!(w.step().expect("a step").false_acceleration, 0.0);
 }

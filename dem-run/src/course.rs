@@ -7,7 +7,7 @@ use dem_core::body::{Drive, Wall};
 use dem_core::bond::BondStatus;
 use dem_core::dim::{Dim, Vect};
 use dem_core::saved::{Mismatch, Reader, Saved};
-use dem_core::solver::{SolveStatus, Work};
+use dem_core::solver::{Route, Work};
 use dem_core::world::{StepReport, World};
 
 /// Counts of a run, and its stop conditions.
@@ -25,10 +25,16 @@ pub struct Course<D: Dim> {
     pub broken: [usize; 4],
     /// Largest residual of an accepted solve (–).
     pub worst_residual: f64,
+    /// Largest load error of an accepted solve (–); none where no solve reported one.
+    pub worst_load_error: Option<f64>,
     /// What all solves took.
     pub work: Work,
-    /// Steps that were accepted and missed the tolerance.
+    /// Steps with a solve: those that were not extrapolated.
+    pub solved_steps: u64,
+    /// Steps with an accepted solve whose residual exceeds the tolerance.
     pub missed_tolerance: u64,
+    /// Steps with an accepted solve whose load error exceeds its tolerance.
+    pub missed_load_tolerance: u64,
     /// Solves that were not accepted.
     pub rejected: u64,
     /// Deepest overlap (m).
@@ -72,8 +78,11 @@ impl<D: Dim> Course<D> {
             driven,
             broken: [0; 4],
             worst_residual: 0.0,
+            worst_load_error: None,
             work: Work::default(),
+            solved_steps: 0,
             missed_tolerance: 0,
+            missed_load_tolerance: 0,
             rejected: 0,
             penetration: 0.0,
             bond_elongation: 0.0,
@@ -93,8 +102,11 @@ impl<D: Dim> Course<D> {
         to.reals.extend(&self.extents);
         self.broken.into_iter().for_each(|broken| to.count(broken));
         to.reals.extend([self.worst_residual, self.penetration, self.bond_elongation]);
+        to.flag(self.worst_load_error.is_some());
+        to.real(self.worst_load_error.unwrap_or(0.0));
         let Work { sweeps, newton, factorisations } = self.work;
-        to.counts.extend([sweeps, newton, factorisations, self.missed_tolerance, self.rejected]);
+        to.counts.extend([sweeps, newton, factorisations, self.solved_steps]);
+        to.counts.extend([self.missed_tolerance, self.missed_load_tolerance, self.rejected]);
         to.flag(self.stop.is_some());
         if let Some(stop) = &self.stop {
             to.real(stop.distance);
@@ -120,9 +132,13 @@ impl<D: Dim> Course<D> {
         course.broken = [from.count()?, from.count()?, from.count()?, from.count()?];
         (course.worst_residual, course.penetration) = (from.real()?, from.real()?);
         course.bond_elongation = from.real()?;
+        let (reported, worst) = (from.flag()?, from.real()?);
+        course.worst_load_error = reported.then_some(worst);
         let mut count = || from.count().map(|n| n as u64);
         course.work = Work { sweeps: count()?, newton: count()?, factorisations: count()? };
-        (course.missed_tolerance, course.rejected) = (count()?, count()?);
+        course.solved_steps = count()?;
+        (course.missed_tolerance, course.missed_load_tolerance) = (count()?, count()?);
+        course.rejected = count()?;
         if from.flag()? {
             let (distance, begun, place) = (from.real()?, from.flag()?, from.vector()?);
             // a stop that the scene no longer has is forgotten
@@ -160,10 +176,7 @@ impl<D: Dim> Course<D> {
                 BondStatus::Intact => {}
             }
         }
-        self.worst_residual = self.worst_residual.max(report.residual);
-        self.work = self.work + report.work;
-        self.missed_tolerance += u64::from(report.status == SolveStatus::Accepted);
-        self.rejected += u64::from(report.rejected);
+        self.count_solves(world, report);
         self.penetration = self.penetration.max(report.penetration);
         self.bond_elongation = self.bond_elongation.max(report.bond_elongation);
         if self.driven.is_empty() {
@@ -176,6 +189,19 @@ impl<D: Dim> Course<D> {
             let (displacement, strain) = ((wall.position - *start).dot(&direction), axial(&strain, direction));
             collapse.push(LoadStep { load: load(wall), displacement, strain, broken, bonds });
         }
+    }
+
+    /// Enter the solves of a step.
+    fn count_solves(&mut self, world: &World<D>, report: &StepReport<D>) {
+        let solver = &world.settings.solver;
+        self.worst_residual = self.worst_residual.max(report.residual);
+        self.worst_load_error = self.worst_load_error.into_iter().chain(report.load_error).reduce(f64::max);
+        self.work = self.work + report.work;
+        self.solved_steps += u64::from(report.route != Route::Extrapolation);
+        self.missed_tolerance += u64::from(report.residual > solver.tolerance());
+        let missed = report.load_error.zip(solver.load_tolerance()).is_some_and(|(error, most)| error > most);
+        self.missed_load_tolerance += u64::from(missed);
+        self.rejected += u64::from(report.rejected);
     }
 
     /// Whether a stop condition of the scene ends the run here, and which.
@@ -246,6 +272,7 @@ mod tests {
     use crate::build::build;
     use dem_core::contact::Local;
     use dem_core::dim::D2;
+    use dem_core::solver::SolveStatus;
     use dem_core::world::Break;
 
     const TWO_GRAINS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../configs/two-grains.json");
@@ -266,5 +293,37 @@ mod tests {
         course.count(&world, &report);
         // before, what is no mode counted as tension: 3
         assert_eq!(course.broken, [1, 1, 1, 1]);
+    }
+
+    /// Steps that miss the tolerance are those whose residual exceeds it, and no others; those
+    /// whose load error exceeds its own are counted apart.
+    #[test]
+    fn a_step_that_misses_its_load_tolerance_alone_does_not_miss_the_tolerance() {
+        let scene = crate::scene::load(TWO_GRAINS.as_ref(), &[]).expect("scene");
+        let mut world = build::<D2>(&scene, &mut |_| true).expect("world").world;
+        let solver = world.settings.solver;
+        let (tolerance, load_tolerance) =
+            (solver.tolerance(), solver.load_tolerance().expect("it reports a load error"));
+        let mut course = Course::new(&scene, &world);
+        let report = world.step().expect("a step");
+        let mut enter = |residual, load_error, route, status| {
+            course.count(&world, &StepReport { residual, load_error, route, status, ..report.clone() });
+        };
+        use SolveStatus::{Accepted, Converged};
+        enter(tolerance, Some(load_tolerance), Route::Extrapolation, Converged);
+        enter(0.5 * tolerance, Some(2.0 * load_tolerance), Route::ActiveSet, Accepted);
+        enter(0.5 * tolerance, Some(3.0 * load_tolerance), Route::InteriorPoint, Accepted);
+        enter(2.0 * tolerance, None, Route::Sweeps, Accepted);
+        // sweeps that aimed at less than the tolerance, and met it
+        enter(0.5 * tolerance, None, Route::Sweeps, Accepted);
+        assert_eq!((course.missed_tolerance, course.missed_load_tolerance), (1, 2));
+        assert_eq!((course.solved_steps, course.worst_load_error), (4, Some(3.0 * load_tolerance)));
+        // and a run that goes on has them
+        let mut saved = Saved::default();
+        course.save(&mut saved);
+        let restored = Course::restored(&scene, &world, &mut Reader::new(&saved.reals, &saved.counts));
+        let restored = restored.expect("what was saved");
+        assert_eq!((restored.missed_tolerance, restored.missed_load_tolerance), (1, 2));
+        assert_eq!((restored.solved_steps, restored.worst_load_error), (4, course.worst_load_error));
     }
 }

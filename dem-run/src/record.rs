@@ -3,12 +3,13 @@
 use crate::build::Built;
 use crate::history::{
     self, Background, Batch, BondStatus, Checkpoint, ContactRows, ContactStatus, Frame, GrainState, History, Kept,
-    Layout, Observable, Parameters, Rupture, RuptureMode, WallDrive, WallKind, WallState, Writer,
+    Layout, Observable, Parameters, Rupture, RuptureMode, SolverRoute, WallDrive, WallKind, WallState, Writer,
 };
 use crate::scene::{Precision, Scene};
 use dem_core::body::{Drive, Shape, Wall};
 use dem_core::bond;
 use dem_core::dim::{Dim, Moments, Vect};
+use dem_core::solver::Route;
 use dem_core::world::{Break, StepReport, TouchStatus, World};
 use std::path::Path;
 
@@ -205,6 +206,15 @@ fn bond_status(status: bond::BondStatus) -> BondStatus {
     }
 }
 
+fn solver_route(route: Route) -> SolverRoute {
+    match route {
+        Route::Extrapolation => SolverRoute::Extrapolation,
+        Route::ActiveSet => SolverRoute::ActiveSet,
+        Route::InteriorPoint => SolverRoute::InteriorPoint,
+        Route::Sweeps => SolverRoute::Sweeps,
+    }
+}
+
 fn rupture<D: Dim>(failed: &Break<D>, step: i64, time: f64) -> Rupture {
     Rupture {
         step,
@@ -286,7 +296,7 @@ fn parameters(scene: &Scene, solid_fraction: Option<f64>) -> Parameters {
 }
 
 /// The force that drives a wall (N): the one prescribed, or what the drive needs to keep its velocity.
-pub fn applied_force<D: Dim>(wall: &Wall<D>) -> f64 {
+fn applied_force<D: Dim>(wall: &Wall<D>) -> f64 {
     match wall.drive {
         Drive::Fixed => 0.0,
         Drive::Velocity { direction, .. } => -direction.dot(&wall.reaction),
@@ -296,7 +306,7 @@ pub fn applied_force<D: Dim>(wall: &Wall<D>) -> f64 {
 
 /// What is measured at every step, in order. What the world lacks is not measured.
 fn observables<D: Dim>(world: &World<D>) -> Vec<(Observable, Measure<D>)> {
-    let (d, spins, walls) = (D::N, D::Spin::LEN, world.walls.len());
+    let (d, spins) = (D::N, D::Spin::LEN);
     let scalar: &[usize] = &[];
     let mut list: Vec<(Observable, Measure<D>)> = Vec::new();
     let mut add = |name: &str, unit: &str, shape: &[usize], measure: Measure<D>| {
@@ -309,8 +319,9 @@ fn observables<D: Dim>(world: &World<D>) -> Vec<(Observable, Measure<D>)> {
     add("energy_remainder", "J", scalar, |w, _, out| out.push(w.ledger.remainder));
     add("momentum", "kg m s-1", &[d], |w, _, out| out.extend(w.momentum().linear.as_slice()));
     add("angular_momentum", "kg m2 s-1", &[spins], |w, _, out| out.extend(w.momentum().angular.as_slice()));
+    add(history::FALSE_ACCELERATION, "", scalar, |_, r, out| out.push(r.false_acceleration));
     add("solver_residual", "", scalar, |_, r, out| out.push(r.residual));
-    add("solver_load_error", "", scalar, |_, r, out| out.push(r.load_error));
+    add(history::LOAD_ERROR, "", scalar, |_, r, out| out.push(r.load_error.unwrap_or(f64::NAN)));
     add("solver_iterations", "", scalar, |_, r, out| out.push(r.work.iterations() as f64));
     add("solver_newton_iterations", "", scalar, |_, r, out| out.push(r.work.newton as f64));
     add("solver_factorisations", "", scalar, |_, r, out| out.push(r.work.factorisations as f64));
@@ -319,6 +330,18 @@ fn observables<D: Dim>(world: &World<D>) -> Vec<(Observable, Measure<D>)> {
     add("penetration", "m", scalar, |_, r, out| out.push(r.penetration));
     add("stress", "Pa", &[d, d], |w, _, out| out.extend(w.stress()));
     add("strain", "", &[d, d], |w, _, out| out.extend(w.strain()));
+    list.push((Observable::route(), |_, r, out| out.push(solver_route(r.route).number())));
+    list.extend(of_bonds_and_walls(world));
+    list
+}
+
+/// The same of bonds and walls.
+fn of_bonds_and_walls<D: Dim>(world: &World<D>) -> Vec<(Observable, Measure<D>)> {
+    let (d, walls, scalar) = (D::N, world.walls.len(), &[][..]);
+    let mut list: Vec<(Observable, Measure<D>)> = Vec::new();
+    let mut add = |name: &str, unit: &str, shape: &[usize], measure: Measure<D>| {
+        list.push((Observable::new(name, unit, shape), measure));
+    };
     if !world.bonds.is_empty() {
         if world.bonds.iter().any(|b| b.stiffness.is_some()) {
             add("elastic_energy", "J", scalar, |w, _, out| out.push(w.ledger.elastic));

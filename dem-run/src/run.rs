@@ -170,7 +170,7 @@ pub(crate) struct State<D: Dim> {
 }
 
 /// The form of what [`State::save`] writes; another form has another number.
-const FORM: usize = 6;
+const FORM: usize = 7;
 
 impl<D: Dim> State<D> {
     /// The state as numbers. The processor time is not among them: two runs of a scene write the same file.
@@ -379,8 +379,12 @@ impl<D: Dim> State<D> {
             driven_walls,
             tolerance: scene.solver.tolerance,
             worst_residual: course.worst_residual,
+            load_tolerance: world.settings.solver.load_tolerance(),
+            worst_load_error: course.worst_load_error,
             work: course.work,
+            solved_steps: course.solved_steps,
             missed_tolerance: course.missed_tolerance,
+            missed_load_tolerance: course.missed_load_tolerance,
             rejected: course.rejected,
             penetration: course.penetration,
             bond_elongation: course.bond_elongation,

@@ -72,11 +72,19 @@ pub struct Summary {
     pub tolerance: f64,
     /// Largest residual of an accepted solve (–).
     pub worst_residual: f64,
-    /// Sweeps of all solves.
+    /// Load error that the solver aims at (–); none where it reports no load error.
+    pub load_tolerance: Option<f64>,
+    /// Largest load error of an accepted solve (–); none where no solve reported one.
+    pub worst_load_error: Option<f64>,
+    /// What all accepted solves took.
     #[serde(serialize_with = "counts")]
     pub work: Work,
-    /// Steps that were accepted and missed the tolerance.
+    /// Solved steps: those with a solve that was not an extrapolation.
+    pub solved_steps: u64,
+    /// Steps with an accepted solve whose residual exceeds the tolerance.
     pub missed_tolerance: u64,
+    /// Steps with an accepted solve whose load error exceeds its tolerance.
+    pub missed_load_tolerance: u64,
     /// Solves that were not accepted: their steps were halved.
     pub rejected: u64,
     /// Deepest overlap (m).
@@ -228,14 +236,22 @@ pub(crate) fn told(work: Work, count: impl Fn(u64) -> String) -> Option<String> 
 
 impl Summary {
     fn write_solves(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let rate = |count: u64| format!("{:.2}", count as f64 / self.steps.max(1) as f64);
-        let took = told(self.work, rate).map_or_else(|| "nothing to solve".into(), |took| took + " a step");
-        writeln!(f, "solver           {took}")?;
+        let rate = |count: u64| format!("{:.2}", count as f64 / self.solved_steps.max(1) as f64);
+        match told(self.work, rate) {
+            Some(took) => {
+                writeln!(f, "solver           {took} a solved step ({} of {})", self.solved_steps, self.steps)?;
+            }
+            None => writeln!(f, "solver           nothing to solve")?,
+        }
         writeln!(
             f,
             "accuracy         worst residual {:.2e} (tolerance {:.0e}), {} steps missed it, {} solves not accepted",
             self.worst_residual, self.tolerance, self.missed_tolerance, self.rejected
         )?;
+        if let Some((worst, tolerance)) = self.worst_load_error.zip(self.load_tolerance) {
+            let missed = self.missed_load_tolerance;
+            writeln!(f, "load error       worst {worst:.2e} (tolerance {tolerance:.0e}), {missed} steps missed it")?;
+        }
         writeln!(
             f,
             "penetration      {:.2e} m, {:.1e} mean diameters",

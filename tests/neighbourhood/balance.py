@@ -18,6 +18,7 @@ def check(h, c, p, report):
     check_virial(h, c, report)
     check_strain(h, report)
     check_penetration(h, c, report)
+    check_false_acceleration(h, report)
     check_counts(h, report)
 
 
@@ -281,6 +282,25 @@ def check_penetration(h, c, report):
     report.figures["deepest overlap (mean radii)"] = float(deepest.max(initial=0) / h.radius.mean())
 
 
+def check_false_acceleration(h, report):
+    """The false acceleration is the inertial force of the grains over the norm of all that loads the sample."""
+    if "false_acceleration" not in h.observed:
+        return
+    free = ~h.fixed
+    inertial = (h.mass[None, :, None] * np.diff(h.v, axis=0) / h.h)[:, free]
+    applied = (h.external()[0][:, free] ** 2).sum((1, 2)) + (h.wall_drive_force() ** 2).sum(1)
+    for k, (kind, _) in enumerate(h.drives):
+        if kind == "velocity":
+            applied = applied + (h.observed["wall_force"][:, k] @ h.wall_direction[k]) ** 2
+    ratio = np.sqrt((inertial**2).sum((1, 2))) / np.sqrt(np.where(applied > 0, applied, 1.0))
+    expected = np.where(applied > 0, ratio, 0.0)
+    off = np.where(h.single, np.abs(h.observed["false_acceleration"] - expected), 0.0)
+    # velocities of frames are differences of larger ones
+    speed = np.sqrt((h.mass[None, :, None] ** 2 * (h.v[1:] ** 2 + h.v[:-1] ** 2))[:, free].sum((1, 2))) / h.h
+    scale = expected + np.where(applied > 0, speed / np.sqrt(np.where(applied > 0, applied, 1.0)), 0.0)
+    report.expect("false_acceleration", off, tolerances.rounding(scale), of_step("false_acceleration"))
+
+
 def check_counts(h, report):
     """Numbers of what was done are whole and not negative; processor time does not run back."""
     for name in (
@@ -297,3 +317,6 @@ def check_counts(h, report):
     report.expect("counts", -np.diff(np.append(0.0, h.observed["cpu_time"])), 0.0, of_step("cpu_time (s)"))
     sweeps = h.observed["solver_iterations"] - h.observed["solver_newton_iterations"]
     report.expect("counts", -sweeps, 0.0, of_step("sweeps"))
+    if h.route is not None:
+        made = np.where(h.route == "EXTRAPOLATION", h.observed["solver_newton_iterations"], 0)
+        report.expect("counts", made, 0.0, of_step("iterations of an extrapolated step"))

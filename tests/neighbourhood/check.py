@@ -63,6 +63,9 @@ def check_finite(h, report):
         "moments": h.moment,
     }
     arrays |= {"gaps": h.gap, "points": h.point, "normals": h.normal, **h.observed}
+    # not a number in a step none of whose solves reports one
+    error = h.observed["solver_load_error"]
+    arrays["solver_load_error"] = error[~np.isnan(error)]
     for name, array in arrays.items():
         report.require("finite numbers", bool(np.isfinite(array).all()), f"{name} hold what is not finite")
 

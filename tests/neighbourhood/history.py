@@ -36,6 +36,9 @@ class History:
             self.observed = {
                 name: group["value"][: self.S] for name, group in file["observables"].items() if "value" in group
             }
+            # the method that solved each step; histories of before version 4 do not say
+            route = file.get("observables/solver_route/value")
+            self.route = None if route is None else np.array(enum_names(route, self.S))
             self.observed_step = file["observables/step"][: self.S]
             self.observed_time = file["observables/time"][: self.S]
         self._bodies()

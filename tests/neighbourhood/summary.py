@@ -80,8 +80,8 @@ def recomputed(h, told):
         "twists": h.D == 3 and (h.scene.get("bonds") or {}).get("twist") is not None,
         "broken": [modes.count(mode) for mode in MODES],
         "worst_residual": float(residual.max(initial=0.0)),
-        # Newton's solves also count where the load error missed its own tolerance
-        "missed_tolerance": (beyond, max(unsettled, beyond)),
+        # before version 4 of histories, steps counted too whose load error missed its own tolerance
+        "missed_tolerance": beyond if h.route is not None else (beyond, max(unsettled, beyond)),
         "rejected": (rejected, rejected + 1) if failed else rejected,
         "penetration": float(o["penetration"].max(initial=0.0)),
         "mean_diameter": float(2 * h.radius.mean()),
@@ -95,10 +95,24 @@ def recomputed(h, told):
         },
         "solid_fraction": None if h.packed is None else float(h.packed),
     }
+    if h.route is not None:
+        out |= of_solves(o, h.route, newton)
     if "bond_elongation" in told:
         out["bond_elongation"] = float(o["bond_elongation"].max(initial=0.0)) if "bond_elongation" in o else 0.0
     out.update(loads(h, told))
     return out
+
+
+def of_solves(o, route, newton):
+    """Solved steps, and load errors, of a solver with the settings `newton`; there are none of Gauss–Seidel."""
+    error = o["solver_load_error"][~np.isnan(o["solver_load_error"])]
+    tolerance = newton.get("load_tolerance")
+    return {
+        "solved_steps": int((route != "EXTRAPOLATION").sum()),
+        "load_tolerance": None if tolerance is None else float(tolerance),
+        "worst_load_error": float(error.max()) if len(error) else None,
+        "missed_load_tolerance": int((error > (np.inf if tolerance is None else tolerance)).sum()),
+    }
 
 
 def loads(h, told):
@@ -207,7 +221,8 @@ def check_ending(h, report, told):
 def text_lines(h, told):
     """The numbers that each line of the text shows, by its label; nothing for a line without one."""
     f, K = told["failure"], told["bonds"]
-    per_step = lambda n: n / max(told["steps"], 1)
+    new = "solved_steps" in told
+    per_step = lambda n: n / max(told["solved_steps" if new else "steps"], 1)
     work = told["work"]
     lines = [("ended", [told["time"], told["steps"]])]
     lines.append(
@@ -218,10 +233,13 @@ def text_lines(h, told):
         lines.append(("bonds", [K, sum(counts), 100.0 * sum(counts) / K] + counts))
     if h.S:
         took = [per_step(work[k]) for k in ("newton_iterations", "factorisations", "sweeps") if work[k] > 0]
-        lines.append(("solver", took))
+        lines.append(("solver", took + ([told["solved_steps"], told["steps"]] if new and took else [])))
         lines.append(
             ("accuracy", [told["worst_residual"], told["tolerance"], told["missed_tolerance"], told["rejected"]])
         )
+        if told.get("worst_load_error") is not None:
+            numbers = [told["worst_load_error"], told["load_tolerance"], told["missed_load_tolerance"]]
+            lines.append(("load error", numbers))
         lines.append(("penetration", [told["penetration"], told["penetration"] / told["mean_diameter"]]))
         lines.append(("external work", [told["external_work"]]))
         lines.append(("energy remainder", [told["energy_remainder"]]))

@@ -500,6 +500,14 @@ SPOILT = (
         ("pressed", "the elongation", observed("bond_elongation", -1, 1e-5, 1e-12), "bond_elongation"),
         ("pressed", "half a part", observed("substeps", -1, 0, 0.5), "counts"),
         ("pressed", "half an iteration", observed("solver_iterations", -1, 0, 0.5), "counts"),
+        (
+            "pressed",
+            "a solved step that is said to be extrapolated",
+            put("observables/solver_route/value", lambda g: int(np.argmax(newton_of(g) > 0)), 0),
+            "counts",
+        ),
+        ("pressed", "the false acceleration", observed("false_acceleration", 40, 1e-6, 1e-9), "false_acceleration"),
+        ("bouncing", "the false acceleration in free fall", observed("false_acceleration", 2), "false_acceleration"),
         ("pressed", "time that runs back", observed("cpu_time", 60, -0.9), "counts"),
         ("beam", "elastic energy", observed("elastic_energy", 20), "elastic_energy"),
         ("beam", "damping", observed("dissipation_damping", -1), "dissipation_damping"),
@@ -515,6 +523,11 @@ EITHER = {
     "Signorini_or_complementarity": {"Signorini", "complementarity"},
     "rt_or_mode": {"events at their limit", "mode of events"},
 }
+
+
+def newton_of(good):
+    """Newton iterations of each step."""
+    return good.h.observed["solver_newton_iterations"]
 
 
 def worst(good):

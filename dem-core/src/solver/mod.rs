@@ -89,7 +89,8 @@ pub struct SolveReport {
     pub work: Work,
     /// Residual reached (–), see [`crate::problem::residual`].
     pub residual: f64,
-    /// Load error (–), by the solvers that can tell it.
+    /// Load error (–): the estimated error of the net impulses of the contacts on the bodies, over
+    /// those impulses. Gauss–Seidel reports none.
     pub load_error: Option<f64>,
 }
 
@@ -139,6 +140,14 @@ impl SolverSettings {
         match self {
             Self::GaussSeidel(settings) => settings.tolerance,
             Self::Staged(settings) => settings.tolerance,
+        }
+    }
+
+    /// Load error that the solver aims at (–); none where it reports no load error.
+    pub fn load_tolerance(&self) -> Option<f64> {
+        match self {
+            Self::GaussSeidel(_) => None,
+            Self::Staged(settings) => Some(settings.load_tolerance),
         }
     }
 

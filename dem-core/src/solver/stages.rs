@@ -32,8 +32,8 @@ const COARSE_SWEEPS: u64 = 20_000;
 /// Sweeps from where a path ended.
 const LAST_SWEEPS: u64 = 2_000;
 
-/// The method that brought a solution.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// The method that brought a solution; a step reports the last in this order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Route {
     /// The reactions grew as in the steps before.
     Extrapolation,

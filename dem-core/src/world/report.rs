@@ -2,7 +2,7 @@
 
 use super::{Break, Counts};
 use crate::dim::Dim;
-use crate::solver::{SolveReport, SolveStatus, Work};
+use crate::solver::{Route, SolveReport, SolveStatus, Work};
 use std::fmt;
 
 /// What one step did.
@@ -10,15 +10,23 @@ use std::fmt;
 pub struct StepReport<D: Dim> {
     /// Time at its end (s).
     pub time: f64,
-    /// How the worst of its solves ended; never `Failed`.
+    /// How the worst of its solves ended: `Accepted` where a residual or a load error missed what
+    /// the solver aims at; never `Failed`.
     pub status: SolveStatus,
+    /// The method that solved it: of the routes of its accepted solves the last in the order of
+    /// [`Route`].
+    pub route: Route,
     /// What all its solves took.
     pub work: Work,
     /// Largest residual of its accepted solves (–).
     pub residual: f64,
-    /// Largest load error of its solves (–) where the last of them told one, as Newton's do; else ‖M (v⁺ − v⁻)/h‖ / ‖F_ext‖ over
-    /// the grains that are free to move, in a static scene a false acceleration force over the load, and zero without load.
-    pub load_error: f64,
+    /// Largest load error of those of its accepted solves that report one (–), zero for a solve
+    /// whose residual is zero; none where no solve reports one.
+    pub load_error: Option<f64>,
+    /// ‖M (v⁺ − v⁻)/h‖ over the grains that are free to move, over the norm of the forces on the
+    /// sample: gravity, loads, and those that drive walls (–). Zero without such forces; of a step
+    /// in parts the largest. In a sample that should be at rest all of it is false.
+    pub false_acceleration: f64,
     /// Contacts by what they did.
     pub counts: Counts,
     /// Bonds that broke, in the order of the cascade's rounds.
@@ -42,9 +50,11 @@ impl<D: Dim> StepReport<D> {
         let missed = [self.status, second.status].contains(&SolveStatus::Accepted);
         Self {
             status: if missed { SolveStatus::Accepted } else { SolveStatus::Converged },
+            route: self.route.max(second.route),
             work: self.work + second.work,
             residual: self.residual.max(second.residual),
-            load_error: self.load_error.max(second.load_error),
+            load_error: larger(self.load_error, second.load_error),
+            false_acceleration: self.false_acceleration.max(second.false_acceleration),
             breaks,
             penetration: self.penetration.max(second.penetration),
             bond_elongation: self.bond_elongation.max(second.bond_elongation),
@@ -55,23 +65,36 @@ impl<D: Dim> StepReport<D> {
     }
 }
 
+/// The larger of those of two load errors that were reported.
+fn larger(a: Option<f64>, b: Option<f64>) -> Option<f64> {
+    a.into_iter().chain(b).reduce(f64::max)
+}
+
 /// The solves of one step taken together.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 pub(super) struct Solves {
+    pub route: Route,
     pub work: Work,
     pub residual: f64,
-    /// The worst that was told, and whether the last solve told it.
-    pub load_error: f64,
-    pub load_error_told: bool,
+    pub load_error: Option<f64>,
     missed_aim: bool,
+}
+
+impl Default for Solves {
+    fn default() -> Self {
+        let route = Route::Extrapolation;
+        Self { route, work: Work::default(), residual: 0.0, load_error: None, missed_aim: false }
+    }
 }
 
 impl Solves {
     pub fn add(&mut self, solve: SolveReport) {
+        self.route = self.route.max(solve.route);
         self.work = self.work + solve.work;
         self.residual = self.residual.max(solve.residual);
-        self.load_error = self.load_error.max(solve.load_error.unwrap_or(0.0));
-        self.load_error_told = solve.load_error.is_some();
+        // where the residual is zero, a load error is round-off
+        let load_error = solve.load_error.map(|error| if solve.residual == 0.0 { 0.0 } else { error });
+        self.load_error = larger(self.load_error, load_error);
         self.missed_aim |= solve.status != SolveStatus::Converged;
     }
 
@@ -190,3 +213,44 @@ impl fmt::Display for StepError {
 }
 
 impl std::error::Error for StepError {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn solve(route: Route, residual: f64, load_error: Option<f64>) -> SolveReport {
+        SolveReport { status: SolveStatus::Converged, route, work: Work::default(), residual, load_error }
+    }
+
+    fn together(solves: &[SolveReport]) -> Solves {
+        let mut all = Solves::default();
+        solves.iter().for_each(|solve| all.add(*solve));
+        all
+    }
+
+    #[test]
+    fn the_route_of_a_step_is_the_last_in_order_of_those_of_its_solves() {
+        use Route::{ActiveSet, Extrapolation, InteriorPoint, Sweeps};
+        for (routes, step) in [
+            (&[Extrapolation][..], Extrapolation),
+            (&[Extrapolation, ActiveSet], ActiveSet),
+            (&[InteriorPoint, ActiveSet], InteriorPoint),
+            (&[ActiveSet, Sweeps, InteriorPoint], Sweeps),
+        ] {
+            let solves: Vec<SolveReport> = routes.iter().map(|route| solve(*route, 1e-9, None)).collect();
+            assert_eq!(together(&solves).route, step, "{routes:?}");
+        }
+    }
+
+    #[test]
+    fn the_load_error_of_a_step_is_that_of_the_solves_that_report_one() {
+        let (none, some) = (solve(Route::Sweeps, 1e-9, None), solve(Route::ActiveSet, 1e-9, Some(3e-6)));
+        assert_eq!(together(&[none, none]).load_error, None);
+        // whichever comes last
+        assert_eq!(together(&[none, some]).load_error, Some(3e-6));
+        assert_eq!(together(&[some, none]).load_error, Some(3e-6));
+        assert_eq!(together(&[some, solve(Route::ActiveSet, 1e-9, Some(4e-6))]).load_error, Some(4e-6));
+        // without a residual it is round-off
+        assert_eq!(together(&[solve(Route::ActiveSet, 0.0, Some(1.0))]).load_error, Some(0.0));
+    }
+}

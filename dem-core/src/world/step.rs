@@ -123,7 +123,7 @@ impl<D: Dim> World<D> {
         if let Some(forces) = walls_at_limit {
             self.walls.iter_mut().zip(forces).for_each(|(wall, force)| wall.reaction_at_limit = force);
         }
-        Ok(self.report(&motion, &problem, done, breaks))
+        Ok(self.report(h, &motion, &problem, done, breaks))
     }
 
     /// Solve a contact problem; where `limited`, once more if its velocities are too far from the laws and there is another way.
@@ -389,19 +389,33 @@ impl<D: Dim> World<D> {
         work
     }
 
-    /// What the step did, after it.
-    fn report(
-        &self,
-        motion: &Motion<D>,
-        problem: &ContactProblem<D>,
-        done: Solves,
-        breaks: Vec<Break<D>>,
-    ) -> StepReport<D> {
+    /// ‖M (v⁺ − v⁻)/h‖ over the grains that are free to move, over the norm of the forces on the
+    /// sample (–), after a step of length `h`; zero without such forces.
+    fn false_acceleration(&self, h: f64, motion: &Motion<D>, problem: &ContactProblem<D>) -> f64 {
         let mut change = 0.0;
         for (k, mass) in self.grains.mass.iter().enumerate().filter(|(k, _)| !self.grains.fixed[*k]) {
             let dv = (problem.nodes.all[k].velocity - motion.before[k].0) * *mass;
             change += dv.dot(&dv);
         }
+        // the forces that are prescribed, and those that walls of prescribed velocity need
+        let mut applied = problem.applied * problem.applied;
+        for wall in &self.walls {
+            if let Drive::Velocity { direction, .. } = &wall.drive {
+                applied += (h * direction.dot(&wall.reaction)).powi(2);
+            }
+        }
+        if applied > 0.0 { change.sqrt() / applied.sqrt() } else { 0.0 }
+    }
+
+    /// What the step of length `h` did, after it.
+    fn report(
+        &self,
+        h: f64,
+        motion: &Motion<D>,
+        problem: &ContactProblem<D>,
+        done: Solves,
+        breaks: Vec<Break<D>>,
+    ) -> StepReport<D> {
         let (mut penetration, mut bond_elongation) = (0.0, 0.0);
         for kept in &self.kept {
             let gap = self.geometry(&self.mid, kept.pair).0;
@@ -416,13 +430,11 @@ impl<D: Dim> World<D> {
         StepReport {
             time: self.time,
             status: done.status(),
+            route: done.route,
             work: done.work,
             residual: done.residual,
-            load_error: match problem.applied {
-                _ if done.load_error_told => done.load_error,
-                applied if applied > 0.0 => change.sqrt() / applied,
-                _ => 0.0,
-            },
+            load_error: done.load_error,
+            false_acceleration: self.false_acceleration(h, motion, problem),
             counts: Counts::of(self.kept.iter().map(|t| t.status)),
             breaks,
             penetration,

@@ -3,8 +3,8 @@
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
-use dem_run::history::sound::{Surroundings, is_huge, is_plausible, median};
-use dem_run::history::{BondStatus, RuptureMode};
+use dem_run::history::sound::{Surroundings, is_huge, is_plausible, may_be_observed, median};
+use dem_run::history::{BondStatus, RuptureMode, SolverRoute};
 use hdf5::H5Type;
 
 use super::{Checker, Sizes, schema};
@@ -15,6 +15,7 @@ const POSITION: &str = "particles/grains/position/value";
 const RADIUS: &str = "particles/grains/radius";
 const STATUS: &str = "bonds/status/value";
 const RUPTURE: &str = "events/rupture";
+const ROUTE: &str = "observables/solver_route/value";
 /// Codes of an intact bond and of a contact that is one.
 const INTACT: u8 = 0;
 const BONDED: u8 = 3;
@@ -60,6 +61,7 @@ pub(super) fn check(c: &mut Checker) {
     numbers(c);
     codes(c, "walls/kind", 4);
     codes(c, "walls/drive", 3);
+    codes(c, ROUTE, SolverRoute::ALL.len() as u8);
     signs(c);
     places(c);
     directions(c);
@@ -172,7 +174,8 @@ fn numbers(c: &mut Checker) {
     };
     let places: Vec<String> = c.sound.keys().cloned().collect();
     for place in places {
-        let coded = place == RUPTURE || place == STATUS || place.ends_with("/kind") || place.ends_with("/drive");
+        let coded =
+            [RUPTURE, STATUS, ROUTE].contains(&place.as_str()) || place.ends_with("/kind") || place.ends_with("/drive");
         if coded
             || whole(&place)
             || place == "contacts/status"
@@ -182,8 +185,9 @@ fn numbers(c: &mut Checker) {
             continue;
         }
         let width = c.sound[&place][1].max(1);
+        let name = place.strip_prefix("observables/").and_then(|rest| rest.strip_suffix("/value")).unwrap_or("");
         c.blocks::<f64>(&place, |c, start, values| {
-            for (k, value) in values.iter().enumerate().filter(|(_, value)| !is_plausible(**value)) {
+            for (k, value) in values.iter().enumerate().filter(|(_, value)| !may_be_observed(name, **value)) {
                 c.wrong(&place, Some(start + k / width), no_number(*value));
             }
         });

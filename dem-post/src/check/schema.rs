@@ -1,6 +1,6 @@
 //! What the layout promises of names, types, shapes and units.
 
-use dem_run::history::{BondStatus, ContactStatus, RuptureMode, WallDrive, WallKind};
+use dem_run::history::{BondStatus, ContactStatus, ROUTE, RuptureMode, SolverRoute, WallDrive, WallKind};
 use hdf5::Attribute;
 use hdf5::types::{CompoundField, EnumMember, EnumType, FloatSize, IntSize, TypeDescriptor, VarLenUnicode};
 
@@ -340,8 +340,10 @@ fn observables(c: &mut Checker) {
     let names = c.file.group("observables").and_then(|group| group.member_names()).unwrap_or_default();
     for name in names.iter().filter(|name| *name != "step" && *name != "time") {
         let place = format!("observables/{name}/value");
+        let routes = || bytes(SolverRoute::ALL.iter().map(|route| route.label()));
+        let kind = if name == ROUTE { routes() } else { F64 };
         // the shape and the unit of an observable are its own
-        let Some(shape) = c.typed(&place, &F64) else { continue };
+        let Some(shape) = c.typed(&place, &kind) else { continue };
         if shape.first().is_none_or(|&rows| rows < s) {
             c.wrong(&place, None, format!("has shape {shape:?}, and {s} rows are promised"));
         } else {

@@ -100,6 +100,7 @@ impl Report {
             ("bonds broken", broken),
             ("worst residual", percent(a.residual.map(|r| r.worst))),
             ("worst load error", percent(a.load_error.map(|r| r.worst))),
+            ("worst false acceleration", percent(a.false_acceleration.map(|r| r.worst))),
             ("steps whose residual missed it", missed),
         ];
         lines.extend(self.left_out.iter().map(|out| ("left out", format!("{}: {}", out.section, out.why))));

@@ -63,6 +63,7 @@ fn accuracy(history: &History, report: &Report) -> Result<Section> {
     for (name, title, alt, steps) in [
         ("solver_residual", "residual", "Residual of the accepted solve of each step over time.", false),
         ("solver_load_error", "load error", "Load error of each step over time.", false),
+        ("false_acceleration", "false acceleration", "False acceleration of each step over time.", false),
         ("solver_iterations", "iterations of a step", "Iterations of each step over time.", true),
         ("penetration", "penetration (m)", "Deepest penetration of each step over time.", false),
     ] {
@@ -84,8 +85,10 @@ fn accuracy(history: &History, report: &Report) -> Result<Section> {
         id: "accuracy",
         title: "Accuracy of the solver",
         text: "The residual tells how far the contact laws are from being met, over the size of the reactions and the \
-               load. The load error is the force that the accelerations of the grains stand for, over the load: in a \
-               scene at rest it should be zero, and a small residual can hide a large one."
+               load. The load error is the estimated error of the net impulses of the contacts on the bodies, over \
+               those impulses, as the direct solvers report it. The false acceleration is the force that the \
+               accelerations of the grains stand for, over the load: in a scene at rest it should be zero, and a \
+               small residual can hide a large one."
             .into(),
         facts: report.accuracy.lines(),
         figures,

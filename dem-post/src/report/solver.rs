@@ -1,6 +1,6 @@
 //! How accurately a run was solved, by the measures that it recorded at every step.
 
-use dem_run::history::History;
+use dem_run::history::{FALSE_ACCELERATION, History, LOAD_ERROR, ROUTE, SolverRoute};
 use serde::Serialize;
 
 use crate::output::{Result, number};
@@ -29,8 +29,14 @@ pub struct Accuracy {
     pub accept: Option<f64>,
     /// Residuals.
     pub residual: Option<Spread>,
-    /// Load errors.
+    /// Load errors of the steps whose solves reported one; in histories of before version 4 false
+    /// accelerations among them.
     pub load_error: Option<Spread>,
+    /// False accelerations; none in histories of before version 4.
+    pub false_acceleration: Option<Spread>,
+    /// Steps by the method that solved them, in the order of [`SolverRoute::ALL`]; none in
+    /// histories of before version 4.
+    pub routes: Option<[usize; 4]>,
     /// Steps whose residual exceeds the tolerance.
     pub missed: Option<usize>,
     /// Solves that were not accepted.
@@ -53,7 +59,11 @@ pub fn read(history: &History) -> Result<Accuracy> {
     let scene: serde_json::Value = serde_json::from_str(&history.parameters()?.scene).unwrap_or_default();
     let setting = |name: &str| scene.get("solver").and_then(|solver| solver.get(name)).and_then(|value| value.as_f64());
     let series = |name: &str| -> Result<Option<(Vec<f64>, Vec<f64>)>> {
-        Ok(history.observable(name)?.filter(|s| !s.value.is_empty()).map(|s| (s.time, s.value)))
+        let Some(found) = history.observable(name)? else { return Ok(None) };
+        // a load error is not a number where no solve reported one
+        let told = found.time.into_iter().zip(found.value).filter(|(_, value)| !value.is_nan());
+        let (time, value): (Vec<f64>, Vec<f64>) = told.unzip();
+        Ok((!value.is_empty()).then_some((time, value)))
     };
     let of = |name: &str| -> Result<Option<Spread>> { Ok(series(name)?.map(|(time, value)| spread(&time, value))) };
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
@@ -68,7 +78,13 @@ pub fn read(history: &History) -> Result<Accuracy> {
         accept: setting("accept"),
         missed: tolerance.and_then(beyond),
         residual: of("solver_residual")?,
-        load_error: of("solver_load_error")?,
+        load_error: of(LOAD_ERROR)?,
+        false_acceleration: of(FALSE_ACCELERATION)?,
+        routes: series(ROUTE)?.map(|(_, value)| {
+            let mut counts = [0; 4];
+            value.iter().filter_map(|code| SolverRoute::of_number(*code)).for_each(|route| counts[route as usize] += 1);
+            counts
+        }),
         rejected: series("solver_rejected")?.map(|(_, value)| value.iter().sum()),
         iterations: of("solver_iterations")?,
         mean_iterations: mean_of("solver_iterations")?,
@@ -104,6 +120,13 @@ impl Accuracy {
             || "–".into(),
             |n| format!("{n} of {} ({:.1} %)", self.steps, 100.0 * n as f64 / self.steps.max(1) as f64),
         );
+        let routes = self.routes.map_or_else(
+            || "not recorded".into(),
+            |counts| {
+                let named = SolverRoute::ALL.iter().zip(counts).filter(|(_, count)| *count > 0);
+                named.map(|(route, count)| format!("{count} {}", route.label())).collect::<Vec<_>>().join(", ")
+            },
+        );
         let newton = self.newton.map_or_else(
             || "–".into(),
             |[n, f]| format!("{} iterations and {} factorisations a step", number(n), number(f)),
@@ -111,7 +134,15 @@ impl Accuracy {
         [
             ("Residual aimed at, accepted", format!("{}, {}", plain(self.tolerance), plain(self.accept))),
             ("Residual", spread(self.residual)),
-            ("Load error", spread(self.load_error)),
+            (
+                match self.false_acceleration {
+                    Some(_) => "Load error",
+                    None => "Load error; false acceleration where none was reported",
+                },
+                spread(self.load_error),
+            ),
+            ("False acceleration", spread(self.false_acceleration)),
+            ("Steps by method", routes),
             ("Steps that missed the residual aimed at", missed),
             ("Solves not accepted", plain(self.rejected)),
             ("Iterations of a step", format!("mean {}; {}", plain(self.mean_iterations), spread(self.iterations))),

@@ -8,6 +8,7 @@ use dem_run::history::*;
 mod check;
 mod damage;
 mod folders;
+mod solves;
 mod view;
 
 /// How long a run goes on, and when its bonds 0 and 1 break, in steps.

@@ -68,7 +68,7 @@ fn work(report: &Report) -> String {
     let bonded = report.bonds > 0;
     // only a rigid sample keeps its shape until a bond breaks
     let rigid = bonded && !report.elastic;
-    let mut heads = row!["solver", "tolerance", "step", "CPU", "steps", "iterations", "residual", "load error"];
+    let mut heads = row!["solver", "tolerance", "step", "CPU", "steps", "iterations", "residual", "false accel."];
     let mut units = row!["", "", "s", "s", "", "", "worst", if bonded { "to 1st break" } else { "worst" }];
     if rigid {
         heads.push("strain".into());
@@ -82,7 +82,13 @@ fn work(report: &Report) -> String {
     for (k, row) in report.runs.iter().enumerate() {
         let o = &row.outcome;
         let mut cells = labels(report, k);
-        cells.extend(row![short(o.cpu_time), o.steps, o.iterations, short(o.worst_residual), short(o.load_error)]);
+        cells.extend(row![
+            short(o.cpu_time),
+            o.steps,
+            o.iterations,
+            short(o.worst_residual),
+            short(o.false_acceleration)
+        ]);
         if rigid {
             cells.push(o.false_strain.map_or("–".into(), short));
         }
@@ -154,11 +160,12 @@ fn collapse(outcome: &Outcome, k: usize) -> String {
 fn notes(report: &Report) -> String {
     let mut text = String::from("\n");
     if report.elastic {
-        text += "load error is that before the first break: acceleration, which means something only where the load grows slowly\n";
+        text +=
+            "false acceleration is that before the first break, and means something only where the load grows slowly\n";
     } else if report.bonds > 0 {
-        text += "load error and strain are those before the first break, where a rigid sample is at rest and keeps its shape\n";
+        text += "false acceleration and strain are those before the first break, where a rigid sample is at rest and keeps its shape\n";
     } else {
-        text += "load error means something only where the sample should be at rest\n";
+        text += "false acceleration means something only where the sample should be at rest\n";
     }
     if report.runs.iter().any(|row| row.outcome.failure.early.contains(&true)) {
         text += match (report.elastic, report.one_piece) {
@@ -317,7 +324,7 @@ const OUTCOME: [&str; 25] = [
     "iterations",
     "worst_residual",
     "median_residual",
-    "load_error",
+    "false_acceleration",
     "false_strain",
     "missed_tolerance",
     "rejected",
@@ -348,7 +355,7 @@ fn outcome(o: &Outcome) -> Vec<String> {
         o.iterations,
         o.worst_residual,
         o.median_residual,
-        o.load_error,
+        o.false_acceleration,
         cell(o.false_strain),
         o.missed_tolerance,
         o.rejected,

@@ -3,7 +3,6 @@
 use crate::build::{Built, settings};
 use crate::collapse::{Collapse, Failure};
 use crate::course::Course;
-use crate::record::applied_force;
 use crate::scene::{GaussSeidel, Newton, Scene, SolverKind};
 use crate::summary::Ending;
 use dem_core::body::{Grain, Grains, Load, Wall};
@@ -294,8 +293,9 @@ pub struct Outcome {
     pub worst_residual: f64,
     /// Median over the steps of the largest residual in each (–).
     pub median_residual: f64,
-    /// Largest load error of a step before the first break (–).
-    pub load_error: f64,
+    /// Largest false acceleration of a step before the first break (–), see
+    /// [`StepReport::false_acceleration`].
+    pub false_acceleration: f64,
     /// Largest component of the sample's strain before the first break (–), all of it false; none without bonds, or where they
     /// are elastic.
     pub false_strain: Option<f64>,
@@ -346,12 +346,11 @@ impl<D: Dim> Trial<'_, D> {
                 return None;
             }
             problems.look(&mut world);
-            let before = world.grains.velocity.clone();
             let began = thread_time();
             let step = world.step();
             state.cpu_time += thread_time() - began;
             match step {
-                Ok(report) => state.follow(&world, &report, &before),
+                Ok(report) => state.follow(&world, &report),
                 Err(error) => break End::Failed(error.to_string()),
             }
             if state.blown_up(&world) {
@@ -379,7 +378,7 @@ struct Followed<D: Dim> {
     kinetic: f64,
     cpu_time: f64,
     residuals: Vec<f64>,
-    load_error: f64,
+    false_acceleration: f64,
     strain: f64,
     first: Option<FirstBreak>,
 }
@@ -388,11 +387,11 @@ impl<D: Dim> Followed<D> {
     fn new(scene: &Scene, world: &World<D>) -> Self {
         let course = Course::new(scene, world);
         let kinetic = world.ledger.kinetic;
-        Self { course, kinetic, cpu_time: 0.0, residuals: vec![], load_error: 0.0, strain: 0.0, first: None }
+        Self { course, kinetic, cpu_time: 0.0, residuals: vec![], false_acceleration: 0.0, strain: 0.0, first: None }
     }
 
-    /// Enter a step; `before` are the velocities of the grains before it.
-    fn follow(&mut self, world: &World<D>, report: &StepReport<D>, before: &[D::Vector]) {
+    /// Enter a step.
+    fn follow(&mut self, world: &World<D>, report: &StepReport<D>) {
         self.course.count(world, report);
         self.residuals.push(report.residual);
         if self.first.is_some() {
@@ -409,7 +408,7 @@ impl<D: Dim> Followed<D> {
             });
             return;
         }
-        self.load_error = self.load_error.max(load_error(world, before));
+        self.false_acceleration = self.false_acceleration.max(report.false_acceleration);
         self.strain = world.strain().iter().fold(self.strain, |worst, e| worst.max(e.abs()));
     }
 
@@ -440,7 +439,7 @@ impl<D: Dim> Followed<D> {
             iterations: self.course.work.iterations(),
             worst_residual: self.course.worst_residual,
             median_residual: self.residuals.get(self.residuals.len() / 2).copied().unwrap_or(0.0),
-            load_error: self.load_error,
+            false_acceleration: self.false_acceleration,
             false_strain: (!bonds.is_empty() && bonds.iter().all(|b| b.stiffness.is_none())).then_some(self.strain),
             missed_tolerance: self.course.missed_tolerance,
             rejected: self.course.rejected,
@@ -452,25 +451,6 @@ impl<D: Dim> Followed<D> {
             broken,
         }
     }
-}
-
-/// The force that the accelerations of the grains in the last step stand for, over the forces on the sample (–), the
-/// same for all solvers; zero without forces.
-fn load_error<D: Dim>(world: &World<D>, before: &[D::Vector]) -> f64 {
-    let (h, g) = (world.settings.step, &world.grains);
-    let gravity = world.settings.gravity.unwrap_or(D::Vector::zero());
-    let mut forces: Vec<D::Vector> = g.mass.iter().map(|m| gravity * *m).collect();
-    for load in &world.loads {
-        forces[load.grain] += load.force * (load.factor)(world.time - 0.5 * h);
-    }
-    let (mut false_force, mut applied) = (0.0, 0.0);
-    for k in (0..g.len()).filter(|k| !g.fixed[*k]) {
-        let force = (g.velocity[k] - before[k]) * (g.mass[k] / h);
-        false_force += force.dot(&force);
-        applied += forces[k].dot(&forces[k]);
-    }
-    applied += world.walls.iter().map(|wall| applied_force(wall).powi(2)).sum::<f64>();
-    if applied > 0.0 { (false_force / applied).sqrt() } else { 0.0 }
 }
 
 /// CPU time of this thread so far (s).

@@ -126,6 +126,31 @@ codes! {
     Force = 2 "FORCE"
 }
 
+codes! {
+    /// The method that solved a step: of those of its solves the last in this order.
+    SolverRoute, RouteCode(u8, U1, signed = false),
+    /// The reactions grew as in the steps before, and a check confirmed it.
+    Extrapolation = 0 "EXTRAPOLATION",
+    /// Newton from the active set of the last step.
+    ActiveSet = 1 "ACTIVE_SET",
+    /// The interior-point method.
+    InteriorPoint = 2 "INTERIOR_POINT",
+    /// Sweeps of Gauss–Seidel.
+    Sweeps = 3 "SWEEPS"
+}
+
+impl SolverRoute {
+    /// Its code as an observation holds it.
+    pub fn number(self) -> f64 {
+        f64::from(self.code().0)
+    }
+
+    /// The route that an observation holds; `None` for a number that is no code.
+    pub fn of_number(number: f64) -> Option<Self> {
+        Self::ALL.iter().copied().find(|route| route.number() == number)
+    }
+}
+
 impl From<RuptureMode> for BondStatus {
     fn from(mode: RuptureMode) -> Self {
         match mode {

@@ -8,7 +8,7 @@ use hdf5::H5Type;
 
 use crate::replace::replace;
 
-use super::codes::{BondCode, ContactCode};
+use super::codes::{BondCode, ContactCode, RouteCode};
 use super::error::{HistoryError, Result, refused, while_writing};
 use super::lock;
 use super::reader::History;
@@ -58,7 +58,8 @@ stored!(
     i32: |a, b| a == b,
     u32: |a, b| a == b,
     BondCode: |a, b| a == b,
-    ContactCode: |a, b| a == b
+    ContactCode: |a, b| a == b,
+    RouteCode: |a, b| a == b
 );
 
 impl Stored for RuptureRow {

@@ -3,12 +3,12 @@
 use hdf5::types::VarLenUnicode;
 use hdf5::{Dataset, File, Group};
 
-use super::codes::{BondCode, Coded, ContactCode, WallDriveCode, WallKindCode};
+use super::codes::{BondCode, Coded, ContactCode, RouteCode, SolverRoute, WallDriveCode, WallKindCode};
 use super::copy::Visit;
 use super::error::{HistoryError, Result};
-use super::schema::{CREATOR, SCHEMA_VERSION, path};
+use super::schema::{CREATOR, path, schema_version};
 use super::table::{Growth, Storage, Table, fixed, text, text_attribute};
-use super::{Bonds, Frame, Layout, Observable, Wall};
+use super::{Bonds, Frame, Layout, Observable, ValueKind, Wall};
 
 /// A table of doubles and where a frame keeps its values.
 pub(super) struct Column {
@@ -43,10 +43,38 @@ pub(super) struct ContactTables {
 pub(super) struct Observables {
     pub step: Table,
     time: Table,
-    values: Vec<Table>,
+    values: Vec<Values>,
     pub steps: Vec<i64>,
     times: Vec<f64>,
-    blocks: Vec<Vec<f64>>,
+}
+
+/// The values of one observable, and those that wait to be appended.
+struct Values {
+    table: Table,
+    kind: ValueKind,
+    block: Vec<f64>,
+}
+
+impl Values {
+    fn append(&mut self) -> hdf5::Result<()> {
+        match self.kind {
+            ValueKind::Real => self.table.append(&self.block)?,
+            ValueKind::Route => {
+                let routes = self.block.iter().map(|number| SolverRoute::of_number(*number).map(SolverRoute::code));
+                let codes: Option<Vec<RouteCode>> = routes.collect();
+                self.table.append(&codes.ok_or("an observed route is none")?)?;
+            }
+        }
+        self.block.clear();
+        Ok(())
+    }
+
+    fn visit(&mut self, rows: usize, visit: &mut impl Visit) -> Result<()> {
+        match self.kind {
+            ValueKind::Real => visit.table::<f64>(&mut self.table, rows),
+            ValueKind::Route => visit.table::<RouteCode>(&mut self.table, rows),
+        }
+    }
 }
 
 pub(super) struct Commit {
@@ -85,13 +113,13 @@ impl ContactTables {
 
 impl Observables {
     pub fn width(&self) -> usize {
-        self.values.iter().map(Table::width).sum()
+        self.values.iter().map(|values| values.table.width()).sum()
     }
 
     pub fn push(&mut self, step: i64, time: f64, mut values: &[f64]) {
         self.steps.push(step);
         self.times.push(time);
-        for (table, block) in self.values.iter().zip(&mut self.blocks) {
+        for Values { table, block, .. } in &mut self.values {
             let (value, rest) = values.split_at(table.width());
             block.extend(value);
             values = rest;
@@ -103,17 +131,13 @@ impl Observables {
         self.time.append(&self.times)?;
         self.steps.clear();
         self.times.clear();
-        for (table, block) in self.values.iter_mut().zip(&mut self.blocks) {
-            table.append(block)?;
-            block.clear();
-        }
-        Ok(())
+        self.values.iter_mut().try_for_each(Values::append)
     }
 
     pub fn visit(&mut self, rows: usize, visit: &mut impl Visit) -> Result<()> {
         visit.table::<i64>(&mut self.step, rows)?;
         visit.table::<f64>(&mut self.time, rows)?;
-        self.values.iter_mut().try_for_each(|table| visit.table::<f64>(table, rows))
+        self.values.iter_mut().try_for_each(|values| values.visit(rows, visit))
     }
 }
 
@@ -149,7 +173,7 @@ pub(super) fn write_identity(file: &File, layout: &Layout) -> hdf5::Result<()> {
     text_attribute(&creator, "version", &run.version)?;
 
     let parameters = file.create_group(path::PARAMETERS)?;
-    parameters.new_attr::<u32>().create("schema_version")?.write_scalar(&SCHEMA_VERSION)?;
+    parameters.new_attr::<u32>().create("schema_version")?.write_scalar(&schema_version(layout))?;
     parameters.new_attr::<u64>().create("seed")?.write_scalar(&run.seed)?;
     for (name, value) in [
         ("version", &run.version),
@@ -313,9 +337,13 @@ pub(super) fn observables(file: &File, observables: &[Observable], storage: Stor
             group.link_hard(&format!("/{}/{name}", path::OBSERVABLES), name)?;
         }
         let (unit, shape) = (&observable.unit, &observable.shape);
-        values.push(Table::create::<f64>(&group, "value", unit, shape, growth, storage)?);
+        let table = match observable.kind {
+            ValueKind::Real => Table::create::<f64>(&group, "value", unit, shape, growth, storage)?,
+            ValueKind::Route => Table::create::<RouteCode>(&group, "value", unit, shape, growth, storage)?,
+        };
+        values.push(Values { table, kind: observable.kind, block: Vec::new() });
     }
-    Ok(Observables { step, time, blocks: vec![Vec::new(); values.len()], values, steps: vec![], times: vec![] })
+    Ok(Observables { step, time, values, steps: vec![], times: vec![] })
 }
 
 pub(super) fn commit(file: &File, bonded: bool, storage: Storage) -> hdf5::Result<Commit> {

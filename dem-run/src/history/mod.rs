@@ -36,7 +36,8 @@
 //! /events/rupture          compound [E]: step i64; time, x, y, z, rn, rt, m, twist, energy f64; round, bond, i, j i32;
 //!                          mode i32 enum TENSION, SHEAR, ROLLING, TWIST; pad i32 (0)
 //! /observables/            step i64[S], time [S], shared by all (hard links, as H5MD allows)
-//!     NAME                 {step, time, value[S,…]}
+//!     NAME                 {step, time, value[S,…]}, f64
+//!     solver_route         the same, enum EXTRAPOLATION, ACTIVE_SET, INTERIOR_POINT, SWEEPS
 //! /parameters/             scene (the JSON as run); attributes schema_version, seed, version, git_revision, build,
 //!                          host, start; solid_fraction, of a sample that was packed
 //! ```
@@ -58,6 +59,7 @@ mod copy;
 mod create;
 mod error;
 mod lock;
+mod observed;
 mod reader;
 mod schema;
 pub mod sound;
@@ -70,12 +72,13 @@ mod writer;
 
 pub use background::{Background, Batch};
 pub use checkpoint::Checkpoint;
-pub use codes::{BondStatus, ContactStatus, RuptureMode, WallDrive, WallKind};
+pub use codes::{BondStatus, ContactStatus, RuptureMode, SolverRoute, WallDrive, WallKind};
 pub use copy::{CopyAs, Kept, copy};
 pub(crate) use error::reason;
 pub use error::{HistoryError, Result};
 pub use lock::refuse_busy;
-pub use reader::{History, Series};
+pub use observed::{FALSE_ACCELERATION, LOAD_ERROR, ROUTE, Series};
+pub use reader::History;
 pub use schema::SCHEMA_VERSION;
 pub use writer::Writer;
 
@@ -163,6 +166,16 @@ impl Bonds {
     }
 }
 
+/// What the values of an observable are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ValueKind {
+    /// Real numbers.
+    #[default]
+    Real,
+    /// Codes of [`SolverRoute`].
+    Route,
+}
+
 /// A quantity that is recorded at every step.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Observable {
@@ -172,12 +185,19 @@ pub struct Observable {
     pub unit: String,
     /// The shape of one value: empty for a scalar, `[D, D]` for a tensor.
     pub shape: Vec<usize>,
+    /// What its values are.
+    pub kind: ValueKind,
 }
 
 impl Observable {
-    /// An observable from its name, unit and shape.
+    /// An observable of real numbers from its name, unit and shape.
     pub fn new(name: &str, unit: &str, shape: &[usize]) -> Self {
-        Self { name: name.into(), unit: unit.into(), shape: shape.into() }
+        Self { name: name.into(), unit: unit.into(), shape: shape.into(), kind: ValueKind::Real }
+    }
+
+    /// The method that solved each step, as [`SolverRoute::number`] codes it.
+    pub fn route() -> Self {
+        Self { kind: ValueKind::Route, ..Self::new(ROUTE, "", &[]) }
     }
 
     /// Numbers in one value.

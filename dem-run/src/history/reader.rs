@@ -13,7 +13,7 @@ use super::error::{HistoryError, Result, refused, while_reading};
 use super::schema::{RuptureRow, path};
 use super::sound::{self, Surroundings};
 use super::source::Source;
-use super::{Bonds, ContactRows, GrainState, Grains, Layout, Observable, Parameters, Rupture, Wall, WallState};
+use super::{Bonds, ContactRows, GrainState, Grains, Layout, Parameters, Rupture, Wall, WallState};
 use super::{checkpoint, lock};
 
 /// An open history, read-only. Only complete frames are seen; a file that a run still writes, or that a killed run left,
@@ -31,33 +31,6 @@ pub struct History {
     observed: usize,
     /// Where grains may be, once it was asked.
     surroundings: OnceCell<Surroundings>,
-}
-
-/// One observable over the whole run.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Series {
-    /// Its unit, empty for a number.
-    pub unit: String,
-    /// The shape of one value.
-    pub shape: Vec<usize>,
-    /// Steps, S.
-    pub step: Vec<i64>,
-    /// Times, s, S.
-    pub time: Vec<f64>,
-    /// Values, S × shape, row by row.
-    pub value: Vec<f64>,
-}
-
-impl Series {
-    /// Component `index` of every value, as `[1, 1]` of a tensor or `[]` of a scalar; `None` outside the shape.
-    pub fn component(&self, index: &[usize]) -> Option<Vec<f64>> {
-        if index.len() != self.shape.len() || index.iter().zip(&self.shape).any(|(i, n)| i >= n) {
-            return None;
-        }
-        let offset = index.iter().zip(&self.shape).fold(0, |offset, (i, n)| offset * n + i);
-        let width = self.shape.iter().product();
-        Some(self.value.chunks_exact(width).map(|value| value[offset]).collect())
-    }
 }
 
 impl History {
@@ -171,10 +144,6 @@ impl History {
     pub fn layout(&self) -> Result<Layout> {
         let contacts = |name: &str| format!("{}/{name}", path::CONTACTS);
         let width = |place: &str| -> Result<usize> { Ok(self.source.read::<f64>(place, 0..0)?.0.iter().product()) };
-        let observable = |name: String| -> Result<Observable> {
-            let Series { unit, shape, .. } = self.observable_of(&name, 0..0)?.unwrap_or_default();
-            Ok(Observable { name, unit, shape })
-        };
         let without_reactions = !self.source.has(&contacts("reaction"));
         let position = self.source.dataset(&format!("{}/position/value", path::GRAINS))?;
         let size = position.dtype().map_err(while_reading(self.path(), path::GRAINS))?.size();
@@ -188,7 +157,7 @@ impl History {
             grains: self.grains()?,
             walls: self.walls()?,
             bonds: self.bonds()?,
-            observables: self.observable_names()?.into_iter().map(observable).collect::<Result<_>>()?,
+            observables: self.observables()?,
             parameters: self.parameters()?,
         })
     }
@@ -473,49 +442,6 @@ impl History {
         let (counts, last) = ([self.bonds()?.len(), self.grains], self.steps.last().copied().unwrap_or(i64::MAX));
         sound::ruptures(&self.source, path::RUPTURE, &known, counts, last)?;
         Ok(known)
-    }
-
-    /// The names of what was observed, sorted.
-    ///
-    /// # Errors
-    /// [`HistoryError::Damaged`].
-    pub fn observable_names(&self) -> Result<Vec<String>> {
-        let group =
-            self.source.file.group(path::OBSERVABLES).map_err(while_reading(&self.source.path, path::OBSERVABLES))?;
-        let mut names = group.member_names().map_err(while_reading(&self.source.path, path::OBSERVABLES))?;
-        names.retain(|name| group.link_exists(&format!("{name}/value")));
-        names.sort_unstable();
-        Ok(names)
-    }
-
-    /// One observable over the whole run, `None` if it was not recorded.
-    ///
-    /// # Errors
-    /// [`HistoryError::Damaged`].
-    pub fn observable(&self, name: &str) -> Result<Option<Series>> {
-        self.observable_of(name, 0..self.observed)
-    }
-
-    /// One observable over a range of its rows, `None` if it was not recorded.
-    fn observable_of(&self, name: &str, rows: Range<usize>) -> Result<Option<Series>> {
-        let place = format!("{}/{name}/value", path::OBSERVABLES);
-        if name.contains('/') || !self.source.has(&format!("{}/{name}", path::OBSERVABLES)) || !self.source.has(&place)
-        {
-            return Ok(None);
-        }
-        let (shape, value) = self.source.read(&place, rows.clone())?;
-        sound::reals(&self.source, &place, rows.start, shape.iter().product(), &value)?;
-        let unit = match self.source.dataset(&place)?.attr("unit") {
-            Ok(unit) => {
-                unit.read_scalar::<VarLenUnicode>().map_err(while_reading(&self.source.path, &place))?.to_string()
-            }
-            Err(_) => String::new(),
-        };
-        let step = self.source.read(&format!("{}/step", path::OBSERVABLES), rows.clone())?.1;
-        let times = format!("{}/time", path::OBSERVABLES);
-        let time = self.source.read(&times, rows.clone())?.1;
-        sound::reals(&self.source, &times, rows.start, 1, &time)?;
-        Ok(Some(Series { unit, shape, step, time, value }))
     }
 }
 

@@ -7,12 +7,22 @@ use std::ops::Range;
 
 use super::codes::{Coded, ModeCode};
 use super::error::{Result, while_reading};
+use super::observed::{FALSE_ACCELERATION, LOAD_ERROR};
 use super::source::Source;
-use super::{Rupture, RuptureMode};
+use super::{Layout, Rupture, RuptureMode};
 
-/// Version of the layout. It grows with every change that an older reader would misread. 2: bonds break in twist, too. 3: a
-/// rupture has its twisting moment apart from the bending moment.
-pub const SCHEMA_VERSION: u32 = 3;
+/// Version of the layout. It grows with every change that an older reader would misread. 2: bonds
+/// break in twist, too. 3: a rupture has its twisting moment apart from the bending moment. 4: the
+/// load error is that of the solver alone, not a number where no solve reports one, beside the
+/// false acceleration; observables may be enumerations.
+pub const SCHEMA_VERSION: u32 = 4;
+
+/// The version of a file of this layout: 3 where it is a copy of a history from before version 4,
+/// which keeps the load error as it was, without a false acceleration beside it.
+pub(super) fn schema_version(layout: &Layout) -> u32 {
+    let observes = |name: &str| layout.observables.iter().any(|observable| observable.name == name);
+    if observes(LOAD_ERROR) && !observes(FALSE_ACCELERATION) { 3 } else { SCHEMA_VERSION }
+}
 
 /// The program's name as `/h5md/creator` records it.
 pub(super) const CREATOR: &str = "dem-run";

@@ -5,6 +5,7 @@ use std::fmt::Display;
 
 use super::Rupture;
 use super::error::{HistoryError, Result};
+use super::observed::LOAD_ERROR;
 use super::source::Source;
 
 /// Magnitude that no quantity in SI units comes near; squares and cubes of lesser ones are finite.
@@ -17,6 +18,13 @@ const FAR: f64 = 1e6;
 #[must_use]
 pub fn is_plausible(value: f64) -> bool {
     value.abs() < GREATEST
+}
+
+/// Whether the observable `name` may have this value: a measure, or for the load error not a
+/// number, in a step none of whose solves reports one.
+#[must_use]
+pub fn may_be_observed(name: &str, value: f64) -> bool {
+    is_plausible(value) || (name == LOAD_ERROR && value.is_nan())
 }
 
 /// Where the grains of a sample may be at all: within a million sizes of the sample from its middle.
@@ -67,7 +75,32 @@ pub(super) fn row(source: &Source, place: &str, row: usize, why: impl Display) -
 
 /// Refuses what is no plausible number among rows of `width` numbers, the first of which is row `first`.
 pub(super) fn reals(source: &Source, place: &str, first: usize, width: usize, values: &[f64]) -> Result<()> {
-    match values.iter().position(|value| !is_plausible(*value)) {
+    refused(source, place, first, width, values.iter().position(|value| !is_plausible(*value)), values)
+}
+
+/// The same among those of the observable `name`.
+pub(super) fn observed(
+    source: &Source,
+    name: &str,
+    place: &str,
+    first: usize,
+    width: usize,
+    values: &[f64],
+) -> Result<()> {
+    let wrong = values.iter().position(|value| !may_be_observed(name, *value));
+    refused(source, place, first, width, wrong, values)
+}
+
+/// Refuses the value numbered `wrong`, if there is one.
+fn refused(
+    source: &Source,
+    place: &str,
+    first: usize,
+    width: usize,
+    wrong: Option<usize>,
+    values: &[f64],
+) -> Result<()> {
+    match wrong {
         Some(k) => Err(row(source, place, first + k / width.max(1), format!("{:e} is no plausible number", values[k]))),
         None => Ok(()),
     }

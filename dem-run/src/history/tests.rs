@@ -503,3 +503,89 @@ fn of_two_checkpoints_the_newest_whole_one_counts() {
     drop(file);
     assert_eq!(newest(), None);
 }
+
+/// A bare history of what the solver reports, with these routes, as numbers, and load errors.
+fn solved(path: &Path, observables: Vec<Observable>, rows: &[&[f64]]) -> Writer {
+    let layout = Layout { observables, ..bare() };
+    let mut writer = Writer::create(path, &layout, false).unwrap();
+    for (step, row) in rows.iter().enumerate() {
+        writer.observe(step as i64, step as f64, row).unwrap();
+    }
+    write_frame(&mut writer, &layout, 0);
+    writer
+}
+
+fn of_solver() -> Vec<Observable> {
+    let real = |name: &str| Observable::new(name, "", &[]);
+    vec![Observable::route(), real(LOAD_ERROR), real(FALSE_ACCELERATION)]
+}
+
+#[test]
+fn the_route_is_an_enumeration_and_read_as_its_codes() {
+    let (folder, path) = folder();
+    let routes: Vec<f64> = SolverRoute::ALL.iter().map(|route| route.number()).collect();
+    let rows: Vec<[f64; 3]> = routes.iter().map(|route| [*route, 1e-6, 0.5]).collect();
+    solved(&path, of_solver(), &rows.iter().map(|row| &row[..]).collect::<Vec<_>>()).finish().unwrap();
+    let packed = folder.path().join("packed.h5");
+    let history = History::open(&path).unwrap();
+    copy(&history, &packed, CopyAs::Packed, &mut |_| true).unwrap();
+    drop(history);
+    for path in [&path, &packed] {
+        let file = hdf5::File::open(path).unwrap();
+        let descriptor = file.dataset("observables/solver_route/value").unwrap().dtype().unwrap().to_descriptor();
+        assert_eq!(descriptor.unwrap(), <codes::RouteCode as hdf5::H5Type>::type_descriptor());
+        drop(file);
+        let history = History::open(path).unwrap();
+        assert_eq!(history.observable(ROUTE).unwrap().unwrap().value, routes);
+        let kinds = history.layout().unwrap().observables.into_iter().map(|observable| observable.kind);
+        assert_eq!(kinds.collect::<Vec<_>>(), [ValueKind::Real, ValueKind::Real, ValueKind::Route]);
+    }
+    let file = hdf5::File::open_rw(&path).unwrap();
+    let values = file.dataset("observables/solver_route/value").unwrap();
+    values.write(&[0, 1, 7, 3].map(codes::RouteCode)).unwrap();
+    drop((values, file));
+    let error = History::open(&path).unwrap().observable(ROUTE).unwrap_err().to_string();
+    assert!(error.contains("solver_route") && error.contains("names nothing"), "{error}");
+}
+
+#[test]
+fn a_route_that_is_none_is_not_written() {
+    let (_folder, path) = folder();
+    let layout = Layout { observables: of_solver(), ..bare() };
+    let mut writer = Writer::create(&path, &layout, false).unwrap();
+    writer.observe(0, 0.0, &[4.0, 0.0, 0.0]).unwrap();
+    let Sample { grains, walls, contacts, bonds } = sample(&layout, 0);
+    let error = writer.frame(&Frame { grains, walls, contacts, bonds, ..Frame::default() }).unwrap_err();
+    assert!(matches!(error, HistoryError::Write { .. }), "{error}");
+    writer.abandon();
+}
+
+#[test]
+fn only_a_load_error_may_be_no_number() {
+    for (name, column) in [(LOAD_ERROR, 1), (FALSE_ACCELERATION, 2)] {
+        let (_folder, path) = folder();
+        let mut row = [3.0, 0.0, 0.0];
+        row[column] = f64::NAN;
+        solved(&path, of_solver(), &[&row]).finish().unwrap();
+        let read = History::open(&path).unwrap().observable(name);
+        match name {
+            LOAD_ERROR => assert!(read.unwrap().unwrap().value[0].is_nan()),
+            _ => assert!(read.unwrap_err().to_string().contains("no plausible number")),
+        }
+    }
+}
+
+/// A copy of a history whose load error may be a false acceleration says so by its version.
+#[test]
+fn a_copy_keeps_the_meaning_of_its_load_error() {
+    for (observables, version) in [(of_solver(), SCHEMA_VERSION), (vec![Observable::new(LOAD_ERROR, "", &[])], 3)] {
+        let (folder, path) = folder();
+        let packed = folder.path().join("packed.h5");
+        let row = &[1.0, 2.0, 3.0][..observables.len()];
+        solved(&path, observables, &[row]).finish().unwrap();
+        let history = History::open(&path).unwrap();
+        copy(&history, &packed, CopyAs::Packed, &mut |_| true).unwrap();
+        let parameters = hdf5::File::open(&packed).unwrap().group("parameters").unwrap();
+        assert_eq!(parameters.attr("schema_version").unwrap().read_scalar::<u32>().unwrap(), version);
+    }
+}

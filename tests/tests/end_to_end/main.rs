@@ -12,6 +12,7 @@ mod interrupt;
 mod loads;
 mod pack;
 mod resume;
+mod solves;
 mod specimens;
 mod sweep;
 mod teaching;
