@@ -10,7 +10,7 @@ use faer::{Accum, MatMut, Par};
 /// The factors of a matrix; their room is taken over from one to the next.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Lu {
-    /// Of each front on end: its pivot columns (L and U of the pivots, L of the border below), then U of the border.
+    /// Of each front in turn: its pivot columns (L and U of the pivots, L of the border below), then U of the border.
     values: Vec<f64>,
     /// Where those of each front begin.
     starts: Vec<usize>,
@@ -20,8 +20,9 @@ pub(crate) struct Lu {
 
 impl Lu {
     /// Factorise 1 + Σ of all elements; `element` writes the matrix of an element, row by row, over the unknowns of its first
-    /// node and then its second. False if a pivot is zero or not finite.
-    pub fn factorise(&mut self, tree: &Tree, mut element: impl FnMut(usize, &mut [f64])) -> bool {
+    /// node and then its second. Returns the sign of the determinant, none if a pivot is zero or not finite.
+    pub fn factorise(&mut self, tree: &Tree, mut element: impl FnMut(usize, &mut [f64])) -> Option<f64> {
+        let mut sign = 1.0;
         self.starts.clear();
         self.rows.clear();
         let mut total = 0;
@@ -54,12 +55,10 @@ impl Lu {
             for child in &front.children {
                 parts.take_over(&std::mem::take(&mut left[*child]), &tree.fronts[*child].up);
             }
-            if !parts.eliminate(&mut self.rows) {
-                return false;
-            }
+            sign *= parts.eliminate(&mut self.rows)?;
             left[k] = parts.rest;
         }
-        true
+        Some(sign)
     }
 
     /// x ← (L U)⁻¹ x.
@@ -134,16 +133,20 @@ impl Parts<'_> {
         }
     }
 
-    /// Factorise the pivots and take them out of what is left.
-    fn eliminate(&mut self, rows: &mut Vec<usize>) -> bool {
+    /// Factorise the pivots and take them out of what is left; the sign of their determinant, none if one is zero or not finite.
+    fn eliminate(&mut self, rows: &mut Vec<usize>) -> Option<f64> {
         let (n, p, b) = (self.n, self.p, self.n - self.p);
         let columns = MatMut::from_column_major_slice_mut(self.columns, n, p);
         let (mut pivots, mut below) = columns.split_at_row_mut(p);
         let (mut forward, mut inverse) = (vec![0usize; p], vec![0usize; p]);
         let mut scratch = MemBuffer::new(lu_in_place_scratch::<usize, f64>(p, p, Par::Seq, Default::default()));
         let stack = MemStack::new(&mut scratch);
-        lu_in_place(pivots.as_mut(), &mut forward, &mut inverse, Par::Seq, stack, Default::default());
-        let sound = (0..p).all(|d| pivots[(d, d)] != 0.0 && pivots[(d, d)].is_finite());
+        let (info, _) = lu_in_place(pivots.as_mut(), &mut forward, &mut inverse, Par::Seq, stack, Default::default());
+        if (0..p).any(|d| pivots[(d, d)] == 0.0 || !pivots[(d, d)].is_finite()) {
+            return None;
+        }
+        let odd = info.transposition_count % 2 == 1;
+        let sign = (0..p).fold(if odd { -1.0 } else { 1.0 }, |sign, d| pivots[(d, d)].signum() * sign);
         if b > 0 {
             let mut line = vec![0.0; p];
             for column in self.across.chunks_exact_mut(p) {
@@ -157,7 +160,7 @@ impl Parts<'_> {
             matmul(rest, Accum::Add, below.as_ref(), across.as_ref(), -1.0, Par::Seq);
         }
         rows.extend(forward);
-        sound
+        Some(sign)
     }
 }
 
@@ -203,7 +206,7 @@ mod tests {
             }
         };
         let mut lu = Lu::default();
-        assert!(lu.factorise(&tree, fill));
+        assert!(lu.factorise(&tree, fill).is_some());
         let n: usize = sizes.iter().sum();
         let firsts: Vec<usize> = sizes
             .iter()
@@ -237,6 +240,6 @@ mod tests {
     #[test]
     fn a_matrix_without_an_inverse_is_told() {
         let tree = Tree::new(vec![2], vec![[0, 0]]).unwrap();
-        assert!(!Lu::default().factorise(&tree, |_, m| m.copy_from_slice(&[-1.0, 1.0, 0.0, -1.0 + 0.0])));
+        assert!(Lu::default().factorise(&tree, |_, m| m.copy_from_slice(&[-1.0, 1.0, 0.0, -1.0 + 0.0])).is_none());
     }
 }

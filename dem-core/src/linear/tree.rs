@@ -56,7 +56,7 @@ pub(crate) struct Tree {
 }
 
 impl Tree {
-    /// The fronts for nodes with so many unknowns each, numbered on end, and elements between them; an element of one node names
+    /// The fronts for nodes with so many unknowns each, numbered consecutively, and elements between them; an element of one node names
     /// it twice. None if no order is found.
     pub fn new(sizes: Vec<usize>, elements: Vec<[usize; 2]>) -> Option<Self> {
         let unknowns = sizes.iter().sum();

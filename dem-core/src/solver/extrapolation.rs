@@ -1,5 +1,5 @@
 //! Steps without a linear solve: while a sample at rest is loaded evenly and no contact changes its status, each step adds the same to
-//! the reactions. What two solves on end have added is added again, and taken where the contact laws hold better than the
+//! the reactions. What two consecutive solves have added is added again, and taken where the contact laws hold better than the
 //! tolerance asks, the balance as well as after the last solve, and no bond is at its limit.
 //!
 //! Laws and balance do not tell how the contacts of a rigid network share the load. What sticks shows a change of status by itself: its
@@ -15,7 +15,7 @@ use crate::problem::residual::residual;
 use crate::problem::{Contact, ContactProblem, Group, Nodes, Visitor};
 use crate::saved::{Mismatch, Reader, Saved};
 
-/// Steps that are predicted on end: at first, and at most.
+/// Consecutive steps that are predicted: at first, and at most.
 const FIRST: u64 = 4;
 const MOST: u64 = 32;
 /// Share of the tolerances that a prediction may take, and how much more momentum it may leave than the solve before it.
@@ -46,7 +46,7 @@ pub(super) struct Extrapolation {
     /// Whether the last step was predicted: what it left of momentum is in the reactions of the next solve, which tell nothing of
     /// the growth.
     kicked: bool,
-    /// Rest where predictions are in vain.
+    /// Back-off after predictions that failed.
     rest: Rest,
 }
 

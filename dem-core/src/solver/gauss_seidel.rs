@@ -15,7 +15,7 @@ use crate::problem::{ContactProblem, Group, Nodes, blocks};
 /// Settings of [`GaussSeidel`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GaussSeidelSettings {
-    /// How one contact is bettered.
+    /// How the reaction of one contact is updated.
     pub local: LocalSolve,
     /// Residual that the solver aims at (–).
     pub tolerance: f64,

@@ -6,6 +6,7 @@ mod assembled_rows;
 mod extrapolation;
 mod gauss_seidel;
 mod graph;
+mod history;
 mod interior;
 mod newton;
 mod rest;

@@ -26,7 +26,7 @@ impl Rest {
         self.next = (2 * self.next).clamp(1, LONGEST_REST);
     }
 
-    /// It served.
+    /// It succeeded.
     pub fn forget(&mut self) {
         *self = Self::default();
     }

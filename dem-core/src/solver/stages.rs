@@ -5,14 +5,15 @@
 //! | [`Route::Extrapolation`] | adds to the reactions what each of the last steps has added | bonds, while a sample at rest is loaded evenly |
 //! | [`Route::Sweeps`] | Gauss–Seidel from the last reactions | all contacts are dry |
 //! | [`Route::ActiveSet`] | Newton from the active set of the last step | bonds |
-//! | [`Route::InteriorPoint`] | follows the central path, with Coulomb's law exact | always |
-//! | [`Route::Sweeps`] | Gauss–Seidel from where the path ended | where the path folds |
+//! | [`Route::InteriorPoint`] | follows the central path, through its folds, with Coulomb's law exact | always |
+//! | [`Route::Sweeps`] | Gauss–Seidel from the best point of the path | where the path is lost |
 //!
 //! What none of them brings to the tolerance is taken at [`StagedSettings::accept`] or refused. No clock is looked at, and nothing but the
 //! extrapolation is left out because it failed in an earlier step: a solve depends on its problem, the last reactions, Newton's last factors
 //! and what is known of the growth of reactions.
 
 use super::extrapolation::Extrapolation;
+use super::history::history;
 use super::interior::{Aims, Interior};
 use super::newton::Newton;
 use super::rows::{Rows, StiffnessRatio};
@@ -157,7 +158,11 @@ impl Staged {
         let StagedSettings { tolerance, accept, load_tolerance, max_iterations, .. } = self.settings;
         // what Newton has left of margins belongs to other reactions
         self.newton.margins.clear();
-        let (anchor, begun) = (self.anchor(rows), multipliers(rows));
+        let begun = multipliers(rows);
+        let anchor = match self.settings.start {
+            Start::LastStep if problem.matrix().is_none() => history(rows, &mut self.newton.graph),
+            _ => self.anchor(rows),
+        };
         let start = (!is_cold(rows)).then_some(&begun[..]);
         // what breaks a bond is the load that it bears; of dry contacts any reactions that balance will do
         let least = problem.matrix().is_none() && rows.list.iter().any(|row| row.shift > 0.0);
@@ -166,7 +171,7 @@ impl Staged {
         let mut best = self.interior.solve(problem, rows, graph, &anchor, start, aims);
         newton += best.as_ref().map_or(0, |found| found.iterations);
         if best.as_ref().is_none_or(|found| found.residual > accept) {
-            // any reactions, from no start: another path
+            // any reactions, from a cold start: another path
             let any = Aims { least: false, ..aims };
             let other = self.interior.solve(problem, rows, graph, &anchor, None, any);
             newton += other.as_ref().map_or(0, |found| found.iterations);

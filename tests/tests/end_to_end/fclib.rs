@@ -173,17 +173,20 @@ fn wrong_exports_are_refused() {
 
 const TOLERANCE: f64 = 1e-8;
 
-fn interior_point(problem: &mut Assembled) -> SolveStatus {
-    let settings = StagedSettings {
+fn staged(tolerance: f64) -> StagedSettings {
+    StagedSettings {
         stages: Stages::Interior,
-        tolerance: TOLERANCE,
-        accept: TOLERANCE,
+        tolerance,
+        accept: tolerance,
         load_tolerance: f64::INFINITY,
         start: Start::StiffLimit,
         stiffness: StiffnessRatio { tangential: 1.0, rolling: 1.0 / 12.0 },
         max_iterations: 300,
-    };
-    Staged::new(settings).solve_assembled(problem).status
+    }
+}
+
+fn interior_point(problem: &mut Assembled) -> SolveStatus {
+    Staged::new(staged(TOLERANCE)).solve_assembled(problem).status
 }
 
 fn swept(problem: &mut Assembled, local: LocalSolve, acceleration: usize) -> SolveStatus {
@@ -251,5 +254,18 @@ fn the_collection_is_solved_by_every_solver() {
                 assert!(distance <= 1e-5 * largest(at.r.iter().copied()), "{name}: {distance:e}");
             }
         }
+    }
+}
+
+/// The path of these problems folds: one step of `compression` and one of `brazilian-3d`, after their collapse.
+#[test]
+fn folds_of_the_path_are_followed() {
+    for (name, most) in [("compression", 100), ("brazilian-3d", 300)] {
+        let path = problems().join(format!("folds/{name}.hdf5"));
+        let mut at = Problem::read(&path).expect("read").assembled;
+        let settings = StagedSettings { max_iterations: most, ..staged(TOLERANCE) };
+        let report = Staged::new(settings).solve_assembled(&mut at);
+        assert_eq!(report.status, SolveStatus::Converged, "{name}: {:e}", at.residual());
+        assert_eq!(report.work.sweeps, 0, "{name}");
     }
 }

@@ -1,6 +1,6 @@
 //! Second-order cones Q = {x : x₀ ≥ ‖x₁, x₂‖} and their Jordan algebra, x ∘ z = (x·z, x₀ z₁ + z₀ x₁, x₀ z₂ + z₀ x₂).
 //!
-//! One type serves a ray, the cone in the plane and the cone in space: components that are missing are zero and stay zero.
+//! One type stands for a ray, the cone in 2D and the cone in 3D: components that are missing are zero and stay zero.
 //!
 //! Source: Alizadeh & Goldfarb, Math. Program. 95, 2003.
 

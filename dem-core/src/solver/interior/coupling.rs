@@ -99,8 +99,9 @@ impl<'a> Coupling<'a> {
         u
     }
 
-    /// Factorise the matrix of a step, whose D⁻¹ stands in the upper left corners of the local matrices.
-    pub fn factorise(&self, sites: &Sites, inverses: &[f64], lu: &mut Lu) -> bool {
+    /// Factorise the matrix of a step, whose D⁻¹ stands in the upper left corners of the local matrices: the sign of its
+    /// determinant, none if it is singular.
+    pub fn factorise(&self, sites: &Sites, inverses: &[f64], lu: &mut Lu) -> Option<f64> {
         match self {
             Self::Bodies { rows, scale, graph } => lu.factorise(self.tree(), |e, out| {
                 let c = graph.contacts[e];

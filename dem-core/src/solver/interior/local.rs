@@ -29,8 +29,10 @@ fn scale(x: &Point, z: &Point) -> f64 {
     1.0 / (x[0] + z[0])
 }
 
-/// The inverses of all local matrices at a point, with the compliance of each row; false if one has none.
-pub(super) fn invert(sites: &Sites, at: &State, compliance: &[f64], inverses: &mut Vec<f64>) -> bool {
+/// The inverses of all local matrices at a point, with the compliance of each row, and the sign of the product of their
+/// determinants; none if one has no inverse.
+pub(super) fn invert(sites: &Sites, at: &State, compliance: &[f64], inverses: &mut Vec<f64>) -> Option<f64> {
+    let mut sign = 1.0;
     inverses.clear();
     inverses.resize(sites.matrices, 0.0);
     for site in &sites.list {
@@ -60,18 +62,17 @@ pub(super) fn invert(sites: &Sites, at: &State, compliance: &[f64], inverses: &m
             }
             first += 1 + tangents;
         }
-        if !gauss_jordan(&mut a, order) {
-            return false;
-        }
+        sign *= gauss_jordan(&mut a, order)?;
         for (row, out) in a.iter().zip(inverses[site.matrix..].chunks_exact_mut(order).take(order)) {
             out.copy_from_slice(&row[order..2 * order]);
         }
     }
-    true
+    Some(sign)
 }
 
-/// Leaves the inverse in the right half, with pivots chosen in their column.
-fn gauss_jordan(a: &mut [[f64; 2 * ORDER]; ORDER], order: usize) -> bool {
+/// Leaves the inverse in the right half, with pivots chosen in their column; the sign of the determinant, none if it is zero.
+fn gauss_jordan(a: &mut [[f64; 2 * ORDER]; ORDER], order: usize) -> Option<f64> {
+    let mut sign = 1.0;
     for k in 0..order {
         a[k][order + k] = 1.0;
     }
@@ -83,8 +84,9 @@ fn gauss_jordan(a: &mut [[f64; 2 * ORDER]; ORDER], order: usize) -> bool {
         a.swap(k, pivot);
         let inverse = 1.0 / a[k][k];
         if !inverse.is_finite() {
-            return false;
+            return None;
         }
+        sign *= if pivot == k { inverse.signum() } else { -inverse.signum() };
         a[k][k..2 * order].iter_mut().for_each(|x| *x *= inverse);
         let line = a[k];
         for row in (0..order).filter(|row| *row != k) {
@@ -94,7 +96,7 @@ fn gauss_jordan(a: &mut [[f64; 2 * ORDER]; ORDER], order: usize) -> bool {
             }
         }
     }
-    true
+    Some(sign)
 }
 
 /// The step for these right sides, where nothing moves the bodies: its `r` and `z` alone.

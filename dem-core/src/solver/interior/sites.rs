@@ -194,6 +194,18 @@ impl Sites {
         self.list.push(site);
     }
 
+    /// x = G r̂ of all cones.
+    pub fn primal(&self, r: &[f64]) -> Vec<Point> {
+        let mut x = vec![[0.0; 3]; self.cones.len()];
+        for (site, shift) in self.list.iter().zip(&self.shift) {
+            for c in site.cones.clone() {
+                x[c] = self.cones[c].primal(site.part(r));
+                x[c][0] += self.cones[c].slope * shift;
+            }
+        }
+        x
+    }
+
     /// Reactions of the problem as a list of all rows.
     pub fn gathered(&self, reactions: &[Padded]) -> Vec<f64> {
         let mut list = Vec::with_capacity(self.rows);

@@ -1,4 +1,4 @@
-//! The matrix I + Σ H̃ A H̃ᵀ of a Newton step and its factors, kept while they serve.
+//! The matrix I + Σ H̃ A H̃ᵀ of a Newton step and its factors, kept while refinement with them converges.
 
 use crate::linear::{Lu, Tree};
 use crate::saved::{Mismatch, Reader, Saved};
@@ -10,7 +10,7 @@ use std::sync::Arc;
 #[derive(Default)]
 pub(super) struct Factor {
     graph: Option<Arc<Graph>>,
-    /// The matrices of all elements on end.
+    /// The matrices of all elements, one after the other.
     elements: Vec<f64>,
     lu: Lu,
     /// Whether they must be made anew.
@@ -21,7 +21,7 @@ pub(super) struct Factor {
 
 impl Factor {
     /// Whether they can be tried for this many unknowns.
-    pub fn serves(&self, unknowns: usize) -> bool {
+    pub fn fits(&self, unknowns: usize) -> bool {
         !self.stale && self.graph.as_ref().is_some_and(|graph| graph.tree.unknowns() == unknowns)
     }
 
@@ -57,8 +57,8 @@ impl Factor {
             let n = out.len();
             out.copy_from_slice(&elements[starts[e]..][..n]);
         });
-        self.stale = !made;
-        made
+        self.stale = made.is_none();
+        made.is_some()
     }
 
     /// x ← the inverse of the matrix times x.

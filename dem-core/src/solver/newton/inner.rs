@@ -105,7 +105,7 @@ impl Newton {
         let norm = norm2(&right).sqrt();
         let least = (SMALL * target / norm).clamp(TIGHT, if guess.is_none() { LOOSE } else { FAIR });
         let exact = operators(rows, &points);
-        for fresh in [!self.factor.serves(rows.unknowns), true] {
+        for fresh in [!self.factor.fits(rows.unknowns), true] {
             if fresh {
                 let graph = Graph::of(rows, &mut self.graph)?;
                 if self.factor.made >= self.most_made || !self.factor.renew(rows, &exact, graph) {

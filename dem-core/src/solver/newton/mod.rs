@@ -8,7 +8,7 @@
 //! for the slipping dry contacts. The outer iteration is r̂ ← P(r̂ − ρ (Hᵀv + b)), a proximal step of size ρ on the
 //! reactions; with a large ρ two or three suffice, and nearly always the active set of the last step still holds, so
 //! each costs one linear solve. Its factors are kept over steps and renewed when refinement with them no longer converges.
-//! Where the active set runs in circles it gives up: the interior-point method does without a guess.
+//! Where the active set cycles it gives up: the interior-point method needs no active set.
 //!
 //! Started from zero reactions the first proximal step is the stiff limit: the reactions of least Σ r²/ρ among all
 //! that balance the load, the ones that elastic contacts with stiffnesses in the ratio of ρ would give.
@@ -60,8 +60,8 @@ impl Newton {
         self.factor.made
     }
 
-    /// Rounds from the active set of the reactions that the problem brought along, bettered by some sweeps in the plane, or as it was in
-    /// space, where sweeps that have not converged spoil the directions of slip; none if they run in circles.
+    /// Proximal iterations from the active set of the reactions that the problem brought along; in 2D after some sweeps of Gauss–Seidel, in 3D without,
+    /// where sweeps that have not converged spoil the directions of slip. None where the active set cycles.
     pub fn solve(
         &mut self,
         problem: &mut impl Solvable,

@@ -9,10 +9,8 @@ use crate::solver::solvable::Solvable;
 use crate::solver::stall::Shrinking;
 use crate::solver::{SolveStatus, Work};
 
-/// Newton iterations of one inner problem before it is given up: those in which F shrinks by less than a tenth, fewer in space
-/// where each is dear, and all of them.
-const PATIENCE: u64 = 8;
-const PATIENCE_IN_SPACE: u64 = 4;
+/// Newton iterations of one inner problem before it is given up: those in which F shrinks by less than a tenth, and all of them.
+const PATIENCE: u64 = 3;
 const MOST_INNER: u64 = 30;
 /// How often the penalty may be lowered a hundredfold in one solve.
 const MOST_SOFTENED: u32 = 4;
@@ -27,13 +25,12 @@ impl Newton {
         mut guess: Guess,
         iterations: &mut u64,
     ) -> Option<SolveReport> {
-        let patience = if rows.in_space() { PATIENCE_IN_SPACE } else { PATIENCE };
         let mut shrinking = Shrinking::default();
         let (mut last_error, mut softened, mut made_in_all) = (f64::INFINITY, 0, 0);
         self.margins.clear();
         loop {
             let mut state = Iterate::from_reactions(rows, &guess.reactions);
-            let (made, solved) = self.inner(rows, &mut state, Some(&guess), patience, MOST_INNER);
+            let (made, solved) = self.inner(rows, &mut state, Some(&guess), PATIENCE, MOST_INNER);
             *iterations += made.max(1);
             if !solved && made > 1 && last_error <= self.settings.tolerance {
                 // what the round before left is good enough, and this was to tell its load error: the velocities show it

@@ -1,0 +1,86 @@
+//! The direction of a predictor–corrector iteration.
+
+use super::cones::{Point, correction, dot, eigenvalues, moved, product};
+use super::local::{State, gap};
+use super::system::System;
+
+/// Least centring, as a share of the gap.
+const CENTRING: f64 = 0.1;
+/// Most of Gondzio's correctors in an iteration, by how much a step is tried longer, the share by which it must grow, and how far products
+/// may be from the barrier, as a factor.
+const CORRECTORS: usize = 2;
+const LONGER: f64 = 0.3;
+const GROWN: f64 = 1.05;
+const APART: f64 = 10.0;
+/// Least product of a pair that a point may have, over the gap; in space the direction is lost where products leave the cone.
+const CENTRAL: f64 = 1e-3;
+/// A step shorter than this turns towards the middle, by these shares of the gap, where it grows by this factor.
+const SHORT: f64 = 0.5;
+const TO_THE_MIDDLE: [f64; 2] = [0.2, 0.7];
+const WORTH: f64 = 1.5;
+
+/// The direction of an iteration, and how far one can go along it.
+pub(super) fn direction(system: &System) -> (State, f64) {
+    let at = system.at;
+    let products: Vec<Point> = at.x.iter().zip(&at.z).map(|(x, z)| product(x, z)).collect();
+    let gap = gap(at);
+    // predictor
+    let to_the_end: Vec<Point> = products.iter().map(|p| [-p[0], -p[1], -p[2]]).collect();
+    let predictor = system.step(&to_the_end);
+    let length = system.longest(&predictor).min(1.0);
+    let count = at.x.len() as f64;
+    let aim = at.x.iter().zip(&at.z).zip(predictor.x.iter().zip(&predictor.z));
+    let aim = aim.map(|((x, z), (dx, dz))| dot(&moved(x, length, dx), &moved(z, length, dz))).sum::<f64>() / count;
+    let centring = (aim / gap).max(0.0).powi(3).clamp(CENTRING, 1.0);
+    // corrector, of second order
+    let barrier = centring * gap;
+    let second = predictor.x.iter().zip(&predictor.z).map(|(dx, dz)| product(dx, dz));
+    let mut by: Vec<Point> =
+        products.iter().zip(second).map(|(p, s)| [barrier - p[0] - s[0], -p[1] - s[1], -p[2] - s[2]]).collect();
+    let mut step = system.step(&by);
+    let mut far = system.longest(&step);
+    for _ in 0..CORRECTORS {
+        let length = (far + LONGER).min(1.0);
+        let trial = |c: usize| {
+            let v = product(&moved(&at.x[c], length, &step.x[c]), &moved(&at.z[c], length, &step.z[c]));
+            moved(&by[c], 1.0, &correction(&v, barrier / APART, barrier * APART))
+        };
+        let more: Vec<Point> = (0..by.len()).map(trial).collect();
+        let other = system.step(&more);
+        let reached = system.longest(&other);
+        if reached <= GROWN * far {
+            break;
+        }
+        (step, far, by) = (other, reached, more);
+    }
+    let mut chosen = by;
+    if far < SHORT {
+        // at the boundary: towards the middle instead, without the second order
+        for share in TO_THE_MIDDLE {
+            let barrier = share.max(centring) * gap;
+            let by: Vec<Point> = products.iter().map(|p| [barrier - p[0], -p[1], -p[2]]).collect();
+            let other = system.step(&by);
+            let reached = system.longest(&other);
+            if reached > WORTH * far {
+                (step, far) = (other, reached);
+                chosen = by;
+            }
+        }
+    }
+    let step = system.refined(step, &chosen);
+    let far = system.longest(&step);
+    (step, far)
+}
+
+/// Whether no product of a pair is far below the gap.
+pub(super) fn is_central(at: &State) -> bool {
+    let least = CENTRAL * gap(at);
+    at.x.iter().zip(&at.z).all(|(x, z)| eigenvalues(&product(x, z))[1] >= least)
+}
+
+/// Go along a step.
+pub(super) fn advance(at: &mut State, length: f64, step: &State) {
+    at.r.iter_mut().zip(&step.r).for_each(|(r, d)| *r += length * d);
+    at.x.iter_mut().zip(&step.x).for_each(|(x, d)| *x = moved(x, length, d));
+    at.z.iter_mut().zip(&step.z).for_each(|(z, d)| *z = moved(z, length, d));
+}

@@ -1,0 +1,148 @@
+//! Which of many reactions: those of least energy in the metric.
+//!
+//! 1. With the compliance of the metric the path is followed until its gaps are far below the energy of the metric: these are the reactions of
+//!    least energy, r*. What r* has at a limit is known then.
+//! 2. Where that compliance shows in the residual, the path is followed again with the metric anchored at r*, from a point on the way there,
+//!    since nearer to the boundary steps are short; then with a harder metric.
+
+use super::local::{State, gap};
+use super::metric::Metric;
+use super::sites::{Limit, Sites};
+use super::{Aims, Found};
+use crate::solver::solvable::Solvable;
+
+/// Stiffness of the metric over the inverse of the mean normal entry of W.
+const KAPPA: f64 = 1e7;
+/// Share of the tolerance that the compliance may take where any reactions will do, and the stiffest metric: with no compliance the path wanders
+/// among the reactions that balance themselves.
+const ANY: f64 = 0.1;
+const STIFFEST: f64 = 1e12;
+/// What the gaps of all pairs may be beside the energy of the metric for reactions to count as those of least energy.
+const LEAST: f64 = 1e-3;
+/// Gaps, over those, at which the point is kept from which the path is followed again.
+pub(super) const BACK: f64 = 30.0;
+/// Share of its compliance that a metric keeps each time it is anchored again after the first, and how often that is done.
+const HARDER: f64 = 0.01;
+const MOST_ANCHORED: u32 = 5;
+/// Share of the tolerance that the compliance may take of the residual before the metric is anchored again.
+const SHOWS: f64 = 0.5;
+/// Iterations in which reactions that solve the problem may come to the limits of r*.
+const MOST_PATIENT: u32 = 3;
+/// Gap, over the square of the unit of reactions, below which only rounding changes.
+const LEAST_GAP: f64 = 1e-26;
+
+/// What to do at a point.
+pub(super) enum Verdict {
+    /// It is a solution, or nothing better will follow.
+    Arrived,
+    /// The path goes on.
+    Onwards,
+    /// The metric has a new anchor: the path goes on from here.
+    Anchored(State),
+}
+
+/// The state of the selection, and the best point so far.
+pub(super) struct Selection {
+    aims: Aims,
+    pub metric: Metric,
+    pub best: Option<Found>,
+    /// Change of the net impulses in the last iteration, over them (–).
+    pub change: f64,
+    /// The limits of r*, once it is known, and the gaps of all pairs at which a solution counts.
+    limits: Option<Vec<Limit>>,
+    enough: f64,
+    turn: Option<State>,
+    anchored: u32,
+    patient: u32,
+}
+
+impl Selection {
+    pub fn new(sites: &Sites, anchor: Vec<f64>, aims: Aims) -> Self {
+        let kappa = if aims.least { KAPPA } else { (1.0 / (ANY * aims.tolerance)).min(STIFFEST) };
+        let metric = Metric::new(sites, anchor, kappa);
+        let limits = (!aims.least).then(Vec::new);
+        Self {
+            aims,
+            metric,
+            best: None,
+            change: 1.0,
+            limits,
+            enough: f64::INFINITY,
+            turn: None,
+            anchored: 0,
+            patient: 0,
+        }
+    }
+
+    /// Measure a point, and decide how the path goes on.
+    pub fn assess(&mut self, problem: &mut impl Solvable, sites: &Sites, at: &State, iteration: u64) -> Verdict {
+        let gaps = gap(at) * at.x.len() as f64;
+        let least = LEAST * self.metric.energy(&at.r);
+        if self.limits.is_none() && gaps <= least {
+            (self.limits, self.enough) = (Some(sites.limits(at, &self.metric.own)), least);
+        }
+        let selected = self.limits.is_some() && gaps <= self.enough;
+        let plain = self.measure(problem, sites, at, &[], selected, iteration);
+        let mut solved = self.solves(plain) && selected;
+        if selected && self.aims.least {
+            let limits = self.limits.take().unwrap_or_default();
+            let at_limits = self.measure(problem, sites, at, &limits, selected, iteration);
+            self.limits = Some(limits);
+            let was_solved = std::mem::replace(&mut solved, self.solves(at_limits));
+            if was_solved && !solved {
+                self.patient += 1;
+                solved = self.patient > MOST_PATIENT;
+            }
+        }
+        // a gap that is rounding tells nothing more
+        let exhausted = gaps.is_nan() || gap(at) <= LEAST_GAP || iteration == self.aims.most;
+        if solved || exhausted {
+            return Verdict::Arrived;
+        }
+        if gaps <= BACK * least && self.turn.is_none() {
+            self.turn = Some(at.clone());
+        }
+        match &self.turn {
+            Some(turn) if gaps <= least && self.metric.residual(&at.r) > SHOWS * self.aims.tolerance => {
+                if self.anchored == MOST_ANCHORED {
+                    return Verdict::Arrived;
+                }
+                // the same metric once more, then harder ones
+                let share = if self.anchored == 0 { 1.0 } else { HARDER };
+                self.metric.anchor_at(at.r.clone(), share);
+                self.enough *= share;
+                self.anchored += 1;
+                Verdict::Anchored(turn.clone())
+            }
+            _ => Verdict::Onwards,
+        }
+    }
+
+    fn solves(&self, residual: f64) -> bool {
+        residual <= self.aims.tolerance && self.change <= self.aims.load_tolerance || residual == 0.0
+    }
+
+    /// The residual of the reactions of a point, put on their limits; they are kept if they are the best so far: those that are selected and
+    /// within the tolerance, else those of the smallest residual.
+    fn measure(
+        &mut self,
+        problem: &mut impl Solvable,
+        sites: &Sites,
+        at: &State,
+        limits: &[Limit],
+        selected: bool,
+        iterations: u64,
+    ) -> f64 {
+        let reactions = sites.snapped(at, limits);
+        problem.write_back(&reactions);
+        let residual = problem.residual();
+        let done = selected && residual <= self.aims.tolerance;
+        let better = |best: &Found| done || !best.selected && residual < best.residual;
+        if self.best.as_ref().is_none_or(better) {
+            self.best = Some(Found { reactions, residual, load_error: self.change, iterations, selected: done });
+        } else if let Some(best) = &mut self.best {
+            best.iterations = iterations;
+        }
+        residual
+    }
+}

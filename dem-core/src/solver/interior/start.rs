@@ -1,0 +1,55 @@
+//! Points from which a path begins.
+
+use super::cones::{eigenvalues, product};
+use super::coupling::Coupling;
+use super::local::{State, gap};
+use super::sites::Sites;
+
+/// How far inside its cone a start is moved, over the mean reaction.
+const INSIDE: f64 = 0.1;
+
+/// Reactions well inside their cones, velocities as large as the free ones.
+pub(super) fn cold(sites: &Sites) -> State {
+    let largest = sites.shift.iter().copied().fold(1.0, f64::max);
+    let mut r = vec![0.0; sites.rows];
+    for (site, shift) in sites.list.iter().zip(&sites.shift) {
+        site.part_mut(&mut r)[0] = (INSIDE * largest - shift).max(0.0);
+    }
+    let speed = sites.free.iter().map(|u| u.abs()).fold(0.0, f64::max).max(f64::MIN_POSITIVE);
+    State { x: sites.primal(&r), r, z: vec![[speed, 0.0, 0.0]; sites.cones.len()] }
+}
+
+/// Reactions moved inside their cones, and the slips that they give likewise.
+pub(super) fn warm(sites: &Sites, coupling: &Coupling, reactions: &[f64]) -> State {
+    let count = sites.list.len() as f64;
+    let mean = (reactions.iter().map(|r| r * r).sum::<f64>() / count).sqrt().max(f64::MIN_POSITIVE);
+    let mut r = reactions.to_vec();
+    for (site, shift) in sites.list.iter().zip(&sites.shift) {
+        let own = site.part_mut(&mut r);
+        let needs = |c: usize| {
+            let cone = &sites.cones[c];
+            let x = cone.primal(own);
+            x[1].hypot(x[2]) / cone.slope
+        };
+        let least = site.cones.clone().map(needs).fold(0.0, f64::max);
+        own[0] = own[0].max(least - shift) + INSIDE * mean;
+    }
+    let moving = coupling.velocity(sites, &r);
+    let mut z = vec![[0.0; 3]; sites.cones.len()];
+    for site in &sites.list {
+        let velocity: Vec<f64> = (site.at..site.at + site.rows).map(|k| sites.free[k] + moving[k]).collect();
+        for c in site.cones.clone() {
+            let cone = &sites.cones[c];
+            z[c] = cone.primal(&velocity);
+            z[c][0] = INSIDE * mean + if cone.tangents == 0 { z[c][0].max(0.0) } else { z[c][1].hypot(z[c][2]) };
+        }
+    }
+    let mut at = State { x: sites.primal(&r), r, z };
+    let least = 0.1 * gap(&at);
+    for (x, z) in at.x.iter().zip(&mut at.z) {
+        while eigenvalues(&product(x, z))[1] < least {
+            z[0] *= 2.0;
+        }
+    }
+    at
+}

@@ -1,0 +1,73 @@
+//! The linear system of a point.
+
+use super::cones::{Point, moved, product, reach};
+use super::coupling::Coupling;
+use super::local::{State, follow, opened, solve, yield_to};
+use super::sites::Sites;
+use crate::linear::Lu;
+
+/// One linear system and the point that it belongs to.
+pub(super) struct System<'a> {
+    pub sites: &'a Sites,
+    pub coupling: &'a Coupling<'a>,
+    pub at: &'a State,
+    /// By how much the contacts' velocities must change to be what z makes them.
+    pub right: Vec<f64>,
+    /// W r at the point.
+    pub velocity: Vec<f64>,
+    pub compliance: &'a [f64],
+    pub inverses: &'a [f64],
+    pub lu: &'a Lu,
+    /// Sign of the determinant: it changes where the path folds.
+    pub sign: f64,
+}
+
+impl System<'_> {
+    /// The step after which x ∘ z has changed by `by`, to first order.
+    pub fn step(&self, by: &[Point]) -> State {
+        self.solved(&self.right, by)
+    }
+
+    /// The same without what rounding has left.
+    pub fn refined(&self, mut step: State, by: &[Point]) -> State {
+        let (left, missing) = self.left(by, &step);
+        let more = self.solved(&left, &missing);
+        step.r.iter_mut().zip(&more.r).for_each(|(r, d)| *r += d);
+        step.z.iter_mut().zip(&more.z).for_each(|(z, d)| *z = moved(z, 1.0, d));
+        follow(self.sites, &mut step);
+        step
+    }
+
+    pub fn solved(&self, right: &[f64], by: &[Point]) -> State {
+        let mut step = solve(self.sites, self.at, self.inverses, right, by);
+        let yielded = self.coupling.yielded(self.sites, &step.r, self.lu);
+        yield_to(self.sites, self.inverses, &yielded, &mut step);
+        follow(self.sites, &mut step);
+        step
+    }
+
+    /// What a step leaves of the equations.
+    fn left(&self, by: &[Point], step: &State) -> (Vec<f64>, Vec<Point>) {
+        let moving = self.coupling.velocity(self.sites, &step.r);
+        let opened = opened(self.sites, &step.z);
+        let left = (0..self.sites.rows).map(|k| self.right[k] - moving[k] - self.compliance[k] * step.r[k] + opened[k]);
+        let missing = |c: usize| {
+            let (a, b) = (product(&self.at.z[c], &step.x[c]), product(&self.at.x[c], &step.z[c]));
+            [by[c][0] - a[0] - b[0], by[c][1] - a[1] - b[1], by[c][2] - a[2] - b[2]]
+        };
+        (left.collect(), (0..by.len()).map(missing).collect())
+    }
+
+    /// By how much a step changes the net impulses on the bodies, relative to them, in the metric of their masses (–).
+    pub fn net_change(&self, step: &State) -> f64 {
+        let moving = self.coupling.velocity(self.sites, &step.r);
+        let square = |r: &[f64], u: &[f64]| r.iter().zip(u).map(|(r, u)| r * u).sum::<f64>().abs();
+        (square(&step.r, &moving) / square(&self.at.r, &self.velocity).max(f64::MIN_POSITIVE)).sqrt()
+    }
+
+    /// How far one can go along a step.
+    pub fn longest(&self, step: &State) -> f64 {
+        let ends = self.at.x.iter().zip(&step.x).chain(self.at.z.iter().zip(&step.z)).map(|(x, d)| reach(x, d));
+        ends.fold(f64::INFINITY, f64::min)
+    }
+}
