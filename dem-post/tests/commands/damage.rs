@@ -163,7 +163,6 @@ fn no_spoilt_value_makes_an_analysis_panic_or_pass_unseen() {
     for l in [layout(2), Layout { rotation: true, twist: true, ..layout(3) }] {
         let (folder, path) = sample(&l);
         let (good, sound, space) = (folder.path().join("good.h5"), folder.path().join("sound.h5"), l.dimension == 3);
-        // never opened for writing here: programs that other tests start meanwhile inherit the lock on what was
         std::fs::copy(&path, &good).unwrap();
         std::fs::copy(&path, &sound).unwrap();
         assert_eq!(tried(&sound, &good, "a sound history"), Vec::<&str>::new());
@@ -183,7 +182,6 @@ fn no_spoilt_value_makes_an_analysis_panic_or_pass_unseen() {
                 let last = k % 4 < 2 || place.starts_with("contacts/");
                 let index: Vec<usize> = shape.iter().map(|&n| if last { n - 1 } else { 0 }).collect();
                 let what = format!("{}D, /{place} {index:?} = {value}", l.dimension);
-                // a file of its own, for the same reason
                 let copy = folder.path().join(format!("spoilt-{count}.h5"));
                 std::fs::copy(&good, &copy).unwrap();
                 let copy = damaged(&copy, |file| spoil(file, place, &index));

@@ -102,6 +102,12 @@ pub enum HistoryError {
         /// The process.
         process: i32,
     },
+    /// Another program has the file open for writing, by HDF5's own lock.
+    #[error("{} is open for writing in another program (h5py, a viewer): close it there, or read a copy", .path.display())]
+    Locked {
+        /// The file.
+        path: PathBuf,
+    },
     /// The one who asked for it ended the work.
     #[error("interrupted")]
     Interrupted,

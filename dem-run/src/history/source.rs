@@ -180,11 +180,14 @@ pub(super) fn end_of_file(superblock: &[u8]) -> u64 {
 fn open_file(path: &Path, open_ended: bool) -> Result<File> {
     let mode = if open_ended { OpenMode::ReadSWMR } else { OpenMode::Read };
     File::open_as(path, mode).map_err(|error| {
-        let why = reason(&error);
+        let path = path.into();
         if error.contains_minor(hdf5::MinorErrorCode::NotHdf5) {
-            return HistoryError::NotHdf5 { path: path.into() };
+            return HistoryError::NotHdf5 { path };
         }
-        HistoryError::Damaged { path: path.into(), place: String::new(), why }
+        if error.contains_minor(hdf5::MinorErrorCode::CantLockFile) {
+            return HistoryError::Locked { path };
+        }
+        HistoryError::Damaged { path, place: String::new(), why: reason(&error) }
     })
 }
 
