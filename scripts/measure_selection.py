@@ -271,7 +271,11 @@ def main():
     arguments.add_argument("--gaps", action="store_true", help="whether the reactions satisfy the law of the limit: some seconds more")
     given, lines = arguments.parse_args(), []
     for path in given.problems:
-        line = measured(path, given.moves, given.gaps)
+        try:
+            line = measured(path, given.moves, given.gaps)
+        except RuntimeError as error:
+            print(f"no reference: {error}")
+            continue
         if line is None:
             print(f"{path}: no solution")
             continue
@@ -279,7 +283,7 @@ def main():
             print(" ".join(f"{name:>9}" for name in line))
         print(" ".join(f"{x:9.2e}" if isinstance(x, float) else f"{x:9d}" for x in line.values()), path, flush=True)
         lines.append(line)
-    for name in lines[0]:
+    for name in lines[0] if lines else []:
         values = np.abs([line[name] for line in lines])
         print(f"{name:>9}: median {np.median(values):.2e}, nine in ten {np.quantile(values, 0.9):.2e}, worst {values.max():.2e}")
 
