@@ -18,6 +18,7 @@ use crate::warnings;
 use dem_core::body::{Drive, Wall};
 use dem_core::dim::{D2, D3, D3Twist, Dim, Vect};
 use dem_core::saved::{Mismatch, Reader, Saved};
+use dem_core::solver::certificate::Verdict;
 use dem_core::world::{StepError, StepReport, World};
 use std::path::{Path, PathBuf};
 
@@ -263,17 +264,44 @@ impl<D: Dim> Run<'_, D> {
 
     fn failed(&mut self, error: StepError) -> Result<Ending, RunError> {
         self.state.course.rejected += u64::from(matches!(error, StepError::NotAccepted { .. }));
-        let help = match (&error, &self.scene.solver.kind) {
-            (StepError::NotAccepted { .. }, SolverKind::GaussSeidel(_)) => {
-                "; a smaller time.step, more max_sweeps or a larger solver.accept may help"
-            }
-            (StepError::NotAccepted { .. }, _) => "; a smaller time.step or a larger solver.accept may help",
-            (StepError::NotFinite { .. }, _) => "; a smaller time.step may help",
-            // their messages name the remedy
-            (StepError::TooFast { .. } | StepError::Yielded { .. }, _) => "",
-        };
+        let help = self.remedy(&error);
         let error = error.message(&|body| self.name(body));
         Err(RunError::NoConvergence(format!("{error}\nthe history is complete up to there{help}")))
+    }
+
+    /// What may help against an error, with the places in the scene.
+    fn remedy(&self, error: &StepError) -> String {
+        let newton = !matches!(self.scene.solver.kind, SolverKind::GaussSeidel(_));
+        let grains = self.state.world.grains.len();
+        let squeezed = match (error, error.verdict()) {
+            (_, Some(Verdict::NoSolution(bodies))) => Some(bodies),
+            (StepError::Yielded { violation, .. }, _) => violation.jammed.as_ref(),
+            _ => None,
+        };
+        if let Some(bodies) = squeezed {
+            let wall =
+                |body: &u32| (*body as usize).checked_sub(grains).and_then(|wall| self.scene.walls.iter().nth(wall));
+            let driven = bodies.iter().filter_map(wall).filter(|(_, wall)| wall.velocity.is_some());
+            let places: Vec<String> = driven.map(|(name, _)| format!("walls.{name}")).collect();
+            let walls = places.join(", ");
+            return match places.is_empty() {
+                true => "; leave room between the bodies".into(),
+                false => {
+                    format!("; let a force drive {walls} in place of velocity, end that motion earlier, or leave room")
+                }
+            };
+        }
+        let help = match error {
+            StepError::NotAccepted { .. } if newton => "; a smaller time.step or a larger solver.accept may help",
+            StepError::NotAccepted { .. } => {
+                "; a smaller time.step, more max_sweeps or a larger solver.accept may help"
+            }
+            StepError::NotFinite { .. } => "; a smaller time.step may help",
+            StepError::Yielded { .. } => "; a smaller solver.tolerance or time.step may help",
+            // its message names the remedy
+            StepError::TooFast { .. } => "",
+        };
+        help.into()
     }
 
     /// What a person calls a body: grains by number, walls by their name in the scene.

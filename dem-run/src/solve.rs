@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use dem_core::contact::LocalSolve;
 use dem_core::problem::assembled::Assembled;
 use dem_core::solver::assembled::gauss_seidel;
+use dem_core::solver::certificate::{Verdict, verdict_of_assembled};
 use dem_core::solver::{
     GaussSeidelSettings, SolveReport, SolveStatus, Staged, StagedSettings, Stages, Start, StiffnessRatio, Work,
 };
@@ -74,6 +75,11 @@ struct Solved {
 const VELOCITY_ERROR: f64 = 1e-3;
 const FINE: f64 = 1e-6;
 
+/// What may help where a solution may exist.
+const REMEDY: &str = "; a larger --max-iterations, another --solver or a larger --tolerance may help";
+/// Most contacts that a message names.
+const SHOWN: usize = 8;
+
 /// Sweeps of Gauss–Seidel after which it gives up.
 const MOST_SWEEPS: u64 = 100_000;
 
@@ -111,24 +117,8 @@ pub fn solve(options: &SolveOptions) -> Result<(), RunError> {
         cpu_time: cpu_time() - began,
     };
     let printed = print_result(&solved, options.json);
-    if report.status == SolveStatus::Converged && !solved.converged {
-        return Err(RunError::NoConvergence(format!(
-            "{}: not solved: the residual is {:.2e} only because the reactions are as large as they are, the contacts still move at {:.2e} of \
-             the free velocities against their laws; most likely no velocities satisfy these laws",
-            options.problem.display(),
-            solved.residual,
-            solved.velocity_error
-        )));
-    }
     if !solved.converged {
-        return Err(RunError::NoConvergence(format!(
-            "{}: residual {:.2e} after {}, and {:.0e} was asked for; a larger --max-iterations, another \
-             --solver or a larger --tolerance may help",
-            options.problem.display(),
-            solved.residual,
-            solved.took(),
-            solved.tolerance
-        )));
+        return Err(RunError::NoConvergence(format!("{}: {}", options.problem.display(), solved.failure(&at))));
     }
     if let Some(output) = &options.output {
         problem.solution = Some(at.r);
@@ -164,6 +154,33 @@ fn iterate(problem: &mut Assembled, options: &SolveOptions) -> SolveReport {
 }
 
 impl Solved {
+    /// Why the problem counts as not solved, and what is proved of it.
+    fn failure(&self, problem: &Assembled) -> String {
+        let (verdict, remedy) = match verdict_of_assembled(problem) {
+            Verdict::NoSolution(contacts) => {
+                let shown: Vec<String> = contacts.iter().take(SHOWN).map(usize::to_string).collect();
+                let more = contacts.len() - shown.len();
+                let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+                (format!("no velocities satisfy the laws of contacts {}{more}", shown.join(", ")), "")
+            }
+            Verdict::Guaranteed => ("not solved, though a solution exists".into(), REMEDY),
+            Verdict::Undecided => ("not solved, and a solution is not guaranteed".into(), REMEDY),
+        };
+        let residual = self.residual;
+        if residual <= self.tolerance {
+            return format!(
+                "{verdict}: the residual is {residual:.2e} only because the reactions are as large as they are, the contacts still move at \
+                 {:.2e} of the free velocities against their laws",
+                self.velocity_error
+            );
+        }
+        format!(
+            "{verdict}: residual {residual:.2e} after {}, and {:.0e} was asked for{remedy}",
+            self.took(),
+            self.tolerance
+        )
+    }
+
     fn took(&self) -> String {
         told(self.work, |count| count.to_string()).unwrap_or_else(|| "nothing to do".into())
     }

@@ -54,6 +54,34 @@ fn a_wrong_scene_is_exit_2_and_names_every_place() {
     assert_eq!(report["problems"][1]["path"], "time.step");
 }
 
+/// A disk between a floor and a lid that a given velocity moves.
+#[test]
+fn a_step_without_a_solution_is_exit_3_and_names_what_is_squeezed_and_the_remedy() {
+    let folder = folder();
+    let scene = r#"{"dimension": 2, "thickness": 0.01, "time": {"step": 1e-4, "end": 1e-2}, "output": {"every_steps": 10},
+        "sample": {"grains": [{"center": [0, 1e-3], "radius": 1e-3}]},
+        "materials": {"density": 2500, "friction": {"grain_grain": 0.3, "grain_wall": 0.2}},
+        "walls": {"base": {"shape": {"plane": {"normal": [0, 1], "place": {"at": [0, 0]}}}},
+            "lid": {"shape": {"plane": {"normal": [0, -1], "place": {"at": [0, 2e-3]}}}, "velocity": {"constant": 0.01}}}}"#;
+    std::fs::write(folder.path().join("lid.json"), scene).expect("a file");
+    for kind in ["newton", "interior", "gauss_seidel"] {
+        let kind = format!("solver.kind={{\"{kind}\":{{}}}}");
+        let (code, _, stderr) =
+            dem_run(folder.path(), &["run", "lid.json", "--output", "lid.h5", "--force", "--set", &kind]);
+        assert_eq!(code, Some(3), "{stderr}");
+        for part in ["no motion satisfies grain 0, wall base and wall lid at t = 0", "let a force drive walls.lid"] {
+            assert!(stderr.contains(part), "{part} in\n{stderr}");
+        }
+    }
+    let (code, _, stderr) = dem_run(folder.path(), &["export", "lid.h5", "--step", "1", "--output", "lid.hdf5"]);
+    assert_eq!(code, Some(0), "{stderr}");
+    for solver in ["interior", "gauss-seidel"] {
+        let (code, _, stderr) = dem_run(folder.path(), &["solve", "lid.hdf5", "--solver", solver]);
+        assert_eq!(code, Some(3), "{stderr}");
+        assert!(stderr.contains("no velocities satisfy the laws of contacts 0, 1:"), "{stderr}");
+    }
+}
+
 #[test]
 fn wrong_usage_is_exit_2() {
     let scene = config("column.json");

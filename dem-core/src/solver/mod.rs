@@ -3,6 +3,7 @@
 mod anderson;
 pub mod assembled;
 mod assembled_rows;
+pub mod certificate;
 mod extrapolation;
 mod gauss_seidel;
 mod graph;

@@ -283,6 +283,26 @@ impl Rows {
         }
     }
 
+    /// H̃ r of all contacts.
+    pub fn pushed(&self, reactions: &[Padded]) -> Vec<f64> {
+        let mut y = vec![0.0; self.unknowns];
+        self.list.iter().zip(reactions).for_each(|(row, r)| self.apply(row, r, &mut y));
+        y
+    }
+
+    /// The largest coefficient of each unknown, one where it has none.
+    pub fn largest(&self) -> Vec<f64> {
+        let mut most = vec![0.0f64; self.unknowns];
+        for row in &self.list {
+            for k in 0..row.rows.len() {
+                let (first, second) = self.coefficients(row, k).split_at(row.count[0]);
+                first.iter().zip(&mut most[row.at[0]..]).for_each(|(h, most)| *most = most.max(h.abs()));
+                second.iter().zip(&mut most[row.at[1]..]).for_each(|(h, most)| *most = most.max(h.abs()));
+            }
+        }
+        most.into_iter().map(|most| if most > 0.0 { most } else { 1.0 }).collect()
+    }
+
     /// out += H̃ A H̃ᵀ for some rows of one contact, row by row over the unknowns of its pair; `a` gives the entries of A over those rows.
     pub fn add_element(&self, row: &Row, of: &[usize], a: impl Fn(usize, usize) -> f64, out: &mut [f64]) {
         let width = row.width();

@@ -21,6 +21,7 @@ use crate::bond::failure;
 use crate::contact::Law;
 use crate::dim::{Dim, Vect};
 use crate::problem::{Contact, ContactProblem, Nodes, Visitor};
+use crate::solver::certificate::{Verdict, verdict};
 
 /// Overlap of a pair, over the smaller radius, that half a step may add.
 const DEEP: f64 = 0.5;
@@ -40,7 +41,7 @@ const YIELDED: f64 = 1e-3;
 const FINE: f64 = 1e-6;
 const ACCEPTED: f64 = 1e-4;
 
-/// Share of the closing power of the free velocities that reactions leave where no velocities satisfy the laws: all of it where
+/// Share of the closing power of the free velocities that reactions leave where bodies are jammed: all of it where
 /// they only balance each other, none in a solution.
 const UNOPPOSED: f64 = 0.5;
 
@@ -110,7 +111,8 @@ impl<D: Dim> World<D> {
             pair,
             share,
             accumulated: false,
-            infeasible: self.infeasible(problem),
+            jammed: self.jammed(problem),
+            verdict: Verdict::Undecided,
         })
     }
 
@@ -144,7 +146,8 @@ impl<D: Dim> World<D> {
             pair,
             share,
             accumulated: true,
-            infeasible: self.infeasible(problem),
+            jammed: self.jammed(problem),
+            verdict: Verdict::Undecided,
         })
     }
 
@@ -154,9 +157,22 @@ impl<D: Dim> World<D> {
         (solver.tolerance() / FINE).max(solver.accept() / ACCEPTED).max(1.0)
     }
 
+    /// What is proved of a problem that was not solved, by its bodies.
+    pub(super) fn verdict(&self, problem: &ContactProblem<D>) -> Verdict<u32> {
+        verdict(problem).map(|contacts| {
+            let mut pairs = Pairs(Vec::with_capacity(problem.len()));
+            problem.visit(&mut pairs);
+            let mut bodies: Vec<u32> = contacts.into_iter().flat_map(|c| pairs.0[c]).collect();
+            bodies.sort_unstable();
+            bodies.dedup();
+            bodies
+        })
+    }
+
     /// Whether the reactions only balance each other, as where a wall that is moved closes on a grain: the walls that carry them. In a
-    /// solution they take as much power from the bodies as the free velocities would put into closing contacts.
-    fn infeasible(&self, problem: &ContactProblem<D>) -> Option<Vec<u32>> {
+    /// solution they take as much power from the bodies as the free velocities would put into closing contacts. This is no proof that no
+    /// solution exists; that is [`World::verdict`].
+    fn jammed(&self, problem: &ContactProblem<D>) -> Option<Vec<u32>> {
         let mut powers = Powers { problem, asked: 0.0, left: 0.0, largest: 0.0 };
         problem.visit(&mut powers);
         let Powers { asked, left, largest, .. } = powers;
@@ -225,6 +241,15 @@ impl<D: Dim> Visitor<D> for Yielding<'_, D> {
         if share > self.share {
             (self.pair, self.share) = (c.link.nodes, share);
         }
+    }
+}
+
+/// Lists the bodies of each contact.
+struct Pairs(Vec<[u32; 2]>);
+
+impl<D: Dim> Visitor<D> for Pairs {
+    fn visit<L: Law>(&mut self, _: &Nodes<D>, c: &Contact<D, L>) {
+        self.0.push(c.link.nodes);
     }
 }
 

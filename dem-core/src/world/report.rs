@@ -2,8 +2,12 @@
 
 use super::{Break, Counts};
 use crate::dim::Dim;
+use crate::solver::certificate::Verdict;
 use crate::solver::{Route, SolveReport, SolveStatus, Work};
 use std::fmt;
+
+/// Most bodies that a message names.
+const NAMED: usize = 8;
 
 /// What one step did.
 #[derive(Clone, Debug)]
@@ -116,6 +120,8 @@ pub enum StepError {
         residual: f64,
         /// Iterations of its solve.
         iterations: u64,
+        /// What is proved of its problem, with bodies by number (walls follow the grains).
+        verdict: Verdict<u32>,
     },
     /// A grain would pass through another body, or be pushed by one it passes, in the shortest part of a step.
     TooFast {
@@ -147,19 +153,39 @@ pub struct Violation {
     pub share: f64,
     /// Whether it is the sum over the run so far; else it is the way of one step.
     pub accumulated: bool,
-    /// Where the reactions balance each other without stopping the bodies, so that no velocities satisfy the contact laws:
-    /// the walls that carry them (walls follow the grains), one of which is moved.
-    pub infeasible: Option<Vec<u32>>,
+    /// Where the reactions balance each other without stopping the bodies: the walls that carry them (walls follow the grains), one of
+    /// which is moved.
+    pub jammed: Option<Vec<u32>>,
+    /// What is proved of the problem, with bodies by number (walls follow the grains).
+    pub verdict: Verdict<u32>,
 }
 
 impl StepError {
+    /// What is proved of the problem that was not solved, where the error is of a solve.
+    pub fn verdict(&self) -> Option<&Verdict<u32>> {
+        match self {
+            Self::NotAccepted { verdict, .. } | Self::Yielded { violation: Violation { verdict, .. }, .. } => {
+                Some(verdict)
+            }
+            Self::TooFast { .. } | Self::NotFinite { .. } => None,
+        }
+    }
+
     /// The message, with bodies called by `name`, which is given a number: grains first, then walls.
     pub fn message(&self, name: &dyn Fn(u32) -> String) -> String {
         match self {
-            Self::NotAccepted { time, step, residual, iterations } => format!(
-                "no convergence at t = {time:.6e} s: residual {residual:.2e} after {iterations} iterations, with the step cut to \
-                 {step:.2e} s"
-            ),
+            Self::NotAccepted { time, step, residual, iterations, verdict } => {
+                let [opening, known] = match verdict {
+                    Verdict::NoSolution(bodies) => {
+                        [format!("no motion satisfies {}", listed(bodies, name)), String::new()]
+                    }
+                    verdict => ["no convergence".into(), format!("; {}", existence(verdict))],
+                };
+                format!(
+                    "{opening} at t = {time:.6e} s: residual {residual:.2e} after {iterations} iterations, with the step cut to \
+                     {step:.2e} s{known}"
+                )
+            }
             Self::TooFast { time, pair } => format!(
                 "{} is too fast for the step at t = {time:.6e} s: even in {} parts it would pass through {}: shorten the step, \
                  or look why it is so fast",
@@ -176,32 +202,49 @@ impl StepError {
     }
 }
 
+/// What is known of a solution that was not found.
+fn existence(verdict: &Verdict<u32>) -> &'static str {
+    match verdict {
+        Verdict::NoSolution(_) => "there is no solution",
+        Verdict::Guaranteed => "a solution exists, which the solver has not found",
+        Verdict::Undecided => "a solution is not guaranteed",
+    }
+}
+
+/// Names in a sentence; of many bodies the last, which are the walls, and how many more there are.
+fn listed(bodies: &[u32], name: &dyn Fn(u32) -> String) -> String {
+    let (others, named) = bodies.split_at(bodies.len().saturating_sub(NAMED));
+    let mut names: Vec<String> = named.iter().map(|body| name(*body)).collect();
+    if !others.is_empty() {
+        names.push(format!("{} more", others.len()));
+    }
+    match names.as_slice() {
+        [first @ .., last] if !first.is_empty() => format!("{} and {last}", first.join(", ")),
+        names => names.concat(),
+    }
+}
+
 impl Violation {
     /// Whether a better solve, or a shorter step, may do without it.
     pub(super) fn is_of_the_solve(&self) -> bool {
-        !self.accumulated && self.infeasible.is_none()
+        !self.accumulated && self.jammed.is_none()
     }
 
     fn message(&self, time: f64, name: &dyn Fn(u32) -> String) -> String {
         let [i, j] = self.pair.map(name);
         let span = if self.accumulated { "since the start of the run" } else { "in one step" };
         let what = format!("{i} and {j} move {:.1e} of a radius beyond their contact law {span}", self.share);
-        match &self.infeasible {
-            None => format!(
-                "{what} at t = {time:.6e} s, though the residual is small enough: a smaller tolerance of the solver, or a shorter \
-                 step, may help"
-            ),
-            Some(walls) => {
-                let names: Vec<String> = walls.iter().map(|wall| name(*wall)).collect();
-                let bodies = match names.as_slice() {
-                    [first @ .., last] if !first.is_empty() => format!("{} and {last}", first.join(", ")),
-                    names => names.concat(),
-                };
-                format!(
-                    "no motion satisfies {bodies} at t = {time:.6e} s: {what}, and the reactions only balance each other; nothing \
-                     can give way: let a wall be driven by a force, end its motion earlier, or leave room"
-                )
+        let known = match &self.jammed {
+            None => "though the residual is small enough".into(),
+            Some(walls) => format!("and the reactions of {} only balance each other", listed(walls, name)),
+        };
+        match &self.verdict {
+            Verdict::NoSolution(bodies) => {
+                format!("no motion satisfies {} at t = {time:.6e} s: {what}, {known}", listed(bodies, name))
             }
+            // the sum over many steps says little of the last problem
+            _ if self.accumulated => format!("{what} at t = {time:.6e} s, {known}"),
+            verdict => format!("not solved at t = {time:.6e} s: {what}, {known}; {}", existence(verdict)),
         }
     }
 }

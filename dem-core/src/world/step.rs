@@ -10,6 +10,7 @@ use crate::bond::{BondStatus, Rupture, failure};
 use crate::contact::{Law, Local};
 use crate::dim::{Dim, Vect};
 use crate::problem::{ContactProblem, Group, Nodes};
+use crate::solver::certificate::Verdict;
 use crate::solver::{SolveReport, SolveStatus};
 
 /// Parts into which a step is divided at most where bodies are fast.
@@ -41,7 +42,8 @@ impl<D: Dim> World<D> {
         parts: u32,
         watch: &mut dyn FnMut(usize),
     ) -> Result<StepReport<D>, StepError> {
-        let refused = match self.attempt(h, watch) {
+        let last = halvings == self.settings.max_halvings;
+        let refused = match self.attempt(h, last, watch) {
             Err(StepError::NotAccepted { .. }) if halvings < self.settings.max_halvings => 1,
             Err(StepError::Yielded { violation, .. })
                 if violation.is_of_the_solve() && halvings < self.settings.max_halvings =>
@@ -71,8 +73,8 @@ impl<D: Dim> World<D> {
         }
     }
 
-    /// One step of length `h`. An error leaves the world as it was.
-    fn attempt(&mut self, h: f64, watch: &mut dyn FnMut(usize)) -> Result<StepReport<D>, StepError> {
+    /// One step of length `h`. An error leaves the world as it was; where it is the `last` attempt, it has the verdict on its problem.
+    fn attempt(&mut self, h: f64, last: bool, watch: &mut dyn FnMut(usize)) -> Result<StepReport<D>, StepError> {
         let mid = self.midpoint(h);
         let motion = self.free_motion(h);
         let applied = self.applied_impulse(h);
@@ -90,9 +92,9 @@ impl<D: Dim> World<D> {
             let (mut problem, places) = self.assemble(&mid, &touches, &motion, &carried, applied, h);
             let solve = self.solve(&mut problem, limited);
             done.add(solve);
-            self.refuse_unaccepted(solve, &problem, h)?;
+            self.refuse_unaccepted(solve, &problem, h, last)?;
             if limited {
-                self.refuse_violation(self.yielding(&problem))?;
+                self.refuse_violation(self.yielding(&problem), &problem, last)?;
             }
             write_reactions(&mut touches, &problem, &places, h);
             let missed = self.missed(&mid, &touches, &problem.nodes, h);
@@ -117,7 +119,7 @@ impl<D: Dim> World<D> {
             let velocity = |k: usize| problem.nodes.all[k].velocity;
             self.refuse_crossing(self.pushes_from_afar(&mid, &touches, &problem.nodes, h))?;
             self.refuse_crossing(self.crossing(|k| mid.place(k), velocity, 0.5 * h))?;
-            self.refuse_violation(self.accumulate(&mut touches, &problem, &places, h))?;
+            self.refuse_violation(self.accumulate(&mut touches, &problem, &places, h), &problem, last)?;
         }
         self.settle(h, mid, &motion, &problem, touches, &breaks);
         if let Some(forces) = walls_at_limit {
@@ -210,20 +212,36 @@ impl<D: Dim> World<D> {
         h * f64::sqrt(sum)
     }
 
-    fn refuse_unaccepted(&self, solve: SolveReport, problem: &ContactProblem<D>, h: f64) -> Result<(), StepError> {
+    fn refuse_unaccepted(
+        &self,
+        solve: SolveReport,
+        problem: &ContactProblem<D>,
+        h: f64,
+        last: bool,
+    ) -> Result<(), StepError> {
         let finite = |v: &[f64]| v.iter().all(|c| c.is_finite());
         if !problem.nodes.all.iter().all(|n| finite(n.velocity.as_slice()) && finite(n.spin.as_slice())) {
             return Err(StepError::NotFinite { time: self.time });
         }
         if solve.status == SolveStatus::Failed {
             let SolveReport { residual, work, .. } = solve;
-            return Err(StepError::NotAccepted { time: self.time, step: h, residual, iterations: work.iterations() });
+            let (iterations, verdict) =
+                (work.iterations(), if last { self.verdict(problem) } else { Verdict::Undecided });
+            return Err(StepError::NotAccepted { time: self.time, step: h, residual, iterations, verdict });
         }
         Ok(())
     }
 
-    fn refuse_violation(&self, found: Option<Violation>) -> Result<(), StepError> {
-        found.map_or(Ok(()), |violation| Err(StepError::Yielded { time: self.time, violation }))
+    fn refuse_violation(
+        &self,
+        found: Option<Violation>,
+        problem: &ContactProblem<D>,
+        last: bool,
+    ) -> Result<(), StepError> {
+        let Some(violation) = found else { return Ok(()) };
+        let last = last || !violation.is_of_the_solve();
+        let verdict = if last { self.verdict(problem) } else { Verdict::Undecided };
+        Err(StepError::Yielded { time: self.time, violation: Violation { verdict, ..violation } })
     }
 
     fn refuse_crossing(&self, found: Option<[u32; 2]>) -> Result<(), StepError> {

@@ -6,6 +6,7 @@ use crate::scene::{Heap, Kind, TOLERANCE};
 use dem_core::body::{Drive, Grain, Load, Shape, Wall};
 use dem_core::bond::BondStatus;
 use dem_core::dim::{D2, D3, Dim, Vect};
+use dem_core::solver::certificate::Verdict;
 use dem_core::world::{Settings, StepError, World};
 use std::sync::Arc;
 
@@ -128,12 +129,13 @@ fn walls_that_cannot_yield_stop_the_run_and_say_so() {
             Kind::GaussSeidel => matches!(error, StepError::NotAccepted { time: 0.0, .. }),
             _ => match &error {
                 StepError::Yielded { time: 0.0, violation } => {
-                    violation.pair[0] == 0 && violation.infeasible.as_deref() == Some(&[1, 2])
+                    violation.pair[0] == 0 && violation.jammed.as_deref() == Some(&[1, 2])
                 }
                 _ => false,
             },
         };
         assert!(why, "{kind:?}: {error:?}");
+        assert_eq!(error.verdict(), Some(&Verdict::NoSolution(vec![0, 1, 2])), "{kind:?}");
         // the first step is refused, and nothing has moved in it
         assert_eq!(out.steps, 0);
         assert_eq!((w.grains.position[0], w.walls[1].position), (at::<D>(&[R]), at::<D>(&[2.0 * R])));
@@ -160,7 +162,8 @@ fn what_a_slow_wall_squeezes_is_found_in_the_sum_over_the_steps() {
                 continue;
             };
             let walls = [count as u32, count as u32 + 1];
-            assert!(violation.accumulated && violation.infeasible.as_deref() == Some(&walls), "{violation:?}");
+            assert!(violation.accumulated && violation.jammed.as_deref() == Some(&walls), "{violation:?}");
+            assert_eq!(violation.verdict, Verdict::NoSolution((0..count as u32 + 2).collect()));
             let closed = 2.0 * R * f64::from(count) - w.walls[1].position[0];
             assert!(closed <= 4e-3 * R, "{kind:?}, {count}: {closed:e}");
         }

@@ -22,6 +22,7 @@ mod selection;
 mod sites;
 mod start;
 mod system;
+mod violation;
 
 use crate::contact::Padded;
 use crate::linear::Lu;
@@ -37,6 +38,8 @@ use sites::Sites;
 use start::{cold, warm};
 use std::sync::Arc;
 use system::System;
+
+pub(super) use violation::Least;
 
 /// What is asked of a solution.
 #[derive(Clone, Copy, Debug)]

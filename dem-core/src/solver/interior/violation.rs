@@ -1,0 +1,84 @@
+//! Of all velocities those that violate the contact laws least, and the impulses dual to the violation.
+//!
+//! For an associated problem without shifts,
+//!
+//! minimise ½ d·C d + ½ κ d·W d + q·d over d ∈ K,
+//!
+//! is strictly convex and has one solution. With y = κ H̃ d and u = H̃ᵀ y + q, the velocity u + C d lies in K*: C d is the violation. The problem is
+//! solved again with q + κ W d for q: then κ W d tends to zero and d to the least of all violations, with H̃ d = 0 and q·d = −d·C d (docs/theory/interior-point.md, "What has no solution").
+
+use super::Interior;
+use super::coupling::Coupling;
+use super::direction::{advance, direction};
+use super::local::{State, gap};
+use super::metric::Metric;
+use super::sites::{ROWS, Site, Sites};
+use super::start::cold;
+use crate::contact::Padded;
+use crate::problem::assembled::BlockMatrix;
+use crate::solver::graph::Graph;
+use crate::solver::rows::Rows;
+
+/// W over the compliance, and how often q is moved on.
+const KAPPA: f64 = 1e8;
+const ROUNDS: usize = 3;
+/// Most iterations of a round, the gap at which it ends, over the square of the unit of reactions, and how far a step goes to the boundary.
+const MOST: usize = 100;
+const LEAST_GAP: f64 = 1e-18;
+const INSIDE: f64 = 0.99;
+
+/// What violates least.
+pub(in crate::solver) struct Least {
+    /// d, in the unit of the rows' reactions.
+    pub direction: Vec<Padded>,
+    /// The reactions that give the bodies their velocities, likewise.
+    pub reactions: Vec<Padded>,
+}
+
+impl Interior {
+    /// The least violation of an associated problem without shifts; none where no elimination tree can be made.
+    pub fn least_violation(&mut self, rows: &Rows, matrix: Option<&BlockMatrix>) -> Option<Least> {
+        let mut sites = Sites::of(rows, &[]);
+        let ratio = sites.speed / (sites.force * KAPPA);
+        let graph = if matrix.is_none() { Graph::of(rows, &mut None) } else { None };
+        let coupling = match (matrix, &graph) {
+            (Some(matrix), _) => Coupling::matrix(matrix, &sites, ratio)?,
+            (None, Some(graph)) => Coupling::bodies(rows, ratio, graph),
+            (None, None) => return None,
+        };
+        let metric = Metric::new(&sites, vec![0.0; sites.rows], 1.0);
+        let mut reactions = vec![0.0; sites.rows];
+        let mut at = State::default();
+        for _ in 0..ROUNDS {
+            at = self.of_a_round(&sites, &coupling, &metric);
+            let moved = coupling.velocity(&sites, &at.r);
+            sites.free.iter_mut().zip(&moved).for_each(|(q, u)| *q += u);
+            reactions.iter_mut().zip(&at.r).for_each(|(sum, d)| *sum += KAPPA * d);
+        }
+        Some(Least { direction: scattered(&sites, &at.r), reactions: scattered(&sites, &reactions) })
+    }
+
+    /// The path of one round, to its end.
+    fn of_a_round(&mut self, sites: &Sites, coupling: &Coupling, metric: &Metric) -> State {
+        let mut at = cold(sites);
+        for _ in 0..MOST {
+            if gap(&at) <= LEAST_GAP {
+                break;
+            }
+            let Some(system) = self.factorised(sites, coupling, &at, metric) else { break };
+            let (step, far) = direction(&system);
+            advance(&mut at, (INSIDE * far).min(1.0), &step);
+        }
+        at
+    }
+}
+
+/// A list of all rows as reactions of the contacts.
+fn scattered(sites: &Sites, list: &[f64]) -> Vec<Padded> {
+    let one = |site: &Site| {
+        let mut r = [0.0; ROWS];
+        site.places.iter().zip(site.part(list)).for_each(|(place, value)| r[*place] = value * sites.force);
+        Padded::from_order(&r.into())
+    };
+    sites.list.iter().map(one).collect()
+}

@@ -1,0 +1,247 @@
+//! What is said of problems that were not solved, against closed forms.
+
+mod common;
+
+use common::{force_driven, grain, newton, settings, world};
+use dem_core::body::{Drive, Grain, Shape, Wall};
+use dem_core::bond::Stiffness;
+use dem_core::contact::{BondFlow, LocalSolve};
+use dem_core::dim::{D2, D3, D3Twist, Dim, Vect};
+use dem_core::problem::assembled::{Assembled, BlockMatrix, ContactRows, Parts};
+use dem_core::solver::certificate::{Verdict, verdict, verdict_of_assembled};
+use dem_core::solver::{GaussSeidelSettings, SolveStatus, SolverSettings, Staged, StagedSettings, Stages};
+use dem_core::world::{Settings, StepError, World};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use std::sync::Arc;
+
+/// Radius of the grains (m), speed of the driven walls (m/s), time step (s).
+const R: f64 = 0.01;
+const SPEED: f64 = 0.1;
+const STEP: f64 = 1e-3;
+
+/// The first axes of a vector, the others zero.
+fn at<D: Dim>(x: &[f64]) -> D::Vector {
+    let mut v = D::Vector::zero();
+    x.iter().enumerate().for_each(|(k, x)| v[k] = *x);
+    v
+}
+
+fn set<D: Dim>() -> Settings<D> {
+    Settings { solver: SolverSettings::Staged(newton(1e-8, 1e-6, 1e-4)), ..settings(STEP) }
+}
+
+fn plane<D: Dim>(normal: &[f64], position: &[f64]) -> Wall<D> {
+    Wall::fixed(Shape::Plane { normal: at::<D>(normal) }, at::<D>(position), 0.3)
+}
+
+/// The same, made to move with this direction at [`SPEED`].
+fn driven<D: Dim>(normal: &[f64], position: &[f64], direction: &[f64]) -> Wall<D> {
+    let drive = Drive::Velocity { direction: at::<D>(direction), speed: Arc::new(|_| SPEED) };
+    Wall { drive, ..plane(normal, position) }
+}
+
+/// Grains in a row along x.
+fn row<D: Dim>(count: usize) -> Vec<Grain<D>> {
+    (0..count).map(|k| grain::<D>(&[&[R * (2 * k + 1) as f64][..], &vec![0.0; D::N - 1]].concat(), R)).collect()
+}
+
+/// A row of grains between a wall and another that comes nearer.
+fn squeezed<D: Dim>(count: usize) -> World<D> {
+    let press = driven(&[-1.0], &[2.0 * R * count as f64], &[-1.0]);
+    world(row(count), vec![plane(&[1.0], &[]), press], set())
+}
+
+/// The verdict on the first step. With the matrix alone a solution may not be guaranteed, for what bodies do by themselves is not known.
+fn of<D: Dim>(w: &mut World<D>) -> Verdict<usize> {
+    let problem = w.contact_problem();
+    let found = verdict(&problem);
+    let by_the_matrix = verdict_of_assembled(&Assembled::of(&problem));
+    assert!(
+        by_the_matrix == found || found == Verdict::Guaranteed && by_the_matrix == Verdict::Undecided,
+        "{by_the_matrix:?}"
+    );
+    found
+}
+
+fn fails<D: Dim>(w: &mut World<D>) -> Verdict<u32> {
+    w.step().expect_err("no solution").verdict().cloned().expect("a verdict")
+}
+
+#[test]
+fn a_grain_between_walls_that_close_has_no_solution() {
+    fn case<D: Dim>() {
+        for count in [1, 2, 5] {
+            let mut w = squeezed::<D>(count);
+            assert_eq!(of(&mut w), Verdict::NoSolution((0..=count).collect()));
+            // gravity along the walls and spinning grains change nothing
+            w.settings.gravity = Some(at::<D>(&[0.0, -9.81]));
+            w.grains.spin[0][0] = 3.0;
+            w.grains.velocity.fill(at::<D>(&[0.0, -2.0]));
+            assert_eq!(of(&mut w), Verdict::NoSolution((0..=count).collect()));
+            assert_eq!(fails(&mut w), Verdict::NoSolution((0..count as u32 + 2).collect()));
+        }
+    }
+    case::<D2>();
+    case::<D3>();
+}
+
+#[test]
+fn a_bonded_row_between_walls_that_close_has_no_solution() {
+    fn case<D: Dim>(flow: BondFlow) {
+        let mut w = squeezed::<D>(3);
+        w.settings.bond_flow = flow;
+        w.form_bonds(1e-6, |_| 1.0, 0.3);
+        w.limit_twist(0.02);
+        assert_eq!(of(&mut w), Verdict::NoSolution(vec![0, 1, 2, 3]));
+        assert_eq!(fails(&mut w), Verdict::NoSolution(vec![0, 1, 2, 3, 4]));
+    }
+    for flow in [BondFlow::Associated, BondFlow::Bipotential] {
+        case::<D2>(flow);
+        case::<D3>(flow);
+        case::<D3Twist>(flow);
+    }
+}
+
+/// A rigid bond and an elastic one in a row: the elastic one gives way.
+#[test]
+fn an_elastic_bond_gives_way() {
+    fn case<D: Dim>(known: &Verdict<usize>) {
+        let mut w = squeezed::<D>(2);
+        w.form_bonds(1e-6, |_| 1e3, 0.3);
+        w.make_bonds_elastic(|a| Stiffness {
+            normal: 1e6,
+            tangential: 4e5,
+            rolling: 1e6 * a * a / 12.0,
+            twist: 1e6 * a * a / 16.0,
+        });
+        assert_eq!(verdict(&w.contact_problem()), *known);
+        // with the matrix the compliance is one with the masses
+        assert!(!matches!(verdict_of_assembled(&Assembled::of(&w.contact_problem())), Verdict::NoSolution(_)));
+        w.step().expect("a solution");
+    }
+    case::<D2>(&Verdict::Guaranteed);
+    case::<D3>(&Verdict::Undecided);
+}
+
+/// However heavy a wall is that a force drives, it gives way.
+#[test]
+fn a_heavy_wall_gives_way() {
+    for mass in [1.0, 1e3, 1e6, 1e9] {
+        let mut w = squeezed::<D2>(1);
+        w.walls[0] = force_driven(at::<D2>(&[1.0]), at::<D2>(&[]), mass, 0.0);
+        assert!(!matches!(verdict(&w.contact_problem()), Verdict::NoSolution(_)), "{mass}");
+        // heavier still, round-off moves the light grain
+        assert!(mass > 1e6 || w.step().is_ok(), "{mass}");
+    }
+}
+
+/// A wedge of half-angle α with tan α < μ, one plate of which slides along itself towards the edge: impulses that hold the grain there at
+/// the limit of friction balance and resist that motion, so a solution is not guaranteed. Without a load there is one, no reactions at
+/// all. Under a load none is found.
+#[test]
+fn a_plate_that_slides_along_itself_is_undecided() {
+    let (s, c) = 0.1f64.sin_cos();
+    for gravity in [None, Some(at::<D2>(&[0.0, -9.81]))] {
+        let walls = vec![plane(&[c, s], &[]), driven(&[-c, s], &[], &[-s, -c])];
+        let mut w = world::<D2>(vec![grain(&[0.0, R / s], R)], walls, set());
+        w.settings.gravity = gravity;
+        assert_eq!(of(&mut w), Verdict::Undecided);
+        match gravity {
+            None => assert_eq!(w.step().expect("a solution").residual, 0.0),
+            Some(_) => assert_eq!(fails(&mut w), Verdict::Undecided),
+        }
+    }
+}
+
+/// The plates of that wedge close on the grain. It can only move outwards and friction, which is then inwards, exceeds what
+/// pushes it out where μ > tan α. Where the friction is less, the grain is pushed out.
+#[test]
+fn a_pip_between_closing_plates_is_undecided() {
+    for (angle, found) in [(0.1f64, Verdict::Undecided), (0.6, Verdict::Guaranteed)] {
+        let (s, c) = angle.sin_cos();
+        let walls = vec![driven(&[c, s], &[], &[c, s]), driven(&[-c, s], &[], &[-c, s])];
+        let mut w = world::<D2>(vec![grain(&[0.0, R / s], R)], walls, set());
+        assert_eq!(of(&mut w), found, "{angle}");
+        match (w.step(), found) {
+            (Ok(_), found) => assert_eq!(found, Verdict::Guaranteed),
+            (Err(StepError::NotAccepted { verdict, .. }), found) => {
+                assert_eq!((verdict, found), (Verdict::Undecided, Verdict::Undecided))
+            }
+            (Err(StepError::Yielded { violation, .. }), found) => {
+                assert_eq!((violation.verdict, found), (Verdict::Undecided, Verdict::Undecided))
+            }
+            (Err(error), _) => panic!("{error}"),
+        }
+    }
+}
+
+#[test]
+fn a_solution_is_guaranteed_where_nothing_is_made_to_close() {
+    // in 2D with walls at rest, or with room
+    let mut still = squeezed::<D2>(2);
+    still.walls[1].drive = Drive::Fixed;
+    still.settings.gravity = Some(at::<D2>(&[-9.81, -9.81]));
+    assert_eq!(of(&mut still), Verdict::Guaranteed);
+    let mut pushed = world::<D2>(row(2), vec![driven(&[-1.0], &[4.0 * R], &[-1.0])], set());
+    assert_eq!(of(&mut pushed), Verdict::Guaranteed);
+    // in 3D this is not proved
+    let mut still = squeezed::<D3>(2);
+    still.walls[1].drive = Drive::Fixed;
+    assert_eq!(of(&mut still), Verdict::Undecided);
+}
+
+/// A solver that stops too early fails, and the verdict is that it is the solver.
+#[test]
+fn a_failure_of_the_solver_is_said_to_be_one() {
+    let mut set = set::<D2>();
+    let (local, tolerance, accept) = (LocalSolve::Exact, 1e-12, 1e-12);
+    set.solver =
+        SolverSettings::GaussSeidel(GaussSeidelSettings { local, tolerance, accept, max_sweeps: 1, acceleration: 0 });
+    let mut w = world::<D2>(row(5), vec![plane(&[1.0], &[])], set);
+    w.grains.velocity[4] = at::<D2>(&[-0.1, 0.0]);
+    assert_eq!(fails(&mut w), Verdict::Guaranteed);
+}
+
+/// Small random problems of low rank: what is solved is never called infeasible, and each verdict occurs.
+#[test]
+fn no_verdict_contradicts_a_solution() {
+    let mut rng = Pcg64::seed_from_u64(5);
+    let mut any = || 2.0 * rng.random::<f64>() - 1.0;
+    let mut counts = [0; 3];
+    for trial in 0..300 {
+        let (contacts, rank) = (4, 2 + trial % 4);
+        let size = 2 * contacts;
+        let h: Vec<f64> = (0..size * rank).map(|_| any()).collect();
+        let w = |i: usize, j: usize| (0..rank).map(|k| h[i * rank + k] * h[j * rank + k]).sum::<f64>();
+        let entries: Vec<_> = (0..size * size).map(|k| (k / size, k % size, w(k / size, k % size))).collect();
+        let parts = Parts {
+            rows: ContactRows { tangents: 1, moments: 0 },
+            matrix: BlockMatrix::from_entries(contacts, 2, &entries),
+            q: (0..size).map(|_| any()).collect(),
+            mu: vec![0.3; contacts],
+            nu: vec![0.0; contacts],
+            xi: vec![0.0; contacts],
+            associated: (0..contacts).map(|c| trial % 3 == 0 && c == 0).collect(),
+            shift: vec![0.0; contacts],
+            applied: 0.0,
+        };
+        let mut problem = Assembled::new(parts).unwrap();
+        let found = verdict_of_assembled(&problem);
+        let settings = StagedSettings { stages: Stages::Interior, ..newton(1e-9, 1e-9, f64::INFINITY) };
+        let report = Staged::new(settings).solve_assembled(&mut problem);
+        let solved = report.status == SolveStatus::Converged && problem.velocity_error() < 1e-6;
+        match found {
+            Verdict::NoSolution(_) => {
+                counts[0] += 1;
+                assert!(!solved, "{trial}: {:e}", problem.velocity_error());
+            }
+            Verdict::Guaranteed => {
+                counts[1] += 1;
+                assert!(solved, "{trial}: {:e} {:e}", report.residual, problem.velocity_error());
+            }
+            Verdict::Undecided => counts[2] += 1,
+        }
+    }
+    assert!(counts.iter().all(|count| *count >= 10), "{counts:?}");
+}
