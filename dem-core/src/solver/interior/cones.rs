@@ -2,7 +2,7 @@
 //!
 //! One type stands for a ray, the cone in 2D and the cone in 3D: components that are missing are zero and stay zero.
 //!
-//! Source: Alizadeh & Goldfarb, Math. Program. 95, 2003.
+//! Sources: Alizadeh & Goldfarb, Math. Program. 95, 2003; for the scaling Nesterov & Todd, SIAM J. Optim. 8, 1998.
 
 /// A vector of the algebra.
 pub(super) type Point = [f64; 3];
@@ -37,6 +37,49 @@ pub(super) fn eigenvalues(x: &Point) -> [f64; 2] {
 fn determinant(x: &Point) -> f64 {
     let [high, low] = eigenvalues(x);
     high * low
+}
+
+/// The smaller eigenvalue of the product of a pair in the scaling that makes it commute, P(√x) z.
+pub(super) fn least_product(x: &Point, z: &Point) -> f64 {
+    let (half, whole) = (dot(x, z), determinant(x) * determinant(z));
+    whole / (half + (half * half - whole).max(0.0).sqrt())
+}
+
+/// An automorphism of Q for x, and its transposed inverse for z: the boosts along −w and w, with w₀² − w₁² − w₂² = 1.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Scaling {
+    w: Point,
+}
+
+impl Scaling {
+    /// The one that changes nothing.
+    pub const NONE: Self = Self { w: [1.0, 0.0, 0.0] };
+
+    /// That of Nesterov & Todd: it makes x and z multiples of each other.
+    pub fn of(x: &Point, z: &Point) -> Self {
+        let (x_size, z_size) = (determinant(x).sqrt(), determinant(z).sqrt());
+        let w = [x[0] / x_size + z[0] / z_size, x[1] / x_size - z[1] / z_size, x[2] / x_size - z[2] / z_size];
+        let size = determinant(&w).sqrt();
+        let (a, b) = (w[1] / size, w[2] / size);
+        Self { w: [(1.0 + a * a + b * b).sqrt(), a, b] }
+    }
+
+    /// A scaled x.
+    pub fn x(&self, x: &Point) -> Point {
+        boosted(&[self.w[0], -self.w[1], -self.w[2]], x)
+    }
+
+    /// A scaled z.
+    pub fn z(&self, z: &Point) -> Point {
+        boosted(&self.w, z)
+    }
+}
+
+/// The boost along w of p: (w·p, p̄ + w̄ (p₀ + p̄·w̄/(1 + w₀))), where a bar is for what follows the first component.
+fn boosted(w: &Point, p: &Point) -> Point {
+    let along = w[1] * p[1] + w[2] * p[2];
+    let across = p[0] + along / (1.0 + w[0]);
+    [w[0] * p[0] + along, p[1] + w[1] * across, p[2] + w[2] * across]
 }
 
 /// By how much the eigenvalues of x must change to lie between `low` and `high`, downwards by no more than `high`.
@@ -83,6 +126,27 @@ mod tests {
             assert!(low.abs() < 1e-12 && high >= 0.0, "{x:?} {d:?} {tau} {low:e}");
         }
         assert_eq!(reach(&[1.0, 0.2, 0.0], &[1.0, 0.5, 0.5]), f64::INFINITY);
+    }
+
+    #[test]
+    fn scaled_pairs_commute_and_keep_their_product() {
+        for (x, z) in [
+            ([1.0, 0.9, 0.1], [0.5, 0.3, -0.2]),
+            ([1.0, 0.999, 0.0], [1e-6, 0.0, 0.99e-6]),
+            ([2.0, 0.0, 0.0], [1.0, 0.0, 0.0]),
+        ] {
+            let scaling = Scaling::of(&x, &z);
+            let (a, b) = (scaling.x(&x), scaling.z(&z));
+            let (scaled, size) = (product(&a, &b), dot(&x, &z));
+            // multiples of each other: their product has the eigenvalues of P(√x) z, of which the smaller is asked for
+            assert!(
+                (a[1] * b[0] - a[0] * b[1]).abs() < 1e-9 * a[0] * b[0]
+                    && (a[2] * b[0] - a[0] * b[2]).abs() < 1e-9 * a[0] * b[0]
+            );
+            assert!((scaled[0] - size).abs() < 1e-9 * size, "{scaled:?} {size}");
+            assert!((eigenvalues(&scaled)[1] - least_product(&x, &z)).abs() < 1e-9 * size);
+            assert!(least_product(&x, &z) >= eigenvalues(&product(&x, &z))[1] - 1e-15);
+        }
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The direction of a predictor–corrector iteration.
 
-use super::cones::{Point, correction, dot, eigenvalues, moved, product};
+use super::cones::{Point, correction, dot, least_product, moved};
 use super::local::{State, gap};
 use super::system::System;
 
@@ -12,7 +12,7 @@ const CORRECTORS: usize = 2;
 const LONGER: f64 = 0.3;
 const GROWN: f64 = 1.05;
 const APART: f64 = 10.0;
-/// Least product of a pair that a point may have, over the gap; in space the direction is lost where products leave the cone.
+/// Least product of a pair that a point may have, over the gap.
 const CENTRAL: f64 = 1e-3;
 /// A step shorter than this turns towards the middle, by these shares of the gap, where it grows by this factor.
 const SHORT: f64 = 0.5;
@@ -22,7 +22,7 @@ const WORTH: f64 = 1.5;
 /// The direction of an iteration, and how far one can go along it.
 pub(super) fn direction(system: &System) -> (State, f64) {
     let at = system.at;
-    let products: Vec<Point> = at.x.iter().zip(&at.z).map(|(x, z)| product(x, z)).collect();
+    let products = system.products(&at.x, &at.z);
     let gap = gap(at);
     // predictor
     let to_the_end: Vec<Point> = products.iter().map(|p| [-p[0], -p[1], -p[2]]).collect();
@@ -34,18 +34,19 @@ pub(super) fn direction(system: &System) -> (State, f64) {
     let centring = (aim / gap).max(0.0).powi(3).clamp(CENTRING, 1.0);
     // corrector, of second order
     let barrier = centring * gap;
-    let second = predictor.x.iter().zip(&predictor.z).map(|(dx, dz)| product(dx, dz));
+    let second = system.products(&predictor.x, &predictor.z);
     let mut by: Vec<Point> =
-        products.iter().zip(second).map(|(p, s)| [barrier - p[0] - s[0], -p[1] - s[1], -p[2] - s[2]]).collect();
+        products.iter().zip(&second).map(|(p, s)| [barrier - p[0] - s[0], -p[1] - s[1], -p[2] - s[2]]).collect();
     let mut step = system.step(&by);
     let mut far = system.longest(&step);
     for _ in 0..CORRECTORS {
         let length = (far + LONGER).min(1.0);
-        let trial = |c: usize| {
-            let v = product(&moved(&at.x[c], length, &step.x[c]), &moved(&at.z[c], length, &step.z[c]));
-            moved(&by[c], 1.0, &correction(&v, barrier / APART, barrier * APART))
+        let ends = |at: &[Point], step: &[Point]| -> Vec<Point> {
+            at.iter().zip(step).map(|(x, d)| moved(x, length, d)).collect()
         };
-        let more: Vec<Point> = (0..by.len()).map(trial).collect();
+        let products = system.products(&ends(&at.x, &step.x), &ends(&at.z, &step.z));
+        let corrected = |(by, v): (&Point, &Point)| moved(by, 1.0, &correction(v, barrier / APART, barrier * APART));
+        let more: Vec<Point> = by.iter().zip(&products).map(corrected).collect();
         let other = system.step(&more);
         let reached = system.longest(&other);
         if reached <= GROWN * far {
@@ -75,7 +76,7 @@ pub(super) fn direction(system: &System) -> (State, f64) {
 /// Whether no product of a pair is far below the gap.
 pub(super) fn is_central(at: &State) -> bool {
     let least = CENTRAL * gap(at);
-    at.x.iter().zip(&at.z).all(|(x, z)| eigenvalues(&product(x, z))[1] >= least)
+    at.x.iter().zip(&at.z).all(|(x, z)| least_product(x, z) >= least)
 }
 
 /// Go along a step.

@@ -7,7 +7,7 @@
 //! The inverse of this small matrix holds in its upper left corner D⁻¹ of docs/theory/interior-point.md. D itself, with
 //! Arw(x)⁻¹ Arw(z), would lose the digits of what sticks beside what slips.
 
-use super::cones::{Point, dot};
+use super::cones::{Point, Scaling, dot, eigenvalues, product};
 use super::sites::{CONES, Cone, ROWS, Sites};
 
 /// Largest order of a local matrix.
@@ -29,9 +29,24 @@ fn scale(x: &Point, z: &Point) -> f64 {
     1.0 / (x[0] + z[0])
 }
 
+/// In which scaling the pairs of a point are linearised: as they are, or where x ∘ z is outside the cone in that of Nesterov & Todd, in which
+/// every interior pair has a direction.
+pub(super) fn scalings(at: &State) -> Vec<Scaling> {
+    let one = |(x, z): (&Point, &Point)| {
+        if eigenvalues(&product(x, z))[1] > 0.0 { Scaling::NONE } else { Scaling::of(x, z) }
+    };
+    at.x.iter().zip(&at.z).map(one).collect()
+}
+
 /// The inverses of all local matrices at a point, with the compliance of each row, and the sign of the product of their
 /// determinants; none if one has no inverse.
-pub(super) fn invert(sites: &Sites, at: &State, compliance: &[f64], inverses: &mut Vec<f64>) -> Option<f64> {
+pub(super) fn invert(
+    sites: &Sites,
+    at: &State,
+    scalings: &[Scaling],
+    compliance: &[f64],
+    inverses: &mut Vec<f64>,
+) -> Option<f64> {
     let mut sign = 1.0;
     inverses.clear();
     inverses.resize(sites.matrices, 0.0);
@@ -43,22 +58,25 @@ pub(super) fn invert(sites: &Sites, at: &State, compliance: &[f64], inverses: &m
         }
         let mut first = site.rows;
         for c in site.cones.clone() {
-            let (Cone { slope, rows, tangents, opens }, x, z) = (&sites.cones[c], &at.x[c], &at.z[c]);
-            let scale = scale(x, z);
+            let Cone { slope, rows, tangents, opens } = &sites.cones[c];
+            let (scaling, x, z) = (&scalings[c], scalings[c].x(&at.x[c]), scalings[c].z(&at.z[c]));
+            let scale = scale(&x, &z);
             if *opens {
                 a[0][first] = -slope;
             }
-            a[first][0] = scale * slope * z[0];
-            a[first][first] = scale * x[0];
-            for (k, row) in rows[..*tangents].iter().enumerate() {
-                let (at, k) = (first + 1 + k, 1 + k);
-                a[*row][at] = -1.0;
-                a[first][*row] = scale * z[k];
-                a[first][at] = scale * x[k];
-                a[at][0] = scale * slope * z[k];
-                a[at][*row] = scale * z[0];
-                a[at][first] = scale * x[k];
-                a[at][at] = scale * x[0];
+            for k in 0..=*tangents {
+                let mut unit = [0.0; 3];
+                unit[k] = 1.0;
+                // the columns of Arw(z) G and of Arw(x)
+                let (dx, dz) = (product(&z, &scaling.x(&unit)), product(&x, &scaling.z(&unit)));
+                let (column, factor) = if k == 0 { (0, *slope) } else { (rows[k - 1], 1.0) };
+                for row in 0..=*tangents {
+                    a[first + row][column] = scale * factor * dx[row];
+                    a[first + row][first + k] = scale * dz[row];
+                }
+                if k > 0 {
+                    a[column][first + k] = -1.0;
+                }
             }
             first += 1 + tangents;
         }
@@ -100,7 +118,14 @@ fn gauss_jordan(a: &mut [[f64; 2 * ORDER]; ORDER], order: usize) -> Option<f64> 
 }
 
 /// The step for these right sides, where nothing moves the bodies: its `r` and `z` alone.
-pub(super) fn solve(sites: &Sites, at: &State, inverses: &[f64], a: &[f64], b: &[Point]) -> State {
+pub(super) fn solve(
+    sites: &Sites,
+    at: &State,
+    scalings: &[Scaling],
+    inverses: &[f64],
+    a: &[f64],
+    b: &[Point],
+) -> State {
     let mut step = State { r: vec![0.0; sites.rows], x: Vec::new(), z: vec![[0.0; 3]; sites.cones.len()] };
     for site in &sites.list {
         let order = site.order();
@@ -108,7 +133,8 @@ pub(super) fn solve(sites: &Sites, at: &State, inverses: &[f64], a: &[f64], b: &
         right[..site.rows].copy_from_slice(site.part(a));
         let mut first = site.rows;
         for c in site.cones.clone() {
-            let (scale, tangents) = (scale(&at.x[c], &at.z[c]), sites.cones[c].tangents);
+            let scale = scale(&scalings[c].x(&at.x[c]), &scalings[c].z(&at.z[c]));
+            let tangents = sites.cones[c].tangents;
             for k in 0..1 + tangents {
                 right[first + k] = scale * b[c][k];
             }

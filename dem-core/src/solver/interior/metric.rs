@@ -34,6 +34,11 @@ impl Metric {
         if soft == 0.0 { 0.0 } else { (soft / size).sqrt() }
     }
 
+    /// Σ r²/ρ.
+    pub fn weight(&self, r: &[f64]) -> f64 {
+        r.iter().zip(&self.own).map(|(r, c)| c * r * r).sum()
+    }
+
     /// Σ (r − r₀)²/ρ.
     pub fn energy(&self, r: &[f64]) -> f64 {
         r.iter().zip(&self.anchor).zip(&self.own).map(|((r, r0), c)| c * (r - r0) * (r - r0)).sum()

@@ -2,12 +2,13 @@
 //!
 //! Every contact is a list of cone pairs ([`sites`]): x = G r̂ ∈ Q ⊥ z ∈ Q with u + C (r − r₀) = Σ Bᵀ z and u = W r + q. Between the pairs the
 //! method follows the path x ∘ z = barrier, linearised as it stands, slip speeds and all: the direction of Alizadeh, Haeberly
-//! & Overton with Mehrotra's predictor–corrector and Gondzio's correctors, one factorisation an iteration.
+//! & Overton, for a pair whose product has left the cone that of Nesterov & Todd, with Mehrotra's predictor–corrector and Gondzio's correctors,
+//! one factorisation an iteration.
 //!
 //! The metric 1/ρ is a compliance anchored at given reactions: among the many that balance a rigid network the path ends at those of least
 //! Σ r²/ρ. See docs/theory/interior-point.md.
 //!
-//! Sources: Alizadeh, Haeberly & Overton, SIAM J. Optim. 8, 1998; Mehrotra, SIAM J. Optim. 2, 1992; Gondzio, Comput. Optim. Appl. 6,
+//! Sources: Alizadeh, Haeberly & Overton, SIAM J. Optim. 8, 1998; Nesterov & Todd, SIAM J. Optim. 8, 1998; Mehrotra, SIAM J. Optim. 2, 1992; Gondzio, Comput. Optim. Appl. 6,
 //! 1996; for contact with friction Acary, Armand, Nguyen & Shpakovych, Optim. Methods Softw. 39, 2024.
 
 mod cones;
@@ -31,7 +32,7 @@ use crate::solver::rows::Rows;
 use crate::solver::solvable::Solvable;
 use coupling::Coupling;
 use follow::Follow;
-use local::{State, invert};
+use local::{State, invert, scalings};
 use metric::{Metric, lack};
 use selection::{Selection, Verdict};
 use sites::Sites;
@@ -129,10 +130,22 @@ impl Interior {
     ) -> Option<System<'a>> {
         let velocity = coupling.velocity(sites, &at.r);
         let right = lack(sites, &velocity, at, metric).into_iter().map(|x| -x).collect();
-        let locally = invert(sites, at, &metric.compliance, &mut self.inverses)?;
+        let scalings = scalings(at);
+        let locally = invert(sites, at, &scalings, &metric.compliance, &mut self.inverses)?;
         self.made += 1;
         let globally = coupling.factorise(sites, &self.inverses, &mut self.lu)?;
         let (compliance, inverses, lu) = (&metric.compliance[..], &self.inverses[..], &self.lu);
-        Some(System { sites, coupling, at, velocity, right, compliance, inverses, lu, sign: locally * globally })
+        Some(System {
+            sites,
+            coupling,
+            at,
+            velocity,
+            right,
+            scalings,
+            compliance,
+            inverses,
+            lu,
+            sign: locally * globally,
+        })
     }
 }

@@ -17,8 +17,9 @@ const KAPPA: f64 = 1e7;
 /// among the reactions that balance themselves.
 const ANY: f64 = 0.1;
 const STIFFEST: f64 = 1e12;
-/// What the gaps of all pairs may be beside the energy of the metric for reactions to count as those of least energy.
-const LEAST: f64 = 1e-3;
+/// What the gaps of all pairs may be beside the energy of the metric for reactions to count as those of least energy, and what this may be beside
+/// Σ r²/ρ.
+const LEAST: f64 = 1e-5;
 /// Gaps, over those, at which the point is kept from which the path is followed again.
 pub(super) const BACK: f64 = 30.0;
 /// Share of its compliance that a metric keeps each time it is anchored again after the first, and how often that is done.
@@ -77,7 +78,8 @@ impl Selection {
     /// Measure a point, and decide how the path goes on.
     pub fn assess(&mut self, problem: &mut impl Solvable, sites: &Sites, at: &State, iteration: u64) -> Verdict {
         let gaps = gap(at) * at.x.len() as f64;
-        let least = LEAST * self.metric.energy(&at.r);
+        // what has hardly changed since the anchor is known well enough by itself
+        let least = LEAST * self.metric.energy(&at.r).max(LEAST * self.metric.weight(&at.r));
         if self.limits.is_none() && gaps <= least {
             (self.limits, self.enough) = (Some(sites.limits(at, &self.metric.own)), least);
         }
@@ -88,7 +90,9 @@ impl Selection {
             let limits = self.limits.take().unwrap_or_default();
             let at_limits = self.measure(problem, sites, at, &limits, selected, iteration);
             self.limits = Some(limits);
-            let was_solved = std::mem::replace(&mut solved, self.solves(at_limits));
+            // reactions that are next to r* need not be at its limits
+            let was_solved = solved;
+            solved = self.solves(at_limits) || was_solved && self.anchored > 0;
             if was_solved && !solved {
                 self.patient += 1;
                 solved = self.patient > MOST_PATIENT;

@@ -1,6 +1,6 @@
 //! Points from which a path begins.
 
-use super::cones::{eigenvalues, product};
+use super::cones::least_product;
 use super::coupling::Coupling;
 use super::local::{State, gap};
 use super::sites::Sites;
@@ -47,7 +47,7 @@ pub(super) fn warm(sites: &Sites, coupling: &Coupling, reactions: &[f64]) -> Sta
     let mut at = State { x: sites.primal(&r), r, z };
     let least = 0.1 * gap(&at);
     for (x, z) in at.x.iter().zip(&mut at.z) {
-        while eigenvalues(&product(x, z))[1] < least {
+        while least_product(x, z) < least {
             z[0] *= 2.0;
         }
     }
