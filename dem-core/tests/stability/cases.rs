@@ -390,11 +390,13 @@ fn a_pile_rests_or_falls_as_its_friction_says() {
 
 /// Reactions that balance the weights of six disks exist from a friction of 0.43399 on (a linear programme in the rows of
 /// its contacts): below, every solver must let them fall. Above, rest and motion can both be solutions of Coulomb's law, and
-/// which is found depends on where the search begins; from 0.7 on all find rest.
+/// which is found depends on where the search begins: from 0.7 on all find rest but the central path, which from a cold start ends
+/// at motion up to 1.2 at least.
 #[test]
 fn a_pile_of_six_falls_where_no_reactions_can_hold_it() {
     for kind in Kind::ALL {
-        assert!(travel(pile(3, 0.8, kind), 1_000) < 1e-6, "{kind:?}");
+        let rests = if kind == Kind::Interior { 3.0 } else { 0.8 };
+        assert!(travel(pile(3, rests, kind), 1_000) < 1e-6, "{kind:?}");
         assert!(travel(pile(3, 0.43, kind), 1_000) > 1e-3, "{kind:?}");
     }
 }
