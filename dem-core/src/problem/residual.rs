@@ -4,8 +4,11 @@
 //! entry of its Delassus block. The cohesion's shift is not in the denominator: on a strongly bonded sample it would
 //! hide the load. A natural map that is as small as the rounding of the velocities behind it is zero: grains that part
 //! leave reactions so small that their ratio to the map says nothing.
+//!
+//! The residual is relative to all reactions. Where a body of mass m bears bodies of mass M, its velocity is off by the residual times
+//! M/m. The *velocity error* measures that, and the solvers of [`crate::solver::Staged`] stop on both.
 
-use super::{Contact, ContactProblem, Group, Nodes};
+use super::{Contact, ContactProblem, Group, Nodes, Visitor};
 use crate::contact::Law;
 use crate::dim::{Dim, Vect};
 use rayon::prelude::*;
@@ -72,4 +75,32 @@ pub fn residual<D: Dim>(problem: &ContactProblem<D>) -> f64 {
 /// The norm of the natural map over `scale`; zero where it is the rounding of summands of norm `rounded`.
 pub(super) fn relative(map: f64, rounded: f64, scale: f64) -> f64 {
     if map <= ROUNDING * rounded { 0.0 } else { map / scale }
+}
+
+/// The velocity error of the impulses and node velocities that the problem now holds (–): the natural map as a velocity, D ‖map‖, of the
+/// contact where it is largest, over the largest relative velocity without reactions.
+pub fn velocity_error<D: Dim>(problem: &ContactProblem<D>) -> f64 {
+    let mut largest = Largest { problem, map: 0.0, free: 0.0 };
+    problem.visit(&mut largest);
+    if largest.map == 0.0 { 0.0 } else { largest.map / largest.free }
+}
+
+/// The largest velocities of all contacts (m/s): of the natural map, and without reactions.
+struct Largest<'a, D: Dim> {
+    problem: &'a ContactProblem<D>,
+    map: f64,
+    free: f64,
+}
+
+impl<D: Dim> Visitor<D> for Largest<'_, D> {
+    #[inline(always)]
+    fn visit<L: Law>(&mut self, nodes: &Nodes<D>, c: &Contact<D, L>) {
+        let (law, arms) = (&c.law, c.law.arms());
+        let map = law.natural_map(c.r, nodes.relative_velocity(&c.link, arms));
+        let [i, j] = c.link.nodes.map(|k| self.problem.free[k as usize]);
+        let mut free = c.link.relative_velocity::<L::T, L::B>(arms, i, j) - law.compliance().times(&law.carried());
+        free.n += law.bias();
+        self.map = self.map.max(map.dot(&map).sqrt() / law.gamma());
+        self.free = self.free.max(free.dot(&free).sqrt());
+    }
 }

@@ -63,6 +63,10 @@ impl Solvable for Assembled {
         self.residual()
     }
 
+    fn velocity_error(&self) -> f64 {
+        self.velocity_error()
+    }
+
     fn swept(&mut self, sweeps: usize) -> Vec<Padded> {
         let sites = Sites::of(self);
         for _ in 0..sweeps {

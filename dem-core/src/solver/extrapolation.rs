@@ -11,7 +11,7 @@ use super::rows::{Row, Rows, mass_unit};
 use crate::bond::failure;
 use crate::contact::{Law, PADDED, Padded};
 use crate::dim::{Dim, Moments, Vect};
-use crate::problem::residual::residual;
+use crate::problem::residual::{residual, velocity_error};
 use crate::problem::{Contact, ContactProblem, Group, Nodes, Visitor};
 use crate::saved::{Mismatch, Reader, Saved};
 
@@ -67,7 +67,10 @@ impl Extrapolation {
         problem.velocities_from_reactions();
         let (residual, load_error) = (residual(problem), motion(problem));
         let allowed = load_tolerance.min((MORE * self.moves).max(SHARE * load_tolerance));
-        let holds = residual <= SHARE * tolerance && load_error <= allowed && self.keeps_status();
+        let holds = residual <= SHARE * tolerance
+            && load_error <= allowed
+            && velocity_error(problem) <= load_tolerance
+            && self.keeps_status();
         if holds && !at_limit(&problem.bonded) && !at_limit(&problem.elastic) {
             (self.steps, self.left, self.kicked) = (self.steps + 1, self.left - 1, true);
             self.rest.forget();

@@ -5,7 +5,7 @@ use super::{ContactSolver, GaussSeidel, GaussSeidelSettings, SolveReport, sweep}
 use crate::contact::{Law, LocalSolve, Padded};
 use crate::dim::{Dim, Vect};
 use crate::problem::assembled::BlockMatrix;
-use crate::problem::residual::residual;
+use crate::problem::residual::{residual, velocity_error};
 use crate::problem::{ContactProblem, Group};
 
 /// A problem that can be put into rows over scaled unknowns, swept and measured.
@@ -20,6 +20,8 @@ pub(super) trait Solvable {
     fn velocities_from_reactions(&mut self);
     /// The residual of the reactions at hand (–).
     fn residual(&self) -> f64;
+    /// Their velocity error (–).
+    fn velocity_error(&self) -> f64;
     /// The reactions after some sweeps of Gauss–Seidel, in the unit of the rows.
     fn swept(&mut self, sweeps: usize) -> Vec<Padded>;
     /// Take over reactions in the unit of the rows, and the velocities that they give.
@@ -41,6 +43,10 @@ impl<D: Dim> Solvable for ContactProblem<D> {
 
     fn residual(&self) -> f64 {
         residual(self)
+    }
+
+    fn velocity_error(&self) -> f64 {
+        velocity_error(self)
     }
 
     fn swept(&mut self, sweeps: usize) -> Vec<Padded> {

@@ -23,6 +23,7 @@ use crate::contact::{LocalSolve, Padded};
 use crate::dim::Dim;
 use crate::problem::ContactProblem;
 use crate::problem::assembled::Assembled;
+use crate::problem::residual::velocity_error;
 use crate::saved::{Mismatch, Reader, Saved};
 
 /// Penalty of Newton's rows, over the inverse of the mean normal entry of W.
@@ -75,7 +76,7 @@ pub struct StagedSettings {
     pub tolerance: f64,
     /// Largest residual that is accepted (–), at least `tolerance`.
     pub accept: f64,
-    /// Load error that the solver aims at (–).
+    /// Load error and velocity error that the solver aims at (–).
     pub load_tolerance: f64,
     /// Where the reactions start from.
     pub start: Start,
@@ -86,10 +87,10 @@ pub struct StagedSettings {
 }
 
 impl StagedSettings {
-    /// What a solve with this residual and load error amounts to.
-    pub(super) fn report(&self, work: Work, residual: f64, load_error: f64) -> SolveReport {
+    /// What a solve with this residual, load error and velocity error amounts to.
+    pub(super) fn report(&self, work: Work, residual: f64, load_error: f64, velocity_error: f64) -> SolveReport {
         // a residual of zero is rounding, and rounding is all that still changes
-        let settled = load_error <= self.load_tolerance || residual == 0.0;
+        let settled = load_error.max(velocity_error) <= self.load_tolerance || residual == 0.0;
         let status = match SolveStatus::of(residual, self.tolerance, self.accept) {
             SolveStatus::Converged if !settled => SolveStatus::Accepted,
             status => status,
@@ -130,7 +131,7 @@ impl Staged {
         // the reactions at hand may be it, as none are where bodies fly apart, and nothing may be there that yields
         let residual = problem.residual();
         if residual == 0.0 || rows.list.iter().all(|row| row.normal == 0.0) {
-            return self.settings.report(Work::default(), residual, 0.0);
+            return self.settings.report(Work::default(), residual, 0.0, 0.0);
         }
         let made = self.newton.made() + self.interior.made;
         let report = match self.by_the_active_set(problem, &rows) {
@@ -155,7 +156,7 @@ impl Staged {
 
     /// What the interior-point method comes to, and sweeps from where it ends.
     fn along_the_path(&mut self, problem: &mut impl Solvable, rows: &Rows, mut newton: u64) -> SolveReport {
-        let StagedSettings { tolerance, accept, load_tolerance, max_iterations, .. } = self.settings;
+        let StagedSettings { tolerance, accept, .. } = self.settings;
         // what Newton has left of margins belongs to other reactions
         self.newton.margins.clear();
         let begun = multipliers(rows);
@@ -166,22 +167,24 @@ impl Staged {
         let start = (!is_cold(rows)).then_some(&begun[..]);
         // what breaks a bond is the load that it bears; of dry contacts any reactions that balance will do
         let least = problem.matrix().is_none() && rows.list.iter().any(|row| row.shift > 0.0);
-        let aims = Aims { tolerance, load_tolerance, least, most: max_iterations };
+        let aims = self.aims(least);
         let graph = &mut self.newton.graph;
         let mut best = self.interior.solve(problem, rows, graph, &anchor, start, aims);
         newton += best.as_ref().map_or(0, |found| found.iterations);
-        if best.as_ref().is_none_or(|found| found.residual > accept) {
+        if best.as_ref().is_none_or(|found| found.missed(aims) > accept / tolerance) {
             // any reactions, from a cold start: another path
             let any = Aims { least: false, ..aims };
             let other = self.interior.solve(problem, rows, graph, &anchor, None, any);
             newton += other.as_ref().map_or(0, |found| found.iterations);
-            best = best.into_iter().chain(other).min_by(|a, b| a.residual.total_cmp(&b.residual));
+            best = best.into_iter().chain(other).min_by(|a, b| a.missed(aims).total_cmp(&b.missed(aims)));
         }
         let residual = best.as_ref().map_or(f64::INFINITY, |found| found.residual);
         let by_the_path = |problem: &mut _, sweeps| {
-            let load_error = best.as_ref().map_or(1.0, |found| found.load_error);
+            let (load_error, velocity_error) =
+                best.as_ref().map_or((1.0, 1.0), |found| (found.load_error, found.velocity_error));
             best.iter().for_each(|found| Solvable::write_back(problem, &found.reactions));
-            let report = self.settings.report(Work { sweeps, newton, factorisations: 0 }, residual, load_error);
+            let work = Work { sweeps, newton, factorisations: 0 };
+            let report = self.settings.report(work, residual, load_error, velocity_error);
             SolveReport { route: Route::InteriorPoint, ..report }
         };
         if residual <= tolerance {
@@ -190,10 +193,13 @@ impl Staged {
         best.iter().for_each(|found| problem.write_back(&found.reactions));
         problem.forget_what_is_not_finite();
         let swept = problem.gauss_seidel(self.sweeps(tolerance, LAST_SWEEPS));
-        if residual <= swept.residual {
+        let velocity_error = problem.velocity_error();
+        if best.as_ref().is_some_and(|found| found.missed(aims) <= aims.missed(swept.residual, velocity_error)) {
             return by_the_path(problem, swept.work.sweeps);
         }
-        SolveReport { work: Work { newton, ..swept.work }, ..swept }
+        let work = Work { newton, ..swept.work };
+        let SolveReport { status, .. } = self.settings.report(work, swept.residual, 0.0, velocity_error);
+        SolveReport { status, work, ..swept }
     }
 
     /// The reactions that those of least energy are nearest to.
@@ -204,27 +210,43 @@ impl Staged {
         }
     }
 
+    /// What is asked of a solution.
+    fn aims(&self, least: bool) -> Aims {
+        let StagedSettings { tolerance, load_tolerance, max_iterations, .. } = self.settings;
+        Aims { tolerance, load_tolerance, least, most: max_iterations }
+    }
+
     /// Gauss–Seidel that aims at this residual.
     fn sweeps(&self, tolerance: f64, max_sweeps: u64) -> GaussSeidelSettings {
         let (local, accept) = (LocalSolve::Exact, self.settings.accept);
         GaussSeidelSettings { local, tolerance, accept, max_sweeps, acceleration: 0 }
     }
 
-    /// By sweeps over dry contacts: for the tolerance, then for what is accepted.
+    /// By sweeps over dry contacts: for the tolerances, then for what is accepted. Both measures may miss by as much as the residual may.
     fn swept<D: Dim>(&self, problem: &mut ContactProblem<D>) -> SolveReport {
         let StagedSettings { tolerance, accept, .. } = self.settings;
         let by = |tolerance, most| GaussSeidel::new(self.sweeps(tolerance, most));
-        let fine = by(tolerance, FINE_SWEEPS).solve(problem);
-        if fine.status != SolveStatus::Failed {
-            return fine;
+        let most_missed = accept / tolerance;
+        let (mut aim, mut work) = (tolerance, Work::default());
+        loop {
+            let fine = by(aim, FINE_SWEEPS - work.sweeps).solve(problem);
+            work = work + fine.work;
+            let missed = self.aims(false).missed(fine.residual, velocity_error(problem));
+            // sweeps look at the residual alone: a finer one for the velocities
+            if missed > 1.0 && fine.residual <= aim && work.sweeps < FINE_SWEEPS {
+                aim = fine.residual / missed;
+                continue;
+            }
+            match SolveStatus::of(missed, 1.0, most_missed) {
+                SolveStatus::Failed => break,
+                status => return SolveReport { status, work, ..fine },
+            }
         }
         let coarse = by(accept, COARSE_SWEEPS).solve(problem);
-        let work = fine.work + coarse.work;
-        match coarse.status {
-            // it aimed at less than the tolerance
-            SolveStatus::Converged => SolveReport { status: SolveStatus::Accepted, work, ..coarse },
-            _ => SolveReport { work, ..coarse },
-        }
+        let missed = self.aims(false).missed(coarse.residual, velocity_error(problem));
+        // it aimed at less than the tolerance
+        let status = if missed <= most_missed { SolveStatus::Accepted } else { SolveStatus::Failed };
+        SolveReport { status, work: work + coarse.work, ..coarse }
     }
 }
 

@@ -129,8 +129,8 @@ pub struct Run {
 
 impl Row {
     /// Runs of these values, by value, solver and dimension.
-    pub fn runs(&self, values: &[f64], kinds: &[Kind], steps: usize) -> Vec<Run> {
-        let every = values.iter().flat_map(|v| kinds.iter().flat_map(move |k| [2, 3].map(|d| (*v, *k, d))));
+    pub fn runs(&self, values: &[f64], kinds: &[Kind], dimensions: &[usize], steps: usize) -> Vec<Run> {
+        let every = values.iter().flat_map(|v| kinds.iter().flat_map(move |k| dimensions.iter().map(|d| (*v, *k, *d))));
         let every: Vec<(f64, Kind, usize)> = every.collect();
         let run = |&(value, kind, dimension): &(f64, Kind, usize)| {
             let heap = Heap { kind, ..(self.heap)(value) };
@@ -158,7 +158,7 @@ impl Row {
 
 impl Run {
     /// How it fails; empty where it holds.
-    fn failing(&self) -> String {
+    pub fn failing(&self) -> String {
         let o = &self.outcome;
         let mut how = Vec::new();
         if o.penetration > OVERLAP {
@@ -177,11 +177,12 @@ impl Run {
         how.join(", ")
     }
 
-    fn name(&self) -> String {
+    pub fn name(&self) -> String {
         let solver = match self.kind {
             Kind::GaussSeidel => "Gauss–Seidel",
             Kind::Newton => "Newton",
             Kind::Auto => "auto",
+            Kind::Interior => "interior",
         };
         format!("{solver} {}D", self.dimension)
     }
@@ -204,7 +205,7 @@ pub fn table(rows: &[(&Row, Vec<Run>)]) -> String {
                 let failing = of(*value).map(|run| (run.failing(), run.name())).filter(|(how, _)| !how.is_empty());
                 failing.for_each(|(how, name)| ways.entry(how).or_default().push(name));
                 let way = |(how, names): (&String, &Vec<String>)| match names.len() {
-                    6 => format!("{how} (all)"),
+                    n if n == of(*value).count() => format!("{how} (all)"),
                     _ => format!("{how} ({})", names.join(", ")),
                 };
                 format!("**{value:e}** {}", ways.iter().map(way).collect::<Vec<_>>().join("; "))

@@ -18,13 +18,14 @@ pub enum Kind {
     GaussSeidel,
     Newton,
     Auto,
+    Interior,
 }
 
 /// Sweeps of Gauss–Seidel after which a solve is refused.
 pub const SWEEPS: u64 = 100_000;
 
 impl Kind {
-    pub const ALL: [Self; 3] = [Self::GaussSeidel, Self::Newton, Self::Auto];
+    pub const ALL: [Self; 4] = [Self::GaussSeidel, Self::Newton, Self::Auto, Self::Interior];
 
     pub fn settings(self, tolerance: f64, accept: f64) -> SolverSettings {
         let newton = common::newton(tolerance, accept, 1e-5);
@@ -38,6 +39,7 @@ impl Kind {
             }),
             Self::Newton => SolverSettings::Staged(newton),
             Self::Auto => SolverSettings::Staged(StagedSettings { stages: Stages::All, ..newton }),
+            Self::Interior => SolverSettings::Staged(StagedSettings { stages: Stages::Interior, ..newton }),
         }
     }
 }

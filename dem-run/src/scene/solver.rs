@@ -58,7 +58,8 @@ pub struct GaussSeidel {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Newton {
-    /// Load error that the solver aims at: how far the net force on the bodies still changed, over itself.
+    /// Load error that the solver aims at, how far the net force on the bodies still changed, over itself; the velocity error
+    /// likewise, how far contacts are from their laws, over the free velocities.
     pub load_tolerance: f64,
     /// Where the reactions start from in every step.
     pub start: Start,

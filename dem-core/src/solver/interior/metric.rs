@@ -1,7 +1,7 @@
 //! The metric 1/ρ: a compliance that selects one of many reactions.
 
 use super::local::{State, opened};
-use super::sites::Sites;
+use super::sites::{ROWS, Sites};
 
 /// A compliance that draws reactions to given ones.
 pub(super) struct Metric {
@@ -27,11 +27,24 @@ impl Metric {
         }
     }
 
-    /// What the compliance leaves of the residual: the norm of (r − r₀)/ρ over that of r, where the mean normal entry of W is one.
-    pub fn residual(&self, r: &[f64]) -> f64 {
-        let soft = r.iter().zip(&self.anchor).zip(&self.own).map(|((r, r0), c)| (c * (r - r0)).powi(2)).sum::<f64>();
+    /// What the compliance leaves of the residual, and the largest velocity that it leaves a contact: u = (r − r₀)/ρ, as an impulse over the
+    /// normal entry of W. Where friction does not open, the law adds μ times the slip to the normal velocity.
+    pub fn left(&self, sites: &Sites, r: &[f64]) -> (f64, f64) {
+        let (mut all, mut largest) = (0.0, 0.0f64);
+        for (site, normal) in sites.list.iter().zip(&sites.normal).filter(|(_, normal)| **normal > 0.0) {
+            let mut u = [0.0; ROWS];
+            for (k, u) in (site.at..site.at + site.rows).zip(&mut u) {
+                *u = self.own[k] * (r[k] - self.anchor[k]);
+            }
+            for cone in sites.cones[site.cones.clone()].iter().filter(|cone| !cone.opens) {
+                let slip = cone.rows[..cone.tangents].iter().map(|row| u[*row] * u[*row]).sum::<f64>();
+                u[0] += cone.slope * slip.sqrt();
+            }
+            let square = u.iter().map(|u| u * u).sum::<f64>();
+            (all, largest) = (all + square / (normal * normal), largest.max(square));
+        }
         let size = r.iter().map(|r| r * r).sum::<f64>();
-        if soft == 0.0 { 0.0 } else { (soft / size).sqrt() }
+        (if all == 0.0 { 0.0 } else { (all / size).sqrt() }, largest.sqrt())
     }
 
     /// Σ r²/ρ.

@@ -107,7 +107,7 @@ impl Selection {
             self.turn = Some(at.clone());
         }
         match &self.turn {
-            Some(turn) if gaps <= least && self.metric.residual(&at.r) > SHOWS * self.aims.tolerance => {
+            Some(turn) if gaps <= least && self.metric_shows(sites, at) => {
                 if self.anchored == MOST_ANCHORED {
                     return Verdict::Arrived;
                 }
@@ -122,12 +122,19 @@ impl Selection {
         }
     }
 
-    fn solves(&self, residual: f64) -> bool {
-        residual <= self.aims.tolerance && self.change <= self.aims.load_tolerance || residual == 0.0
+    /// Whether the compliance of the metric takes much of what the residual, or the velocity error, may be.
+    fn metric_shows(&self, sites: &Sites, at: &State) -> bool {
+        let Aims { tolerance, load_tolerance, .. } = self.aims;
+        let (residual, velocity) = self.metric.left(sites, &at.r);
+        residual > SHOWS * tolerance || velocity > SHOWS * load_tolerance * sites.largest_free()
     }
 
-    /// The residual of the reactions of a point, put on their limits; they are kept if they are the best so far: those that are selected and
-    /// within the tolerance, else those of the smallest residual.
+    fn solves(&self, missed: f64) -> bool {
+        missed <= 1.0 && self.change <= self.aims.load_tolerance || missed == 0.0
+    }
+
+    /// How far the reactions of a point, put on their limits, [miss](Aims::missed) what is asked for; they are kept if they are the best so far:
+    /// those that are selected and within the tolerances, else those that miss least.
     fn measure(
         &mut self,
         problem: &mut impl Solvable,
@@ -139,14 +146,16 @@ impl Selection {
     ) -> f64 {
         let reactions = sites.snapped(at, limits);
         problem.write_back(&reactions);
-        let residual = problem.residual();
-        let done = selected && residual <= self.aims.tolerance;
-        let better = |best: &Found| done || !best.selected && residual < best.residual;
+        let (residual, velocity_error) = (problem.residual(), problem.velocity_error());
+        let missed = self.aims.missed(residual, velocity_error);
+        let done = selected && missed <= 1.0;
+        let better = |best: &Found| done || !best.selected && missed < best.missed(self.aims);
         if self.best.as_ref().is_none_or(better) {
-            self.best = Some(Found { reactions, residual, load_error: self.change, iterations, selected: done });
+            let load_error = self.change;
+            self.best = Some(Found { reactions, residual, load_error, velocity_error, iterations, selected: done });
         } else if let Some(best) = &mut self.best {
             best.iterations = iterations;
         }
-        residual
+        missed
     }
 }

@@ -109,6 +109,8 @@ pub(super) struct Sites {
     pub speed: f64,
     /// For each contact: the shift of its normal reaction.
     pub shift: Vec<f64>,
+    /// For each contact: the normal entry of W over the mean of all.
+    pub normal: Vec<f64>,
     /// For each row: the velocity without reactions, the compliance of an elastic bond and the reaction at which it is at rest, and
     /// the compliance that stands for the limit of stiff contacts, where κ is one.
     pub free: Vec<f64>,
@@ -191,7 +193,14 @@ impl Sites {
             self.metric.push(weights[*place] / soft);
         }
         self.shift.push(row.shift / self.force);
+        self.normal.push(row.normal / normal);
         self.list.push(site);
+    }
+
+    /// The largest velocity without reactions.
+    pub fn largest_free(&self) -> f64 {
+        let rows = self.free.iter().zip(&self.compliance).zip(&self.carried);
+        rows.map(|((u, c), r0)| (u - c * r0).abs()).fold(0.0, f64::max)
     }
 
     /// x = G r̂ of all cones.

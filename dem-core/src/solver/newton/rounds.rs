@@ -26,7 +26,7 @@ impl Newton {
         iterations: &mut u64,
     ) -> Option<SolveReport> {
         let mut shrinking = Shrinking::default();
-        let (mut last_error, mut softened, mut made_in_all) = (f64::INFINITY, 0, 0);
+        let (mut last_error, mut last_velocity_error, mut softened, mut made_in_all) = (f64::INFINITY, 0.0, 0, 0);
         self.margins.clear();
         loop {
             let mut state = Iterate::from_reactions(rows, &guess.reactions);
@@ -36,7 +36,7 @@ impl Newton {
                 // what the round before left is good enough, and this was to tell its load error: the velocities show it
                 let begun = rows.given_by(&guess.reactions);
                 let load_error = distance(&begun, &state.y) / distance(&begun, &rows.free);
-                let report = self.report(*iterations, last_error, load_error);
+                let report = self.report(*iterations, last_error, load_error, last_velocity_error);
                 if report.status == SolveStatus::Converged {
                     return Some(report);
                 }
@@ -51,10 +51,10 @@ impl Newton {
             problem.write_back(&state.reactions);
             let multipliers: Vec<_> = rows.list.iter().map(|row| row.multiplier).collect();
             let load_error = shrinking.error(net_change(rows, &multipliers, &state.reactions));
-            let error = problem.residual();
+            let (error, velocity_error) = (problem.residual(), problem.velocity_error());
             rows.move_multipliers(&state.reactions);
             guess = Guess::of(state.reactions);
-            let report = self.report(*iterations, error, load_error);
+            let report = self.report(*iterations, error, load_error, velocity_error);
             if report.status == SolveStatus::Converged {
                 return Some(report);
             }
@@ -68,12 +68,12 @@ impl Newton {
                 rows.soften(100.0);
                 softened += 1;
             }
-            last_error = error;
+            (last_error, last_velocity_error) = (error, velocity_error);
         }
     }
 
-    fn report(&self, iterations: u64, residual: f64, load_error: f64) -> SolveReport {
+    fn report(&self, iterations: u64, residual: f64, load_error: f64, velocity_error: f64) -> SolveReport {
         let work = Work { newton: iterations, ..Work::default() };
-        self.settings.report(work, residual, load_error)
+        self.settings.report(work, residual, load_error, velocity_error)
     }
 }
