@@ -3,7 +3,6 @@
 use super::continuation::{Continuation, Progress};
 use super::direction::{advance, direction, is_central};
 use super::local::{State, gap};
-use super::selection::BACK;
 use super::sites::Sites;
 use super::start::cold;
 use super::system::System;
@@ -48,18 +47,17 @@ impl Follow {
         self.by_arc_length.as_ref().map_or_else(|| self.at.clone(), |by| by.continuation.state())
     }
 
-    /// Go on from a point that was passed; by arc length from the point at hand with a higher barrier, which is nearer to the path.
-    pub fn turn_back(&mut self, mut to: State, sites: &Sites) {
-        if self.by_arc_length.is_some() {
-            self.at = self.state();
-            self.jam(BACK);
+    /// Go on from a point that was passed.
+    pub fn turn_back(&mut self, to: State, sites: &Sites) {
+        let by_arc_length = self.by_arc_length.take().is_some();
+        self.short = 0;
+        self.at = to;
+        if by_arc_length {
+            self.jam(1.0);
             return;
         }
-        to.x = sites.primal(&to.r);
-        self.short = 0;
-        let jams = !is_central(&to);
-        self.at = to;
-        if jams {
+        self.at.x = sites.primal(&self.at.r);
+        if !is_central(&self.at) {
             self.jam(RAISED);
         }
     }

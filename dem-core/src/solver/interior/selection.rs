@@ -20,8 +20,9 @@ const STIFFEST: f64 = 1e12;
 /// What the gaps of all pairs may be beside the energy of the metric for reactions to count as those of least energy, and what this may be beside
 /// Σ r²/ρ.
 const LEAST: f64 = 1e-5;
-/// Gaps, over those, at which the point is kept from which the path is followed again.
-pub(super) const BACK: f64 = 30.0;
+/// Gaps of all pairs, over the energy of the metric, at which the point is kept from which the path is followed again: with another anchor a path
+/// whose gaps are far smaller is another one.
+const BACK: f64 = 0.03;
 /// Share of its compliance that a metric keeps each time it is anchored again after the first, and how often that is done.
 const HARDER: f64 = 0.01;
 const MOST_ANCHORED: u32 = 5;
@@ -79,7 +80,8 @@ impl Selection {
     pub fn assess(&mut self, problem: &mut impl Solvable, sites: &Sites, at: &State, iteration: u64) -> Verdict {
         let gaps = gap(at) * at.x.len() as f64;
         // what has hardly changed since the anchor is known well enough by itself
-        let least = LEAST * self.metric.energy(&at.r).max(LEAST * self.metric.weight(&at.r));
+        let energy = self.metric.energy(&at.r).max(LEAST * self.metric.weight(&at.r));
+        let least = LEAST * energy;
         if self.limits.is_none() && gaps <= least {
             (self.limits, self.enough) = (Some(sites.limits(at, &self.metric.own)), least);
         }
@@ -103,7 +105,7 @@ impl Selection {
         if solved || exhausted {
             return Verdict::Arrived;
         }
-        if gaps <= BACK * least && self.turn.is_none() {
+        if gaps <= BACK * energy && self.turn.is_none() {
             self.turn = Some(at.clone());
         }
         match &self.turn {
