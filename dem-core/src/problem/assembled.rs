@@ -194,9 +194,14 @@ impl Assembled {
     /// The relative velocities u = W r̂ + q (m/s), C × M.
     #[must_use]
     pub fn velocities(&self) -> Vec<f64> {
+        self.velocities_from(&self.r)
+    }
+
+    /// The relative velocities of all contacts that these reactions would give.
+    fn velocities_from(&self, r: &[f64]) -> Vec<f64> {
         let (mut u, size) = (self.parts.q.clone(), self.parts.rows.count());
         for (c, u) in u.chunks_exact_mut(size).enumerate() {
-            self.parts.matrix.multiply_row(c, &self.r, u);
+            self.parts.matrix.multiply_row(c, r, u);
         }
         u
     }
@@ -263,10 +268,9 @@ impl Assembled {
     #[must_use]
     pub fn velocity_error(&self) -> f64 {
         let size = self.parts.rows.count();
-        let mut free = self.clone();
-        free.r.iter_mut().for_each(|r| *r = 0.0);
-        self.parts.shift.iter().enumerate().for_each(|(c, shift)| free.r[c * size] = *shift);
-        let speed = free.velocities().iter().map(|u| u.abs()).fold(0.0, f64::max);
+        let mut none = vec![0.0; self.r.len()];
+        self.parts.shift.iter().enumerate().for_each(|(c, shift)| none[c * size] = *shift);
+        let speed = self.velocities_from(&none).iter().map(|u| u.abs()).fold(0.0, f64::max);
         let map = |(c, d): (usize, f64)| {
             let change = self.correction(c, 1.0 / d, self.reaction(c), self.velocity(c));
             d * change.dot(&change).sqrt()

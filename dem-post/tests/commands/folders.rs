@@ -180,3 +180,16 @@ fn control_characters_never_reach_the_terminal() {
     let found = json(&dem_post(&path, &["stress-strain", "--json"]));
     assert_eq!(found["wall"], odd.walls[1].name.as_str());
 }
+
+#[test]
+fn a_file_that_another_program_writes_is_not_called_damaged() {
+    let (_folder, path) = sample(&layout(2));
+    // the lock that HDF5 takes on a file open for writing
+    let held = std::fs::File::open(&path).unwrap();
+    held.lock().unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_dem-post"));
+    command.env("HDF5_USE_FILE_LOCKING", "TRUE").arg("info").arg(&path);
+    refused(&command.output().unwrap(), 4, &["open for writing in another program", "close it there"]);
+    held.unlock().unwrap();
+    assert!(command.output().unwrap().status.success());
+}

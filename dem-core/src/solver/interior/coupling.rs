@@ -34,13 +34,27 @@ pub(super) struct Block {
 }
 
 impl<'a> Coupling<'a> {
+    /// By the matrix where the problem is known by one, else through the bodies; none where no elimination tree can be made.
+    pub fn of(
+        rows: &'a Rows,
+        matrix: Option<&BlockMatrix>,
+        graph: Option<&'a Graph>,
+        sites: &Sites,
+        speed_over_force: f64,
+    ) -> Option<Self> {
+        match matrix {
+            Some(matrix) => Self::matrix(matrix, sites, speed_over_force),
+            None => graph.map(|graph| Self::bodies(rows, speed_over_force, graph)),
+        }
+    }
+
     /// Through the bodies of `rows`.
-    pub fn bodies(rows: &'a Rows, speed_over_force: f64, graph: &'a Graph) -> Self {
+    fn bodies(rows: &'a Rows, speed_over_force: f64, graph: &'a Graph) -> Self {
         Self::Bodies { rows, scale: 1.0 / speed_over_force.sqrt(), graph }
     }
 
     /// By a symmetric matrix, of which the upper triangle is read.
-    pub fn matrix(matrix: &BlockMatrix, sites: &Sites, speed_over_force: f64) -> Option<Self> {
+    fn matrix(matrix: &BlockMatrix, sites: &Sites, speed_over_force: f64) -> Option<Self> {
         let (scale, size) = (1.0 / speed_over_force, matrix.size());
         let (mut blocks, mut values) = (Vec::new(), Vec::new());
         for (c, site) in sites.list.iter().enumerate() {

@@ -29,24 +29,26 @@ fn scale(x: &Point, z: &Point) -> f64 {
     1.0 / (x[0] + z[0])
 }
 
-/// In which scaling the pairs of a point are linearised: as they are, or where x ∘ z is outside the cone in that of Nesterov & Todd, in which
-/// every interior pair has a direction.
-pub(super) fn scalings(at: &State) -> Vec<Scaling> {
+/// A pair in the scaling in which it is linearised.
+pub(super) struct Scaled {
+    pub scaling: Scaling,
+    pub x: Point,
+    pub z: Point,
+}
+
+/// The pairs of a point, linearised as they are, or where x ∘ z is outside the cone in the scaling of Nesterov & Todd, in which every
+/// interior pair has a direction.
+pub(super) fn scaled(at: &State) -> Vec<Scaled> {
     let one = |(x, z): (&Point, &Point)| {
-        if eigenvalues(&product(x, z))[1] > 0.0 { Scaling::NONE } else { Scaling::of(x, z) }
+        let scaling = if eigenvalues(&product(x, z))[1] > 0.0 { Scaling::NONE } else { Scaling::of(x, z) };
+        Scaled { scaling, x: scaling.x(x), z: scaling.z(z) }
     };
     at.x.iter().zip(&at.z).map(one).collect()
 }
 
 /// The inverses of all local matrices at a point, with the compliance of each row, and the sign of the product of their
 /// determinants; none if one has no inverse.
-pub(super) fn invert(
-    sites: &Sites,
-    at: &State,
-    scalings: &[Scaling],
-    compliance: &[f64],
-    inverses: &mut Vec<f64>,
-) -> Option<f64> {
+pub(super) fn invert(sites: &Sites, pairs: &[Scaled], compliance: &[f64], inverses: &mut Vec<f64>) -> Option<f64> {
     let mut sign = 1.0;
     inverses.clear();
     inverses.resize(sites.matrices, 0.0);
@@ -59,8 +61,8 @@ pub(super) fn invert(
         let mut first = site.rows;
         for c in site.cones.clone() {
             let Cone { slope, rows, tangents, opens } = &sites.cones[c];
-            let (scaling, x, z) = (&scalings[c], scalings[c].x(&at.x[c]), scalings[c].z(&at.z[c]));
-            let scale = scale(&x, &z);
+            let Scaled { scaling, x, z } = &pairs[c];
+            let scale = scale(x, z);
             if *opens {
                 a[0][first] = -slope;
             }
@@ -68,7 +70,7 @@ pub(super) fn invert(
                 let mut unit = [0.0; 3];
                 unit[k] = 1.0;
                 // the columns of Arw(z) G and of Arw(x)
-                let (dx, dz) = (product(&z, &scaling.x(&unit)), product(&x, &scaling.z(&unit)));
+                let (dx, dz) = (product(z, &scaling.x(&unit)), product(x, &scaling.z(&unit)));
                 let (column, factor) = if k == 0 { (0, *slope) } else { (rows[k - 1], 1.0) };
                 for row in 0..=*tangents {
                     a[first + row][column] = scale * factor * dx[row];
@@ -118,14 +120,7 @@ fn gauss_jordan(a: &mut [[f64; 2 * ORDER]; ORDER], order: usize) -> Option<f64> 
 }
 
 /// The step for these right sides, where nothing moves the bodies: its `r` and `z` alone.
-pub(super) fn solve(
-    sites: &Sites,
-    at: &State,
-    scalings: &[Scaling],
-    inverses: &[f64],
-    a: &[f64],
-    b: &[Point],
-) -> State {
+pub(super) fn solve(sites: &Sites, pairs: &[Scaled], inverses: &[f64], a: &[f64], b: &[Point]) -> State {
     let mut step = State { r: vec![0.0; sites.rows], x: Vec::new(), z: vec![[0.0; 3]; sites.cones.len()] };
     for site in &sites.list {
         let order = site.order();
@@ -133,7 +128,7 @@ pub(super) fn solve(
         right[..site.rows].copy_from_slice(site.part(a));
         let mut first = site.rows;
         for c in site.cones.clone() {
-            let scale = scale(&scalings[c].x(&at.x[c]), &scalings[c].z(&at.z[c]));
+            let scale = scale(&pairs[c].x, &pairs[c].z);
             let tangents = sites.cones[c].tangents;
             for k in 0..1 + tangents {
                 right[first + k] = scale * b[c][k];

@@ -1,15 +1,15 @@
 //! The interior-point method, with Coulomb's law exact.
 //!
-//! Every contact is a list of cone pairs ([`sites`]): x = G r̂ ∈ Q ⊥ z ∈ Q with u + C (r − r₀) = Σ Bᵀ z and u = W r + q. Between the pairs the
-//! method follows the path x ∘ z = barrier, linearised as it stands, slip speeds and all: the direction of Alizadeh, Haeberly
-//! & Overton, for a pair whose product has left the cone that of Nesterov & Todd, with Mehrotra's predictor–corrector and Gondzio's correctors,
-//! one factorisation an iteration.
+//! Every contact is a list of cone pairs ([`sites`]): x = G r̂ ∈ Q ⊥ z ∈ Q with u + C (r − r₀) = Σ Bᵀ z and u = W r + q. Between the
+//! pairs the method follows the path x ∘ z = barrier, linearised as it stands, slip speeds and all: in the direction of Alizadeh,
+//! Haeberly & Overton, or of Nesterov & Todd for a pair whose product has left the cone, with Mehrotra's predictor–corrector and
+//! Gondzio's correctors, one factorisation an iteration.
 //!
 //! The metric 1/ρ is a compliance anchored at given reactions: among the many that balance a rigid network the path ends at those of least
 //! Σ r²/ρ. See docs/theory/interior-point.md.
 //!
-//! Sources: Alizadeh, Haeberly & Overton, SIAM J. Optim. 8, 1998; Nesterov & Todd, SIAM J. Optim. 8, 1998; Mehrotra, SIAM J. Optim. 2, 1992; Gondzio, Comput. Optim. Appl. 6,
-//! 1996; for contact with friction Acary, Armand, Nguyen & Shpakovych, Optim. Methods Softw. 39, 2024.
+//! Sources: Alizadeh, Haeberly & Overton, SIAM J. Optim. 8, 1998; Nesterov & Todd, SIAM J. Optim. 8, 1998; Mehrotra, SIAM J. Optim.
+//! 2, 1992; Gondzio, Comput. Optim. Appl. 6, 1996; for contact with friction Acary, Armand, Nguyen & Shpakovych, Optim. Methods Softw. 39, 2024.
 
 mod cones;
 mod continuation;
@@ -32,9 +32,9 @@ use crate::solver::rows::Rows;
 use crate::solver::solvable::Solvable;
 use coupling::Coupling;
 use follow::Follow;
-use local::{State, invert, scalings};
+use local::{State, invert, scaled};
 use metric::{Metric, lack};
-use selection::{Selection, Verdict};
+use selection::{Next, Selection};
 use sites::Sites;
 use start::{cold, warm};
 use std::sync::Arc;
@@ -111,13 +111,8 @@ impl Interior {
         aims: Aims,
     ) -> Option<Found> {
         let sites = Sites::of(rows, start.unwrap_or(anchor));
-        let ratio = sites.speed / sites.force;
         let graph = if problem.matrix().is_none() { Graph::of(rows, graph) } else { None };
-        let coupling = match (problem.matrix(), &graph) {
-            (Some(matrix), _) => Coupling::matrix(matrix, &sites, ratio)?,
-            (None, Some(graph)) => Coupling::bodies(rows, ratio, graph),
-            (None, None) => return None,
-        };
+        let coupling = Coupling::of(rows, problem.matrix(), graph.as_deref(), &sites, sites.speed / sites.force)?;
         let begun = match start {
             Some(reactions) => warm(&sites, &coupling, &sites.gathered(reactions)),
             None => cold(&sites),
@@ -127,9 +122,9 @@ impl Interior {
         for iteration in 0..=aims.most {
             let at = follow.state();
             match selection.assess(problem, &sites, &at, iteration) {
-                Verdict::Arrived => break,
-                Verdict::Onwards => {}
-                Verdict::Anchored(turn) => {
+                Next::Arrived => break,
+                Next::Onwards => {}
+                Next::Anchored(turn) => {
                     follow.turn_back(turn, &sites);
                     continue;
                 }
@@ -151,22 +146,11 @@ impl Interior {
     ) -> Option<System<'a>> {
         let velocity = coupling.velocity(sites, &at.r);
         let right = lack(sites, &velocity, at, metric).into_iter().map(|x| -x).collect();
-        let scalings = scalings(at);
-        let locally = invert(sites, at, &scalings, &metric.compliance, &mut self.inverses)?;
+        let pairs = scaled(at);
+        let locally = invert(sites, &pairs, &metric.compliance, &mut self.inverses)?;
         self.made += 1;
         let globally = coupling.factorise(sites, &self.inverses, &mut self.lu)?;
         let (compliance, inverses, lu) = (&metric.compliance[..], &self.inverses[..], &self.lu);
-        Some(System {
-            sites,
-            coupling,
-            at,
-            velocity,
-            right,
-            scalings,
-            compliance,
-            inverses,
-            lu,
-            sign: locally * globally,
-        })
+        Some(System { sites, coupling, at, velocity, right, pairs, compliance, inverses, lu, sign: locally * globally })
     }
 }

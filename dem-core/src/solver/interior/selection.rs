@@ -34,7 +34,7 @@ const MOST_PATIENT: u32 = 3;
 const LEAST_GAP: f64 = 1e-26;
 
 /// What to do at a point.
-pub(super) enum Verdict {
+pub(super) enum Next {
     /// It is a solution, or nothing better will follow.
     Arrived,
     /// The path goes on.
@@ -77,7 +77,7 @@ impl Selection {
     }
 
     /// Measure a point, and decide how the path goes on.
-    pub fn assess(&mut self, problem: &mut impl Solvable, sites: &Sites, at: &State, iteration: u64) -> Verdict {
+    pub fn assess(&mut self, problem: &mut impl Solvable, sites: &Sites, at: &State, iteration: u64) -> Next {
         let gaps = gap(at) * at.x.len() as f64;
         // what has hardly changed since the anchor is known well enough by itself
         let energy = self.metric.energy(&at.r).max(LEAST * self.metric.weight(&at.r));
@@ -103,7 +103,7 @@ impl Selection {
         // a gap that is rounding tells nothing more
         let exhausted = gaps.is_nan() || gap(at) <= LEAST_GAP || iteration == self.aims.most;
         if solved || exhausted {
-            return Verdict::Arrived;
+            return Next::Arrived;
         }
         if gaps <= BACK * energy && self.turn.is_none() {
             self.turn = Some(at.clone());
@@ -111,16 +111,16 @@ impl Selection {
         match &self.turn {
             Some(turn) if gaps <= least && self.metric_shows(sites, at) => {
                 if self.anchored == MOST_ANCHORED {
-                    return Verdict::Arrived;
+                    return Next::Arrived;
                 }
                 // the same metric once more, then harder ones
                 let share = if self.anchored == 0 { 1.0 } else { HARDER };
                 self.metric.anchor_at(at.r.clone(), share);
                 self.enough *= share;
                 self.anchored += 1;
-                Verdict::Anchored(turn.clone())
+                Next::Anchored(turn.clone())
             }
-            _ => Verdict::Onwards,
+            _ => Next::Onwards,
         }
     }
 

@@ -225,6 +225,18 @@ impl Sites {
         list
     }
 
+    /// A list of all rows as reactions of the problem.
+    pub fn scattered(&self, list: &[f64]) -> Vec<Padded> {
+        self.list.iter().map(|site| self.padded(site, site.part(list))).collect()
+    }
+
+    /// The rows of one contact as its reaction.
+    fn padded(&self, site: &Site, own: &[f64]) -> Padded {
+        let mut r = [0.0; ROWS];
+        site.places.iter().zip(own).for_each(|(place, value)| r[*place] = value * self.force);
+        Padded::from_order(&r.into())
+    }
+
     /// Which cones reactions are at the limit of, where z is what the compliance of each row makes of how far they would be beyond.
     pub fn limits(&self, at: &State, compliance: &[f64]) -> Vec<Limit> {
         let mut limits = vec![Limit::default(); self.cones.len()];
@@ -265,10 +277,7 @@ impl Sites {
                     cone.rows[..cone.tangents].iter().for_each(|row| own[*row] *= scale);
                 }
             }
-            let mut r = [0.0; ROWS];
-            let rows = site.places.iter().zip(&own[..site.rows]);
-            rows.for_each(|(place, value)| r[*place] = value * self.force);
-            Padded::from_order(&r.into())
+            self.padded(site, &own[..site.rows])
         };
         self.list.iter().zip(&self.shift).map(one).collect()
     }

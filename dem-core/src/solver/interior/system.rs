@@ -1,8 +1,8 @@
 //! The linear system of a point.
 
-use super::cones::{Point, Scaling, moved, product, reach};
+use super::cones::{Point, moved, product, reach};
 use super::coupling::Coupling;
-use super::local::{State, follow, opened, solve, yield_to};
+use super::local::{Scaled, State, follow, opened, solve, yield_to};
 use super::sites::Sites;
 use crate::linear::Lu;
 
@@ -15,8 +15,8 @@ pub(super) struct System<'a> {
     pub right: Vec<f64>,
     /// W r at the point.
     pub velocity: Vec<f64>,
-    /// In which scaling each pair is linearised.
-    pub scalings: Vec<Scaling>,
+    /// Its pairs as they are linearised.
+    pub pairs: Vec<Scaled>,
     pub compliance: &'a [f64],
     pub inverses: &'a [f64],
     pub lu: &'a Lu,
@@ -27,8 +27,8 @@ pub(super) struct System<'a> {
 impl System<'_> {
     /// The products of these pairs, in the scaling of the point.
     pub fn products(&self, x: &[Point], z: &[Point]) -> Vec<Point> {
-        let pairs = x.iter().zip(z).zip(&self.scalings);
-        pairs.map(|((x, z), scaling)| product(&scaling.x(x), &scaling.z(z))).collect()
+        let all = x.iter().zip(z).zip(&self.pairs);
+        all.map(|((x, z), Scaled { scaling, .. })| product(&scaling.x(x), &scaling.z(z))).collect()
     }
 
     /// The step after which x ∘ z has changed by `by`, to first order.
@@ -47,7 +47,7 @@ impl System<'_> {
     }
 
     pub fn solved(&self, right: &[f64], by: &[Point]) -> State {
-        let mut step = solve(self.sites, self.at, &self.scalings, self.inverses, right, by);
+        let mut step = solve(self.sites, &self.pairs, self.inverses, right, by);
         let yielded = self.coupling.yielded(self.sites, &step.r, self.lu);
         yield_to(self.sites, self.inverses, &yielded, &mut step);
         follow(self.sites, &mut step);
@@ -60,9 +60,8 @@ impl System<'_> {
         let opened = opened(self.sites, &step.z);
         let left = (0..self.sites.rows).map(|k| self.right[k] - moving[k] - self.compliance[k] * step.r[k] + opened[k]);
         let missing = |c: usize| {
-            let scaling = &self.scalings[c];
-            let (x, z) = (scaling.x(&self.at.x[c]), scaling.z(&self.at.z[c]));
-            let (a, b) = (product(&z, &scaling.x(&step.x[c])), product(&x, &scaling.z(&step.z[c])));
+            let Scaled { scaling, x, z } = &self.pairs[c];
+            let (a, b) = (product(z, &scaling.x(&step.x[c])), product(x, &scaling.z(&step.z[c])));
             [by[c][0] - a[0] - b[0], by[c][1] - a[1] - b[1], by[c][2] - a[2] - b[2]]
         };
         (left.collect(), (0..by.len()).map(missing).collect())

@@ -4,15 +4,16 @@
 //!
 //! minimise ½ d·C d + ½ κ d·W d + q·d over d ∈ K,
 //!
-//! is strictly convex and has one solution. With y = κ H̃ d and u = H̃ᵀ y + q, the velocity u + C d lies in K*: C d is the violation. The problem is
-//! solved again with q + κ W d for q: then κ W d tends to zero and d to the least of all violations, with H̃ d = 0 and q·d = −d·C d (docs/theory/interior-point.md, "What has no solution").
+//! is strictly convex and has one solution. With y = κ H̃ d and u = H̃ᵀ y + q, the velocity u + C d lies in K*: C d is the violation.
+//! The problem is solved again with q + κ W d for q: then κ W d tends to zero and d to the least of all violations, with H̃ d = 0 and
+//! q·d = −d·C d (docs/theory/interior-point.md, "What has no solution").
 
 use super::Interior;
 use super::coupling::Coupling;
 use super::direction::{advance, direction};
 use super::local::{State, gap};
 use super::metric::Metric;
-use super::sites::{ROWS, Site, Sites};
+use super::sites::Sites;
 use super::start::cold;
 use crate::contact::Padded;
 use crate::problem::assembled::BlockMatrix;
@@ -41,11 +42,7 @@ impl Interior {
         let mut sites = Sites::of(rows, &[]);
         let ratio = sites.speed / (sites.force * KAPPA);
         let graph = if matrix.is_none() { Graph::of(rows, &mut None) } else { None };
-        let coupling = match (matrix, &graph) {
-            (Some(matrix), _) => Coupling::matrix(matrix, &sites, ratio)?,
-            (None, Some(graph)) => Coupling::bodies(rows, ratio, graph),
-            (None, None) => return None,
-        };
+        let coupling = Coupling::of(rows, matrix, graph.as_deref(), &sites, ratio)?;
         let metric = Metric::new(&sites, vec![0.0; sites.rows], 1.0);
         let mut reactions = vec![0.0; sites.rows];
         let mut at = State::default();
@@ -55,7 +52,7 @@ impl Interior {
             sites.free.iter_mut().zip(&moved).for_each(|(q, u)| *q += u);
             reactions.iter_mut().zip(&at.r).for_each(|(sum, d)| *sum += KAPPA * d);
         }
-        Some(Least { direction: scattered(&sites, &at.r), reactions: scattered(&sites, &reactions) })
+        Some(Least { direction: sites.scattered(&at.r), reactions: sites.scattered(&reactions) })
     }
 
     /// The path of one round, to its end.
@@ -71,14 +68,4 @@ impl Interior {
         }
         at
     }
-}
-
-/// A list of all rows as reactions of the contacts.
-fn scattered(sites: &Sites, list: &[f64]) -> Vec<Padded> {
-    let one = |site: &Site| {
-        let mut r = [0.0; ROWS];
-        site.places.iter().zip(site.part(list)).for_each(|(place, value)| r[*place] = value * sites.force);
-        Padded::from_order(&r.into())
-    };
-    sites.list.iter().map(one).collect()
 }
