@@ -3,13 +3,14 @@
 mod common;
 
 use common::pressed;
-use dem_core::body::Grains;
+use dem_core::body::{Drive, Grains, Shape, Wall};
 use dem_core::bond::Stiffness;
 use dem_core::contact::BondFlow;
 use dem_core::dim::{D2, D3, D3Twist, Dim, Vect};
 use dem_core::saved::{Mismatch, Saved};
 use dem_core::solver::{SolverSettings, StagedSettings, Stages, StiffnessRatio};
 use dem_core::world::World;
+use std::sync::Arc;
 
 fn settings() -> StagedSettings {
     let stiffness = StiffnessRatio { tangential: 0.5, rolling: 0.1 };
@@ -147,6 +148,36 @@ fn a_state_goes_on_between_steps_that_are_predicted() {
         predicted += usize::from(report.work.iterations() == 0);
     }
     assert!(predicted > 30, "{predicted}");
+}
+
+#[test]
+fn a_step_that_fails_leaves_the_world_and_its_solver_as_they_were() {
+    // a bonded column at rest below a lid that closes on it later
+    let mut set = common::settings(1e-3);
+    set.gravity = common::down::<D2>(9.81);
+    set.solver = SolverSettings::Staged(settings());
+    let column = (0..5).map(|k| common::grain::<D2>(&[0.0, 0.01 + 0.02 * f64::from(k)], 0.01)).collect();
+    let lid = Wall {
+        shape: Shape::Plane { normal: [0.0, -1.0].into() },
+        position: [0.0, 0.1].into(),
+        drive: Drive::Velocity {
+            direction: [0.0, -1.0].into(),
+            speed: Arc::new(|time| if time < 0.0205 { 0.0 } else { 0.1 }),
+        },
+        ..common::floor(0.2)
+    };
+    let mut world = common::world(column, vec![common::floor(0.2), lid], set);
+    world.form_bonds(1e-6, |_| 1e3, 0.3);
+    let mut before = saved(&world);
+    let mut steps = 0;
+    while world.step().is_ok() {
+        before = saved(&world);
+        steps += 1;
+    }
+    assert_eq!(steps, 20, "the lid begins to move");
+    assert_eq!(bits(&saved(&world)), bits(&before));
+    assert!(world.step().is_err(), "and once more");
+    assert_eq!(bits(&saved(&world)), bits(&before));
 }
 
 #[test]

@@ -26,7 +26,7 @@ const SAME: f64 = 1e-6;
 const ROUNDING: f64 = 1e-12;
 
 /// How the reactions grow.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Extrapolation {
     /// Numbers of contacts of each kind.
     shape: [usize; 4],

@@ -207,4 +207,8 @@ impl<D: Dim> ContactSolver<D> for GaussSeidel {
         let settings = self.settings;
         blocks::among_threads(problem.nodes.grains, || iterate(problem, &settings))
     }
+
+    fn snapshot(&self) -> Box<dyn ContactSolver<D>> {
+        Box::new(*self)
+    }
 }

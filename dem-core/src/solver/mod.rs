@@ -107,6 +107,9 @@ pub trait ContactSolver<D: Dim>: Send {
         None
     }
 
+    /// A copy with all that is kept from one solve to the next: the solver of a step that may have to be undone.
+    fn snapshot(&self) -> Box<dyn ContactSolver<D>>;
+
     /// Write what is kept from one solve to the next, if anything is.
     fn save(&self, _to: &mut Saved) {}
 

@@ -298,6 +298,13 @@ impl<D: Dim> ContactSolver<D> for Staged {
         (self.settings.stages == Stages::All && is_dry(problem)).then(|| self.directly(problem))
     }
 
+    fn snapshot(&self) -> Box<dyn ContactSolver<D>> {
+        let Self { settings, extrapolation, newton, .. } = self;
+        // the interior-point method keeps its room and nothing else
+        let interior = Interior::default();
+        Box::new(Self { settings: *settings, extrapolation: extrapolation.clone(), newton: newton.clone(), interior })
+    }
+
     fn save(&self, to: &mut Saved) {
         self.extrapolation.save(to);
         self.newton.save(to);

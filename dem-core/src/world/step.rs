@@ -17,7 +17,7 @@ use crate::solver::{SolveReport, SolveStatus};
 pub(super) const PARTS: u32 = 4096;
 
 impl<D: Dim> World<D> {
-    /// Carry the world on by one time step. An error leaves the world as it was.
+    /// Carry the world on by one time step. An error leaves the world and its solver as they were.
     pub fn step(&mut self) -> Result<StepReport<D>, StepError> {
         self.step_watched(&mut |_| {})
     }
@@ -25,7 +25,14 @@ impl<D: Dim> World<D> {
     /// The same; `watch` is told after each round of a cascade how many bonds have broken in it so far. A step that is made
     /// anew in halves begins to count anew.
     pub fn step_watched(&mut self, watch: &mut dyn FnMut(usize)) -> Result<StepReport<D>, StepError> {
-        let mut report = self.advance(self.settings.step, 0, 1, watch)?;
+        let solver = self.solver.snapshot();
+        let mut report = match self.advance(self.settings.step, 0, 1, watch) {
+            Ok(report) => report,
+            Err(error) => {
+                self.solver = solver;
+                return Err(error);
+            }
+        };
         self.steps += 1;
         // a product, not a sum: the clock does not drift
         self.time = self.steps as f64 * self.settings.step;

@@ -7,12 +7,17 @@ use crate::solver::rows::{Operator, PAIR, Rows};
 use std::sync::Arc;
 
 /// Factors, and what they were made of.
-#[derive(Default)]
-pub(super) struct Factor {
-    graph: Option<Arc<Graph>>,
+struct Factors {
+    graph: Arc<Graph>,
     /// The matrices of all elements, one after the other.
     elements: Vec<f64>,
     lu: Lu,
+}
+
+/// The factors at hand. A copy shares them until either renews its own.
+#[derive(Clone, Default)]
+pub(super) struct Factor {
+    factors: Option<Arc<Factors>>,
     /// Whether they must be made anew.
     pub stale: bool,
     /// Factorisations so far.
@@ -22,30 +27,34 @@ pub(super) struct Factor {
 impl Factor {
     /// Whether they can be tried for this many unknowns.
     pub fn fits(&self, unknowns: usize) -> bool {
-        !self.stale && self.graph.as_ref().is_some_and(|graph| graph.tree.unknowns() == unknowns)
+        !self.stale && self.factors.as_ref().is_some_and(|factors| factors.graph.tree.unknowns() == unknowns)
     }
 
     /// Factorise I + Σ H̃ A H̃ᵀ for these operators; false if it has no inverse to rounding.
     pub fn renew(&mut self, rows: &Rows, operators: &[Option<Operator>], graph: Arc<Graph>) -> bool {
         self.made += 1;
-        self.elements.clear();
+        // the room of the old factors, unless a copy shares them
+        let (mut elements, lu) = match self.factors.take().and_then(Arc::into_inner) {
+            Some(old) => (old.elements, old.lu),
+            None => (Vec::new(), Lu::default()),
+        };
+        elements.clear();
         for c in &graph.contacts {
-            let (row, first) = (&rows.list[*c], self.elements.len());
-            self.elements.resize(first + row.width() * row.width(), 0.0);
+            let (row, first) = (&rows.list[*c], elements.len());
+            elements.resize(first + row.width() * row.width(), 0.0);
             if let Some(a) = &operators[*c] {
                 let all: Vec<usize> = (0..row.rows.len()).collect();
                 let entry = |i: usize, j: usize| a.entry(row.rows[i], row.rows[j]);
-                rows.add_element(row, &all, entry, &mut self.elements[first..]);
+                rows.add_element(row, &all, entry, &mut elements[first..]);
             }
         }
-        self.graph = Some(graph);
-        self.factorise()
+        self.factorise(Factors { graph, elements, lu })
     }
 
-    fn factorise(&mut self) -> bool {
-        let Some(graph) = &self.graph else { return false };
-        let (elements, mut next) = (&self.elements, 0);
+    fn factorise(&mut self, mut factors: Factors) -> bool {
+        let Factors { graph, elements, lu } = &mut factors;
         // each element is asked for once, but in the order of the fronts
+        let mut next = 0;
         let starts: Vec<usize> = (0..graph.contacts.len())
             .map(|e| {
                 let width = graph.tree.width(e);
@@ -53,33 +62,34 @@ impl Factor {
                 next - width * width
             })
             .collect();
-        let made = self.lu.factorise(&graph.tree, |e, out| {
+        let made = lu.factorise(&graph.tree, |e, out| {
             let n = out.len();
             out.copy_from_slice(&elements[starts[e]..][..n]);
         });
         self.stale = made.is_none();
+        self.factors = Some(Arc::new(factors));
         made.is_some()
     }
 
     /// x ← the inverse of the matrix times x.
     pub fn solve(&self, x: &mut [f64]) {
-        if let Some(graph) = &self.graph {
-            self.lu.solve(&graph.tree, x);
+        if let Some(factors) = &self.factors {
+            factors.lu.solve(&factors.graph.tree, x);
         }
     }
 
     /// Write what the factors were made of.
     pub fn save(&self, to: &mut Saved) {
-        let kept = self.graph.as_ref().filter(|_| !self.stale);
+        let kept = self.factors.as_ref().filter(|_| !self.stale);
         to.flag(kept.is_some());
-        let Some(graph) = kept else { return };
+        let Some(Factors { graph, elements: values, .. }) = kept.map(AsRef::as_ref) else { return };
         let (sizes, elements) = graph.tree.nodes_and_elements();
         to.count(sizes.len());
         sizes.iter().for_each(|size| to.count(*size));
         to.count(elements.len());
         elements.iter().flatten().chain(&graph.contacts).for_each(|n| to.count(*n));
-        to.count(self.elements.len());
-        to.reals.extend_from_slice(&self.elements);
+        to.count(values.len());
+        to.reals.extend_from_slice(values);
     }
 
     /// The same factors, made anew of what [`Factor::save`] wrote.
@@ -104,8 +114,8 @@ impl Factor {
         if (0..count).map(|e| tree.width(e).pow(2)).sum::<usize>() != values {
             return Err(Mismatch);
         }
-        factor.elements = from.reals(values)?.to_vec();
-        factor.graph = Some(Arc::new(Graph { tree, contacts }));
-        if factor.factorise() { Ok(factor) } else { Err(Mismatch) }
+        let elements = from.reals(values)?.to_vec();
+        let factors = Factors { graph: Arc::new(Graph { tree, contacts }), elements, lu: Lu::default() };
+        if factor.factorise(factors) { Ok(factor) } else { Err(Mismatch) }
     }
 }

@@ -38,6 +38,7 @@ const COLD_SWEEPS: usize = 100;
 const MOST_MADE: u64 = 8;
 
 /// Augmented-Lagrangian semismooth Newton.
+#[derive(Clone)]
 pub(super) struct Newton {
     settings: StagedSettings,
     factor: Factor,
