@@ -3,12 +3,22 @@
 mod common;
 
 use common::{grain, newton, settings, world};
+use dem_core::body::{Shape, Wall};
 use dem_core::bond::Stiffness;
 use dem_core::dim::{D2, D3, Dim, Vect};
 use dem_core::solver::SolverSettings;
+use dem_core::world::Restitution;
 
 /// Radius of the grains (m).
 const R: f64 = 0.01;
+
+/// Angle by which the pair that is stopped turns in a step (rad).
+const ANGLE: f64 = 0.1;
+
+/// Stiffness of a bond of the mean diameter `a`, `k` along its normal.
+fn stiff(k: f64, a: f64) -> Stiffness {
+    Stiffness { normal: k, tangential: 0.7 * k, rolling: k * a * a / 12.0, twist: k * a * a / 16.0 }
+}
 
 /// Two bonded grains that turn about the middle between them at 100 rad/s, a hundredth of a radian a step, for a hundred radians: by how
 /// much the bond lengthened (–), the rate of turning at the end over that at the start (–), and the largest gain of energy (–).
@@ -24,12 +34,7 @@ fn dumbbell<D: Dim>(stiffness: Option<f64>, friction: f64) -> (f64, f64, f64) {
     let mut w = world(pair, vec![], set);
     w.form_bonds(1e-6, |_| 1e6, friction);
     if let Some(k) = stiffness {
-        w.make_bonds_elastic(|a| Stiffness {
-            normal: k,
-            tangential: 0.7 * k,
-            rolling: k * a * a / 12.0,
-            twist: k * a * a / 16.0,
-        });
+        w.make_bonds_elastic(|a| stiff(k, a));
     }
     let (length, first) = (2.0 * R, w.kinetic_energy());
     let (mut longest, mut gain) = (0.0f64, 0.0f64);
@@ -48,6 +53,60 @@ fn a_bond_that_turns_keeps_its_length_its_spin_and_its_energy() {
         for (longest, turning, gain) in [dumbbell::<D2>(stiffness, friction), dumbbell::<D3>(stiffness, friction)] {
             let what = format!("{stiffness:?} {friction}: {longest:e} {turning} {gain:e}");
             assert!(longest <= 1e-3 && (turning - 1.0).abs() <= 5e-3 && gain <= 1e-6, "{what}");
+        }
+    }
+}
+
+/// Two bonded grains that turn by `ANGLE` a step and are stopped by two fixed ones, at the end of a way of so many steps; where a third
+/// one is so `fast` that it makes the third step one of two parts. By how much the bond is longer afterwards than its force tells (–).
+fn stopped_dumbbell<D: Dim>(stiffness: Option<f64>, friction: f64, way: f64, fast: bool) -> f64 {
+    let h = 1e-3;
+    let at = |x: f64, y: f64| grain::<D>(&[x, y, 0.0][..D::N], R);
+    let mut grains = vec![at(-R, 0.0), at(R, 0.0)];
+    for (grain, side) in grains.iter_mut().zip([-1.0, 1.0]) {
+        grain.velocity[1] = side * ANGLE / h * R;
+        grain.spin[D::Spin::LEN - 1] = if friction > 0.0 { ANGLE / h } else { 0.0 };
+    }
+    for side in [-1.0, 1.0] {
+        grains.push(at(side * R, side * (2.0 + way * ANGLE) * R));
+        grains.last_mut().unwrap().fixed = true;
+    }
+    // with restitution a contact acts where it touches, and the wall would be passed in half a step
+    let (speed, arrival) = (6.0 * R / h, 2.7 * h);
+    let (mut normal, mut place) = (D::Vector::zero(), D::Vector::zero());
+    normal[0] = -1.0;
+    place[0] = 101.0 * R + arrival * speed;
+    grains.push(at(100.0 * R, 0.0));
+    grains[4].velocity[0] = if fast { speed } else { 0.0 };
+    let mut set = settings(h);
+    set.friction = 0.0;
+    set.restitution = Some(Restitution { grain_wall: 0.5, ..Restitution::default() });
+    set.solver = SolverSettings::Staged(newton(1e-10, 1e-8, 1e-6));
+    let mut w = world(grains, vec![Wall::fixed(Shape::Plane { normal }, place, 0.0)], set);
+    w.form_bonds(1e-6, |_| 1e9, friction);
+    if let Some(k) = stiffness {
+        w.make_bonds_elastic(|a| stiff(k, a));
+    }
+    let parts: Vec<u32> = (0..16).map(|_| w.step().unwrap().substeps).collect();
+    assert_eq!(parts.iter().sum::<u32>(), if fast { 17 } else { 16 }, "{parts:?}");
+    let length = (w.grains.position[1] - w.grains.position[0]).norm();
+    let force = w.touches().find(|t| t.bond.is_some()).map_or(0.0, |t| t.reaction.n);
+    (length + stiffness.map_or(0.0, |k| force / k)) / (2.0 * R) - 1.0
+}
+
+/// What a change of the length of steps leaves of the hidden length of a turn is given back: at rest a bond is as long as if no step had
+/// been made in parts, wherever the turn is stopped.
+#[test]
+fn parts_of_a_step_leave_the_length_of_a_bond_that_turned() {
+    for (stiffness, friction) in [(None, 0.0), (None, 0.3), (Some(1e9), 0.0), (Some(1e9), 0.3)] {
+        for way in [2.3, 2.9, 3.3, 4.2] {
+            for (whole, parts) in [
+                [false, true].map(|fast| stopped_dumbbell::<D2>(stiffness, friction, way, fast)).into(),
+                [false, true].map(|fast| stopped_dumbbell::<D3>(stiffness, friction, way, fast)).into(),
+            ] {
+                let left = (parts - whole) / (ANGLE * ANGLE);
+                assert!(left.abs() < 2e-3, "{stiffness:?} {friction} {way}: {left} of the square of the angle is left");
+            }
         }
     }
 }

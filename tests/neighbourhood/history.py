@@ -172,6 +172,8 @@ class History:
         else:
             self.single = self.observed["solver_rejected"] == 0
         self.row_single = self.single[self.row_step]
+        # steps whose last mid-step lies in a step in parts
+        self.after_parts = np.append(False, ~self.single[:-1])[: self.S]
 
     def external(self):
         """Prescribed forces (N) [S,N,D] and torques (N m) [S,N,Q] on the grains at the middle of each

@@ -121,8 +121,7 @@ class Solved:
         self.other = np.where(self.bonds, self.bias, self.other)
         self.rigid = rigid
         # where the last mid-step of a step in parts was, no frame tells
-        after_parts = np.append(False, ~h.single[:-1])[h.row_step]
-        self.unknown = self.bonds & ~rigid & after_parts
+        self.unknown = self.bonds & h.after_parts[h.row_step]
 
     def _elastic(self, h):
         """u + C (r − r₀) in place of u, C = 1/(k h²)."""
@@ -163,8 +162,8 @@ class Solved:
         self.bias, self.u[:, 0] = chosen, self.raw + chosen
         self.map = np.where(idle[:, None], 0.0, best)
         moving = c.speed + np.abs(self.bias) + np.where(c.gap > 0, c.place / h.h, 0.0)
-        at_limit = (~self.bonds) | (np.abs(self.map).max(1) > 0) & ~self.sticks
-        size = norm(self.r) + np.where(at_limit & ~self.sticks, self.shift, 0.0)
+        # a map that is not ũ/D is a difference of shifted reactions, and where it is zero ũ/D may be the rounding of these
+        size = norm(self.r) + np.where(self.sticks, 0.0, self.shift)
         stored = norm(self.compliance * np.abs(self.r)) + norm(self.compliance * np.abs(self.carried))
         self.rounding = tolerances.rounding((moving + stored) / self.D + size)
         outer, _ = h.external()

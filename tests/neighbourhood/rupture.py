@@ -55,7 +55,9 @@ def check_lengths(h, p, report):
 
     A bond that turns by θ in a step is longer at mid-step by the chord, θ²/2 of its length: half of what a
     step along the tangent adds is given back by the next (docs/theory/time-stepping.md, bonds that turn),
-    so it does not add up. By what the solves miss the law of a spring, which `elastic bonds` bounds in each
+    so it does not add up. A step in parts has mid-steps that no frame tells, and what a change of the length of
+    steps leaves is given back by the first whole step after it: lengths are judged at the mid-steps of whole
+    steps that follow whole ones. By what the solves miss the law of a spring, which `elastic bonds` bounds in each
     step, force and length part over the run.
     """
     bi, bj = h.bond_pair.T
@@ -70,13 +72,14 @@ def check_lengths(h, p, report):
     longer = gap - h.rest_gap
     # intact when the step began
     intact = h.bond_status[:-1] == "INTACT"
+    judged = intact & (h.single & ~h.after_parts)[:, None]
     smaller = np.minimum(h.radius[bi], h.radius[bj])
     report.figures["largest change of the length of an intact bond (m)"] = float(
         np.abs(np.where(intact, longer, 0)).max(initial=0)
     )
     if h.stiffness is None:
         describe = lambda s, b: f"step {s + 1}, bond {b}: change of length (m)"
-        off = np.where(intact, np.abs(longer), 0.0)
+        off = np.where(judged, np.abs(longer), 0.0)
         report.expect("length of rigid bonds", off, tolerances.value("rigid length") * smaller + chord, describe)
     else:
         # what a bond carries after a step follows the length of the next mid-step
@@ -87,7 +90,7 @@ def check_lengths(h, p, report):
         of_bonds = np.flatnonzero(p.bonds)
         missed[h.row_step[of_bonds], h.bond[of_bonds]] = h.h * np.abs(p.u[of_bonds, 0])
         allowed = tolerances.value("elastic length") * length[b] + chord[s, b] + np.cumsum(missed, 0)[s - 1, b]
-        report.expect("length of elastic bonds", np.where(intact[s, b], off, 0.0), allowed, where(h, rows))
+        report.expect("length of elastic bonds", np.where(judged[s, b], off, 0.0), allowed, where(h, rows))
     check_elongation(h, longer, report)
 
 

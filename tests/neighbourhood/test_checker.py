@@ -622,3 +622,55 @@ def test_every_check_has_a_history_that_it_fails(good):
     spoilt = {expected for _, _, _, expected in SPOILT if expected not in EITHER} | set().union(*EITHER.values())
     spoilt |= {"summary", "summary's text", "ending"}
     assert names <= spoilt, f"nothing is spoilt for {sorted(names - spoilt)}"
+
+
+def stopped(stiffness, friction):
+    """Two bonded disks that a force of one step makes turn, by 0.1 rad a step, until two fixed ones stop them; a fast
+    one that bounces off a wall makes the fifth step in parts."""
+    r, h = 1e-2, 1e-3
+    # what turns with them has half as much inertia again
+    force = (1.5 if friction else 1.0) * 2500 * np.pi * r**2 * 0.1 * r / h**2
+    pulse = {"table": [[0.0, 1.0], [h, 1.0], [1.01 * h, 0.0]]}
+    grains = [
+        {"center": [-r, 0], "radius": r},
+        {"center": [r, 0], "radius": r},
+        {"center": [-r, -2.45 * r], "radius": r},
+        {"center": [r, 2.45 * r], "radius": r},
+        {"center": [100 * r, 0], "radius": r, "velocity": [6 * r / h, 0]},
+    ]
+    bonds = {"strength": 2e4, "gap_tolerance": 1e-3, "friction": friction}
+    if stiffness:
+        bonds["stiffness"] = {"young": {"modulus": stiffness, "poisson_ratio": 0.2}}
+    return {
+        "dimension": 2,
+        "thickness": 1,
+        "sample": {"grains": grains},
+        "grains": {
+            "fixed": [2, 3],
+            "loads": [{"grain": k, "force": [0, f], "time": pulse} for k, f in enumerate([-force, force])],
+        },
+        "materials": {
+            "density": 2500,
+            "friction": {"grain_grain": 0.0, "grain_wall": 0.0},
+            "restitution": {"grain_grain": 0.0, "grain_wall": 0.5},
+        },
+        "bonds": bonds,
+        "walls": {"side": {"shape": {"plane": {"normal": [-1, 0], "place": {"at": [129.2 * r, 0]}}}}},
+        "time": {"step": h, "end": 0.016},
+        "output": OUTPUT,
+    }
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize("stiffness", [None, 1e8])
+def test_lengths_are_judged_where_frames_tell_them(tmp_path, stiffness, friction):
+    path, told, _ = programs.run(stopped(stiffness, friction), tmp_path)
+    h = History(path)
+    assert (~h.single).sum() == 1 and h.K == 1
+    assert not check(path, told).wrong
+    # a whole step after the parts
+    with h5py.File(path, "r+") as file:
+        place = file["particles/grains/position/value"]
+        place[12] = place[12] + np.where(np.arange(5) == 1, 5e-4, 0.0)[:, None] * [1.0, 0.0]
+    expected = "length of elastic bonds" if stiffness else "length of rigid bonds"
+    assert expected in check(path, told).wrong

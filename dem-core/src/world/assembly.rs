@@ -2,6 +2,7 @@
 
 use super::World;
 use super::touch::{Kept, Touch, TouchStatus};
+use super::turning::Turn;
 use crate::body::{Grains, Wall, direction};
 use crate::bond::{Bond, BondStatus};
 use crate::contact::{Arms, Bonded, Coulomb, Elastic, Frictionless, Law, Local};
@@ -47,6 +48,14 @@ impl<D: Dim> Midpoint<D> {
 pub(super) struct Motion<D: Dim> {
     pub before: Vec<(D::Vector, D::Spin)>,
     pub free: Arc<[(D::Vector, D::Spin)]>,
+}
+
+/// What the bonds bring into a step, by their numbers.
+pub(super) struct Brought<D: Dim> {
+    /// Reactions of the elastic ones (N, N m); empty where bonds are rigid.
+    carried: Vec<Local<D::Tangent, D::Moment>>,
+    /// What they are given back.
+    pub turns: Vec<Turn>,
 }
 
 /// Place of each contact of the step in the groups of the problem.
@@ -136,9 +145,14 @@ impl<D: Dim> World<D> {
         }
     }
 
+    /// What the bonds bring into a step of length `h`.
+    pub(super) fn brought(&self, mid: &Midpoint<D>, touches: &[Kept<D>], motion: &Motion<D>, h: f64) -> Brought<D> {
+        Brought { carried: self.carried(touches), turns: self.turns(mid, touches, motion, h) }
+    }
+
     /// Reactions (N, N m) that the elastic bonds carry as a step begins, by the number of the bond; empty where bonds are
     /// rigid.
-    pub(super) fn carried(&self, touches: &[Kept<D>]) -> Vec<Local<D::Tangent, D::Moment>> {
+    fn carried(&self, touches: &[Kept<D>]) -> Vec<Local<D::Tangent, D::Moment>> {
         if self.bonds.iter().all(|b| b.stiffness.is_none()) {
             return Vec::new();
         }
@@ -208,24 +222,6 @@ impl<D: Dim> World<D> {
         touching.then_some(if at_rest { 0.0 } else { e * approach })
     }
 
-    /// What is added to the normal velocity of a bond before its law, so that it keeps its length while it turns (m/s), where its grains
-    /// need not turn with it: where it is elastic, or has no friction.
-    ///
-    /// Between two mid-steps the grains moved by the way d apart, of which d_t across the normal of the first one. Their distance grew by
-    /// d_n and, because the bond turned, by ℓ' − ℓ − d_n = d_t² / (ℓ' + ℓ + d_n), of which its law, which knows normal velocities, is
-    /// not told; it is given back. In a steady turn that is what [`turning`] gives. See docs/theory/elastic-bonds.md.
-    fn lengthening(&self, mid: &Midpoint<D>, motion: &Motion<D>, pair: [u32; 2], h: f64) -> f64 {
-        let [i, j] = pair.map(|k| k as usize);
-        let (apart, way) = (mid.grains[i] - mid.grains[j], (motion.before[i].0 - motion.before[j].0) * h);
-        let before = apart - way;
-        let length = before.norm();
-        let normal = direction::<D>(before, length);
-        let along = way.dot(&normal);
-        let across = way - normal * along;
-        let square = across.dot(&across);
-        if square == 0.0 { 0.0 } else { square / (h * (apart.norm() + length + along)) }
-    }
-
     /// Friction coefficient of a dry contact (–).
     fn friction_of(&self, pair: [u32; 2]) -> f64 {
         match (pair[1] as usize).checked_sub(self.grains.len()) {
@@ -258,7 +254,7 @@ impl<D: Dim> World<D> {
         mid: &Midpoint<D>,
         touches: &[Kept<D>],
         motion: &Motion<D>,
-        carried: &[Local<D::Tangent, D::Moment>],
+        brought: &Brought<D>,
         applied: f64,
         h: f64,
     ) -> (ContactProblem<D>, Places) {
@@ -291,23 +287,13 @@ impl<D: Dim> World<D> {
                 let block = link.block(i, j, arms, None);
                 let r = over_arm(start, arm);
                 let (shift, cone, flow) = (h * bond.strength, bond.cone(), self.settings.bond_flow);
+                let bias = brought.turns[number].bias;
                 if let Some(compliance) = bond.compliance(h) {
-                    let carried = over_arm(carried[number] * h, arm);
-                    let bias = self.lengthening(mid, motion, kept.pair, h);
+                    let carried = over_arm(brought.carried[number] * h, arm);
                     let law = Elastic::new(block, compliance, carried, arms, shift, cone, flow).with_bias(bias);
                     problem.elastic.push(Contact { link, law, r });
                     places.elastic.push(place as u32);
                 } else {
-                    let bias = match kept.held {
-                        _ if bond.friction > 0.0 => turning(&link, motion, h),
-                        true => match self.lengthening(mid, motion, kept.pair, h) {
-                            // rigid bonds answer to any misfit with forces, to that of rounding too
-                            hidden if h * hidden <= f64::EPSILON * arm => 0.0,
-                            bias => bias,
-                        },
-                        // what moved before there was the bond did not move as it lets it
-                        false => 0.0,
-                    };
                     let law = Bonded::new(block, arms, shift, cone, flow).with_bias(bias);
                     problem.bonded.push(Contact { link, law, r });
                     places.bonded.push(place as u32);
@@ -366,18 +352,6 @@ impl<D: Dim> World<D> {
 /// Radius of a grain (m); none of a wall.
 fn radius_of<D: Dim>(grains: &Grains<D>, body: usize) -> f64 {
     grains.radius.get(body).copied().unwrap_or(0.0)
-}
-
-/// What is added to the normal velocity of a rigid bond before its law, so that a bond that turns keeps its length (m/s).
-///
-/// A velocity along the tangent of mid-step leads away from the partner before mid-step and after it. Where the bond turned
-/// by R since the last mid-step, its velocity u⁻ gained n·(1 − R) u⁻ along the normal by that alone; half of it back,
-/// u_n⁺ = −½ n·(1 − R) u⁻, makes the step symmetric in time: the length is kept, and since u_n⁺ = −u_n⁻ the reaction does no
-/// work. Within a rigid fragment R is one for all, so that all bonds can do so at once. See docs/theory/time-stepping.md.
-fn turning<D: Dim>(link: &Link<D>, motion: &Motion<D>, h: f64) -> f64 {
-    let [(v_i, spin_i), (v_j, spin_j)] = link.nodes.map(|k| motion.before[k as usize]);
-    // spins follow the tangential row at mid-step, where they are sin φ / h of the angle φ between two of them
-    -0.5 * D::normal(&link.axes).dot(&D::swing(v_i - v_j, (spin_i + spin_j) * (0.5 * h)))
 }
 
 /// Moments over the mean diameter.

@@ -12,6 +12,7 @@ mod start;
 mod state;
 mod step;
 mod touch;
+mod turning;
 
 pub use ledger::{Ledger, Momentum};
 pub use report::{StepError, StepReport, Violation};
@@ -19,6 +20,7 @@ pub use touch::{Break, Counts, Touch, TouchStatus};
 
 use assembly::Midpoint;
 use touch::Kept;
+use turning::Turn;
 
 use crate::body::{Grains, Load, Wall};
 use crate::bond::{Bond, BondStatus, Rupture, Stiffness};
@@ -86,6 +88,10 @@ pub struct World<D: Dim> {
     kept: Vec<Kept<D>>,
     /// Where the bodies were in the middle of that step: the geometry of its contacts.
     mid: Midpoint<D>,
+    /// Length of the last accepted step, or of the last part of it (s); zero before the first.
+    last_part: f64,
+    /// What the bonds were given back in it, by their numbers; empty before the first.
+    turns: Vec<Turn>,
     candidates: Candidates<D>,
     solver: Box<dyn ContactSolver<D>>,
     reference: Vec<D::Vector>,
@@ -99,6 +105,8 @@ struct State<D: Dim> {
     bonds: Vec<Bond>,
     kept: Vec<Kept<D>>,
     mid: Midpoint<D>,
+    last_part: f64,
+    turns: Vec<Turn>,
     ledger: Ledger,
     time: f64,
 }
@@ -115,6 +123,8 @@ impl<D: Dim> World<D> {
             candidates: Candidates::default(),
             kept: Vec::new(),
             mid: Midpoint::of(&grains, &walls),
+            last_part: 0.0,
+            turns: Vec::new(),
             bonds: Vec::new(),
             ledger: Ledger::default(),
             time: 0.0,
@@ -177,6 +187,8 @@ impl<D: Dim> World<D> {
             bonds: self.bonds.clone(),
             kept: self.kept.clone(),
             mid: self.mid.clone(),
+            last_part: self.last_part,
+            turns: self.turns.clone(),
             ledger: self.ledger,
             time: self.time,
         }
@@ -188,6 +200,7 @@ impl<D: Dim> World<D> {
         self.bonds = state.bonds;
         self.kept = state.kept;
         self.mid = state.mid;
+        (self.last_part, self.turns) = (state.last_part, state.turns);
         self.ledger = state.ledger;
         self.time = state.time;
     }

@@ -5,6 +5,7 @@
 
 use super::assembly::Midpoint;
 use super::touch::Kept;
+use super::turning::Turn;
 use super::{Ledger, Settings, TouchStatus, World};
 use crate::body::{Grains, Load, Wall};
 use crate::bond::{Bond, BondStatus, Stiffness};
@@ -78,6 +79,9 @@ impl<D: Dim> World<D> {
         self.bonds.iter().for_each(|bond| save_bond(bond, to));
         to.vectors(&self.mid.grains);
         to.vectors(&self.mid.walls);
+        to.real(self.last_part);
+        to.count(self.turns.len());
+        self.turns.iter().for_each(|turn| to.reals.extend([turn.bias, turn.owed]));
         to.count(self.kept.len());
         self.kept.iter().for_each(|kept| save_kept(kept, to));
         let l = &self.ledger;
@@ -114,6 +118,10 @@ impl<D: Dim> World<D> {
         world.bonds = (0..from.number_of()?).map(|_| restored_bond(n, from)).collect::<Result<_, _>>()?;
         let (bodies, bonds) = (n + world.walls.len(), world.bonds.len());
         world.mid = Midpoint { grains: from.vectors(n)?, walls: from.vectors(bodies - n)? };
+        world.last_part = from.real()?;
+        world.turns = (0..from.number_of()?)
+            .map(|_| Ok(Turn { bias: from.real()?, owed: from.real()? }))
+            .collect::<Result<_, _>>()?;
         world.kept = (0..from.number_of()?).map(|_| restored_kept(bodies, bonds, from)).collect::<Result<_, _>>()?;
         let mut next = || from.real();
         world.ledger = Ledger {

@@ -91,12 +91,12 @@ impl<D: Dim> World<D> {
         if limited {
             self.refuse_crossing(self.crossing(|k| self.place(k), |k| motion.before[k].0, 0.5 * h))?;
         }
-        let carried = self.carried(&touches);
+        let brought = self.brought(&mid, &touches, &motion, h);
         let mut done = Solves::default();
         let mut breaks: Vec<Break<D>> = Vec::new();
         let mut walls_at_limit = None;
         let (problem, places) = loop {
-            let (mut problem, places) = self.assemble(&mid, &touches, &motion, &carried, applied, h);
+            let (mut problem, places) = self.assemble(&mid, &touches, &motion, &brought, applied, h);
             let solve = self.solve(&mut problem, limited);
             done.add(solve);
             self.refuse_unaccepted(solve, &problem, h, last)?;
@@ -129,6 +129,7 @@ impl<D: Dim> World<D> {
             self.refuse_violation(self.accumulate(&mut touches, &problem, &places, h), &problem, last)?;
         }
         self.settle(h, mid, &motion, &problem, touches, &breaks);
+        (self.turns, self.last_part) = (brought.turns, h);
         if let Some(forces) = walls_at_limit {
             self.walls.iter_mut().zip(forces).for_each(|(wall, force)| wall.reaction_at_limit = force);
         }
@@ -150,8 +151,8 @@ impl<D: Dim> World<D> {
         let h = self.settings.step;
         let (mid, motion) = (self.midpoint(h), self.free_motion(h));
         let touches = self.detect(&mid, &motion, h);
-        let carried = self.carried(&touches);
-        self.assemble(&mid, &touches, &motion, &carried, self.applied_impulse(h), h).0
+        let brought = self.brought(&mid, &touches, &motion, h);
+        self.assemble(&mid, &touches, &motion, &brought, self.applied_impulse(h), h).0
     }
 
     /// Half a step in position at the old velocities.
