@@ -5,12 +5,8 @@
 //! GMRES; on Gauss–Seidel's, which is linear while no contact changes its status, it finds the long waves that sweeps
 //! alone diffuse away.
 
+use crate::solver::tuning::gauss_seidel as tuning;
 use nalgebra::{DMatrix, DVector};
-
-/// Residuals larger than this many times the least one so far make it start over.
-const GROWTH: f64 = 2.0;
-/// Share of the trace that keeps the least-squares matrix positive definite where changes are alike.
-const RIDGE: f64 = 1e-12;
 
 /// The memory of an accelerated iteration.
 pub(super) struct Anderson {
@@ -56,7 +52,7 @@ impl Anderson {
     pub fn next(&mut self, g: Vec<f64>) -> &[f64] {
         let f = minus(&g, &self.from);
         let size = dot(&f, &f);
-        if size > GROWTH * GROWTH * self.least {
+        if size > tuning::GROWTH * tuning::GROWTH * self.least {
             self.last = None;
             self.changes.clear();
             self.gram.clear();
@@ -96,7 +92,7 @@ impl Anderson {
         if k == 0 {
             return None;
         }
-        let ridge = RIDGE * (0..k).map(|i| self.gram[i][i]).sum::<f64>();
+        let ridge = tuning::RIDGE * (0..k).map(|i| self.gram[i][i]).sum::<f64>();
         let entry = |i: usize, j: usize| self.gram[i.max(j)][i.min(j)] + if i == j { ridge } else { 0.0 };
         let right = DVector::from_iterator(k, self.changes.iter().map(|c| dot(&c.f, f)));
         Some(DMatrix::from_fn(k, k, entry).cholesky()?.solve(&right))

@@ -10,10 +10,8 @@ use super::{GaussSeidelSettings, SolveReport};
 use crate::contact::{LocalSolve, PADDED, Padded};
 use crate::dim::{Moments, Vect};
 use crate::problem::assembled::Assembled;
+use crate::solver::tuning::gauss_seidel as tuning;
 use nalgebra::SMatrix;
-
-/// Most repetitions of the predictor–corrector in one visit of a contact; the next sweep goes on.
-const ROUNDS: usize = 100;
 
 type Block = SMatrix<f64, PADDED, PADDED>;
 
@@ -69,11 +67,11 @@ impl Site {
         if open.n >= pull {
             return Padded::zero();
         }
-        for _ in 0..ROUNDS {
+        for _ in 0..tuning::ROUNDS {
             let change = problem.correction(contact, self.gamma, r, u);
             r += change;
             u += Padded::from_order(&(self.block * change.in_order()));
-            if change.dot(&change) <= 1e-30 * r.dot(&r) {
+            if change.dot(&change) <= tuning::UNCHANGED * r.dot(&r) {
                 break;
             }
         }

@@ -20,15 +20,7 @@ use crate::contact::{Cone, PADDED, Padded, Weights};
 use crate::dim::{Dim, Moments};
 use crate::problem::ContactProblem;
 use crate::problem::assembled::{Assembled, BlockMatrix};
-
-/// Largest net impulse of a certificate on a body, over its largest impulse, and least −q·d over the sizes of its summands (–). A solution would
-/// need velocities of the order of 1/`EXACT` times those at which the contacts close.
-const EXACT: f64 = 1e-10;
-/// How far inside K* velocities are asked to be, over the largest given velocity, and the share of it that counts as inside (–).
-const MARGIN: f64 = 1e-6;
-const INSIDE: f64 = 0.5;
-/// Share of the largest impulse from which a contact counts among those of a certificate (–).
-const CARRIES: f64 = 1e-3;
+use crate::solver::tuning::certificate as tuning;
 
 /// What is proved of a problem that was not solved.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -69,7 +61,7 @@ fn of(problem: &impl Solvable) -> Verdict<usize> {
     let (rows, matrix) = (problem.rows(1.0, StiffnessRatio { tangential: 1.0, rolling: 1.0 }), problem.matrix());
     if let Some(d) = certificate(&rows, matrix) {
         let largest = d.iter().map(|d| d.n).fold(0.0, f64::max);
-        return Verdict::NoSolution((0..d.len()).filter(|c| d[*c].n >= CARRIES * largest).collect());
+        return Verdict::NoSolution((0..d.len()).filter(|c| d[*c].n >= tuning::CARRIES * largest).collect());
     }
     if !rows.in_space() && is_admissible(&rows, matrix) { Verdict::Guaranteed } else { Verdict::Undecided }
 }
@@ -90,7 +82,7 @@ fn certificate(rows: &Rows, matrix: Option<&BlockMatrix>) -> Option<Vec<Padded>>
         // rounding may leave them next to the cone
         let cone = strict(row);
         for (slope, size) in [(cone.mu, d.t.norm()), (cone.nu, d.m.bending()), (cone.xi, d.m.twist())] {
-            d.n = if size > slope * d.n { (1.0 + 4.0 * f64::EPSILON) * size / slope } else { d.n };
+            d.n = if size > slope * d.n { (1.0 + tuning::ROUNDING) * size / slope } else { d.n };
         }
     }
     proves(rows, matrix, &d).then_some(d)
@@ -116,8 +108,8 @@ fn proves(rows: &Rows, matrix: Option<&BlockMatrix>, d: &[Padded]) -> bool {
         power += products.sum();
         size += products.abs().sum();
     }
-    let balanced = net.iter().all(|net| net.abs() <= EXACT * largest);
-    rows.list.iter().zip(d).all(in_cone) && balanced && power < -EXACT * size
+    let balanced = net.iter().all(|net| net.abs() <= tuning::EXACT * largest);
+    rows.list.iter().zip(d).all(in_cone) && balanced && power < -tuning::EXACT * size
 }
 
 /// The least violation of the problem without shifts and elastic bonds, all flow associated, with these cones, and normal velocities that
@@ -175,10 +167,10 @@ fn is_admissible(rows: &Rows, matrix: Option<&BlockMatrix>) -> bool {
         return true;
     }
     let speed = given.iter().map(|u| u.dot(u)).fold(0.0, f64::max).sqrt();
-    let Some(found) = least(rows, matrix, |row| row.cone, MARGIN * speed) else { return false };
+    let Some(found) = least(rows, matrix, |row| row.cone, tuning::MARGIN * speed) else { return false };
     let moved = velocities(rows, matrix, &found.reactions);
     let u: Vec<Padded> = given.iter().zip(moved).map(|(given, moved)| *given + moved).collect();
-    inside(&u, INSIDE * MARGIN * speed)
+    inside(&u, tuning::INSIDE * tuning::MARGIN * speed)
 }
 
 #[cfg(test)]

@@ -14,16 +14,7 @@ use crate::dim::{Dim, Moments, Vect};
 use crate::problem::residual::{residual, velocity_error};
 use crate::problem::{Contact, ContactProblem, Group, Nodes, Visitor};
 use crate::saved::{Mismatch, Reader, Saved};
-
-/// Consecutive steps that are predicted: at first, and at most.
-const FIRST: u64 = 4;
-const MOST: u64 = 32;
-/// Share of the tolerances that a prediction may take, and how much more momentum it may leave than the solve before it.
-const SHARE: f64 = 1e-2;
-const MORE: f64 = 2.0;
-/// By how much a solve may differ from what was predicted: over what the reactions have grown by, and over the reactions.
-const SAME: f64 = 1e-6;
-const ROUNDING: f64 = 1e-12;
+use crate::solver::tuning::extrapolation as tuning;
 
 /// How the reactions grow.
 #[derive(Clone, Default)]
@@ -66,8 +57,8 @@ impl Extrapolation {
         write(problem, &self.grown(&self.base, &self.rate));
         problem.velocities_from_reactions();
         let (residual, load_error) = (residual(problem), motion(problem));
-        let allowed = load_tolerance.min((MORE * self.moves).max(SHARE * load_tolerance));
-        let holds = residual <= SHARE * tolerance
+        let allowed = load_tolerance.min((tuning::MORE * self.moves).max(tuning::SHARE * load_tolerance));
+        let holds = residual <= tuning::SHARE * tolerance
             && load_error <= allowed
             && velocity_error(problem) <= load_tolerance
             && self.keeps_status();
@@ -105,9 +96,10 @@ impl Extrapolation {
         }
         self.moves = motion(problem);
         let same_limits = margins.iter().zip(&self.margins).all(|(now, base)| now.is_finite() == base.is_finite());
-        let even =
-            off <= (SAME * SAME * grown).max(ROUNDING * ROUNDING * size) && self.moves <= load_tolerance && same_limits;
-        self.most = if even { (2 * self.most).clamp(FIRST, MOST) } else { 0 };
+        let even = off <= (tuning::SAME * tuning::SAME * grown).max(tuning::ROUNDING * tuning::ROUNDING * size)
+            && self.moves <= load_tolerance
+            && same_limits;
+        self.most = if even { (2 * self.most).clamp(tuning::FIRST, tuning::MOST) } else { 0 };
         let steps = (self.steps + 1) as f64;
         let finite = |change: f64| if change.is_finite() { change } else { 0.0 };
         let rate =
@@ -130,7 +122,7 @@ impl Extrapolation {
     /// Whether all that is open or slips does so in the next step too.
     fn keeps_status(&self) -> bool {
         let size = self.base.iter().map(|r| r * r).sum::<f64>().sqrt();
-        self.grown(&self.margins, &self.margin_rate).into_iter().all(|margin| margin >= -ROUNDING * size)
+        self.grown(&self.margins, &self.margin_rate).into_iter().all(|margin| margin >= -tuning::ROUNDING * size)
     }
 
     pub fn save(&self, to: &mut Saved) {
@@ -153,7 +145,7 @@ impl Extrapolation {
         }
         let [a, b, c, d, steps, most, left] = counts;
         let [steps, most, left] = [steps, most, left].map(|n| n as u64);
-        if most > MOST || left > most || steps > MOST + 1 {
+        if most > tuning::MOST || left > most || steps > tuning::MOST + 1 {
             return Err(Mismatch);
         }
         let (kicked, rest, moves) = (from.flag()?, Rest::restored(from)?, from.real()?);

@@ -11,6 +11,7 @@ use crate::contact::{Law, LocalSolve};
 use crate::dim::{Dim, Vect};
 use crate::problem::residual::residual;
 use crate::problem::{ContactProblem, Group, Nodes, blocks};
+use crate::solver::tuning::gauss_seidel as tuning;
 
 /// Settings of [`GaussSeidel`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,13 +27,6 @@ pub struct GaussSeidelSettings {
     /// Steps that Anderson's acceleration remembers; 0 for plain sweeps.
     pub acceleration: usize,
 }
-
-/// Sweeps between two accelerated steps.
-const BURST: u64 = 4;
-/// Accelerated steps between two looks at the residual.
-const LOOK: u64 = 4;
-/// Plain sweeps before the acceleration begins: easy problems need no more.
-const PLAIN: u64 = 32;
 
 /// Non-linear Gauss–Seidel on node velocities.
 #[derive(Clone, Copy, Debug)]
@@ -168,17 +162,17 @@ fn plain(problem: &mut impl Sweepable, settings: &GaussSeidelSettings, most: u64
 /// Bursts of sweeps, accelerated, after some plain ones. What it ends with is the result of a burst: every impulse is in
 /// its cone.
 fn accelerated(problem: &mut impl Sweepable, settings: &GaussSeidelSettings) -> (u64, f64) {
-    let (mut sweeps, mut error) = plain(problem, settings, PLAIN.min(settings.max_sweeps));
+    let (mut sweeps, mut error) = plain(problem, settings, tuning::PLAIN.min(settings.max_sweeps));
     if error <= settings.tolerance {
         return (sweeps, error);
     }
     let mut memory = Anderson::new(settings.acceleration, problem.gather());
     while error > settings.tolerance && sweeps < settings.max_sweeps {
-        for _ in 0..BURST {
+        for _ in 0..tuning::BURST {
             problem.sweep(settings.local);
         }
-        sweeps += BURST;
-        if sweeps.is_multiple_of(LOOK * BURST) || sweeps >= settings.max_sweeps {
+        sweeps += tuning::BURST;
+        if sweeps.is_multiple_of(tuning::LOOK * tuning::BURST) || sweeps >= settings.max_sweeps {
             problem.velocities_from_reactions();
             error = problem.residual();
         }

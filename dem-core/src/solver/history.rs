@@ -13,10 +13,8 @@ use super::graph::Graph;
 use super::rows::{Row, Rows};
 use crate::contact::Padded;
 use crate::linear::Lu;
+use crate::solver::tuning::history as tuning;
 use std::sync::Arc;
-
-/// Size of H̃ ρ H̃ᵀ over the identity that is added to it, so that a body without a bond is no singularity (–).
-const STIFF: f64 = 1e8;
 
 /// The multipliers of all contacts, those of the bonds without their self-stress (N s); unchanged where the matrix is singular.
 pub(super) fn history(rows: &Rows, graph: &mut Option<Arc<Graph>>) -> Vec<Padded> {
@@ -60,11 +58,11 @@ fn stiffened(rows: &Rows, row: &Row, stiff: f64, y: &[f64]) -> Padded {
     Padded::from_order(&r)
 }
 
-/// The factor on ρ with which H̃ ρ H̃ᵀ has the size [`STIFF`].
+/// The factor on ρ with which H̃ ρ H̃ᵀ has the size [`tuning::STIFF`].
 fn stiffness(rows: &Rows) -> f64 {
     let count = rows.list.len().max(1) as f64;
     let mean = |of: &dyn Fn(&Row) -> f64| rows.list.iter().map(of).sum::<f64>() / count;
-    STIFF * mean(&|row| row.weights.n) / mean(&|row| row.normal)
+    tuning::STIFF * mean(&|row| row.weights.n) / mean(&|row| row.normal)
 }
 
 #[cfg(test)]

@@ -14,7 +14,7 @@ mod rest;
 mod rows;
 mod solvable;
 mod stages;
-mod stall;
+mod tuning;
 
 pub use gauss_seidel::{GaussSeidel, GaussSeidelSettings, sweep};
 pub use rows::StiffnessRatio;

@@ -1,9 +1,7 @@
 //! When something that failed is tried again.
 
 use crate::saved::{Mismatch, Reader, Saved};
-
-/// Most solves for which something that failed is not tried again.
-const LONGEST_REST: u64 = 64;
+use crate::solver::tuning::extrapolation as tuning;
 
 /// Solves for which something that failed is not tried: steps that are alike fail alike.
 #[derive(Clone, Copy, Default)]
@@ -23,7 +21,7 @@ impl Rest {
     /// It failed: one failure is forgiven, after the next it rests for one solve, then for twice as many each time.
     pub fn lengthen(&mut self) {
         self.left = self.next;
-        self.next = (2 * self.next).clamp(1, LONGEST_REST);
+        self.next = (2 * self.next).clamp(1, tuning::LONGEST_REST);
     }
 
     /// It succeeded.
@@ -40,6 +38,6 @@ impl Rest {
     /// What [`Rest::save`] wrote.
     pub fn restored(from: &mut Reader) -> Result<Self, Mismatch> {
         let rest = Self { left: from.count()? as u64, next: from.count()? as u64 };
-        if rest.left.max(rest.next) <= LONGEST_REST { Ok(rest) } else { Err(Mismatch) }
+        if rest.left.max(rest.next) <= tuning::LONGEST_REST { Ok(rest) } else { Err(Mismatch) }
     }
 }

@@ -25,14 +25,7 @@ use crate::problem::ContactProblem;
 use crate::problem::assembled::Assembled;
 use crate::problem::residual::velocity_error;
 use crate::saved::{Mismatch, Reader, Saved};
-
-/// Penalty of Newton's rows, over the inverse of the mean normal entry of W.
-const KAPPA: f64 = 1e9;
-/// Sweeps over dry contacts that aim at the tolerance, and those beyond that aim at what is accepted.
-const FINE_SWEEPS: u64 = 2_000;
-const COARSE_SWEEPS: u64 = 20_000;
-/// Sweeps from where a path ended.
-const LAST_SWEEPS: u64 = 2_000;
+use crate::solver::tuning::stages as tuning;
 
 /// The method that brought a solution; a step reports the last in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -127,7 +120,7 @@ impl Staged {
     /// By the stages that solve linear systems, and sweeps from where these end.
     fn directly(&mut self, problem: &mut impl Solvable) -> SolveReport {
         problem.velocities_from_reactions();
-        let rows = problem.rows(KAPPA, self.settings.stiffness);
+        let rows = problem.rows(tuning::KAPPA, self.settings.stiffness);
         // the reactions at hand may be it, as none are where bodies fly apart, and nothing may be there that yields
         let residual = problem.residual();
         if residual == 0.0 || rows.list.iter().all(|row| row.normal == 0.0) {
@@ -192,7 +185,7 @@ impl Staged {
         }
         best.iter().for_each(|found| problem.write_back(&found.reactions));
         problem.forget_what_is_not_finite();
-        let swept = problem.gauss_seidel(self.sweeps(tolerance, LAST_SWEEPS));
+        let swept = problem.gauss_seidel(self.sweeps(tolerance, tuning::LAST_SWEEPS));
         let velocity_error = problem.velocity_error();
         if best.as_ref().is_some_and(|found| found.missed(aims) <= aims.missed(swept.residual, velocity_error)) {
             return by_the_path(problem, swept.work.sweeps);
@@ -229,11 +222,11 @@ impl Staged {
         let most_missed = accept / tolerance;
         let (mut aim, mut work) = (tolerance, Work::default());
         loop {
-            let fine = by(aim, FINE_SWEEPS - work.sweeps).solve(problem);
+            let fine = by(aim, tuning::FINE_SWEEPS - work.sweeps).solve(problem);
             work = work + fine.work;
             let missed = self.aims(false).missed(fine.residual, velocity_error(problem));
             // sweeps look at the residual alone: a finer one for the velocities
-            if missed > 1.0 && fine.residual <= aim && work.sweeps < FINE_SWEEPS {
+            if missed > 1.0 && fine.residual <= aim && work.sweeps < tuning::FINE_SWEEPS {
                 aim = fine.residual / missed;
                 continue;
             }
@@ -242,7 +235,7 @@ impl Staged {
                 status => return SolveReport { status, work, ..fine },
             }
         }
-        let coarse = by(accept, COARSE_SWEEPS).solve(problem);
+        let coarse = by(accept, tuning::COARSE_SWEEPS).solve(problem);
         let missed = self.aims(false).missed(coarse.residual, velocity_error(problem));
         // it aimed at less than the tolerance
         let status = if missed <= most_missed { SolveStatus::Accepted } else { SolveStatus::Failed };

@@ -18,22 +18,7 @@ use super::local::State;
 use super::pairs::{largest, pair};
 use super::sites::Sites;
 use super::system::System;
-
-/// Relative length of a Newton step up to which a point counts as on the path, and to which a longer step is shortened.
-const ON_PATH: f64 = 0.3;
-const LONGEST_CORRECTION: f64 = 5.0;
-/// Longest relative change in a step along the tangent, the shortest, and the length of the next Newton step that it aims at.
-const LONGEST: f64 = 0.9;
-const SHORTEST: f64 = 1e-3;
-const AIM: f64 = 0.15;
-/// Share of the barrier that a step leaves at least.
-const STEEPEST: f64 = 1e-2;
-/// Relative change with θ of the fastest component up to which the barrier is the parameter.
-const SLOW: f64 = 0.2;
-/// Newton steps after which a step along the tangent is made again, shorter by this factor; Newton steps that look for a first point.
-const CORRECTIONS: u32 = 5;
-const FIRST_CORRECTIONS: u32 = 15;
-const SHORTER: f64 = 0.3;
+use crate::solver::tuning::continuation as tuning;
 
 /// A point next to the path, or a change of it.
 #[derive(Clone, Debug)]
@@ -122,7 +107,7 @@ impl Continuation {
             predictor: None,
             corrections: 0,
             first_error: 0.0,
-            length: LONGEST,
+            length: tuning::LONGEST,
             end: (0.5 * gap).ln(),
             straight,
         }
@@ -146,7 +131,7 @@ impl Continuation {
         if self.corrections == 0 {
             self.first_error = error;
         }
-        if error > ON_PATH || error.is_nan() {
+        if error > tuning::ON_PATH || error.is_nan() {
             return self.correct(error, &newton);
         }
         self.at.advance(1.0, &newton);
@@ -156,17 +141,17 @@ impl Continuation {
     /// A Newton step alone; the step along the tangent once more, and shorter, where there have been too many.
     fn correct(&mut self, error: f64, newton: &Iterate) -> Progress {
         self.corrections += 1;
-        let most = if self.predictor.is_some() { CORRECTIONS } else { FIRST_CORRECTIONS };
+        let most = if self.predictor.is_some() { tuning::CORRECTIONS } else { tuning::FIRST_CORRECTIONS };
         if self.corrections <= most && error.is_finite() {
-            self.at.advance((LONGEST_CORRECTION / error).min(1.0), newton);
+            self.at.advance((tuning::LONGEST_CORRECTION / error).min(1.0), newton);
             return Progress::Path;
         }
-        self.length *= SHORTER;
+        self.length *= tuning::SHORTER;
         self.corrections = 0;
-        let Some(predictor) = self.predictor.as_mut().filter(|_| self.length >= SHORTEST) else {
+        let Some(predictor) = self.predictor.as_mut().filter(|_| self.length >= tuning::SHORTEST) else {
             return Progress::Lost;
         };
-        predictor.length *= SHORTER;
+        predictor.length *= tuning::SHORTER;
         self.at = predictor.end();
         Progress::Path
     }
@@ -174,12 +159,12 @@ impl Continuation {
     /// A step along the tangent, `down` to a lower barrier or up to a higher one.
     fn predict(&mut self, tangent: Iterate, down: bool) -> Progress {
         // the error of a step grows with the square of its length
-        let factor = (AIM / self.first_error).sqrt().clamp(SHORTER, 2.0);
-        self.length = (factor * self.length).min(LONGEST);
+        let factor = (tuning::AIM / self.first_error).sqrt().clamp(tuning::SHORTER, 2.0);
+        self.length = (factor * self.length).min(tuning::LONGEST);
         self.corrections = 0;
         let (fastest, size) = self.at.fastest(&tangent);
-        self.parameter = if down && size <= SLOW { Parameter::Barrier } else { fastest };
-        let length = if down { -(self.length / size).min(1.0 - STEEPEST) } else { self.length / size };
+        self.parameter = if down && size <= tuning::SLOW { Parameter::Barrier } else { fastest };
+        let length = if down { -(self.length / size).min(1.0 - tuning::STEEPEST) } else { self.length / size };
         let predictor = Predictor { from: self.at.clone(), tangent, length };
         self.at = predictor.end();
         self.predictor = Some(predictor);

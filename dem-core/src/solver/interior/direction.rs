@@ -3,21 +3,7 @@
 use super::cones::{Point, correction, dot, least_product, moved};
 use super::local::{State, gap};
 use super::system::System;
-
-/// Least centring, as a share of the gap.
-const CENTRING: f64 = 0.1;
-/// Most of Gondzio's correctors in an iteration, by how much a step is tried longer, the share by which it must grow, and how far products
-/// may be from the barrier, as a factor.
-const CORRECTORS: usize = 2;
-const LONGER: f64 = 0.3;
-const GROWN: f64 = 1.05;
-const APART: f64 = 10.0;
-/// Least product of a pair that a point may have, over the gap.
-const CENTRAL: f64 = 1e-3;
-/// A step shorter than this turns towards the middle, by these shares of the gap, where it grows by this factor.
-const SHORT: f64 = 0.5;
-const TO_THE_MIDDLE: [f64; 2] = [0.2, 0.7];
-const WORTH: f64 = 1.5;
+use crate::solver::tuning::direction as tuning;
 
 /// The direction of an iteration, and how far one can go along it.
 pub(super) fn direction(system: &System) -> (State, f64) {
@@ -31,7 +17,7 @@ pub(super) fn direction(system: &System) -> (State, f64) {
     let count = at.x.len() as f64;
     let aim = at.x.iter().zip(&at.z).zip(predictor.x.iter().zip(&predictor.z));
     let aim = aim.map(|((x, z), (dx, dz))| dot(&moved(x, length, dx), &moved(z, length, dz))).sum::<f64>() / count;
-    let centring = (aim / gap).max(0.0).powi(3).clamp(CENTRING, 1.0);
+    let centring = (aim / gap).max(0.0).powi(3).clamp(tuning::CENTRING, 1.0);
     // corrector, of second order
     let barrier = centring * gap;
     let second = system.products(&predictor.x, &predictor.z);
@@ -39,30 +25,32 @@ pub(super) fn direction(system: &System) -> (State, f64) {
         products.iter().zip(&second).map(|(p, s)| [barrier - p[0] - s[0], -p[1] - s[1], -p[2] - s[2]]).collect();
     let mut step = system.step(&by);
     let mut far = system.longest(&step);
-    for _ in 0..CORRECTORS {
-        let length = (far + LONGER).min(1.0);
+    for _ in 0..tuning::CORRECTORS {
+        let length = (far + tuning::LONGER).min(1.0);
         let ends = |at: &[Point], step: &[Point]| -> Vec<Point> {
             at.iter().zip(step).map(|(x, d)| moved(x, length, d)).collect()
         };
         let products = system.products(&ends(&at.x, &step.x), &ends(&at.z, &step.z));
-        let corrected = |(by, v): (&Point, &Point)| moved(by, 1.0, &correction(v, barrier / APART, barrier * APART));
+        let corrected = |(by, v): (&Point, &Point)| {
+            moved(by, 1.0, &correction(v, barrier / tuning::APART, barrier * tuning::APART))
+        };
         let more: Vec<Point> = by.iter().zip(&products).map(corrected).collect();
         let other = system.step(&more);
         let reached = system.longest(&other);
-        if reached <= GROWN * far {
+        if reached <= tuning::GROWN * far {
             break;
         }
         (step, far, by) = (other, reached, more);
     }
     let mut chosen = by;
-    if far < SHORT {
+    if far < tuning::SHORT {
         // at the boundary: towards the middle instead, without the second order
-        for share in TO_THE_MIDDLE {
+        for share in tuning::TO_THE_MIDDLE {
             let barrier = share.max(centring) * gap;
             let by: Vec<Point> = products.iter().map(|p| [barrier - p[0], -p[1], -p[2]]).collect();
             let other = system.step(&by);
             let reached = system.longest(&other);
-            if reached > WORTH * far {
+            if reached > tuning::WORTH * far {
                 (step, far) = (other, reached);
                 chosen = by;
             }
@@ -75,7 +63,7 @@ pub(super) fn direction(system: &System) -> (State, f64) {
 
 /// Whether no product of a pair is far below the gap.
 pub(super) fn is_central(at: &State) -> bool {
-    let least = CENTRAL * gap(at);
+    let least = tuning::CENTRAL * gap(at);
     at.x.iter().zip(&at.z).all(|(x, z)| least_product(x, z) >= least)
 }
 

@@ -6,20 +6,7 @@ use super::local::{State, gap};
 use super::sites::Sites;
 use super::start::cold;
 use super::system::System;
-
-/// How near the boundary a step may go, and by which factor it is shortened until its end is central.
-const NEAR: f64 = 0.99;
-const SHORTER: f64 = 0.8;
-const SHORTEST: f64 = 1e-3;
-/// A step shorter than this is short, and the path jams where so many follow each other.
-const SHORT: f64 = 0.1;
-const JAMMED: u32 = 2;
-/// By how much the barrier is above the gap of a jam where the path is looked for by arc length, and how often it is raised so.
-const RAISED: f64 = 10.0;
-const MOST_RAISED: i32 = 2;
-/// Relative change with θ up to which the path counts as straight: this factor at each jam times this.
-const STRAIGHT: f64 = 4.0;
-const STRAIGHTER: f64 = 0.5;
+use crate::solver::tuning::{direction as steps, follow as tuning};
 
 /// Where the path is, and how it is followed.
 pub(super) struct Follow {
@@ -39,7 +26,7 @@ struct ByArcLength {
 impl Follow {
     /// In long steps, from a point within all cones.
     pub fn from(at: State) -> Self {
-        Self { at, short: 0, straight: STRAIGHT, by_arc_length: None }
+        Self { at, short: 0, straight: tuning::STRAIGHT, by_arc_length: None }
     }
 
     /// The point at hand.
@@ -58,7 +45,7 @@ impl Follow {
         }
         self.at.x = sites.primal(&self.at.r);
         if !is_central(&self.at) {
-            self.jam(RAISED);
+            self.jam(tuning::RAISED);
         }
     }
 
@@ -85,23 +72,23 @@ impl Follow {
     /// A predictor–corrector step.
     fn long_step(&mut self, system: &System) -> State {
         let (mut step, far) = direction(system);
-        let mut length = (NEAR * far).min(1.0);
+        let mut length = (steps::TO_THE_BOUNDARY * far).min(1.0);
         let end = |length: f64| {
             let mut end = system.at.clone();
             advance(&mut end, length, &step);
             end
         };
         let mut next = end(length);
-        while length > SHORTEST && !is_central(&next) {
-            length *= SHORTER;
+        while length > steps::SHORTEST && !is_central(&next) {
+            length *= steps::SHORTER;
             next = end(length);
         }
-        self.short = if length > SHORT { 0 } else { self.short + 1 };
+        self.short = if length > tuning::SHORT { 0 } else { self.short + 1 };
         self.at = next;
-        if self.short == JAMMED {
+        if self.short == tuning::JAMMED {
             self.short = 0;
-            self.straight *= STRAIGHTER;
-            self.jam(RAISED);
+            self.straight *= tuning::STRAIGHTER;
+            self.jam(tuning::RAISED);
         }
         step.r.iter_mut().for_each(|r| *r *= length);
         step
@@ -117,9 +104,9 @@ impl Follow {
     fn raise(&mut self, sites: &Sites) -> Option<()> {
         let raised = self.by_arc_length.as_ref().map_or(0, |by| by.raised) + 1;
         let below = gap(&self.at);
-        let continuation = if raised <= MOST_RAISED {
-            Continuation::new(&self.at, below, RAISED.powi(raised), self.straight)
-        } else if raised == MOST_RAISED + 1 {
+        let continuation = if raised <= tuning::MOST_RAISED {
+            Continuation::new(&self.at, below, tuning::RAISED.powi(raised), self.straight)
+        } else if raised == tuning::MOST_RAISED + 1 {
             let start = cold(sites);
             Continuation::new(&start, below, gap(&start) / below, self.straight)
         } else {

@@ -10,28 +10,7 @@ use super::metric::Metric;
 use super::sites::{Limit, Sites};
 use super::{Aims, Found};
 use crate::solver::solvable::Solvable;
-
-/// Stiffness of the metric over the inverse of the mean normal entry of W.
-const KAPPA: f64 = 1e7;
-/// Share of the tolerance that the compliance may take where any reactions will do, and the stiffest metric: with no compliance the path wanders
-/// among the reactions that balance themselves.
-const ANY: f64 = 0.1;
-const STIFFEST: f64 = 1e12;
-/// What the gaps of all pairs may be beside the energy of the metric for reactions to count as those of least energy, and what this may be beside
-/// Σ r²/ρ.
-const LEAST: f64 = 1e-5;
-/// Gaps of all pairs, over the energy of the metric, at which the point is kept from which the path is followed again: with another anchor a path
-/// whose gaps are far smaller is another one.
-const BACK: f64 = 0.03;
-/// Share of its compliance that a metric keeps each time it is anchored again after the first, and how often that is done.
-const HARDER: f64 = 0.01;
-const MOST_ANCHORED: u32 = 5;
-/// Share of the tolerance that the compliance may take of the residual before the metric is anchored again.
-const SHOWS: f64 = 0.5;
-/// Iterations in which reactions that solve the problem may come to the limits of r*.
-const MOST_PATIENT: u32 = 3;
-/// Gap, over the square of the unit of reactions, below which only rounding changes.
-const LEAST_GAP: f64 = 1e-26;
+use crate::solver::tuning::selection as tuning;
 
 /// What to do at a point.
 pub(super) enum Next {
@@ -60,7 +39,8 @@ pub(super) struct Selection {
 
 impl Selection {
     pub fn new(sites: &Sites, anchor: Vec<f64>, aims: Aims) -> Self {
-        let kappa = if aims.least { KAPPA } else { (1.0 / (ANY * aims.tolerance)).min(STIFFEST) };
+        let kappa =
+            if aims.least { tuning::KAPPA } else { (1.0 / (tuning::ANY * aims.tolerance)).min(tuning::STIFFEST) };
         let metric = Metric::new(sites, anchor, kappa);
         let limits = (!aims.least).then(Vec::new);
         Self {
@@ -80,8 +60,8 @@ impl Selection {
     pub fn assess(&mut self, problem: &mut impl Solvable, sites: &Sites, at: &State, iteration: u64) -> Next {
         let gaps = gap(at) * at.x.len() as f64;
         // what has hardly changed since the anchor is known well enough by itself
-        let energy = self.metric.energy(&at.r).max(LEAST * self.metric.weight(&at.r));
-        let least = LEAST * energy;
+        let energy = self.metric.energy(&at.r).max(tuning::LEAST * self.metric.weight(&at.r));
+        let least = tuning::LEAST * energy;
         if self.limits.is_none() && gaps <= least {
             (self.limits, self.enough) = (Some(sites.limits(at, &self.metric.own)), least);
         }
@@ -97,24 +77,24 @@ impl Selection {
             solved = self.solves(at_limits) || was_solved && self.anchored > 0;
             if was_solved && !solved {
                 self.patient += 1;
-                solved = self.patient > MOST_PATIENT;
+                solved = self.patient > tuning::MOST_PATIENT;
             }
         }
         // a gap that is rounding tells nothing more
-        let exhausted = gaps.is_nan() || gap(at) <= LEAST_GAP || iteration == self.aims.most;
+        let exhausted = gaps.is_nan() || gap(at) <= tuning::LEAST_GAP || iteration == self.aims.most;
         if solved || exhausted {
             return Next::Arrived;
         }
-        if gaps <= BACK * energy && self.turn.is_none() {
+        if gaps <= tuning::BACK * energy && self.turn.is_none() {
             self.turn = Some(at.clone());
         }
         match &self.turn {
             Some(turn) if gaps <= least && self.metric_shows(sites, at) => {
-                if self.anchored == MOST_ANCHORED {
+                if self.anchored == tuning::MOST_ANCHORED {
                     return Next::Arrived;
                 }
                 // the same metric once more, then harder ones
-                let share = if self.anchored == 0 { 1.0 } else { HARDER };
+                let share = if self.anchored == 0 { 1.0 } else { tuning::HARDER };
                 self.metric.anchor_at(at.r.clone(), share);
                 self.enough *= share;
                 self.anchored += 1;
@@ -128,7 +108,7 @@ impl Selection {
     fn metric_shows(&self, sites: &Sites, at: &State) -> bool {
         let Aims { tolerance, load_tolerance, .. } = self.aims;
         let (residual, velocity) = self.metric.left(sites, &at.r);
-        residual > SHOWS * tolerance || velocity > SHOWS * load_tolerance * sites.largest_free()
+        residual > tuning::SHOWS * tolerance || velocity > tuning::SHOWS * load_tolerance * sites.largest_free()
     }
 
     fn solves(&self, missed: f64) -> bool {

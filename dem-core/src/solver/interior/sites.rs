@@ -11,14 +11,12 @@ use super::cones::{Point, eigenvalues};
 use super::local::State;
 use crate::contact::{PADDED, Padded};
 use crate::solver::rows::{Row, Rows, TWIST};
+use crate::solver::tuning::selection as tuning;
 use std::ops::Range;
 
 /// Most rows of a contact, and most unknowns of its cones.
 pub(super) const ROWS: usize = PADDED;
 pub(super) const CONES: usize = 9;
-
-/// How near a limit a reaction must be, over itself, to be at one that is known.
-const BESIDE: f64 = 1e-6;
 
 /// Whether a reaction is at the apex of its cone, or on its side.
 #[derive(Clone, Copy, Debug, Default)]
@@ -257,8 +255,8 @@ impl Sites {
             let (x, z) = (eigenvalues(&at.x[c]), eigenvalues(&at.z[c]));
             let known = known.get(c).copied().unwrap_or_default();
             Limit {
-                apex: x[0] < z[1] || known.apex && at.x[c][0] <= BESIDE * self.cones[c].slope * shift,
-                side: x[1] < z[0] || known.side && x[1] <= BESIDE * x[0],
+                apex: x[0] < z[1] || known.apex && at.x[c][0] <= tuning::BESIDE * self.cones[c].slope * shift,
+                side: x[1] < z[0] || known.side && x[1] <= tuning::BESIDE * x[0],
             }
         };
         let one = |(site, shift): (&Site, &f64)| {

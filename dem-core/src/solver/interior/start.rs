@@ -4,16 +4,14 @@ use super::cones::least_product;
 use super::coupling::Coupling;
 use super::local::{State, gap};
 use super::sites::Sites;
-
-/// How far inside its cone a start is moved, over the mean reaction.
-const INSIDE: f64 = 0.1;
+use crate::solver::tuning::start as tuning;
 
 /// Reactions well inside their cones, velocities as large as the free ones.
 pub(super) fn cold(sites: &Sites) -> State {
     let largest = sites.shift.iter().copied().fold(1.0, f64::max);
     let mut r = vec![0.0; sites.rows];
     for (site, shift) in sites.list.iter().zip(&sites.shift) {
-        site.part_mut(&mut r)[0] = (INSIDE * largest - shift).max(0.0);
+        site.part_mut(&mut r)[0] = (tuning::INSIDE * largest - shift).max(0.0);
     }
     let speed = sites.free.iter().map(|u| u.abs()).fold(0.0, f64::max).max(f64::MIN_POSITIVE);
     State { x: sites.primal(&r), r, z: vec![[speed, 0.0, 0.0]; sites.cones.len()] }
@@ -32,7 +30,7 @@ pub(super) fn warm(sites: &Sites, coupling: &Coupling, reactions: &[f64]) -> Sta
             x[1].hypot(x[2]) / cone.slope
         };
         let least = site.cones.clone().map(needs).fold(0.0, f64::max);
-        own[0] = own[0].max(least - shift) + INSIDE * mean;
+        own[0] = own[0].max(least - shift) + tuning::INSIDE * mean;
     }
     let moving = coupling.velocity(sites, &r);
     let mut z = vec![[0.0; 3]; sites.cones.len()];
@@ -41,11 +39,12 @@ pub(super) fn warm(sites: &Sites, coupling: &Coupling, reactions: &[f64]) -> Sta
         for c in site.cones.clone() {
             let cone = &sites.cones[c];
             z[c] = cone.primal(&velocity);
-            z[c][0] = INSIDE * mean + if cone.tangents == 0 { z[c][0].max(0.0) } else { z[c][1].hypot(z[c][2]) };
+            z[c][0] =
+                tuning::INSIDE * mean + if cone.tangents == 0 { z[c][0].max(0.0) } else { z[c][1].hypot(z[c][2]) };
         }
     }
     let mut at = State { x: sites.primal(&r), r, z };
-    let least = 0.1 * gap(&at);
+    let least = tuning::INSIDE * gap(&at);
     for (x, z) in at.x.iter().zip(&mut at.z) {
         while least_product(x, z) < least {
             z[0] *= 2.0;

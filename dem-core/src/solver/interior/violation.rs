@@ -19,14 +19,7 @@ use crate::contact::Padded;
 use crate::problem::assembled::BlockMatrix;
 use crate::solver::graph::Graph;
 use crate::solver::rows::Rows;
-
-/// W over the compliance, and how often q is moved on.
-const KAPPA: f64 = 1e8;
-const ROUNDS: usize = 3;
-/// Most iterations of a round, the gap at which it ends, over the square of the unit of reactions, and how far a step goes to the boundary.
-const MOST: usize = 100;
-const LEAST_GAP: f64 = 1e-18;
-const INSIDE: f64 = 0.99;
+use crate::solver::tuning::{direction as steps, violation as tuning};
 
 /// What violates least.
 pub(in crate::solver) struct Least {
@@ -40,17 +33,17 @@ impl Interior {
     /// The least violation of an associated problem without shifts; none where no elimination tree can be made.
     pub fn least_violation(&mut self, rows: &Rows, matrix: Option<&BlockMatrix>) -> Option<Least> {
         let mut sites = Sites::of(rows, &[]);
-        let ratio = sites.speed / (sites.force * KAPPA);
+        let ratio = sites.speed / (sites.force * tuning::KAPPA);
         let graph = if matrix.is_none() { Graph::of(rows, &mut None) } else { None };
         let coupling = Coupling::of(rows, matrix, graph.as_deref(), &sites, ratio)?;
         let metric = Metric::new(&sites, vec![0.0; sites.rows], 1.0);
         let mut reactions = vec![0.0; sites.rows];
         let mut at = State::default();
-        for _ in 0..ROUNDS {
+        for _ in 0..tuning::ROUNDS {
             at = self.of_a_round(&sites, &coupling, &metric);
             let moved = coupling.velocity(&sites, &at.r);
             sites.free.iter_mut().zip(&moved).for_each(|(q, u)| *q += u);
-            reactions.iter_mut().zip(&at.r).for_each(|(sum, d)| *sum += KAPPA * d);
+            reactions.iter_mut().zip(&at.r).for_each(|(sum, d)| *sum += tuning::KAPPA * d);
         }
         Some(Least { direction: sites.scattered(&at.r), reactions: sites.scattered(&reactions) })
     }
@@ -58,13 +51,13 @@ impl Interior {
     /// The path of one round, to its end.
     fn of_a_round(&mut self, sites: &Sites, coupling: &Coupling, metric: &Metric) -> State {
         let mut at = cold(sites);
-        for _ in 0..MOST {
-            if gap(&at) <= LEAST_GAP {
+        for _ in 0..tuning::MOST {
+            if gap(&at) <= tuning::LEAST_GAP {
                 break;
             }
             let Some(system) = self.factorised(sites, coupling, &at, metric) else { break };
             let (step, far) = direction(&system);
-            advance(&mut at, (INSIDE * far).min(1.0), &step);
+            advance(&mut at, (steps::TO_THE_BOUNDARY * far).min(1.0), &step);
         }
         at
     }

@@ -3,9 +3,7 @@
 use crate::contact::{Local, Padded};
 use crate::dim::{Moments, Vect};
 use crate::solver::rows::Row;
-
-/// Relative distance to a limit that counts as at it.
-const BEYOND: f64 = 1e-9;
+use crate::solver::tuning::newton as tuning;
 
 /// A guess of the active set: that of these reactions (N s), without the shift.
 pub(super) struct Guess {
@@ -24,7 +22,8 @@ impl Guess {
         let guess = &self.reactions[k];
         let limit = guess.n + row.shift;
         // how far the rows of one group are beyond their limit; zero for those that stick
-        let at_limit = |c: f64, size: f64| if size >= (1.0 - BEYOND) * c * limit { 2.0 * BEYOND } else { 0.0 };
+        let at_limit =
+            |c: f64, size: f64| if size >= (1.0 - tuning::BEYOND) * c * limit { 2.0 * tuning::BEYOND } else { 0.0 };
         let slip = at_limit(row.cone.mu, Vect::norm(&guess.t));
         let bend = at_limit(row.cone.nu, guess.m.bending());
         let twist = at_limit(row.cone.xi, guess.m.twist());

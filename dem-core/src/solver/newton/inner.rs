@@ -6,20 +6,7 @@ use super::guess::Guess;
 use crate::contact::Padded;
 use crate::solver::graph::Graph;
 use crate::solver::rows::{Operator, Rows};
-use crate::solver::stall::Stall;
-
-/// What a linear solve may leave of F, over what is small enough.
-const SMALL: f64 = 0.1;
-/// Tolerance of a linear solve: the least and the largest where one may suffice, and where another must follow.
-const TIGHT: f64 = 1e-12;
-const FAIR: f64 = 1e-3;
-const LOOSE: f64 = 1e-2;
-/// What a linear solve with fresh factors may leave before its step is none, and how far F may grow.
-const LOST: f64 = 0.1;
-const DIVERGED: f64 = 1e6;
-/// Most rounds of refinement of a linear solve, and the share that one must bring what is left down to.
-const REFINED: usize = 8;
-const SHRUNK: f64 = 0.5;
+use crate::solver::tuning::newton as tuning;
 
 /// State of one solve.
 pub(super) struct Iterate {
@@ -57,28 +44,27 @@ impl Iterate {
 }
 
 impl Newton {
-    /// Solve the inner problem for fixed multipliers from `state`, in at most `most` iterations and `patience` without
-    /// progress; the active set of `guess` is tried first. Returns the iterations made and whether F vanished.
-    pub(super) fn inner(
-        &mut self,
-        rows: &Rows,
-        state: &mut Iterate,
-        guess: Option<&Guess>,
-        patience: u64,
-        most: u64,
-    ) -> (u64, bool) {
-        let mut stall = Stall::after(patience, 0.9);
-        for iteration in 0..most {
-            let guessed = guess.filter(|_| iteration == 0);
+    /// Solve the inner problem for fixed multipliers from `state`, with the active set of `guess` first: in the `first` proximal iteration
+    /// Newton gives up where this active set leaves much of F. Returns the iterations made and whether F vanished.
+    pub(super) fn inner(&mut self, rows: &Rows, state: &mut Iterate, guess: &Guess, first: bool) -> (u64, bool) {
+        let (begun, mut least, mut since) = (state.norm, f64::INFINITY, 0);
+        for iteration in 0..tuning::MOST_ITERATIONS {
+            let guessed = (iteration == 0).then_some(guess);
             let target = self.target(rows, state);
-            let lost = state.norm > DIVERGED * stall.mark;
-            if guessed.is_none() && (state.norm <= target || stall.at(state.norm) || lost) {
-                return (iteration, state.norm <= target);
+            if guessed.is_none() {
+                let wrong = first && iteration == 1 && state.norm > tuning::LEFT_BY_GUESS * begun;
+                // false for what is no number
+                let stays = state.norm <= tuning::DIVERGED * least;
+                since = if state.norm < tuning::PROGRESS * least { 0 } else { since + 1 };
+                least = least.min(state.norm);
+                if state.norm <= target || wrong || !stays || since >= tuning::PATIENCE {
+                    return (iteration, state.norm <= target);
+                }
             }
             let Some(direction) = self.direction(rows, state, guessed, target) else { return (iteration + 1, false) };
             advance(rows, state, &direction, guessed.is_some());
         }
-        (most, state.norm <= self.target(rows, state))
+        (tuning::MOST_ITERATIONS, state.norm <= self.target(rows, state))
     }
 
     /// The norm of F that is small enough: a tenth of what either tolerance allows, or what rounding leaves.
@@ -94,8 +80,9 @@ impl Newton {
             rounding += row.size * (speed * row.size / (soft * soft) + r.dot(r));
             carried += row.size * r.dot(r);
         }
-        let wanted = (0.1 * self.settings.load_tolerance * change).min(0.1 * self.settings.tolerance * carried.sqrt());
-        wanted.max(4.0 * f64::EPSILON * rounding.sqrt())
+        let wanted =
+            tuning::SHARE * (self.settings.load_tolerance * change).min(self.settings.tolerance * carried.sqrt());
+        wanted.max(tuning::ROUNDING * rounding.sqrt())
     }
 
     /// The Newton direction −J⁻¹ F, by the factors at hand where a few rounds of refinement make it exact enough, else by new ones.
@@ -103,7 +90,8 @@ impl Newton {
         let (mut right, points) = linearise(rows, state, guess);
         right.iter_mut().for_each(|f| *f = -*f);
         let norm = norm2(&right).sqrt();
-        let least = (SMALL * target / norm).clamp(TIGHT, if guess.is_none() { LOOSE } else { FAIR });
+        let least = (tuning::SHARE * target / norm)
+            .clamp(tuning::TIGHT, if guess.is_none() { tuning::LOOSE } else { tuning::FAIR });
         let exact = operators(rows, &points);
         for fresh in [!self.factor.fits(rows.unknowns), true] {
             if fresh {
@@ -113,21 +101,21 @@ impl Newton {
                 }
             }
             let (mut step, mut left, mut last) = (vec![0.0; right.len()], right.clone(), 1.0);
-            for _ in 0..REFINED {
+            for _ in 0..tuning::MOST_REFINED {
                 self.factor.solve(&mut left);
                 step.iter_mut().zip(&left).for_each(|(x, d)| *x += d);
                 multiply(rows, &exact, &step, &mut left);
                 left.iter_mut().zip(&right).for_each(|(l, r)| *l = r - *l);
                 let share = norm2(&left).sqrt() / norm;
-                if share <= least || fresh && share <= LOST && share > SHRUNK * last {
+                if share <= least || fresh && share <= tuning::LOST && share > tuning::REFINED * last {
                     return Some(step);
                 }
-                if share > SHRUNK * last || !share.is_finite() {
+                if share > tuning::REFINED * last || !share.is_finite() {
                     break;
                 }
                 last = share;
             }
-            if fresh && last <= LOST {
+            if fresh && last <= tuning::LOST {
                 return Some(step);
             }
         }
@@ -192,7 +180,8 @@ fn advance(rows: &Rows, state: &mut Iterate, direction: &[f64], whole: bool) {
     let convex = rows.list.iter().all(|row| row.associated);
     let full = step(1.0);
     let start = slope(state);
-    let good = if convex { slope(&full).abs() <= 0.5 * start.abs() } else { full.norm <= 0.9 * state.norm };
+    let good =
+        if convex { slope(&full).abs() <= 0.5 * start.abs() } else { full.norm <= tuning::PROGRESS * state.norm };
     if whole || good {
         *state = full;
         return;
@@ -238,7 +227,7 @@ fn root(step: impl Fn(f64) -> Iterate, slope: impl Fn(&Iterate) -> f64, start: f
         let next = step(length);
         let s = slope(&next);
         found = next;
-        if s.abs() <= 0.1 * start.abs() {
+        if s.abs() <= tuning::FLAT * start.abs() {
             break;
         }
         if s < 0.0 {

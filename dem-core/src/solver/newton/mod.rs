@@ -27,15 +27,10 @@ use super::rows::Rows;
 use super::solvable::Solvable;
 use super::{SolveReport, StagedSettings};
 use crate::saved::{Mismatch, Reader, Saved};
+use crate::solver::tuning::newton as tuning;
 use factor::Factor;
 use guess::Guess;
 use std::sync::Arc;
-
-/// Sweeps that look for the active set: at every step, and from zero reactions.
-const SWEEPS: usize = 5;
-const COLD_SWEEPS: usize = 100;
-/// Most factorisations of a solve: the interior-point method takes 8 to 20.
-const MOST_MADE: u64 = 8;
 
 /// Augmented-Lagrangian semismooth Newton.
 #[derive(Clone)]
@@ -71,11 +66,11 @@ impl Newton {
         iterations: &mut u64,
     ) -> Option<SolveReport> {
         let sweeps = match rows.in_space() {
-            _ if cold => COLD_SWEEPS,
+            _ if cold => tuning::COLD_SWEEPS,
             true => 0,
-            false => SWEEPS,
+            false => tuning::SWEEPS,
         };
-        self.most_made = self.made() + MOST_MADE;
+        self.most_made = self.made() + tuning::MOST_FACTORISATIONS;
         let guess = Guess::of(problem.swept(sweeps));
         let report = self.rounds(problem, rows, guess, iterations);
         self.factor.stale |= report.is_none();

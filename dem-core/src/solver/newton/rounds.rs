@@ -6,14 +6,8 @@ use super::{Newton, SolveReport};
 use crate::solver::extrapolation::margins;
 use crate::solver::rows::{Rows, net_change};
 use crate::solver::solvable::Solvable;
-use crate::solver::stall::Shrinking;
+use crate::solver::tuning::newton as tuning;
 use crate::solver::{SolveStatus, Work};
-
-/// Newton iterations of one inner problem before it is given up: those in which F shrinks by less than a tenth, and all of them.
-const PATIENCE: u64 = 3;
-const MOST_INNER: u64 = 30;
-/// How often the penalty may be lowered a hundredfold in one solve.
-const MOST_SOFTENED: u32 = 4;
 
 impl Newton {
     /// Proximal rounds, each begun with the active set of the one before, the first with that of `guess`. None if an inner problem is not
@@ -30,7 +24,7 @@ impl Newton {
         self.margins.clear();
         loop {
             let mut state = Iterate::from_reactions(rows, &guess.reactions);
-            let (made, solved) = self.inner(rows, &mut state, Some(&guess), PATIENCE, MOST_INNER);
+            let (made, solved) = self.inner(rows, &mut state, &guess, self.margins.is_empty());
             *iterations += made.max(1);
             if !solved && made > 1 && last_error <= self.settings.tolerance {
                 // what the round before left is good enough, and this was to tell its load error: the velocities show it
@@ -59,13 +53,13 @@ impl Newton {
                 return Some(report);
             }
             made_in_all += made;
-            let stuck = softened == MOST_SOFTENED && error > 0.5 * last_error;
+            let stuck = softened == tuning::MOST_SOFTENED && error > 0.5 * last_error;
             if stuck || made_in_all >= self.settings.max_iterations {
                 return (report.status == SolveStatus::Accepted).then_some(report);
             }
-            if error > 0.5 * last_error && softened < MOST_SOFTENED {
+            if error > 0.5 * last_error && softened < tuning::MOST_SOFTENED {
                 // what moves fast is rounded by ρ u: a smaller ρ hears less of it, and takes more rounds
-                rows.soften(100.0);
+                rows.soften(tuning::SOFTENED);
                 softened += 1;
             }
             (last_error, last_velocity_error) = (error, velocity_error);
@@ -75,5 +69,25 @@ impl Newton {
     fn report(&self, iterations: u64, residual: f64, load_error: f64, velocity_error: f64) -> SolveReport {
         let work = Work { newton: iterations, ..Work::default() };
         self.settings.report(work, residual, load_error, velocity_error)
+    }
+}
+
+/// The changes of proximal iterations.
+struct Shrinking {
+    last: f64,
+}
+
+impl Default for Shrinking {
+    fn default() -> Self {
+        Self { last: 1.0 }
+    }
+}
+
+impl Shrinking {
+    /// Enter the next change: the error that is left, for iterations that shorten it by c leave c/(1 − c) of the last change.
+    fn error(&mut self, change: f64) -> f64 {
+        let shrinkage = (change / self.last).min(0.5);
+        self.last = change;
+        change * shrinkage / (1.0 - shrinkage)
     }
 }
