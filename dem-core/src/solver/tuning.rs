@@ -181,8 +181,6 @@ pub(super) mod selection {
     pub const MOST_ANCHORED: u32 = 5;
     /// Share of the tolerances that the compliance may take before the metric is anchored again.
     pub const SHOWS: f64 = 0.5;
-    /// Iterations in which reactions that solve the problem may come to the limits of those of least energy.
-    pub const MOST_PATIENT: u32 = 3;
     /// Gap, over the square of the unit of reactions, below which only rounding changes.
     pub const LEAST_GAP: f64 = 1e-26;
     /// How near a limit a reaction must be, over itself, to be at one that is known.

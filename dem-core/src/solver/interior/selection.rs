@@ -34,7 +34,6 @@ pub(super) struct Selection {
     enough: f64,
     turn: Option<State>,
     anchored: u32,
-    patient: u32,
 }
 
 impl Selection {
@@ -43,17 +42,7 @@ impl Selection {
             if aims.least { tuning::KAPPA } else { (1.0 / (tuning::ANY * aims.tolerance)).min(tuning::STIFFEST) };
         let metric = Metric::new(sites, anchor, kappa);
         let limits = (!aims.least).then(Vec::new);
-        Self {
-            aims,
-            metric,
-            best: None,
-            change: 1.0,
-            limits,
-            enough: f64::INFINITY,
-            turn: None,
-            anchored: 0,
-            patient: 0,
-        }
+        Self { aims, metric, best: None, change: 1.0, limits, enough: f64::INFINITY, turn: None, anchored: 0 }
     }
 
     /// Measure a point, and decide how the path goes on.
@@ -73,12 +62,7 @@ impl Selection {
             let at_limits = self.measure(problem, sites, at, &limits, selected, iteration);
             self.limits = Some(limits);
             // reactions that are next to r* need not be at its limits
-            let was_solved = solved;
-            solved = self.solves(at_limits) || was_solved && self.anchored > 0;
-            if was_solved && !solved {
-                self.patient += 1;
-                solved = self.patient > tuning::MOST_PATIENT;
-            }
+            solved |= self.solves(at_limits);
         }
         // a gap that is rounding tells nothing more
         let exhausted = gaps.is_nan() || gap(at) <= tuning::LEAST_GAP || iteration == self.aims.most;
