@@ -205,6 +205,9 @@ fn an_unaccepted_solve_breaks_no_bond_and_moves_no_body() {
     let before = (w.grains.clone(), w.bonds.clone(), w.ledger, w.time, w.steps);
     let error = w.step().unwrap_err();
     assert!(matches!(error, StepError::NotAccepted { step, .. } if step == 0.25e-4), "{error}");
+    // one sweep along the row leaves the end, which it visits last, on its law, and the contact before it furthest from it
+    let message = error.message(&|body| format!("grain {body}"));
+    assert!(message.contains("grain 17 and grain 18 are furthest from their contact law"), "{message}");
     assert_eq!(before.0.position, w.grains.position);
     assert_eq!(before.0.velocity, w.grains.velocity);
     assert_eq!(before.1, w.bonds);

@@ -80,16 +80,29 @@ pub(super) fn relative(map: f64, rounded: f64, scale: f64) -> f64 {
 /// The velocity error of the impulses and node velocities that the problem now holds (–): the natural map as a velocity, D ‖map‖, of the
 /// contact where it is largest, over the largest relative velocity without reactions.
 pub fn velocity_error<D: Dim>(problem: &ContactProblem<D>) -> f64 {
-    let mut largest = Largest { problem, map: 0.0, free: 0.0 };
-    problem.visit(&mut largest);
-    if largest.map == 0.0 { 0.0 } else { largest.map / largest.free }
+    let Largest { map, free, .. } = Largest::of(problem);
+    if map == 0.0 { 0.0 } else { map / free }
 }
 
-/// The largest velocities of all contacts (m/s): of the natural map, and without reactions.
+/// The nodes of the contact that is furthest from its law by the same measure.
+pub fn furthest_from_law<D: Dim>(problem: &ContactProblem<D>) -> [u32; 2] {
+    Largest::of(problem).pair
+}
+
+/// The largest velocities of all contacts (m/s): of the natural map, with the nodes of its contact, and without reactions.
 struct Largest<'a, D: Dim> {
     problem: &'a ContactProblem<D>,
     map: f64,
+    pair: [u32; 2],
     free: f64,
+}
+
+impl<'a, D: Dim> Largest<'a, D> {
+    fn of(problem: &'a ContactProblem<D>) -> Self {
+        let mut largest = Self { problem, map: 0.0, pair: [0; 2], free: 0.0 };
+        problem.visit(&mut largest);
+        largest
+    }
 }
 
 impl<D: Dim> Visitor<D> for Largest<'_, D> {
@@ -100,7 +113,10 @@ impl<D: Dim> Visitor<D> for Largest<'_, D> {
         let [i, j] = c.link.nodes.map(|k| self.problem.free[k as usize]);
         let mut free = c.link.relative_velocity::<L::T, L::B>(arms, i, j) - law.compliance().times(&law.carried());
         free.n += law.bias();
-        self.map = self.map.max(map.dot(&map).sqrt() / law.gamma());
+        let speed = map.dot(&map).sqrt() / law.gamma();
+        if speed > self.map {
+            (self.map, self.pair) = (speed, c.link.nodes);
+        }
         self.free = self.free.max(free.dot(&free).sqrt());
     }
 }

@@ -120,6 +120,8 @@ pub enum StepError {
         residual: f64,
         /// Iterations of its solve.
         iterations: u64,
+        /// The bodies of the contact that is furthest from its law (walls follow the grains).
+        pair: [u32; 2],
         /// What is proved of its problem, with bodies by number (walls follow the grains).
         verdict: Verdict<u32>,
     },
@@ -137,8 +139,10 @@ pub enum StepError {
         /// Which, and how far.
         violation: Violation,
     },
-    /// A velocity or a reaction is not a finite number.
+    /// A velocity is not a finite number.
     NotFinite {
+        /// Whose (walls follow the grains).
+        body: u32,
         /// Time of the last accepted state (s).
         time: f64,
     },
@@ -174,12 +178,16 @@ impl StepError {
     /// The message, with bodies called by `name`, which is given a number: grains first, then walls.
     pub fn message(&self, name: &dyn Fn(u32) -> String) -> String {
         match self {
-            Self::NotAccepted { time, step, residual, iterations, verdict } => {
+            Self::NotAccepted { time, step, residual, iterations, pair, verdict } => {
                 let [opening, known] = match verdict {
                     Verdict::NoSolution(bodies) => {
                         [format!("no motion satisfies {}", listed(bodies, name)), String::new()]
                     }
-                    verdict => ["no convergence".into(), format!("; {}", existence(verdict))],
+                    verdict => {
+                        let furthest = listed(pair, name);
+                        let known = format!("; {furthest} are furthest from their contact law; {}", existence(verdict));
+                        ["no convergence".into(), known]
+                    }
                 };
                 format!(
                     "{opening} at t = {time:.6e} s: residual {residual:.2e} after {iterations} iterations, with the step cut to \
@@ -194,9 +202,10 @@ impl StepError {
                 name(pair[1])
             ),
             Self::Yielded { time, violation } => violation.message(*time, name),
-            Self::NotFinite { time } => format!(
-                "a velocity is not a finite number at t = {time:.6e} s: look for grains squeezed between bodies that cannot \
-                 yield"
+            Self::NotFinite { time, body } => format!(
+                "the velocity of {} is not a finite number at t = {time:.6e} s: look for grains squeezed between bodies that \
+                 cannot yield",
+                name(*body)
             ),
         }
     }

@@ -9,6 +9,7 @@ use crate::body::Drive;
 use crate::bond::{BondStatus, Rupture, failure};
 use crate::contact::{Law, Local};
 use crate::dim::{Dim, Vect};
+use crate::problem::residual::furthest_from_law;
 use crate::problem::{ContactProblem, Group, Nodes};
 use crate::solver::certificate::Verdict;
 use crate::solver::{SolveReport, SolveStatus};
@@ -228,14 +229,17 @@ impl<D: Dim> World<D> {
         last: bool,
     ) -> Result<(), StepError> {
         let finite = |v: &[f64]| v.iter().all(|c| c.is_finite());
-        if !problem.nodes.all.iter().all(|n| finite(n.velocity.as_slice()) && finite(n.spin.as_slice())) {
-            return Err(StepError::NotFinite { time: self.time });
+        if let Some(body) =
+            problem.nodes.all.iter().position(|n| !(finite(n.velocity.as_slice()) && finite(n.spin.as_slice())))
+        {
+            return Err(StepError::NotFinite { time: self.time, body: body as u32 });
         }
         if solve.status == SolveStatus::Failed {
             let SolveReport { residual, work, .. } = solve;
             let (iterations, verdict) =
                 (work.iterations(), if last { self.verdict(problem) } else { Verdict::Undecided });
-            return Err(StepError::NotAccepted { time: self.time, step: h, residual, iterations, verdict });
+            let pair = furthest_from_law(problem);
+            return Err(StepError::NotAccepted { time: self.time, step: h, residual, iterations, pair, verdict });
         }
         Ok(())
     }

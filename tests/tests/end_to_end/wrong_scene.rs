@@ -196,7 +196,7 @@ fn a_run_that_does_not_converge_is_exit_3_and_keeps_its_history() {
         limits.extend(["--set", force, "-o", "a.h5"]);
         let outcome = here
             .dem_run(&[&["run", &scene], &SMALL[..], &limits].concat())
-            .fails(3, &["no convergence at t =", "residual", "max_sweeps"]);
+            .fails(3, &["no convergence at t =", "residual", "are furthest from their contact law", "max_sweeps"]);
         assert!(outcome.stdout.contains("a step was not solved"), "{}", outcome.stdout);
         assert_eq!(here.names(), ["a.h5"]);
         let history = here.history("a.h5");
