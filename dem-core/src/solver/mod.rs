@@ -15,6 +15,7 @@ mod rows;
 mod solvable;
 mod stages;
 mod tuning;
+mod twofold;
 
 pub use gauss_seidel::{GaussSeidel, GaussSeidelSettings, sweep};
 pub use rows::StiffnessRatio;

@@ -8,6 +8,7 @@
 use crate::contact::{Arms, Cone, Law, PADDED, Padded, Weights};
 use crate::dim::{Dim, Vect, tangential_rows};
 use crate::problem::{Contact, ContactProblem, Link, Nodes, Visitor};
+use crate::solver::twofold::Twofold;
 use nalgebra::SMatrix;
 
 /// The derivative of padded rows.
@@ -254,6 +255,22 @@ impl Rows {
         let (first, second) = self.coefficients(row, k).split_at(row.count[0]);
         let sum = |h: &[f64], y: &[f64]| h.iter().zip(y).map(|(h, y)| h * y).sum::<f64>();
         sum(first, &y[row.at[0]..]) + sum(second, &y[row.at[1]..])
+    }
+
+    /// y += H̃ r for row `k` of one contact, in twice the precision.
+    pub fn push_twofold(&self, row: &Row, k: usize, r: f64, y: &mut [Twofold]) {
+        let (first, second) = self.coefficients(row, k).split_at(row.count[0]);
+        first.iter().zip(&mut y[row.at[0]..]).for_each(|(h, y)| y.add_product(*h, r));
+        second.iter().zip(&mut y[row.at[1]..]).for_each(|(h, y)| y.add_product(*h, r));
+    }
+
+    /// Row `k` of H̃ᵀ y for one contact, in twice the precision.
+    pub fn pulled_twofold(&self, row: &Row, k: usize, y: &[Twofold]) -> Twofold {
+        let (first, second) = self.coefficients(row, k).split_at(row.count[0]);
+        let mut sum = Twofold::default();
+        first.iter().zip(&y[row.at[0]..]).for_each(|(h, y)| sum.add_scaled(*h, *y));
+        second.iter().zip(&y[row.at[1]..]).for_each(|(h, y)| sum.add_scaled(*h, *y));
+        sum
     }
 
     /// y += scale · H̃ r for row `k` of one contact.

@@ -5,6 +5,7 @@ use crate::linear::{Lu, Tree};
 use crate::problem::assembled::BlockMatrix;
 use crate::solver::graph::Graph;
 use crate::solver::rows::Rows;
+use crate::solver::twofold::Twofold;
 
 /// The Delassus operator over the rows of [`Sites`], in their units.
 pub(super) enum Coupling<'a> {
@@ -76,6 +77,26 @@ impl<'a> Coupling<'a> {
             Self::Bodies { graph, .. } => &graph.tree,
             Self::Matrix { tree, .. } => tree,
         }
+    }
+
+    /// q + W r. Through the bodies with twice the precision: where contacts stick, the terms cancel to 1/κ of their size.
+    pub fn relative_velocity(&self, sites: &Sites, r: &[f64]) -> Vec<f64> {
+        let Self::Bodies { rows, scale, .. } = self else {
+            return sites.free.iter().zip(self.velocity(sites, r)).map(|(q, u)| q + u).collect();
+        };
+        let mut y = vec![Twofold::default(); rows.unknowns];
+        for (site, row) in sites.list.iter().zip(&rows.list) {
+            site.of.iter().zip(site.part(r)).for_each(|(k, r)| rows.push_twofold(row, *k, *r, &mut y));
+        }
+        let (mut u, square) = (sites.free.clone(), scale * scale);
+        for (site, row) in sites.list.iter().zip(&rows.list) {
+            for (k, u) in site.of.iter().zip(site.part_mut(&mut u)) {
+                let mut sum = Twofold::from(*u);
+                sum.add_scaled(square, rows.pulled_twofold(row, *k, &y));
+                *u = sum.rounded();
+            }
+        }
+        u
     }
 
     /// W r.

@@ -58,12 +58,12 @@ impl Metric {
     }
 }
 
-/// u + C (r − r₀) − Σ Bᵀ z, with the metric among the compliances.
-pub(super) fn lack(sites: &Sites, weight: &[f64], at: &State, metric: &Metric) -> Vec<f64> {
+/// u + C (r − r₀) − Σ Bᵀ z for the relative velocities u, with the metric among the compliances.
+pub(super) fn lack(sites: &Sites, velocity: &[f64], at: &State, metric: &Metric) -> Vec<f64> {
     let opened = opened(sites, &at.z);
     let row = |k: usize| {
         let soft = sites.compliance[k] * (at.r[k] - sites.carried[k]) + metric.own[k] * (at.r[k] - metric.anchor[k]);
-        sites.free[k] + weight[k] + soft - opened[k]
+        velocity[k] + soft - opened[k]
     };
     (0..sites.rows).map(row).collect()
 }

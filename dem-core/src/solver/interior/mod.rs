@@ -144,8 +144,9 @@ impl Interior {
         at: &'a State,
         metric: &'a Metric,
     ) -> Option<System<'a>> {
-        let velocity = coupling.velocity(sites, &at.r);
-        let right = lack(sites, &velocity, at, metric).into_iter().map(|x| -x).collect();
+        let relative = coupling.relative_velocity(sites, &at.r);
+        let right = lack(sites, &relative, at, metric).into_iter().map(|x| -x).collect();
+        let velocity = relative.iter().zip(&sites.free).map(|(u, q)| u - q).collect();
         let pairs = scaled(at);
         let locally = invert(sites, &pairs, &metric.compliance, &mut self.inverses)?;
         self.made += 1;
