@@ -286,6 +286,15 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_message_names_the_last_eight_bodies_and_counts_the_others() {
+        let text = |bodies: std::ops::Range<u32>| listed(&bodies.collect::<Vec<_>>(), &|body| format!("b{body}"));
+        assert_eq!(text(3..4), "b3");
+        assert_eq!(text(3..5), "b3 and b4");
+        assert_eq!(text(0..8), "b0, b1, b2, b3, b4, b5, b6 and b7");
+        assert_eq!(text(0..10), "b2, b3, b4, b5, b6, b7, b8, b9 and 2 more");
+    }
+
     /// A step in one part.
     fn whole() -> StepReport<D2> {
         let Solves { route, work, residual, load_error, .. } = Solves::default();
