@@ -6,7 +6,7 @@ use common::{down, floor, force_driven, grain, newton, run, settings, world};
 use dem_core::body::{Drive, Grains, Shape, Wall};
 use dem_core::dim::{D2, D3, Dim, Vect};
 use dem_core::solver::{Route, SolverSettings};
-use dem_core::world::World;
+use dem_core::world::{Counts, World};
 use std::sync::Arc;
 
 const G: f64 = 9.81;
@@ -196,4 +196,18 @@ fn the_force_of_a_wall_of_prescribed_velocity_is_a_load() {
     assert!((report.false_acceleration - 1.0).abs() < 1e-9, "{}", report.false_acceleration);
     // once it moves with the wall there is neither load nor acceleration
     assert_eq!(w.step().expect("a step").false_acceleration, 0.0);
+}
+
+/// On a floor: a grain at rest, one that slides, a bonded pair at rest, and two at rest beside each other with a small gap.
+#[test]
+fn contacts_are_counted_by_what_they_did() {
+    let r = 0.01;
+    let places = [0.0, 0.1, 0.2, 0.2 + 2.0 * r, 0.3, 0.3 + 2.0005 * r];
+    let mut set = settings(1e-4);
+    set.gravity = down::<D2>(G);
+    let mut w = world(places.map(|x| grain::<D2>(&[x, r], r)).into(), vec![floor(0.3)], set);
+    w.grains.velocity[1][0] = 1.0;
+    w.form_bonds(1e-6, |_| 1.0, 0.3);
+    let counts = w.step().expect("a step").counts;
+    assert_eq!(counts, Counts { open: 1, stick: 5, slip: 1, bonded: 1 });
 }
