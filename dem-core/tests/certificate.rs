@@ -86,6 +86,36 @@ fn a_grain_between_walls_that_close_has_no_solution() {
     case::<D3>();
 }
 
+/// The wall that comes nearer has a gap to the grain, a part of its way in the step; the rest of the way has no room, and one of the two
+/// contacts closes by half of it or more. The reactions only balance each other: the power that they leave is that of the rest, which is
+/// what they act against, and not that of the whole way.
+#[test]
+fn walls_jam_a_grain_by_the_way_beyond_its_gap() {
+    fn case<D: Dim>() {
+        let way = STEP * SPEED;
+        for part in [0.0, 0.5, 0.8, 1.2] {
+            let mut w = squeezed::<D>(1);
+            w.walls[1].position[0] += part * way;
+            let outcome = w.step();
+            if part > 1.0 {
+                assert!(outcome.is_ok(), "{part}");
+                continue;
+            }
+            let Err(StepError::Yielded { violation, .. }) = outcome else { panic!("{part}: {outcome:?}") };
+            assert_eq!(violation.jammed, Some(vec![1, 2]), "{part}");
+            assert!(!violation.accumulated);
+            let lacking = (1.0 - part) * way / R;
+            assert!(
+                (0.499 * lacking..1.001 * lacking).contains(&violation.share),
+                "{part}: {:e} of {lacking:e}",
+                violation.share
+            );
+        }
+    }
+    case::<D2>();
+    case::<D3>();
+}
+
 #[test]
 fn a_bonded_row_between_walls_that_close_has_no_solution() {
     fn case<D: Dim>(flow: BondFlow) {

@@ -4,6 +4,8 @@ use dem_core::contact::{Arms, Block, BondFlow, Bonded, Cone, Coulomb, Law, Local
 use dem_core::dim::{Moments, V0, Vect};
 use nalgebra::SVector;
 use proptest::prelude::*;
+use std::array::from_fn;
+use std::f64::consts::TAU;
 
 fn vect<const N: usize>() -> impl Strategy<Value = SVector<f64, N>> {
     prop::array::uniform(-1.0..1.0f64).prop_map(SVector::from)
@@ -58,6 +60,19 @@ proptest! {
 
     #[test]
     fn projection_without_bending(k in cone(), x in local(vect::<2>(), Just(V0::zeros()))) { is_projection(k, x) }
+
+    /// Rounding leaves a point of the edge, where one group of rows is at its limit, on either side of it: it stays where it is.
+    #[test]
+    fn a_point_on_the_edge_of_the_cone_is_its_own_projection(
+        k in cone(), n in 0.1..1.0f64, share in 0.0..0.9f64, angle in 0.0..TAU, group in 0..3usize,
+    ) {
+        let shares: [f64; 3] = from_fn(|row| if row == group { 1.0 } else { share });
+        let along = |size: f64| SVector::from([size * angle.cos(), size * angle.sin()]);
+        let (t, m) = (along(shares[0] * k.mu * n), along(shares[1] * k.nu * n));
+        let x = Local { n, t, m: SVector::from([m[0], m[1], shares[2] * k.xi * n]) };
+        let moved = k.project(x) - x;
+        prop_assert!(moved.dot(&moved).sqrt() <= 1e-14, "{moved:?}");
+    }
 
     /// The minimiser of ½ Σ w r² + q·r over K: r ∈ K, w r + q ∈ K*, r ⊥ w r + q.
     #[test]

@@ -3,11 +3,12 @@
 mod common;
 
 use common::{grain, settings, world};
+use dem_core::bond::Stiffness;
 use dem_core::contact::Law;
 use dem_core::dim::{D2, D3, Dim, Vect};
 use dem_core::problem::ContactProblem;
 use dem_core::problem::assembled::{Assembled, BlockMatrix, ContactRows, Parts};
-use dem_core::problem::residual::residual;
+use dem_core::problem::residual::{residual, velocity_error};
 
 const MU: f64 = 0.3;
 /// Normal impulse (N s), so large that the contact sticks.
@@ -73,6 +74,37 @@ fn the_residual_is_the_natural_map_over_the_larger_of_reactions_and_load() {
 fn a_map_that_is_rounding_is_none() {
     rounding::<D2>();
     rounding::<D3>();
+}
+
+/// The pair is bonded by a spring of compliance C and parts. After a step, which began without a force, the bond carries R and
+/// u = −C R. In the next, reactions ρ R make the velocities −C R + w ρ R, w = 1/m_i + 1/m_j; the law of the spring asks that
+/// u + C (ρ R − R) is zero. Without reactions that is −2 C R: the error is |ρ (1 + w/C) / 2 − 1|.
+fn sprung<D: Dim>() {
+    let (h, ratio) = (1e-3, 3.0);
+    let mut second = vec![0.0; D::N];
+    second[0] = 0.04;
+    let mut w = world(vec![grain::<D>(&vec![0.0; D::N], 0.01), grain(&second, 0.03)], vec![], settings(h));
+    w.grains.velocity[0][0] = -0.01;
+    w.grains.velocity[1][0] = 0.02;
+    w.form_bonds(1e-6, |_| 1e6, MU);
+    let normal = ratio / (h * h * w.grains.mass.iter().map(|m| 1.0 / m).sum::<f64>());
+    w.make_bonds_elastic(|_| Stiffness { normal, tangential: normal, rolling: normal, twist: normal });
+    w.step().expect("a step");
+    let mut problem = w.contact_problem();
+    let carried = problem.elastic[0].law.carried().n;
+    assert!(carried < 0.0 && problem.len() == 1, "{carried:e}");
+    for rho in [0.0, 0.25, 0.5, 1.0, 3.0] {
+        problem.elastic[0].r.n = rho * carried;
+        problem.velocities_from_reactions();
+        let (found, expected) = (velocity_error(&problem), f64::abs(rho * (1.0 + ratio) / 2.0 - 1.0));
+        assert!((found - expected).abs() < 1e-9, "{rho}: {found:e} against {expected:e}");
+    }
+}
+
+#[test]
+fn the_velocity_error_of_a_spring_is_relative_to_what_its_force_would_leave() {
+    sprung::<D2>();
+    sprung::<D3>();
 }
 
 /// One contact with its matrix: W = diag(w, w/2), q = −w r − `push` in the normal row, so that u_n is −`push`.

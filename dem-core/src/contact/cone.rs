@@ -162,8 +162,7 @@ impl Cone {
     ///
     /// w_n n + q_n − μ (‖q_t‖ − w_t μ n)⁺ − ν (‖q_m‖ − w_m ν n)⁺ − ξ (|q_τ| − w_τ ξ n)⁺ = 0,
     ///
-    /// with a breakpoint for each group: solved by cases, without iterations. With unit weights and q = −x it is the
-    /// projection of x on K.
+    /// whose root is the largest of those of its linear pieces. With unit weights and q = −x it is the projection of x on K.
     pub fn minimise<T: Vect, B: Moments>(&self, w: Weights, q: Local<T, B>) -> Local<T, B> {
         let (slip, bend) = (q.t.norm(), q.m.bending());
         // with the row group active its equation reads: pull = coefficient × norm, stiffness = coefficient² × weight
@@ -193,32 +192,13 @@ struct Group {
     stiff: f64,
 }
 
-impl Group {
-    #[inline(always)]
-    fn active(self, n: f64) -> bool {
-        self.pull > self.stiff * n
-    }
-}
-
-/// The n ≥ 0 with w n + q = Σ (pull − stiff n)⁺, zero where there is none.
+/// The n ≥ 0 with w n + q = Σ (pull − stiff n)⁺; zero or less where there is none.
+///
+/// The left side minus the right is the least of four increasing lines, one for each set of groups at their limit: its root is the largest
+/// of the four. A comparison that selects the set would depend on rounding at a kink.
 #[inline(always)]
 fn root(w: f64, q: f64, t: Group, m: Group) -> f64 {
-    let both = (t.pull + m.pull - q) / (w + t.stiff + m.stiff);
-    if both <= 0.0 {
-        return 0.0;
-    }
-    let n = -q / w;
-    if !t.active(n) && !m.active(n) {
-        return n;
-    }
-    // fewer active groups mean a smaller n; walk down from none to one to both
-    let only_t = (t.pull - q) / (w + t.stiff);
-    let only_m = (m.pull - q) / (w + m.stiff);
-    if t.active(only_t) && !m.active(only_t) {
-        only_t
-    } else if m.active(only_m) && !t.active(only_m) {
-        only_m
-    } else {
-        both
-    }
+    let [none, slips] = [-q / w, (t.pull - q) / (w + t.stiff)];
+    let [bends, both] = [(m.pull - q) / (w + m.stiff), (t.pull + m.pull - q) / (w + t.stiff + m.stiff)];
+    none.max(slips).max(bends).max(both)
 }

@@ -403,7 +403,7 @@ impl<A: Vect, B: Moments> Bonded<A, B> {
 
     /// Local solve on the boundary of the cone.
     ///
-    /// The diagonal of W is solved by cases ([`Cone::minimise`]); its coupling of t and m is lagged. The splitting
+    /// The diagonal of W is solved in closed form ([`Cone::minimise`]); its coupling of t and m is lagged. The splitting
     /// W = B + C with B = diag W converges because B − C is positive definite where W is, by a factor
     /// |w_tm| / √(w_t w_m) a round: zero for grains of one size, 0.8 at a size ratio of four.
     #[cold]

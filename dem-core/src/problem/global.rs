@@ -415,6 +415,30 @@ mod tests {
         assert!(condensed.matrix.block(0, 2).is_some() && condensed.matrix.block(2, 0).is_some());
     }
 
+    /// Masses s_i s_j min(i, j), i from one: L has s_i in all places of its row, and the inverse of min(i, j) is that of a chain of
+    /// unit springs, 2 on the diagonal (1 at its end) and −1 beside it. Powers of two make no rounding.
+    #[test]
+    fn four_unknowns_that_are_all_coupled_have_the_inverse_of_their_mass() {
+        let s = [2.0, 0.25, 8.0, 0.5];
+        let (mut mass, mut inverse) = (Vec::new(), Vec::new());
+        for i in 0..4usize {
+            for j in 0..4 {
+                mass.push((i, j, s[i] * s[j] * (i.min(j) + 1) as f64));
+                let spring = [if i == 3 { 1.0 } else { 2.0 }, -1.0, 0.0, 0.0][i.abs_diff(j)];
+                inverse.push((i, j, spring / (s[i] * s[j])));
+            }
+        }
+        // one contact for each unknown: W = M⁻¹ and q = w + M⁻¹ f
+        let directions: Vec<_> = (0..4).map(|k| (k, k, 1.0)).collect();
+        let (impulses, given) = ([1.0, -2.0, 3.0, 4.0], [0.5, 0.0, -1.0, 2.0]);
+        let global = Global { size: 1, mass: &mass, directions: &directions, impulses: &impulses, given: &given };
+        let condensed = global.condensed().expect("condensed");
+        let inverse = dense(4, 4, &inverse);
+        assert_eq!(dense(4, 4, &condensed.matrix.entries()), inverse);
+        let q = inverse * nalgebra::DVector::from_row_slice(&impulses) + nalgebra::DVector::from_row_slice(&given);
+        assert_eq!(condensed.q, q.as_slice());
+    }
+
     #[test]
     fn a_block_without_a_factorisation_is_named() {
         let error = |change: &[(usize, usize, f64)]| {

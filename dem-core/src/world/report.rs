@@ -269,6 +269,7 @@ impl std::error::Error for StepError {}
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dim::D2;
 
     fn solve(route: Route, residual: f64, load_error: Option<f64>) -> SolveReport {
         SolveReport { status: SolveStatus::Converged, route, work: Work::default(), residual, load_error }
@@ -292,6 +293,48 @@ mod tests {
             let solves: Vec<SolveReport> = routes.iter().map(|route| solve(*route, 1e-9, None)).collect();
             assert_eq!(together(&solves).route, step, "{routes:?}");
         }
+    }
+
+    #[test]
+    fn a_message_names_the_last_eight_bodies_and_counts_the_others() {
+        let text = |bodies: std::ops::Range<u32>| listed(&bodies.collect::<Vec<_>>(), &|body| format!("b{body}"));
+        assert_eq!(text(3..4), "b3");
+        assert_eq!(text(3..5), "b3 and b4");
+        assert_eq!(text(0..8), "b0, b1, b2, b3, b4, b5, b6 and b7");
+        assert_eq!(text(0..10), "b2, b3, b4, b5, b6, b7, b8, b9 and 2 more");
+    }
+
+    /// A step in one part.
+    fn whole() -> StepReport<D2> {
+        let Solves { route, work, residual, load_error, .. } = Solves::default();
+        StepReport {
+            time: 0.0,
+            status: SolveStatus::Converged,
+            route,
+            work,
+            residual,
+            load_error,
+            false_acceleration: 0.0,
+            counts: Counts::default(),
+            breaks: Vec::new(),
+            penetration: 0.0,
+            bond_elongation: 0.0,
+            rejected: 0,
+            substeps: 1,
+        }
+    }
+
+    /// Each refused solve makes two parts of one, whichever half it was of.
+    #[test]
+    fn a_step_has_one_part_more_than_refused_solves() {
+        let halves = || whole().followed_by(whole(), 1);
+        let steps = [halves(), halves().followed_by(whole(), 1), whole().followed_by(halves(), 1)];
+        assert_eq!(steps.map(|step| (step.rejected, step.substeps)), [(1, 2), (2, 3), (2, 3)]);
+        let both = halves().followed_by(halves(), 1);
+        assert_eq!((both.rejected, both.substeps), (3, 4));
+        // bodies that are too fast refuse no solve
+        let fast = halves().followed_by(halves(), 0);
+        assert_eq!((fast.rejected, fast.substeps), (2, 4));
     }
 
     #[test]
