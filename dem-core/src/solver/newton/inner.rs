@@ -44,15 +44,15 @@ impl Iterate {
 }
 
 impl Newton {
-    /// Solve the inner problem for fixed multipliers from `state`, with the active set of `guess` first: in the `first` proximal iteration
-    /// Newton gives up where this active set leaves much of F. Returns the iterations made and whether F vanished.
-    pub(super) fn inner(&mut self, rows: &Rows, state: &mut Iterate, guess: &Guess, first: bool) -> (u64, bool) {
+    /// Solve the inner problem for fixed multipliers from `state`, with the active set of `guess` first. In the first proximal iteration of
+    /// a `warm` start Newton gives up where this active set leaves much of F. Returns the iterations made and whether F vanished.
+    pub(super) fn inner(&mut self, rows: &Rows, state: &mut Iterate, guess: &Guess, warm: bool) -> (u64, bool) {
         let (begun, mut least, mut since) = (state.norm, f64::INFINITY, 0);
         for iteration in 0..tuning::MOST_ITERATIONS {
             let guessed = (iteration == 0).then_some(guess);
             let target = self.target(rows, state);
             if guessed.is_none() {
-                let wrong = first && iteration == 1 && state.norm > tuning::LEFT_BY_GUESS * begun;
+                let wrong = warm && iteration == 1 && state.norm > tuning::LEFT_BY_GUESS * begun;
                 // false for what is no number
                 let stays = state.norm <= tuning::DIVERGED * least;
                 since = if state.norm < tuning::PROGRESS * least { 0 } else { since + 1 };

@@ -72,7 +72,7 @@ impl Newton {
         };
         self.most_made = self.made() + tuning::MOST_FACTORISATIONS;
         let guess = Guess::of(problem.swept(sweeps));
-        let report = self.rounds(problem, rows, guess, iterations);
+        let report = self.rounds(problem, rows, guess, !cold, iterations);
         self.factor.stale |= report.is_none();
         report
     }

@@ -10,13 +10,14 @@ use crate::solver::tuning::newton as tuning;
 use crate::solver::{SolveStatus, Work};
 
 impl Newton {
-    /// Proximal rounds, each begun with the active set of the one before, the first with that of `guess`. None if an inner problem is not
-    /// solved.
+    /// Proximal rounds, each begun with the active set of the one before, the first with that of `guess`, which in a `warm` start is that of
+    /// the last solve. None if an inner problem is not solved.
     pub(super) fn rounds(
         &mut self,
         problem: &mut impl Solvable,
         rows: &mut Rows,
         mut guess: Guess,
+        warm: bool,
         iterations: &mut u64,
     ) -> Option<SolveReport> {
         let mut shrinking = Shrinking::default();
@@ -24,7 +25,7 @@ impl Newton {
         self.margins.clear();
         loop {
             let mut state = Iterate::from_reactions(rows, &guess.reactions);
-            let (made, solved) = self.inner(rows, &mut state, &guess, self.margins.is_empty());
+            let (made, solved) = self.inner(rows, &mut state, &guess, warm && self.margins.is_empty());
             *iterations += made.max(1);
             if !solved && made > 1 && last_error <= self.settings.tolerance {
                 // what the round before left is good enough, and this was to tell its load error: the velocities show it
