@@ -47,16 +47,18 @@ impl Newton {
     /// Solve the inner problem for fixed multipliers from `state`, with the active set of `guess` first. In the first proximal iteration of
     /// a `warm` start Newton gives up where this active set leaves much of F. Returns the iterations made and whether F vanished.
     pub(super) fn inner(&mut self, rows: &Rows, state: &mut Iterate, guess: &Guess, warm: bool) -> (u64, bool) {
-        let (begun, mut least, mut since) = (state.norm, f64::INFINITY, 0);
+        // less than the contacts push is never much
+        let much = (tuning::LEFT_BY_GUESS * state.norm).max(distance(&state.y, &rows.free));
+        let (mut least, mut since) = (f64::INFINITY, 0);
         for iteration in 0..tuning::MOST_ITERATIONS {
             let guessed = (iteration == 0).then_some(guess);
             let target = self.target(rows, state);
             if guessed.is_none() {
-                let wrong = warm && iteration == 1 && state.norm > tuning::LEFT_BY_GUESS * begun;
+                let wrong = warm && iteration == 1 && state.norm > much;
                 // false for what is no number
                 let stays = state.norm <= tuning::DIVERGED * least;
-                since = if state.norm < tuning::PROGRESS * least { 0 } else { since + 1 };
-                least = least.min(state.norm);
+                (least, since) =
+                    if state.norm < tuning::PROGRESS * least { (state.norm, 0) } else { (least, since + 1) };
                 if state.norm <= target || wrong || !stays || since >= tuning::PATIENCE {
                     return (iteration, state.norm <= target);
                 }
