@@ -63,8 +63,8 @@ def cost(program):
 
 
 # Instructions and bytes of a contact without friction over those of a dry one, and of that over those of a bond. Of spheres they
-# are smaller than asked for, and held near what was counted.
-LIMITS = {"disks": [0.5, 0.6, 0.7, 0.7], "spheres": [0.31, 0.6, 0.7, 0.55]}
+# are smaller than asked for, and held near what was counted (0.316 since dry spheres take 5 % fewer instructions).
+LIMITS = {"disks": [0.5, 0.6, 0.7, 0.7], "spheres": [0.32, 0.6, 0.7, 0.55]}
 
 
 @pytest.mark.parametrize("grains", LIMITS)
