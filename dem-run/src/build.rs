@@ -74,7 +74,7 @@ pub fn build<D: Dim>(scene: &Scene, watch: Watch) -> Result<Built<D>, RunError> 
 /// # Errors
 /// As [`build`].
 pub fn place<D: Dim>(scene: &Scene, watch: Watch) -> Result<Placed<D>, RunError> {
-    let (mut grains, solid_fraction) = grains::<D>(scene, watch)?;
+    let Sampled { mut grains, solid_fraction, unsettled } = grains::<D>(scene, watch)?;
     refuse_other_units(&grains)?;
     let mut wrong = hold_fixed(scene, &mut grains);
     let loads = scene.grains.iter().flat_map(|g| &g.loads);
@@ -89,6 +89,7 @@ pub fn place<D: Dim>(scene: &Scene, watch: Watch) -> Result<Placed<D>, RunError>
         return Err(RunError::Sample(wrong));
     }
     let mut warnings = warnings::of_scene(scene);
+    warnings.extend(unsettled.map(warnings::of_packing));
     warnings.extend(shallow);
     warnings.extend(warnings::of_walls(scene, &walls, Some(&grains)));
     Ok(Placed { grains, walls, solid_fraction, warnings })
@@ -107,20 +108,29 @@ pub fn rebuild<D: Dim>(scene: &Scene, from: &mut Reader) -> Result<World<D>, Mis
     World::restored(grains, walls, loads(scene), settings(scene), from)
 }
 
-/// The grains of a scene, and the solid fraction of a random packing.
-fn grains<D: Dim>(scene: &Scene, watch: Watch) -> Result<(Grains<D>, Option<f64>), RunError> {
+/// The grains of a scene, and of a random packing what [`prepare::Packing`] says.
+struct Sampled<D: Dim> {
+    grains: Grains<D>,
+    solid_fraction: Option<f64>,
+    unsettled: Option<f64>,
+}
+
+/// The sample of a scene.
+fn grains<D: Dim>(scene: &Scene, watch: Watch) -> Result<Sampled<D>, RunError> {
     let density = scene.materials.density * scene.thickness();
     let at_rest =
         |balls: Vec<Ball<D>>| balls.into_iter().map(|(x, r)| Grain::at_rest(x, r, density)).collect::<Grains<D>>();
-    Ok(match &scene.sample {
+    let grains = match &scene.sample {
         Sample::Random(random) => {
             let packing = prepare::pack::<D>(random, scene.seed, watch).map_err(preparation_error)?;
-            (at_rest(packing.balls), Some(packing.solid_fraction))
+            let prepare::Packing { balls, solid_fraction, unsettled } = packing;
+            return Ok(Sampled { grains: at_rest(balls), solid_fraction: Some(solid_fraction), unsettled });
         }
-        Sample::Lattice(lattice) => (at_rest(prepare::lattice::<D>(lattice)), None),
-        Sample::File(file) => (at_rest(sample_file::read::<D>(&file.path)?), None),
-        Sample::Grains(list) => (list.iter().map(|spec| listed(spec, scene)).collect(), None),
-    })
+        Sample::Lattice(lattice) => at_rest(prepare::lattice::<D>(lattice)),
+        Sample::File(file) => at_rest(sample_file::read::<D>(&file.path)?),
+        Sample::Grains(list) => list.iter().map(|spec| listed(spec, scene)).collect(),
+    };
+    Ok(Sampled { grains, solid_fraction: None, unsettled: None })
 }
 
 /// Hold the grains of `grains.fixed`; returns those that are not there.

@@ -65,13 +65,15 @@ pub struct Packing<D: Dim> {
     pub balls: Vec<Ball<D>>,
     /// Volume of the grains over volume of the box between the walls (–).
     pub solid_fraction: f64,
+    /// What the last step still moved it by, in mean radii, where the steps of a packing were not enough to bring it to rest.
+    pub unsettled: Option<f64>,
 }
 
 /// Told how far the packing is (0 to 1); false stops it.
 pub type Watch<'a> = &'a mut dyn FnMut(f64) -> bool;
 
 /// Most steps of one packing.
-const MOST_STEPS: usize = 20_000;
+pub const MOST_STEPS: usize = 20_000;
 /// Packings that are tried, each from other places, until one is dense enough.
 const MOST_PACKINGS: usize = 8;
 /// Thrust at the start and at the end: what a free body would move in a step, in mean radii.
@@ -253,8 +255,9 @@ pub fn pack<D: Dim>(sample: &RandomSample, seed: u64, watch: Watch) -> Result<Pa
         let (grains, top) = scatter::<D>(&radii, &container, &mut rng);
         let mut world = packing_world(grains, &container, top, from_top);
         let share = |done: f64| (attempt as f64 + done) / MOST_PACKINGS as f64;
-        settle(&mut world, &container, from_top, &mut |done| watch(if attempt == 0 { done } else { share(done) }))?;
-        let mut packing = measured(&world, &container);
+        let mut watch = |done| watch(if attempt == 0 { done } else { share(done) });
+        let unsettled = settle(&mut world, &container, from_top, MOST_STEPS, &mut watch)?;
+        let mut packing = Packing { unsettled, ..measured(&world, &container) };
         if packing.solid_fraction >= wanted {
             if let Some(cut) = sample.cut {
                 cut_out::<D>(&mut packing.balls, cut)?;
@@ -272,7 +275,7 @@ fn measured<D: Dim>(world: &World<D>, container: &Container) -> Packing<D> {
     let height = balls.iter().map(|(x, r)| x[D::N - 1] + r).fold(0.0, f64::max);
     let volume = container.floor::<D>() * height;
     let solid_fraction = balls.iter().map(|(_, r)| D::volume(*r)).sum::<f64>() / volume;
-    Packing { balls, solid_fraction }
+    Packing { balls, solid_fraction, unsettled: None }
 }
 
 /// Keep the grains that lie within the shape around the middle of the packing.
@@ -365,7 +368,7 @@ fn height<D: Dim>(world: &World<D>, from_top: bool) -> f64 {
     2.0 * world.grains.position.iter().map(|x| x[up]).sum::<f64>() / world.grains.len() as f64
 }
 
-/// Step from rest to rest until nothing moves.
+/// Step from rest to rest until nothing moves: at most so many steps. What the last of them moved, in mean radii, where it still moves.
 ///
 /// The error of a step is a fraction of its thrust. Where the packing resists, the thrust is lowered, in the end to
 /// nearly nothing: a jammed packing is one for any thrust, and its contacts close to rounding.
@@ -373,13 +376,15 @@ fn settle<D: Dim>(
     world: &mut World<D>,
     container: &Container,
     from_top: bool,
+    steps: usize,
     watch: Watch,
-) -> Result<(), PrepareError> {
+) -> Result<Option<f64>, PrepareError> {
     let mean = world.grains.radius.iter().sum::<f64>() / world.grains.len() as f64;
     let mut thrust = THRUST.0;
     let volume: f64 = world.grains.radius.iter().map(|r| D::volume(*r)).sum();
     let (begun, dense) = (height(world, from_top), volume / (DENSE[D::N - 2] * container.floor::<D>()));
-    for _ in 0..MOST_STEPS {
+    let mut last = 0.0;
+    for _ in 0..steps {
         push(world, from_top, thrust * mean);
         world.stop_motion();
         world.step()?;
@@ -389,10 +394,11 @@ fn settle<D: Dim>(
         } else {
             world.grains.velocity.iter().map(Vect::norm).sum::<f64>() / world.grains.len() as f64
         };
-        let share = moved / (thrust * mean);
+        last = moved / mean;
+        let share = last / thrust;
         thrust *= if share < 0.1 { 0.7 } else { 1.0 };
         if thrust < THRUST.1 {
-            return Ok(());
+            return Ok(None);
         }
         let fallen = ((begun - height(world, from_top)) / (begun - dense)).clamp(0.0, 1.0);
         let closed = (THRUST.0 / thrust).ln() / (THRUST.0 / THRUST.1).ln();
@@ -400,7 +406,7 @@ fn settle<D: Dim>(
             return Err(PrepareError::Interrupted);
         }
     }
-    Ok(())
+    Ok(Some(last))
 }
 
 #[cfg(test)]
@@ -419,6 +425,18 @@ mod tests {
             preparation: Preparation::Compaction(Compaction { solid_fraction: 0.1 }),
             cut: None,
         }
+    }
+
+    #[test]
+    fn a_packing_that_has_not_come_to_rest_says_how_far_it_moved() {
+        let container = Container::of(&cylinder(50, 0.012));
+        let mut rng = Pcg64::seed_from_u64(3);
+        let (grains, top) = scatter::<D3>(&[1e-3; 50], &container, &mut rng);
+        let mut world = packing_world(grains, &container, top, true);
+        let after = |steps, world: &mut World<D3>| settle(world, &container, true, steps, &mut |_| true).expect("steps");
+        let moved = after(2, &mut world).expect("a lid that is still on its way");
+        assert!(moved > 0.01, "{moved}");
+        assert_eq!(after(MOST_STEPS, &mut world), None);
     }
 
     #[test]

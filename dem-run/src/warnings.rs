@@ -2,6 +2,7 @@
 
 use crate::build::TOUCHING;
 use crate::output::number;
+use crate::prepare::MOST_STEPS;
 use crate::scene::{Sample, Scene};
 use dem_core::body::{Drive, Grains, Shape, Wall};
 use dem_core::dim::{Dim, Vect};
@@ -48,6 +49,14 @@ pub(crate) fn of_scene(scene: &Scene) -> Vec<String> {
     });
     told.extend(first_few(lines.collect(), "loads are on fixed grains"));
     told
+}
+
+/// That the steps of a packing did not bring it to rest: the last one moved it by `moved` mean radii.
+pub(crate) fn of_packing(moved: f64) -> String {
+    format!(
+        "sample.random: the packing still moved by {moved:.1e} of the mean radius a step after {MOST_STEPS} steps: grains may lie apart \
+         where they should touch; try another seed or a wider container, or see it with `dem-post view`"
+    )
 }
 
 /// The first of many lines of one kind, and how many more there are.

@@ -86,3 +86,30 @@ def test_nothing_costs_more_than_it_did(cost):
         for feature, figures in features.items():
             for what, figure in figures.items():
                 assert cost[grains][feature][what] <= 1.02 * figure, (grains, feature, what)
+
+
+# what docs/cost.md calls the rows of its first table
+ROWS = {
+    ("disks", "frictionless"): "of disks, without friction",
+    ("disks", "dry"): "dry",
+    ("disks", "restitution"): "dry, with restitution",
+    ("disks", "bonded"): "rigid bonds",
+    ("disks", "elastic"): "elastic bonds",
+    ("spheres", "frictionless"): "of spheres, without friction",
+    ("spheres", "dry"): "dry",
+    ("spheres", "restitution"): "dry, with restitution",
+    ("spheres", "bonded"): "rigid bonds",
+    ("spheres", "elastic"): "elastic bonds",
+    ("twisting", "bonded"): "rigid bonds that resist twist",
+    ("twisting", "elastic"): "elastic bonds that resist twist",
+}
+
+
+def test_the_page_has_the_recorded_figures():
+    recorded = json.loads(RECORD.read_text())["cost"]
+    rows = []
+    for (grains, feature), name in ROWS.items():
+        figures = recorded[grains][feature]
+        rows.append(f"| {name} | {figures['bytes']} | {round(figures['sweep'])} | {10 * round(figures['step'] / 10):,} |")
+    page = (RECORD.parents[2] / "docs/cost.md").read_text()
+    assert "\n".join(rows) in page, "\n".join(rows)

@@ -69,11 +69,9 @@ fn killed(here: &Folder, whole: &History, file: &str, seed: u64, moments: usize,
         // it opens, and holds every frame that was complete
         let history = here.history(file);
         assert_eq!(history.steps(), &whole.steps()[..history.frames()]);
-        for frame in [0, history.frames() / 2, history.frames().saturating_sub(1)] {
-            if frame < history.frames() {
-                assert_eq!(history.grain_state(frame).expect("grains"), whole.grain_state(frame).expect("grains"));
-                assert_eq!(history.contacts(frame).expect("contacts"), whole.contacts(frame).expect("contacts"));
-            }
+        for frame in 0..history.frames() {
+            assert_eq!(history.grain_state(frame).expect("grains"), whole.grain_state(frame).expect("grains"));
+            assert_eq!(history.contacts(frame).expect("contacts"), whole.contacts(frame).expect("contacts"));
         }
         let checkpoint = history.checkpoint().expect("checkpoint").map_or(0, |c| c.step);
         if hit {
