@@ -433,7 +433,8 @@ mod tests {
         let mut rng = Pcg64::seed_from_u64(3);
         let (grains, top) = scatter::<D3>(&[1e-3; 50], &container, &mut rng);
         let mut world = packing_world(grains, &container, top, true);
-        let after = |steps, world: &mut World<D3>| settle(world, &container, true, steps, &mut |_| true).expect("steps");
+        let after =
+            |steps, world: &mut World<D3>| settle(world, &container, true, steps, &mut |_| true).expect("steps");
         let moved = after(2, &mut world).expect("a lid that is still on its way");
         assert!(moved > 0.01, "{moved}");
         assert_eq!(after(MOST_STEPS, &mut world), None);

@@ -120,6 +120,16 @@ mod tests {
         let blocks: Vec<usize> = order.iter().map(|k| block_of(pairs[*k as usize], grains)).collect();
         assert!(blocks.is_sorted());
         assert_eq!(blocks.last(), Some(&3));
+        // a colour holds no body twice: that of a contact is the least that is free at both its bodies
+        let inside = order.iter().map(|k| pairs[*k as usize]).filter(|pair| block_of(*pair, grains) == 0);
+        let (mut first, mut seen) = (0, std::collections::HashSet::new());
+        for pair in inside {
+            if !pair.iter().all(|body| seen.insert(*body)) {
+                first += 1;
+                seen = pair.into_iter().collect();
+            }
+        }
+        assert_eq!(first + 1, 4, "a square lattice has four colours");
         let joining = |p: &&[u32; 2]| p[1] as usize == grains || p[0] as usize / BLOCK != p[1] as usize / BLOCK;
         assert_eq!(blocks.iter().filter(|b| **b == 3).count(), pairs.iter().filter(joining).count());
         // hardly any contact waits for the one before

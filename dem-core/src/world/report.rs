@@ -332,6 +332,11 @@ mod tests {
         assert_eq!(steps.map(|step| (step.rejected, step.substeps)), [(1, 2), (2, 3), (2, 3)]);
         let both = halves().followed_by(halves(), 1);
         assert_eq!((both.rejected, both.substeps), (3, 4));
+        // what is largest in either half is largest in the step
+        let late = || StepReport { false_acceleration: 2.0, ..whole() };
+        for step in [late().followed_by(whole(), 1), whole().followed_by(late(), 1)] {
+            assert_eq!(step.false_acceleration, 2.0);
+        }
         // bodies that are too fast refuse no solve
         let fast = halves().followed_by(halves(), 0);
         assert_eq!((fast.rejected, fast.substeps), (2, 4));

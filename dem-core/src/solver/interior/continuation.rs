@@ -73,6 +73,8 @@ pub(super) struct Continuation {
     /// ln τ below which, and relative change with θ up to which, the path counts as straight.
     end: f64,
     straight: f64,
+    /// Whether the start of the step along the tangent is being corrected, since the end of that step could not be.
+    again: bool,
 }
 
 impl Iterate {
@@ -110,6 +112,7 @@ impl Continuation {
             length: tuning::LONGEST,
             end: (0.5 * gap).ln(),
             straight,
+            again: false,
         }
     }
 
@@ -138,7 +141,8 @@ impl Continuation {
         self.predict(tangent, system.sign > 0.0)
     }
 
-    /// A Newton step alone; the step along the tangent once more, and shorter, where there have been too many.
+    /// A Newton step alone. Where there have been too many, the start of the step along the tangent is not on the path, or that step is too
+    /// long: the start is corrected again, or where that has been done the step is made again, shorter.
     fn correct(&mut self, error: f64, newton: &Iterate) -> Progress {
         self.corrections += 1;
         let most = if self.predictor.is_some() { tuning::CORRECTIONS } else { tuning::FIRST_CORRECTIONS };
@@ -151,16 +155,24 @@ impl Continuation {
         let Some(predictor) = self.predictor.as_mut().filter(|_| self.length >= tuning::SHORTEST) else {
             return Progress::Lost;
         };
-        predictor.length *= tuning::SHORTER;
-        self.at = predictor.end();
+        self.again = !self.again;
+        if self.again {
+            self.at = predictor.from.clone();
+            self.parameter = Parameter::Barrier;
+        } else {
+            predictor.length *= tuning::SHORTER;
+            self.at = predictor.end();
+        }
         Progress::Path
     }
 
     /// A step along the tangent, `down` to a lower barrier or up to a higher one.
     fn predict(&mut self, tangent: Iterate, down: bool) -> Progress {
         // the error of a step grows with the square of its length
-        let factor = (tuning::AIM / self.first_error).sqrt().clamp(tuning::SHORTER, 2.0);
-        self.length = (factor * self.length).min(tuning::LONGEST);
+        if !std::mem::take(&mut self.again) {
+            let factor = (tuning::AIM / self.first_error).sqrt().clamp(tuning::SHORTER, 2.0);
+            self.length = (factor * self.length).min(tuning::LONGEST);
+        }
         self.corrections = 0;
         let (fastest, size) = self.at.fastest(&tangent);
         self.parameter = if down && size <= tuning::SLOW { Parameter::Barrier } else { fastest };

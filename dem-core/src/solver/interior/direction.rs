@@ -67,6 +67,12 @@ pub(super) fn is_central(at: &State) -> bool {
     at.x.iter().zip(&at.z).all(|(x, z)| least_product(x, z) >= least)
 }
 
+/// Whether rounding hides if a point is [central](is_central).
+pub(super) fn is_rounded(at: &State) -> bool {
+    let largest = at.x.iter().zip(&at.z).map(|(x, z)| x[0] * z[0]).fold(0.0, f64::max);
+    f64::EPSILON * largest > tuning::CENTRAL * gap(at)
+}
+
 /// Go along a step.
 pub(super) fn advance(at: &mut State, length: f64, step: &State) {
     at.r.iter_mut().zip(&step.r).for_each(|(r, d)| *r += length * d);

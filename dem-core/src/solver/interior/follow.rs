@@ -1,7 +1,11 @@
 //! How the path is followed: in long steps within a wide neighbourhood, and by arc length where these jam.
+//!
+//! A fast sliding contact has a reaction and a velocity that are both on the boundary of their cones, so that x₀ z₀ and the rest of x·z cancel:
+//! rounding leaves ε x₀ z₀ of a product. Long steps end where that is the gap. By arc length the pairs are known by w = x − z, whose
+//! eigenvalues keep their digits, and are central to rounding.
 
 use super::continuation::{Continuation, Progress};
-use super::direction::{advance, direction, is_central};
+use super::direction::{advance, direction, is_central, is_rounded};
 use super::local::{State, gap};
 use super::sites::Sites;
 use super::start::cold;
@@ -15,6 +19,8 @@ pub(super) struct Follow {
     short: u32,
     straight: f64,
     by_arc_length: Option<ByArcLength>,
+    /// Whether rounding has ended the long steps.
+    to_the_end: bool,
 }
 
 struct ByArcLength {
@@ -26,7 +32,7 @@ struct ByArcLength {
 impl Follow {
     /// In long steps, from a point within all cones.
     pub fn from(at: State) -> Self {
-        Self { at, short: 0, straight: tuning::STRAIGHT, by_arc_length: None }
+        Self { at, short: 0, straight: tuning::STRAIGHT, by_arc_length: None, to_the_end: false }
     }
 
     /// The point at hand.
@@ -60,7 +66,7 @@ impl Follow {
             Progress::Straight => {
                 let x = sites.primal(&now.r);
                 let inside = State { x, ..now };
-                if is_central(&inside) {
+                if !self.to_the_end && is_central(&inside) {
                     (self.at, self.by_arc_length) = (inside, None);
                 }
             }
@@ -85,7 +91,10 @@ impl Follow {
         }
         self.short = if length > tuning::SHORT { 0 } else { self.short + 1 };
         self.at = next;
-        if self.short == tuning::JAMMED {
+        self.to_the_end = gap(&self.at) > 0.5 * gap(system.at) && is_rounded(&self.at);
+        if self.to_the_end {
+            self.jam(1.0);
+        } else if self.short == tuning::JAMMED {
             self.short = 0;
             self.straight *= tuning::STRAIGHTER;
             self.jam(tuning::RAISED);

@@ -31,12 +31,13 @@ impl System<'_> {
         all.map(|((x, z), Scaled { scaling, .. })| product(&scaling.x(x), &scaling.z(z))).collect()
     }
 
-    /// The step after which x ∘ z has changed by `by`, to first order.
+    /// The step after which x ∘ z has changed by `by`, to first order. Where fragments move fast, rounding leaves as much of the equations as
+    /// the step is to take away, and with it the way to the boundary is arbitrary: so one round of refinement.
     pub fn step(&self, by: &[Point]) -> State {
-        self.solved(&self.right, by)
+        self.refined(self.solved(&self.right, by), by)
     }
 
-    /// The same without what rounding has left.
+    /// A step with less of what rounding has left.
     pub fn refined(&self, mut step: State, by: &[Point]) -> State {
         let (left, missing) = self.left(by, &step);
         let more = self.solved(&left, &missing);
