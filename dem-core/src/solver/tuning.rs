@@ -167,9 +167,9 @@ pub(super) mod selection {
     /// stiff contacts, which moves the load of one sample of ten by 20 %, and the compliance shows in three solves of four. With 1e8 and
     /// velocities in one precision rounding decides; with 1e9 and twice the precision loads agree to 1e-3 (decision 35).
     pub const KAPPA: f64 = 1e9;
-    /// Share of the tolerance that the compliance may take where any reactions will do, and the stiffest metric: with no compliance the path
-    /// wanders among the reactions that balance themselves.
-    pub const ANY: f64 = 0.1;
+    /// Share of the tolerance that the compliance may take: below 1e-8 the metric is stiffer. The stiffest: with no compliance the path wanders
+    /// among the reactions that balance themselves.
+    pub const SHARE: f64 = 0.1;
     pub const STIFFEST: f64 = 1e12;
     /// Gaps of all pairs over the energy of the metric at which the reactions of least energy are known, and the least energy that counts,
     /// over Σ r²/ρ. A thousandth left reactions 3 % from them.

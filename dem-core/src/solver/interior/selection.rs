@@ -2,7 +2,7 @@
 //!
 //! 1. With the compliance of the metric the path is followed until its gaps are far below the energy of the metric: these are the reactions of
 //!    least energy, r*. What r* has at a limit is known then.
-//! 2. Where that compliance shows in the residual, the path is followed again with the metric anchored at r*, from a point on the way there,
+//! 2. Where that compliance shows in the residual or in the velocities, as between bodies of very unlike masses, the path is followed again with the metric anchored at r*, from a point on the way there,
 //!    since nearer to the boundary steps are short; then with a harder metric.
 
 use super::local::{State, gap};
@@ -38,8 +38,7 @@ pub(super) struct Selection {
 
 impl Selection {
     pub fn new(sites: &Sites, anchor: Vec<f64>, aims: Aims) -> Self {
-        let kappa =
-            if aims.least { tuning::KAPPA } else { (1.0 / (tuning::ANY * aims.tolerance)).min(tuning::STIFFEST) };
+        let kappa = (1.0 / (tuning::SHARE * aims.tolerance)).clamp(tuning::KAPPA, tuning::STIFFEST);
         let metric = Metric::new(sites, anchor, kappa);
         let limits = (!aims.least).then(Vec::new);
         Self { aims, metric, best: None, change: 1.0, limits, enough: f64::INFINITY, turn: None, anchored: 0 }
