@@ -78,14 +78,12 @@ pub(super) struct Found {
     pub velocity_error: f64,
     /// Iterations made.
     pub iterations: u64,
-    /// Whether they are those of least energy, if these are asked for, and within the tolerance.
-    pub selected: bool,
 }
 
 impl Found {
-    /// See [`Aims::missed`].
+    /// See [`Aims::missed`]; the load error counts as the velocity error does.
     pub fn missed(&self, aims: Aims) -> f64 {
-        aims.missed(self.residual, self.velocity_error)
+        aims.missed(self.residual, self.velocity_error.max(self.load_error))
     }
 }
 

@@ -54,14 +54,14 @@ impl Selection {
             (self.limits, self.enough) = (Some(sites.limits(at, &self.metric.own)), least);
         }
         let selected = self.limits.is_some() && gaps <= self.enough;
-        let plain = self.measure(problem, sites, at, &[], selected, iteration);
-        let mut solved = self.solves(plain) && selected;
+        let plain = self.measure(problem, sites, at, &[], iteration);
+        let mut solved = plain <= 1.0 && selected;
         if selected && self.aims.least {
             let limits = self.limits.take().unwrap_or_default();
-            let at_limits = self.measure(problem, sites, at, &limits, selected, iteration);
+            let at_limits = self.measure(problem, sites, at, &limits, iteration);
             self.limits = Some(limits);
             // reactions that are next to r* need not be at its limits
-            solved |= self.solves(at_limits);
+            solved |= at_limits <= 1.0;
         }
         // a gap that is rounding tells nothing more
         let exhausted = gaps.is_nan() || gap(at) <= tuning::LEAST_GAP || iteration == self.aims.most;
@@ -94,30 +94,23 @@ impl Selection {
         residual > tuning::SHOWS * tolerance || velocity > tuning::SHOWS * load_tolerance * sites.largest_free()
     }
 
-    fn solves(&self, missed: f64) -> bool {
-        missed <= 1.0 && self.change <= self.aims.load_tolerance || missed == 0.0
-    }
-
     /// How far the reactions of a point, put on their limits, [miss](Aims::missed) what is asked for; they are kept if they are the best so far:
-    /// those that are selected and within the tolerances, else those that miss least.
+    /// of those within the tolerances the last, which is nearest to r*, else those that miss least.
     fn measure(
         &mut self,
         problem: &mut impl Solvable,
         sites: &Sites,
         at: &State,
         limits: &[Limit],
-        selected: bool,
         iterations: u64,
     ) -> f64 {
         let reactions = sites.snapped(at, limits);
         problem.write_back(&reactions);
-        let (residual, velocity_error) = (problem.residual(), problem.velocity_error());
-        let missed = self.aims.missed(residual, velocity_error);
-        let done = selected && missed <= 1.0;
-        let better = |best: &Found| done || !best.selected && missed < best.missed(self.aims);
-        if self.best.as_ref().is_none_or(better) {
-            let load_error = self.change;
-            self.best = Some(Found { reactions, residual, load_error, velocity_error, iterations, selected: done });
+        let (residual, velocity_error, load_error) = (problem.residual(), problem.velocity_error(), self.change);
+        let found = Found { reactions, residual, load_error, velocity_error, iterations };
+        let missed = found.missed(self.aims);
+        if self.best.as_ref().is_none_or(|best| missed <= 1.0 || missed < best.missed(self.aims)) {
+            self.best = Some(found);
         } else if let Some(best) = &mut self.best {
             best.iterations = iterations;
         }
