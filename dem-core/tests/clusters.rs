@@ -34,21 +34,19 @@ fn blocks(stages: Stages) -> World<D3> {
     world
 }
 
-/// ε x₀ z₀ of a contact that slides fast is more than the gap at which the reactions of least energy are known. Long steps went on there for up
-/// to 300 factorisations, and left the load error at 1e-4.
+/// With rounding of ε ρ u in the reactions Newton's rounds did not converge, and with ε x₀ z₀ in the gap long steps went on for up to 300
+/// factorisations, to load errors of 1e-4: 5,454 factorisations in all with the default solver, at most 308 in a step.
 #[test]
-fn fragments_that_slide_fast_take_no_more_than_others() {
-    for stages in [Stages::All, Stages::Interior] {
+fn fragments_that_slide_fast_take_few_factorisations() {
+    for (stages, most, most_in_all) in [(Stages::All, 60, 2_000), (Stages::Interior, 60, 4_000)] {
         let mut world = blocks(stages);
-        let (mut worst, mut all, mut solved) = (0, 0, 0);
+        let mut all = 0;
         for _ in 0..200 {
             let report = world.step().expect("a step");
             assert!(report.residual <= 1e-8 && report.load_error.unwrap_or(0.0) <= 1e-5, "{report:?}");
-            worst = worst.max(report.work.factorisations);
+            assert!(report.work.factorisations <= most, "{report:?}");
             all += report.work.factorisations;
-            solved += u64::from(report.work.factorisations > 8);
         }
-        eprintln!("{stages:?}: {worst} {all} {solved} {}", all as f64 / solved as f64);
-        assert!(false);
+        assert!(all <= most_in_all, "{stages:?}: {all}");
     }
 }

@@ -131,9 +131,10 @@ pub(super) mod direction {
 
 /// When the central path is followed by arc length (decision 33).
 pub(super) mod follow {
-    /// A step shorter than this is short, and the path jams after so many short steps in a row.
-    pub const SHORT: f64 = 0.1;
-    pub const JAMMED: u32 = 2;
+    /// The path jams after so many steps in a row in which the gap has not fallen by this share. Two are too few, where a step goes towards the
+    /// middle of the cones; with the length of steps in place of the gap, a path may go to and fro for 300 iterations.
+    pub const PROGRESS: f64 = 0.1;
+    pub const JAMMED: u32 = 3;
     /// By how much the barrier is above the gap of a jam where the path is looked for, and how often it is raised so.
     pub const RAISED: f64 = 10.0;
     pub const MOST_RAISED: i32 = 2;

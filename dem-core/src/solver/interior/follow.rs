@@ -15,8 +15,8 @@ use crate::solver::tuning::{direction as steps, follow as tuning};
 /// Where the path is, and how it is followed.
 pub(super) struct Follow {
     at: State,
-    /// Short steps in a row.
-    short: u32,
+    /// Steps in a row without progress.
+    stuck: u32,
     straight: f64,
     by_arc_length: Option<ByArcLength>,
     /// Whether rounding has ended the long steps.
@@ -32,7 +32,7 @@ struct ByArcLength {
 impl Follow {
     /// In long steps, from a point within all cones.
     pub fn from(at: State) -> Self {
-        Self { at, short: 0, straight: tuning::STRAIGHT, by_arc_length: None, to_the_end: false }
+        Self { at, stuck: 0, straight: tuning::STRAIGHT, by_arc_length: None, to_the_end: false }
     }
 
     /// The point at hand.
@@ -43,7 +43,7 @@ impl Follow {
     /// Go on from a point that was passed.
     pub fn turn_back(&mut self, to: State, sites: &Sites) {
         let by_arc_length = self.by_arc_length.take().is_some();
-        self.short = 0;
+        self.stuck = 0;
         self.at = to;
         if by_arc_length {
             self.jam(1.0);
@@ -89,13 +89,14 @@ impl Follow {
             length *= steps::SHORTER;
             next = end(length);
         }
-        self.short = if length > tuning::SHORT { 0 } else { self.short + 1 };
+        let left = gap(&next) / gap(system.at);
+        self.stuck = if left <= 1.0 - tuning::PROGRESS { 0 } else { self.stuck + 1 };
         self.at = next;
-        self.to_the_end = gap(&self.at) > 0.5 * gap(system.at) && is_rounded(&self.at);
+        self.to_the_end = left > 0.5 && is_rounded(&self.at);
         if self.to_the_end {
             self.jam(1.0);
-        } else if self.short == tuning::JAMMED {
-            self.short = 0;
+        } else if self.stuck == tuning::JAMMED {
+            self.stuck = 0;
             self.straight *= tuning::STRAIGHTER;
             self.jam(tuning::RAISED);
         }
