@@ -70,16 +70,10 @@ impl Newton {
     }
 
     /// The norm of F that is small enough: a tenth of what either tolerance allows, or what rounding leaves.
-    fn target(&self, rows: &Rows, state: &Iterate) -> f64 {
-        let (wanted, rounding) = self.target_and_rounding(rows, state);
-        wanted.max(rounding)
-    }
-
-    /// A tenth of what either tolerance allows, and what rounding leaves, of ‖F‖.
     ///
     /// An error of F turns up as a velocity when v is computed from the reactions. Rounding comes from ρ u, where u is a
     /// sum of velocities.
-    pub(super) fn target_and_rounding(&self, rows: &Rows, state: &Iterate) -> (f64, f64) {
+    fn target(&self, rows: &Rows, state: &Iterate) -> f64 {
         let change = distance(&state.y, &rows.free);
         let (mut rounding, mut carried) = (0.0, 0.0);
         for (row, r) in rows.list.iter().zip(&state.reactions) {
@@ -90,7 +84,7 @@ impl Newton {
         }
         let wanted =
             tuning::SHARE * (self.settings.load_tolerance * change).min(self.settings.tolerance * carried.sqrt());
-        (wanted, tuning::ROUNDING * rounding.sqrt())
+        wanted.max(tuning::ROUNDING * rounding.sqrt())
     }
 
     /// The Newton direction −J⁻¹ F, by the factors at hand where a few rounds of refinement make it exact enough, else by new ones.

@@ -24,7 +24,7 @@ impl Newton {
         let (mut last_error, mut last_velocity_error, mut softened, mut made_in_all) = (f64::INFINITY, 0.0, 0, 0);
         self.margins.clear();
         loop {
-            let mut state = self.begun(rows, &guess, &mut softened);
+            let mut state = Iterate::from_reactions(rows, &guess.reactions);
             let (made, solved) = self.inner(rows, &mut state, &guess, warm && self.margins.is_empty());
             *iterations += made.max(1);
             if !solved && made > 1 && last_error <= self.settings.tolerance {
@@ -64,20 +64,6 @@ impl Newton {
                 softened += 1;
             }
             (last_error, last_velocity_error) = (error, velocity_error);
-        }
-    }
-
-    /// The state at the reactions of `guess`, with a penalty so small that rounding leaves what the tolerances allow: contacts that move fast are
-    /// rounded by ρ u.
-    fn begun(&self, rows: &mut Rows, guess: &Guess, softened: &mut u32) -> Iterate {
-        loop {
-            let state = Iterate::from_reactions(rows, &guess.reactions);
-            let (target, rounding) = self.target_and_rounding(rows, &state);
-            if tuning::SHARE * rounding <= target || *softened == tuning::MOST_SOFTENED {
-                return state;
-            }
-            rows.soften(tuning::SOFTENED);
-            *softened += 1;
         }
     }
 
