@@ -75,14 +75,14 @@ fn the_residual_is_the_natural_map_over_the_larger_of_reactions_and_load() {
 fn a_sum_in_parts_is_that_of_its_contacts() {
     let one = pair::<D2>([-0.1, 0.0], [20.0, 10.0]);
     let mut many = one.clone();
-    many.dry = vec![one.dry[0].clone(); 100_000];
+    many.dry = vec![one.dry[0]; 100_000];
     let (expected, found) = (residual(&one), residual(&many));
     assert!((found / expected - 1.0).abs() < 1e-12, "{found:e} against {expected:e}");
     // rounding is relative to the velocities of all contacts
     let part = 32.0 * f64::EPSILON * 2f64.sqrt() * 3.0;
     let one = pair::<D2>([3.0 - part, 3.0], [0.0; 2]);
     let mut many = one.clone();
-    many.dry = vec![one.dry[0].clone(); 100_000];
+    many.dry = vec![one.dry[0]; 100_000];
     assert_eq!((residual(&one), residual(&many)), (0.0, 0.0));
 }
 
