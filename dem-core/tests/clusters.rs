@@ -3,7 +3,7 @@
 mod common;
 
 use common::{down, floor, grain, newton, settings, world};
-use dem_core::dim::{D3, Vect};
+use dem_core::dim::D3;
 use dem_core::solver::{SolverSettings, StagedSettings, Stages};
 use dem_core::world::World;
 
