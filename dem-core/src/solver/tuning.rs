@@ -45,8 +45,8 @@ pub(super) mod newton {
     pub const MOST_FACTORISATIONS: u64 = 8;
     /// Most iterations of one inner problem.
     pub const MOST_ITERATIONS: u64 = 30;
-    /// Share of ‖F‖ that the step to the active set of the last solve may leave, where that is more than the contacts push. Where that active set holds but for a few contacts it
-    /// leaves 1e-5 to 1e-10, else 1e-4 to 10: three failures of four end after one factorisation in place of four (ablation).
+    /// Share of ‖F‖ that the step to the active set of the last solve may leave, where that is more than the contacts push. Where
+    /// that active set holds but for a few contacts it leaves 1e-5 to 1e-10, else 1e-4 to 10: three failures of four end after one factorisation in place of four (ablation).
     pub const LEFT_BY_GUESS: f64 = 1e-3;
     /// An iteration makes progress where it brings ‖F‖ below this share of its value at the last progress; so many without progress end an
     /// inner problem. (For the line search of Coulomb's law, the share that a whole step must reach.)

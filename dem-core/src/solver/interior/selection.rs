@@ -2,8 +2,9 @@
 //!
 //! 1. With the compliance of the metric the path is followed until its gaps are far below the energy of the metric: these are the reactions of
 //!    least energy, r*. What r* has at a limit is known then.
-//! 2. Where that compliance shows in the residual or in the velocities, as between bodies of very unlike masses, the path is followed again with the metric anchored at r*, from a point on the way there,
-//!    since nearer to the boundary steps are short; then with a harder metric.
+//! 2. Where that compliance shows in the residual or in the velocities, as between bodies of very unlike masses, the path is
+//!    followed again with the metric anchored at r*, from a point on the way there, since nearer to the boundary steps are short;
+//!    then with a harder metric.
 
 use super::local::{State, gap};
 use super::metric::Metric;

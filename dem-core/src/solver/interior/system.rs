@@ -31,8 +31,8 @@ impl System<'_> {
         all.map(|((x, z), Scaled { scaling, .. })| product(&scaling.x(x), &scaling.z(z))).collect()
     }
 
-    /// The step after which x ∘ z has changed by `by`, to first order. Where fragments move fast, rounding leaves as much of the equations as
-    /// the step is to take away, and with it the way to the boundary is arbitrary: so one round of refinement.
+    /// The step after which x ∘ z has changed by `by`, to first order. It is refined once: where fragments move fast, the error that
+    /// rounding leaves is as large as the right side, and the length to the boundary of the cones would be arbitrary.
     pub fn step(&self, by: &[Point]) -> State {
         self.refined(self.solved(&self.right, by), by)
     }
