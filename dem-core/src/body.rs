@@ -109,12 +109,17 @@ impl<D: Dim> Grains<D> {
 
     /// Lowest and highest corner of the box around all grains (m).
     pub fn bounds(&self) -> (D::Vector, D::Vector) {
+        self.bounds_at(&self.position)
+    }
+
+    /// The same for grains at these places (m).
+    pub(crate) fn bounds_at(&self, places: &[D::Vector]) -> (D::Vector, D::Vector) {
         let mut low = D::Vector::zero();
         let mut high = D::Vector::zero();
         for axis in 0..D::N {
             low[axis] = f64::INFINITY;
             high[axis] = f64::NEG_INFINITY;
-            for (x, r) in self.position.iter().zip(&self.radius) {
+            for (x, r) in places.iter().zip(&self.radius) {
                 low[axis] = low[axis].min(x[axis] - r);
                 high[axis] = high[axis].max(x[axis] + r);
             }

@@ -2,6 +2,7 @@
 
 use crate::contact::{Cone, Local, Weights};
 use crate::dim::{Moments, Vect};
+use std::ops::{Deref, DerefMut};
 
 /// Relative distance to the limit at which a bond counts as being at it (–).
 pub const LIMIT: f64 = 1e-7;
@@ -53,6 +54,52 @@ pub struct Bond {
     pub stiffness: Option<Stiffness>,
     /// Whether it holds.
     pub status: BondStatus,
+}
+
+/// Bonds sorted by pair, at most one for each. They can be changed in place, but for their pairs, and none can be taken out:
+/// contacts and histories know them by their index. [`crate::world::World::add_bonds`] adds some.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Bonds(Vec<Bond>);
+
+impl Bonds {
+    /// Add bonds of pairs that have none; the index that each of the earlier ones has now.
+    pub(crate) fn merge(&mut self, bonds: Vec<Bond>) -> Vec<u32> {
+        let earlier = self.0.len();
+        let mut list: Vec<(usize, Bond)> = std::mem::take(&mut self.0).into_iter().chain(bonds).enumerate().collect();
+        // stable: of one pair the earlier bond comes first, and stays
+        list.sort_by_key(|(_, bond)| bond.pair);
+        list.dedup_by_key(|(_, bond)| bond.pair);
+        let mut numbers = vec![0; earlier];
+        for (now, (before, _)) in list.iter().enumerate() {
+            if let Some(number) = numbers.get_mut(*before) {
+                *number = now as u32;
+            }
+        }
+        self.0 = list.into_iter().map(|(_, bond)| bond).collect();
+        numbers
+    }
+}
+
+impl From<Vec<Bond>> for Bonds {
+    /// Sorted by pair; of several bonds of one pair the first.
+    fn from(list: Vec<Bond>) -> Self {
+        let mut bonds = Self::default();
+        bonds.merge(list);
+        bonds
+    }
+}
+
+impl Deref for Bonds {
+    type Target = [Bond];
+    fn deref(&self) -> &[Bond] {
+        &self.0
+    }
+}
+
+impl DerefMut for Bonds {
+    fn deref_mut(&mut self) -> &mut [Bond] {
+        &mut self.0
+    }
 }
 
 impl Bond {

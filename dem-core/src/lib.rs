@@ -5,6 +5,25 @@
 //! de Saxcé's bipotential, bonds that carry tension, shear and a rolling moment and break for good.
 //!
 //! SI units throughout. Reactions are impulses (N s) inside a step, forces (N) in everything that is reported.
+//!
+//! A disk falls on a floor and stays there:
+//!
+//! ```
+//! use dem_core::prelude::*;
+//!
+//! let disk = Grain::at_rest([0.0, 0.11].into(), 0.01, 25.0); // centre (m), radius (m), density × thickness (kg/m²)
+//! let floor = Wall::fixed(Shape::Plane { normal: [0.0, 1.0].into() }, [0.0, 0.0].into(), 0.5);
+//! let settings = Settings { step: 1e-3, gravity: Some([0.0, -9.81].into()), ..Settings::default() };
+//! let mut world = World::<D2>::new([disk].into_iter().collect(), vec![floor], vec![], settings);
+//! for _ in 0..300 {
+//!     world.step()?;
+//! }
+//! assert!((world.grains.position[0][1] - 0.01).abs() < 1e-9);
+//! # Ok::<(), StepError>(())
+//! ```
+//!
+//! [`world::World::step`] is the place to read on: a step from top to bottom. `examples/` has a falling disk whose energy is
+//! followed, a bond that is pulled apart, a contact law and a solver of one's own.
 #![forbid(unsafe_code)]
 
 pub mod body;
@@ -17,3 +36,13 @@ pub mod problem;
 pub mod saved;
 pub mod solver;
 pub mod world;
+
+/// What a program that steps a world needs.
+pub mod prelude {
+    pub use crate::body::{Drive, Grain, Grains, Load, Schedule, Shape, Wall};
+    pub use crate::bond::{Bond, BondStatus, Bonds, Rupture, Stiffness};
+    pub use crate::contact::BondFlow;
+    pub use crate::dim::{D2, D3, D3Twist, Dim, Vect};
+    pub use crate::solver::{GaussSeidelSettings, SolverSettings, StagedSettings};
+    pub use crate::world::{Restitution, Settings, StepError, StepReport, World};
+}

@@ -6,7 +6,8 @@
 //! not wait for the contact before. All of this is fixed by the problem alone: results are the same for any number of
 //! threads. A problem of less than two blocks keeps the order of its keys.
 
-use super::{Contact, Group, Nodes, Span};
+use super::link::{Contact, Group};
+use super::nodes::{Nodes, Span};
 use crate::contact::Law;
 use crate::dim::Dim;
 use rayon::prelude::*;

@@ -7,131 +7,16 @@ pub mod assembled;
 mod block_matrix;
 pub(crate) mod blocks;
 pub mod global;
+mod link;
+mod nodes;
 pub mod residual;
 
-use crate::contact::{Arms, Block, Bonded, Coulomb, Elastic, Frictionless, Law, Local, Padded};
-use crate::dim::{Axes, Dim, Moments, Vect, in_frame, is_vector, of_frame, resized};
-use std::marker::PhantomData;
+pub use link::{Contact, Group, Link};
+pub use nodes::{Node, Nodes};
+
+use crate::contact::{Bonded, Coulomb, Elastic, Frictionless, Law, Local, PADDED};
+use crate::dim::{Dim, Vect};
 use std::sync::Arc;
-
-/// The velocity unknowns of one body, and what an impulse does to them.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Node<D: Dim> {
-    /// Velocity of the centre (m/s).
-    pub velocity: D::Vector,
-    /// Angular velocity (rad/s).
-    pub spin: D::Spin,
-    /// Inverse mass (1/kg), zero when the body does not yield.
-    pub inverse_mass: f64,
-    /// Inverse moment of inertia (1/(kg m²)), zero when the body does not turn.
-    pub inverse_inertia: f64,
-}
-
-/// Geometry of a contact between node i and node j: the linear map between node velocities and relative velocity.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Link<D: Dim, A: Axes<D> = <D as Dim>::Frame> {
-    /// Nodes i and j; the normal points from j to i. `j` may be a wall.
-    pub nodes: [u32; 2],
-    /// Axes: an orthonormal frame (n, t…), or n alone.
-    pub axes: A,
-    dim: PhantomData<D>,
-}
-
-/// One contact of the problem: its geometry, its law and its impulse.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Contact<D: Dim, L: Law> {
-    /// Nodes and axes.
-    pub link: Link<D, L::Axes<D>>,
-    /// Law with the constants of the local solve.
-    pub law: L,
-    /// Impulse of j on i (N s), in the frame of the contact; where its axes are a normal alone, the tangential part is a vector.
-    pub r: Local<L::T, L::B>,
-}
-
-impl<D: Dim, A: Axes<D>> Link<D, A> {
-    /// Between these nodes, with the axes of `frame` that are needed.
-    pub fn new(nodes: [u32; 2], frame: D::Frame) -> Self {
-        Self { nodes, axes: A::of(frame), dim: PhantomData }
-    }
-
-    /// The same with a whole frame: where the axes are a normal alone, the one that [`Dim::frame`] makes of it.
-    pub fn whole(&self) -> Link<D> {
-        Link::new(self.nodes, self.frame())
-    }
-
-    fn frame(&self) -> D::Frame {
-        self.axes.frame().copied().unwrap_or_else(|| D::frame(self.axes.normal()))
-    }
-
-    /// A reaction or a velocity of the contact as rows of its [whole](Link::whole) frame.
-    #[inline]
-    pub(crate) fn in_frame<T: Vect, B: Moments>(&self, r: &Local<T, B>) -> Padded {
-        let t = in_frame::<D, T>(&self.frame(), r.t);
-        Local { n: r.n, t: resized(t), m: resized(r.m) }
-    }
-
-    /// The inverse of [`Link::in_frame`].
-    #[inline]
-    pub(crate) fn of_frame<T: Vect, B: Moments>(&self, r: &Padded) -> Local<T, B> {
-        Local { n: r.n, t: of_frame::<D, T>(&self.frame(), resized(r.t)), m: resized(r.m) }
-    }
-
-    /// This reaction without what the rounding of many sweeps has left of a tangential vector along the normal: where grains are fast and
-    /// reactions small, it would be an impulse that no law knows of.
-    #[inline(always)]
-    fn without_drift<T: Vect, B: Moments>(&self, mut r: Local<T, B>) -> Local<T, B> {
-        if is_vector::<D, T>() {
-            let (normal, t) = (self.axes.normal(), resized::<T, D::Vector>(r.t));
-            r.t = resized(t - normal * normal.dot(&t));
-        }
-        r
-    }
-
-    /// The impulse on node i as a vector.
-    #[inline(always)]
-    pub(crate) fn impulse<T: Vect, B: Moments>(&self, r: &Local<T, B>) -> D::Vector {
-        match self.axes.frame() {
-            Some(frame) if T::LEN > 0 => D::compose(frame, r.n, resized(r.t)),
-            _ if is_vector::<D, T>() => self.axes.normal() * r.n + resized::<T, D::Vector>(r.t),
-            _ => {
-                debug_assert_eq!(T::LEN, 0, "tangential rows without a frame");
-                self.axes.normal() * r.n
-            }
-        }
-    }
-}
-
-impl<D: Dim> Link<D> {
-    /// Local Delassus block for two nodes. `drive` is the direction of the one degree of freedom of a force-driven wall j, if
-    /// it is one.
-    pub fn block(&self, i: &Node<D>, j: &Node<D>, arms: Arms, drive: Option<D::Vector>) -> Block {
-        let Arms { lever: [li, lj], bending: arm } = arms;
-        let spin = i.inverse_inertia + j.inverse_inertia;
-        let mut block = Block {
-            n: i.inverse_mass + j.inverse_mass,
-            t: i.inverse_mass + j.inverse_mass + li * li * i.inverse_inertia + lj * lj * j.inverse_inertia,
-            m: arm * arm * spin,
-            w: arm * arm * spin,
-            tm: arm * (lj * j.inverse_inertia - li * i.inverse_inertia),
-        };
-        if let Some(d) = drive {
-            // the wall yields along d alone: a diagonal that dominates (n·d)², (t·d)² and their coupling
-            let (along, across) = D::split(&self.axes, d);
-            let across = across.norm();
-            let coupling = (along * across).abs();
-            block.n = i.inverse_mass + j.inverse_mass * (along * along + coupling);
-            block.t = i.inverse_mass + li * li * i.inverse_inertia + j.inverse_mass * (across * across + coupling);
-            // no impulse changes a row whose bodies do not yield along it: any positive entry serves
-            let some = block.n.max(block.t);
-            block.n = if block.n == 0.0 { some } else { block.n };
-            block.t = if block.t == 0.0 { some } else { block.t };
-        }
-        block
-    }
-}
-
-/// Contacts with the same rows, sorted by key; in a large problem, by the blocks in which they are swept.
-pub type Group<D, L> = Vec<Contact<D, L>>;
 
 /// The law of a dry contact in dimension D.
 pub type Dry<D> = Coulomb<<D as Dim>::Slide>;
@@ -139,6 +24,22 @@ pub type Dry<D> = Coulomb<<D as Dim>::Slide>;
 pub type Bond<D> = Bonded<<D as Dim>::Tangent, <D as Dim>::Moment>;
 /// The law of an intact elastic bond in dimension D.
 pub type ElasticBond<D> = Elastic<<D as Dim>::Tangent, <D as Dim>::Moment>;
+
+/// The kinds of contacts, each a group of the problem, in the order in which they are visited.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Intact rigid bonds.
+    Bonded,
+    /// Intact elastic bonds.
+    Elastic,
+    /// Dry contacts with friction.
+    Dry,
+    /// Contacts without friction.
+    Frictionless,
+}
+
+/// Number of kinds of contacts.
+pub const KINDS: usize = 4;
 
 /// The contact problem of one step.
 #[derive(Clone, Debug)]
@@ -161,138 +62,101 @@ pub struct ContactProblem<D: Dim> {
     pub applied: f64,
 }
 
-/// Node velocities: grains first, then walls.
-#[derive(Clone, Debug)]
-pub struct Nodes<D: Dim> {
-    /// Grains, then walls.
-    pub all: Vec<Node<D>>,
-    /// Number of grains.
-    pub grains: usize,
-    /// Unit direction in which each wall yields to impulses; zero for a wall that does not.
-    pub drives: Vec<D::Vector>,
-}
-
-/// Nodes that follow one another, and the walls where they are all of them.
-pub(crate) struct Span<'a, D: Dim> {
-    all: &'a mut [Node<D>],
-    /// Number of the first.
-    first: usize,
-    /// How many are grains.
-    grains: usize,
-    drives: &'a [D::Vector],
-}
-
-impl<D: Dim> Nodes<D> {
-    /// Relative velocity u = Hᵀ v of node i with respect to node j at the contact point.
-    #[inline(always)]
-    pub fn relative_velocity<T: Vect, B: Moments>(&self, link: &Link<D, impl Axes<D>>, arms: Arms) -> Local<T, B> {
-        let [i, j] = link.nodes.map(|node| self.all[node as usize].motion());
-        link.relative_velocity(arms, i, j)
-    }
-
-    /// Add the impulse r of node j on node i: v += M⁻¹ H r.
-    #[inline(always)]
-    pub fn apply<T: Vect, B: Moments>(&mut self, link: &Link<D, impl Axes<D>>, arms: Arms, r: Local<T, B>) {
-        self.span().apply(link, arms, r);
-    }
-
-    fn span(&mut self) -> Span<'_, D> {
-        Span { first: 0, all: &mut self.all, grains: self.grains, drives: &self.drives }
-    }
-}
-
-impl<D: Dim> Node<D> {
-    #[inline(always)]
-    fn motion(&self) -> (D::Vector, D::Spin) {
-        (self.velocity, self.spin)
-    }
-}
-
-impl<D: Dim, A: Axes<D>> Link<D, A> {
-    /// Relative velocity of a body with this velocity and spin, i, with respect to another, j, at the contact point.
-    #[inline(always)]
-    pub(crate) fn relative_velocity<T: Vect, B: Moments>(
-        &self,
-        arms: Arms,
-        (velocity_i, spin_i): (D::Vector, D::Spin),
-        (velocity_j, spin_j): (D::Vector, D::Spin),
-    ) -> Local<T, B> {
-        let velocity = velocity_i - velocity_j;
-        let Some(frame) = self.axes.frame() else {
-            let normal = self.axes.normal();
-            let n = normal.dot(&velocity);
-            if !is_vector::<D, T>() {
-                debug_assert_eq!(T::LEN, 0, "tangential rows without a frame");
-                return Local { n, ..Local::zero() };
-            }
-            let turn = D::velocity(spin_i * arms.lever[0] + spin_j * arms.lever[1], normal);
-            return Local { n, t: resized(velocity - normal * n - turn), ..Local::zero() };
-        };
-        let (n, t) = D::split(frame, velocity);
-        if T::LEN == 0 {
-            return Local { n, ..Local::zero() };
-        }
-        let turn = D::spin_rows(frame, spin_i * arms.lever[0] + spin_j * arms.lever[1]);
-        let moment = |spin: D::Spin| resized(D::moment_rows(frame, spin * arms.bending));
-        let m = if B::LEN == 0 { B::zero() } else { moment(spin_i - spin_j) };
-        Local { n, t: resized(t - turn), m }
-    }
-}
-
-impl<D: Dim> Span<'_, D> {
-    /// As [`Nodes::relative_velocity`].
-    #[inline(always)]
-    pub fn relative_velocity<T: Vect, B: Moments>(&self, link: &Link<D, impl Axes<D>>, arms: Arms) -> Local<T, B> {
-        let [i, j] = link.nodes.map(|node| self.all[node as usize - self.first].motion());
-        link.relative_velocity(arms, i, j)
-    }
-
-    /// As [`Nodes::apply`].
-    #[inline(always)]
-    pub fn apply<T: Vect, B: Moments>(&mut self, link: &Link<D, impl Axes<D>>, arms: Arms, r: Local<T, B>) {
-        let [i, j] = link.nodes.map(|node| node as usize - self.first);
-        let impulse = link.impulse(&r);
-        let (t, m): (D::Tangent, D::Moment) = (resized(r.t), resized(r.m));
-        // without moment rows both torques are multiples of one
-        let slide = match link.axes.frame() {
-            Some(frame) if B::LEN == 0 => D::spin_rows_transposed(frame, t),
-            None if is_vector::<D, T>() => D::torque(link.axes.normal(), resized(r.t)),
-            _ => D::Spin::zero(),
-        };
-        let turn = |lever: f64, arm: f64, inverse: f64| match link.axes.frame() {
-            Some(frame) if B::LEN > 0 => D::torque_of_rows(frame, t * -lever, m * arm) * inverse,
-            Some(_) => slide * -lever * inverse,
-            None => slide * (-lever * inverse),
-        };
-        let node = &mut self.all[i];
-        node.velocity += impulse * node.inverse_mass;
-        if T::LEN > 0 {
-            node.spin += turn(arms.lever[0], arms.bending, node.inverse_inertia);
-        }
-        let node = &mut self.all[j];
-        if j >= self.grains {
-            let drive = self.drives[j - self.grains];
-            node.velocity -= drive * (drive.dot(&impulse) * node.inverse_mass);
-            return;
-        }
-        node.velocity -= impulse * node.inverse_mass;
-        if T::LEN > 0 {
-            node.spin += turn(arms.lever[1], -arms.bending, node.inverse_inertia);
-        }
-    }
-}
-
-/// A fold over all contacts of a problem, whatever their rows.
+/// Something that is done with every contact of a problem, whatever its law.
 pub trait Visitor<D: Dim> {
     /// Called once for each contact: rigid bonds, elastic bonds, dry contacts, frictionless ones, each in the order of
     /// its group.
     fn visit<L: Law>(&mut self, nodes: &Nodes<D>, contact: &Contact<D, L>);
 }
 
+/// The same for what changes contacts.
+pub trait VisitorMut<D: Dim> {
+    /// Called once for each contact, in the order of [`Visitor::visit`].
+    fn visit<L: Law>(&mut self, contact: &mut Contact<D, L>);
+}
+
+/// Something that is done with every group of contacts, for loops that are written for one law.
+pub trait GroupVisitor<D: Dim> {
+    /// Called once for each group.
+    fn visit<L: Law>(&mut self, nodes: &Nodes<D>, group: &Group<D, L>);
+}
+
+/// The same for what changes contacts and the velocities of the nodes.
+pub trait GroupVisitorMut<D: Dim> {
+    /// Called once for each group.
+    fn visit<L: Law>(&mut self, nodes: &mut Nodes<D>, group: &mut Group<D, L>);
+}
+
+struct EachContact<'a, V>(&'a mut V);
+
+impl<D: Dim, V: Visitor<D>> GroupVisitor<D> for EachContact<'_, V> {
+    #[inline]
+    fn visit<L: Law>(&mut self, nodes: &Nodes<D>, group: &Group<D, L>) {
+        group.iter().for_each(|c| self.0.visit(nodes, c));
+    }
+}
+
+impl<D: Dim, V: VisitorMut<D>> GroupVisitorMut<D> for EachContact<'_, V> {
+    #[inline]
+    fn visit<L: Law>(&mut self, _: &mut Nodes<D>, group: &mut Group<D, L>) {
+        group.iter_mut().for_each(|c| self.0.visit(c));
+    }
+}
+
 impl<D: Dim> ContactProblem<D> {
+    /// A problem without contacts.
+    pub fn new(nodes: Nodes<D>, free: Arc<[(D::Vector, D::Spin)]>, applied: f64) -> Self {
+        let (bonded, elastic, dry, frictionless) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        Self { nodes, free, bonded, elastic, dry, frictionless, radii: Vec::new(), applied }
+    }
+
+    /// Visit every group.
+    #[inline]
+    pub fn visit_groups(&self, visitor: &mut impl GroupVisitor<D>) {
+        visitor.visit(&self.nodes, &self.bonded);
+        visitor.visit(&self.nodes, &self.elastic);
+        visitor.visit(&self.nodes, &self.dry);
+        visitor.visit(&self.nodes, &self.frictionless);
+    }
+
+    /// Visit every group, to change it.
+    #[inline]
+    pub fn visit_groups_mut(&mut self, visitor: &mut impl GroupVisitorMut<D>) {
+        visitor.visit(&mut self.nodes, &mut self.bonded);
+        visitor.visit(&mut self.nodes, &mut self.elastic);
+        visitor.visit(&mut self.nodes, &mut self.dry);
+        visitor.visit(&mut self.nodes, &mut self.frictionless);
+    }
+
+    /// Visit every contact.
+    #[inline]
+    pub fn visit(&self, visitor: &mut impl Visitor<D>) {
+        self.visit_groups(&mut EachContact(visitor));
+    }
+
+    /// Visit every contact, to change it.
+    #[inline]
+    pub fn visit_mut(&mut self, visitor: &mut impl VisitorMut<D>) {
+        self.visit_groups_mut(&mut EachContact(visitor));
+    }
+
+    /// Number of contacts of each kind.
+    pub fn lengths(&self) -> [usize; KINDS] {
+        [self.bonded.len(), self.elastic.len(), self.dry.len(), self.frictionless.len()]
+    }
+
+    /// Make room for so many contacts of each kind, and no more: lists that grow by doubling would take twice the memory of a
+    /// large problem.
+    pub(crate) fn reserve(&mut self, [bonded, elastic, dry, frictionless]: [usize; KINDS]) {
+        self.bonded.reserve_exact(bonded);
+        self.elastic.reserve_exact(elastic);
+        self.dry.reserve_exact(dry);
+        self.frictionless.reserve_exact(frictionless);
+    }
+
     /// Number of contacts.
     pub fn len(&self) -> usize {
-        self.bonded.len() + self.elastic.len() + self.dry.len() + self.frictionless.len()
+        self.lengths().into_iter().sum()
     }
 
     /// Whether there is no contact at all.
@@ -302,43 +166,86 @@ impl<D: Dim> ContactProblem<D> {
 
     /// Bytes that the contacts take.
     pub fn contact_bytes(&self) -> usize {
-        size_of_val(self.bonded.as_slice())
-            + size_of_val(self.elastic.as_slice())
-            + size_of_val(self.dry.as_slice())
-            + size_of_val(self.frictionless.as_slice())
+        struct Bytes(usize);
+        impl<D: Dim> GroupVisitor<D> for Bytes {
+            fn visit<L: Law>(&mut self, _: &Nodes<D>, group: &Group<D, L>) {
+                self.0 += size_of_val(group.as_slice());
+            }
+        }
+        let mut bytes = Bytes(0);
+        self.visit_groups(&mut bytes);
+        bytes.0
     }
 
-    /// Visit every contact.
-    pub fn visit(&self, visitor: &mut impl Visitor<D>) {
-        self.bonded.iter().for_each(|c| visitor.visit(&self.nodes, c));
-        self.elastic.iter().for_each(|c| visitor.visit(&self.nodes, c));
-        self.dry.iter().for_each(|c| visitor.visit(&self.nodes, c));
-        self.frictionless.iter().for_each(|c| visitor.visit(&self.nodes, c));
+    /// All impulses in one list, contact by contact in the order of [`Visitor::visit`] (N s).
+    pub fn reactions(&self) -> Vec<f64> {
+        struct Gather(Vec<f64>);
+        impl<D: Dim> Visitor<D> for Gather {
+            fn visit<L: Law>(&mut self, _: &Nodes<D>, contact: &Contact<D, L>) {
+                self.0.push(contact.r.n);
+                self.0.extend_from_slice(contact.r.t.as_slice());
+                self.0.extend_from_slice(contact.r.m.as_slice());
+            }
+        }
+        let mut list = Gather(Vec::with_capacity(self.len() * PADDED));
+        self.visit(&mut list);
+        list.0
+    }
+
+    /// Set all impulses from such a list.
+    pub fn set_reactions(&mut self, list: &[f64]) {
+        struct Scatter<'a>(&'a [f64]);
+        impl<D: Dim> VisitorMut<D> for Scatter<'_> {
+            fn visit<L: Law>(&mut self, contact: &mut Contact<D, L>) {
+                let (own, rest) = self.0.split_at(1 + L::T::LEN + L::B::LEN);
+                contact.r.n = own[0];
+                contact.r.t = L::T::from_slice(&own[1..][..L::T::LEN]);
+                contact.r.m = L::B::from_slice(&own[1 + L::T::LEN..]);
+                self.0 = rest;
+            }
+        }
+        self.visit_mut(&mut Scatter(list));
+    }
+
+    /// Whether a bond is at its limit.
+    pub fn is_at_limit(&self) -> bool {
+        struct AtLimit(bool);
+        impl<D: Dim> Visitor<D> for AtLimit {
+            fn visit<L: Law>(&mut self, _: &Nodes<D>, contact: &Contact<D, L>) {
+                self.0 |= contact.failure().is_some();
+            }
+        }
+        let mut found = AtLimit(false);
+        self.visit(&mut found);
+        found.0
     }
 
     /// Set all impulses to zero.
     pub fn forget_reactions(&mut self) {
-        self.bonded.iter_mut().for_each(|c| c.r = Local::zero());
-        self.elastic.iter_mut().for_each(|c| c.r = Local::zero());
-        self.dry.iter_mut().for_each(|c| c.r = Local::zero());
-        self.frictionless.iter_mut().for_each(|c| c.r = Local::zero());
+        struct Forget;
+        impl<D: Dim> VisitorMut<D> for Forget {
+            fn visit<L: Law>(&mut self, contact: &mut Contact<D, L>) {
+                contact.r = Local::zero();
+            }
+        }
+        self.visit_mut(&mut Forget);
     }
 
     /// Set the node velocities to v_f + M⁻¹ H r, free of the rounding that a long series of increments leaves in them and in
     /// tangential vectors.
     pub fn velocities_from_reactions(&mut self) {
+        struct Push;
+        impl<D: Dim> GroupVisitorMut<D> for Push {
+            fn visit<L: Law>(&mut self, nodes: &mut Nodes<D>, group: &mut Group<D, L>) {
+                blocks::for_each(nodes, group, |span, c| {
+                    c.r = c.link.without_drift(c.r);
+                    span.apply(&c.link, c.law.arms(), c.r);
+                });
+            }
+        }
         for (node, free) in self.nodes.all.iter_mut().zip(self.free.iter()) {
             (node.velocity, node.spin) = *free;
         }
-        fn group<D: Dim, L: Law>(nodes: &mut Nodes<D>, group: &mut Group<D, L>) {
-            blocks::for_each(nodes, group, |span, c| {
-                c.r = c.link.without_drift(c.r);
-                span.apply(&c.link, c.law.arms(), c.r);
-            });
-        }
-        group(&mut self.nodes, &mut self.bonded);
-        group(&mut self.nodes, &mut self.elastic);
-        group(&mut self.nodes, &mut self.dry);
-        group(&mut self.nodes, &mut self.frictionless);
+        self.visit_groups_mut(&mut Push);
     }
 }

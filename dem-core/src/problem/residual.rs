@@ -8,7 +8,7 @@
 //! The residual is relative to all reactions. Where a body of mass m bears bodies of mass M, its velocity is off by the residual times
 //! M/m. The *velocity error* measures that, and the solvers of [`crate::solver::Staged`] stop on both.
 
-use super::{Contact, ContactProblem, Group, Nodes, Visitor};
+use super::{Contact, ContactProblem, Group, GroupVisitor, Nodes, Visitor};
 use crate::contact::Law;
 use crate::dim::{Dim, Vect};
 use rayon::prelude::*;
@@ -27,8 +27,8 @@ struct Sums {
 /// Contacts that are summed one after another; chunks of so many are summed at the same time.
 const CHUNK: usize = 32_768;
 
-impl Sums {
-    fn group<D: Dim, L: Law>(&mut self, nodes: &Nodes<D>, group: &Group<D, L>) {
+impl<D: Dim> GroupVisitor<D> for Sums {
+    fn visit<L: Law>(&mut self, nodes: &Nodes<D>, group: &Group<D, L>) {
         if group.len() <= CHUNK {
             group.iter().for_each(|c| self.add(nodes, c));
             return;
@@ -45,7 +45,9 @@ impl Sums {
             self.motion += part.motion;
         }
     }
+}
 
+impl Sums {
     #[inline(always)]
     fn add<D: Dim, L: Law>(&mut self, nodes: &Nodes<D>, c: &Contact<D, L>) {
         let u = nodes.relative_velocity(&c.link, c.law.arms());
@@ -64,10 +66,7 @@ impl Sums {
 /// The residual of the impulses and node velocities that the problem now holds (–). Not a number stays not a number.
 pub fn residual<D: Dim>(problem: &ContactProblem<D>) -> f64 {
     let mut sums = Sums::default();
-    sums.group(&problem.nodes, &problem.bonded);
-    sums.group(&problem.nodes, &problem.elastic);
-    sums.group(&problem.nodes, &problem.dry);
-    sums.group(&problem.nodes, &problem.frictionless);
+    problem.visit_groups(&mut sums);
     let scale = sums.reaction.sqrt().max(problem.applied);
     relative(sums.map.sqrt(), sums.motion.sqrt(), scale)
 }

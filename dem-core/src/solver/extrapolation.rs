@@ -8,11 +8,10 @@
 
 use super::rest::Rest;
 use super::rows::{Row, Rows, mass_unit};
-use crate::bond::failure;
-use crate::contact::{Law, PADDED, Padded};
+use crate::contact::Padded;
 use crate::dim::{Dim, Moments, Vect};
 use crate::problem::residual::{residual, velocity_error};
-use crate::problem::{Contact, ContactProblem, Group, Nodes, Visitor};
+use crate::problem::{ContactProblem, KINDS};
 use crate::saved::{Mismatch, Reader, Saved};
 use crate::solver::tuning::extrapolation as tuning;
 
@@ -20,7 +19,7 @@ use crate::solver::tuning::extrapolation as tuning;
 #[derive(Clone, Default)]
 pub(super) struct Extrapolation {
     /// Numbers of contacts of each kind.
-    shape: [usize; 4],
+    shape: [usize; KINDS],
     /// Reactions of a solve, and what each step since has added to them (N s).
     base: Vec<f64>,
     rate: Vec<f64>,
@@ -50,11 +49,11 @@ impl Extrapolation {
         tolerance: f64,
         load_tolerance: f64,
     ) -> Option<(f64, f64)> {
-        if self.left == 0 || self.shape != shape(problem) || !self.rest.is_over() {
+        if self.left == 0 || self.shape != problem.lengths() || !self.rest.is_over() {
             return None;
         }
-        let brought = reactions(problem);
-        write(problem, &self.grown(&self.base, &self.rate));
+        let brought = problem.reactions();
+        problem.set_reactions(&self.grown(&self.base, &self.rate));
         problem.velocities_from_reactions();
         let (residual, load_error) = (residual(problem), motion(problem));
         let allowed = load_tolerance.min((tuning::MORE * self.moves).max(tuning::SHARE * load_tolerance));
@@ -62,12 +61,12 @@ impl Extrapolation {
             && load_error <= allowed
             && velocity_error(problem) <= load_tolerance
             && self.keeps_status();
-        if holds && !at_limit(&problem.bonded) && !at_limit(&problem.elastic) {
+        if holds && !problem.is_at_limit() {
             (self.steps, self.left, self.kicked) = (self.steps + 1, self.left - 1, true);
             self.rest.forget();
             return Some((residual, load_error));
         }
-        write(problem, &brought);
+        problem.set_reactions(&brought);
         self.left = 0;
         self.rest.lengthen();
         None
@@ -76,10 +75,10 @@ impl Extrapolation {
     /// Compare a solution, and the [margins](margins) of its contacts, with what was predicted.
     pub fn learn<D: Dim>(&mut self, problem: &ContactProblem<D>, margins: &[f64], load_tolerance: f64) {
         let unit = mass_unit(&problem.nodes);
-        let (solution, margins) = (reactions(problem), margins.iter().map(|m| m * unit).collect::<Vec<_>>());
-        if self.shape != shape(problem) || self.base.is_empty() {
+        let (solution, margins) = (problem.reactions(), margins.iter().map(|m| m * unit).collect::<Vec<_>>());
+        if self.shape != problem.lengths() || self.base.is_empty() {
             let (rate, margin_rate) = (vec![0.0; solution.len()], vec![0.0; margins.len()]);
-            let (shape, rest) = (shape(problem), self.rest);
+            let (shape, rest) = (problem.lengths(), self.rest);
             *self = Self { shape, base: solution, rate, margins, margin_rate, rest, ..Self::default() };
             return;
         }
@@ -175,47 +174,6 @@ pub(super) fn margins(rows: &Rows, velocities: &[Padded], reactions: &[Padded]) 
         slip.min(bend).min(beyond(q.m.twist(), w.w, row.cone.xi * limit))
     };
     rows.list.iter().zip(velocities).zip(reactions).map(margin).collect()
-}
-
-fn shape<D: Dim>(problem: &ContactProblem<D>) -> [usize; 4] {
-    [problem.bonded.len(), problem.elastic.len(), problem.dry.len(), problem.frictionless.len()]
-}
-
-/// All reactions, row by row.
-fn reactions<D: Dim>(problem: &ContactProblem<D>) -> Vec<f64> {
-    struct Listed(Vec<f64>);
-    impl<D: Dim> Visitor<D> for Listed {
-        fn visit<L: Law>(&mut self, _: &Nodes<D>, contact: &Contact<D, L>) {
-            self.0.push(contact.r.n);
-            self.0.extend_from_slice(contact.r.t.as_slice());
-            self.0.extend_from_slice(contact.r.m.as_slice());
-        }
-    }
-    let mut listed = Listed(Vec::with_capacity(problem.len() * PADDED));
-    problem.visit(&mut listed);
-    listed.0
-}
-
-/// Set all reactions.
-fn write<D: Dim>(problem: &mut ContactProblem<D>, all: &[f64]) {
-    fn group<D: Dim, L: Law>(group: &mut Group<D, L>, from: &mut impl Iterator<Item = f64>) {
-        let mut next = || from.next().unwrap_or_default();
-        for c in group {
-            c.r.n = next();
-            (0..L::T::LEN).for_each(|k| c.r.t[k] = next());
-            (0..L::B::LEN).for_each(|k| c.r.m[k] = next());
-        }
-    }
-    let mut from = all.iter().copied();
-    group(&mut problem.bonded, &mut from);
-    group(&mut problem.elastic, &mut from);
-    group(&mut problem.dry, &mut from);
-    group(&mut problem.frictionless, &mut from);
-}
-
-/// Whether one of these bonds is at its limit.
-fn at_limit<D: Dim, L: Law<T = D::Tangent, B = D::Moment>>(group: &Group<D, L>) -> bool {
-    group.iter().any(|c| failure(&c.r, c.law.shift(), c.law.cone()).is_some())
 }
 
 /// What is left of momentum over what the contacts have taken, both over the roots of the masses: the load error of a sample at rest (–).

@@ -8,9 +8,10 @@
 use super::anderson::Anderson;
 use super::{ContactSolver, Route, SolveReport, SolveStatus, Work};
 use crate::contact::{Law, LocalSolve};
-use crate::dim::{Dim, Vect};
+use crate::dim::Dim;
 use crate::problem::residual::residual;
-use crate::problem::{ContactProblem, Group, Nodes, blocks};
+use crate::problem::{ContactProblem, Group, GroupVisitorMut, Nodes, blocks};
+use crate::saved::{Mismatch, Reader, Saved};
 use crate::solver::tuning::gauss_seidel as tuning;
 
 /// Settings of [`GaussSeidel`].
@@ -26,6 +27,13 @@ pub struct GaussSeidelSettings {
     pub max_sweeps: u64,
     /// Steps that Anderson's acceleration remembers; 0 for plain sweeps.
     pub acceleration: usize,
+}
+
+impl Default for GaussSeidelSettings {
+    /// Exact local solves to a residual of 10⁻⁸, nothing above 10⁻⁶ accepted, no acceleration.
+    fn default() -> Self {
+        Self { local: LocalSolve::Exact, tolerance: 1e-8, accept: 1e-6, max_sweeps: 100_000, acceleration: 0 }
+    }
 }
 
 /// Non-linear Gauss–Seidel on node velocities.
@@ -53,23 +61,22 @@ fn sweep_group<D: Dim, L: Law>(nodes: &mut Nodes<D>, group: &mut Group<D, L>, lo
     });
 }
 
-/// One sweep over all contacts: bonds, then dry contacts, then frictionless ones.
-pub fn sweep<D: Dim>(problem: &mut ContactProblem<D>, local: LocalSolve) {
-    // a constant for each call, so that the choice is made outside the loops
-    match local {
-        LocalSolve::Exact => {
-            sweep_group(&mut problem.nodes, &mut problem.bonded, LocalSolve::Exact);
-            sweep_group(&mut problem.nodes, &mut problem.elastic, LocalSolve::Exact);
-            sweep_group(&mut problem.nodes, &mut problem.dry, LocalSolve::Exact);
-            sweep_group(&mut problem.nodes, &mut problem.frictionless, LocalSolve::Exact);
-        }
-        LocalSolve::PredictorCorrector => {
-            sweep_group(&mut problem.nodes, &mut problem.bonded, LocalSolve::PredictorCorrector);
-            sweep_group(&mut problem.nodes, &mut problem.elastic, LocalSolve::PredictorCorrector);
-            sweep_group(&mut problem.nodes, &mut problem.dry, LocalSolve::PredictorCorrector);
-            sweep_group(&mut problem.nodes, &mut problem.frictionless, LocalSolve::PredictorCorrector);
+struct Sweep(LocalSolve);
+
+impl<D: Dim> GroupVisitorMut<D> for Sweep {
+    #[inline]
+    fn visit<L: Law>(&mut self, nodes: &mut Nodes<D>, group: &mut Group<D, L>) {
+        // a constant for each call, so that the choice is made outside the loops
+        match self.0 {
+            LocalSolve::Exact => sweep_group(nodes, group, LocalSolve::Exact),
+            LocalSolve::PredictorCorrector => sweep_group(nodes, group, LocalSolve::PredictorCorrector),
         }
     }
+}
+
+/// One sweep over all contacts: bonds, then dry contacts, then frictionless ones.
+pub fn sweep<D: Dim>(problem: &mut ContactProblem<D>, local: LocalSolve) {
+    problem.visit_groups_mut(&mut Sweep(local));
 }
 
 /// What the iteration asks of a problem, matrix-free or with its matrix.
@@ -100,36 +107,11 @@ impl<D: Dim> Sweepable for ContactProblem<D> {
     }
 
     fn gather(&self) -> Vec<f64> {
-        fn group<D: Dim, L: Law>(group: &Group<D, L>, out: &mut Vec<f64>) {
-            for c in group {
-                out.push(c.r.n);
-                out.extend_from_slice(c.r.t.as_slice());
-                out.extend_from_slice(c.r.m.as_slice());
-            }
-        }
-        let mut out = Vec::with_capacity(self.len() * 3);
-        group(&self.bonded, &mut out);
-        group(&self.elastic, &mut out);
-        group(&self.dry, &mut out);
-        group(&self.frictionless, &mut out);
-        out
+        self.reactions()
     }
 
     fn scatter(&mut self, from: &[f64]) {
-        fn group<D: Dim, L: Law>(group: &mut Group<D, L>, mut from: &[f64]) -> usize {
-            let rows = 1 + L::T::LEN + L::B::LEN;
-            for c in group.iter_mut() {
-                c.r.n = from[0];
-                c.r.t = L::T::from_slice(&from[1..][..L::T::LEN]);
-                c.r.m = L::B::from_slice(&from[1 + L::T::LEN..][..L::B::LEN]);
-                from = &from[rows..];
-            }
-            rows * group.len()
-        }
-        let bonded = group(&mut self.bonded, from);
-        let elastic = bonded + group(&mut self.elastic, &from[bonded..]);
-        let dry = elastic + group(&mut self.dry, &from[elastic..]);
-        group(&mut self.frictionless, &from[dry..]);
+        self.set_reactions(from);
         self.velocities_from_reactions();
     }
 }
@@ -204,5 +186,12 @@ impl<D: Dim> ContactSolver<D> for GaussSeidel {
 
     fn snapshot(&self) -> Box<dyn ContactSolver<D>> {
         Box::new(*self)
+    }
+
+    /// Nothing is kept.
+    fn save(&self, _: &mut Saved) {}
+
+    fn restore(&mut self, _: &mut Reader) -> Result<(), Mismatch> {
+        Ok(())
     }
 }

@@ -99,7 +99,7 @@ pub struct SolveReport {
 
 /// A method that solves a contact problem from the impulses it holds as a start.
 pub trait ContactSolver<D: Dim>: Send {
-    /// Better the impulses and node velocities of `problem` until the tolerance, or a limit, is reached.
+    /// Improve the impulses and node velocities of `problem` until the tolerance, or a limit, is reached.
     fn solve(&mut self, problem: &mut ContactProblem<D>) -> SolveReport;
 
     /// Solve a problem once more whose solution is accepted, but lets bodies move too far beyond the laws of their contacts; none
@@ -111,25 +111,30 @@ pub trait ContactSolver<D: Dim>: Send {
     /// A copy with all that is kept from one solve to the next: the solver of a step that may have to be undone.
     fn snapshot(&self) -> Box<dyn ContactSolver<D>>;
 
-    /// Write what is kept from one solve to the next, if anything is.
-    fn save(&self, _to: &mut Saved) {}
+    /// Write what is kept from one solve to the next.
+    fn save(&self, to: &mut Saved);
 
     /// Take up what [`ContactSolver::save`] wrote.
     ///
     /// # Errors
     /// [`Mismatch`] where another solver, or another version of it, wrote it.
-    fn restore(&mut self, _from: &mut Reader) -> Result<(), Mismatch> {
-        Ok(())
-    }
+    fn restore(&mut self, from: &mut Reader) -> Result<(), Mismatch>;
 }
 
 /// The choice of a solver and its settings.
+#[non_exhaustive]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SolverSettings {
     /// Non-linear Gauss–Seidel, the paper's method of successive equilibria.
     GaussSeidel(GaussSeidelSettings),
     /// The methods of [`Staged`], one after the other.
     Staged(StagedSettings),
+}
+
+impl Default for SolverSettings {
+    fn default() -> Self {
+        Self::Staged(StagedSettings::default())
+    }
 }
 
 impl SolverSettings {

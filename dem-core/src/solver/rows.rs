@@ -124,6 +124,13 @@ pub struct StiffnessRatio {
     pub rolling: f64,
 }
 
+impl Default for StiffnessRatio {
+    /// A bar as wide as long: the bending stiffness over the normal one is a²/12.
+    fn default() -> Self {
+        Self { tangential: 1.0, rolling: 1.0 / 12.0 }
+    }
+}
+
 impl StiffnessRatio {
     /// 1/ρ of each group for that of the normal row. In twist a bar has the shear modulus and, round, twice the second moment.
     pub(super) fn weights(&self, normal: f64) -> Weights {

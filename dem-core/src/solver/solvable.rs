@@ -6,7 +6,7 @@ use crate::contact::{Law, LocalSolve, Padded};
 use crate::dim::{Dim, Vect};
 use crate::problem::assembled::BlockMatrix;
 use crate::problem::residual::{residual, velocity_error};
-use crate::problem::{ContactProblem, Group};
+use crate::problem::{Contact, ContactProblem, Nodes, Visitor, VisitorMut};
 
 /// A problem that can be put into rows over scaled unknowns, swept and measured.
 pub(super) trait Solvable {
@@ -54,30 +54,28 @@ impl<D: Dim> Solvable for ContactProblem<D> {
         for _ in 0..sweeps {
             sweep(self, LocalSolve::Exact);
         }
-        let mut reactions = Vec::with_capacity(self.len());
-        reactions.extend(self.bonded.iter().map(|c| c.link.in_frame(&c.r)));
-        reactions.extend(self.elastic.iter().map(|c| c.link.in_frame(&c.r)));
-        reactions.extend(self.dry.iter().map(|c| c.link.in_frame(&c.r)));
-        reactions.extend(self.frictionless.iter().map(|c| c.link.in_frame(&c.r)));
-        let unit = mass_unit(&self.nodes);
-        reactions.iter_mut().for_each(|r| *r = *r * (1.0 / unit));
-        reactions
+        struct InFrame(Vec<Padded>, f64);
+        impl<D: Dim> Visitor<D> for InFrame {
+            fn visit<L: Law>(&mut self, _: &Nodes<D>, c: &Contact<D, L>) {
+                self.0.push(c.link.in_frame(&c.r) * (1.0 / self.1));
+            }
+        }
+        let mut reactions = InFrame(Vec::with_capacity(self.len()), mass_unit(&self.nodes));
+        self.visit(&mut reactions);
+        reactions.0
     }
 
     fn write_back(&mut self, reactions: &[Padded]) {
-        fn group<D: Dim, L: Law>(group: &mut Group<D, L>, list: &[Padded], unit: f64) {
-            for (c, r) in group.iter_mut().zip(list) {
-                c.r = c.link.of_frame(&(*r * unit));
+        struct OfFrame<'a>(std::slice::Iter<'a, Padded>, f64);
+        impl<D: Dim> VisitorMut<D> for OfFrame<'_> {
+            fn visit<L: Law>(&mut self, c: &mut Contact<D, L>) {
+                if let Some(r) = self.0.next() {
+                    c.r = c.link.of_frame(&(*r * self.1));
+                }
             }
         }
         let unit = mass_unit(&self.nodes);
-        let bonded = self.bonded.len();
-        let elastic = bonded + self.elastic.len();
-        let dry = elastic + self.dry.len();
-        group(&mut self.bonded, &reactions[..bonded], unit);
-        group(&mut self.elastic, &reactions[bonded..elastic], unit);
-        group(&mut self.dry, &reactions[elastic..dry], unit);
-        group(&mut self.frictionless, &reactions[dry..], unit);
+        self.visit_mut(&mut OfFrame(reactions.iter(), unit));
         self.velocities_from_reactions();
     }
 

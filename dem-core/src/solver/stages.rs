@@ -28,6 +28,7 @@ use crate::saved::{Mismatch, Reader, Saved};
 use crate::solver::tuning::stages as tuning;
 
 /// The method that brought a solution; a step reports the last in this order.
+#[non_exhaustive]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Route {
     /// The reactions grew as in the steps before.
@@ -77,6 +78,21 @@ pub struct StagedSettings {
     pub stiffness: StiffnessRatio,
     /// Most iterations in one solve, of Newton and of the interior-point method.
     pub max_iterations: u64,
+}
+
+impl Default for StagedSettings {
+    /// All stages, a tolerance of 10⁻⁸, of 10⁻⁵ for load and velocity error, and nothing above 10⁻⁶ accepted.
+    fn default() -> Self {
+        Self {
+            stages: Stages::All,
+            tolerance: 1e-8,
+            accept: 1e-6,
+            load_tolerance: 1e-5,
+            start: Start::LastStep,
+            stiffness: StiffnessRatio::default(),
+            max_iterations: 300,
+        }
+    }
 }
 
 impl StagedSettings {

@@ -1,14 +1,13 @@
 //! From bodies to the contact problem and back: detection with warm start, assembly, reading of the result.
 
 use super::World;
+use super::motion::{Midpoint, Motion, Turn};
 use super::touch::{Kept, Touch, TouchStatus};
-use super::turning::Turn;
-use crate::body::{Grains, Wall, direction};
+use crate::body::{Grains, direction};
 use crate::bond::{Bond, BondStatus};
 use crate::contact::{Arms, Bonded, Coulomb, Elastic, Frictionless, Law, Local};
 use crate::dim::{Axes, Dim, Moments, Vect, in_frame, of_frame, resized};
-use crate::problem::{Contact, ContactProblem, Group, Link, Node, Nodes, blocks};
-use std::sync::Arc;
+use crate::problem::{Contact, ContactProblem, KINDS, Kind, Link, Node, Nodes, Visitor, blocks};
 
 /// Gap over the smaller radius of a pair up to which a contact touches, and way of its bodies in a step up to which they are at
 /// rest to each other. The rounding of positions would else be a misfit of rigid contacts, to which stiff ones answer with
@@ -25,31 +24,6 @@ const NEAR: f64 = 1e-3;
 /// What a grain may move, over its radius, before the list of candidates is built anew.
 const SPARE: f64 = 0.15;
 
-/// The configuration at mid-step, where contacts are looked for (m).
-#[derive(Clone)]
-pub(super) struct Midpoint<D: Dim> {
-    pub grains: Vec<D::Vector>,
-    pub walls: Vec<D::Vector>,
-}
-
-impl<D: Dim> Midpoint<D> {
-    /// Where the bodies are now.
-    pub fn of(grains: &Grains<D>, walls: &[Wall<D>]) -> Self {
-        Self { grains: grains.position.clone(), walls: walls.iter().map(|w| w.position).collect() }
-    }
-
-    /// The place of a body (m), grains first.
-    pub fn place(&self, body: usize) -> D::Vector {
-        body.checked_sub(self.grains.len()).map_or_else(|| self.grains[body], |wall| self.walls[wall])
-    }
-}
-
-/// Node velocities before the step (m/s, rad/s) and their free values, grains first.
-pub(super) struct Motion<D: Dim> {
-    pub before: Vec<(D::Vector, D::Spin)>,
-    pub free: Arc<[(D::Vector, D::Spin)]>,
-}
-
 /// What the bonds bring into a step, by their numbers.
 pub(super) struct Brought<D: Dim> {
     /// Reactions of the elastic ones (N, N m); empty where bonds are rigid.
@@ -58,13 +32,20 @@ pub(super) struct Brought<D: Dim> {
     pub turns: Vec<Turn>,
 }
 
-/// Place of each contact of the step in the groups of the problem.
+/// For each contact of the problem, by kind, its place among the contacts of the step.
 #[derive(Default)]
-pub(super) struct Places {
-    pub bonded: Vec<u32>,
-    pub elastic: Vec<u32>,
-    pub dry: Vec<u32>,
-    pub frictionless: Vec<u32>,
+pub(super) struct Places([Vec<u32>; KINDS]);
+
+impl Places {
+    /// Of contacts of one kind.
+    pub fn of(&self, kind: Kind) -> &[u32] {
+        &self.0[kind as usize]
+    }
+
+    /// In the order in which a problem is visited.
+    pub fn all(&self) -> impl Iterator<Item = usize> {
+        self.0.iter().flatten().map(|place| *place as usize)
+    }
 }
 
 impl<D: Dim> World<D> {
@@ -258,18 +239,14 @@ impl<D: Dim> World<D> {
         applied: f64,
         h: f64,
     ) -> (ContactProblem<D>, Places) {
-        let mut problem = ContactProblem {
-            nodes: self.nodes(motion),
-            free: motion.free.clone(),
-            bonded: Vec::new(),
-            elastic: Vec::new(),
-            dry: Vec::new(),
-            frictionless: Vec::new(),
-            radii: if D::N > 2 { self.grains.radius.clone() } else { Vec::new() },
-            applied,
-        };
-        let mut places = Places::default();
-        self.reserve(touches, &mut problem, &mut places);
+        let mut problem = ContactProblem::new(self.nodes(motion), motion.free.clone(), applied);
+        if D::N > 2 {
+            problem.radii.clone_from(&self.grains.radius);
+        }
+        let mut counts = [0; KINDS];
+        touches.iter().for_each(|touch| counts[self.kind(touch) as usize] += 1);
+        problem.reserve(counts);
+        let mut places = Places(counts.map(Vec::with_capacity));
         let order = blocks::order(touches.iter().map(|t| t.pair), self.grains.len());
         for k in 0..touches.len() {
             let place = order.as_ref().map_or(k, |order| order[k] as usize);
@@ -277,14 +254,12 @@ impl<D: Dim> World<D> {
             let touch = &self.touch(mid, kept);
             let link = Link::<D>::new(touch.pair, touch.frame);
             let lever = self.levers(touch);
-            let [i, j] = link.nodes.map(|k| &problem.nodes.all[k as usize]);
-            let drive =
-                (touch.pair[1] as usize).checked_sub(self.grains.len()).and_then(|w| self.walls[w].free_direction());
             let start = touch.reaction * h;
+            let kind = self.kind(kept);
             if let Some((number, bond)) = touch.bond.map(|b| (b as usize, &self.bonds[b as usize])) {
                 let arm = bond.mean_diameter;
                 let arms = Arms { lever, bending: arm };
-                let block = link.block(i, j, arms, None);
+                let block = problem.nodes.block(&link, arms);
                 let r = over_arm(start, arm);
                 let (shift, cone, flow) = (h * bond.strength, bond.cone(), self.settings.bond_flow);
                 let bias = brought.turns[number].bias;
@@ -292,14 +267,12 @@ impl<D: Dim> World<D> {
                     let carried = over_arm(brought.carried[number] * h, arm);
                     let law = Elastic::new(block, compliance, carried, arms, shift, cone, flow).with_bias(bias);
                     problem.elastic.push(Contact { link, law, r });
-                    places.elastic.push(place as u32);
                 } else {
                     let law = Bonded::new(block, arms, shift, cone, flow).with_bias(bias);
                     problem.bonded.push(Contact { link, law, r });
-                    places.bonded.push(place as u32);
                 }
             } else if let Some(bias) = self.bias(touch, kept.closed, motion, h) {
-                let block = link.block(i, j, Arms { lever, bending: 0.0 }, drive.map(|(d, _)| d));
+                let block = problem.nodes.block(&link, Arms { lever, bending: 0.0 });
                 let mu = self.friction_of(touch.pair);
                 if mu > 0.0 {
                     problem.dry.push(Contact {
@@ -307,40 +280,29 @@ impl<D: Dim> World<D> {
                         law: Coulomb::new(block, lever, mu, bias),
                         r: Local { n: start.n, t: of_frame::<D, _>(&link.axes, start.t), ..Local::zero() },
                     });
-                    places.dry.push(place as u32);
                 } else {
                     problem.frictionless.push(Contact {
                         link: Link::new(link.nodes, link.axes),
                         law: Frictionless::new(block, bias),
                         r: Local { n: start.n, ..Local::zero() },
                     });
-                    places.frictionless.push(place as u32);
                 }
+            } else {
+                continue;
             }
+            places.0[kind as usize].push(place as u32);
         }
         (problem, places)
     }
 
-    /// Room for these contacts, and no more: lists that grow by doubling would take twice the memory of a large problem.
-    fn reserve(&self, touches: &[Kept<D>], problem: &mut ContactProblem<D>, places: &mut Places) {
-        let [mut bonded, mut elastic, mut dry, mut frictionless] = [0; 4];
-        for touch in touches {
-            let count = match touch.bond() {
-                Some(bond) if self.bonds[bond as usize].stiffness.is_some() => &mut elastic,
-                Some(_) => &mut bonded,
-                None if self.friction_of(touch.pair) > 0.0 => &mut dry,
-                None => &mut frictionless,
-            };
-            *count += 1;
+    /// The kind of a contact.
+    fn kind(&self, kept: &Kept<D>) -> Kind {
+        match kept.bond() {
+            Some(bond) if self.bonds[bond as usize].stiffness.is_some() => Kind::Elastic,
+            Some(_) => Kind::Bonded,
+            None if self.friction_of(kept.pair) > 0.0 => Kind::Dry,
+            None => Kind::Frictionless,
         }
-        problem.bonded.reserve_exact(bonded);
-        problem.elastic.reserve_exact(elastic);
-        problem.dry.reserve_exact(dry);
-        problem.frictionless.reserve_exact(frictionless);
-        places.bonded.reserve_exact(bonded);
-        places.elastic.reserve_exact(elastic);
-        places.dry.reserve_exact(dry);
-        places.frictionless.reserve_exact(frictionless);
     }
 
     /// Distances from the centres to the contact point (m); none to that of a wall.
@@ -359,10 +321,26 @@ fn over_arm<T: Vect, B: Moments>(r: Local<T, B>, arm: f64) -> Local<T, B> {
     Local { m: r.m * (1.0 / arm), ..r }
 }
 
-/// Write the impulses of a group back to the contacts as forces.
-pub(super) fn read_back<D: Dim, L: Law>(touches: &mut [Kept<D>], group: &Group<D, L>, places: &[u32], h: f64) {
-    for (contact, place) in group.iter().zip(places) {
-        let touch = &mut touches[*place as usize];
+/// Write the impulses of a problem back to the contacts of the step, as forces.
+pub(super) fn write_reactions<D: Dim>(touches: &mut [Kept<D>], problem: &ContactProblem<D>, places: &Places, h: f64) {
+    for touch in touches.iter_mut() {
+        touch.reaction = Local::zero();
+        touch.status = TouchStatus::Open;
+    }
+    problem.visit(&mut ReadBack { touches, places: places.all(), h });
+}
+
+/// Writes each contact to its place.
+struct ReadBack<'a, D: Dim, P> {
+    touches: &'a mut [Kept<D>],
+    places: P,
+    h: f64,
+}
+
+impl<D: Dim, P: Iterator<Item = usize>> Visitor<D> for ReadBack<'_, D, P> {
+    fn visit<L: Law>(&mut self, _: &Nodes<D>, contact: &Contact<D, L>) {
+        let Some(place) = self.places.next() else { return };
+        let (touch, h) = (&mut self.touches[place], self.h);
         let arm = contact.law.arms().bending;
         let frame = D::with_tangents(contact.link.axes.normal(), &touch.tangents);
         let (r, t) = (&contact.r, in_frame::<D, _>(&frame, contact.r.t));

@@ -5,7 +5,7 @@
 
 use crate::contact::{Law, Local};
 use crate::dim::{Dim, Vect};
-use crate::problem::{Group, Nodes};
+use crate::problem::{ContactProblem, Group, GroupVisitor, KINDS, Nodes};
 
 /// Energies since the start of a run (J).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -44,21 +44,30 @@ pub(super) fn elastic_energy<L: Law>(law: &L, r: &Local<L::T, L::B>) -> f64 {
     0.5 * r.dot(&law.compliance().times(r))
 }
 
-/// Energy (J) that the rows of a group took from the bodies: −Σ r·(u⁺ + u⁻)/2 for n, t and m.
-pub(super) fn group_losses<D: Dim, L: Law>(
-    before: &[(D::Vector, D::Spin)],
-    after: &Nodes<D>,
-    group: &Group<D, L>,
-) -> [f64; 3] {
-    let mut sums = [0.0; 3];
-    for c in group {
-        let arms = c.law.arms();
-        let [i, j] = c.link.nodes.map(|k| before[k as usize]);
-        let u = (c.link.relative_velocity(arms, i, j) + after.relative_velocity(&c.link, arms)) * 0.5;
-        let rows: [f64; 3] = [c.r.n * u.n, c.r.t.dot(&u.t), c.r.m.dot(&u.m)];
-        for (sum, row) in sums.iter_mut().zip(rows) {
-            *sum -= row;
+/// Energy (J) that the rows of each kind of contact took from the bodies: −Σ r·(u⁺ + u⁻)/2 for n, t and m.
+pub(super) fn losses<D: Dim>(before: &[(D::Vector, D::Spin)], problem: &ContactProblem<D>) -> [[f64; 3]; KINDS] {
+    let mut losses = Losses::<D> { before, kind: 0, sums: [[0.0; 3]; KINDS] };
+    problem.visit_groups(&mut losses);
+    losses.sums
+}
+
+struct Losses<'a, D: Dim> {
+    before: &'a [(D::Vector, D::Spin)],
+    kind: usize,
+    sums: [[f64; 3]; KINDS],
+}
+
+impl<D: Dim> GroupVisitor<D> for Losses<'_, D> {
+    fn visit<L: Law>(&mut self, after: &Nodes<D>, group: &Group<D, L>) {
+        for c in group {
+            let arms = c.law.arms();
+            let [i, j] = c.link.nodes.map(|k| self.before[k as usize]);
+            let u = (c.link.relative_velocity(arms, i, j) + after.relative_velocity(&c.link, arms)) * 0.5;
+            let rows: [f64; 3] = [c.r.n * u.n, c.r.t.dot(&u.t), c.r.m.dot(&u.m)];
+            for (sum, row) in self.sums[self.kind].iter_mut().zip(rows) {
+                *sum -= row;
+            }
         }
+        self.kind += 1;
     }
-    sums
 }

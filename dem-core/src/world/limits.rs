@@ -13,11 +13,11 @@
 //! The step asks for none of this where overlaps are pushed out: the speeds of that preparation mean nothing.
 
 use super::World;
-use super::assembly::{Midpoint, Places};
+use super::assembly::Places;
+use super::motion::Midpoint;
 use super::report::Violation;
 use super::touch::Kept;
 use crate::body::{Drive, Shape};
-use crate::bond::failure;
 use crate::contact::Law;
 use crate::dim::{Dim, Vect};
 use crate::problem::{Contact, ContactProblem, Nodes, Visitor};
@@ -125,23 +125,9 @@ impl<D: Dim> World<D> {
         places: &Places,
         h: f64,
     ) -> Option<Violation> {
-        let mut worst = ([0; 2], 0.0);
-        let mut add = |place: u32, speed: Option<f64>| {
-            let Some(speed) = speed else { return };
-            let kept = &mut touches[place as usize];
-            let sum = kept.yielded + h * speed;
-            // what opens is free to
-            kept.yielded = if kept.bond().is_some() { sum } else { sum.max(0.0) };
-            let share = kept.yielded.abs() / self.smaller(kept.pair);
-            if share > worst.1 {
-                worst = (kept.pair, share);
-            }
-        };
-        let nodes = &problem.nodes;
-        problem.bonded.iter().zip(&places.bonded).for_each(|(c, place)| add(*place, beyond_law(nodes, c)));
-        problem.dry.iter().zip(&places.dry).for_each(|(c, place)| add(*place, beyond_law(nodes, c)));
-        problem.frictionless.iter().zip(&places.frictionless).for_each(|(c, place)| add(*place, beyond_law(nodes, c)));
-        let (pair, share) = worst;
+        let mut worst = Accumulating { world: self, touches, places: places.all(), h, pair: [0; 2], share: 0.0 };
+        problem.visit(&mut worst);
+        let Accumulating { pair, share, .. } = worst;
         (share > YIELDED * self.looseness()).then(|| Violation {
             pair,
             share,
@@ -220,9 +206,35 @@ impl<D: Dim> World<D> {
 /// sets no bound: a spring yields, and a bond at its limit flows and is about to break.
 fn beyond_law<D: Dim, L: Law>(nodes: &Nodes<D>, c: &Contact<D, L>) -> Option<f64> {
     let law = &c.law;
-    let free = law.compliance().n > 0.0 || (law.shift() > 0.0 && failure(&c.r, law.shift(), law.cone()).is_some());
+    let free = law.compliance().n > 0.0 || c.failure().is_some();
     let closing = || -(nodes.relative_velocity::<L::T, L::B>(&c.link, law.arms()).n + law.bias());
     (!free).then(closing)
+}
+
+/// Adds to the ways of the contacts of a step beyond their laws, and looks for the longest.
+struct Accumulating<'a, D: Dim, P> {
+    world: &'a World<D>,
+    touches: &'a mut [Kept<D>],
+    places: P,
+    h: f64,
+    pair: [u32; 2],
+    share: f64,
+}
+
+impl<D: Dim, P: Iterator<Item = usize>> Visitor<D> for Accumulating<'_, D, P> {
+    #[inline(always)]
+    fn visit<L: Law>(&mut self, nodes: &Nodes<D>, c: &Contact<D, L>) {
+        let Some(place) = self.places.next() else { return };
+        let Some(speed) = beyond_law(nodes, c) else { return };
+        let kept = &mut self.touches[place];
+        let sum = kept.yielded + self.h * speed;
+        // what opens is free to
+        kept.yielded = if kept.bond().is_some() { sum } else { sum.max(0.0) };
+        let share = kept.yielded.abs() / self.world.smaller(kept.pair);
+        if share > self.share {
+            (self.pair, self.share) = (kept.pair, share);
+        }
+    }
 }
 
 /// Looks for the contact that yields most.

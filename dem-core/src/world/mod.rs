@@ -6,6 +6,7 @@
 mod assembly;
 mod ledger;
 mod limits;
+mod motion;
 mod observe;
 mod report;
 mod start;
@@ -18,12 +19,11 @@ pub use ledger::{Ledger, Momentum};
 pub use report::{StepError, StepReport, Violation};
 pub use touch::{Break, Counts, Touch, TouchStatus};
 
-use assembly::Midpoint;
+use motion::{Midpoint, Turn};
 use touch::Kept;
-use turning::Turn;
 
 use crate::body::{Grains, Load, Wall};
-use crate::bond::{Bond, BondStatus, Rupture, Stiffness};
+use crate::bond::{Bond, BondStatus, Bonds, Rupture, Stiffness};
 use crate::contact::BondFlow;
 use crate::detection::{Candidates, pairs_within};
 use crate::dim::{Dim, Vect};
@@ -73,7 +73,7 @@ pub struct World<D: Dim> {
     /// The walls.
     pub walls: Vec<Wall<D>>,
     /// The bonds that ever formed, sorted by pair; broken ones stay in the list.
-    pub bonds: Vec<Bond>,
+    pub bonds: Bonds,
     /// Prescribed forces and torques.
     pub loads: Vec<Load<D>>,
     /// Settings of the run.
@@ -94,15 +94,17 @@ pub struct World<D: Dim> {
     turns: Vec<Turn>,
     candidates: Candidates<D>,
     solver: Box<dyn ContactSolver<D>>,
+    /// The settings that the solver was built with; none for one that was handed over.
+    built_with: Option<SolverSettings>,
+    /// Where the grains were at time zero (m).
     reference: Vec<D::Vector>,
-    volume: f64,
 }
 
 /// What a step changes, kept while a step is tried in halves.
 struct State<D: Dim> {
     grains: Grains<D>,
     walls: Vec<Wall<D>>,
-    bonds: Vec<Bond>,
+    bonds: Bonds,
     kept: Vec<Kept<D>>,
     mid: Midpoint<D>,
     last_part: f64,
@@ -111,21 +113,37 @@ struct State<D: Dim> {
     time: f64,
 }
 
+impl<D: Dim> Default for Settings<D> {
+    /// Steps of 10⁻⁴ s, no gravity, no friction, no restitution, and the settings that a scene has by default.
+    fn default() -> Self {
+        Self {
+            step: 1e-4,
+            gravity: None,
+            friction: 0.0,
+            restitution: None,
+            bond_flow: BondFlow::default(),
+            rupture: Rupture::default(),
+            solver: SolverSettings::default(),
+            max_halvings: 4,
+            thickness: 1.0,
+            expel_overlaps: false,
+        }
+    }
+}
+
 impl<D: Dim> World<D> {
     /// A world at time zero, without bonds.
     pub fn new(grains: Grains<D>, walls: Vec<Wall<D>>, loads: Vec<Load<D>>, settings: Settings<D>) -> Self {
-        let (low, high) = grains.bounds();
-        let volume = (0..D::N).map(|axis| high[axis] - low[axis]).product::<f64>() * settings.thickness;
         let mut world = Self {
             reference: grains.position.clone(),
-            volume,
             solver: settings.solver.build(),
+            built_with: Some(settings.solver),
             candidates: Candidates::default(),
             kept: Vec::new(),
             mid: Midpoint::of(&grains, &walls),
             last_part: 0.0,
             turns: Vec::new(),
-            bonds: Vec::new(),
+            bonds: Bonds::default(),
             ledger: Ledger::default(),
             time: 0.0,
             steps: 0,
@@ -141,12 +159,13 @@ impl<D: Dim> World<D> {
     /// Bond every pair of grains whose gap is at most `gap_tolerance` (–) times its mean diameter, with friction `friction`;
     /// `strength` gives the tensile strength (N) for a mean diameter (m), and zero means no bond.
     ///
-    /// Pairs of two fixed grains are left out: nothing can strain their bond.
+    /// Pairs of two fixed grains are left out, since nothing can strain their bond, and pairs that have a bond already,
+    /// intact or broken.
     pub fn form_bonds(&mut self, gap_tolerance: f64, strength: impl Fn(f64) -> f64, friction: f64) {
         // too many: the gap decides below
         let skin: Vec<f64> = self.grains.radius.iter().map(|r| 2.0 * gap_tolerance * r).collect();
-        let pairs = pairs_within(&self.grains, &self.grains.position, &skin);
-        for pair in pairs {
+        let mut bonds = Vec::new();
+        for pair in pairs_within(&self.grains, &self.grains.position, &skin) {
             let [i, j] = pair.map(|k| k as usize);
             let mean_diameter = self.grains.radius[i] + self.grains.radius[j];
             let rest_gap = (self.grains.position[i] - self.grains.position[j]).norm() - mean_diameter;
@@ -155,8 +174,23 @@ impl<D: Dim> World<D> {
             if rest_gap <= gap_tolerance * mean_diameter && strength > 0.0 && !held {
                 let status = BondStatus::Intact;
                 let (twist, stiffness) = (0.0, None);
-                self.bonds.push(Bond { pair, rest_gap, mean_diameter, strength, friction, twist, stiffness, status });
+                bonds.push(Bond { pair, rest_gap, mean_diameter, strength, friction, twist, stiffness, status });
             }
+        }
+        self.add_bonds(bonds);
+    }
+
+    /// Add bonds. A pair that has one keeps it, be it intact or broken.
+    pub fn add_bonds(&mut self, bonds: Vec<Bond>) {
+        let numbers = self.bonds.merge(bonds);
+        if !self.turns.is_empty() {
+            let mut turns = vec![Turn::default(); self.bonds.len()];
+            self.turns.iter().zip(&numbers).for_each(|(turn, number)| turns[*number as usize] = *turn);
+            self.turns = turns;
+        }
+        for kept in &mut self.kept {
+            let number = kept.bond().map(|bond| numbers[bond as usize]);
+            kept.tie(number);
         }
     }
 
@@ -168,15 +202,28 @@ impl<D: Dim> World<D> {
 
     /// Make every bond elastic; `stiffness` gives its stiffness for a mean diameter (m).
     pub fn make_bonds_elastic(&mut self, stiffness: impl Fn(f64) -> Stiffness) {
-        for bond in &mut self.bonds {
+        for bond in self.bonds.iter_mut() {
             bond.stiffness = Some(stiffness(bond.mean_diameter));
         }
     }
 
-    /// Take another solver from the next step on.
+    /// Take another solver from the next step on, with nothing kept of earlier solves.
     pub fn set_solver(&mut self, solver: SolverSettings) {
         self.settings.solver = solver;
-        self.solver = solver.build();
+        (self.solver, self.built_with) = (solver.build(), Some(solver));
+    }
+
+    /// Take a solver of one's own from the next step on. `settings.solver` still says which residuals count as small: its
+    /// tolerances bound how far bodies may move beyond their contact laws.
+    pub fn use_solver(&mut self, solver: Box<dyn ContactSolver<D>>) {
+        (self.solver, self.built_with) = (solver, None);
+    }
+
+    /// The solver that the settings ask for, where they were changed.
+    fn follow_settings(&mut self) {
+        if self.built_with.is_some_and(|built| built != self.settings.solver) {
+            self.set_solver(self.settings.solver);
+        }
     }
 
     /// Everything that a step changes.
@@ -212,7 +259,8 @@ impl<D: Dim> World<D> {
 
     /// Volume of the box around the sample at time zero (m³), the reference of the stress.
     pub fn reference_volume(&self) -> f64 {
-        self.volume
+        let (low, high) = self.grains.bounds_at(&self.reference);
+        (0..D::N).map(|axis| high[axis] - low[axis]).product::<f64>() * self.settings.thickness
     }
 
     /// Bring every grain and wall to rest and forget nothing else: a quasi-static preparation steps from rest to rest.

@@ -44,7 +44,8 @@ impl<D: Dim> World<D> {
                 }
             }
         }
-        sum.iter_mut().for_each(|s| *s /= self.volume);
+        let volume = self.reference_volume();
+        sum.iter_mut().for_each(|s| *s /= volume);
         sum
     }
 

@@ -6,6 +6,9 @@ use crate::solver::certificate::Verdict;
 use crate::solver::{Route, SolveReport, SolveStatus, Work};
 use std::fmt;
 
+/// Parts into which a step is divided at most where bodies are fast.
+pub(super) const PARTS: u32 = 4096;
+
 /// Most bodies that a message names.
 const NAMED: usize = 8;
 
@@ -108,6 +111,7 @@ impl Solves {
 }
 
 /// Why a step could not be made. The world stands as it did after the last accepted step.
+#[non_exhaustive]
 #[derive(Clone, Debug, PartialEq)]
 pub enum StepError {
     /// No solve was accepted, down to the shortest step that the settings allow.
@@ -198,7 +202,7 @@ impl StepError {
                 "{} is too fast for the step at t = {time:.6e} s: even in {} parts it would pass through {}: shorten the step, \
                  or look why it is so fast",
                 name(pair[0]),
-                super::step::PARTS,
+                PARTS,
                 name(pair[1])
             ),
             Self::Yielded { time, violation } => violation.message(*time, name),

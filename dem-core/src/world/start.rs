@@ -1,7 +1,7 @@
 //! The reactions that a run starts from.
 
 use super::World;
-use super::assembly::Midpoint;
+use super::motion::Midpoint;
 use super::touch::Kept;
 use crate::body::direction;
 use crate::bond::{Bond, BondStatus};

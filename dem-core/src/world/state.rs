@@ -3,9 +3,9 @@
 //! What the scene gives is not part of it: shapes and drives of walls, loads, settings. Nor is the list of candidate
 //! pairs, which may be any that covers a step.
 
-use super::assembly::Midpoint;
+use super::motion::Midpoint;
+use super::motion::Turn;
 use super::touch::Kept;
-use super::turning::Turn;
 use super::{Ledger, Settings, TouchStatus, World};
 use crate::body::{Grains, Load, Wall};
 use crate::bond::{Bond, BondStatus, Stiffness};
@@ -68,7 +68,7 @@ impl<D: Dim> World<D> {
         self.grains.save(to);
         to.count(self.steps as usize);
         to.real(self.time);
-        to.real(self.volume);
+        to.real(self.reference_volume());
         to.vectors(&self.reference);
         to.count(self.walls.len());
         for wall in &self.walls {
@@ -105,7 +105,9 @@ impl<D: Dim> World<D> {
         let mut world = Self::new(grains, walls, loads, settings);
         let n = world.grains.len();
         world.steps = from.count()? as u64;
-        (world.time, world.volume) = (from.real()?, from.real()?);
+        world.time = from.real()?;
+        // the reference volume, which follows from the places at time zero
+        from.real()?;
         world.reference = from.vectors(n)?;
         if from.count()? != world.walls.len() {
             return Err(Mismatch);
@@ -115,7 +117,8 @@ impl<D: Dim> World<D> {
             (wall.reaction, wall.reaction_at_limit) = (from.vector()?, from.vector()?);
             wall.applied = from.real()?;
         }
-        world.bonds = (0..from.number_of()?).map(|_| restored_bond(n, from)).collect::<Result<_, _>>()?;
+        let bonds: Vec<Bond> = (0..from.number_of()?).map(|_| restored_bond(n, from)).collect::<Result<_, _>>()?;
+        world.bonds = bonds.into();
         let (bodies, bonds) = (n + world.walls.len(), world.bonds.len());
         world.mid = Midpoint { grains: from.vectors(n)?, walls: from.vectors(bodies - n)? };
         world.last_part = from.real()?;

@@ -1,21 +1,19 @@
 //! One time step: the scheme of Moreau and Jean with θ = 1/2, its rupture cascade, and what is done when a solve fails.
 
-use super::assembly::{Midpoint, Motion, Places, read_back};
-use super::ledger::{elastic_energy, group_losses};
-use super::report::{Solves, StepError, StepReport, Violation};
-use super::touch::{Break, Kept, TouchStatus};
+use super::assembly::{Places, write_reactions};
+use super::ledger::{elastic_energy, losses};
+use super::motion::{Midpoint, Motion};
+use super::report::{PARTS, Solves, StepError, StepReport, Violation};
+use super::touch::{Break, Kept};
 use super::{Counts, World};
 use crate::body::Drive;
-use crate::bond::{BondStatus, Rupture, failure};
-use crate::contact::{Law, Local};
+use crate::bond::{BondStatus, Rupture};
+use crate::contact::Law;
 use crate::dim::{Dim, Vect};
 use crate::problem::residual::furthest_from_law;
-use crate::problem::{ContactProblem, Group, Nodes};
+use crate::problem::{Contact, ContactProblem, Group, Kind, Nodes, Visitor};
 use crate::solver::certificate::Verdict;
 use crate::solver::{SolveReport, SolveStatus};
-
-/// Parts into which a step is divided at most where bodies are fast.
-pub(super) const PARTS: u32 = 4096;
 
 impl<D: Dim> World<D> {
     /// Carry the world on by one time step. An error leaves the world and its solver as they were.
@@ -26,6 +24,7 @@ impl<D: Dim> World<D> {
     /// The same; `watch` is told after each round of a cascade how many bonds have broken in it so far. A step that is made
     /// anew in halves begins to count anew.
     pub fn step_watched(&mut self, watch: &mut dyn FnMut(usize)) -> Result<StepReport<D>, StepError> {
+        self.follow_settings();
         let solver = self.solver.snapshot();
         let mut report = match self.advance(self.settings.step, 0, 1, watch) {
             Ok(report) => report,
@@ -269,8 +268,9 @@ impl<D: Dim> World<D> {
         places: &Places,
         round: u32,
     ) -> Vec<Break<D>> {
-        let mut found = self.group_at_limit(mid, touches, &problem.nodes, &problem.bonded, &places.bonded, round);
-        found.extend(self.group_at_limit(mid, touches, &problem.nodes, &problem.elastic, &places.elastic, round));
+        let (rigid, elastic) = (places.of(Kind::Bonded), places.of(Kind::Elastic));
+        let mut found = self.group_at_limit(mid, touches, &problem.nodes, &problem.bonded, rigid, round);
+        found.extend(self.group_at_limit(mid, touches, &problem.nodes, &problem.elastic, elastic, round));
         if self.settings.rupture == Rupture::CascadeWorst {
             let worst = found.iter().map(|(flow, _)| *flow).fold(f64::NEG_INFINITY, f64::max);
             let first = found.iter().position(|(flow, _)| *flow == worst);
@@ -292,7 +292,7 @@ impl<D: Dim> World<D> {
         let mut found = Vec::new();
         for (contact, place) in group.iter().zip(places) {
             let law = &contact.law;
-            let Some(mode) = failure(&contact.r, law.shift(), law.cone()) else { continue };
+            let Some(mode) = contact.failure() else { continue };
             let touch = self.touch(mid, &touches[*place as usize]);
             let mut u = nodes.relative_velocity::<D::Tangent, D::Moment>(&contact.link, law.arms());
             u.n += law.bias();
@@ -361,10 +361,8 @@ impl<D: Dim> World<D> {
         let before = &motion.before;
         let kinetic = self.kinetic_after(&problem.nodes);
         let external = self.external_work(h, motion, problem);
-        let dry = group_losses(before, &problem.nodes, &problem.dry);
-        let smooth = group_losses(before, &problem.nodes, &problem.frictionless);
-        let bonds: f64 = group_losses(before, &problem.nodes, &problem.bonded).iter().sum();
-        let elastic: f64 = group_losses(before, &problem.nodes, &problem.elastic).iter().sum();
+        let [bonds, elastic, dry, smooth] = losses(before, problem);
+        let (bonds, elastic) = (bonds.iter().sum::<f64>(), elastic.iter().sum::<f64>());
         let stored: f64 = problem.elastic.iter().map(|c| elastic_energy(&c.law, &c.r)).sum();
         let released: f64 = breaks.iter().map(|b| b.energy).sum();
         // bonds that break at the end of the step are still among those that store
@@ -477,28 +475,17 @@ impl<D: Dim> World<D> {
 
 /// Impulse of the grains on each wall (N s).
 fn wall_impulses<D: Dim>(problem: &ContactProblem<D>, walls: usize) -> Vec<D::Vector> {
-    let mut sums = vec![D::Vector::zero(); walls];
-    let first = problem.nodes.grains;
-    let mut add = |pair: [u32; 2], impulse: D::Vector| {
-        if let Some(wall) = (pair[1] as usize).checked_sub(first) {
-            sums[wall] -= impulse;
+    struct Pushes<V>(Vec<V>);
+    impl<D: Dim> Visitor<D> for Pushes<D::Vector> {
+        fn visit<L: Law>(&mut self, nodes: &Nodes<D>, c: &Contact<D, L>) {
+            if let Some(wall) = (c.link.nodes[1] as usize).checked_sub(nodes.grains) {
+                self.0[wall] -= c.link.impulse(&c.r);
+            }
         }
-    };
-    problem.dry.iter().for_each(|c| add(c.link.nodes, c.link.impulse(&c.r)));
-    problem.frictionless.iter().for_each(|c| add(c.link.nodes, c.link.impulse(&c.r)));
-    sums
-}
-
-/// Write the impulses of the problem back to the contacts of the step, as forces.
-fn write_reactions<D: Dim>(touches: &mut [Kept<D>], problem: &ContactProblem<D>, places: &Places, h: f64) {
-    for touch in touches.iter_mut() {
-        touch.reaction = Local::zero();
-        touch.status = TouchStatus::Open;
     }
-    read_back(touches, &problem.bonded, &places.bonded, h);
-    read_back(touches, &problem.elastic, &places.elastic, h);
-    read_back(touches, &problem.dry, &places.dry, h);
-    read_back(touches, &problem.frictionless, &places.frictionless, h);
+    let mut pushes = Pushes(vec![D::Vector::zero(); walls]);
+    problem.visit(&mut pushes);
+    pushes.0
 }
 
 /// Turn the contacts of broken bonds into dry ones that start without reaction.

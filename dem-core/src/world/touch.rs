@@ -60,6 +60,11 @@ impl<D: Dim> Kept<D> {
     pub fn bond(&self) -> Option<u32> {
         self.bond_from_one.map(|bond| bond.get() - 1)
     }
+
+    /// Give the bond that ties the pair this index.
+    pub fn tie(&mut self, bond: Option<u32>) {
+        self.bond_from_one = bond.and_then(|bond| NonZeroU32::new(bond + 1));
+    }
 }
 
 /// A contact of one step, with its reaction.

@@ -6,20 +6,10 @@
 //! docs/theory/time-stepping.md, "Bonds that turn in steps of several lengths".
 
 use super::World;
-use super::assembly::{Midpoint, Motion};
+use super::motion::{Midpoint, Motion, Turn};
 use super::touch::Kept;
 use crate::body::direction;
 use crate::dim::{Dim, Vect};
-
-/// What a bond is given back in a step.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Turn {
-    /// What is added to the normal velocity of the bond before its law (m/s).
-    pub bias: f64,
-    /// By how much the bond is longer at mid-step than its law knows, beside the hidden length of steps of this length (m): zero
-    /// where all steps were of one length.
-    pub owed: f64,
-}
 
 impl<D: Dim> World<D> {
     /// What the bonds are given back in a step of length `h`, by their numbers.

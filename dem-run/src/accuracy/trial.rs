@@ -152,8 +152,8 @@ impl<D: Dim> Sample<D> {
         let mut bonds: Vec<(Bond, u32)> = self.bonds.iter().map(moved).zip(0..).collect();
         bonds.sort_unstable_by_key(|(bond, _)| bond.pair);
         let mut world = World::new(grains, self.walls.clone(), loads, settings(scene));
-        let numbers;
-        (world.bonds, numbers) = bonds.into_iter().unzip();
+        let (bonds, numbers): (Vec<_>, Vec<_>) = bonds.into_iter().unzip();
+        world.bonds = bonds.into();
         (world, numbers)
     }
 

@@ -14,9 +14,9 @@
 //! (Rheinboldt, SIAM J. Numer. Anal. 17, 1980), elsewhere the barrier is.
 
 use super::cones::{Point, dot, moved, product};
-use super::local::State;
 use super::pairs::{largest, pair};
 use super::sites::Sites;
+use super::state::State;
 use super::system::System;
 use crate::solver::tuning::continuation as tuning;
 

@@ -1,7 +1,7 @@
 //! The direction of a predictor–corrector iteration.
 
 use super::cones::{Point, correction, dot, least_product, moved};
-use super::local::{State, gap};
+use super::state::{State, gap};
 use super::system::System;
 use crate::solver::tuning::direction as tuning;
 

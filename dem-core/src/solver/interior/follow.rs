@@ -6,9 +6,9 @@
 
 use super::continuation::{Continuation, Progress};
 use super::direction::{advance, direction, is_central, is_rounded};
-use super::local::{State, gap};
 use super::sites::Sites;
 use super::start::cold;
+use super::state::{State, gap};
 use super::system::System;
 use crate::solver::tuning::{direction as steps, follow as tuning};
 

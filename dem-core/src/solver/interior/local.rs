@@ -7,21 +7,12 @@
 //! The inverse of this small matrix holds in its upper left corner D⁻¹ of docs/theory/interior-point.md. D itself, with
 //! Arw(x)⁻¹ Arw(z), would lose the digits of what sticks beside what slips.
 
-use super::cones::{Point, Scaling, dot, eigenvalues, product};
+use super::cones::{Point, Scaling, eigenvalues, product};
 use super::sites::{CONES, Cone, ROWS, Sites};
+use super::state::State;
 
 /// Largest order of a local matrix.
 pub(super) const ORDER: usize = ROWS + CONES;
-
-/// A point, or a step of it.
-#[derive(Clone, Debug, Default)]
-pub(super) struct State {
-    /// Reactions without the shift, of all rows.
-    pub r: Vec<f64>,
-    /// Of all cones.
-    pub x: Vec<Point>,
-    pub z: Vec<Point>,
-}
 
 /// What the complementarity equations of a cone are divided by.
 #[inline]
@@ -187,9 +178,4 @@ pub(super) fn opened(sites: &Sites, z: &[Point]) -> Vec<f64> {
         }
     }
     u
-}
-
-/// Mean of x·z over all cones.
-pub(super) fn gap(at: &State) -> f64 {
-    at.x.iter().zip(&at.z).map(|(x, z)| dot(x, z)).sum::<f64>() / at.x.len() as f64
 }

@@ -1,7 +1,8 @@
 //! The metric 1/ρ: a compliance that selects one of many reactions.
 
-use super::local::{State, opened};
+use super::local::opened;
 use super::sites::{ROWS, Sites};
+use super::state::State;
 
 /// A compliance that draws reactions to given ones.
 pub(super) struct Metric {

@@ -6,10 +6,10 @@
 //!    followed again with the metric anchored at r*, from a point on the way there, since nearer to the boundary steps are short;
 //!    then with a harder metric.
 
-use super::local::{State, gap};
+use super::aims::{Aims, Found};
 use super::metric::Metric;
 use super::sites::{Limit, Sites};
-use super::{Aims, Found};
+use super::state::{State, gap};
 use crate::solver::solvable::Solvable;
 use crate::solver::tuning::selection as tuning;
 

@@ -8,7 +8,7 @@
 //! one whose z₀ acts on no row: B is G without its normal column, and z₀ is the slip speed.
 
 use super::cones::{Point, eigenvalues};
-use super::local::State;
+use super::state::State;
 use crate::contact::{PADDED, Padded};
 use crate::solver::rows::{Row, Rows, TWIST};
 use crate::solver::tuning::selection as tuning;

@@ -2,8 +2,8 @@
 
 use super::cones::least_product;
 use super::coupling::Coupling;
-use super::local::{State, gap};
 use super::sites::Sites;
+use super::state::{State, gap};
 use crate::solver::tuning::start as tuning;
 
 /// Reactions well inside their cones, velocities as large as the free ones.

@@ -2,8 +2,9 @@
 
 use super::cones::{Point, moved, product, reach};
 use super::coupling::Coupling;
-use super::local::{Scaled, State, follow, opened, solve, yield_to};
+use super::local::{Scaled, follow, opened, solve, yield_to};
 use super::sites::Sites;
+use super::state::State;
 use crate::linear::Lu;
 
 /// One linear system and the point that it belongs to.

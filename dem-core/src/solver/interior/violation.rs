@@ -11,10 +11,10 @@
 use super::Interior;
 use super::coupling::Coupling;
 use super::direction::{advance, direction};
-use super::local::{State, gap};
 use super::metric::Metric;
 use super::sites::Sites;
 use super::start::cold;
+use super::state::{State, gap};
 use crate::contact::Padded;
 use crate::problem::assembled::BlockMatrix;
 use crate::solver::graph::Graph;

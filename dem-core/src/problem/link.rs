@@ -1,0 +1,122 @@
+//! One contact of the problem: its geometry, which maps node velocities to relative velocities, its law and its impulse.
+
+use crate::bond::{BondStatus, failure};
+use crate::contact::{Arms, Law, Local, Padded};
+use crate::dim::{Axes, Dim, Moments, Vect, in_frame, is_vector, of_frame, resized};
+use std::marker::PhantomData;
+
+/// Geometry of a contact between node i and node j: the linear map between node velocities and relative velocity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Link<D: Dim, A: Axes<D> = <D as Dim>::Frame> {
+    /// Nodes i and j; the normal points from j to i. `j` may be a wall.
+    pub nodes: [u32; 2],
+    /// Axes: an orthonormal frame (n, t…), or n alone.
+    pub axes: A,
+    dim: PhantomData<D>,
+}
+
+/// One contact of the problem: its geometry, its law and its impulse.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contact<D: Dim, L: Law> {
+    /// Nodes and axes.
+    pub link: Link<D, L::Axes<D>>,
+    /// Law with the constants of the local solve.
+    pub law: L,
+    /// Impulse of j on i (N s), in the frame of the contact; where its axes are a normal alone, the tangential part is a vector.
+    pub r: Local<L::T, L::B>,
+}
+
+impl<D: Dim, A: Axes<D>> Link<D, A> {
+    /// Between these nodes, with the axes of `frame` that are needed.
+    pub fn new(nodes: [u32; 2], frame: D::Frame) -> Self {
+        Self { nodes, axes: A::of(frame), dim: PhantomData }
+    }
+
+    /// The same with a whole frame: where the axes are a normal alone, the one that [`Dim::frame`] makes of it.
+    pub fn whole(&self) -> Link<D> {
+        Link::new(self.nodes, self.frame())
+    }
+
+    fn frame(&self) -> D::Frame {
+        self.axes.frame().copied().unwrap_or_else(|| D::frame(self.axes.normal()))
+    }
+
+    /// A reaction or a velocity of the contact as rows of its [whole](Link::whole) frame.
+    #[inline]
+    pub(crate) fn in_frame<T: Vect, B: Moments>(&self, r: &Local<T, B>) -> Padded {
+        let t = in_frame::<D, T>(&self.frame(), r.t);
+        Local { n: r.n, t: resized(t), m: resized(r.m) }
+    }
+
+    /// The inverse of [`Link::in_frame`].
+    #[inline]
+    pub(crate) fn of_frame<T: Vect, B: Moments>(&self, r: &Padded) -> Local<T, B> {
+        Local { n: r.n, t: of_frame::<D, T>(&self.frame(), resized(r.t)), m: resized(r.m) }
+    }
+
+    /// This reaction without what the rounding of many sweeps has left of a tangential vector along the normal: where grains are fast and
+    /// reactions small, it would be an impulse that no law knows of.
+    #[inline(always)]
+    pub(super) fn without_drift<T: Vect, B: Moments>(&self, mut r: Local<T, B>) -> Local<T, B> {
+        if is_vector::<D, T>() {
+            let (normal, t) = (self.axes.normal(), resized::<T, D::Vector>(r.t));
+            r.t = resized(t - normal * normal.dot(&t));
+        }
+        r
+    }
+
+    /// The impulse on node i as a vector.
+    #[inline(always)]
+    pub(crate) fn impulse<T: Vect, B: Moments>(&self, r: &Local<T, B>) -> D::Vector {
+        match self.axes.frame() {
+            Some(frame) if T::LEN > 0 => D::compose(frame, r.n, resized(r.t)),
+            _ if is_vector::<D, T>() => self.axes.normal() * r.n + resized::<T, D::Vector>(r.t),
+            _ => {
+                debug_assert_eq!(T::LEN, 0, "tangential rows without a frame");
+                self.axes.normal() * r.n
+            }
+        }
+    }
+}
+
+impl<D: Dim, L: Law> Contact<D, L> {
+    /// The mode in which the bond that this contact is fails under its impulse; none of one that holds, and of a dry contact.
+    pub(crate) fn failure(&self) -> Option<BondStatus> {
+        let shift = self.law.shift();
+        if shift > 0.0 { failure(&self.r, shift, self.law.cone()) } else { None }
+    }
+}
+
+/// Contacts with the same rows, sorted by key; in a large problem, by the blocks in which they are swept.
+pub type Group<D, L> = Vec<Contact<D, L>>;
+
+impl<D: Dim, A: Axes<D>> Link<D, A> {
+    /// Relative velocity of a body with this velocity and spin, i, with respect to another, j, at the contact point.
+    #[inline(always)]
+    pub(crate) fn relative_velocity<T: Vect, B: Moments>(
+        &self,
+        arms: Arms,
+        (velocity_i, spin_i): (D::Vector, D::Spin),
+        (velocity_j, spin_j): (D::Vector, D::Spin),
+    ) -> Local<T, B> {
+        let velocity = velocity_i - velocity_j;
+        let Some(frame) = self.axes.frame() else {
+            let normal = self.axes.normal();
+            let n = normal.dot(&velocity);
+            if !is_vector::<D, T>() {
+                debug_assert_eq!(T::LEN, 0, "tangential rows without a frame");
+                return Local { n, ..Local::zero() };
+            }
+            let turn = D::velocity(spin_i * arms.lever[0] + spin_j * arms.lever[1], normal);
+            return Local { n, t: resized(velocity - normal * n - turn), ..Local::zero() };
+        };
+        let (n, t) = D::split(frame, velocity);
+        if T::LEN == 0 {
+            return Local { n, ..Local::zero() };
+        }
+        let turn = D::spin_rows(frame, spin_i * arms.lever[0] + spin_j * arms.lever[1]);
+        let moment = |spin: D::Spin| resized(D::moment_rows(frame, spin * arms.bending));
+        let m = if B::LEN == 0 { B::zero() } else { moment(spin_i - spin_j) };
+        Local { n, t: resized(t - turn), m }
+    }
+}

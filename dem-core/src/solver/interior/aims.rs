@@ -1,0 +1,48 @@
+//! What is asked of a solution, and what the path came to.
+
+use crate::contact::Padded;
+
+/// What is asked of a solution.
+#[derive(Clone, Copy, Debug)]
+pub struct Aims {
+    /// Residual (–).
+    pub tolerance: f64,
+    /// Load error and velocity error (–).
+    pub load_tolerance: f64,
+    /// Whether of all reactions those of least energy in the metric are wanted.
+    pub least: bool,
+    /// Most iterations.
+    pub most: u64,
+}
+
+impl Aims {
+    /// How far these are from what is asked for: the larger of both over their tolerances (–). A residual of zero is rounding.
+    pub fn missed(&self, residual: f64, velocity_error: f64) -> f64 {
+        match residual {
+            0.0 => 0.0,
+            _ if residual.is_nan() => f64::INFINITY,
+            _ => (velocity_error / self.load_tolerance).max(residual / self.tolerance),
+        }
+    }
+}
+
+/// What the path came to.
+#[derive(Clone, Debug)]
+pub struct Found {
+    /// Reactions without the shift, in the unit of the rows.
+    pub reactions: Vec<Padded>,
+    /// Their residual (–), and their load error (–): how much the net impulses changed in the last iteration.
+    pub residual: f64,
+    pub load_error: f64,
+    /// Their velocity error (–), see [`crate::problem::residual::velocity_error`].
+    pub velocity_error: f64,
+    /// Iterations made.
+    pub iterations: u64,
+}
+
+impl Found {
+    /// See [`Aims::missed`]; the load error counts as the velocity error does.
+    pub fn missed(&self, aims: Aims) -> f64 {
+        aims.missed(self.residual, self.velocity_error.max(self.load_error))
+    }
+}
