@@ -1,4 +1,4 @@
-"""The examples of README do what they say on a real history."""
+"""The examples of docs/examples, which docs/history.md shows, do what they say on a real history."""
 
 import subprocess
 import sys
@@ -38,7 +38,7 @@ def test_the_pandas_example(compression):
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.name)
-def test_the_readme_shows_the_example_as_it_is(example):
+def test_the_page_shows_the_example_as_it_is(example):
     text = example.read_text(encoding="utf-8")
     assert len(text.splitlines()) <= 12
-    assert f"```python\n{text}```" in (ROOT / "README.md").read_text(encoding="utf-8")
+    assert f"```python\n{text}```" in (ROOT / "docs/history.md").read_text(encoding="utf-8")

@@ -353,7 +353,7 @@ fn a_turning_lattice_keeps_its_bonds_and_its_momentum() {
 
 /// Some minutes in release.
 #[test]
-#[ignore = "long: see README"]
+#[ignore = "long: see docs/running.md"]
 fn a_lattice_turns_for_a_million_steps() {
     for (stretch, turned) in [turning::<D2>(Kind::Auto, 1_000_000), turning::<D3>(Kind::Auto, 100_000)] {
         println!("stretch {stretch:.1e} of a diameter, angular momentum off by {turned:.1e}");
@@ -405,7 +405,7 @@ fn a_pile_of_six_falls_where_no_reactions_can_hold_it() {
 }
 
 #[test]
-#[ignore = "long: see README"]
+#[ignore = "long: see docs/running.md"]
 fn a_pile_rests_for_ten_million_steps() {
     let mut pile = pile(2, 0.3, Kind::Auto);
     let start = pile.grains.position.clone();
@@ -451,7 +451,7 @@ fn towers_and_chains_bear_their_weight() {
 }
 
 #[test]
-#[ignore = "long: see README"]
+#[ignore = "long: see docs/running.md"]
 fn towers_and_chains_of_ten_thousand_bear_their_weight() {
     for hanging in [false, true] {
         let share = tower(10_000, hanging, Kind::Auto);

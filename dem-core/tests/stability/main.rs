@@ -1,5 +1,5 @@
-//! The simulator at its limits. The tests that are not ignored are the quick part; README names the long one, which writes
-//! docs/stability.md anew.
+//! The simulator at its limits. The tests that are not ignored are the quick part; docs/running.md names the long
+//! one, which writes docs/stability.md anew.
 
 mod atlas;
 mod cases;
@@ -21,7 +21,7 @@ fn what_must_hold_holds_with_the_default_solver_and_the_interior_point_method() 
 
 /// `cargo test --release -p dem-core --test stability page -- --ignored`
 #[test]
-#[ignore = "long: see README"]
+#[ignore = "long: see docs/running.md"]
 fn page() {
     let rows: Vec<_> = ROWS.par_iter().map(|row| (row, row.runs(row.tried, &Kind::ALL, &[2, 3], 200))).collect();
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/stability.md");

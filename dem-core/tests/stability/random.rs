@@ -270,7 +270,7 @@ fn random_scenes_keep_what_must_hold_between_cylinders() {
 
 /// `STABILITY_SCENES=0..20000 cargo test --release -p dem-core --test stability twenty_thousand -- --ignored --nocapture`
 #[test]
-#[ignore = "long: see README"]
+#[ignore = "long: see docs/running.md"]
 fn twenty_thousand_random_scenes() {
     let seeds = std::env::var("STABILITY_SCENES").map_or(0..20_000, |text| {
         let (first, end) = text.split_once("..").expect("seeds FIRST..END");
