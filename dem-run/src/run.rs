@@ -298,8 +298,8 @@ impl<D: Dim> Run<'_, D> {
             }
             StepError::NotFinite { .. } => "; a smaller time.step may help",
             StepError::Yielded { .. } => "; a smaller solver.tolerance or time.step may help",
-            // its message names the remedy
-            StepError::TooFast { .. } => "",
+            // the message of a step too fast names the remedy
+            _ => "",
         };
         help.into()
     }

@@ -28,7 +28,6 @@ use crate::saved::{Mismatch, Reader, Saved};
 use crate::solver::tuning::stages as tuning;
 
 /// The method that brought a solution; a step reports the last in this order.
-#[non_exhaustive]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Route {
     /// The reactions grew as in the steps before.

@@ -6,7 +6,7 @@ use crate::course::Course;
 use crate::scene::{GaussSeidel, Newton, Scene, SolverKind};
 use crate::summary::Ending;
 use dem_core::body::{Grain, Grains, Load, Wall};
-use dem_core::bond::Bond;
+use dem_core::bond::{Bond, Bonds};
 use dem_core::contact::Local;
 use dem_core::dim::{Dim, Vect};
 use dem_core::problem::ContactProblem;
@@ -102,7 +102,7 @@ pub struct Sample<D: Dim> {
     /// Solid fraction of a random sample (–).
     pub solid_fraction: Option<f64>,
     /// The bonds, all intact.
-    pub bonds: Vec<Bond>,
+    pub bonds: Bonds,
     /// The grains.
     pub grains: Grains<D>,
     walls: Vec<Wall<D>>,
