@@ -102,6 +102,22 @@ impl DerefMut for Bonds {
     }
 }
 
+impl<'a> IntoIterator for &'a Bonds {
+    type Item = &'a Bond;
+    type IntoIter = std::slice::Iter<'a, Bond>;
+    fn into_iter(self) -> Self::IntoIter {
+        self.iter()
+    }
+}
+
+impl<'a> IntoIterator for &'a mut Bonds {
+    type Item = &'a mut Bond;
+    type IntoIter = std::slice::IterMut<'a, Bond>;
+    fn into_iter(self) -> Self::IntoIter {
+        self.iter_mut()
+    }
+}
+
 impl Bond {
     /// The cone of its shifted reaction. Moments are divided by the mean diameter, so shear and bending have one coefficient, μ.
     pub fn cone(&self) -> Cone {

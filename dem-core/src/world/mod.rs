@@ -202,7 +202,7 @@ impl<D: Dim> World<D> {
 
     /// Make every bond elastic; `stiffness` gives its stiffness for a mean diameter (m).
     pub fn make_bonds_elastic(&mut self, stiffness: impl Fn(f64) -> Stiffness) {
-        for bond in self.bonds.iter_mut() {
+        for bond in &mut self.bonds {
             bond.stiffness = Some(stiffness(bond.mean_diameter));
         }
     }
