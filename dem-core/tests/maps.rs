@@ -131,6 +131,8 @@ impl Check {
     /// The entries of the local block, with axes that form a frame.
     fn block<D: Dim>(nodes: &Nodes<D>, link: &Link<D>, arms: Arms) {
         let w = responses(nodes, link, arms);
+        let wall = (link.nodes[1] as usize).checked_sub(nodes.grains).map(|wall| nodes.drives[wall]);
+        let driven = wall.filter(|d| d.norm() > 0.0);
         let block = nodes.block(link, arms);
         let tangents = D::N - 1;
         let size = if arms.bending > 0.0 { 1 + tangents + D::Moment::LEN } else { D::N };
