@@ -167,12 +167,13 @@ impl Run {
         if o.gain > GAIN {
             how.push(format!("energy +{:.0} %", 100.0 * o.gain));
         }
-        match o.stopped {
+        match &o.stopped {
             None => {}
             Some(StepError::NotAccepted { .. }) => how.push("stops: no convergence".into()),
             Some(StepError::Yielded { .. }) => how.push("stops: a contact yields".into()),
             Some(StepError::TooFast { .. }) => how.push("stops: too fast for the step".into()),
             Some(StepError::NotFinite { .. }) => how.push("stops: not finite".into()),
+            Some(other) => how.push(format!("stops: {other:?}")),
         }
         how.join(", ")
     }
