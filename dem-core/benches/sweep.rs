@@ -1,7 +1,9 @@
-//! Cost of one Gauss–Seidel sweep per contact, for each law, from 430 to 1,000,000 disks and for spheres, beside a loop that
-//! streams the same bytes on one thread. Large problems are swept by as many threads as `RAYON_NUM_THREADS` says.
+//! Cost of one Gauss–Seidel sweep per contact, for each law, from 430 to 1,000,000 disks and for
+//! spheres, beside a loop that streams the same bytes on one thread. Large problems are swept by as
+//! many threads as `RAYON_NUM_THREADS` says.
 //!
-//! `cargo bench -p dem-core --bench sweep`; criterion's throughput line gives contacts per second, 1e9 / that is ns a contact.
+//! `cargo bench -p dem-core --bench sweep`; criterion's throughput line gives contacts per second,
+//! 1e9 / that is ns a contact.
 
 #[path = "../tests/common/mod.rs"]
 mod common;

@@ -1,6 +1,6 @@
-//! A scene that does one thing many times, for tools that count instructions or bytes:
-//! `cost disks|spheres|twisting FEATURE ROWS COLUMNS sweep|step TIMES` prints the number of grains and contacts, the bytes of
-//! a contact, and the greatest resident size (kB).
+//! A scene that does one thing many times, for tools that count instructions or bytes: `cost
+//! disks|spheres|twisting FEATURE ROWS COLUMNS sweep|step TIMES` prints the number of grains and
+//! contacts, the bytes of a contact, and the greatest resident size (kB).
 
 #[path = "../tests/common/mod.rs"]
 mod common;

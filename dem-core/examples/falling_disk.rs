@@ -1,4 +1,5 @@
-//! A disk falls from 10 cm on a floor, bounces with a restitution of 0.5 and comes to rest: height and energy over time.
+//! A disk falls from 10 cm on a floor, bounces with a restitution of 0.5 and comes to rest: height
+//! and energy over time.
 //!
 //! `cargo run --release -p dem-core --example falling_disk`
 

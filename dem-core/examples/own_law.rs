@@ -1,5 +1,6 @@
-//! A contact law of one's own: adhesion without friction, r_n ≥ −c ⊥ u_n ≥ 0, in a chain of three spheres that hangs from a
-//! fixed one. Solved by sweeps that are written here, since a [`World`](dem_core::world::World) knows the laws of its kinds alone.
+//! A contact law of one's own: adhesion without friction, r_n ≥ −c ⊥ u_n ≥ 0, in a chain of three
+//! spheres that hangs from a fixed one. Solved by sweeps that are written here, since a
+//! [`World`](dem_core::world::World) knows the laws of its kinds alone.
 //!
 //! `cargo run --release -p dem-core --example own_law`
 
@@ -51,7 +52,8 @@ impl Law for Adhesive {
 }
 
 fn main() {
-    // four spheres of 1 kg, the uppermost fixed; a step of 10 ms under gravity leaves each with v_f = −g h
+    // four spheres of 1 kg, the uppermost fixed; a step of 10 ms under gravity leaves each with v_f
+    // = −g h
     let (step, gravity, mass) = (0.01, 9.81, 1.0);
     let weight = mass * gravity * step;
     let sphere = |k: usize| Node::<D3> {

@@ -1,4 +1,5 @@
-//! A solver of one's own in a world: plain sweeps until the residual is small enough, and a count of them.
+//! A solver of one's own in a world: plain sweeps until the residual is small enough, and a count
+//! of them.
 //!
 //! `cargo run --release -p dem-core --example own_solver`
 
@@ -19,7 +20,8 @@ struct PlainSweeps {
 impl<D: Dim> ContactSolver<D> for PlainSweeps {
     fn solve(&mut self, problem: &mut ContactProblem<D>) -> SolveReport {
         let mut work = Work::default();
-        // the problem brings the reactions of the last step along
+        // the problem brings the reactions of the last step, and the nodes their free velocities
+        problem.velocities_from_reactions();
         while residual(problem) > self.tolerance && work.sweeps < self.most {
             sweep(problem, LocalSolve::Exact);
             work.sweeps += 1;

@@ -1,5 +1,5 @@
-//! Two bonded spheres are pulled apart by a force that grows with time: the bond carries it without moving and breaks where
-//! the force reaches its strength of 10 N.
+//! Two bonded spheres are pulled apart by a force that grows with time: the bond carries it without
+//! moving and breaks where the force reaches its strength of 10 N.
 //!
 //! `cargo run --release -p dem-core --example pulled_bond`
 

@@ -47,7 +47,8 @@ pub struct Grain<D: Dim> {
 }
 
 impl<D: Dim> Grain<D> {
-    /// A homogeneous grain at rest; `surface_density` is the density (kg/m³) times the thickness (m) in 2D, the density in 3D.
+    /// A homogeneous grain at rest; `surface_density` is the density (kg/m³) times the thickness
+    /// (m) in 2D, the density in 3D.
     pub fn at_rest(position: D::Vector, radius: f64, surface_density: f64) -> Self {
         let mass = surface_density * D::volume(radius);
         Self {
@@ -148,7 +149,8 @@ pub enum Shape<D: Dim> {
 }
 
 impl<D: Dim> Shape<D> {
-    /// Gap (m, negative for an overlap) and unit normal towards the grain, for a grain at `offset` from the wall's position.
+    /// Gap (m, negative for an overlap) and unit normal towards the grain, for a grain at `offset`
+    /// from the wall's position.
     pub fn gap(&self, offset: D::Vector, radius: f64) -> (f64, D::Vector) {
         match *self {
             Self::Plane { normal } => (offset.dot(&normal) - radius, normal),
@@ -174,12 +176,20 @@ impl<D: Dim> Shape<D> {
     }
 }
 
+/// The way (m) to the centre of a body at `i` from that of another at `j`: the one place to change
+/// for a periodic cell.
+#[inline]
+pub(crate) fn separation<D: Dim>(i: D::Vector, j: D::Vector) -> D::Vector {
+    i - j
+}
+
 /// The part of a vector across the axis of a cylinder, if there is one.
 fn across<D: Dim>(x: D::Vector, axis: Option<D::Vector>) -> D::Vector {
     axis.map_or(x, |a| x - a * a.dot(&x))
 }
 
-/// The unit vector along `offset`, whose norm is `distance`. Where two centres are one, any normal serves: the first axis.
+/// The unit vector along `offset`, whose norm is `distance`. Where two centres coincide, any
+/// normal will do: the first axis.
 pub(crate) fn direction<D: Dim>(offset: D::Vector, distance: f64) -> D::Vector {
     if distance > 0.0 {
         return offset * (1.0 / distance);
@@ -201,7 +211,8 @@ pub enum Drive<D: Dim> {
         /// Speed (m/s) over time (s).
         speed: Schedule,
     },
-    /// A prescribed force (N) along a unit direction; the wall has a mass and this one degree of freedom.
+    /// A prescribed force (N) along a unit direction; the wall has a mass and this one degree of
+    /// freedom.
     Force {
         /// Unit direction.
         direction: D::Vector,
@@ -227,7 +238,8 @@ pub struct Wall<D: Dim> {
     pub friction: f64,
     /// Force of the grains on the wall at the end of the last step (N), after all that broke in it.
     pub reaction: D::Vector,
-    /// The same before anything broke in the step (N): the equilibrium that broke, where something did.
+    /// The same before anything broke in the step (N): the equilibrium that broke, where something
+    /// did.
     pub reaction_at_limit: D::Vector,
     /// Force prescribed at the last step (N); zero for a wall that is not driven by a force.
     pub applied: f64,
@@ -246,6 +258,14 @@ impl<D: Dim> Wall<D> {
             reaction: zero,
             reaction_at_limit: zero,
             applied: 0.0,
+        }
+    }
+
+    /// The prescribed force at a time (N); zero for a wall that no force drives.
+    pub fn applied_force(&self, time: f64) -> f64 {
+        match &self.drive {
+            Drive::Force { force, .. } => force(time),
+            Drive::Fixed | Drive::Velocity { .. } => 0.0,
         }
     }
 

@@ -1,4 +1,5 @@
-//! Cohesive bonds: how they form, what they carry and when they break for good (Guessasma & Fortin 2011, (4) and (5)).
+//! Cohesive bonds: how they form, what they carry and when they break for good (Guessasma & Fortin
+//! 2011, (4) and (5)).
 
 use crate::contact::{Cone, Local, Weights};
 use crate::dim::{Moments, Vect};
@@ -56,8 +57,9 @@ pub struct Bond {
     pub status: BondStatus,
 }
 
-/// Bonds sorted by pair, at most one for each. They can be changed in place, but for their pairs, and none can be taken out:
-/// contacts and histories know them by their index. [`crate::world::World::add_bonds`] adds some.
+/// Bonds sorted by pair, at most one for each. They can be changed in place, but for their pairs,
+/// and none can be taken out: contacts and histories know them by their index.
+/// [`crate::world::World::add_bonds`] adds some.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Bonds(Vec<Bond>);
 
@@ -119,12 +121,14 @@ impl<'a> IntoIterator for &'a mut Bonds {
 }
 
 impl Bond {
-    /// The cone of its shifted reaction. Moments are divided by the mean diameter, so shear and bending have one coefficient, μ.
+    /// The cone of its shifted reaction. Moments are divided by the mean diameter, so shear and
+    /// bending have one coefficient, μ.
     pub fn cone(&self) -> Cone {
         Cone { mu: self.friction, nu: self.friction, xi: self.twist }
     }
 
-    /// Compliance of its rows over an implicit step `h` (s), 1/(k h²) (1/kg); none for a rigid bond.
+    /// Compliance of its rows over an implicit step `h` (s), 1/(k h²) (1/kg); none for a rigid
+    /// bond.
     pub fn compliance(&self, h: f64) -> Option<Weights> {
         let a = self.mean_diameter;
         self.stiffness.map(|k| Weights {
@@ -142,17 +146,19 @@ pub enum Rupture {
     /// All break, and the same step is solved again, until none is at its limit.
     #[default]
     Cascade,
-    /// The one that flows fastest breaks, and the same step is solved again, until none is at its limit.
+    /// The one that flows fastest breaks, and the same step is solved again, until none is at its
+    /// limit.
     CascadeWorst,
     /// All break at the end of the step.
     EndOfStep,
 }
 
-/// The mode in which a bond fails under the reaction `r`, for a shift s = r_coh in the unit of `r`; none if it holds.
+/// The mode in which a bond fails under the reaction `r`, for a shift s = r_coh in the unit of `r`;
+/// none if it holds.
 ///
-/// TENSION if r_n + s ≤ ε s; else SHEAR, ROLLING or TWIST, whichever of ‖t‖/μ, ‖m‖/ν and |τ|/ξ is the largest (the first of
-/// those that tie), once it reaches (1 − ε) (r_n + s). Compression never breaks a bond, and one without friction fails in
-/// tension only.
+/// TENSION if r_n + s ≤ ε s; else SHEAR, ROLLING or TWIST, whichever of ‖t‖/μ, ‖m‖/ν and |τ|/ξ is
+/// the largest (the first of those that tie), once it reaches (1 − ε) (r_n + s). Compression never
+/// breaks a bond, and one without friction fails in tension only.
 pub fn failure<T: Vect, B: Moments>(r: &Local<T, B>, shift: f64, cone: Cone) -> Option<BondStatus> {
     let limit = r.n + shift;
     if limit <= LIMIT * shift {

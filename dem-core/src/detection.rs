@@ -1,15 +1,16 @@
 //! Candidate pairs: grids of cells with a skin around each body.
 //!
-//! The list holds every pair whose gap was at most the sum of its two skins when it was built. It stays valid while each
-//! body's displacement since then, plus the reach that the step needs of it, is within its own skin: a single fast grain
-//! lengthens its own list and no other.
+//! The list holds every pair whose gap was at most the sum of its two skins when it was built. It
+//! stays valid while each body's displacement since then, plus the reach that the step needs of it,
+//! is within its own skin: a single fast grain lengthens its own list and no other.
 //!
-//! Grains lie in a hierarchy of grids after Ogarko & Luding (Comput. Phys. Commun. 183, 931, 2012): a level for each halving
-//! of radius plus skin. A grain is compared with its own level and those of larger cells, so that neither a wide range of
-//! radii nor a fast grain makes all cells large. Cells are sorted by key rather than laid out as an array: a grain that
-//! flies away costs no memory.
+//! Grains lie in a hierarchy of grids after Ogarko & Luding (Comput. Phys. Commun. 183, 931, 2012):
+//! a level for each halving of radius plus skin. A grain is compared with its own level and those
+//! of larger cells, so that neither a wide range of radii nor a fast grain makes all cells large.
+//! Cells are sorted by key rather than laid out as an array: a grain that flies away costs no
+//! memory.
 
-use crate::body::{Grains, Wall};
+use crate::body::{Grains, Wall, separation};
 use crate::dim::{Dim, Vect};
 use rayon::prelude::*;
 
@@ -29,8 +30,9 @@ impl<D: Dim> Default for Candidates<D> {
 }
 
 impl<D: Dim> Candidates<D> {
-    /// Make the list hold every pair whose gap at these places is at most the sum of what `reach` (m) gives for its bodies,
-    /// grains first. If it must be built anew, each body may go as far as `spare` (m) gives before that is so again.
+    /// Make the list hold every pair whose gap at these places is at most the sum of what `reach`
+    /// (m) gives for its bodies, grains first. If it must be built anew, each body may go as far as
+    /// `spare` (m) gives before that is so again.
     pub fn cover(
         &mut self,
         grains: &Grains<D>,
@@ -71,7 +73,8 @@ struct Entry {
     grain: u32,
 }
 
-/// The grids: cells of level L are 2⁻ᴸ times as wide as those of level 0, which hold the largest grains.
+/// The grids: cells of level L are 2⁻ᴸ times as wide as those of level 0, which hold the largest
+/// grains.
 struct Grids<'a, D: Dim> {
     grains: &'a Grains<D>,
     position: &'a [D::Vector],
@@ -122,7 +125,8 @@ impl<'a, D: Dim> Grids<'a, D> {
         self.entries.par_chunks(256).flat_map_iter(|chunk| self.pairs_of(chunk)).collect()
     }
 
-    /// Pairs of these grains with those of their own level that come after them, and with all in levels of larger cells.
+    /// Pairs of these grains with those of their own level that come after them, and with all in
+    /// levels of larger cells.
     fn pairs_of(&self, chunk: &[Entry]) -> Vec<[u32; 2]> {
         let mut found = Vec::new();
         let deep = D::N > 2;
@@ -130,13 +134,15 @@ impl<'a, D: Dim> Grids<'a, D> {
         for &level in self.levels.iter().take_while(|level| **level <= finest) {
             for (dx, dy) in [(0, 0), (0, 1), (1, -1), (1, 0), (1, 1), (0, -1), (-1, -1), (-1, 0), (-1, 1)] {
                 let ahead = (dx, dy) >= (0, 0);
-                // grains come in the order of their cells, so that the next run begins near the last
+                // grains come in the order of their cells, so that the next run begins near the
+                // last
                 let mut start = 0;
                 for entry in chunk.iter().filter(|entry| level < entry.level || level == entry.level && ahead) {
                     let own = level == entry.level;
                     let key = if own { entry.key } else { self.cell(entry.grain as usize, level) };
                     let (Some(x), Some(y)) = (key[0].checked_add(dx), key[1].checked_add(dy)) else { continue };
-                    // cells are ordered by their last key last: one run of the sorted list holds all of dz
+                    // cells are ordered by their last key last: one run of the sorted list holds
+                    // all of dz
                     let below = deep && !(own && (dx, dy) == (0, 0));
                     let low = [x, y, key[2].saturating_sub(below.into())];
                     let high = [x, y, key[2].saturating_add(deep.into())];
@@ -166,7 +172,7 @@ impl<'a, D: Dim> Grids<'a, D> {
     fn add_if_near(&self, a: u32, b: u32, found: &mut Vec<[u32; 2]>) {
         let [i, j] = [a, b].map(|k| k as usize);
         let limit = self.grains.radius[i] + self.grains.radius[j] + self.skin[i] + self.skin[j];
-        let apart = self.position[i] - self.position[j];
+        let apart = separation::<D>(self.position[i], self.position[j]);
         if apart.dot(&apart) <= limit * limit {
             found.push([a.min(b), a.max(b)]);
         }
@@ -185,7 +191,8 @@ mod tests {
         let mut pairs = Vec::new();
         for i in 0..grains.len() {
             for j in i + 1..grains.len() {
-                let gap = (grains.position[i] - grains.position[j]).norm() - grains.radius[i] - grains.radius[j];
+                let apart = grains.position[i] - grains.position[j];
+                let gap = apart.norm() - grains.radius[i] - grains.radius[j];
                 if gap <= skin[i] + skin[j] {
                     pairs.push([i as u32, j as u32]);
                 }
@@ -204,7 +211,8 @@ mod tests {
     }
 
     proptest! {
-        // sizes and skins over six decades in a box of side 2, so that all is found from a few pairs to every one
+        // sizes and skins over six decades in a box of side 2, so that all is found from a few
+        // pairs to every one
         #[test]
         fn grids_find_every_pair(
             numbers in prop::collection::vec((-1.0..1.0, -1.0..1.0, -1.0..1.0, -4.0..0.5, -5.0..0.5), 0..120)

@@ -1,7 +1,7 @@
 //! Two and three dimensions from one source.
 //!
-//! Everything above this file is written for a [`Dim`]; [`D2`] and [`Space`] say what a vector, a spin, a contact
-//! frame and an orientation are. Nothing else in the crate names a dimension.
+//! Everything above this file is written for a [`Dim`]; [`D2`] and [`Space`] say what a vector, a
+//! spin, a contact frame and an orientation are. Nothing else in the crate names a dimension.
 //!
 //! Symbols: n normal from body j to body i; t tangent(s), in 2D t = (−n_y, n_x), in 3D n = t₁ × t₂;
 //! ω spin, counter-clockwise in 2D.
@@ -56,7 +56,8 @@ pub trait Vect:
             let norm = self.norm();
             return if norm <= limit { self } else { self * (limit / norm) };
         }
-        // the next contact waits for this one: no square root within the ball, and none for what carries nothing
+        // the next contact waits for this one: no square root within the ball, and none for what
+        // carries nothing
         let square = self.dot(&self);
         if square <= limit * limit {
             self
@@ -96,7 +97,8 @@ pub type V0 = SVector<f64, 0>;
 /// One row.
 pub type V1 = SVector<f64, 1>;
 
-/// The moment rows of a contact: as many bending rows as tangential ones and, where there are three, one of twist last.
+/// The moment rows of a contact: as many bending rows as tangential ones and, where there are
+/// three, one of twist last.
 ///
 /// Bending and twist have limits of their own.
 pub trait Moments: Vect {
@@ -197,8 +199,8 @@ fn versine(s: f64) -> f64 {
     square / (1.0 + (1.0 - square).max(0.0).sqrt())
 }
 
-/// The axes of a contact that its rows need: the whole frame; in space the normal alone where nothing rubs, or where friction is a
-/// vector.
+/// The axes of a contact that its rows need: the whole frame; in space the normal alone where
+/// nothing rubs, or where friction is a vector.
 pub trait Axes<D: Dim>: Copy + Debug + PartialEq + Send + Sync + 'static {
     /// Those of a frame.
     fn of(frame: D::Frame) -> Self;
@@ -220,8 +222,8 @@ pub trait Dim: Copy + Debug + Default + Send + Sync + 'static {
     type Tangent: Vect;
     /// Moment rows of a bond.
     type Moment: Moments;
-    /// What the tangential rows of a dry contact are held as: in the plane the row of its frame, in space a vector in the tangent
-    /// plane, which needs no tangents.
+    /// What the tangential rows of a dry contact are held as: in the plane the row of its frame, in
+    /// space a vector in the tangent plane, which needs no tangents.
     type Slide: Vect;
     /// Orthonormal frame (n, t…) of a contact.
     type Frame: Axes<Self>;
@@ -232,7 +234,8 @@ pub trait Dim: Copy + Debug + Default + Send + Sync + 'static {
 
     /// The frame of a unit normal.
     fn frame(normal: Self::Vector) -> Self::Frame;
-    /// The frame of a unit normal that turned least from `old`; it keeps tangential reactions meaningful between steps.
+    /// The frame of a unit normal that turned least from `old`; it keeps tangential reactions
+    /// meaningful between steps.
     fn transported(old: &Self::Tangents, normal: Self::Vector) -> Self::Frame;
     /// The normal of a frame.
     #[inline(always)]
@@ -253,18 +256,20 @@ pub trait Dim: Copy + Debug + Default + Send + Sync + 'static {
     fn spin_rows(frame: &Self::Frame, spin: Self::Spin) -> Self::Tangent;
     /// Transpose of [`Dim::spin_rows`]: the torque that does the work of tangential rows.
     fn spin_rows_transposed(frame: &Self::Frame, rows: Self::Tangent) -> Self::Spin;
-    /// Moment rows of a relative spin ω: those of ω × n, and the component of ω along n where twist has a row.
+    /// Moment rows of a relative spin ω: those of ω × n, and the component of ω along n where twist
+    /// has a row.
     #[inline(always)]
     fn moment_rows(frame: &Self::Frame, spin: Self::Spin) -> Self::Moment {
         resized(Self::spin_rows(frame, spin))
     }
-    /// The torque that does the work of tangential and moment rows; for the latter the transpose of [`Dim::moment_rows`].
+    /// The torque that does the work of tangential and moment rows; for the latter the transpose of
+    /// [`Dim::moment_rows`].
     #[inline(always)]
     fn torque_of_rows(frame: &Self::Frame, tangential: Self::Tangent, moment: Self::Moment) -> Self::Spin {
         Self::spin_rows_transposed(frame, tangential + resized(moment))
     }
-    /// Components of a torque about the tangents of a frame, and about its normal where twist has a row; in 2D the torque
-    /// itself.
+    /// Components of a torque about the tangents of a frame, and about its normal where twist has a
+    /// row; in 2D the torque itself.
     fn about_axes(frame: &Self::Frame, torque: Self::Spin) -> Self::Moment;
     /// The torque x × f of a force with lever x.
     fn torque(lever: Self::Vector, force: Self::Vector) -> Self::Spin;
@@ -274,8 +279,8 @@ pub trait Dim: Copy + Debug + Default + Send + Sync + 'static {
     fn unturned() -> Self::Orientation;
     /// The orientation after turning by the rotation vector `turn` (rad).
     fn turned(orientation: Self::Orientation, turn: Self::Spin) -> Self::Orientation;
-    /// (R − 1) x: what a rotation changes of a vector, for the rotation about `sine` by the angle whose sine is its norm, at
-    /// most a quarter of a turn.
+    /// (R − 1) x: what a rotation changes of a vector, for the rotation about `sine` by the angle
+    /// whose sine is its norm, at most a quarter of a turn.
     fn swing(vector: Self::Vector, sine: Self::Spin) -> Self::Vector;
     /// Area (2D) or volume (3D) of a disk or sphere, m² or m³.
     fn volume(radius: f64) -> f64;
@@ -443,7 +448,8 @@ where
     type Tangents = SVector<f64, 6>;
     type Orientation = SVector<f64, 4>;
 
-    /// Branch-light orthonormal basis: Duff et al., *Building an orthonormal basis, revisited*, JCGT 6(1), 2017.
+    /// Branch-light orthonormal basis: Duff et al., *Building an orthonormal basis, revisited*,
+    /// JCGT 6(1), 2017.
     fn frame(n: Self::Vector) -> Self::Frame {
         let sign = 1.0f64.copysign(n[2]);
         let a = -1.0 / (sign + n[2]);

@@ -1,20 +1,27 @@
-//! The discrete element model of cohesive granular material, solved implicitly by non-smooth contact dynamics.
+//! The discrete element model of cohesive granular material, solved implicitly by non-smooth
+//! contact dynamics.
 //!
-//! The model is that of M. Guessasma and J. Fortin, *Modélisation d'un milieu discret cohésif par l'approche
-//! dynamique des contacts*, Giens 2011 (hal-00592916): rigid disks and spheres, Signorini–Coulomb contact written as
-//! de Saxcé's bipotential, bonds that carry tension, shear and a rolling moment and break for good.
+//! The model is that of M. Guessasma and J. Fortin, *Modélisation d'un milieu discret cohésif par
+//! l'approche dynamique des contacts*, Giens 2011 (hal-00592916): rigid disks and spheres,
+//! Signorini–Coulomb contact written as de Saxcé's bipotential, bonds that carry tension, shear and
+//! a rolling moment and break for good.
 //!
-//! SI units throughout. Reactions are impulses (N s) inside a step, forces (N) in everything that is reported.
+//! SI units throughout. Reactions are impulses (N s) inside a step, forces (N) in everything that
+//! is reported.
 //!
 //! A disk falls on a floor and stays there:
 //!
 //! ```
 //! use dem_core::prelude::*;
 //!
-//! let disk = Grain::at_rest([0.0, 0.11].into(), 0.01, 25.0); // centre (m), radius (m), density × thickness (kg/m²)
-//! let floor = Wall::fixed(Shape::Plane { normal: [0.0, 1.0].into() }, [0.0, 0.0].into(), 0.5);
-//! let settings = Settings { step: 1e-3, gravity: Some([0.0, -9.81].into()), ..Settings::default() };
-//! let mut world = World::<D2>::new([disk].into_iter().collect(), vec![floor], vec![], settings);
+//! // centre (m), radius (m), density times thickness (kg/m²)
+//! let disk = Grain::at_rest([0.0, 0.11].into(), 0.01, 25.0);
+//! let plane = Shape::Plane { normal: [0.0, 1.0].into() };
+//! let floor = Wall::fixed(plane, [0.0, 0.0].into(), 0.5);
+//! let gravity = Some([0.0, -9.81].into());
+//! let settings = Settings { step: 1e-3, gravity, ..Settings::default() };
+//! let grains = [disk].into_iter().collect();
+//! let mut world = World::<D2>::new(grains, vec![floor], vec![], settings);
 //! for _ in 0..300 {
 //!     world.step()?;
 //! }
@@ -22,8 +29,9 @@
 //! # Ok::<(), StepError>(())
 //! ```
 //!
-//! [`world::World::step`] is the place to read on: a step from top to bottom. `examples/` has a falling disk whose energy is
-//! followed, a bond that is pulled apart, a contact law and a solver of one's own.
+//! [`world::World::step`] is the place to read on: a step from top to bottom. `examples/` has a
+//! falling disk whose energy is followed, a bond that is pulled apart, a contact law and a solver
+//! of one's own.
 #![forbid(unsafe_code)]
 
 pub mod body;

@@ -1,7 +1,7 @@
 //! A state as plain numbers: what a run needs to go on as if it had never stopped, to the bit.
 //!
-//! Whatever saves its state writes its numbers one after the other, and reads them back in the same order. Integers and
-//! reals are kept apart, each as it is: nothing is rounded.
+//! Whatever saves its state writes its numbers one after the other, and reads them back in the same
+//! order. Integers and reals are kept apart, each as it is: nothing is rounded.
 
 use crate::dim::Vect;
 use thiserror::Error;

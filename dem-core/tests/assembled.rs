@@ -24,8 +24,8 @@ fn difference(a: &[f64], b: &[f64]) -> f64 {
     largest(&a.iter().zip(b).map(|(a, b)| a - b).collect::<Vec<_>>())
 }
 
-/// What the relative velocities of all contacts are, read from the nodes: rows n, t and m in the whole frame of each, and what
-/// its law adds to the normal velocity.
+/// What the relative velocities of all contacts are, read from the nodes: rows n, t and m in the
+/// whole frame of each, and what its law adds to the normal velocity.
 struct Velocities<'a> {
     assembled: &'a [f64],
     size: usize,
@@ -64,7 +64,8 @@ impl<D: Dim> Visitor<D> for Velocities<'_> {
     }
 }
 
-/// One problem both ways, after some sweeps: u of every contact from the nodes and from W, and both residuals.
+/// One problem both ways, after some sweeps: u of every contact from the nodes and from W, and both
+/// residuals.
 fn same<D: Dim>(mut problem: ContactProblem<D>) {
     problem.velocities_from_reactions();
     let walls = problem.nodes.drives.iter().any(|d| d.norm() > 0.0);
@@ -78,7 +79,8 @@ fn same<D: Dim>(mut problem: ContactProblem<D>) {
         problem.visit(&mut seen);
         assert_eq!(seen.contact, assembled.len());
         let (a, b) = (residual(&problem), assembled.residual());
-        // the definition, and the matrix: the wall is driven along its normal, so that its blocks are exact
+        // the definition, and the matrix: the wall is driven along its normal, so that its blocks
+        // are exact
         let defined = seen.map.sqrt() / seen.reaction.sqrt().max(problem.applied);
         assert!(a > 0.0 && (a - defined).abs() <= 1e-12 * a + 1e-15, "{a:e} and {defined:e}");
         assert!((a - b).abs() <= 1e-9 * a + 1e-15, "{a:e} and {b:e}");

@@ -52,7 +52,8 @@ fn squeezed<D: Dim>(count: usize) -> World<D> {
     world(row(count), vec![plane(&[1.0], &[]), press], set())
 }
 
-/// The verdict on the first step. With the matrix alone a solution may not be guaranteed, for what bodies do by themselves is not known.
+/// The verdict on the first step. With the matrix alone a solution may not be guaranteed, for what
+/// bodies do by themselves is not known.
 fn of<D: Dim>(w: &mut World<D>) -> Verdict<usize> {
     let problem = w.contact_problem();
     let found = verdict(&problem);
@@ -86,9 +87,10 @@ fn a_grain_between_walls_that_close_has_no_solution() {
     case::<D3>();
 }
 
-/// The wall that comes nearer has a gap to the grain, a part of its way in the step; the rest of the way has no room, and one of the two
-/// contacts closes by half of it or more. The reactions only balance each other: the power that they leave is that of the rest, which is
-/// what they act against, and not that of the whole way.
+/// The wall that comes nearer has a gap to the grain, a part of its way in the step; the rest of
+/// the way has no room, and one of the two contacts closes by half of it or more. The reactions
+/// only balance each other: the power that they leave is that of the rest, which is what they act
+/// against, and not that of the whole way.
 #[test]
 fn walls_jam_a_grain_by_the_way_beyond_its_gap() {
     fn case<D: Dim>() {
@@ -166,9 +168,10 @@ fn a_heavy_wall_gives_way() {
     }
 }
 
-/// A wedge of half-angle α with tan α < μ, one plate of which slides along itself towards the edge: impulses that hold the grain there at
-/// the limit of friction balance and resist that motion, so a solution is not guaranteed. Without a load there is one, no reactions at
-/// all. Under a load none is found.
+/// A wedge of half-angle α with tan α < μ, one plate of which slides along itself towards the edge:
+/// impulses that hold the grain there at the limit of friction balance and resist that motion, so a
+/// solution is not guaranteed. Without a load there is one, no reactions at all. Under a load none
+/// is found.
 #[test]
 fn a_plate_that_slides_along_itself_is_undecided() {
     let (s, c) = 0.1f64.sin_cos();
@@ -184,8 +187,9 @@ fn a_plate_that_slides_along_itself_is_undecided() {
     }
 }
 
-/// The plates of that wedge close on the grain. It can only move outwards and friction, which is then inwards, exceeds what
-/// pushes it out where μ > tan α. Where the friction is less, the grain is pushed out.
+/// The plates of that wedge close on the grain. It can only move outwards and friction, which is
+/// then inwards, exceeds what pushes it out where μ > tan α. Where the friction is less, the grain
+/// is pushed out.
 #[test]
 fn a_pip_between_closing_plates_is_undecided() {
     for (angle, found) in [(0.1f64, Verdict::Undecided), (0.6, Verdict::Guaranteed)] {
@@ -233,7 +237,8 @@ fn a_failure_of_the_solver_is_said_to_be_one() {
     assert_eq!(fails(&mut w), Verdict::Guaranteed);
 }
 
-/// Small random problems of low rank: what is solved is never called infeasible, and each verdict occurs.
+/// Small random problems of low rank: what is solved is never called infeasible, and each verdict
+/// occurs.
 #[test]
 fn no_verdict_contradicts_a_solution() {
     let mut rng = Pcg64::seed_from_u64(5);

@@ -172,7 +172,8 @@ fn slide<D: Dim>(v: f64, mu: f64) -> Slide {
 #[test]
 fn a_free_grain_slides_and_then_rolls() {
     let (v, mu) = (0.3, 0.25);
-    // the contact point slows down by μ g (1 + m R²/I), the centre by μ g: until v/(3 μ g) in 2D and v/(3.5 μ g) in 3D
+    // the contact point slows down by μ g (1 + m R²/I), the centre by μ g: until v/(3 μ g) in 2D
+    // and v/(3.5 μ g) in 3D
     let unit = v * v / (mu * G);
     for (found, way, slip, speed) in [
         (slide::<D2>(v, mu), 5.0 / 18.0, 1.0 / 6.0, 2.0 / 3.0),
@@ -257,7 +258,8 @@ fn breaking(mut w: World<D2>, steps: usize) -> Option<(dem_core::world::Break<D2
 
 #[test]
 fn a_bond_breaks_in_tension_at_r_coh() {
-    // pulled at 1000 N/s, 10 N is reached after 100 steps of 1e-4 s; one step is 0.1 N, so step finer at the end
+    // pulled at 1000 N/s, 10 N is reached after 100 steps of 1e-4 s; one step is 0.1 N, so step
+    // finer at the end
     let (b, time) = breaking(bonded_pair(10.0, [1000.0, 0.0], 0.0), 200).expect("it breaks");
     assert_eq!(b.mode, BondStatus::Tension);
     assert!((b.reaction.n + 10.0).abs() < 1e-6 * 10.0, "{}", b.reaction.n);
@@ -267,7 +269,8 @@ fn a_bond_breaks_in_tension_at_r_coh() {
 
 #[test]
 fn a_bond_breaks_in_shear_at_mu_times_the_shifted_normal_reaction() {
-    // the shear force at the free disk's centre is balanced by a torque at the contact: no moment in the bond
+    // the shear force at the free disk's centre is balanced by a torque at the contact: no moment
+    // in the bond
     let (b, _) = breaking(bonded_pair(10.0, [-200.0, 1000.0], -1.0), 2000).expect("it breaks");
     assert_eq!(b.mode, BondStatus::Shear);
     assert!((b.reaction.t[0].abs() / (0.3 * (b.reaction.n + 10.0)) - 1.0).abs() < 1e-6);

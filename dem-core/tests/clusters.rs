@@ -1,4 +1,5 @@
-//! Fragments that fly and slide: bonds far below their limits, and contacts with fast slip and small reactions.
+//! Fragments that fly and slide: bonds far below their limits, and contacts with fast slip and
+//! small reactions.
 
 mod common;
 
@@ -9,7 +10,8 @@ use dem_core::world::World;
 
 const R: f64 = 1e-3;
 
-/// Blocks of 2 × 3 × 2 bonded spheres above a floor, tilted and thrown; strength of a bond 10⁴ weights of a sphere.
+/// Blocks of 2 × 3 × 2 bonded spheres above a floor, tilted and thrown; strength of a bond 10⁴
+/// weights of a sphere.
 fn blocks(stages: Stages) -> World<D3> {
     let mut grains = Vec::new();
     for (k, (tilt, v)) in

@@ -8,7 +8,8 @@ use dem_core::world::{Restitution, World};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-/// A cloud of grains of different sizes that fly into each other; neighbours in the first rows may be bonded.
+/// A cloud of grains of different sizes that fly into each other; neighbours in the first rows may
+/// be bonded.
 fn cloud<D: Dim>(seed: u64, friction: f64, restitution: f64) -> World<D> {
     let mut rng = Pcg64::seed_from_u64(seed);
     let mut set = settings(1e-3);
@@ -55,7 +56,8 @@ fn keeps_momentum<D: Dim>(bonded: bool) {
     run(&mut w, 150);
     let end = w.momentum();
     assert!((end.linear - start.linear).norm() <= 1e-13 * exchanged);
-    // positions at mid-step carry the moments: the exchange is exact there, up to the drift of half a step
+    // positions at mid-step carry the moments: the exchange is exact there, up to the drift of half
+    // a step
     assert!(
         (end.angular - start.angular).norm() <= 1e-12 * exchanged * 0.1,
         "{}",
@@ -144,8 +146,8 @@ fn losses_are_booked_where_they_belong() {
         [w.ledger.impact, w.ledger.friction].map(|energy| energy / (0.5 * w.grains.mass[0]))
     }
     for e in [0.0, 0.5] {
-        // a blow of 2 m/s straight on loses (1 − e²) 4 m²/s²; friction slows the slip of 1 m/s by μ times its impulse, for
-        // which a disk is a third of its mass, a sphere two sevenths
+        // a blow of 2 m/s straight on loses (1 − e²) 4 m²/s²; friction slows the slip of 1 m/s by μ
+        // times its impulse, for which a disk is a third of its mass, a sphere two sevenths
         let (straight, mu) = (4.0 * (1.0 - e * e), 0.05);
         let impulse = mu * 2.0 * (1.0 + e);
         for (smooth, rough, mass) in

@@ -1,4 +1,5 @@
-//! The list of candidates while bodies move: it holds every pair within reach, and is kept while nothing has gone too far.
+//! The list of candidates while bodies move: it holds every pair within reach, and is kept while
+//! nothing has gone too far.
 
 mod common;
 
@@ -89,7 +90,8 @@ fn candidates_hold_every_pair_within_reach_while_bodies_move() {
 
 #[test]
 fn the_list_is_kept_until_a_body_has_used_up_its_skin() {
-    // two grains, the gap 0.1: a list made with 0.01 of reach and 0.02 to spare lacks the pair, one made with 1 to spare has it
+    // two grains, the gap 0.1: a list made with 0.01 of reach and 0.02 to spare lacks the pair, one
+    // made with 1 to spare has it
     let grains: Grains<D2> = [grain(&[0.0, 0.0], 0.1), grain(&[0.3, 0.0], 0.1)].into_iter().collect();
     let mut candidates = Candidates::<D2>::default();
     let mut pairs = |moved: f64, reach: f64, spare: f64| {

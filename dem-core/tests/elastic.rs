@@ -1,4 +1,5 @@
-//! Elastic bonds: waves, moduli, energy, stability, rupture, and that every solver finds their one answer.
+//! Elastic bonds: waves, moduli, energy, stability, rupture, and that every solver finds their one
+//! answer.
 
 mod common;
 
@@ -20,14 +21,16 @@ const R: f64 = 0.01;
 const A: f64 = 2.0 * R;
 /// Normal stiffness (N/m).
 const K: f64 = 1e6;
-/// Strength (N) beyond all forces of these tests; not by far, for it is a shift of reactions and takes digits from them.
+/// Strength (N) beyond all forces of these tests; not by far, for it is a shift of reactions and
+/// takes digits from them.
 const UNBREAKABLE: f64 = 1e3;
 
 fn newton(tolerance: f64, load_tolerance: f64) -> SolverSettings {
     SolverSettings::Staged(common::newton(tolerance, 100.0 * tolerance, load_tolerance))
 }
 
-/// Springs with the tangential stiffness over the normal one, that bend as a bar as wide as long does.
+/// Springs with the tangential stiffness over the normal one, that bend as a bar as wide as long
+/// does.
 fn springs(normal: f64, ratio: f64) -> impl Fn(f64) -> Stiffness {
     move |a| Stiffness {
         normal,
@@ -37,12 +40,14 @@ fn springs(normal: f64, ratio: f64) -> impl Fn(f64) -> Stiffness {
     }
 }
 
-/// The angular frequency that steps of length h show of a vibration ω: a step turns it by atan(ωh) and not ωh.
+/// The angular frequency that steps of length h show of a vibration ω: a step turns it by atan(ωh)
+/// and not ωh.
 fn seen(omega: f64, h: f64) -> f64 {
     (omega * h).atan() / h
 }
 
-/// Angular frequency (1/s) of what `amplitude` reads off a world that vibrates: from the zeros of its first periods.
+/// Angular frequency (1/s) of what `amplitude` reads off a world that vibrates: from the zeros of
+/// its first periods.
 fn frequency<D: Dim>(w: &mut World<D>, amplitude: impl Fn(&World<D>) -> f64) -> f64 {
     let mut zeros = Vec::new();
     let mut last = amplitude(w);
@@ -81,12 +86,13 @@ fn a_chain_vibrates_as_a_chain_of_springs() {
     assert!((found / q / speed - 1.0).abs() < 0.01, "{} m/s against {speed}", found / q);
 }
 
-/// A strip of an infinite hexagonal lattice, cut so that nothing of a longitudinal standing wave of half a length `cells` A
-/// along its rows is lost, at rest.
+/// A strip of an infinite hexagonal lattice, cut so that nothing of a longitudinal standing wave of
+/// half a length `cells` A along its rows is lost, at rest.
 ///
-/// Above and below it ends in a mirror: half a row (half of its mass, half of the stiffness along it), which slides on a
-/// wall without friction, onto which a load holds it, and does not turn. At both ends the wave is odd: rows have a fixed
-/// grain there, or the mirror image of their last grain, which moves against it: twice the stiffness to a fixed grain.
+/// Above and below it ends in a mirror: half a row (half of its mass, half of the stiffness along
+/// it), which slides on a wall without friction, onto which a load holds it, and does not turn. At
+/// both ends the wave is odd: rows have a fixed grain there, or the mirror image of their last
+/// grain, which moves against it: twice the stiffness to a fixed grain.
 fn wave_strip(cells: usize, ratio: f64) -> World<D2> {
     let rows = 5;
     let (length, pitch) = (A * cells as f64, 0.75f64.sqrt() * A);
@@ -135,12 +141,12 @@ fn wave_strip(cells: usize, ratio: f64) -> World<D2> {
 
 #[test]
 fn a_wave_in_the_hexagonal_lattice_has_the_lattice_s_speed() {
-    // Displacements u(x) along x, a direction of the rows. The mirror y → −y leaves u as it is and changes the sign of u_y
-    // and of spins: both stay zero. A grain has two neighbours at ±a, and four at ±a/2 whose bonds are tilted by 60° and
-    // resist with k_n cos²60° + k_t sin²60°. So
-    //   m ω² = 4 k_n sin²(q a/2) + (2 k_n + 6 k_t) sin²(q a/4),
-    // and for long waves c² = 3 a² (3 k_n + k_t) / (8 m), the longitudinal modulus √3/4 (3 k_n + k_t) of the lattice over its
-    // density m / (√3/2 a²).
+    // Displacements u(x) along x, a direction of the rows. The mirror y → −y leaves u as it is and
+    // changes the sign of u_y and of spins: both stay zero. A grain has two neighbours at ±a, and
+    // four at ±a/2 whose bonds are tilted by 60° and resist with k_n cos²60° + k_t sin²60°. So m ω²
+    // = 4 k_n sin²(q a/2) + (2 k_n + 6 k_t) sin²(q a/4), and for long waves c² = 3 a² (3 k_n + k_t)
+    // / (8 m), the longitudinal modulus √3/4 (3 k_n + k_t) of the lattice over its density m /
+    // (√3/2 a²).
     let cells = 24;
     let q = PI / (A * cells as f64);
     for ratio in [1e-6, 0.3, 1.0] {
@@ -175,8 +181,9 @@ fn settle<D: Dim>(w: &mut World<D>) {
 
 #[test]
 fn the_hexagonal_lattice_has_its_moduli() {
-    // C11 = √3/4 (3 k_n + k_t) and C12 = √3/4 (k_n − k_t) (forces per length, no spins in a uniform strain) give
-    // E = 2√3 k_n (k_n + k_t) / (3 k_n + k_t) and ν = (k_n − k_t) / (3 k_n + k_t) for a free lattice pulled along its rows.
+    // C11 = √3/4 (3 k_n + k_t) and C12 = √3/4 (k_n − k_t) (forces per length, no spins in a uniform
+    // strain) give E = 2√3 k_n (k_n + k_t) / (3 k_n + k_t) and ν = (k_n − k_t) / (3 k_n + k_t) for
+    // a free lattice pulled along its rows.
     let (rows, columns) = (7, 20);
     let stress = 100.0;
     let h32 = 0.75f64.sqrt();
@@ -184,7 +191,8 @@ fn the_hexagonal_lattice_has_its_moduli() {
         let young = 2.0 * 3f64.sqrt() * K * (1.0 + ratio) / (3.0 + ratio);
         let poisson = (1.0 - ratio) / (3.0 + ratio);
         let strain = [stress / young, -poisson * stress / young];
-        // the forces of the strained lattice on a grain from its six neighbours; those on the cut ends are the load
+        // the forces of the strained lattice on a grain from its six neighbours; those on the cut
+        // ends are the load
         let neighbours = [(1.0, 0.0), (0.5, h32), (-0.5, h32), (-1.0, 0.0), (-0.5, -h32), (0.5, -h32)];
         let mut lattice = Vec::new();
         for row in 0..rows {
@@ -328,8 +336,9 @@ fn the_books_balance_through_breaks() {
     }
 }
 
-/// Kinetic and elastic energy never grow without forces, but for what bonds that turn are given back, and what is lost is the
-/// damping ½ Σ m |Δv|² + ½ Σ k (h u⁺)² + Σ r b of each step, b the rate by which turning lengthened the bond before.
+/// Kinetic and elastic energy never grow without forces, but for what bonds that turn are given
+/// back, and what is lost is the damping ½ Σ m |Δv|² + ½ Σ k (h u⁺)² + Σ r b of each step, b the
+/// rate by which turning lengthened the bond before.
 fn never_grows<D: Dim>(periods: f64) {
     let mut rng = Pcg64::seed_from_u64(5);
     let side: usize = if D::N == 2 { 5 } else { 3 };
@@ -346,7 +355,8 @@ fn never_grows<D: Dim>(periods: f64) {
     let omega = (K / grains[0].mass).sqrt();
     let h = periods * 2.0 * PI / omega;
     let mut set = settings(h);
-    // at rest bonds that turned keep forces that balance each other: the load error is relative to what still moves
+    // at rest bonds that turned keep forces that balance each other: the load error is relative to
+    // what still moves
     set.solver = newton(1e-10, 1e-6);
     let mut w = world(grains, vec![], set);
     // by a thousandth of the radius in a step, or in a period
@@ -390,7 +400,8 @@ fn never_grows<D: Dim>(periods: f64) {
             lost += t.reaction.n * (way.dot(&way) - along * along) / (now.norm() + length + along);
         }
         let damping = w.ledger.damping - damped;
-        // the laws hold as well as the solver's tolerance says, 1e-10 of what the reactions have exchanged
+        // the laws hold as well as the solver's tolerance says, 1e-10 of what the reactions have
+        // exchanged
         let allowed = 1e-12 * first + 1e-10 * exchanged;
         assert!((damping - lost).abs() <= allowed, "{damping:e} against {lost:e} of {first:e}");
     }
@@ -405,8 +416,8 @@ fn energy_never_grows_however_long_the_step() {
     }
 }
 
-/// A pair, loaded slowly up to a share of what its bond bears and let rest there; whether and how it broke, with the
-/// energy set free over ½ f²/k.
+/// A pair, loaded slowly up to a share of what its bond bears and let rest there; whether and how
+/// it broke, with the energy set free over ½ f²/k.
 fn loaded(share: f64, force: [f64; 2], torque: f64) -> Option<(BondStatus, f64)> {
     let (k, coh) = (1e12, 10.0);
     let steps = 400;
@@ -438,7 +449,8 @@ fn loaded(share: f64, force: [f64; 2], torque: f64) -> Option<(BondStatus, f64)>
 #[test]
 fn a_bond_breaks_at_its_threshold_and_sets_its_energy_free() {
     let (mu, coh, a) = (0.3, 10.0, 2e-3);
-    // tension; shear whose moment at the contact a torque takes away, under pressure; a moment under pressure
+    // tension; shear whose moment at the contact a torque takes away, under pressure; a moment
+    // under pressure
     let shear = mu * coh / (1.0 - 0.2 * mu);
     let moment = mu * a * (coh + 5.0);
     for (mode, force, torque) in [
@@ -533,7 +545,8 @@ fn the_answer_does_not_depend_on_the_start() {
     start_does_not_matter::<D3Twist>(3);
 }
 
-/// A hexagonal block whose first column is held and whose last is pulled across: many reactions balance that.
+/// A hexagonal block whose first column is held and whose last is pulled across: many reactions
+/// balance that.
 fn held_block() -> World<D2> {
     let (mut grains, mut loads) = (Vec::new(), Vec::new());
     for row in 0..6 {

@@ -1,7 +1,9 @@
-//! One short run, held to the bit: what changes it changes all results, and belongs into the list of changes.
+//! One short run, held to the bit: what changes it changes all results, and belongs into the list
+//! of changes.
 //!
-//! Its bits hold for x86_64 Linux: Gauss–Seidel in 2D uses what IEEE 754 fixes, sums, products, quotients and roots, in an order
-//! that the scene fixes. Where a change is meant, the test prints the new value for [`GOLDEN`].
+//! Its bits hold for x86_64 Linux: Gauss–Seidel in 2D uses what IEEE 754 fixes, sums, products,
+//! quotients and roots, in an order that the scene fixes. Where a change is meant, the test prints
+//! the new value for [`GOLDEN`].
 
 mod common;
 
@@ -29,7 +31,8 @@ impl Hash {
     }
 }
 
-/// Bonded disks on a floor, under a lid whose force grows until some of their bonds have broken, and twenty steps more.
+/// Bonded disks on a floor, under a lid whose force grows until some of their bonds have broken,
+/// and twenty steps more.
 fn compressed() -> World<D2> {
     let mut w = pressed::<D2>(3, 6, 0.3, Some(BondFlow::Associated));
     w.stop_motion();

@@ -1,5 +1,6 @@
-//! The maps H and Hᵀ between the nodes and the contacts, for grains whose radii differ by a factor of two and walls of every
-//! drive: each is the transpose of the other, rigid motion is seen by no contact, and local blocks are what unit impulses do.
+//! The maps H and Hᵀ between the nodes and the contacts, for grains whose radii differ by a factor
+//! of two and walls of every drive: each is the transpose of the other, rigid motion is seen by no
+//! contact, and local blocks are what unit impulses do.
 
 mod common;
 
@@ -24,9 +25,9 @@ fn unit<V: Vect>(rng: &mut Pcg64) -> V {
     v * (1.0 / v.norm())
 }
 
-/// A walk of grains, each of which touches the one before and may overlap others. Every third pair that touches is bonded
-/// rigidly, every third by a spring. One grain is fixed, a floor too; a lid is driven by a force aslant to its normal, a side
-/// without friction moves at a given speed.
+/// A walk of grains, each of which touches the one before and may overlap others. Every third pair
+/// that touches is bonded rigidly, every third by a spring. One grain is fixed, a floor too; a lid
+/// is driven by a force aslant to its normal, a side without friction moves at a given speed.
 fn crowd<D: Dim>(seed: u64, friction: f64) -> ContactProblem<D> {
     let mut rng = Pcg64::seed_from_u64(seed);
     let mut grains = vec![grain::<D>(&vec![0.0; D::N], 0.01)];
@@ -72,7 +73,8 @@ fn crowd<D: Dim>(seed: u64, friction: f64) -> ContactProblem<D> {
     w.contact_problem()
 }
 
-/// Checks every contact that it visits, at random velocities and impulses, and counts them by their rows.
+/// Checks every contact that it visits, at random velocities and impulses, and counts them by their
+/// rows.
 struct Check {
     rng: Pcg64,
     seen: [usize; 4],

@@ -40,7 +40,8 @@ fn sliding<D: Dim>() {
     assert!((w.reference_volume() / volume - 1.0).abs() < 1e-14);
     let weight = w.grains.mass[0] * G;
     let (last, force) = (D::N - 1, [-mu * weight, weight]);
-    // ℓ = R e_last, f = −μ m g e_0 + m g e_last: the row is that of the branch, the column that of the force
+    // ℓ = R e_last, f = −μ m g e_0 + m g e_last: the row is that of the branch, the column that of
+    // the force
     let expected = |row: usize, col: usize| match (row == last, col) {
         (true, 0) => r * force[0],
         (true, col) if col == last => r * force[1],
@@ -55,7 +56,8 @@ fn the_stress_of_a_sliding_grain_has_the_branch_in_its_rows() {
     sliding::<D3>();
 }
 
-/// A column of grains of several sizes between a floor and a lid: Σ ℓ f is the force times the height.
+/// A column of grains of several sizes between a floor and a lid: Σ ℓ f is the force times the
+/// height.
 fn column<D: Dim>() {
     let radii = [0.01, 0.006, 0.008, 0.005];
     let (mut grains, mut top) = (Vec::new(), 0.0);
@@ -80,7 +82,8 @@ fn the_stress_of_a_column_is_its_load() {
     column::<D3>();
 }
 
-/// Grains inside a ring that shrinks onto them from one side: the branch at a wall begins at the contact point.
+/// Grains inside a ring that shrinks onto them from one side: the branch at a wall begins at the
+/// contact point.
 #[test]
 fn the_branch_at_a_round_wall_begins_at_the_contact_point() {
     let (r, ring) = (0.01, 0.05);
@@ -116,8 +119,8 @@ fn strained<D: Dim>() {
     }
 }
 
-/// The mean displacement is taken off before the fit: a way of 2³⁰ m, which is exact here, would leave the rounding of the places as a
-/// strain of some 1e-6.
+/// The mean displacement is taken off before the fit: a way of 2³⁰ m, which is exact here, would
+/// leave the rounding of the places as a strain of some 1e-6.
 #[test]
 fn a_sample_that_is_carried_far_is_not_strained() {
     let grains = (0..7u8).map(|k| grain::<D2>(&[0.25 * f64::from(k % 3), 0.25 * f64::from(k / 3)], 0.125)).collect();
@@ -130,7 +133,8 @@ fn a_sample_that_is_carried_far_is_not_strained() {
 fn the_strain_is_the_gradient_of_the_displacements() {
     strained::<D2>();
     strained::<D3>();
-    // grains in a row span one direction only, and so they do where every other is off by a ten-millionth of a radius
+    // grains in a row span one direction only, and so they do where every other is off by a
+    // ten-millionth of a radius
     let of_row = |off: f64| {
         let place = |k: u8| [0.02 * f64::from(k), off * f64::from(k % 2)];
         let mut w = world((0..4).map(|k| grain::<D2>(&place(k), 0.01)).collect(), Vec::new(), settings(1e-3));
@@ -203,7 +207,8 @@ fn the_force_of_a_wall_of_prescribed_velocity_is_a_load() {
     assert_eq!(w.step().expect("a step").false_acceleration, 0.0);
 }
 
-/// On a floor: a grain at rest, one that slides, a bonded pair at rest, and two at rest beside each other with a small gap.
+/// On a floor: a grain at rest, one that slides, a bonded pair at rest, and two at rest beside each
+/// other with a small gap.
 #[test]
 fn contacts_are_counted_by_what_they_did() {
     let r = 0.01;

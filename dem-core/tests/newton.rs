@@ -44,8 +44,8 @@ fn dry_disks(centres: impl Iterator<Item = [f64; 2]>, walls: Vec<Wall<D2>>) -> W
     world(centres.map(|x| grain::<D2>(&x, 0.01)).collect(), walls, set)
 }
 
-/// The problem as Newton solves it from no reactions at all, to a residual of 1e-10 and a load error of 1e-9, in at most
-/// thirty iterations.
+/// The problem as Newton solves it from no reactions at all, to a residual of 1e-10 and a load
+/// error of 1e-9, in at most thirty iterations.
 fn solved_cold<D: Dim>(world: &mut World<D>) -> ContactProblem<D> {
     let mut problem = world.contact_problem();
     // sweeps that are accepted would end far from the answer
@@ -65,7 +65,8 @@ fn a_column_of_2000_from_no_reactions() {
     assert!((on_the_floor / weight - 1.0).abs() <= 1e-6, "{:e}", on_the_floor / weight - 1.0);
 }
 
-/// Disks along the line of thrust of their weight: each contact bears the same horizontal force, and no friction.
+/// Disks along the line of thrust of their weight: each contact bears the same horizontal force,
+/// and no friction.
 #[test]
 fn an_arch_from_no_reactions() {
     let (count, rise) = (41, 0.1);
@@ -93,7 +94,8 @@ fn an_arch_from_no_reactions() {
     }
 }
 
-/// A dry hexagonal block in a box, under a lid. What each contact bears is not unique, what the floor bears is.
+/// A dry hexagonal block in a box, under a lid. What each contact bears is not unique, what the
+/// floor bears is.
 #[test]
 fn a_pressed_hexagonal_block_from_no_reactions() {
     let (rows, columns, r) = (40, 40, 0.01);
@@ -114,7 +116,8 @@ fn a_pressed_hexagonal_block_from_no_reactions() {
     assert!(fastest <= 1e-9 * free, "{:e}", fastest / free);
 }
 
-/// A box of bonded and dry grains with random radii, pressed from above and sheared from the side: all kinds of rows.
+/// A box of bonded and dry grains with random radii, pressed from above and sheared from the side:
+/// all kinds of rows.
 fn pressed<D: Dim>(seed: u64, bonded: bool) -> World<D> {
     let mut rng = Pcg64::seed_from_u64(seed);
     let side: usize = if D::N == 2 { 8 } else { 4 };
@@ -150,7 +153,8 @@ fn solved<D: Dim>(problem: &ContactProblem<D>, settings: SolverSettings) -> Cont
     problem
 }
 
-/// Largest difference of velocities between Newton and Gauss–Seidel at a tolerance, over the largest velocity.
+/// Largest difference of velocities between Newton and Gauss–Seidel at a tolerance, over the
+/// largest velocity.
 fn apart<D: Dim>(problem: &ContactProblem<D>, found: &ContactProblem<D>, tolerance: f64) -> f64 {
     let swept = solved(problem, solver(tolerance));
     let scale: f64 = swept.nodes.all.iter().map(|n| n.velocity.norm()).fold(0.0, f64::max);
@@ -199,9 +203,11 @@ fn a_struck_beam_is_solved_from_no_guess() {
 
 #[test]
 fn gauss_seidel_approaches_newton_in_3d() {
-    // a million sweeps come to 1e-7 here: what can be seen is that they head for the same velocities
+    // a million sweeps come to 1e-7 here: what can be seen is that they head for the same
+    // velocities
     let problem = pressed::<D3>(0, true).contact_problem();
-    // the last path leaves a load error of 3e-8 or 4e-6, as it is rounded: nothing beside the thousandth that is asked for
+    // the last path leaves a load error of 3e-8 or 4e-6, as it is rounded: nothing beside the
+    // thousandth that is asked for
     let found = solved(&problem, SolverSettings::Staged(common::newton(1e-10, 1e-10, 1e-5)));
     let [coarse, fine] = [1e-5, 1e-7].map(|tolerance| apart(&problem, &found, tolerance));
     assert!(fine <= 0.1 * coarse && fine <= 1e-3, "{coarse:e}, then {fine:e}");
@@ -216,7 +222,8 @@ fn dry_and_bonded_problems_reach_the_residual() {
     }
 }
 
-/// A hexagonal block between two plates: hyperstatic, so that reactions are many and velocities are one.
+/// A hexagonal block between two plates: hyperstatic, so that reactions are many and velocities are
+/// one.
 fn block() -> World<D2> {
     pressed_block(|_| 50.0)
 }
@@ -279,9 +286,9 @@ fn a_rigid_block_does_not_move_before_it_breaks() {
     assert!(strain.iter().all(|e| e.abs() <= 1e-9), "{strain:?}");
 }
 
-/// Carries a sample on for `most` steps, or until a bond breaks, beside one whose solver is a new one in every step, and so has
-/// nothing to predict from: the reactions and what breaks are the same. The share of the steps that were predicted, and whether
-/// a bond broke.
+/// Carries a sample on for `most` steps, or until a bond breaks, beside one whose solver is a new
+/// one in every step, and so has nothing to predict from: the reactions and what breaks are the
+/// same. The share of the steps that were predicted, and whether a bond broke.
 fn predicted(most: u64, mut w: World<D2>, mut solved: World<D2>) -> (f64, bool) {
     w.set_solver(newton(1e-8, Start::StiffLimit));
     let mut predicted = 0;
@@ -333,8 +340,8 @@ fn contacts_that_stick_or_close_unseen_are_not_predicted() {
     assert!(share > 0.5 && !broke, "{share}");
 }
 
-/// The forces (N) between a floor and five bonded disks in a row on it, and those in the step after the row was tilted, so
-/// that each disk lies `tilt` (–) of a radius higher than the one before.
+/// The forces (N) between a floor and five bonded disks in a row on it, and those in the step after
+/// the row was tilted, so that each disk lies `tilt` (–) of a radius higher than the one before.
 fn forces_of_a_tilted_row(tilt: f64) -> [Vec<f64>; 2] {
     let mut set = settings(1e-5);
     set.gravity = down::<D2>(9.81);

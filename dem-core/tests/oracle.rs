@@ -1,6 +1,8 @@
-//! The convex problems against an interior-point method: without friction, or with associated bonds only.
+//! The convex problems against an interior-point method: without friction, or with associated bonds
+//! only.
 //!
-//! minimise ½ r̂·W r̂ + q·r̂ over the cones; K = { ‖t‖ ≤ μ n, ‖m‖ ≤ ν n, |τ| ≤ ξ n } is second-order cones on the same n.
+//! minimise ½ r̂·W r̂ + q·r̂ over the cones; K = { ‖t‖ ≤ μ n, ‖m‖ ≤ ν n, |τ| ≤ ξ n } is
+//! second-order cones on the same n.
 
 mod common;
 

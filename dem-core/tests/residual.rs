@@ -1,4 +1,5 @@
-//! The residual against its definition, at a pair of grains: what it is relative to, and below which rounding it is zero.
+//! The residual against its definition, at a pair of grains: what it is relative to, and below
+//! which rounding it is zero.
 
 mod common;
 
@@ -14,7 +15,8 @@ const MU: f64 = 0.3;
 /// Normal impulse (N s), so large that the contact sticks.
 const PUSH: f64 = 1e3;
 
-/// Two grains that touch, the second three times as large, at these velocities (m/s) along their line and spins (rad/s).
+/// Two grains that touch, the second three times as large, at these velocities (m/s) along their
+/// line and spins (rad/s).
 fn pair<D: Dim>(speeds: [f64; 2], spins: [f64; 2]) -> ContactProblem<D> {
     let mut second = vec![0.0; D::N];
     second[0] = 0.04;
@@ -31,7 +33,8 @@ fn pair<D: Dim>(speeds: [f64; 2], spins: [f64; 2]) -> ContactProblem<D> {
 }
 
 fn definition<D: Dim>() {
-    // the first moves along the normal, away from the second, at 0.1 m/s: the map is γ u_n, whatever is applied
+    // the first moves along the normal, away from the second, at 0.1 m/s: the map is γ u_n,
+    // whatever is applied
     let mut problem = pair::<D>([-0.1, 0.0], [0.0; 2]);
     let gamma = problem.dry[0].law.gamma();
     for (applied, scale) in [(0.0, PUSH), (0.5 * PUSH, PUSH), (7.0 * PUSH, 7.0 * PUSH)] {
@@ -70,7 +73,8 @@ fn the_residual_is_the_natural_map_over_the_larger_of_reactions_and_load() {
     definition::<D3>();
 }
 
-/// Beyond some ten thousand contacts sums are made in parts. Of so many equal contacts the residual is that of one.
+/// Beyond some ten thousand contacts sums are made in parts. Of so many equal contacts the residual
+/// is that of one.
 #[test]
 fn a_sum_in_parts_is_that_of_its_contacts() {
     let one = pair::<D2>([-0.1, 0.0], [20.0, 10.0]);
@@ -92,9 +96,10 @@ fn a_map_that_is_rounding_is_none() {
     rounding::<D3>();
 }
 
-/// The pair is bonded by a spring of compliance C and parts. After a step, which began without a force, the bond carries R and
-/// u = −C R. In the next, reactions ρ R make the velocities −C R + w ρ R, w = 1/m_i + 1/m_j; the law of the spring asks that
-/// u + C (ρ R − R) is zero. Without reactions that is −2 C R: the error is |ρ (1 + w/C) / 2 − 1|.
+/// The pair is bonded by a spring of compliance C and parts. After a step, which began without a
+/// force, the bond carries R and u = −C R. In the next, reactions ρ R make the velocities −C R + w
+/// ρ R, w = 1/m_i + 1/m_j; the law of the spring asks that u + C (ρ R − R) is zero. Without
+/// reactions that is −2 C R: the error is |ρ (1 + w/C) / 2 − 1|.
 fn sprung<D: Dim>() {
     let (h, ratio) = (1e-3, 3.0);
     let mut second = vec![0.0; D::N];
@@ -123,7 +128,8 @@ fn the_velocity_error_of_a_spring_is_relative_to_what_its_force_would_leave() {
     sprung::<D3>();
 }
 
-/// One contact with its matrix: W = diag(w, w/2), q = −w r − `push` in the normal row, so that u_n is −`push`.
+/// One contact with its matrix: W = diag(w, w/2), q = −w r − `push` in the normal row, so that u_n
+/// is −`push`.
 fn assembled(w: f64, r: f64, push: f64, shift: f64, applied: f64) -> Assembled {
     let parts = Parts {
         rows: ContactRows { tangents: 1, moments: 0 },

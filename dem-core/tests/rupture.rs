@@ -17,7 +17,8 @@ const XI: f64 = 0.17;
 /// Mean diameter of the pair (m).
 const A: f64 = 2e-3;
 
-/// A bonded pair along the first axis, its first grain fixed, under a constant force and torque on the second.
+/// A bonded pair along the first axis, its first grain fixed, under a constant force and torque on
+/// the second.
 fn pair<D: Dim>(force: &[f64], torque: &[f64]) -> World<D> {
     let mut second = vec![0.0; D::N];
     second[0] = A;
@@ -56,9 +57,8 @@ fn thresholds_are_met_within_1e_6() {
     let near = 1e-6;
     for normal in [-R_COH * 0.5, 0.0, 3.0 * R_COH] {
         let limit = normal + R_COH;
-        // pure pull; the normal reaction is minus the pull
-        // shear: the force at the centre has the lever A/2, and a torque takes its moment from the bond
-        // rolling: a torque alone
+        // pure pull; the normal reaction is minus the pull shear: the force at the centre has the
+        // lever A/2, and a torque takes its moment from the bond rolling: a torque alone
         for (share, breaks) in [(1.0 - near, None), (1.0 + near, Some(()))] {
             let tension = first_break(pair::<D2>(&[R_COH * share, 0.0], &[0.0]));
             assert_eq!(tension.map(|b| b.mode), breaks.map(|_| BondStatus::Tension));
@@ -130,7 +130,8 @@ fn a_broken_pair_is_bit_for_bit_a_pair_that_was_never_bonded() {
 
 #[test]
 fn a_bond_that_breaks_in_a_step_acts_in_it_as_if_it_had_never_been() {
-    // far too weak for the impact: it breaks in the first step, and the cascade solves that step without it
+    // far too weak for the impact: it breaks in the first step, and the cascade solves that step
+    // without it
     let mut never = world(colliding(), vec![], settings(1e-4));
     let mut bonded = world(colliding(), vec![], settings(1e-4));
     bonded.form_bonds(1e-6, |_| 1e-3, MU);
@@ -205,7 +206,8 @@ fn an_unaccepted_solve_breaks_no_bond_and_moves_no_body() {
     let before = (w.grains.clone(), w.bonds.clone(), w.ledger, w.time, w.steps);
     let error = w.step().unwrap_err();
     assert!(matches!(error, StepError::NotAccepted { step, .. } if step == 0.25e-4), "{error}");
-    // one sweep along the row leaves the end, which it visits last, on its law, and the contact before it furthest from it
+    // one sweep along the row leaves the end, which it visits last, on its law, and the contact
+    // before it furthest from it
     let message = error.message(&|body| format!("grain {body}"));
     assert!(message.contains("grain 17 and grain 18 are furthest from their contact law"), "{message}");
     assert_eq!(before.0.position, w.grains.position);
@@ -217,7 +219,8 @@ fn an_unaccepted_solve_breaks_no_bond_and_moves_no_body() {
 
 #[test]
 fn a_step_whose_second_half_fails_is_taken_back_whole() {
-    // the pull of the second half breaks a chain that one sweep cannot solve; the first half, without load, is easy
+    // the pull of the second half breaks a chain that one sweep cannot solve; the first half,
+    // without load, is easy
     let mut set = settings(1e-4);
     set.solver = one_sweep();
     set.max_halvings = 1;
@@ -247,8 +250,8 @@ fn a_force_driven_wall_on_a_fixed_grain_carries_its_force() {
     assert!((w.walls[0].reaction[1] - 10.0).abs() < 1e-9, "{}", w.walls[0].reaction[1]);
 }
 
-/// Pairs of grains that touch, far from each other: the first grain of each is fixed, the second is pulled by a force (N) from
-/// a time on (s).
+/// Pairs of grains that touch, far from each other: the first grain of each is fixed, the second is
+/// pulled by a force (N) from a time on (s).
 fn pairs(rule: Rupture, pulls: &[(f64, f64)]) -> World<D2> {
     let (mut grains, mut loads) = (Vec::new(), Vec::new());
     for (k, &(force, from)) in pulls.iter().enumerate() {
@@ -279,8 +282,8 @@ fn the_worst_bond_breaks_first() {
 
 #[test]
 fn rounds_of_a_step_in_halves_are_counted_on() {
-    // a grain that would pass through another in the whole step, but not in half of it; one bond fails in each half, at the
-    // middles of which loads are taken: 0.25e-4 and 0.75e-4 s
+    // a grain that would pass through another in the whole step, but not in half of it; one bond
+    // fails in each half, at the middles of which loads are taken: 0.25e-4 and 0.75e-4 s
     for rule in [Rupture::Cascade, Rupture::CascadeWorst] {
         let mut w = pairs(rule, &[(15.0, 0.0), (25.0, 0.5e-4), (35.0, 0.5e-4)]);
         let wall = Wall::fixed(Shape::Plane { normal: [-1.0, 0.0].into() }, [1.0, 0.0].into(), 0.0);

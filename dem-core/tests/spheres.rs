@@ -1,4 +1,5 @@
-//! Space against the plane and against itself: a flat twin, a turned scene, a sphere that spins, a cantilever of spheres.
+//! Space against the plane and against itself: a flat twin, a turned scene, a sphere that spins, a
+//! cantilever of spheres.
 
 mod common;
 
@@ -68,8 +69,8 @@ fn pressed<D: Dim>() -> World<D> {
     World::new(list.into_iter().collect(), vec![floor(0.3), side(0.0, 1.0), side(0.12, -1.0), lid], Vec::new(), set)
 }
 
-/// Steps both until a bond breaks, or `most` steps; everything is the same to 1e-8 and nothing leaves the plane. Of the step in
-/// which bonds break so many rounds are compared.
+/// Steps both until a bond breaks, or `most` steps; everything is the same to 1e-8 and nothing
+/// leaves the plane. Of the step in which bonds break so many rounds are compared.
 fn assert_twins(mut plane: World<D2>, mut space: World<D3>, most: usize, rounds: u32) -> usize {
     for step in 0..most {
         let (two, three) = (plane.step().expect("accepted"), space.step().expect("accepted"));
@@ -90,7 +91,8 @@ fn assert_twins(mut plane: World<D2>, mut space: World<D3>, most: usize, rounds:
             near(0.0, s.position[k][1], p.radius[k]);
             near(p.velocity[k][0], s.velocity[k][0], fastest);
             near(p.velocity[k][1], s.velocity[k][2], fastest);
-            // counter-clockwise from the first axis to the last is about the second axis, turned round
+            // counter-clockwise from the first axis to the last is about the second axis, turned
+            // round
             near(p.spin[k][0] * p.radius[k], -s.spin[k][1] * p.radius[k], fastest);
         }
         assert_eq!(plane.touches().len(), space.touches().len());
@@ -114,7 +116,8 @@ fn centres_in_a_plane_move_as_their_flat_twin() {
 #[test]
 fn bonds_in_a_plane_carry_and_break_as_in_their_flat_twin() {
     let newton = SolverSettings::Staged(newton(1e-12, 1e-12, 1e-9));
-    // in the fifth round all falls and much slips: Newton then comes to other solutions in space than in the plane
+    // in the fifth round all falls and much slips: Newton then comes to other solutions in space
+    // than in the plane
     for (solver, rounds) in [(solver(1e-12), u32::MAX), (newton, 4)] {
         let first = assert_twins(sheared::<D2>(solver), sheared::<D3>(solver), 400, rounds);
         assert!((5..400).contains(&first), "the first break comes in step {first}");
@@ -248,7 +251,8 @@ fn a_cantilever_of_spheres_carries_its_load_at_the_root() {
     }
 }
 
-/// A row of spheres along x with an arm along y at its end, which a force along z pulls: the row bends and twists.
+/// A row of spheres along x with an arm along y at its end, which a force along z pulls: the row
+/// bends and twists.
 fn bent_arm(solver: SolverSettings) -> World<D3Twist> {
     let (row, arm) = (6, 4);
     let centre = |k: usize| if k < row { [k as f64, 0.0, 0.0] } else { [(row - 1) as f64, (k + 1 - row) as f64, 0.0] };
@@ -285,7 +289,8 @@ fn an_arm_twists_the_row_that_carries_it() {
     }
 }
 
-/// A cube of cemented spheres of many sizes, held at its lowest layer, under forces on its highest that grow.
+/// A cube of cemented spheres of many sizes, held at its lowest layer, under forces on its highest
+/// that grow.
 fn cemented() -> World<D3> {
     let mut rng = Pcg64::seed_from_u64(3);
     let side = 5;

@@ -1,8 +1,10 @@
-//! The stiff limit: of all reactions that balance a load, those of bonds that are springs of the ratios of the solver's
-//! settings, stiff beyond measure. A grain that several bonds hold shares its load among them by their stiffness.
+//! The stiff limit: of all reactions that balance a load, those of bonds that are springs of the
+//! ratios of the solver's settings, stiff beyond measure. A grain that several bonds hold shares
+//! its load among them by their stiffness.
 //!
-//! In space a bond is a bar as thick as its pair's mean diameter a: E A/a and G A/a grow with a, E I/a and G J/a with a³, and
-//! J = 2 I. In the plane all bonds are alike, but for the arm a of their moments.
+//! In space a bond is a bar as thick as its pair's mean diameter a: E A/a and G A/a grow with a, E
+//! I/a and G J/a with a³, and J = 2 I. In the plane all bonds are alike, but for the arm a of their
+//! moments.
 
 mod common;
 
@@ -16,7 +18,8 @@ use std::sync::Arc;
 
 const RATIO: StiffnessRatio = StiffnessRatio { tangential: 0.4, rolling: 0.05 };
 
-/// Radius of the grain in the middle (m), and of those around it, which are fixed, with the directions in which they lie.
+/// Radius of the grain in the middle (m), and of those around it, which are fixed, with the
+/// directions in which they lie.
 const MIDDLE: f64 = 0.008;
 const AROUND: [(f64, [f64; 3]); 4] =
     [(0.004, [1.0, 0.0, 0.0]), (0.02, [-0.6, 0.8, 0.0]), (0.012, [-0.3, -1.0, 0.2]), (0.006, [0.1, -0.2, 1.0])];
@@ -36,8 +39,8 @@ fn directions<D: Dim>() -> Vec<(f64, Vector3<f64>)> {
     AROUND.iter().filter(here).map(|&(r, d)| (r, flat(d))).collect()
 }
 
-/// Force and moment on the grain in the middle from each bond, by the displacement method: six unknowns, one spring for each
-/// row of a bond, under this force and torque.
+/// Force and moment on the grain in the middle from each bond, by the displacement method: six
+/// unknowns, one spring for each row of a bond, under this force and torque.
 fn by_springs<D: Dim>(force: &Vector3<f64>, torque: &Vector3<f64>) -> Vec<(Vector3<f64>, Vector3<f64>)> {
     let cross = |x: &Vector3<f64>| x.cross_matrix();
     let bonds: Vec<_> = directions::<D>()

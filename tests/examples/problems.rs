@@ -1,12 +1,13 @@
-//! The contact problems of steps of a scene, each with the reactions of the interior-point method, for `scripts/measure_selection.py`.
+//! The contact problems of steps of a scene, each with the reactions of the interior-point method,
+//! for `scripts/measure_selection.py`.
 //!
-//! `problems SCENE FOLDER STEPS [PATH=VALUE…]`: STEPS is `first:last:stride`, or numbers separated by commas. The scene runs
-//! with its own solver; each problem is solved besides by the interior-point method alone, and written as `dem-run export`
-//! writes it, with
+//! `problems SCENE FOLDER STEPS [PATH=VALUE…]`: STEPS is `first:last:stride`, or numbers separated
+//! by commas. The scene runs with its own solver; each problem is solved besides by the
+//! interior-point method alone, and written as `dem-run export` writes it, with
 //!
 //! ```text
 //! /cohesive_dem/metric   1/ρ of each row of each contact, up to a common factor
-//! /cohesive_dem/last     1 where the metric is anchored at the last step's reactions, 0 where at zero
+//! /cohesive_dem/last     1: the metric is anchored at the last step's reactions, 0: at zero
 //! /cohesive_dem/work     factorisations of the solve
 //! ```
 

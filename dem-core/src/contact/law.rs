@@ -1,21 +1,25 @@
-//! Contact laws: frictionless (Signorini), dry (Signorini–Coulomb) and the intact bond, all as one shifted cone.
+//! Contact laws: frictionless (Signorini), dry (Signorini–Coulomb) and the intact bond, all as one
+//! shifted cone.
 //!
-//! With r̂ = r + s n (s = h r_coh for a bond, 0 else), ũ = u + (μ‖u_t‖ + ν‖u_m‖ + ξ|u_τ|) n and the cone K,
+//! With r̂ = r + s n (s = h r_coh for a bond, 0 else), ũ = u + (μ‖u_t‖ + ν‖u_m‖ + ξ|u_τ|) n and the
+//! cone K,
 //!
 //! K ∋ r̂ ⊥ ũ ∈ K*   ⇔   r̂ = P_K(r̂ − γ ũ) for any γ > 0:
 //!
-//! de Saxcé's bipotential, Guessasma & Fortin 2011, (3)–(5). A bond with associated flow leaves the shift of u out.
+//! de Saxcé's bipotential, Guessasma & Fortin 2011, (3)–(5). A bond with associated flow leaves the
+//! shift of u out.
 //!
-//! A law offers two ways to better one contact while all others stand still. The *predictor–corrector* is one
-//! step of the line above with γ = 1 / (largest diagonal entry of the local Delassus block W), which makes it a
-//! contraction where the flow is associated; see docs/theory/contact-law.md. The *exact local solve* finds the r for which the contact alone satisfies its law. Both have the
-//! same fixed points.
+//! A law offers two ways to improve one contact while all others stand still. The
+//! *predictor–corrector* is one step of the line above with γ = 1 / (largest diagonal entry of the
+//! local Delassus block W), which makes it a contraction where the flow is associated; see
+//! docs/theory/contact-law.md. The *exact local solve* finds the r for which the contact alone
+//! satisfies its law. Both have the same fixed points.
 
 use super::cone::{Cone, Local, Weights};
 use crate::dim::{Axes, Dim, Moments, V0, V1, Vect, resized};
 use std::marker::PhantomData;
 
-/// How one contact is bettered within a sweep.
+/// How one contact is improved within a sweep.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LocalSolve {
     /// The r that satisfies the law of this contact alone.
@@ -25,9 +29,11 @@ pub enum LocalSolve {
     PredictorCorrector,
 }
 
-/// The local Delassus block of a contact: what a unit of each group of rows does to its own relative velocity.
+/// The local Delassus block of a contact: what a unit of each group of rows does to its own
+/// relative velocity.
 ///
-/// For disks and spheres every group is a multiple of the identity, and only t and bending are coupled.
+/// For disks and spheres every group is a multiple of the identity, and only t and bending are
+/// coupled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Block {
     /// Normal entry (1/kg).
@@ -60,7 +66,8 @@ pub trait Law: Copy + Send + Sync + 'static {
     /// The axes that these rows need.
     type Axes<D: Dim>: Axes<D>;
 
-    /// A better impulse for this contact alone, from its impulse `r` (N s) and relative velocity `u` (m/s).
+    /// A better impulse for this contact alone, from its impulse `r` (N s) and relative velocity
+    /// `u` (m/s).
     fn improve(
         &self,
         local: LocalSolve,
@@ -68,7 +75,8 @@ pub trait Law: Copy + Send + Sync + 'static {
         u: Local<Self::T, Self::B>,
     ) -> Local<Self::T, Self::B>;
 
-    /// Natural map r̂ − P_K(r̂ − ũ/D) of the contact, D the largest diagonal entry of its block: zero at a solution.
+    /// Natural map r̂ − P_K(r̂ − ũ/D) of the contact, D the largest diagonal entry of its block:
+    /// zero at a solution.
     fn natural_map(&self, r: Local<Self::T, Self::B>, u: Local<Self::T, Self::B>) -> Local<Self::T, Self::B>;
 
     /// 1/D: the inverse of the largest diagonal entry of the block (kg).
@@ -110,7 +118,8 @@ pub trait Law: Copy + Send + Sync + 'static {
 
 /// Predictor and corrector on the cone, as the change of the reaction: P_K(r̂ − γ ũ) − r̂.
 ///
-/// A predictor inside the cone is its own projection; the change −γ ũ is then exact, however large the shift s is beside r.
+/// A predictor inside the cone is its own projection; the change −γ ũ is then exact, however large
+/// the shift s is beside r.
 #[inline]
 pub(crate) fn predict_correct<T: Vect, B: Moments>(
     cone: Cone,
@@ -180,8 +189,8 @@ impl Law for Frictionless {
     }
 }
 
-/// Signorini–Coulomb: a normal row, and the tangential rows or, since Coulomb's disk looks alike from every tangent, a tangential
-/// vector.
+/// Signorini–Coulomb: a normal row, and the tangential rows or, since Coulomb's disk looks alike
+/// from every tangent, a tangential vector.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coulomb<T> {
     inverse_n: f64,
@@ -193,7 +202,8 @@ pub struct Coulomb<T> {
 }
 
 impl<T: Vect> Coulomb<T> {
-    /// From the local block, the levers (m), the friction coefficient and the bias of the normal velocity (m/s).
+    /// From the local block, the levers (m), the friction coefficient and the bias of the normal
+    /// velocity (m/s).
     pub fn new(block: Block, lever: [f64; 2], mu: f64, bias: f64) -> Self {
         Self { inverse_n: 1.0 / block.n, inverse_t: 1.0 / block.t, lever, bias, mu, rows: PhantomData }
     }
@@ -209,7 +219,8 @@ impl<T: Vect> Law for Coulomb<T> {
     // in the plane the normal is the whole frame
     type Axes<D: Dim> = D::Vector;
 
-    /// Exact: n and t are not coupled, so Signorini's r_n comes first and Coulomb clips r_t to its disk.
+    /// Exact: n and t are not coupled, so Signorini's r_n comes first and Coulomb clips r_t to its
+    /// disk.
     #[inline(always)]
     fn improve(&self, local: LocalSolve, r: Local<T, V0>, mut u: Local<T, V0>) -> Local<T, V0> {
         u.n += self.bias;
@@ -294,7 +305,8 @@ fn of_twist<B: Moments>(x: B::Twist, other: f64) -> f64 {
 }
 
 impl<T: Vect, B: Moments> Bonded<T, B> {
-    /// From the local block, the arms, the cohesion as an impulse h r_coh (N s), the cone and the flow rule.
+    /// From the local block, the arms, the cohesion as an impulse h r_coh (N s), the cone and the
+    /// flow rule.
     pub fn new(block: Block, arms: Arms, shift: f64, cone: Cone, flow: BondFlow) -> Self {
         let det = block.t * block.m - block.tm * block.tm;
         Self {
@@ -403,8 +415,9 @@ impl<A: Vect, B: Moments> Bonded<A, B> {
 
     /// Local solve on the boundary of the cone.
     ///
-    /// The diagonal of W is solved in closed form ([`Cone::minimise`]); its coupling of t and m is lagged. The splitting
-    /// W = B + C with B = diag W converges because B − C is positive definite where W is, by a factor
+    /// The diagonal of W is solved in closed form ([`Cone::minimise`]); its coupling of t and m is
+    /// lagged. The splitting W = B + C with B = diag W converges because B − C is positive definite
+    /// where W is, by a factor
     /// |w_tm| / √(w_t w_m) a round: zero for grains of one size, 0.8 at a size ratio of four.
     #[cold]
     fn at_limit(&self, r: Local<A, B>, u: Local<A, B>) -> Local<A, B> {
@@ -446,8 +459,9 @@ impl<A: Vect, B: Moments> Bonded<A, B> {
 
 /// An intact bond with a stiffness: rigid but for the compliance C, u + C (r − r₀) in place of u.
 ///
-/// An elastic row of stiffness k over an implicit step h has f⁺ = f − k h u⁺, which is C = 1/(k h²) for impulses and
-/// r₀ = h f the impulse that the bond carried when the step began, see docs/theory/elastic-bonds.md.
+/// An elastic row of stiffness k over an implicit step h has f⁺ = f − k h u⁺, which is C = 1/(k h²)
+/// for impulses and r₀ = h f the impulse that the bond carried when the step began, see
+/// docs/theory/elastic-bonds.md.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Elastic<T, B: Moments> {
     bond: Bonded<T, B>,
@@ -458,8 +472,8 @@ pub struct Elastic<T, B: Moments> {
 }
 
 impl<T: Vect, B: Moments> Elastic<T, B> {
-    /// From the local block of the rigid bond, its compliance (1/kg), the impulse that it carried (N s), and what
-    /// [`Bonded::new`] takes.
+    /// From the local block of the rigid bond, its compliance (1/kg), the impulse that it carried
+    /// (N s), and what [`Bonded::new`] takes.
     pub fn new(
         block: Block,
         compliance: Weights,

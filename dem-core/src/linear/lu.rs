@@ -10,7 +10,8 @@ use faer::{Accum, MatMut, Par};
 /// The factors of a matrix; their room is taken over from one to the next.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Lu {
-    /// Of each front in turn: its pivot columns (L and U of the pivots, L of the border below), then U of the border.
+    /// Of each front in turn: its pivot columns (L and U of the pivots, L of the border below),
+    /// then U of the border.
     values: Vec<f64>,
     /// Where those of each front begin.
     starts: Vec<usize>,
@@ -19,8 +20,9 @@ pub(crate) struct Lu {
 }
 
 impl Lu {
-    /// Factorise 1 + Σ of all elements; `element` writes the matrix of an element, row by row, over the unknowns of its first
-    /// node and then its second. Returns the sign of the determinant, none if a pivot is zero or not finite.
+    /// Factorise 1 + Σ of all elements; `element` writes the matrix of an element, row by row, over
+    /// the unknowns of its first node and then its second. Returns the sign of the determinant,
+    /// none if a pivot is zero or not finite.
     pub fn factorise(&mut self, tree: &Tree, mut element: impl FnMut(usize, &mut [f64])) -> Option<f64> {
         let mut sign = 1.0;
         self.starts.clear();
@@ -107,7 +109,8 @@ impl Lu {
 struct Parts<'a> {
     n: usize,
     p: usize,
-    /// Columns of the pivots (n each), rows of the pivots in the columns of the border (p each), and what is left (column by column).
+    /// Columns of the pivots (n each), rows of the pivots in the columns of the border (p each),
+    /// and what is left (column by column).
     columns: &'a mut [f64],
     across: &'a mut [f64],
     rest: Vec<f64>,
@@ -133,7 +136,8 @@ impl Parts<'_> {
         }
     }
 
-    /// Factorise the pivots and take them out of what is left; the sign of their determinant, none if one is zero or not finite.
+    /// Factorise the pivots and take them out of what is left; the sign of their determinant, none
+    /// if one is zero or not finite.
     fn eliminate(&mut self, rows: &mut Vec<usize>) -> Option<f64> {
         let (n, p, b) = (self.n, self.p, self.n - self.p);
         let columns = MatMut::from_column_major_slice_mut(self.columns, n, p);
@@ -168,7 +172,8 @@ impl Parts<'_> {
 mod tests {
     use super::*;
 
-    /// A lattice of nodes with 3 unknowns and a plate with one, matrices of elements with numbers from a formula, and a node alone.
+    /// A lattice of nodes with 3 unknowns and a plate with one, matrices of elements with numbers
+    /// from a formula, and a node alone.
     fn lattice(side: usize) -> (Vec<usize>, Vec<[usize; 2]>) {
         let plate = side * side;
         let mut sizes = vec![3; plate];

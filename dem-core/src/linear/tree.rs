@@ -1,13 +1,14 @@
 //! The fronts in which a matrix on a graph is factorised.
 //!
-//! Order: nested dissection (George, SIAM J. Numer. Anal. 10, 1973; Karypis & Kumar, SIAM J. Sci. Comput. 20, 1998). Fronts:
-//! nodes of the elimination tree, joined to their parents where the dense work on the zeros that this brings is less than
-//! what a front costs by itself (Liu, SIAM Rev. 34, 1992).
+//! Order: nested dissection (George, SIAM J. Numer. Anal. 10, 1973; Karypis & Kumar, SIAM J. Sci.
+//! Comput. 20, 1998). Fronts: nodes of the elimination tree, joined to their parents where the
+//! dense work on the zeros that this brings is less than what a front costs by itself (Liu, SIAM
+//! Rev. 34, 1992).
 
 use feral_metis::{CscPattern, metis_order};
 
-/// Work (floating-point operations) that a front costs beside its own: below that, joining fronts pays. Measured: the time of a
-/// front of one disk, 1 to 2 µs, at some 5 operations a nanosecond.
+/// Work (floating-point operations) that a front costs beside its own: below that, joining fronts
+/// pays. Measured: the time of a front of one disk, 1 to 2 µs, at some 5 operations a nanosecond.
 const WORK_OF_A_FRONT: f64 = 8e3;
 /// Share by which joined fronts may take more operations than apart.
 const MORE_WORK: f64 = 0.1;
@@ -56,8 +57,8 @@ pub(crate) struct Tree {
 }
 
 impl Tree {
-    /// The fronts for nodes with so many unknowns each, numbered consecutively, and elements between them; an element of one node names
-    /// it twice. None if no order is found.
+    /// The fronts for nodes with so many unknowns each, numbered consecutively, and elements
+    /// between them; an element of one node names it twice. None if no order is found.
     pub fn new(sizes: Vec<usize>, elements: Vec<[usize; 2]>) -> Option<Self> {
         let unknowns = sizes.iter().sum();
         let mut tree = Self { sizes, elements, fronts: Vec::new(), unknowns };
@@ -111,7 +112,8 @@ impl Tree {
         let n = order.len();
         let mut position = vec![0; n];
         order.iter().enumerate().for_each(|(k, node)| position[*node] = k);
-        // by positions: the later nodes that each is coupled to when it is eliminated, and its children in the tree
+        // by positions: the later nodes that each is coupled to when it is eliminated, and its
+        // children in the tree
         let mut coupled: Vec<Vec<usize>> = Vec::with_capacity(n);
         let mut children: Vec<Vec<usize>> = vec![Vec::new(); n];
         let mut seen = vec![usize::MAX; n];

@@ -1,12 +1,14 @@
-//! The contact problem with its matrix: u = W r̂ + q, and a cone for each contact. What other codes exchange and solve.
+//! The contact problem with its matrix: u = W r̂ + q, and a cone for each contact. What other codes
+//! exchange and solve.
 //!
-//! K ∋ r̂ ⊥ ũ ∈ K*, with r̂ = r + s n: the shift of the cohesion is inside r̂ and q, so the cones all stand at the origin.
-//! All contacts have the same rows; one that has fewer by its law has zeros in W and q there, and coefficients that are
-//! zero. Moments are divided by the mean diameter of the pair and relative spins multiplied by it, so that all rows
-//! share a unit (N s, m/s) and the coefficients of t and m are plain numbers.
+//! K ∋ r̂ ⊥ ũ ∈ K*, with r̂ = r + s n: the shift of the cohesion is inside r̂ and q, so the cones
+//! all stand at the origin. All contacts have the same rows; one that has fewer by its law has
+//! zeros in W and q there, and coefficients that are zero. Moments are divided by the mean diameter
+//! of the pair and relative spins multiplied by it, so that all rows share a unit (N s, m/s) and
+//! the coefficients of t and m are plain numbers.
 //!
-//! W is made from the maps H and Hᵀ of the matrix-free problem, column by column: what a unit impulse does to the
-//! relative velocities around it. See docs/theory/fclib.md.
+//! W is made from the maps H and Hᵀ of the matrix-free problem, column by column: what a unit
+//! impulse does to the relative velocities around it. See docs/theory/fclib.md.
 
 pub use super::block_matrix::{Asymmetry, BlockMatrix};
 use super::residual::relative;
@@ -24,7 +26,8 @@ pub const ROUNDING: f64 = 1e-6;
 pub struct ContactRows {
     /// Tangential rows: 1 in the plane, 2 in space.
     pub tangents: usize,
-    /// Moment rows: none, as many of bending as there are tangential ones, or those and one of twist.
+    /// Moment rows: none, as many of bending as there are tangential ones, or those and one of
+    /// twist.
     pub moments: usize,
 }
 
@@ -47,7 +50,8 @@ pub struct Parts {
     pub associated: Vec<bool>,
     /// What r̂ is above the reaction r in the normal row (N s), C; zero where it is not known.
     pub shift: Vec<f64>,
-    /// Euclidean norm of the applied impulses (N s), one scale of the residual; zero where it is not known.
+    /// Euclidean norm of the applied impulses (N s), one scale of the residual; zero where it is
+    /// not known.
     pub applied: f64,
 }
 
@@ -166,8 +170,8 @@ impl Assembled {
     /// A problem from its parts, with reactions that are zero.
     ///
     /// # Errors
-    /// [`AssemblyError`]: lengths that do not fit together, numbers that are not finite, coefficients below zero, a
-    /// matrix that is not symmetric.
+    /// [`AssemblyError`]: lengths that do not fit together, numbers that are not finite,
+    /// coefficients below zero, a matrix that is not symmetric.
     pub fn new(parts: Parts) -> Result<Self, AssemblyError> {
         parts.check()?;
         Ok(Self { r: vec![0.0; parts.q.len()], parts })
@@ -229,7 +233,8 @@ impl Assembled {
         rows.padded(&u[..size])
     }
 
-    /// D of each contact: the largest diagonal entry of its block (1/kg); of the others, where nothing yields to it.
+    /// D of each contact: the largest diagonal entry of its block (1/kg); of the others, where
+    /// nothing yields to it.
     pub(crate) fn scales(&self) -> Vec<f64> {
         let size = self.parts.rows.count();
         let largest = |block: &[f64]| (0..size).map(|k| block[k * size + k]).fold(0.0, f64::max);
@@ -247,7 +252,8 @@ impl Assembled {
 
     /// The residual of [`super::residual`], from the matrix (–).
     ///
-    /// The reactions in its denominator are without their shift where that is known. Not a number stays not a number.
+    /// The reactions in its denominator are without their shift where that is known. Not a number
+    /// stays not a number.
     #[must_use]
     pub fn residual(&self) -> f64 {
         let (mut map, mut reaction, mut rounding) = (0.0f64, 0.0, 0.0f64);
@@ -263,8 +269,9 @@ impl Assembled {
         relative(map.sqrt(), rounding.sqrt(), scale)
     }
 
-    /// The natural map as velocities, of the contact where it is largest, over the largest velocity without cohesion and contact
-    /// reactions (–). Where reactions diverge because there is no solution, it stays near one while the residual vanishes.
+    /// The natural map as velocities, of the contact where it is largest, over the largest velocity
+    /// without cohesion and contact reactions (–). Where reactions diverge because there is no
+    /// solution, it stays near one while the residual vanishes.
     #[must_use]
     pub fn velocity_error(&self) -> f64 {
         let size = self.parts.rows.count();
@@ -279,7 +286,8 @@ impl Assembled {
         if largest == 0.0 { 0.0 } else { largest / speed }
     }
 
-    /// Sum of the squares of what is added up to the velocity of a contact: what that is rounded against.
+    /// Sum of the squares of what is added up to the velocity of a contact: what that is rounded
+    /// against.
     fn summands(&self, contact: usize) -> f64 {
         let size = self.parts.rows.count();
         let mut sum: f64 = self.parts.q[contact * size..(contact + 1) * size].iter().map(|q| q * q).sum();
@@ -292,8 +300,8 @@ impl Assembled {
         sum
     }
 
-    /// The error as Siconos measures it, for comparison (–): the natural map with ρ = 1, over the largest of the norms
-    /// of q, r̂ and u. It depends on the units.
+    /// The error as Siconos measures it, for comparison (–): the natural map with ρ = 1, over the
+    /// largest of the norms of q, r̂ and u. It depends on the units.
     #[must_use]
     pub fn siconos_error(&self) -> f64 {
         let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();

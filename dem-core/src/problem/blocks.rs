@@ -1,9 +1,10 @@
 //! Large problems in blocks that are swept at the same time.
 //!
-//! A block is [`BLOCK`] grains that follow one another in the list. Contacts within a block come first, block by block: no
-//! two blocks share a grain, so they are swept in parallel. Contacts between blocks and at walls come last. Within each
-//! part, contacts that follow one another share no grain if that can be (a greedy colouring), so that a processor need
-//! not wait for the contact before. All of this is fixed by the problem alone: results are the same for any number of
+//! A block is [`BLOCK`] grains that follow one another in the list. Contacts within a block come
+//! first, block by block: no two blocks share a grain, so they are swept in parallel. Contacts
+//! between blocks and at walls come last. Within each part, contacts that follow one another share
+//! no grain if that can be (a greedy colouring), so that a processor need not wait for the contact
+//! before. All of this is fixed by the problem alone: results are the same for any number of
 //! threads. A problem of less than two blocks keeps the order of its keys.
 
 use super::link::{Contact, Group};
@@ -15,7 +16,8 @@ use rayon::prelude::*;
 /// Grains of a block: their velocities stay in a core's own cache.
 const BLOCK: usize = 4096;
 
-/// Do this where threads are near at hand, if the problem is large: else each sweep would wake them anew.
+/// Do this where threads are near at hand, if the problem is large: else each sweep would wake them
+/// anew.
 pub(crate) fn among_threads<R: Send>(grains: usize, work: impl FnOnce() -> R + Send) -> R {
     if blocks(grains) > 1 { rayon::scope(|_| work()) } else { work() }
 }
@@ -31,7 +33,8 @@ fn block_of(pair: [u32; 2], grains: usize) -> usize {
     if j < grains && i / BLOCK == j / BLOCK { i / BLOCK } else { blocks(grains) }
 }
 
-/// The order in which the contacts of these pairs, sorted, are swept; none where it is that of the list.
+/// The order in which the contacts of these pairs, sorted, are swept; none where it is that of the
+/// list.
 pub(crate) fn order(pairs: impl ExactSizeIterator<Item = [u32; 2]>, grains: usize) -> Option<Vec<u32>> {
     let blocks = blocks(grains);
     if blocks == 1 {
@@ -121,7 +124,8 @@ mod tests {
         let blocks: Vec<usize> = order.iter().map(|k| block_of(pairs[*k as usize], grains)).collect();
         assert!(blocks.is_sorted());
         assert_eq!(blocks.last(), Some(&3));
-        // a colour holds no body twice: that of a contact is the least that is free at both its bodies
+        // a colour holds no body twice: that of a contact is the least that is free at both its
+        // bodies
         let inside = order.iter().map(|k| pairs[*k as usize]).filter(|pair| block_of(*pair, grains) == 0);
         let (mut first, mut seen) = (0, std::collections::HashSet::new());
         for pair in inside {

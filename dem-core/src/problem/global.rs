@@ -415,8 +415,9 @@ mod tests {
         assert!(condensed.matrix.block(0, 2).is_some() && condensed.matrix.block(2, 0).is_some());
     }
 
-    /// Masses s_i s_j min(i, j), i from one: L has s_i in all places of its row, and the inverse of min(i, j) is that of a chain of
-    /// unit springs, 2 on the diagonal (1 at its end) and −1 beside it. Powers of two make no rounding.
+    /// Masses s_i s_j min(i, j), i from one: L has s_i in all places of its row, and the inverse of
+    /// min(i, j) is that of a chain of unit springs, 2 on the diagonal (1 at its end) and −1 beside
+    /// it. Powers of two make no rounding.
     #[test]
     fn four_unknowns_that_are_all_coupled_have_the_inverse_of_their_mass() {
         let s = [2.0, 0.25, 8.0, 0.5];

@@ -1,11 +1,13 @@
-//! One contact of the problem: its geometry, which maps node velocities to relative velocities, its law and its impulse.
+//! One contact of the problem: its geometry, which maps node velocities to relative velocities, its
+//! law and its impulse.
 
 use crate::bond::{BondStatus, failure};
 use crate::contact::{Arms, Law, Local, Padded};
 use crate::dim::{Axes, Dim, Moments, Vect, in_frame, is_vector, of_frame, resized};
 use std::marker::PhantomData;
 
-/// Geometry of a contact between node i and node j: the linear map between node velocities and relative velocity.
+/// Geometry of a contact between node i and node j: the linear map between node velocities and
+/// relative velocity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Link<D: Dim, A: Axes<D> = <D as Dim>::Frame> {
     /// Nodes i and j; the normal points from j to i. `j` may be a wall.
@@ -22,7 +24,8 @@ pub struct Contact<D: Dim, L: Law> {
     pub link: Link<D, L::Axes<D>>,
     /// Law with the constants of the local solve.
     pub law: L,
-    /// Impulse of j on i (N s), in the frame of the contact; where its axes are a normal alone, the tangential part is a vector.
+    /// Impulse of j on i (N s), in the frame of the contact; where its axes are a normal alone, the
+    /// tangential part is a vector.
     pub r: Local<L::T, L::B>,
 }
 
@@ -32,7 +35,8 @@ impl<D: Dim, A: Axes<D>> Link<D, A> {
         Self { nodes, axes: A::of(frame), dim: PhantomData }
     }
 
-    /// The same with a whole frame: where the axes are a normal alone, the one that [`Dim::frame`] makes of it.
+    /// The same with a whole frame: where the axes are a normal alone, the one that [`Dim::frame`]
+    /// makes of it.
     pub fn whole(&self) -> Link<D> {
         Link::new(self.nodes, self.frame())
     }
@@ -54,8 +58,9 @@ impl<D: Dim, A: Axes<D>> Link<D, A> {
         Local { n: r.n, t: of_frame::<D, T>(&self.frame(), resized(r.t)), m: resized(r.m) }
     }
 
-    /// This reaction without what the rounding of many sweeps has left of a tangential vector along the normal: where grains are fast and
-    /// reactions small, it would be an impulse that no law knows of.
+    /// This reaction without what the rounding of many sweeps has left of a tangential vector along
+    /// the normal: where grains are fast and reactions small, it would be an impulse that no law
+    /// knows of.
     #[inline(always)]
     pub(super) fn without_drift<T: Vect, B: Moments>(&self, mut r: Local<T, B>) -> Local<T, B> {
         if is_vector::<D, T>() {
@@ -80,18 +85,21 @@ impl<D: Dim, A: Axes<D>> Link<D, A> {
 }
 
 impl<D: Dim, L: Law> Contact<D, L> {
-    /// The mode in which the bond that this contact is fails under its impulse; none of one that holds, and of a dry contact.
+    /// The mode in which the bond that this contact is fails under its impulse; none of one that
+    /// holds, and of a dry contact.
     pub(crate) fn failure(&self) -> Option<BondStatus> {
         let shift = self.law.shift();
         if shift > 0.0 { failure(&self.r, shift, self.law.cone()) } else { None }
     }
 }
 
-/// Contacts with the same rows, sorted by key; in a large problem, by the blocks in which they are swept.
+/// Contacts with the same rows, sorted by key; in a large problem, by the blocks in which they are
+/// swept.
 pub type Group<D, L> = Vec<Contact<D, L>>;
 
 impl<D: Dim, A: Axes<D>> Link<D, A> {
-    /// Relative velocity of a body with this velocity and spin, i, with respect to another, j, at the contact point.
+    /// Relative velocity of a body with this velocity and spin, i, with respect to another, j, at
+    /// the contact point.
     #[inline(always)]
     pub(crate) fn relative_velocity<T: Vect, B: Moments>(
         &self,

@@ -1,7 +1,7 @@
 //! The contact problem of one step: u = Hᵀ v, v = v_f + M⁻¹ H r, and one law per contact.
 //!
-//! It knows nodes (a velocity and inverse masses) and contacts, and no bodies, bonds or detection. It is
-//! matrix-free: the Delassus operator W = Hᵀ M⁻¹ H acts through the velocities of the nodes.
+//! It knows nodes (a velocity and inverse masses) and contacts, and no bodies, bonds or detection.
+//! It is matrix-free: the Delassus operator W = Hᵀ M⁻¹ H acts through the velocities of the nodes.
 
 pub mod assembled;
 mod block_matrix;
@@ -56,7 +56,8 @@ pub struct ContactProblem<D: Dim> {
     pub dry: Group<D, Dry<D>>,
     /// Contacts without friction.
     pub frictionless: Group<D, Frictionless>,
-    /// Radii of the grains (m) where the stiffness of a contact follows them, in space; empty in the plane.
+    /// Radii of the grains (m) where the stiffness of a contact follows them, in space; empty in
+    /// the plane.
     pub radii: Vec<f64>,
     /// Euclidean norm of the applied impulses h F_ext (N s), one scale of the residual.
     pub applied: f64,
@@ -64,8 +65,8 @@ pub struct ContactProblem<D: Dim> {
 
 /// Something that is done with every contact of a problem, whatever its law.
 pub trait Visitor<D: Dim> {
-    /// Called once for each contact: rigid bonds, elastic bonds, dry contacts, frictionless ones, each in the order of
-    /// its group.
+    /// Called once for each contact: rigid bonds, elastic bonds, dry contacts, frictionless ones,
+    /// each in the order of its group.
     fn visit<L: Law>(&mut self, nodes: &Nodes<D>, contact: &Contact<D, L>);
 }
 
@@ -145,8 +146,8 @@ impl<D: Dim> ContactProblem<D> {
         [self.bonded.len(), self.elastic.len(), self.dry.len(), self.frictionless.len()]
     }
 
-    /// Make room for so many contacts of each kind, and no more: lists that grow by doubling would take twice the memory of a
-    /// large problem.
+    /// Make room for so many contacts of each kind, and no more: lists that grow by doubling would
+    /// take twice the memory of a large problem.
     pub(crate) fn reserve(&mut self, [bonded, elastic, dry, frictionless]: [usize; KINDS]) {
         self.bonded.reserve_exact(bonded);
         self.elastic.reserve_exact(elastic);
@@ -231,8 +232,8 @@ impl<D: Dim> ContactProblem<D> {
         self.visit_mut(&mut Forget);
     }
 
-    /// Set the node velocities to v_f + M⁻¹ H r, free of the rounding that a long series of increments leaves in them and in
-    /// tangential vectors.
+    /// Set the node velocities to v_f + M⁻¹ H r, free of the rounding that a long series of
+    /// increments leaves in them and in tangential vectors.
     pub fn velocities_from_reactions(&mut self) {
         struct Push;
         impl<D: Dim> GroupVisitorMut<D> for Push {

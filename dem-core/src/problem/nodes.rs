@@ -66,13 +66,15 @@ impl<D: Dim> Nodes<D> {
         };
         let drive = (link.nodes[1] as usize).checked_sub(self.grains).map(|wall| self.drives[wall]);
         if let Some(d) = drive.filter(|_| j.inverse_mass > 0.0) {
-            // the wall yields along d alone: a diagonal that dominates (n·d)², (t·d)² and their coupling
+            // the wall yields along d alone: a diagonal that dominates (n·d)², (t·d)² and their
+            // coupling
             let (along, across) = D::split(&link.axes, d);
             let across = across.norm();
             let coupling = (along * across).abs();
             block.n = i.inverse_mass + j.inverse_mass * (along * along + coupling);
             block.t = i.inverse_mass + li * li * i.inverse_inertia + j.inverse_mass * (across * across + coupling);
-            // no impulse changes a row whose bodies do not yield along it: any positive entry will do
+            // no impulse changes a row whose bodies do not yield along it: any positive entry will
+            // do
             let some = block.n.max(block.t);
             block.n = if block.n == 0.0 { some } else { block.n };
             block.t = if block.t == 0.0 { some } else { block.t };

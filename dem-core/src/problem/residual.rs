@@ -1,12 +1,14 @@
 //! One measure of error for all solvers: the natural map, relative to the reactions and the load.
 //!
-//! residual = √Σ‖r̂ − P_K(r̂ − ũ/D)‖² / max(√Σ‖r‖², ‖h F_ext‖), with D one scalar per contact, the largest diagonal
-//! entry of its Delassus block. The cohesion's shift is not in the denominator: on a strongly bonded sample it would
-//! hide the load. A natural map that is as small as the rounding of the velocities behind it is zero: grains that part
-//! leave reactions so small that their ratio to the map says nothing.
+//! residual = √Σ‖r̂ − P_K(r̂ − ũ/D)‖² / max(√Σ‖r‖², ‖h F_ext‖), with D one scalar per contact, the
+//! largest diagonal entry of its Delassus block. The cohesion's shift is not in the denominator: on
+//! a strongly bonded sample it would hide the load. A natural map that is as small as the rounding
+//! of the velocities behind it is zero: grains that part leave reactions so small that their ratio
+//! to the map says nothing.
 //!
-//! The residual is relative to all reactions. Where a body of mass m bears bodies of mass M, its velocity is off by the residual times
-//! M/m. The *velocity error* measures that, and the solvers of [`crate::solver::Staged`] stop on both.
+//! The residual is relative to all reactions. Where a body of mass m bears bodies of mass M, its
+//! velocity is off by the residual times M/m. The *velocity error* measures that, and the solvers
+//! of [`crate::solver::Staged`] stop on both.
 
 use super::{Contact, ContactProblem, Group, GroupVisitor, Nodes, Visitor};
 use crate::contact::Law;
@@ -63,7 +65,8 @@ impl Sums {
     }
 }
 
-/// The residual of the impulses and node velocities that the problem now holds (–). Not a number stays not a number.
+/// The residual of the impulses and node velocities that the problem now holds (–). Not a number
+/// stays not a number.
 pub fn residual<D: Dim>(problem: &ContactProblem<D>) -> f64 {
     let mut sums = Sums::default();
     problem.visit_groups(&mut sums);
@@ -71,13 +74,15 @@ pub fn residual<D: Dim>(problem: &ContactProblem<D>) -> f64 {
     relative(sums.map.sqrt(), sums.motion.sqrt(), scale)
 }
 
-/// The norm of the natural map over `scale`; zero where it is the rounding of summands of norm `rounded`.
+/// The norm of the natural map over `scale`; zero where it is the rounding of summands of norm
+/// `rounded`.
 pub(super) fn relative(map: f64, rounded: f64, scale: f64) -> f64 {
     if map <= ROUNDING * rounded { 0.0 } else { map / scale }
 }
 
-/// The velocity error of the impulses and node velocities that the problem now holds (–): the natural map as a velocity, D ‖map‖, of the
-/// contact where it is largest, over the largest relative velocity without reactions.
+/// The velocity error of the impulses and node velocities that the problem now holds (–): the
+/// natural map as a velocity, D ‖map‖, of the contact where it is largest, over the largest
+/// relative velocity without reactions.
 pub fn velocity_error<D: Dim>(problem: &ContactProblem<D>) -> f64 {
     let Largest { map, free, .. } = Largest::of(problem);
     if map == 0.0 { 0.0 } else { map / free }
@@ -88,7 +93,8 @@ pub fn furthest_from_law<D: Dim>(problem: &ContactProblem<D>) -> [u32; 2] {
     Largest::of(problem).pair
 }
 
-/// The largest velocities of all contacts (m/s): of the natural map, with the nodes of its contact, and without reactions.
+/// The largest velocities of all contacts (m/s): of the natural map, with the nodes of its contact,
+/// and without reactions.
 struct Largest<'a, D: Dim> {
     problem: &'a ContactProblem<D>,
     map: f64,

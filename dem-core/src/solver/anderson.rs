@@ -1,9 +1,10 @@
-//! Anderson's acceleration of a fixed-point iteration x ← g(x) (Anderson 1965; Walker & Ni, SIAM J. Numer. Anal. 49, 2011).
+//! Anderson's acceleration of a fixed-point iteration x ← g(x) (Anderson 1965; Walker & Ni, SIAM J.
+//! Numer. Anal. 49, 2011).
 //!
-//! Of the last steps it keeps how the results g and the residuals f = g − x changed, seeks the combination of changes
-//! of f that comes nearest to the present f, and takes the matching changes of g away. On a linear iteration this is
-//! GMRES; on Gauss–Seidel's, which is linear while no contact changes its status, it finds the long waves that sweeps
-//! alone diffuse away.
+//! Of the last steps it keeps how the results g and the residuals f = g − x changed, seeks the
+//! combination of changes of f that comes nearest to the present f, and takes the matching changes
+//! of g away. On a linear iteration this is GMRES; on Gauss–Seidel's, which is linear while no
+//! contact changes its status, it finds the long waves that sweeps alone diffuse away.
 
 use crate::solver::tuning::gauss_seidel as tuning;
 use nalgebra::{DMatrix, DVector};

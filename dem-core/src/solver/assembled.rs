@@ -1,9 +1,10 @@
 //! Solvers of the problem with its matrix ([`Assembled`]), for what other codes wrote.
 //!
-//! Gauss–Seidel visits the contacts in their order. The block of a contact may be any symmetric matrix here, so there
-//! is no solution by cases: the contact sticks if the reaction that stops it lies in its cone, it is open if zero
-//! satisfies its law, and otherwise the predictor–corrector is repeated with γ = 1/(largest eigenvalue of the block),
-//! which contracts where the flow is associated.
+//! Gauss–Seidel visits the contacts in their order. The block of a contact may be any symmetric
+//! matrix here, so there is no solution by cases: the contact sticks if the reaction that stops it
+//! lies in its cone, it is open if zero satisfies its law, and otherwise the predictor–corrector is
+//! repeated with γ = 1/(largest eigenvalue of the block), which contracts where the flow is
+//! associated.
 
 use super::gauss_seidel::{Sweepable, iterate};
 use super::{GaussSeidelSettings, SolveReport};
@@ -49,7 +50,8 @@ impl Site {
         Self { block, inverse, gamma: 1.0 / largest }
     }
 
-    /// The reaction that satisfies the law of this contact alone, from its reaction and relative velocity.
+    /// The reaction that satisfies the law of this contact alone, from its reaction and relative
+    /// velocity.
     fn exact(&self, problem: &Assembled, contact: usize, mut r: Padded, mut u: Padded) -> Padded {
         let cone = problem.cone(contact);
         if let Some(inverse) = &self.inverse {

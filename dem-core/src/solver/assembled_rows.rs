@@ -1,6 +1,6 @@
-//! A problem with its matrix as rows over unknowns: W = L Lᵀ by a pivoted Cholesky factorisation up to the rank, so
-//! that u = L y + q and y = Lᵀ r, as if there were bodies of unit mass behind it. L is full: every contact has as many
-//! coefficients as W has rank.
+//! A problem with its matrix as rows over unknowns: W = L Lᵀ by a pivoted Cholesky factorisation up
+//! to the rank, so that u = L y + q and y = Lᵀ r, as if there were bodies of unit mass behind it. L
+//! is full: every contact has as many coefficients as W has rank.
 
 use super::assembled::{Sites, gauss_seidel};
 use super::rows::{Row, Rows, StiffnessRatio, places};

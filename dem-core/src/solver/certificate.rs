@@ -6,12 +6,14 @@
 //! | a solution exists (2D) | velocities well inside the admissible ones of the associated problem: u ∈ int K* |
 //! | neither is proved | |
 //!
-//! K_S = { dry contacts and bipotential bonds: d_n ≥ 0, all else 0; associated bonds: d ∈ K; elastic bonds: d = 0 }. Every solution has
-//! d·u ≥ 0 for d ∈ K_S, and d·u = q·d where H d = 0. In 2D the problem is a linear complementarity problem with a copositive matrix:
-//! it has a solution where q·d ≥ 0 for all d ∈ K with H d = 0, which follows from u ∈ K*.
+//! K_S = { dry contacts and bipotential bonds: d_n ≥ 0, all else 0; associated bonds: d ∈ K;
+//! elastic bonds: d = 0 }. Every solution has d·u ≥ 0 for d ∈ K_S, and d·u = q·d where H d = 0. In
+//! 2D the problem is a linear complementarity problem with a copositive matrix: it has a solution
+//! where q·d ≥ 0 for all d ∈ K with H d = 0, which follows from u ∈ K*.
 //!
-//! Both proofs come from the least violation of an associated problem (`interior/violation.rs`) and are checked here on the problem as it
-//! was given. Only what passes that check is reported. Derivation and sources: docs/theory/interior-point.md, "What has no solution".
+//! Both proofs come from the least violation of an associated problem (`interior/violation.rs`) and
+//! are checked here on the problem as it was given. Only what passes that check is reported.
+//! Derivation and sources: docs/theory/interior-point.md, "What has no solution".
 
 use super::interior::{Interior, Least};
 use super::rows::{Row, Rows, StiffnessRatio};
@@ -25,7 +27,8 @@ use crate::solver::tuning::certificate as tuning;
 /// What is proved of a problem that was not solved.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Verdict<T> {
-    /// It has no solution: no velocities are admissible for these contacts, or bodies, in rising order.
+    /// It has no solution: no velocities are admissible for these contacts, or bodies, in rising
+    /// order.
     NoSolution(Vec<T>),
     /// It has a solution, which the solver has not found.
     Guaranteed,
@@ -45,7 +48,8 @@ impl<T> Verdict<T> {
     }
 }
 
-/// The verdict on a problem, by the numbers of its contacts in the order of [`ContactProblem::visit`].
+/// The verdict on a problem, by the numbers of its contacts in the order of
+/// [`ContactProblem::visit`].
 #[must_use]
 pub fn verdict<D: Dim>(problem: &ContactProblem<D>) -> Verdict<usize> {
     of(problem)
@@ -88,7 +92,8 @@ fn certificate(rows: &Rows, matrix: Option<&BlockMatrix>) -> Option<Vec<Padded>>
     proves(rows, matrix, &d).then_some(d)
 }
 
-/// Whether impulses lie in K_S, balance on every body and do negative work at the given velocities: then there is no solution.
+/// Whether impulses lie in K_S, balance on every body and do negative work at the given velocities:
+/// then there is no solution.
 fn proves(rows: &Rows, matrix: Option<&BlockMatrix>, d: &[Padded]) -> bool {
     let in_cone =
         |(row, d): (&Row, &Padded)| if is_elastic(row) { *d == Padded::zero() } else { strict(row).contains(d) };
@@ -112,8 +117,8 @@ fn proves(rows: &Rows, matrix: Option<&BlockMatrix>, d: &[Padded]) -> bool {
     rows.list.iter().zip(d).all(in_cone) && balanced && power < -tuning::EXACT * size
 }
 
-/// The least violation of the problem without shifts and elastic bonds, all flow associated, with these cones, and normal velocities that
-/// must exceed `margin` (m/s).
+/// The least violation of the problem without shifts and elastic bonds, all flow associated, with
+/// these cones, and normal velocities that must exceed `margin` (m/s).
 fn least(rows: &Rows, matrix: Option<&BlockMatrix>, cone: impl Fn(&Row) -> Cone, margin: f64) -> Option<Least> {
     let mut convex = rows.clone();
     convex.free.fill(0.0);
@@ -153,7 +158,8 @@ fn velocities(rows: &Rows, matrix: Option<&BlockMatrix>, r: &[Padded]) -> Vec<Pa
     rows.list.iter().enumerate().map(one).collect()
 }
 
-/// Whether velocities well inside K* are found, where nothing has to be found if the given ones lie in it.
+/// Whether velocities well inside K* are found, where nothing has to be found if the given ones lie
+/// in it.
 fn is_admissible(rows: &Rows, matrix: Option<&BlockMatrix>) -> bool {
     let inside = |u: &[Padded], least: f64| {
         let margin = |(row, u): (&Row, &Padded)| {
@@ -179,7 +185,8 @@ mod tests {
     use crate::contact::Local;
     use crate::problem::assembled::{ContactRows, Parts};
 
-    /// A disk of unit mass between two walls that close: rows n, t of each contact over (x, y, spin).
+    /// A disk of unit mass between two walls that close: rows n, t of each contact over (x, y,
+    /// spin).
     fn squeezed() -> Assembled {
         let h = [[1.0, 0.0, 0.0], [0.0, 1.0, -1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, -1.0]];
         let entry = |k: usize| (k / 4, k % 4, (0..3).map(|c| h[k / 4][c] * h[k % 4][c]).sum());

@@ -1,10 +1,12 @@
-//! Steps without a linear solve: while a sample at rest is loaded evenly and no contact changes its status, each step adds the same to
-//! the reactions. What two consecutive solves have added is added again, and taken where the contact laws hold better than the
-//! tolerance asks, the balance as well as after the last solve, and no bond is at its limit.
+//! Steps without a linear solve: while a sample at rest is loaded evenly and no contact changes its
+//! status, each step adds the same to the reactions. What two consecutive solves have added is
+//! added again, and taken where the contact laws hold better than the tolerance asks, the balance
+//! as well as after the last solve, and no bond is at its limit.
 //!
-//! Laws and balance do not tell how the contacts of a rigid network share the load. What sticks shows a change of status by itself: its
-//! reaction leaves the cone. What is open or slips does not, and so the distance to closing or sticking is predicted with the
-//! reactions. And from time to time a solve is compared with what was predicted.
+//! Laws and balance do not tell how the contacts of a rigid network share the load. What sticks
+//! shows a change of status by itself: its reaction leaves the cone. What is open or slips does
+//! not, and so the distance to closing or sticking is predicted with the reactions. And from time
+//! to time a solve is compared with what was predicted.
 
 use super::rest::Rest;
 use super::rows::{Row, Rows, mass_unit};
@@ -28,21 +30,22 @@ pub(super) struct Extrapolation {
     margin_rate: Vec<f64>,
     /// Steps since.
     steps: u64,
-    /// Steps that may be predicted between solves, none while the growth is not known to be even, and those that are left.
+    /// Steps that may be predicted between solves, none while the growth is not known to be even,
+    /// and those that are left.
     most: u64,
     left: u64,
     /// Share of the impulses that the solve left as momentum (–).
     moves: f64,
-    /// Whether the last step was predicted: what it left of momentum is in the reactions of the next solve, which tell nothing of
-    /// the growth.
+    /// Whether the last step was predicted: what it left of momentum is in the reactions of the
+    /// next solve, which tell nothing of the growth.
     kicked: bool,
     /// Back-off after predictions that failed.
     rest: Rest,
 }
 
 impl Extrapolation {
-    /// Set the reactions of a problem to what is predicted, if that solves it: its residual and load error. Else the reactions are
-    /// left as they were.
+    /// Set the reactions of a problem to what is predicted, if that solves it: its residual and
+    /// load error. Else the reactions are left as they were.
     pub fn predict<D: Dim>(
         &mut self,
         problem: &mut ContactProblem<D>,
@@ -157,8 +160,9 @@ impl Extrapolation {
     }
 }
 
-/// By how much each contact is beyond its limits at these velocities, as a reaction (N s over the unit of mass): what an open one
-/// would have to be pushed to close, and what one that slips, to stick. Infinite for one that does neither.
+/// By how much each contact is beyond its limits at these velocities, as a reaction (N s over the
+/// unit of mass): what an open one would have to be pushed to close, and what one that slips, to
+/// stick. Infinite for one that does neither.
 pub(super) fn margins(rows: &Rows, velocities: &[Padded], reactions: &[Padded]) -> Vec<f64> {
     let beyond = |norm: f64, weight: f64, limit: f64| match norm / weight - limit {
         beyond if beyond > 0.0 => beyond,
@@ -176,7 +180,8 @@ pub(super) fn margins(rows: &Rows, velocities: &[Padded], reactions: &[Padded]) 
     rows.list.iter().zip(velocities).zip(reactions).map(margin).collect()
 }
 
-/// What is left of momentum over what the contacts have taken, both over the roots of the masses: the load error of a sample at rest (–).
+/// What is left of momentum over what the contacts have taken, both over the roots of the masses:
+/// the load error of a sample at rest (–).
 fn motion<D: Dim>(problem: &ContactProblem<D>) -> f64 {
     let (mut left, mut taken) = (0.0, 0.0);
     for (node, (velocity, spin)) in problem.nodes.all.iter().zip(problem.free.iter()) {

@@ -1,9 +1,10 @@
 //! Non-linear Gauss–Seidel: the method of successive equilibria (Moreau, Jean; paper §2.1).
 //!
-//! One sweep visits every contact in the order of its group and key, reads the relative velocity from the nodes,
-//! betters the contact's impulse by its law and gives the change to the nodes at once. No matrix is assembled.
-//! Information moves one neighbour a sweep, so long chains of bonds converge slowly: the residual says how far.
-//! Anderson's acceleration of bursts of sweeps, an option, takes ten times fewer of them where bonds abound.
+//! One sweep visits every contact in the order of its group and key, reads the relative velocity
+//! from the nodes, betters the contact's impulse by its law and gives the change to the nodes at
+//! once. No matrix is assembled. Information moves one neighbour a sweep, so long chains of bonds
+//! converge slowly: the residual says how far. Anderson's acceleration of bursts of sweeps, an
+//! option, takes ten times fewer of them where bonds abound.
 
 use super::anderson::Anderson;
 use super::{ContactSolver, Route, SolveReport, SolveStatus, Work};
@@ -83,7 +84,8 @@ pub fn sweep<D: Dim>(problem: &mut ContactProblem<D>, local: LocalSolve) {
 pub(super) trait Sweepable {
     /// One visit of every contact.
     fn sweep(&mut self, local: LocalSolve);
-    /// Set the velocities to what the impulses make of them, free of the rounding of the sweeps' increments.
+    /// Set the velocities to what the impulses make of them, free of the rounding of the sweeps'
+    /// increments.
     fn velocities_from_reactions(&mut self);
     /// The residual of the impulses and velocities at hand (–).
     fn residual(&self) -> f64;
@@ -129,7 +131,8 @@ fn plain(problem: &mut impl Sweepable, settings: &GaussSeidelSettings, most: u64
         sweeps += burst;
         error = problem.residual();
         if error <= settings.tolerance {
-            // what counts is the error of the impulses, without the rounding of the sweeps' increments
+            // what counts is the error of the impulses, without the rounding of the sweeps'
+            // increments
             problem.velocities_from_reactions();
             error = problem.residual();
         }
@@ -141,8 +144,8 @@ fn plain(problem: &mut impl Sweepable, settings: &GaussSeidelSettings, most: u64
     (sweeps, error)
 }
 
-/// Bursts of sweeps, accelerated, after some plain ones. What it ends with is the result of a burst: every impulse is in
-/// its cone.
+/// Bursts of sweeps, accelerated, after some plain ones. What it ends with is the result of a
+/// burst: every impulse is in its cone.
 fn accelerated(problem: &mut impl Sweepable, settings: &GaussSeidelSettings) -> (u64, f64) {
     let (mut sweeps, mut error) = plain(problem, settings, tuning::PLAIN.min(settings.max_sweeps));
     if error <= settings.tolerance {

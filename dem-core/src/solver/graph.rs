@@ -36,7 +36,8 @@ impl Graph {
     }
 }
 
-/// First unknown of each node, and how many it has, in rising order; unknowns without a contact stand alone.
+/// First unknown of each node, and how many it has, in rising order; unknowns without a contact
+/// stand alone.
 fn nodes(rows: &Rows) -> Vec<(usize, usize)> {
     let mut counts = vec![1; rows.unknowns];
     for row in &rows.list {

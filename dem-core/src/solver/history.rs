@@ -1,9 +1,11 @@
 //! The reactions that a step's reactions are measured from.
 //!
-//! In the limit of stiff contacts reactions grow by ρ times the displacements of a step. A bond that has held since it formed carries ρ H̃ᵀλ, with λ
-//! the displacements of the bodies since then: of all reactions with the same net impulses on the bodies those of least Σ r²/ρ. A solve leaves a
-//! small self-stress besides, which balances among the bonds, and with the last step's reactions as the anchor of the metric it would add up from
-//! step to step. It is removed; of the reactions r_b of the bonds remain
+//! In the limit of stiff contacts reactions grow by ρ times the displacements of a step. A bond
+//! that has held since it formed carries ρ H̃ᵀλ, with λ the displacements of the bodies since then:
+//! of all reactions with the same net impulses on the bodies those of least Σ r²/ρ. A solve leaves
+//! a small self-stress besides, which balances among the bonds, and with the last step's reactions
+//! as the anchor of the metric it would add up from step to step. It is removed; of the reactions
+//! r_b of the bonds remain
 //!
 //! r_a = ρ H̃ᵀ (H̃ ρ H̃ᵀ)⁺ H̃ r_b.
 //!
@@ -16,7 +18,8 @@ use crate::linear::Lu;
 use crate::solver::tuning::history as tuning;
 use std::sync::Arc;
 
-/// The multipliers of all contacts, those of the bonds without their self-stress (N s); unchanged where the matrix is singular.
+/// The multipliers of all contacts, those of the bonds without their self-stress (N s); unchanged
+/// where the matrix is singular.
 pub(super) fn history(rows: &Rows, graph: &mut Option<Arc<Graph>>) -> Vec<Padded> {
     let all: Vec<Padded> = rows.list.iter().map(|row| row.multiplier).collect();
     let is_bond = |row: &Row| row.shift > 0.0 && row.compliance.n == 0.0;

@@ -54,7 +54,8 @@ impl SolveStatus {
 /// What solves took.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Work {
-    /// Sweeps of Gauss–Seidel that made up the solution; those that only look for an active set do not count.
+    /// Sweeps of Gauss–Seidel that made up the solution; those that only look for an active set do
+    /// not count.
     pub sweeps: u64,
     /// Newton iterations.
     pub newton: u64,
@@ -99,16 +100,19 @@ pub struct SolveReport {
 
 /// A method that solves a contact problem from the impulses it holds as a start.
 pub trait ContactSolver<D: Dim>: Send {
-    /// Improve the impulses and node velocities of `problem` until the tolerance, or a limit, is reached.
+    /// Improve the impulses and node velocities of `problem` until the tolerance, or a limit, is
+    /// reached. It comes with the impulses of the last step, and with the free velocities of its
+    /// nodes: [`ContactProblem::velocities_from_reactions`] makes the two agree, before and after.
     fn solve(&mut self, problem: &mut ContactProblem<D>) -> SolveReport;
 
-    /// Solve a problem once more whose solution is accepted, but lets bodies move too far beyond the laws of their contacts; none
-    /// where there is no other way to solve it.
+    /// Solve a problem once more whose solution is accepted, but lets bodies move too far beyond
+    /// the laws of their contacts; none where there is no other way to solve it.
     fn solve_finer(&mut self, _problem: &mut ContactProblem<D>) -> Option<SolveReport> {
         None
     }
 
-    /// A copy with all that is kept from one solve to the next: the solver of a step that may have to be undone.
+    /// A copy with all that is kept from one solve to the next: the solver of a step that may have
+    /// to be undone.
     fn snapshot(&self) -> Box<dyn ContactSolver<D>>;
 
     /// Write what is kept from one solve to the next.

@@ -18,7 +18,8 @@ impl Rest {
         over
     }
 
-    /// It failed: one failure is forgiven, after the next it rests for one solve, then for twice as many each time.
+    /// It failed: one failure is forgiven, after the next it rests for one solve, then for twice as
+    /// many each time.
     pub fn lengthen(&mut self) {
         self.left = self.next;
         self.next = (2 * self.next).clamp(1, tuning::LONGEST_REST);

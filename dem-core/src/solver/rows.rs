@@ -1,9 +1,10 @@
 //! The contact problem as rows over scaled unknowns, free of dimension.
 //!
-//! Unknowns are y = M^{1/2} v of the nodes that can move, so the mass matrix is the identity and any ratio of masses is
-//! as good as another. Masses and impulses are counted in a unit of 1 or 2 kg ([`mass_unit`]), so that a scene whose
-//! masses are scaled by a power of two has the same bits. Each contact keeps the coefficients of its rows,
-//! u = Hᵀ v = Σ h y + u₀, where u₀ comes from nodes whose velocity is given.
+//! Unknowns are y = M^{1/2} v of the nodes that can move, so the mass matrix is the identity and
+//! any ratio of masses is as good as another. Masses and impulses are counted in a unit of 1 or 2
+//! kg ([`mass_unit`]), so that a scene whose masses are scaled by a power of two has the same bits.
+//! Each contact keeps the coefficients of its rows, u = Hᵀ v = Σ h y + u₀, where u₀ comes from
+//! nodes whose velocity is given.
 
 use crate::contact::{Arms, Cone, Law, PADDED, Padded, Weights};
 use crate::dim::{Dim, Vect, tangential_rows};
@@ -87,7 +88,8 @@ impl Row {
         self.weights + self.compliance
     }
 
-    /// q = u − r/ρ − C r₀, the linear form of the corrector for reactions without the shift at the velocity `u`.
+    /// q = u − r/ρ − C r₀, the linear form of the corrector for reactions without the shift at the
+    /// velocity `u`.
     #[inline]
     pub fn form(&self, u: &Padded) -> Padded {
         *u - self.weights.times(&self.multiplier) - self.compliance.times(&self.carried)
@@ -132,7 +134,8 @@ impl Default for StiffnessRatio {
 }
 
 impl StiffnessRatio {
-    /// 1/ρ of each group for that of the normal row. In twist a bar has the shear modulus and, round, twice the second moment.
+    /// 1/ρ of each group for that of the normal row. In twist a bar has the shear modulus and,
+    /// round, twice the second moment.
     pub(super) fn weights(&self, normal: f64) -> Weights {
         let (t, m) = (normal / self.tangential, normal / self.rolling);
         Weights { n: normal, t, m, w: 0.5 * m / self.tangential }
@@ -181,7 +184,8 @@ impl Unknowns {
         Self { first, total, unit: mass_unit(nodes) }
     }
 
-    /// Root of an inverse mass or inertia, in the unit of mass: velocity over the unknown that stands for it.
+    /// Root of an inverse mass or inertia, in the unit of mass: velocity over the unknown that
+    /// stands for it.
     fn root(&self, inverse: f64) -> f64 {
         (inverse * self.unit).sqrt()
     }
@@ -196,8 +200,9 @@ fn degrees<D: Dim>(nodes: &Nodes<D>, k: usize, moves: bool) -> usize {
 }
 
 impl Rows {
-    /// The rows of a problem whose normal rows have ρ = κ / (mean of the normal entries of W), scaled to the stiffness
-    /// of each pair (in 3D a cylinder of the mean diameter, so ρ grows with it; in 2D all are alike).
+    /// The rows of a problem whose normal rows have ρ = κ / (mean of the normal entries of W),
+    /// scaled to the stiffness of each pair (in 3D a cylinder of the mean diameter, so ρ grows with
+    /// it; in 2D all are alike).
     pub fn of<D: Dim>(problem: &ContactProblem<D>, kappa: f64, ratio: StiffnessRatio) -> Self {
         let unknowns = Unknowns::of(&problem.nodes);
         let mut free = vec![0.0; unknowns.total];
@@ -250,7 +255,8 @@ impl Rows {
         self.list.iter_mut().zip(reactions).for_each(|(row, r)| row.multiplier = *r);
     }
 
-    /// Coefficients of row `k` of a contact, over the unknowns of its first node and then its second.
+    /// Coefficients of row `k` of a contact, over the unknowns of its first node and then its
+    /// second.
     #[inline]
     fn coefficients(&self, row: &Row, k: usize) -> &[f64] {
         &self.coefficients[row.start + k * row.width()..][..row.width()]
@@ -327,7 +333,8 @@ impl Rows {
         most.into_iter().map(|most| if most > 0.0 { most } else { 1.0 }).collect()
     }
 
-    /// out += H̃ A H̃ᵀ for some rows of one contact, row by row over the unknowns of its pair; `a` gives the entries of A over those rows.
+    /// out += H̃ A H̃ᵀ for some rows of one contact, row by row over the unknowns of its pair; `a`
+    /// gives the entries of A over those rows.
     pub fn add_element(&self, row: &Row, of: &[usize], a: impl Fn(usize, usize) -> f64, out: &mut [f64]) {
         let width = row.width();
         let h = |k: usize| self.coefficients(row, of[k]);
@@ -347,7 +354,8 @@ impl Rows {
     }
 }
 
-/// By how much the net impulses on the bodies differ between two sets of reactions, over those of the second.
+/// By how much the net impulses on the bodies differ between two sets of reactions, over those of
+/// the second.
 pub(super) fn net_change(rows: &Rows, from: &[Padded], to: &[Padded]) -> f64 {
     let mut change = vec![0.0; rows.unknowns];
     let mut total = vec![0.0; rows.unknowns];
@@ -360,8 +368,8 @@ pub(super) fn net_change(rows: &Rows, from: &[Padded], to: &[Padded]) -> f64 {
     if change == 0.0 { 0.0 } else { change / total }
 }
 
-/// The unit of mass (kg), 1 or 2: the heaviest grain has an even binary exponent in it, and roots of masses that are scaled by
-/// powers of two differ by powers of two.
+/// The unit of mass (kg), 1 or 2: the heaviest grain has an even binary exponent in it, and roots
+/// of masses that are scaled by powers of two differ by powers of two.
 pub(super) fn mass_unit<D: Dim>(nodes: &Nodes<D>) -> f64 {
     let inverse = nodes.all[..nodes.grains].iter().map(|n| n.inverse_mass).filter(|m| *m > 0.0);
     let exponent = inverse.fold(f64::INFINITY, f64::min).to_bits() >> 52;

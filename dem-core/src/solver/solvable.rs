@@ -10,7 +10,8 @@ use crate::problem::{Contact, ContactProblem, Nodes, Visitor, VisitorMut};
 
 /// A problem that can be put into rows over scaled unknowns, swept and measured.
 pub(super) trait Solvable {
-    /// The problem as rows, without coefficients where it has a matrix; ρ is `kappa` over the mean normal entry of W.
+    /// The problem as rows, without coefficients where it has a matrix; ρ is `kappa` over the mean
+    /// normal entry of W.
     fn rows(&self, kappa: f64, ratio: StiffnessRatio) -> Rows;
     /// Its matrix, where there is one.
     fn matrix(&self) -> Option<&BlockMatrix> {

@@ -8,9 +8,10 @@
 //! | [`Route::InteriorPoint`] | follows the central path, through its folds, with Coulomb's law exact | always |
 //! | [`Route::Sweeps`] | Gauss–Seidel from the best point of the path | where the path is lost |
 //!
-//! What none of them brings to the tolerance is taken at [`StagedSettings::accept`] or refused. No clock is looked at, and nothing but the
-//! extrapolation is left out because it failed in an earlier step: a solve depends on its problem, the last reactions, Newton's last factors
-//! and what is known of the growth of reactions.
+//! What none of them brings to the tolerance is taken at [`StagedSettings::accept`] or refused. No
+//! clock is looked at, and nothing but the extrapolation is left out because it failed in an
+//! earlier step: a solve depends on its problem, the last reactions, Newton's last factors and what
+//! is known of the growth of reactions.
 
 use super::extrapolation::Extrapolation;
 use super::history::history;
@@ -80,7 +81,8 @@ pub struct StagedSettings {
 }
 
 impl Default for StagedSettings {
-    /// All stages, a tolerance of 10⁻⁸, of 10⁻⁵ for load and velocity error, and nothing above 10⁻⁶ accepted.
+    /// All stages, a tolerance of 10⁻⁸, of 10⁻⁵ for load and velocity error, and nothing above 10⁻⁶
+    /// accepted.
     fn default() -> Self {
         Self {
             stages: Stages::All,
@@ -136,7 +138,8 @@ impl Staged {
     fn directly(&mut self, problem: &mut impl Solvable) -> SolveReport {
         problem.velocities_from_reactions();
         let rows = problem.rows(tuning::KAPPA, self.settings.stiffness);
-        // the reactions at hand may be it, as none are where bodies fly apart, and nothing may be there that yields
+        // the reactions at hand may be it, as none are where bodies fly apart, and nothing may be
+        // there that yields
         let residual = problem.residual();
         if residual == 0.0 || rows.list.iter().all(|row| row.normal == 0.0) {
             return self.settings.report(Work::default(), residual, 0.0, 0.0);
@@ -173,7 +176,8 @@ impl Staged {
             _ => self.anchor(rows),
         };
         let start = (!is_cold(rows)).then_some(&begun[..]);
-        // what breaks a bond is the load that it bears; of dry contacts any reactions that balance will do
+        // what breaks a bond is the load that it bears; of dry contacts any reactions that balance
+        // will do
         let least = problem.matrix().is_none() && rows.list.iter().any(|row| row.shift > 0.0);
         let aims = self.aims(least);
         let graph = &mut self.newton.graph;
@@ -230,7 +234,8 @@ impl Staged {
         GaussSeidelSettings { local, tolerance, accept, max_sweeps, acceleration: 0 }
     }
 
-    /// By sweeps over dry contacts: for the tolerances, then for what is accepted. Both measures may miss by as much as the residual may.
+    /// By sweeps over dry contacts: for the tolerances, then for what is accepted. Both measures
+    /// may miss by as much as the residual may.
     fn swept<D: Dim>(&self, problem: &mut ContactProblem<D>) -> SolveReport {
         let StagedSettings { tolerance, accept, .. } = self.settings;
         let by = |tolerance, most| GaussSeidel::new(self.sweeps(tolerance, most));

@@ -1,4 +1,5 @@
-//! Sums and products with the error of their rounding: pairs of numbers that carry twice the precision.
+//! Sums and products with the error of their rounding: pairs of numbers that carry twice the
+//! precision.
 //!
 //! Without fused multiply-add, whose rounding differs between processors.
 //!

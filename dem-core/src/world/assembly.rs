@@ -1,24 +1,27 @@
-//! From bodies to the contact problem and back: detection with warm start, assembly, reading of the result.
+//! From bodies to the contact problem and back: detection with warm start, assembly, reading of the
+//! result.
 
 use super::World;
 use super::motion::{Midpoint, Motion, Turn};
 use super::touch::{Kept, Touch, TouchStatus};
-use crate::body::{Grains, direction};
+use crate::body::{Grains, direction, separation};
 use crate::bond::{Bond, BondStatus};
 use crate::contact::{Arms, Bonded, Coulomb, Elastic, Frictionless, Law, Local};
 use crate::dim::{Axes, Dim, Moments, Vect, in_frame, of_frame, resized};
 use crate::problem::{Contact, ContactProblem, KINDS, Kind, Link, Node, Nodes, Visitor, blocks};
 
-/// Gap over the smaller radius of a pair up to which a contact touches, and way of its bodies in a step up to which they are at
-/// rest to each other. The rounding of positions would else be a misfit of rigid contacts, to which stiff ones answer with
-/// forces; with restitution it would decide which contacts act.
+/// Gap over the smaller radius of a pair up to which a contact touches, and way of its bodies in a
+/// step up to which they are at rest to each other. The rounding of positions would else be a
+/// misfit of rigid contacts, to which stiff ones answer with forces; with restitution it would
+/// decide which contacts act.
 const TOUCHING: f64 = 1e-9;
 
-/// The same where the contact pushed in the step before. It was closed then: what opened it since are the errors of many
-/// solves, and a stiff contact would lose its force to them at once.
+/// The same where the contact pushed in the step before. It was closed then: what opened it since
+/// are the errors of many solves, and a stiff contact would lose its force to them at once.
 const CLOSED: f64 = 1e-6;
 
-/// Gap over the radius of the grain below which a contact that does not close is part of the problem.
+/// Gap over the radius of the grain below which a contact that does not close is part of the
+/// problem.
 const NEAR: f64 = 1e-3;
 
 /// What a grain may move, over its radius, before the list of candidates is built anew.
@@ -57,17 +60,18 @@ impl<D: Dim> World<D> {
         }
     }
 
-    /// Gap, normal and contact point of a pair at mid-step; the point is mid-gap, the same for both bodies.
+    /// Gap, normal and contact point of a pair at mid-step; the point is mid-gap, the same for both
+    /// bodies.
     pub(super) fn geometry(&self, mid: &Midpoint<D>, pair: [u32; 2]) -> (f64, D::Vector, D::Vector) {
         let [i, j] = pair.map(|k| k as usize);
         let (x, r) = (mid.grains[i], self.grains.radius[i]);
         let (gap, normal) = match j.checked_sub(self.grains.len()) {
             None => {
-                let apart = x - mid.grains[j];
+                let apart = separation::<D>(x, mid.grains[j]);
                 let distance = apart.norm();
                 (distance - r - self.grains.radius[j], direction::<D>(apart, distance))
             }
-            Some(wall) => self.walls[wall].shape.gap(x - mid.walls[wall], r),
+            Some(wall) => self.walls[wall].shape.gap(separation::<D>(x, mid.walls[wall]), r),
         };
         (gap, normal, x - normal * (r + 0.5 * gap))
     }
@@ -131,8 +135,8 @@ impl<D: Dim> World<D> {
         Brought { carried: self.carried(touches), turns: self.turns(mid, touches, motion, h) }
     }
 
-    /// Reactions (N, N m) that the elastic bonds carry as a step begins, by the number of the bond; empty where bonds are
-    /// rigid.
+    /// Reactions (N, N m) that the elastic bonds carry as a step begins, by the number of the bond;
+    /// empty where bonds are rigid.
     fn carried(&self, touches: &[Kept<D>]) -> Vec<Local<D::Tangent, D::Moment>> {
         if self.bonds.iter().all(|b| b.stiffness.is_none()) {
             return Vec::new();
@@ -155,10 +159,11 @@ impl<D: Dim> World<D> {
         self.candidates.cover(&self.grains, &mid.grains, &self.walls, &mid.walls, reach, spare);
     }
 
-    /// Contacts that the step left out and that its velocities would close: they are added, and the step is solved again.
+    /// Contacts that the step left out and that its velocities would close: they are added, and the
+    /// step is solved again.
     pub(super) fn missed(&mut self, mid: &Midpoint<D>, touches: &[Kept<D>], nodes: &Nodes<D>, h: f64) -> Vec<Kept<D>> {
         let way = |k: usize| h * nodes.all[k].velocity.norm();
-        // as much as serves the next step too
+        // enough for the next step too
         let spare = |k: usize| (SPARE * radius_of(&self.grains, k)).max(0.5 * way(k));
         self.candidates.cover(&self.grains, &mid.grains, &self.walls, &mid.walls, way, spare);
         let mut present = touches.iter().peekable();
@@ -187,7 +192,8 @@ impl<D: Dim> World<D> {
         }
     }
 
-    /// What is added to the normal velocity of a dry contact before Signorini's law (m/s); none if it cannot act in this step.
+    /// What is added to the normal velocity of a dry contact before Signorini's law (m/s); none if
+    /// it cannot act in this step.
     fn bias(&self, touch: &Touch<D>, closed: bool, motion: &Motion<D>, h: f64) -> Option<f64> {
         let e = self.restitution_of(touch.pair);
         let none = self.smaller(touch.pair) * if closed { CLOSED } else { TOUCHING };
@@ -229,7 +235,8 @@ impl<D: Dim> World<D> {
         }
     }
 
-    /// The contact problem of these contacts, started from their reactions, and the place of each contact in it.
+    /// The contact problem of these contacts, started from their reactions, and the place of each
+    /// contact in it.
     pub(super) fn assemble(
         &self,
         mid: &Midpoint<D>,

@@ -1,7 +1,7 @@
 //! The energy ledger: where the work of each step went, and the momentum.
 //!
-//! Contact work is r·(u⁺ + u⁻)/2 by row. The sum closes by identity (kinetic energy is quadratic in v), so its remainder
-//! checks the bookkeeping, not the accuracy.
+//! Contact work is r·(u⁺ + u⁻)/2 by row. The sum closes by identity (kinetic energy is quadratic in
+//! v), so its remainder checks the bookkeeping, not the accuracy.
 
 use crate::contact::{Law, Local};
 use crate::dim::{Dim, Vect};
@@ -44,7 +44,8 @@ pub(super) fn elastic_energy<L: Law>(law: &L, r: &Local<L::T, L::B>) -> f64 {
     0.5 * r.dot(&law.compliance().times(r))
 }
 
-/// Energy (J) that the rows of each kind of contact took from the bodies: −Σ r·(u⁺ + u⁻)/2 for n, t and m.
+/// Energy (J) that the rows of each kind of contact took from the bodies: −Σ r·(u⁺ + u⁻)/2 for n, t
+/// and m.
 pub(super) fn losses<D: Dim>(before: &[(D::Vector, D::Spin)], problem: &ContactProblem<D>) -> [[f64; 3]; KINDS] {
     let mut losses = Losses::<D> { before, kind: 0, sums: [[0.0; 3]; KINDS] };
     problem.visit_groups(&mut losses);

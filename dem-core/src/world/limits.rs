@@ -1,23 +1,27 @@
-//! What a step must not do, however small its residual. Such a step is made in halves, or the run stops.
+//! What a step must not do, however small its residual. Such a step is made in halves, or the run
+//! stops.
 //!
-//! *Bodies too fast for the step* would pass through another between two looks, or be stopped by one that they pass at a
-//! distance: contacts are looked for at mid-step only, and their law knows the tangent plane, not the curved surface. Both
-//! serve while bodies move little beside their size. The way of each half step is followed here pair by pair, but only where
-//! the fastest body goes further than a quarter of the smallest grain: slow scenes pay one look at the velocities.
+//! *Bodies too fast for the step* would pass through another between two looks, or be stopped by
+//! one that they pass at a distance: contacts are looked for at mid-step only, and their law knows
+//! the tangent plane, not the curved surface. Both suffice while bodies move little beside their
+//! size. The way of each half step is followed here pair by pair, but only where the fastest body
+//! goes further than a quarter of the smallest grain: slow scenes pay one look at the velocities.
 //!
-//! *Contacts that yield.* The residual is relative to all reactions. Where a light grain is pressed between heavy ones, an
-//! error that is small beside their weight is a large velocity of the light one; and where no velocities satisfy the contact laws,
-//! as between two walls that close on a grain, reactions grow until any error is small beside them. So velocities are
-//! measured too: in each step, and summed over the run for each pair, since an error of one sign adds up.
+//! *Contacts that yield.* The residual is relative to all reactions. Where a light grain is pressed
+//! between heavy ones, an error that is small beside their weight is a large velocity of the light
+//! one; and where no velocities satisfy the contact laws, as between two walls that close on a
+//! grain, reactions grow until any error is small beside them. So velocities are measured too: in
+//! each step, and summed over the run for each pair, since an error of one sign adds up.
 //!
-//! The step asks for none of this where overlaps are pushed out: the speeds of that preparation mean nothing.
+//! The step asks for none of this where overlaps are pushed out: the speeds of that preparation
+//! mean nothing.
 
 use super::World;
 use super::assembly::Places;
 use super::motion::Midpoint;
 use super::report::Violation;
 use super::touch::Kept;
-use crate::body::{Drive, Shape};
+use crate::body::{Drive, Shape, separation};
 use crate::contact::Law;
 use crate::dim::{Dim, Vect};
 use crate::problem::{Contact, ContactProblem, Nodes, Visitor};
@@ -29,28 +33,28 @@ const DEEP: f64 = 0.5;
 /// Distance, over the smaller radius, at which a grain passes another.
 const PASSING: f64 = 0.05;
 
-/// Way, over the smaller radius, that a solve may let a pair move beyond its law in a step: close a dry contact, or change the
-/// length of a rigid bond.
+/// Way, over the smaller radius, that a solve may let a pair move beyond its law in a step: close a
+/// dry contact, or change the length of a rigid bond.
 const YIELDING: f64 = 1e-4;
 
 /// The same, added up over the run.
 const YIELDED: f64 = 1e-3;
 
-/// The largest tolerance of a solver, and the largest residual that it accepts, for which these two hold; larger ones, which ask for
-/// less, loosen both in proportion.
+/// The largest tolerance of a solver, and the largest residual that it accepts, for which these two
+/// hold; larger ones, which ask for less, loosen both in proportion.
 const FINE: f64 = 1e-6;
 const ACCEPTED: f64 = 1e-4;
 
-/// Share of the closing power of the free velocities that reactions leave where bodies are jammed: all of it where
-/// they only balance each other, none in a solution.
+/// Share of the closing power of the free velocities that reactions leave where bodies are jammed:
+/// all of it where they only balance each other, none in a solution.
 const UNOPPOSED: f64 = 0.5;
 
 /// Share of the largest reaction from which a wall counts among those that carry it.
 const CARRIES: f64 = 1e-3;
 
 impl<D: Dim> World<D> {
-    /// A pair that goes too deep into one another, or through, within `time` (s) from these places at these velocities; of
-    /// all candidates the first.
+    /// A pair that goes too deep into one another, or through, within `time` (s) from these places
+    /// at these velocities; of all candidates the first.
     pub(super) fn crossing(
         &self,
         place: impl Fn(usize) -> D::Vector,
@@ -65,7 +69,8 @@ impl<D: Dim> World<D> {
         let too_deep = |pair: &&[u32; 2]| {
             let [i, j] = pair.map(|k| k as usize);
             let (surface, radius) = (self.surface(j), self.grains.radius[i]);
-            let (offset, way) = (place(i) - place(j), (velocity(i) - velocity(j)) * time);
+            let offset = separation::<D>(place(i), place(j));
+            let way = (velocity(i) - velocity(j)) * time;
             let before = surface.gap(offset, radius).0.min(0.0);
             surface.smallest_gap(offset, way, radius) < before - DEEP * self.smaller(**pair)
         };
@@ -77,8 +82,9 @@ impl<D: Dim> World<D> {
         gap > PASSING * self.smaller(pair)
     }
 
-    /// A pair of grains that pushes though it would pass at a distance: only its tangent plane was in the way.
-    pub(super) fn pushes_from_afar(
+    /// A pair of grains that pushes though it would pass at a distance: only its tangent plane was
+    /// in the way.
+    pub(super) fn pushes_at_a_distance(
         &self,
         mid: &Midpoint<D>,
         touches: &[Kept<D>],
@@ -102,7 +108,8 @@ impl<D: Dim> World<D> {
         touches.iter().filter(|t| (t.pair[1] as usize) < self.grains.len()).find(far).map(|t| t.pair)
     }
 
-    /// The pair that a solution lets move furthest beyond its law, if that is too far; ways are those of a whole step.
+    /// The pair that a solution lets move furthest beyond its law, if that is too far; ways are
+    /// those of a whole step.
     pub(super) fn yielding(&self, problem: &ContactProblem<D>) -> Option<Violation> {
         let mut worst = Yielding { world: self, pair: [0; 2], share: 0.0 };
         problem.visit(&mut worst);
@@ -116,8 +123,8 @@ impl<D: Dim> World<D> {
         })
     }
 
-    /// Add the ways that this solution lets each contact move beyond its law to those of the steps before; the pair with the
-    /// longest sum, if that is too far.
+    /// Add the ways that this solution lets each contact move beyond its law to those of the steps
+    /// before; the pair with the longest sum, if that is too far.
     pub(super) fn accumulate(
         &self,
         touches: &mut [Kept<D>],
@@ -155,9 +162,10 @@ impl<D: Dim> World<D> {
         })
     }
 
-    /// Whether the reactions only balance each other, as where a wall that is moved closes on a grain: the walls that carry them. In a
-    /// solution they take as much power from the bodies as the free velocities would put into closing contacts. This is no proof that no
-    /// solution exists; that is [`World::verdict`].
+    /// Whether the reactions only balance each other, as where a wall that is moved closes on a
+    /// grain: the walls that carry them. In a solution they take as much power from the bodies as
+    /// the free velocities would put into closing contacts. This is no proof that no solution
+    /// exists; that is [`World::verdict`].
     fn jammed(&self, problem: &ContactProblem<D>) -> Option<Vec<u32>> {
         let mut powers = Powers { problem, asked: 0.0, left: 0.0, largest: 0.0 };
         problem.visit(&mut powers);
@@ -202,8 +210,9 @@ impl<D: Dim> World<D> {
     }
 }
 
-/// Speed (m/s) at which the bodies of a contact close beyond its law; of a rigid bond, at which it gets shorter. None where the law
-/// sets no bound: a spring yields, and a bond at its limit flows and is about to break.
+/// Speed (m/s) at which the bodies of a contact close beyond its law; of a rigid bond, at which it
+/// gets shorter. None where the law sets no bound: a spring yields, and a bond at its limit flows
+/// and is about to break.
 fn beyond_law<D: Dim, L: Law>(nodes: &Nodes<D>, c: &Contact<D, L>) -> Option<f64> {
     let law = &c.law;
     let free = law.compliance().n > 0.0 || c.failure().is_some();
@@ -265,7 +274,8 @@ impl<D: Dim> Visitor<D> for Pairs {
     }
 }
 
-/// Sums the power that the reactions of a solution would take from the free velocities (N s times m/s), and what is left of it.
+/// Sums the power that the reactions of a solution would take from the free velocities (N s times
+/// m/s), and what is left of it.
 struct Powers<'a, D: Dim> {
     problem: &'a ContactProblem<D>,
     asked: f64,

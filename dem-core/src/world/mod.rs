@@ -1,7 +1,7 @@
 //! The world: grains, walls, bonds and time, and the step that carries them on.
 //!
-//! [`World::step`] reads as the scheme of Moreau and Jean (Jean 1999): half a step in position, detection, free
-//! velocity, contact problem with its rupture cascade, half a step.
+//! [`World::step`] reads as the scheme of Moreau and Jean (Jean 1999): half a step in position,
+//! detection, free velocity, contact problem with its rupture cascade, half a step.
 
 mod assembly;
 mod ledger;
@@ -22,7 +22,7 @@ pub use touch::{Break, Counts, Touch, TouchStatus};
 use motion::{Midpoint, Turn};
 use touch::Kept;
 
-use crate::body::{Grains, Load, Wall};
+use crate::body::{Grains, Load, Wall, separation};
 use crate::bond::{Bond, BondStatus, Bonds, Rupture, Stiffness};
 use crate::contact::BondFlow;
 use crate::detection::{Candidates, pairs_within};
@@ -61,8 +61,8 @@ pub struct Settings<D: Dim> {
     pub max_halvings: u32,
     /// Thickness of the sample (m) in 2D, 1 in 3D: it turns areas into volumes.
     pub thickness: f64,
-    /// Push overlaps apart within one step instead of only keeping them from growing. Energy is gained: for preparation, where
-    /// velocities are thrown away.
+    /// Push overlaps apart within one step instead of only keeping them from growing. Energy is
+    /// gained: for preparation, where velocities are thrown away.
     pub expel_overlaps: bool,
 }
 
@@ -114,7 +114,8 @@ struct State<D: Dim> {
 }
 
 impl<D: Dim> Default for Settings<D> {
-    /// Steps of 10⁻⁴ s, no gravity, no friction, no restitution, and the settings that a scene has by default.
+    /// Steps of 10⁻⁴ s, no gravity, no friction, no restitution, and the settings that a scene has
+    /// by default.
     fn default() -> Self {
         Self {
             step: 1e-4,
@@ -156,11 +157,12 @@ impl<D: Dim> World<D> {
         world
     }
 
-    /// Bond every pair of grains whose gap is at most `gap_tolerance` (–) times its mean diameter, with friction `friction`;
-    /// `strength` gives the tensile strength (N) for a mean diameter (m), and zero means no bond.
+    /// Bond every pair of grains whose gap is at most `gap_tolerance` (–) times its mean diameter,
+    /// with friction `friction`; `strength` gives the tensile strength (N) for a mean diameter (m),
+    /// and zero means no bond.
     ///
-    /// Pairs of two fixed grains are left out, since nothing can strain their bond, and pairs that have a bond already,
-    /// intact or broken.
+    /// Pairs of two fixed grains are left out, since nothing can strain their bond, and pairs that
+    /// have a bond already, intact or broken.
     pub fn form_bonds(&mut self, gap_tolerance: f64, strength: impl Fn(f64) -> f64, friction: f64) {
         // too many: the gap decides below
         let skin: Vec<f64> = self.grains.radius.iter().map(|r| 2.0 * gap_tolerance * r).collect();
@@ -168,7 +170,8 @@ impl<D: Dim> World<D> {
         for pair in pairs_within(&self.grains, &self.grains.position, &skin) {
             let [i, j] = pair.map(|k| k as usize);
             let mean_diameter = self.grains.radius[i] + self.grains.radius[j];
-            let rest_gap = (self.grains.position[i] - self.grains.position[j]).norm() - mean_diameter;
+            let apart = separation::<D>(self.grains.position[i], self.grains.position[j]);
+            let rest_gap = apart.norm() - mean_diameter;
             let strength = strength(mean_diameter);
             let held = self.grains.fixed[i] && self.grains.fixed[j];
             if rest_gap <= gap_tolerance * mean_diameter && strength > 0.0 && !held {
@@ -194,8 +197,8 @@ impl<D: Dim> World<D> {
         }
     }
 
-    /// Give the twisting moment of every bond the limit ξ a (r_n + r_coh) with this ξ (–); in space with twist rows, where a
-    /// bond that has none breaks as soon as it is twisted.
+    /// Give the twisting moment of every bond the limit ξ a (r_n + r_coh) with this ξ (–); in space
+    /// with twist rows, where a bond that has none breaks as soon as it is twisted.
     pub fn limit_twist(&mut self, xi: f64) {
         self.bonds.iter_mut().for_each(|bond| bond.twist = xi);
     }
@@ -213,8 +216,9 @@ impl<D: Dim> World<D> {
         (self.solver, self.built_with) = (solver.build(), Some(solver));
     }
 
-    /// Take a solver of one's own from the next step on. `settings.solver` still says which residuals count as small: its
-    /// tolerances bound how far bodies may move beyond their contact laws.
+    /// Take a solver of one's own from the next step on. `settings.solver` still says which
+    /// residuals count as small: its tolerances bound how far bodies may move beyond their contact
+    /// laws.
     pub fn use_solver(&mut self, solver: Box<dyn ContactSolver<D>>) {
         (self.solver, self.built_with) = (solver, None);
     }
@@ -263,7 +267,8 @@ impl<D: Dim> World<D> {
         (0..D::N).map(|axis| high[axis] - low[axis]).product::<f64>() * self.settings.thickness
     }
 
-    /// Bring every grain and wall to rest and forget nothing else: a quasi-static preparation steps from rest to rest.
+    /// Bring every grain and wall to rest and forget nothing else: a quasi-static preparation steps
+    /// from rest to rest.
     pub fn stop_motion(&mut self) {
         self.grains.velocity.iter_mut().for_each(|v| *v = D::Vector::zero());
         self.grains.spin.iter_mut().for_each(|w| *w = D::Spin::zero());

@@ -34,7 +34,7 @@ pub(super) struct Motion<D: Dim> {
 pub(super) struct Turn {
     /// What is added to the normal velocity of the bond before its law (m/s).
     pub bias: f64,
-    /// By how much the bond is longer at mid-step than its law knows, beside the hidden length of steps of this length (m): zero
-    /// where all steps were of one length.
+    /// By how much the bond is longer at mid-step than its law knows, beside the hidden length of
+    /// steps of this length (m): zero where all steps were of one length.
     pub owed: f64,
 }

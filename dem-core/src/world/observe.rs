@@ -31,8 +31,9 @@ impl<D: Dim> World<D> {
         sum
     }
 
-    /// Mean stress σ = (1/V) Σ ℓ ⊗ f over the contacts of the last step (Pa, D × D row by row; compression positive), after
-    /// Love and Weber. ℓ joins the centres, or at a wall the contact point to the centre; V is the box around the sample at time zero.
+    /// Mean stress σ = (1/V) Σ ℓ ⊗ f over the contacts of the last step (Pa, D × D row by row;
+    /// compression positive), after Love and Weber. ℓ joins the centres, or at a wall the contact
+    /// point to the centre; V is the box around the sample at time zero.
     pub fn stress(&self) -> Vec<f64> {
         let mut sum = vec![0.0; D::N * D::N];
         for touch in self.touches() {
@@ -49,8 +50,8 @@ impl<D: Dim> World<D> {
         sum
     }
 
-    /// Contacts of the last accepted step, sorted by pair, with their reactions. Gaps and points are those of mid-step, with the
-    /// radii, shapes and numbers of bodies as they are now.
+    /// Contacts of the last accepted step, sorted by pair, with their reactions. Gaps and points
+    /// are those of mid-step, with the radii, shapes and numbers of bodies as they are now.
     pub fn touches(&self) -> impl ExactSizeIterator<Item = Touch<D>> {
         self.kept.iter().map(|kept| self.touch(&self.mid, kept))
     }
@@ -61,8 +62,9 @@ impl<D: Dim> World<D> {
         D::normal(&touch.frame) * (radius + touch.gap)
     }
 
-    /// Strain of the sample: the displacement gradient E of the affine fit u ≈ a + E x to the displacements of all grains since
-    /// time zero (–, D × D row by row; elongation positive). Zero if the grains do not span all directions.
+    /// Strain of the sample: the displacement gradient E of the affine fit u ≈ a + E x to the
+    /// displacements of all grains since time zero (–, D × D row by row; elongation positive). Zero
+    /// if the grains do not span all directions.
     pub fn strain(&self) -> Vec<f64> {
         let n = self.grains.len() as f64;
         let mean =
@@ -85,7 +87,8 @@ impl<D: Dim> World<D> {
         let spread = s.trace();
         match s.cholesky() {
             Some(factor) if factor.l().diagonal().iter().all(|d| d * d > 1e-12 * spread) => {
-                // S is symmetric: E = (S⁻¹ Uᵀ)ᵀ, whose column-major storage of the transpose is E row by row
+                // S is symmetric: E = (S⁻¹ Uᵀ)ᵀ, whose column-major storage of the transpose is E
+                // row by row
                 factor.solve(&u.transpose()).as_slice().to_vec()
             }
             _ => vec![0.0; D::N * D::N],

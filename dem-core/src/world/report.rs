@@ -40,11 +40,13 @@ pub struct StepReport<D: Dim> {
     pub breaks: Vec<Break<D>>,
     /// Deepest overlap of a dry contact at mid-step (m).
     pub penetration: f64,
-    /// Largest difference between the length of an intact bond at mid-step and its length at rest (m).
+    /// Largest difference between the length of an intact bond at mid-step and its length at rest
+    /// (m).
     pub bond_elongation: f64,
     /// Number of solves that were not accepted and made the step shorter.
     pub rejected: u32,
-    /// Number of parts that the step was made in: 1, or more where a solve was not accepted or a body was too fast.
+    /// Number of parts that the step was made in: 1, or more where a solve was not accepted or a
+    /// body was too fast.
     pub substeps: u32,
 }
 
@@ -129,7 +131,8 @@ pub enum StepError {
         /// What is proved of its problem, with bodies by number (walls follow the grains).
         verdict: Verdict<u32>,
     },
-    /// A grain would pass through another body, or be pushed by one it passes, in the shortest part of a step.
+    /// A grain would pass through another body, or be pushed by one it passes, in the shortest part
+    /// of a step.
     TooFast {
         /// Time at which the part of the step that failed began (s).
         time: f64,
@@ -152,7 +155,8 @@ pub enum StepError {
     },
 }
 
-/// A pair that a solve lets move beyond its law: a dry contact closes, a rigid bond changes its length.
+/// A pair that a solve lets move beyond its law: a dry contact closes, a rigid bond changes its
+/// length.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Violation {
     /// Grain, and grain or wall (walls follow the grains).
@@ -161,8 +165,8 @@ pub struct Violation {
     pub share: f64,
     /// Whether it is the sum over the run so far; else it is the way of one step.
     pub accumulated: bool,
-    /// Where the reactions balance each other without stopping the bodies: the walls that carry them (walls follow the grains), one of
-    /// which is moved.
+    /// Where the reactions balance each other without stopping the bodies: the walls that carry
+    /// them (walls follow the grains), one of which is moved.
     pub jammed: Option<Vec<u32>>,
     /// What is proved of the problem, with bodies by number (walls follow the grains).
     pub verdict: Verdict<u32>,
@@ -179,7 +183,8 @@ impl StepError {
         }
     }
 
-    /// The message, with bodies called by `name`, which is given a number: grains first, then walls.
+    /// The message, with bodies called by `name`, which is given a number: grains first, then
+    /// walls.
     pub fn message(&self, name: &dyn Fn(u32) -> String) -> String {
         match self {
             Self::NotAccepted { time, step, residual, iterations, pair, verdict } => {

@@ -1,7 +1,7 @@
 //! The state of a world as plain numbers, and the world that goes on from it.
 //!
-//! What the scene gives is not part of it: shapes and drives of walls, loads, settings. Nor is the list of candidate
-//! pairs, which may be any that covers a step.
+//! What the scene gives is not part of it: shapes and drives of walls, loads, settings. Nor is the
+//! list of candidate pairs, which may be any that covers a step.
 
 use super::motion::Midpoint;
 use super::motion::Turn;
@@ -90,8 +90,8 @@ impl<D: Dim> World<D> {
         self.solver.save(to);
     }
 
-    /// The world whose `grains` and the rest after them [`World::save`] wrote. The walls are those of the scene; their
-    /// motion is the one that was written.
+    /// The world whose `grains` and the rest after them [`World::save`] wrote. The walls are those
+    /// of the scene; their motion is the one that was written.
     ///
     /// # Errors
     /// [`Mismatch`].

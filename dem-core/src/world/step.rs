@@ -1,4 +1,5 @@
-//! One time step: the scheme of Moreau and Jean with θ = 1/2, its rupture cascade, and what is done when a solve fails.
+//! One time step: the scheme of Moreau and Jean with θ = 1/2, its rupture cascade, and what is done
+//! when a solve fails.
 
 use super::assembly::{Places, write_reactions};
 use super::ledger::{elastic_energy, losses};
@@ -21,8 +22,8 @@ impl<D: Dim> World<D> {
         self.step_watched(&mut |_| {})
     }
 
-    /// The same; `watch` is told after each round of a cascade how many bonds have broken in it so far. A step that is made
-    /// anew in halves begins to count anew.
+    /// The same; `watch` is told after each round of a cascade how many bonds have broken in it so
+    /// far. A step that is made anew in halves begins to count anew.
     pub fn step_watched(&mut self, watch: &mut dyn FnMut(usize)) -> Result<StepReport<D>, StepError> {
         self.follow_settings();
         let solver = self.solver.snapshot();
@@ -40,8 +41,8 @@ impl<D: Dim> World<D> {
         Ok(report)
     }
 
-    /// One step of length `h`, or two of half that length if its solve is not accepted, or if bodies are too fast for it;
-    /// `parts` of its length were the step.
+    /// One step of length `h`, or two of half that length if its solve is not accepted, or if
+    /// bodies are too fast for it; `parts` of its length were the step.
     fn advance(
         &mut self,
         h: f64,
@@ -80,7 +81,8 @@ impl<D: Dim> World<D> {
         }
     }
 
-    /// One step of length `h`. An error leaves the world as it was; where it is the `last` attempt, it has the verdict on its problem.
+    /// One step of length `h`. An error leaves the world as it was; where it is the `last` attempt,
+    /// it has the verdict on its problem.
     fn attempt(&mut self, h: f64, last: bool, watch: &mut dyn FnMut(usize)) -> Result<StepReport<D>, StepError> {
         let mid = self.midpoint(h);
         let motion = self.free_motion(h);
@@ -124,7 +126,7 @@ impl<D: Dim> World<D> {
         };
         if limited {
             let velocity = |k: usize| problem.nodes.all[k].velocity;
-            self.refuse_crossing(self.pushes_from_afar(&mid, &touches, &problem.nodes, h))?;
+            self.refuse_crossing(self.pushes_at_a_distance(&mid, &touches, &problem.nodes, h))?;
             self.refuse_crossing(self.crossing(|k| mid.place(k), velocity, 0.5 * h))?;
             self.refuse_violation(self.accumulate(&mut touches, &problem, &places, h), &problem, last)?;
         }
@@ -136,7 +138,8 @@ impl<D: Dim> World<D> {
         Ok(self.report(h, &motion, &problem, done, breaks))
     }
 
-    /// Solve a contact problem; where `limited`, once more if its velocities are too far from the laws and there is another way.
+    /// Solve a contact problem; where `limited`, once more if its velocities are too far from the
+    /// laws and there is another way.
     fn solve(&mut self, problem: &mut ContactProblem<D>, limited: bool) -> SolveReport {
         let solve = self.solver.solve(problem);
         if !limited || solve.status != SolveStatus::Accepted || self.yielding(problem).is_none() {
@@ -146,7 +149,8 @@ impl<D: Dim> World<D> {
         finer.map_or(solve, |finer| SolveReport { work: solve.work + finer.work, ..finer })
     }
 
-    /// The contact problem that the next step would start from, for export and for benchmarks. The world does not move.
+    /// The contact problem that the next step would start from, for export and for benchmarks. The
+    /// world does not move.
     pub fn contact_problem(&mut self) -> ContactProblem<D> {
         let h = self.settings.step;
         let (mid, motion) = (self.midpoint(h), self.free_motion(h));
@@ -176,7 +180,8 @@ impl<D: Dim> World<D> {
         forces
     }
 
-    /// Velocities before the step and the free velocities v_f = v + h M⁻¹ F_ext; walls follow the grains.
+    /// Velocities before the step and the free velocities v_f = v + h M⁻¹ F_ext; walls follow the
+    /// grains.
     fn free_motion(&self, h: f64) -> Motion<D> {
         let g = &self.grains;
         let mut before: Vec<_> = g.velocity.iter().copied().zip(g.spin.iter().copied()).collect();
@@ -194,8 +199,8 @@ impl<D: Dim> World<D> {
             free.push(match &wall.drive {
                 Drive::Fixed => (D::Vector::zero(), still),
                 Drive::Velocity { direction, speed } => (*direction * speed(self.time + h), still),
-                Drive::Force { direction, mass, force } => {
-                    (wall.velocity + *direction * (h * force(self.time + 0.5 * h) / mass), still)
+                Drive::Force { direction, mass, .. } => {
+                    (wall.velocity + *direction * (h * wall.applied_force(self.time + 0.5 * h) / mass), still)
                 }
             });
         }
@@ -213,9 +218,7 @@ impl<D: Dim> World<D> {
             }
         }
         for wall in &self.walls {
-            if let Drive::Force { force, .. } = &wall.drive {
-                sum += force(self.time + 0.5 * h).powi(2);
-            }
+            sum += wall.applied_force(self.time + 0.5 * h).powi(2);
         }
         h * f64::sqrt(sum)
     }
@@ -259,7 +262,8 @@ impl<D: Dim> World<D> {
         found.map_or(Ok(()), |pair| Err(StepError::TooFast { time: self.time, pair }))
     }
 
-    /// The bonds that the accepted solve left at their limit, as many as the scene's rule lets break in one round.
+    /// The bonds that the accepted solve left at their limit, as many as the scene's rule lets
+    /// break in one round.
     fn at_limit(
         &self,
         mid: &Midpoint<D>,
@@ -298,7 +302,8 @@ impl<D: Dim> World<D> {
             u.n += law.bias();
             let flow = u + law.compliance().times(&(contact.r - law.carried()));
             let Some(bond) = touch.bond else { continue };
-            // what the books hold of it: of the step's beginning where the step is made without the bond
+            // what the books hold of it: of the step's beginning where the step is made without the
+            // bond
             let stored = if self.settings.rupture == Rupture::EndOfStep { contact.r } else { law.carried() };
             let energy = elastic_energy(law, &stored);
             let (pair, point, reaction) = (touch.pair, touch.point, touch.reaction);
@@ -309,7 +314,8 @@ impl<D: Dim> World<D> {
         found
     }
 
-    /// Take over the result: velocities, second half of the positions, broken bonds, reactions, books.
+    /// Take over the result: velocities, second half of the positions, broken bonds, reactions,
+    /// books.
     fn settle(
         &mut self,
         h: f64,
@@ -331,7 +337,7 @@ impl<D: Dim> World<D> {
         for (w, wall) in self.walls.iter_mut().enumerate() {
             wall.velocity = problem.nodes.all[n + w].velocity;
             wall.position = mid.walls[w] + wall.velocity * (0.5 * h);
-            wall.applied = if let Drive::Force { force, .. } = &wall.drive { force(self.time + 0.5 * h) } else { 0.0 };
+            wall.applied = wall.applied_force(self.time + 0.5 * h);
         }
         let forces = self.wall_forces(&mid, &touches);
         for (wall, force) in self.walls.iter_mut().zip(forces) {
@@ -392,8 +398,8 @@ impl<D: Dim> World<D> {
         0.5 * sum
     }
 
-    /// Work of gravity, loads and drives in the step (J): force times mean velocity; a wall with prescribed velocity does the
-    /// work of its reaction.
+    /// Work of gravity, loads and drives in the step (J): force times mean velocity; a wall with
+    /// prescribed velocity does the work of its reaction.
     fn external_work(&self, h: f64, motion: &Motion<D>, problem: &ContactProblem<D>) -> f64 {
         let mean = |k: usize| (motion.before[k].0 + problem.nodes.all[k].velocity) * 0.5;
         let mut work = 0.0;
@@ -411,7 +417,9 @@ impl<D: Dim> World<D> {
             work += match &wall.drive {
                 Drive::Fixed => 0.0,
                 Drive::Velocity { .. } => -pushes[w].dot(&mean(n + w)),
-                Drive::Force { direction, force, .. } => h * force(self.time + 0.5 * h) * direction.dot(&mean(n + w)),
+                Drive::Force { direction, .. } => {
+                    h * wall.applied_force(self.time + 0.5 * h) * direction.dot(&mean(n + w))
+                }
             };
         }
         work

@@ -1,4 +1,5 @@
-//! The contacts of a step, with reactions as forces: as the world keeps them, and as others see them.
+//! The contacts of a step, with reactions as forces: as the world keeps them, and as others see
+//! them.
 
 use crate::bond::BondStatus;
 use crate::contact::Local;
@@ -18,8 +19,9 @@ pub enum TouchStatus {
     Bonded,
 }
 
-/// A contact as the world keeps it from step to step. Its gap, normal and point follow from the places of its bodies at
-/// mid-step, and are not kept: a million grains have three million contacts, twice while a step is made.
+/// A contact as the world keeps it from step to step. Its gap, normal and point follow from the
+/// places of its bodies at mid-step, and are not kept: a million grains have three million
+/// contacts, twice while a step is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Kept<D: Dim> {
     pub pair: [u32; 2],
@@ -35,8 +37,8 @@ pub(super) struct Kept<D: Dim> {
     /// What its frame has beside the normal.
     pub tangents: D::Tangents,
     pub reaction: Local<D::Tangent, D::Moment>,
-    /// How far its bodies have closed beyond its law since they touched (m), summed over the steps: the errors of their solves. Of a
-    /// rigid bond, by how much these have shortened it.
+    /// How far its bodies have closed beyond its law since they touched (m), summed over the steps:
+    /// the errors of their solves. Of a rigid bond, by how much these have shortened it.
     pub yielded: f64,
 }
 

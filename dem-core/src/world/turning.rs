@@ -1,14 +1,15 @@
 //! What bonds that turn are given back, so that they keep their length, or their force follows it.
 //!
-//! Write w for the time between the mid-steps of two steps of lengths h and h'. In it a bond grows by w u_n, of which its law has been
-//! told h u_n, and by a *hidden* length e(w), because it turns. A step gives e(h) back, the hidden length of steps as long as itself. What
-//! a change of the length of steps leaves beside it is *owed*, and given back over the step of the scene. See
+//! Write w for the time between the mid-steps of two steps of lengths h and h'. In it a bond grows
+//! by w u_n, of which its law has been told h u_n, and by a *hidden* length e(w), because it turns.
+//! A step gives e(h) back, the hidden length of steps as long as itself. What a change of the
+//! length of steps leaves beside it is *owed*, and given back over the step of the scene. See
 //! docs/theory/time-stepping.md, "Bonds that turn in steps of several lengths".
 
 use super::World;
 use super::motion::{Midpoint, Motion, Turn};
 use super::touch::Kept;
-use crate::body::direction;
+use crate::body::{direction, separation};
 use crate::dim::{Dim, Vect};
 
 impl<D: Dim> World<D> {
@@ -47,7 +48,8 @@ impl<D: Dim> World<D> {
         let own = hidden(h);
         if last != h {
             let span = 0.5 * (last + h);
-            // of a rigid bond the velocity that its law asks for: the errors of solves do not fit each other
+            // of a rigid bond the velocity that its law asks for: the errors of solves do not fit
+            // each other
             let speed = if elastic { self.lengthening(mid, motion, kept.pair, span).1 } else { -before.bias };
             owed += (span - last) * speed + span * hidden(span) - h * own;
         }
@@ -57,15 +59,18 @@ impl<D: Dim> World<D> {
         Turn { bias: own + owed / full, owed }
     }
 
-    /// How fast a bond grew unknown to its law in the time `span` (s) between the last two mid-steps, and its normal velocity in the
-    /// first of them (m/s): for a bond whose grains need not turn with it, one that is elastic or has no friction.
+    /// How fast a bond grew unknown to its law in the time `span` (s) between the last two
+    /// mid-steps, and its normal velocity in the first of them (m/s): for a bond whose grains need
+    /// not turn with it, one that is elastic or has no friction.
     ///
-    /// Between two mid-steps the grains moved by the way d apart, of which d_t across the normal of the first one. Their distance grew by
-    /// d_n and, because the bond turned, by ℓ' − ℓ − d_n = d_t² / (ℓ' + ℓ + d_n), of which its law, which knows normal velocities, is
-    /// not told. In a steady turn that is what [`World::turning`] gives. See docs/theory/elastic-bonds.md.
+    /// Between two mid-steps the grains moved by the way d apart, of which d_t across the normal of
+    /// the first one. Their distance grew by d_n and, because the bond turned, by ℓ' − ℓ − d_n =
+    /// d_t² / (ℓ' + ℓ + d_n), of which its law, which knows normal velocities, is not told. In a
+    /// steady turn that is what [`World::turning`] gives. See docs/theory/elastic-bonds.md.
     fn lengthening(&self, mid: &Midpoint<D>, motion: &Motion<D>, pair: [u32; 2], span: f64) -> (f64, f64) {
         let [i, j] = pair.map(|k| k as usize);
-        let (apart, way) = (mid.grains[i] - mid.grains[j], (motion.before[i].0 - motion.before[j].0) * span);
+        let apart = separation::<D>(mid.grains[i], mid.grains[j]);
+        let way = (motion.before[i].0 - motion.before[j].0) * span;
         let before = apart - way;
         let length = before.norm();
         let normal = direction::<D>(before, length);
@@ -76,16 +81,20 @@ impl<D: Dim> World<D> {
         (hidden, along / span)
     }
 
-    /// How fast a rigid bond with friction grew unknown to its law in the time `span` (s) between the last two mid-steps (m/s).
+    /// How fast a rigid bond with friction grew unknown to its law in the time `span` (s) between
+    /// the last two mid-steps (m/s).
     ///
-    /// A velocity along the tangent of mid-step leads away from the partner before mid-step and after it. Where the bond turned
-    /// by R since the last mid-step, its velocity u⁻ gained n·(1 − R) u⁻ along the normal by that alone; half of it back,
-    /// u_n⁺ = −½ n·(1 − R) u⁻, makes the step symmetric in time: the length is kept, and since u_n⁺ = −u_n⁻ the reaction does no
-    /// work. Within a rigid fragment R is one for all, so that all bonds can do so at once. See docs/theory/time-stepping.md.
+    /// A velocity along the tangent of mid-step leads away from the partner before mid-step and
+    /// after it. Where the bond turned by R since the last mid-step, its velocity u⁻ gained n·(1 −
+    /// R) u⁻ along the normal by that alone; half of it back, u_n⁺ = −½ n·(1 − R) u⁻, makes the
+    /// step symmetric in time: the length is kept, and since u_n⁺ = −u_n⁻ the reaction does no
+    /// work. Within a rigid fragment R is one for all, so that all bonds can do so at once. See
+    /// docs/theory/time-stepping.md.
     fn turning(&self, mid: &Midpoint<D>, motion: &Motion<D>, pair: [u32; 2], span: f64) -> f64 {
         let (_, normal, _) = self.geometry(mid, pair);
         let [(v_i, spin_i), (v_j, spin_j)] = pair.map(|k| motion.before[k as usize]);
-        // spins follow the tangential row at mid-step, where they are sin φ / w of the angle φ between two of them
+        // spins follow the tangential row at mid-step, where they are sin φ / w of the angle φ
+        // between two of them
         -0.5 * normal.dot(&D::swing(v_i - v_j, (spin_i + spin_j) * (0.5 * span)))
     }
 }

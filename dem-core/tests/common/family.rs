@@ -1,4 +1,5 @@
-//! One scene with and without each feature: hexagonal rows of disks, or close-packed layers of spheres, that rest on a floor.
+//! One scene with and without each feature: hexagonal rows of disks, or close-packed layers of
+//! spheres, that rest on a floor.
 
 use super::{down, floor, grain, settings, world};
 use dem_core::body::Grain;
@@ -33,8 +34,8 @@ pub const FEATURES: [(&str, Feature); 5] = [
 
 const RADIUS: f64 = 2e-3;
 
-/// `rows` rows of `columns` disks, every other one a disk shorter and between those below. A step makes `sweeps` sweeps,
-/// whatever they reach.
+/// `rows` rows of `columns` disks, every other one a disk shorter and between those below. A step
+/// makes `sweeps` sweeps, whatever they reach.
 pub fn rows_of_disks(rows: usize, columns: usize, feature: Feature, sweeps: u64) -> World<D2> {
     let r = RADIUS;
     let mut disks = Vec::new();

@@ -25,7 +25,8 @@ pub fn solver(tolerance: f64) -> SolverSettings {
     })
 }
 
-/// Newton from the stiff limit, with the settings that a scene has by default but for its tolerances.
+/// Newton from the stiff limit, with the settings that a scene has by default but for its
+/// tolerances.
 pub fn newton(tolerance: f64, accept: f64, load_tolerance: f64) -> StagedSettings {
     StagedSettings {
         stages: Stages::Newton,
@@ -81,8 +82,8 @@ pub fn run<D: Dim>(world: &mut World<D>, steps: usize) {
     }
 }
 
-/// Two bonded disks of radius 1 mm along x, the first held fixed, the second under a growing force and torque:
-/// `force` (N) and `torque` (N m) are rates per second. The bond has strength `r_coh`.
+/// Two bonded disks of radius 1 mm along x, the first held fixed, the second under a growing force
+/// and torque: `force` (N) and `torque` (N m) are rates per second. The bond has strength `r_coh`.
 pub fn bonded_pair(r_coh: f64, force: [f64; 2], torque: f64) -> World<D2> {
     let mut fixed = grain::<D2>(&[0.0, 0.0], 1e-3);
     fixed.fixed = true;

@@ -1,4 +1,5 @@
-//! Every parameter over its range, in both dimensions and with every solver, and the page that tells of it.
+//! Every parameter over its range, in both dimensions and with every solver, and the page that
+//! tells of it.
 
 use crate::harness::{Outcome, watch};
 use crate::scene::{Heap, Kind};

@@ -106,7 +106,8 @@ fn a_corner_and_a_wedge_hold_a_grain_at_any_friction() {
                 let mut w = world::<D>(vec![grain(&[0.0, R / s])], walls, set);
                 w.grains.velocity[0] = at::<D>(&[0.01, -0.1]);
                 let out = watch(&mut w, 100, 1e-6);
-                // with much friction it may be wedged so that no reaction obeys the law; then it is said
+                // with much friction it may be wedged so that no reaction obeys the law; then it is
+                // said
                 assert!(out.stopped.is_none() || friction > 1.0, "{friction} {half_angle} {out:?}");
                 // the first half step leads it in, by the speed it fell at
                 assert!(out.penetration < 0.1, "{friction} {half_angle} {out:?}");
@@ -124,7 +125,8 @@ fn walls_that_cannot_yield_stop_the_run_and_say_so() {
         let mut w = world::<D>(vec![grain(&[R])], vec![plane(&[1.0], &[], 0.3), press], settings(1e-3, kind));
         let out = watch(&mut w, 20, 1e-6);
         let error = out.stopped.expect("nothing can obey both walls");
-        // Newton solves the problem but for an error that closes the contact; Gauss–Seidel does not converge
+        // Newton solves the problem but for an error that closes the contact; Gauss–Seidel does not
+        // converge
         let why = match kind {
             Kind::GaussSeidel => matches!(error, StepError::NotAccepted { time: 0.0, .. }),
             _ => match &error {
@@ -143,7 +145,8 @@ fn walls_that_cannot_yield_stop_the_run_and_say_so() {
     everywhere!(case);
 }
 
-/// A wall that closes so slowly that no single step is refused, on a grain and on bonded ones between it and another.
+/// A wall that closes so slowly that no single step is refused, on a grain and on bonded ones
+/// between it and another.
 #[test]
 fn what_a_slow_wall_squeezes_is_found_in_the_sum_over_the_steps() {
     fn case<D: Dim + PartialEq>(kind: Kind) {
@@ -382,7 +385,8 @@ fn travel(mut pile: World<D2>, steps: usize) -> f64 {
     out.travel
 }
 
-/// A disk on two that touch stands if friction is at least tan 15° = 0.268, and rolls them apart if it is less.
+/// A disk on two that touch stands if friction is at least tan 15° = 0.268, and rolls them apart if
+/// it is less.
 #[test]
 fn a_pile_rests_or_falls_as_its_friction_says() {
     for kind in Kind::ALL {
@@ -391,10 +395,11 @@ fn a_pile_rests_or_falls_as_its_friction_says() {
     }
 }
 
-/// Reactions that balance the weights of six disks exist from a friction of 0.43399 on (a linear programme in the rows of
-/// its contacts): below, every solver must let them fall. Above, rest and motion can both be solutions of Coulomb's law, and
-/// which is found depends on where the search begins: from 0.7 on all find rest but the central path, which from a cold start ends
-/// at motion up to 1.2 at least.
+/// Reactions that balance the weights of six disks exist from a friction of 0.43399 on (a linear
+/// programme in the rows of its contacts): below, every solver must let them fall. Above, rest and
+/// motion can both be solutions of Coulomb's law, and which is found depends on where the search
+/// begins: from 0.7 on all find rest but the central path, which from a cold start ends at motion
+/// up to 1.2 at least.
 #[test]
 fn a_pile_of_six_falls_where_no_reactions_can_hold_it() {
     for kind in Kind::ALL {
@@ -421,7 +426,8 @@ fn a_pile_rests_for_ten_million_steps() {
     assert!(crept[1] < 1e-3 && heat < 1e-12, "{crept:?} {heat:e}");
 }
 
-/// Disks one on another, or hanging from the first by their bonds; the force at the end that bears all, over their weight.
+/// Disks one on another, or hanging from the first by their bonds; the force at the end that bears
+/// all, over their weight.
 fn tower(count: usize, hanging: bool, kind: Kind) -> f64 {
     let up = if hanging { -1.0 } else { 1.0 };
     let mut grains: Vec<_> = (0..count).map(|k| grain::<D2>(&[0.0, up * R * (2 * k + 1) as f64])).collect();
@@ -460,8 +466,9 @@ fn towers_and_chains_of_ten_thousand_bear_their_weight() {
     }
 }
 
-/// Disks between two walls that do not let them aside, every other one so many times as heavy, noise in their places. At rest each is
-/// borne by contacts that differ by its weight: an error of the reactions of ε times those is a speed of ε M/m times g h.
+/// Disks between two walls that do not let them aside, every other one so many times as heavy,
+/// noise in their places. At rest each is borne by contacts that differ by its weight: an error of
+/// the reactions of ε times those is a speed of ε M/m times g h.
 fn shaft(mass_ratio: f64, kind: Kind) -> World<D2> {
     let mut grains: Vec<Grain<D2>> = Vec::new();
     for k in 0..6 {
@@ -480,7 +487,8 @@ fn shaft(mass_ratio: f64, kind: Kind) -> World<D2> {
     world(grains, std::iter::once(floor(0.3)).chain(sides).collect(), set)
 }
 
-/// A light disk under heavy ones rests as they do: it moved at up to the tolerance times the ratio of the masses.
+/// A light disk under heavy ones rests as they do: it moved at up to the tolerance times the ratio
+/// of the masses.
 #[test]
 fn a_light_grain_that_bears_heavy_ones_is_solved_too() {
     for kind in [Kind::Newton, Kind::Auto, Kind::Interior] {

@@ -13,8 +13,8 @@ pub struct Outcome {
     pub stopped: Option<StepError>,
     /// Deepest overlap of a dry contact over the smallest radius.
     pub penetration: f64,
-    /// Energy that came from nowhere: what kinetic and elastic energy less the work done on the sample grew by, summed over the
-    /// steps, over the largest energy seen.
+    /// Energy that came from nowhere: what kinetic and elastic energy less the work done on the
+    /// sample grew by, summed over the steps, over the largest energy seen.
     pub gain: f64,
     /// Bonds that broke.
     pub broken: usize,
@@ -22,11 +22,13 @@ pub struct Outcome {
     pub travel: f64,
 }
 
-/// Carry a world on by so many steps, or until it stops with an error, which must leave it as it was.
+/// Carry a world on by so many steps, or until it stops with an error, which must leave it as it
+/// was.
 ///
 /// # Panics
-/// Where a number is not finite, a residual is above what the solver accepts, a status goes back or contradicts another, or
-/// the energy books do not close; where nothing acts from outside, also if the momentum changes.
+/// Where a number is not finite, a residual is above what the solver accepts, a status goes back or
+/// contradicts another, or the energy books do not close; where nothing acts from outside, also if
+/// the momentum changes.
 pub fn watch<D: Dim + PartialEq>(world: &mut World<D>, steps: usize, accept: f64) -> Outcome {
     let mut out = Outcome::default();
     // the scene may have set velocities

@@ -1,5 +1,5 @@
-//! The simulator at its limits. The tests that are not ignored are the quick part; docs/running.md names the long
-//! one, which writes docs/stability.md anew.
+//! The simulator at its limits. The tests that are not ignored are the quick part; docs/running.md
+//! names the long one, which writes docs/stability.md anew.
 
 mod atlas;
 mod cases;
@@ -33,8 +33,9 @@ fn page() {
     rows.iter().for_each(|(row, runs)| row.check(runs));
 }
 
-/// Light grains that bear heavy ones: the error of their velocities was the residual times the ratio of the masses, and the heap stopped
-/// or gained energy. With friction of 1e6 the law adds 1e6 times what a contact creeps to its opening.
+/// Light grains that bear heavy ones: the error of their velocities was the residual times the
+/// ratio of the masses, and the heap stopped or gained energy. With friction of 1e6 the law adds
+/// 1e6 times what a contact creeps to its opening.
 #[test]
 fn heaps_that_failed_hold_with_the_exact_solvers() {
     let exact = [Kind::Auto, Kind::Interior];

@@ -1,4 +1,5 @@
-//! Random scenes: everything that a scene can say, in every combination. Nothing is known of them but what must hold always.
+//! Random scenes: everything that a scene can say, in every combination. Nothing is known of them
+//! but what must hold always.
 
 use crate::common::DENSITY;
 use crate::harness::watch;
@@ -52,12 +53,13 @@ impl Dice {
     }
 }
 
-/// Sweeps of Gauss–Seidel after which a solve is refused, so many that no scene of twenty thousand takes minutes. A scene that stops
-/// for want of sweeps says so, and has kept what must hold until then.
+/// Sweeps of Gauss–Seidel after which a solve is refused, so many that no scene of twenty thousand
+/// takes minutes. A scene that stops for want of sweeps says so, and has kept what must hold until
+/// then.
 const FEW_SWEEPS: u64 = 10_000;
 
-/// How large and how long random scenes are, and what takes the place of what the dice give: a change there would make every seed another
-/// scene.
+/// How large and how long random scenes are, and what takes the place of what the dice give: a
+/// change there would make every seed another scene.
 #[derive(Clone, Copy)]
 struct Size {
     grains: f64,
@@ -198,8 +200,8 @@ fn scene<D: Dim>(dice: &mut Dice, Size { grains: most, sweeps, solver, cylinders
     (world, accept)
 }
 
-/// What came of a scene: the steps made, whether it stopped before its end with an error, whether anything touched in it, and how
-/// many bonds broke.
+/// What came of a scene: the steps made, whether it stopped before its end with an error, whether
+/// anything touched in it, and how many bonds broke.
 #[derive(Clone, Copy, Debug)]
 struct Course {
     steps: usize,
@@ -232,8 +234,8 @@ fn failures(seeds: std::ops::Range<u64>, size: Size) -> (Vec<u64>, Vec<Course>) 
     (failed, outcomes.into_iter().flatten().collect())
 }
 
-/// That the scenes of these seeds keep what must hold; how many stop, the steps they make in all, how many are touched, in how many bonds
-/// break.
+/// That the scenes of these seeds keep what must hold; how many stop, the steps they make in all,
+/// how many are touched, in how many bonds break.
 fn figures(seeds: std::ops::Range<u64>, size: Size) -> [usize; 4] {
     let (failed, courses) = failures(seeds, size);
     assert_eq!(failed, [], "seeds of scenes that fail");
@@ -268,7 +270,8 @@ fn random_scenes_keep_what_must_hold_between_cylinders() {
     assert!(shown, "{stopped} {steps} {touched} {breaking}");
 }
 
-/// `STABILITY_SCENES=0..20000 cargo test --release -p dem-core --test stability twenty_thousand -- --ignored --nocapture`
+/// `STABILITY_SCENES=0..20000 cargo test --release -p dem-core --test stability twenty_thousand --
+/// --ignored --nocapture`
 #[test]
 #[ignore = "long: see docs/running.md"]
 fn twenty_thousand_random_scenes() {

@@ -44,7 +44,8 @@ impl Kind {
     }
 }
 
-/// A heap of grains in a box without a lid: a lattice with noise, that falls onto the floor, and is bonded or not.
+/// A heap of grains in a box without a lid: a lattice with noise, that falls onto the floor, and is
+/// bonded or not.
 #[derive(Clone, Debug)]
 pub struct Heap {
     pub kind: Kind,

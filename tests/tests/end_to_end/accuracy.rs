@@ -125,7 +125,8 @@ fn a_scene_s_accuracy_is_measured_twice_alike() {
     assert_eq!(without_clock(&again), without_clock(&report));
 }
 
-/// A cylinder of 60 spheres: Newton keeps it rigid, and finds one first break whatever the order of the contacts and the start.
+/// A cylinder of 60 spheres: Newton keeps it rigid, and finds one first break whatever the order of
+/// the contacts and the start.
 #[test]
 fn spheres_are_measured_as_disks_are() {
     let here = Folder::new();

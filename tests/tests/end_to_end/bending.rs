@@ -1,5 +1,5 @@
-//! The beam in three-point bending: where the force goes, where the crack starts and how it runs (Guessasma & Fortin 2011,
-//! figures 10 and 11), asserted on numbers.
+//! The beam in three-point bending: where the force goes, where the crack starts and how it runs
+//! (Guessasma & Fortin 2011, figures 10 and 11), asserted on numbers.
 
 use crate::common::Folder;
 use dem_run::history::{History, Rupture};
@@ -11,8 +11,9 @@ const HEIGHT: f64 = 0.0698;
 /// The loader and the two supports.
 const POINTS: [[f64; 2]; 3] = [[MIDDLE, HEIGHT], [0.058, 0.0], [0.782, 0.0]];
 
-/// Mean vertical force of the contacts within three diameters of each point, over its mean in the whole beam. Bending loads
-/// every contact along the beam; what goes from the loader to the supports is vertical.
+/// Mean vertical force of the contacts within three diameters of each point, over its mean in the
+/// whole beam. Bending loads every contact along the beam; what goes from the loader to the
+/// supports is vertical.
 fn concentration(history: &History, frame: usize) -> [f64; 3] {
     let contacts = history.contacts(frame).expect("contacts");
     let vertical = |c: usize| {

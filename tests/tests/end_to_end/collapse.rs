@@ -1,4 +1,5 @@
-//! What cohesion does to a sample in compression: the load at failure, and the bonds that are broken at one time.
+//! What cohesion does to a sample in compression: the load at failure, and the bonds that are
+//! broken at one time.
 
 use crate::common::Folder;
 
@@ -8,8 +9,8 @@ fn spread(values: &[f64]) -> f64 {
     most / least
 }
 
-/// Without gravity three cohesions under ramps that are scaled by them are one problem in larger numbers, up to the
-/// motion of what came loose.
+/// Without gravity three cohesions under ramps that are scaled by them are one problem in larger
+/// numbers, up to the motion of what came loose.
 #[test]
 fn the_load_at_failure_is_proportional_to_the_cohesion() {
     let (mut first, mut broken) = (Vec::new(), Vec::new());

@@ -41,9 +41,9 @@ pub fn problems() -> PathBuf {
     root().join("tests/problems")
 }
 
-/// The path of a program. `scripts/test` says in which folder it built them. Cargo knows the programs of a test's own
-/// package only, so it is asked to build them otherwise, in release, as README does: the compression takes seconds there,
-/// and minutes in the profile of the tests.
+/// The path of a program. `scripts/test` says in which folder it built them. Cargo knows the
+/// programs of a test's own package only, so it is asked to build them otherwise, in release, as
+/// README does: the compression takes seconds there, and minutes in the profile of the tests.
 pub fn program(name: &str) -> &'static Path {
     static PROGRAMS: OnceLock<HashMap<String, PathBuf>> = OnceLock::new();
     let programs = || match env::var_os("DEM_PROGRAMS") {

@@ -102,7 +102,8 @@ fn the_compression_breaks_its_sample_and_the_views_show_it() {
     }
 }
 
-/// The summary's worst residual is that of the recorded steps; none of them missed the tolerance before the first bond broke.
+/// The summary's worst residual is that of the recorded steps; none of them missed the tolerance
+/// before the first bond broke.
 fn residuals_are_those_of_the_history(here: &Folder, summary: &Value) {
     let history = History::open(&here.path("compression.h5")).expect("a history");
     let residual = history.observable("solver_residual").expect("read").expect("an observable");

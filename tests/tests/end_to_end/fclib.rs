@@ -1,4 +1,5 @@
-//! Problems in FCLIB's format: written by `dem-run export`, solved by `dem-run solve`, and the collection in `problems`.
+//! Problems in FCLIB's format: written by `dem-run export`, solved by `dem-run solve`, and the
+//! collection in `problems`.
 
 use crate::common::{Folder, SMALL, problems};
 use dem_core::contact::LocalSolve;
@@ -199,7 +200,8 @@ fn largest(x: impl Iterator<Item = f64>) -> f64 {
     x.fold(0.0, |most, x| most.max(x.abs()))
 }
 
-/// Largest difference of the relative velocities, over the largest that there would be without reactions.
+/// Largest difference of the relative velocities, over the largest that there would be without
+/// reactions.
 fn velocities_apart(a: &Assembled, b: &Assembled) -> f64 {
     let mut free = a.clone();
     free.r.fill(0.0);
@@ -257,7 +259,8 @@ fn the_collection_is_solved_by_every_solver() {
     }
 }
 
-/// The path of these problems folds: one step of `compression` and one of `brazilian-3d`, after their collapse.
+/// The path of these problems folds: one step of `compression` and one of `brazilian-3d`, after
+/// their collapse.
 #[test]
 fn folds_of_the_path_are_followed() {
     for (name, most) in [("compression", 100), ("brazilian-3d", 300)] {

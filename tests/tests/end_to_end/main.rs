@@ -1,4 +1,5 @@
-//! The commands end to end, as a user runs them: release builds, scenes from `configs/`, files in a folder of their own.
+//! The commands end to end, as a user runs them: release builds, scenes from `configs/`, files in a
+//! folder of their own.
 
 mod accuracy;
 mod bending;

@@ -1,4 +1,5 @@
-//! Runs that end before their time and go on: what was recorded stays, and the end is that of a run without a stop.
+//! Runs that end before their time and go on: what was recorded stays, and the end is that of a run
+//! without a stop.
 
 use crate::common::{Endless, Folder, SMALL, config, content, problems, program};
 use dem_run::history::History;
@@ -7,7 +8,8 @@ use rand_pcg::Pcg64;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// That two histories hold the same to the bit, but for the processor time, and come from the same scene.
+/// That two histories hold the same to the bit, but for the processor time, and come from the same
+/// scene.
 fn same(a: &History, b: &History) {
     let [one, other] = [a, b].map(|history| history.parameters().expect("parameters").scene);
     assert_eq!(one, other);
@@ -17,7 +19,8 @@ fn same(a: &History, b: &History) {
     assert_eq!(content(a).len(), content(b).len());
 }
 
-/// The small compression, with frames and checkpoints so often that a kill hits any place of the writer.
+/// The small compression, with frames and checkpoints so often that a kill hits any place of the
+/// writer.
 fn scene() -> Vec<String> {
     let mut args = vec![config("compression.json")];
     args.extend(SMALL.iter().map(ToString::to_string));
@@ -39,7 +42,8 @@ struct Killed {
     beyond: usize,
 }
 
-/// Starts the scene, or goes on with it, and kills the process `after` so long; none if it ended before.
+/// Starts the scene, or goes on with it, and kills the process `after` so long; none if it ended
+/// before.
 fn kill(here: &Folder, file: &str, after: Duration) -> bool {
     let resumed = here.path(file).exists();
     let mut command = Command::new(program("dem-run"));
@@ -56,7 +60,8 @@ fn kill(here: &Folder, file: &str, after: Duration) -> bool {
     running
 }
 
-/// Kills a run, and what goes on with it, at `moments` random moments; it then goes on to its end. The kills that hit.
+/// Kills a run, and what goes on with it, at `moments` random moments; it then goes on to its end.
+/// The kills that hit.
 fn killed(here: &Folder, whole: &History, file: &str, seed: u64, moments: usize, longest: Duration) -> Vec<Killed> {
     let mut rng = Pcg64::seed_from_u64(seed);
     let mut hits = vec![];
@@ -330,7 +335,8 @@ fn a_run_that_was_killed_before_its_first_checkpoint_begins_anew() {
     let before = here.read("a.h5");
     here.dem_run(&["resume", "a.h5", "--quiet"]).fails(4, &["no whole state", "damaged"]);
     assert_eq!(here.read("a.h5"), before);
-    // a file each: HDF5's lock on one that was read here may live on in a program that another test started meanwhile
+    // a file each: HDF5's lock on one that was read here may live on in a program that another test
+    // started meanwhile
     for (frames, name) in [(0u64, "b.h5"), (1, "c.h5")] {
         std::fs::write(here.path(name), &before).expect("write");
         let file = hdf5::File::open_rw(here.path(name)).expect("open");

@@ -1,4 +1,5 @@
-//! Specimens that are cut and split: the Brazilian test in the plane, and a small cylinder through every view.
+//! Specimens that are cut and split: the Brazilian test in the plane, and a small cylinder through
+//! every view.
 
 use crate::common::Folder;
 

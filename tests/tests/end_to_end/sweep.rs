@@ -1,4 +1,5 @@
-//! Sweeps: every run a history, killed and gone on with, with runs that fail, and refused where they are wrong.
+//! Sweeps: every run a history, killed and gone on with, with runs that fail, and refused where
+//! they are wrong.
 
 use crate::common::{Folder, SMALL, config, content, program};
 use serde_json::{Value, json};
@@ -65,7 +66,8 @@ fn start(here: &Folder, args: &[&str]) -> Child {
 fn runs_in(here: &Folder) -> bool {
     let folder = here.path("").canonicalize().expect("folder");
     let processes = fs::read_dir("/proc").expect("/proc").filter_map(Result::ok);
-    // one that has just ended has no such entries any more; the paths on its command line start in its folder
+    // one that has just ended has no such entries any more; the paths on its command line start in
+    // its folder
     processes.map(|process| process.path()).any(|process| {
         let is_run = fs::read(process.join("cmdline")).is_ok_and(|line| line.windows(7).any(|part| part == b"part.h5"));
         is_run && fs::read_link(process.join("cwd")).is_ok_and(|cwd| cwd == folder)

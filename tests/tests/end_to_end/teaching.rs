@@ -56,7 +56,8 @@ fn two_grains_pressed_together_never_part() {
 
 #[test]
 fn a_bent_arm_twists_its_row_off_or_bends_it() {
-    // the load grows by 100 N/s; the row carries it with the arm of 12 mm in twist, its first bond with 10 mm in bending
+    // the load grows by 100 N/s; the row carries it with the arm of 12 mm in twist, its first bond
+    // with 10 mm in bending
     let (strength, diameter, arm, root) = (100.0, 4e-3, 12e-3, 10e-3);
     for (twist, mode, bonds, load) in [
         ("bonds.twist=0.1", RuptureMode::Twist, 3, 0.1 * diameter * strength / arm),
@@ -70,7 +71,8 @@ fn a_bent_arm_twists_its_row_off_or_bends_it() {
             assert_eq!(rupture.mode, mode);
             assert!((rupture.time - load / 100.0).abs() < 1.01e-4, "{mode:?} at {} s", rupture.time);
         }
-        // the moments about t1, t2 and n of the last frame before the break, 10 steps of 0.01 N apart
+        // the moments about t1, t2 and n of the last frame before the break, 10 steps of 0.01 N
+        // apart
         let contacts = history.contacts(history.frames() - 2).expect("contacts");
         let time = history.times()[history.frames() - 2] - 5e-5;
         for (c, moment) in contacts.moment.chunks(3).enumerate() {

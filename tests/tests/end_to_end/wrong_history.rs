@@ -1,4 +1,5 @@
-//! Files that are no history, given to every command of `dem-post`: exit 4, what is wrong, the remedy, nothing written.
+//! Files that are no history, given to every command of `dem-post`: exit 4, what is wrong, the
+//! remedy, nothing written.
 
 use crate::common::{Folder, SMALL};
 

@@ -185,7 +185,8 @@ fn a_packing_looser_than_asked_is_refused() {
 #[test]
 fn a_run_that_does_not_converge_is_exit_3_and_keeps_its_history() {
     let scene = config("compression.json");
-    // a sweep finds the answer only while there is no force: at the first step, or until the force comes
+    // a sweep finds the answer only while there is no force: at the first step, or until the force
+    // comes
     let late = "walls.top.force={\"ramp\": {\"rate\": 100, \"start\": 5e-3}}";
     for (force, steps) in [("walls.top.force_rate=100", 0), (late, 50)] {
         let here = Folder::new();

@@ -16,7 +16,8 @@ pub struct Aims {
 }
 
 impl Aims {
-    /// How far these are from what is asked for: the larger of both over their tolerances (–). A residual of zero is rounding.
+    /// How far these are from what is asked for: the larger of both over their tolerances (–). A
+    /// residual of zero is rounding.
     pub fn missed(&self, residual: f64, velocity_error: f64) -> f64 {
         match residual {
             0.0 => 0.0,
@@ -31,7 +32,8 @@ impl Aims {
 pub struct Found {
     /// Reactions without the shift, in the unit of the rows.
     pub reactions: Vec<Padded>,
-    /// Their residual (–), and their load error (–): how much the net impulses changed in the last iteration.
+    /// Their residual (–), and their load error (–): how much the net impulses changed in the last
+    /// iteration.
     pub residual: f64,
     pub load_error: f64,
     /// Their velocity error (–), see [`crate::problem::residual::velocity_error`].

@@ -1,8 +1,11 @@
-//! Second-order cones Q = {x : x₀ ≥ ‖x₁, x₂‖} and their Jordan algebra, x ∘ z = (x·z, x₀ z₁ + z₀ x₁, x₀ z₂ + z₀ x₂).
+//! Second-order cones Q = {x : x₀ ≥ ‖x₁, x₂‖} and their Jordan algebra, x ∘ z = (x·z, x₀ z₁ + z₀
+//! x₁, x₀ z₂ + z₀ x₂).
 //!
-//! One type stands for a ray, the cone in 2D and the cone in 3D: components that are missing are zero and stay zero.
+//! One type stands for a ray, the cone in 2D and the cone in 3D: components that are missing are
+//! zero and stay zero.
 //!
-//! Sources: Alizadeh & Goldfarb, Math. Program. 95, 2003; for the scaling Nesterov & Todd, SIAM J. Optim. 8, 1998.
+//! Sources: Alizadeh & Goldfarb, Math. Program. 95, 2003; for the scaling Nesterov & Todd, SIAM J.
+//! Optim. 8, 1998.
 
 /// A vector of the algebra.
 pub(super) type Point = [f64; 3];
@@ -45,7 +48,8 @@ pub(super) fn least_product(x: &Point, z: &Point) -> f64 {
     whole / (half + (half * half - whole).max(0.0).sqrt())
 }
 
-/// An automorphism of Q for x, and its transposed inverse for z: the boosts along −w and w, with w₀² − w₁² − w₂² = 1.
+/// An automorphism of Q for x, and its transposed inverse for z: the boosts along −w and w, with
+/// w₀² − w₁² − w₂² = 1.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scaling {
     w: Point,
@@ -75,14 +79,16 @@ impl Scaling {
     }
 }
 
-/// The boost along w of p: (w·p, p̄ + w̄ (p₀ + p̄·w̄/(1 + w₀))), where a bar is for what follows the first component.
+/// The boost along w of p: (w·p, p̄ + w̄ (p₀ + p̄·w̄/(1 + w₀))), where a bar is for what follows
+/// the first component.
 fn boosted(w: &Point, p: &Point) -> Point {
     let along = w[1] * p[1] + w[2] * p[2];
     let across = p[0] + along / (1.0 + w[0]);
     [w[0] * p[0] + along, p[1] + w[1] * across, p[2] + w[2] * across]
 }
 
-/// By how much the eigenvalues of x must change to lie between `low` and `high`, downwards by no more than `high`.
+/// By how much the eigenvalues of x must change to lie between `low` and `high`, downwards by no
+/// more than `high`.
 pub(super) fn correction(x: &Point, low: f64, high: f64) -> Point {
     let length = x[1].hypot(x[2]);
     let change = |value: f64| (value.clamp(low, high) - value).max(-high);
@@ -138,7 +144,8 @@ mod tests {
             let scaling = Scaling::of(&x, &z);
             let (a, b) = (scaling.x(&x), scaling.z(&z));
             let (scaled, size) = (product(&a, &b), dot(&x, &z));
-            // multiples of each other: their product has the eigenvalues of P(√x) z, of which the smaller is asked for
+            // multiples of each other: their product has the eigenvalues of P(√x) z, of which the
+            // smaller is asked for
             assert!(
                 (a[1] * b[0] - a[0] * b[1]).abs() < 1e-9 * a[0] * b[0]
                     && (a[2] * b[0] - a[0] * b[2]).abs() < 1e-9 * a[0] * b[0]

@@ -4,14 +4,18 @@
 //!
 //! ℓ = q + W r + C (r − r₀) + (r − r_a)/ρ − Σ Bᵀ z,     p = x − G r̂,     (x, z) = [`pair`]\(w, τ),
 //!
-//! in the unknowns r and w. The Newton step and the tangent are two right sides of one matrix ([`System`]):
+//! in the unknowns r and w. The Newton step and the tangent are two right sides of one matrix
+//! ([`System`]):
 //!
-//! (W + C + ρ⁻¹) dr − Σ Bᵀ dz = −ℓ,     Arw(z) G dr + Arw(x) dz = z ∘ p + τ e dθ,     dw = G dr − p − dz.
+//! (W + C + ρ⁻¹) dr − Σ Bᵀ dz = −ℓ,     Arw(z) G dr + Arw(x) dz = z ∘ p + τ e dθ,     dw = G dr − p
+//! − dz.
 //!
-//! For Coulomb's law the path need not be monotone in the barrier (Acary, Armand, Nguyen & Shpakovych 2024). At a fold the matrix is singular
-//! and its determinant changes sign, so the sign orients the path: the barrier falls where it is positive and rises where it is negative. Near
-//! a fold a few contacts change by large factors while the others rest; there the component that changes fastest is the parameter of the path
-//! (Rheinboldt, SIAM J. Numer. Anal. 17, 1980), elsewhere the barrier is.
+//! For Coulomb's law the path need not be monotone in the barrier (Acary, Armand, Nguyen &
+//! Shpakovych 2024). At a fold the matrix is singular and its determinant changes sign, so the sign
+//! orients the path: the barrier falls where it is positive and rises where it is negative. Near a
+//! fold a few contacts change by large factors while the others rest; there the component that
+//! changes fastest is the parameter of the path (Rheinboldt, SIAM J. Numer. Anal. 17, 1980),
+//! elsewhere the barrier is.
 
 use super::cones::{Point, dot, moved, product};
 use super::pairs::{largest, pair};
@@ -73,7 +77,8 @@ pub(super) struct Continuation {
     /// ln τ below which, and relative change with θ up to which, the path counts as straight.
     end: f64,
     straight: f64,
-    /// Whether the start of the step along the tangent is being corrected, since the end of that step could not be.
+    /// Whether the start of the step along the tangent is being corrected, since the end of that
+    /// step could not be.
     again: bool,
 }
 
@@ -99,8 +104,9 @@ impl Iterate {
 }
 
 impl Continuation {
-    /// From a point next to the path, with `raised` times its gap as the barrier. The path counts as straight where the barrier is below
-    /// half the gap and no component changes faster with θ than by `straight`.
+    /// From a point next to the path, with `raised` times its gap as the barrier. The path counts
+    /// as straight where the barrier is below half the gap and no component changes faster with θ
+    /// than by `straight`.
     pub fn new(point: &State, gap: f64, raised: f64, straight: f64) -> Self {
         let w = point.x.iter().zip(&point.z).map(|(x, z)| moved(x, -1.0, z)).collect();
         Self {
@@ -123,7 +129,8 @@ impl Continuation {
         State { r: self.at.r.clone(), x, z }
     }
 
-    /// One iteration, with the system at the pairs at hand: a Newton step, and where that is short a step along the tangent.
+    /// One iteration, with the system at the pairs at hand: a Newton step, and where that is short
+    /// a step along the tangent.
     pub fn step(&mut self, system: &System, sites: &Sites) -> Progress {
         let (mut newton, tangent) = directions(system, sites, self.at.theta.exp());
         if let Parameter::Component(c, form) = self.parameter {
@@ -141,8 +148,9 @@ impl Continuation {
         self.predict(tangent, system.sign > 0.0)
     }
 
-    /// A Newton step alone. Where there have been too many, the start of the step along the tangent is not on the path, or that step is too
-    /// long: the start is corrected again, or where that has been done the step is made again, shorter.
+    /// A Newton step alone. Where there have been too many, the start of the step along the tangent
+    /// is not on the path, or that step is too long: the start is corrected again, or where that
+    /// has been done the step is made again, shorter.
     fn correct(&mut self, error: f64, newton: &Iterate) -> Progress {
         self.corrections += 1;
         let most = if self.predictor.is_some() { tuning::CORRECTIONS } else { tuning::FIRST_CORRECTIONS };

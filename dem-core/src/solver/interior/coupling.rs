@@ -1,4 +1,5 @@
-//! How contacts move each other: W = H̃ᵀ H̃ through the bodies, or as a matrix, and the linear systems with it.
+//! How contacts move each other: W = H̃ᵀ H̃ through the bodies, or as a matrix, and the linear
+//! systems with it.
 
 use super::sites::{Site, Sites};
 use crate::linear::{Lu, Tree};
@@ -9,7 +10,8 @@ use crate::solver::twofold::Twofold;
 
 /// The Delassus operator over the rows of [`Sites`], in their units.
 pub(super) enum Coupling<'a> {
-    /// Through the unknowns of the bodies. The matrix of a step is 1 + Σ H̃ D⁻¹ H̃ᵀ, of the size of the bodies.
+    /// Through the unknowns of the bodies. The matrix of a step is 1 + Σ H̃ D⁻¹ H̃ᵀ, of the size of
+    /// the bodies.
     Bodies {
         rows: &'a Rows,
         /// Coefficients over those of `rows`.
@@ -35,7 +37,8 @@ pub(super) struct Block {
 }
 
 impl<'a> Coupling<'a> {
-    /// By the matrix where the problem is known by one, else through the bodies; none where no elimination tree can be made.
+    /// By the matrix where the problem is known by one, else through the bodies; none where no
+    /// elimination tree can be made.
     pub fn of(
         rows: &'a Rows,
         matrix: Option<&BlockMatrix>,
@@ -79,7 +82,8 @@ impl<'a> Coupling<'a> {
         }
     }
 
-    /// q + W r. Through the bodies with twice the precision: where contacts stick, the terms cancel to 1/κ of their size.
+    /// q + W r. Through the bodies with twice the precision: where contacts stick, the terms cancel
+    /// to 1/κ of their size.
     pub fn relative_velocity(&self, sites: &Sites, r: &[f64]) -> Vec<f64> {
         let Self::Bodies { rows, scale, .. } = self else {
             return sites.free.iter().zip(self.velocity(sites, r)).map(|(q, u)| q + u).collect();
@@ -134,8 +138,8 @@ impl<'a> Coupling<'a> {
         u
     }
 
-    /// Factorise the matrix of a step, whose D⁻¹ stands in the upper left corners of the local matrices: the sign of its
-    /// determinant, none if it is singular.
+    /// Factorise the matrix of a step, whose D⁻¹ stands in the upper left corners of the local
+    /// matrices: the sign of its determinant, none if it is singular.
     pub fn factorise(&self, sites: &Sites, inverses: &[f64], lu: &mut Lu) -> Option<f64> {
         match self {
             Self::Bodies { rows, scale, graph } => lu.factorise(self.tree(), |e, out| {
@@ -151,7 +155,8 @@ impl<'a> Coupling<'a> {
         }
     }
 
-    /// The velocities that reactions `r` would give the contacts if these did not yield, as they are when they do.
+    /// The velocities that reactions `r` would give the contacts if these did not yield, as they
+    /// are when they do.
     pub fn yielded(&self, sites: &Sites, r: &[f64], lu: &Lu) -> Vec<f64> {
         match self {
             Self::Bodies { .. } => {

@@ -1,7 +1,9 @@
-//! How the path is followed: in long steps within a wide neighbourhood, and by arc length where these jam.
+//! How the path is followed: in long steps within a wide neighbourhood, and by arc length where
+//! these jam.
 //!
-//! A fast sliding contact has a reaction and a velocity that are both on the boundary of their cones, so that x₀ z₀ and the rest of x·z cancel:
-//! rounding leaves ε x₀ z₀ of a product. Long steps end where that is the gap. By arc length the pairs are known by w = x − z, whose
+//! A fast sliding contact has a reaction and a velocity that are both on the boundary of their
+//! cones, so that x₀ z₀ and the rest of x·z cancel: rounding leaves ε x₀ z₀ of a product. Long
+//! steps end where that is the gap. By arc length the pairs are known by w = x − z, whose
 //! eigenvalues keep their digits, and are central to rounding.
 
 use super::continuation::{Continuation, Progress};
@@ -55,7 +57,8 @@ impl Follow {
         }
     }
 
-    /// One iteration, with the system at the point at hand; its change of the reactions, none where the path is lost.
+    /// One iteration, with the system at the point at hand; its change of the reactions, none where
+    /// the path is lost.
     pub fn step(&mut self, system: &System, sites: &Sites) -> Option<State> {
         let Some(by) = &mut self.by_arc_length else { return Some(self.long_step(system)) };
         let progress = by.continuation.step(system, sites);

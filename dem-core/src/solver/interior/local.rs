@@ -4,8 +4,9 @@
 //!
 //! C dr − Bᵀ dz = a − t,     Arw(z) G dr + Arw(x) dz = b.
 //!
-//! The inverse of this small matrix holds in its upper left corner D⁻¹ of docs/theory/interior-point.md. D itself, with
-//! Arw(x)⁻¹ Arw(z), would lose the digits of what sticks beside what slips.
+//! The inverse of this small matrix holds in its upper left corner D⁻¹ of
+//! docs/theory/interior-point.md. D itself, with Arw(x)⁻¹ Arw(z), would lose the digits of what
+//! sticks beside what slips.
 
 use super::cones::{Point, Scaling, eigenvalues, product};
 use super::sites::{CONES, Cone, ROWS, Sites};
@@ -27,8 +28,8 @@ pub(super) struct Scaled {
     pub z: Point,
 }
 
-/// The pairs of a point, linearised as they are, or where x ∘ z is outside the cone in the scaling of Nesterov & Todd, in which every
-/// interior pair has a direction.
+/// The pairs of a point, linearised as they are, or where x ∘ z is outside the cone in the scaling
+/// of Nesterov & Todd, in which every interior pair has a direction.
 pub(super) fn scaled(at: &State) -> Vec<Scaled> {
     let one = |(x, z): (&Point, &Point)| {
         let scaling = if eigenvalues(&product(x, z))[1] > 0.0 { Scaling::NONE } else { Scaling::of(x, z) };
@@ -37,8 +38,8 @@ pub(super) fn scaled(at: &State) -> Vec<Scaled> {
     at.x.iter().zip(&at.z).map(one).collect()
 }
 
-/// The inverses of all local matrices at a point, with the compliance of each row, and the sign of the product of their
-/// determinants; none if one has no inverse.
+/// The inverses of all local matrices at a point, with the compliance of each row, and the sign of
+/// the product of their determinants; none if one has no inverse.
 pub(super) fn invert(sites: &Sites, pairs: &[Scaled], compliance: &[f64], inverses: &mut Vec<f64>) -> Option<f64> {
     let mut sign = 1.0;
     inverses.clear();
@@ -81,7 +82,8 @@ pub(super) fn invert(sites: &Sites, pairs: &[Scaled], compliance: &[f64], invers
     Some(sign)
 }
 
-/// Leaves the inverse in the right half, with pivots chosen in their column; the sign of the determinant, none if it is zero.
+/// Leaves the inverse in the right half, with pivots chosen in their column; the sign of the
+/// determinant, none if it is zero.
 fn gauss_jordan(a: &mut [[f64; 2 * ORDER]; ORDER], order: usize) -> Option<f64> {
     let mut sign = 1.0;
     for k in 0..order {

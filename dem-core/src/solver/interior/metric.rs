@@ -28,8 +28,9 @@ impl Metric {
         }
     }
 
-    /// What the compliance leaves of the residual, and the largest velocity that it leaves a contact: u = (r − r₀)/ρ, as an impulse over the
-    /// normal entry of W. Where friction does not open, the law adds μ times the slip to the normal velocity.
+    /// What the compliance leaves of the residual, and the largest velocity that it leaves a
+    /// contact: u = (r − r₀)/ρ, as an impulse over the normal entry of W. Where friction does not
+    /// open, the law adds μ times the slip to the normal velocity.
     pub fn left(&self, sites: &Sites, r: &[f64]) -> (f64, f64) {
         let (mut all, mut largest) = (0.0, 0.0f64);
         for (site, normal) in sites.list.iter().zip(&sites.normal).filter(|(_, normal)| **normal > 0.0) {

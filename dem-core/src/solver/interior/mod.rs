@@ -1,15 +1,17 @@
 //! The interior-point method, with Coulomb's law exact.
 //!
-//! Every contact is a list of cone pairs ([`sites`]): x = G r̂ ∈ Q ⊥ z ∈ Q with u + C (r − r₀) = Σ Bᵀ z and u = W r + q. Between the
-//! pairs the method follows the path x ∘ z = barrier, linearised as it stands, slip speeds and all: in the direction of Alizadeh,
-//! Haeberly & Overton, or of Nesterov & Todd for a pair whose product has left the cone, with Mehrotra's predictor–corrector and
-//! Gondzio's correctors, one factorisation an iteration.
+//! Every contact is a list of cone pairs ([`sites`]): x = G r̂ ∈ Q ⊥ z ∈ Q with u + C (r − r₀) = Σ
+//! Bᵀ z and u = W r + q. Between the pairs the method follows the path x ∘ z = barrier, linearised
+//! as it stands, slip speeds and all: in the direction of Alizadeh, Haeberly & Overton, or of
+//! Nesterov & Todd for a pair whose product has left the cone, with Mehrotra's predictor–corrector
+//! and Gondzio's correctors, one factorisation an iteration.
 //!
-//! The metric 1/ρ is a compliance anchored at given reactions: among the many that balance a rigid network the path ends at those of least
-//! Σ r²/ρ. See docs/theory/interior-point.md.
+//! The metric 1/ρ is a compliance anchored at given reactions: among the many that balance a rigid
+//! network the path ends at those of least Σ r²/ρ. See docs/theory/interior-point.md.
 //!
-//! Sources: Alizadeh, Haeberly & Overton, SIAM J. Optim. 8, 1998; Nesterov & Todd, SIAM J. Optim. 8, 1998; Mehrotra, SIAM J. Optim.
-//! 2, 1992; Gondzio, Comput. Optim. Appl. 6, 1996; for contact with friction Acary, Armand, Nguyen & Shpakovych, Optim. Methods Softw. 39, 2024.
+//! Sources: Alizadeh, Haeberly & Overton, SIAM J. Optim. 8, 1998; Nesterov & Todd, SIAM J. Optim.
+//! 8, 1998; Mehrotra, SIAM J. Optim. 2, 1992; Gondzio, Comput. Optim. Appl. 6, 1996; for contact
+//! with friction Acary, Armand, Nguyen & Shpakovych, Optim. Methods Softw. 39, 2024.
 
 mod aims;
 mod cones;
@@ -56,8 +58,9 @@ pub(super) struct Interior {
 }
 
 impl Interior {
-    /// Follow the path from these reactions, moved inside their cones, or from a cold start, to a solution; where many reactions solve the
-    /// problem, to those of least energy in the metric anchored at `anchor` ([`Selection`]). `graph` is that of the last problem.
+    /// Follow the path from these reactions, moved inside their cones, or from a cold start, to a
+    /// solution; where many reactions solve the problem, to those of least energy in the metric
+    /// anchored at `anchor` ([`Selection`]). `graph` is that of the last problem.
     pub fn solve(
         &mut self,
         problem: &mut impl Solvable,

@@ -1,10 +1,13 @@
 //! The pairs (x, z) of the central path, and how much they change.
 //!
-//! A pair (x, z) with x ∘ z = τ e is known by w = x − z alone: x = f(w), z = f(−w) with the spectral function f(λ) = (λ + √(λ² + 4τ))/2, the
-//! smoothed projection onto the cone (Fukushima, Luo & Tseng, SIAM J. Optim. 12, 2002). So w is free: no step has to end at a boundary, and
-//! every iterate is on the path of *its* pairs, but its reactions and velocities need not be those of its pairs.
+//! A pair (x, z) with x ∘ z = τ e is known by w = x − z alone: x = f(w), z = f(−w) with the
+//! spectral function f(λ) = (λ + √(λ² + 4τ))/2, the smoothed projection onto the cone (Fukushima,
+//! Luo & Tseng, SIAM J. Optim. 12, 2002). So w is free: no step has to end at a boundary, and every
+//! iterate is on the path of *its* pairs, but its reactions and velocities need not be those of its
+//! pairs.
 //!
-//! f is curved on the scale √(λ² + 4τ), the eigenvalues of x + z: changes of w are measured relative to these.
+//! f is curved on the scale √(λ² + 4τ), the eigenvalues of x + z: changes of w are measured
+//! relative to these.
 
 use super::cones::{Point, dot};
 
@@ -26,7 +29,8 @@ fn smoothed(value: f64, barrier: f64) -> f64 {
     if value > 0.0 { 0.5 * (value + root) } else { 2.0 * barrier / (root - value) }
 }
 
-/// The three relative components of a change of w, as linear forms: those of its two eigenvalues, and that of its direction.
+/// The three relative components of a change of w, as linear forms: those of its two eigenvalues,
+/// and that of its direction.
 fn forms(w: &Point, barrier: f64, change: &Point) -> [Point; 3] {
     let length = w[1].hypot(w[2]);
     let axis = if length > 0.0 { [w[1] / length, w[2] / length] } else { [0.0, 0.0] };

@@ -1,10 +1,11 @@
 //! Which of many reactions: those of least energy in the metric.
 //!
-//! 1. With the compliance of the metric the path is followed until its gaps are far below the energy of the metric: these are the reactions of
-//!    least energy, r*. What r* has at a limit is known then.
-//! 2. Where that compliance shows in the residual or in the velocities, as between bodies of very unlike masses, the path is
-//!    followed again with the metric anchored at r*, from a point on the way there, since nearer to the boundary steps are short;
-//!    then with a harder metric.
+//! 1. With the compliance of the metric the path is followed until its gaps are far below the
+//!    energy of the metric: these are the reactions of least energy, r*. What r* has at a limit is
+//!    known then.
+//! 2. Where that compliance shows in the residual or in the velocities, as between bodies of very
+//!    unlike masses, the path is followed again with the metric anchored at r*, from a point on the
+//!    way there, since nearer to the boundary steps are short; then with a harder metric.
 
 use super::aims::{Aims, Found};
 use super::metric::Metric;
@@ -88,15 +89,17 @@ impl Selection {
         }
     }
 
-    /// Whether the compliance of the metric takes much of what the residual, or the velocity error, may be.
+    /// Whether the compliance of the metric takes much of what the residual, or the velocity error,
+    /// may be.
     fn metric_shows(&self, sites: &Sites, at: &State) -> bool {
         let Aims { tolerance, load_tolerance, .. } = self.aims;
         let (residual, velocity) = self.metric.left(sites, &at.r);
         residual > tuning::SHOWS * tolerance || velocity > tuning::SHOWS * load_tolerance * sites.largest_free()
     }
 
-    /// How far the reactions of a point, put on their limits, [miss](Aims::missed) what is asked for; they are kept if they are the best so far:
-    /// of those within the tolerances the last, which is nearest to r*, else those that miss least.
+    /// How far the reactions of a point, put on their limits, [miss](Aims::missed) what is asked
+    /// for; they are kept if they are the best so far: of those within the tolerances the last,
+    /// which is nearest to r*, else those that miss least.
     fn measure(
         &mut self,
         problem: &mut impl Solvable,

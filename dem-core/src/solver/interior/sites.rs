@@ -1,11 +1,13 @@
 //! The contacts of a problem as cone pairs, whatever their laws.
 //!
-//! A contact has rows r (its reaction, without the shift s of the normal row) and a list of cones, each with
+//! A contact has rows r (its reaction, without the shift s of the normal row) and a list of cones,
+//! each with
 //!
 //! x = G r̂ = (slope · (r_n + s), r_t…) ∈ Q   ⊥   z ∈ Q,      u + C (r − r₀) = Σ Bᵀ z.
 //!
-//! An associated law has one cone for each group of rows, with B = G. Any other has a ray for Signorini's condition, and for each group
-//! one whose z₀ acts on no row: B is G without its normal column, and z₀ is the slip speed.
+//! An associated law has one cone for each group of rows, with B = G. Any other has a ray for
+//! Signorini's condition, and for each group one whose z₀ acts on no row: B is G without its normal
+//! column, and z₀ is the slip speed.
 
 use super::cones::{Point, eigenvalues};
 use super::state::State;
@@ -40,7 +42,8 @@ pub(super) struct Cone {
 /// One contact.
 #[derive(Clone, Debug)]
 pub(super) struct Site {
-    /// Places in a padded vector of the rows that it has here: a group with a limit of zero has none.
+    /// Places in a padded vector of the rows that it has here: a group with a limit of zero has
+    /// none.
     pub places: [usize; ROWS],
     /// Which rows of the problem these are.
     pub of: [usize; ROWS],
@@ -109,8 +112,9 @@ pub(super) struct Sites {
     pub shift: Vec<f64>,
     /// For each contact: the normal entry of W over the mean of all.
     pub normal: Vec<f64>,
-    /// For each row: the velocity without reactions, the compliance of an elastic bond and the reaction at which it is at rest, and
-    /// the compliance that stands for the limit of stiff contacts, where κ is one.
+    /// For each row: the velocity without reactions, the compliance of an elastic bond and the
+    /// reaction at which it is at rest, and the compliance that stands for the limit of stiff
+    /// contacts, where κ is one.
     pub free: Vec<f64>,
     pub compliance: Vec<f64>,
     pub carried: Vec<f64>,
@@ -235,7 +239,8 @@ impl Sites {
         Padded::from_order(&r.into())
     }
 
-    /// Which cones reactions are at the limit of, where z is what the compliance of each row makes of how far they would be beyond.
+    /// Which cones reactions are at the limit of, where z is what the compliance of each row makes
+    /// of how far they would be beyond.
     pub fn limits(&self, at: &State, compliance: &[f64]) -> Vec<Limit> {
         let mut limits = vec![Limit::default(); self.cones.len()];
         for site in &self.list {
@@ -248,8 +253,8 @@ impl Sites {
         limits
     }
 
-    /// The reactions of the problem at a point, each at the limits that it is nearer to than its z is to its own, and at those that it is
-    /// known to be at where it is next to them.
+    /// The reactions of the problem at a point, each at the limits that it is nearer to than its z
+    /// is to its own, and at those that it is known to be at where it is next to them.
     pub fn snapped(&self, at: &State, known: &[Limit]) -> Vec<Padded> {
         let limit = |c: usize, shift: f64| {
             let (x, z) = (eigenvalues(&at.x[c]), eigenvalues(&at.z[c]));

@@ -32,8 +32,9 @@ impl System<'_> {
         all.map(|((x, z), Scaled { scaling, .. })| product(&scaling.x(x), &scaling.z(z))).collect()
     }
 
-    /// The step after which x ∘ z has changed by `by`, to first order. It is refined once: where fragments move fast, the error that
-    /// rounding leaves is as large as the right side, and the length to the boundary of the cones would be arbitrary.
+    /// The step after which x ∘ z has changed by `by`, to first order. It is refined once: where
+    /// fragments move fast, the error that rounding leaves is as large as the right side, and the
+    /// length to the boundary of the cones would be arbitrary.
     pub fn step(&self, by: &[Point]) -> State {
         self.refined(self.solved(&self.right, by), by)
     }
@@ -69,7 +70,8 @@ impl System<'_> {
         (left.collect(), (0..by.len()).map(missing).collect())
     }
 
-    /// By how much a step changes the net impulses on the bodies, relative to them, in the metric of their masses (–).
+    /// By how much a step changes the net impulses on the bodies, relative to them, in the metric
+    /// of their masses (–).
     pub fn net_change(&self, step: &State) -> f64 {
         let moving = self.coupling.velocity(self.sites, &step.r);
         let square = |r: &[f64], u: &[f64]| r.iter().zip(u).map(|(r, u)| r * u).sum::<f64>().abs();

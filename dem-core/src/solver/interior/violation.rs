@@ -1,12 +1,14 @@
-//! Of all velocities those that violate the contact laws least, and the impulses dual to the violation.
+//! Of all velocities those that violate the contact laws least, and the impulses dual to the
+//! violation.
 //!
 //! For an associated problem without shifts,
 //!
 //! minimise ½ d·C d + ½ κ d·W d + q·d over d ∈ K,
 //!
-//! is strictly convex and has one solution. With y = κ H̃ d and u = H̃ᵀ y + q, the velocity u + C d lies in K*: C d is the violation.
-//! The problem is solved again with q + κ W d for q: then κ W d tends to zero and d to the least of all violations, with H̃ d = 0 and
-//! q·d = −d·C d (docs/theory/interior-point.md, "What has no solution").
+//! is strictly convex and has one solution. With y = κ H̃ d and u = H̃ᵀ y + q, the velocity u + C d
+//! lies in K*: C d is the violation. The problem is solved again with q + κ W d for q: then κ W d
+//! tends to zero and d to the least of all violations, with H̃ d = 0 and q·d = −d·C d
+//! (docs/theory/interior-point.md, "What has no solution").
 
 use super::Interior;
 use super::coupling::Coupling;
@@ -30,7 +32,8 @@ pub(in crate::solver) struct Least {
 }
 
 impl Interior {
-    /// The least violation of an associated problem without shifts; none where no elimination tree can be made.
+    /// The least violation of an associated problem without shifts; none where no elimination tree
+    /// can be made.
     pub fn least_violation(&mut self, rows: &Rows, matrix: Option<&BlockMatrix>) -> Option<Least> {
         let mut sites = Sites::of(rows, &[]);
         let ratio = sites.speed / (sites.force * tuning::KAPPA);

@@ -1,18 +1,19 @@
 //! The corrector of one contact in the metric 1/ρ, and its derivative.
 //!
-//! From a multiplier r̂ and a relative velocity u the corrector is r(q) with q = u − r̂/ρ (and the carried reaction of an
-//! elastic bond, [`Row::form`]): for an associated law the minimiser of ½ Σ w r² + q·r over the cone, w = 1/ρ + C, for
-//! Coulomb's law Signorini's r_n = (−q_n/w_n)⁺ and the tangential part clipped to μ r_n (Alart & Curnier 1991). Its
-//! negative derivative A = −∂r/∂q is what a contact adds to the matrix of the Newton step; it is symmetric where the
-//! law is associated.
+//! From a multiplier r̂ and a relative velocity u the corrector is r(q) with q = u − r̂/ρ (and the
+//! carried reaction of an elastic bond, [`Row::form`]): for an associated law the minimiser of ½ Σ
+//! w r² + q·r over the cone, w = 1/ρ + C, for Coulomb's law Signorini's r_n = (−q_n/w_n)⁺ and the
+//! tangential part clipped to μ r_n (Alart & Curnier 1991). Its negative derivative A = −∂r/∂q is
+//! what a contact adds to the matrix of the Newton step; it is symmetric where the law is
+//! associated.
 
 use crate::contact::{Local, PADDED, Padded, Weights};
 use crate::dim::{Moments, Vect};
 use crate::solver::rows::{Operator, Row, TWIST};
 use nalgebra::{SMatrix, SVector, Vector2};
 
-/// The corrected reaction for the relative velocity `u`, without the shift: a reaction that is small beside the
-/// cohesion keeps all its digits while its bond sticks.
+/// The corrected reaction for the relative velocity `u`, without the shift: a reaction that is
+/// small beside the cohesion keeps all its digits while its bond sticks.
 #[inline]
 pub(super) fn correct(row: &Row, u: &Padded) -> Padded {
     let mut q = row.form(u);
@@ -51,7 +52,8 @@ pub(super) fn operator(row: &Row, u: &Padded, r: &Padded) -> Option<Operator> {
     // a row group inside its ball follows its own stiffness; on the sphere it turns with q
     block(&mut a, 1, slip, 1.0 / w.t, cone.mu * limit);
     block(&mut a, 3, bend, 1.0 / w.m, cone.nu * limit);
-    // the normal row drags the limits along: r = n (1, −μ q̂_t, −ν q̂_m, −ξ q̂_τ) on the active ones
+    // the normal row drags the limits along: r = n (1, −μ q̂_t, −ν q̂_m, −ξ q̂_τ) on the active
+    // ones
     let mut drag = SVector::<f64, PADDED>::ith(0, 1.0);
     let mut stiffness = w.n;
     if let Some((direction, _)) = slip {

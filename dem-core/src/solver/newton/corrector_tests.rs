@@ -45,7 +45,8 @@ fn contact(rng: &mut Pcg64, tangents: usize, moments: usize, associated: bool, e
     }
 }
 
-/// −∂r/∂u column by column from differences; none where they differ by the side they are taken from: at a kink.
+/// −∂r/∂u column by column from differences; none where they differ by the side they are taken
+/// from: at a kink.
 fn differences(row: &Row, u: &Padded) -> Option<SMatrix<f64, PADDED, PADDED>> {
     let mut a = SMatrix::<f64, PADDED, PADDED>::zeros();
     let here = correct(row, u).in_order();

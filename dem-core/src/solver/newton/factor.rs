@@ -1,4 +1,5 @@
-//! The matrix I + Σ H̃ A H̃ᵀ of a Newton step and its factors, kept while refinement with them converges.
+//! The matrix I + Σ H̃ A H̃ᵀ of a Newton step and its factors, kept while refinement with them
+//! converges.
 
 use crate::linear::{Lu, Tree};
 use crate::saved::{Mismatch, Reader, Saved};

@@ -16,8 +16,8 @@ impl Guess {
         Self { reactions }
     }
 
-    /// The velocity at which the corrector of contact `k` gives the guessed reaction. One at its limit is moved beyond it,
-    /// where rounding cannot make it stick.
+    /// The velocity at which the corrector of contact `k` gives the guessed reaction. One at its
+    /// limit is moved beyond it, where rounding cannot make it stick.
     pub fn velocity(&self, k: usize, row: &Row) -> Padded {
         let guess = &self.reactions[k];
         let limit = guess.n + row.shift;

@@ -44,8 +44,9 @@ impl Iterate {
 }
 
 impl Newton {
-    /// Solve the inner problem for fixed multipliers from `state`, with the active set of `guess` first. In the first proximal iteration of
-    /// a `warm` start Newton gives up where this active set leaves much of F. Returns the iterations made and whether F vanished.
+    /// Solve the inner problem for fixed multipliers from `state`, with the active set of `guess`
+    /// first. In the first proximal iteration of a `warm` start Newton gives up where this active
+    /// set leaves much of F. Returns the iterations made and whether F vanished.
     pub(super) fn inner(&mut self, rows: &Rows, state: &mut Iterate, guess: &Guess, warm: bool) -> (u64, bool) {
         // less than the contacts push is never much
         let much = (tuning::LEFT_BY_GUESS * state.norm).max(distance(&state.y, &rows.free));
@@ -69,10 +70,11 @@ impl Newton {
         (tuning::MOST_ITERATIONS, state.norm <= self.target(rows, state))
     }
 
-    /// The norm of F that is small enough: a tenth of what either tolerance allows, or what rounding leaves.
+    /// The norm of F that is small enough: a tenth of what either tolerance allows, or what
+    /// rounding leaves.
     ///
-    /// An error of F turns up as a velocity when v is computed from the reactions. Rounding comes from ρ u, where u is a
-    /// sum of velocities.
+    /// An error of F turns up as a velocity when v is computed from the reactions. Rounding comes
+    /// from ρ u, where u is a sum of velocities.
     fn target(&self, rows: &Rows, state: &Iterate) -> f64 {
         let change = distance(&state.y, &rows.free);
         let (mut rounding, mut carried) = (0.0, 0.0);
@@ -87,7 +89,8 @@ impl Newton {
         wanted.max(tuning::ROUNDING * rounding.sqrt())
     }
 
-    /// The Newton direction −J⁻¹ F, by the factors at hand where a few rounds of refinement make it exact enough, else by new ones.
+    /// The Newton direction −J⁻¹ F, by the factors at hand where a few rounds of refinement make it
+    /// exact enough, else by new ones.
     fn direction(&mut self, rows: &Rows, state: &Iterate, guess: Option<&Guess>, target: f64) -> Option<Vec<f64>> {
         let (mut right, points) = linearise(rows, state, guess);
         right.iter_mut().for_each(|f| *f = -*f);
@@ -134,8 +137,8 @@ pub(super) fn distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
 }
 
-/// F, and for each contact the velocity and reaction that its operator A belongs to: those of the state, or with a
-/// guess those of the guessed active set, from which F is then extrapolated.
+/// F, and for each contact the velocity and reaction that its operator A belongs to: those of the
+/// state, or with a guess those of the guessed active set, from which F is then extrapolated.
 fn linearise(rows: &Rows, state: &Iterate, guess: Option<&Guess>) -> (Vec<f64>, Vec<(Padded, Padded)>) {
     let Some(guess) = guess else {
         let points = state.velocities.iter().copied().zip(state.reactions.iter().copied());
@@ -171,8 +174,8 @@ fn multiply(rows: &Rows, operators: &[Option<Operator>], x: &[f64], out: &mut [f
     }
 }
 
-/// Move along the direction: the whole step where F shrinks enough or a guess is taken up, else the best of a few
-/// shorter ones.
+/// Move along the direction: the whole step where F shrinks enough or a guess is taken up, else the
+/// best of a few shorter ones.
 fn advance(rows: &Rows, state: &mut Iterate, direction: &[f64], whole: bool) {
     let step = |length: f64| {
         let y = state.y.iter().zip(direction).map(|(y, d)| y + length * d).collect();
@@ -205,8 +208,8 @@ fn advance(rows: &Rows, state: &mut Iterate, direction: &[f64], whole: bool) {
     *state = best;
 }
 
-/// Where the slope vanishes, between 0 (slope `start` < 0) and a step that may have to be prolonged: regula falsi with
-/// the Illinois rule.
+/// Where the slope vanishes, between 0 (slope `start` < 0) and a step that may have to be
+/// prolonged: regula falsi with the Illinois rule.
 fn root(step: impl Fn(f64) -> Iterate, slope: impl Fn(&Iterate) -> f64, start: f64, full: Iterate) -> Iterate {
     let (mut low, mut low_slope) = (0.0, start);
     let mut high = 1.0;

@@ -4,17 +4,19 @@
 //!
 //! F(v) = M (v − v_f) − H (P(r̂ − ρ (Hᵀv + b)) − s n) = 0,
 //!
-//! for associated laws the gradient of a convex function of v. Its derivative M + H A Hᵀ is sparse, and symmetric but
-//! for the slipping dry contacts. The outer iteration is r̂ ← P(r̂ − ρ (Hᵀv + b)), a proximal step of size ρ on the
-//! reactions; with a large ρ two or three suffice, and nearly always the active set of the last step still holds, so
-//! each costs one linear solve. Its factors are kept over steps and renewed when refinement with them no longer converges.
-//! Where the active set cycles it gives up: the interior-point method needs no active set.
+//! for associated laws the gradient of a convex function of v. Its derivative M + H A Hᵀ is sparse,
+//! and symmetric but for the slipping dry contacts. The outer iteration is r̂ ← P(r̂ − ρ (Hᵀv +
+//! b)), a proximal step of size ρ on the reactions; with a large ρ two or three suffice, and nearly
+//! always the active set of the last step still holds, so each costs one linear solve. Its factors
+//! are kept over steps and renewed when refinement with them no longer converges. Where the active
+//! set cycles it gives up: the interior-point method needs no active set.
 //!
-//! Started from zero reactions the first proximal step is the stiff limit: the reactions of least Σ r²/ρ among all
-//! that balance the load, the ones that elastic contacts with stiffnesses in the ratio of ρ would give.
+//! Started from zero reactions the first proximal step is the stiff limit: the reactions of least Σ
+//! r²/ρ among all that balance the load, the ones that elastic contacts with stiffnesses in the
+//! ratio of ρ would give.
 //!
-//! Sources: Hestenes 1969 and Powell 1969 (augmented Lagrangian); Alart & Curnier 1991; Qi & Sun 1993 (semismooth
-//! Newton); Olsen & Kamrin, arXiv 1805.07437 (the stiff limit).
+//! Sources: Hestenes 1969 and Powell 1969 (augmented Lagrangian); Alart & Curnier 1991; Qi & Sun
+//! 1993 (semismooth Newton); Olsen & Kamrin, arXiv 1805.07437 (the stiff limit).
 
 mod corrector;
 mod factor;
@@ -56,8 +58,9 @@ impl Newton {
         self.factor.made
     }
 
-    /// Proximal iterations from the active set of the reactions that the problem brought along; in 2D after some sweeps of Gauss–Seidel, in 3D without,
-    /// where sweeps that have not converged spoil the directions of slip. None where the active set cycles.
+    /// Proximal iterations from the active set of the reactions that the problem brought along; in
+    /// 2D after some sweeps of Gauss–Seidel, in 3D without, where sweeps that have not converged
+    /// spoil the directions of slip. None where the active set cycles.
     pub fn solve(
         &mut self,
         problem: &mut impl Solvable,
