@@ -28,10 +28,16 @@ pub(super) fn moved(x: &Point, a: f64, d: &Point) -> Point {
     [x[0] + a * d[0], x[1] + a * d[1], x[2] + a * d[2]]
 }
 
+/// ‖a, b‖; in 2D, where b is zero, without a root.
+#[inline]
+pub(super) fn norm(a: f64, b: f64) -> f64 {
+    if b == 0.0 { a.abs() } else { a.hypot(b) }
+}
+
 /// The two eigenvalues x₀ ± ‖x₁, x₂‖, the larger one first.
 #[inline]
 pub(super) fn eigenvalues(x: &Point) -> [f64; 2] {
-    let length = x[1].hypot(x[2]);
+    let length = norm(x[1], x[2]);
     [x[0] + length, x[0] - length]
 }
 
@@ -90,7 +96,7 @@ fn boosted(w: &Point, p: &Point) -> Point {
 /// By how much the eigenvalues of x must change to lie between `low` and `high`, downwards by no
 /// more than `high`.
 pub(super) fn correction(x: &Point, low: f64, high: f64) -> Point {
-    let length = x[1].hypot(x[2]);
+    let length = norm(x[1], x[2]);
     let change = |value: f64| (value.clamp(low, high) - value).max(-high);
     let (up, down) = (change(x[0] + length), change(x[0] - length));
     let along = if length > 0.0 { 0.5 * (up - down) / length } else { 0.0 };

@@ -46,9 +46,9 @@ pub(super) fn invert(sites: &Sites, pairs: &[Scaled], compliance: &[f64], invers
     inverses.resize(sites.matrices, 0.0);
     for site in &sites.list {
         let order = site.order();
-        let mut a = [[0.0; 2 * ORDER]; ORDER];
+        let a = &mut inverses[site.matrix..][..order * order];
         for (k, c) in site.part(compliance).iter().enumerate() {
-            a[k][k] = *c;
+            a[k * order + k] = *c;
         }
         let mut first = site.rows;
         for c in site.cones.clone() {
@@ -56,7 +56,7 @@ pub(super) fn invert(sites: &Sites, pairs: &[Scaled], compliance: &[f64], invers
             let Scaled { scaling, x, z } = &pairs[c];
             let scale = scale(x, z);
             if *opens {
-                a[0][first] = -slope;
+                a[first] = -slope;
             }
             for k in 0..=*tangents {
                 let mut unit = [0.0; 3];
@@ -65,49 +65,59 @@ pub(super) fn invert(sites: &Sites, pairs: &[Scaled], compliance: &[f64], invers
                 let (dx, dz) = (product(z, &scaling.x(&unit)), product(x, &scaling.z(&unit)));
                 let (column, factor) = if k == 0 { (0, *slope) } else { (rows[k - 1], 1.0) };
                 for row in 0..=*tangents {
-                    a[first + row][column] = scale * factor * dx[row];
-                    a[first + row][first + k] = scale * dz[row];
+                    a[(first + row) * order + column] = scale * factor * dx[row];
+                    a[(first + row) * order + first + k] = scale * dz[row];
                 }
                 if k > 0 {
-                    a[column][first + k] = -1.0;
+                    a[column * order + first + k] = -1.0;
                 }
             }
             first += 1 + tangents;
         }
-        sign *= gauss_jordan(&mut a, order)?;
-        for (row, out) in a.iter().zip(inverses[site.matrix..].chunks_exact_mut(order).take(order)) {
-            out.copy_from_slice(&row[order..2 * order]);
-        }
+        sign *= gauss_jordan(a, order)?;
     }
     Some(sign)
 }
 
-/// Leaves the inverse in the right half, with pivots chosen in their column; the sign of the
-/// determinant, none if it is zero.
-fn gauss_jordan(a: &mut [[f64; 2 * ORDER]; ORDER], order: usize) -> Option<f64> {
+/// Replace a matrix, row by row, by its inverse, with pivots chosen in their column; the sign of
+/// the determinant, none if it is zero.
+fn gauss_jordan(a: &mut [f64], order: usize) -> Option<f64> {
     let mut sign = 1.0;
-    for k in 0..order {
-        a[k][order + k] = 1.0;
-    }
+    let mut pivots = [0; ORDER];
     for k in 0..order {
         let mut pivot = k;
         for row in k + 1..order {
-            pivot = if a[row][k].abs() > a[pivot][k].abs() { row } else { pivot };
+            pivot = if a[row * order + k].abs() > a[pivot * order + k].abs() { row } else { pivot };
         }
-        a.swap(k, pivot);
-        let inverse = 1.0 / a[k][k];
+        pivots[k] = pivot;
+        if pivot != k {
+            let (above, below) = a.split_at_mut(pivot * order);
+            above[k * order..][..order].swap_with_slice(&mut below[..order]);
+        }
+        let inverse = 1.0 / a[k * order + k];
         if !inverse.is_finite() {
             return None;
         }
         sign *= if pivot == k { inverse.signum() } else { -inverse.signum() };
-        a[k][k..2 * order].iter_mut().for_each(|x| *x *= inverse);
-        let line = a[k];
-        for row in (0..order).filter(|row| *row != k) {
-            let factor = a[row][k];
-            if factor != 0.0 {
-                a[row][k..2 * order].iter_mut().zip(&line[k..2 * order]).for_each(|(x, l)| *x -= factor * l);
+        // column k becomes that of the inverse
+        a[k * order + k] = 1.0;
+        let mut line = [0.0; ORDER];
+        for (x, l) in a[k * order..][..order].iter_mut().zip(&mut line) {
+            *x *= inverse;
+            *l = *x;
+        }
+        for (row, x) in a.chunks_exact_mut(order).enumerate() {
+            if row != k {
+                let factor = std::mem::take(&mut x[k]);
+                if factor != 0.0 {
+                    x.iter_mut().zip(&line).for_each(|(x, l)| *x -= factor * l);
+                }
             }
         }
+    }
+    // the columns follow the rows that were swapped
+    for (k, pivot) in pivots[..order].iter().enumerate().rev().filter(|(k, pivot)| k != *pivot) {
+        a.chunks_exact_mut(order).for_each(|row| row.swap(k, *pivot));
     }
     Some(sign)
 }

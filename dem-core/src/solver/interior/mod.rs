@@ -93,7 +93,7 @@ impl Interior {
             let Some(step) = follow.step(&system, &sites) else { break };
             selection.change = system.net_change(&step);
         }
-        selection.best
+        selection.found(problem, &sites)
     }
 
     /// The linear system at a point, factorised; none where it has no inverse to rounding.

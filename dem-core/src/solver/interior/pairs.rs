@@ -9,11 +9,11 @@
 //! f is curved on the scale √(λ² + 4τ), the eigenvalues of x + z: changes of w are measured
 //! relative to these.
 
-use super::cones::{Point, dot};
+use super::cones::{Point, dot, norm};
 
 /// The pair (x, z) of w on the path with barrier τ.
 pub(super) fn pair(w: &Point, barrier: f64) -> (Point, Point) {
-    let length = w[1].hypot(w[2]);
+    let length = norm(w[1], w[2]);
     let (high, low) = (w[0] + length, w[0] - length);
     let side = |high: f64, low: f64, sign: f64| {
         let (a, b) = (smoothed(sign * high, barrier), smoothed(sign * low, barrier));
@@ -32,13 +32,13 @@ fn smoothed(value: f64, barrier: f64) -> f64 {
 /// The three relative components of a change of w, as linear forms: those of its two eigenvalues,
 /// and that of its direction.
 fn forms(w: &Point, barrier: f64, change: &Point) -> [Point; 3] {
-    let length = w[1].hypot(w[2]);
+    let length = norm(w[1], w[2]);
     let axis = if length > 0.0 { [w[1] / length, w[2] / length] } else { [0.0, 0.0] };
     let scale = |value: f64| value.hypot(2.0 * barrier.sqrt());
     let (high, low) = (scale(w[0] + length), scale(w[0] - length));
     let along = change[1] * axis[0] + change[2] * axis[1];
     let across = [change[1] - along * axis[0], change[2] - along * axis[1]];
-    let size = across[0].hypot(across[1]);
+    let size = norm(across[0], across[1]);
     let turn = if size > 0.0 { 2.0 / (high + low) / size } else { 0.0 };
     [
         [1.0 / high, axis[0] / high, axis[1] / high],

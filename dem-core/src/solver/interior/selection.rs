@@ -28,7 +28,7 @@ pub(super) enum Next {
 pub(super) struct Selection {
     aims: Aims,
     pub metric: Metric,
-    pub best: Option<Found>,
+    best: Option<Found>,
     /// Change of the net impulses in the last iteration, over them (–).
     pub change: f64,
     /// The limits of r*, once it is known, and the gaps of all pairs at which a solution counts.
@@ -36,6 +36,10 @@ pub(super) struct Selection {
     enough: f64,
     turn: Option<State>,
     anchored: u32,
+    /// Of the points that were not measured the one of least gap, and that gap.
+    nearest: Option<State>,
+    least_gap: f64,
+    iterations: u64,
 }
 
 impl Selection {
@@ -43,7 +47,19 @@ impl Selection {
         let kappa = (1.0 / (tuning::SHARE * aims.tolerance)).clamp(tuning::KAPPA, tuning::STIFFEST);
         let metric = Metric::new(sites, anchor, kappa);
         let limits = (!aims.least).then(Vec::new);
-        Self { aims, metric, best: None, change: 1.0, limits, enough: f64::INFINITY, turn: None, anchored: 0 }
+        Self {
+            aims,
+            metric,
+            best: None,
+            change: 1.0,
+            limits,
+            enough: f64::INFINITY,
+            turn: None,
+            anchored: 0,
+            nearest: None,
+            least_gap: f64::INFINITY,
+            iterations: 0,
+        }
     }
 
     /// Measure a point, and decide how the path goes on.
@@ -56,8 +72,13 @@ impl Selection {
             (self.limits, self.enough) = (Some(sites.limits(at, &self.metric.own)), least);
         }
         let selected = self.limits.is_some() && gaps <= self.enough;
-        let plain = self.measure(problem, sites, at, &[], iteration);
-        let mut solved = plain <= 1.0 && selected;
+        self.iterations = iteration;
+        // far from the reactions of least energy a point is no solution, and is measured only if
+        // the path ends without one
+        if !selected && (self.nearest.is_none() || gaps < self.least_gap) {
+            (self.least_gap, self.nearest) = (gaps, Some(at.clone()));
+        }
+        let mut solved = selected && self.measure(problem, sites, at, &[], iteration) <= 1.0;
         if selected && self.aims.least {
             let limits = self.limits.take().unwrap_or_default();
             let at_limits = self.measure(problem, sites, at, &limits, iteration);
@@ -87,6 +108,16 @@ impl Selection {
             }
             _ => Next::Onwards,
         }
+    }
+
+    /// The best point; of a path that ended before any was measured, that of least gap.
+    pub fn found(mut self, problem: &mut impl Solvable, sites: &Sites) -> Option<Found> {
+        if self.best.as_ref().is_none_or(|best| best.missed(self.aims) > 1.0)
+            && let Some(nearest) = self.nearest.take()
+        {
+            self.measure(problem, sites, &nearest, &[], self.iterations);
+        }
+        self.best
     }
 
     /// Whether the compliance of the metric takes much of what the residual, or the velocity error,
