@@ -1,6 +1,6 @@
 //! Cost of one Gauss–Seidel sweep per contact, for each law, from 430 to 1,000,000 disks and for
-//! spheres, beside a loop that streams the same bytes on one thread. Large problems are swept by as
-//! many threads as `RAYON_NUM_THREADS` says.
+//! spheres, compared with a loop that streams the same bytes on one thread. Large problems are
+//! swept by `RAYON_NUM_THREADS` threads.
 //!
 //! `cargo bench -p dem-core --bench sweep`; criterion's throughput line gives contacts per second,
 //! 1e9 / that is ns a contact.
@@ -30,7 +30,7 @@ fn stream(words: &[f64]) -> f64 {
 
 fn of_disks(c: &mut Criterion) {
     for (name, rows, columns) in [("430", 20, 22), ("4190", 20, 210), ("40000", 200, 200), ("1000000", 1000, 1000)] {
-        // a million disks are there to be compared with memory
+        // a million disks are for comparison with the memory bandwidth
         let wanted = |feature| rows < 1000 || feature == Feature::Friction;
         sweeps(c, &format!("sweep {name} disks"), wanted, |feature| rows_of_disks(rows, columns, feature, 0));
     }
@@ -47,7 +47,7 @@ fn of_spheres(c: &mut Criterion) {
     }
 }
 
-/// Sweeps over the contacts of a scene with each feature that is wanted.
+/// Sweeps over the contacts of a scene, once for each wanted feature.
 fn sweeps<D: Dim>(
     c: &mut Criterion,
     name: &str,
@@ -55,7 +55,7 @@ fn sweeps<D: Dim>(
     scene: impl Fn(Feature) -> World<D>,
 ) {
     let mut group = c.benchmark_group(name);
-    // restitution is a dry contact
+    // contacts with restitution are dry contacts
     for (kind, feature) in FEATURES.into_iter().filter(|&(_, f)| f != Feature::Restitution && wanted(f)) {
         let mut problem = scene(feature).contact_problem();
         let bytes = problem.contact_bytes();
@@ -65,7 +65,7 @@ fn sweeps<D: Dim>(
             group.bench_function(BenchmarkId::new(kind, format!("{local:?}")), |b| {
                 b.iter_custom(|times| {
                     let start = Instant::now();
-                    // among the threads of the pool, as a solver sweeps
+                    // inside the thread pool, as in a solver
                     rayon::scope(|_| (0..times).for_each(|_| sweep(black_box(&mut problem), local)));
                     start.elapsed()
                 })

@@ -1,6 +1,6 @@
-//! A scene that does one thing many times, for tools that count instructions or bytes: `cost
+//! Repeats one operation on a scene, for tools that count instructions or bytes: `cost
 //! disks|spheres|twisting FEATURE ROWS COLUMNS sweep|step TIMES` prints the number of grains and
-//! contacts, the bytes of a contact, and the greatest resident size (kB).
+//! contacts, the bytes of a contact, and the peak resident size (kB).
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -41,7 +41,7 @@ fn spend<D: Dim>(mut world: World<D>, what: &str, times: usize) {
     println!("{} {contacts} {} {}", world.grains.len(), bytes / contacts, peak());
 }
 
-/// The greatest resident size of this process (kB), where Linux tells it; else zero.
+/// The peak resident size of this process (kB) as Linux reports it; zero elsewhere.
 fn peak() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));

@@ -27,7 +27,7 @@ fn main() -> Result<(), StepError> {
             );
         }
     }
-    // it rests: the floor bears its weight
+    // at rest the floor carries the weight of the disk
     let weight = world.grains.mass[0] * 9.81;
     assert!((world.walls[0].reaction[1] / weight + 1.0).abs() < 1e-6);
     Ok(())

@@ -1,5 +1,5 @@
-//! A contact law of one's own: adhesion without friction, r_n ≥ −c ⊥ u_n ≥ 0, in a chain of three
-//! spheres that hangs from a fixed one. Solved by sweeps that are written here, since a
+//! A user-defined contact law: adhesion without friction, r_n ≥ −c ⊥ u_n ≥ 0, in a chain of three
+//! spheres that hangs from a fixed one. The example has its own sweeps, since a
 //! [`World`](dem_core::world::World) knows the laws of its kinds alone.
 //!
 //! `cargo run --release -p dem-core --example own_law`
@@ -28,7 +28,7 @@ impl Law for Adhesive {
     type B = V0;
     type Axes<D: Dim> = D::Vector;
 
-    /// The r_n at which u_n vanishes, or the most that adhesion carries.
+    /// The r_n at which u_n vanishes, but not below the limit of the adhesion.
     fn improve(&self, _: LocalSolve, r: Local<V0, V0>, u: Local<V0, V0>) -> Local<V0, V0> {
         Local { n: (r.n - self.inverse * u.n).max(-self.adhesion), ..r }
     }

@@ -1,5 +1,4 @@
-//! A solver of one's own in a world: plain sweeps until the residual is small enough, and a count
-//! of them.
+//! A user-defined solver in a world: plain sweeps, counted, until the residual is small enough.
 //!
 //! `cargo run --release -p dem-core --example own_solver`
 
@@ -10,7 +9,7 @@ use dem_core::problem::residual::residual;
 use dem_core::saved::{Mismatch, Reader, Saved};
 use dem_core::solver::{ContactSolver, Route, SolveReport, SolveStatus, Work, sweep};
 
-/// Sweeps of Gauss–Seidel, with a look at the residual after each.
+/// Gauss–Seidel sweeps, each followed by a check of the residual.
 #[derive(Clone)]
 struct PlainSweeps {
     tolerance: f64,
@@ -20,7 +19,7 @@ struct PlainSweeps {
 impl<D: Dim> ContactSolver<D> for PlainSweeps {
     fn solve(&mut self, problem: &mut ContactProblem<D>) -> SolveReport {
         let mut work = Work::default();
-        // the problem brings the reactions of the last step, and the nodes their free velocities
+        // the problem has the reactions of the last step, and its nodes the free velocities
         problem.velocities_from_reactions();
         while residual(problem) > self.tolerance && work.sweeps < self.most {
             sweep(problem, LocalSolve::Exact);
@@ -36,7 +35,7 @@ impl<D: Dim> ContactSolver<D> for PlainSweeps {
         Box::new(self.clone())
     }
 
-    // nothing is kept from one solve to the next
+    // the solver has no state from one solve to the next
     fn save(&self, _: &mut Saved) {}
 
     fn restore(&mut self, _: &mut Reader) -> Result<(), Mismatch> {

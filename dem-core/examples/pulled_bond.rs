@@ -28,7 +28,7 @@ fn main() -> Result<(), StepError> {
             );
         }
     }
-    // the load of a step is that of its middle
+    // the load of a step is taken at mid-step
     assert!((world.time - 0.1).abs() <= 1.5e-4);
     Ok(())
 }

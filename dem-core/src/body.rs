@@ -1,4 +1,5 @@
-//! Bodies: rigid disks or spheres, and rigid walls.
+//! Bodies: grains (rigid disks or spheres) and rigid walls, with the drives of walls and the loads
+//! on grains.
 
 use crate::dim::{Dim, Vect};
 use std::sync::Arc;
@@ -103,7 +104,8 @@ impl<D: Dim> Grains<D> {
         self.fixed.push(grain.fixed);
     }
 
-    /// Inverse mass (1/kg) and inverse inertia (1/(kg m²)) of grain `k`, zero for a fixed one.
+    /// Inverse mass (1/kg) and inverse inertia (1/(kg m²)) of grain `k`, both zero for a fixed
+    /// grain.
     pub fn inverse(&self, k: usize) -> (f64, f64) {
         if self.fixed[k] { (0.0, 0.0) } else { (1.0 / self.mass[k], 1.0 / self.inertia[k]) }
     }
@@ -113,7 +115,7 @@ impl<D: Dim> Grains<D> {
         self.bounds_at(&self.position)
     }
 
-    /// The same for grains at these places (m).
+    /// The same box for grains at these positions (m).
     pub(crate) fn bounds_at(&self, places: &[D::Vector]) -> (D::Vector, D::Vector) {
         let mut low = D::Vector::zero();
         let mut high = D::Vector::zero();
@@ -129,7 +131,7 @@ impl<D: Dim> Grains<D> {
     }
 }
 
-/// The surface of a wall; its place is the wall's position.
+/// The surface of a wall, relative to the wall's position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape<D: Dim> {
     /// A plane through the position; the grains are on the side of the unit normal.
@@ -163,11 +165,12 @@ impl<D: Dim> Shape<D> {
         }
     }
 
-    /// The smallest gap (m) on the straight way `way` (m) from `offset`.
+    /// Smallest gap (m) of a grain that moves from `offset` along the straight displacement `way`
+    /// (m).
     pub(crate) fn smallest_gap(&self, offset: D::Vector, way: D::Vector, radius: f64) -> f64 {
         let end = self.gap(offset + way, radius).0.min(self.gap(offset, radius).0);
         let Self::Round { inside: false, axis, .. } = *self else {
-            // along a line these gaps are smallest at an end
+            // along a line the gap to a plane or to an enclosing wall is smallest at an end
             return end;
         };
         let (x, w) = (across::<D>(offset, axis), across::<D>(way, axis));
@@ -176,20 +179,21 @@ impl<D: Dim> Shape<D> {
     }
 }
 
-/// The way (m) to the centre of a body at `i` from that of another at `j`: the one place to change
-/// for a periodic cell.
+/// Vector (m) from the centre at `j` to the centre at `i`. A periodic cell would change this
+/// function alone.
 #[inline]
 pub(crate) fn separation<D: Dim>(i: D::Vector, j: D::Vector) -> D::Vector {
     i - j
 }
 
-/// The part of a vector across the axis of a cylinder, if there is one.
+/// The component of a vector perpendicular to the axis of a cylinder; the vector itself without an
+/// axis.
 fn across<D: Dim>(x: D::Vector, axis: Option<D::Vector>) -> D::Vector {
     axis.map_or(x, |a| x - a * a.dot(&x))
 }
 
-/// The unit vector along `offset`, whose norm is `distance`. Where two centres coincide, any
-/// normal will do: the first axis.
+/// The unit vector along `offset`, whose norm is `distance`. Coinciding centres have no normal: the
+/// first axis is returned.
 pub(crate) fn direction<D: Dim>(offset: D::Vector, distance: f64) -> D::Vector {
     if distance > 0.0 {
         return offset * (1.0 / distance);
@@ -199,10 +203,10 @@ pub(crate) fn direction<D: Dim>(offset: D::Vector, distance: f64) -> D::Vector {
     first
 }
 
-/// What moves a wall.
+/// How a wall moves.
 #[derive(Clone)]
 pub enum Drive<D: Dim> {
-    /// Nothing: it does not yield.
+    /// The wall does not move.
     Fixed,
     /// A prescribed speed (m/s) along a unit direction.
     Velocity {
@@ -232,16 +236,16 @@ pub struct Wall<D: Dim> {
     pub position: D::Vector,
     /// Velocity (m/s).
     pub velocity: D::Vector,
-    /// What moves it.
+    /// How it moves.
     pub drive: Drive<D>,
     /// Friction coefficient with grains (–).
     pub friction: f64,
-    /// Force of the grains on the wall at the end of the last step (N), after all that broke in it.
+    /// Force of the grains on the wall at the end of the last step (N), after all ruptures in it.
     pub reaction: D::Vector,
-    /// The same before anything broke in the step (N): the equilibrium that broke, where something
-    /// did.
+    /// The same before the first rupture in the step (N): the equilibrium whose bonds reached their
+    /// limit. Equals `reaction` where no solve followed a rupture.
     pub reaction_at_limit: D::Vector,
-    /// Force prescribed at the last step (N); zero for a wall that is not driven by a force.
+    /// Force prescribed at the last step (N); zero for a wall without a force drive.
     pub applied: f64,
 }
 
@@ -261,7 +265,7 @@ impl<D: Dim> Wall<D> {
         }
     }
 
-    /// The prescribed force at a time (N); zero for a wall that no force drives.
+    /// Prescribed force (N) at a time (s); zero for a wall without a force drive.
     pub fn applied_force(&self, time: f64) -> f64 {
         match &self.drive {
             Drive::Force { force, .. } => force(time),

@@ -1,17 +1,17 @@
-//! Cohesive bonds: how they form, what they carry and when they break for good (Guessasma & Fortin
-//! 2011, (4) and (5)).
+//! Cohesive bonds: their properties, their limits and their rupture criterion (Guessasma & Fortin
+//! 2011, (4) and (5)). A broken bond never re-forms.
 
 use crate::contact::{Cone, Local, Weights};
 use crate::dim::{Moments, Vect};
 use std::ops::{Deref, DerefMut};
 
-/// Relative distance to the limit at which a bond counts as being at it (–).
+/// Relative distance from the limit within which a bond counts as at its limit (–).
 pub const LIMIT: f64 = 1e-7;
 
-/// Whether a bond holds, and if not, how it failed.
+/// Whether a bond is intact, and if not, its failure mode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum BondStatus {
-    /// It holds.
+    /// Not broken.
     Intact,
     /// Broken: the shifted normal reaction vanished.
     Tension,
@@ -36,7 +36,7 @@ pub struct Stiffness {
     pub twist: f64,
 }
 
-/// A bond between two grains; it formed once and never re-forms.
+/// A bond between two grains.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bond {
     /// The two grains, the lower index first.
@@ -53,22 +53,22 @@ pub struct Bond {
     pub twist: f64,
     /// Stiffness; none for a rigid bond.
     pub stiffness: Option<Stiffness>,
-    /// Whether it holds.
+    /// Whether it is intact.
     pub status: BondStatus,
 }
 
-/// Bonds sorted by pair, at most one for each. They can be changed in place, but for their pairs,
-/// and none can be taken out: contacts and histories know them by their index.
-/// [`crate::world::World::add_bonds`] adds some.
+/// Bonds sorted by pair, at most one per pair. A bond can be changed in place, except for its pair,
+/// and cannot be removed: contacts and histories refer to bonds by index.
+/// [`crate::world::World::add_bonds`] adds bonds.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Bonds(Vec<Bond>);
 
 impl Bonds {
-    /// Add bonds of pairs that have none; the index that each of the earlier ones has now.
+    /// Add bonds to pairs that have none; returns the new index of each earlier bond.
     pub(crate) fn merge(&mut self, bonds: Vec<Bond>) -> Vec<u32> {
         let earlier = self.0.len();
         let mut list: Vec<(usize, Bond)> = std::mem::take(&mut self.0).into_iter().chain(bonds).enumerate().collect();
-        // stable: of one pair the earlier bond comes first, and stays
+        // a stable sort: the earlier bond of a pair comes first and is kept
         list.sort_by_key(|(_, bond)| bond.pair);
         list.dedup_by_key(|(_, bond)| bond.pair);
         let mut numbers = vec![0; earlier];
@@ -83,7 +83,7 @@ impl Bonds {
 }
 
 impl From<Vec<Bond>> for Bonds {
-    /// Sorted by pair; of several bonds of one pair the first.
+    /// Sorts by pair and keeps the first of several bonds of one pair.
     fn from(list: Vec<Bond>) -> Self {
         let mut bonds = Self::default();
         bonds.merge(list);
@@ -140,7 +140,7 @@ impl Bond {
     }
 }
 
-/// What happens to bonds at their limit after an accepted solve.
+/// Which bonds at their limit break after an accepted solve, and when.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Rupture {
     /// All break, and the same step is solved again, until none is at its limit.
@@ -153,12 +153,13 @@ pub enum Rupture {
     EndOfStep,
 }
 
-/// The mode in which a bond fails under the reaction `r`, for a shift s = r_coh in the unit of `r`;
-/// none if it holds.
+/// Failure mode of a bond under the reaction `r`, with the shift s = r_coh in the unit of `r`;
+/// `None` below the limit.
 ///
 /// TENSION if r_n + s ≤ ε s; else SHEAR, ROLLING or TWIST, whichever of ‖t‖/μ, ‖m‖/ν and |τ|/ξ is
-/// the largest (the first of those that tie), once it reaches (1 − ε) (r_n + s). Compression never
-/// breaks a bond, and one without friction fails in tension only.
+/// the largest (the first of equal ones), if it reaches (1 − ε) (r_n + s). Pure compression never
+/// breaks a bond. A row group with coefficient zero never fails: a bond with μ = ν = ξ = 0 fails in
+/// tension only.
 pub fn failure<T: Vect, B: Moments>(r: &Local<T, B>, shift: f64, cone: Cone) -> Option<BondStatus> {
     let limit = r.n + shift;
     if limit <= LIMIT * shift {

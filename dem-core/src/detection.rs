@@ -1,14 +1,14 @@
-//! Candidate pairs: grids of cells with a skin around each body.
+//! Candidate pairs for contact, from grids of cells and a skin around each body.
 //!
-//! The list holds every pair whose gap was at most the sum of its two skins when it was built. It
-//! stays valid while each body's displacement since then, plus the reach that the step needs of it,
-//! is within its own skin: a single fast grain lengthens its own list and no other.
+//! The list holds every pair whose gap was at most the sum of its two skins when the list was
+//! built. The list is valid while the displacement of each body since then, plus the reach that the
+//! step requires of it, is at most its skin. A single fast grain thus adds pairs of its own and no
+//! others.
 //!
-//! Grains lie in a hierarchy of grids after Ogarko & Luding (Comput. Phys. Commun. 183, 931, 2012):
-//! a level for each halving of radius plus skin. A grain is compared with its own level and those
-//! of larger cells, so that neither a wide range of radii nor a fast grain makes all cells large.
-//! Cells are sorted by key rather than laid out as an array: a grain that flies away costs no
-//! memory.
+//! The grids form a hierarchy after Ogarko & Luding (Comput. Phys. Commun. 183, 931, 2012): one
+//! level for each halving of radius plus skin. A grain is compared with its own level and with
+//! those of larger cells, so that neither a wide range of radii nor a fast grain makes all cells
+//! large. Cells are sorted by key and not stored as an array: a grain far away costs no memory.
 
 use crate::body::{Grains, Wall, separation};
 use crate::dim::{Dim, Vect};
@@ -30,9 +30,10 @@ impl<D: Dim> Default for Candidates<D> {
 }
 
 impl<D: Dim> Candidates<D> {
-    /// Make the list hold every pair whose gap at these places is at most the sum of what `reach`
-    /// (m) gives for its bodies, grains first. If it must be built anew, each body may go as far as
-    /// `spare` (m) gives before that is so again.
+    /// Make the list hold every pair whose gap at these positions is at most the sum of the `reach`
+    /// (m) of its two bodies; bodies are numbered grains first. A list that is no longer valid is
+    /// rebuilt with skins of `reach` + `spare` (m): each body may then move by `spare` before the
+    /// next rebuild.
     pub fn cover(
         &mut self,
         grains: &Grains<D>,
@@ -99,7 +100,7 @@ impl<'a, D: Dim> Grids<'a, D> {
         let widest = 2.0 * (0..grains.len()).map(size).fold(0.0, f64::max);
         let mut grids = Self { grains, position, skin, widest, entries: Vec::new(), levels: Vec::new() };
         let entry = |k: usize| {
-            // as many halvings as leave the cell at least as wide as the grain with its skin
+            // the finest level whose cells are at least as wide as the grain with its skin
             let level = (widest / (2.0 * size(k))).log2().floor().clamp(0.0, 1000.0) as u16;
             Entry { level, key: grids.cell(k, level), grain: k as u32 }
         };
@@ -125,8 +126,8 @@ impl<'a, D: Dim> Grids<'a, D> {
         self.entries.par_chunks(256).flat_map_iter(|chunk| self.pairs_of(chunk)).collect()
     }
 
-    /// Pairs of these grains with those of their own level that come after them, and with all in
-    /// levels of larger cells.
+    /// Pairs of these grains with later grains of their own level, and with all grains in levels of
+    /// larger cells.
     fn pairs_of(&self, chunk: &[Entry]) -> Vec<[u32; 2]> {
         let mut found = Vec::new();
         let deep = D::N > 2;
@@ -134,21 +135,20 @@ impl<'a, D: Dim> Grids<'a, D> {
         for &level in self.levels.iter().take_while(|level| **level <= finest) {
             for (dx, dy) in [(0, 0), (0, 1), (1, -1), (1, 0), (1, 1), (0, -1), (-1, -1), (-1, 0), (-1, 1)] {
                 let ahead = (dx, dy) >= (0, 0);
-                // grains come in the order of their cells, so that the next run begins near the
-                // last
+                // entries are sorted by cell: the next run begins near the last one
                 let mut start = 0;
                 for entry in chunk.iter().filter(|entry| level < entry.level || level == entry.level && ahead) {
                     let own = level == entry.level;
                     let key = if own { entry.key } else { self.cell(entry.grain as usize, level) };
                     let (Some(x), Some(y)) = (key[0].checked_add(dx), key[1].checked_add(dy)) else { continue };
-                    // cells are ordered by their last key last: one run of the sorted list holds
-                    // all of dz
+                    // the last component of the key varies fastest: one run of the sorted list
+                    // holds all of dz
                     let below = deep && !(own && (dx, dy) == (0, 0));
                     let low = [x, y, key[2].saturating_sub(below.into())];
                     let high = [x, y, key[2].saturating_add(deep.into())];
                     start = self.first_from(start, (level, low));
                     let run = self.entries[start..].iter().take_while(|e| (e.level, e.key) <= (level, high));
-                    // of two in one cell the first finds the other
+                    // of two grains in one cell, the one with the lower index finds the other
                     for other in run.filter(|e| !own || e.key != key || e.grain > entry.grain) {
                         self.add_if_near(entry.grain, other.grain, &mut found);
                     }
@@ -158,7 +158,7 @@ impl<'a, D: Dim> Grids<'a, D> {
         found
     }
 
-    /// The first entry that is not before a cell of a level, looked for from `near` on.
+    /// Index of the first entry at or after a cell of a level; the search begins at `near`.
     fn first_from(&self, near: usize, cell: (u16, [i64; 3])) -> usize {
         let before = |e: &Entry| (e.level, e.key) < cell;
         let (passed, coming) = self.entries.split_at(near);
@@ -186,7 +186,7 @@ mod tests {
     use crate::dim::{D2, D3};
     use proptest::prelude::*;
 
-    /// Every pair, looked at one by one.
+    /// All pairs by brute force.
     fn every_pair<D: Dim>(grains: &Grains<D>, skin: &[f64]) -> Vec<[u32; 2]> {
         let mut pairs = Vec::new();
         for i in 0..grains.len() {
@@ -211,8 +211,8 @@ mod tests {
     }
 
     proptest! {
-        // sizes and skins over six decades in a box of side 2, so that all is found from a few
-        // pairs to every one
+        // sizes and skins over six decades in a box of side 2, so that the result ranges from a few
+        // pairs to all of them
         #[test]
         fn grids_find_every_pair(
             numbers in prop::collection::vec((-1.0..1.0, -1.0..1.0, -1.0..1.0, -4.0..0.5, -5.0..0.5), 0..120)

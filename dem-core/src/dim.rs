@@ -1,7 +1,7 @@
-//! Two and three dimensions from one source.
+//! The dimension of space as a type: one source for 2D and 3D.
 //!
-//! Everything above this file is written for a [`Dim`]; [`D2`] and [`Space`] say what a vector, a
-//! spin, a contact frame and an orientation are. Nothing else in the crate names a dimension.
+//! The rest of the crate is generic over [`Dim`]; [`D2`] and [`Space`] define vectors, spins,
+//! contact frames and orientations. Outside tests no other file names a dimension.
 //!
 //! Symbols: n normal from body j to body i; t tangent(s), in 2D t = (−n_y, n_x), in 3D n = t₁ × t₂;
 //! ω spin, counter-clockwise in 2D.
@@ -41,7 +41,7 @@ pub trait Vect:
     /// Euclidean norm.
     #[inline(always)]
     fn norm(&self) -> f64 {
-        // one component needs no square root, and keeps its bits
+        // one component needs no square root and stays exact
         match Self::LEN {
             0 => 0.0,
             1 => self[0].abs(),
@@ -56,8 +56,8 @@ pub trait Vect:
             let norm = self.norm();
             return if norm <= limit { self } else { self * (limit / norm) };
         }
-        // the next contact waits for this one: no square root within the ball, and none for what
-        // carries nothing
+        // latency matters, as the next contact may depend on this one: no square root inside the
+        // ball, nor for a limit of zero
         let square = self.dot(&self);
         if square <= limit * limit {
             self
@@ -91,21 +91,21 @@ impl<const N: usize> Vect for SVector<f64, N> {
     }
 }
 
-/// The rows that a contact lacks: no storage, no instruction.
+/// A row group that a contact lacks: no storage, no instruction.
 pub type V0 = SVector<f64, 0>;
 
 /// One row.
 pub type V1 = SVector<f64, 1>;
 
-/// The moment rows of a contact: as many bending rows as tangential ones and, where there are
-/// three, one of twist last.
+/// The moment rows of a contact: as many bending rows as tangential ones; the last of three rows is
+/// the twist row.
 ///
-/// Bending and twist have limits of their own.
+/// Bending and twist have separate limits.
 pub trait Moments: Vect {
-    /// A number that only a contact with a twist row has: no storage in the others.
+    /// A number of the twist row; no storage where there is no twist row.
     type Twist: Vect;
 
-    /// Whether the last row is one of twist.
+    /// Whether the last row is the twist row.
     const TWISTS: bool = Self::Twist::LEN > 0;
 
     /// Norm of the bending rows.
@@ -114,7 +114,7 @@ pub trait Moments: Vect {
         if Self::TWISTS { (self[0] * self[0] + self[1] * self[1]).sqrt() } else { self.norm() }
     }
 
-    /// Size of the twist row, zero where there is none.
+    /// Absolute value of the twist row; zero where there is none.
     #[inline(always)]
     fn twist(&self) -> f64 {
         if Self::TWISTS { self[2].abs() } else { 0.0 }
@@ -130,7 +130,7 @@ pub trait Moments: Vect {
         out
     }
 
-    /// The nearest rows with norms of at most these limits.
+    /// The nearest rows whose bending and twist norms are at most these limits.
     #[inline(always)]
     fn within(self, bending: f64, twist: f64) -> Self {
         if !Self::TWISTS {
@@ -159,7 +159,7 @@ impl Moments for SVector<f64, 3> {
     type Twist = V1;
 }
 
-/// The rows of `rows` that a group of type `B` has: all, or none; missing ones are zero.
+/// `rows` as a group of type `B`: surplus rows are dropped, missing ones are zero.
 #[inline(always)]
 pub fn resized<A: Vect, B: Vect>(rows: A) -> B {
     let mut out = B::zero();
@@ -169,19 +169,20 @@ pub fn resized<A: Vect, B: Vect>(rows: A) -> B {
     out
 }
 
-/// Whether `T` is a vector in the tangent plane ([`Dim::Slide`] in space), and not rows of a frame.
+/// Whether `T` is a vector in the tangent plane ([`Dim::Slide`] in 3D) and not rows of a frame.
 #[inline(always)]
 pub(crate) fn is_vector<D: Dim, T: Vect>() -> bool {
     D::Slide::LEN != D::Tangent::LEN && T::LEN == D::Slide::LEN
 }
 
-/// Tangential rows in a frame of what a law holds as `T`: how many.
+/// Number of tangential rows, in a frame, of a law whose tangential part is a `T`.
 #[inline(always)]
 pub(crate) fn tangential_rows<D: Dim, T: Vect>() -> usize {
     if is_vector::<D, T>() { D::Tangent::LEN } else { T::LEN }
 }
 
-/// These rows, of what a law holds: the rows themselves, a vector in the tangent plane, or nothing.
+/// The tangential part `t` of a law as rows of the frame; `t` is such rows, a vector in the tangent
+/// plane, or nothing.
 #[inline(always)]
 pub(crate) fn in_frame<D: Dim, T: Vect>(frame: &D::Frame, t: T) -> D::Tangent {
     if is_vector::<D, T>() { D::split(frame, resized(t)).1 } else { resized(t) }
@@ -193,24 +194,24 @@ pub(crate) fn of_frame<D: Dim, T: Vect>(frame: &D::Frame, rows: D::Tangent) -> T
     if is_vector::<D, T>() { resized(D::compose(frame, 0.0, rows)) } else { resized(rows) }
 }
 
-/// 1 − cos φ for s = sin φ, with all digits where φ is small.
+/// 1 − cos φ for s = sin φ, accurate for small φ.
 fn versine(s: f64) -> f64 {
     let square = s * s;
     square / (1.0 + (1.0 - square).max(0.0).sqrt())
 }
 
-/// The axes of a contact that its rows need: the whole frame; in space the normal alone where
-/// nothing rubs, or where friction is a vector.
+/// The axes that the rows of a contact need: the whole frame, or in 3D the normal alone if there is
+/// no friction or if friction is a vector.
 pub trait Axes<D: Dim>: Copy + Debug + PartialEq + Send + Sync + 'static {
-    /// Those of a frame.
+    /// The axes of this type from a frame.
     fn of(frame: D::Frame) -> Self;
     /// The normal.
     fn normal(&self) -> D::Vector;
-    /// The frame, if they are one.
+    /// The frame; `None` if the normal alone is stored.
     fn frame(&self) -> Option<&D::Frame>;
 }
 
-/// A dimension of space, as the contact problem sees it.
+/// A dimension of space: the types and maps that depend on it.
 pub trait Dim: Copy + Debug + Default + Send + Sync + 'static {
     /// Number of space dimensions.
     const N: usize;
@@ -222,20 +223,20 @@ pub trait Dim: Copy + Debug + Default + Send + Sync + 'static {
     type Tangent: Vect;
     /// Moment rows of a bond.
     type Moment: Moments;
-    /// What the tangential rows of a dry contact are held as: in the plane the row of its frame, in
-    /// space a vector in the tangent plane, which needs no tangents.
+    /// Tangential part of a dry contact: in 2D the row of its frame, in 3D a vector in the tangent
+    /// plane, which needs no tangents.
     type Slide: Vect;
     /// Orthonormal frame (n, t…) of a contact.
     type Frame: Axes<Self>;
-    /// The tangents of a frame as numbers, where the normal does not give them: none in the plane.
+    /// The tangents of a frame as numbers; none in 2D, where the normal determines them.
     type Tangents: Vect;
     /// Orientation of a body: an angle (rad) in 2D, a unit quaternion w, x, y, z in 3D.
     type Orientation: Vect;
 
-    /// The frame of a unit normal.
+    /// A frame with this unit normal.
     fn frame(normal: Self::Vector) -> Self::Frame;
-    /// The frame of a unit normal that turned least from `old`; it keeps tangential reactions
-    /// meaningful between steps.
+    /// The frame with this unit normal that turned least from the tangents `old`, so that
+    /// tangential reactions keep their meaning from step to step.
     fn transported(old: &Self::Tangents, normal: Self::Vector) -> Self::Frame;
     /// The normal of a frame.
     #[inline(always)]
@@ -244,7 +245,7 @@ pub trait Dim: Copy + Debug + Default + Send + Sync + 'static {
     }
     /// First tangent of a frame.
     fn tangent(frame: &Self::Frame) -> Self::Vector;
-    /// What a frame has beside its normal.
+    /// The tangents of a frame.
     fn tangents(frame: &Self::Frame) -> Self::Tangents;
     /// The frame of this normal and these tangents.
     fn with_tangents(normal: Self::Vector, tangents: &Self::Tangents) -> Self::Frame;
@@ -262,8 +263,8 @@ pub trait Dim: Copy + Debug + Default + Send + Sync + 'static {
     fn moment_rows(frame: &Self::Frame, spin: Self::Spin) -> Self::Moment {
         resized(Self::spin_rows(frame, spin))
     }
-    /// The torque that does the work of tangential and moment rows; for the latter the transpose of
-    /// [`Dim::moment_rows`].
+    /// The torque that does the work of tangential and moment rows: the transposes of
+    /// [`Dim::spin_rows`] and [`Dim::moment_rows`].
     #[inline(always)]
     fn torque_of_rows(frame: &Self::Frame, tangential: Self::Tangent, moment: Self::Moment) -> Self::Spin {
         Self::spin_rows_transposed(frame, tangential + resized(moment))
@@ -273,14 +274,14 @@ pub trait Dim: Copy + Debug + Default + Send + Sync + 'static {
     fn about_axes(frame: &Self::Frame, torque: Self::Spin) -> Self::Moment;
     /// The torque x × f of a force with lever x.
     fn torque(lever: Self::Vector, force: Self::Vector) -> Self::Spin;
-    /// The velocity ω × x of a point at x of a body that turns.
+    /// The velocity ω × x of the point x of a rotating body.
     fn velocity(spin: Self::Spin, place: Self::Vector) -> Self::Vector;
-    /// The orientation of a body that has not turned.
+    /// The orientation of a body before any rotation.
     fn unturned() -> Self::Orientation;
     /// The orientation after turning by the rotation vector `turn` (rad).
     fn turned(orientation: Self::Orientation, turn: Self::Spin) -> Self::Orientation;
-    /// (R − 1) x: what a rotation changes of a vector, for the rotation about `sine` by the angle
-    /// whose sine is its norm, at most a quarter of a turn.
+    /// (R − 1) x, the change of a vector by a rotation R about `sine`; the norm of `sine` is the
+    /// sine of the angle, which is at most a quarter of a turn.
     fn swing(vector: Self::Vector, sine: Self::Spin) -> Self::Vector;
     /// Area (2D) or volume (3D) of a disk or sphere, m² or m³.
     fn volume(radius: f64) -> f64;
@@ -288,21 +289,21 @@ pub trait Dim: Copy + Debug + Default + Send + Sync + 'static {
     const INERTIA_FACTOR: f64;
 }
 
-/// The plane: disks, one spin.
+/// 2D: disks with one spin component.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct D2;
 
-/// Space: spheres, three spins, and bonds of so many moment rows.
+/// 3D: spheres with three spin components, and bonds with `MOMENTS` moment rows.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Space<const MOMENTS: usize>;
 
-/// Space with bonds that bend and are free to spin about their normal.
+/// 3D with bonds that resist bending but not twist about their normal.
 pub type D3 = Space<2>;
 
-/// Space with bonds that resist twist, too.
+/// 3D with bonds that resist bending and twist.
 pub type D3Twist = Space<3>;
 
-/// Frame of a contact in space: n = t₁ × t₂.
+/// Frame of a contact in 3D: n = t₁ × t₂.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frame3 {
     n: SVector<f64, 3>,

@@ -4,10 +4,9 @@
 //! The model is that of M. Guessasma and J. Fortin, *Modélisation d'un milieu discret cohésif par
 //! l'approche dynamique des contacts*, Giens 2011 (hal-00592916): rigid disks and spheres,
 //! Signorini–Coulomb contact written as de Saxcé's bipotential, bonds that carry tension, shear and
-//! a rolling moment and break for good.
+//! a rolling moment and do not re-form once broken.
 //!
-//! SI units throughout. Reactions are impulses (N s) inside a step, forces (N) in everything that
-//! is reported.
+//! SI units throughout. Reactions are impulses (N s) inside a step, forces (N) in every output.
 //!
 //! A disk falls on a floor and stays there:
 //!
@@ -29,9 +28,9 @@
 //! # Ok::<(), StepError>(())
 //! ```
 //!
-//! [`world::World::step`] is the place to read on: a step from top to bottom. `examples/` has a
-//! falling disk whose energy is followed, a bond that is pulled apart, a contact law and a solver
-//! of one's own.
+//! Read on at [`world::World::step`]: the time step, from top to bottom. `examples/` has a falling
+//! disk with its energy over time, a bond pulled until it breaks, a user-defined contact law and a
+//! user-defined solver.
 #![forbid(unsafe_code)]
 
 pub mod body;
@@ -45,7 +44,7 @@ pub mod saved;
 pub mod solver;
 pub mod world;
 
-/// What a program that steps a world needs.
+/// The types needed to build a world and to step it.
 pub mod prelude {
     pub use crate::body::{Drive, Grain, Grains, Load, Schedule, Shape, Wall};
     pub use crate::bond::{Bond, BondStatus, Bonds, Rupture, Stiffness};

@@ -1,7 +1,7 @@
-//! A state as plain numbers: what a run needs to go on as if it had never stopped, to the bit.
+//! A saved state as plain numbers, from which a run continues bit for bit.
 //!
-//! Whatever saves its state writes its numbers one after the other, and reads them back in the same
-//! order. Integers and reals are kept apart, each as it is: nothing is rounded.
+//! Each type writes the numbers of its state in a fixed order and reads them back in the same
+//! order. Integers and reals are stored separately, without rounding.
 
 use crate::dim::Vect;
 use thiserror::Error;
@@ -11,11 +11,11 @@ use thiserror::Error;
 pub struct Saved {
     /// Reals, in the order in which they were written.
     pub reals: Vec<f64>,
-    /// Counts, indices and codes, likewise.
+    /// Counts, indices and codes, in the order in which they were written.
     pub counts: Vec<u64>,
 }
 
-/// Numbers that do not fit what reads them.
+/// A saved state whose numbers do not match what the reader expects.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 #[error("the saved state has another form: it belongs to another scene, or to another version of the program")]
 pub struct Mismatch;
@@ -41,12 +41,12 @@ impl Saved {
         self.reals.extend_from_slice(v.as_slice());
     }
 
-    /// Writes vectors whose number is known to the reader.
+    /// Writes vectors but not their number, which the reader must know.
     pub fn vectors<V: Vect>(&mut self, list: &[V]) {
         list.iter().for_each(|v| self.vector(v));
     }
 
-    /// Reads the numbers from the first on.
+    /// A reader at the first number.
     pub fn read(&self) -> Reader<'_> {
         Reader::new(&self.reals, &self.counts)
     }
@@ -60,7 +60,7 @@ pub struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// Reads what was saved as these reals and counts.
+    /// A reader of these saved reals and counts.
     pub fn new(reals: &'a [f64], counts: &'a [u64]) -> Self {
         Self { reals, counts }
     }
@@ -68,7 +68,7 @@ impl<'a> Reader<'a> {
     /// The next real.
     ///
     /// # Errors
-    /// [`Mismatch`] at the end, as for all that reads.
+    /// [`Mismatch`] if no real is left.
     pub fn real(&mut self) -> Result<f64, Mismatch> {
         Ok(self.reals(1)?[0])
     }
@@ -93,10 +93,10 @@ impl<'a> Reader<'a> {
         usize::try_from(first).map_err(|_| Mismatch)
     }
 
-    /// The next count, of things of which each takes at least one number.
+    /// The next count, as the number of items that take at least one saved number each.
     ///
     /// # Errors
-    /// [`Mismatch`] where so many are not left: memory is asked for in such numbers.
+    /// [`Mismatch`] if fewer numbers than that are left: a corrupt count must not allocate memory.
     pub fn number_of(&mut self) -> Result<usize, Mismatch> {
         let n = self.count()?;
         if n <= self.reals.len() + self.counts.len() { Ok(n) } else { Err(Mismatch) }
@@ -131,10 +131,10 @@ impl<'a> Reader<'a> {
         Ok(if V::LEN == 0 { vec![V::zero(); n] } else { all.chunks_exact(V::LEN).map(V::from_slice).collect() })
     }
 
-    /// That nothing is left.
+    /// Checks that all numbers have been read.
     ///
     /// # Errors
-    /// [`Mismatch`] if something is.
+    /// [`Mismatch`] if numbers are left.
     pub fn end(&self) -> Result<(), Mismatch> {
         if self.reals.is_empty() && self.counts.is_empty() { Ok(()) } else { Err(Mismatch) }
     }

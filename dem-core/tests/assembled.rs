@@ -1,4 +1,4 @@
-//! The problem with its matrix is the matrix-free problem.
+//! The assembled problem, with its matrix, is the matrix-free problem.
 
 mod common;
 
@@ -24,8 +24,8 @@ fn difference(a: &[f64], b: &[f64]) -> f64 {
     largest(&a.iter().zip(b).map(|(a, b)| a - b).collect::<Vec<_>>())
 }
 
-/// What the relative velocities of all contacts are, read from the nodes: rows n, t and m in the
-/// whole frame of each, and what its law adds to the normal velocity.
+/// Compares the relative velocities of all contacts with those from the nodes: rows n, t and m in
+/// the whole frame of each contact, with the bias of its law.
 struct Velocities<'a> {
     assembled: &'a [f64],
     size: usize,
@@ -55,7 +55,7 @@ impl<D: Dim> Visitor<D> for Velocities<'_> {
         let found = &self.assembled[self.contact * self.size..][..self.size];
         let off = difference(found, &expected);
         assert!(off <= 1e-12 * self.scale, "contact {}: {found:?} against {expected:?}", self.contact);
-        // what sweeps see of it, in space a vector
+        // the tangential part as sweeps see it: in 3D a vector
         assert!((seen.n + c.law.bias() - rows.n).abs() <= 1e-12 * self.scale);
         if L::T::LEN > 0 {
             assert!((seen.t.norm() - rows.t.norm()).abs() <= 1e-12 * self.scale);
@@ -79,7 +79,7 @@ fn same<D: Dim>(mut problem: ContactProblem<D>) {
         problem.visit(&mut seen);
         assert_eq!(seen.contact, assembled.len());
         let (a, b) = (residual(&problem), assembled.residual());
-        // the definition, and the matrix: the wall is driven along its normal, so that its blocks
+        // by definition and by the matrix: the wall is driven along its normal, so that its blocks
         // are exact
         let defined = seen.map.sqrt() / seen.reaction.sqrt().max(problem.applied);
         assert!(a > 0.0 && (a - defined).abs() <= 1e-12 * a + 1e-15, "{a:e} and {defined:e}");
@@ -122,12 +122,12 @@ fn newton_finds_the_same_velocities() {
         newton_is_newton(pressed::<D2>(0, 5, mu, flow).contact_problem(), 1e-10);
         newton_is_newton(pressed::<D3>(0, 3, mu, flow).contact_problem(), 1e-10);
     }
-    // where twist holds the grains, too, the rest of a residual of 1e-10 is more velocity
+    // with twist rows a residual of 1e-10 leaves larger velocities
     let mut twisting = pressed::<D3Twist>(0, 3, 0.0, Some(BondFlow::Associated));
     newton_is_newton(twisting.contact_problem(), 1e-11);
 }
 
-/// On the matrix and on the bodies, from zero to the stiff limit.
+/// Newton on the matrix and on the bodies, from a cold start to the stiff limit.
 fn newton_is_newton<D: Dim>(mut problem: ContactProblem<D>, tolerance: f64) {
     let settings = common::newton(tolerance, tolerance, 1e-6);
     let mut assembled = Assembled::of(&problem);

@@ -1,4 +1,4 @@
-//! What is said of problems that were not solved, against closed forms.
+//! Verdicts on problems that were not solved, against closed forms.
 
 mod common;
 
@@ -20,7 +20,7 @@ const R: f64 = 0.01;
 const SPEED: f64 = 0.1;
 const STEP: f64 = 1e-3;
 
-/// The first axes of a vector, the others zero.
+/// A vector with these first components, the others zero.
 fn at<D: Dim>(x: &[f64]) -> D::Vector {
     let mut v = D::Vector::zero();
     x.iter().enumerate().for_each(|(k, x)| v[k] = *x);
@@ -35,7 +35,7 @@ fn plane<D: Dim>(normal: &[f64], position: &[f64]) -> Wall<D> {
     Wall::fixed(Shape::Plane { normal: at::<D>(normal) }, at::<D>(position), 0.3)
 }
 
-/// The same, made to move with this direction at [`SPEED`].
+/// The same wall, driven in this direction at [`SPEED`].
 fn driven<D: Dim>(normal: &[f64], position: &[f64], direction: &[f64]) -> Wall<D> {
     let drive = Drive::Velocity { direction: at::<D>(direction), speed: Arc::new(|_| SPEED) };
     Wall { drive, ..plane(normal, position) }
@@ -46,14 +46,14 @@ fn row<D: Dim>(count: usize) -> Vec<Grain<D>> {
     (0..count).map(|k| grain::<D>(&[&[R * (2 * k + 1) as f64][..], &vec![0.0; D::N - 1]].concat(), R)).collect()
 }
 
-/// A row of grains between a wall and another that comes nearer.
+/// A row of grains between a fixed wall and an approaching one.
 fn squeezed<D: Dim>(count: usize) -> World<D> {
     let press = driven(&[-1.0], &[2.0 * R * count as f64], &[-1.0]);
     world(row(count), vec![plane(&[1.0], &[]), press], set())
 }
 
-/// The verdict on the first step. With the matrix alone a solution may not be guaranteed, for what
-/// bodies do by themselves is not known.
+/// The verdict on the first step. From the matrix alone the verdict may be weaker, undecided
+/// instead of guaranteed, because the matrix does not contain the motion of the bodies.
 fn of<D: Dim>(w: &mut World<D>) -> Verdict<usize> {
     let problem = w.contact_problem();
     let found = verdict(&problem);
@@ -87,10 +87,10 @@ fn a_grain_between_walls_that_close_has_no_solution() {
     case::<D3>();
 }
 
-/// The wall that comes nearer has a gap to the grain, a part of its way in the step; the rest of
-/// the way has no room, and one of the two contacts closes by half of it or more. The reactions
-/// only balance each other: the power that they leave is that of the rest, which is what they act
-/// against, and not that of the whole way.
+/// The approaching wall has a gap to the grain, a part of its displacement in the step. The rest of
+/// the displacement has no room: one of the two contacts closes by half of the rest or more. The
+/// reactions only balance each other, so the power that they leave is that of the rest, against
+/// which they act, not that of the whole displacement.
 #[test]
 fn walls_jam_a_grain_by_the_way_beyond_its_gap() {
     fn case<D: Dim>() {
@@ -135,7 +135,7 @@ fn a_bonded_row_between_walls_that_close_has_no_solution() {
     }
 }
 
-/// A rigid bond and an elastic one in a row: the elastic one gives way.
+/// A rigid bond and an elastic one in a row: the elastic one deforms.
 #[test]
 fn an_elastic_bond_gives_way() {
     fn case<D: Dim>(known: &Verdict<usize>) {
@@ -148,7 +148,7 @@ fn an_elastic_bond_gives_way() {
             twist: 1e6 * a * a / 16.0,
         });
         assert_eq!(verdict(&w.contact_problem()), *known);
-        // with the matrix the compliance is one with the masses
+        // the matrix adds the compliance to the inverse masses
         assert!(!matches!(verdict_of_assembled(&Assembled::of(&w.contact_problem())), Verdict::NoSolution(_)));
         w.step().expect("a solution");
     }
@@ -156,7 +156,7 @@ fn an_elastic_bond_gives_way() {
     case::<D3>(&Verdict::Undecided);
 }
 
-/// However heavy a wall is that a force drives, it gives way.
+/// A force-driven wall gives way, however heavy it is.
 #[test]
 fn a_heavy_wall_gives_way() {
     for mass in [1.0, 1e3, 1e6, 1e9] {
@@ -168,10 +168,10 @@ fn a_heavy_wall_gives_way() {
     }
 }
 
-/// A wedge of half-angle α with tan α < μ, one plate of which slides along itself towards the edge:
-/// impulses that hold the grain there at the limit of friction balance and resist that motion, so a
-/// solution is not guaranteed. Without a load there is one, no reactions at all. Under a load none
-/// is found.
+/// A wedge of half-angle α with tan α < μ, one plate of which slides along itself towards the edge.
+/// Impulses that hold the grain there at the friction limit balance each other and resist the
+/// motion, so a solution is not guaranteed. Without a load zero reactions are a solution; under a
+/// load no solution is found.
 #[test]
 fn a_plate_that_slides_along_itself_is_undecided() {
     let (s, c) = 0.1f64.sin_cos();
@@ -187,9 +187,8 @@ fn a_plate_that_slides_along_itself_is_undecided() {
     }
 }
 
-/// The plates of that wedge close on the grain. It can only move outwards and friction, which is
-/// then inwards, exceeds what pushes it out where μ > tan α. Where the friction is less, the grain
-/// is pushed out.
+/// The plates of that wedge close on the grain, which can only move outwards. For μ > tan α the
+/// friction, which acts inwards, exceeds the outward push. For smaller μ the grain is pushed out.
 #[test]
 fn a_pip_between_closing_plates_is_undecided() {
     for (angle, found) in [(0.1f64, Verdict::Undecided), (0.6, Verdict::Guaranteed)] {
@@ -225,7 +224,8 @@ fn a_solution_is_guaranteed_where_nothing_is_made_to_close() {
     assert_eq!(of(&mut still), Verdict::Undecided);
 }
 
-/// A solver that stops too early fails, and the verdict is that it is the solver.
+/// A solver that stops too early fails, and the verdict attributes the failure to the solver: a
+/// solution is guaranteed.
 #[test]
 fn a_failure_of_the_solver_is_said_to_be_one() {
     let mut set = set::<D2>();
@@ -237,8 +237,8 @@ fn a_failure_of_the_solver_is_said_to_be_one() {
     assert_eq!(fails(&mut w), Verdict::Guaranteed);
 }
 
-/// Small random problems of low rank: what is solved is never called infeasible, and each verdict
-/// occurs.
+/// Small random problems of low rank: no solved problem gets the verdict of no solution, and each
+/// verdict occurs.
 #[test]
 fn no_verdict_contradicts_a_solution() {
     let mut rng = Pcg64::seed_from_u64(5);

@@ -1,4 +1,4 @@
-//! Scenes with a known answer, in 2D and where it is the same law in 3D.
+//! Scenes with a closed-form solution, in 2D, and in 3D where the same law applies.
 
 mod common;
 
@@ -67,7 +67,7 @@ fn pairs_and_walls_have_their_own_restitution() {
         set.restitution = Some(Restitution { grain_grain: 0.2, grain_wall: 0.7, threshold_speed: 0.0 });
         let mut start = above::<D>(0.0105);
         start.velocity[D::N - 1] = -1.0;
-        // another one falls onto one that is fixed, far from the first
+        // a second grain falls onto a fixed one, far from the first
         let (mut held, mut falling) = (above::<D>(0.2), above::<D>(0.2305));
         (held.position[0], falling.position[0]) = (1.0, 1.0);
         held.fixed = true;
@@ -133,11 +133,11 @@ fn a_wall_has_the_speed_of_the_end_of_the_step() {
     case::<D3>();
 }
 
-/// What a grain does that is set sliding over a rough floor.
+/// The motion of a grain that starts sliding on a rough floor.
 struct Slide {
-    /// Way of its centre until it rolls (m).
+    /// Displacement of its centre until it rolls (m).
     travelled: f64,
-    /// Way that its contact point slips until then (m).
+    /// Slip of its contact point until then (m).
     slid: f64,
     /// Its speed as it rolls (m/s).
     rolling: f64,
@@ -172,8 +172,8 @@ fn slide<D: Dim>(v: f64, mu: f64) -> Slide {
 #[test]
 fn a_free_grain_slides_and_then_rolls() {
     let (v, mu) = (0.3, 0.25);
-    // the contact point slows down by μ g (1 + m R²/I), the centre by μ g: until v/(3 μ g) in 2D
-    // and v/(3.5 μ g) in 3D
+    // the contact point decelerates by μ g (1 + m R²/I), the centre by μ g; slip ends at v/(3 μ g)
+    // in 2D and at v/(3.5 μ g) in 3D
     let unit = v * v / (mu * G);
     for (found, way, slip, speed) in [
         (slide::<D2>(v, mu), 5.0 / 18.0, 1.0 / 6.0, 2.0 / 3.0),
@@ -183,7 +183,7 @@ fn a_free_grain_slides_and_then_rolls() {
         assert!((travelled / (way * unit) - 1.0).abs() < 2e-3, "{travelled}");
         assert!((slid / (slip * unit) - 1.0).abs() < 2e-3, "{slid}");
         assert!((rolling - speed * v).abs() < 1e-9 * v);
-        // friction takes μ m g for each metre of slip, to the half step in which it stops
+        // friction dissipates μ m g per metre of slip, up to the half step in which slip stops
         assert!((friction / (mu * slid) - 1.0).abs() < 1e-3 && impact.abs() < 1e-12 * friction, "{friction} {impact}");
     }
 }
@@ -269,8 +269,8 @@ fn a_bond_breaks_in_tension_at_r_coh() {
 
 #[test]
 fn a_bond_breaks_in_shear_at_mu_times_the_shifted_normal_reaction() {
-    // the shear force at the free disk's centre is balanced by a torque at the contact: no moment
-    // in the bond
+    // a torque balances the moment of the shear force at the free disk's centre: no moment in the
+    // bond
     let (b, _) = breaking(bonded_pair(10.0, [-200.0, 1000.0], -1.0), 2000).expect("it breaks");
     assert_eq!(b.mode, BondStatus::Shear);
     assert!((b.reaction.t[0].abs() / (0.3 * (b.reaction.n + 10.0)) - 1.0).abs() < 1e-6);

@@ -36,7 +36,8 @@ fn blocks(stages: Stages) -> World<D3> {
     world
 }
 
-/// With ε x₀ z₀ in the gap long steps went on for up to 300 factorisations, to load errors of 1e-4.
+/// With ε x₀ z₀ in the complementarity gap, long steps took up to 300 factorisations and left load
+/// errors of 1e-4.
 #[test]
 fn fragments_that_slide_fast_take_few_factorisations() {
     for (stages, most_in_all) in [(Stages::All, 5_000), (Stages::Interior, 3_500)] {

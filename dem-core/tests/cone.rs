@@ -1,5 +1,5 @@
 //! The cone and the laws on it, at random points: projection by its defining inequalities, local
-//! solves by the law they solve.
+//! solves by their law.
 
 use dem_core::contact::{Arms, Block, BondFlow, Bonded, Cone, Coulomb, Law, Local, LocalSolve, Weights};
 use dem_core::dim::{Moments, V0, Vect};
@@ -62,8 +62,8 @@ proptest! {
     #[test]
     fn projection_without_bending(k in cone(), x in local(vect::<2>(), Just(V0::zeros()))) { is_projection(k, x) }
 
-    /// Rounding leaves a point of the edge, where one group of rows is at its limit, on either side
-    /// of it: it stays where it is.
+    /// Round-off puts a point of the edge, where one group of rows is at its limit, on either side
+    /// of the cone: its projection is the point itself.
     #[test]
     fn a_point_on_the_edge_of_the_cone_is_its_own_projection(
         k in cone(), n in 0.1..1.0f64, share in 0.0..0.9f64, angle in 0.0..TAU, group in 0..3usize,
@@ -88,8 +88,8 @@ proptest! {
         prop_assert!(r.dot(&u).abs() <= 1e-11);
     }
 
-    /// The exact local solve of a dry contact satisfies the bipotential's fixed point, and its
-    /// steps lead there.
+    /// The exact local solve of a dry contact satisfies the bipotential's fixed point, and
+    /// predictor–corrector steps converge to it.
     #[test]
     fn dry_local_solves_agree(
         mu in 0.0..2.0f64, n in 0.3..3.0f64, t in 0.3..3.0f64,

@@ -1,4 +1,4 @@
-//! Momentum and energy: what must be kept, and what must never grow.
+//! Momentum is conserved, and energy never grows without work.
 
 mod common;
 
@@ -45,18 +45,18 @@ fn cloud<D: Dim>(seed: u64, friction: f64, restitution: f64) -> World<D> {
 fn keeps_momentum<D: Dim>(bonded: bool) {
     let mut w = cloud::<D>(3, 0.4, 0.0);
     if bonded {
-        // momentum is kept by every sweep: the tolerance has no part in it
+        // every sweep conserves momentum, whatever the tolerance
         w.set_solver(solver(1e-5));
         w.form_bonds(0.3, |_| 50.0, 0.3);
         assert!(w.bonds.len() > 5);
     }
     let start = w.momentum();
-    // scales: the momentum that is exchanged, not its vanishing sum
+    // the scale is the exchanged momentum, not its vanishing sum
     let exchanged: f64 = w.grains.mass.iter().zip(&w.grains.velocity).map(|(m, v)| m * v.norm()).sum();
     run(&mut w, 150);
     let end = w.momentum();
     assert!((end.linear - start.linear).norm() <= 1e-13 * exchanged);
-    // positions at mid-step carry the moments: the exchange is exact there, up to the drift of half
+    // moments refer to positions at mid-step: the exchange is exact there, up to the drift of half
     // a step
     assert!(
         (end.angular - start.angular).norm() <= 1e-12 * exchanged * 0.1,
@@ -84,7 +84,7 @@ fn never_gains<D: Dim>(friction: f64, restitution: f64) {
             assert!(w.ledger.kinetic <= last + 1e-9 * start, "seed {seed}: {last} grew to {}", w.ledger.kinetic);
             last = w.ledger.kinetic;
         }
-        // something happened, and the books close
+        // energy was lost, and the balance closes
         assert!(last < 0.999 * start || restitution == 1.0);
         assert!(w.ledger.remainder.abs() <= 1e-12 * start);
     }
@@ -114,7 +114,7 @@ fn the_ledger_closes_under_gravity_loads_and_drives() {
     let mut lid = common::force_driven::<D2>([0.0, -1.0].into(), [0.0, 0.16].into(), 3.0, 40.0);
     lid.velocity = [0.0, -0.1].into();
     let mut w = world(grains.collect(), vec![floor(0.2), lid], set);
-    // a wall that comes in from the left at a prescribed speed
+    // a wall that moves in from the left at a prescribed speed
     let mut pusher = dem_core::body::Wall::fixed(
         dem_core::body::Shape::Plane { normal: [1.0, 0.0].into() },
         [-0.012, 0.0].into(),
@@ -146,8 +146,9 @@ fn losses_are_booked_where_they_belong() {
         [w.ledger.impact, w.ledger.friction].map(|energy| energy / (0.5 * w.grains.mass[0]))
     }
     for e in [0.0, 0.5] {
-        // a blow of 2 m/s straight on loses (1 − e²) 4 m²/s²; friction slows the slip of 1 m/s by μ
-        // times its impulse, for which a disk is a third of its mass, a sphere two sevenths
+        // a normal impact at 2 m/s loses (1 − e²) 4 m²/s²; friction reduces the slip of 1 m/s by μ
+        // times the normal impulse over the effective mass, a third of the mass for a disk, two
+        // sevenths for a sphere
         let (straight, mu) = (4.0 * (1.0 - e * e), 0.05);
         let impulse = mu * 2.0 * (1.0 + e);
         for (smooth, rough, mass) in

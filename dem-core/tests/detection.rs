@@ -1,5 +1,5 @@
-//! The list of candidates while bodies move: it holds every pair within reach, and is kept while
-//! nothing has gone too far.
+//! The list of candidates while bodies move: it holds every pair within reach, and is kept until a
+//! body has used up its skin.
 
 mod common;
 
@@ -25,7 +25,7 @@ fn scene<D: Dim>(rng: &mut Pcg64, count: usize) -> (Grains<D>, Vec<Wall<D>>) {
     (grains, vec![common::floor(0.1), Wall::fixed(ring, centre, 0.1)])
 }
 
-/// Every pair whose gap is at most the sum of the reaches, looked at one by one.
+/// Every pair whose gap is at most the sum of the reaches, by brute force.
 fn near<D: Dim>(
     grains: &Grains<D>,
     x: &[D::Vector],
@@ -49,7 +49,7 @@ fn near<D: Dim>(
     pairs
 }
 
-/// Moves bodies at random, fast ones and slow ones, and how often the list was made anew.
+/// Moves bodies at random and checks the list; returns how often it was rebuilt.
 fn holds_what_is_near<D: Dim>(seed: u64) -> usize {
     let mut rng = Pcg64::seed_from_u64(seed);
     let (grains, walls) = scene::<D>(&mut rng, 80);
@@ -67,7 +67,7 @@ fn holds_what_is_near<D: Dim>(seed: u64) -> usize {
         for pair in near(&grains, &x, &walls, &at, &reach) {
             assert!(candidates.pairs.binary_search(&pair).is_ok(), "{pair:?} is missing");
         }
-        // nothing that is farther than the skins allow, made anew or moved since
+        // no pair beyond the skins and the motion since the list was built
         let skins: Vec<f64> = vec![0.025 + 0.02; bodies];
         let far = near(&grains, &x, &walls, &at, &skins);
         assert!(candidates.pairs.iter().all(|pair| far.binary_search(pair).is_ok()));
@@ -90,8 +90,8 @@ fn candidates_hold_every_pair_within_reach_while_bodies_move() {
 
 #[test]
 fn the_list_is_kept_until_a_body_has_used_up_its_skin() {
-    // two grains, the gap 0.1: a list made with 0.01 of reach and 0.02 to spare lacks the pair, one
-    // made with 1 to spare has it
+    // two grains with a gap of 0.1: a list with a reach of 0.01 and a spare of 0.02 lacks the pair,
+    // one with a spare of 1 has it
     let grains: Grains<D2> = [grain(&[0.0, 0.0], 0.1), grain(&[0.3, 0.0], 0.1)].into_iter().collect();
     let mut candidates = Candidates::<D2>::default();
     let mut pairs = |moved: f64, reach: f64, spare: f64| {
@@ -107,7 +107,7 @@ fn the_list_is_kept_until_a_body_has_used_up_its_skin() {
     assert_eq!(pairs(0.5, 0.01, 0.02), 1);
     assert_eq!(pairs(-1.5, 0.01, 0.02), 0);
     assert_eq!(pairs(-1.5201, 0.01, 2.0), 1);
-    // another number of bodies is another list
+    // another number of bodies requires a new list
     candidates.cover(&grains, &grains.position, &[common::floor(0.0)], &[[0.0, -0.09].into()], |_| 0.01, |_| 0.02);
     assert_eq!(candidates.pairs, [[0, 2], [1, 2]]);
 }

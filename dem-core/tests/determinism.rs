@@ -34,7 +34,7 @@ fn pile<D: Dim>() -> World<D> {
     w
 }
 
-/// The motion after some steps, made by so many threads.
+/// The motion after some steps on this number of threads.
 fn bits<D: Dim>(threads: usize, build: fn() -> World<D>, steps: usize) -> Vec<u64> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     pool.install(|| {
@@ -73,7 +73,7 @@ fn blocks_swept_at_once_give_the_same_bits() {
     }
 }
 
-/// Elastic bonds have one answer: blocks find the one that Newton finds.
+/// Elastic bonds have a unique solution: sweeps in blocks converge to that of Newton.
 #[test]
 fn blocks_swept_at_once_solve_the_problem() {
     let settled = |solver: SolverSettings| {

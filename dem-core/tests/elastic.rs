@@ -1,5 +1,5 @@
-//! Elastic bonds: waves, moduli, energy, stability, rupture, and that every solver finds their one
-//! answer.
+//! Elastic bonds: waves, moduli, energy, stability, rupture, and the same unique solution with
+//! every solver.
 
 mod common;
 
@@ -21,16 +21,16 @@ const R: f64 = 0.01;
 const A: f64 = 2.0 * R;
 /// Normal stiffness (N/m).
 const K: f64 = 1e6;
-/// Strength (N) beyond all forces of these tests; not by far, for it is a shift of reactions and
-/// takes digits from them.
+/// Strength (N) above all forces of these tests. It is not much larger: as a shift of the reactions
+/// it costs them digits.
 const UNBREAKABLE: f64 = 1e3;
 
 fn newton(tolerance: f64, load_tolerance: f64) -> SolverSettings {
     SolverSettings::Staged(common::newton(tolerance, 100.0 * tolerance, load_tolerance))
 }
 
-/// Springs with the tangential stiffness over the normal one, that bend as a bar as wide as long
-/// does.
+/// Springs with this ratio of tangential to normal stiffness; they bend like a bar as wide as it is
+/// long.
 fn springs(normal: f64, ratio: f64) -> impl Fn(f64) -> Stiffness {
     move |a| Stiffness {
         normal,
@@ -40,14 +40,13 @@ fn springs(normal: f64, ratio: f64) -> impl Fn(f64) -> Stiffness {
     }
 }
 
-/// The angular frequency that steps of length h show of a vibration ω: a step turns it by atan(ωh)
-/// and not ωh.
+/// The angular frequency observed with steps of length h for a vibration ω: the phase advances by
+/// atan(ωh) a step instead of ωh.
 fn seen(omega: f64, h: f64) -> f64 {
     (omega * h).atan() / h
 }
 
-/// Angular frequency (1/s) of what `amplitude` reads off a world that vibrates: from the zeros of
-/// its first periods.
+/// Angular frequency (1/s) of the `amplitude` of a vibrating world, from its first zeros.
 fn frequency<D: Dim>(w: &mut World<D>, amplitude: impl Fn(&World<D>) -> f64) -> f64 {
     let mut zeros = Vec::new();
     let mut last = amplitude(w);
@@ -86,13 +85,13 @@ fn a_chain_vibrates_as_a_chain_of_springs() {
     assert!((found / q / speed - 1.0).abs() < 0.01, "{} m/s against {speed}", found / q);
 }
 
-/// A strip of an infinite hexagonal lattice, cut so that nothing of a longitudinal standing wave of
-/// half a length `cells` A along its rows is lost, at rest.
+/// A strip of an infinite hexagonal lattice at rest, cut so that it carries a longitudinal standing
+/// wave of half a length `cells` A along its rows as the lattice does.
 ///
-/// Above and below it ends in a mirror: half a row (half of its mass, half of the stiffness along
-/// it), which slides on a wall without friction, onto which a load holds it, and does not turn. At
-/// both ends the wave is odd: rows have a fixed grain there, or the mirror image of their last
-/// grain, which moves against it: twice the stiffness to a fixed grain.
+/// The upper and the lower edge are mirrors: half a row (half of its mass, half of the stiffness
+/// along it) that does not turn and slides without friction on a wall, against which a load presses
+/// it. At both ends the wave is odd: a row ends in a fixed grain, or in a mirror image that moves
+/// opposite to its last grain; a fixed grain with twice the stiffness replaces the image.
 fn wave_strip(cells: usize, ratio: f64) -> World<D2> {
     let rows = 5;
     let (length, pitch) = (A * cells as f64, 0.75f64.sqrt() * A);
@@ -172,7 +171,7 @@ fn a_wave_in_the_hexagonal_lattice_has_the_lattice_s_speed() {
     }
 }
 
-/// Step until nothing moves: the implicit step takes the motion out, the more the longer it is.
+/// Step until nothing moves: the implicit step damps the motion, the more the longer it is.
 fn settle<D: Dim>(w: &mut World<D>) {
     for _ in 0..60 {
         w.step().unwrap();
@@ -191,8 +190,8 @@ fn the_hexagonal_lattice_has_its_moduli() {
         let young = 2.0 * 3f64.sqrt() * K * (1.0 + ratio) / (3.0 + ratio);
         let poisson = (1.0 - ratio) / (3.0 + ratio);
         let strain = [stress / young, -poisson * stress / young];
-        // the forces of the strained lattice on a grain from its six neighbours; those on the cut
-        // ends are the load
+        // the forces of the strained lattice on a grain from its six neighbours; the forces of
+        // missing neighbours are the load
         let neighbours = [(1.0, 0.0), (0.5, h32), (-0.5, h32), (-1.0, 0.0), (-0.5, -h32), (0.5, -h32)];
         let mut lattice = Vec::new();
         for row in 0..rows {
@@ -217,7 +216,7 @@ fn the_hexagonal_lattice_has_its_moduli() {
                     torque += R * (nx * f[1] - ny * f[0]);
                 }
             }
-            // no stress across the rows, or the moduli above are wrong
+            // no stress across the rows, as the moduli above assume
             assert!(force[1].abs() < 1e-9 * stress * A, "{force:?}");
             loads.push(Load { grain: k, force: force.into(), torque: [torque].into(), factor: Arc::new(|_| 1.0) });
         }
@@ -237,7 +236,8 @@ fn the_hexagonal_lattice_has_its_moduli() {
 
 #[test]
 fn a_cantilever_bends_by_its_springs() {
-    // bond j, d_j from the force at the last grain, yields by F/k_t and turns by F d_j / k_m
+    // bond j, at a distance d_j from the force at the last grain, shears by F/k_t and bends by F
+    // d_j / k_m
     let count = 12;
     let mut grains: Vec<_> = (0..=count).map(|k| grain::<D2>(&[A * k as f64, 0.0], R)).collect();
     grains[0].fixed = true;
@@ -266,7 +266,7 @@ fn a_row_twists_by_its_springs() {
     let torque = 1e-5;
     let (force, torques) = ([0.0; 3].into(), [torque, 0.0, 0.0].into());
     let load = Load { grain: count, force, torque: torques, factor: Arc::new(|_| 1.0) };
-    // long beside the slowest period, 8 ms
+    // long compared with the slowest period, 8 ms
     let mut set = settings(0.1);
     set.solver = newton(1e-12, 1e-12);
     let mut w = World::new(grains, vec![], vec![load], set);
@@ -336,9 +336,9 @@ fn the_books_balance_through_breaks() {
     }
 }
 
-/// Kinetic and elastic energy never grow without forces, but for what bonds that turn are given
-/// back, and what is lost is the damping ½ Σ m |Δv|² + ½ Σ k (h u⁺)² + Σ r b of each step, b the
-/// rate by which turning lengthened the bond before.
+/// Without forces, kinetic and elastic energy never grow, except by the length correction of
+/// turning bonds. The loss of a step is the damping ½ Σ m |Δv|² + ½ Σ k (h u⁺)² + Σ r b, with the
+/// rate b of hidden lengthening before the step.
 fn never_grows<D: Dim>(periods: f64) {
     let mut rng = Pcg64::seed_from_u64(5);
     let side: usize = if D::N == 2 { 5 } else { 3 };
@@ -355,11 +355,11 @@ fn never_grows<D: Dim>(periods: f64) {
     let omega = (K / grains[0].mass).sqrt();
     let h = periods * 2.0 * PI / omega;
     let mut set = settings(h);
-    // at rest bonds that turned keep forces that balance each other: the load error is relative to
-    // what still moves
+    // at rest, bonds that turned keep self-balanced forces, while the load error is relative to the
+    // remaining motion
     set.solver = newton(1e-10, 1e-6);
     let mut w = world(grains, vec![], set);
-    // by a thousandth of the radius in a step, or in a period
+    // a thousandth of the radius in a step, or in a period
     let slow = 1e-3 * R * omega.min(1.0 / h);
     w.grains.velocity.iter_mut().for_each(|v| *v = *v * slow);
     w.grains.spin.iter_mut().for_each(|s| *s = *s * slow);
@@ -389,19 +389,18 @@ fn never_grows<D: Dim>(periods: f64) {
             let change = old.map_or(t.reaction, |old| t.reaction - old);
             let parts = change.n.powi(2) / k.normal + change.t.dot(&change.t) / k.tangential;
             lost += 0.5 * (parts + change.m.dot(&change.m) / k.rolling);
-            // from the mid-step before, had it been as long, to this one
+            // from the previous mid-step, of a step of the same length, to this one
             let [i, j] = bond.pair.map(|k| k as usize);
             let way = (before[i] - before[j]) * h;
             let now = places[i] - places[j] + way * 0.5;
             let length = (now - way).norm();
             let along = way.dot(&(now - way)) / length;
-            // ℓ' − ℓ − d_n with all its digits
+            // ℓ' − ℓ − d_n without cancellation
             exchanged += (t.reaction.n * way.norm()).abs();
             lost += t.reaction.n * (way.dot(&way) - along * along) / (now.norm() + length + along);
         }
         let damping = w.ledger.damping - damped;
-        // the laws hold as well as the solver's tolerance says, 1e-10 of what the reactions have
-        // exchanged
+        // the laws are satisfied to the solver's tolerance, 1e-10 of the exchanged work
         let allowed = 1e-12 * first + 1e-10 * exchanged;
         assert!((damping - lost).abs() <= allowed, "{damping:e} against {lost:e} of {first:e}");
     }
@@ -416,15 +415,15 @@ fn energy_never_grows_however_long_the_step() {
     }
 }
 
-/// A pair, loaded slowly up to a share of what its bond bears and let rest there; whether and how
-/// it broke, with the energy set free over ½ f²/k.
+/// Loads a pair slowly up to a share of the limit of its bond and holds the load; returns the
+/// failure mode, if the bond broke, with the released energy over ½ f²/k.
 fn loaded(share: f64, force: [f64; 2], torque: f64) -> Option<(BondStatus, f64)> {
     let (k, coh) = (1e12, 10.0);
     let steps = 400;
     let mut w = bonded_pair(coh, force, torque);
     w.settings.step = 1e-5;
     let end = 1e-5 * steps as f64;
-    // rises and comes to rest smoothly: nothing shoots beyond
+    // a smooth rise, without overshoot
     w.loads[0].factor = Arc::new(move |t| {
         let s = (t / end).min(1.0);
         share * s * s * (3.0 - 2.0 * s)
@@ -449,7 +448,7 @@ fn loaded(share: f64, force: [f64; 2], torque: f64) -> Option<(BondStatus, f64)>
 #[test]
 fn a_bond_breaks_at_its_threshold_and_sets_its_energy_free() {
     let (mu, coh, a) = (0.3, 10.0, 2e-3);
-    // tension; shear whose moment at the contact a torque takes away, under pressure; a moment
+    // tension; shear under pressure, with a torque that cancels its moment at the contact; a moment
     // under pressure
     let shear = mu * coh / (1.0 - 0.2 * mu);
     let moment = mu * a * (coh + 5.0);
@@ -545,8 +544,8 @@ fn the_answer_does_not_depend_on_the_start() {
     start_does_not_matter::<D3Twist>(3);
 }
 
-/// A hexagonal block whose first column is held and whose last is pulled across: many reactions
-/// balance that.
+/// A hexagonal block whose first column is fixed and whose last column is pulled obliquely: many
+/// reactions balance the load.
 fn held_block() -> World<D2> {
     let (mut grains, mut loads) = (Vec::new(), Vec::new());
     for row in 0..6 {
@@ -583,7 +582,7 @@ fn stiff_bonds_tend_to_the_stiff_limit() {
         .collect();
     for pair in distances.windows(2) {
         let fall = pair[0] / pair[1];
-        // a tenth each, until the rounding of the rigid solve is reached
+        // a tenth for each decade, down to the round-off of the rigid solve
         assert!(pair[1] < 1e-9 || (pair[0] > 0.1 && fall > 1.5) || (9.0..11.0).contains(&fall), "{distances:?}");
     }
     assert!(distances[6] < 1e-6, "{distances:?}");

@@ -1,9 +1,9 @@
-//! One short run, held to the bit: what changes it changes all results, and belongs into the list
-//! of changes.
+//! One short run, compared to the bit. A change that alters it alters all results and belongs in
+//! the list of changes.
 //!
-//! Its bits hold for x86_64 Linux: Gauss–Seidel in 2D uses what IEEE 754 fixes, sums, products,
-//! quotients and roots, in an order that the scene fixes. Where a change is meant, the test prints
-//! the new value for [`GOLDEN`].
+//! Its bits are those of x86_64 Linux: Gauss–Seidel in 2D uses operations defined by IEEE 754
+//! (sums, products, quotients and roots) in an order fixed by the scene. For an intended change,
+//! the test prints the new value for [`GOLDEN`].
 
 mod common;
 
@@ -17,7 +17,7 @@ use std::sync::Arc;
 /// Hash of the state after the last step of [`compressed`].
 const GOLDEN: u64 = 0xcaba_68e2_c338_63ab;
 
-/// FNV-1a over the bytes of numbers, from the lowest of each.
+/// FNV-1a over the bytes of the numbers, lowest byte first.
 struct Hash(u64);
 
 impl Hash {

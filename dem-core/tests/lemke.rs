@@ -1,6 +1,6 @@
 //! Small problems in 2D against Lemke's method: there the cones are polyhedral, and Coulomb's
 //! problem is a linear complementarity problem w = M z + b ≥ 0 ⊥ z ≥ 0, which pivoting solves to
-//! rounding or leaves on a ray.
+//! round-off, or ends on a ray.
 //!
 //! Source: Cottle, Pang & Stone, *The linear complementarity problem*, 1992, section 4.4 with the
 //! lexicographic ratio test of section 4.9; friction as in Stewart & Trinkle, Int. J. Numer.
@@ -20,7 +20,7 @@ const ROWS: usize = 3;
 const TOLERANCE: f64 = 1e-10;
 /// Problems of each kind.
 const SEEDS: u64 = 70;
-/// Difference of two ratios, over them, that is rounding, and the least pivot.
+/// Relative difference of two ratios that counts as round-off, and the smallest pivot.
 const TIE: f64 = 1e-10;
 const PIVOT: f64 = 1e-9;
 
@@ -57,9 +57,9 @@ fn lemke(m: &DMatrix<f64>, b: &DVector<f64>) -> Option<DVector<f64>> {
         if leaving == artificial {
             return Some(solution(&table, &basis));
         }
-        // the complement of what has left enters
+        // the complement of the variable that left enters
         entering = if leaving > n { leaving - n } else { leaving + n };
-        // the least ratio, by the columns of b and of w one after the other
+        // the least ratio, in lexicographic order of the columns of b and of w
         let before = |i: usize, j: usize| {
             let ratio = |k: usize, column: usize| table[(k, column)] / table[(k, entering)];
             let differ =
@@ -112,8 +112,8 @@ fn referee(problem: &Assembled) -> Option<Vec<f64>> {
     Some((edges * z).as_slice().to_vec())
 }
 
-/// By how much reactions violate the laws as they are written, over the largest of the reactions
-/// and the free velocities: masses are one.
+/// The violation of the laws, evaluated as they are written, over the largest of the reactions and
+/// the free velocities; masses are one.
 fn violation(problem: &Assembled) -> f64 {
     let (parts, u) = (problem.parts(), problem.velocities());
     let size = largest(problem.r.iter().chain(&parts.q).copied());
@@ -130,9 +130,8 @@ fn violation(problem: &Assembled) -> f64 {
     most / size
 }
 
-/// Disks of mass and inertia one that touch each other and the ground at random angles: bonds in a
-/// `share` of the contacts. Bodies that approach by a bias that no motion gives may have no
-/// solution.
+/// Disks of mass and inertia one that touch each other and the ground at random angles; a `share`
+/// of the contacts are bonds. With a bias that no motion satisfies there may be no solution.
 fn random(seed: u64, friction: f64, share: f64, bias: f64) -> Assembled {
     let mut rng = Pcg64::seed_from_u64(seed);
     let contacts = rng.random_range(2..=12);
@@ -172,9 +171,9 @@ fn random(seed: u64, friction: f64, share: f64, bias: f64) -> Assembled {
     Assembled::new(Parts { rows, matrix, q, mu, nu, xi, associated, shift, applied: 0.0 }).unwrap()
 }
 
-/// How many of Lemke's solutions were compared, where velocities differ, and of these where W is
-/// regular; how many the solver missed; how many that Lemke's method leaves on a ray it solved and
-/// refused.
+/// Numbers of problems: those compared with Lemke's solution; among them those with other
+/// velocities, and of these the ones with a regular W; those that the solver missed; those that end
+/// on a ray in Lemke's method and that the solver solved or refused.
 #[derive(Debug, Default, PartialEq)]
 struct Count {
     compared: usize,
@@ -185,7 +184,7 @@ struct Count {
     ray_refused: usize,
 }
 
-/// Whether no reactions balance each other: W has no kernel over the rows that the contacts have.
+/// Whether W has no kernel over the rows that the contacts have: no reactions balance each other.
 fn is_regular(problem: &Assembled) -> bool {
     let parts = problem.parts();
     let rows: Vec<usize> = (0..problem.r.len()).filter(|k| k % ROWS < 2 || parts.associated[k / ROWS]).collect();
@@ -228,7 +227,7 @@ fn compare(friction: f64, share: f64, bias: f64) -> Count {
     count
 }
 
-/// Velocities are unique where all flows are associated or nothing rubs.
+/// Velocities are unique if all flows are associated or there is no friction.
 #[test]
 fn velocities_of_convex_problems_are_lemkes() {
     for (friction, share) in [(0.0, 0.0), (1.5, 1.0)] {
@@ -237,9 +236,9 @@ fn velocities_of_convex_problems_are_lemkes() {
     }
 }
 
-/// Of Coulomb's problems those whose W is regular have velocities that do not depend on the method.
-/// Where reactions can balance each other, a fifth of the dry problems has several solutions: both
-/// methods then leave residuals of rounding, at velocities that differ. One dry problem of eight
+/// For Coulomb friction with a regular W the velocities do not depend on the method. Where
+/// reactions can balance each other, a fifth of the dry problems have several solutions: both
+/// methods then reach residuals of round-off, with different velocities. One dry problem of eight
 /// contacts is solved to 1e-8 only.
 #[test]
 fn coulomb_problems_are_solved_where_lemke_solves_them() {
@@ -254,9 +253,9 @@ fn coulomb_problems_are_solved_where_lemke_solves_them() {
     }
 }
 
-/// With biases that no motion of the bodies gives, Lemke's method ends on a ray in up to half of
-/// the problems: for convex ones that is a proof that there is no solution. The solver refuses all
-/// of these: reactions grow, the residual falls, and velocities stay wrong by a hundredth or more.
+/// With biases that no motion satisfies, Lemke's method ends on a ray in up to half of the
+/// problems; for convex problems this proves that no solution exists. The solver refuses all of
+/// them: reactions grow, the residual falls, and the velocity error stays at a hundredth or more.
 #[test]
 fn what_lemke_leaves_on_a_ray_is_refused() {
     for (friction, share) in [(0.0, 0.0), (1.5, 1.0), (0.3, 0.5), (1.5, 0.0), (1.5, 0.5)] {

@@ -1,6 +1,6 @@
 //! The maps H and Hᵀ between the nodes and the contacts, for grains whose radii differ by a factor
-//! of two and walls of every drive: each is the transpose of the other, rigid motion is seen by no
-//! contact, and local blocks are what unit impulses do.
+//! of two and walls of every drive: each is the transpose of the other, rigid motion has no
+//! relative velocity at any contact, and local blocks are the effect of unit impulses.
 
 mod common;
 
@@ -25,9 +25,10 @@ fn unit<V: Vect>(rng: &mut Pcg64) -> V {
     v * (1.0 / v.norm())
 }
 
-/// A walk of grains, each of which touches the one before and may overlap others. Every third pair
-/// that touches is bonded rigidly, every third by a spring. One grain is fixed, a floor too; a lid
-/// is driven by a force aslant to its normal, a side without friction moves at a given speed.
+/// A random walk of grains, each of which touches the one before and may overlap others. Every
+/// third pair that touches is bonded rigidly, every third by a spring. One grain and the floor are
+/// fixed; a lid is driven by a force oblique to its normal; a side wall without friction moves at a
+/// given speed.
 fn crowd<D: Dim>(seed: u64, friction: f64) -> ContactProblem<D> {
     let mut rng = Pcg64::seed_from_u64(seed);
     let mut grains = vec![grain::<D>(&vec![0.0; D::N], 0.01)];
@@ -130,7 +131,7 @@ impl Check {
         assert!(u.dot(&u).sqrt() <= 1e-13, "{u:?}");
     }
 
-    /// The entries of the local block, with axes that form a frame.
+    /// The entries of the local block, for a link with a whole frame.
     fn block<D: Dim>(nodes: &Nodes<D>, link: &Link<D>, arms: Arms) {
         let w = responses(nodes, link, arms);
         let wall = (link.nodes[1] as usize).checked_sub(nodes.grains).map(|wall| nodes.drives[wall]);
@@ -154,7 +155,7 @@ impl Check {
         let w = w.view((0, 0), (size, size)).into_owned();
         let (off, scale) = (&expected - &w, w.amax());
         if driven.is_some() {
-            // an estimate from above
+            // an upper bound
             let least = SymmetricEigen::new(off).eigenvalues.min();
             assert!(least >= -1e-12 * scale, "{expected} against {w}");
         } else {

@@ -1,4 +1,4 @@
-//! What is measured on a world, against closed forms: stress, strain, volume.
+//! The measures of a world against closed forms: stress, strain, volume.
 
 mod common;
 
@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 const G: f64 = 9.81;
 
-/// The tensor Σ ℓ ⊗ f of the contacts (N m) where the stress times the volume should be that.
+/// Compares the stress times the volume with the tensor Σ ℓ ⊗ f of the contacts (N m).
 fn assert_stress<D: Dim>(w: &World<D>, expected: impl Fn(usize, usize) -> f64, tolerance: f64) {
     let stress = w.stress();
     assert_eq!(stress.len(), D::N * D::N);
@@ -24,7 +24,8 @@ fn assert_stress<D: Dim>(w: &World<D>, expected: impl Fn(usize, usize) -> f64, t
     }
 }
 
-/// A grain that slides over a floor: the branch stands on the floor, the force leans back.
+/// A grain that slides over a floor: the branch is normal to the floor, the force is inclined
+/// against the motion.
 fn sliding<D: Dim>() {
     let (r, mu) = (0.01, 0.25);
     let mut place = vec![0.0; D::N];
@@ -40,8 +41,7 @@ fn sliding<D: Dim>() {
     assert!((w.reference_volume() / volume - 1.0).abs() < 1e-14);
     let weight = w.grains.mass[0] * G;
     let (last, force) = (D::N - 1, [-mu * weight, weight]);
-    // ℓ = R e_last, f = −μ m g e_0 + m g e_last: the row is that of the branch, the column that of
-    // the force
+    // ℓ = R e_last, f = −μ m g e_0 + m g e_last: the branch gives the row, the force the column
     let expected = |row: usize, col: usize| match (row == last, col) {
         (true, 0) => r * force[0],
         (true, col) if col == last => r * force[1],
@@ -119,8 +119,8 @@ fn strained<D: Dim>() {
     }
 }
 
-/// The mean displacement is taken off before the fit: a way of 2³⁰ m, which is exact here, would
-/// leave the rounding of the places as a strain of some 1e-6.
+/// The fit subtracts the mean displacement first: otherwise a displacement of 2³⁰ m, which is exact
+/// here, would turn the round-off of the positions into a strain of some 1e-6.
 #[test]
 fn a_sample_that_is_carried_far_is_not_strained() {
     let grains = (0..7u8).map(|k| grain::<D2>(&[0.25 * f64::from(k % 3), 0.25 * f64::from(k / 3)], 0.125)).collect();
@@ -133,8 +133,8 @@ fn a_sample_that_is_carried_far_is_not_strained() {
 fn the_strain_is_the_gradient_of_the_displacements() {
     strained::<D2>();
     strained::<D3>();
-    // grains in a row span one direction only, and so they do where every other is off by a
-    // ten-millionth of a radius
+    // grains in a row span one direction only, even if every other grain is off by a ten-millionth
+    // of a radius
     let of_row = |off: f64| {
         let place = |k: u8| [0.02 * f64::from(k), off * f64::from(k % 2)];
         let mut w = world((0..4).map(|k| grain::<D2>(&place(k), 0.01)).collect(), Vec::new(), settings(1e-3));
@@ -200,15 +200,15 @@ fn the_force_of_a_wall_of_prescribed_velocity_is_a_load() {
     let wall = Wall { drive, ..Wall::fixed(Shape::Plane { normal: direction }, [0.0, 0.0].into(), 0.0) };
     let mut w = world(vec![grain::<D2>(&[r, 0.0], r)], vec![wall], settings(h));
     let report = w.step().expect("a step");
-    // it pushes one grain, and all of its force accelerates that
+    // it pushes one grain, and all of its force accelerates the grain
     assert!((w.grains.velocity[0][0] - speed).abs() < 1e-9 * speed, "{}", w.grains.velocity[0][0]);
     assert!((report.false_acceleration - 1.0).abs() < 1e-9, "{}", report.false_acceleration);
     // once it moves with the wall there is neither load nor acceleration
     assert_eq!(w.step().expect("a step").false_acceleration, 0.0);
 }
 
-/// On a floor: a grain at rest, one that slides, a bonded pair at rest, and two at rest beside each
-/// other with a small gap.
+/// On a floor: a grain at rest, a sliding grain, a bonded pair at rest, and two grains at rest with
+/// a small gap between them.
 #[test]
 fn contacts_are_counted_by_what_they_did() {
     let r = 0.01;

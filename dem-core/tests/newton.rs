@@ -33,7 +33,7 @@ fn weight_at_the_bottom_of_a_column_of_500() {
         assert_eq!(report.status, SolveStatus::Converged);
         assert!((-w.walls[0].reaction[1] / weight - 1.0).abs() < 1e-6, "{}", -w.walls[0].reaction[1] / weight - 1.0);
     }
-    // the state of the step before shows the active set
+    // the previous step provides the active set
     assert!(w.step().unwrap().work.newton <= 10);
 }
 
@@ -44,11 +44,11 @@ fn dry_disks(centres: impl Iterator<Item = [f64; 2]>, walls: Vec<Wall<D2>>) -> W
     world(centres.map(|x| grain::<D2>(&x, 0.01)).collect(), walls, set)
 }
 
-/// The problem as Newton solves it from no reactions at all, to a residual of 1e-10 and a load
-/// error of 1e-9, in at most thirty iterations.
+/// The problem solved by Newton from a cold start, to a residual of 1e-10 and a load error of 1e-9,
+/// in at most thirty iterations.
 fn solved_cold<D: Dim>(world: &mut World<D>) -> ContactProblem<D> {
     let mut problem = world.contact_problem();
-    // sweeps that are accepted would end far from the answer
+    // accepted sweeps would end far from the solution
     let settings = SolverSettings::Staged(common::newton(1e-10, 1e-3, 1e-9));
     let report = settings.build::<D>().solve(&mut problem);
     assert_eq!(report.status, SolveStatus::Converged, "{report:?}");
@@ -65,7 +65,7 @@ fn a_column_of_2000_from_no_reactions() {
     assert!((on_the_floor / weight - 1.0).abs() <= 1e-6, "{:e}", on_the_floor / weight - 1.0);
 }
 
-/// Disks along the line of thrust of their weight: each contact bears the same horizontal force,
+/// Disks along the line of thrust of their weight: each contact carries the same horizontal force,
 /// and no friction.
 #[test]
 fn an_arch_from_no_reactions() {
@@ -94,8 +94,8 @@ fn an_arch_from_no_reactions() {
     }
 }
 
-/// A dry hexagonal block in a box, under a lid. What each contact bears is not unique, what the
-/// floor bears is.
+/// A dry hexagonal block in a box, under a lid. The contact forces are not unique, but the force on
+/// the floor is.
 #[test]
 fn a_pressed_hexagonal_block_from_no_reactions() {
     let (rows, columns, r) = (40, 40, 0.01);
@@ -111,7 +111,7 @@ fn a_pressed_hexagonal_block_from_no_reactions() {
         dry_disks((0..rows * columns).map(centre), vec![floor(0.2), side(1.0, 0.0), side(-1.0, width), lid]);
     let problem = solved_cold(&mut world);
     let fastest = problem.nodes.all.iter().map(|n| n.velocity.norm()).fold(0.0, f64::max);
-    // the lid would else fall by this
+    // the velocity of the lid without the sample
     let free = 1e-3 * (5e3 / 100.0 + 9.81);
     assert!(fastest <= 1e-9 * free, "{:e}", fastest / free);
 }
@@ -171,7 +171,7 @@ fn velocities_agree_with_gauss_seidel() {
     }
 }
 
-/// A beam of bonded disks that a wall hits: a plastic zone that no guess of the active set finds.
+/// A beam of bonded disks hit by a wall: no warm start finds the active set of its plastic zone.
 #[test]
 fn a_struck_beam_is_solved_from_no_guess() {
     let (rows, columns, d) = (6, 60, 4e-3);
@@ -194,20 +194,20 @@ fn a_struck_beam_is_solved_from_no_guess() {
     w.form_bonds(1e-6, |_| 100.0, 0.3);
     let problem = w.contact_problem();
     let found = solved(&problem, newton(1e-9, Start::StiffLimit));
-    // slack limits are no test: many bonds are at theirs
+    // the test needs active limits: many bonds are at their limit
     let limit = found.bonded.iter().filter(|c| failure(&c.r, c.law.shift(), c.law.cone()).is_some()).count();
     assert!(4 * limit > found.bonded.len(), "{limit} of {}", found.bonded.len());
-    // Gauss–Seidel does not come to that in a million sweeps; what both stop on tells
+    // Gauss–Seidel does not reach this in a million sweeps; the residual, on which both stop, is
+    // compared
     assert!(residual(&found) <= 1e-9);
 }
 
 #[test]
 fn gauss_seidel_approaches_newton_in_3d() {
-    // a million sweeps come to 1e-7 here: what can be seen is that they head for the same
-    // velocities
+    // a million sweeps reach 1e-7 here: the test is that they approach the same velocities
     let problem = pressed::<D3>(0, true).contact_problem();
-    // the last path leaves a load error of 3e-8 or 4e-6, as it is rounded: nothing beside the
-    // thousandth that is asked for
+    // the last path leaves a load error of 3e-8 or 4e-6, depending on round-off: small beside the
+    // thousandth required below
     let found = solved(&problem, SolverSettings::Staged(common::newton(1e-10, 1e-10, 1e-5)));
     let [coarse, fine] = [1e-5, 1e-7].map(|tolerance| apart(&problem, &found, tolerance));
     assert!(fine <= 0.1 * coarse && fine <= 1e-3, "{coarse:e}, then {fine:e}");
@@ -222,13 +222,13 @@ fn dry_and_bonded_problems_reach_the_residual() {
     }
 }
 
-/// A hexagonal block between two plates: hyperstatic, so that reactions are many and velocities are
-/// one.
+/// A hexagonal block between two plates: hyperstatic, so that reactions are not unique but
+/// velocities are.
 fn block() -> World<D2> {
     pressed_block(|_| 50.0)
 }
 
-/// The same under a force (N) that follows the time (s).
+/// The same under a force (N) that is a function of time (s).
 fn pressed_block(force: impl Fn(f64) -> f64 + Send + Sync + 'static) -> World<D2> {
     let r = 2e-3;
     let mut disks = Vec::new();
@@ -265,9 +265,10 @@ fn the_stiff_limit_does_not_depend_on_the_start() {
     };
     let size = first.bonded.iter().map(|c| c.r.dot(&c.r)).sum::<f64>().sqrt();
     assert!(distance(&first, &other) <= 1e-6 * size, "{:e}", distance(&first, &other) / size);
-    // a start from other reactions keeps what of them does no work
+    // a start from other reactions keeps their self-balanced part, which does no work
     assert!(distance(&first, &kept) > 1e-2 * size);
-    // of all reactions that balance the load the stiff limit has the least complementary energy
+    // among all reactions that balance the load, those of the stiff limit have the least
+    // complementary energy
     let energy = |p: &ContactProblem<D2>| {
         p.bonded.iter().map(|c| c.r.n * c.r.n + c.r.t[0] * c.r.t[0] + 12.0 * c.r.m[0] * c.r.m[0]).sum::<f64>()
     };
@@ -286,9 +287,9 @@ fn a_rigid_block_does_not_move_before_it_breaks() {
     assert!(strain.iter().all(|e| e.abs() <= 1e-9), "{strain:?}");
 }
 
-/// Carries a sample on for `most` steps, or until a bond breaks, beside one whose solver is a new
-/// one in every step, and so has nothing to predict from: the reactions and what breaks are the
-/// same. The share of the steps that were predicted, and whether a bond broke.
+/// Steps a sample `most` times, or until a bond breaks, beside one whose solver is new in every
+/// step and cannot extrapolate: the reactions and the ruptures are the same. Returns the share of
+/// extrapolated steps, and whether a bond broke.
 fn predicted(most: u64, mut w: World<D2>, mut solved: World<D2>) -> (f64, bool) {
     w.set_solver(newton(1e-8, Start::StiffLimit));
     let mut predicted = 0;
@@ -319,7 +320,7 @@ fn predicted(most: u64, mut w: World<D2>, mut solved: World<D2>) -> (f64, bool) 
 
 #[test]
 fn steps_that_are_predicted_are_those_that_a_solve_finds() {
-    // a kink of the load, and then on until it breaks
+    // a kink in the load, which then grows until rupture
     let force = |t: f64| if t < 0.02 { 5e3 * t } else { 100.0 + 2e4 * (t - 0.02) };
     let (share, broke) = predicted(2_000, pressed_block(force), pressed_block(force));
     assert!(share > 0.5 && broke, "{share}");
@@ -327,7 +328,8 @@ fn steps_that_are_predicted_are_those_that_a_solve_finds() {
 
 #[test]
 fn contacts_that_stick_or_close_unseen_are_not_predicted() {
-    // one load stays while another grows: what slips under the first sticks under the second
+    // one load is constant while another grows: contacts that slip under the first stick under the
+    // second
     let turned = || {
         let mut w = pressed_block(|_| 500.0);
         let top = w.grains.position.iter().map(|x| x[1]).fold(0.0, f64::max);
@@ -340,8 +342,8 @@ fn contacts_that_stick_or_close_unseen_are_not_predicted() {
     assert!(share > 0.5 && !broke, "{share}");
 }
 
-/// The forces (N) between a floor and five bonded disks in a row on it, and those in the step after
-/// the row was tilted, so that each disk lies `tilt` (–) of a radius higher than the one before.
+/// The forces (N) between a floor and a row of five bonded disks on it, before and after the row is
+/// tilted: each disk then lies `tilt` (–) radii higher than the one before.
 fn forces_of_a_tilted_row(tilt: f64) -> [Vec<f64>; 2] {
     let mut set = settings(1e-5);
     set.gravity = down::<D2>(9.81);
@@ -362,7 +364,8 @@ fn forces_of_a_tilted_row(tilt: f64) -> [Vec<f64>; 2] {
 
 #[test]
 fn a_contact_that_pushed_keeps_its_force_until_it_is_open() {
-    // the errors of many solves: ten times what counts as no gap where nothing pushed before
+    // like the errors of many solves: ten times the gap that counts as none without a previous
+    // reaction
     let [before, after] = forces_of_a_tilted_row(1e-8);
     assert!(before.len() == 5 && before.iter().all(|f| *f > 0.0), "{before:?}");
     let close = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-6 * b;

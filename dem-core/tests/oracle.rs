@@ -1,7 +1,7 @@
 //! The convex problems against an interior-point method: without friction, or with associated bonds
 //! only.
 //!
-//! minimise ½ r̂·W r̂ + q·r̂ over the cones; K = { ‖t‖ ≤ μ n, ‖m‖ ≤ ν n, |τ| ≤ ξ n } is
+//! minimise ½ r̂·W r̂ + q·r̂ over the cones; K = { ‖t‖ ≤ μ n, ‖m‖ ≤ ν n, |τ| ≤ ξ n } consists of
 //! second-order cones on the same n.
 
 mod common;
@@ -30,7 +30,7 @@ fn root(problem: &Assembled) -> DMatrix<f64> {
     DMatrix::from_fn(n, kept.len(), |row, k| eigenvectors[(row, kept[k])] * eigenvalues[kept[k]].sqrt())
 }
 
-/// Reactions by Clarabel, with y = Lᵀ r̂ as more unknowns: minimise ½ y·y + q·r̂.
+/// Reactions by Clarabel, with y = Lᵀ r̂ as additional unknowns: minimise ½ y·y + q·r̂.
 fn interior_point(problem: &Assembled) -> Vec<f64> {
     let parts = problem.parts();
     let (rows, size, n) = (parts.rows, parts.rows.count(), problem.r.len());
@@ -121,7 +121,7 @@ fn associated_bonds_agree() {
         let distance = apart(pressed::<D3>(seed, 3, 0.0, flow).contact_problem(), newton());
         assert!(distance <= 1e-7, "3D, seed {seed}: {distance:e}");
     }
-    // problems with bonds at the limit of twist that the oracle solves, too
+    // seeds of problems with bonds at the twist limit that the oracle also solves
     for seed in [0, 3, 5, 6, 7] {
         let problem = pressed::<D3Twist>(seed, 3, 0.0, flow).contact_problem();
         let distance = apart(problem, newton());

@@ -1,5 +1,5 @@
-//! The residual against its definition, at a pair of grains: what it is relative to, and below
-//! which rounding it is zero.
+//! The residual of a pair of grains against its definition: its scale, and the round-off below
+//! which it is zero.
 
 mod common;
 
@@ -33,8 +33,8 @@ fn pair<D: Dim>(speeds: [f64; 2], spins: [f64; 2]) -> ContactProblem<D> {
 }
 
 fn definition<D: Dim>() {
-    // the first moves along the normal, away from the second, at 0.1 m/s: the map is γ u_n,
-    // whatever is applied
+    // the first grain moves along the normal, away from the second, at 0.1 m/s: the map is γ u_n,
+    // whatever the applied load
     let mut problem = pair::<D>([-0.1, 0.0], [0.0; 2]);
     let gamma = problem.dry[0].law.gamma();
     for (applied, scale) in [(0.0, PUSH), (0.5 * PUSH, PUSH), (7.0 * PUSH, 7.0 * PUSH)] {
@@ -48,16 +48,16 @@ fn definition<D: Dim>() {
     assert!((found / expected - 1.0).abs() < 1e-9, "{found:e} against {expected:e}");
 }
 
-/// A map of half of what counts as rounding is none, one of twice as much is one.
+/// A map of half the round-off threshold counts as zero, a map of twice the threshold does not.
 fn rounding<D: Dim>() {
     const ROUNDING: f64 = 64.0 * f64::EPSILON;
     let gamma = pair::<D>([0.0; 2], [0.0; 2]).dry[0].law.gamma();
     for (share, counts) in [(0.5, false), (2.0, true)] {
-        // both at 3 m/s but for a small difference: √2 × 3 m/s is what the map is rounded against
+        // both at 3 m/s but for a small difference: the round-off scale of the map is √2 × 3 m/s
         let part = share * ROUNDING * 2f64.sqrt() * 3.0;
         let found = residual(&pair::<D>([3.0 - part, 3.0], [0.0; 2]));
         assert_eq!(found > 0.0, counts, "{share}: {found:e}");
-        // spins that roll on each other but for a small slip: √2 × 0.01 × 900 m/s
+        // rolling on each other but for a small slip: the scale is √2 × 0.01 × 900 m/s
         let part = share * ROUNDING * 2f64.sqrt() * 9.0 / (1.0 + MU * MU).sqrt();
         let found = residual(&pair::<D>([0.0; 2], [900.0, -300.0 + part / 0.03]));
         assert_eq!(found > 0.0, counts, "{share}: {found:e}");
@@ -73,8 +73,8 @@ fn the_residual_is_the_natural_map_over_the_larger_of_reactions_and_load() {
     definition::<D3>();
 }
 
-/// Beyond some ten thousand contacts sums are made in parts. Of so many equal contacts the residual
-/// is that of one.
+/// Beyond some ten thousand contacts sums are made in parts. The residual of many equal contacts is
+/// that of one.
 #[test]
 fn a_sum_in_parts_is_that_of_its_contacts() {
     let one = pair::<D2>([-0.1, 0.0], [20.0, 10.0]);
@@ -82,7 +82,7 @@ fn a_sum_in_parts_is_that_of_its_contacts() {
     many.dry = vec![one.dry[0]; 100_000];
     let (expected, found) = (residual(&one), residual(&many));
     assert!((found / expected - 1.0).abs() < 1e-12, "{found:e} against {expected:e}");
-    // rounding is relative to the velocities of all contacts
+    // round-off is relative to the velocities of all contacts
     let part = 32.0 * f64::EPSILON * 2f64.sqrt() * 3.0;
     let one = pair::<D2>([3.0 - part, 3.0], [0.0; 2]);
     let mut many = one.clone();
@@ -96,10 +96,10 @@ fn a_map_that_is_rounding_is_none() {
     rounding::<D3>();
 }
 
-/// The pair is bonded by a spring of compliance C and parts. After a step, which began without a
-/// force, the bond carries R and u = −C R. In the next, reactions ρ R make the velocities −C R + w
-/// ρ R, w = 1/m_i + 1/m_j; the law of the spring asks that u + C (ρ R − R) is zero. Without
-/// reactions that is −2 C R: the error is |ρ (1 + w/C) / 2 − 1|.
+/// The grains of a pair bonded by a spring of compliance C separate. After a step without an
+/// initial force the bond carries R, and u = −C R. In the next step, reactions ρ R make the
+/// velocity −C R + w ρ R, with w = 1/m_i + 1/m_j; the law of the spring is u + C (ρ R − R) = 0.
+/// Without reactions its left side is −2 C R, so the error is |ρ (1 + w/C) / 2 − 1|.
 fn sprung<D: Dim>() {
     let (h, ratio) = (1e-3, 3.0);
     let mut second = vec![0.0; D::N];
@@ -149,12 +149,12 @@ fn assembled(w: f64, r: f64, push: f64, shift: f64, applied: f64) -> Assembled {
 
 #[test]
 fn with_its_matrix_the_residual_is_the_same_measure() {
-    // reactions count without their shift
+    // reactions enter without their shift
     for (shift, applied, scale) in [(0.0, 0.0, 30.0), (12.0, 0.0, 18.0), (12.0, 70.0, 70.0)] {
         let (found, expected) = (assembled(0.1, 30.0, 0.2, shift, applied).residual(), 0.2 / 0.1 / scale);
         assert!((found / expected - 1.0).abs() < 1e-12, "{found:e} against {expected:e}");
     }
-    // rounded against q and W r, which are opposite: √2 w r
+    // the round-off scale is that of q and W r, which are opposite: √2 w r
     for (w, r) in [(0.1, 30.0), (7.0, 0.3)] {
         for (share, counts) in [(0.8, false), (1.25, true)] {
             let push = share * 64.0 * f64::EPSILON * 2f64.sqrt() * w * r;

@@ -1,4 +1,5 @@
-//! Bonds: thresholds, cascades, what a broken bond is, and what a failed solve must not do.
+//! Rupture of bonds: thresholds, cascades, broken bonds as dry contacts, and refused solves that
+//! change nothing.
 
 mod common;
 
@@ -37,7 +38,7 @@ fn pair<D: Dim>(force: &[f64], torque: &[f64]) -> World<D> {
     w
 }
 
-/// A solver that a row of 20 grains is too much for.
+/// A solver that fails on a row of 20 grains.
 fn one_sweep() -> SolverSettings {
     SolverSettings::GaussSeidel(GaussSeidelSettings {
         local: Default::default(),
@@ -57,8 +58,8 @@ fn thresholds_are_met_within_1e_6() {
     let near = 1e-6;
     for normal in [-R_COH * 0.5, 0.0, 3.0 * R_COH] {
         let limit = normal + R_COH;
-        // pure pull; the normal reaction is minus the pull shear: the force at the centre has the
-        // lever A/2, and a torque takes its moment from the bond rolling: a torque alone
+        // tension: a pure pull, which is minus the normal reaction; shear: the force at the centre
+        // has the lever A/2, and a torque cancels its moment in the bond; rolling: a torque alone
         for (share, breaks) in [(1.0 - near, None), (1.0 + near, Some(()))] {
             let tension = first_break(pair::<D2>(&[R_COH * share, 0.0], &[0.0]));
             assert_eq!(tension.map(|b| b.mode), breaks.map(|_| BondStatus::Tension));
@@ -70,7 +71,7 @@ fn thresholds_are_met_within_1e_6() {
             assert_eq!(found.map(|b| b.mode), breaks.map(|_| BondStatus::Rolling), "normal {normal}");
             let found = first_break(pair::<D3>(&[-normal, 0.0, 0.0], &[0.0, moment, 0.0]));
             assert_eq!(found.map(|b| b.mode), breaks.map(|_| BondStatus::Rolling), "3D, normal {normal}");
-            // twist has a limit of its own: bending just below its limit changes nothing
+            // the limit of twist is separate: bending just below its own limit changes nothing
             for bending in [0.0, (1.0 - near) * MU * A * limit] {
                 let torque = [XI * A * limit * share, bending * 0.6, bending * 0.8];
                 let found = first_break(pair::<D3Twist>(&[-normal, 0.0, 0.0], &torque));
@@ -130,8 +131,8 @@ fn a_broken_pair_is_bit_for_bit_a_pair_that_was_never_bonded() {
 
 #[test]
 fn a_bond_that_breaks_in_a_step_acts_in_it_as_if_it_had_never_been() {
-    // far too weak for the impact: it breaks in the first step, and the cascade solves that step
-    // without it
+    // far too weak for the impact: the bond breaks in the first step, and the cascade solves that
+    // step without it
     let mut never = world(colliding(), vec![], settings(1e-4));
     let mut bonded = world(colliding(), vec![], settings(1e-4));
     bonded.form_bonds(1e-6, |_| 1e-3, MU);
@@ -164,7 +165,7 @@ fn the_rules_of_rupture_differ_as_they_say() {
     let mut late = chain(Rupture::EndOfStep);
     let end = late.step().unwrap().breaks;
     assert_eq!(end.len(), 4);
-    // within the step the bonds pulled at their limit: the free end was held back by r_coh
+    // within the step the bonds carried their limit: r_coh held the free end back
     let expected = 1e-4 * (20.0 - R_COH) / late.grains.mass[4];
     assert!((late.grains.velocity[4][0] / expected - 1.0).abs() < 1e-9);
 }
@@ -206,8 +207,8 @@ fn an_unaccepted_solve_breaks_no_bond_and_moves_no_body() {
     let before = (w.grains.clone(), w.bonds.clone(), w.ledger, w.time, w.steps);
     let error = w.step().unwrap_err();
     assert!(matches!(error, StepError::NotAccepted { step, .. } if step == 0.25e-4), "{error}");
-    // one sweep along the row leaves the end, which it visits last, on its law, and the contact
-    // before it furthest from it
+    // one sweep along the row visits its end last: the last contact satisfies its law, and the
+    // contact before it is furthest from its law
     let message = error.message(&|body| format!("grain {body}"));
     assert!(message.contains("grain 17 and grain 18 are furthest from their contact law"), "{message}");
     assert_eq!(before.0.position, w.grains.position);
@@ -234,7 +235,7 @@ fn a_step_whose_second_half_fails_is_taken_back_whole() {
     w.form_bonds(1e-6, |_| R_COH, MU);
     let before = (w.grains.clone(), w.bonds.clone(), w.ledger, w.time, w.steps);
     let error = w.step().unwrap_err();
-    // it is the second half that failed: the error names its time
+    // the second half failed: the error has its time
     assert!(matches!(error, StepError::NotAccepted { time, .. } if time == 0.5e-4), "{error}");
     assert_eq!(before.0.position, w.grains.position);
     assert_eq!((before.1, before.2, before.3, before.4), (w.bonds.clone(), w.ledger, w.time, w.steps));
@@ -272,7 +273,7 @@ fn pairs(rule: Rupture, pulls: &[(f64, f64)]) -> World<D2> {
 
 #[test]
 fn the_worst_bond_breaks_first() {
-    // beyond the limit by 5, 25, 15 and not at all
+    // beyond the limit by 5 N, 25 N, 15 N and not at all
     let mut w = pairs(Rupture::CascadeWorst, &[(15.0, 0.0), (35.0, 0.0), (25.0, 0.0), (5.0, 0.0)]);
     let mut told = Vec::new();
     let breaks = w.step_watched(&mut |broken| told.push(broken)).unwrap().breaks;
@@ -282,8 +283,8 @@ fn the_worst_bond_breaks_first() {
 
 #[test]
 fn rounds_of_a_step_in_halves_are_counted_on() {
-    // a grain that would pass through another in the whole step, but not in half of it; one bond
-    // fails in each half, at the middles of which loads are taken: 0.25e-4 and 0.75e-4 s
+    // a grain would pass through a wall in the whole step, but not in half a step; bonds fail in
+    // each half, whose loads are those of its middle: 0.25e-4 and 0.75e-4 s
     for rule in [Rupture::Cascade, Rupture::CascadeWorst] {
         let mut w = pairs(rule, &[(15.0, 0.0), (25.0, 0.5e-4), (35.0, 0.5e-4)]);
         let wall = Wall::fixed(Shape::Plane { normal: [-1.0, 0.0].into() }, [1.0, 0.0].into(), 0.0);
@@ -299,7 +300,7 @@ fn rounds_of_a_step_in_halves_are_counted_on() {
             _ => (&[(0, 0), (2, 1), (1, 2)], &[1, 2, 3]),
         };
         assert_eq!(found, expected, "{rule:?}");
-        // the whole step began to count, too, before it was given up: what it told came before
+        // the refused whole step also reported counts, before those of the halves
         assert!(told.ends_with(counts), "{told:?}");
         assert_eq!((report.rejected, w.time), (0, 1e-4));
     }

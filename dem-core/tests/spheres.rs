@@ -1,5 +1,5 @@
-//! Space against the plane and against itself: a flat twin, a turned scene, a sphere that spins, a
-//! cantilever of spheres.
+//! 3D against 2D and against itself: a flat twin, a rotated scene, a spinning sphere, a cantilever
+//! of spheres.
 
 mod common;
 
@@ -16,7 +16,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use std::sync::Arc;
 
-/// A point of the plane; in space it lies across the second axis.
+/// A point in 2D; in 3D its second coordinate is zero.
 fn flat<D: Dim>(x: f64, y: f64) -> D::Vector {
     let mut point = D::Vector::zero();
     point[0] = x;
@@ -69,8 +69,9 @@ fn pressed<D: Dim>() -> World<D> {
     World::new(list.into_iter().collect(), vec![floor(0.3), side(0.0, 1.0), side(0.12, -1.0), lid], Vec::new(), set)
 }
 
-/// Steps both until a bond breaks, or `most` steps; everything is the same to 1e-8 and nothing
-/// leaves the plane. Of the step in which bonds break so many rounds are compared.
+/// Steps both until a bond breaks, at most `most` times; everything agrees to 1e-8 and nothing
+/// leaves the plane. In the step in which bonds break, the first `rounds` cascade rounds are
+/// compared.
 fn assert_twins(mut plane: World<D2>, mut space: World<D3>, most: usize, rounds: u32) -> usize {
     for step in 0..most {
         let (two, three) = (plane.step().expect("accepted"), space.step().expect("accepted"));
@@ -81,7 +82,7 @@ fn assert_twins(mut plane: World<D2>, mut space: World<D3>, most: usize, rounds:
         if !two.is_empty() {
             return step;
         }
-        // a grain at rest is one to the rounding of what gravity gives it in a step
+        // a grain is at rest to the round-off of its velocity gain by gravity in a step
         let fastest = plane.grains.velocity.iter().map(Vect::norm).fold(9.81 * 1e-4, f64::max);
         for k in 0..plane.grains.len() {
             let near = |a: f64, b: f64, scale: f64| assert!((a - b).abs() <= 1e-8 * scale, "step {step}: {a} and {b}");
@@ -91,8 +92,8 @@ fn assert_twins(mut plane: World<D2>, mut space: World<D3>, most: usize, rounds:
             near(0.0, s.position[k][1], p.radius[k]);
             near(p.velocity[k][0], s.velocity[k][0], fastest);
             near(p.velocity[k][1], s.velocity[k][2], fastest);
-            // counter-clockwise from the first axis to the last is about the second axis, turned
-            // round
+            // a counter-clockwise spin, from the first axis to the last, is a spin about minus the
+            // second axis
             near(p.spin[k][0] * p.radius[k], -s.spin[k][1] * p.radius[k], fastest);
         }
         assert_eq!(plane.touches().len(), space.touches().len());
@@ -116,18 +117,18 @@ fn centres_in_a_plane_move_as_their_flat_twin() {
 #[test]
 fn bonds_in_a_plane_carry_and_break_as_in_their_flat_twin() {
     let newton = SolverSettings::Staged(newton(1e-12, 1e-12, 1e-9));
-    // in the fifth round all falls and much slips: Newton then comes to other solutions in space
-    // than in the plane
+    // in the fifth cascade round all grains fall and many contacts slip: Newton then finds other
+    // solutions in 3D than in 2D
     for (solver, rounds) in [(solver(1e-12), u32::MAX), (newton, 4)] {
         let first = assert_twins(sheared::<D2>(solver), sheared::<D3>(solver), 400, rounds);
         assert!((5..400).contains(&first), "the first break comes in step {first}");
     }
 }
 
-/// Speed of the grains of [`turned`] when they start (m/s), along each axis.
+/// Initial speed of the grains of [`turned`] along each axis (m/s).
 const SPEED: f64 = 0.05;
 
-/// A scene in space, all of it turned by a rotation.
+/// A scene in 3D, rotated as a whole.
 fn turned<const M: usize>(by: &Rotation3<f64>, bonds: bool) -> World<Space<M>>
 where
     SVector<f64, M>: Moments,
@@ -176,7 +177,7 @@ fn a_turned_scene_does_the_same_turned() {
     assert!(modes.contains(&BondStatus::Twist), "{modes:?}");
 }
 
-/// How the bonds broke.
+/// The failure modes of the bonds.
 fn turned_is_the_same<const M: usize>(bonds: bool) -> Vec<BondStatus>
 where
     SVector<f64, M>: Moments,
@@ -193,7 +194,7 @@ where
     let (a, b) = (&straight.grains, &other.grains);
     for k in 0..a.len() {
         assert!((by * a.position[k] - b.position[k]).norm() <= 1e-9 * a.radius[k], "grain {k}");
-        // a spring turns the rounding of lengths into forces
+        // a spring turns the round-off of lengths into forces
         let near = SPEED * if bonds { 1e-7 } else { 1e-9 };
         assert!((by * a.velocity[k] - b.velocity[k]).norm() <= near, "grain {k}");
         assert!((by * a.spin[k] - b.spin[k]).norm() * a.radius[k] <= near, "grain {k}");

@@ -1,4 +1,4 @@
-//! A state that is written and taken up again goes on to the bit.
+//! A world restored from its saved state continues bit for bit.
 
 mod common;
 
@@ -23,7 +23,7 @@ fn saved<D: Dim>(world: &World<D>) -> Saved {
     saved
 }
 
-/// The world that goes on from `saved`; walls, loads and settings are those of `like`.
+/// The world restored from `saved`; walls, loads and settings are those of `like`.
 fn restored<D: Dim>(saved: &Saved, like: &World<D>) -> Result<World<D>, Mismatch> {
     let mut from = saved.read();
     let grains = Grains::restored(&mut from)?;
@@ -36,7 +36,7 @@ fn bits(saved: &Saved) -> (Vec<u64>, &[u64]) {
     (saved.reals.iter().map(|x| x.to_bits()).collect(), &saved.counts)
 }
 
-/// Every number that a world shows, read from its fields and not from what it saves.
+/// Every public number of a world, read from its fields and not from its saved state.
 fn shown<D: Dim>(w: &World<D>) -> Vec<u64> {
     let mut all: Vec<f64> = Vec::new();
     let g = &w.grains;
@@ -86,7 +86,7 @@ fn shown<D: Dim>(w: &World<D>) -> Vec<u64> {
     bits
 }
 
-/// Stops a world after each of some steps, and goes on with a restored one beside it.
+/// Saves a world after each of some steps, and continues with it and with a restored one.
 fn goes_on<D: Dim>(mut world: World<D>, solver: SolverSettings) -> World<D> {
     world.set_solver(solver);
     let mut broken = 0;
@@ -140,7 +140,7 @@ fn a_state_goes_on_between_steps_that_are_predicted() {
     world.form_bonds(1e-6, |_| 1e3, 0.3);
     let mut predicted = 0;
     for _ in 0..60 {
-        // a world that is restored before every step
+        // a world restored before every step
         let mut other = restored(&saved(&world), &world).expect("the state of this world");
         let (report, again) = (world.step().expect("a step"), other.step().expect("a step"));
         assert_eq!(report.work, again.work);
@@ -152,7 +152,7 @@ fn a_state_goes_on_between_steps_that_are_predicted() {
 
 #[test]
 fn a_step_that_fails_leaves_the_world_and_its_solver_as_they_were() {
-    // a bonded column at rest below a lid that closes on it later
+    // a bonded column at rest below a lid that later reaches it
     let mut set = common::settings(1e-3);
     set.gravity = common::down::<D2>(9.81);
     set.solver = SolverSettings::Staged(settings());
@@ -186,7 +186,7 @@ fn numbers_that_do_not_fit_are_refused() {
     world.set_solver(SolverSettings::Staged(settings()));
     common::run(&mut world, 5);
     let state = saved(&world);
-    // cut short anywhere, at either end of either list
+    // truncated anywhere, at either end of either list
     for cut in 0..state.counts.len() {
         let short = Saved { counts: state.counts[..cut].to_vec(), ..state.clone() };
         assert!(restored(&short, &world).is_err(), "{cut} counts");
@@ -195,7 +195,7 @@ fn numbers_that_do_not_fit_are_refused() {
         let short = Saved { reals: state.reals[..cut].to_vec(), ..state.clone() };
         assert!(restored(&short, &world).is_err(), "{cut} reals");
     }
-    // a count that is another one must not lead to a panic or to endless memory
+    // a changed count must cause neither a panic nor an unbounded allocation
     for place in 0..state.counts.len() {
         for value in [0, 1, 5, u64::MAX, u64::MAX / 16] {
             let mut wrong = state.clone();

@@ -1,9 +1,9 @@
-//! The stiff limit: of all reactions that balance a load, those of bonds that are springs of the
-//! ratios of the solver's settings, stiff beyond measure. A grain that several bonds hold shares
-//! its load among them by their stiffness.
+//! The stiff limit: among all reactions that balance a load, those of springs with the stiffness
+//! ratios of the solver's settings, in the limit of infinite stiffness. A grain held by several
+//! bonds distributes its load among them by their stiffness.
 //!
-//! In space a bond is a bar as thick as its pair's mean diameter a: E A/a and G A/a grow with a, E
-//! I/a and G J/a with a³, and J = 2 I. In the plane all bonds are alike, but for the arm a of their
+//! In 3D a bond is a bar as thick as its pair's mean diameter a: E A/a and G A/a grow with a, E I/a
+//! and G J/a with a³, and J = 2 I. In 2D all bonds are alike, except for the arm a of their
 //! moments.
 
 mod common;
@@ -18,16 +18,15 @@ use std::sync::Arc;
 
 const RATIO: StiffnessRatio = StiffnessRatio { tangential: 0.4, rolling: 0.05 };
 
-/// Radius of the grain in the middle (m), and of those around it, which are fixed, with the
-/// directions in which they lie.
+/// Radius of the central grain (m), and radii of the fixed grains around it with their directions.
 const MIDDLE: f64 = 0.008;
 const AROUND: [(f64, [f64; 3]); 4] =
     [(0.004, [1.0, 0.0, 0.0]), (0.02, [-0.6, 0.8, 0.0]), (0.012, [-0.3, -1.0, 0.2]), (0.006, [0.1, -0.2, 1.0])];
 
-/// A vector in space as one of the dimension.
+/// A 3D vector as a vector of the dimension.
 fn cut<V: Vect>(x: &Vector3<f64>) -> V {
     match V::LEN {
-        // spins of the plane
+        // spins in 2D
         1 => V::from_slice(&[x[2]]),
         n => V::from_slice(&x.as_slice()[..n]),
     }
@@ -39,8 +38,8 @@ fn directions<D: Dim>() -> Vec<(f64, Vector3<f64>)> {
     AROUND.iter().filter(here).map(|&(r, d)| (r, flat(d))).collect()
 }
 
-/// Force and moment on the grain in the middle from each bond, by the displacement method: six
-/// unknowns, one spring for each row of a bond, under this force and torque.
+/// Force and moment of each bond on the central grain, which is under this force and torque.
+/// Displacement method: six unknowns, one spring for each row of a bond.
 fn by_springs<D: Dim>(force: &Vector3<f64>, torque: &Vector3<f64>) -> Vec<(Vector3<f64>, Vector3<f64>)> {
     let cross = |x: &Vector3<f64>| x.cross_matrix();
     let bonds: Vec<_> = directions::<D>()
@@ -50,7 +49,7 @@ fn by_springs<D: Dim>(force: &Vector3<f64>, torque: &Vector3<f64>) -> Vec<(Vecto
             let size = if D::N == 3 { a } else { 1.0 };
             let (along, across) = (d * d.transpose(), Matrix3::identity() - d * d.transpose());
             let translation = (along + across * RATIO.tangential) * size;
-            // out of the plane nothing turns
+            // in 2D there is no rotation out of the plane
             let twist = if D::Moment::TWISTS { 2.0 * RATIO.tangential } else { 0.0 };
             let rotation = (across + along * twist) * (RATIO.rolling * a * a * size);
             (d * MIDDLE, translation, rotation)
@@ -100,7 +99,7 @@ fn shares<D: Dim>(force: [f64; 3], torque: [f64; 3]) {
     let largest = expected.iter().map(|(f, _)| f.norm()).fold(0.0, f64::max);
     assert_eq!(w.touches().len(), expected.len());
     for (touch, ((f, m), (_, d))) in w.touches().zip(expected.iter().zip(directions::<D>())) {
-        // the normal points to the grain in the middle
+        // the normal points to the central grain
         let normal = -f.dot(&d);
         let shear = (f - d * f.dot(&d)).norm();
         let (twist, bending) = (m.dot(&d).abs(), (m - d * m.dot(&d)).norm());

@@ -1,5 +1,5 @@
-//! Bonds that turn: a pair that flies round keeps its length, its rate of turning and its energy,
-//! whatever holds it together.
+//! Bonds that turn: a rotating pair keeps its length, its angular velocity and its energy, with
+//! every kind of bond.
 
 mod common;
 
@@ -13,17 +13,17 @@ use dem_core::world::Restitution;
 /// Radius of the grains (m).
 const R: f64 = 0.01;
 
-/// Angle by which the pair that is stopped turns in a step (rad).
+/// Angle by which the pair of [`stopped_dumbbell`] turns in a step (rad).
 const ANGLE: f64 = 0.1;
 
-/// Stiffness of a bond of the mean diameter `a`, `k` along its normal.
+/// Stiffness of a bond of mean diameter `a` with the normal stiffness `k`.
 fn stiff(k: f64, a: f64) -> Stiffness {
     Stiffness { normal: k, tangential: 0.7 * k, rolling: k * a * a / 12.0, twist: k * a * a / 16.0 }
 }
 
-/// Two bonded grains that turn about the middle between them at 100 rad/s, a hundredth of a radian
-/// a step, for a hundred radians: by how much the bond lengthened (–), the rate of turning at the
-/// end over that at the start (–), and the largest gain of energy (–).
+/// Two bonded grains rotate about their common centre at 100 rad/s, a hundredth of a radian a step,
+/// for a hundred radians. Returns the largest relative change of length, the final angular velocity
+/// over the initial one, and the largest relative gain of energy.
 fn dumbbell<D: Dim>(stiffness: Option<f64>, friction: f64) -> (f64, f64, f64) {
     let (h, rate) = (1e-4, 100.0);
     let mut pair: Vec<_> = [-R, R].iter().map(|x| grain::<D>(&[*x, 0.0, 0.0][..D::N], R)).collect();
@@ -59,9 +59,9 @@ fn a_bond_that_turns_keeps_its_length_its_spin_and_its_energy() {
     }
 }
 
-/// Two bonded grains that turn by `ANGLE` a step and are stopped by two fixed ones, at the end of a
-/// way of so many steps; where a third one is so `fast` that it makes the third step one of two
-/// parts. By how much the bond is longer afterwards than its force tells (–).
+/// Two bonded grains turn by [`ANGLE`] a step until two fixed grains stop them after `way` steps.
+/// If `fast`, another grain is so fast that the third step is made in two parts. Returns the
+/// relative length of the bond afterwards beyond the length that follows from its force (–).
 fn stopped_dumbbell<D: Dim>(stiffness: Option<f64>, friction: f64, way: f64, fast: bool) -> f64 {
     let h = 1e-3;
     let at = |x: f64, y: f64| grain::<D>(&[x, y, 0.0][..D::N], R);
@@ -74,7 +74,8 @@ fn stopped_dumbbell<D: Dim>(stiffness: Option<f64>, friction: f64, way: f64, fas
         grains.push(at(side * R, side * (2.0 + way * ANGLE) * R));
         grains.last_mut().unwrap().fixed = true;
     }
-    // with restitution a contact acts where it touches, and the wall would be passed in half a step
+    // with restitution a contact acts only when it touches, so the fast grain would pass the wall
+    // in half a step
     let (speed, arrival) = (6.0 * R / h, 2.7 * h);
     let (mut normal, mut place) = (D::Vector::zero(), D::Vector::zero());
     normal[0] = -1.0;
@@ -97,8 +98,8 @@ fn stopped_dumbbell<D: Dim>(stiffness: Option<f64>, friction: f64, way: f64, fas
     (length + stiffness.map_or(0.0, |k| force / k)) / (2.0 * R) - 1.0
 }
 
-/// What a change of the length of steps leaves of the hidden length of a turn is given back: at
-/// rest a bond is as long as if no step had been made in parts, wherever the turn is stopped.
+/// The hidden length that a change of step length leaves is corrected: at rest a bond is as long as
+/// without a step in parts, wherever the turn is stopped.
 #[test]
 fn parts_of_a_step_leave_the_length_of_a_bond_that_turned() {
     for (stiffness, friction) in [(None, 0.0), (None, 0.3), (Some(1e9), 0.0), (Some(1e9), 0.3)] {

@@ -1,10 +1,10 @@
-//! The one family of cones, K = { ‖t‖ ≤ μ n, ‖m‖ ≤ ν n, |τ| ≤ ξ n }, and the minimisation over it
-//! that every law needs.
+//! The cone K = { ‖t‖ ≤ μ n, ‖m‖ ≤ ν n, |τ| ≤ ξ n } of all contact laws, with projection and
+//! minimisation on it.
 //!
 //! `Local<T, B>` holds the rows of one contact: the normal component n, the tangential rows t and
-//! the moment rows, of bending m and of twist τ (moments divided by the mean diameter, relative
-//! spins multiplied by it, so all rows share a unit). A group that a contact lacks has length zero,
-//! so one formula covers frictionless, dry and bonded contacts.
+//! the moment rows, bending m and twist τ (moments divided by the mean diameter, relative spins
+//! multiplied by it, so all rows share a unit). A group that a contact lacks has length zero, so
+//! one formula covers frictionless, dry and bonded contacts.
 //!
 //! Source: the cone of Coulomb with rolling resistance, Guessasma & Fortin 2011 with the rolling of
 //! Taboada, Estrada & Radjaï 2006.
@@ -38,11 +38,11 @@ impl<T: Vect, B: Moments> Local<T, B> {
     }
 }
 
-/// Rows of any contact, padded with zeros to the most that one has: n, two tangential, two bending,
-/// one of twist.
+/// Rows of any contact, padded with zeros to the largest number: n, two tangential, two bending,
+/// one twist.
 pub(crate) type Padded = Local<SVector<f64, 2>, SVector<f64, 3>>;
 
-/// How many rows that are.
+/// Number of rows of `Padded`.
 pub(crate) const PADDED: usize = 6;
 
 impl Padded {
@@ -160,23 +160,23 @@ impl Cone {
 
     /// The r in K that minimises ½ Σ w r² + q·r.
     ///
-    /// For a given r_n the rows t, m and τ are clipped to their balls, which leaves one increasing,
-    /// piecewise linear equation in r_n,
+    /// For a given r_n the rows t, m and τ are clipped to their balls. The remaining equation in
+    /// r_n is increasing and piecewise linear:
     ///
     /// w_n n + q_n − μ (‖q_t‖ − w_t μ n)⁺ − ν (‖q_m‖ − w_m ν n)⁺ − ξ (|q_τ| − w_τ ξ n)⁺ = 0,
     ///
-    /// whose root is the largest of those of its linear pieces. With unit weights and q = −x it is
-    /// the projection of x on K.
+    /// Its root is the largest of the roots of its linear pieces. With unit weights and q = −x the
+    /// minimiser is the projection of x on K.
     pub fn minimise<T: Vect, B: Moments>(&self, w: Weights, q: Local<T, B>) -> Local<T, B> {
         let (slip, bend) = (q.t.norm(), q.m.bending());
-        // with the row group active its equation reads: pull = coefficient × norm, stiffness =
+        // an active group contributes pull − stiff n, with pull = coefficient × norm and stiff =
         // coefficient² × weight
         let slip = Group { pull: self.mu * slip, stiff: self.mu * self.mu * w.t };
         let bend = Group { pull: self.nu * bend, stiff: self.nu * self.nu * w.m };
         let mut n = root(w.n, q.n, slip, bend);
         if B::TWISTS {
-            // the equation is the lesser of those without and with the twist row at its limit; both
-            // increase
+            // the left side is the minimum of two increasing functions, without and with the twist
+            // row at its limit: its root is the larger of their roots
             let twist = Group { pull: self.xi * q.m.twist(), stiff: self.xi * self.xi * w.w };
             n = n.max(root(w.n + twist.stiff, q.n - twist.pull, slip, bend));
         }
@@ -191,18 +191,18 @@ impl Cone {
     }
 }
 
-/// A group of rows in the equation of r_n.
+/// The contribution (pull − stiff n)⁺ of a row group to the equation of r_n.
 #[derive(Clone, Copy)]
 struct Group {
     pull: f64,
     stiff: f64,
 }
 
-/// The n ≥ 0 with w n + q = Σ (pull − stiff n)⁺; zero or less where there is none.
+/// The root n of w n + q = Σ (pull − stiff n)⁺; a result ≤ 0 means that there is no positive root.
 ///
-/// The left side minus the right is the least of four increasing lines, one for each set of groups
-/// at their limit: its root is the largest of the four. A comparison that selects the set would
-/// depend on rounding at a kink.
+/// Left side minus right side is the minimum of four increasing lines, one for each set of groups
+/// at their limit, so the root is the largest of the four roots. Selecting the set by comparison
+/// would depend on round-off at a kink.
 #[inline(always)]
 fn root(w: f64, q: f64, t: Group, m: Group) -> f64 {
     let [none, slips] = [-q / w, (t.pull - q) / (w + t.stiff)];

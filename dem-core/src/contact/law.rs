@@ -6,14 +6,13 @@
 //!
 //! K ∋ r̂ ⊥ ũ ∈ K*   ⇔   r̂ = P_K(r̂ − γ ũ) for any γ > 0:
 //!
-//! de Saxcé's bipotential, Guessasma & Fortin 2011, (3)–(5). A bond with associated flow leaves the
-//! shift of u out.
+//! de Saxcé's bipotential, Guessasma & Fortin 2011, (3)–(5). A bond with associated flow has ũ = u.
 //!
-//! A law offers two ways to improve one contact while all others stand still. The
-//! *predictor–corrector* is one step of the line above with γ = 1 / (largest diagonal entry of the
-//! local Delassus block W), which makes it a contraction where the flow is associated; see
-//! docs/theory/contact-law.md. The *exact local solve* finds the r for which the contact alone
-//! satisfies its law. Both have the same fixed points.
+//! A law has two local solves, which improve one contact while the impulses of all others are
+//! fixed. The *predictor–corrector* is one step of this fixed-point map with γ = 1 / (largest
+//! diagonal entry of the local Delassus block W), which makes it a contraction where the flow is
+//! associated; see docs/theory/contact-law.md. The *exact local solve* returns the r that satisfies
+//! the law of this contact. Both have the same fixed points.
 
 use super::cone::{Cone, Local, Weights};
 use crate::dim::{Axes, Dim, Moments, V0, V1, Vect, resized};
@@ -29,8 +28,7 @@ pub enum LocalSolve {
     PredictorCorrector,
 }
 
-/// The local Delassus block of a contact: what a unit of each group of rows does to its own
-/// relative velocity.
+/// The local Delassus block of a contact: its relative velocity per unit impulse in each row group.
 ///
 /// For disks and spheres every group is a multiple of the identity, and only t and bending are
 /// coupled.
@@ -48,7 +46,7 @@ pub struct Block {
     pub tm: f64,
 }
 
-/// Lengths by which the forces of a contact turn its bodies.
+/// Lever arms of the rows of a contact about the centres of its bodies.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Arms {
     /// Distances from the centres of i and j to the contact point along the normal (m).
@@ -66,8 +64,8 @@ pub trait Law: Copy + Send + Sync + 'static {
     /// The axes that these rows need.
     type Axes<D: Dim>: Axes<D>;
 
-    /// A better impulse for this contact alone, from its impulse `r` (N s) and relative velocity
-    /// `u` (m/s).
+    /// The improved impulse (N s) of this contact, all others fixed, from its impulse `r` (N s) and
+    /// relative velocity `u` (m/s).
     fn improve(
         &self,
         local: LocalSolve,
@@ -90,7 +88,7 @@ pub trait Law: Copy + Send + Sync + 'static {
         0.0
     }
 
-    /// What is added to the normal velocity before the law (m/s).
+    /// Velocity that the law adds to u_n (m/s).
     fn bias(&self) -> f64 {
         0.0
     }
@@ -100,17 +98,17 @@ pub trait Law: Copy + Send + Sync + 'static {
         true
     }
 
-    /// By which lengths its rows turn the bodies; zero for rows that it lacks.
+    /// Lever arms of its rows; zero for rows that it lacks.
     fn arms(&self) -> Arms {
         Arms::default()
     }
 
-    /// Compliance of the rows over the step (1/kg), zero for what is rigid.
+    /// Compliance of the rows over the step (1/kg), zero for rigid rows.
     fn compliance(&self) -> Weights {
         Weights::default()
     }
 
-    /// Impulse that a compliant contact carried when the step began (N s).
+    /// Impulse r₀ that a compliant contact carried at the start of the step (N s).
     fn carried(&self) -> Local<Self::T, Self::B> {
         Local::zero()
     }
@@ -165,7 +163,7 @@ impl Law for Frictionless {
     type B = V0;
     type Axes<D: Dim> = D::Vector;
 
-    // the projection on a half line is exact: predictor–corrector and exact solve are one
+    // the projection on a half-line is exact: both local solves coincide
     #[inline(always)]
     fn improve(&self, _: LocalSolve, r: Local<V0, V0>, u: Local<V0, V0>) -> Local<V0, V0> {
         Local { n: (r.n - (u.n + self.bias) * self.inverse).max(0.0), ..Local::zero() }
@@ -189,8 +187,8 @@ impl Law for Frictionless {
     }
 }
 
-/// Signorini–Coulomb: a normal row, and the tangential rows or, since Coulomb's disk looks alike
-/// from every tangent, a tangential vector.
+/// The law of Signorini and Coulomb: a normal row, and tangential rows or a tangential vector
+/// (Coulomb's disk is isotropic, so a vector needs no tangents).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coulomb<T> {
     inverse_n: f64,
@@ -216,11 +214,11 @@ impl<T: Vect> Coulomb<T> {
 impl<T: Vect> Law for Coulomb<T> {
     type T = T;
     type B = V0;
-    // in the plane the normal is the whole frame
+    // in 2D the normal determines the frame
     type Axes<D: Dim> = D::Vector;
 
-    /// Exact: n and t are not coupled, so Signorini's r_n comes first and Coulomb clips r_t to its
-    /// disk.
+    /// Exact: n and t are uncoupled, so Signorini's law gives r_n first, and r_t is then clipped to
+    /// Coulomb's disk.
     #[inline(always)]
     fn improve(&self, local: LocalSolve, r: Local<T, V0>, mut u: Local<T, V0>) -> Local<T, V0> {
         u.n += self.bias;
@@ -263,13 +261,13 @@ impl<T: Vect> Law for Coulomb<T> {
     }
 }
 
-/// What a bond at its limit does within the solve; it breaks there afterwards.
+/// Flow rule of a bond at its limit during a solve; the bond breaks after it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BondFlow {
     /// Flow normal to the cone; the problem of intact bonds is convex.
     #[default]
     Associated,
-    /// The paper's: slip and roll without opening.
+    /// The rule of the paper: slip and rolling without opening.
     Bipotential,
 }
 
@@ -293,12 +291,12 @@ pub struct Bonded<T, B: Moments> {
     rows: PhantomData<(T, B)>,
 }
 
-/// A number as one that only a twist row has.
+/// A number that is stored for a twist row only.
 fn only_twist<B: Moments>(x: f64) -> B::Twist {
     resized(V1::from([x]))
 }
 
-/// The number of a twist row, `other` where there is none.
+/// The number stored for the twist row; `other` where there is no twist row.
 #[inline(always)]
 fn of_twist<B: Moments>(x: B::Twist, other: f64) -> f64 {
     if B::TWISTS { x[0] } else { other }
@@ -326,13 +324,13 @@ impl<T: Vect, B: Moments> Bonded<T, B> {
         }
     }
 
-    /// The same bond with something added to the normal velocity before the law (m/s).
+    /// The same bond with this bias of the normal velocity (m/s).
     #[must_use]
     pub fn with_bias(self, bias: f64) -> Self {
         Self { bias, ..self }
     }
 
-    /// The local block back from its inverse.
+    /// The local block, recomputed from its inverse.
     fn block(&self) -> Block {
         let det = self.inverse_t * self.inverse_m - self.inverse_tm * self.inverse_tm;
         let (t, m) = (self.inverse_m / det, self.inverse_t / det);
@@ -415,10 +413,10 @@ impl<A: Vect, B: Moments> Bonded<A, B> {
 
     /// Local solve on the boundary of the cone.
     ///
-    /// The diagonal of W is solved in closed form ([`Cone::minimise`]); its coupling of t and m is
-    /// lagged. The splitting W = B + C with B = diag W converges because B − C is positive definite
-    /// where W is, by a factor
-    /// |w_tm| / √(w_t w_m) a round: zero for grains of one size, 0.8 at a size ratio of four.
+    /// An iteration with the splitting W = B + C, B = diag W: B is solved in closed form
+    /// ([`Cone::minimise`]), and C, the coupling of t and m, is lagged. It converges because B − C
+    /// is positive definite where W is. An iteration reduces the error by |w_tm| / √(w_t w_m): zero
+    /// for grains of one size, 0.8 at a size ratio of four.
     #[cold]
     fn at_limit(&self, r: Local<A, B>, u: Local<A, B>) -> Local<A, B> {
         let (w, cone) = (self.block(), self.limits());
@@ -457,10 +455,11 @@ impl<A: Vect, B: Moments> Bonded<A, B> {
     }
 }
 
-/// An intact bond with a stiffness: rigid but for the compliance C, u + C (r − r₀) in place of u.
+/// An intact elastic bond: the law of the rigid bond with u + C (r − r₀) in place of u, C being the
+/// compliance.
 ///
-/// An elastic row of stiffness k over an implicit step h has f⁺ = f − k h u⁺, which is C = 1/(k h²)
-/// for impulses and r₀ = h f the impulse that the bond carried when the step began, see
+/// A row of stiffness k obeys f⁺ = f − k h u⁺ over an implicit step h. In impulses, C = 1/(k h²),
+/// and r₀ = h f is the impulse that the bond carried at the start of the step; see
 /// docs/theory/elastic-bonds.md.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Elastic<T, B: Moments> {
@@ -472,8 +471,8 @@ pub struct Elastic<T, B: Moments> {
 }
 
 impl<T: Vect, B: Moments> Elastic<T, B> {
-    /// From the local block of the rigid bond, its compliance (1/kg), the impulse that it carried
-    /// (N s), and what [`Bonded::new`] takes.
+    /// From the local block of the rigid bond, its compliance (1/kg), the carried impulse r₀ (N s),
+    /// and the arguments of [`Bonded::new`].
     pub fn new(
         block: Block,
         compliance: Weights,
@@ -489,7 +488,7 @@ impl<T: Vect, B: Moments> Elastic<T, B> {
         Self { bond, soft: [n, t, m], soft_w: only_twist::<B>(w), carried }
     }
 
-    /// The same bond with something added to the normal velocity before the law (m/s).
+    /// The same bond with this bias of the normal velocity (m/s).
     #[must_use]
     pub fn with_bias(self, bias: f64) -> Self {
         Self { bond: self.bond.with_bias(bias), ..self }

@@ -1,4 +1,4 @@
-//! Contacts: the cone, the laws on it, and the kinematics that ties a contact to its two nodes.
+//! Contact laws: the cone of the reactions, and the laws on it.
 
 pub mod cone;
 pub mod law;

@@ -1,4 +1,4 @@
-//! LU factors over the fronts of a [`Tree`], with pivots chosen within each front.
+//! LU factors over the fronts of a [`Tree`], with pivoting within each front.
 
 use super::tree::{Front, Tree};
 use faer::dyn_stack::{MemBuffer, MemStack};
@@ -7,13 +7,13 @@ use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_unit_lower_triangular_in_place};
 use faer::{Accum, MatMut, Par};
 
-/// The factors of a matrix; their room is taken over from one to the next.
+/// The factors of a matrix; the next factorisation reuses their memory.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Lu {
     /// Of each front in turn: its pivot columns (L and U of the pivots, L of the border below),
     /// then U of the border.
     values: Vec<f64>,
-    /// Where those of each front begin.
+    /// Start of the values of each front.
     starts: Vec<usize>,
     /// Rows in the order in which they became pivots, front by front.
     rows: Vec<usize>,
@@ -21,7 +21,7 @@ pub(crate) struct Lu {
 
 impl Lu {
     /// Factorise 1 + Σ of all elements; `element` writes the matrix of an element, row by row, over
-    /// the unknowns of its first node and then its second. Returns the sign of the determinant,
+    /// the unknowns of its first node and then its second. Returns the sign of the determinant;
     /// none if a pivot is zero or not finite.
     pub fn factorise(&mut self, tree: &Tree, mut element: impl FnMut(usize, &mut [f64])) -> Option<f64> {
         let mut sign = 1.0;
@@ -105,12 +105,12 @@ impl Lu {
     }
 }
 
-/// A front in numbers.
+/// The numeric values of a front.
 struct Parts<'a> {
     n: usize,
     p: usize,
     /// Columns of the pivots (n each), rows of the pivots in the columns of the border (p each),
-    /// and what is left (column by column).
+    /// and the Schur complement on the border (column by column).
     columns: &'a mut [f64],
     across: &'a mut [f64],
     rest: Vec<f64>,
@@ -127,7 +127,7 @@ impl Parts<'_> {
         }
     }
 
-    /// Add what a front left, whose unknowns are at these places.
+    /// Add the Schur complement of a child front; `up` are the places of its unknowns here.
     fn take_over(&mut self, left: &[f64], up: &[usize]) {
         for (c, column) in left.chunks_exact(up.len().max(1)).enumerate() {
             for (r, value) in column.iter().enumerate() {
@@ -136,8 +136,8 @@ impl Parts<'_> {
         }
     }
 
-    /// Factorise the pivots and take them out of what is left; the sign of their determinant, none
-    /// if one is zero or not finite.
+    /// Factorise the pivots and form the Schur complement. Returns the sign of their determinant;
+    /// none if a pivot is zero or not finite.
     fn eliminate(&mut self, rows: &mut Vec<usize>) -> Option<f64> {
         let (n, p, b) = (self.n, self.p, self.n - self.p);
         let columns = MatMut::from_column_major_slice_mut(self.columns, n, p);
@@ -172,8 +172,8 @@ impl Parts<'_> {
 mod tests {
     use super::*;
 
-    /// A lattice of nodes with 3 unknowns and a plate with one, matrices of elements with numbers
-    /// from a formula, and a node alone.
+    /// A lattice of nodes with 3 unknowns, a plate with one, and an isolated node: sizes and
+    /// elements.
     fn lattice(side: usize) -> (Vec<usize>, Vec<[usize; 2]>) {
         let plate = side * side;
         let mut sizes = vec![3; plate];
@@ -205,7 +205,7 @@ mod tests {
             let width = (m.len() as f64).sqrt() as usize;
             for (k, value) in m.iter_mut().enumerate() {
                 let (r, c) = (k / width, k % width);
-                // not symmetric, and large off the diagonal, so that pivots change places
+                // not symmetric, and large off the diagonal, so that pivoting exchanges rows
                 *value = (1.0 + ((7 * e + 3 * r + 5 * c) % 11) as f64)
                     * if (r + c + e).is_multiple_of(3) { -10.0 } else { 1.0 };
             }

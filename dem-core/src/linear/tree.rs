@@ -1,16 +1,15 @@
-//! The fronts in which a matrix on a graph is factorised.
+//! Symbolic factorisation: the fronts in which a matrix on a graph is factorised.
 //!
 //! Order: nested dissection (George, SIAM J. Numer. Anal. 10, 1973; Karypis & Kumar, SIAM J. Sci.
-//! Comput. 20, 1998). Fronts: nodes of the elimination tree, joined to their parents where the
-//! dense work on the zeros that this brings is less than what a front costs by itself (Liu, SIAM
-//! Rev. 34, 1992).
+//! Comput. 20, 1998). Fronts: nodes of the elimination tree, merged with their parents if the extra
+//! operations on zeros cost less than a separate front (Liu, SIAM Rev. 34, 1992).
 
 use feral_metis::{CscPattern, metis_order};
 
-/// Work (floating-point operations) that a front costs beside its own: below that, joining fronts
-/// pays. Measured: the time of a front of one disk, 1 to 2 µs, at some 5 operations a nanosecond.
+/// Overhead of a front (floating-point operations): merging fronts pays if it adds less work.
+/// Measured: the time of a front of one disk, 1 to 2 µs, at some 5 operations a nanosecond.
 const WORK_OF_A_FRONT: f64 = 8e3;
-/// Share by which joined fronts may take more operations than apart.
+/// Share by which merged fronts may take more operations than separate ones.
 const MORE_WORK: f64 = 0.1;
 
 /// One element in a front.
@@ -18,7 +17,7 @@ const MORE_WORK: f64 = 0.1;
 pub(super) struct Place {
     /// Number of the element.
     pub element: usize,
-    /// Where the unknowns of its nodes begin in the front.
+    /// Where the unknowns of its two nodes begin in the front.
     pub at: [usize; 2],
 }
 
@@ -31,15 +30,15 @@ pub(super) struct Front {
     pub pivots: usize,
     /// The elements that are added here.
     pub elements: Vec<Place>,
-    /// The front that takes what is left, and where its border lies there.
+    /// The front that receives the Schur complement, and the places of the border there.
     pub parent: Option<usize>,
     pub up: Vec<usize>,
-    /// Fronts that leave something to this one.
+    /// The fronts whose parent is this one.
     pub children: Vec<usize>,
 }
 
 impl Front {
-    /// Unknowns that are left to later fronts.
+    /// Number of unknowns left to later fronts.
     pub fn border(&self) -> usize {
         self.unknowns.len() - self.pivots
     }
@@ -48,16 +47,16 @@ impl Front {
 /// Nodes, elements, and the fronts made of them.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tree {
-    /// Number of unknowns of each node, and its first one.
+    /// Number of unknowns of each node.
     sizes: Vec<usize>,
-    /// Nodes of each element; one that has a single node names it twice.
+    /// Nodes of each element; an element of one node names it twice.
     elements: Vec<[usize; 2]>,
     pub(super) fronts: Vec<Front>,
     unknowns: usize,
 }
 
 impl Tree {
-    /// The fronts for nodes with so many unknowns each, numbered consecutively, and elements
+    /// The fronts for nodes with `sizes` unknowns each, numbered consecutively, and `elements`
     /// between them; an element of one node names it twice. None if no order is found.
     pub fn new(sizes: Vec<usize>, elements: Vec<[usize; 2]>) -> Option<Self> {
         let unknowns = sizes.iter().sum();
@@ -88,7 +87,7 @@ impl Tree {
         (&self.sizes, &self.elements)
     }
 
-    /// Unknowns of the two nodes of an element: how many; none for a second node that is the first.
+    /// Numbers of unknowns of the two nodes of an element; zero if the second node is the first.
     pub(super) fn widths(&self, element: usize) -> [usize; 2] {
         let [a, b] = self.elements[element];
         [self.sizes[a], if a == b { 0 } else { self.sizes[b] }]
@@ -112,7 +111,7 @@ impl Tree {
         let n = order.len();
         let mut position = vec![0; n];
         order.iter().enumerate().for_each(|(k, node)| position[*node] = k);
-        // by positions: the later nodes that each is coupled to when it is eliminated, and its
+        // for each position: the later nodes that it is coupled to at its elimination, and its
         // children in the tree
         let mut coupled: Vec<Vec<usize>> = Vec::with_capacity(n);
         let mut children: Vec<Vec<usize>> = vec![Vec::new(); n];
@@ -134,7 +133,7 @@ impl Tree {
             }
             coupled.push(list);
         }
-        // join children where it pays: a group is known by its last node
+        // merge children where it pays; a group is identified by its last node
         let size = |k: usize| self.sizes[order[k]] as f64;
         let border: Vec<f64> = coupled.iter().map(|list| list.iter().map(|p| size(*p)).sum()).collect();
         let mut members: Vec<Vec<usize>> = (0..n).map(|k| vec![k]).collect();
@@ -189,7 +188,7 @@ impl Tree {
         self.sizes.iter().scan(0, next).collect()
     }
 
-    /// Where elements and borders lie.
+    /// Set the places of elements and borders in the fronts.
     fn place(&self, fronts: &mut [Front], firsts: &[usize], front_of: impl Fn(usize) -> usize) {
         let mut elements = vec![Vec::new(); fronts.len()];
         for (e, [a, b]) in self.elements.iter().enumerate() {
@@ -227,7 +226,7 @@ fn ordered(adjacency: &[Vec<usize>]) -> Option<Vec<usize>> {
     let mut starts: Vec<i32> = vec![0];
     let mut rows = Vec::new();
     for (k, near) in adjacency.iter().enumerate() {
-        // with the diagonal, in rising order
+        // with the diagonal, in ascending order
         let (before, after) = near.split_at(near.partition_point(|p| *p < k));
         rows.extend(before.iter().chain([&k]).chain(after).map(|p| *p as i32));
         starts.push(rows.len() as i32);

@@ -1,14 +1,14 @@
-//! The contact problem with its matrix: u = W r̂ + q, and a cone for each contact. What other codes
-//! exchange and solve.
+//! The contact problem with its matrix: u = W r̂ + q, and a cone for each contact. This is the form
+//! that other codes exchange and solve.
 //!
-//! K ∋ r̂ ⊥ ũ ∈ K*, with r̂ = r + s n: the shift of the cohesion is inside r̂ and q, so the cones
-//! all stand at the origin. All contacts have the same rows; one that has fewer by its law has
-//! zeros in W and q there, and coefficients that are zero. Moments are divided by the mean diameter
-//! of the pair and relative spins multiplied by it, so that all rows share a unit (N s, m/s) and
-//! the coefficients of t and m are plain numbers.
+//! K ∋ r̂ ⊥ ũ ∈ K*, with r̂ = r + s n: r̂ and q include the cohesive shift, so all cones have their
+//! apex at the origin. All contacts have the same rows; rows that a law lacks are zero in W and q,
+//! with zero coefficients. Moments are divided by the mean diameter of the pair and relative spins
+//! multiplied by it, so that all rows share a unit (N s, m/s) and the coefficients of t and m are
+//! plain numbers.
 //!
-//! W is made from the maps H and Hᵀ of the matrix-free problem, column by column: what a unit
-//! impulse does to the relative velocities around it. See docs/theory/fclib.md.
+//! W is built column by column from the maps H and Hᵀ of the matrix-free problem: the relative
+//! velocities that a unit impulse causes. See docs/theory/fclib.md.
 
 pub use super::block_matrix::{Asymmetry, BlockMatrix};
 use super::residual::relative;
@@ -18,20 +18,19 @@ use crate::contact::{Arms, Cone, Law, Local, PADDED, Padded, Weights};
 use crate::dim::{Dim, Vect, tangential_rows};
 use thiserror::Error;
 
-/// Asymmetry of a matrix that is put down to rounding, as [`Asymmetry`] measures it (–).
+/// Largest asymmetry of a matrix that counts as round-off, as [`Asymmetry`] measures it (–).
 pub const ROUNDING: f64 = 1e-6;
 
 /// The rows that every contact of an assembled problem has, in the order n, t…, m….
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ContactRows {
-    /// Tangential rows: 1 in the plane, 2 in space.
+    /// Tangential rows: 1 in 2D, 2 in 3D.
     pub tangents: usize,
-    /// Moment rows: none, as many of bending as there are tangential ones, or those and one of
-    /// twist.
+    /// Moment rows: none; as many bending rows as tangential ones; or those and one twist row.
     pub moments: usize,
 }
 
-/// What an assembled problem is made of. Lengths: C contacts of M rows.
+/// The data of an assembled problem. Lengths: C contacts of M rows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parts {
     /// The rows of each contact.
@@ -48,14 +47,13 @@ pub struct Parts {
     pub xi: Vec<f64>,
     /// Whether the flow of a contact is normal to its cone, C.
     pub associated: Vec<bool>,
-    /// What r̂ is above the reaction r in the normal row (N s), C; zero where it is not known.
+    /// Normal component of r̂ − r (N s), C; zero where unknown.
     pub shift: Vec<f64>,
-    /// Euclidean norm of the applied impulses (N s), one scale of the residual; zero where it is
-    /// not known.
+    /// Euclidean norm of the applied impulses (N s), one scale of the residual; zero if unknown.
     pub applied: f64,
 }
 
-/// A contact problem with its matrix, and the shifted reactions that are to solve it.
+/// A contact problem with its matrix, and its shifted reactions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Assembled {
     parts: Parts,
@@ -63,7 +61,7 @@ pub struct Assembled {
     pub r: Vec<f64>,
 }
 
-/// Why parts do not make a problem.
+/// Why [`Parts`] are not a valid problem.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum AssemblyError {
     /// An array has another length.
@@ -81,11 +79,11 @@ pub enum AssemblyError {
     Value {
         /// The array.
         array: &'static str,
-        /// Where in it.
+        /// Index of the value.
         index: usize,
-        /// What stands there.
+        /// The value.
         value: f64,
-        /// What may stand there.
+        /// The allowed values.
         allowed: &'static str,
     },
     /// W is not symmetric.
@@ -167,7 +165,7 @@ impl Parts {
 }
 
 impl Assembled {
-    /// A problem from its parts, with reactions that are zero.
+    /// A problem from its parts, with zero reactions.
     ///
     /// # Errors
     /// [`AssemblyError`]: lengths that do not fit together, numbers that are not finite,
@@ -177,7 +175,7 @@ impl Assembled {
         Ok(Self { r: vec![0.0; parts.q.len()], parts })
     }
 
-    /// What the problem is made of.
+    /// The data of the problem.
     #[must_use]
     pub fn parts(&self) -> &Parts {
         &self.parts
@@ -201,7 +199,7 @@ impl Assembled {
         self.velocities_from(&self.r)
     }
 
-    /// The relative velocities of all contacts that these reactions would give.
+    /// The relative velocities of all contacts under these shifted reactions.
     fn velocities_from(&self, r: &[f64]) -> Vec<f64> {
         let (mut u, size) = (self.parts.q.clone(), self.parts.rows.count());
         for (c, u) in u.chunks_exact_mut(size).enumerate() {
@@ -233,8 +231,8 @@ impl Assembled {
         rows.padded(&u[..size])
     }
 
-    /// D of each contact: the largest diagonal entry of its block (1/kg); of the others, where
-    /// nothing yields to it.
+    /// D of each contact: the largest diagonal entry of its block (1/kg); if that is zero, the
+    /// largest of all contacts.
     pub(crate) fn scales(&self) -> Vec<f64> {
         let size = self.parts.rows.count();
         let largest = |block: &[f64]| (0..size).map(|k| block[k * size + k]).fold(0.0, f64::max);
@@ -252,8 +250,8 @@ impl Assembled {
 
     /// The residual of [`super::residual`], from the matrix (–).
     ///
-    /// The reactions in its denominator are without their shift where that is known. Not a number
-    /// stays not a number.
+    /// The denominator has the reactions without their shift, where the shift is known. NaN
+    /// propagates.
     #[must_use]
     pub fn residual(&self) -> f64 {
         let (mut map, mut reaction, mut rounding) = (0.0f64, 0.0, 0.0f64);
@@ -269,9 +267,9 @@ impl Assembled {
         relative(map.sqrt(), rounding.sqrt(), scale)
     }
 
-    /// The natural map as velocities, of the contact where it is largest, over the largest velocity
-    /// without cohesion and contact reactions (–). Where reactions diverge because there is no
-    /// solution, it stays near one while the residual vanishes.
+    /// The velocity error (–): the largest natural map of a contact as a velocity, over the largest
+    /// velocity without cohesion and contact reactions. If reactions diverge because no solution
+    /// exists, the velocity error stays near one while the residual vanishes.
     #[must_use]
     pub fn velocity_error(&self) -> f64 {
         let size = self.parts.rows.count();
@@ -286,8 +284,7 @@ impl Assembled {
         if largest == 0.0 { 0.0 } else { largest / speed }
     }
 
-    /// Sum of the squares of what is added up to the velocity of a contact: what that is rounded
-    /// against.
+    /// Sum of the squares of the summands of a contact's velocity: the scale of its round-off.
     fn summands(&self, contact: usize) -> f64 {
         let size = self.parts.rows.count();
         let mut sum: f64 = self.parts.q[contact * size..(contact + 1) * size].iter().map(|q| q * q).sum();
@@ -314,7 +311,7 @@ impl Assembled {
         if map == 0.0 { 0.0 } else { map.sqrt() / scale }
     }
 
-    /// The problem `problem` with its matrix, in its shifted reactions, as they stand.
+    /// The problem `problem` with its matrix and its present reactions, shifted.
     #[must_use]
     pub fn of<D: Dim>(problem: &ContactProblem<D>) -> Self {
         let mut list = List(Vec::with_capacity(problem.len()));
@@ -359,7 +356,7 @@ impl Assembled {
     }
 }
 
-/// A contact whatever its law.
+/// A contact of any law.
 struct Item<D: Dim> {
     link: Link<D>,
     arms: Arms,

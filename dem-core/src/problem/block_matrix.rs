@@ -1,11 +1,11 @@
 //! W as sparse blocks: one M × M block for each pair of contacts that act on each other.
 
-/// A matrix of square blocks, one row and one column of them for each contact. Diagonal blocks are
-/// always there, and with a block the one that mirrors it.
+/// A matrix of square blocks, one row and one column of them for each contact. Diagonal blocks
+/// always exist, and so does the mirror image of each block.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BlockMatrix {
     size: usize,
-    /// Where the blocks of each contact's row start, and the end.
+    /// Index of the first block of each contact's row, and the number of blocks.
     start: Vec<usize>,
     /// The contact of each block's column, increasing within a row.
     column: Vec<usize>,
@@ -31,7 +31,7 @@ pub struct Asymmetry {
 
 impl BlockMatrix {
     /// Zeros of `contacts` × `contacts` blocks of `size` × `size`, which exist at these places
-    /// (row, column), at those that mirror them and on the diagonal.
+    /// (row, column), at the mirrored places and on the diagonal.
     ///
     /// # Panics
     /// A place lies outside the matrix.
@@ -92,20 +92,20 @@ impl BlockMatrix {
         &self.value
     }
 
-    /// Where the values of a block start.
+    /// Index of the first value of a block.
     fn find(&self, row: usize, column: usize) -> Option<usize> {
         let columns = &self.column[self.start[row]..self.start[row + 1]];
         let place = columns.binary_search(&column).ok()?;
         Some((self.start[row] + place) * self.size * self.size)
     }
 
-    /// The values of a block, row by row, if it is there.
+    /// The values of a block, row by row, if it exists.
     #[must_use]
     pub fn block(&self, row: usize, column: usize) -> Option<&[f64]> {
         self.find(row, column).map(|at| &self.value[at..at + self.size * self.size])
     }
 
-    /// The same, to be changed.
+    /// The same, mutable.
     pub(super) fn block_mut(&mut self, row: usize, column: usize) -> Option<&mut [f64]> {
         self.find(row, column).map(|at| &mut self.value[at..at + self.size * self.size])
     }
@@ -149,7 +149,7 @@ impl BlockMatrix {
         }
     }
 
-    /// Where the matrix differs most from its transpose; nowhere if they are the same.
+    /// The largest difference from the transpose; `None` if the matrix is symmetric.
     #[must_use]
     pub fn asymmetry(&self) -> Option<Asymmetry> {
         let size = self.size;
@@ -193,7 +193,7 @@ mod tests {
 
     #[test]
     fn the_mean_with_the_transpose_is_symmetric() {
-        // block (0, 1) alone: its mirror is made
+        // block (0, 1) alone is given: its mirror image is created
         let entries = [(0, 0, 4.0), (0, 1, 1.0), (1, 0, 1.5), (1, 1, 3.0), (1, 2, 0.5), (2, 2, 2.0), (3, 3, 2.0)];
         let matrix = BlockMatrix::from_entries(2, 2, &entries);
         assert_eq!(matrix.block(1, 0), Some(&[0.0; 4][..]));

@@ -1,11 +1,11 @@
-//! Large problems in blocks that are swept at the same time.
+//! The order in which a large problem is swept: blocks of grains, in parallel.
 //!
-//! A block is [`BLOCK`] grains that follow one another in the list. Contacts within a block come
-//! first, block by block: no two blocks share a grain, so they are swept in parallel. Contacts
-//! between blocks and at walls come last. Within each part, contacts that follow one another share
-//! no grain if that can be (a greedy colouring), so that a processor need not wait for the contact
-//! before. All of this is fixed by the problem alone: results are the same for any number of
-//! threads. A problem of less than two blocks keeps the order of its keys.
+//! A block is [`BLOCK`] consecutive grains. Contacts within a block come first, block by block: no
+//! two blocks share a grain, so they are swept in parallel. Contacts between blocks and at walls
+//! come last. Within each part, consecutive contacts share no grain where possible (a greedy
+//! colouring), so that a processor need not wait for the previous contact. The order depends on the
+//! problem alone: results are the same for any number of threads. A problem of less than two blocks
+//! keeps the order of its keys.
 
 use super::link::{Contact, Group};
 use super::nodes::{Nodes, Span};
@@ -13,27 +13,28 @@ use crate::contact::Law;
 use crate::dim::Dim;
 use rayon::prelude::*;
 
-/// Grains of a block: their velocities stay in a core's own cache.
+/// Number of grains of a block: their velocities fit into a core's own cache.
 const BLOCK: usize = 4096;
 
-/// Do this where threads are near at hand, if the problem is large: else each sweep would wake them
-/// anew.
+/// Run `work`, for a large problem inside the thread pool: the threads then need not be woken for
+/// each sweep.
 pub(crate) fn among_threads<R: Send>(grains: usize, work: impl FnOnce() -> R + Send) -> R {
     if blocks(grains) > 1 { rayon::scope(|_| work()) } else { work() }
 }
 
-/// Number of blocks of so many grains; one means that all is done in the order of the keys.
+/// Number of blocks of this many grains; 1 means that contacts are swept in the order of their
+/// keys.
 fn blocks(grains: usize) -> usize {
     if grains < 2 * BLOCK { 1 } else { grains.div_ceil(BLOCK) }
 }
 
-/// The block that holds both bodies of a pair, and the number of blocks if there is none.
+/// The block that holds both bodies of a pair, or the number of blocks if none does.
 fn block_of(pair: [u32; 2], grains: usize) -> usize {
     let [i, j] = pair.map(|k| k as usize);
     if j < grains && i / BLOCK == j / BLOCK { i / BLOCK } else { blocks(grains) }
 }
 
-/// The order in which the contacts of these pairs, sorted, are swept; none where it is that of the
+/// The order in which the contacts of these sorted pairs are swept; `None` if it is that of the
 /// list.
 pub(crate) fn order(pairs: impl ExactSizeIterator<Item = [u32; 2]>, grains: usize) -> Option<Vec<u32>> {
     let blocks = blocks(grains);
@@ -53,7 +54,7 @@ pub(crate) fn order(pairs: impl ExactSizeIterator<Item = [u32; 2]>, grains: usiz
         colour as usize
     };
     let bins: Vec<u32> = pairs.map(|pair| (block_of(pair, grains) * COLOURS + colour(pair)) as u32).collect();
-    // sorted by counting: as fast as reading the list
+    // counting sort, in linear time
     let mut next = vec![0u32; (blocks + 1) * COLOURS + 1];
     bins.iter().for_each(|bin| next[*bin as usize + 1] += 1);
     for bin in 1..next.len() {
@@ -68,7 +69,7 @@ pub(crate) fn order(pairs: impl ExactSizeIterator<Item = [u32; 2]>, grains: usiz
     Some(order)
 }
 
-/// Visit every contact of a group, those of different blocks at the same time.
+/// Visit every contact of a group, the blocks in parallel.
 #[inline]
 pub(crate) fn for_each<D: Dim, L: Law>(
     nodes: &mut Nodes<D>,
@@ -124,7 +125,7 @@ mod tests {
         let blocks: Vec<usize> = order.iter().map(|k| block_of(pairs[*k as usize], grains)).collect();
         assert!(blocks.is_sorted());
         assert_eq!(blocks.last(), Some(&3));
-        // a colour holds no body twice: that of a contact is the least that is free at both its
+        // a colour holds no body twice: each contact has the lowest colour that is free at both its
         // bodies
         let inside = order.iter().map(|k| pairs[*k as usize]).filter(|pair| block_of(*pair, grains) == 0);
         let (mut first, mut seen) = (0, std::collections::HashSet::new());
@@ -137,7 +138,7 @@ mod tests {
         assert_eq!(first + 1, 4, "a square lattice has four colours");
         let joining = |p: &&[u32; 2]| p[1] as usize == grains || p[0] as usize / BLOCK != p[1] as usize / BLOCK;
         assert_eq!(blocks.iter().filter(|b| **b == 3).count(), pairs.iter().filter(joining).count());
-        // hardly any contact waits for the one before
+        // hardly any contact shares a body with the one before
         let shares = |k: &&[u32]| pairs[k[0] as usize].iter().any(|b| pairs[k[1] as usize].contains(b));
         assert!(order.windows(2).filter(shares).count() < pairs.len() / 50);
     }

@@ -4,14 +4,14 @@
 //! M is block diagonal, one block for each body: the blocks are the connected components of its
 //! pattern. With M = L Lᵀ of each block and H̃ = L⁻¹ H, which is sparse as H is, W = H̃ᵀ H̃. A
 //! block of W exists where two contacts share a body, so a body with k contacts makes k² blocks:
-//! cheap for grains, and what limits a plate that moves.
+//! cheap for grains, but a limit for a moving plate.
 
 use super::block_matrix::BlockMatrix;
 use thiserror::Error;
 
-/// Most unknowns of a body: its block of M is factorised as a dense matrix.
+/// Largest number of unknowns of a body, whose block of M is factorised as a dense matrix.
 const MOST_UNKNOWNS: usize = 1_000;
-/// Most values of W, of 8 bytes each.
+/// Largest number of values of W, 8 bytes each.
 const MOST_VALUES: usize = 100_000_000;
 /// Largest change of an entry of M that makes M symmetric, over the root of the product of its
 /// diagonal entries (–). Siconos's chute with rolling friction needs 1e-3.
@@ -25,7 +25,7 @@ pub struct Global<'a> {
     pub size: usize,
     /// M, N × N (kg; kg m² for spins): symmetric and positive definite.
     pub mass: &'a [(usize, usize, f64)],
-    /// H, N × C·S: what the reactions of the contacts do to the bodies.
+    /// H, N × C·S: maps contact reactions to impulses on the bodies.
     pub directions: &'a [(usize, usize, f64)],
     /// f (N s), N.
     pub impulses: &'a [f64],
@@ -61,7 +61,7 @@ pub enum GlobalError {
         /// The change (–).
         relative: f64,
     },
-    /// A body without mass, or of a mass below zero in some direction.
+    /// The mass of a body is zero or negative in some direction.
     #[error(
         "M is not positive definite in the block of rows {first} to {last} ({unknowns} unknowns): the pivot of row {row} \
              is {pivot:e}"
@@ -75,10 +75,10 @@ pub enum GlobalError {
         unknowns: usize,
         /// The row.
         row: usize,
-        /// What remains of its diagonal entry.
+        /// The pivot, what the factorisation leaves of its diagonal entry.
         pivot: f64,
     },
-    /// Many unknowns are coupled by M.
+    /// M couples too many unknowns.
     #[error(
         "M couples {unknowns} unknowns from row {first} on; blocks of up to {MOST_UNKNOWNS}, as of rigid bodies, are read"
     )]
@@ -88,7 +88,7 @@ pub enum GlobalError {
         /// How many rows it has.
         unknowns: usize,
     },
-    /// Bodies with very many contacts.
+    /// W would be too large, as bodies have very many contacts.
     #[error(
         "W would have {values} values, {MOST_VALUES} at most: the body of row {first} alone has {contacts} contacts"
     )]
@@ -131,8 +131,8 @@ impl Global<'_> {
         Ok(Condensed { matrix, q, asymmetry })
     }
 
-    /// The blocks of M, in the order of their first rows, with zeros in M and what is applied to
-    /// them.
+    /// The bodies in the order of their first rows, with their applied impulses, but not yet with
+    /// their blocks of M and their contacts.
     fn bodies(&self) -> Result<Vec<Body>, GlobalError> {
         let unknowns = self.impulses.len();
         let mut parent: Vec<usize> = (0..unknowns).collect();
@@ -161,13 +161,14 @@ impl Global<'_> {
         Ok(bodies)
     }
 
-    /// Factorise the blocks of M and divide what is applied by L; returns the largest asymmetry.
+    /// Factorise the blocks of M and multiply the applied impulses by L⁻¹; returns the largest
+    /// asymmetry.
     fn factorise(&self, bodies: &mut [Body]) -> Result<f64, GlobalError> {
         let places = places(bodies, self.impulses.len());
         let mut entries = vec![Vec::new(); bodies.len()];
         for (row, column, value) in self.mass {
             let (body, row) = places[*row];
-            // a zero may couple two bodies
+            // an explicit zero may lie between two bodies
             if places[*column].0 == body {
                 entries[body].push((row, places[*column].1, *value));
             }
@@ -186,7 +187,7 @@ impl Global<'_> {
         Ok(asymmetry)
     }
 
-    /// Give the bodies their columns of H̃ = L⁻¹ H.
+    /// Compute the columns of H̃ = L⁻¹ H of each body.
     fn attach(&self, bodies: &mut [Body]) {
         let places = places(bodies, self.impulses.len());
         let mut order: Vec<usize> = (0..self.directions.len()).collect();
@@ -229,13 +230,13 @@ impl Global<'_> {
 /// One block of M, of order n, and the contacts that act on it.
 #[derive(Clone, Debug, Default)]
 struct Body {
-    /// Its rows of M, rising.
+    /// Its rows of M, ascending.
     rows: Vec<usize>,
     /// The block, then L in its lower triangle; n × n, row by row.
     factor: Vec<f64>,
     /// L⁻¹ f, n.
     applied: Vec<f64>,
-    /// Its contacts, rising.
+    /// Its contacts, ascending.
     contacts: Vec<Columns>,
 }
 
@@ -282,7 +283,7 @@ impl Body {
                     continue;
                 }
                 let pivot = own[i] - own[..i].iter().map(|l| l * l).sum::<f64>();
-                // what is left of a diagonal entry by rounding alone is no mass
+                // a pivot within the round-off of its diagonal entry is no mass
                 let sound = pivot > n as f64 * f64::EPSILON * own[i] && pivot.is_finite();
                 if !sound {
                     let (first, last) = (self.rows[0], self.rows[n - 1]);
@@ -304,8 +305,7 @@ impl Body {
         }
     }
 
-    /// Add what the contacts do to each other through this body, and to their velocities what is
-    /// applied to it.
+    /// Add the contribution of this body to W, and that of its applied impulses to q.
     fn add_to(&self, size: usize, matrix: &mut BlockMatrix, q: &mut [f64]) {
         let n = self.rows.len();
         let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
@@ -341,7 +341,7 @@ fn places(bodies: &[Body], unknowns: usize) -> Vec<(usize, usize)> {
     places
 }
 
-/// The root of an unknown in the forest of those that M couples; paths are halved on the way.
+/// The root of an unknown in the union–find forest of coupled unknowns, with path halving.
 fn root(parent: &mut [usize], mut of: usize) -> usize {
     while parent[of] != of {
         parent[of] = parent[parent[of]];
@@ -417,7 +417,7 @@ mod tests {
 
     /// Masses s_i s_j min(i, j), i from one: L has s_i in all places of its row, and the inverse of
     /// min(i, j) is that of a chain of unit springs, 2 on the diagonal (1 at its end) and −1 beside
-    /// it. Powers of two make no rounding.
+    /// it. Powers of two are exact.
     #[test]
     fn four_unknowns_that_are_all_coupled_have_the_inverse_of_their_mass() {
         let s = [2.0, 0.25, 8.0, 0.5];

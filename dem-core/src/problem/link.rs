@@ -1,5 +1,5 @@
-//! One contact of the problem: its geometry, which maps node velocities to relative velocities, its
-//! law and its impulse.
+//! One contact of the problem: its geometry, its law and its impulse. The geometry maps node
+//! velocities to relative velocities.
 
 use crate::bond::{BondStatus, failure};
 use crate::contact::{Arms, Law, Local, Padded};
@@ -35,8 +35,8 @@ impl<D: Dim, A: Axes<D>> Link<D, A> {
         Self { nodes, axes: A::of(frame), dim: PhantomData }
     }
 
-    /// The same with a whole frame: where the axes are a normal alone, the one that [`Dim::frame`]
-    /// makes of it.
+    /// The same link with a whole frame; if the axes are a normal alone, [`Dim::frame`] makes the
+    /// frame.
     pub fn whole(&self) -> Link<D> {
         Link::new(self.nodes, self.frame())
     }
@@ -58,9 +58,9 @@ impl<D: Dim, A: Axes<D>> Link<D, A> {
         Local { n: r.n, t: of_frame::<D, T>(&self.frame(), resized(r.t)), m: resized(r.m) }
     }
 
-    /// This reaction without what the rounding of many sweeps has left of a tangential vector along
-    /// the normal: where grains are fast and reactions small, it would be an impulse that no law
-    /// knows of.
+    /// The reaction with its tangential vector projected on the tangent plane. Round-off of many
+    /// sweeps adds a normal component to this vector; with fast grains and small reactions it would
+    /// be an impulse outside any law.
     #[inline(always)]
     pub(super) fn without_drift<T: Vect, B: Moments>(&self, mut r: Local<T, B>) -> Local<T, B> {
         if is_vector::<D, T>() {
@@ -85,21 +85,20 @@ impl<D: Dim, A: Axes<D>> Link<D, A> {
 }
 
 impl<D: Dim, L: Law> Contact<D, L> {
-    /// The mode in which the bond that this contact is fails under its impulse; none of one that
-    /// holds, and of a dry contact.
+    /// Failure mode of a bond under its impulse; `None` for a bond below its limit and for a dry
+    /// contact.
     pub(crate) fn failure(&self) -> Option<BondStatus> {
         let shift = self.law.shift();
         if shift > 0.0 { failure(&self.r, shift, self.law.cone()) } else { None }
     }
 }
 
-/// Contacts with the same rows, sorted by key; in a large problem, by the blocks in which they are
-/// swept.
+/// Contacts with the same rows, sorted by key; in a large problem, by the blocks of a sweep.
 pub type Group<D, L> = Vec<Contact<D, L>>;
 
 impl<D: Dim, A: Axes<D>> Link<D, A> {
-    /// Relative velocity of a body with this velocity and spin, i, with respect to another, j, at
-    /// the contact point.
+    /// Relative velocity of body i with respect to body j at the contact point, from the velocity
+    /// (m/s) and spin (rad/s) of each.
     #[inline(always)]
     pub(crate) fn relative_velocity<T: Vect, B: Moments>(
         &self,

@@ -1,7 +1,8 @@
 //! The contact problem of one step: u = Hᵀ v, v = v_f + M⁻¹ H r, and one law per contact.
 //!
-//! It knows nodes (a velocity and inverse masses) and contacts, and no bodies, bonds or detection.
-//! It is matrix-free: the Delassus operator W = Hᵀ M⁻¹ H acts through the velocities of the nodes.
+//! The problem consists of nodes (velocities and inverse masses) and contacts, without bodies,
+//! bonds or detection. It is matrix-free: the Delassus operator W = Hᵀ M⁻¹ H acts through the
+//! velocities of the nodes.
 
 pub mod assembled;
 mod block_matrix;
@@ -56,33 +57,33 @@ pub struct ContactProblem<D: Dim> {
     pub dry: Group<D, Dry<D>>,
     /// Contacts without friction.
     pub frictionless: Group<D, Frictionless>,
-    /// Radii of the grains (m) where the stiffness of a contact follows them, in space; empty in
-    /// the plane.
+    /// Radii of the grains (m) in 3D, where the stiffness of a contact depends on them; empty in
+    /// 2D.
     pub radii: Vec<f64>,
     /// Euclidean norm of the applied impulses h F_ext (N s), one scale of the residual.
     pub applied: f64,
 }
 
-/// Something that is done with every contact of a problem, whatever its law.
+/// An operation on every contact of a problem, whatever its law.
 pub trait Visitor<D: Dim> {
     /// Called once for each contact: rigid bonds, elastic bonds, dry contacts, frictionless ones,
     /// each in the order of its group.
     fn visit<L: Law>(&mut self, nodes: &Nodes<D>, contact: &Contact<D, L>);
 }
 
-/// The same for what changes contacts.
+/// An operation that changes every contact.
 pub trait VisitorMut<D: Dim> {
     /// Called once for each contact, in the order of [`Visitor::visit`].
     fn visit<L: Law>(&mut self, contact: &mut Contact<D, L>);
 }
 
-/// Something that is done with every group of contacts, for loops that are written for one law.
+/// An operation on every group of contacts, for loops over contacts of one law.
 pub trait GroupVisitor<D: Dim> {
     /// Called once for each group.
     fn visit<L: Law>(&mut self, nodes: &Nodes<D>, group: &Group<D, L>);
 }
 
-/// The same for what changes contacts and the velocities of the nodes.
+/// An operation that changes the contacts of every group and the velocities of the nodes.
 pub trait GroupVisitorMut<D: Dim> {
     /// Called once for each group.
     fn visit<L: Law>(&mut self, nodes: &mut Nodes<D>, group: &mut Group<D, L>);
@@ -146,8 +147,8 @@ impl<D: Dim> ContactProblem<D> {
         [self.bonded.len(), self.elastic.len(), self.dry.len(), self.frictionless.len()]
     }
 
-    /// Make room for so many contacts of each kind, and no more: lists that grow by doubling would
-    /// take twice the memory of a large problem.
+    /// Reserve memory for exactly this many contacts of each kind: lists that grow by doubling
+    /// would take twice the memory of a large problem.
     pub(crate) fn reserve(&mut self, [bonded, elastic, dry, frictionless]: [usize; KINDS]) {
         self.bonded.reserve_exact(bonded);
         self.elastic.reserve_exact(elastic);
@@ -165,7 +166,7 @@ impl<D: Dim> ContactProblem<D> {
         self.len() == 0
     }
 
-    /// Bytes that the contacts take.
+    /// Memory of the contacts (bytes).
     pub fn contact_bytes(&self) -> usize {
         struct Bytes(usize);
         impl<D: Dim> GroupVisitor<D> for Bytes {
@@ -193,7 +194,7 @@ impl<D: Dim> ContactProblem<D> {
         list.0
     }
 
-    /// Set all impulses from such a list.
+    /// Set all impulses from a list in the form of [`ContactProblem::reactions`].
     pub fn set_reactions(&mut self, list: &[f64]) {
         struct Scatter<'a>(&'a [f64]);
         impl<D: Dim> VisitorMut<D> for Scatter<'_> {
@@ -232,8 +233,8 @@ impl<D: Dim> ContactProblem<D> {
         self.visit_mut(&mut Forget);
     }
 
-    /// Set the node velocities to v_f + M⁻¹ H r, free of the rounding that a long series of
-    /// increments leaves in them and in tangential vectors.
+    /// Set the node velocities to v_f + M⁻¹ H r. This removes the round-off that many increments
+    /// leave in them and in tangential vectors.
     pub fn velocities_from_reactions(&mut self) {
         struct Push;
         impl<D: Dim> GroupVisitorMut<D> for Push {

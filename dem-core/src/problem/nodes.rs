@@ -4,16 +4,16 @@ use super::link::Link;
 use crate::contact::{Arms, Block, Local};
 use crate::dim::{Axes, Dim, Moments, Vect, is_vector, resized};
 
-/// The velocity unknowns of one body, and what an impulse does to them.
+/// The velocity unknowns of one body and its inverse masses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Node<D: Dim> {
     /// Velocity of the centre (m/s).
     pub velocity: D::Vector,
     /// Angular velocity (rad/s).
     pub spin: D::Spin,
-    /// Inverse mass (1/kg), zero when the body does not yield.
+    /// Inverse mass (1/kg), zero if impulses do not move the body.
     pub inverse_mass: f64,
-    /// Inverse moment of inertia (1/(kg m²)), zero when the body does not turn.
+    /// Inverse moment of inertia (1/(kg m²)), zero if impulses do not turn the body.
     pub inverse_inertia: f64,
 }
 
@@ -24,16 +24,16 @@ pub struct Nodes<D: Dim> {
     pub all: Vec<Node<D>>,
     /// Number of grains.
     pub grains: usize,
-    /// Unit direction in which each wall yields to impulses; zero for a wall that does not.
+    /// Unit direction in which impulses move each wall; zero for a wall that they do not move.
     pub drives: Vec<D::Vector>,
 }
 
-/// Nodes that follow one another, and the walls where they are all of them.
+/// Consecutive nodes: a block of grains, or all grains and walls.
 pub(crate) struct Span<'a, D: Dim> {
     pub(super) all: &'a mut [Node<D>],
-    /// Number of the first.
+    /// Index of the first.
     pub(super) first: usize,
-    /// How many are grains.
+    /// Number of grains among them.
     pub(super) grains: usize,
     pub(super) drives: &'a [D::Vector],
 }
@@ -66,15 +66,14 @@ impl<D: Dim> Nodes<D> {
         };
         let drive = (link.nodes[1] as usize).checked_sub(self.grains).map(|wall| self.drives[wall]);
         if let Some(d) = drive.filter(|_| j.inverse_mass > 0.0) {
-            // the wall yields along d alone: a diagonal that dominates (n·d)², (t·d)² and their
+            // the wall moves along d alone: the diagonal dominates (n·d)², (t·d)² and their
             // coupling
             let (along, across) = D::split(&link.axes, d);
             let across = across.norm();
             let coupling = (along * across).abs();
             block.n = i.inverse_mass + j.inverse_mass * (along * along + coupling);
             block.t = i.inverse_mass + li * li * i.inverse_inertia + j.inverse_mass * (across * across + coupling);
-            // no impulse changes a row whose bodies do not yield along it: any positive entry will
-            // do
+            // if no body moves along a row, impulses do not change it: any positive entry is valid
             let some = block.n.max(block.t);
             block.n = if block.n == 0.0 { some } else { block.n };
             block.t = if block.t == 0.0 { some } else { block.t };
@@ -108,7 +107,7 @@ impl<D: Dim> Span<'_, D> {
         let [i, j] = link.nodes.map(|node| node as usize - self.first);
         let impulse = link.impulse(&r);
         let (t, m): (D::Tangent, D::Moment) = (resized(r.t), resized(r.m));
-        // without moment rows both torques are multiples of one
+        // without moment rows both torques are multiples of one vector
         let slide = match link.axes.frame() {
             Some(frame) if B::LEN == 0 => D::spin_rows_transposed(frame, t),
             None if is_vector::<D, T>() => D::torque(link.axes.normal(), resized(r.t)),

@@ -1,32 +1,33 @@
-//! One measure of error for all solvers: the natural map, relative to the reactions and the load.
+//! The residual of a contact problem, one measure for all solvers: the natural map, relative to the
+//! reactions and the load.
 //!
 //! residual = √Σ‖r̂ − P_K(r̂ − ũ/D)‖² / max(√Σ‖r‖², ‖h F_ext‖), with D one scalar per contact, the
-//! largest diagonal entry of its Delassus block. The cohesion's shift is not in the denominator: on
-//! a strongly bonded sample it would hide the load. A natural map that is as small as the rounding
-//! of the velocities behind it is zero: grains that part leave reactions so small that their ratio
-//! to the map says nothing.
+//! largest diagonal entry of its Delassus block. The cohesive shift is not in the denominator: in a
+//! strongly bonded sample it would mask the load. A natural map within the round-off of its
+//! velocities counts as zero: separating grains leave reactions so small that their ratio to the
+//! map is meaningless.
 //!
-//! The residual is relative to all reactions. Where a body of mass m bears bodies of mass M, its
-//! velocity is off by the residual times M/m. The *velocity error* measures that, and the solvers
-//! of [`crate::solver::Staged`] stop on both.
+//! The residual is relative to all reactions. Where a body of mass m carries bodies of mass M, the
+//! error of its velocity is the residual times M/m. The *velocity error* measures that, and the
+//! solvers of [`crate::solver::Staged`] stop on both.
 
 use super::{Contact, ContactProblem, Group, GroupVisitor, Nodes, Visitor};
 use crate::contact::Law;
 use crate::dim::{Dim, Vect};
 use rayon::prelude::*;
 
-/// Relative rounding of the natural map that counts as zero.
+/// Relative round-off up to which the natural map counts as zero.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
 #[derive(Default)]
 struct Sums {
     map: f64,
     reaction: f64,
-    /// Impulses that would stop the bodies of each contact: what the map is rounded against.
+    /// Impulses that would stop the bodies of each contact: the scale of the map's round-off.
     motion: f64,
 }
 
-/// Contacts that are summed one after another; chunks of so many are summed at the same time.
+/// Number of contacts summed in sequence; chunks of this size are summed in parallel.
 const CHUNK: usize = 32_768;
 
 impl<D: Dim> GroupVisitor<D> for Sums {
@@ -65,8 +66,7 @@ impl Sums {
     }
 }
 
-/// The residual of the impulses and node velocities that the problem now holds (–). Not a number
-/// stays not a number.
+/// The residual of the impulses and node velocities that the problem now holds (–). NaN propagates.
 pub fn residual<D: Dim>(problem: &ContactProblem<D>) -> f64 {
     let mut sums = Sums::default();
     problem.visit_groups(&mut sums);
@@ -74,27 +74,27 @@ pub fn residual<D: Dim>(problem: &ContactProblem<D>) -> f64 {
     relative(sums.map.sqrt(), sums.motion.sqrt(), scale)
 }
 
-/// The norm of the natural map over `scale`; zero where it is the rounding of summands of norm
+/// The norm of the natural map over `scale`; zero if it is within the round-off of summands of norm
 /// `rounded`.
 pub(super) fn relative(map: f64, rounded: f64, scale: f64) -> f64 {
     if map <= ROUNDING * rounded { 0.0 } else { map / scale }
 }
 
 /// The velocity error of the impulses and node velocities that the problem now holds (–): the
-/// natural map as a velocity, D ‖map‖, of the contact where it is largest, over the largest
-/// relative velocity without reactions.
+/// largest natural map of a contact as a velocity, D ‖map‖, over the largest relative velocity
+/// without reactions.
 pub fn velocity_error<D: Dim>(problem: &ContactProblem<D>) -> f64 {
     let Largest { map, free, .. } = Largest::of(problem);
     if map == 0.0 { 0.0 } else { map / free }
 }
 
-/// The nodes of the contact that is furthest from its law by the same measure.
+/// The nodes of the contact with the largest velocity error.
 pub fn furthest_from_law<D: Dim>(problem: &ContactProblem<D>) -> [u32; 2] {
     Largest::of(problem).pair
 }
 
-/// The largest velocities of all contacts (m/s): of the natural map, with the nodes of its contact,
-/// and without reactions.
+/// Largest velocities over all contacts (m/s): `map` of the natural map, at the contact between the
+/// nodes `pair`, and `free` without reactions.
 struct Largest<'a, D: Dim> {
     problem: &'a ContactProblem<D>,
     map: f64,

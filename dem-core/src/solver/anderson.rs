@@ -1,10 +1,11 @@
 //! Anderson's acceleration of a fixed-point iteration x ← g(x) (Anderson 1965; Walker & Ni, SIAM J.
 //! Numer. Anal. 49, 2011).
 //!
-//! Of the last steps it keeps how the results g and the residuals f = g − x changed, seeks the
-//! combination of changes of f that comes nearest to the present f, and takes the matching changes
-//! of g away. On a linear iteration this is GMRES; on Gauss–Seidel's, which is linear while no
-//! contact changes its status, it finds the long waves that sweeps alone diffuse away.
+//! It stores the changes of the results g and of the residuals f = g − x over the last steps. The
+//! combination of changes of f that is nearest to the present f is sought, and the same combination
+//! of changes of g is subtracted from g. On a linear iteration this is GMRES. Gauss–Seidel is
+//! linear while no contact changes its status; there the acceleration removes long-wave errors,
+//! which sweeps alone reduce only by diffusion.
 
 use crate::solver::tuning::gauss_seidel as tuning;
 use nalgebra::{DMatrix, DVector};
@@ -26,7 +27,7 @@ struct Pair {
     f: Vec<f64>,
 }
 
-/// Scalar product in eight partial sums: always the same order, and fast.
+/// Scalar product in eight partial sums: fast, and in a fixed order.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
     let (mut blocks_a, mut blocks_b) = (a.chunks_exact(8), b.chunks_exact(8));
@@ -49,7 +50,7 @@ impl Anderson {
         Self { depth, from, last: None, changes: Vec::new(), gram: Vec::new(), least: f64::INFINITY }
     }
 
-    /// The point to go on from, where the iteration came to `g` from the last one.
+    /// The next point, for the result `g` of the iteration at the last one.
     pub fn next(&mut self, g: Vec<f64>) -> &[f64] {
         let f = minus(&g, &self.from);
         let size = dot(&f, &f);
@@ -87,7 +88,7 @@ impl Anderson {
         self.gram.push(row);
     }
 
-    /// Weights of the changes whose f come nearest to the present one; none without changes.
+    /// Least-squares weights of the changes for the present residual `f`; none without changes.
     fn weights(&self, f: &[f64]) -> Option<DVector<f64>> {
         let k = self.changes.len();
         if k == 0 {
@@ -106,7 +107,7 @@ mod tests {
 
     #[test]
     fn a_linear_iteration_ends_in_as_many_steps_as_it_has_rates() {
-        // x ← R x + b with four rates near one: alone it would take thousands of steps
+        // x ← R x + b with four rates near one: without acceleration it takes thousands of steps
         let rates = [0.999, 0.99, 0.9, -0.5];
         let b = [1.0, 2.0, -3.0, 4.0];
         let apply = |x: &[f64]| (0..4).map(|k| rates[k] * x[k] + b[k]).collect::<Vec<_>>();

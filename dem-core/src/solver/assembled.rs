@@ -1,10 +1,9 @@
-//! Solvers of the problem with its matrix ([`Assembled`]), for what other codes wrote.
+//! Gauss–Seidel for a problem given by its matrix ([`Assembled`]), as other codes write it.
 //!
-//! Gauss–Seidel visits the contacts in their order. The block of a contact may be any symmetric
-//! matrix here, so there is no solution by cases: the contact sticks if the reaction that stops it
-//! lies in its cone, it is open if zero satisfies its law, and otherwise the predictor–corrector is
-//! repeated with γ = 1/(largest eigenvalue of the block), which contracts where the flow is
-//! associated.
+//! Contacts are visited in their order. The block of a contact may be any symmetric matrix, so
+//! there is no closed-form local solve. The contact sticks if the reaction that stops it lies in
+//! its cone; it is open if zero satisfies its law; otherwise the predictor–corrector is repeated
+//! with γ = 1/(largest eigenvalue of the block), which contracts for associated flow.
 
 use super::gauss_seidel::{Sweepable, iterate};
 use super::{GaussSeidelSettings, SolveReport};
@@ -16,7 +15,7 @@ use nalgebra::SMatrix;
 
 type Block = SMatrix<f64, PADDED, PADDED>;
 
-/// The block of a contact, padded, and what its local solve needs.
+/// The block of a contact, padded, with the data of its local solve.
 struct Site {
     block: Block,
     /// Inverse on the rows that are not zero, if the block has one.
@@ -24,7 +23,7 @@ struct Site {
     gamma: f64,
 }
 
-/// What all local solves of a problem need, computed once.
+/// Data of all local solves of a problem, computed once.
 pub(super) struct Sites(Vec<Site>);
 
 impl Site {
@@ -37,7 +36,7 @@ impl Site {
         for (k, w) in values.iter().enumerate() {
             block[(place(k / size), place(k % size))] = *w;
         }
-        // rows that the contact lacks: one on the diagonal keeps them out of the way of the inverse
+        // a diagonal entry for each row that the contact lacks makes the matrix invertible
         let mut filled = block;
         let lacks: Vec<usize> = (0..PADDED).filter(|k| block.row(*k).iter().all(|w| *w == 0.0)).collect();
         lacks.iter().for_each(|k| filled[(*k, *k)] = scale);
@@ -87,7 +86,7 @@ pub fn gauss_seidel(problem: &mut Assembled, settings: &GaussSeidelSettings) -> 
     iterate(&mut Visited { problem, sites: &sites }, settings)
 }
 
-/// A problem and what the visits of its contacts need.
+/// A problem with the data of its local solves.
 struct Visited<'a> {
     problem: &'a mut Assembled,
     sites: &'a Sites,
@@ -98,7 +97,7 @@ impl Sweepable for Visited<'_> {
         self.sites.sweep(self.problem, local);
     }
 
-    /// Nothing: they are taken from W whenever they are asked for.
+    /// Nothing: velocities are computed from W when they are needed.
     fn velocities_from_reactions(&mut self) {}
 
     fn residual(&self) -> f64 {

@@ -1,6 +1,5 @@
-//! A problem with its matrix as rows over unknowns: W = L Lᵀ by a pivoted Cholesky factorisation up
-//! to the rank, so that u = L y + q and y = Lᵀ r, as if there were bodies of unit mass behind it. L
-//! is full: every contact has as many coefficients as W has rank.
+//! A problem given by its matrix W, as a [`Solvable`]: its rows have no coefficients and no
+//! unknowns, and the methods use W itself ([`Solvable::matrix`]).
 
 use super::assembled::{Sites, gauss_seidel};
 use super::rows::{Row, Rows, StiffnessRatio, places};
@@ -24,7 +23,7 @@ impl Solvable for Assembled {
         let normal: f64 = (0..self.len()).map(|c| parts.matrix.diagonal(c)[0]).sum();
         let soft = normal / (self.len().max(1) as f64 * kappa);
         let weights = ratio.weights(soft);
-        // without the shift, u = W r + q
+        // for reactions without the shift s: u = W r + (q + W s)
         let mut shifts = vec![0.0; self.r.len()];
         (0..self.len()).for_each(|c| shifts[c * size] = parts.shift[c]);
         let mut out = Rows { applied: parts.applied, ..Rows::default() };
@@ -42,7 +41,7 @@ impl Solvable for Assembled {
                 given: rows.padded(&given),
                 weights,
                 multiplier: self.own_reaction(c),
-                // the compliance of elastic bonds is inside W and q
+                // the compliance of elastic bonds is part of W and q
                 compliance: Weights::default(),
                 carried: Padded::zero(),
                 normal: parts.matrix.diagonal(c)[0],

@@ -1,4 +1,4 @@
-//! What can be said of a problem that was not solved.
+//! The verdict on a problem that was not solved: no solution, solvable, or undecided.
 //!
 //! | verdict | proof |
 //! |---|---|
@@ -7,13 +7,13 @@
 //! | neither is proved | |
 //!
 //! K_S = { dry contacts and bipotential bonds: d_n ≥ 0, all else 0; associated bonds: d ∈ K;
-//! elastic bonds: d = 0 }. Every solution has d·u ≥ 0 for d ∈ K_S, and d·u = q·d where H d = 0. In
-//! 2D the problem is a linear complementarity problem with a copositive matrix: it has a solution
-//! where q·d ≥ 0 for all d ∈ K with H d = 0, which follows from u ∈ K*.
+//! elastic bonds: d = 0 }. Every solution has d·u ≥ 0 for d ∈ K_S, and d·u = q·d if H d = 0. In 2D
+//! the problem is a linear complementarity problem with a copositive matrix: it has a solution if
+//! q·d ≥ 0 for all d ∈ K with H d = 0, which follows from u ∈ K*.
 //!
 //! Both proofs come from the least violation of an associated problem (`interior/violation.rs`) and
-//! are checked here on the problem as it was given. Only what passes that check is reported.
-//! Derivation and sources: docs/theory/interior-point.md, "What has no solution".
+//! are checked here on the original problem. A verdict is reported only if its proof passes this
+//! check. Derivation and sources: docs/theory/interior-point.md, "What has no solution".
 
 use super::interior::{Interior, Least};
 use super::rows::{Row, Rows, StiffnessRatio};
@@ -24,11 +24,10 @@ use crate::problem::ContactProblem;
 use crate::problem::assembled::{Assembled, BlockMatrix};
 use crate::solver::tuning::certificate as tuning;
 
-/// What is proved of a problem that was not solved.
+/// The verdict on a problem that was not solved.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Verdict<T> {
-    /// It has no solution: no velocities are admissible for these contacts, or bodies, in rising
-    /// order.
+    /// No solution: no velocities are admissible for these contacts, or bodies, in ascending order.
     NoSolution(Vec<T>),
     /// It has a solution, which the solver has not found.
     Guaranteed,
@@ -37,7 +36,7 @@ pub enum Verdict<T> {
 }
 
 impl<T> Verdict<T> {
-    /// The same with other names for what has no solution.
+    /// The same verdict with other names for its contacts or bodies.
     #[must_use]
     pub fn map<U>(self, names: impl FnOnce(Vec<T>) -> Vec<U>) -> Verdict<U> {
         match self {
@@ -48,14 +47,13 @@ impl<T> Verdict<T> {
     }
 }
 
-/// The verdict on a problem, by the numbers of its contacts in the order of
-/// [`ContactProblem::visit`].
+/// The verdict on a problem; its contacts are numbered in the order of [`ContactProblem::visit`].
 #[must_use]
 pub fn verdict<D: Dim>(problem: &ContactProblem<D>) -> Verdict<usize> {
     of(problem)
 }
 
-/// The verdict on a problem that is known by its matrix.
+/// The verdict on a problem given by its matrix.
 #[must_use]
 pub fn verdict_of_assembled(problem: &Assembled) -> Verdict<usize> {
     of(problem)
@@ -83,7 +81,7 @@ fn is_elastic(row: &Row) -> bool {
 fn certificate(rows: &Rows, matrix: Option<&BlockMatrix>) -> Option<Vec<Padded>> {
     let Least { direction: mut d, .. } = least(rows, matrix, strict, 0.0)?;
     for (row, d) in rows.list.iter().zip(&mut d) {
-        // rounding may leave them next to the cone
+        // round-off may leave them just outside the cone
         let cone = strict(row);
         for (slope, size) in [(cone.mu, d.t.norm()), (cone.nu, d.m.bending()), (cone.xi, d.m.twist())] {
             d.n = if size > slope * d.n { (1.0 + tuning::ROUNDING) * size / slope } else { d.n };
@@ -99,7 +97,7 @@ fn proves(rows: &Rows, matrix: Option<&BlockMatrix>, d: &[Padded]) -> bool {
         |(row, d): (&Row, &Padded)| if is_elastic(row) { *d == Padded::zero() } else { strict(row).contains(d) };
     let largest =
         d.iter().flat_map(|d| <[f64; PADDED]>::from(d.in_order())).fold(0.0, |most: f64, d| most.max(d.abs()));
-    // H̃ d over the largest coefficient of each unknown, or W d over the size of each block
+    // H̃ d relative to the largest coefficient of each unknown, or W d to the size of each block
     let net: Vec<f64> = match matrix {
         None => rows.pushed(d).iter().zip(rows.largest()).map(|(net, most)| net / most).collect(),
         Some(_) => {
@@ -117,8 +115,8 @@ fn proves(rows: &Rows, matrix: Option<&BlockMatrix>, d: &[Padded]) -> bool {
     rows.list.iter().zip(d).all(in_cone) && balanced && power < -tuning::EXACT * size
 }
 
-/// The least violation of the problem without shifts and elastic bonds, all flow associated, with
-/// these cones, and normal velocities that must exceed `margin` (m/s).
+/// The least violation of the associated problem with these cones, without shifts and elastic
+/// bonds. Normal velocities must exceed `margin` (m/s).
 fn least(rows: &Rows, matrix: Option<&BlockMatrix>, cone: impl Fn(&Row) -> Cone, margin: f64) -> Option<Least> {
     let mut convex = rows.clone();
     convex.free.fill(0.0);
@@ -158,8 +156,8 @@ fn velocities(rows: &Rows, matrix: Option<&BlockMatrix>, r: &[Padded]) -> Vec<Pa
     rows.list.iter().enumerate().map(one).collect()
 }
 
-/// Whether velocities well inside K* are found, where nothing has to be found if the given ones lie
-/// in it.
+/// Whether there are velocities in K*: the given ones, or else those of the least violation, if
+/// they lie well inside.
 fn is_admissible(rows: &Rows, matrix: Option<&BlockMatrix>) -> bool {
     let inside = |u: &[Padded], least: f64| {
         let margin = |(row, u): (&Row, &Padded)| {
@@ -228,7 +226,7 @@ mod tests {
         opened.list[0].given.n = 0.5;
         assert!(!proves(&opened, matrix, &d));
         assert!(certificate(&opened, matrix).is_none());
-        // a coefficient of the matrix, and the compliance of a contact
+        // a compliant contact; zero impulses
         let mut soft = rows.clone();
         soft.list[1].compliance = Weights { n: 1e-6, ..Weights::default() };
         assert!(!proves(&soft, matrix, &d));

@@ -1,12 +1,13 @@
-//! Steps without a linear solve: while a sample at rest is loaded evenly and no contact changes its
-//! status, each step adds the same to the reactions. What two consecutive solves have added is
-//! added again, and taken where the contact laws hold better than the tolerance asks, the balance
-//! as well as after the last solve, and no bond is at its limit.
+//! Extrapolated steps, without a linear solve. While a sample at rest is loaded at a constant rate
+//! and no contact changes its status, the reactions grow by the same increment in each step. The
+//! increment between two consecutive solves is added again. The step is accepted if the residual is
+//! well below its tolerance, the balance of momentum is as good as after the last solve, and no
+//! bond is at its limit.
 //!
-//! Laws and balance do not tell how the contacts of a rigid network share the load. What sticks
-//! shows a change of status by itself: its reaction leaves the cone. What is open or slips does
-//! not, and so the distance to closing or sticking is predicted with the reactions. And from time
-//! to time a solve is compared with what was predicted.
+//! Laws and balance do not determine how the contacts of a rigid network share the load. A contact
+//! that sticks shows a change of status: its reaction leaves the cone. An open or slipping contact
+//! does not, so its margin to closing or sticking is extrapolated with the reactions. At intervals
+//! a solve is compared with the extrapolation.
 
 use super::rest::Rest;
 use super::rows::{Row, Rows, mass_unit};
@@ -17,35 +18,35 @@ use crate::problem::{ContactProblem, KINDS};
 use crate::saved::{Mismatch, Reader, Saved};
 use crate::solver::tuning::extrapolation as tuning;
 
-/// How the reactions grow.
+/// Reactions and their growth.
 #[derive(Clone, Default)]
 pub(super) struct Extrapolation {
     /// Numbers of contacts of each kind.
     shape: [usize; KINDS],
-    /// Reactions of a solve, and what each step since has added to them (N s).
+    /// Reactions of a solve, and their increment in each step since (N s).
     base: Vec<f64>,
     rate: Vec<f64>,
     /// The same for the [margins](margins) of the contacts.
     margins: Vec<f64>,
     margin_rate: Vec<f64>,
-    /// Steps since.
+    /// Steps since that solve.
     steps: u64,
-    /// Steps that may be predicted between solves, none while the growth is not known to be even,
-    /// and those that are left.
+    /// Extrapolated steps allowed between two solves (none until a solve confirms constant growth),
+    /// and the steps left of them.
     most: u64,
     left: u64,
-    /// Share of the impulses that the solve left as momentum (–).
+    /// Momentum that the solve left, relative to the net impulses of the contacts (–).
     moves: f64,
-    /// Whether the last step was predicted: what it left of momentum is in the reactions of the
-    /// next solve, which tell nothing of the growth.
+    /// Whether the last step was extrapolated. The reactions of the next solve then include the
+    /// momentum that it left, and say nothing about the growth.
     kicked: bool,
-    /// Back-off after predictions that failed.
+    /// Back-off after failed extrapolations.
     rest: Rest,
 }
 
 impl Extrapolation {
-    /// Set the reactions of a problem to what is predicted, if that solves it: its residual and
-    /// load error. Else the reactions are left as they were.
+    /// Set the reactions of a problem to the extrapolated ones if these solve it; returns their
+    /// residual and load error. Else the reactions remain unchanged.
     pub fn predict<D: Dim>(
         &mut self,
         problem: &mut ContactProblem<D>,
@@ -75,7 +76,8 @@ impl Extrapolation {
         None
     }
 
-    /// Compare a solution, and the [margins](margins) of its contacts, with what was predicted.
+    /// Compare a solution, and the [margins](margins) of its contacts, with the extrapolation, and
+    /// update the growth.
     pub fn learn<D: Dim>(&mut self, problem: &ContactProblem<D>, margins: &[f64], load_tolerance: f64) {
         let unit = mass_unit(&problem.nodes);
         let (solution, margins) = (problem.reactions(), margins.iter().map(|m| m * unit).collect::<Vec<_>>());
@@ -110,18 +112,18 @@ impl Extrapolation {
         (self.base, self.margins, self.steps, self.left) = (solution, margins, 0, self.most);
     }
 
-    /// Nothing is known any more.
+    /// Forget the growth; the back-off remains.
     pub fn forget(&mut self) {
         *self = Self { rest: self.rest, ..Self::default() };
     }
 
-    /// What has grown from `base` at this rate until the next step.
+    /// `base` extrapolated at this rate to the next step.
     fn grown(&self, base: &[f64], rate: &[f64]) -> Vec<f64> {
         let steps = (self.steps + 1) as f64;
         base.iter().zip(rate).map(|(base, rate)| base + steps * rate).collect()
     }
 
-    /// Whether all that is open or slips does so in the next step too.
+    /// Whether each open or slipping contact keeps its status in the next step.
     fn keeps_status(&self) -> bool {
         let size = self.base.iter().map(|r| r * r).sum::<f64>().sqrt();
         self.grown(&self.margins, &self.margin_rate).into_iter().all(|margin| margin >= -tuning::ROUNDING * size)
@@ -160,9 +162,9 @@ impl Extrapolation {
     }
 }
 
-/// By how much each contact is beyond its limits at these velocities, as a reaction (N s over the
-/// unit of mass): what an open one would have to be pushed to close, and what one that slips, to
-/// stick. Infinite for one that does neither.
+/// The margin of each contact to another status at these velocities, as a reaction (N s over the
+/// unit of mass): the reaction that closes an open contact or makes a slipping one stick. Infinite
+/// for a sticking contact.
 pub(super) fn margins(rows: &Rows, velocities: &[Padded], reactions: &[Padded]) -> Vec<f64> {
     let beyond = |norm: f64, weight: f64, limit: f64| match norm / weight - limit {
         beyond if beyond > 0.0 => beyond,
@@ -180,8 +182,8 @@ pub(super) fn margins(rows: &Rows, velocities: &[Padded], reactions: &[Padded]) 
     rows.list.iter().zip(velocities).zip(reactions).map(margin).collect()
 }
 
-/// What is left of momentum over what the contacts have taken, both over the roots of the masses:
-/// the load error of a sample at rest (–).
+/// Momentum that remains, relative to the net impulses of the contacts, both divided by the square
+/// roots of the masses: the load error of a sample at rest (–).
 fn motion<D: Dim>(problem: &ContactProblem<D>) -> f64 {
     let (mut left, mut taken) = (0.0, 0.0);
     for (node, (velocity, spin)) in problem.nodes.all.iter().zip(problem.free.iter()) {

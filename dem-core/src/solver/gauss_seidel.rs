@@ -1,10 +1,10 @@
 //! Non-linear Gauss–Seidel: the method of successive equilibria (Moreau, Jean; paper §2.1).
 //!
 //! One sweep visits every contact in the order of its group and key, reads the relative velocity
-//! from the nodes, betters the contact's impulse by its law and gives the change to the nodes at
-//! once. No matrix is assembled. Information moves one neighbour a sweep, so long chains of bonds
-//! converge slowly: the residual says how far. Anderson's acceleration of bursts of sweeps, an
-//! option, takes ten times fewer of them where bonds abound.
+//! from the nodes, updates the contact's impulse by its law and applies the change to the nodes at
+//! once. No matrix is assembled. Information moves one neighbour per sweep, so long chains of bonds
+//! converge slowly; the residual measures the convergence. Optionally, Anderson's acceleration of
+//! bursts of sweeps reduces their number by a factor of ten in bonded samples.
 
 use super::anderson::Anderson;
 use super::{ContactSolver, Route, SolveReport, SolveStatus, Work};
@@ -20,18 +20,18 @@ use crate::solver::tuning::gauss_seidel as tuning;
 pub struct GaussSeidelSettings {
     /// How the reaction of one contact is updated.
     pub local: LocalSolve,
-    /// Residual that the solver aims at (–).
+    /// Target residual (–).
     pub tolerance: f64,
     /// Largest residual that is accepted (–), at least `tolerance`.
     pub accept: f64,
     /// Most sweeps in one solve.
     pub max_sweeps: u64,
-    /// Steps that Anderson's acceleration remembers; 0 for plain sweeps.
+    /// Steps stored by Anderson's acceleration; 0 for plain sweeps.
     pub acceleration: usize,
 }
 
 impl Default for GaussSeidelSettings {
-    /// Exact local solves to a residual of 10⁻⁸, nothing above 10⁻⁶ accepted, no acceleration.
+    /// Exact local solves to a residual of 10⁻⁸, residuals up to 10⁻⁶ accepted, no acceleration.
     fn default() -> Self {
         Self { local: LocalSolve::Exact, tolerance: 1e-8, accept: 1e-6, max_sweeps: 100_000, acceleration: 0 }
     }
@@ -67,7 +67,7 @@ struct Sweep(LocalSolve);
 impl<D: Dim> GroupVisitorMut<D> for Sweep {
     #[inline]
     fn visit<L: Law>(&mut self, nodes: &mut Nodes<D>, group: &mut Group<D, L>) {
-        // a constant for each call, so that the choice is made outside the loops
+        // a constant argument in each call moves the branch out of the loops
         match self.0 {
             LocalSolve::Exact => sweep_group(nodes, group, LocalSolve::Exact),
             LocalSolve::PredictorCorrector => sweep_group(nodes, group, LocalSolve::PredictorCorrector),
@@ -80,18 +80,17 @@ pub fn sweep<D: Dim>(problem: &mut ContactProblem<D>, local: LocalSolve) {
     problem.visit_groups_mut(&mut Sweep(local));
 }
 
-/// What the iteration asks of a problem, matrix-free or with its matrix.
+/// Interface of the iteration to a problem, matrix-free or given by its matrix.
 pub(super) trait Sweepable {
     /// One visit of every contact.
     fn sweep(&mut self, local: LocalSolve);
-    /// Set the velocities to what the impulses make of them, free of the rounding of the sweeps'
-    /// increments.
+    /// Recompute the velocities from the impulses, without the round-off of the sweeps' increments.
     fn velocities_from_reactions(&mut self);
-    /// The residual of the impulses and velocities at hand (–).
+    /// The residual of the current impulses and velocities (–).
     fn residual(&self) -> f64;
     /// All impulses in one list.
     fn gather(&self) -> Vec<f64>;
-    /// The inverse of [`Sweepable::gather`], and the velocities that belong to the impulses.
+    /// The inverse of [`Sweepable::gather`]; also recomputes the velocities from the impulses.
     fn scatter(&mut self, from: &[f64]);
 }
 
@@ -123,7 +122,7 @@ fn plain(problem: &mut impl Sweepable, settings: &GaussSeidelSettings, most: u64
     let mut error = problem.residual();
     let mut sweeps = 0;
     while error > settings.tolerance && sweeps < most {
-        // the residual costs about a sweep: look at it ever more rarely, at most every 64 sweeps
+        // the residual costs about a sweep: evaluate it ever more rarely, up to 64 sweeps apart
         let burst = (1 + sweeps / 4).min(64).min(most - sweeps);
         for _ in 0..burst {
             problem.sweep(settings.local);
@@ -131,8 +130,7 @@ fn plain(problem: &mut impl Sweepable, settings: &GaussSeidelSettings, most: u64
         sweeps += burst;
         error = problem.residual();
         if error <= settings.tolerance {
-            // what counts is the error of the impulses, without the rounding of the sweeps'
-            // increments
+            // decide on the residual without the round-off of the sweeps' increments
             problem.velocities_from_reactions();
             error = problem.residual();
         }
@@ -144,8 +142,8 @@ fn plain(problem: &mut impl Sweepable, settings: &GaussSeidelSettings, most: u64
     (sweeps, error)
 }
 
-/// Bursts of sweeps, accelerated, after some plain ones. What it ends with is the result of a
-/// burst: every impulse is in its cone.
+/// Plain sweeps, then accelerated bursts of sweeps. The result is that of a burst, not of an
+/// extrapolation: every impulse is in its cone.
 fn accelerated(problem: &mut impl Sweepable, settings: &GaussSeidelSettings) -> (u64, f64) {
     let (mut sweeps, mut error) = plain(problem, settings, tuning::PLAIN.min(settings.max_sweeps));
     if error <= settings.tolerance {
@@ -191,7 +189,7 @@ impl<D: Dim> ContactSolver<D> for GaussSeidel {
         Box::new(*self)
     }
 
-    /// Nothing is kept.
+    /// No state is kept.
     fn save(&self, _: &mut Saved) {}
 
     fn restore(&mut self, _: &mut Reader) -> Result<(), Mismatch> {

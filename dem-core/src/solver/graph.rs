@@ -1,4 +1,4 @@
-//! The graph of bodies and contacts, and the tree along which matrices on it are factorised.
+//! The graph of bodies and contacts, and the elimination tree of matrices on it.
 
 use super::rows::Rows;
 use crate::linear::Tree;
@@ -13,7 +13,7 @@ pub(super) struct Graph {
 }
 
 impl Graph {
-    /// That of these rows, the last one where it still is.
+    /// The graph of these rows; `last` is reused if it is still valid.
     pub fn of(rows: &Rows, last: &mut Option<Arc<Self>>) -> Option<Arc<Self>> {
         let nodes = nodes(rows);
         let node = |first: usize| nodes.partition_point(|(start, _)| *start < first);
@@ -36,8 +36,8 @@ impl Graph {
     }
 }
 
-/// First unknown of each node, and how many it has, in rising order; unknowns without a contact
-/// stand alone.
+/// First unknown and number of unknowns of each node, in ascending order. An unknown without a
+/// contact is a node of its own.
 fn nodes(rows: &Rows) -> Vec<(usize, usize)> {
     let mut counts = vec![1; rows.unknowns];
     for row in &rows.list {

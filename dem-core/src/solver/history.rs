@@ -1,15 +1,16 @@
-//! The reactions that a step's reactions are measured from.
+//! The anchor, from which a step's reactions are measured: the last reactions, those of the bonds
+//! without self-stress.
 //!
-//! In the limit of stiff contacts reactions grow by ρ times the displacements of a step. A bond
-//! that has held since it formed carries ρ H̃ᵀλ, with λ the displacements of the bodies since then:
-//! of all reactions with the same net impulses on the bodies those of least Σ r²/ρ. A solve leaves
-//! a small self-stress besides, which balances among the bonds, and with the last step's reactions
-//! as the anchor of the metric it would add up from step to step. It is removed; of the reactions
-//! r_b of the bonds remain
+//! In the limit of stiff contacts reactions change by ρ times the displacements of a step. An
+//! intact bond carries ρ H̃ᵀλ, with λ the displacements of the bodies since the bond formed: the
+//! minimum-energy reactions (least Σ r²/ρ) with the same net impulses on the bodies. A solve adds a
+//! small self-stress, balanced among the bonds. With the last reactions as the anchor of the metric
+//! the self-stress would accumulate over the steps. It is removed: the reactions r_b of the bonds
+//! become
 //!
 //! r_a = ρ H̃ᵀ (H̃ ρ H̃ᵀ)⁺ H̃ r_b.
 //!
-//! A dry contact keeps its reactions: they depend on how it has slipped.
+//! A dry contact keeps its reactions, which depend on its slip history.
 
 use super::graph::Graph;
 use super::rows::{Row, Rows};
@@ -19,7 +20,7 @@ use crate::solver::tuning::history as tuning;
 use std::sync::Arc;
 
 /// The multipliers of all contacts, those of the bonds without their self-stress (N s); unchanged
-/// where the matrix is singular.
+/// if the matrix is singular.
 pub(super) fn history(rows: &Rows, graph: &mut Option<Arc<Graph>>) -> Vec<Padded> {
     let all: Vec<Padded> = rows.list.iter().map(|row| row.multiplier).collect();
     let is_bond = |row: &Row| row.shift > 0.0 && row.compliance.n == 0.0;
@@ -61,7 +62,7 @@ fn stiffened(rows: &Rows, row: &Row, stiff: f64, y: &[f64]) -> Padded {
     Padded::from_order(&r)
 }
 
-/// The factor on ρ with which H̃ ρ H̃ᵀ has the size [`tuning::STIFF`].
+/// The factor on ρ that gives H̃ ρ H̃ᵀ the size [`tuning::STIFF`].
 fn stiffness(rows: &Rows) -> f64 {
     let count = rows.list.len().max(1) as f64;
     let mean = |of: &dyn Fn(&Row) -> f64| rows.list.iter().map(of).sum::<f64>() / count;
@@ -76,7 +77,7 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_pcg::Pcg64;
 
-    /// Five disks, each bonded to each other and to the ground: 45 rows of bonds over 15 unknowns.
+    /// Five disks, each bonded to all others and to the ground: 45 rows of bonds over 15 unknowns.
     fn network() -> Rows {
         let mut rng = Pcg64::seed_from_u64(7);
         let mut any = || 2.0 * rng.random::<f64>() - 1.0;
@@ -127,7 +128,7 @@ mod tests {
         let (wanted, kept) = (net(&rows, &before), net(&rows, &after));
         wanted.iter().zip(&kept).for_each(|(a, b)| assert!((a - b).abs() < 1e-10, "{a} {b}"));
         assert!(energy(&rows, &after) < 0.7 * energy(&rows, &before));
-        // what is left has no self-stress
+        // the result has no self-stress
         rows.move_multipliers(&after);
         let again = history(&rows, &mut None);
         after.iter().zip(&again).for_each(|(a, b)| assert!((*a - *b).dot(&(*a - *b)).sqrt() < 1e-10));

@@ -1,4 +1,5 @@
-//! Solvers of the contact problem, behind one trait and one enum of settings.
+//! Solvers of the contact problem: one trait, [`ContactSolver`], and one enum of settings,
+//! [`SolverSettings`].
 
 mod anderson;
 pub mod assembled;
@@ -38,7 +39,7 @@ pub enum SolveStatus {
 }
 
 impl SolveStatus {
-    /// What a residual amounts to.
+    /// The status for a residual (–).
     #[must_use]
     pub fn of(residual: f64, tolerance: f64, accept: f64) -> Self {
         if residual <= tolerance {
@@ -51,11 +52,10 @@ impl SolveStatus {
     }
 }
 
-/// What solves took.
+/// Iterations and factorisations of solves.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Work {
-    /// Sweeps of Gauss–Seidel that made up the solution; those that only look for an active set do
-    /// not count.
+    /// Gauss–Seidel sweeps of the solution, without those that only estimate an active set.
     pub sweeps: u64,
     /// Newton iterations.
     pub newton: u64,
@@ -82,46 +82,46 @@ impl Add for Work {
     }
 }
 
-/// What a solve did.
+/// Result of a solve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolveReport {
     /// How it ended.
     pub status: SolveStatus,
-    /// The method that brought the solution.
+    /// The method that found the solution.
     pub route: Route,
-    /// What it took.
+    /// Its iterations and factorisations.
     pub work: Work,
     /// Residual reached (–), see [`crate::problem::residual`].
     pub residual: f64,
-    /// Load error (–): the estimated error of the net impulses of the contacts on the bodies, over
-    /// those impulses. Gauss–Seidel reports none.
+    /// Load error (–): the estimated error of the net impulses of the contacts on the bodies,
+    /// relative to those impulses. Gauss–Seidel reports none.
     pub load_error: Option<f64>,
 }
 
-/// A method that solves a contact problem from the impulses it holds as a start.
+/// A method that solves a contact problem, starting from the impulses in it.
 pub trait ContactSolver<D: Dim>: Send {
-    /// Improve the impulses and node velocities of `problem` until the tolerance, or a limit, is
-    /// reached. It comes with the impulses of the last step, and with the free velocities of its
-    /// nodes: [`ContactProblem::velocities_from_reactions`] makes the two agree, before and after.
+    /// Update the impulses and node velocities of `problem` until the tolerance or an iteration
+    /// limit is reached. On entry `problem` holds the impulses of the last step and the free
+    /// velocities of its nodes; [`ContactProblem::velocities_from_reactions`] makes the two agree,
+    /// before and after.
     fn solve(&mut self, problem: &mut ContactProblem<D>) -> SolveReport;
 
-    /// Solve a problem once more whose solution is accepted, but lets bodies move too far beyond
-    /// the laws of their contacts; none where there is no other way to solve it.
+    /// Solve a problem again by a more accurate method, because its accepted solution violates the
+    /// contact laws by too large displacements; none if there is no such method.
     fn solve_finer(&mut self, _problem: &mut ContactProblem<D>) -> Option<SolveReport> {
         None
     }
 
-    /// A copy with all that is kept from one solve to the next: the solver of a step that may have
-    /// to be undone.
+    /// A copy with the state kept between solves, for a step that may be undone.
     fn snapshot(&self) -> Box<dyn ContactSolver<D>>;
 
-    /// Write what is kept from one solve to the next.
+    /// Write the state kept between solves.
     fn save(&self, to: &mut Saved);
 
-    /// Take up what [`ContactSolver::save`] wrote.
+    /// Restore the state that [`ContactSolver::save`] wrote.
     ///
     /// # Errors
-    /// [`Mismatch`] where another solver, or another version of it, wrote it.
+    /// [`Mismatch`] if another solver, or another version of this one, wrote it.
     fn restore(&mut self, from: &mut Reader) -> Result<(), Mismatch>;
 }
 
@@ -131,7 +131,7 @@ pub trait ContactSolver<D: Dim>: Send {
 pub enum SolverSettings {
     /// Non-linear Gauss–Seidel, the paper's method of successive equilibria.
     GaussSeidel(GaussSeidelSettings),
-    /// The methods of [`Staged`], one after the other.
+    /// The stages of [`Staged`], one after the other.
     Staged(StagedSettings),
 }
 
@@ -150,7 +150,7 @@ impl SolverSettings {
         }
     }
 
-    /// Residual that the solver aims at (–).
+    /// Target residual (–).
     pub fn tolerance(&self) -> f64 {
         match self {
             Self::GaussSeidel(settings) => settings.tolerance,
@@ -158,7 +158,7 @@ impl SolverSettings {
         }
     }
 
-    /// Load error that the solver aims at (–); none where it reports no load error.
+    /// Target load error (–); none for a solver that reports no load error.
     pub fn load_tolerance(&self) -> Option<f64> {
         match self {
             Self::GaussSeidel(_) => None,

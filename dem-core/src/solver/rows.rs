@@ -1,10 +1,10 @@
-//! The contact problem as rows over scaled unknowns, free of dimension.
+//! The contact problem as rows over scaled unknowns, in one form for 2D and 3D.
 //!
-//! Unknowns are y = M^{1/2} v of the nodes that can move, so the mass matrix is the identity and
-//! any ratio of masses is as good as another. Masses and impulses are counted in a unit of 1 or 2
-//! kg ([`mass_unit`]), so that a scene whose masses are scaled by a power of two has the same bits.
-//! Each contact keeps the coefficients of its rows, u = Hᵀ v = Σ h y + u₀, where u₀ comes from
-//! nodes whose velocity is given.
+//! The unknowns are y = M^{1/2} v of the nodes that can move: the mass matrix becomes the identity,
+//! so that heavy and light bodies are treated alike. Masses and impulses are relative to a unit of
+//! mass of 1 or 2 kg ([`mass_unit`]), so that a scene whose masses are scaled by a power of two has
+//! the same bits. Each contact stores the coefficients h of its rows, u = Hᵀ v = Σ h y + u₀, where
+//! u₀ comes from nodes whose velocity is given.
 
 use crate::contact::{Arms, Cone, Law, PADDED, Padded, Weights};
 use crate::dim::{Dim, Vect, tangential_rows};
@@ -12,10 +12,10 @@ use crate::problem::{Contact, ContactProblem, Link, Nodes, Visitor};
 use crate::solver::twofold::Twofold;
 use nalgebra::SMatrix;
 
-/// The derivative of padded rows.
+/// The derivative A of a corrector, over padded rows.
 #[derive(Clone, Debug)]
 pub(super) enum Operator {
-    /// Every group of rows on its own.
+    /// The groups of rows are uncoupled.
     Diagonal(Weights),
     /// In the order n, t, m.
     Full(Box<SMatrix<f64, PADDED, PADDED>>),
@@ -42,36 +42,36 @@ impl Operator {
     }
 }
 
-/// Most unknowns that two bodies have.
+/// Most unknowns of two bodies.
 pub(super) const PAIR: usize = 12;
 
 /// One contact.
 #[derive(Clone, Debug)]
 pub(super) struct Row {
-    /// First unknown of the two nodes, and how many each has (zero for one that cannot move).
+    /// First unknown of each of the two nodes, and its number of unknowns (zero if it cannot move).
     pub at: [usize; 2],
     pub count: [usize; 2],
-    /// Where its coefficients start; row by row, `count[0] + count[1]` each.
+    /// Start of its coefficients; row by row, `count[0] + count[1]` each.
     pub start: usize,
-    /// Places in a padded vector of the rows that the contact has.
+    /// Places of the contact's rows in a padded vector.
     pub rows: &'static [usize],
     pub cone: Cone,
     pub associated: bool,
     /// Shift of the normal reaction (N s).
     pub shift: f64,
-    /// Relative velocity that comes from given velocities, with the bias (m/s).
+    /// Relative velocity due to given velocities, with the bias (m/s).
     pub given: Padded,
     /// 1/ρ of each group.
     pub weights: Weights,
-    /// Multiplier: a reaction, without the shift, which would round it (N s).
+    /// Multiplier: a reaction without the shift, which would cause round-off (N s).
     pub multiplier: Padded,
-    /// Compliance of an elastic bond, zero for what is rigid.
+    /// Compliance of an elastic bond; zero for a rigid contact.
     pub compliance: Weights,
     /// Reaction that an elastic bond carried when the step began (N s).
     pub carried: Padded,
     /// Normal entry of W (1/kg).
     pub normal: f64,
-    /// Σ h² over all coefficients: how much a unit of velocity and of reaction weigh (1/kg).
+    /// Σ h² over all coefficients: the trace of the contact's block of W (1/kg).
     pub size: f64,
 }
 
@@ -117,7 +117,7 @@ struct Unknowns {
     unit: f64,
 }
 
-/// Relative compliance of the rows: 1/k over that of the normal row, from stiffness settings.
+/// Stiffness of the tangential and bending rows relative to the normal row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StiffnessRatio {
     /// Tangential stiffness over the normal one (–).
@@ -134,8 +134,8 @@ impl Default for StiffnessRatio {
 }
 
 impl StiffnessRatio {
-    /// 1/ρ of each group for that of the normal row. In twist a bar has the shear modulus and,
-    /// round, twice the second moment.
+    /// 1/ρ of each group, given that of the normal row. For twist the shear modulus of a bar
+    /// applies and, as it is round, twice its second moment of area.
     pub(super) fn weights(&self, normal: f64) -> Weights {
         let (t, m) = (normal / self.tangential, normal / self.rolling);
         Weights { n: normal, t, m, w: 0.5 * m / self.tangential }
@@ -148,7 +148,7 @@ struct Flatten<'a, D: Dim> {
     ratio: StiffnessRatio,
     normal: Vec<f64>,
     problem: &'a ContactProblem<D>,
-    /// The nodes with the velocities that are given, and zero for those that are unknown.
+    /// The nodes with their given velocities; zero for nodes that can move.
     still: Nodes<D>,
 }
 
@@ -184,8 +184,8 @@ impl Unknowns {
         Self { first, total, unit: mass_unit(nodes) }
     }
 
-    /// Root of an inverse mass or inertia, in the unit of mass: velocity over the unknown that
-    /// stands for it.
+    /// Square root of an inverse mass or inertia, in the unit of mass: ratio of a velocity to its
+    /// scaled unknown.
     fn root(&self, inverse: f64) -> f64 {
         (inverse * self.unit).sqrt()
     }
@@ -200,9 +200,9 @@ fn degrees<D: Dim>(nodes: &Nodes<D>, k: usize, moves: bool) -> usize {
 }
 
 impl Rows {
-    /// The rows of a problem whose normal rows have ρ = κ / (mean of the normal entries of W),
-    /// scaled to the stiffness of each pair (in 3D a cylinder of the mean diameter, so ρ grows with
-    /// it; in 2D all are alike).
+    /// The rows of a problem. Normal rows have ρ = κ / (mean normal entry of W), times the relative
+    /// stiffness of the pair: in 3D that of a cylinder of the mean diameter, so that ρ grows with
+    /// the diameter; in 2D all pairs are alike.
     pub fn of<D: Dim>(problem: &ContactProblem<D>, kappa: f64, ratio: StiffnessRatio) -> Self {
         let unknowns = Unknowns::of(&problem.nodes);
         let mut free = vec![0.0; unknowns.total];
@@ -225,7 +225,7 @@ impl Rows {
         rows
     }
 
-    /// Whether a contact has rows in two tangential directions.
+    /// Whether the problem is in 3D: some contact has rows in two tangential directions.
     pub fn in_space(&self) -> bool {
         self.list.iter().any(|row| row.rows.contains(&2))
     }
@@ -243,14 +243,14 @@ impl Rows {
         row.given + self.pulled(row, y)
     }
 
-    /// The velocities that reactions give, in the scaled unknowns.
+    /// The scaled velocities that these reactions give.
     pub fn given_by(&self, reactions: &[Padded]) -> Vec<f64> {
         let mut y = self.free.clone();
         self.list.iter().zip(reactions).for_each(|(row, r)| self.apply(row, r, &mut y));
         y
     }
 
-    /// Begin the next proximal step at these reactions.
+    /// Set the multipliers of the next proximal iteration.
     pub fn move_multipliers(&mut self, reactions: &[Padded]) {
         self.list.iter_mut().zip(reactions).for_each(|(row, r)| row.multiplier = *r);
     }
@@ -320,7 +320,7 @@ impl Rows {
         y
     }
 
-    /// The largest coefficient of each unknown, one where it has none.
+    /// The largest coefficient of each unknown; 1 for an unknown without coefficients.
     pub fn largest(&self) -> Vec<f64> {
         let mut most = vec![0.0f64; self.unknowns];
         for row in &self.list {
@@ -354,7 +354,7 @@ impl Rows {
     }
 }
 
-/// By how much the net impulses on the bodies differ between two sets of reactions, over those of
+/// Difference of the net impulses on the bodies between two sets of reactions, relative to those of
 /// the second.
 pub(super) fn net_change(rows: &Rows, from: &[Padded], to: &[Padded]) -> f64 {
     let mut change = vec![0.0; rows.unknowns];
@@ -368,12 +368,12 @@ pub(super) fn net_change(rows: &Rows, from: &[Padded], to: &[Padded]) -> f64 {
     if change == 0.0 { 0.0 } else { change / total }
 }
 
-/// The unit of mass (kg), 1 or 2: the heaviest grain has an even binary exponent in it, and roots
-/// of masses that are scaled by powers of two differ by powers of two.
+/// The unit of mass (kg), 1 or 2, chosen so that the heaviest grain has an even binary exponent.
+/// Square roots of masses scaled by powers of two then differ by powers of two.
 pub(super) fn mass_unit<D: Dim>(nodes: &Nodes<D>) -> f64 {
     let inverse = nodes.all[..nodes.grains].iter().map(|n| n.inverse_mass).filter(|m| *m > 0.0);
     let exponent = inverse.fold(f64::INFINITY, f64::min).to_bits() >> 52;
-    // the exponent is stored with an odd offset
+    // the stored exponent has an odd offset
     if exponent % 2 == 0 { 2.0 } else { 1.0 }
 }
 
@@ -464,13 +464,14 @@ impl<D: Dim> Visitor<D> for Flatten<'_, D> {
         for row in &table.rows[..rows.len()] {
             self.rows.coefficients.extend_from_slice(&row[..table.width]);
         }
-        // what the given velocities of nodes that cannot move do
+        // contribution of nodes with given velocities
         let mut given = c.link.in_frame(&self.still.relative_velocity::<L::T, L::B>(&c.link, arms));
         given.n += c.law.bias();
         let normal: f64 = table.rows[0][..table.width].iter().map(|h| h * h).sum();
         self.normal.push(normal);
         let radius = |side: usize| self.problem.radii.get(c.link.nodes[side] as usize).copied();
-        // of two grains, or of a grain at a wall; in the plane stiffness knows no size
+        // two grains, or a grain at a wall; in 2D there are no radii: stiffness is independent of
+        // size
         let soft = radius(0).map_or(1.0, |r| 1.0 / (r + radius(1).unwrap_or(r)));
         self.rows.list.push(Row {
             at: c.link.nodes.map(|k| self.unknowns.first[k as usize]),

@@ -1,4 +1,4 @@
-//! What the Newton solver asks of a problem, matrix-free or with its matrix.
+//! Interface of the solver stages to a problem, matrix-free or given by its matrix.
 
 use super::rows::{Rows, StiffnessRatio, mass_unit};
 use super::{ContactSolver, GaussSeidel, GaussSeidelSettings, SolveReport, sweep};
@@ -8,28 +8,28 @@ use crate::problem::assembled::BlockMatrix;
 use crate::problem::residual::{residual, velocity_error};
 use crate::problem::{Contact, ContactProblem, Nodes, Visitor, VisitorMut};
 
-/// A problem that can be put into rows over scaled unknowns, swept and measured.
+/// A problem that can be converted to rows over scaled unknowns, swept and measured.
 pub(super) trait Solvable {
-    /// The problem as rows, without coefficients where it has a matrix; ρ is `kappa` over the mean
+    /// The problem as rows, without coefficients if it has a matrix; ρ is `kappa` over the mean
     /// normal entry of W.
     fn rows(&self, kappa: f64, ratio: StiffnessRatio) -> Rows;
-    /// Its matrix, where there is one.
+    /// Its matrix, if it is given by one.
     fn matrix(&self) -> Option<&BlockMatrix> {
         None
     }
-    /// Set the velocities to what the reactions make of them, free of the rounding of increments.
+    /// Recompute the velocities from the reactions, without the round-off of increments.
     fn velocities_from_reactions(&mut self);
-    /// The residual of the reactions at hand (–).
+    /// The residual of the current reactions (–).
     fn residual(&self) -> f64;
     /// Their velocity error (–).
     fn velocity_error(&self) -> f64;
     /// The reactions after some sweeps of Gauss–Seidel, in the unit of the rows.
     fn swept(&mut self, sweeps: usize) -> Vec<Padded>;
-    /// Take over reactions in the unit of the rows, and the velocities that they give.
+    /// Set the reactions, given in the unit of the rows, and the velocities that they give.
     fn write_back(&mut self, reactions: &[Padded]);
     /// Set the reactions to zero if one of them is not finite.
     fn forget_what_is_not_finite(&mut self);
-    /// Gauss–Seidel from the reactions at hand.
+    /// Gauss–Seidel from the current reactions.
     fn gauss_seidel(&mut self, settings: GaussSeidelSettings) -> SolveReport;
 }
 

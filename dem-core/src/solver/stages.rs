@@ -1,17 +1,18 @@
-//! What solves a problem: one method after the other, the cheapest first, until one solves it.
+//! The default solver: its stages are tried in order, the cheapest first, until one solves the
+//! problem.
 //!
-//! | stage | what it does | where it is tried |
+//! | stage | what it does | when it is tried |
 //! |---|---|---|
-//! | [`Route::Extrapolation`] | adds to the reactions what each of the last steps has added | bonds, while a sample at rest is loaded evenly |
+//! | [`Route::Extrapolation`] | adds the constant increment of the last steps to the reactions | bonds, while a sample at rest is loaded at a constant rate |
 //! | [`Route::Sweeps`] | Gauss–Seidel from the last reactions | all contacts are dry |
 //! | [`Route::ActiveSet`] | Newton from the active set of the last step | bonds |
-//! | [`Route::InteriorPoint`] | follows the central path, through its folds, with Coulomb's law exact | always |
-//! | [`Route::Sweeps`] | Gauss–Seidel from the best point of the path | where the path is lost |
+//! | [`Route::InteriorPoint`] | follows the central path through its folds, with Coulomb's law exact | always |
+//! | [`Route::Sweeps`] | Gauss–Seidel from the best point of the path | the path missed the tolerance |
 //!
-//! What none of them brings to the tolerance is taken at [`StagedSettings::accept`] or refused. No
-//! clock is looked at, and nothing but the extrapolation is left out because it failed in an
-//! earlier step: a solve depends on its problem, the last reactions, Newton's last factors and what
-//! is known of the growth of reactions.
+//! A solve that misses the tolerance is accepted up to [`StagedSettings::accept`] and refused
+//! beyond. No stage depends on elapsed time, and only the extrapolation has a back-off. A solve
+//! depends on its problem, the last reactions, Newton's cached factors and the growth known to the
+//! extrapolation.
 
 use super::extrapolation::Extrapolation;
 use super::history::history;
@@ -28,10 +29,11 @@ use crate::problem::residual::velocity_error;
 use crate::saved::{Mismatch, Reader, Saved};
 use crate::solver::tuning::stages as tuning;
 
-/// The method that brought a solution; a step reports the last in this order.
+/// The method that found a solution. A step with several solves reports the last of their routes in
+/// this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Route {
-    /// The reactions grew as in the steps before.
+    /// Extrapolation of the reactions of earlier steps.
     Extrapolation,
     /// Newton from the active set of the last step.
     ActiveSet,
@@ -41,12 +43,12 @@ pub enum Route {
     Sweeps,
 }
 
-/// Where the reactions start from in every step.
+/// The reactions from which every step starts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Start {
-    /// From zero: the stiff limit.
+    /// Zero: the stiff limit.
     StiffLimit,
-    /// From the reactions of the last step: they keep their history.
+    /// The reactions of the last step, which keep their history.
     LastStep,
 }
 
@@ -55,9 +57,9 @@ pub enum Start {
 pub enum Stages {
     /// All of them.
     All,
-    /// No sweeps over dry contacts before the others.
+    /// All but the sweeps over dry contacts.
     Newton,
-    /// The interior-point method, and sweeps from where its path ends.
+    /// The interior-point method, then sweeps from its best point.
     Interior,
 }
 
@@ -66,13 +68,13 @@ pub enum Stages {
 pub struct StagedSettings {
     /// Which stages are tried.
     pub stages: Stages,
-    /// Residual that the solver aims at (–).
+    /// Target residual (–).
     pub tolerance: f64,
     /// Largest residual that is accepted (–), at least `tolerance`.
     pub accept: f64,
-    /// Load error and velocity error that the solver aims at (–).
+    /// Target load error and velocity error (–).
     pub load_tolerance: f64,
-    /// Where the reactions start from.
+    /// The reactions from which a step starts.
     pub start: Start,
     /// Stiffness of the rows in the metric of the stiff limit.
     pub stiffness: StiffnessRatio,
@@ -81,8 +83,8 @@ pub struct StagedSettings {
 }
 
 impl Default for StagedSettings {
-    /// All stages, a tolerance of 10⁻⁸, of 10⁻⁵ for load and velocity error, and nothing above 10⁻⁶
-    /// accepted.
+    /// All stages; tolerances of 10⁻⁸ for the residual and of 10⁻⁵ for load and velocity error;
+    /// residuals up to 10⁻⁶ accepted.
     fn default() -> Self {
         Self {
             stages: Stages::All,
@@ -97,9 +99,9 @@ impl Default for StagedSettings {
 }
 
 impl StagedSettings {
-    /// What a solve with this residual, load error and velocity error amounts to.
+    /// Report of a solve with this residual, load error and velocity error.
     pub(super) fn report(&self, work: Work, residual: f64, load_error: f64, velocity_error: f64) -> SolveReport {
-        // a residual of zero is rounding, and rounding is all that still changes
+        // with a residual of zero only round-off still changes
         let settled = load_error.max(velocity_error) <= self.load_tolerance || residual == 0.0;
         let status = match SolveStatus::of(residual, self.tolerance, self.accept) {
             SolveStatus::Converged if !settled => SolveStatus::Accepted,
@@ -109,7 +111,7 @@ impl StagedSettings {
     }
 }
 
-/// One method after the other.
+/// The solver in stages.
 pub struct Staged {
     settings: StagedSettings,
     extrapolation: Extrapolation,
@@ -128,18 +130,17 @@ impl Staged {
         }
     }
 
-    /// Solve a problem with its matrix, from the reactions that it holds.
+    /// Solve a problem given by its matrix, from the reactions that it holds.
     pub fn solve_assembled(&mut self, problem: &mut Assembled) -> SolveReport {
         self.newton.margins.clear();
         self.directly(problem)
     }
 
-    /// By the stages that solve linear systems, and sweeps from where these end.
+    /// Newton, then the interior-point method, then sweeps from its best point.
     fn directly(&mut self, problem: &mut impl Solvable) -> SolveReport {
         problem.velocities_from_reactions();
         let rows = problem.rows(tuning::KAPPA, self.settings.stiffness);
-        // the reactions at hand may be it, as none are where bodies fly apart, and nothing may be
-        // there that yields
+        // solved already, for example zero reactions of bodies that fly apart, or no body can move
         let residual = problem.residual();
         if residual == 0.0 || rows.list.iter().all(|row| row.normal == 0.0) {
             return self.settings.report(Work::default(), residual, 0.0, 0.0);
@@ -153,7 +154,7 @@ impl Staged {
         SolveReport { work: Work { factorisations, ..report.work }, ..report }
     }
 
-    /// What Newton comes to; the iterations that it made where it does not reach the tolerance.
+    /// Result of Newton's method, or its iterations if it misses the tolerance.
     fn by_the_active_set(&mut self, problem: &mut impl Solvable, rows: &Rows) -> Result<SolveReport, u64> {
         let mut iterations = 0;
         if self.settings.stages == Stages::Interior || problem.matrix().is_some() {
@@ -165,10 +166,10 @@ impl Staged {
         report.filter(|report| report.status == SolveStatus::Converged).ok_or(iterations)
     }
 
-    /// What the interior-point method comes to, and sweeps from where it ends.
+    /// Result of the interior-point method, or of sweeps from its best point.
     fn along_the_path(&mut self, problem: &mut impl Solvable, rows: &Rows, mut newton: u64) -> SolveReport {
         let StagedSettings { tolerance, accept, .. } = self.settings;
-        // what Newton has left of margins belongs to other reactions
+        // margins that Newton left belong to other reactions
         self.newton.margins.clear();
         let begun = multipliers(rows);
         let anchor = match self.settings.start {
@@ -176,15 +177,15 @@ impl Staged {
             _ => self.anchor(rows),
         };
         let start = (!is_cold(rows)).then_some(&begun[..]);
-        // what breaks a bond is the load that it bears; of dry contacts any reactions that balance
-        // will do
+        // bonds break by the load that they bear and need minimum-energy reactions; dry contacts
+        // need only reactions that balance
         let least = problem.matrix().is_none() && rows.list.iter().any(|row| row.shift > 0.0);
         let aims = self.aims(least);
         let graph = &mut self.newton.graph;
         let mut best = self.interior.solve(problem, rows, graph, &anchor, start, aims);
         newton += best.as_ref().map_or(0, |found| found.iterations);
         if best.as_ref().is_none_or(|found| found.missed(aims) > accept / tolerance) {
-            // any reactions, from a cold start: another path
+            // another path, from a cold start to any reactions that balance
             let any = Aims { least: false, ..aims };
             let other = self.interior.solve(problem, rows, graph, &anchor, None, any);
             newton += other.as_ref().map_or(0, |found| found.iterations);
@@ -214,7 +215,7 @@ impl Staged {
         SolveReport { status, work, ..swept }
     }
 
-    /// The reactions that those of least energy are nearest to.
+    /// The anchor, from which the energy of the minimum-energy reactions is measured.
     fn anchor(&self, rows: &Rows) -> Vec<Padded> {
         match self.settings.start {
             Start::StiffLimit => vec![Padded::zero(); rows.list.len()],
@@ -222,20 +223,20 @@ impl Staged {
         }
     }
 
-    /// What is asked of a solution.
+    /// Tolerances and iteration limit of the interior-point method.
     fn aims(&self, least: bool) -> Aims {
         let StagedSettings { tolerance, load_tolerance, max_iterations, .. } = self.settings;
         Aims { tolerance, load_tolerance, least, most: max_iterations }
     }
 
-    /// Gauss–Seidel that aims at this residual.
+    /// Settings of Gauss–Seidel for this target residual.
     fn sweeps(&self, tolerance: f64, max_sweeps: u64) -> GaussSeidelSettings {
         let (local, accept) = (LocalSolve::Exact, self.settings.accept);
         GaussSeidelSettings { local, tolerance, accept, max_sweeps, acceleration: 0 }
     }
 
-    /// By sweeps over dry contacts: for the tolerances, then for what is accepted. Both measures
-    /// may miss by as much as the residual may.
+    /// Sweeps over dry contacts, first to the tolerances, then to the accepted residual. Residual
+    /// and velocity error may exceed their tolerances by the same factor, `accept / tolerance`.
     fn swept<D: Dim>(&self, problem: &mut ContactProblem<D>) -> SolveReport {
         let StagedSettings { tolerance, accept, .. } = self.settings;
         let by = |tolerance, most| GaussSeidel::new(self.sweeps(tolerance, most));
@@ -245,7 +246,7 @@ impl Staged {
             let fine = by(aim, tuning::FINE_SWEEPS - work.sweeps).solve(problem);
             work = work + fine.work;
             let missed = self.aims(false).missed(fine.residual, velocity_error(problem));
-            // sweeps look at the residual alone: a finer one for the velocities
+            // sweeps stop on the residual alone: lower its target to reduce the velocity error
             if missed > 1.0 && fine.residual <= aim && work.sweeps < tuning::FINE_SWEEPS {
                 aim = fine.residual / missed;
                 continue;
@@ -257,13 +258,13 @@ impl Staged {
         }
         let coarse = by(accept, tuning::COARSE_SWEEPS).solve(problem);
         let missed = self.aims(false).missed(coarse.residual, velocity_error(problem));
-        // it aimed at less than the tolerance
+        // its target was `accept`: at best it is accepted
         let status = if missed <= most_missed { SolveStatus::Accepted } else { SolveStatus::Failed };
         SolveReport { status, work: work + coarse.work, ..coarse }
     }
 }
 
-/// The reactions that a problem brought along.
+/// The multipliers of all contacts: the reactions that the problem holds.
 fn multipliers(rows: &Rows) -> Vec<Padded> {
     rows.list.iter().map(|row| row.multiplier).collect()
 }
@@ -273,7 +274,7 @@ fn is_dry<D: Dim>(problem: &ContactProblem<D>) -> bool {
     problem.bonded.is_empty() && problem.elastic.is_empty()
 }
 
-/// Whether no reactions are known to start from.
+/// Whether all normal reactions are zero: a cold start.
 fn is_cold(rows: &Rows) -> bool {
     rows.list.iter().all(|row| row.multiplier.n == 0.0)
 }
@@ -306,14 +307,14 @@ impl<D: Dim> ContactSolver<D> for Staged {
         SolveReport { work: before + report.work, ..report }
     }
 
-    /// Without sweeps before the other stages.
+    /// Skips the sweeps over dry contacts.
     fn solve_finer(&mut self, problem: &mut ContactProblem<D>) -> Option<SolveReport> {
         (self.settings.stages == Stages::All && is_dry(problem)).then(|| self.directly(problem))
     }
 
     fn snapshot(&self) -> Box<dyn ContactSolver<D>> {
         let Self { settings, extrapolation, newton, .. } = self;
-        // the interior-point method keeps its room and nothing else
+        // the interior-point method keeps only buffers
         let interior = Interior::default();
         Box::new(Self { settings: *settings, extrapolation: extrapolation.clone(), newton: newton.clone(), interior })
     }

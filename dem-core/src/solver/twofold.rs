@@ -1,11 +1,10 @@
-//! Sums and products with the error of their rounding: pairs of numbers that carry twice the
-//! precision.
+//! Arithmetic in twice the precision: a number is a pair of a rounded value and its rounding error.
 //!
-//! Without fused multiply-add, whose rounding differs between processors.
+//! It uses no fused multiply-add, whose rounding differs between processors.
 //!
 //! Sources: Dekker, Numer. Math. 18, 1971; Knuth, The Art of Computer Programming 2, §4.2.2.
 
-/// A number as a sum of two, the second of which is the rounding error of the first.
+/// A number as the sum of a rounded value and its rounding error.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Twofold {
     pub high: f64,
@@ -40,7 +39,7 @@ impl From<f64> for Twofold {
     }
 }
 
-/// a + b, and what its rounding has lost.
+/// a + b and its rounding error.
 #[inline]
 fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
@@ -48,7 +47,7 @@ fn two_sum(a: f64, b: f64) -> (f64, f64) {
     (sum, (a - (sum - part)) + (b - part))
 }
 
-/// a · b, and what its rounding has lost.
+/// a · b and its rounding error.
 #[inline]
 fn two_product(a: f64, b: f64) -> (f64, f64) {
     let product = a * b;
@@ -56,7 +55,7 @@ fn two_product(a: f64, b: f64) -> (f64, f64) {
     (product, ((ah * bh - product) + ah * bl + al * bh) + al * bl)
 }
 
-/// A number as two of half its digits.
+/// A number as the sum of two with half its digits.
 #[inline]
 fn halves(x: f64) -> [f64; 2] {
     let scaled = f64::from((1_u32 << 27) + 1) * x;

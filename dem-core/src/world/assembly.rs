@@ -10,28 +10,28 @@ use crate::contact::{Arms, Bonded, Coulomb, Elastic, Frictionless, Law, Local};
 use crate::dim::{Axes, Dim, Moments, Vect, in_frame, of_frame, resized};
 use crate::problem::{Contact, ContactProblem, KINDS, Kind, Link, Node, Nodes, Visitor, blocks};
 
-/// Gap over the smaller radius of a pair up to which a contact touches, and way of its bodies in a
-/// step up to which they are at rest to each other. The rounding of positions would else be a
-/// misfit of rigid contacts, to which stiff ones answer with forces; with restitution it would
-/// decide which contacts act.
+/// Gap, over the smaller radius of a pair, up to which a contact touches; also the displacement in
+/// a step up to which its bodies are at rest to each other. Otherwise the round-off of positions
+/// would be a misfit, to which stiff contacts respond with forces; with restitution it would decide
+/// which contacts act.
 const TOUCHING: f64 = 1e-9;
 
-/// The same where the contact pushed in the step before. It was closed then: what opened it since
-/// are the errors of many solves, and a stiff contact would lose its force to them at once.
+/// The same for a contact with a reaction in the previous step. It was closed then, and only solver
+/// errors have opened it since; a stiff contact would lose its force to them at once.
 const CLOSED: f64 = 1e-6;
 
-/// Gap over the radius of the grain below which a contact that does not close is part of the
-/// problem.
+/// Gap, over the radius of the grain, below which a pair is part of the problem even if it does not
+/// close.
 const NEAR: f64 = 1e-3;
 
-/// What a grain may move, over its radius, before the list of candidates is built anew.
+/// Displacement of a grain, over its radius, before the list of candidates is rebuilt.
 const SPARE: f64 = 0.15;
 
-/// What the bonds bring into a step, by their numbers.
+/// State of the bonds at the start of a step, by bond index.
 pub(super) struct Brought<D: Dim> {
-    /// Reactions of the elastic ones (N, N m); empty where bonds are rigid.
+    /// Reactions of elastic bonds (N, N m); empty if all bonds are rigid.
     carried: Vec<Local<D::Tangent, D::Moment>>,
-    /// What they are given back.
+    /// Length corrections.
     pub turns: Vec<Turn>,
 }
 
@@ -40,19 +40,19 @@ pub(super) struct Brought<D: Dim> {
 pub(super) struct Places([Vec<u32>; KINDS]);
 
 impl Places {
-    /// Of contacts of one kind.
+    /// Places of the contacts of one kind.
     pub fn of(&self, kind: Kind) -> &[u32] {
         &self.0[kind as usize]
     }
 
-    /// In the order in which a problem is visited.
+    /// All places, in the order in which a problem is visited.
     pub fn all(&self) -> impl Iterator<Item = usize> {
         self.0.iter().flatten().map(|place| *place as usize)
     }
 }
 
 impl<D: Dim> World<D> {
-    /// Whether a node yields to nothing.
+    /// Whether no impulse moves a node.
     fn immovable(&self, node: usize) -> bool {
         match node.checked_sub(self.grains.len()) {
             None => self.grains.fixed[node],
@@ -83,7 +83,7 @@ impl<D: Dim> World<D> {
         Touch { pair: kept.pair, frame, point, gap, bond: kept.bond(), reaction: kept.reaction, status: kept.status }
     }
 
-    /// All contacts of the step, sorted by pair, with the reactions of the last step as a start.
+    /// All contacts of the step, sorted by pair, with the reactions of the last step as warm start.
     pub(super) fn detect(&mut self, mid: &Midpoint<D>, motion: &Motion<D>, h: f64) -> Vec<Kept<D>> {
         self.refresh_candidates(mid, motion, h);
         let mut touches: Vec<Kept<D>> = Vec::with_capacity(self.kept.len() + self.kept.len() / 8 + 16);
@@ -110,7 +110,7 @@ impl<D: Dim> World<D> {
         touches
     }
 
-    /// Carry the reactions of the last step over, in the frame that turned with the contact.
+    /// Copy the reactions of the last step; the frame of each contact turns with its normal.
     fn recall(&self, mid: &Midpoint<D>, touches: &mut [Kept<D>]) {
         let mut old = self.kept.iter().peekable();
         for touch in touches {
@@ -130,13 +130,13 @@ impl<D: Dim> World<D> {
         }
     }
 
-    /// What the bonds bring into a step of length `h`.
+    /// State of the bonds at the start of a step of length `h`.
     pub(super) fn brought(&self, mid: &Midpoint<D>, touches: &[Kept<D>], motion: &Motion<D>, h: f64) -> Brought<D> {
         Brought { carried: self.carried(touches), turns: self.turns(mid, touches, motion, h) }
     }
 
-    /// Reactions (N, N m) that the elastic bonds carry as a step begins, by the number of the bond;
-    /// empty where bonds are rigid.
+    /// Reactions (N, N m) of elastic bonds at the start of a step, by bond index; empty if all
+    /// bonds are rigid.
     fn carried(&self, touches: &[Kept<D>]) -> Vec<Local<D::Tangent, D::Moment>> {
         if self.bonds.iter().all(|b| b.stiffness.is_none()) {
             return Vec::new();
@@ -154,13 +154,13 @@ impl<D: Dim> World<D> {
     fn refresh_candidates(&mut self, mid: &Midpoint<D>, motion: &Motion<D>, h: f64) {
         let way = |k: usize| h * motion.free[k].0.norm().max(motion.before[k].0.norm());
         let reach = |k: usize| NEAR * radius_of(&self.grains, k) + 2.0 * way(k);
-        // some of its size, or three steps at its speed
+        // a share of its radius, or three steps at its speed
         let spare = |k: usize| (SPARE * radius_of(&self.grains, k)).max(3.0 * way(k));
         self.candidates.cover(&self.grains, &mid.grains, &self.walls, &mid.walls, reach, spare);
     }
 
-    /// Contacts that the step left out and that its velocities would close: they are added, and the
-    /// step is solved again.
+    /// Pairs that the problem lacks and that its velocities would close. The step adds them and
+    /// solves again.
     pub(super) fn missed(&mut self, mid: &Midpoint<D>, touches: &[Kept<D>], nodes: &Nodes<D>, h: f64) -> Vec<Kept<D>> {
         let way = |k: usize| h * nodes.all[k].velocity.norm();
         // enough for the next step too
@@ -192,8 +192,8 @@ impl<D: Dim> World<D> {
         }
     }
 
-    /// What is added to the normal velocity of a dry contact before Signorini's law (m/s); none if
-    /// it cannot act in this step.
+    /// Velocity that Signorini's law adds to the normal velocity of a dry contact (m/s); `None` if
+    /// the contact cannot act in this step.
     fn bias(&self, touch: &Touch<D>, closed: bool, motion: &Motion<D>, h: f64) -> Option<f64> {
         let e = self.restitution_of(touch.pair);
         let none = self.smaller(touch.pair) * if closed { CLOSED } else { TOUCHING };
@@ -235,8 +235,8 @@ impl<D: Dim> World<D> {
         }
     }
 
-    /// The contact problem of these contacts, started from their reactions, and the place of each
-    /// contact in it.
+    /// The contact problem of these contacts, with their reactions as warm start, and the place of
+    /// each contact of the problem in `touches`.
     pub(super) fn assemble(
         &self,
         mid: &Midpoint<D>,
@@ -312,18 +312,18 @@ impl<D: Dim> World<D> {
         }
     }
 
-    /// Distances from the centres to the contact point (m); none to that of a wall.
+    /// Distances from the centres to the contact point (m); zero for a wall.
     fn levers(&self, touch: &Touch<D>) -> [f64; 2] {
         touch.pair.map(|k| self.grains.radius.get(k as usize).map_or(0.0, |r| r + 0.5 * touch.gap))
     }
 }
 
-/// Radius of a grain (m); none of a wall.
+/// Radius of a grain (m); zero for a wall.
 fn radius_of<D: Dim>(grains: &Grains<D>, body: usize) -> f64 {
     grains.radius.get(body).copied().unwrap_or(0.0)
 }
 
-/// Moments over the mean diameter.
+/// A reaction with its moments divided by the mean diameter `arm`.
 fn over_arm<T: Vect, B: Moments>(r: Local<T, B>, arm: f64) -> Local<T, B> {
     Local { m: r.m * (1.0 / arm), ..r }
 }

@@ -1,7 +1,7 @@
-//! The energy ledger: where the work of each step went, and the momentum.
+//! The energy balance of a run, and the momentum.
 //!
-//! Contact work is r·(u⁺ + u⁻)/2 by row. The sum closes by identity (kinetic energy is quadratic in
-//! v), so its remainder checks the bookkeeping, not the accuracy.
+//! Contact work is r·(u⁺ + u⁻)/2, by row. The balance closes for any reactions, since kinetic
+//! energy is quadratic in v: its remainder checks the implementation, not the accuracy.
 
 use crate::contact::{Law, Local};
 use crate::dim::{Dim, Vect};
@@ -18,15 +18,16 @@ pub struct Ledger {
     pub impact: f64,
     /// Energy lost by friction.
     pub friction: f64,
-    /// Energy lost by intact rigid bonds; they should lose none, so it is a numerical remainder.
+    /// Energy lost by intact rigid bonds; exact rigid bonds lose none, so it is a numerical
+    /// remainder.
     pub bonds: f64,
     /// Energy stored in elastic bonds now, Σ ½ f²/k.
     pub elastic: f64,
-    /// Energy that elastic bonds lost to the damping of the implicit step.
+    /// Energy of elastic bonds dissipated by the numerical damping of the implicit step.
     pub damping: f64,
     /// Elastic energy released by bonds that broke.
     pub fracture: f64,
-    /// Work minus energy found elsewhere: rounding, if the books are right.
+    /// Work minus all other entries: round-off, if the balance is implemented correctly.
     pub remainder: f64,
 }
 

@@ -1,20 +1,21 @@
-//! What a step must not do, however small its residual. Such a step is made in halves, or the run
-//! stops.
+//! Limits that every step must respect, however small its residual. A step that violates one is
+//! made in halves, or the run stops.
 //!
-//! *Bodies too fast for the step* would pass through another between two looks, or be stopped by
-//! one that they pass at a distance: contacts are looked for at mid-step only, and their law knows
-//! the tangent plane, not the curved surface. Both suffice while bodies move little beside their
-//! size. The way of each half step is followed here pair by pair, but only where the fastest body
-//! goes further than a quarter of the smallest grain: slow scenes pay one look at the velocities.
+//! *Bodies too fast for the step* would pass through another body between two detections, or be
+//! stopped by a body that they pass at a distance: contacts are detected at mid-step only, and
+//! their law knows the tangent plane, not the curved surface. Both suffice while displacements are
+//! small beside the bodies. The path of each half step is checked pair by pair, but only if the
+//! fastest body moves further than a quarter of the smallest radius: slow scenes pay one pass over
+//! the velocities.
 //!
-//! *Contacts that yield.* The residual is relative to all reactions. Where a light grain is pressed
+//! *Contacts that yield.* The residual is relative to all reactions. For a light grain pressed
 //! between heavy ones, an error that is small beside their weight is a large velocity of the light
-//! one; and where no velocities satisfy the contact laws, as between two walls that close on a
-//! grain, reactions grow until any error is small beside them. So velocities are measured too: in
-//! each step, and summed over the run for each pair, since an error of one sign adds up.
+//! grain. If no velocities satisfy the contact laws, as between two walls that close on a grain,
+//! reactions grow until any error is small beside them. Velocities are therefore measured too: in
+//! each step, and summed over the run for each pair, since errors of one sign add up.
 //!
-//! The step asks for none of this where overlaps are pushed out: the speeds of that preparation
-//! mean nothing.
+//! With `expel_overlaps` the step skips these checks: the speeds of sample preparation have no
+//! physical meaning.
 
 use super::World;
 use super::assembly::Places;
@@ -27,34 +28,34 @@ use crate::dim::{Dim, Vect};
 use crate::problem::{Contact, ContactProblem, Nodes, Visitor};
 use crate::solver::certificate::{Verdict, verdict};
 
-/// Overlap of a pair, over the smaller radius, that half a step may add.
+/// Overlap, over the smaller radius, that half a step may add to a pair.
 const DEEP: f64 = 0.5;
 
-/// Distance, over the smaller radius, at which a grain passes another.
+/// Distance, over the smaller radius, beyond which a grain passes another without contact.
 const PASSING: f64 = 0.05;
 
-/// Way, over the smaller radius, that a solve may let a pair move beyond its law in a step: close a
-/// dry contact, or change the length of a rigid bond.
+/// Displacement beyond the contact law, over the smaller radius, that a solve may leave in a step:
+/// closing of a dry contact, or change of length of a rigid bond.
 const YIELDING: f64 = 1e-4;
 
-/// The same, added up over the run.
+/// The same, summed over the run.
 const YIELDED: f64 = 1e-3;
 
-/// The largest tolerance of a solver, and the largest residual that it accepts, for which these two
-/// hold; larger ones, which ask for less, loosen both in proportion.
+/// Largest solver tolerance (`FINE`) and largest accepted residual (`ACCEPTED`) for which
+/// `YIELDING` and `YIELDED` apply unchanged; coarser values loosen both in proportion.
 const FINE: f64 = 1e-6;
 const ACCEPTED: f64 = 1e-4;
 
-/// Share of the closing power of the free velocities that reactions leave where bodies are jammed:
-/// all of it where they only balance each other, none in a solution.
+/// Share of the closing power of the free velocities, as left by the reactions, from which bodies
+/// count as jammed: 1 where reactions only balance each other, 0 in a solution.
 const UNOPPOSED: f64 = 0.5;
 
-/// Share of the largest reaction from which a wall counts among those that carry it.
+/// Share of the largest reaction from which a wall counts as carrying it.
 const CARRIES: f64 = 1e-3;
 
 impl<D: Dim> World<D> {
-    /// A pair that goes too deep into one another, or through, within `time` (s) from these places
-    /// at these velocities; of all candidates the first.
+    /// The first candidate pair that would overlap too deeply, or pass through each other, within
+    /// `time` (s) from these positions at these velocities.
     pub(super) fn crossing(
         &self,
         place: impl Fn(usize) -> D::Vector,
@@ -82,8 +83,8 @@ impl<D: Dim> World<D> {
         gap > PASSING * self.smaller(pair)
     }
 
-    /// A pair of grains that pushes though it would pass at a distance: only its tangent plane was
-    /// in the way.
+    /// A pair of grains with a reaction although they would pass at a distance: only the tangent
+    /// plane stopped them.
     pub(super) fn pushes_at_a_distance(
         &self,
         mid: &Midpoint<D>,
@@ -108,8 +109,8 @@ impl<D: Dim> World<D> {
         touches.iter().filter(|t| (t.pair[1] as usize) < self.grains.len()).find(far).map(|t| t.pair)
     }
 
-    /// The pair that a solution lets move furthest beyond its law, if that is too far; ways are
-    /// those of a whole step.
+    /// The pair that moves furthest beyond its law in a solution, if too far; displacements are
+    /// those of a whole step of the scene.
     pub(super) fn yielding(&self, problem: &ContactProblem<D>) -> Option<Violation> {
         let mut worst = Yielding { world: self, pair: [0; 2], share: 0.0 };
         problem.visit(&mut worst);
@@ -123,8 +124,8 @@ impl<D: Dim> World<D> {
         })
     }
 
-    /// Add the ways that this solution lets each contact move beyond its law to those of the steps
-    /// before; the pair with the longest sum, if that is too far.
+    /// Add the displacement of each contact beyond its law to the sum over the previous steps;
+    /// returns the pair with the largest sum, if too large.
     pub(super) fn accumulate(
         &self,
         touches: &mut [Kept<D>],
@@ -144,13 +145,13 @@ impl<D: Dim> World<D> {
         })
     }
 
-    /// By how much the bounds on what yields are loosened for the solver.
+    /// Factor by which the tolerances of the solver loosen `YIELDING` and `YIELDED`.
     fn looseness(&self) -> f64 {
         let solver = &self.settings.solver;
         (solver.tolerance() / FINE).max(solver.accept() / ACCEPTED).max(1.0)
     }
 
-    /// What is proved of a problem that was not solved, by its bodies.
+    /// The verdict on an unsolved problem, with bodies in place of contacts.
     pub(super) fn verdict(&self, problem: &ContactProblem<D>) -> Verdict<u32> {
         verdict(problem).map(|contacts| {
             let mut pairs = Pairs(Vec::with_capacity(problem.len()));
@@ -162,10 +163,10 @@ impl<D: Dim> World<D> {
         })
     }
 
-    /// Whether the reactions only balance each other, as where a wall that is moved closes on a
-    /// grain: the walls that carry them. In a solution they take as much power from the bodies as
-    /// the free velocities would put into closing contacts. This is no proof that no solution
-    /// exists; that is [`World::verdict`].
+    /// The walls that carry the reactions, if the reactions only balance each other, as where a
+    /// driven wall closes on a grain. In a solution the reactions take as much power from the
+    /// bodies as the free velocities would put into closing contacts. The test does not prove that
+    /// no solution exists; [`World::verdict`] can.
     fn jammed(&self, problem: &ContactProblem<D>) -> Option<Vec<u32>> {
         let mut powers = Powers { problem, asked: 0.0, left: 0.0, largest: 0.0 };
         problem.visit(&mut powers);
@@ -177,7 +178,7 @@ impl<D: Dim> World<D> {
         problem.visit(&mut carrying);
         carrying.walls.sort_unstable();
         carrying.walls.dedup();
-        // where nothing is made to move, rest is a motion that satisfies the laws
+        // if no wall is driven, rest satisfies the laws
         let driven = |wall: &u32| {
             let node = *wall as usize;
             matches!(self.walls[node - problem.nodes.grains].drive, Drive::Velocity { .. })
@@ -186,7 +187,7 @@ impl<D: Dim> World<D> {
         carrying.walls.iter().any(driven).then_some(carrying.walls)
     }
 
-    /// The place of a body (m), grains first.
+    /// Position of a body (m), grains first.
     pub(super) fn place(&self, body: usize) -> D::Vector {
         body.checked_sub(self.grains.len()).map_or_else(|| self.grains.position[body], |wall| self.walls[wall].position)
     }
@@ -199,7 +200,7 @@ impl<D: Dim> World<D> {
         }
     }
 
-    /// The radius of the smaller body of a pair (m); that of the grain at a plane.
+    /// The radius of the smaller body of a pair (m); at a plane, the radius of the grain.
     pub(super) fn smaller(&self, pair: [u32; 2]) -> f64 {
         let [i, j] = pair.map(|k| k as usize);
         let other = match self.surface(j) {
@@ -210,9 +211,9 @@ impl<D: Dim> World<D> {
     }
 }
 
-/// Speed (m/s) at which the bodies of a contact close beyond its law; of a rigid bond, at which it
-/// gets shorter. None where the law sets no bound: a spring yields, and a bond at its limit flows
-/// and is about to break.
+/// Speed (m/s) at which a contact closes beyond its law; for a rigid bond, at which it shortens.
+/// `None` where the law sets no bound: an elastic bond deforms, and a bond at its limit flows and
+/// is about to break.
 fn beyond_law<D: Dim, L: Law>(nodes: &Nodes<D>, c: &Contact<D, L>) -> Option<f64> {
     let law = &c.law;
     let free = law.compliance().n > 0.0 || c.failure().is_some();
@@ -220,7 +221,7 @@ fn beyond_law<D: Dim, L: Law>(nodes: &Nodes<D>, c: &Contact<D, L>) -> Option<f64
     (!free).then(closing)
 }
 
-/// Adds to the ways of the contacts of a step beyond their laws, and looks for the longest.
+/// Adds up displacements beyond the contact laws, and finds the largest sum.
 struct Accumulating<'a, D: Dim, P> {
     world: &'a World<D>,
     touches: &'a mut [Kept<D>],
@@ -237,7 +238,7 @@ impl<D: Dim, P: Iterator<Item = usize>> Visitor<D> for Accumulating<'_, D, P> {
         let Some(speed) = beyond_law(nodes, c) else { return };
         let kept = &mut self.touches[place];
         let sum = kept.yielded + self.h * speed;
-        // what opens is free to
+        // a dry contact may open
         kept.yielded = if kept.bond().is_some() { sum } else { sum.max(0.0) };
         let share = kept.yielded.abs() / self.world.smaller(kept.pair);
         if share > self.share {
@@ -246,7 +247,7 @@ impl<D: Dim, P: Iterator<Item = usize>> Visitor<D> for Accumulating<'_, D, P> {
     }
 }
 
-/// Looks for the contact that yields most.
+/// Finds the contact that yields most.
 struct Yielding<'a, D: Dim> {
     world: &'a World<D>,
     pair: [u32; 2],
@@ -274,8 +275,8 @@ impl<D: Dim> Visitor<D> for Pairs {
     }
 }
 
-/// Sums the power that the reactions of a solution would take from the free velocities (N s times
-/// m/s), and what is left of it.
+/// Sums the power of the reactions of a solution against the free velocities, `asked`, and against
+/// the velocities of the solution, `left` (N s times m/s).
 struct Powers<'a, D: Dim> {
     problem: &'a ContactProblem<D>,
     asked: f64,
@@ -296,7 +297,7 @@ impl<D: Dim> Visitor<D> for Powers<'_, D> {
     }
 }
 
-/// Lists the walls that carry more than the least reaction.
+/// Lists the walls that carry a reaction of at least `least`.
 struct Carrying {
     first: u32,
     least: f64,

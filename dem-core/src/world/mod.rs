@@ -1,6 +1,6 @@
-//! The world: grains, walls, bonds and time, and the step that carries them on.
+//! The world: grains, walls, bonds and time, and the time step that advances them.
 //!
-//! [`World::step`] reads as the scheme of Moreau and Jean (Jean 1999): half a step in position,
+//! [`World::step`] follows the scheme of Moreau and Jean (Jean 1999): half a step in position,
 //! detection, free velocity, contact problem with its rupture cascade, half a step.
 
 mod assembly;
@@ -40,7 +40,7 @@ pub struct Restitution {
     pub threshold_speed: f64,
 }
 
-/// What holds for the whole of a run.
+/// Settings of a run.
 #[derive(Clone, Debug)]
 pub struct Settings<D: Dim> {
     /// Time step h (s).
@@ -51,18 +51,18 @@ pub struct Settings<D: Dim> {
     pub friction: f64,
     /// Restitution, if there is any.
     pub restitution: Option<Restitution>,
-    /// What a bond at its limit does within the solve.
+    /// Flow rule of bonds at their limit.
     pub bond_flow: BondFlow,
-    /// What happens to bonds at their limit.
+    /// Which bonds at their limit break, and when.
     pub rupture: Rupture,
     /// Solver of the contact problem.
     pub solver: SolverSettings,
-    /// How often a step whose solve was not accepted may be halved.
+    /// Number of times that a step may be halved after a refused solve.
     pub max_halvings: u32,
-    /// Thickness of the sample (m) in 2D, 1 in 3D: it turns areas into volumes.
+    /// Thickness of the sample (m) in 2D, 1 in 3D; areas times this are volumes.
     pub thickness: f64,
-    /// Push overlaps apart within one step instead of only keeping them from growing. Energy is
-    /// gained: for preparation, where velocities are thrown away.
+    /// Remove overlaps within one step instead of only preventing their growth. This adds energy:
+    /// for sample preparation alone, which discards velocities.
     pub expel_overlaps: bool,
 }
 
@@ -72,7 +72,7 @@ pub struct World<D: Dim> {
     pub grains: Grains<D>,
     /// The walls.
     pub walls: Vec<Wall<D>>,
-    /// The bonds that ever formed, sorted by pair; broken ones stay in the list.
+    /// All bonds that ever formed, sorted by pair; broken bonds stay in the list.
     pub bonds: Bonds,
     /// Prescribed forces and torques.
     pub loads: Vec<Load<D>>,
@@ -82,25 +82,25 @@ pub struct World<D: Dim> {
     pub time: f64,
     /// Number of accepted steps.
     pub steps: u64,
-    /// Energy since the start.
+    /// Energy balance since the start.
     pub ledger: Ledger,
     /// Contacts of the last accepted step, sorted by pair, with their reactions.
     kept: Vec<Kept<D>>,
-    /// Where the bodies were in the middle of that step: the geometry of its contacts.
+    /// Positions at mid-step of that step, which determine the geometry of its contacts.
     mid: Midpoint<D>,
     /// Length of the last accepted step, or of the last part of it (s); zero before the first.
     last_part: f64,
-    /// What the bonds were given back in it, by their numbers; empty before the first.
+    /// Length corrections of the bonds in it, by bond index; empty before the first.
     turns: Vec<Turn>,
     candidates: Candidates<D>,
     solver: Box<dyn ContactSolver<D>>,
-    /// The settings that the solver was built with; none for one that was handed over.
+    /// The settings that the solver was built from; `None` for a user-defined solver.
     built_with: Option<SolverSettings>,
-    /// Where the grains were at time zero (m).
+    /// Positions of the grains at time zero (m).
     reference: Vec<D::Vector>,
 }
 
-/// What a step changes, kept while a step is tried in halves.
+/// Everything that a step changes, saved while a step is attempted in halves.
 struct State<D: Dim> {
     grains: Grains<D>,
     walls: Vec<Wall<D>>,
@@ -114,8 +114,8 @@ struct State<D: Dim> {
 }
 
 impl<D: Dim> Default for Settings<D> {
-    /// Steps of 10⁻⁴ s, no gravity, no friction, no restitution, and the settings that a scene has
-    /// by default.
+    /// Steps of 10⁻⁴ s, no gravity, no friction, no restitution, and otherwise the defaults of a
+    /// scene.
     fn default() -> Self {
         Self {
             step: 1e-4,
@@ -158,13 +158,13 @@ impl<D: Dim> World<D> {
     }
 
     /// Bond every pair of grains whose gap is at most `gap_tolerance` (–) times its mean diameter,
-    /// with friction `friction`; `strength` gives the tensile strength (N) for a mean diameter (m),
-    /// and zero means no bond.
+    /// with friction `friction`; `strength` maps a mean diameter (m) to a tensile strength (N),
+    /// where zero means no bond.
     ///
-    /// Pairs of two fixed grains are left out, since nothing can strain their bond, and pairs that
-    /// have a bond already, intact or broken.
+    /// Pairs of two fixed grains get no bond, since nothing can strain it, nor do pairs that
+    /// already have one, intact or broken.
     pub fn form_bonds(&mut self, gap_tolerance: f64, strength: impl Fn(f64) -> f64, friction: f64) {
-        // too many: the gap decides below
+        // a superset of the pairs: the gap decides below
         let skin: Vec<f64> = self.grains.radius.iter().map(|r| 2.0 * gap_tolerance * r).collect();
         let mut bonds = Vec::new();
         for pair in pairs_within(&self.grains, &self.grains.position, &skin) {
@@ -183,7 +183,7 @@ impl<D: Dim> World<D> {
         self.add_bonds(bonds);
     }
 
-    /// Add bonds. A pair that has one keeps it, be it intact or broken.
+    /// Add bonds. A pair that already has a bond, intact or broken, keeps it.
     pub fn add_bonds(&mut self, bonds: Vec<Bond>) {
         let numbers = self.bonds.merge(bonds);
         if !self.turns.is_empty() {
@@ -197,40 +197,39 @@ impl<D: Dim> World<D> {
         }
     }
 
-    /// Give the twisting moment of every bond the limit ξ a (r_n + r_coh) with this ξ (–); in space
+    /// Give the twisting moment of every bond the limit ξ a (r_n + r_coh) with this ξ (–); in 3D
     /// with twist rows, where a bond that has none breaks as soon as it is twisted.
     pub fn limit_twist(&mut self, xi: f64) {
         self.bonds.iter_mut().for_each(|bond| bond.twist = xi);
     }
 
-    /// Make every bond elastic; `stiffness` gives its stiffness for a mean diameter (m).
+    /// Make every bond elastic; `stiffness` maps the mean diameter (m) of a bond to its stiffness.
     pub fn make_bonds_elastic(&mut self, stiffness: impl Fn(f64) -> Stiffness) {
         for bond in &mut self.bonds {
             bond.stiffness = Some(stiffness(bond.mean_diameter));
         }
     }
 
-    /// Take another solver from the next step on, with nothing kept of earlier solves.
+    /// Replace the solver from the next step on; the new one knows nothing of earlier solves.
     pub fn set_solver(&mut self, solver: SolverSettings) {
         self.settings.solver = solver;
         (self.solver, self.built_with) = (solver.build(), Some(solver));
     }
 
-    /// Take a solver of one's own from the next step on. `settings.solver` still says which
-    /// residuals count as small: its tolerances bound how far bodies may move beyond their contact
-    /// laws.
+    /// Use a user-defined solver from the next step on. The tolerances of `settings.solver` still
+    /// apply: they bound how far bodies may move beyond their contact laws.
     pub fn use_solver(&mut self, solver: Box<dyn ContactSolver<D>>) {
         (self.solver, self.built_with) = (solver, None);
     }
 
-    /// The solver that the settings ask for, where they were changed.
+    /// Rebuild the solver if its settings have changed.
     fn follow_settings(&mut self) {
         if self.built_with.is_some_and(|built| built != self.settings.solver) {
             self.set_solver(self.settings.solver);
         }
     }
 
-    /// Everything that a step changes.
+    /// A copy of everything that a step changes.
     fn state(&self) -> State<D> {
         State {
             grains: self.grains.clone(),
@@ -256,7 +255,7 @@ impl<D: Dim> World<D> {
         self.time = state.time;
     }
 
-    /// Number of bonds that hold.
+    /// Number of intact bonds.
     pub fn intact_bonds(&self) -> usize {
         self.bonds.iter().filter(|b| b.status == BondStatus::Intact).count()
     }
@@ -267,8 +266,8 @@ impl<D: Dim> World<D> {
         (0..D::N).map(|axis| high[axis] - low[axis]).product::<f64>() * self.settings.thickness
     }
 
-    /// Bring every grain and wall to rest and forget nothing else: a quasi-static preparation steps
-    /// from rest to rest.
+    /// Set all velocities and spins to zero and keep everything else: in quasi-static preparation
+    /// each step begins at rest.
     pub fn stop_motion(&mut self) {
         self.grains.velocity.iter_mut().for_each(|v| *v = D::Vector::zero());
         self.grains.spin.iter_mut().for_each(|w| *w = D::Spin::zero());

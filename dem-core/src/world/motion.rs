@@ -1,10 +1,10 @@
-//! Where the bodies are and how they move in a step, before its contacts are known.
+//! Positions and velocities of the bodies in a step before its contacts are known.
 
 use crate::body::{Grains, Wall};
 use crate::dim::Dim;
 use std::sync::Arc;
 
-/// The configuration at mid-step, where contacts are looked for (m).
+/// Positions at mid-step (m), at which contacts are detected.
 #[derive(Clone)]
 pub(super) struct Midpoint<D: Dim> {
     pub grains: Vec<D::Vector>,
@@ -12,12 +12,12 @@ pub(super) struct Midpoint<D: Dim> {
 }
 
 impl<D: Dim> Midpoint<D> {
-    /// Where the bodies are now.
+    /// The current positions.
     pub fn of(grains: &Grains<D>, walls: &[Wall<D>]) -> Self {
         Self { grains: grains.position.clone(), walls: walls.iter().map(|w| w.position).collect() }
     }
 
-    /// The place of a body (m), grains first.
+    /// Position of a body (m), grains first.
     pub fn place(&self, body: usize) -> D::Vector {
         body.checked_sub(self.grains.len()).map_or_else(|| self.grains[body], |wall| self.walls[wall])
     }
@@ -29,12 +29,12 @@ pub(super) struct Motion<D: Dim> {
     pub free: Arc<[(D::Vector, D::Spin)]>,
 }
 
-/// What a bond is given back in a step.
+/// Length correction of a turning bond in a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Turn {
-    /// What is added to the normal velocity of the bond before its law (m/s).
+    /// Velocity that the law of the bond adds to its normal velocity (m/s).
     pub bias: f64,
-    /// By how much the bond is longer at mid-step than its law knows, beside the hidden length of
-    /// steps of this length (m): zero where all steps were of one length.
+    /// Length of the bond at mid-step beyond the length known to its law, less the hidden length of
+    /// steps of this length (m): zero if all steps had one length.
     pub owed: f64,
 }

@@ -1,4 +1,4 @@
-//! What is measured on a world: kinetic energy, momentum, mean stress and strain.
+//! Measures of a world: kinetic energy, momentum, mean stress and strain.
 
 use super::{Momentum, Touch, World};
 use crate::dim::{Dim, Vect};
@@ -51,7 +51,7 @@ impl<D: Dim> World<D> {
     }
 
     /// Contacts of the last accepted step, sorted by pair, with their reactions. Gaps and points
-    /// are those of mid-step, with the radii, shapes and numbers of bodies as they are now.
+    /// are those of mid-step, with the present radii and shapes of the bodies.
     pub fn touches(&self) -> impl ExactSizeIterator<Item = Touch<D>> {
         self.kept.iter().map(|kept| self.touch(&self.mid, kept))
     }

@@ -1,4 +1,4 @@
-//! What a step did, and why one could not be made.
+//! The report of a step, and the error of a step that could not be made.
 
 use super::{Break, Counts};
 use crate::dim::Dim;
@@ -6,52 +6,52 @@ use crate::solver::certificate::Verdict;
 use crate::solver::{Route, SolveReport, SolveStatus, Work};
 use std::fmt;
 
-/// Parts into which a step is divided at most where bodies are fast.
+/// Largest number of parts into which fast bodies divide a step.
 pub(super) const PARTS: u32 = 4096;
 
-/// Most bodies that a message names.
+/// Largest number of bodies that a message names.
 const NAMED: usize = 8;
 
-/// What one step did.
+/// The result of one step.
 #[derive(Clone, Debug)]
 pub struct StepReport<D: Dim> {
     /// Time at its end (s).
     pub time: f64,
-    /// How the worst of its solves ended: `Accepted` where a residual or a load error missed what
-    /// the solver aims at; never `Failed`.
+    /// The worst status of its solves: `Accepted` if a residual or a load error missed the
+    /// tolerance of the solver; never `Failed`.
     pub status: SolveStatus,
-    /// The method that solved it: of the routes of its accepted solves the last in the order of
+    /// The method that solved it: among the routes of its accepted solves, the last in the order of
     /// [`Route`].
     pub route: Route,
-    /// What all its solves took.
+    /// Work of all its solves.
     pub work: Work,
     /// Largest residual of its accepted solves (–).
     pub residual: f64,
-    /// Largest load error of those of its accepted solves that report one (–), zero for a solve
-    /// whose residual is zero; none where no solve reports one.
+    /// Largest load error of its accepted solves (–), zero for a solve whose residual is zero;
+    /// `None` if no solve reports one.
     pub load_error: Option<f64>,
     /// ‖M (v⁺ − v⁻)/h‖ over the grains that are free to move, over the norm of the forces on the
-    /// sample: gravity, loads, and those that drive walls (–). Zero without such forces; of a step
-    /// in parts the largest. In a sample that should be at rest all of it is false.
+    /// sample: gravity, loads, and those that drive walls (–). Zero without such forces; for a step
+    /// in parts, the largest of its parts. In a sample that should be at rest all acceleration is
+    /// false.
     pub false_acceleration: f64,
-    /// Contacts by what they did.
+    /// Contacts by status.
     pub counts: Counts,
-    /// Bonds that broke, in the order of the cascade's rounds.
+    /// Bonds that broke, in the order of the cascade rounds.
     pub breaks: Vec<Break<D>>,
     /// Deepest overlap of a dry contact at mid-step (m).
     pub penetration: f64,
     /// Largest difference between the length of an intact bond at mid-step and its length at rest
     /// (m).
     pub bond_elongation: f64,
-    /// Number of solves that were not accepted and made the step shorter.
+    /// Number of refused solves, each of which halved a part of the step.
     pub rejected: u32,
-    /// Number of parts that the step was made in: 1, or more where a solve was not accepted or a
-    /// body was too fast.
+    /// Number of parts of the step: 1, or more if a solve was refused or a body was too fast.
     pub substeps: u32,
 }
 
 impl<D: Dim> StepReport<D> {
-    /// Two half steps as one, made because `refused` solves were not accepted.
+    /// The report of two half steps as that of one step; `refused` solves caused the halving.
     pub(super) fn followed_by(self, second: Self, refused: u32) -> Self {
         let mut breaks = self.breaks;
         let rounds = breaks.last().map_or(0, |b| b.round + 1);
@@ -74,7 +74,7 @@ impl<D: Dim> StepReport<D> {
     }
 }
 
-/// The larger of those of two load errors that were reported.
+/// The larger of two load errors, either of which may not be reported.
 fn larger(a: Option<f64>, b: Option<f64>) -> Option<f64> {
     a.into_iter().chain(b).reduce(f64::max)
 }
@@ -112,7 +112,7 @@ impl Solves {
     }
 }
 
-/// Why a step could not be made. The world stands as it did after the last accepted step.
+/// Why a step could not be made. The world is in its state after the last accepted step.
 #[non_exhaustive]
 #[derive(Clone, Debug, PartialEq)]
 pub enum StepError {
@@ -128,52 +128,52 @@ pub enum StepError {
         iterations: u64,
         /// The bodies of the contact that is furthest from its law (walls follow the grains).
         pair: [u32; 2],
-        /// What is proved of its problem, with bodies by number (walls follow the grains).
+        /// The verdict on its problem, with bodies by index (walls follow the grains).
         verdict: Verdict<u32>,
     },
-    /// A grain would pass through another body, or be pushed by one it passes, in the shortest part
-    /// of a step.
+    /// A grain would pass through another body, or be pushed by one that it passes at a distance,
+    /// in the shortest part of a step.
     TooFast {
         /// Time at which the part of the step that failed began (s).
         time: f64,
         /// Grain, and grain or wall (walls follow the grains).
         pair: [u32; 2],
     },
-    /// Two bodies move beyond the law of their contact though the residual is small enough.
+    /// Two bodies move beyond the law of their contact although the residual is small enough.
     Yielded {
         /// Time at which the step that failed began (s), or its half.
         time: f64,
-        /// Which, and how far.
+        /// The pair and its displacement.
         violation: Violation,
     },
     /// A velocity is not a finite number.
     NotFinite {
-        /// Whose (walls follow the grains).
+        /// The body (walls follow the grains).
         body: u32,
         /// Time of the last accepted state (s).
         time: f64,
     },
 }
 
-/// A pair that a solve lets move beyond its law: a dry contact closes, a rigid bond changes its
-/// length.
+/// A pair that moves beyond its contact law in a solution: a dry contact closes, or a rigid bond
+/// changes its length.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Violation {
     /// Grain, and grain or wall (walls follow the grains).
     pub pair: [u32; 2],
-    /// How far, over the smaller radius (–).
+    /// Displacement over the smaller radius (–).
     pub share: f64,
-    /// Whether it is the sum over the run so far; else it is the way of one step.
+    /// Whether `share` is the sum over the run so far; otherwise it is that of one step.
     pub accumulated: bool,
-    /// Where the reactions balance each other without stopping the bodies: the walls that carry
-    /// them (walls follow the grains), one of which is moved.
+    /// If the reactions balance each other without stopping the bodies, the walls that carry them
+    /// (walls follow the grains), at least one of them driven.
     pub jammed: Option<Vec<u32>>,
-    /// What is proved of the problem, with bodies by number (walls follow the grains).
+    /// The verdict on the problem, with bodies by index (walls follow the grains).
     pub verdict: Verdict<u32>,
 }
 
 impl StepError {
-    /// What is proved of the problem that was not solved, where the error is of a solve.
+    /// The verdict on the unsolved problem, if the error is that of a solve.
     pub fn verdict(&self) -> Option<&Verdict<u32>> {
         match self {
             Self::NotAccepted { verdict, .. } | Self::Yielded { violation: Violation { verdict, .. }, .. } => {
@@ -183,8 +183,7 @@ impl StepError {
         }
     }
 
-    /// The message, with bodies called by `name`, which is given a number: grains first, then
-    /// walls.
+    /// The message; `name` maps the index of a body to its name, grains first, then walls.
     pub fn message(&self, name: &dyn Fn(u32) -> String) -> String {
         match self {
             Self::NotAccepted { time, step, residual, iterations, pair, verdict } => {
@@ -220,7 +219,7 @@ impl StepError {
     }
 }
 
-/// What is known of a solution that was not found.
+/// What the verdict says of the existence of a solution.
 fn existence(verdict: &Verdict<u32>) -> &'static str {
     match verdict {
         Verdict::NoSolution(_) => "there is no solution",
@@ -229,7 +228,8 @@ fn existence(verdict: &Verdict<u32>) -> &'static str {
     }
 }
 
-/// Names in a sentence; of many bodies the last, which are the walls, and how many more there are.
+/// Names of bodies for a sentence; of many bodies the last [`NAMED`], among them the walls, and the
+/// number of the others.
 fn listed(bodies: &[u32], name: &dyn Fn(u32) -> String) -> String {
     let (others, named) = bodies.split_at(bodies.len().saturating_sub(NAMED));
     let mut names: Vec<String> = named.iter().map(|body| name(*body)).collect();
@@ -243,7 +243,7 @@ fn listed(bodies: &[u32], name: &dyn Fn(u32) -> String) -> String {
 }
 
 impl Violation {
-    /// Whether a better solve, or a shorter step, may do without it.
+    /// Whether a finer solve or a shorter step may avoid the violation.
     pub(super) fn is_of_the_solve(&self) -> bool {
         !self.accumulated && self.jammed.is_none()
     }
@@ -333,7 +333,7 @@ mod tests {
         }
     }
 
-    /// Each refused solve makes two parts of one, whichever half it was of.
+    /// Each refused solve splits one part into two, in either half.
     #[test]
     fn a_step_has_one_part_more_than_refused_solves() {
         let halves = || whole().followed_by(whole(), 1);
@@ -341,12 +341,12 @@ mod tests {
         assert_eq!(steps.map(|step| (step.rejected, step.substeps)), [(1, 2), (2, 3), (2, 3)]);
         let both = halves().followed_by(halves(), 1);
         assert_eq!((both.rejected, both.substeps), (3, 4));
-        // what is largest in either half is largest in the step
+        // the step reports the larger value of its halves
         let late = || StepReport { false_acceleration: 2.0, ..whole() };
         for step in [late().followed_by(whole(), 1), whole().followed_by(late(), 1)] {
             assert_eq!(step.false_acceleration, 2.0);
         }
-        // bodies that are too fast refuse no solve
+        // halving for fast bodies counts no refused solve
         let fast = halves().followed_by(halves(), 0);
         assert_eq!((fast.rejected, fast.substeps), (2, 4));
     }
@@ -355,7 +355,7 @@ mod tests {
     fn the_load_error_of_a_step_is_that_of_the_solves_that_report_one() {
         let (none, some) = (solve(Route::Sweeps, 1e-9, None), solve(Route::ActiveSet, 1e-9, Some(3e-6)));
         assert_eq!(together(&[none, none]).load_error, None);
-        // whichever comes last
+        // in either order
         assert_eq!(together(&[none, some]).load_error, Some(3e-6));
         assert_eq!(together(&[some, none]).load_error, Some(3e-6));
         assert_eq!(together(&[some, solve(Route::ActiveSet, 1e-9, Some(4e-6))]).load_error, Some(4e-6));

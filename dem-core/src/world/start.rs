@@ -1,4 +1,4 @@
-//! The reactions that a run starts from.
+//! The initial reactions of a run: the warm start of its first step.
 
 use super::World;
 use super::motion::Midpoint;
@@ -9,12 +9,11 @@ use crate::contact::Local;
 use crate::dim::{Dim, Vect};
 
 impl<D: Dim> World<D> {
-    /// Start the next step from these reactions (N, moments N m, in the contact's frame) of the
-    /// intact bonds, and from none at the other contacts.
+    /// Start the next step from these reactions of the intact bonds (N, moments N m, in the
+    /// contact's frame), and from zero at the other contacts.
     ///
-    /// A start is where a solver begins, not a load: what the solver makes of it is up to the
-    /// solver. In a rigid sample, whose reactions are not unique, different starts lead to
-    /// different reactions that are all solutions.
+    /// A start is the first iterate of a solver, not a load, and a solver may ignore it. In a rigid
+    /// sample the reactions are not unique: different starts lead to different solutions.
     pub fn start_from(&mut self, mut reaction: impl FnMut(&Bond) -> Local<D::Tangent, D::Moment>) {
         self.kept.clear();
         self.mid = Midpoint::of(&self.grains, &self.walls);

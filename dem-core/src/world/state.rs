@@ -1,7 +1,8 @@
-//! The state of a world as plain numbers, and the world that goes on from it.
+//! The state of a world as plain numbers, and the world restored from them.
 //!
-//! What the scene gives is not part of it: shapes and drives of walls, loads, settings. Nor is the
-//! list of candidate pairs, which may be any that covers a step.
+//! The state does not include what the scene defines: shapes and drives of walls, loads, settings.
+//! Nor does it include the list of candidate pairs: any list that is valid for a step gives the
+//! same contacts.
 
 use super::motion::Midpoint;
 use super::motion::Turn;
@@ -13,14 +14,14 @@ use crate::contact::Local;
 use crate::dim::Dim;
 use crate::saved::{Mismatch, Reader, Saved};
 
-/// The code of "no bond" where an index could stand.
+/// Code of "no bond" in place of a bond index.
 const NONE: u64 = u64::MAX;
 
 const BONDS: [BondStatus; 5] =
     [BondStatus::Intact, BondStatus::Tension, BondStatus::Shear, BondStatus::Rolling, BondStatus::Twist];
 const TOUCHES: [TouchStatus; 4] = [TouchStatus::Open, TouchStatus::Stick, TouchStatus::Slip, TouchStatus::Bonded];
 
-/// A value by its code, the place in `all`.
+/// The value with the next code, which is its index in `all`.
 fn coded<T: Copy>(all: &[T], from: &mut Reader) -> Result<T, Mismatch> {
     all.get(from.count()?).copied().ok_or(Mismatch)
 }
@@ -63,7 +64,7 @@ impl<D: Dim> Grains<D> {
 }
 
 impl<D: Dim> World<D> {
-    /// Write everything that changes from step to step, the grains first.
+    /// Write everything that changes from step to step; the grains come first.
     pub fn save(&self, to: &mut Saved) {
         self.grains.save(to);
         to.count(self.steps as usize);
@@ -90,8 +91,9 @@ impl<D: Dim> World<D> {
         self.solver.save(to);
     }
 
-    /// The world whose `grains` and the rest after them [`World::save`] wrote. The walls are those
-    /// of the scene; their motion is the one that was written.
+    /// The world that [`World::save`] wrote: `grains` are already read, `from` holds the rest.
+    /// `walls`, `loads` and `settings` are those of the scene; positions and velocities of the
+    /// walls are restored.
     ///
     /// # Errors
     /// [`Mismatch`].
@@ -106,7 +108,7 @@ impl<D: Dim> World<D> {
         let n = world.grains.len();
         world.steps = from.count()? as u64;
         world.time = from.real()?;
-        // the reference volume, which follows from the places at time zero
+        // the reference volume, which follows from the positions at time zero
         from.real()?;
         world.reference = from.vectors(n)?;
         if from.count()? != world.walls.len() {

@@ -1,5 +1,5 @@
-//! One time step: the scheme of Moreau and Jean with θ = 1/2, its rupture cascade, and what is done
-//! when a solve fails.
+//! One time step: the scheme of Moreau and Jean with θ = 1/2, its rupture cascade, and halving when
+//! a step is refused.
 
 use super::assembly::{Places, write_reactions};
 use super::ledger::{elastic_energy, losses};
@@ -17,13 +17,13 @@ use crate::solver::certificate::Verdict;
 use crate::solver::{SolveReport, SolveStatus};
 
 impl<D: Dim> World<D> {
-    /// Carry the world on by one time step. An error leaves the world and its solver as they were.
+    /// Advance the world by one time step. An error leaves the world and its solver unchanged.
     pub fn step(&mut self) -> Result<StepReport<D>, StepError> {
         self.step_watched(&mut |_| {})
     }
 
-    /// The same; `watch` is told after each round of a cascade how many bonds have broken in it so
-    /// far. A step that is made anew in halves begins to count anew.
+    /// As [`World::step`]; `watch` is called after each cascade round with the number of bonds
+    /// broken so far in the step. If the step is repeated in halves, the count restarts.
     pub fn step_watched(&mut self, watch: &mut dyn FnMut(usize)) -> Result<StepReport<D>, StepError> {
         self.follow_settings();
         let solver = self.solver.snapshot();
@@ -41,8 +41,8 @@ impl<D: Dim> World<D> {
         Ok(report)
     }
 
-    /// One step of length `h`, or two of half that length if its solve is not accepted, or if
-    /// bodies are too fast for it; `parts` of its length were the step.
+    /// One step of length `h`, or two of half that length if its solve is refused or bodies are too
+    /// fast for it; the step of the scene is `parts` × `h`.
     fn advance(
         &mut self,
         h: f64,
@@ -67,28 +67,28 @@ impl<D: Dim> World<D> {
         let mut watch_second = |broken| watch(first.breaks.len() + broken);
         match self.advance(0.5 * h, halvings + refused, 2 * parts, &mut watch_second) {
             Ok(second) => {
-                // the equilibrium that broke first is that of the step
+                // the forces of the first rupture are those of the step
                 if !first.breaks.is_empty() {
                     self.walls.iter_mut().zip(at_limit).for_each(|(wall, reaction)| wall.reaction_at_limit = reaction);
                 }
                 Ok(first.followed_by(second, refused))
             }
             Err(error) => {
-                // half a step that stands alone would be neither the old state nor the new one
+                // after the first half the world is in neither the old state nor the new one
                 self.restore(before);
                 Err(error)
             }
         }
     }
 
-    /// One step of length `h`. An error leaves the world as it was; where it is the `last` attempt,
-    /// it has the verdict on its problem.
+    /// One step of length `h`. An error leaves the world unchanged; that of the `last` attempt
+    /// includes the verdict on its problem.
     fn attempt(&mut self, h: f64, last: bool, watch: &mut dyn FnMut(usize)) -> Result<StepReport<D>, StepError> {
         let mid = self.midpoint(h);
         let motion = self.free_motion(h);
         let applied = self.applied_impulse(h);
         let mut touches = self.detect(&mid, &motion, h);
-        // packing pushes grains apart at speeds that mean nothing
+        // sample preparation pushes grains apart at speeds without physical meaning
         let limited = !self.settings.expel_overlaps;
         if limited {
             self.refuse_crossing(self.crossing(|k| self.place(k), |k| motion.before[k].0, 0.5 * h))?;
@@ -138,8 +138,8 @@ impl<D: Dim> World<D> {
         Ok(self.report(h, &motion, &problem, done, breaks))
     }
 
-    /// Solve a contact problem; where `limited`, once more if its velocities are too far from the
-    /// laws and there is another way.
+    /// Solve a contact problem. If `limited` and an accepted solution yields, solve again with the
+    /// solver's finer method, if it has one.
     fn solve(&mut self, problem: &mut ContactProblem<D>, limited: bool) -> SolveReport {
         let solve = self.solver.solve(problem);
         if !limited || solve.status != SolveStatus::Accepted || self.yielding(problem).is_none() {
@@ -262,8 +262,8 @@ impl<D: Dim> World<D> {
         found.map_or(Ok(()), |pair| Err(StepError::TooFast { time: self.time, pair }))
     }
 
-    /// The bonds that the accepted solve left at their limit, as many as the scene's rule lets
-    /// break in one round.
+    /// The bonds at their limit after an accepted solve, restricted to those that break in one
+    /// cascade round.
     fn at_limit(
         &self,
         mid: &Midpoint<D>,
@@ -283,7 +283,7 @@ impl<D: Dim> World<D> {
         found.into_iter().map(|(_, failed)| failed).collect()
     }
 
-    /// The bonds of a group that are at their limit, each with the square of its flow.
+    /// The bonds of a group that are at their limit, each with the square of its flow velocity.
     fn group_at_limit<L: Law<T = D::Tangent, B = D::Moment>>(
         &self,
         mid: &Midpoint<D>,
@@ -302,20 +302,20 @@ impl<D: Dim> World<D> {
             u.n += law.bias();
             let flow = u + law.compliance().times(&(contact.r - law.carried()));
             let Some(bond) = touch.bond else { continue };
-            // what the books hold of it: of the step's beginning where the step is made without the
-            // bond
+            // its entry in the energy balance: the value at the start of the step if the step is
+            // solved again without the bond
             let stored = if self.settings.rupture == Rupture::EndOfStep { contact.r } else { law.carried() };
             let energy = elastic_energy(law, &stored);
             let (pair, point, reaction) = (touch.pair, touch.point, touch.reaction);
             found.push((flow.dot(&flow), Break { bond, pair, mode, round, point, reaction, energy }));
         }
-        // a large problem has an order of its own
+        // a large problem is not ordered by pair
         found.sort_by_key(|(_, failed)| failed.pair);
         found
     }
 
-    /// Take over the result: velocities, second half of the positions, broken bonds, reactions,
-    /// books.
+    /// Apply the result: energy balance, velocities, second half of the positions, broken bonds,
+    /// reactions.
     fn settle(
         &mut self,
         h: f64,
@@ -371,7 +371,7 @@ impl<D: Dim> World<D> {
         let (bonds, elastic) = (bonds.iter().sum::<f64>(), elastic.iter().sum::<f64>());
         let stored: f64 = problem.elastic.iter().map(|c| elastic_energy(&c.law, &c.r)).sum();
         let released: f64 = breaks.iter().map(|b| b.energy).sum();
-        // bonds that break at the end of the step are still among those that store
+        // bonds that break at the end of the step are still included in `stored`
         let late = if self.settings.rupture == Rupture::EndOfStep { released } else { 0.0 };
         let ledger = &mut self.ledger;
         ledger.remainder += external - (kinetic - ledger.kinetic) - dry[0] - smooth[0] - dry[1] - bonds - elastic;
@@ -433,7 +433,7 @@ impl<D: Dim> World<D> {
             let dv = (problem.nodes.all[k].velocity - motion.before[k].0) * *mass;
             change += dv.dot(&dv);
         }
-        // the forces that are prescribed, and those that walls of prescribed velocity need
+        // prescribed forces, and those that keep walls at their prescribed velocity
         let mut applied = problem.applied * problem.applied;
         for wall in &self.walls {
             if let Drive::Velocity { direction, .. } = &wall.drive {
@@ -443,7 +443,7 @@ impl<D: Dim> World<D> {
         if applied > 0.0 { change.sqrt() / applied.sqrt() } else { 0.0 }
     }
 
-    /// What the step of length `h` did, after it.
+    /// The report of a step of length `h` that has been settled.
     fn report(
         &self,
         h: f64,

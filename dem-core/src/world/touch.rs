@@ -1,49 +1,49 @@
-//! The contacts of a step, with reactions as forces: as the world keeps them, and as others see
-//! them.
+//! The contacts of a step, with reactions as forces. `Kept` is a contact as the world stores it,
+//! [`Touch`] the same with its geometry, for reading.
 
 use crate::bond::BondStatus;
 use crate::contact::Local;
 use crate::dim::{Dim, Vect};
 use std::num::NonZeroU32;
 
-/// What a contact did in the last step.
+/// Status of a contact in the last step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TouchStatus {
     /// No reaction.
     Open,
     /// Contact without slip.
     Stick,
-    /// Contact that slips; a contact without friction always may.
+    /// Contact that slips; a frictionless contact with a reaction counts as slipping.
     Slip,
     /// An intact bond.
     Bonded,
 }
 
-/// A contact as the world keeps it from step to step. Its gap, normal and point follow from the
-/// places of its bodies at mid-step, and are not kept: a million grains have three million
-/// contacts, twice while a step is made.
+/// A contact as the world stores it from step to step. Gap, normal and point follow from the
+/// positions at mid-step and are not stored: a million grains have three million contacts, stored
+/// twice during a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Kept<D: Dim> {
     pub pair: [u32; 2],
-    /// The bond that ties it, counted from one: four bytes, no bond included.
+    /// Index of its bond plus one: four bytes, including the case of no bond.
     pub bond_from_one: Option<NonZeroU32>,
     pub status: TouchStatus,
-    /// Whether its gap is so wide that the limits of the step look at it; taken as true of bonds.
+    /// Whether its gap is so wide that the limits of the step check it; always true for bonds.
     pub wide: bool,
-    /// Whether it pushed in the step before.
+    /// Whether its normal reaction was positive in the previous step.
     pub closed: bool,
-    /// Whether its bond held in the step before.
+    /// Whether its bond was intact in the previous step.
     pub held: bool,
-    /// What its frame has beside the normal.
+    /// The tangents of its frame.
     pub tangents: D::Tangents,
     pub reaction: Local<D::Tangent, D::Moment>,
-    /// How far its bodies have closed beyond its law since they touched (m), summed over the steps:
-    /// the errors of their solves. Of a rigid bond, by how much these have shortened it.
+    /// Closing of its bodies beyond the contact law since they touched (m): solver errors, summed
+    /// over the steps. For a rigid bond, its shortening by them.
     pub yielded: f64,
 }
 
 impl<D: Dim> Kept<D> {
-    /// A contact without reaction, tied by this bond or by none, of an ordinary gap.
+    /// A contact without reaction, with this bond or none; `wide` is set for a bond only.
     pub fn new(pair: [u32; 2], bond: Option<u32>) -> Self {
         Self {
             pair,
@@ -58,12 +58,12 @@ impl<D: Dim> Kept<D> {
         }
     }
 
-    /// Index of the bond that ties the pair, if it holds.
+    /// Index of the intact bond of the pair, if there is one.
     pub fn bond(&self) -> Option<u32> {
         self.bond_from_one.map(|bond| bond.get() - 1)
     }
 
-    /// Give the bond that ties the pair this index.
+    /// Set the index of the bond of the pair.
     pub fn tie(&mut self, bond: Option<u32>) {
         self.bond_from_one = bond.and_then(|bond| NonZeroU32::new(bond + 1));
     }
@@ -80,15 +80,15 @@ pub struct Touch<D: Dim> {
     pub point: D::Vector,
     /// Gap at mid-step (m).
     pub gap: f64,
-    /// Index of the bond that ties the pair, if it holds.
+    /// Index of the intact bond of the pair, if there is one.
     pub bond: Option<u32>,
     /// Reaction of j on i (N), and moment (N m, as rows of the frame; zero without a bond).
     pub reaction: Local<D::Tangent, D::Moment>,
-    /// What it did.
+    /// Status.
     pub status: TouchStatus,
 }
 
-/// Number of contacts by what they did.
+/// Number of contacts by status.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Without reaction.
@@ -126,7 +126,7 @@ pub struct Break<D: Dim> {
     pub pair: [u32; 2],
     /// How it failed.
     pub mode: BondStatus,
-    /// Round of the cascade, from 0.
+    /// Cascade round, from 0.
     pub round: u32,
     /// Contact point (m).
     pub point: D::Vector,

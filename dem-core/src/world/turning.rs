@@ -1,9 +1,11 @@
-//! What bonds that turn are given back, so that they keep their length, or their force follows it.
+//! Length correction of bonds that turn: rigid bonds keep their length, and the force of elastic
+//! bonds follows theirs. The law of a bond knows its normal velocity u_n, but not the lengthening
+//! by rotation.
 //!
-//! Write w for the time between the mid-steps of two steps of lengths h and h'. In it a bond grows
-//! by w u_n, of which its law has been told h u_n, and by a *hidden* length e(w), because it turns.
-//! A step gives e(h) back, the hidden length of steps as long as itself. What a change of the
-//! length of steps leaves beside it is *owed*, and given back over the step of the scene. See
+//! Let w be the time between the mid-steps of two steps of lengths h and h'. In this time a bond
+//! lengthens by w u_n, of which its law includes h u_n, and by a *hidden* length e(w) due to
+//! rotation. A step corrects e(h), the hidden length of steps of its own length. If the length of
+//! steps changes, a remainder is *owed*; it is corrected over the step of the scene. See
 //! docs/theory/time-stepping.md, "Bonds that turn in steps of several lengths".
 
 use super::World;
@@ -13,7 +15,7 @@ use crate::body::{direction, separation};
 use crate::dim::{Dim, Vect};
 
 impl<D: Dim> World<D> {
-    /// What the bonds are given back in a step of length `h`, by their numbers.
+    /// Length corrections of all bonds in a step of length `h`, by bond index.
     pub(super) fn turns(&self, mid: &Midpoint<D>, touches: &[Kept<D>], motion: &Motion<D>, h: f64) -> Vec<Turn> {
         let mut turns = vec![Turn::default(); self.bonds.len()];
         for kept in touches {
@@ -24,15 +26,15 @@ impl<D: Dim> World<D> {
         turns
     }
 
-    /// What the bond of this contact is given back in a step of length `h`.
+    /// Length correction of the bond of this contact in a step of length `h`.
     fn turn(&self, mid: &Midpoint<D>, kept: &Kept<D>, number: usize, motion: &Motion<D>, h: f64) -> Turn {
         let bond = &self.bonds[number];
         let elastic = bond.stiffness.is_some();
-        // without friction, what moved before there was the bond did not move as it lets it
+        // the velocities before a frictionless bond formed do not satisfy its constraint
         if !elastic && bond.friction == 0.0 && !kept.held {
             return Turn::default();
         }
-        // rigid bonds answer to any misfit with forces, to that of rounding too
+        // rigid bonds respond to any misfit with forces, even to round-off
         let rounding = if elastic { 0.0 } else { f64::EPSILON * bond.mean_diameter };
         let hidden = |span: f64| {
             if !elastic && bond.friction > 0.0 {
@@ -48,8 +50,8 @@ impl<D: Dim> World<D> {
         let own = hidden(h);
         if last != h {
             let span = 0.5 * (last + h);
-            // of a rigid bond the velocity that its law asks for: the errors of solves do not fit
-            // each other
+            // for a rigid bond the velocity required by its law: solver errors of different bonds
+            // are incompatible
             let speed = if elastic { self.lengthening(mid, motion, kept.pair, span).1 } else { -before.bias };
             owed += (span - last) * speed + span * hidden(span) - h * own;
         }
@@ -59,14 +61,15 @@ impl<D: Dim> World<D> {
         Turn { bias: own + owed / full, owed }
     }
 
-    /// How fast a bond grew unknown to its law in the time `span` (s) between the last two
-    /// mid-steps, and its normal velocity in the first of them (m/s): for a bond whose grains need
-    /// not turn with it, one that is elastic or has no friction.
+    /// Rate of hidden lengthening of a bond in the time `span` (s) between the last two mid-steps,
+    /// and its normal velocity at the first of them (m/s). For bonds that may turn without their
+    /// grains: elastic or frictionless ones.
     ///
-    /// Between two mid-steps the grains moved by the way d apart, of which d_t across the normal of
-    /// the first one. Their distance grew by d_n and, because the bond turned, by ℓ' − ℓ − d_n =
-    /// d_t² / (ℓ' + ℓ + d_n), of which its law, which knows normal velocities, is not told. In a
-    /// steady turn that is what [`World::turning`] gives. See docs/theory/elastic-bonds.md.
+    /// Between two mid-steps the relative displacement of the grains is d, with d_n along the
+    /// normal at the first and d_t across it. The distance ℓ grows by d_n and, because the bond
+    /// turned, by ℓ' − ℓ − d_n = d_t² / (ℓ' + ℓ + d_n). The law knows normal velocities only, so
+    /// the second part is hidden from it. In a steady turn it equals the result of
+    /// [`World::turning`]. See docs/theory/elastic-bonds.md.
     fn lengthening(&self, mid: &Midpoint<D>, motion: &Motion<D>, pair: [u32; 2], span: f64) -> (f64, f64) {
         let [i, j] = pair.map(|k| k as usize);
         let apart = separation::<D>(mid.grains[i], mid.grains[j]);
@@ -81,20 +84,20 @@ impl<D: Dim> World<D> {
         (hidden, along / span)
     }
 
-    /// How fast a rigid bond with friction grew unknown to its law in the time `span` (s) between
-    /// the last two mid-steps (m/s).
+    /// Rate of hidden lengthening of a rigid bond with friction in the time `span` (s) between the
+    /// last two mid-steps (m/s).
     ///
-    /// A velocity along the tangent of mid-step leads away from the partner before mid-step and
-    /// after it. Where the bond turned by R since the last mid-step, its velocity u⁻ gained n·(1 −
-    /// R) u⁻ along the normal by that alone; half of it back, u_n⁺ = −½ n·(1 − R) u⁻, makes the
+    /// A velocity along the tangent at mid-step increases the distance both before and after
+    /// mid-step. A turn by R since the last mid-step alone changes the normal component of the
+    /// bond's velocity u⁻ by n·(1 − R) u⁻. Correcting half of it, u_n⁺ = −½ n·(1 − R) u⁻, makes the
     /// step symmetric in time: the length is kept, and since u_n⁺ = −u_n⁻ the reaction does no
-    /// work. Within a rigid fragment R is one for all, so that all bonds can do so at once. See
-    /// docs/theory/time-stepping.md.
+    /// work. R is the same for all bonds of a rigid fragment, so their corrections are compatible.
+    /// See docs/theory/time-stepping.md.
     fn turning(&self, mid: &Midpoint<D>, motion: &Motion<D>, pair: [u32; 2], span: f64) -> f64 {
         let (_, normal, _) = self.geometry(mid, pair);
         let [(v_i, spin_i), (v_j, spin_j)] = pair.map(|k| motion.before[k as usize]);
-        // spins follow the tangential row at mid-step, where they are sin φ / w of the angle φ
-        // between two of them
+        // the tangential row at mid-step determines the spins: sin φ / w, with the angle φ between
+        // two mid-steps
         -0.5 * normal.dot(&D::swing(v_i - v_j, (spin_i + spin_j) * (0.5 * span)))
     }
 }

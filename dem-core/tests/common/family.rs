@@ -34,8 +34,8 @@ pub const FEATURES: [(&str, Feature); 5] = [
 
 const RADIUS: f64 = 2e-3;
 
-/// `rows` rows of `columns` disks, every other one a disk shorter and between those below. A step
-/// makes `sweeps` sweeps, whatever they reach.
+/// `rows` rows of `columns` disks, every other one a disk shorter, with its disks between those
+/// below. A step makes `sweeps` sweeps, whatever residual they reach.
 pub fn rows_of_disks(rows: usize, columns: usize, feature: Feature, sweeps: u64) -> World<D2> {
     let r = RADIUS;
     let mut disks = Vec::new();

@@ -25,8 +25,7 @@ pub fn solver(tolerance: f64) -> SolverSettings {
     })
 }
 
-/// Newton from the stiff limit, with the settings that a scene has by default but for its
-/// tolerances.
+/// Newton from the stiff limit, with the default settings of a scene except for the tolerances.
 pub fn newton(tolerance: f64, accept: f64, load_tolerance: f64) -> StagedSettings {
     StagedSettings {
         stages: Stages::Newton,

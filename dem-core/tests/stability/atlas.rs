@@ -1,5 +1,5 @@
-//! Every parameter over its range, in both dimensions and with every solver, and the page that
-//! tells of it.
+//! Every parameter over its range, in both dimensions and with every solver, and the table of its
+//! results.
 
 use crate::harness::{Outcome, watch};
 use crate::scene::{Heap, Kind};
@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-/// Overlap, over the smallest radius, and share of energy gained up to which a run counts as held.
+/// Largest overlap, over the smallest radius, and largest relative energy gain of a run that holds.
 const OVERLAP: f64 = 0.1;
 const GAIN: f64 = 0.05;
 
@@ -120,7 +120,7 @@ pub const ROWS: [Row; 16] = [
     },
 ];
 
-/// A run: value, solver, dimension, and what it showed.
+/// A run: value, solver, dimension and outcome.
 pub struct Run {
     value: f64,
     kind: Kind,
@@ -138,7 +138,7 @@ impl Row {
             let outcome = if dimension == 2 {
                 watch(&mut heap.world::<D2>(), steps, heap.accept())
             } else {
-                // as many grains as in the plane, about
+                // about as many grains as in 2D
                 let side = heap.side.min(4).saturating_sub(1).max(1);
                 watch(&mut Heap { side, ..heap.clone() }.world::<D3>(), steps, heap.accept())
             };
@@ -158,7 +158,7 @@ impl Row {
 }
 
 impl Run {
-    /// How it fails; empty where it holds.
+    /// The failures of the run; empty if it holds.
     pub fn failing(&self) -> String {
         let o = &self.outcome;
         let mut how = Vec::new();
@@ -190,7 +190,8 @@ impl Run {
     }
 }
 
-/// The rows of the table for the page: what was tried, what held, what did not and how.
+/// The table of the page: for each parameter the values that hold, and the failures at the other
+/// values.
 pub fn table(rows: &[(&Row, Vec<Run>)]) -> String {
     let mut out = String::from("| parameter | holds | overlap | energy gained | elsewhere |\n|---|---|---|---|---|\n");
     for (row, runs) in rows {

@@ -52,7 +52,7 @@ fn nothing_at_all() {
         assert!(alone.bonds.is_empty());
         assert_eq!(watch(&mut alone, 0, 1e-6).steps, 0);
         assert_eq!(watch(&mut alone, 3, 1e-6).travel, 0.0);
-        // walls alone have nobody to meet
+        // walls alone have no contacts
         let mut room = world::<D>(vec![], vec![plane(&[1.0], &[], 0.3)], settings(1e-3, kind));
         assert_eq!(watch(&mut room, 3, 1e-6).stopped, None);
     }
@@ -101,15 +101,15 @@ fn a_corner_and_a_wedge_hold_a_grain_at_any_friction() {
                 let mut set = settings(1e-3, kind);
                 set.gravity = Some(at::<D>(&down));
                 set.friction = friction;
-                // it touches both walls, and falls into them
+                // the grain touches both walls and falls towards the edge
                 let walls = vec![plane(&[c, s], &[], friction), plane(&[-c, s], &[], friction)];
                 let mut w = world::<D>(vec![grain(&[0.0, R / s])], walls, set);
                 w.grains.velocity[0] = at::<D>(&[0.01, -0.1]);
                 let out = watch(&mut w, 100, 1e-6);
-                // with much friction it may be wedged so that no reaction obeys the law; then it is
-                // said
+                // with large friction it may be wedged so that no reaction satisfies the law; the
+                // run then stops with an error
                 assert!(out.stopped.is_none() || friction > 1.0, "{friction} {half_angle} {out:?}");
-                // the first half step leads it in, by the speed it fell at
+                // the first half step moves it into the walls at its initial speed
                 assert!(out.penetration < 0.1, "{friction} {half_angle} {out:?}");
             }
         }
@@ -125,7 +125,7 @@ fn walls_that_cannot_yield_stop_the_run_and_say_so() {
         let mut w = world::<D>(vec![grain(&[R])], vec![plane(&[1.0], &[], 0.3), press], settings(1e-3, kind));
         let out = watch(&mut w, 20, 1e-6);
         let error = out.stopped.expect("nothing can obey both walls");
-        // Newton solves the problem but for an error that closes the contact; Gauss–Seidel does not
+        // Newton reaches the residual with an error that closes the contact; Gauss–Seidel does not
         // converge
         let why = match kind {
             Kind::GaussSeidel => matches!(error, StepError::NotAccepted { time: 0.0, .. }),
@@ -145,8 +145,8 @@ fn walls_that_cannot_yield_stop_the_run_and_say_so() {
     everywhere!(case);
 }
 
-/// A wall that closes so slowly that no single step is refused, on a grain and on bonded ones
-/// between it and another.
+/// A wall that closes so slowly that no single step is refused; between it and another wall are one
+/// grain or three bonded grains.
 #[test]
 fn what_a_slow_wall_squeezes_is_found_in_the_sum_over_the_steps() {
     fn case<D: Dim + PartialEq>(kind: Kind) {
@@ -177,7 +177,7 @@ fn what_a_slow_wall_squeezes_is_found_in_the_sum_over_the_steps() {
 #[test]
 fn nothing_flies_through_anything() {
     fn case<D: Dim + PartialEq>(kind: Kind) {
-        // up to 10,000 diameters a step, at a wall and at a grain, head on
+        // up to 10,000 diameters a step, head on against a wall and against a grain
         for speed in [1.0, 1e2, 1e4, 1e7] {
             let mut bullet = grain::<D>(&[0.5, 0.0]);
             bullet.velocity = at::<D>(&[-speed]);
@@ -190,7 +190,7 @@ fn nothing_flies_through_anything() {
             bullet.velocity = at::<D>(&[-speed]);
             let mut w = world(vec![grain(&[0.0, 0.0]), bullet], vec![], settings(1e-3, kind));
             match watch(&mut w, 600, 1e-6).stopped {
-                // they go on together
+                // both move on together
                 None => {
                     let apart = w.grains.position[1][0] - w.grains.position[0][0];
                     assert!((1.4 * R..3.0 * R).contains(&apart), "{speed}: {apart}");
@@ -324,7 +324,7 @@ fn turning<D: Dim + PartialEq>(kind: Kind, steps: usize) -> (f64, f64) {
     let n = w.grains.len() as f64;
     let centre = w.grains.position.iter().fold(D::Vector::zero(), |a, b| a + *b) * (1.0 / n);
     let mut spin = D::Spin::zero();
-    // about the last axis of three, or obliquely: any will do
+    // out of the plane in 2D, about an oblique axis in 3D: the choice is arbitrary
     for axis in 0..D::Spin::LEN {
         spin[axis] = 1.0 / (D::Spin::LEN as f64).sqrt();
     }
@@ -378,15 +378,15 @@ fn pile(rows: u32, friction: f64, kind: Kind) -> World<D2> {
     world(grains, vec![floor(friction)], set)
 }
 
-/// How far the grain goes that goes farthest (radii), in so many steps, all of which are made.
+/// The largest displacement of a grain (radii) in this number of steps, all of which must succeed.
 fn travel(mut pile: World<D2>, steps: usize) -> f64 {
     let out = watch(&mut pile, steps, 1e-6);
     assert!(out.stopped.is_none(), "{out:?}");
     out.travel
 }
 
-/// A disk on two that touch stands if friction is at least tan 15° = 0.268, and rolls them apart if
-/// it is less.
+/// A disk on two touching disks stays if friction is at least tan 15° = 0.268; with less friction
+/// it rolls them apart.
 #[test]
 fn a_pile_rests_or_falls_as_its_friction_says() {
     for kind in Kind::ALL {
@@ -395,11 +395,11 @@ fn a_pile_rests_or_falls_as_its_friction_says() {
     }
 }
 
-/// Reactions that balance the weights of six disks exist from a friction of 0.43399 on (a linear
-/// programme in the rows of its contacts): below, every solver must let them fall. Above, rest and
-/// motion can both be solutions of Coulomb's law, and which is found depends on where the search
-/// begins: from 0.7 on all find rest but the central path, which from a cold start ends at motion
-/// up to 1.2 at least.
+/// Reactions that balance the weights of six disks exist for friction of at least 0.43399 (from a
+/// linear programme in the rows of the contacts). Below, the pile must fall with every solver.
+/// Above, rest and motion can both be solutions of Coulomb's law, and the start decides which one a
+/// solver finds. From 0.7 on all solvers find rest except the central path, which from a cold start
+/// ends at motion up to 1.2 at least.
 #[test]
 fn a_pile_of_six_falls_where_no_reactions_can_hold_it() {
     for kind in Kind::ALL {
@@ -426,8 +426,8 @@ fn a_pile_rests_for_ten_million_steps() {
     assert!(crept[1] < 1e-3 && heat < 1e-12, "{crept:?} {heat:e}");
 }
 
-/// Disks one on another, or hanging from the first by their bonds; the force at the end that bears
-/// all, over their weight.
+/// Disks one on another, or hanging from the first by their bonds; returns the force at the end
+/// that carries all of them, over their weight.
 fn tower(count: usize, hanging: bool, kind: Kind) -> f64 {
     let up = if hanging { -1.0 } else { 1.0 };
     let mut grains: Vec<_> = (0..count).map(|k| grain::<D2>(&[0.0, up * R * (2 * k + 1) as f64])).collect();
@@ -466,9 +466,9 @@ fn towers_and_chains_of_ten_thousand_bear_their_weight() {
     }
 }
 
-/// Disks between two walls that do not let them aside, every other one so many times as heavy,
-/// noise in their places. At rest each is borne by contacts that differ by its weight: an error of
-/// the reactions of ε times those is a speed of ε M/m times g h.
+/// Disks in zigzag between two walls that hold them sideways, every other one `mass_ratio` times as
+/// heavy. At rest the forces below and above a disk differ by its weight: a relative error ε of
+/// these forces is a speed of ε M/m times g h.
 fn shaft(mass_ratio: f64, kind: Kind) -> World<D2> {
     let mut grains: Vec<Grain<D2>> = Vec::new();
     for k in 0..6 {
@@ -487,8 +487,8 @@ fn shaft(mass_ratio: f64, kind: Kind) -> World<D2> {
     world(grains, std::iter::once(floor(0.3)).chain(sides).collect(), set)
 }
 
-/// A light disk under heavy ones rests as they do: it moved at up to the tolerance times the ratio
-/// of the masses.
+/// A light disk under heavy ones stays at rest as they do; it once moved at up to the tolerance
+/// times the mass ratio.
 #[test]
 fn a_light_grain_that_bears_heavy_ones_is_solved_too() {
     for kind in [Kind::Newton, Kind::Auto, Kind::Interior] {

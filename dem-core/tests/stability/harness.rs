@@ -1,34 +1,33 @@
-//! Runs a world and watches what must hold in every step, whatever the scene.
+//! Runs a world and checks the invariants of every step, which hold for any scene.
 
 use dem_core::bond::BondStatus;
 use dem_core::dim::{Dim, Vect};
 use dem_core::world::{StepError, World};
 
-/// What a run showed. Ratios are without unit.
+/// The outcome of a run. Ratios are without unit.
 #[derive(Clone, Debug, Default)]
 pub struct Outcome {
     /// Steps made.
     pub steps: usize,
-    /// Why it ended before its time.
+    /// The error that ended it early.
     pub stopped: Option<StepError>,
     /// Deepest overlap of a dry contact over the smallest radius.
     pub penetration: f64,
-    /// Energy that came from nowhere: what kinetic and elastic energy less the work done on the
-    /// sample grew by, summed over the steps, over the largest energy seen.
+    /// Spurious energy gain: increases of kinetic plus elastic energy minus the work done on the
+    /// sample, summed over the steps, over the largest energy seen.
     pub gain: f64,
     /// Bonds that broke.
     pub broken: usize,
-    /// Furthest that a grain went over its radius.
+    /// Largest displacement of a grain over its radius.
     pub travel: f64,
 }
 
-/// Carry a world on by so many steps, or until it stops with an error, which must leave it as it
-/// was.
+/// Make this number of steps, or stop at the first error, which must leave the world unchanged.
 ///
 /// # Panics
-/// Where a number is not finite, a residual is above what the solver accepts, a status goes back or
-/// contradicts another, or the energy books do not close; where nothing acts from outside, also if
-/// the momentum changes.
+/// If a number is not finite, a residual is above `accept`, a bond heals or changes its mode, bonds
+/// and contacts contradict each other, or the energy balance does not close; without external
+/// action also if the momentum changes.
 pub fn watch<D: Dim + PartialEq>(world: &mut World<D>, steps: usize, accept: f64) -> Outcome {
     let mut out = Outcome::default();
     // the scene may have set velocities
@@ -72,9 +71,9 @@ pub fn watch<D: Dim + PartialEq>(world: &mut World<D>, steps: usize, accept: f64
         let energy = |l: &dem_core::world::Ledger| l.kinetic + l.elastic + l.fracture - l.external_work;
         gained += (energy(&ledger) - energy(&last)).max(0.0);
         last = ledger;
-        // what impacts take and friction gives back may be large beside what is left
+        // losses by impact and negative losses by friction may be large beside the remaining energy
         let entered = largest.max(ledger.impact.abs() + ledger.friction.abs());
-        assert!(ledger.remainder.abs() <= 1e-9 * entered, "the books are off by {} of {entered}", ledger.remainder);
+        assert!(ledger.remainder.abs() <= 1e-9 * entered, "the balance is off by {} of {entered}", ledger.remainder);
         exchanged += world.touches().map(|t| t.reaction.n.abs() * world.settings.step).sum::<f64>();
     }
     exchanged += world.grains.mass.iter().zip(&world.grains.velocity).map(|(m, v)| m * v.norm()).sum::<f64>();

@@ -1,5 +1,5 @@
-//! The simulator at its limits. The tests that are not ignored are the quick part; docs/running.md
-//! names the long one, which writes docs/stability.md anew.
+//! The simulator at its limits. The ignored tests are long; docs/running.md names the one that
+//! rewrites docs/stability.md.
 
 mod atlas;
 mod cases;
@@ -33,9 +33,9 @@ fn page() {
     rows.iter().for_each(|(row, runs)| row.check(runs));
 }
 
-/// Light grains that bear heavy ones: the error of their velocities was the residual times the
-/// ratio of the masses, and the heap stopped or gained energy. With friction of 1e6 the law adds
-/// 1e6 times what a contact creeps to its opening.
+/// Light grains that carry heavy ones: the error of their velocities was the residual times the
+/// mass ratio, and the heap stopped or gained energy. With a friction of 1e6 the law adds 1e6 times
+/// the creep velocity of a contact to its opening velocity.
 #[test]
 fn heaps_that_failed_hold_with_the_exact_solvers() {
     let exact = [Kind::Auto, Kind::Interior];

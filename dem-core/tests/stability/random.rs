@@ -1,5 +1,4 @@
-//! Random scenes: everything that a scene can say, in every combination. Nothing is known of them
-//! but what must hold always.
+//! Random scenes: all features of a scene in all combinations, checked by the invariants alone.
 
 use crate::common::DENSITY;
 use crate::harness::watch;
@@ -16,10 +15,10 @@ use rayon::prelude::*;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
-/// Scenes that once failed, and how many steps they make.
+/// Scenes that once failed, and the number of steps that they now make.
 const REGRESSIONS: [(u64, usize); 2] = [(1208, 200), (12237, 200)];
 
-/// Solvers of the scenes: with another one every seed would be another scene.
+/// Solvers of the scenes. Another solver in the list would change the scene of every seed.
 const SOLVERS: [Kind; 3] = [Kind::GaussSeidel, Kind::Newton, Kind::Auto];
 
 struct Dice(Pcg64);
@@ -31,7 +30,7 @@ impl Dice {
     fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.unit()
     }
-    /// Evenly over the orders of magnitude.
+    /// Uniform in the logarithm.
     fn decade(&mut self, low: f64, high: f64) -> f64 {
         (self.between(low.ln(), high.ln())).exp()
     }
@@ -53,13 +52,13 @@ impl Dice {
     }
 }
 
-/// Sweeps of Gauss–Seidel after which a solve is refused, so many that no scene of twenty thousand
-/// takes minutes. A scene that stops for want of sweeps says so, and has kept what must hold until
-/// then.
+/// Gauss–Seidel sweeps after which a solve is refused, few enough that no scene of twenty thousand
+/// takes minutes. A scene that stops for lack of sweeps reports it, and has satisfied the
+/// invariants until then.
 const FEW_SWEEPS: u64 = 10_000;
 
-/// How large and how long random scenes are, and what takes the place of what the dice give: a
-/// change there would make every seed another scene.
+/// Size and length of random scenes, and values that replace drawn ones. A change of the draws
+/// themselves would change the scene of every seed.
 #[derive(Clone, Copy)]
 struct Size {
     grains: f64,
@@ -71,7 +70,7 @@ struct Size {
     cylinders: bool,
 }
 
-/// Scenes that do what the dice say.
+/// Scenes without replaced values.
 const AS_DRAWN: Size = Size { grains: 30.0, steps: 20, sweeps: SWEEPS, solver: None, cylinders: false };
 
 /// A unit vector at right angles to one, in 3D.
@@ -83,7 +82,7 @@ fn across<V: Vect>(normal: V) -> V {
     x * (1.0 / x.norm())
 }
 
-/// A random scene, and what its solver accepts.
+/// A random scene, and the residual that its solver accepts.
 fn scene<D: Dim>(dice: &mut Dice, Size { grains: most, sweeps, solver, cylinders, .. }: Size) -> (World<D>, f64) {
     let count = dice.decade(2.0, most).round();
     let side = count.powf(1.0 / D::N as f64).ceil() as usize;
@@ -200,8 +199,8 @@ fn scene<D: Dim>(dice: &mut Dice, Size { grains: most, sweeps, solver, cylinders
     (world, accept)
 }
 
-/// What came of a scene: the steps made, whether it stopped before its end with an error, whether
-/// anything touched in it, and how many bonds broke.
+/// The outcome of a scene: the steps made, whether an error ended it early, whether a contact
+/// carried a reaction at its end, and the number of broken bonds.
 #[derive(Clone, Copy, Debug)]
 struct Course {
     steps: usize,
@@ -210,7 +209,7 @@ struct Course {
     broken: usize,
 }
 
-/// Make scene `seed` and carry it on.
+/// Make scene `seed` and run it.
 fn scene_holds(seed: u64, size: Size) -> Course {
     fn course<D: Dim + PartialEq>(mut dice: Dice, size: Size) -> Course {
         let (mut world, accept) = scene::<D>(&mut dice, size);
@@ -226,7 +225,7 @@ fn scene_holds(seed: u64, size: Size) -> Course {
     }
 }
 
-/// The scenes that fail, of these, and what came of the others.
+/// The seeds of scenes that fail, and the outcomes of the others.
 fn failures(seeds: std::ops::Range<u64>, size: Size) -> (Vec<u64>, Vec<Course>) {
     let outcome = |seed: u64| catch_unwind(AssertUnwindSafe(|| scene_holds(seed, size))).map_err(|_| seed);
     let outcomes: Vec<_> = seeds.into_par_iter().map(outcome).collect();
@@ -234,8 +233,8 @@ fn failures(seeds: std::ops::Range<u64>, size: Size) -> (Vec<u64>, Vec<Course>) 
     (failed, outcomes.into_iter().flatten().collect())
 }
 
-/// That the scenes of these seeds keep what must hold; how many stop, the steps they make in all,
-/// how many are touched, in how many bonds break.
+/// Checks that the scenes of these seeds satisfy the invariants; returns the number of scenes that
+/// stop, the total number of steps, and the numbers of scenes with contacts and with broken bonds.
 fn figures(seeds: std::ops::Range<u64>, size: Size) -> [usize; 4] {
     let (failed, courses) = failures(seeds, size);
     assert_eq!(failed, [], "seeds of scenes that fail");
@@ -247,7 +246,8 @@ fn figures(seeds: std::ops::Range<u64>, size: Size) -> [usize; 4] {
 #[test]
 fn random_scenes_keep_what_must_hold() {
     let [stopped, steps, touched, breaking] = figures(0..100, AS_DRAWN);
-    // a scene that stops has shown little: few may, and in most something must have happened
+    // a scene that stops early tests little: only few may, and enough scenes must have contacts and
+    // ruptures
     let shown = stopped <= 3 && steps >= 1950 && touched >= 25 && breaking >= 8;
     assert!(shown, "{stopped} {steps} {touched} {breaking}");
     REGRESSIONS.into_iter().for_each(|(seed, steps)| {

@@ -1,4 +1,4 @@
-//! One scene with everything in it that can be pushed to its limits.
+//! One scene with every parameter that can be pushed to its limits.
 
 use crate::common;
 use dem_core::body::{Grain, Shape, Wall};
@@ -9,10 +9,10 @@ use dem_core::world::{Restitution, Settings, World};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-/// Gravity at rest on the ground (m/s²).
+/// Gravity on Earth (m/s²).
 pub const G: f64 = 9.81;
 
-/// Which solver, as a user would ask for it.
+/// The solver, as a user selects it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {
     GaussSeidel,
@@ -44,8 +44,8 @@ impl Kind {
     }
 }
 
-/// A heap of grains in a box without a lid: a lattice with noise, that falls onto the floor, and is
-/// bonded or not.
+/// A heap of grains in a box without a lid: a lattice with noise, bonded or not, that falls onto
+/// the floor.
 #[derive(Clone, Debug)]
 pub struct Heap {
     pub kind: Kind,
@@ -136,7 +136,7 @@ impl Heap {
         }
         let mut walls = Vec::new();
         if self.floor {
-            // a heap without sides, where a big grain lies on it
+            // a heap with a big grain on top has no side walls
             let sides = if self.size_ratio == 1.0 { 0..D::N } else { D::N - 1..D::N };
             for axis in sides {
                 let mut normal = D::Vector::zero();

@@ -1,23 +1,23 @@
-//! What is asked of a solution, and what the path came to.
+//! Tolerances of the interior-point method, and its result.
 
 use crate::contact::Padded;
 
-/// What is asked of a solution.
+/// Tolerances, selection and iteration limit.
 #[derive(Clone, Copy, Debug)]
 pub struct Aims {
     /// Residual (–).
     pub tolerance: f64,
     /// Load error and velocity error (–).
     pub load_tolerance: f64,
-    /// Whether of all reactions those of least energy in the metric are wanted.
+    /// Whether the minimum-energy reactions in the metric are required.
     pub least: bool,
     /// Most iterations.
     pub most: u64,
 }
 
 impl Aims {
-    /// How far these are from what is asked for: the larger of both over their tolerances (–). A
-    /// residual of zero is rounding.
+    /// The larger of residual and velocity error, relative to their tolerances (–). Zero if the
+    /// residual is zero: then both are round-off.
     pub fn missed(&self, residual: f64, velocity_error: f64) -> f64 {
         match residual {
             0.0 => 0.0,
@@ -27,13 +27,13 @@ impl Aims {
     }
 }
 
-/// What the path came to.
+/// The best point of the path.
 #[derive(Clone, Debug)]
 pub struct Found {
     /// Reactions without the shift, in the unit of the rows.
     pub reactions: Vec<Padded>,
-    /// Their residual (–), and their load error (–): how much the net impulses changed in the last
-    /// iteration.
+    /// Their residual (–), and their load error (–): the relative change of the net impulses in the
+    /// last iteration.
     pub residual: f64,
     pub load_error: f64,
     /// Their velocity error (–), see [`crate::problem::residual::velocity_error`].

@@ -1,8 +1,8 @@
 //! Second-order cones Q = {x : x₀ ≥ ‖x₁, x₂‖} and their Jordan algebra, x ∘ z = (x·z, x₀ z₁ + z₀
 //! x₁, x₀ z₂ + z₀ x₂).
 //!
-//! One type stands for a ray, the cone in 2D and the cone in 3D: components that are missing are
-//! zero and stay zero.
+//! One type represents a ray, the cone in 2D and the cone in 3D: missing components are zero and
+//! stay zero.
 //!
 //! Sources: Alizadeh & Goldfarb, Math. Program. 95, 2003; for the scaling Nesterov & Todd, SIAM J.
 //! Optim. 8, 1998.
@@ -62,10 +62,10 @@ pub(super) struct Scaling {
 }
 
 impl Scaling {
-    /// The one that changes nothing.
+    /// The identity.
     pub const NONE: Self = Self { w: [1.0, 0.0, 0.0] };
 
-    /// That of Nesterov & Todd: it makes x and z multiples of each other.
+    /// The scaling of Nesterov & Todd, which makes x and z multiples of each other.
     pub fn of(x: &Point, z: &Point) -> Self {
         let (x_size, z_size) = (determinant(x).sqrt(), determinant(z).sqrt());
         let w = [x[0] / x_size + z[0] / z_size, x[1] / x_size - z[1] / z_size, x[2] / x_size - z[2] / z_size];
@@ -85,16 +85,16 @@ impl Scaling {
     }
 }
 
-/// The boost along w of p: (w·p, p̄ + w̄ (p₀ + p̄·w̄/(1 + w₀))), where a bar is for what follows
-/// the first component.
+/// The boost along w of p: (w·p, p̄ + w̄ (p₀ + p̄·w̄/(1 + w₀))), where a bar denotes the components
+/// after the first.
 fn boosted(w: &Point, p: &Point) -> Point {
     let along = w[1] * p[1] + w[2] * p[2];
     let across = p[0] + along / (1.0 + w[0]);
     [w[0] * p[0] + along, p[1] + w[1] * across, p[2] + w[2] * across]
 }
 
-/// By how much the eigenvalues of x must change to lie between `low` and `high`, downwards by no
-/// more than `high`.
+/// The change of x that brings its eigenvalues between `low` and `high`, downwards by no more than
+/// `high`.
 pub(super) fn correction(x: &Point, low: f64, high: f64) -> Point {
     let length = norm(x[1], x[2]);
     let change = |value: f64| (value.clamp(low, high) - value).max(-high);
@@ -103,7 +103,8 @@ pub(super) fn correction(x: &Point, low: f64, high: f64) -> Point {
     [0.5 * (up + down), along * x[1], along * x[2]]
 }
 
-/// How far one can go from x inside Q along d and stay in it; infinite where there is no end.
+/// The longest step from x along d that stays inside Q, in units of d; infinite if there is no
+/// limit.
 pub(super) fn reach(x: &Point, d: &Point) -> f64 {
     // the roots of det(x + τ d) = c + 2 b τ + a τ², and where x₀ + τ d₀ vanishes
     let (a, c) = (determinant(d), determinant(x).max(0.0));
@@ -150,8 +151,8 @@ mod tests {
             let scaling = Scaling::of(&x, &z);
             let (a, b) = (scaling.x(&x), scaling.z(&z));
             let (scaled, size) = (product(&a, &b), dot(&x, &z));
-            // multiples of each other: their product has the eigenvalues of P(√x) z, of which the
-            // smaller is asked for
+            // multiples of each other: their product has the eigenvalues of P(√x) z, the smaller of
+            // which is `least_product`
             assert!(
                 (a[1] * b[0] - a[0] * b[1]).abs() < 1e-9 * a[0] * b[0]
                     && (a[2] * b[0] - a[0] * b[2]).abs() < 1e-9 * a[0] * b[0]

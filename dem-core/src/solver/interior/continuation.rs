@@ -1,4 +1,4 @@
-//! The central path through its folds: predictor, corrector and arc length.
+//! Arc-length continuation of the central path through its folds, by predictor and corrector.
 //!
 //! With θ = ln τ the points of the path are the zeros of
 //!
@@ -7,14 +7,15 @@
 //! in the unknowns r and w. The Newton step and the tangent are two right sides of one matrix
 //! ([`System`]):
 //!
-//! (W + C + ρ⁻¹) dr − Σ Bᵀ dz = −ℓ,     Arw(z) G dr + Arw(x) dz = z ∘ p + τ e dθ,     dw = G dr − p
-//! − dz.
+//! (W + C + ρ⁻¹) dr − Σ Bᵀ dz = −ℓ,     Arw(z) G dr + Arw(x) dz = z ∘ p + τ e dθ,
+//!
+//! dw = G dr − p − dz.
 //!
 //! For Coulomb's law the path need not be monotone in the barrier (Acary, Armand, Nguyen &
-//! Shpakovych 2024). At a fold the matrix is singular and its determinant changes sign, so the sign
-//! orients the path: the barrier falls where it is positive and rises where it is negative. Near a
-//! fold a few contacts change by large factors while the others rest; there the component that
-//! changes fastest is the parameter of the path (Rheinboldt, SIAM J. Numer. Anal. 17, 1980),
+//! Shpakovych 2024). At a fold the matrix is singular and its determinant changes sign. The sign
+//! orients the path: the barrier falls if the sign is positive, and rises if it is negative. Near a
+//! fold a few contacts change by large factors while the others hardly change. There the component
+//! that changes fastest is the parameter of the path (Rheinboldt, SIAM J. Numer. Anal. 17, 1980);
 //! elsewhere the barrier is.
 
 use super::cones::{Point, dot, moved, product};
@@ -35,7 +36,7 @@ struct Iterate {
     theta: f64,
 }
 
-/// What the corrector leaves as it is.
+/// The component that the corrector keeps constant.
 #[derive(Clone, Copy, Debug)]
 enum Parameter {
     Barrier,
@@ -52,12 +53,13 @@ struct Predictor {
     length: f64,
 }
 
-/// Where an iteration has come to.
+/// Result of an iteration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Progress {
-    /// The path goes on.
+    /// The path continues.
     Path,
-    /// The barrier falls below that of the start, and no component changes much faster than it.
+    /// The barrier falls below that of the start, and no component changes much faster than the
+    /// barrier.
     Straight,
     /// No point of the path was found, or the steps have become too short.
     Lost,
@@ -74,11 +76,11 @@ pub(super) struct Continuation {
     first_error: f64,
     /// Longest relative change in the next step along the tangent.
     length: f64,
-    /// ln τ below which, and relative change with θ up to which, the path counts as straight.
+    /// The path counts as straight below this ln τ, and up to this relative change per unit of θ.
     end: f64,
     straight: f64,
-    /// Whether the start of the step along the tangent is being corrected, since the end of that
-    /// step could not be.
+    /// Whether the start of the step along the tangent is corrected again, since the correction of
+    /// its end failed.
     again: bool,
 }
 
@@ -104,9 +106,9 @@ impl Iterate {
 }
 
 impl Continuation {
-    /// From a point next to the path, with `raised` times its gap as the barrier. The path counts
-    /// as straight where the barrier is below half the gap and no component changes faster with θ
-    /// than by `straight`.
+    /// Start from a point next to the path, with `raised` times the complementarity gap as the
+    /// barrier. The path counts as straight if the barrier is below half the gap and no component
+    /// changes by more than `straight` per unit of θ.
     pub fn new(point: &State, gap: f64, raised: f64, straight: f64) -> Self {
         let w = point.x.iter().zip(&point.z).map(|(x, z)| moved(x, -1.0, z)).collect();
         Self {
@@ -122,15 +124,15 @@ impl Continuation {
         }
     }
 
-    /// The pairs at hand.
+    /// The current pairs.
     pub fn state(&self) -> State {
         let barrier = self.at.theta.exp();
         let (x, z) = self.at.w.iter().map(|w| pair(w, barrier)).unzip();
         State { r: self.at.r.clone(), x, z }
     }
 
-    /// One iteration, with the system at the pairs at hand: a Newton step, and where that is short
-    /// a step along the tangent.
+    /// One iteration, with the system at the current pairs: a Newton step and, if that is short, a
+    /// step along the tangent.
     pub fn step(&mut self, system: &System, sites: &Sites) -> Progress {
         let (mut newton, tangent) = directions(system, sites, self.at.theta.exp());
         if let Parameter::Component(c, form) = self.parameter {
@@ -148,9 +150,9 @@ impl Continuation {
         self.predict(tangent, system.sign > 0.0)
     }
 
-    /// A Newton step alone. Where there have been too many, the start of the step along the tangent
-    /// is not on the path, or that step is too long: the start is corrected again, or where that
-    /// has been done the step is made again, shorter.
+    /// A Newton step alone. Too many of them mean that the start of the step along the tangent is
+    /// not on the path, or that this step is too long. The start is corrected again first; then the
+    /// step is repeated, shorter.
     fn correct(&mut self, error: f64, newton: &Iterate) -> Progress {
         self.corrections += 1;
         let most = if self.predictor.is_some() { tuning::CORRECTIONS } else { tuning::FIRST_CORRECTIONS };
@@ -193,7 +195,7 @@ impl Continuation {
 }
 
 impl Predictor {
-    /// w is nearly linear in τ.
+    /// The end of the step; w is nearly linear in τ.
     fn end(&self) -> Iterate {
         let mut at = self.from.clone();
         at.advance(self.length, &self.tangent);

@@ -1,5 +1,5 @@
-//! How contacts move each other: W = H̃ᵀ H̃ through the bodies, or as a matrix, and the linear
-//! systems with it.
+//! The Delassus operator W = H̃ᵀ H̃, through the bodies or as a matrix, and the linear systems with
+//! it.
 
 use super::sites::{Site, Sites};
 use crate::linear::{Lu, Tree};
@@ -14,11 +14,11 @@ pub(super) enum Coupling<'a> {
     /// the bodies.
     Bodies {
         rows: &'a Rows,
-        /// Coefficients over those of `rows`.
+        /// Ratio of the coefficients to those of `rows`.
         scale: f64,
         graph: &'a Graph,
     },
-    /// A symmetric matrix over the contacts. That of a step is 1 + W D⁻¹.
+    /// W as a symmetric matrix over the contacts. The matrix of a step is 1 + W D⁻¹.
     Matrix {
         /// The upper triangle, block by block: an element of `tree` each.
         blocks: Vec<Block>,
@@ -28,16 +28,16 @@ pub(super) enum Coupling<'a> {
     },
 }
 
-/// A block of W in the units of [`Sites`]: the rows of the first contact, row by row over those of
-/// the second, which is the first for a block of the diagonal.
+/// A block of W in the units of [`Sites`]: the rows of the first contact, one after the other, over
+/// those of the second (the same contact for a diagonal block).
 pub(super) struct Block {
     contacts: [usize; 2],
-    /// Where its values start.
+    /// Start of its values.
     start: usize,
 }
 
 impl<'a> Coupling<'a> {
-    /// By the matrix where the problem is known by one, else through the bodies; none where no
+    /// By the matrix if the problem is given by one, else through the bodies; none if no
     /// elimination tree can be made.
     pub fn of(
         rows: &'a Rows,
@@ -82,8 +82,8 @@ impl<'a> Coupling<'a> {
         }
     }
 
-    /// q + W r. Through the bodies with twice the precision: where contacts stick, the terms cancel
-    /// to 1/κ of their size.
+    /// q + W r. Through the bodies in twice the precision: the terms of sticking contacts cancel to
+    /// 1/κ of their size.
     pub fn relative_velocity(&self, sites: &Sites, r: &[f64]) -> Vec<f64> {
         let Self::Bodies { rows, scale, .. } = self else {
             return sites.free.iter().zip(self.velocity(sites, r)).map(|(q, u)| q + u).collect();
@@ -138,8 +138,8 @@ impl<'a> Coupling<'a> {
         u
     }
 
-    /// Factorise the matrix of a step, whose D⁻¹ stands in the upper left corners of the local
-    /// matrices: the sign of its determinant, none if it is singular.
+    /// Factorise the matrix of a step; D⁻¹ is in the upper left corners of the inverses of the
+    /// local matrices. Returns the sign of the determinant; none if the matrix is singular.
     pub fn factorise(&self, sites: &Sites, inverses: &[f64], lu: &mut Lu) -> Option<f64> {
         match self {
             Self::Bodies { rows, scale, graph } => lu.factorise(self.tree(), |e, out| {
@@ -155,8 +155,7 @@ impl<'a> Coupling<'a> {
         }
     }
 
-    /// The velocities that reactions `r` would give the contacts if these did not yield, as they
-    /// are when they do.
+    /// The contact velocities (1 + W D⁻¹)⁻¹ W r: reactions `r` with the response of the contacts.
     pub fn yielded(&self, sites: &Sites, r: &[f64], lu: &Lu) -> Vec<f64> {
         match self {
             Self::Bodies { .. } => {
@@ -174,7 +173,7 @@ impl<'a> Coupling<'a> {
 }
 
 impl Block {
-    /// u += W r for this block and the one that mirrors it.
+    /// u += W r for this block and its transpose.
     fn multiply(&self, sites: &Sites, values: &[f64], r: &[f64], u: &mut [f64]) {
         let [site, other] = self.contacts.map(|c| &sites.list[c]);
         let block = values[self.start..].chunks_exact(other.rows).take(site.rows);
@@ -187,7 +186,7 @@ impl Block {
         }
     }
 
-    /// W D⁻¹ of this block and the one that mirrors it, over the rows of both contacts.
+    /// Add W D⁻¹ of this block and its transpose, over the rows of both contacts.
     fn add_element(&self, sites: &Sites, values: &[f64], inverses: &[f64], out: &mut [f64]) {
         let [site, other] = self.contacts.map(|c| &sites.list[c]);
         let apart = self.contacts[0] != self.contacts[1];

@@ -5,7 +5,7 @@ use super::state::{State, gap};
 use super::system::System;
 use crate::solver::tuning::direction as tuning;
 
-/// The direction of an iteration, and how far one can go along it.
+/// The direction of an iteration, and the longest multiple of it inside the cones.
 pub(super) fn direction(system: &System) -> (State, f64) {
     let at = system.at;
     let products = system.products(&at.x, &at.z);
@@ -18,7 +18,7 @@ pub(super) fn direction(system: &System) -> (State, f64) {
     let aim = at.x.iter().zip(&at.z).zip(predictor.x.iter().zip(&predictor.z));
     let aim = aim.map(|((x, z), (dx, dz))| dot(&moved(x, length, dx), &moved(z, length, dz))).sum::<f64>() / count;
     let centring = (aim / gap).max(0.0).powi(3).clamp(tuning::CENTRING, 1.0);
-    // corrector, of second order
+    // second-order corrector
     let barrier = centring * gap;
     let second = system.products(&predictor.x, &predictor.z);
     let mut by: Vec<Point> =
@@ -44,7 +44,7 @@ pub(super) fn direction(system: &System) -> (State, f64) {
     }
     let mut chosen = by;
     if far < tuning::SHORT {
-        // at the boundary: towards the middle instead, without the second order
+        // a short step: try directions towards the central path, without the second-order term
         for share in tuning::TO_THE_MIDDLE {
             let barrier = share.max(centring) * gap;
             let by: Vec<Point> = products.iter().map(|p| [barrier - p[0], -p[1], -p[2]]).collect();
@@ -61,19 +61,19 @@ pub(super) fn direction(system: &System) -> (State, f64) {
     (step, far)
 }
 
-/// Whether no product of a pair is far below the gap.
+/// Whether no product of a pair is far below the complementarity gap.
 pub(super) fn is_central(at: &State) -> bool {
     let least = tuning::CENTRAL * gap(at);
     at.x.iter().zip(&at.z).all(|(x, z)| least_product(x, z) >= least)
 }
 
-/// Whether rounding hides if a point is [central](is_central).
+/// Whether round-off hides if a point is [central](is_central).
 pub(super) fn is_rounded(at: &State) -> bool {
     let largest = at.x.iter().zip(&at.z).map(|(x, z)| x[0] * z[0]).fold(0.0, f64::max);
     f64::EPSILON * largest > tuning::CENTRAL * gap(at)
 }
 
-/// Go along a step.
+/// Advance a point along a step.
 pub(super) fn advance(at: &mut State, length: f64, step: &State) {
     at.r.iter_mut().zip(&step.r).for_each(|(r, d)| *r += length * d);
     at.x.iter_mut().zip(&step.x).for_each(|(x, d)| *x = moved(x, length, d));

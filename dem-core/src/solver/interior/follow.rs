@@ -1,10 +1,10 @@
-//! How the path is followed: in long steps within a wide neighbourhood, and by arc length where
-//! these jam.
+//! Path following: long steps within a wide neighbourhood of the central path, and arc-length
+//! continuation where these jam.
 //!
-//! A fast sliding contact has a reaction and a velocity that are both on the boundary of their
-//! cones, so that x₀ z₀ and the rest of x·z cancel: rounding leaves ε x₀ z₀ of a product. Long
-//! steps end where that is the gap. By arc length the pairs are known by w = x − z, whose
-//! eigenvalues keep their digits, and are central to rounding.
+//! The reaction and the velocity of a fast sliding contact are both on the boundary of their cones.
+//! In x·z the term x₀ z₀ and the others cancel, with a round-off of ε x₀ z₀. Long steps end where
+//! this is comparable to the complementarity gap. The arc-length continuation represents a pair by
+//! w = x − z, whose eigenvalues keep their digits: its pairs are central to round-off.
 
 use super::continuation::{Continuation, Progress};
 use super::direction::{advance, direction, is_central, is_rounded};
@@ -14,14 +14,14 @@ use super::state::{State, gap};
 use super::system::System;
 use crate::solver::tuning::{direction as steps, follow as tuning};
 
-/// Where the path is, and how it is followed.
+/// The current point, and how the path is followed from it.
 pub(super) struct Follow {
     at: State,
-    /// Steps in a row without progress.
+    /// Consecutive steps without progress.
     stuck: u32,
     straight: f64,
     by_arc_length: Option<ByArcLength>,
-    /// Whether rounding has ended the long steps.
+    /// Whether round-off has ended the long steps.
     to_the_end: bool,
 }
 
@@ -32,17 +32,17 @@ struct ByArcLength {
 }
 
 impl Follow {
-    /// In long steps, from a point within all cones.
+    /// Follow in long steps, from a point inside all cones.
     pub fn from(at: State) -> Self {
         Self { at, stuck: 0, straight: tuning::STRAIGHT, by_arc_length: None, to_the_end: false }
     }
 
-    /// The point at hand.
+    /// The current point.
     pub fn state(&self) -> State {
         self.by_arc_length.as_ref().map_or_else(|| self.at.clone(), |by| by.continuation.state())
     }
 
-    /// Go on from a point that was passed.
+    /// Continue from an earlier point of the path.
     pub fn turn_back(&mut self, to: State, sites: &Sites) {
         let by_arc_length = self.by_arc_length.take().is_some();
         self.stuck = 0;
@@ -57,8 +57,8 @@ impl Follow {
         }
     }
 
-    /// One iteration, with the system at the point at hand; its change of the reactions, none where
-    /// the path is lost.
+    /// One iteration, with the system at the current point. Returns the change of the reactions;
+    /// none if the path is lost.
     pub fn step(&mut self, system: &System, sites: &Sites) -> Option<State> {
         let Some(by) = &mut self.by_arc_length else { return Some(self.long_step(system)) };
         let progress = by.continuation.step(system, sites);
@@ -107,13 +107,13 @@ impl Follow {
         step
     }
 
-    /// Look for the path by arc length, from the point at hand.
+    /// Seek the path by arc length, from the current point.
     fn jam(&mut self, raised: f64) {
         let continuation = Continuation::new(&self.at, gap(&self.at), raised, self.straight);
         self.by_arc_length = Some(ByArcLength { continuation, raised: 1 });
     }
 
-    /// The same with a higher barrier; from a cold start at last.
+    /// The same with a higher barrier, and finally from a cold start; none after that.
     fn raise(&mut self, sites: &Sites) -> Option<()> {
         let raised = self.by_arc_length.as_ref().map_or(0, |by| by.raised) + 1;
         let below = gap(&self.at);

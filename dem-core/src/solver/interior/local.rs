@@ -1,12 +1,12 @@
-//! The equations of one contact in a step, and their inverse.
+//! The equations of one contact in an interior-point step, and their inverse.
 //!
-//! Of a step (dr, dz), with t what the bodies add to the contact's velocity,
+//! For a step (dr, dz), with t the velocity that the bodies add to the contact:
 //!
 //! C dr − Bᵀ dz = a − t,     Arw(z) G dr + Arw(x) dz = b.
 //!
-//! The inverse of this small matrix holds in its upper left corner D⁻¹ of
-//! docs/theory/interior-point.md. D itself, with Arw(x)⁻¹ Arw(z), would lose the digits of what
-//! sticks beside what slips.
+//! The upper left corner of the inverse of this small matrix is D⁻¹ of
+//! docs/theory/interior-point.md. D itself contains Arw(x)⁻¹ Arw(z), and would lose the digits of
+//! sticking rows, which are small beside slipping ones.
 
 use super::cones::{Point, Scaling, eigenvalues, product};
 use super::sites::{CONES, Cone, ROWS, Sites};
@@ -15,7 +15,7 @@ use super::state::State;
 /// Largest order of a local matrix.
 pub(super) const ORDER: usize = ROWS + CONES;
 
-/// What the complementarity equations of a cone are divided by.
+/// The factor on the complementarity equations of a cone.
 #[inline]
 fn scale(x: &Point, z: &Point) -> f64 {
     1.0 / (x[0] + z[0])
@@ -28,8 +28,8 @@ pub(super) struct Scaled {
     pub z: Point,
 }
 
-/// The pairs of a point, linearised as they are, or where x ∘ z is outside the cone in the scaling
-/// of Nesterov & Todd, in which every interior pair has a direction.
+/// The pairs of a point, unscaled, or in the scaling of Nesterov & Todd if x ∘ z is outside the
+/// cone. In that scaling the direction is defined for every interior pair.
 pub(super) fn scaled(at: &State) -> Vec<Scaled> {
     let one = |(x, z): (&Point, &Point)| {
         let scaling = if eigenvalues(&product(x, z))[1] > 0.0 { Scaling::NONE } else { Scaling::of(x, z) };
@@ -38,8 +38,8 @@ pub(super) fn scaled(at: &State) -> Vec<Scaled> {
     at.x.iter().zip(&at.z).map(one).collect()
 }
 
-/// The inverses of all local matrices at a point, with the compliance of each row, and the sign of
-/// the product of their determinants; none if one has no inverse.
+/// Compute the inverses of all local matrices at a point, with the compliance of each row. Returns
+/// the sign of the product of their determinants; none if one is singular.
 pub(super) fn invert(sites: &Sites, pairs: &[Scaled], compliance: &[f64], inverses: &mut Vec<f64>) -> Option<f64> {
     let mut sign = 1.0;
     inverses.clear();
@@ -79,8 +79,8 @@ pub(super) fn invert(sites: &Sites, pairs: &[Scaled], compliance: &[f64], invers
     Some(sign)
 }
 
-/// Replace a matrix, row by row, by its inverse, with pivots chosen in their column; the sign of
-/// the determinant, none if it is zero.
+/// Replace a matrix, stored row by row, by its inverse, with partial pivoting. Returns the sign of
+/// the determinant; none if it is zero.
 fn gauss_jordan(a: &mut [f64], order: usize) -> Option<f64> {
     let mut sign = 1.0;
     let mut pivots = [0; ORDER];
@@ -122,7 +122,7 @@ fn gauss_jordan(a: &mut [f64], order: usize) -> Option<f64> {
     Some(sign)
 }
 
-/// The step for these right sides, where nothing moves the bodies: its `r` and `z` alone.
+/// The step (`r` and `z` alone) for these right sides, with t = 0.
 pub(super) fn solve(sites: &Sites, pairs: &[Scaled], inverses: &[f64], a: &[f64], b: &[Point]) -> State {
     let mut step = State { r: vec![0.0; sites.rows], x: Vec::new(), z: vec![[0.0; 3]; sites.cones.len()] };
     for site in &sites.list {
@@ -152,7 +152,7 @@ pub(super) fn solve(sites: &Sites, pairs: &[Scaled], inverses: &[f64], a: &[f64]
     step
 }
 
-/// Take out of a step what the bodies' velocities `t` do to it.
+/// Subtract from a step the effect of the bodies' velocities `t`.
 pub(super) fn yield_to(sites: &Sites, inverses: &[f64], t: &[f64], step: &mut State) {
     for site in &sites.list {
         let order = site.order();

@@ -1,13 +1,13 @@
-//! The metric 1/ρ: a compliance that selects one of many reactions.
+//! The metric 1/ρ: a compliance that selects among the reactions that balance a load.
 
 use super::local::opened;
 use super::sites::{ROWS, Sites};
 use super::state::State;
 
-/// A compliance that draws reactions to given ones.
+/// A compliance, and the anchor to which it draws the reactions.
 pub(super) struct Metric {
     pub anchor: Vec<f64>,
-    /// Of each row, and with that of elastic bonds.
+    /// The compliance of the metric for each row; the same plus that of elastic bonds.
     pub own: Vec<f64>,
     pub compliance: Vec<f64>,
 }
@@ -19,7 +19,7 @@ impl Metric {
         Self { anchor, own, compliance }
     }
 
-    /// Draw to these reactions, by this share of the compliance.
+    /// Set a new anchor, and multiply the compliance of the metric by `share`.
     pub fn anchor_at(&mut self, anchor: Vec<f64>, share: f64) {
         self.anchor = anchor;
         for (c, own) in self.compliance.iter_mut().zip(&mut self.own) {
@@ -28,9 +28,10 @@ impl Metric {
         }
     }
 
-    /// What the compliance leaves of the residual, and the largest velocity that it leaves a
-    /// contact: u = (r − r₀)/ρ, as an impulse over the normal entry of W. Where friction does not
-    /// open, the law adds μ times the slip to the normal velocity.
+    /// The residual and the largest velocity of a contact that are due to the compliance, by
+    /// u = (r − r_a)/ρ. For the residual u is divided by the normal entry of W, which makes it an
+    /// impulse. If the flow is not associated, the law adds μ times the slip to the normal
+    /// velocity.
     pub fn left(&self, sites: &Sites, r: &[f64]) -> (f64, f64) {
         let (mut all, mut largest) = (0.0, 0.0f64);
         for (site, normal) in sites.list.iter().zip(&sites.normal).filter(|(_, normal)| **normal > 0.0) {
@@ -54,13 +55,13 @@ impl Metric {
         r.iter().zip(&self.own).map(|(r, c)| c * r * r).sum()
     }
 
-    /// Σ (r − r₀)²/ρ.
+    /// Σ (r − r_a)²/ρ, with the anchor r_a.
     pub fn energy(&self, r: &[f64]) -> f64 {
         r.iter().zip(&self.anchor).zip(&self.own).map(|((r, r0), c)| c * (r - r0) * (r - r0)).sum()
     }
 }
 
-/// u + C (r − r₀) − Σ Bᵀ z for the relative velocities u, with the metric among the compliances.
+/// ℓ = u + C (r − r₀) + (r − r_a)/ρ − Σ Bᵀ z, for the relative velocities u.
 pub(super) fn lack(sites: &Sites, velocity: &[f64], at: &State, metric: &Metric) -> Vec<f64> {
     let opened = opened(sites, &at.z);
     let row = |k: usize| {

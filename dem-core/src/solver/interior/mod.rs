@@ -1,13 +1,15 @@
 //! The interior-point method, with Coulomb's law exact.
 //!
-//! Every contact is a list of cone pairs ([`sites`]): x = G r̂ ∈ Q ⊥ z ∈ Q with u + C (r − r₀) = Σ
-//! Bᵀ z and u = W r + q. Between the pairs the method follows the path x ∘ z = barrier, linearised
-//! as it stands, slip speeds and all: in the direction of Alizadeh, Haeberly & Overton, or of
-//! Nesterov & Todd for a pair whose product has left the cone, with Mehrotra's predictor–corrector
-//! and Gondzio's correctors, one factorisation an iteration.
+//! Every contact is a list of cone pairs ([`sites`]): x = G r̂ ∈ Q ⊥ z ∈ Q with
+//! u + C (r − r₀) = Σ Bᵀ z and u = W r + q. The method follows the central path x ∘ z = τ e to the
+//! barrier parameter τ = 0. The path is linearised completely, slip speeds included. The direction
+//! is that of Alizadeh, Haeberly & Overton, or of Nesterov & Todd for a pair whose product has left
+//! the cone. An iteration is Mehrotra's predictor–corrector with Gondzio's correctors, and takes
+//! one factorisation.
 //!
-//! The metric 1/ρ is a compliance anchored at given reactions: among the many that balance a rigid
-//! network the path ends at those of least Σ r²/ρ. See docs/theory/interior-point.md.
+//! The metric 1/ρ is a compliance anchored at given reactions r_a. Among the many reactions that
+//! balance a rigid network the path ends at the minimum-energy ones, of least Σ (r − r_a)²/ρ. See
+//! docs/theory/interior-point.md.
 //!
 //! Sources: Alizadeh, Haeberly & Overton, SIAM J. Optim. 8, 1998; Nesterov & Todd, SIAM J. Optim.
 //! 8, 1998; Mehrotra, SIAM J. Optim. 2, 1992; Gondzio, Comput. Optim. Appl. 6, 1996; for contact
@@ -48,7 +50,7 @@ use system::System;
 pub(super) use aims::{Aims, Found};
 pub(super) use violation::Least;
 
-/// The method, and the room that it keeps from one solve to the next.
+/// The method, with buffers kept between solves.
 #[derive(Default)]
 pub(super) struct Interior {
     lu: Lu,
@@ -58,9 +60,10 @@ pub(super) struct Interior {
 }
 
 impl Interior {
-    /// Follow the path from these reactions, moved inside their cones, or from a cold start, to a
-    /// solution; where many reactions solve the problem, to those of least energy in the metric
-    /// anchored at `anchor` ([`Selection`]). `graph` is that of the last problem.
+    /// Follow the central path to a solution, from the reactions `start` moved inside their cones,
+    /// or else from a cold start. If many reactions solve the problem, the solution has minimum
+    /// energy in the metric anchored at `anchor` ([`Selection`]). `graph` is that of the last
+    /// problem.
     pub fn solve(
         &mut self,
         problem: &mut impl Solvable,
@@ -96,7 +99,7 @@ impl Interior {
         selection.found(problem, &sites)
     }
 
-    /// The linear system at a point, factorised; none where it has no inverse to rounding.
+    /// The linear system at a point, factorised; none if it is singular to round-off.
     fn factorised<'a>(
         &'a mut self,
         sites: &'a Sites,

@@ -1,13 +1,14 @@
-//! The pairs (x, z) of the central path, and how much they change.
+//! The pairs (x, z) of the central path, represented by w = x − z, and the relative size of changes
+//! of w.
 //!
-//! A pair (x, z) with x ∘ z = τ e is known by w = x − z alone: x = f(w), z = f(−w) with the
-//! spectral function f(λ) = (λ + √(λ² + 4τ))/2, the smoothed projection onto the cone (Fukushima,
-//! Luo & Tseng, SIAM J. Optim. 12, 2002). So w is free: no step has to end at a boundary, and every
-//! iterate is on the path of *its* pairs, but its reactions and velocities need not be those of its
-//! pairs.
+//! A pair (x, z) with x ∘ z = τ e is determined by w alone: x = f(w), z = f(−w) with the spectral
+//! function f(λ) = (λ + √(λ² + 4τ))/2, the smoothed projection onto the cone (Fukushima, Luo &
+//! Tseng, SIAM J. Optim. 12, 2002). So w is free: no step ends at a boundary, and the pairs of
+//! every iterate are central. Only the reactions and velocities of an iterate may differ from those
+//! of its pairs.
 //!
-//! f is curved on the scale √(λ² + 4τ), the eigenvalues of x + z: changes of w are measured
-//! relative to these.
+//! f is curved on the scale √(λ² + 4τ), the eigenvalues of x + z. Changes of w are measured
+//! relative to them.
 
 use super::cones::{Point, dot, norm};
 

@@ -1,11 +1,11 @@
-//! Which of many reactions: those of least energy in the metric.
+//! Selection among many reactions: the minimum-energy reactions r* in the metric.
 //!
-//! 1. With the compliance of the metric the path is followed until its gaps are far below the
-//!    energy of the metric: these are the reactions of least energy, r*. What r* has at a limit is
-//!    known then.
-//! 2. Where that compliance shows in the residual or in the velocities, as between bodies of very
-//!    unlike masses, the path is followed again with the metric anchored at r*, from a point on the
-//!    way there, since nearer to the boundary steps are short; then with a harder metric.
+//! 1. With the compliance of the metric the path is followed until the complementarity gaps are far
+//!    below the energy of the metric. The reactions are then r*, and the limits of r* are known.
+//! 2. If the compliance takes much of the tolerance of the residual or of the velocity error, as
+//!    between bodies of very different masses, the path is followed again with the metric anchored
+//!    at r*, then with stiffer metrics. It starts from an earlier point of the path, since steps
+//!    near the boundary are short.
 
 use super::aims::{Aims, Found};
 use super::metric::Metric;
@@ -14,13 +14,13 @@ use super::state::{State, gap};
 use crate::solver::solvable::Solvable;
 use crate::solver::tuning::selection as tuning;
 
-/// What to do at a point.
+/// How the path continues at a point.
 pub(super) enum Next {
-    /// It is a solution, or nothing better will follow.
+    /// The point is a solution, or no better one will follow.
     Arrived,
-    /// The path goes on.
+    /// The path continues.
     Onwards,
-    /// The metric has a new anchor: the path goes on from here.
+    /// The metric has a new anchor: the path continues from this point.
     Anchored(State),
 }
 
@@ -29,9 +29,10 @@ pub(super) struct Selection {
     aims: Aims,
     pub metric: Metric,
     best: Option<Found>,
-    /// Change of the net impulses in the last iteration, over them (–).
+    /// Relative change of the net impulses in the last iteration (–).
     pub change: f64,
-    /// The limits of r*, once it is known, and the gaps of all pairs at which a solution counts.
+    /// The limits of r*, once it is known, and the sum of the complementarity gaps up to which a
+    /// solution counts.
     limits: Option<Vec<Limit>>,
     enough: f64,
     turn: Option<State>,
@@ -62,10 +63,10 @@ impl Selection {
         }
     }
 
-    /// Measure a point, and decide how the path goes on.
+    /// Measure a point, and decide how the path continues.
     pub fn assess(&mut self, problem: &mut impl Solvable, sites: &Sites, at: &State, iteration: u64) -> Next {
         let gaps = gap(at) * at.x.len() as f64;
-        // what has hardly changed since the anchor is known well enough by itself
+        // reactions that hardly differ from the anchor are known well enough
         let energy = self.metric.energy(&at.r).max(tuning::LEAST * self.metric.weight(&at.r));
         let least = tuning::LEAST * energy;
         if self.limits.is_none() && gaps <= least {
@@ -83,10 +84,10 @@ impl Selection {
             let limits = self.limits.take().unwrap_or_default();
             let at_limits = self.measure(problem, sites, at, &limits, iteration);
             self.limits = Some(limits);
-            // reactions that are next to r* need not be at its limits
+            // reactions near r* need not be at its limits
             solved |= at_limits <= 1.0;
         }
-        // a gap that is rounding tells nothing more
+        // a gap at round-off cannot fall further
         let exhausted = gaps.is_nan() || gap(at) <= tuning::LEAST_GAP || iteration == self.aims.most;
         if solved || exhausted {
             return Next::Arrived;
@@ -99,7 +100,7 @@ impl Selection {
                 if self.anchored == tuning::MOST_ANCHORED {
                     return Next::Arrived;
                 }
-                // the same metric once more, then harder ones
+                // the same metric once more, then stiffer ones
                 let share = if self.anchored == 0 { 1.0 } else { tuning::HARDER };
                 self.metric.anchor_at(at.r.clone(), share);
                 self.enough *= share;
@@ -120,17 +121,17 @@ impl Selection {
         self.best
     }
 
-    /// Whether the compliance of the metric takes much of what the residual, or the velocity error,
-    /// may be.
+    /// Whether the compliance of the metric takes much of the tolerance of the residual or of the
+    /// velocity error.
     fn metric_shows(&self, sites: &Sites, at: &State) -> bool {
         let Aims { tolerance, load_tolerance, .. } = self.aims;
         let (residual, velocity) = self.metric.left(sites, &at.r);
         residual > tuning::SHOWS * tolerance || velocity > tuning::SHOWS * load_tolerance * sites.largest_free()
     }
 
-    /// How far the reactions of a point, put on their limits, [miss](Aims::missed) what is asked
-    /// for; they are kept if they are the best so far: of those within the tolerances the last,
-    /// which is nearest to r*, else those that miss least.
+    /// By which factor the reactions of a point, projected on their limits, [miss](Aims::missed)
+    /// the tolerances. The best are kept: of those within the tolerances the last, which are
+    /// nearest to r*, else those that miss least.
     fn measure(
         &mut self,
         problem: &mut impl Solvable,

@@ -1,13 +1,13 @@
-//! The contacts of a problem as cone pairs, whatever their laws.
+//! The contacts of a problem as cone pairs, whatever their law.
 //!
 //! A contact has rows r (its reaction, without the shift s of the normal row) and a list of cones,
 //! each with
 //!
 //! x = G r̂ = (slope · (r_n + s), r_t…) ∈ Q   ⊥   z ∈ Q,      u + C (r − r₀) = Σ Bᵀ z.
 //!
-//! An associated law has one cone for each group of rows, with B = G. Any other has a ray for
-//! Signorini's condition, and for each group one whose z₀ acts on no row: B is G without its normal
-//! column, and z₀ is the slip speed.
+//! An associated law has one cone for each group of rows, with B = G. Any other law has a ray for
+//! Signorini's condition, and for each group a cone whose z₀ acts on no row: there B is G without
+//! its normal column, and z₀ is the slip speed.
 
 use super::cones::{Point, eigenvalues};
 use super::state::State;
@@ -30,9 +30,9 @@ pub(super) struct Limit {
 /// One cone of a contact.
 #[derive(Clone, Debug)]
 pub(super) struct Cone {
-    /// x₀ over the normal reaction with its shift.
+    /// Ratio of x₀ to the shifted normal reaction.
     pub slope: f64,
-    /// The contact's rows that follow x₀, as many as `tangents`.
+    /// The contact's rows for the components after x₀; `tangents` of them.
     pub rows: [usize; 2],
     pub tangents: usize,
     /// Whether z₀ acts on the normal row.
@@ -42,18 +42,17 @@ pub(super) struct Cone {
 /// One contact.
 #[derive(Clone, Debug)]
 pub(super) struct Site {
-    /// Places in a padded vector of the rows that it has here: a group with a limit of zero has
-    /// none.
+    /// Places of its rows in a padded vector. A group with a limit of zero has no rows here.
     pub places: [usize; ROWS],
-    /// Which rows of the problem these are.
+    /// Numbers of these rows among all rows of the contact.
     pub of: [usize; ROWS],
     pub rows: usize,
-    /// Where they begin in a list of all rows.
+    /// Start of its rows in a list of all rows.
     pub at: usize,
-    /// Its cones, and how many unknowns these have.
+    /// Its cones, and their number of unknowns.
     pub cones: Range<usize>,
     pub duals: usize,
-    /// Where the local matrix begins in a list of all.
+    /// Start of its local matrix in a list of all.
     pub matrix: usize,
 }
 
@@ -112,9 +111,8 @@ pub(super) struct Sites {
     pub shift: Vec<f64>,
     /// For each contact: the normal entry of W over the mean of all.
     pub normal: Vec<f64>,
-    /// For each row: the velocity without reactions, the compliance of an elastic bond and the
-    /// reaction at which it is at rest, and the compliance that stands for the limit of stiff
-    /// contacts, where κ is one.
+    /// For each row: the velocity without reactions; the compliance of an elastic bond, and the
+    /// reaction at which the bond is at rest; the compliance of the metric for κ = 1.
     pub free: Vec<f64>,
     pub compliance: Vec<f64>,
     pub carried: Vec<f64>,
@@ -124,14 +122,14 @@ pub(super) struct Sites {
 }
 
 impl Sites {
-    /// The contacts of `rows`, in units that these reactions have a part in.
+    /// The contacts of `rows`, in units that depend on the problem and on these reactions.
     pub fn of(rows: &Rows, reactions: &[Padded]) -> Self {
         let mut sites = Self::default();
         let velocities: Vec<Padded> = rows.list.iter().map(|row| rows.velocity(row, &rows.free)).collect();
         let count = rows.list.len().max(1) as f64;
         let mean = |sum: f64| sum / count;
         let normal = mean(rows.list.iter().map(|row| row.normal).sum());
-        // reactions that would stop the bodies, those at hand, or what is applied
+        // reactions that would stop the bodies, current reactions, or applied impulses
         let stopping = (mean(velocities.iter().map(|u| u.dot(u)).sum())).sqrt() / normal;
         let at_hand = mean(reactions.iter().map(|r| r.dot(r)).sum()).sqrt();
         sites.force = stopping.max(at_hand).max(rows.applied / count.sqrt());
@@ -239,8 +237,9 @@ impl Sites {
         Padded::from_order(&r.into())
     }
 
-    /// Which cones reactions are at the limit of, where z is what the compliance of each row makes
-    /// of how far they would be beyond.
+    /// The limits that the reactions have reached. For each row z over the compliance is the
+    /// distance beyond a limit; the reaction is at the limit if this exceeds x, the distance
+    /// inside.
     pub fn limits(&self, at: &State, compliance: &[f64]) -> Vec<Limit> {
         let mut limits = vec![Limit::default(); self.cones.len()];
         for site in &self.list {
@@ -253,8 +252,8 @@ impl Sites {
         limits
     }
 
-    /// The reactions of the problem at a point, each at the limits that it is nearer to than its z
-    /// is to its own, and at those that it is known to be at where it is next to them.
+    /// The reactions of the problem at a point, projected on a limit if x is nearer to it than z is
+    /// to its own, or if the limit is `known` and next to x.
     pub fn snapped(&self, at: &State, known: &[Limit]) -> Vec<Padded> {
         let limit = |c: usize, shift: f64| {
             let (x, z) = (eigenvalues(&at.x[c]), eigenvalues(&at.z[c]));
@@ -268,7 +267,7 @@ impl Sites {
             let mut own = [0.0; ROWS];
             own[..site.rows].copy_from_slice(site.part(&at.r));
             if site.cones.clone().any(|c| self.cones[c].opens && limit(c, *shift).apex) {
-                // at the apex: nothing is carried but what the shift stands for
+                // at the apex: the shifted reaction is zero
                 own = [0.0; ROWS];
                 own[0] = -shift;
             } else {

@@ -1,4 +1,4 @@
-//! Points from which a path begins.
+//! Start points of the central path, cold and warm.
 
 use super::cones::least_product;
 use super::coupling::Coupling;
@@ -6,7 +6,7 @@ use super::sites::Sites;
 use super::state::{State, gap};
 use crate::solver::tuning::start as tuning;
 
-/// Reactions well inside their cones, velocities as large as the free ones.
+/// Cold start: reactions well inside their cones, velocities as large as the free ones.
 pub(super) fn cold(sites: &Sites) -> State {
     let largest = sites.shift.iter().copied().fold(1.0, f64::max);
     let mut r = vec![0.0; sites.rows];
@@ -17,7 +17,7 @@ pub(super) fn cold(sites: &Sites) -> State {
     State { x: sites.primal(&r), r, z: vec![[speed, 0.0, 0.0]; sites.cones.len()] }
 }
 
-/// Reactions moved inside their cones, and the slips that they give likewise.
+/// Warm start: reactions moved inside their cones, and the velocities that they give likewise.
 pub(super) fn warm(sites: &Sites, coupling: &Coupling, reactions: &[f64]) -> State {
     let count = sites.list.len() as f64;
     let mean = (reactions.iter().map(|r| r * r).sum::<f64>() / count).sqrt().max(f64::MIN_POSITIVE);

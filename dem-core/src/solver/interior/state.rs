@@ -7,7 +7,7 @@ use super::cones::{Point, dot};
 pub(super) struct State {
     /// Reactions without the shift, of all rows.
     pub r: Vec<f64>,
-    /// Of all cones.
+    /// Primal and dual side of all cones.
     pub x: Vec<Point>,
     pub z: Vec<Point>,
 }

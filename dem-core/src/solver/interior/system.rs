@@ -1,4 +1,4 @@
-//! The linear system of a point.
+//! The linear system of an iteration at a point.
 
 use super::cones::{Point, moved, product, reach};
 use super::coupling::Coupling;
@@ -12,7 +12,8 @@ pub(super) struct System<'a> {
     pub sites: &'a Sites,
     pub coupling: &'a Coupling<'a>,
     pub at: &'a State,
-    /// By how much the contacts' velocities must change to be what z makes them.
+    /// Right side of the velocity equations, −ℓ: the change of the contacts' velocities that z
+    /// requires.
     pub right: Vec<f64>,
     /// W r at the point.
     pub velocity: Vec<f64>,
@@ -32,14 +33,14 @@ impl System<'_> {
         all.map(|((x, z), Scaled { scaling, .. })| product(&scaling.x(x), &scaling.z(z))).collect()
     }
 
-    /// The step after which x ∘ z has changed by `by`, to first order. It is refined once: where
-    /// fragments move fast, the error that rounding leaves is as large as the right side, and the
-    /// length to the boundary of the cones would be arbitrary.
+    /// The step that changes x ∘ z by `by`, to first order. It is refined once: if fragments move
+    /// fast, its round-off is as large as the right side, and the length to the boundary of the
+    /// cones would be arbitrary.
     pub fn step(&self, by: &[Point]) -> State {
         self.refined(self.solved(&self.right, by), by)
     }
 
-    /// A step with less of what rounding has left.
+    /// A step after one refinement, which reduces its round-off.
     pub fn refined(&self, mut step: State, by: &[Point]) -> State {
         let (left, missing) = self.left(by, &step);
         let more = self.solved(&left, &missing);
@@ -57,7 +58,7 @@ impl System<'_> {
         step
     }
 
-    /// What a step leaves of the equations.
+    /// The residuals of the equations after a step.
     fn left(&self, by: &[Point], step: &State) -> (Vec<f64>, Vec<Point>) {
         let moving = self.coupling.velocity(self.sites, &step.r);
         let opened = opened(self.sites, &step.z);
@@ -70,15 +71,14 @@ impl System<'_> {
         (left.collect(), (0..by.len()).map(missing).collect())
     }
 
-    /// By how much a step changes the net impulses on the bodies, relative to them, in the metric
-    /// of their masses (–).
+    /// Relative change of the net impulses on the bodies by a step, in the mass metric (–).
     pub fn net_change(&self, step: &State) -> f64 {
         let moving = self.coupling.velocity(self.sites, &step.r);
         let square = |r: &[f64], u: &[f64]| r.iter().zip(u).map(|(r, u)| r * u).sum::<f64>().abs();
         (square(&step.r, &moving) / square(&self.at.r, &self.velocity).max(f64::MIN_POSITIVE)).sqrt()
     }
 
-    /// How far one can go along a step.
+    /// The longest multiple of a step that stays inside all cones.
     pub fn longest(&self, step: &State) -> f64 {
         let ends = self.at.x.iter().zip(&step.x).chain(self.at.z.iter().zip(&step.z)).map(|(x, d)| reach(x, d));
         ends.fold(f64::INFINITY, f64::min)

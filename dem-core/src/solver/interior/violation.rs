@@ -1,13 +1,12 @@
-//! Of all velocities those that violate the contact laws least, and the impulses dual to the
-//! violation.
+//! The least violation of the contact laws over all velocities, and the impulses dual to it.
 //!
 //! For an associated problem without shifts,
 //!
 //! minimise ½ d·C d + ½ κ d·W d + q·d over d ∈ K,
 //!
 //! is strictly convex and has one solution. With y = κ H̃ d and u = H̃ᵀ y + q, the velocity u + C d
-//! lies in K*: C d is the violation. The problem is solved again with q + κ W d for q: then κ W d
-//! tends to zero and d to the least of all violations, with H̃ d = 0 and q·d = −d·C d
+//! lies in K*: C d is the violation. The problem is solved again with q + κ W d in place of q. Then
+//! κ W d tends to zero, and C d to the least of all violations, with H̃ d = 0 and q·d = −d·C d
 //! (docs/theory/interior-point.md, "What has no solution").
 
 use super::Interior;
@@ -23,17 +22,17 @@ use crate::solver::graph::Graph;
 use crate::solver::rows::Rows;
 use crate::solver::tuning::{direction as steps, violation as tuning};
 
-/// What violates least.
+/// The least violation.
 pub(in crate::solver) struct Least {
     /// d, in the unit of the rows' reactions.
     pub direction: Vec<Padded>,
-    /// The reactions that give the bodies their velocities, likewise.
+    /// The reactions that give the bodies their velocities, in the same unit.
     pub reactions: Vec<Padded>,
 }
 
 impl Interior {
-    /// The least violation of an associated problem without shifts; none where no elimination tree
-    /// can be made.
+    /// The least violation of an associated problem without shifts; none if no elimination tree can
+    /// be made.
     pub fn least_violation(&mut self, rows: &Rows, matrix: Option<&BlockMatrix>) -> Option<Least> {
         let mut sites = Sites::of(rows, &[]);
         let ratio = sites.speed / (sites.force * tuning::KAPPA);
@@ -51,7 +50,7 @@ impl Interior {
         Some(Least { direction: sites.scattered(&at.r), reactions: sites.scattered(&reactions) })
     }
 
-    /// The path of one round, to its end.
+    /// The end of the central path of one multiplier iteration.
     fn of_a_round(&mut self, sites: &Sites, coupling: &Coupling, metric: &Metric) -> State {
         let mut at = cold(sites);
         for _ in 0..tuning::MOST {

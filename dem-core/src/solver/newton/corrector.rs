@@ -1,24 +1,23 @@
 //! The corrector of one contact in the metric 1/ρ, and its derivative.
 //!
-//! From a multiplier r̂ and a relative velocity u the corrector is r(q) with q = u − r̂/ρ (and the
-//! carried reaction of an elastic bond, [`Row::form`]): for an associated law the minimiser of ½ Σ
-//! w r² + q·r over the cone, w = 1/ρ + C, for Coulomb's law Signorini's r_n = (−q_n/w_n)⁺ and the
-//! tangential part clipped to μ r_n (Alart & Curnier 1991). Its negative derivative A = −∂r/∂q is
-//! what a contact adds to the matrix of the Newton step; it is symmetric where the law is
-//! associated.
+//! The corrector maps a multiplier r̂ and a relative velocity u to a reaction r(q), with
+//! q = u − r̂/ρ (and the carried reaction of an elastic bond, [`Row::form`]). For an associated law
+//! r minimises ½ Σ w r² + q·r over the cone, w = 1/ρ + C. For Coulomb's law r_n = (−q_n/w_n)⁺
+//! (Signorini), and the tangential part is clipped to μ r_n (Alart & Curnier 1991). A contact adds
+//! A = −∂r/∂q to the matrix of the Newton step; A is symmetric if the law is associated.
 
 use crate::contact::{Local, PADDED, Padded, Weights};
 use crate::dim::{Moments, Vect};
 use crate::solver::rows::{Operator, Row, TWIST};
 use nalgebra::{SMatrix, SVector, Vector2};
 
-/// The corrected reaction for the relative velocity `u`, without the shift: a reaction that is
-/// small beside the cohesion keeps all its digits while its bond sticks.
+/// The corrected reaction for the relative velocity `u`, without the shift, so that a reaction much
+/// smaller than the cohesion keeps all its digits while its bond sticks.
 #[inline]
 pub(super) fn correct(row: &Row, u: &Padded) -> Padded {
     let mut q = row.form(u);
     let (w, cone, shift) = (row.metric(), &row.cone, row.shift);
-    // most contacts stick, and then nothing couples
+    // most contacts stick, and then the rows are uncoupled
     let stuck = Local { n: -q.n / w.n, t: q.t * (-1.0 / w.t), m: q.m.scaled(-1.0 / w.m, -1.0 / w.w) };
     if cone.contains(&Local { n: stuck.n + shift, ..stuck }) {
         return stuck;
@@ -34,7 +33,7 @@ pub(super) fn correct(row: &Row, u: &Padded) -> Padded {
     r
 }
 
-/// A = −∂r/∂q at the velocity `u`, where the corrector gave `r`; nothing where the contact is open.
+/// A = −∂r/∂q at the velocity `u`, at which the corrector gave `r`; none if the contact is open.
 pub(super) fn operator(row: &Row, u: &Padded, r: &Padded) -> Option<Operator> {
     let limit = r.n + row.shift;
     if limit <= 0.0 {
@@ -49,11 +48,11 @@ pub(super) fn operator(row: &Row, u: &Padded, r: &Padded) -> Option<Operator> {
         return Some(Operator::Diagonal(Weights { n: 1.0 / w.n, t: 1.0 / w.t, m: 1.0 / w.m, w: 1.0 / w.w }));
     }
     let mut a = SMatrix::<f64, PADDED, PADDED>::zeros();
-    // a row group inside its ball follows its own stiffness; on the sphere it turns with q
+    // a row group below its limit has its own stiffness; at its limit it turns with q
     block(&mut a, 1, slip, 1.0 / w.t, cone.mu * limit);
     block(&mut a, 3, bend, 1.0 / w.m, cone.nu * limit);
-    // the normal row drags the limits along: r = n (1, −μ q̂_t, −ν q̂_m, −ξ q̂_τ) on the active
-    // ones
+    // the limits follow the normal reaction: r = n (1, −μ q̂_t, −ν q̂_m, −ξ q̂_τ) in the active
+    // groups
     let mut drag = SVector::<f64, PADDED>::ith(0, 1.0);
     let mut stiffness = w.n;
     if let Some((direction, _)) = slip {
@@ -78,13 +77,13 @@ pub(super) fn operator(row: &Row, u: &Padded, r: &Padded) -> Option<Operator> {
     Some(Operator::Full(Box::new(a)))
 }
 
-/// Direction and norm of a row group's q where the group is at its limit.
+/// Direction and norm of a row group's q if the group is at its limit.
 fn limit_direction(q: Vector2<f64>, weight: f64, limit: f64) -> Option<(Vector2<f64>, f64)> {
     let norm = Vect::norm(&q);
     (norm > weight * limit).then(|| (q / norm, norm))
 }
 
-/// The part of A that a row group has for a fixed limit.
+/// The part of A of a row group, for a fixed limit.
 fn block(
     a: &mut SMatrix<f64, PADDED, PADDED>,
     at: usize,

@@ -1,4 +1,5 @@
-//! The corrector's derivative against differences of the corrector, for every law, in 2D and 3D.
+//! The corrector's derivative agrees with finite differences of the corrector, for every law, in 2D
+//! and in 3D.
 
 use super::{correct, operator};
 use crate::contact::{Cone, PADDED, Padded, Weights};
@@ -7,7 +8,7 @@ use nalgebra::{SMatrix, SVector};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-/// Step of the differences, beside numbers of order one.
+/// Step of the finite differences, for numbers of order one.
 const STEP: f64 = 1e-6;
 
 fn padded(rng: &mut Pcg64, rows: &[usize]) -> Padded {
@@ -21,7 +22,7 @@ fn weights(rng: &mut Pcg64) -> Weights {
     Weights { n: any(), t: any(), m: any(), w: any() }
 }
 
-/// A contact of so many tangential and moment rows.
+/// A contact with these numbers of tangential and moment rows.
 fn contact(rng: &mut Pcg64, tangents: usize, moments: usize, associated: bool, elastic: bool) -> Row {
     let rows = places(tangents, moments);
     let mut coefficient = |there: bool| if there { 0.1 + rng.random::<f64>() } else { 0.0 };
@@ -45,8 +46,8 @@ fn contact(rng: &mut Pcg64, tangents: usize, moments: usize, associated: bool, e
     }
 }
 
-/// −∂r/∂u column by column from differences; none where they differ by the side they are taken
-/// from: at a kink.
+/// −∂r/∂u by finite differences, column by column; none at a kink, where forward and backward
+/// differences disagree.
 fn differences(row: &Row, u: &Padded) -> Option<SMatrix<f64, PADDED, PADDED>> {
     let mut a = SMatrix::<f64, PADDED, PADDED>::zeros();
     let here = correct(row, u).in_order();
@@ -77,7 +78,8 @@ fn whole(operator: Option<&Operator>, rows: &[usize]) -> SMatrix<f64, PADDED, PA
     a
 }
 
-/// How often a contact was open, stuck, and at some limit.
+/// Check one contact, and count in `seen` whether it was open, stuck or at a limit; false at a
+/// kink.
 fn check(rng: &mut Pcg64, row: &Row, seen: &mut [usize; 3]) -> bool {
     let u = padded(rng, row.rows) * 2.0;
     let Some(expected) = differences(row, &u) else { return false };
@@ -93,7 +95,7 @@ fn check(rng: &mut Pcg64, row: &Row, seen: &mut [usize; 3]) -> bool {
     if row.associated {
         assert!((a - a.transpose()).amax() <= 1e-14 * a.amax(), "{a} is not symmetric");
     }
-    // the product with a vector is that of the matrix
+    // `times` agrees with the matrix
     if let Some(found) = found {
         let x = padded(rng, row.rows);
         assert!((found.times(&x).in_order() - a * x.in_order()).amax() <= 1e-14 * (1.0 + a.amax()));
@@ -104,7 +106,7 @@ fn check(rng: &mut Pcg64, row: &Row, seen: &mut [usize; 3]) -> bool {
 #[test]
 fn the_operator_is_the_derivative_of_the_corrector() {
     let mut rng = Pcg64::seed_from_u64(30);
-    // tangential and moment rows of contacts without friction, with it, and of bonds
+    // tangential and moment rows of frictionless contacts, dry contacts and bonds
     for (tangents, moments) in [(0, 0), (1, 0), (2, 0), (1, 1), (2, 2), (2, 3)] {
         for kind in 0..4 {
             let (associated, elastic) = (kind & 1 == 1, kind & 2 == 2);

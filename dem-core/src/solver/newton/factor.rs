@@ -1,5 +1,5 @@
-//! The matrix I + Σ H̃ A H̃ᵀ of a Newton step and its factors, kept while refinement with them
-//! converges.
+//! The matrix I + Σ H̃ A H̃ᵀ of a Newton step and its factors, which are kept while refinement with
+//! them converges.
 
 use crate::linear::{Lu, Tree};
 use crate::saved::{Mismatch, Reader, Saved};
@@ -7,7 +7,7 @@ use crate::solver::graph::Graph;
 use crate::solver::rows::{Operator, PAIR, Rows};
 use std::sync::Arc;
 
-/// Factors, and what they were made of.
+/// Factors, and the matrices from which they were computed.
 struct Factors {
     graph: Arc<Graph>,
     /// The matrices of all elements, one after the other.
@@ -15,26 +15,26 @@ struct Factors {
     lu: Lu,
 }
 
-/// The factors at hand. A copy shares them until either renews its own.
+/// The cached factors. A copy shares them until either copy renews its own.
 #[derive(Clone, Default)]
 pub(super) struct Factor {
     factors: Option<Arc<Factors>>,
-    /// Whether they must be made anew.
+    /// Whether the factors must be renewed.
     pub stale: bool,
     /// Factorisations so far.
     pub made: u64,
 }
 
 impl Factor {
-    /// Whether they can be tried for this many unknowns.
+    /// Whether the factors can be tried for this many unknowns.
     pub fn fits(&self, unknowns: usize) -> bool {
         !self.stale && self.factors.as_ref().is_some_and(|factors| factors.graph.tree.unknowns() == unknowns)
     }
 
-    /// Factorise I + Σ H̃ A H̃ᵀ for these operators; false if it has no inverse to rounding.
+    /// Factorise I + Σ H̃ A H̃ᵀ for these operators; false if the matrix is singular to round-off.
     pub fn renew(&mut self, rows: &Rows, operators: &[Option<Operator>], graph: Arc<Graph>) -> bool {
         self.made += 1;
-        // the room of the old factors, unless a copy shares them
+        // reuse the memory of the old factors, unless a copy shares them
         let (mut elements, lu) = match self.factors.take().and_then(Arc::into_inner) {
             Some(old) => (old.elements, old.lu),
             None => (Vec::new(), Lu::default()),
@@ -54,7 +54,7 @@ impl Factor {
 
     fn factorise(&mut self, mut factors: Factors) -> bool {
         let Factors { graph, elements, lu } = &mut factors;
-        // each element is asked for once, but in the order of the fronts
+        // `Lu` requests each element once, in the order of the fronts
         let mut next = 0;
         let starts: Vec<usize> = (0..graph.contacts.len())
             .map(|e| {
@@ -72,14 +72,14 @@ impl Factor {
         made.is_some()
     }
 
-    /// x ← the inverse of the matrix times x.
+    /// x ← (I + Σ H̃ A H̃ᵀ)⁻¹ x, with the factors.
     pub fn solve(&self, x: &mut [f64]) {
         if let Some(factors) = &self.factors {
             factors.lu.solve(&factors.graph.tree, x);
         }
     }
 
-    /// Write what the factors were made of.
+    /// Write the matrices from which the factors were computed.
     pub fn save(&self, to: &mut Saved) {
         let kept = self.factors.as_ref().filter(|_| !self.stale);
         to.flag(kept.is_some());
@@ -93,7 +93,7 @@ impl Factor {
         to.reals.extend_from_slice(values);
     }
 
-    /// The same factors, made anew of what [`Factor::save`] wrote.
+    /// The same factors, recomputed from what [`Factor::save`] wrote.
     pub fn restored(from: &mut Reader) -> Result<Self, Mismatch> {
         let mut factor = Self { stale: true, ..Self::default() };
         if !from.flag()? {

@@ -5,7 +5,7 @@ use crate::dim::{Moments, Vect};
 use crate::solver::rows::Row;
 use crate::solver::tuning::newton as tuning;
 
-/// A guess of the active set: that of these reactions (N s), without the shift.
+/// A guess of the active set, given by reactions (N s) without the shift.
 pub(super) struct Guess {
     pub reactions: Vec<Padded>,
 }
@@ -16,12 +16,13 @@ impl Guess {
         Self { reactions }
     }
 
-    /// The velocity at which the corrector of contact `k` gives the guessed reaction. One at its
-    /// limit is moved beyond it, where rounding cannot make it stick.
+    /// The velocity at which the corrector of contact `k` gives the guessed reaction. A reaction at
+    /// its limit is moved beyond it, so that round-off cannot make the contact stick.
     pub fn velocity(&self, k: usize, row: &Row) -> Padded {
         let guess = &self.reactions[k];
         let limit = guess.n + row.shift;
-        // how far the rows of one group are beyond their limit; zero for those that stick
+        // relative distance by which a group at its limit is moved beyond it; zero if the group
+        // sticks
         let at_limit =
             |c: f64, size: f64| if size >= (1.0 - tuning::BEYOND) * c * limit { 2.0 * tuning::BEYOND } else { 0.0 };
         let slip = at_limit(row.cone.mu, Vect::norm(&guess.t));

@@ -8,7 +8,7 @@ use crate::solver::graph::Graph;
 use crate::solver::rows::{Operator, Rows};
 use crate::solver::tuning::newton as tuning;
 
-/// State of one solve.
+/// An iterate of the inner problem.
 pub(super) struct Iterate {
     pub y: Vec<f64>,
     /// Relative velocities of the contacts at `y`.
@@ -44,11 +44,12 @@ impl Iterate {
 }
 
 impl Newton {
-    /// Solve the inner problem for fixed multipliers from `state`, with the active set of `guess`
-    /// first. In the first proximal iteration of a `warm` start Newton gives up where this active
-    /// set leaves much of F. Returns the iterations made and whether F vanished.
+    /// Solve the inner problem for fixed multipliers from `state`; the first iteration uses the
+    /// active set of `guess`. With `warm`, the first proximal iteration of a warm start, Newton
+    /// gives up if this active set leaves much of F. Returns the iterations made and whether ‖F‖
+    /// reached its target.
     pub(super) fn inner(&mut self, rows: &Rows, state: &mut Iterate, guess: &Guess, warm: bool) -> (u64, bool) {
-        // less than the contacts push is never much
+        // at least the net impulses of the contacts
         let much = (tuning::LEFT_BY_GUESS * state.norm).max(distance(&state.y, &rows.free));
         let (mut least, mut since) = (f64::INFINITY, 0);
         for iteration in 0..tuning::MOST_ITERATIONS {
@@ -56,7 +57,7 @@ impl Newton {
             let target = self.target(rows, state);
             if guessed.is_none() {
                 let wrong = warm && iteration == 1 && state.norm > much;
-                // false for what is no number
+                // false for NaN
                 let stays = state.norm <= tuning::DIVERGED * least;
                 (least, since) =
                     if state.norm < tuning::PROGRESS * least { (state.norm, 0) } else { (least, since + 1) };
@@ -70,11 +71,10 @@ impl Newton {
         (tuning::MOST_ITERATIONS, state.norm <= self.target(rows, state))
     }
 
-    /// The norm of F that is small enough: a tenth of what either tolerance allows, or what
-    /// rounding leaves.
+    /// Target of ‖F‖: a tenth of what the stricter tolerance allows, but at least its round-off.
     ///
-    /// An error of F turns up as a velocity when v is computed from the reactions. Rounding comes
-    /// from ρ u, where u is a sum of velocities.
+    /// An error of F becomes an error of velocity when v is computed from the reactions. Round-off
+    /// comes from ρ u, where u is a sum of velocities.
     fn target(&self, rows: &Rows, state: &Iterate) -> f64 {
         let change = distance(&state.y, &rows.free);
         let (mut rounding, mut carried) = (0.0, 0.0);
@@ -89,8 +89,8 @@ impl Newton {
         wanted.max(tuning::ROUNDING * rounding.sqrt())
     }
 
-    /// The Newton direction −J⁻¹ F, by the factors at hand where a few rounds of refinement make it
-    /// exact enough, else by new ones.
+    /// The Newton direction −J⁻¹ F: with the cached factors if a few refinements make it accurate
+    /// enough, else with new ones.
     fn direction(&mut self, rows: &Rows, state: &Iterate, guess: Option<&Guess>, target: f64) -> Option<Vec<f64>> {
         let (mut right, points) = linearise(rows, state, guess);
         right.iter_mut().for_each(|f| *f = -*f);
@@ -137,8 +137,9 @@ pub(super) fn distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
 }
 
-/// F, and for each contact the velocity and reaction that its operator A belongs to: those of the
-/// state, or with a guess those of the guessed active set, from which F is then extrapolated.
+/// F, and for each contact the velocity and reaction at which its operator A is evaluated. With a
+/// guess these are those of the guessed active set, from which F is extrapolated; else those of the
+/// state.
 fn linearise(rows: &Rows, state: &Iterate, guess: Option<&Guess>) -> (Vec<f64>, Vec<(Padded, Padded)>) {
     let Some(guess) = guess else {
         let points = state.velocities.iter().copied().zip(state.reactions.iter().copied());
@@ -174,8 +175,8 @@ fn multiply(rows: &Rows, operators: &[Option<Operator>], x: &[f64], out: &mut [f
     }
 }
 
-/// Move along the direction: the whole step where F shrinks enough or a guess is taken up, else the
-/// best of a few shorter ones.
+/// Line search: the full step if F shrinks enough or `whole` is set (a guess is adopted). Else the
+/// root of the slope if all laws are associated, or the best of the step and a few shorter ones.
 fn advance(rows: &Rows, state: &mut Iterate, direction: &[f64], whole: bool) {
     let step = |length: f64| {
         let y = state.y.iter().zip(direction).map(|(y, d)| y + length * d).collect();
@@ -192,7 +193,7 @@ fn advance(rows: &Rows, state: &mut Iterate, direction: &[f64], whole: bool) {
         return;
     }
     if convex {
-        // F·d grows along d: the minimum of the convex function is where it vanishes
+        // F·d grows along d and vanishes at the minimum of the convex function
         *state = root(step, slope, start, full);
         return;
     }
@@ -208,8 +209,8 @@ fn advance(rows: &Rows, state: &mut Iterate, direction: &[f64], whole: bool) {
     *state = best;
 }
 
-/// Where the slope vanishes, between 0 (slope `start` < 0) and a step that may have to be
-/// prolonged: regula falsi with the Illinois rule.
+/// The iterate at which the slope vanishes, by regula falsi with the Illinois rule. The slope at 0
+/// is `start` < 0; the full step is doubled first while its slope is negative.
 fn root(step: impl Fn(f64) -> Iterate, slope: impl Fn(&Iterate) -> f64, start: f64, full: Iterate) -> Iterate {
     let (mut low, mut low_slope) = (0.0, start);
     let mut high = 1.0;

@@ -4,16 +4,16 @@
 //!
 //! F(v) = M (v − v_f) − H (P(r̂ − ρ (Hᵀv + b)) − s n) = 0,
 //!
-//! for associated laws the gradient of a convex function of v. Its derivative M + H A Hᵀ is sparse,
-//! and symmetric but for the slipping dry contacts. The outer iteration is r̂ ← P(r̂ − ρ (Hᵀv +
-//! b)), a proximal step of size ρ on the reactions; with a large ρ two or three suffice, and nearly
-//! always the active set of the last step still holds, so each costs one linear solve. Its factors
-//! are kept over steps and renewed when refinement with them no longer converges. Where the active
-//! set cycles it gives up: the interior-point method needs no active set.
+//! where F is the gradient of a convex function of v for associated laws. Its derivative M + H A Hᵀ
+//! is sparse, and symmetric except for slipping dry contacts. The outer, proximal iteration is
+//! r̂ ← P(r̂ − ρ (Hᵀv + b)). With a large ρ two or three iterations suffice; nearly always the
+//! active set of the last step still holds, so that each costs one linear solve. The factors are
+//! kept over steps and renewed when refinement with them no longer converges. Newton gives up if
+//! the active set cycles; the interior-point method needs no active set.
 //!
-//! Started from zero reactions the first proximal step is the stiff limit: the reactions of least Σ
-//! r²/ρ among all that balance the load, the ones that elastic contacts with stiffnesses in the
-//! ratio of ρ would give.
+//! From zero reactions the first proximal iteration gives the stiff limit: the minimum-energy
+//! reactions (least Σ r²/ρ among all that balance the load), as of elastic contacts with
+//! stiffnesses in the ratio of ρ.
 //!
 //! Sources: Hestenes 1969 and Powell 1969 (augmented Lagrangian); Alart & Curnier 1991; Qi & Sun
 //! 1993 (semismooth Newton); Olsen & Kamrin, arXiv 1805.07437 (the stiff limit).
@@ -39,11 +39,12 @@ use std::sync::Arc;
 pub(super) struct Newton {
     settings: StagedSettings,
     factor: Factor,
-    /// The graph of the last problem.
+    /// Graph of the last problem.
     pub graph: Option<Arc<Graph>>,
-    /// Factorisations after which this solve is given up.
+    /// Number of factorisations, since the first solve, at which this solve is given up.
     most_made: u64,
-    /// How far contacts are from another status in the first round of the last solve.
+    /// Margins of the contacts to another status, in the first proximal iteration of the last
+    /// solve.
     pub margins: Vec<f64>,
 }
 
@@ -58,9 +59,9 @@ impl Newton {
         self.factor.made
     }
 
-    /// Proximal iterations from the active set of the reactions that the problem brought along; in
-    /// 2D after some sweeps of Gauss–Seidel, in 3D without, where sweeps that have not converged
-    /// spoil the directions of slip. None where the active set cycles.
+    /// Proximal iterations from the active set of the reactions in the problem. In 2D and in a cold
+    /// start some Gauss–Seidel sweeps correct the active set first; in 3D unconverged sweeps would
+    /// spoil the slip directions. None if Newton fails.
     pub fn solve(
         &mut self,
         problem: &mut impl Solvable,
@@ -80,12 +81,12 @@ impl Newton {
         report
     }
 
-    /// Write what is kept from one solve to the next.
+    /// Write the state kept between solves.
     pub fn save(&self, to: &mut Saved) {
         self.factor.save(to);
     }
 
-    /// Take up what [`Newton::save`] wrote.
+    /// Restore the state that [`Newton::save`] wrote.
     pub fn restore(&mut self, from: &mut Reader) -> Result<(), Mismatch> {
         self.factor = Factor::restored(from)?;
         Ok(())

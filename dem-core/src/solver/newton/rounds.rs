@@ -1,4 +1,4 @@
-//! Proximal rounds: one inner problem after the other, each with the reactions of the one before as
+//! Proximal iterations: a sequence of inner problems, each with the reactions of the last one as
 //! multipliers.
 
 use super::guess::Guess;
@@ -11,9 +11,9 @@ use crate::solver::tuning::newton as tuning;
 use crate::solver::{SolveStatus, Work};
 
 impl Newton {
-    /// Proximal rounds, each begun with the active set of the one before, the first with that of
-    /// `guess`, which in a `warm` start is that of the last solve. None if an inner problem is not
-    /// solved.
+    /// Proximal iterations. Each starts from the active set of the last one, the first from that of
+    /// `guess` (in a `warm` start the active set of the last solve). None if an inner problem is
+    /// not solved.
     pub(super) fn rounds(
         &mut self,
         problem: &mut impl Solvable,
@@ -30,8 +30,8 @@ impl Newton {
             let (made, solved) = self.inner(rows, &mut state, &guess, warm && self.margins.is_empty());
             *iterations += made.max(1);
             if !solved && made > 1 && last_error <= self.settings.tolerance {
-                // what the round before left is good enough, and this was to tell its load error:
-                // the velocities show it
+                // the last iteration met the residual tolerance, and this one was to measure its
+                // load error: the velocities give it
                 let begun = rows.given_by(&guess.reactions);
                 let load_error = distance(&begun, &state.y) / distance(&begun, &rows.free);
                 let report = self.report(*iterations, last_error, load_error, last_velocity_error);
@@ -62,8 +62,8 @@ impl Newton {
                 return (report.status == SolveStatus::Accepted).then_some(report);
             }
             if error > 0.5 * last_error && softened < tuning::MOST_SOFTENED {
-                // what moves fast is rounded by ρ u: a smaller ρ hears less of it, and takes more
-                // rounds
+                // a smaller ρ reduces the round-off of ρ u of fast contacts, at the cost of more
+                // iterations
                 rows.soften(tuning::SOFTENED);
                 softened += 1;
             }
@@ -77,7 +77,7 @@ impl Newton {
     }
 }
 
-/// The changes of proximal iterations.
+/// Convergence of the proximal iterations: the last change of the net impulses.
 struct Shrinking {
     last: f64,
 }
@@ -89,8 +89,8 @@ impl Default for Shrinking {
 }
 
 impl Shrinking {
-    /// Enter the next change: the error that is left, for iterations that shorten it by c leave
-    /// c/(1 − c) of the last change.
+    /// Enter the next change and return the estimated error that remains: iterations that reduce
+    /// the error by the factor c leave c/(1 − c) of the last change.
     fn error(&mut self, change: f64) -> f64 {
         let shrinkage = (change / self.last).min(0.5);
         self.last = change;
