@@ -9,12 +9,12 @@ use dem_run::history::{BondStatus, History, RuptureMode};
 use serde::Serialize;
 
 use crate::chains::pictures::{force_legend, links};
-use crate::chains::{normal_forces, require_reactions, statistics};
+use crate::chains::report::{normal_forces, require_reactions, statistics};
 use crate::map::{Colour, Key, Link, Panel, Ramp, Sample, Scale, View, draw_view};
 use crate::output::{Folder, PostError, Result, facts, number, progress, quantity, short};
-use crate::plot::colour;
 use crate::velocities::{speeds, usual_speed};
 use crate::{cracks, moments};
+use dem_run::plot::colour;
 
 /// Pixels per unit of a drawing.
 const PIXELS: f32 = 2.0;

@@ -22,5 +22,3 @@ pub mod strength;
 pub mod stress_strain;
 pub mod velocities;
 pub mod view;
-
-use dem_run::{plot, row};

@@ -35,7 +35,7 @@ use serde_json::Value;
 use crate::chains::stress::thickness;
 use crate::collapse::{Bonding, Collapse, peak, work};
 use crate::output::{Folder, PostError, Result, cell, facts, quantity, short};
-use crate::plot::{Chart, Style, colour};
+use dem_run::plot::{Chart, Style, colour};
 
 /// Strains that define the collapse.
 const COLLAPSE: [f64; 2] = [1e-4, 1e-3];

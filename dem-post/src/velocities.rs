@@ -13,8 +13,8 @@ use serde::Serialize;
 use crate::map::{Arrow, Key, Panel, Ramp, Sample, Scale, draw};
 use crate::moments;
 use crate::output::{Folder, Result, Text, number, short};
-use crate::plot::{Drawing, colour};
-use crate::row;
+use dem_run::plot::{Drawing, colour};
+use dem_run::row;
 
 /// Squares of the grid along the longer side of the sample.
 const SQUARES: f64 = 18.0;

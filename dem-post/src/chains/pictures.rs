@@ -2,10 +2,10 @@
 
 use dem_run::history::{ContactRows, History};
 
-use super::{CARRIES, Report};
+use super::report::{CARRIES, Report};
 use crate::map::{Colour, Key, Link, Panel, Sample, draw};
 use crate::output::{Result, number, short};
-use crate::plot::{Chart, Drawing, Style, colour};
+use dem_run::plot::{Chart, Drawing, Style, colour};
 
 /// Width of a line that carries ⟨f⟩, and the greatest width, units of the drawing: of disks, and of spheres.
 const WIDTH: [(f64, f64); 2] = [(1.3, 8.0), (0.6, 4.0)];

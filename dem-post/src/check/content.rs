@@ -7,7 +7,8 @@ use dem_run::history::sound::{Surroundings, is_huge, is_plausible, may_be_observ
 use dem_run::history::{BondStatus, RuptureMode, SolverRoute};
 use hdf5::H5Type;
 
-use super::{Checker, Sizes, schema};
+use super::checker::{Checker, Sizes};
+use super::schema;
 
 const STEP: &str = "particles/grains/position/step";
 const TIME: &str = "particles/grains/position/time";

@@ -4,7 +4,7 @@ use dem_run::history::{BondStatus, ContactStatus, ROUTE, RuptureMode, SolverRout
 use hdf5::Attribute;
 use hdf5::types::{CompoundField, EnumMember, EnumType, FloatSize, IntSize, TypeDescriptor, VarLenUnicode};
 
-use super::{Checker, Sizes};
+use super::checker::{Checker, Sizes};
 
 const F32: TypeDescriptor = TypeDescriptor::Float(FloatSize::U4);
 const F64: TypeDescriptor = TypeDescriptor::Float(FloatSize::U8);

@@ -5,8 +5,8 @@ use dem_run::history::History;
 use super::{Break, Fate, Report};
 use crate::map::{Key, Link, Panel, Sample, draw};
 use crate::output::{Folder, Result, cell};
-use crate::plot::{Chart, Drawing, Style, colour};
-use crate::row;
+use dem_run::plot::{Chart, Drawing, Style, colour};
+use dem_run::row;
 
 /// Colours of bonds that broke in both runs, only in the first, only in the second.
 const COLOURS: [&str; 3] = [colour::BLACK, colour::BLUE, colour::VERMILLION];

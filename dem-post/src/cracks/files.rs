@@ -3,14 +3,14 @@
 use dem_run::history::History;
 
 use super::pictures::{broken_chart, crack_map, decohesion, fragment_charts, fragment_map, front_charts, surface_maps};
+use super::report::{Report, broken_over_time};
 use super::surfaces::Facet;
-use super::{Report, broken_over_time};
 use crate::fragments::{Fragment, fragment_list};
 use crate::map::Sample;
 use crate::moments;
 use crate::output::{Folder, Result, cell};
-use crate::plot::Chart;
-use crate::row;
+use dem_run::plot::Chart;
+use dem_run::row;
 
 /// Writes `ruptures.csv`, `broken.csv`, `fragments.csv` and `fragment-list.csv`, and as drawings `broken`, `fragments`,
 /// `fragment-map` and `decohesion`, of spheres also `decohesion-inside`; that list and these maps show the moments nearest

@@ -11,13 +11,16 @@ use petgraph::algo::{astar, dijkstra};
 use petgraph::graph::{EdgeIndex, NodeIndex, UnGraph};
 use petgraph::visit::EdgeRef;
 
-use super::paths::distance;
-
 /// Share of a length below which two are equal: what rounding leaves of ways that are equally long.
 const EQUAL: f64 = 1e-9;
 
 /// Places (m) and the lengths (m) of what joins them.
 pub(super) type Ways = UnGraph<[f64; 2], f64>;
+
+/// Distance of two places, m.
+pub(super) fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (b[0] - a[0]).hypot(b[1] - a[1])
+}
 
 /// What is known of the node farthest from one.
 #[derive(Clone, Copy)]

@@ -19,8 +19,8 @@ use dem_run::history::{Bonds, Rupture};
 use petgraph::graph::NodeIndex;
 use serde::Serialize;
 
-use super::Modes;
-use super::longest::{Ways, longest};
+use super::longest::{Ways, distance, longest};
+use super::modes::Modes;
 use super::parts::{Part, groups};
 use super::voids::Voids;
 
@@ -144,10 +144,6 @@ fn segments(position: &[[f64; 2]], radius: &[f64], bonds: &Bonds, ruptures: &[Ru
         });
     }
     segments
-}
-
-pub(super) fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
-    (b[0] - a[0]).hypot(b[1] - a[1])
 }
 
 /// The segments from one end of a crack to the other, each with whether it is passed from its first node to its second.

@@ -4,12 +4,12 @@ use dem_run::history::{BondStatus, History};
 
 use super::front::Growth;
 use super::paths::Crack;
+use super::report::{Pieces, Report};
 use super::surfaces::Facet;
-use super::{Pieces, Report};
 use crate::fragments::{Fragment, Fragments};
 use crate::map::{Colour, Key, Link, Panel, Patch, Ramp, Sample, Scale, draw, draw_view};
 use crate::output::{Result, number};
-use crate::plot::{Chart, Drawing, Style, colour};
+use dem_run::plot::{Chart, Drawing, Style, colour};
 
 /// Fill of grains that kept all their bonds.
 const BONDED: &str = "#8c8c8c";

@@ -22,7 +22,7 @@ use dem_run::history::{Bonds, Rupture};
 use nalgebra::Vector3;
 use serde::Serialize;
 
-use super::Modes;
+use super::modes::Modes;
 use super::parts::{Part, groups};
 use crate::chains::stress::major;
 

@@ -2,8 +2,8 @@
 
 use nalgebra::Vector3;
 
+use super::boxes::{Box2, EMPTY, around, union};
 use super::scale::{Colour, mixed};
-use super::{Box2, EMPTY, around, union};
 
 /// How the sample is seen.
 pub(super) enum Eye {

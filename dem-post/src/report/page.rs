@@ -7,7 +7,7 @@ use dem_run::history::History;
 
 use super::{Report, sections};
 use crate::output::{PostError, Result};
-use crate::plot::{Chart, Drawing};
+use dem_run::plot::{Chart, Drawing};
 
 /// Width and height of a chart: small, so that its text is still read on a narrow screen.
 const CHART: (f64, f64) = (500.0, 400.0);

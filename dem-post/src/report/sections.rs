@@ -5,14 +5,14 @@ use dem_run::history::{History, Series};
 use super::Report;
 use super::page::{Figure, Section, Table, chart, map};
 use crate::chains::pictures::{chain_map, distribution_chart, length_charts, network_map};
-use crate::chains::{CHAIN_HEAD, Report as Chains};
+use crate::chains::report::{CHAIN_HEAD, Report as Chains};
 use crate::cracks::pictures::{broken_chart, crack_map, decohesion, fragment_charts, front_charts, surface_maps};
-use crate::cracks::{Report as Cracks, broken_over_time};
+use crate::cracks::report::{Report as Cracks, broken_over_time};
 use crate::map::Sample;
 use crate::output::{Result, number, quantity};
-use crate::plot::{Chart, Style, colour};
 use crate::stress_strain::{Report as StressStrain, force_displacement, onset, stress_strain};
 use crate::velocities::{self, Report as Velocities};
+use dem_run::plot::{Chart, Style, colour};
 
 /// Heads of the sections that a scene may have nothing for.
 const LOAD: &str = "Load and displacement";

@@ -1,9 +1,9 @@
 //! What `dem-post strength` writes.
 
-use super::{Report, Run, axis};
+use super::report::{Report, Run, axis};
 use crate::output::{Folder, Result, cell};
-use crate::plot::{Bars, Chart, Style, colour};
-use crate::row;
+use dem_run::plot::{Bars, Chart, Style, colour};
+use dem_run::row;
 
 /// Values that span at least this ratio are shown on a logarithmic axis.
 const DECADE: f64 = 10.0;

@@ -10,7 +10,6 @@ use dem_run::sweep::store::{State, Store};
 use serde::Serialize;
 use serde_json::Value;
 
-use super::LeftOut;
 use crate::collapse::{Bonding, Collapse, peak};
 use crate::output::{PostError, Result, quantity};
 use crate::stress_strain;
@@ -53,6 +52,15 @@ pub struct Found {
     pub strength: std::result::Result<Strength, String>,
     /// Radii of its grains and its bonds: equal in two runs of the same grains.
     pub grains: (Vec<f64>, Vec<[i32; 2]>),
+}
+
+/// A run without a strength.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct LeftOut {
+    /// Its file.
+    pub run: String,
+    /// Why it has none.
+    pub why: String,
 }
 
 /// Where a run gave way.

@@ -3,8 +3,8 @@
 use hdf5::types::VarLenUnicode;
 use hdf5::{Group, Location};
 
-use super::Outline;
 use super::companion::{Companion, Piece, first};
+use super::outline::Outline;
 use super::vtk::{POSITION, RADIUS, VELOCITY};
 
 const STEP: &str = "particles/grains/position/step";

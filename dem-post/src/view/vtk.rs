@@ -8,8 +8,8 @@ use hdf5::{Group, H5Type, Hyperslab, SliceOrIndex};
 use indicatif::ProgressBar;
 use ndarray::ArrayView3;
 
-use super::Outline;
 use super::companion::{Companion, Fault, Piece, Rows, append, blocks, first, label, span, wrong_shape};
+use super::outline::Outline;
 
 pub(super) const POSITION: &str = "particles/grains/position/value";
 pub(super) const VELOCITY: &str = "particles/grains/velocity/value";
