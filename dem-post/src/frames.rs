@@ -4,13 +4,15 @@
 //! stands for a value, the same meaning of it. They are read, drawn and written one by one, so a long series needs no
 //! more memory than a short one.
 
-use clap::ValueEnum;
+use clap::{Args, ValueEnum};
 use dem_run::history::{BondStatus, History, RuptureMode};
 use serde::Serialize;
 
+use crate::analysis::Analysis;
 use crate::chains::pictures::{force_legend, links};
 use crate::chains::report::{normal_forces, require_reactions, statistics};
 use crate::map::{Colour, Key, Link, Panel, Ramp, Sample, Scale, View, draw_view};
+use crate::options::Files;
 use crate::output::{Folder, PostError, Result, facts, number, progress, quantity, short};
 use crate::velocities::{speeds, usual_speed};
 use crate::{cracks, moments};
@@ -25,6 +27,48 @@ const RELEASED: &str = "#ffffff";
 /// Width of the lines of bonds and of cracks.
 const BOND: f64 = 1.6;
 const CRACK: f64 = 2.8;
+
+/// A series of numbered pictures, for a viewer or a film.
+#[derive(Debug, Args)]
+pub struct Command {
+    #[command(flatten)]
+    files: Files,
+    /// What to draw.
+    #[arg(long, value_enum, default_value_t)]
+    draw: Subject,
+    /// Take every N-th frame, and the last.
+    #[arg(long, value_name = "N", default_value_t = 1, conflicts_with = "times")]
+    every: usize,
+    /// Take the frames nearest to these times, s.
+    #[arg(long, value_name = "T,…", value_delimiter = ',')]
+    times: Vec<f64>,
+}
+
+impl Analysis for Command {
+    const NAME: &'static str = "frames";
+    type Input = History;
+    type Report = Report;
+
+    fn open(&self) -> Result<History> {
+        self.files.open()
+    }
+
+    fn read(&self, history: &History, _: bool) -> Result<Report> {
+        read(history, self.draw, self.every, &self.times)
+    }
+
+    fn table(report: &Report) -> String {
+        report.table()
+    }
+
+    fn folder(&self, history: &History) -> Result<Option<Folder>> {
+        self.files.folder(history, Self::NAME)
+    }
+
+    fn write(&self, history: &History, report: &mut Report, folder: &mut Folder, quiet: bool) -> Result<()> {
+        write(history, report, folder, quiet)
+    }
+}
 
 /// What the pictures show.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, ValueEnum)]

@@ -1,11 +1,49 @@
 //! Copies of a history that take its place: compressed, to be kept, or plain, of a file whose run was killed.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use dem_run::history::{self, CopyAs, History};
+use clap::Args;
+use dem_run::history::{self, CopyAs, History, HistoryError};
 use serde::Serialize;
 
+use crate::analysis::Analysis;
 use crate::output::{Result, facts, progress};
+
+/// Compress a history: a copy with checksums takes its place once it is found to be the same to the bit.
+#[derive(Debug, Args)]
+pub struct Command {
+    /// The history.
+    #[arg(value_name = "FILE.h5")]
+    history: PathBuf,
+    /// Write the copy there, and leave the history as it is.
+    #[arg(short, long, value_name = "PACKED.h5")]
+    output: Option<PathBuf>,
+    /// Replace a file that stands at PACKED.h5.
+    #[arg(long)]
+    force: bool,
+}
+
+impl Analysis for Command {
+    const NAME: &'static str = "pack";
+    type Input = History;
+    type Report = Report;
+
+    fn open(&self) -> Result<History> {
+        if let Some(path) = self.output.as_ref().filter(|path| path.exists() && !self.force) {
+            return Err(HistoryError::Exists { path: path.clone() }.into());
+        }
+        Ok(History::open(&self.history)?)
+    }
+
+    /// Makes the copy; there is nothing else to write.
+    fn read(&self, history: &History, quiet: bool) -> Result<Report> {
+        write(history, self.output.as_ref().unwrap_or(&self.history), CopyAs::Packed, quiet)
+    }
+
+    fn table(report: &Report) -> String {
+        report.table()
+    }
+}
 
 /// What came of it.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -25,6 +25,7 @@
 
 use std::path::Path;
 
+use clap::Args;
 use dem_run::collapse::Disk;
 use dem_run::history::{History, Series, Wall, WallDrive, WallKind};
 use dem_run::scene::{Scene, choose_load_wall};
@@ -32,9 +33,12 @@ use dem_run::summary::Splitting;
 use serde::Serialize;
 use serde_json::Value;
 
+use crate::analysis::Analysis;
 use crate::chains::stress::thickness;
 use crate::collapse::{Bonding, Collapse, peak, work};
+use crate::options::Files;
 use crate::output::{Folder, PostError, Result, cell, facts, quantity, short};
+use crate::section::{OnPage, Section, chart_figure};
 use dem_run::plot::{Chart, Style, colour};
 
 /// Strains that define the collapse.
@@ -43,6 +47,42 @@ const COLLAPSE: [f64; 2] = [1e-4, 1e-3];
 const BROKEN: f64 = 0.05;
 /// Least strain that the logarithmic axis shows.
 const LEAST_STRAIN: f64 = 1e-9;
+
+/// Force–displacement, stress–strain, the collapse load.
+#[derive(Debug, Args)]
+pub struct Command {
+    #[command(flatten)]
+    files: Files,
+    /// The load wall [default: that of the scene, else the only driven one].
+    #[arg(long, value_name = "NAME")]
+    wall: Option<String>,
+}
+
+impl Analysis for Command {
+    const NAME: &'static str = "stress-strain";
+    type Input = History;
+    type Report = Report;
+
+    fn open(&self) -> Result<History> {
+        self.files.open()
+    }
+
+    fn read(&self, history: &History, _: bool) -> Result<Report> {
+        read(history, self.wall.as_deref())
+    }
+
+    fn table(report: &Report) -> String {
+        report.table()
+    }
+
+    fn folder(&self, history: &History) -> Result<Option<Folder>> {
+        self.files.folder(history, Self::NAME)
+    }
+
+    fn write(&self, _: &History, report: &mut Report, folder: &mut Folder, _: bool) -> Result<()> {
+        write(report, folder)
+    }
+}
 
 /// The numbers that the analysis ends with. `None`: it did not happen, or was not recorded.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -95,24 +135,33 @@ pub struct Summary {
     pub worst_residual: Option<f64>,
 }
 
-/// The curves, one entry per observed step, and what follows from them.
-#[derive(Clone, Debug, Default)]
+/// The curves, one entry per observed step, and what follows from them; JSON has the summary.
+#[derive(Clone, Debug, Default, Serialize)]
+#[serde(transparent)]
 pub struct Report {
     /// Steps.
+    #[serde(skip)]
     pub step: Vec<i64>,
     /// Times, s.
+    #[serde(skip)]
     pub time: Vec<f64>,
     /// Displacement of the wall, m.
+    #[serde(skip)]
     pub displacement: Vec<f64>,
     /// Load, N.
+    #[serde(skip)]
     pub load: Vec<f64>,
     /// Reaction of the grains on the wall, N; empty if not recorded.
+    #[serde(skip)]
     pub reaction: Vec<f64>,
     /// Axial strain fitted to the grains; empty if not recorded.
+    #[serde(skip)]
     pub strain: Vec<f64>,
     /// Axial stress of the contacts after Love and Weber, Pa; empty if not recorded.
+    #[serde(skip)]
     pub stress: Vec<f64>,
     /// Bonds broken; empty if not recorded.
+    #[serde(skip)]
     pub broken: Vec<f64>,
     /// What follows.
     pub summary: Summary,
@@ -521,4 +570,53 @@ pub fn stress_strain(report: &Report) -> Chart {
         chart.levels.push((load * wall_stress, format!("at strain 10⁻⁴: {} kPa", short(load * wall_stress))));
     }
     chart
+}
+
+impl OnPage for Report {
+    const ID: &'static str = "load";
+    const TITLE: &'static str = "Load and displacement";
+
+    fn section(&self, _: &History, _: &[usize]) -> Result<Section> {
+        let mut figures = vec![
+            chart_figure(
+                force_displacement(self),
+                "Applied force and reaction of the grains over the displacement of the driven wall.",
+                "Force over displacement of the driven wall.",
+            ),
+            chart_figure(
+                stress_strain(self),
+                "Axial stress over axial strain, from the walls and from the particles.",
+                "Axial stress over strain.",
+            ),
+        ];
+        figures.extend(onset(self).map(|onset| {
+            let alt =
+                "Applied force over the logarithm of the axial strain, with the strains that define the collapse.";
+            chart_figure(onset, alt, "The onset of collapse: force over the logarithm of the strain.")
+        }));
+        let s = &self.summary;
+        let mut facts = vec![
+            ("Driven wall", s.wall.clone()),
+            ("Sample", s.sample()),
+            ("First break", quantity(s.first_break, "N")),
+            ("Collapse load (strain 1e-4)", s.collapse(0)),
+            ("Collapse load (strain 1e-3)", s.collapse(1)),
+            ("Load with 5 % of the bonds broken", quantity(s.load_at_5_percent_broken, "N")),
+            ("Collapse load over cohesion", quantity(s.collapse_over_cohesion, "")),
+            ("Peak load", s.peak()),
+            ("Greatest load", quantity(Some(s.greatest_load), "N")),
+            ("Work of the wall", quantity(Some(s.work), "J")),
+        ];
+        facts.extend(s.splitting.as_ref().map(|splitting| ("Splitting strength", splitting.to_string())));
+        Ok(Section {
+            text:
+                "Of rigid grains that bonds join to one piece a strain before the first bond breaks is solver error: believe a \
+                   collapse load only where it lies above the load of the first break. A wall that moves at a prescribed \
+                   velocity loads the sample with the force that acted before any bond broke in the step."
+                    .into(),
+            facts: facts.into_iter().map(|(name, value)| (name.into(), value)).collect(),
+            figures,
+            ..Section::of::<Self>()
+        })
+    }
 }

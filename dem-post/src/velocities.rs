@@ -7,12 +7,16 @@
 //! centres; the longest of a panel is as long as a square is wide. So both compare grains of one panel; the captions
 //! compare panels.
 
+use clap::Args;
 use dem_run::history::{GrainState, History};
 use serde::Serialize;
 
+use crate::analysis::Analysis;
 use crate::map::{Arrow, Key, Panel, Ramp, Sample, Scale, draw};
 use crate::moments;
+use crate::options::Moments;
 use crate::output::{Folder, Result, Text, number, short};
+use crate::section::{OnPage, Section, map_figure};
 use dem_run::plot::{Drawing, colour};
 use dem_run::row;
 
@@ -20,6 +24,39 @@ use dem_run::row;
 const SQUARES: f64 = 18.0;
 /// Share of the speeds that the scale of colours covers, so that one grain thrown off does not make all others equal.
 const COVERED: f64 = 0.99;
+
+/// Maps and table of the velocities.
+#[derive(Debug, Args)]
+pub struct Command {
+    #[command(flatten)]
+    moments: Moments,
+}
+
+impl Analysis for Command {
+    const NAME: &'static str = "velocities";
+    type Input = History;
+    type Report = Report;
+
+    fn open(&self) -> Result<History> {
+        self.moments.files.open()
+    }
+
+    fn read(&self, history: &History, _: bool) -> Result<Report> {
+        read(history, &self.moments.times)
+    }
+
+    fn table(report: &Report) -> String {
+        report.table()
+    }
+
+    fn folder(&self, history: &History) -> Result<Option<Folder>> {
+        self.moments.files.folder(history, Self::NAME)
+    }
+
+    fn write(&self, history: &History, report: &mut Report, folder: &mut Folder, _: bool) -> Result<()> {
+        write(history, report, folder)
+    }
+}
 
 /// The motion of the grains at one moment.
 #[derive(Clone, Debug, Serialize)]
@@ -189,6 +226,22 @@ pub fn map(history: &History, report: &Report) -> Result<Drawing> {
         legend.push(Key::Arrow("mean velocity of a square".into()));
     }
     Ok(draw(&Sample::with_depth(history)?, &panels, &legend))
+}
+
+impl OnPage for Report {
+    const ID: &'static str = "velocities";
+    const TITLE: &'static str = "Velocities";
+
+    fn section(&self, history: &History, _: &[usize]) -> Result<Section> {
+        let mut figures = vec![];
+        for field in &self.fields {
+            let one = Self { fields: vec![field.clone()] };
+            let time = number(field.time);
+            let alt = format!("Grains coloured by their speed at t = {time} s, with arrows of the mean velocity.");
+            figures.push(map_figure(&map(history, &one)?, &alt, &format!("Velocities at t = {time} s."))?);
+        }
+        Ok(Section { figures, ..Section::of::<Self>() })
+    }
 }
 
 /// The mean velocities of the squares of a grid over disks as arrows, the longest as long as a square is wide.

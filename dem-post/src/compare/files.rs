@@ -2,7 +2,7 @@
 
 use dem_run::history::History;
 
-use super::{Break, Fate, Report};
+use super::report::{Break, Fate, Gap, Report};
 use crate::map::{Key, Link, Panel, Sample, draw};
 use crate::output::{Folder, Result, cell};
 use dem_run::plot::{Chart, Drawing, Style, colour};
@@ -50,7 +50,7 @@ pub fn write(a: &History, report: &Report, folder: &mut Folder) -> Result<()> {
 fn distance_chart(report: &Report) -> Chart {
     let mut chart = Chart::new("time (s)", "distance of the grains' places (radii)");
     chart.log_y = report.gaps.iter().any(|gap| gap.greatest > 0.0);
-    let points = |value: fn(&super::Gap) -> f64| report.gaps.iter().map(|gap| (gap.time, value(gap))).collect();
+    let points = |value: fn(&Gap) -> f64| report.gaps.iter().map(|gap| (gap.time, value(gap))).collect();
     chart.curve("greatest", colour::BLUE, Style::Line, points(|gap| gap.greatest)).curve(
         "rms",
         colour::ORANGE,

@@ -4,6 +4,12 @@
 //! What a crack, its path and its front are: [`paths`] and [`front`] in the plane; in space a crack is a surface,
 //! [`surfaces`].
 
+use clap::Args;
+use dem_run::history::History;
+
+use crate::analysis::Analysis;
+use crate::options::Moments;
+use crate::output::{Folder, Result};
 pub use files::write;
 pub use modes::Modes;
 pub use report::{Report, read};
@@ -16,5 +22,39 @@ pub mod parts;
 pub mod paths;
 pub mod pictures;
 pub mod report;
+mod section;
 pub mod surfaces;
 pub mod voids;
+
+/// Ruptures, broken bonds over time, cracks as lines and their fronts, fragments.
+#[derive(Debug, Args)]
+pub struct Command {
+    #[command(flatten)]
+    moments: Moments,
+}
+
+impl Analysis for Command {
+    const NAME: &'static str = "cracks";
+    type Input = History;
+    type Report = Report;
+
+    fn open(&self) -> Result<History> {
+        self.moments.files.open()
+    }
+
+    fn read(&self, history: &History, quiet: bool) -> Result<Report> {
+        read(history, quiet)
+    }
+
+    fn table(report: &Report) -> String {
+        report.table()
+    }
+
+    fn folder(&self, history: &History) -> Result<Option<Folder>> {
+        self.moments.files.folder(history, Self::NAME)
+    }
+
+    fn write(&self, history: &History, report: &mut Report, folder: &mut Folder, _: bool) -> Result<()> {
+        write(history, report, &self.moments.times, folder)
+    }
+}

@@ -5,10 +5,14 @@
 //! inside the page as `data:` addresses. Long curves are thinned as all charts are. A section that
 //! a scene has nothing for says why.
 
+use clap::Args;
 use dem_run::history::History;
 use serde::Serialize;
 
+use crate::analysis::Analysis;
+use crate::options::Moments;
 use crate::output::{Folder, PostError, Result, facts, number};
+use crate::section::{OnPage, Section};
 use crate::{chains, cracks, info, stress_strain, velocities};
 
 mod page;
@@ -16,6 +20,42 @@ mod sections;
 pub mod solver;
 
 use solver::Accuracy;
+
+/// The run on one HTML page that needs nothing else: pictures, curves, tables, accuracy, energy, scene.
+#[derive(Debug, Args)]
+pub struct Command {
+    #[command(flatten)]
+    moments: Moments,
+    /// The load wall [default: that of the scene, else the only driven one].
+    #[arg(long, value_name = "NAME")]
+    wall: Option<String>,
+}
+
+impl Analysis for Command {
+    const NAME: &'static str = "report";
+    type Input = History;
+    type Report = Report;
+
+    fn open(&self) -> Result<History> {
+        self.moments.files.open()
+    }
+
+    fn read(&self, history: &History, quiet: bool) -> Result<Report> {
+        read(history, &self.moments.times, self.wall.as_deref(), quiet)
+    }
+
+    fn table(report: &Report) -> String {
+        report.table()
+    }
+
+    fn folder(&self, history: &History) -> Result<Option<Folder>> {
+        self.moments.files.folder(history, Self::NAME)
+    }
+
+    fn write(&self, history: &History, report: &mut Report, folder: &mut Folder, _: bool) -> Result<()> {
+        write(history, report, folder)
+    }
+}
 
 /// What the page tells.
 #[derive(Clone, Debug, Serialize)]
@@ -62,19 +102,19 @@ pub fn read(history: &History, times: &[f64], wall: Option<&str>, quiet: bool) -
         info: info::read(history)?,
         accuracy: solver::read(history)?,
         // the first to say that a wall is wrong: cracks take their time
-        stress_strain: if_there("load", stress_strain::read(history, wall), &mut left_out)?,
-        cracks: if_there("cracks", cracks::read(history, quiet), &mut left_out)?,
-        chains: if_there("chains", chains::read(history, times), &mut left_out)?,
+        stress_strain: if_there(stress_strain::read(history, wall), &mut left_out)?,
+        cracks: if_there(cracks::read(history, quiet), &mut left_out)?,
+        chains: if_there(chains::read(history, times), &mut left_out)?,
         left_out,
     })
 }
 
 /// What a scene lacks, it has no section of: the reason stands in its place.
-fn if_there<T>(section: &'static str, found: Result<T>, left_out: &mut Vec<LeftOut>) -> Result<Option<T>> {
+fn if_there<R: OnPage>(found: Result<R>, left_out: &mut Vec<LeftOut>) -> Result<Option<R>> {
     match found {
         Ok(found) => Ok(Some(found)),
         Err(PostError::Lacking { what, .. }) => {
-            left_out.push(LeftOut { section, why: what });
+            left_out.push(LeftOut { section: R::ID, why: what });
             Ok(None)
         }
         Err(error) => Err(error),
@@ -82,6 +122,30 @@ fn if_there<T>(section: &'static str, found: Result<T>, left_out: &mut Vec<LeftO
 }
 
 impl Report {
+    /// The sections of the page, in order; one that the history has nothing for says why.
+    fn sections(&self, history: &History) -> Result<Vec<Section>> {
+        let frames: Vec<usize> = self.velocities.fields.iter().map(|field| field.frame).collect();
+        Ok(vec![
+            self.info.section(history, &frames)?,
+            self.accuracy.section(history, &frames)?,
+            self.section_of(self.stress_strain.as_ref(), history, &frames)?,
+            self.section_of(self.cracks.as_ref(), history, &frames)?,
+            self.section_of(self.chains.as_ref(), history, &frames)?,
+            self.velocities.section(history, &frames)?,
+            sections::energy(history)?,
+        ])
+    }
+
+    /// The section of what was found, or of why nothing was.
+    fn section_of<R: OnPage>(&self, found: Option<&R>, history: &History, frames: &[usize]) -> Result<Section> {
+        if let Some(found) = found {
+            return found.section(history, frames);
+        }
+        let why = self.left_out.iter().find(|out| out.section == R::ID);
+        let text = why.map_or_else(String::new, |out| format!("None: {}.", out.why));
+        Ok(Section { text, ..Section::of::<R>() })
+    }
+
     /// What stands on the page, in a few lines.
     pub fn table(&self) -> String {
         let a = &self.accuracy;
@@ -113,6 +177,6 @@ impl Report {
 /// # Errors
 /// [`PostError::Write`], and those of reading the history.
 pub fn write(history: &History, report: &Report, folder: &mut Folder) -> Result<()> {
-    let page = page::render(history, report)?;
+    let page = page::render(history, report.sections(history)?)?;
     Ok(folder.write("report.html", page.as_bytes())?)
 }

@@ -14,6 +14,12 @@
 //! standard errors take every run as independent, each sample has a line of its own, and the intervals over the samples are
 //! those of the mean of their slopes and intercepts.
 
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::analysis::Analysis;
+use crate::output::{Folder, Result, Source, default_folder};
 pub use files::write;
 pub use report::{Options, Report, read};
 pub use runs::Measure;
@@ -23,3 +29,62 @@ pub mod fit;
 pub mod report;
 pub mod runs;
 pub mod scenes;
+
+/// Strength against a field of the scene over many runs, as against cohesion: a line, its errors, the scatter of samples.
+///
+/// The exit code is 1 where runs were left out because they did not give way, or are not done.
+#[derive(Debug, Args)]
+pub struct Command {
+    /// Histories, or the folder of a sweep.
+    #[arg(value_name = "RUNS", required = true)]
+    runs: Vec<PathBuf>,
+    /// The varied field, as --set names it [default: the one that differs].
+    #[arg(long, value_name = "FIELD")]
+    against: Option<String>,
+    /// What counts as the strength: the load at …
+    #[arg(long, value_enum, default_value_t)]
+    measure: Measure,
+    /// The load wall [default: that of the scene, else the only driven one].
+    #[arg(long, value_name = "NAME")]
+    wall: Option<String>,
+    /// Folder for the results, created if need be [default: RUNS-strength].
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Take the folder over from the history that it belongs to: its results are removed.
+    #[arg(long)]
+    force: bool,
+}
+
+impl Analysis for Command {
+    const NAME: &'static str = "strength";
+    /// Runs are opened one by one as they are read.
+    type Input = ();
+    type Report = Report;
+
+    fn open(&self) -> Result<()> {
+        Ok(())
+    }
+
+    fn read(&self, (): &(), _: bool) -> Result<Report> {
+        let options = Options { against: self.against.clone(), measure: self.measure, wall: self.wall.clone() };
+        read(&self.runs, &options)
+    }
+
+    fn table(report: &Report) -> String {
+        report.table()
+    }
+
+    fn folder(&self, (): &()) -> Result<Option<Folder>> {
+        let path = self.output.clone().unwrap_or_else(|| default_folder(&self.runs[0], "-strength"));
+        let sources = self.runs.iter().map(|run| Source::new(run, None)).collect();
+        Ok(Some(Folder::of(path, Self::NAME, sources, self.force)?))
+    }
+
+    fn write(&self, (): &(), report: &mut Report, folder: &mut Folder, _: bool) -> Result<()> {
+        write(report, folder)
+    }
+
+    fn verdict(report: &Report) -> Result<()> {
+        report.complete()
+    }
+}

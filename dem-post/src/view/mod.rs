@@ -4,6 +4,12 @@
 //! links and virtual datasets that lead to the history by a path relative to themselves; almost nothing is copied
 //! (`docs/history.md` tells what, and how large it is).
 
+use clap::Args;
+use dem_run::history::History;
+
+use crate::analysis::Analysis;
+use crate::options::Files;
+use crate::output::{Folder, Result};
 pub use files::write;
 pub use report::{Report, read};
 
@@ -13,3 +19,40 @@ mod h5md;
 mod outline;
 pub mod report;
 mod vtk;
+
+/// Small files that show the history in ParaView, VTK and MDAnalysis, and copy almost nothing of it.
+///
+/// Grains, contacts and bonds over time as grains.vtkhdf, contacts.vtkhdf and bonds.vtkhdf (ParaView 5.13, VTK or
+/// pyvista), positions as grains.h5md (MDAnalysis). They lead to the history by a path relative to themselves:
+/// move them together. docs/history.md shows how to use them.
+#[derive(Debug, Args)]
+pub struct Command {
+    #[command(flatten)]
+    files: Files,
+}
+
+impl Analysis for Command {
+    const NAME: &'static str = "view";
+    type Input = History;
+    type Report = Report;
+
+    fn open(&self) -> Result<History> {
+        self.files.open()
+    }
+
+    fn read(&self, history: &History, quiet: bool) -> Result<Report> {
+        read(history, quiet)
+    }
+
+    fn table(report: &Report) -> String {
+        report.table()
+    }
+
+    fn folder(&self, history: &History) -> Result<Option<Folder>> {
+        self.files.folder(history, Self::NAME)
+    }
+
+    fn write(&self, history: &History, report: &mut Report, folder: &mut Folder, quiet: bool) -> Result<()> {
+        write(history, report, folder, quiet)
+    }
+}
