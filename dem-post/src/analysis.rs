@@ -12,7 +12,8 @@ use crate::output::{Folder, PostError, Result, escaped, print};
 /// Files beyond which not all are named.
 const MANY: usize = 24;
 
-/// An analysis as a command of `dem-post`. The type holds its options, and its doc comment is what `--help` says of it.
+/// An analysis as a command of `dem-post`. The type holds its options, and its doc comment is what
+/// `--help` says of it.
 pub trait Analysis: Args {
     /// Name of the command.
     const NAME: &'static str;

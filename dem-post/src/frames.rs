@@ -1,8 +1,8 @@
 //! A series of pictures, one a frame, numbered for viewers and video encoders.
 //!
-//! All pictures have one scale, one part of the plane, the same even number of pixels and, where a colour or a width
-//! stands for a value, the same meaning of it. They are read, drawn and written one by one, so a long series needs no
-//! more memory than a short one.
+//! All pictures have one scale, one part of the plane, the same even number of pixels and, where a
+//! colour or a width stands for a value, the same meaning of it. They are read, drawn and written
+//! one by one, so a long series needs no more memory than a short one.
 
 use clap::{Args, ValueEnum};
 use dem_run::history::{BondStatus, History, RuptureMode};
@@ -92,15 +92,17 @@ pub struct Report {
     pub frames: Vec<usize>,
     /// Time of the first and of the last, s.
     pub span: [f64; 2],
-    /// What the scale is made for: mean force (N) or usual speed (m/s) of the frame where it is greatest.
+    /// What the scale is made for: mean force (N) or usual speed (m/s) of the frame where it is
+    /// greatest.
     pub scale: Option<f64>,
 }
 
 /// Chooses the frames: those nearest to `times` (s), or every `every`-th and the last.
 ///
 /// # Errors
-/// [`PostError::Usage`] for times outside the history or `every` of zero; [`PostError::Lacking`] for a history without
-/// frames, without bonds where bonds are to be drawn, or without any force or motion where these are.
+/// [`PostError::Usage`] for times outside the history or `every` of zero; [`PostError::Lacking`]
+/// for a history without frames, without bonds where bonds are to be drawn, or without any force or
+/// motion where these are.
 pub fn read(history: &History, subject: Subject, every: usize, times: &[f64]) -> Result<Report> {
     let lacking = |what: &str| PostError::Lacking { path: history.path().into(), what: what.into() };
     if every == 0 {

@@ -12,18 +12,21 @@ use crate::output::{Result, facts, in_shell, number, quantity};
 use crate::section::{OnPage, Section};
 use crate::{check, pack, stress_strain};
 
-/// What a history holds, in about twenty lines; with --check, whether it is sound; with --repair, after a kill.
+/// What a history holds, in about twenty lines; with --check, whether it is sound; with --repair,
+/// after a kill.
 #[derive(Debug, Args)]
 pub struct Command {
     /// The history.
     #[arg(value_name = "FILE.h5")]
     history: PathBuf,
-    /// Read everything and name each place that breaks the promises of the layout: types, shapes, units, order,
-    /// numbers that are not finite, bonds and their ruptures. The exit code is 4 where there is one.
+    /// Read everything and name each place that breaks the promises of the layout: types, shapes,
+    /// units, order, numbers that are not finite, bonds and their ruptures. The exit code is 4
+    /// where there is one.
     #[arg(long)]
     check: bool,
-    /// Make a file that any program opens of one whose run was killed: its complete frames are copied, and the copy
-    /// takes its place. `dem-run resume` does the same and goes on with the run.
+    /// Make a file that any program opens of one whose run was killed: its complete frames are
+    /// copied, and the copy takes its place. `dem-run resume` does the same and goes on with the
+    /// run.
     #[arg(long, conflicts_with = "check")]
     repair: bool,
 }

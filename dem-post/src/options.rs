@@ -13,7 +13,8 @@ pub struct Files {
     /// The history.
     #[arg(value_name = "FILE.h5")]
     pub history: PathBuf,
-    /// Folder for the results, created if need be [default: FILE-post, of `frames` FILE-frames, in the current folder].
+    /// Folder for the results, created if need be [default: FILE-post, of `frames` FILE-frames, in
+    /// the current folder].
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
     /// Take the folder over from the history that it belongs to: its results are removed.
@@ -41,10 +42,12 @@ impl Files {
         Ok(History::open(&self.history)?)
     }
 
-    /// The folder for the results of the command `command`: the one that was asked for, or the history's own.
+    /// The folder for the results of the command `command`: the one that was asked for, or the
+    /// history's own.
     ///
     /// # Errors
-    /// [`crate::output::PostError::Write`] for a folder that cannot be created, or that belongs to another history.
+    /// [`crate::output::PostError::Write`] for a folder that cannot be created, or that belongs to
+    /// another history.
     pub fn folder(&self, history: &History, command: &str) -> Result<Option<Folder>> {
         let suffix = if command == "frames" { "-frames" } else { "-post" };
         let path = self.output.clone().unwrap_or_else(|| default_folder(&self.history, suffix));

@@ -1,4 +1,5 @@
-//! What an analysis can fail of, with its exit code; tables, files and numbers are those of [`dem_run::output`].
+//! What an analysis can fail of, with its exit code; tables, files and numbers are those of
+//! [`dem_run::output`].
 
 use std::path::PathBuf;
 
@@ -42,8 +43,8 @@ pub enum PostError {
 }
 
 impl PostError {
-    /// The exit code that stands for this error: 1 for results that lack something, 2 for wrong usage or scene, 4 for
-    /// input and output.
+    /// The exit code that stands for this error: 1 for results that lack something, 2 for wrong
+    /// usage or scene, 4 for input and output.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Incomplete(_) => 1,
@@ -65,8 +66,8 @@ pub(crate) fn progress(length: u64, quiet: bool, template: &str) -> ProgressBar 
     bar
 }
 
-/// A history as what results are made of: its place, and its run by what does not change while it goes on or when it is
-/// packed.
+/// A history as what results are made of: its place, and its run by what does not change while it
+/// goes on or when it is packed.
 ///
 /// # Errors
 /// Those of reading it.

@@ -1,4 +1,5 @@
-//! Copies of a history that take its place: compressed, to be kept, or plain, of a file whose run was killed.
+//! Copies of a history that take its place: compressed, to be kept, or plain, of a file whose run
+//! was killed.
 
 use std::path::{Path, PathBuf};
 
@@ -9,7 +10,8 @@ use serde::Serialize;
 use crate::analysis::Analysis;
 use crate::output::{Result, facts, progress};
 
-/// Compress a history: a copy with checksums takes its place once it is found to be the same to the bit.
+/// Compress a history: a copy with checksums takes its place once it is found to be the same to the
+/// bit.
 #[derive(Debug, Args)]
 pub struct Command {
     /// The history.

@@ -49,7 +49,8 @@ impl Section {
         Self { id: R::ID, title: R::TITLE, ..Self::default() }
     }
 
-    /// The maps and then the charts, each with the name of their kind; kinds without a picture are left out.
+    /// The maps and then the charts, each with the name of their kind; kinds without a picture are
+    /// left out.
     pub(crate) fn groups(&self) -> Vec<(&'static str, Vec<&Figure>)> {
         let (charts, maps): (Vec<_>, Vec<_>) = self.figures.iter().partition(|figure| figure.class == "chart");
         [("maps", maps), ("charts", charts)].into_iter().filter(|(_, figures)| !figures.is_empty()).collect()

@@ -4,9 +4,10 @@
 //! **The load wall** is the one that is asked for, else the scene's `load_wall`, else the wall of
 //! its `stop.wall_travel`, else the only driven one.
 //!
-//! **Signs.** Everything counts positive along the load: the displacement of the wall in the sense in which its force
-//! does work, compressive stress and shortening under a wall that pushes, tensile stress and elongation under one that
-//! pulls. The history has stress positive in compression and strain positive in elongation.
+//! **Signs.** Everything counts positive along the load: the displacement of the wall in the sense
+//! in which its force does work, compressive stress and shortening under a wall that pushes,
+//! tensile stress and elongation under one that pulls. The history has stress positive in
+//! compression and strain positive in elongation.
 //!
 //! **Size of the sample.** Height H along the drive and cross-section A across it are those of the
 //! box around all grains at the first frame; in 2D, A is the width times the scene's `thickness`.
@@ -534,7 +535,8 @@ pub fn force_displacement(report: &Report) -> Chart {
     chart
 }
 
-/// The load over the logarithm of the fitted strain, which shows how little the sample gives way before it collapses.
+/// The load over the logarithm of the fitted strain, which shows how little the sample gives way
+/// before it collapses.
 pub fn onset(report: &Report) -> Option<Chart> {
     let visible = |&(strain, _): &(f64, f64)| strain >= LEAST_STRAIN;
     let points: Vec<(f64, f64)> =

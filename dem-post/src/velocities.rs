@@ -1,11 +1,11 @@
 //! Velocity field: how fast and which way the grains move, at some moments.
 //!
-//! The map fills each grain with the colour of its speed, over the speed v that all but one in a hundred grains of the
-//! panel stay below: speeds grow by orders of magnitude in a collapse, and one scale would leave all but one panel dark.
-//! Arrows show the mean velocity of the grains whose centres lie
-//! in the same square of a grid, so that they can be told apart in a large sample too; they begin in the middle of these
-//! centres; the longest of a panel is as long as a square is wide. So both compare grains of one panel; the captions
-//! compare panels.
+//! The map fills each grain with the colour of its speed, over the speed v that all but one in a
+//! hundred grains of the panel stay below: speeds grow by orders of magnitude in a collapse, and
+//! one scale would leave all but one panel dark. Arrows show the mean velocity of the grains whose
+//! centres lie in the same square of a grid, so that they can be told apart in a large sample too;
+//! they begin in the middle of these centres; the longest of a panel is as long as a square is
+//! wide. So both compare grains of one panel; the captions compare panels.
 
 use clap::Args;
 use dem_run::history::{GrainState, History};
@@ -22,7 +22,8 @@ use dem_run::row;
 
 /// Squares of the grid along the longer side of the sample.
 const SQUARES: f64 = 18.0;
-/// Share of the speeds that the scale of colours covers, so that one grain thrown off does not make all others equal.
+/// Share of the speeds that the scale of colours covers, so that one grain thrown off does not make
+/// all others equal.
 const COVERED: f64 = 0.99;
 
 /// Maps and table of the velocities.
@@ -244,7 +245,8 @@ impl OnPage for Report {
     }
 }
 
-/// The mean velocities of the squares of a grid over disks as arrows, the longest as long as a square is wide.
+/// The mean velocities of the squares of a grid over disks as arrows, the longest as long as a
+/// square is wide.
 fn arrows(state: &GrainState) -> Vec<Arrow> {
     let range = [0, 1].map(|k| {
         let values = || state.position.chunks(2).map(|x| x[k]);

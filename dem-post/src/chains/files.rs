@@ -8,9 +8,9 @@ use super::pictures::{chain_map, distribution_chart, length_charts, network_map}
 use super::report::Report;
 use crate::output::{Folder, Result};
 
-/// Writes `forces.csv`, `distribution.csv`, `force-chains.csv`, `force-chain-lengths.csv`, and as drawings `chains` (the
-/// network), `distribution`, `force-chains` and, where chains differ in length,
-/// `force-chain-lengths`.
+/// Writes `forces.csv`, `distribution.csv`, `force-chains.csv`, `force-chain-lengths.csv`, and as
+/// drawings `chains` (the network), `distribution`, `force-chains` and, where chains differ in
+/// length, `force-chain-lengths`.
 ///
 /// # Errors
 /// [`crate::output::PostError::Write`].

@@ -1,7 +1,9 @@
-//! Force chains: the network of contact forces, how the forces are distributed, and the lines of grains that carry most.
+//! Force chains: the network of contact forces, how the forces are distributed, and the lines of
+//! grains that carry most.
 //!
-//! **Network.** A force here is the normal component r_n of a contact, positive in compression. ⟨f⟩ is the mean of |r_n| over the
-//! contacts that carry a force; the strong network is the contacts with |r_n| > ⟨f⟩.
+//! **Network.** A force here is the normal component r_n of a contact, positive in compression. ⟨f⟩
+//! is the mean of |r_n| over the contacts that carry a force; the strong network is the contacts
+//! with |r_n| > ⟨f⟩.
 //!
 //! **Chains** are lines of at least three grains: [`quasilinear`] says which.
 

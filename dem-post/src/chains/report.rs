@@ -1,4 +1,5 @@
-//! The contact forces of some moments and the chains that carry most: the report, and how it is read from a history.
+//! The contact forces of some moments and the chains that carry most: the report, and how it is
+//! read from a history.
 
 use dem_run::history::{ContactRows, History};
 use serde::Serialize;
@@ -104,8 +105,8 @@ pub struct Report {
 /// Reads the networks at the frames nearest to `times` (s), or at chosen ones.
 ///
 /// # Errors
-/// [`PostError::Usage`] for times outside the history; [`PostError::Lacking`] where no contact carries a force at any
-/// of them, or where forces were not recorded.
+/// [`PostError::Usage`] for times outside the history; [`PostError::Lacking`] where no contact
+/// carries a force at any of them, or where forces were not recorded.
 pub fn read(history: &History, times: &[f64]) -> Result<Report> {
     require_reactions(history)?;
     let mut networks = vec![];
@@ -153,8 +154,8 @@ fn network(history: &History, frame: usize) -> Result<Network> {
     })
 }
 
-/// Normal force of each contact, N, positive in compression; zero where it is nothing beside the tangential ones, which is what
-/// the solver leaves of it.
+/// Normal force of each contact, N, positive in compression; zero where it is nothing beside the
+/// tangential ones, which is what the solver leaves of it.
 pub fn normal_forces(contacts: &ContactRows) -> Vec<f64> {
     let greatest = (0..contacts.len()).map(|c| contacts.tangential_force(c)).fold(0.0, f64::max);
     let force = |c| Some(contacts.normal_force(c)).filter(|f| f.abs() > CARRIES * greatest).unwrap_or(0.0);
@@ -304,7 +305,8 @@ mod tests {
 
     #[test]
     fn statistics_of_known_forces() {
-        // |f| = 1, 1, 2, 4: mean 2, strong is the 4 alone; the zero and the rounding error carry nothing
+        // |f| = 1, 1, 2, 4: mean 2, strong is the 4 alone; the zero and the rounding error carry
+        // nothing
         let s = statistics(&[1.0, -1.0, 2.0, -4.0, 0.0, 1e-12]);
         assert_eq!((s.contacts, s.in_tension, s.strong), (4, 2, 1));
         assert_eq!((s.mean, s.greatest_compression, s.greatest_tension), (2.0, 2.0, 4.0));

@@ -7,12 +7,14 @@ use crate::output::Result;
 /// A symmetric 2 × 2 or 3 × 3 tensor, by rows; in 2D the third row and column are zero.
 pub type Tensor = [[f64; 3]; 3];
 
-/// Mean stress in each grain from the forces on it (Love 1927, Weber 1966), Pa, positive in compression:
+/// Mean stress in each grain from the forces on it (Love 1927, Weber 1966), Pa, positive in
+/// compression:
 ///
 /// σ = −(1/V) Σ f ⊗ (p − x)
 ///
-/// over its contacts, with the force f on the grain at the point p, its centre x and its volume V (in 2D the area times
-/// `thickness`). Where bonds carry moments, forces alone do not balance the torque: the symmetric part is taken.
+/// over its contacts, with the force f on the grain at the point p, its centre x and its volume V
+/// (in 2D the area times `thickness`). Where bonds carry moments, forces alone do not balance the
+/// torque: the symmetric part is taken.
 pub fn grain_stress(
     contacts: &ContactRows,
     position: &[f64],
@@ -65,7 +67,8 @@ fn force(contacts: &ContactRows, c: usize, d: usize) -> [f64; 3] {
     force
 }
 
-/// The greatest principal value of a symmetric tensor and its unit direction, by Jacobi's rotations.
+/// The greatest principal value of a symmetric tensor and its unit direction, by Jacobi's
+/// rotations.
 ///
 /// Of equal values the direction is any of theirs.
 pub fn major(tensor: &Tensor, dimension: usize) -> (f64, [f64; 3]) {

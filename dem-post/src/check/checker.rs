@@ -20,7 +20,8 @@ pub(super) struct Checker {
     /// Whether a whole checkpoint stands in it.
     pub resumable: bool,
     pub report: Report,
-    /// Datasets of the type and shape that the layout promises, with the rows that are complete and the numbers in each.
+    /// Datasets of the type and shape that the layout promises, with the rows that are complete and
+    /// the numbers in each.
     pub sound: BTreeMap<String, [usize; 2]>,
     pub told: BTreeMap<String, usize>,
     pub bar: ProgressBar,
@@ -87,7 +88,8 @@ impl Checker {
         }
     }
 
-    /// Hands the complete rows of a sound dataset to `see`, block by block, with the number of the first row.
+    /// Hands the complete rows of a sound dataset to `see`, block by block, with the number of the
+    /// first row.
     pub fn blocks<T: H5Type>(&mut self, place: &str, mut see: impl FnMut(&mut Self, usize, &[T])) {
         let Some(&[rows, width]) = self.sound.get(place) else { return };
         let step = (BLOCK / width.max(1)).max(1);

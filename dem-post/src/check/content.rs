@@ -72,7 +72,8 @@ pub(super) fn check(c: &mut Checker) {
     events(c, &steps, &pairs, &broken);
 }
 
-/// Steps and times grow, and those of every quantity are those of the frames. The steps of the frames.
+/// Steps and times grow, and those of every quantity are those of the frames. The steps of the
+/// frames.
 fn order(c: &mut Checker) -> Vec<i64> {
     for (step, time) in [(STEP, TIME), ("observables/step", "observables/time")] {
         grows::<i64>(c, step);
@@ -134,8 +135,8 @@ fn alike<T: H5Type + PartialEq>(c: &mut Checker, place: &str, other: &str) {
     });
 }
 
-/// Rows complete at each frame: they never become fewer, contacts follow each other without gaps. First row and number
-/// of the contacts of each frame, where they can be trusted.
+/// Rows complete at each frame: they never become fewer, contacts follow each other without gaps.
+/// First row and number of the contacts of each frame, where they can be trusted.
 fn committed(c: &mut Checker) -> Vec<[u64; 2]> {
     let t = c.sizes.t;
     let mut committed = |name: &str| -> Vec<u64> {
@@ -208,7 +209,8 @@ fn no_number(value: f64) -> String {
     if value.is_finite() { format!("{value:e} is no plausible number") } else { format!("{value} is no finite number") }
 }
 
-/// What is a size is above zero, and what may be nothing is not below; no radius is of another scale than all others.
+/// What is a size is above zero, and what may be nothing is not below; no radius is of another
+/// scale than all others.
 fn signs(c: &mut Checker) {
     for place in [RADIUS, "particles/grains/mass", "bonds/mean_diameter"] {
         every(c, place, |value| (value <= 0.0).then(|| format!("{value} is not positive")));
@@ -312,7 +314,8 @@ fn states(c: &mut Checker) -> Broken {
     broken
 }
 
-/// Contacts name bodies and bonds that are there; one that is bonded has a bond of its grains that holds.
+/// Contacts name bodies and bonds that are there; one that is bonded has a bond of its grains that
+/// holds.
 fn contacts(c: &mut Checker, rows: &[[u64; 2]], pairs: &[[i32; 2]], broken: &Broken) {
     let Sizes { n, w, .. } = c.sizes;
     for (frame, [start, count]) in rows.iter().enumerate() {
@@ -356,8 +359,8 @@ fn contacts(c: &mut Checker, rows: &[[u64; 2]], pairs: &[[i32; 2]], broken: &Bro
     }
 }
 
-/// Ruptures stand in the order of their steps, complete at the right frames, and each broken bond has one, at the frame
-/// where its state changes.
+/// Ruptures stand in the order of their steps, complete at the right frames, and each broken bond
+/// has one, at the frame where its state changes.
 fn events(c: &mut Checker, steps: &[i64], pairs: &[[i32; 2]], broken: &Broken) {
     let complete = c.rows::<u64>("commit_rows/events", 0..c.sizes.t).unwrap_or_default();
     let times = c.rows::<f64>(TIME, 0..c.sizes.t).unwrap_or_default();

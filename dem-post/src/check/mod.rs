@@ -1,8 +1,8 @@
 //! Whether a history is what its layout promises: `dem-post info --check`.
 //!
-//! First every dataset by its name, type, shape and unit, then what stands in them, block by block, so that memory does
-//! not grow with the file. Nothing is believed that the checks before did not find: a dataset of another shape is named
-//! once and not read.
+//! First every dataset by its name, type, shape and unit, then what stands in them, block by block,
+//! so that memory does not grow with the file. Nothing is believed that the checks before did not
+//! find: a dataset of another shape is named once and not read.
 
 use std::collections::BTreeMap;
 
@@ -21,7 +21,8 @@ mod schema;
 /// Checks a history; with a bar on a terminal unless `quiet`.
 ///
 /// # Errors
-/// [`crate::output::PostError::Write`] where the file cannot be opened once more. What is wrong in the file is told in the report.
+/// [`crate::output::PostError::Write`] where the file cannot be opened once more. What is wrong in
+/// the file is told in the report.
 pub fn read(history: &History, quiet: bool) -> Result<Report> {
     let mode = if history.open_ended() { OpenMode::ReadSWMR } else { OpenMode::Read };
     let file = File::open_as(history.path(), mode)

@@ -14,11 +14,13 @@ const U32: TypeDescriptor = TypeDescriptor::Unsigned(IntSize::U4);
 const U64: TypeDescriptor = TypeDescriptor::Unsigned(IntSize::U8);
 const TEXT: TypeDescriptor = TypeDescriptor::VarLenUnicode;
 
-/// Members of a rupture: 64-bit integers and floats, then 32-bit integers. Layouts before version 3 have no `twist`.
+/// Members of a rupture: 64-bit integers and floats, then 32-bit integers. Layouts before version 3
+/// have no `twist`.
 pub(super) const RUPTURE: [&str; 16] =
     ["step", "time", "x", "y", "z", "rn", "rt", "m", "twist", "energy", "round", "bond", "i", "j", "mode", "pad"];
 
-/// Checks names, types, shapes and units; what is as promised is put down as sound, to be read afterwards.
+/// Checks names, types, shapes and units; what is as promised is put down as sound, to be read
+/// afterwards.
 pub(super) fn check(c: &mut Checker) {
     identity(c);
     commit(c);
@@ -55,7 +57,8 @@ fn bytes(names: impl Iterator<Item = &'static str>) -> TypeDescriptor {
     codes(IntSize::U1, false, 0, names)
 }
 
-/// Whether a type of the file is read as this one: the same, or modes of rupture from before there was twist.
+/// Whether a type of the file is read as this one: the same, or modes of rupture from before there
+/// was twist.
 fn is_read_as(found: &TypeDescriptor, kind: &TypeDescriptor) -> bool {
     match (found, kind) {
         (TypeDescriptor::Enum(found), TypeDescriptor::Enum(kind)) => {
@@ -126,7 +129,8 @@ impl Checker {
         self.wrong(place, None, what);
     }
 
-    /// Checks a quantity over time: its values, and its steps and times, which are those of the frames.
+    /// Checks a quantity over time: its values, and its steps and times, which are those of the
+    /// frames.
     fn element(&mut self, place: &str, kind: &TypeDescriptor, row: &[usize], unit: &str) {
         let t = self.sizes.t;
         self.table(&format!("{place}/value"), kind, t, row, unit);
@@ -300,7 +304,8 @@ fn contacts(c: &mut Checker) {
     if bonded {
         c.table("contacts/bond", &I32, m, &[], "");
     }
-    // a history may do without reactions (`output.reactions`): then it has none of what belongs to them
+    // a history may do without reactions (`output.reactions`): then it has none of what belongs to
+    // them
     if ["reaction", "tangent", "moment"].iter().any(|name| c.has(&format!("contacts/{name}"))) {
         reactions(c, &real);
     }
@@ -354,8 +359,8 @@ fn observables(c: &mut Checker) {
     }
 }
 
-/// The two slots of the state from which the run goes on. What stands in them vouches for itself by a sum: one of them
-/// may be torn, of a run that was killed while it wrote it.
+/// The two slots of the state from which the run goes on. What stands in them vouches for itself by
+/// a sum: one of them may be torn, of a run that was killed while it wrote it.
 fn checkpoint(c: &mut Checker) {
     c.table("checkpoint/index", &U64, 2, &[4], "");
     for slot in 0..2 {

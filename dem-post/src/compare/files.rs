@@ -13,8 +13,8 @@ const COLOURS: [&str; 3] = [colour::BLACK, colour::BLUE, colour::VERMILLION];
 /// Width of their lines.
 const WIDTH: f64 = 3.0;
 
-/// Writes `scene.csv`, `distance.csv`, `bonds.csv`, and as drawings `distance`, `broken`, `bonds` where any broke, and
-/// `load` where a wall is driven in either run. `a` is the first history.
+/// Writes `scene.csv`, `distance.csv`, `bonds.csv`, and as drawings `distance`, `broken`, `bonds`
+/// where any broke, and `load` where a wall is driven in either run. `a` is the first history.
 ///
 /// # Errors
 /// [`crate::output::PostError::Write`], and those of reading the history.

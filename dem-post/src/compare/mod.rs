@@ -1,13 +1,13 @@
 //! Where two runs of one sample part: their scenes, their frames, their broken bonds, their curves.
 //!
-//! * **Frames** are compared at equal times. The distance of two frames is the greatest distance of a grain's centres in
-//!   the two, over the grain's radius. They differ if it exceeds the tolerance, which is zero unless told otherwise:
-//!   equal then means equal in every bit.
-//! * **Bonds** are known by their two grains. Events are compared in their order: the first that differs is the first
-//!   place at which the two lists have another bond or another mode.
+//! * **Frames** are compared at equal times. The distance of two frames is the greatest distance of
+//!   a grain's centres in the two, over the grain's radius. They differ if it exceeds the
+//!   tolerance, which is zero unless told otherwise: equal then means equal in every bit.
+//! * **Bonds** are known by their two grains. Events are compared in their order: the first that
+//!   differs is the first place at which the two lists have another bond or another mode.
 //!
-//! Grains are compared by number, so the two samples must have equally many; that they are the same sample otherwise is
-//! not required, but told.
+//! Grains are compared by number, so the two samples must have equally many; that they are the same
+//! sample otherwise is not required, but told.
 
 use std::path::PathBuf;
 
@@ -31,7 +31,8 @@ pub struct Command {
     /// The second history.
     #[arg(value_name = "B.h5")]
     b: PathBuf,
-    /// Distance of a grain's two places, in radii, up to which frames count as equal; 0 is equal in every bit.
+    /// Distance of a grain's two places, in radii, up to which frames count as equal; 0 is equal in
+    /// every bit.
     #[arg(long, value_name = "RADII", default_value_t = 0.0)]
     tolerance: f64,
     /// Folder for the results, created if need be [default: A-compare].

@@ -9,7 +9,8 @@ use serde::Serialize;
 use crate::output::{PostError, Result, Text, facts, number, quantity};
 use crate::stress_strain;
 
-/// Times closer than this share of the later one are equal: the clocks of two time steps round differently.
+/// Times closer than this share of the later one are equal: the clocks of two time steps round
+/// differently.
 const SAME_TIME: f64 = 1e-9;
 /// Differences of the scenes, and bonds, that the table shows.
 const SHOWN: usize = 12;
@@ -108,8 +109,8 @@ pub struct Report {
 /// Compares two runs; frames count as equal up to `tolerance` radii.
 ///
 /// # Errors
-/// [`PostError::Lacking`] for runs of another dimension, another number of grains, or without a common time;
-/// [`PostError::Usage`] for a tolerance that is negative or no number.
+/// [`PostError::Lacking`] for runs of another dimension, another number of grains, or without a
+/// common time; [`PostError::Usage`] for a tolerance that is negative or no number.
 pub fn read(a: &History, b: &History, tolerance: f64) -> Result<Report> {
     if tolerance.is_nan() || tolerance < 0.0 {
         return Err(PostError::Usage(format!("--tolerance {tolerance}: give 0 or more, in radii")));

@@ -1,13 +1,14 @@
 //! The front of a crack: how far it has come along its path's direction, break by break.
 //!
-//! A crack here is one of the final cracks: before its parts met they count as one already. Its places are counted from
-//! where its first bond broke, along the line between the ends of its path, positive towards the end that broke later.
-//! The **front** is the greatest place that a broken segment reaches, the **back** the least. All breaks of one step have
-//! the same time; the round of the cascade gives them an order, not a speed. So a row is a round, and a **speed** is that
-//! of the tip from the last time at which the crack grew to this one.
+//! A crack here is one of the final cracks: before its parts met they count as one already. Its
+//! places are counted from where its first bond broke, along the line between the ends of its path,
+//! positive towards the end that broke later. The **front** is the greatest place that a broken
+//! segment reaches, the **back** the least. All breaks of one step have the same time; the round of
+//! the cascade gives them an order, not a speed. So a row is a round, and a **speed** is that of
+//! the tip from the last time at which the crack grew to this one.
 //!
-//! The **growth** takes the other view: after each round, the cracks as they are then, joined only by what has broken so
-//! far. Where cracks meet, the largest grows by the whole of the other.
+//! The **growth** takes the other view: after each round, the cracks as they are then, joined only
+//! by what has broken so far. Where cracks meet, the largest grows by the whole of the other.
 
 use dem_run::history::Rupture;
 use petgraph::unionfind::UnionFind;
@@ -35,7 +36,8 @@ pub struct Front {
     pub back: f64,
     /// Place of the front tip, m, at least 0.
     pub front: f64,
-    /// Speed of the rear tip away from the origin, m/s; in the last round of a time, from the second time on.
+    /// Speed of the rear tip away from the origin, m/s; in the last round of a time, from the
+    /// second time on.
     pub back_speed: Option<f64>,
     /// Speed of the front tip away from the origin, m/s.
     pub front_speed: Option<f64>,

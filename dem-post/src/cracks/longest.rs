@@ -1,11 +1,13 @@
 //! The longest of the shortest ways through a graph, over all pairs of nodes.
 //!
-//! Dijkstra's search from every node finds it. Most nodes need none: where the node farthest from v is at the distance
-//! e(v), that of any other node w is at most e(v) + d(v, w) and at least max(d(v, w), e(v) − d(v, w)). A node that cannot
-//! reach as far as the longest way found is left out. Searches begin in turn at the node that may reach farthest, which
-//! lengthens the longest way, and at the one that may reach least, in the middle, which lowers the bounds of all.
+//! Dijkstra's search from every node finds it. Most nodes need none: where the node farthest from v
+//! is at the distance e(v), that of any other node w is at most e(v) + d(v, w) and at least
+//! max(d(v, w), e(v) − d(v, w)). A node that cannot reach as far as the longest way found is left
+//! out. Searches begin in turn at the node that may reach farthest, which lengthens the longest
+//! way, and at the one that may reach least, in the middle, which lowers the bounds of all.
 //!
-//! Source: F. W. Takes and W. A. Kosters, *Computing the eccentricity distribution of large graphs*, Algorithms 6, 2013.
+//! Source: F. W. Takes and W. A. Kosters, *Computing the eccentricity distribution of large
+//! graphs*, Algorithms 6, 2013.
 
 use petgraph::algo::{astar, dijkstra};
 use petgraph::graph::{EdgeIndex, NodeIndex, UnGraph};
@@ -30,10 +32,12 @@ struct Bounds {
     searched: bool,
 }
 
-/// The longest of the shortest ways: the node where it begins, and the edges of the way. The graph must be connected.
+/// The longest of the shortest ways: the node where it begins, and the edges of the way. The graph
+/// must be connected.
 ///
-/// Of several that are equally long, to 1e-9 of their length, the one whose ends are farthest apart, and of these, to the
-/// same measure, the one with the first nodes; it leads from the lesser node to the greater. None without an edge.
+/// Of several that are equally long, to 1e-9 of their length, the one whose ends are farthest
+/// apart, and of these, to the same measure, the one with the first nodes; it leads from the lesser
+/// node to the greater. None without an edge.
 pub(super) fn longest(ways: &Ways) -> Option<(NodeIndex, Vec<EdgeIndex>)> {
     let pairs = farthest_pairs(ways);
     let apart = |&(a, b): &(NodeIndex, NodeIndex)| distance(ways[a], ways[b]);
@@ -85,7 +89,8 @@ mod tests {
 
     use super::*;
 
-    /// The length of the longest of the shortest ways by Floyd and Warshall, and of that between two nodes.
+    /// The length of the longest of the shortest ways by Floyd and Warshall, and of that between
+    /// two nodes.
     fn by_force(ways: &Ways) -> (f64, impl Fn(NodeIndex, NodeIndex) -> f64) {
         let all = floyd_warshall(ways, |edge| *edge.weight()).unwrap();
         (all.values().copied().fold(0.0, f64::max), move |a, b| all[&(a, b)])
@@ -119,7 +124,8 @@ mod tests {
         }
     }
 
-    /// A tree of `nodes` random places with `more` edges; as long as the ways between them, or all of length one.
+    /// A tree of `nodes` random places with `more` edges; as long as the ways between them, or all
+    /// of length one.
     fn graph(seed: u64, nodes: usize, more: usize, equal: bool) -> Ways {
         let mut next = random(seed);
         let mut ways = Ways::default();
@@ -169,7 +175,8 @@ mod tests {
 
     #[test]
     fn of_equal_ways_that_with_the_ends_farthest_apart_is_taken() {
-        // a ring of six equal edges, drawn as a flat hexagon: opposite corners are three edges apart
+        // a ring of six equal edges, drawn as a flat hexagon: opposite corners are three edges
+        // apart
         let mut ways = Ways::default();
         let at = [[-3.0, 0.0], [-1.0, 0.5], [1.0, 0.5], [3.0, 0.0], [1.0, -0.5], [-1.0, -0.5]];
         let nodes = at.map(|x| ways.add_node(x));

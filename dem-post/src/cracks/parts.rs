@@ -1,4 +1,5 @@
-//! What the cracks of the plane and of space have in common: broken bonds as parts that meet in points.
+//! What the cracks of the plane and of space have in common: broken bonds as parts that meet in
+//! points.
 
 use petgraph::unionfind::UnionFind;
 

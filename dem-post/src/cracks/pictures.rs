@@ -64,8 +64,9 @@ pub fn fragment_charts(pieces: &[Pieces]) -> Vec<Chart> {
     vec![number, largest]
 }
 
-/// The tips of the longest cracks over time; the size of all cracks and of the largest over time; and, where a step
-/// broke bonds in several rounds, these sizes over the rounds of the step that has most of them.
+/// The tips of the longest cracks over time; the size of all cracks and of the largest over time;
+/// and, where a step broke bonds in several rounds, these sizes over the rounds of the step that
+/// has most of them.
 pub fn front_charts(report: &Report) -> Vec<Chart> {
     let mut over_time = Chart::new("time (s)", "place of the tips along the crack (mm)");
     over_time.set_off = true;
@@ -180,8 +181,9 @@ fn pale_panel(history: &History, report: &Report, cracks: usize) -> Result<Panel
     })
 }
 
-/// The facets of cracks in space, coloured by the time at which each bond broke, or by the round of the cascade where all broke
-/// in one step: in perspective, and over the grains of the first frame along y and against x.
+/// The facets of cracks in space, coloured by the time at which each bond broke, or by the round of
+/// the cascade where all broke in one step: in perspective, and over the grains of the first frame
+/// along y and against x.
 ///
 /// # Errors
 /// Those of reading the history.
@@ -197,8 +199,9 @@ pub fn surface_maps(history: &History, report: &Report) -> Result<[Drawing; 3]> 
     Ok([map(&Sample::with_depth(history)?, &panel), front, side])
 }
 
-/// The cracks over the grains of the first frame, coloured by the time at which each bond broke, or by the round of the
-/// cascade where all broke in one step. The second drawing shows the part around the cracks, where that is small.
+/// The cracks over the grains of the first frame, coloured by the time at which each bond broke, or
+/// by the round of the cascade where all broke in one step. The second drawing shows the part
+/// around the cracks, where that is small.
 ///
 /// # Errors
 /// Those of reading the history.
@@ -234,8 +237,8 @@ fn filled_panel(history: &History, frame: usize, fills: Vec<Colour>, what: Strin
     })
 }
 
-/// The pieces of a sample at some frames, of which `lists` has one by one: the heaviest in colours of their own, in the order
-/// of their masses.
+/// The pieces of a sample at some frames, of which `lists` has one by one: the heaviest in colours
+/// of their own, in the order of their masses.
 ///
 /// # Errors
 /// Those of reading the history.

@@ -184,7 +184,8 @@ impl From<&Rupture> for Event {
     }
 }
 
-/// Broken bonds by mode after each time at which any broke: (time s, [tension, shear, rolling, twist]), from zero on.
+/// Broken bonds by mode after each time at which any broke: (time s, [tension, shear, rolling,
+/// twist]), from zero on.
 pub fn broken_over_time(events: &[Event]) -> Vec<(f64, [usize; 4])> {
     let mut curve: Vec<(f64, [usize; 4])> = vec![];
     let mut count = [0; 4];

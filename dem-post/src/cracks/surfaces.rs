@@ -1,17 +1,19 @@
 //! Cracks as surfaces, in space: facets of broken bonds, joined where they meet.
 //!
-//! All places are those of the first frame: where the crack runs in the sample as it was cemented, whatever the pieces
-//! did afterwards.
+//! All places are those of the first frame: where the crack runs in the sample as it was cemented,
+//! whatever the pieces did afterwards.
 //!
-//! * **Facet** of a broken bond: the face that the cells of its two grains share in the power diagram of all grains (the
-//!   Voronoi diagram where they are equal), as far as it lies within half the pair's mean diameter from the line of
-//!   centres: at the edge of the sample, or beside a large void, a cell has no end near by. Between equal spheres that touch
-//!   it is d² on a cubic lattice, of which the polygon of 24 sides around a circle of diameter d counts, and d²/(2√2) on a
-//!   close packing.
-//! * **Crack**: facets that meet in a corner, which is a point of equal power to four grains: in the void between them, as in
-//!   the plane.
-//! * **Normal**: the direction to which the facets, weighed by their areas, are most perpendicular. **Flatness**: the mean of
-//!   cos², weighed alike, of the angle between the normals of the facets and it, 1 for a plane and 1/3 for a sphere.
+//! * **Facet** of a broken bond: the face that the cells of its two grains share in the power
+//!   diagram of all grains (the Voronoi diagram where they are equal), as far as it lies within
+//!   half the pair's mean diameter from the line of centres: at the edge of the sample, or beside a
+//!   large void, a cell has no end near by. Between equal spheres that touch it is d² on a cubic
+//!   lattice, of which the polygon of 24 sides around a circle of diameter d counts, and d²/(2√2)
+//!   on a close packing.
+//! * **Crack**: facets that meet in a corner, which is a point of equal power to four grains: in
+//!   the void between them, as in the plane.
+//! * **Normal**: the direction to which the facets, weighed by their areas, are most perpendicular.
+//!   **Flatness**: the mean of cos², weighed alike, of the angle between the normals of the facets
+//!   and it, 1 for a plane and 1/3 for a sphere.
 //! * **Extent**: the greatest distance of two corners.
 //!
 //! Source of the diagram: F. Aurenhammer, *Power diagrams*, SIAM J. Comput. 16, 1987.
@@ -28,8 +30,8 @@ use crate::chains::stress::major;
 
 /// Sides of the polygon that stands for a circle.
 const SIDES: usize = 24;
-/// Distance within which two corners are always one, and the one beyond which they never are, over the mean diameter: those
-/// between are one where they lie in one cell.
+/// Distance within which two corners are always one, and the one beyond which they never are, over
+/// the mean diameter: those between are one where they lie in one cell.
 const ONE: f64 = 1e-6;
 const CELL: f64 = 1e-4;
 
@@ -42,7 +44,8 @@ pub struct Facet {
     pub event: usize,
     /// The points in which it meets others.
     pub(super) nodes: Vec<usize>,
-    /// Its corners, one after the other, m; none where the cells do not meet near the line of centres.
+    /// Its corners, one after the other, m; none where the cells do not meet near the line of
+    /// centres.
     pub corners: Vec<[f64; 3]>,
     /// Area, m².
     pub area: f64,
@@ -85,8 +88,8 @@ pub struct Surfaces {
 }
 
 impl Surfaces {
-    /// Finds the cracks that `ruptures` make in the sample whose grains had centres `position` (m) and radii `radius` (m)
-    /// when `bonds` were formed.
+    /// Finds the cracks that `ruptures` make in the sample whose grains had centres `position` (m)
+    /// and radii `radius` (m) when `bonds` were formed.
     pub fn find(position: &[[f64; 3]], radius: &[f64], bonds: &Bonds, ruptures: &[Rupture]) -> Self {
         let mut facets = facets(position, radius, bonds, ruptures);
         let groups = groups(parts(&facets));
@@ -186,8 +189,8 @@ impl Neighbours {
         candidates.map(|(_, k)| *k).filter(move |k| (self.centre[*k] - point).norm() < reach)
     }
 
-    /// Where the line of centres passes the plane of equal power, and the part of the plane within `reach` of it (m) that is
-    /// nearest, in the sense of the power diagram, to both grains.
+    /// Where the line of centres passes the plane of equal power, and the part of the plane within
+    /// `reach` of it (m) that is nearest, in the sense of the power diagram, to both grains.
     fn face(&self, [i, j]: [usize; 2], reach: f64) -> (Point, Point, Vec<Point>) {
         let (a, b) = (self.centre[i], self.centre[j]);
         let way = a - b;
@@ -195,7 +198,8 @@ impl Neighbours {
         let share = 0.5 * (length + (self.radius[j].powi(2) - self.radius[i].powi(2)) / length);
         let middle = b + normal * share;
         let mut polygon = circle(normal, reach);
-        // the power of a corner to either grain is at most this, so no grain farther away comes before them
+        // the power of a corner to either grain is at most this, so no grain farther away comes
+        // before them
         let power = reach * reach / (std::f64::consts::PI / SIDES as f64).cos().powi(2) + (middle - a).norm_squared()
             - self.radius[i].powi(2);
         let far = 1.01 * reach + (power + self.greatest.powi(2)).max(0.0).sqrt();
@@ -210,7 +214,8 @@ impl Neighbours {
     }
 }
 
-/// A regular polygon around the circle of a radius, perpendicular to the unit vector `normal`, around the origin.
+/// A regular polygon around the circle of a radius, perpendicular to the unit vector `normal`,
+/// around the origin.
 fn circle(normal: Point, radius: f64) -> Vec<Point> {
     let least = normal.iamin();
     let first = normal.cross(&Point::ith(least, 1.0)).normalize();

@@ -1,8 +1,8 @@
 //! Voids: the holes that the grains and bonds of a plane sample enclose.
 //!
-//! Bonds between disks that touch do not cross, so the bonds are the edges of a plane graph. Its bounded faces are the
-//! voids: going round a void, one bond follows the next at each grain. What lies outside the sample, and around a piece
-//! that floats inside a void, is no void.
+//! Bonds between disks that touch do not cross, so the bonds are the edges of a plane graph. Its
+//! bounded faces are the voids: going round a void, one bond follows the next at each grain. What
+//! lies outside the sample, and around a piece that floats inside a void, is no void.
 
 /// Area below which a face is one of a tree, over the sum of its squared edges.
 const FLAT: f64 = 1e-6;
@@ -17,7 +17,8 @@ pub struct Voids {
 }
 
 impl Voids {
-    /// The voids between grains with centres `position` (m), bonded by `pair` with points of contact `point` (m).
+    /// The voids between grains with centres `position` (m), bonded by `pair` with points of
+    /// contact `point` (m).
     pub fn find(position: &[[f64; 2]], pair: &[[i32; 2]], point: &[[f64; 2]]) -> Self {
         let graph = Graph::new(position, pair);
         let mut voids = Self { beside: vec![[None; 2]; pair.len()], centre: vec![] };

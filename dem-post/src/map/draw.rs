@@ -21,7 +21,8 @@ const LEGEND: f64 = 30.0;
 const WIDE: f64 = 860.0;
 /// Width over height of a sample from which on panels stand above each other.
 const STACKED: f64 = 1.6;
-/// The size of a sheet is a multiple of this, so that its PNG has an even number of pixels: video encoders ask for that.
+/// The size of a sheet is a multiple of this, so that its PNG has an even number of pixels: video
+/// encoders ask for that.
 const EVEN: f64 = 4.0;
 /// Lines of a wall's hatching: their distance and length.
 const HATCH: f64 = 7.0;
@@ -49,8 +50,8 @@ impl Frame {
     }
 }
 
-/// Draws the panels on one scale, side by side or, if the sample is wide, above each other; with a scale bar and the
-/// legend below.
+/// Draws the panels on one scale, side by side or, if the sample is wide, above each other; with a
+/// scale bar and the legend below.
 pub fn draw(sample: &Sample, panels: &[Panel], legend: &[Key]) -> Drawing {
     let view = sample.view(panels.iter().map(|panel| (&panel.grains, &panel.walls)));
     draw_view(sample, view, panels, legend)
@@ -134,7 +135,8 @@ fn farthest_first<T: Copy>(things: &mut [T], depth: impl Fn(T) -> f64) {
     things.sort_by(|&a, &b| depth(b).total_cmp(&depth(a)));
 }
 
-/// Lines no wider than `widest`; in perspective the nearest last, the farther the thinner and paler.
+/// Lines no wider than `widest`; in perspective the nearest last, the farther the thinner and
+/// paler.
 fn draw_links(canvas: &mut Canvas, sample: &Sample, links: &[Link], frame: &Frame, widest: f64) {
     let mut line = |link: &Link, width: f64, colour: &str| {
         let ends = [&link.from, &link.to].map(|point| frame.at(sample.flat(point)));
@@ -194,7 +196,8 @@ fn draw_wall(canvas: &mut Canvas, sample: &Sample, wall: &Wall, position: &[f64]
     canvas.disk(at, radius, fill, colour::BLACK, 1.5);
 }
 
-/// A plane in perspective, as a plate of the sample's size, if it is behind the grains or before them: full, or its edges alone.
+/// A plane in perspective, as a plate of the sample's size, if it is behind the grains or before
+/// them: full, or its edges alone.
 fn draw_plate(canvas: &mut Canvas, place: &Place, wall: &Wall, position: &[f64], frame: &Frame, behind: bool) {
     let (corners, is_behind) = place.plane(position, wall.normal);
     if is_behind == behind {
@@ -208,7 +211,8 @@ fn draw_plane(canvas: &mut Canvas, point: [f64; 2], normal: [f64; 2], frame: &Fr
     let length = normal[0].hypot(normal[1]);
     // on the sheet y points down
     let (n, t) = ((normal[0] / length, -normal[1] / length), (normal[1] / length, normal[0] / length));
-    // from the place on the line that is nearest to the middle of the panel, in whole lines of the hatching
+    // from the place on the line that is nearest to the middle of the panel, in whole lines of the
+    // hatching
     let (from, middle) = (frame.at(point), [0.5 * frame.size.0, 0.5 * frame.size.1]);
     let off = [frame.corner.0 + middle[0] - from.0, frame.corner.1 + middle[1] - from.1];
     let nearest = HATCH * ((off[0] * t.0 + off[1] * t.1) / HATCH).round();

@@ -1,4 +1,5 @@
-//! From where a sample is seen: straight along an axis, or in perspective from above and to the side.
+//! From where a sample is seen: straight along an axis, or in perspective from above and to the
+//! side.
 
 use nalgebra::Vector3;
 
@@ -24,7 +25,8 @@ pub(super) struct Place {
     ahead: Vector3<f64>,
 }
 
-/// How far the eye is, in halves of the diagonal of the box: near enough to show depth, far enough for spheres to look round.
+/// How far the eye is, in halves of the diagonal of the box: near enough to show depth, far enough
+/// for spheres to look round.
 const FAR: f64 = 5.0;
 /// Angles to the side and above (rad).
 const ASIDE: f64 = 0.45;
@@ -65,7 +67,8 @@ impl Place {
         [self.right, self.up].map(|axis| off.dot(&axis) * self.magnified(self.depth(point)))
     }
 
-    /// The corners of a plane through `point`, m, as large as the sample, and whether the sample is in front of it.
+    /// The corners of a plane through `point`, m, as large as the sample, and whether the sample is
+    /// in front of it.
     pub fn plane(&self, point: &[f64], normal: [f64; 3]) -> ([[f64; 3]; 4], bool) {
         let normal = Vector3::from(normal);
         let middle = self.focus + (Vector3::from_column_slice(point) - self.focus).dot(&normal) * normal;
@@ -83,7 +86,8 @@ impl Place {
         points.iter().fold(EMPTY, |found, point| union(found, around(self.flat(point), 0.0)))
     }
 
-    /// A colour as it looks on a flat polygon: the paler the less it faces the light, which comes from above and the left.
+    /// A colour as it looks on a flat polygon: the paler the less it faces the light, which comes
+    /// from above and the left.
     pub fn lit(&self, colour: &str, corners: &[[f64; 3]]) -> Colour {
         let [a, b, c] = [0, 1, 2].map(|k| corners.get(k).map_or_else(Vector3::default, |x| Vector3::from(*x)));
         let facing = (b - a).cross(&(c - a)).try_normalize(0.0).map_or(1.0, |normal| normal.dot(&self.light()).abs());
@@ -111,8 +115,8 @@ impl Eye {
         }
     }
 
-    /// How far a point of space is from the eye, m, from where it does not matter. To the right, up and to the eye are
-    /// right-handed: it looks along y, or against x.
+    /// How far a point of space is from the eye, m, from where it does not matter. To the right, up
+    /// and to the eye are right-handed: it looks along y, or against x.
     pub fn depth(&self, point: &[f64]) -> f64 {
         match self {
             Self::Along([0, _]) => point[1],

@@ -1,4 +1,5 @@
-//! Maps of the sample: grains, walls and what joins them, several moments side by side on one scale.
+//! Maps of the sample: grains, walls and what joins them, several moments side by side on one
+//! scale.
 
 pub use draw::{draw, draw_view};
 pub use legend::Key;

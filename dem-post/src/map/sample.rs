@@ -1,4 +1,5 @@
-//! A sample as maps show it: its grains and walls, from where they are seen, and the part of the plane that is drawn.
+//! A sample as maps show it: its grains and walls, from where they are seen, and the part of the
+//! plane that is drawn.
 
 use dem_run::history::{GrainState, Grains, History, Wall, WallKind, WallState};
 
@@ -64,8 +65,8 @@ impl Sample {
         Self::seen(history, Eye::At(Place::of(first.position.chunks(3))))
     }
 
-    /// As [`Sample::read`], of spheres cut open along the plane through the middle of their first places, or of the grain
-    /// nearest to it where it cuts none.
+    /// As [`Sample::read`], of spheres cut open along the plane through the middle of their first
+    /// places, or of the grain nearest to it where it cuts none.
     ///
     /// # Errors
     /// As [`Sample::read`].
@@ -127,8 +128,8 @@ impl Sample {
         View(states.fold(EMPTY, |all, (grains, walls)| union(all, self.extent(grains, walls))))
     }
 
-    /// What shows `points` (m, D numbers each) and as much again around them, at least five mean diameters; `None` if
-    /// that is no small part of the sample.
+    /// What shows `points` (m, D numbers each) and as much again around them, at least five mean
+    /// diameters; `None` if that is no small part of the sample.
     pub fn near<'a>(&self, points: impl Iterator<Item = &'a [f64]>, all: View) -> Option<View> {
         let [low, high] = points.fold(EMPTY, |found, point| union(found, around(self.flat(point), 0.0)));
         let diameter = 2.0 * self.radius.iter().sum::<f64>() / self.radius.len() as f64;

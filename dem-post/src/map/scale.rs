@@ -5,14 +5,15 @@ use std::borrow::Cow;
 /// A colour, as `#rrggbb`.
 pub type Colour = Cow<'static, str>;
 
-/// A sequence of colours of steadily changing lightness, for colour-blind readers and for print: after matplotlib's maps
-/// of S. van der Walt and N. Smith, in ten steps with straight lines between.
+/// A sequence of colours of steadily changing lightness, for colour-blind readers and for print:
+/// after matplotlib's maps of S. van der Walt and N. Smith, in ten steps with straight lines
+/// between.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ramp {
     /// From dark blue to yellow: viridis. For areas.
     Areas,
-    /// From near black over red to orange: inferno without its lightest part, which a white sheet would swallow. For
-    /// lines.
+    /// From near black over red to orange: inferno without its lightest part, which a white sheet
+    /// would swallow. For lines.
     Lines,
 }
 

@@ -1,5 +1,5 @@
-//! A run on one page: an HTML file that needs nothing else, with pictures, curves, tables, the solver's own measures of
-//! its accuracy, the energy books and the scene.
+//! A run on one page: an HTML file that needs nothing else, with pictures, curves, tables, the
+//! solver's own measures of its accuracy, the energy books and the scene.
 //!
 //! Curves are SVG, maps are PNG (a map of thousands of grains is far smaller so), all of them
 //! inside the page as `data:` addresses. Long curves are thinned as all charts are. A section that
@@ -21,7 +21,8 @@ pub mod solver;
 
 use solver::Accuracy;
 
-/// The run on one HTML page that needs nothing else: pictures, curves, tables, accuracy, energy, scene.
+/// The run on one HTML page that needs nothing else: pictures, curves, tables, accuracy, energy,
+/// scene.
 #[derive(Debug, Args)]
 pub struct Command {
     #[command(flatten)]

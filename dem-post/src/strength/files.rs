@@ -12,8 +12,8 @@ const LINE_POINTS: usize = 100;
 /// How far the mean is drawn from its points, so that it hides none, as a share of the axis.
 const BESIDE: f64 = 0.018;
 
-/// Writes `strength.csv` with a row for each run, `strength-values.csv` with one for each value of the field,
-/// `strength-samples.csv` with one for each sample, and as a drawing `strength`.
+/// Writes `strength.csv` with a row for each run, `strength-values.csv` with one for each value of
+/// the field, `strength-samples.csv` with one for each sample, and as a drawing `strength`.
 ///
 /// # Errors
 /// [`crate::output::PostError::Write`].

@@ -1,5 +1,5 @@
-//! Strength against a field of the scene, over many runs: the paper's figure 9, strength against cohesion, and the like for
-//! rates, sizes, friction.
+//! Strength against a field of the scene, over many runs: the paper's figure 9, strength against
+//! cohesion, and the like for rates, sizes, friction.
 //!
 //! **Strength** of a run is the load at a step that [`Measure`] names, each as the run's own
 //! summary and `stress-strain` define it. The load is that of the load wall or, without a driven
@@ -9,10 +9,11 @@
 //! tolerance is coarse, and elastic bonds come to it whole; the first break is one weak bond; a
 //! peak needs a load that can fall.
 //!
-//! **Samples.** Runs are grouped by the value of the varied field and by sample ([`scenes`] says how both are found). Runs of
-//! one sample are not independent of each other: they are the same grains again. So beside the line through all points, whose
-//! standard errors take every run as independent, each sample has a line of its own, and the intervals over the samples are
-//! those of the mean of their slopes and intercepts.
+//! **Samples.** Runs are grouped by the value of the varied field and by sample ([`scenes`] says
+//! how both are found). Runs of one sample are not independent of each other: they are the same
+//! grains again. So beside the line through all points, whose standard errors take every run as
+//! independent, each sample has a line of its own, and the intervals over the samples are those of
+//! the mean of their slopes and intercepts.
 
 use std::path::PathBuf;
 
@@ -30,7 +31,8 @@ pub mod report;
 pub mod runs;
 pub mod scenes;
 
-/// Strength against a field of the scene over many runs, as against cohesion: a line, its errors, the scatter of samples.
+/// Strength against a field of the scene over many runs, as against cohesion: a line, its errors,
+/// the scatter of samples.
 ///
 /// The exit code is 1 where runs were left out because they did not give way, or are not done.
 #[derive(Debug, Args)]

@@ -9,7 +9,8 @@ use super::runs::{self, Found, LeftOut, Measure, histories, name};
 use super::scenes::{design, unit};
 use crate::output::{PostError, Result, Text, facts, number, quantity};
 
-/// Rests of R² below this are rounding, and so are intercepts below this share of the greatest strength.
+/// Rests of R² below this are rounding, and so are intercepts below this share of the greatest
+/// strength.
 const ROUNDING: f64 = 1e-12;
 /// Runs left out that the table names.
 const NAMED: usize = 12;
@@ -71,7 +72,8 @@ pub struct OfSample {
     pub line: Option<Line>,
     /// Mean of strength over value; `None` where a value is zero.
     pub ratio: Option<f64>,
-    /// Greatest deviation of that ratio from its mean, as a share of the mean; `None` for runs at one value.
+    /// Greatest deviation of that ratio from its mean, as a share of the mean; `None` for runs at
+    /// one value.
     pub ratio_deviation: Option<f64>,
 }
 
@@ -118,8 +120,8 @@ pub struct Report {
 /// Reads the runs that `paths` name: histories, and folders of sweeps.
 ///
 /// # Errors
-/// [`PostError::Usage`] for no runs, runs of different scenes, and where none gave way; [`PostError::Lacking`] for a run
-/// without a load; those of reading histories and manifests.
+/// [`PostError::Usage`] for no runs, runs of different scenes, and where none gave way;
+/// [`PostError::Lacking`] for a run without a load; those of reading histories and manifests.
 pub fn read(paths: &[PathBuf], options: &Options) -> Result<Report> {
     let (paths, mut left_out) = histories(paths)?;
     let wall = options.wall.as_deref();

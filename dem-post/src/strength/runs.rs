@@ -74,11 +74,12 @@ pub struct Strength {
     pub early: bool,
 }
 
-/// The histories that `paths` name: files, and of the folders of sweeps the runs that are done; with the runs that are not.
+/// The histories that `paths` name: files, and of the folders of sweeps the runs that are done;
+/// with the runs that are not.
 ///
 /// # Errors
-/// [`PostError::Usage`] for no path at all, a folder without a manifest, and where no run is done; [`PostError::Sweep`]
-/// for a manifest that cannot be read.
+/// [`PostError::Usage`] for no path at all, a folder without a manifest, and where no run is done;
+/// [`PostError::Sweep`] for a manifest that cannot be read.
 pub fn histories(paths: &[PathBuf]) -> Result<(Vec<PathBuf>, Vec<LeftOut>)> {
     let (mut found, mut left_out) = (vec![], vec![]);
     for path in paths {
@@ -125,7 +126,8 @@ pub fn name(path: &Path) -> String {
 /// Reads where a run gave way; `wall` is the load wall, that of the scene where it is absent.
 ///
 /// # Errors
-/// [`PostError::Lacking`] for a run without a load, or without what the measure needs; those of reading it.
+/// [`PostError::Lacking`] for a run without a load, or without what the measure needs; those of
+/// reading it.
 pub fn read(path: &Path, measure: Measure, wall: Option<&str>) -> Result<Found> {
     let history = History::open(path)?;
     let bonds = history.bonds()?;
@@ -171,7 +173,8 @@ impl Course {
         }
     }
 
-    /// The course under the force on a grain, where the scene has one such force and no driven wall.
+    /// The course under the force on a grain, where the scene has one such force and no driven
+    /// wall.
     fn of_grain(history: &History) -> Result<Self> {
         let scene = serde_json::from_str::<Value>(&history.parameters()?.scene).unwrap_or_default();
         let loads: Vec<Load> = serde_json::from_value(scene["grains"]["loads"].clone()).unwrap_or_default();

@@ -4,10 +4,11 @@
 //!
 //! * titles and how often the history was written do not count;
 //! * `seed`, a sample's file and listed grains make the **sample**;
-//! * one is the **varied** field: the one that was asked for, or else the only one of the kind that comes first: what the
-//!   sample is (bonds, materials, its size), how it is loaded (walls, loads on grains), how it is computed (time, solver);
-//! * fields that have one value for each value of the varied one **move with it**, as a ramp that is scaled by the
-//!   cohesion does.
+//! * one is the **varied** field: the one that was asked for, or else the only one of the kind that
+//!   comes first: what the sample is (bonds, materials, its size), how it is loaded (walls, loads
+//!   on grains), how it is computed (time, solver);
+//! * fields that have one value for each value of the varied one **move with it**, as a ramp that
+//!   is scaled by the cohesion does.
 //!
 //! Any other difference makes them runs of different scenes, which are refused.
 
@@ -43,11 +44,12 @@ pub struct Design {
     pub samples: Vec<String>,
 }
 
-/// What runs with these names and scenes (JSON) vary; at least one run. `against` is the varied field where it is given.
+/// What runs with these names and scenes (JSON) vary; at least one run. `against` is the varied
+/// field where it is given.
 ///
 /// # Errors
-/// [`PostError::Usage`] where they are of different scenes, where two are the same, or where the field is not known or no
-/// number.
+/// [`PostError::Usage`] where they are of different scenes, where two are the same, or where the
+/// field is not known or no number.
 pub fn design(runs: &[(String, String)], against: Option<&str>) -> Result<Design> {
     let scenes = runs.iter().map(leaves).collect::<Result<Vec<Leaves>>>()?;
     let differing = differing(&scenes);
@@ -182,7 +184,8 @@ fn follows(scenes: &[Leaves], values: &[f64], name: &str) -> bool {
 /// What samples are sorted by: numbers before words.
 type Key = (u64, String);
 
-/// The name of a scene's sample, and what to sort it by; `fields` tell the samples apart, `varied` does not.
+/// The name of a scene's sample, and what to sort it by; `fields` tell the samples apart, `varied`
+/// does not.
 fn label(scene: &Leaves, fields: &[String], varied: &str) -> (Vec<Key>, String) {
     let value = |name: &str| scene.get(name).cloned().unwrap_or_default();
     let text = |name: &str| match value(name) {
@@ -209,7 +212,8 @@ fn list(names: &[String]) -> String {
     text
 }
 
-/// The unit of a field, as the scene's schema has it in parentheses; empty for a number without, or where it is unknown.
+/// The unit of a field, as the scene's schema has it in parentheses; empty for a number without, or
+/// where it is unknown.
 pub fn unit(field: &str) -> String {
     let root = json_schema();
     let mut forms = vec![root];

@@ -13,7 +13,8 @@ use crate::output::{Folder, PostError, Result, WriteError, progress};
 /// Writes the companions into `folder`, and their lengths into the report.
 ///
 /// # Errors
-/// [`PostError::Write`], [`PostError::Usage`] for a history that has the name of a companion, and those of reading it.
+/// [`PostError::Write`], [`PostError::Usage`] for a history that has the name of a companion, and
+/// those of reading it.
 pub fn write(history: &History, report: &mut Report, folder: &mut Folder, quiet: bool) -> Result<()> {
     let absolute = |path: &Path| path.canonicalize().map_err(|error| failed(path, &error));
     let source = absolute(history.path())?;

@@ -1,8 +1,8 @@
 //! Companions of a history: small files that map its data for viewers.
 //!
-//! ParaView and VTK read `grains.vtkhdf`, `contacts.vtkhdf` and `bonds.vtkhdf`, MDAnalysis reads `grains.h5md`. They hold
-//! links and virtual datasets that lead to the history by a path relative to themselves; almost nothing is copied
-//! (`docs/history.md` tells what, and how large it is).
+//! ParaView and VTK read `grains.vtkhdf`, `contacts.vtkhdf` and `bonds.vtkhdf`, MDAnalysis reads
+//! `grains.h5md`. They hold links and virtual datasets that lead to the history by a path relative
+//! to themselves; almost nothing is copied (`docs/history.md` tells what, and how large it is).
 
 use clap::Args;
 use dem_run::history::History;
@@ -20,11 +20,12 @@ mod outline;
 pub mod report;
 mod vtk;
 
-/// Small files that show the history in ParaView, VTK and MDAnalysis, and copy almost nothing of it.
+/// Small files that show the history in ParaView, VTK and MDAnalysis, and copy almost nothing of
+/// it.
 ///
-/// Grains, contacts and bonds over time as grains.vtkhdf, contacts.vtkhdf and bonds.vtkhdf (ParaView 5.13, VTK or
-/// pyvista), positions as grains.h5md (MDAnalysis). They lead to the history by a path relative to themselves:
-/// move them together. docs/history.md shows how to use them.
+/// Grains, contacts and bonds over time as grains.vtkhdf, contacts.vtkhdf and bonds.vtkhdf
+/// (ParaView 5.13, VTK or pyvista), positions as grains.h5md (MDAnalysis). They lead to the history
+/// by a path relative to themselves: move them together. docs/history.md shows how to use them.
 #[derive(Debug, Args)]
 pub struct Command {
     #[command(flatten)]

@@ -39,8 +39,8 @@ pub struct Mapped {
 /// Reads what there is to map; with a bar on a terminal unless `quiet`, here and below.
 ///
 /// # Errors
-/// [`PostError::Lacking`] for a history without frames, or one that was never closed and that viewers cannot open; those
-/// of reading it.
+/// [`PostError::Lacking`] for a history without frames, or one that was never closed and that
+/// viewers cannot open; those of reading it.
 pub fn read(history: &History, quiet: bool) -> Result<Report> {
     let lacking = |what: &str| PostError::Lacking { path: history.path().into(), what: what.into() };
     if history.open_ended() {

@@ -1,7 +1,9 @@
-//! Companions in VTK's HDF5 format, as poly data over time: grains as points, contacts and bonds as lines.
+//! Companions in VTK's HDF5 format, as poly data over time: grains as points, contacts and bonds as
+//! lines.
 //!
-//! VTK wants all frames of an array behind each other and, for each frame, where it begins. Positions of shape [T,N,D]
-//! are such an array of T N points, and the pairs of a frame are lines between them.
+//! VTK wants all frames of an array behind each other and, for each frame, where it begins.
+//! Positions of shape [T,N,D] are such an array of T N points, and the pairs of a frame are lines
+//! between them.
 
 use dem_run::history::History;
 use hdf5::{Group, H5Type, Hyperslab, SliceOrIndex};
@@ -50,8 +52,8 @@ impl<'a> Poly<'a> {
         Ok(Self { companion, root, steps, frames })
     }
 
-    /// Cells of `size` points each: frame k has `counts[k]`, and their points stand in `Connectivity` from `offsets[k]`
-    /// on. The group that takes `Connectivity` is returned.
+    /// Cells of `size` points each: frame k has `counts[k]`, and their points stand in
+    /// `Connectivity` from `offsets[k]` on. The group that takes `Connectivity` is returned.
     fn cells(&self, kind: &str, size: usize, counts: &[i64], offsets: &[i64]) -> hdf5::Result<Group> {
         let frames = [self.frames];
         for name in CELLS.iter().filter(|name| **name != kind) {
@@ -86,7 +88,8 @@ impl<'a> Poly<'a> {
     }
 }
 
-/// Arrays of points or cells; those that change begin at `offsets[k]` at frame k. What the history lacks is left out.
+/// Arrays of points or cells; those that change begin at `offsets[k]` at frame k. What the history
+/// lacks is left out.
 struct Data<'a> {
     companion: &'a Companion<'a>,
     values: Group,
@@ -161,11 +164,12 @@ pub(super) fn bonds(companion: &Companion, o: &Outline) -> hdf5::Result<()> {
     data.still("mean_diameter", "bonds/mean_diameter")
 }
 
-/// The contacts as lines between the centres of two grains, or from a grain's centre to where it touches a wall.
+/// The contacts as lines between the centres of two grains, or from a grain's centre to where it
+/// touches a wall.
 ///
-/// The points of a frame are the grains, mapped, and behind them the points on walls. These must be written, each frame
-/// with room for as many as the frame with the most, so that one mapping serves all frames; and so must the pairs,
-/// once for frames in a row that have the same.
+/// The points of a frame are the grains, mapped, and behind them the points on walls. These must be
+/// written, each frame with room for as many as the frame with the most, so that one mapping serves
+/// all frames; and so must the pairs, once for frames in a row that have the same.
 pub(super) fn contacts(companion: &Companion, history: &History, o: &Outline, bar: &ProgressBar) -> Result<(), Fault> {
     let (n, d) = (o.grains, o.dimension);
     let room = o.at_walls.iter().copied().max().unwrap_or(0) as usize;
@@ -234,7 +238,8 @@ fn write_lines(
     Ok(offsets)
 }
 
-/// The lines of one frame as pairs of points, and the points on walls, which come behind the grains.
+/// The lines of one frame as pairs of points, and the points on walls, which come behind the
+/// grains.
 fn lines(pairs: &[[i32; 2]], points: &[f64], o: &Outline) -> (Vec<i32>, Vec<f64>) {
     let (mut lines, mut at_walls) = (Vec::with_capacity(2 * pairs.len()), vec![]);
     for (&[i, j], point) in pairs.iter().zip(points.chunks_exact(o.dimension)) {

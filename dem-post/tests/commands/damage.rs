@@ -1,5 +1,5 @@
-//! Histories spoilt by one value each, given to every analysis: nothing panics, nothing is drawn from them, and
-//! `info --check` names the place.
+//! Histories spoilt by one value each, given to every analysis: nothing panics, nothing is drawn
+//! from them, and `info --check` names the place.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -118,8 +118,8 @@ fn writes(good: &Path) -> Vec<Command<'_>> {
     ]
 }
 
-/// Gives a spoilt history to every command, and lets those draw that find nothing wrong, where none does; which of them
-/// refused it.
+/// Gives a spoilt history to every command, and lets those draw that find nothing wrong, where none
+/// does; which of them refused it.
 fn tried(path: &Path, good: &Path, what: &str) -> Vec<&'static str> {
     let output = tempfile::tempdir().unwrap();
     let mut refused = vec![];
@@ -174,7 +174,8 @@ fn no_spoilt_value_makes_an_analysis_panic_or_pass_unseen() {
         drop(file);
         for (place, kind, shape) in kinds {
             for (k, (value, spoil)) in spoils(place, &kind).into_iter().enumerate() {
-                // half of the values in the plane and the others in space, the last and the first number in turn
+                // half of the values in the plane and the others in space, the last and the first
+                // number in turn
                 if place != "events/rupture" && (k % 2 == 1) != space {
                     continue;
                 }

@@ -69,8 +69,8 @@ fn tensor(d: usize, yy: f64) -> Vec<f64> {
     t
 }
 
-/// Load 1 N a step up to 100 N; the sample gives way by 1e-3 of its height a step from step 41 on; bond 0 breaks at
-/// step 30 and bond 1 at step 60.
+/// Load 1 N a step up to 100 N; the sample gives way by 1e-3 of its height a step from step 41 on;
+/// bond 0 breaks at step 30 and bond 1 at step 60.
 fn write(path: &Path, l: &Layout) {
     write_course(path, l, COURSE);
 }
@@ -428,7 +428,8 @@ fn wrong_files_are_refused() {
 fn cracks_are_lines_with_ends_and_fronts() {
     let (_folder, path) = sample(&layout(2));
     let found = json(&dem_post(&path, &["cracks", "--json"]));
-    // neighbouring bonds of a ring share the void in its middle: one crack of two facets of one diameter, at right angles
+    // neighbouring bonds of a ring share the void in its middle: one crack of two facets of one
+    // diameter, at right angles
     let cracks = found["cracks"].as_array().unwrap();
     assert_eq!(cracks.len(), 1);
     let number = |name: &str| cracks[0][name].as_f64().unwrap();

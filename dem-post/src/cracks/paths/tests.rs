@@ -85,7 +85,8 @@ fn close(a: f64, b: f64) -> bool {
 fn a_row_of_upright_bonds_is_one_straight_crack() {
     let sample = square(8, 4);
     let bonds = sample.crossing(0.0..13e-3, 2.5e-3..3.5e-3);
-    // seven bonds, the first at the edge of the sample: half a diameter outside, and a facet of one diameter each
+    // seven bonds, the first at the edge of the sample: half a diameter outside, and a facet of one
+    // diameter each
     assert_eq!(bonds.len(), 7);
     let paths = sample.paths(&one_a_step(&bonds));
     assert_eq!(paths.cracks.len(), 1);
