@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use crate::output::{Folder, PostError, Result, escaped, print};
 
-/// Files beyond which not all are named.
+/// Up to this number of files all are named on stderr.
 const MANY: usize = 24;
 
 /// An analysis as a command of `dem-post`. The type holds its options, and its doc comment is what
@@ -34,7 +34,7 @@ pub trait Analysis: Args {
     /// [`PostError::Lacking`], [`PostError::Usage`], and those of reading the input.
     fn read(&self, input: &Self::Input, quiet: bool) -> Result<Self::Report>;
 
-    /// The report for people.
+    /// The report as text.
     fn table(report: &Self::Report) -> String;
 
     /// The folder for the files; `None` for an analysis that writes none.
@@ -115,7 +115,7 @@ fn name_files(folder: &Folder) {
     if folder.removed() > 0 {
         note(&format!("removed {} files of the history that the folder belonged to", folder.removed()));
     }
-    // of a long series the first and the last say enough
+    // of a long series only the first and the last are named
     let written = folder.written();
     for (k, path) in written.iter().enumerate() {
         if written.len() <= MANY || k == 0 || k + 1 == written.len() {
@@ -126,7 +126,7 @@ fn name_files(folder: &Folder) {
     }
 }
 
-/// A line on stderr; one that nobody reads is no error.
+/// Prints a line on stderr; a closed stderr is no error.
 pub fn note(line: &str) {
     let _ = writeln!(std::io::stderr(), "{}", escaped(line));
 }

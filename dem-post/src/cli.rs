@@ -20,8 +20,7 @@ struct Cli {
 /// The analysis that the command line asks for, its options, and how its results are shown. Wrong
 /// usage ends the process.
 pub fn parse() -> (&'static Entry, ArgMatches, Shown) {
-    // the commands first: clap lists options in the order in which it is told of them, and these
-    // come last
+    // commands first: help lists options in the order of definition, and these come last
     let commands = ANALYSES.iter().map(|analysis| (analysis.command)());
     let mut matches = Cli::augment_args(Command::new("dem-post").subcommands(commands)).get_matches();
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());

@@ -1,8 +1,8 @@
 //! A series of pictures, one a frame, numbered for viewers and video encoders.
 //!
 //! All pictures have one scale, one part of the plane, the same even number of pixels and, where a
-//! colour or a width stands for a value, the same meaning of it. They are read, drawn and written
-//! one by one, so a long series needs no more memory than a short one.
+//! colour or a width shows a value, the same scale for it. They are read, drawn and written one by
+//! one, so a long series needs no more memory than a short one.
 
 use clap::{Args, ValueEnum};
 use dem_run::history::{BondStatus, History, RuptureMode};
@@ -92,8 +92,7 @@ pub struct Report {
     pub frames: Vec<usize>,
     /// Time of the first and of the last, s.
     pub span: [f64; 2],
-    /// What the scale is made for: mean force (N) or usual speed (m/s) of the frame where it is
-    /// greatest.
+    /// Reference of the scale: the greatest mean force (N) or usual speed (m/s) of all frames.
     pub scale: Option<f64>,
 }
 
@@ -108,7 +107,7 @@ pub fn read(history: &History, subject: Subject, every: usize, times: &[f64]) ->
     if every == 0 {
         return Err(PostError::Usage("--every 0: give 1 or more".into()));
     }
-    // says what is wrong with the times, or with a history without frames
+    // it reports wrong times and a history without frames
     let mut frames = moments::chosen(history, times)?;
     if times.is_empty() {
         let last = history.frames() - 1;
@@ -207,7 +206,7 @@ fn picture(history: &History, report: &Report, frame: usize) -> Result<(Panel, V
             panel.links = links(&contacts, &panel.grains.position, scale, history.dimension());
             panel.caption.push(format!("⟨f⟩ = {} N, the greatest mean of the series", short(scale)));
             if history.dimension() == 3 {
-                // they would hide the lines
+                // in 3D grains would hide the lines
                 panel.fills.clear();
             }
             force_legend(history.dimension())
@@ -237,7 +236,7 @@ fn bonds(history: &History, frame: usize, panel: &mut Panel) -> Result<Vec<Key>>
         pair.iter().for_each(|&grain| panel.fills[grain as usize] = RELEASED.into());
         let (from, to) = (centre(panel, pair[0]), centre(panel, pair[1]));
         let distance = from.iter().zip(&to).map(|(a, b)| (b - a).powi(2)).sum::<f64>().sqrt();
-        // a line across the sample between grains that went apart would say nothing
+        // no long line across the sample between grains that have moved apart
         if distance < 1.5 * bonds.mean_diameter[k] {
             panel.links.push(Link { from, to, width: CRACK, colour });
         }
@@ -250,7 +249,7 @@ fn bonds(history: &History, frame: usize, panel: &mut Panel) -> Result<Vec<Key>>
     if modes.twist > 0 {
         keys.push(Key::Line(colour::PURPLE, CRACK, "by twist".into()));
     }
-    // in space bonds lie behind each other, and behind grains
+    // in 3D bonds would hide each other and lie behind grains
     if d == 2 {
         let holding = |&(_, status): &(&[i32; 2], &BondStatus)| *status == BondStatus::Intact;
         let (width, colour) = (BOND, "#9a9a9a");

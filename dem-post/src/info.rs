@@ -98,8 +98,8 @@ pub struct Report {
     pub mass: f64,
     /// The walls: name, shape and drive.
     pub walls: Vec<[String; 3]>,
-    /// The wall that loads the sample; `None` where no wall is driven, or where several are and the
-    /// scene does not say which.
+    /// The wall that loads the sample; `None` where no wall is driven, or where several are driven
+    /// and the scene names none of them.
     pub load_wall: Option<String>,
     /// How many walls are driven.
     #[serde(skip)]
@@ -134,7 +134,7 @@ pub struct Report {
     pub kinetic_energy: Option<f64>,
     /// Energy dissipated by friction, J.
     pub friction: Option<f64>,
-    /// What the energy ledger leaves over, J.
+    /// Remainder of the energy balance, J.
     pub energy_remainder: Option<f64>,
     /// Names of everything observed.
     pub observables: Vec<String>,

@@ -2,9 +2,9 @@
 //! picture series, comparisons of two runs, strength over many, and reports; companions for
 //! viewers.
 //!
-//! Each analysis is a module with a [`analysis::Analysis`], and stands in [`ANALYSES`]. It has a
-//! function that reads a [`dem_run::history::History`] and returns a report, and a function that
-//! writes the report as CSV, SVG and PNG. Reports know nothing of files or drawings.
+//! Each analysis is a module with a [`analysis::Analysis`], and an entry of [`ANALYSES`]. Its
+//! functions read a [`dem_run::history::History`] into a report, and write the report as CSV, SVG
+//! and PNG. Reports know nothing of files or drawings.
 
 use analysis::Entry;
 

@@ -20,7 +20,7 @@ pub fn chosen(history: &History, times: &[f64]) -> Result<Vec<usize>> {
     };
     let mut frames = vec![];
     for &time in times {
-        // written so that NaN is refused too
+        // this form refuses NaN too
         if !(first..=last).contains(&time) {
             return Err(PostError::Usage(format!("--times {time}: the history runs from {first} s to {last} s")));
         }

@@ -1,5 +1,5 @@
-//! Copies of a history that take its place: compressed, to be kept, or plain, of a file whose run
-//! was killed.
+//! Copies that replace a history: compressed, for keeping, or plain, to repair the file of a killed
+//! run.
 
 use std::path::{Path, PathBuf};
 
@@ -47,7 +47,7 @@ impl Analysis for Command {
     }
 }
 
-/// What came of it.
+/// The copy that was made.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
     /// The copy.
@@ -74,7 +74,7 @@ impl Report {
     }
 }
 
-/// Copies `history` to `path`, its own place too, with a bar unless `quiet`.
+/// Copies `history` to `path`, which may be its own, with a bar unless `quiet`.
 ///
 /// # Errors
 /// A history that is being written or damaged, a disk without room; `path` is then as it was.

@@ -7,14 +7,14 @@ use dem_run::plot::{Chart, Drawing};
 
 use crate::output::{PostError, Result};
 
-/// Width and height of a chart: small, so that its text is still read on a narrow screen.
+/// Width and height of a chart: small, so that its text stays legible on a narrow screen.
 const CHART: (f64, f64) = (500.0, 400.0);
 /// Pixels of a map per unit of its drawing.
 const PIXELS: f32 = 2.0;
 
 /// The report of an analysis that has a section of the page.
 pub trait OnPage {
-    /// Where links to the section lead.
+    /// Anchor of the section in the page.
     const ID: &'static str;
     /// Its head.
     const TITLE: &'static str;
@@ -29,11 +29,11 @@ pub trait OnPage {
 /// A part of the page with a head of its own.
 #[derive(Default)]
 pub struct Section {
-    /// Where links to it lead.
+    /// Its anchor in the page.
     pub id: &'static str,
     /// Its head.
     pub title: &'static str,
-    /// What there is to know before reading on.
+    /// Its first paragraph.
     pub text: String,
     /// Names and values.
     pub facts: Vec<(String, String)>,
@@ -80,7 +80,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// A table from what the terminal shows.
+    /// A table with the cells of a table on the terminal.
     pub fn new(caption: &str, head: &[&str], rows: Vec<Vec<String>>) -> Self {
         Self { caption: caption.into(), head: head.iter().map(ToString::to_string).collect(), rows }
     }

@@ -14,15 +14,15 @@
 //! Only a plane that moves along its normal has a section: of a round loader no stress or strain is
 //! reported from the walls.
 //!
-//! **The load** is the prescribed force, or, where the motion is prescribed, what the wall took
-//! against the grains before any bond broke in the step (`wall_force_at_limit`; of histories
-//! without it `wall_force`, what was left after the breaks).
+//! **The load** is the prescribed force, or, where the motion is prescribed, the force of the wall
+//! on the grains before any bond broke in the step (`wall_force_at_limit`; in histories without it
+//! `wall_force`, the force after the breaks).
 //!
 //! **Collapse load** (under an ever-growing force there is no peak): the load at the last step
 //! before the strain fitted to the grains exceeds 1e-4; also reported at 1e-3. There is none where
-//! none acted in that step, nor where elastic bonds strained so before any broke. Of rigid bonds
-//! that join all grains to one piece, none of which has broken by then, the strain is the solver's,
-//! and the load says nothing: the tables say so, and the drawings leave it out.
+//! no load acted in that step, nor where elastic bonds reached that strain before any broke. If
+//! rigid bonds join all grains to one piece and none has broken by then, the strain is solver error
+//! and the load is meaningless: the tables note this, and the drawings leave the load out.
 
 use std::path::Path;
 
@@ -85,7 +85,7 @@ impl Analysis for Command {
     }
 }
 
-/// The numbers that the analysis ends with. `None`: it did not happen, or was not recorded.
+/// The results in numbers. `None`: it did not happen, or was not recorded.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Summary {
     /// The load wall.
@@ -105,7 +105,7 @@ pub struct Summary {
     pub collapse_load_1e3: Option<f64>,
     /// Whether no rigid bond had broken by each of the two.
     pub collapse_early: [bool; 2],
-    /// What there is to know of each of the two, or why there is none.
+    /// A caveat on each of the two, or the reason why there is none.
     #[serde(skip)]
     pub collapse_note: [&'static str; 2],
     /// Load when 5 % of the bonds have broken, N.
@@ -130,7 +130,7 @@ pub struct Summary {
     pub bonds_broken: Option<f64>,
     /// Mean cohesion of the bonds, N.
     pub cohesion: Option<f64>,
-    /// Collapse load over cohesion; none where it is the solver's own.
+    /// Collapse load over cohesion; `None` where the strain is solver error.
     pub collapse_over_cohesion: Option<f64>,
     /// Greatest residual that was accepted.
     pub worst_residual: Option<f64>,
@@ -173,7 +173,7 @@ pub struct Report {
 /// # Errors
 /// [`PostError::Lacking`] for a scene without a driven wall or without its force and place at every
 /// step; [`PostError::Usage`] for a wall that is none, or where several are driven and the scene
-/// does not say which is the load wall.
+/// names none of them as the load wall.
 pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
     let walls = history.walls()?;
     let scene = history.parameters()?.scene;
@@ -535,8 +535,8 @@ pub fn force_displacement(report: &Report) -> Chart {
     chart
 }
 
-/// The load over the logarithm of the fitted strain, which shows how little the sample gives way
-/// before it collapses.
+/// The load over the logarithm of the fitted strain: it shows how little the sample deforms before
+/// it collapses.
 pub fn onset(report: &Report) -> Option<Chart> {
     let visible = |&(strain, _): &(f64, f64)| strain >= LEAST_STRAIN;
     let points: Vec<(f64, f64)> =

@@ -1,11 +1,11 @@
-//! Velocity field: how fast and which way the grains move, at some moments.
+//! Velocity field: speeds and directions of the grains, at some moments.
 //!
-//! The map fills each grain with the colour of its speed, over the speed v that all but one in a
-//! hundred grains of the panel stay below: speeds grow by orders of magnitude in a collapse, and
-//! one scale would leave all but one panel dark. Arrows show the mean velocity of the grains whose
-//! centres lie in the same square of a grid, so that they can be told apart in a large sample too;
-//! they begin in the middle of these centres; the longest of a panel is as long as a square is
-//! wide. So both compare grains of one panel; the captions compare panels.
+//! The map fills each grain with the colour of its speed, relative to the speed v that 99 % of the
+//! grains of the panel do not exceed. Each panel has its own v: speeds grow by orders of magnitude
+//! in a collapse, and one scale would leave all but one panel dark. Arrows show the mean velocity
+//! of the grains in each square of a grid, so that a large sample stays legible. An arrow begins at
+//! the mean of the centres; the longest of a panel is as long as a square is wide. So colours and
+//! arrows compare grains within one panel; the captions compare panels.
 
 use clap::Args;
 use dem_run::history::{GrainState, History};
@@ -22,8 +22,8 @@ use dem_run::row;
 
 /// Squares of the grid along the longer side of the sample.
 const SQUARES: f64 = 18.0;
-/// Share of the speeds that the scale of colours covers, so that one grain thrown off does not make
-/// all others equal.
+/// Share of the speeds that the colour scale covers, so that one ejected grain does not set the
+/// scale.
 const COVERED: f64 = 0.99;
 
 /// Maps and table of the velocities.
@@ -135,7 +135,7 @@ pub fn speeds(state: &GrainState, d: usize) -> Vec<f64> {
     state.velocity.chunks(d).map(|v| v.iter().map(|x| x * x).sum::<f64>().sqrt()).collect()
 }
 
-/// The speed (m/s) that all but one in a hundred stay below; zero of none.
+/// The speed (m/s) that 99 % do not exceed; 0 without grains.
 pub fn usual_speed(mut speeds: Vec<f64>) -> f64 {
     speeds.sort_by(f64::total_cmp);
     let place = (COVERED * speeds.len() as f64).ceil() as usize;
@@ -204,7 +204,7 @@ pub fn write(history: &History, report: &Report, folder: &mut Folder) -> Result<
 /// Those of reading the history.
 pub fn map(history: &History, report: &Report) -> Result<Drawing> {
     let scale = |title: &str, high: f64| Scale { title: title.into(), low: 0.0, high, ramp: Ramp::Areas };
-    // of spheres the arrows of a square would be those of all depths
+    // in 3D the arrow of a square would be a mean over all depths
     let flat = history.dimension() == 2;
     let mut panels = vec![];
     for field in &report.fields {

@@ -12,8 +12,8 @@
 //! The paper searches from grain to grain. Here each grain has two ends, one on either side of its
 //! direction, and at most one link at each: links are taken in the order of their normal force, the
 //! greatest first, where both ends are still free. So chains share no grain, and do not depend on
-//! where a search begins; where one forks, it follows the greater force. A closed ring is possible,
-//! and is told as a chain that begins at its first grain.
+//! where a search begins; where one forks, it follows the greater force. A closed ring is possible;
+//! it is reported as a chain that begins at its first grain.
 //!
 //! Chains in **tension** are the same with all signs turned.
 
@@ -27,7 +27,7 @@ const COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// Least number of grains.
 const LEAST: usize = 3;
 
-/// Which sign of the stress makes a chain.
+/// The sign of the stress in a chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
@@ -67,7 +67,7 @@ pub struct Chains {
     pub share: f64,
 }
 
-/// A link that may be taken.
+/// A candidate for a link.
 struct Link {
     grains: [usize; 2],
     /// The end of each grain: 0 against its direction, 1 along it.

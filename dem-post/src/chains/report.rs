@@ -9,7 +9,7 @@ use super::stress::{grain_stress, thickness};
 use crate::moments;
 use crate::output::{PostError, Result, Text, number};
 
-/// A contact carries a force if it has this share of the greatest.
+/// A contact carries a force if it has at least this share of the greatest.
 pub(super) const CARRIES: f64 = 1e-9;
 /// Width of a bin of |f|/⟨f⟩, and the least number of forces in one.
 const BIN: f64 = 0.25;
@@ -27,7 +27,7 @@ pub const CHAIN_HEAD: [&str; 8] = [
     "mean load (kPa)",
 ];
 
-/// What the forces of one moment are like.
+/// Statistics of the forces at one moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Statistics {
     /// Contacts that carry a force.
@@ -80,7 +80,7 @@ pub struct Network {
     pub step: i64,
     /// Its time, s.
     pub time: f64,
-    /// What its forces are like.
+    /// Statistics of its forces.
     #[serde(flatten)]
     pub statistics: Statistics,
     /// Density of |r_n|/⟨f⟩ in bins: (middle of the bin, density).
@@ -122,7 +122,7 @@ pub fn read(history: &History, times: &[f64]) -> Result<Report> {
     Ok(Report { networks })
 }
 
-/// That the history holds the reactions of its contacts.
+/// Refuses a history without the reactions of its contacts.
 ///
 /// # Errors
 /// [`PostError::Lacking`] where its scene left them out.
@@ -154,8 +154,8 @@ fn network(history: &History, frame: usize) -> Result<Network> {
     })
 }
 
-/// Normal force of each contact, N, positive in compression; zero where it is nothing beside the
-/// tangential ones, which is what the solver leaves of it.
+/// Normal force of each contact, N, positive in compression; zero where it is negligible beside the
+/// greatest tangential force, that is, solver error.
 pub fn normal_forces(contacts: &ContactRows) -> Vec<f64> {
     let greatest = (0..contacts.len()).map(|c| contacts.tangential_force(c)).fold(0.0, f64::max);
     let force = |c| Some(contacts.normal_force(c)).filter(|f| f.abs() > CARRIES * greatest).unwrap_or(0.0);
@@ -193,7 +193,7 @@ fn carried(forces: &[f64]) -> Vec<f64> {
     forces.iter().map(|f| f.abs()).filter(|&f| f > CARRIES * greatest).collect()
 }
 
-/// What `forces` (N, positive in compression) are like; all zero where none is.
+/// Statistics of `forces` (N, positive in compression); all zero without forces.
 pub fn statistics(forces: &[f64]) -> Statistics {
     let carried = carried(forces);
     if carried.is_empty() {
@@ -213,7 +213,7 @@ pub fn statistics(forces: &[f64]) -> Statistics {
         greatest_compression,
         greatest_tension,
         strong: strong.len(),
-        // the sum of nothing is −0.0, which would be printed so
+        // an empty sum is −0.0 and would be printed with its sign
         strong_share: (0.0 + strong.iter().sum::<f64>()) / sum,
         spread: variance.sqrt() / mean,
     }
@@ -232,7 +232,7 @@ pub fn distribution(forces: &[f64], mean: f64) -> Vec<(f64, f64)> {
     while let Some(last) = rest.last() {
         let enough = rest[rest.len().min(LEAST) - 1];
         let mut high = low + BIN * ((enough - low) / BIN).floor() + BIN;
-        // what would be left over is too little for a bin of its own
+        // too few forces would be left for a bin of their own
         if rest.len() - rest.partition_point(|&ratio| ratio < high) < LEAST {
             high = low + BIN * ((last - low) / BIN).floor() + BIN;
         }
@@ -305,8 +305,7 @@ mod tests {
 
     #[test]
     fn statistics_of_known_forces() {
-        // |f| = 1, 1, 2, 4: mean 2, strong is the 4 alone; the zero and the rounding error carry
-        // nothing
+        // |f| = 1, 1, 2, 4: mean 2, strong is the 4 alone; the zero and the round-off carry nothing
         let s = statistics(&[1.0, -1.0, 2.0, -4.0, 0.0, 1e-12]);
         assert_eq!((s.contacts, s.in_tension, s.strong), (4, 2, 1));
         assert_eq!((s.mean, s.greatest_compression, s.greatest_tension), (2.0, 2.0, 4.0));

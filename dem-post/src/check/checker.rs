@@ -8,16 +8,16 @@ use indicatif::ProgressBar;
 
 use super::report::{Report, Violation};
 
-/// Violations that are told of one place; the others are counted.
+/// Violations of one place that are listed; the others are counted.
 pub(super) const MANY: usize = 10;
-/// Numbers that are read at once.
+/// Numbers read at once.
 const BLOCK: usize = 1 << 20;
 
 /// A history under examination.
 pub(super) struct Checker {
     pub file: File,
     pub sizes: Sizes,
-    /// Whether a whole checkpoint stands in it.
+    /// Whether it holds a complete checkpoint.
     pub resumable: bool,
     pub report: Report,
     /// Datasets of the type and shape that the layout promises, with the rows that are complete and
@@ -52,7 +52,7 @@ impl Checker {
     }
 
     pub fn has(&self, place: &str) -> bool {
-        // HDF5 asks of every group on the way
+        // HDF5 needs every group of the path to exist
         let parts: Vec<&str> = place.split('/').collect();
         (1..=parts.len()).all(|k| self.file.link_exists(&parts[..k].join("/")))
     }

@@ -1,8 +1,8 @@
 //! Whether a history is what its layout promises: `dem-post info --check`.
 //!
-//! First every dataset by its name, type, shape and unit, then what stands in them, block by block,
-//! so that memory does not grow with the file. Nothing is believed that the checks before did not
-//! find: a dataset of another shape is named once and not read.
+//! First every dataset is checked by name, type, shape and unit, then its content, block by block,
+//! so that memory does not grow with the file. Later checks rely only on what earlier ones found
+//! sound: a dataset of another shape is reported once and not read.
 
 use std::collections::BTreeMap;
 
@@ -22,7 +22,7 @@ mod schema;
 ///
 /// # Errors
 /// [`crate::output::PostError::Write`] where the file cannot be opened once more. What is wrong in
-/// the file is told in the report.
+/// the file is listed in the report.
 pub fn read(history: &History, quiet: bool) -> Result<Report> {
     let mode = if history.open_ended() { OpenMode::ReadSWMR } else { OpenMode::Read };
     let file = File::open_as(history.path(), mode)

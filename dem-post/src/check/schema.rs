@@ -1,4 +1,4 @@
-//! What the layout promises of names, types, shapes and units.
+//! Checks names, types, shapes and units against the layout.
 
 use dem_run::history::{BondStatus, ContactStatus, ROUTE, RuptureMode, SolverRoute, WallDrive, WallKind};
 use hdf5::Attribute;
@@ -19,8 +19,8 @@ const TEXT: TypeDescriptor = TypeDescriptor::VarLenUnicode;
 pub(super) const RUPTURE: [&str; 16] =
     ["step", "time", "x", "y", "z", "rn", "rt", "m", "twist", "energy", "round", "bond", "i", "j", "mode", "pad"];
 
-/// Checks names, types, shapes and units; what is as promised is put down as sound, to be read
-/// afterwards.
+/// Checks names, types, shapes and units; datasets as promised are marked as sound, and their
+/// content is checked afterwards.
 pub(super) fn check(c: &mut Checker) {
     identity(c);
     commit(c);
@@ -82,7 +82,7 @@ fn name(kind: &TypeDescriptor) -> String {
 }
 
 impl Checker {
-    /// Checks a dataset of `rows` complete rows (more may stand behind them), each of shape `row`.
+    /// Checks a dataset of `rows` complete rows (more may follow), each of shape `row`.
     fn table(&mut self, place: &str, kind: &TypeDescriptor, rows: usize, row: &[usize], unit: &str) {
         let Some(found) = self.typed(place, kind) else { return };
         let shape_fits = found.first().is_some_and(|&count| count >= rows) && found[1..] == *row;
@@ -138,13 +138,13 @@ impl Checker {
         self.table(&format!("{place}/time"), &F64, t, &[], "s");
     }
 
-    /// Complete rows that the last frame vouches for.
+    /// Complete rows according to the last frame.
     fn complete(&mut self, place: &str) -> usize {
         let Some(last) = self.sizes.t.checked_sub(1) else { return 0 };
         self.rows::<u64>(place, last..last + 1).and_then(|rows| rows.first().copied()).unwrap_or(0) as usize
     }
 
-    /// The length of a list whose length nothing else tells.
+    /// The length of a list that only its own shape gives.
     fn count(&mut self, place: &str) -> usize {
         self.dataset(place).and_then(|dataset| dataset.shape().first().copied()).unwrap_or(0)
     }
@@ -304,8 +304,7 @@ fn contacts(c: &mut Checker) {
     if bonded {
         c.table("contacts/bond", &I32, m, &[], "");
     }
-    // a history may do without reactions (`output.reactions`): then it has none of what belongs to
-    // them
+    // a history may do without reactions (`output.reactions`): then it has none of their datasets
     if ["reaction", "tangent", "moment"].iter().any(|name| c.has(&format!("contacts/{name}"))) {
         reactions(c, &real);
     }
@@ -359,8 +358,8 @@ fn observables(c: &mut Checker) {
     }
 }
 
-/// The two slots of the state from which the run goes on. What stands in them vouches for itself by
-/// a sum: one of them may be torn, of a run that was killed while it wrote it.
+/// The two slots of the state from which the run goes on. A checksum guards the content: one slot
+/// may be incomplete, if the run was killed while writing it.
 fn checkpoint(c: &mut Checker) {
     c.table("checkpoint/index", &U64, 2, &[4], "");
     for slot in 0..2 {
@@ -368,7 +367,7 @@ fn checkpoint(c: &mut Checker) {
             let place = format!("checkpoint/{name}_{slot}");
             let rows = c.count(&place);
             c.table(&place, kind, rows, &[], "");
-            // they are read by their sum, not one by one
+            // the checksum covers them, they are not read one by one
             c.sound.remove(&place);
         }
     }

@@ -2,12 +2,12 @@
 //!
 //! * **Frames** are compared at equal times. The distance of two frames is the greatest distance of
 //!   a grain's centres in the two, over the grain's radius. They differ if it exceeds the
-//!   tolerance, which is zero unless told otherwise: equal then means equal in every bit.
+//!   tolerance, by default zero: equal then means equal in every bit.
 //! * **Bonds** are known by their two grains. Events are compared in their order: the first that
 //!   differs is the first place at which the two lists have another bond or another mode.
 //!
-//! Grains are compared by number, so the two samples must have equally many; that they are the same
-//! sample otherwise is not required, but told.
+//! Grains are compared by number, so the two samples must have equally many. Other differences of
+//! the samples are allowed and reported.
 
 use std::path::PathBuf;
 

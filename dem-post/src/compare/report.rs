@@ -30,7 +30,7 @@ pub struct Gap {
     pub rms: f64,
 }
 
-/// A break, as it is compared.
+/// A break, reduced to what is compared.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Break {
     /// Time, s.
@@ -95,7 +95,7 @@ pub struct Report {
     pub broken: [usize; 3],
     /// The first place at which the lists of breaks differ; `None` if they are alike.
     pub parting: Option<Parting>,
-    /// What became of each bond that broke.
+    /// For each bond that broke: its break in each run.
     #[serde(skip)]
     pub fates: Vec<Fate>,
     /// The breaks of the two runs in order.

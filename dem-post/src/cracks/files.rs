@@ -16,10 +16,10 @@ use dem_run::row;
 /// `broken`, `fragments`, `fragment-map` and `decohesion`, of spheres also `decohesion-inside`;
 /// that list and these maps show the moments nearest to `times` (s), or chosen ones. Where cracks
 /// were found, also `cracks.csv`, `crack-growth.csv`, and the drawings `cracks` and, where one grew
-/// step by step or round by round, `crack-front`; in the plane `crack-segments.csv`,
-/// `crack-front.csv` and, where the cracks fill a small part of the sample, the drawing
-/// `cracks-near`; in space `crack-facets.csv`, their corners in `crack-facets.vtk`, and the
-/// drawings `cracks-along-y` and `cracks-along-x`.
+/// step by step or round by round, `crack-front`; in 2D `crack-segments.csv`, `crack-front.csv`
+/// and, where the cracks fill a small part of the sample, the drawing `cracks-near`; in 3D
+/// `crack-facets.csv`, their corners in `crack-facets.vtk`, and the drawings `cracks-along-y` and
+/// `cracks-along-x`.
 ///
 /// # Errors
 /// [`crate::output::PostError::Write`], and [`crate::output::PostError::Usage`] for times outside

@@ -1,8 +1,8 @@
 //! Cracks: the bonds that broke, when, where and how; the lines they make, how these grow, and what
 //! they leave of the sample.
 //!
-//! What a crack, its path and its front are: [`paths`] and [`front`] in the plane; in space a crack
-//! is a surface, [`surfaces`].
+//! What a crack, its path and its front are: [`paths`] and [`front`] in 2D; in 3D a crack is a
+//! surface, [`surfaces`].
 
 use clap::Args;
 use dem_run::history::History;

@@ -3,7 +3,7 @@
 use dem_run::history::RuptureMode;
 use serde::Serialize;
 
-/// A number for each way to break.
+/// A number for each mode of rupture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Modes {
     /// In tension.

@@ -1,8 +1,7 @@
-//! Cracks as lines, in the plane: segments of broken bonds, joined through the voids between the
-//! grains.
+//! Cracks as lines, in 2D: segments of broken bonds, joined through the voids between the grains.
 //!
-//! All places are those of the first frame: where the crack runs in the sample as it was cemented,
-//! whatever the pieces did afterwards.
+//! All positions are those of the first frame: the crack is shown in the sample as it was cemented,
+//! whatever the fragments did afterwards.
 //!
 //! * **Segment** of a broken bond: from the middle of the void on its one side over its point of
 //!   contact to the middle of the void on its other side (the dual edge of the bond). Between equal
@@ -12,9 +11,9 @@
 //!   diameter from the point of contact, perpendicular to the bond.
 //! * **Crack**: segments that meet in a void. Two broken bonds of one grain with an intact bond
 //!   between them on either side do not meet: the material between them holds.
-//! * **Path** of a crack: the longest of the shortest ways through it, over all pairs of its voids
-//!   and free ends; of equally long ones the one whose ends are farthest apart. Branches count in
-//!   the length of the crack, not in that of its path.
+//! * **Path** of a crack: the longest of the shortest paths through it, over all pairs of its voids
+//!   and free ends; among paths of equal length the one whose ends are farthest apart. Branches
+//!   count in the length of the crack, not in that of its path.
 //! * **Orientation**: of the line between the ends of the path, from 0° to 180°, counter-clockwise
 //!   from the first axis. **Tortuosity**: length of the path over the distance of its ends, at
 //!   least 1.
@@ -31,9 +30,9 @@ use super::voids::Voids;
 /// A broken bond as a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Segment {
-    /// Its place in the list of ruptures.
+    /// Its index in the list of ruptures.
     pub event: usize,
-    /// Its ends in the graph of cracks: voids, and after them the free ends.
+    /// Its two nodes in the graph of cracks: voids, numbered first, or free ends.
     pub(super) nodes: [usize; 2],
     /// From the left of the bond over its point of contact to the right, m.
     pub line: [[f64; 2]; 3],

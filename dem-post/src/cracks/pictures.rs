@@ -19,7 +19,8 @@ const RELEASED: &str = "#ffffff";
 const OUTLINE: &str = "#404040";
 /// Fill and outline of grains under cracks.
 const PALE: [&str; 2] = ["#f0f0f0", "#cfcfcf"];
-/// Fills of the heaviest fragments: colours that the colour-blind tell apart (Okabe & Ito 2008).
+/// Fills of the heaviest fragments: colours that colour-blind readers distinguish (Okabe & Ito
+/// 2008).
 const FRAGMENTS: [&str; 6] = ["#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#f0e442", "#d55e00"];
 /// Widths of a segment on the path of its crack and of another.
 const WIDTHS: [f64; 2] = [3.2, 1.8];
@@ -70,7 +71,7 @@ pub fn fragment_charts(pieces: &[Pieces]) -> Vec<Chart> {
 pub fn front_charts(report: &Report) -> Vec<Chart> {
     let mut over_time = Chart::new("time (s)", "place of the tips along the crack (mm)");
     over_time.set_off = true;
-    // what broke at once has no way over time
+    // a crack whose bonds all broke at one time has no curve over time
     let grown = |crack: &&Crack| crack.first < crack.last;
     for crack in report.cracks.iter().filter(grown).take(FRONTS) {
         let rows = || report.fronts.iter().filter(|row| row.crack == crack.number);
@@ -181,7 +182,7 @@ fn pale_panel(history: &History, report: &Report, cracks: usize) -> Result<Panel
     })
 }
 
-/// The facets of cracks in space, coloured by the time at which each bond broke, or by the round of
+/// The facets of cracks in 3D, coloured by the time at which each bond broke, or by the round of
 /// the cascade where all broke in one step: in perspective, and over the grains of the first frame
 /// along y and against x.
 ///
@@ -237,8 +238,8 @@ fn filled_panel(history: &History, frame: usize, fills: Vec<Colour>, what: Strin
     })
 }
 
-/// The pieces of a sample at some frames, of which `lists` has one by one: the heaviest in colours
-/// of their own, in the order of their masses.
+/// The fragments of a sample at some frames, listed in `lists` frame by frame: the heaviest in
+/// colours of their own, in the order of their masses.
 ///
 /// # Errors
 /// Those of reading the history.

@@ -12,7 +12,7 @@ use crate::output::{PostError, Result, Text, facts, number, progress, quantity};
 
 /// Events that the table on the terminal shows; the CSV has them all.
 const SHOWN: usize = 12;
-/// Cracks that it shows.
+/// Cracks that the table on the terminal shows.
 const CRACKS: usize = 6;
 
 /// The columns of the table of cracks.
@@ -29,7 +29,7 @@ pub const CRACK_HEAD: [&str; 10] = [
     "last (s)",
 ];
 
-/// The columns of the table of cracks in space.
+/// The columns of the table of cracks in 3D.
 pub const SURFACE_HEAD: [&str; 9] =
     ["crack", "bonds", "T/S/R/Tw", "area (mm²)", "extent (mm)", "normal", "flatness", "first (s)", "last (s)"];
 
@@ -45,7 +45,7 @@ pub struct Pieces {
     pub fragments: Fragments,
 }
 
-/// A rupture, as it is listed.
+/// A rupture in the list.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Event {
     /// Step.
@@ -89,9 +89,9 @@ pub struct Report {
     pub events: Vec<Event>,
     /// The pieces, frame by frame.
     pub fragments: Vec<Pieces>,
-    /// The cracks of a plane sample, the longest first.
+    /// The cracks in 2D, the longest first.
     pub cracks: Vec<Crack>,
-    /// The cracks in space, the largest first.
+    /// The cracks in 3D, the largest first.
     pub surfaces: Vec<Surface>,
     /// How they grew, crack by crack.
     pub fronts: Vec<Front>,
@@ -159,7 +159,7 @@ pub fn read(history: &History, quiet: bool) -> Result<Report> {
 }
 
 impl Event {
-    /// The place of its mode among [`RuptureMode::ALL`].
+    /// The index of its mode in [`RuptureMode::ALL`].
     pub fn mode_number(&self) -> usize {
         RuptureMode::ALL.iter().position(|mode| mode.label() == self.mode).unwrap_or(0)
     }

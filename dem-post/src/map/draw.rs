@@ -17,9 +17,9 @@ const MARGIN: f64 = 14.0;
 /// Height of a panel's caption, and of one row of the legend.
 const CAPTION: f64 = 44.0;
 const LEGEND: f64 = 30.0;
-/// Width of a panel where panels stand above each other: samples that are much wider than high.
+/// Width of a panel where panels are stacked: samples that are much wider than high.
 const WIDE: f64 = 860.0;
-/// Width over height of a sample from which on panels stand above each other.
+/// Width over height of a sample from which on panels are stacked.
 const STACKED: f64 = 1.6;
 /// The size of a sheet is a multiple of this, so that its PNG has an even number of pixels: video
 /// encoders ask for that.
@@ -57,7 +57,7 @@ pub fn draw(sample: &Sample, panels: &[Panel], legend: &[Key]) -> Drawing {
     draw_view(sample, view, panels, legend)
 }
 
-/// As [`draw`], of a given part of the plane.
+/// As [`draw`], for a given part of the plane.
 pub fn draw_view(sample: &Sample, View([low, high]): View, panels: &[Panel], legend: &[Key]) -> Drawing {
     let extent = [high[0] - low[0], high[1] - low[1]];
     let stacked = extent[0] > STACKED * extent[1];
@@ -185,7 +185,7 @@ fn draw_wall(canvas: &mut Canvas, sample: &Sample, wall: &Wall, position: &[f64]
             return draw_plate(canvas, place, wall, position, frame, true);
         }
         let normal = sample.flat(&wall.normal[..sample.dimension]);
-        // a plane that faces the reader has no line
+        // a plane parallel to the sheet has no line
         if normal[0].hypot(normal[1]) > 1e-6 {
             draw_plane(canvas, point, normal, frame);
         }

@@ -1,4 +1,4 @@
-//! What stands below a map: the bar of length, and the legend in rows.
+//! Below a map: the bar of length, and the legend in rows.
 
 use super::arrow::draw_arrow;
 use super::scale::Scale;
@@ -25,7 +25,7 @@ pub enum Key {
 
 /// A bar of a round length that begins at a point, at most a third of the panel wide.
 pub(super) fn scale_bar(canvas: &mut Canvas, (x, y): (f64, f64), scale: f64, width: f64) {
-    // beside a narrow panel the sheet has room
+    // beside a narrow panel the sheet has free space
     let longest = (width / 3.0).max(BAR / 2.0) / scale;
     let power = 10f64.powf(longest.log10().floor());
     let length = [5.0, 2.0, 1.0].into_iter().map(|m| m * power).find(|l| *l <= longest).unwrap_or(power);

@@ -25,7 +25,7 @@ pub struct Panel {
     pub patches: Vec<Patch>,
 }
 
-/// A flat polygon in space.
+/// A flat polygon in 3D.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Patch {
     /// Its corners, m.

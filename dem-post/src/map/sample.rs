@@ -1,5 +1,5 @@
-//! A sample as maps show it: its grains and walls, from where they are seen, and the part of the
-//! plane that is drawn.
+//! A sample as maps show it: its grains and walls, the viewpoint, and the part of the plane that is
+//! drawn.
 
 use dem_run::history::{GrainState, Grains, History, Wall, WallKind, WallState};
 
@@ -7,10 +7,10 @@ use super::boxes::{Box2, EMPTY, EVERYWHERE, around, union};
 use super::eye::{Eye, Place};
 use crate::output::Result;
 
-/// Share of the sample below which a part is worth a picture of its own.
+/// A part of the sample smaller than this share gets a picture of its own.
 const SMALL: f64 = 0.25;
 
-/// What all panels share: the grains' sizes, the walls, and from where they are seen.
+/// What all panels share: the grains' sizes, the walls, and the viewpoint.
 pub struct Sample {
     pub(super) radius: Vec<f64>,
     pub(super) walls: Vec<Wall>,
@@ -18,7 +18,8 @@ pub struct Sample {
     pub(super) eye: Eye,
     /// Depth of the plane that cuts the spheres open, m, where one does.
     slice: Option<f64>,
-    /// Corners of what may be shown, m: the first frame and as much again around it.
+    /// Corners of the greatest part that is shown, m: the first frame with a margin of half its
+    /// size.
     limits: Box2,
 }
 
@@ -123,13 +124,13 @@ impl Sample {
         found
     }
 
-    /// What shows all of `states`, for drawings that must be alike.
+    /// The part that contains all of `states`, for drawings on one scale.
     pub fn view<'a>(&self, states: impl Iterator<Item = (&'a GrainState, &'a WallState)>) -> View {
         View(states.fold(EMPTY, |all, (grains, walls)| union(all, self.extent(grains, walls))))
     }
 
-    /// What shows `points` (m, D numbers each) and as much again around them, at least five mean
-    /// diameters; `None` if that is no small part of the sample.
+    /// The part that contains `points` (m, D numbers each) with a margin, at least five mean
+    /// diameters wide; `None` if that is no small part of the sample.
     pub fn near<'a>(&self, points: impl Iterator<Item = &'a [f64]>, all: View) -> Option<View> {
         let [low, high] = points.fold(EMPTY, |found, point| union(found, around(self.flat(point), 0.0)));
         let diameter = 2.0 * self.radius.iter().sum::<f64>() / self.radius.len() as f64;
@@ -143,7 +144,7 @@ impl Sample {
     fn extent(&self, grains: &GrainState, walls: &WallState) -> Box2 {
         let mut found = self.bounds(grains, self.limits);
         if found == EMPTY {
-            // all have left together, as a disk on an incline does
+            // all grains have left, as a disk on an incline does
             found = self.bounds(grains, EVERYWHERE);
         }
         for (wall, position) in self.walls.iter().zip(walls.position.chunks(self.dimension)) {

@@ -1,4 +1,4 @@
-//! Colours that stand for a value.
+//! Colour scales: colours that show a value.
 
 use std::borrow::Cow;
 
@@ -70,7 +70,7 @@ impl Scale {
     }
 }
 
-/// The colour that is this part of the way from one to another.
+/// Interpolates between two colours; `part` is 0 to 1.
 fn between(from: [u8; 3], to: [u8; 3], part: f64) -> Colour {
     let mix = |c: usize| {
         let (from, to) = (f64::from(from[c]), f64::from(to[c]));

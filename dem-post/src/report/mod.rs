@@ -1,9 +1,9 @@
 //! A run on one page: an HTML file that needs nothing else, with pictures, curves, tables, the
-//! solver's own measures of its accuracy, the energy books and the scene.
+//! solver's own measures of its accuracy, the energy balance and the scene.
 //!
-//! Curves are SVG, maps are PNG (a map of thousands of grains is far smaller so), all of them
-//! inside the page as `data:` addresses. Long curves are thinned as all charts are. A section that
-//! a scene has nothing for says why.
+//! Curves are SVG, maps are PNG (smaller than SVG for thousands of grains), all of them inside the
+//! page as `data:` addresses. Long curves are thinned as all charts are. A section without content
+//! gives the reason.
 
 use clap::Args;
 use dem_run::history::History;
@@ -58,7 +58,7 @@ impl Analysis for Command {
     }
 }
 
-/// What the page tells.
+/// What the page shows.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     /// What the history holds.
@@ -81,13 +81,13 @@ pub struct Report {
 /// A section that has nothing to show.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct LeftOut {
-    /// What it is about.
+    /// Its [`OnPage::ID`].
     pub section: &'static str,
     /// Why there is nothing.
     pub why: String,
 }
 
-/// Reads all that the page tells; maps show the frames nearest to `times` (s), or chosen ones, and
+/// Reads all that the page shows; maps show the frames nearest to `times` (s), or chosen ones, and
 /// the load is that of `wall`, or of the scene's load wall.
 ///
 /// # Errors
@@ -95,14 +95,14 @@ pub struct LeftOut {
 /// several walls are driven and none is chosen; [`PostError::Lacking`] for a history without
 /// frames.
 pub fn read(history: &History, times: &[f64], wall: Option<&str>, quiet: bool) -> Result<Report> {
-    // the first to say that a time is wrong or that there is no frame
+    // read first: it reports wrong times and a history without frames
     let velocities = velocities::read(history, times)?;
     let mut left_out = vec![];
     Ok(Report {
         velocities,
         info: info::read(history)?,
         accuracy: solver::read(history)?,
-        // the first to say that a wall is wrong: cracks take their time
+        // before the cracks, which take long: it reports a wrong wall
         stress_strain: if_there(stress_strain::read(history, wall), &mut left_out)?,
         cracks: if_there(cracks::read(history, quiet), &mut left_out)?,
         chains: if_there(chains::read(history, times), &mut left_out)?,
@@ -110,7 +110,7 @@ pub fn read(history: &History, times: &[f64], wall: Option<&str>, quiet: bool) -
     })
 }
 
-/// What a scene lacks, it has no section of: the reason stands in its place.
+/// `None` for an analysis that the scene lacks something for; the reason goes to `left_out`.
 fn if_there<R: OnPage>(found: Result<R>, left_out: &mut Vec<LeftOut>) -> Result<Option<R>> {
     match found {
         Ok(found) => Ok(Some(found)),
@@ -123,7 +123,7 @@ fn if_there<R: OnPage>(found: Result<R>, left_out: &mut Vec<LeftOut>) -> Result<
 }
 
 impl Report {
-    /// The sections of the page, in order; one that the history has nothing for says why.
+    /// The sections of the page, in order.
     fn sections(&self, history: &History) -> Result<Vec<Section>> {
         let frames: Vec<usize> = self.velocities.fields.iter().map(|field| field.frame).collect();
         Ok(vec![
@@ -137,7 +137,7 @@ impl Report {
         ])
     }
 
-    /// The section of what was found, or of why nothing was.
+    /// The section of an analysis, or the reason why it found nothing.
     fn section_of<R: OnPage>(&self, found: Option<&R>, history: &History, frames: &[usize]) -> Result<Section> {
         if let Some(found) = found {
             return found.section(history, frames);
@@ -147,7 +147,7 @@ impl Report {
         Ok(Section { text, ..Section::of::<R>() })
     }
 
-    /// What stands on the page, in a few lines.
+    /// The page in a few lines.
     pub fn table(&self) -> String {
         let a = &self.accuracy;
         let broken = self.cracks.as_ref().map_or_else(

@@ -53,7 +53,7 @@ impl OnPage for Accuracy {
     }
 }
 
-/// The energy books over time.
+/// The energy balance over time.
 ///
 /// # Errors
 /// Those of reading the history.
@@ -77,7 +77,7 @@ pub fn energy(history: &History) -> Result<Section> {
             continue;
         };
         facts.push((capitalised(label), format!("{} J at the end", number(end))));
-        // what should be zero is no line of its own beside the others
+        // remainders should be zero and are not drawn
         let drawn = !name.ends_with("_remainder") && points.iter().any(|(_, energy)| *energy != 0.0);
         if drawn {
             let colours = colour::CYCLE.iter().chain([&colour::BLACK, &colour::GREY]);

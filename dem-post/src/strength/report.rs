@@ -9,7 +9,7 @@ use super::runs::{self, Found, LeftOut, Measure, histories, name};
 use super::scenes::{design, unit};
 use crate::output::{PostError, Result, Text, facts, number, quantity};
 
-/// Rests of R² below this are rounding, and so are intercepts below this share of the greatest
+/// 1 − R² below this is round-off, and so is an intercept below this share of the greatest
 /// strength.
 const ROUNDING: f64 = 1e-12;
 /// Runs left out that the table names.
@@ -41,8 +41,8 @@ pub struct Run {
     pub time: f64,
     /// Strength over the field's value; `None` where that is zero.
     pub ratio: Option<f64>,
-    /// Whether no rigid bond had broken by the collapse: of grains in one piece the strain is the
-    /// solver's.
+    /// Whether no rigid bond had broken by the collapse: then the strain of grains in one piece is
+    /// solver error.
     pub early: bool,
 }
 
@@ -77,7 +77,7 @@ pub struct OfSample {
     pub ratio_deviation: Option<f64>,
 }
 
-/// How the samples scatter; each is `None` where no sample has it.
+/// The scatter of the samples; a value is `None` where no sample has it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct OverSamples {
     /// Their slopes.
@@ -97,13 +97,13 @@ pub struct Report {
     pub field: String,
     /// Its unit; empty for a number without.
     pub unit: String,
-    /// Fields that move with it.
+    /// Fields that vary with it.
     pub along: Vec<String>,
     /// Fields that make the sample, of those that differ.
     pub sample_fields: Vec<String>,
     /// The runs, in the order given.
     pub runs: Vec<Run>,
-    /// Runs that did not give way, or are not done.
+    /// Runs that did not fail, or are not finished.
     pub left_out: Vec<LeftOut>,
     /// The runs at each value, in order.
     pub values: Vec<AtValue>,
@@ -113,14 +113,14 @@ pub struct Report {
     pub line: Option<Line>,
     /// How the samples scatter.
     pub over_samples: OverSamples,
-    /// What cannot be told, and what to beware of.
+    /// Notes: what the runs do not show, and caveats.
     pub notes: Vec<String>,
 }
 
 /// Reads the runs that `paths` name: histories, and folders of sweeps.
 ///
 /// # Errors
-/// [`PostError::Usage`] for no runs, runs of different scenes, and where none gave way;
+/// [`PostError::Usage`] for no runs, runs of different scenes, and where none failed;
 /// [`PostError::Lacking`] for a run without a load; those of reading histories and manifests.
 pub fn read(paths: &[PathBuf], options: &Options) -> Result<Report> {
     let (paths, mut left_out) = histories(paths)?;
@@ -238,7 +238,7 @@ impl Report {
         }
     }
 
-    /// What cannot be told, and what to beware of.
+    /// Notes: what the runs do not show, and caveats.
     fn remarks(&self) -> Vec<String> {
         let mut notes = vec![];
         let lined = self.samples.iter().filter(|sample| sample.line.is_some()).count();
@@ -363,7 +363,7 @@ impl Report {
         table.lines()
     }
 
-    /// An intercept, or zero for one that is rounding.
+    /// An intercept, or zero where it is round-off.
     fn plain(&self, intercept: f64) -> f64 {
         let greatest = self.runs.iter().map(|run| run.strength.abs()).fold(0.0, f64::max);
         if intercept.abs() < ROUNDING * greatest { 0.0 } else { intercept }
@@ -374,7 +374,7 @@ impl Report {
     fn explained(&self, line: &Line) -> Option<String> {
         let all = line.r_squared.map(share)?;
         let lines = self.samples.iter().filter_map(|sample| sample.line);
-        // two points lie on any line
+        // two points fit a line exactly
         let own = lines.filter(|line| line.points > 2).filter_map(|line| line.r_squared).reduce(f64::min);
         Some(match (self.samples.len(), own) {
             (1, _) => all,
@@ -399,12 +399,12 @@ impl Report {
     }
 }
 
-/// A share by which a ratio deviates, in percent; rounding is told as such.
+/// A relative deviation in percent; round-off is shown as exact.
 fn within(share: f64) -> String {
     if share < ROUNDING { "exact".into() } else { format!("±{} %", number(100.0 * share)) }
 }
 
-/// R², with what is left to 1 where four digits do not show it.
+/// R², as 1 − rest where four digits would round it to 1.
 fn share(r: f64) -> String {
     match 1.0 - r {
         rest if rest < ROUNDING => "1".into(),

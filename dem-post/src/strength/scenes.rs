@@ -1,8 +1,8 @@
-//! Which field of their scenes some runs vary, and which runs are of one sample.
+//! Which field is varied between the scenes of some runs, and which runs are of one sample.
 //!
 //! Fields are named as `--set` names them. Of the fields that differ between the runs,
 //!
-//! * titles and how often the history was written do not count;
+//! * titles and output intervals do not count;
 //! * `seed`, a sample's file and listed grains make the **sample**;
 //! * one is the **varied** field: the one that was asked for, or else the only one of the kind that
 //!   comes first: what the sample is (bonds, materials, its size), how it is loaded (walls, loads
@@ -112,7 +112,7 @@ fn collect(path: String, value: Value, leaves: &mut Leaves) {
     }
 }
 
-/// Names of all fields that are not the same in all scenes.
+/// Names of all fields that differ between the scenes.
 fn differing(scenes: &[Leaves]) -> Vec<String> {
     let mut names: Vec<&String> = scenes.iter().flat_map(Leaves::keys).collect();
     names.sort_unstable();
@@ -181,11 +181,10 @@ fn follows(scenes: &[Leaves], values: &[f64], name: &str) -> bool {
     scenes.iter().zip(values).all(|(scene, &value)| first(value).is_some_and(|one| one.get(name) == scene.get(name)))
 }
 
-/// What samples are sorted by: numbers before words.
+/// Sort key of a sample: numbers before words.
 type Key = (u64, String);
 
-/// The name of a scene's sample, and what to sort it by; `fields` tell the samples apart, `varied`
-/// does not.
+/// The name of a scene's sample, and its sort key; samples differ in `fields`, not in `varied`.
 fn label(scene: &Leaves, fields: &[String], varied: &str) -> (Vec<Key>, String) {
     let value = |name: &str| scene.get(name).cloned().unwrap_or_default();
     let text = |name: &str| match value(name) {

@@ -9,7 +9,7 @@ use hdf5::types::FixedAscii;
 use hdf5::{Dataset, File, Group, H5Type, Hyperslab, SliceOrIndex};
 use ndarray::{ArrayViewD, ShapeError};
 
-/// The file of this name in a virtual dataset is the file that it stands in.
+/// In a virtual dataset, this name means the file that contains the dataset.
 const ITSELF: &str = ".";
 
 /// A companion while it is written.
@@ -76,7 +76,7 @@ impl<'a> Companion<'a> {
     ///
     /// Without the history a link is an error; a virtual dataset would read as zeros.
     pub fn series<T: H5Type>(&self, group: &Group, name: &str, place: &'static str, rows: usize) -> hdf5::Result<()> {
-        // VTK overruns its memory where there are more times than steps
+        // VTK writes beyond its memory where there are more times than steps
         if self.shape(place)? == [rows] {
             return self.link(group, name, place);
         }

@@ -13,7 +13,7 @@ const TIME: &str = "particles/grains/position/time";
 /// The motion of the grains, as the group `trajectory`, and what does not change about them.
 ///
 /// MDAnalysis knows no metre, and refuses units that it does not know. So lengths have no attribute
-/// `unit`, and it is to be told not to convert any.
+/// `unit`, and the user must tell it not to convert any.
 pub(super) fn trajectory(companion: &Companion, o: &Outline) -> hdf5::Result<()> {
     let h5md = companion.file.create_group("h5md")?;
     h5md.new_attr_builder().with_data(&[1i32, 1]).create("version")?;

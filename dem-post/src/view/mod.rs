@@ -2,7 +2,7 @@
 //!
 //! ParaView and VTK read `grains.vtkhdf`, `contacts.vtkhdf` and `bonds.vtkhdf`, MDAnalysis reads
 //! `grains.h5md`. They hold links and virtual datasets that lead to the history by a path relative
-//! to themselves; almost nothing is copied (`docs/history.md` tells what, and how large it is).
+//! to themselves; almost nothing is copied (`docs/history.md` lists what, and its size).
 
 use clap::Args;
 use dem_run::history::History;

@@ -1,10 +1,11 @@
-//! How much of everything a history holds, and where the contacts of each frame stand.
+//! The sizes of a history: numbers of grains, bonds and frames, and the rows of the contacts of
+//! each frame.
 
 use dem_run::history::History;
 
 use crate::output::{Result, progress};
 
-/// How much of each there is.
+/// The sizes of a history.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Outline {
     pub dimension: usize,
@@ -42,7 +43,7 @@ impl Outline {
         Ok(outline)
     }
 
-    /// Where each frame begins if all have `length` rows.
+    /// First row of each frame if all have `length` rows.
     pub fn every(&self, length: usize) -> Vec<i64> {
         (0..self.frames).map(|frame| (frame * length) as i64).collect()
     }

@@ -5,8 +5,8 @@ use hdf5::{File, H5Type, Hyperslab, SliceOrIndex};
 
 use super::*;
 
-/// A byte where one of an enumeration should stand: 0 for the states of bonds, 1 for contacts, 2
-/// for walls, 3 for drives.
+/// A byte where one of an enumeration is expected: 0 for the states of bonds, 1 for contacts, 2 for
+/// walls, 3 for drives.
 #[derive(Clone, Copy)]
 #[repr(transparent)]
 pub struct Code<const OF: usize>(pub u8);
