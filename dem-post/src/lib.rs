@@ -34,7 +34,7 @@ pub mod output;
 pub mod section;
 
 /// All analyses, in the order in which `--help` lists their commands.
-pub const ANALYSES: [Entry; 11] = [
+pub const ANALYSES: &[Entry] = &[
     Entry::of::<info::Command>(),
     Entry::of::<cracks::Command>(),
     Entry::of::<chains::Command>(),
