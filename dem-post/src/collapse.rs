@@ -1,4 +1,4 @@
-//! What is read off a curve: where it gives way, where it peaks, the work under it.
+//! What follows from a load curve: collapse load, peak, work.
 
 use dem_run::collapse::in_one_piece;
 use dem_run::history::History;
@@ -6,17 +6,17 @@ use serde_json::Value;
 
 use crate::output::Result;
 
-/// A maximum is a peak if the load falls at least this share below it afterwards.
+/// A maximum is a peak if the load falls by at least this share afterwards.
 const PEAK_DROP: f64 = 0.05;
 
-/// How the bonds of a sample hold.
+/// The kind of bonds of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bonding {
     /// There are none.
     None,
-    /// They yield before they break.
+    /// They deform before they break.
     Elastic,
-    /// They do not yield.
+    /// They do not deform.
     Rigid {
         /// Whether they joined all grains to one piece at the start.
         one_piece: bool,
@@ -24,7 +24,7 @@ pub enum Bonding {
 }
 
 impl Bonding {
-    /// That of a run.
+    /// The kind in a run.
     ///
     /// # Errors
     /// Those of reading the history.
@@ -38,7 +38,7 @@ impl Bonding {
             return Ok(Self::Elastic);
         }
         let grains = history.grains()?.radius.len();
-        // a damaged file may name others
+        // a damaged file may name grains that do not exist
         let grain = |k: i32| u32::try_from(k).ok().filter(|&k| (k as usize) < grains);
         let pairs = bonds.pair.iter().filter_map(|[i, j]| Some([grain(*i)?, grain(*j)?]));
         Ok(Self::Rigid { one_piece: in_one_piece(grains, pairs) })
@@ -51,10 +51,10 @@ pub struct Collapse {
     /// The last step before the strain exceeds its limit; `None` if it never does, and where there
     /// is no collapse load.
     pub step: Option<usize>,
-    /// Whether no rigid bond had broken when it did.
+    /// Whether no rigid bond had broken by then.
     pub early: bool,
-    /// What there is to know of the load, or why there is none; empty if the strain never exceeds
-    /// its limit.
+    /// A caveat on the load, or the reason why there is none; empty if the strain never exceeds its
+    /// limit.
     pub note: &'static str,
 }
 
@@ -87,8 +87,8 @@ pub fn peak(load: &[f64]) -> Option<usize> {
     (load[top] > 0.0 && lowest < (1.0 - PEAK_DROP) * load[top]).then_some(top)
 }
 
-/// Work of a force along a way from zero (J): `force` is the mean of each step (N), `way` its end
-/// (m). It is the sum of the run's own energy balance.
+/// Work of a force along a displacement from zero (J): `force` is the mean of each step (N), `way`
+/// the displacement at its end (m). The energy balance of the run sums it the same way.
 pub fn work(force: &[f64], way: &[f64]) -> f64 {
     let from = [0.0].into_iter().chain(way.iter().copied());
     force.iter().zip(way).zip(from).map(|((force, to), from)| force * (to - from)).sum()

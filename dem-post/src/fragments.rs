@@ -28,13 +28,13 @@ pub struct Fragment {
     pub mass: f64,
     /// Share of the sample's mass, 0 to 1.
     pub mass_fraction: f64,
-    /// What its grains fill, without the pores between them: m³ in space, m² in the plane.
+    /// Volume of its grains, without the pores: m³ in 3D, m² in 2D.
     pub filled: f64,
     /// Its centre of mass, m, D numbers.
     pub centre: Vec<f64>,
 }
 
-/// For each grain, of which there are `count`, a grain that stands for its piece.
+/// For each of `count` grains, the representative grain of its piece.
 fn pieces(count: usize, bonds: &Bonds, status: &[BondStatus]) -> Vec<usize> {
     let mut pieces = UnionFind::<usize>::new(count);
     for ([i, j], _) in bonds.pair.iter().zip(status).filter(|(_, status)| **status == BondStatus::Intact) {

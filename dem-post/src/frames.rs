@@ -1,20 +1,22 @@
 //! A series of pictures, one a frame, numbered for viewers and video encoders.
 //!
-//! All pictures have one scale, one part of the plane, the same even number of pixels and, where a colour or a width
-//! stands for a value, the same meaning of it. They are read, drawn and written one by one, so a long series needs no
-//! more memory than a short one.
+//! All pictures have one scale, one part of the plane, the same even number of pixels and, where a
+//! colour or a width shows a value, the same scale for it. They are read, drawn and written one by
+//! one, so a long series needs no more memory than a short one.
 
-use clap::ValueEnum;
+use clap::{Args, ValueEnum};
 use dem_run::history::{BondStatus, History, RuptureMode};
 use serde::Serialize;
 
+use crate::analysis::Analysis;
 use crate::chains::pictures::{force_legend, links};
-use crate::chains::{normal_forces, require_reactions, statistics};
+use crate::chains::report::{normal_forces, require_reactions, statistics};
 use crate::map::{Colour, Key, Link, Panel, Ramp, Sample, Scale, View, draw_view};
+use crate::options::Files;
 use crate::output::{Folder, PostError, Result, facts, number, progress, quantity, short};
-use crate::plot::colour;
 use crate::velocities::{speeds, usual_speed};
 use crate::{cracks, moments};
+use dem_run::plot::colour;
 
 /// Pixels per unit of a drawing.
 const PIXELS: f32 = 2.0;
@@ -25,6 +27,48 @@ const RELEASED: &str = "#ffffff";
 /// Width of the lines of bonds and of cracks.
 const BOND: f64 = 1.6;
 const CRACK: f64 = 2.8;
+
+/// A series of numbered pictures, for a viewer or a film.
+#[derive(Debug, Args)]
+pub struct Command {
+    #[command(flatten)]
+    files: Files,
+    /// What to draw.
+    #[arg(long, value_enum, default_value_t)]
+    draw: Subject,
+    /// Take every N-th frame, and the last.
+    #[arg(long, value_name = "N", default_value_t = 1, conflicts_with = "times")]
+    every: usize,
+    /// Take the frames nearest to these times, s.
+    #[arg(long, value_name = "T,…", value_delimiter = ',')]
+    times: Vec<f64>,
+}
+
+impl Analysis for Command {
+    const NAME: &'static str = "frames";
+    type Input = History;
+    type Report = Report;
+
+    fn open(&self) -> Result<History> {
+        self.files.open()
+    }
+
+    fn read(&self, history: &History, _: bool) -> Result<Report> {
+        read(history, self.draw, self.every, &self.times)
+    }
+
+    fn table(report: &Report) -> String {
+        report.table()
+    }
+
+    fn folder(&self, history: &History) -> Result<Option<Folder>> {
+        self.files.folder(history, Self::NAME)
+    }
+
+    fn write(&self, history: &History, report: &mut Report, folder: &mut Folder, quiet: bool) -> Result<()> {
+        write(history, report, folder, quiet)
+    }
+}
 
 /// What the pictures show.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, ValueEnum)]
@@ -48,21 +92,22 @@ pub struct Report {
     pub frames: Vec<usize>,
     /// Time of the first and of the last, s.
     pub span: [f64; 2],
-    /// What the scale is made for: mean force (N) or usual speed (m/s) of the frame where it is greatest.
+    /// Reference of the scale: the greatest mean force (N) or usual speed (m/s) of all frames.
     pub scale: Option<f64>,
 }
 
 /// Chooses the frames: those nearest to `times` (s), or every `every`-th and the last.
 ///
 /// # Errors
-/// [`PostError::Usage`] for times outside the history or `every` of zero; [`PostError::Lacking`] for a history without
-/// frames, without bonds where bonds are to be drawn, or without any force or motion where these are.
+/// [`PostError::Usage`] for times outside the history or `every` of zero; [`PostError::Lacking`]
+/// for a history without frames, without bonds where bonds are to be drawn, or without any force or
+/// motion where these are.
 pub fn read(history: &History, subject: Subject, every: usize, times: &[f64]) -> Result<Report> {
     let lacking = |what: &str| PostError::Lacking { path: history.path().into(), what: what.into() };
     if every == 0 {
         return Err(PostError::Usage("--every 0: give 1 or more".into()));
     }
-    // says what is wrong with the times, or with a history without frames
+    // it reports wrong times and a history without frames
     let mut frames = moments::chosen(history, times)?;
     if times.is_empty() {
         let last = history.frames() - 1;
@@ -161,7 +206,7 @@ fn picture(history: &History, report: &Report, frame: usize) -> Result<(Panel, V
             panel.links = links(&contacts, &panel.grains.position, scale, history.dimension());
             panel.caption.push(format!("⟨f⟩ = {} N, the greatest mean of the series", short(scale)));
             if history.dimension() == 3 {
-                // they would hide the lines
+                // in 3D grains would hide the lines
                 panel.fills.clear();
             }
             force_legend(history.dimension())
@@ -191,7 +236,7 @@ fn bonds(history: &History, frame: usize, panel: &mut Panel) -> Result<Vec<Key>>
         pair.iter().for_each(|&grain| panel.fills[grain as usize] = RELEASED.into());
         let (from, to) = (centre(panel, pair[0]), centre(panel, pair[1]));
         let distance = from.iter().zip(&to).map(|(a, b)| (b - a).powi(2)).sum::<f64>().sqrt();
-        // a line across the sample between grains that went apart would say nothing
+        // no long line across the sample between grains that have moved apart
         if distance < 1.5 * bonds.mean_diameter[k] {
             panel.links.push(Link { from, to, width: CRACK, colour });
         }
@@ -204,7 +249,7 @@ fn bonds(history: &History, frame: usize, panel: &mut Panel) -> Result<Vec<Key>>
     if modes.twist > 0 {
         keys.push(Key::Line(colour::PURPLE, CRACK, "by twist".into()));
     }
-    // in space bonds lie behind each other, and behind grains
+    // in 3D bonds would hide each other and lie behind grains
     if d == 2 {
         let holding = |&(_, status): &(&[i32; 2], &BondStatus)| *status == BondStatus::Intact;
         let (width, colour) = (BOND, "#9a9a9a");

@@ -1,13 +1,79 @@
 //! What a history holds, in about twenty lines.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use dem_run::history::{History, RuptureMode, Series, Wall, WallDrive};
+use clap::Args;
+use dem_run::history::{CopyAs, History, RuptureMode, Series, Wall, WallDrive};
 use serde::Serialize;
 
+use crate::analysis::Analysis;
 use crate::cracks::Modes;
 use crate::output::{Result, facts, in_shell, number, quantity};
-use crate::stress_strain;
+use crate::section::{OnPage, Section};
+use crate::{check, pack, stress_strain};
+
+/// What a history holds, in about twenty lines; with --check, whether it is sound; with --repair,
+/// after a kill.
+#[derive(Debug, Args)]
+pub struct Command {
+    /// The history.
+    #[arg(value_name = "FILE.h5")]
+    history: PathBuf,
+    /// Read everything and name each place that breaks the promises of the layout: types, shapes,
+    /// units, order, numbers that are not finite, bonds and their ruptures. The exit code is 4
+    /// where there is one.
+    #[arg(long)]
+    check: bool,
+    /// Make a file that any program opens of one whose run was killed: its complete frames are
+    /// copied, and the copy takes its place. `dem-run resume` does the same and goes on with the
+    /// run.
+    #[arg(long, conflicts_with = "check")]
+    repair: bool,
+}
+
+/// What the command reports.
+#[derive(Debug, Serialize)]
+#[serde(untagged)]
+pub enum Answer {
+    /// What the history holds.
+    Contents(Box<Report>),
+    /// Whether it is sound: `--check`.
+    Check(check::Report),
+    /// The copy that took its place: `--repair`.
+    Repair(pack::Report),
+}
+
+impl Analysis for Command {
+    const NAME: &'static str = "info";
+    type Input = History;
+    type Report = Answer;
+
+    fn open(&self) -> Result<History> {
+        Ok(if self.check { History::open_as_is(&self.history)? } else { History::open(&self.history)? })
+    }
+
+    fn read(&self, history: &History, quiet: bool) -> Result<Answer> {
+        Ok(if self.repair {
+            Answer::Repair(pack::write(history, &self.history, CopyAs::Plain, quiet)?)
+        } else if self.check {
+            Answer::Check(check::read(history, quiet)?)
+        } else {
+            Answer::Contents(Box::new(read(history)?))
+        })
+    }
+
+    fn table(answer: &Answer) -> String {
+        match answer {
+            Answer::Contents(report) => report.table(),
+            Answer::Check(report) => report.table(),
+            Answer::Repair(report) => report.table(),
+        }
+    }
+
+    fn verdict(answer: &Answer) -> Result<()> {
+        if let Answer::Check(report) = answer { report.verdict() } else { Ok(()) }
+    }
+}
 
 /// What a history holds.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -32,8 +98,8 @@ pub struct Report {
     pub mass: f64,
     /// The walls: name, shape and drive.
     pub walls: Vec<[String; 3]>,
-    /// The wall that loads the sample; `None` where no wall is driven, or where several are and the
-    /// scene does not say which.
+    /// The wall that loads the sample; `None` where no wall is driven, or where several are driven
+    /// and the scene names none of them.
     pub load_wall: Option<String>,
     /// How many walls are driven.
     #[serde(skip)]
@@ -68,7 +134,7 @@ pub struct Report {
     pub kinetic_energy: Option<f64>,
     /// Energy dissipated by friction, J.
     pub friction: Option<f64>,
-    /// What the energy ledger leaves over, J.
+    /// Remainder of the energy balance, J.
     pub energy_remainder: Option<f64>,
     /// Names of everything observed.
     pub observables: Vec<String>,
@@ -130,6 +196,16 @@ fn walls(walls: &[Wall]) -> Vec<[String; 3]> {
         WallDrive::Force => "driven by a force",
     };
     walls.iter().map(|wall| [wall.name.clone(), wall.kind.label().to_lowercase(), drive(wall.drive).into()]).collect()
+}
+
+impl OnPage for Report {
+    const ID: &'static str = "run";
+    const TITLE: &'static str = "Run";
+
+    fn section(&self, _: &History, _: &[usize]) -> Result<Section> {
+        let facts = self.facts().into_iter().map(|(name, value)| (name.to_string(), value)).collect();
+        Ok(Section { facts, ..Section::of::<Self>() })
+    }
 }
 
 impl Report {

@@ -1,21 +1,19 @@
-//! Analyses of histories: cracks and fragments, force chains, velocities, stress and strain; picture series,
-//! comparisons of two runs, strength over many, and reports; companions for viewers.
+//! Analyses of histories: cracks and fragments, force chains, velocities, stress and strain;
+//! picture series, comparisons of two runs, strength over many, and reports; companions for
+//! viewers.
 //!
-//! Each analysis has a module with a function that reads a [`dem_run::history::History`] and returns a report, and a
-//! function that writes the report as CSV, SVG and PNG. Reports know nothing of files or drawings.
+//! Each analysis is a module with a [`analysis::Analysis`], and an entry of [`ANALYSES`]. Its
+//! functions read a [`dem_run::history::History`] into a report, and write the report as CSV, SVG
+//! and PNG. Reports know nothing of files or drawings.
 
+use analysis::Entry;
+
+// the analyses
 pub mod chains;
-pub mod check;
-pub mod cli;
-pub mod collapse;
 pub mod compare;
 pub mod cracks;
-pub mod fragments;
 pub mod frames;
 pub mod info;
-pub mod map;
-pub mod moments;
-pub mod output;
 pub mod pack;
 pub mod report;
 pub mod strength;
@@ -23,4 +21,29 @@ pub mod stress_strain;
 pub mod velocities;
 pub mod view;
 
-use dem_run::{plot, row};
+// what they are made of
+pub mod analysis;
+pub mod check;
+pub mod cli;
+pub mod collapse;
+pub mod fragments;
+pub mod map;
+pub mod moments;
+pub mod options;
+pub mod output;
+pub mod section;
+
+/// All analyses, in the order in which `--help` lists their commands.
+pub const ANALYSES: &[Entry] = &[
+    Entry::of::<info::Command>(),
+    Entry::of::<cracks::Command>(),
+    Entry::of::<chains::Command>(),
+    Entry::of::<velocities::Command>(),
+    Entry::of::<frames::Command>(),
+    Entry::of::<compare::Command>(),
+    Entry::of::<report::Command>(),
+    Entry::of::<strength::Command>(),
+    Entry::of::<view::Command>(),
+    Entry::of::<pack::Command>(),
+    Entry::of::<stress_strain::Command>(),
+];

@@ -7,11 +7,12 @@ use crate::output::{PostError, Result};
 /// Share of broken bonds at which a map is drawn.
 const BROKEN: f64 = 0.05;
 
-/// The frames nearest to `times` (s), or, where none is given: the first after the first rupture, the first after 5 % of
-/// the bonds have broken, and the last. In order and without repetition.
+/// The frames nearest to `times` (s), or, where none is given: the first after the first rupture,
+/// the first after 5 % of the bonds have broken, and the last. In order and without repetition.
 ///
 /// # Errors
-/// [`PostError::Usage`] for a time outside the history, [`PostError::Lacking`] for a history without frames.
+/// [`PostError::Usage`] for a time outside the history, [`PostError::Lacking`] for a history
+/// without frames.
 pub fn chosen(history: &History, times: &[f64]) -> Result<Vec<usize>> {
     let (Some(&first), Some(&last)) = (history.times().first(), history.times().last()) else {
         let what = "it holds no frame yet: wait for the run to write one".into();
@@ -19,7 +20,7 @@ pub fn chosen(history: &History, times: &[f64]) -> Result<Vec<usize>> {
     };
     let mut frames = vec![];
     for &time in times {
-        // written so that NaN is refused too
+        // this form refuses NaN too
         if !(first..=last).contains(&time) {
             return Err(PostError::Usage(format!("--times {time}: the history runs from {first} s to {last} s")));
         }

@@ -1,4 +1,5 @@
-//! What an analysis can fail of, with its exit code; tables, files and numbers are those of [`dem_run::output`].
+//! The errors of an analysis with their exit codes; tables, files and numbers are those of
+//! [`dem_run::output`].
 
 use std::path::PathBuf;
 
@@ -16,7 +17,7 @@ pub enum PostError {
     /// The history cannot be read.
     #[error(transparent)]
     History(#[from] HistoryError),
-    /// The history is sound, but its scene has not what the analysis is about.
+    /// The history is sound, but lacks what the analysis needs.
     #[error("{}: {what}", .path.display())]
     Lacking {
         /// The history.
@@ -30,7 +31,7 @@ pub enum PostError {
     /// The manifest of a sweep cannot be read.
     #[error(transparent)]
     Sweep(#[from] RunError),
-    /// The results are there, but not of all that was asked for.
+    /// There are results, but not of all runs that were asked for.
     #[error("{0}")]
     Incomplete(String),
     /// The history breaks the promises of its layout.
@@ -42,8 +43,8 @@ pub enum PostError {
 }
 
 impl PostError {
-    /// The exit code that stands for this error: 1 for results that lack something, 2 for wrong usage or scene, 4 for
-    /// input and output.
+    /// The exit code of this error: 1 for results that lack something, 2 for wrong usage or scene,
+    /// 4 for input and output.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Incomplete(_) => 1,
@@ -58,15 +59,15 @@ impl PostError {
 pub(crate) fn progress(length: u64, quiet: bool, template: &str) -> ProgressBar {
     let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
     let bar = ProgressBar::with_draw_target(Some(length), target);
-    // a template that does not parse is a bar without numbers, no reason to stop
+    // a template that does not parse gives a bar without numbers, not an error
     if let Ok(style) = ProgressStyle::with_template(template) {
         bar.set_style(style);
     }
     bar
 }
 
-/// A history as what results are made of: its place, and its run by what does not change while it goes on or when it is
-/// packed.
+/// A history as the source of results: its path, and the properties of its run that stay the same
+/// while the run goes on and when the history is packed.
 ///
 /// # Errors
 /// Those of reading it.

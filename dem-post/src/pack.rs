@@ -1,13 +1,53 @@
-//! Copies of a history that take its place: compressed, to be kept, or plain, of a file whose run was killed.
+//! Copies that replace a history: compressed, for keeping, or plain, to repair the file of a killed
+//! run.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use dem_run::history::{self, CopyAs, History};
+use clap::Args;
+use dem_run::history::{self, CopyAs, History, HistoryError};
 use serde::Serialize;
 
+use crate::analysis::Analysis;
 use crate::output::{Result, facts, progress};
 
-/// What came of it.
+/// Compress a history: a copy with checksums takes its place once it is found to be the same to the
+/// bit.
+#[derive(Debug, Args)]
+pub struct Command {
+    /// The history.
+    #[arg(value_name = "FILE.h5")]
+    history: PathBuf,
+    /// Write the copy there, and leave the history as it is.
+    #[arg(short, long, value_name = "PACKED.h5")]
+    output: Option<PathBuf>,
+    /// Replace a file that stands at PACKED.h5.
+    #[arg(long)]
+    force: bool,
+}
+
+impl Analysis for Command {
+    const NAME: &'static str = "pack";
+    type Input = History;
+    type Report = Report;
+
+    fn open(&self) -> Result<History> {
+        if let Some(path) = self.output.as_ref().filter(|path| path.exists() && !self.force) {
+            return Err(HistoryError::Exists { path: path.clone() }.into());
+        }
+        Ok(History::open(&self.history)?)
+    }
+
+    /// Makes the copy; there is nothing else to write.
+    fn read(&self, history: &History, quiet: bool) -> Result<Report> {
+        write(history, self.output.as_ref().unwrap_or(&self.history), CopyAs::Packed, quiet)
+    }
+
+    fn table(report: &Report) -> String {
+        report.table()
+    }
+}
+
+/// The copy that was made.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
     /// The copy.
@@ -34,7 +74,7 @@ impl Report {
     }
 }
 
-/// Copies `history` to `path`, its own place too, with a bar unless `quiet`.
+/// Copies `history` to `path`, which may be its own, with a bar unless `quiet`.
 ///
 /// # Errors
 /// A history that is being written or damaged, a disk without room; `path` is then as it was.

@@ -4,27 +4,29 @@
 //! **The load wall** is the one that is asked for, else the scene's `load_wall`, else the wall of
 //! its `stop.wall_travel`, else the only driven one.
 //!
-//! **Signs.** Everything counts positive along the load: the displacement of the wall in the sense in which its force
-//! does work, compressive stress and shortening under a wall that pushes, tensile stress and elongation under one that
-//! pulls. The history has stress positive in compression and strain positive in elongation.
+//! **Signs.** Everything counts positive along the load: the displacement of the wall in the sense
+//! in which its force does work, compressive stress and shortening under a wall that pushes,
+//! tensile stress and elongation under one that pulls. The history has stress positive in
+//! compression and strain positive in elongation.
 //!
 //! **Size of the sample.** Height H along the drive and cross-section A across it are those of the
 //! box around all grains at the first frame; in 2D, A is the width times the scene's `thickness`.
 //! Only a plane that moves along its normal has a section: of a round loader no stress or strain is
 //! reported from the walls.
 //!
-//! **The load** is the prescribed force, or, where the motion is prescribed, what the wall took
-//! against the grains before any bond broke in the step (`wall_force_at_limit`; of histories
-//! without it `wall_force`, what was left after the breaks).
+//! **The load** is the prescribed force, or, where the motion is prescribed, the force of the wall
+//! on the grains before any bond broke in the step (`wall_force_at_limit`; in histories without it
+//! `wall_force`, the force after the breaks).
 //!
 //! **Collapse load** (under an ever-growing force there is no peak): the load at the last step
 //! before the strain fitted to the grains exceeds 1e-4; also reported at 1e-3. There is none where
-//! none acted in that step, nor where elastic bonds strained so before any broke. Of rigid bonds
-//! that join all grains to one piece, none of which has broken by then, the strain is the solver's,
-//! and the load says nothing: the tables say so, and the drawings leave it out.
+//! no load acted in that step, nor where elastic bonds reached that strain before any broke. If
+//! rigid bonds join all grains to one piece and none has broken by then, the strain is solver error
+//! and the load is meaningless: the tables note this, and the drawings leave the load out.
 
 use std::path::Path;
 
+use clap::Args;
 use dem_run::collapse::Disk;
 use dem_run::history::{History, Series, Wall, WallDrive, WallKind};
 use dem_run::scene::{Scene, choose_load_wall};
@@ -32,10 +34,13 @@ use dem_run::summary::Splitting;
 use serde::Serialize;
 use serde_json::Value;
 
+use crate::analysis::Analysis;
 use crate::chains::stress::thickness;
 use crate::collapse::{Bonding, Collapse, peak, work};
+use crate::options::Files;
 use crate::output::{Folder, PostError, Result, cell, facts, quantity, short};
-use crate::plot::{Chart, Style, colour};
+use crate::section::{OnPage, Section, chart_figure};
+use dem_run::plot::{Chart, Style, colour};
 
 /// Strains that define the collapse.
 const COLLAPSE: [f64; 2] = [1e-4, 1e-3];
@@ -44,7 +49,43 @@ const BROKEN: f64 = 0.05;
 /// Least strain that the logarithmic axis shows.
 const LEAST_STRAIN: f64 = 1e-9;
 
-/// The numbers that the analysis ends with. `None`: it did not happen, or was not recorded.
+/// Force–displacement, stress–strain, the collapse load.
+#[derive(Debug, Args)]
+pub struct Command {
+    #[command(flatten)]
+    files: Files,
+    /// The load wall [default: that of the scene, else the only driven one].
+    #[arg(long, value_name = "NAME")]
+    wall: Option<String>,
+}
+
+impl Analysis for Command {
+    const NAME: &'static str = "stress-strain";
+    type Input = History;
+    type Report = Report;
+
+    fn open(&self) -> Result<History> {
+        self.files.open()
+    }
+
+    fn read(&self, history: &History, _: bool) -> Result<Report> {
+        read(history, self.wall.as_deref())
+    }
+
+    fn table(report: &Report) -> String {
+        report.table()
+    }
+
+    fn folder(&self, history: &History) -> Result<Option<Folder>> {
+        self.files.folder(history, Self::NAME)
+    }
+
+    fn write(&self, _: &History, report: &mut Report, folder: &mut Folder, _: bool) -> Result<()> {
+        write(report, folder)
+    }
+}
+
+/// The results in numbers. `None`: it did not happen, or was not recorded.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Summary {
     /// The load wall.
@@ -64,7 +105,7 @@ pub struct Summary {
     pub collapse_load_1e3: Option<f64>,
     /// Whether no rigid bond had broken by each of the two.
     pub collapse_early: [bool; 2],
-    /// What there is to know of each of the two, or why there is none.
+    /// A caveat on each of the two, or the reason why there is none.
     #[serde(skip)]
     pub collapse_note: [&'static str; 2],
     /// Load when 5 % of the bonds have broken, N.
@@ -89,30 +130,39 @@ pub struct Summary {
     pub bonds_broken: Option<f64>,
     /// Mean cohesion of the bonds, N.
     pub cohesion: Option<f64>,
-    /// Collapse load over cohesion; none where it is the solver's own.
+    /// Collapse load over cohesion; `None` where the strain is solver error.
     pub collapse_over_cohesion: Option<f64>,
     /// Greatest residual that was accepted.
     pub worst_residual: Option<f64>,
 }
 
-/// The curves, one entry per observed step, and what follows from them.
-#[derive(Clone, Debug, Default)]
+/// The curves, one entry per observed step, and what follows from them; JSON has the summary.
+#[derive(Clone, Debug, Default, Serialize)]
+#[serde(transparent)]
 pub struct Report {
     /// Steps.
+    #[serde(skip)]
     pub step: Vec<i64>,
     /// Times, s.
+    #[serde(skip)]
     pub time: Vec<f64>,
     /// Displacement of the wall, m.
+    #[serde(skip)]
     pub displacement: Vec<f64>,
     /// Load, N.
+    #[serde(skip)]
     pub load: Vec<f64>,
     /// Reaction of the grains on the wall, N; empty if not recorded.
+    #[serde(skip)]
     pub reaction: Vec<f64>,
     /// Axial strain fitted to the grains; empty if not recorded.
+    #[serde(skip)]
     pub strain: Vec<f64>,
     /// Axial stress of the contacts after Love and Weber, Pa; empty if not recorded.
+    #[serde(skip)]
     pub stress: Vec<f64>,
     /// Bonds broken; empty if not recorded.
+    #[serde(skip)]
     pub broken: Vec<f64>,
     /// What follows.
     pub summary: Summary,
@@ -123,7 +173,7 @@ pub struct Report {
 /// # Errors
 /// [`PostError::Lacking`] for a scene without a driven wall or without its force and place at every
 /// step; [`PostError::Usage`] for a wall that is none, or where several are driven and the scene
-/// does not say which is the load wall.
+/// names none of them as the load wall.
 pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
     let walls = history.walls()?;
     let scene = history.parameters()?.scene;
@@ -485,7 +535,8 @@ pub fn force_displacement(report: &Report) -> Chart {
     chart
 }
 
-/// The load over the logarithm of the fitted strain, which shows how little the sample gives way before it collapses.
+/// The load over the logarithm of the fitted strain: it shows how little the sample deforms before
+/// it collapses.
 pub fn onset(report: &Report) -> Option<Chart> {
     let visible = |&(strain, _): &(f64, f64)| strain >= LEAST_STRAIN;
     let points: Vec<(f64, f64)> =
@@ -521,4 +572,53 @@ pub fn stress_strain(report: &Report) -> Chart {
         chart.levels.push((load * wall_stress, format!("at strain 10⁻⁴: {} kPa", short(load * wall_stress))));
     }
     chart
+}
+
+impl OnPage for Report {
+    const ID: &'static str = "load";
+    const TITLE: &'static str = "Load and displacement";
+
+    fn section(&self, _: &History, _: &[usize]) -> Result<Section> {
+        let mut figures = vec![
+            chart_figure(
+                force_displacement(self),
+                "Applied force and reaction of the grains over the displacement of the driven wall.",
+                "Force over displacement of the driven wall.",
+            ),
+            chart_figure(
+                stress_strain(self),
+                "Axial stress over axial strain, from the walls and from the particles.",
+                "Axial stress over strain.",
+            ),
+        ];
+        figures.extend(onset(self).map(|onset| {
+            let alt =
+                "Applied force over the logarithm of the axial strain, with the strains that define the collapse.";
+            chart_figure(onset, alt, "The onset of collapse: force over the logarithm of the strain.")
+        }));
+        let s = &self.summary;
+        let mut facts = vec![
+            ("Driven wall", s.wall.clone()),
+            ("Sample", s.sample()),
+            ("First break", quantity(s.first_break, "N")),
+            ("Collapse load (strain 1e-4)", s.collapse(0)),
+            ("Collapse load (strain 1e-3)", s.collapse(1)),
+            ("Load with 5 % of the bonds broken", quantity(s.load_at_5_percent_broken, "N")),
+            ("Collapse load over cohesion", quantity(s.collapse_over_cohesion, "")),
+            ("Peak load", s.peak()),
+            ("Greatest load", quantity(Some(s.greatest_load), "N")),
+            ("Work of the wall", quantity(Some(s.work), "J")),
+        ];
+        facts.extend(s.splitting.as_ref().map(|splitting| ("Splitting strength", splitting.to_string())));
+        Ok(Section {
+            text:
+                "Of rigid grains that bonds join to one piece a strain before the first bond breaks is solver error: believe a \
+                   collapse load only where it lies above the load of the first break. A wall that moves at a prescribed \
+                   velocity loads the sample with the force that acted before any bond broke in the step."
+                    .into(),
+            facts: facts.into_iter().map(|(name, value)| (name.into(), value)).collect(),
+            figures,
+            ..Section::of::<Self>()
+        })
+    }
 }

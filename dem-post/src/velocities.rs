@@ -1,25 +1,63 @@
-//! Velocity field: how fast and which way the grains move, at some moments.
+//! Velocity field: speeds and directions of the grains, at some moments.
 //!
-//! The map fills each grain with the colour of its speed, over the speed v that all but one in a hundred grains of the
-//! panel stay below: speeds grow by orders of magnitude in a collapse, and one scale would leave all but one panel dark.
-//! Arrows show the mean velocity of the grains whose centres lie
-//! in the same square of a grid, so that they can be told apart in a large sample too; they begin in the middle of these
-//! centres; the longest of a panel is as long as a square is wide. So both compare grains of one panel; the captions
-//! compare panels.
+//! The map fills each grain with the colour of its speed, relative to the speed v that 99 % of the
+//! grains of the panel do not exceed. Each panel has its own v: speeds grow by orders of magnitude
+//! in a collapse, and one scale would leave all but one panel dark. Arrows show the mean velocity
+//! of the grains in each square of a grid, so that a large sample stays legible. An arrow begins at
+//! the mean of the centres; the longest of a panel is as long as a square is wide. So colours and
+//! arrows compare grains within one panel; the captions compare panels.
 
+use clap::Args;
 use dem_run::history::{GrainState, History};
 use serde::Serialize;
 
+use crate::analysis::Analysis;
 use crate::map::{Arrow, Key, Panel, Ramp, Sample, Scale, draw};
 use crate::moments;
+use crate::options::Moments;
 use crate::output::{Folder, Result, Text, number, short};
-use crate::plot::{Drawing, colour};
-use crate::row;
+use crate::section::{OnPage, Section, map_figure};
+use dem_run::plot::{Drawing, colour};
+use dem_run::row;
 
 /// Squares of the grid along the longer side of the sample.
 const SQUARES: f64 = 18.0;
-/// Share of the speeds that the scale of colours covers, so that one grain thrown off does not make all others equal.
+/// Share of the speeds that the colour scale covers, so that one ejected grain does not set the
+/// scale.
 const COVERED: f64 = 0.99;
+
+/// Maps and table of the velocities.
+#[derive(Debug, Args)]
+pub struct Command {
+    #[command(flatten)]
+    moments: Moments,
+}
+
+impl Analysis for Command {
+    const NAME: &'static str = "velocities";
+    type Input = History;
+    type Report = Report;
+
+    fn open(&self) -> Result<History> {
+        self.moments.files.open()
+    }
+
+    fn read(&self, history: &History, _: bool) -> Result<Report> {
+        read(history, &self.moments.times)
+    }
+
+    fn table(report: &Report) -> String {
+        report.table()
+    }
+
+    fn folder(&self, history: &History) -> Result<Option<Folder>> {
+        self.moments.files.folder(history, Self::NAME)
+    }
+
+    fn write(&self, history: &History, report: &mut Report, folder: &mut Folder, _: bool) -> Result<()> {
+        write(history, report, folder)
+    }
+}
 
 /// The motion of the grains at one moment.
 #[derive(Clone, Debug, Serialize)]
@@ -97,7 +135,7 @@ pub fn speeds(state: &GrainState, d: usize) -> Vec<f64> {
     state.velocity.chunks(d).map(|v| v.iter().map(|x| x * x).sum::<f64>().sqrt()).collect()
 }
 
-/// The speed (m/s) that all but one in a hundred stay below; zero of none.
+/// The speed (m/s) that 99 % do not exceed; 0 without grains.
 pub fn usual_speed(mut speeds: Vec<f64>) -> f64 {
     speeds.sort_by(f64::total_cmp);
     let place = (COVERED * speeds.len() as f64).ceil() as usize;
@@ -166,7 +204,7 @@ pub fn write(history: &History, report: &Report, folder: &mut Folder) -> Result<
 /// Those of reading the history.
 pub fn map(history: &History, report: &Report) -> Result<Drawing> {
     let scale = |title: &str, high: f64| Scale { title: title.into(), low: 0.0, high, ramp: Ramp::Areas };
-    // of spheres the arrows of a square would be those of all depths
+    // in 3D the arrow of a square would be a mean over all depths
     let flat = history.dimension() == 2;
     let mut panels = vec![];
     for field in &report.fields {
@@ -191,7 +229,24 @@ pub fn map(history: &History, report: &Report) -> Result<Drawing> {
     Ok(draw(&Sample::with_depth(history)?, &panels, &legend))
 }
 
-/// The mean velocities of the squares of a grid over disks as arrows, the longest as long as a square is wide.
+impl OnPage for Report {
+    const ID: &'static str = "velocities";
+    const TITLE: &'static str = "Velocities";
+
+    fn section(&self, history: &History, _: &[usize]) -> Result<Section> {
+        let mut figures = vec![];
+        for field in &self.fields {
+            let one = Self { fields: vec![field.clone()] };
+            let time = number(field.time);
+            let alt = format!("Grains coloured by their speed at t = {time} s, with arrows of the mean velocity.");
+            figures.push(map_figure(&map(history, &one)?, &alt, &format!("Velocities at t = {time} s."))?);
+        }
+        Ok(Section { figures, ..Section::of::<Self>() })
+    }
+}
+
+/// The mean velocities of the squares of a grid over disks as arrows, the longest as long as a
+/// square is wide.
 fn arrows(state: &GrainState) -> Vec<Arrow> {
     let range = [0, 1].map(|k| {
         let values = || state.position.chunks(2).map(|x| x[k]);

@@ -61,7 +61,7 @@ impl Run {
         for step in 0..=60 {
             let load = 0.5 * step as f64;
             let broken = load >= self.breaks_at;
-            // it gives way a step after the break
+            // it fails a step after the break
             let strain = -1e-2 * (load - self.breaks_at).max(0.0);
             let row = [0.0, 4e-3 * (1.0 + strain), load, 0.0, 0.0, 0.0, strain, f64::from(u8::from(broken))];
             writer.observe(step, step as f64 * 1e-3, &row).unwrap();
@@ -134,7 +134,7 @@ fn the_force_at_the_first_break_is_the_strength() {
             assert!(found["line"]["intercept"]["value"].as_f64().unwrap().abs() < 1e-12);
             close(&found["samples"][0]["ratio"], 1.0);
             assert!(found["samples"][0]["ratio_deviation"].as_f64().unwrap() < 1e-12);
-            // the scatter of samples cannot be told from one
+            // one sample shows no scatter
             assert!(found["over_samples"]["slope"]["deviation"].is_null());
             assert!(found["notes"][0].as_str().unwrap().contains("one sample only"), "{}", found["notes"]);
         }

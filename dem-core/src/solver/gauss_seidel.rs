@@ -13,7 +13,7 @@ use crate::dim::Dim;
 use crate::problem::residual::residual;
 use crate::problem::{ContactProblem, Group, GroupVisitorMut, Nodes, blocks};
 use crate::saved::{Mismatch, Reader, Saved};
-use crate::solver::tuning::gauss_seidel as tuning;
+use crate::solver::tuning::{defaults, gauss_seidel as tuning};
 
 /// Settings of [`GaussSeidel`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,7 +33,13 @@ pub struct GaussSeidelSettings {
 impl Default for GaussSeidelSettings {
     /// Exact local solves to a residual of 10⁻⁸, residuals up to 10⁻⁶ accepted, no acceleration.
     fn default() -> Self {
-        Self { local: LocalSolve::Exact, tolerance: 1e-8, accept: 1e-6, max_sweeps: 100_000, acceleration: 0 }
+        Self {
+            local: LocalSolve::Exact,
+            tolerance: defaults::TOLERANCE,
+            accept: defaults::ACCEPT,
+            max_sweeps: defaults::MAX_SWEEPS,
+            acceleration: 0,
+        }
     }
 }
 

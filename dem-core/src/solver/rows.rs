@@ -9,6 +9,7 @@
 use crate::contact::{Arms, Cone, Law, PADDED, Padded, Weights};
 use crate::dim::{Dim, Vect, tangential_rows};
 use crate::problem::{Contact, ContactProblem, Link, Nodes, Visitor};
+use crate::solver::tuning::defaults;
 use crate::solver::twofold::Twofold;
 use nalgebra::SMatrix;
 
@@ -129,7 +130,7 @@ pub struct StiffnessRatio {
 impl Default for StiffnessRatio {
     /// A bar as wide as long: the bending stiffness over the normal one is a²/12.
     fn default() -> Self {
-        Self { tangential: 1.0, rolling: 1.0 / 12.0 }
+        Self { tangential: 1.0, rolling: defaults::ROLLING }
     }
 }
 

@@ -27,7 +27,7 @@ use crate::problem::ContactProblem;
 use crate::problem::assembled::Assembled;
 use crate::problem::residual::velocity_error;
 use crate::saved::{Mismatch, Reader, Saved};
-use crate::solver::tuning::stages as tuning;
+use crate::solver::tuning::{defaults, stages as tuning};
 
 /// The method that found a solution. A step with several solves reports the last of their routes in
 /// this order.
@@ -88,12 +88,12 @@ impl Default for StagedSettings {
     fn default() -> Self {
         Self {
             stages: Stages::All,
-            tolerance: 1e-8,
-            accept: 1e-6,
-            load_tolerance: 1e-5,
+            tolerance: defaults::TOLERANCE,
+            accept: defaults::ACCEPT,
+            load_tolerance: defaults::LOAD_TOLERANCE,
             start: Start::LastStep,
             stiffness: StiffnessRatio::default(),
-            max_iterations: 300,
+            max_iterations: defaults::MAX_ITERATIONS,
         }
     }
 }

@@ -4,6 +4,22 @@
 //! docs/decisions/0035-constants.md: ten different scenes, each heuristic disabled in turn. Solver
 //! code contains no numbers but 0, ½, 1 and 2 (`scripts/check_constants`).
 
+/// Defaults of the settings, those of a scene.
+pub(super) mod defaults {
+    /// Residual that a solver aims at, and the largest that is accepted.
+    pub const TOLERANCE: f64 = 1e-8;
+    pub const ACCEPT: f64 = 1e-6;
+    /// Load error and velocity error that a solver aims at.
+    pub const LOAD_TOLERANCE: f64 = 1e-5;
+    /// Most iterations of Newton, and of the interior-point method.
+    pub const MAX_ITERATIONS: u64 = 300;
+    /// Most sweeps of Gauss–Seidel.
+    pub const MAX_SWEEPS: u64 = 100_000;
+    /// Bending stiffness over the normal one times the square of the mean diameter: a bar as wide as
+    /// long has k_m = k_n a²/12.
+    pub const ROLLING: f64 = 1.0 / 12.0;
+}
+
 /// The stages of the default solver.
 pub(super) mod stages {
     /// Penalty ρ of Newton's proximal iteration, relative to 1/(mean normal entry of W). On a

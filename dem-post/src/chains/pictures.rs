@@ -2,12 +2,13 @@
 
 use dem_run::history::{ContactRows, History};
 
-use super::{CARRIES, Report};
+use super::report::{CARRIES, Report};
 use crate::map::{Colour, Key, Link, Panel, Sample, draw};
 use crate::output::{Result, number, short};
-use crate::plot::{Chart, Drawing, Style, colour};
+use dem_run::plot::{Chart, Drawing, Style, colour};
 
-/// Width of a line that carries ⟨f⟩, and the greatest width, units of the drawing: of disks, and of spheres.
+/// Width of a line that carries ⟨f⟩, and the greatest width, units of the drawing: of disks, and of
+/// spheres.
 const WIDTH: [(f64, f64); 2] = [(1.3, 8.0), (0.6, 4.0)];
 /// Colours of the weak network, compression and tension; of grains in chains, too.
 const PALE: [&str; 2] = ["#9cc9e3", "#f0b27a"];
@@ -124,7 +125,8 @@ pub fn distribution_chart(report: &Report) -> Chart {
     chart
 }
 
-/// The map of the network: a line for each contact between the centres, or from a centre to the point on a wall.
+/// The map of the network: a line for each contact between the centres, or from a centre to the
+/// point on a wall.
 ///
 /// # Errors
 /// Those of reading the history.
@@ -148,8 +150,8 @@ pub fn network_map(history: &History, report: &Report) -> Result<Drawing> {
     Ok(draw(&sample, &panels, &force_legend(d)))
 }
 
-/// The lines of a network, the strongest last, so that they lie on top; of spheres only those above the mean, for so many
-/// more lie behind each other.
+/// The lines of a network, the strongest last, so that they lie on top; of spheres only those above
+/// the mean, for so many more lie behind each other.
 pub fn links(contacts: &ContactRows, position: &[f64], mean: f64, d: usize) -> Vec<Link> {
     let centre = |grain: i32| position[grain as usize * d..(grain as usize + 1) * d].to_vec();
     let (width, greatest) = WIDTH[d - 2];

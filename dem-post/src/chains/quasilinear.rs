@@ -1,17 +1,19 @@
-//! Force chains as lines of grains, after J. F. Peters, M. Muthuswamy, J. Wibowo and A. Tordesillas, *Characterization of
-//! force chains in granular material*, Phys. Rev. E 72, 041307 (2005).
+//! Force chains as lines of grains, after J. F. Peters, M. Muthuswamy, J. Wibowo and A.
+//! Tordesillas, *Characterization of force chains in granular material*, Phys. Rev. E 72, 041307
+//! (2005).
 //!
-//! 1. The **load** of a grain is the greatest principal value of its mean stress, positive in compression
-//!    ([`super::stress`]); its **direction** is the axis of that value.
+//! 1. The **load** of a grain is the greatest principal value of its mean stress, positive in
+//!    compression ([`super::stress`]); its **direction** is the axis of that value.
 //! 2. Only grains whose load exceeds the mean take part: that of all grains whose load is positive.
-//! 3. Two of them that press on each other are **linked** if the line between their centres is within 45° of the
-//!    direction of either.
+//! 3. Two of them that press on each other are **linked** if the line between their centres is
+//!    within 45° of the direction of either.
 //! 4. A **chain** is a line of at least three linked grains.
 //!
-//! The paper searches from grain to grain. Here each grain has two ends, one on either side of its direction, and at most
-//! one link at each: links are taken in the order of their normal force, the greatest first, where both ends are still
-//! free. So chains share no grain, and do not depend on where a search begins; where one forks, it follows the greater
-//! force. A closed ring is possible, and is told as a chain that begins at its first grain.
+//! The paper searches from grain to grain. Here each grain has two ends, one on either side of its
+//! direction, and at most one link at each: links are taken in the order of their normal force, the
+//! greatest first, where both ends are still free. So chains share no grain, and do not depend on
+//! where a search begins; where one forks, it follows the greater force. A closed ring is possible;
+//! it is reported as a chain that begins at its first grain.
 //!
 //! Chains in **tension** are the same with all signs turned.
 
@@ -25,7 +27,7 @@ const COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// Least number of grains.
 const LEAST: usize = 3;
 
-/// Which sign of the stress makes a chain.
+/// The sign of the stress in a chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
@@ -60,11 +62,12 @@ pub struct Chains {
     pub direction: Vec<[f64; 3]>,
     /// Mean load of the grains whose load is positive, Pa.
     pub mean: f64,
-    /// Share of the sum of normal forces of this kind, walls included, that the links of chains carry.
+    /// Share of the sum of normal forces of this kind, walls included, that the links of chains
+    /// carry.
     pub share: f64,
 }
 
-/// A link that may be taken.
+/// A candidate for a link.
 struct Link {
     grains: [usize; 2],
     /// The end of each grain: 0 against its direction, 1 along it.
@@ -72,7 +75,8 @@ struct Link {
     force: f64,
 }
 
-/// Finds the chains of one kind among grains with centres `position` (m, N × D) and stresses `stress` (Pa).
+/// Finds the chains of one kind among grains with centres `position` (m, N × D) and stresses
+/// `stress` (Pa).
 pub fn find(kind: Kind, contacts: &ContactRows, position: &[f64], stress: &[Tensor], dimension: usize) -> Chains {
     let signed = |tensor: &Tensor| tensor.map(|row| row.map(|x| kind.sign() * x));
     let (load, direction): (Vec<f64>, Vec<[f64; 3]>) =
@@ -147,7 +151,8 @@ mod tests {
     use super::super::stress::grain_stress;
     use super::*;
 
-    /// Disks of radius 1 at `centres`; forces `(i, j, N)` along the lines between them, and on walls at the two ends.
+    /// Disks of radius 1 at `centres`; forces `(i, j, N)` along the lines between them, and on
+    /// walls at the two ends.
     fn chains_of(
         kind: Kind,
         centres: &[[f64; 2]],
@@ -174,7 +179,8 @@ mod tests {
         find(kind, &contacts, &position, &stress, 2)
     }
 
-    /// A line of five disks, and five aside that hardly carry, so that the mean lies below the load of the line.
+    /// A line of five disks, and five aside that hardly carry, so that the mean lies below the load
+    /// of the line.
     fn row(turn_after: usize, degrees: f64) -> Vec<[f64; 2]> {
         let (sin, cos) = degrees.to_radians().sin_cos();
         let mut centres = vec![[0.0, 0.0]];
@@ -216,17 +222,20 @@ mod tests {
 
     #[test]
     fn a_gentle_bend_goes_on_and_a_sharp_one_breaks() {
-        // at the bend the direction lies halfway between the branches: within 45° of both up to a right angle
+        // at the bend the direction lies halfway between the branches: within 45° of both up to a
+        // right angle
         for degrees in [30.0, 60.0, 80.0] {
             assert_eq!(pressed(2, degrees, 7.0, Kind::Compression).chains, [vec![0, 1, 2, 3, 4]]);
         }
-        // beyond, both branches lie on one side of the direction: one of them is taken, and two grains are too few
+        // beyond, both branches lie on one side of the direction: one of them is taken, and two
+        // grains are too few
         assert_eq!(pressed(2, 100.0, 7.0, Kind::Compression).chains, [vec![0, 1, 2]]);
     }
 
     #[test]
     fn a_neighbour_at_sixty_degrees_to_the_load_is_not_linked() {
-        // a pressed row along x; its last grain leans on one at 60°, whose own load is along that branch
+        // a pressed row along x; its last grain leans on one at 60°, whose own load is along that
+        // branch
         let s = 3f64.sqrt();
         let centres = [[0.0, 0.0], [2.0, 0.0], [4.0, 0.0], [5.0, s], [6.0, 2.0 * s], [50.0, 0.0]];
         let forces = [(0, 1, 10.0), (1, 2, 10.0), (2, 3, 4.0), (3, 4, 4.0)];
@@ -237,7 +246,8 @@ mod tests {
 
     #[test]
     fn a_fork_follows_the_greater_force() {
-        // from grain 2 two branches at ±30°, the upper one stronger; the lower one is a line of its own
+        // from grain 2 two branches at ±30°, the upper one stronger; the lower one is a line of its
+        // own
         let (c, s) = (3f64.sqrt(), 1.0);
         let centres = [
             [0.0, 0.0],

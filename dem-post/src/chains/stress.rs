@@ -7,12 +7,14 @@ use crate::output::Result;
 /// A symmetric 2 × 2 or 3 × 3 tensor, by rows; in 2D the third row and column are zero.
 pub type Tensor = [[f64; 3]; 3];
 
-/// Mean stress in each grain from the forces on it (Love 1927, Weber 1966), Pa, positive in compression:
+/// Mean stress in each grain from the forces on it (Love 1927, Weber 1966), Pa, positive in
+/// compression:
 ///
 /// σ = −(1/V) Σ f ⊗ (p − x)
 ///
-/// over its contacts, with the force f on the grain at the point p, its centre x and its volume V (in 2D the area times
-/// `thickness`). Where bonds carry moments, forces alone do not balance the torque: the symmetric part is taken.
+/// over its contacts, with the force f on the grain at the point p, its centre x and its volume V
+/// (in 2D the area times `thickness`). Where bonds carry moments, forces alone do not balance the
+/// torque: the symmetric part is taken.
 pub fn grain_stress(
     contacts: &ContactRows,
     position: &[f64],
@@ -65,9 +67,10 @@ fn force(contacts: &ContactRows, c: usize, d: usize) -> [f64; 3] {
     force
 }
 
-/// The greatest principal value of a symmetric tensor and its unit direction, by Jacobi's rotations.
+/// The greatest principal value of a symmetric tensor and its unit direction, by Jacobi's
+/// rotations.
 ///
-/// Of equal values the direction is any of theirs.
+/// The direction of a repeated value is one of the possible ones.
 pub fn major(tensor: &Tensor, dimension: usize) -> (f64, [f64; 3]) {
     let (mut a, mut v) = (*tensor, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
     for _ in 0..12 {
@@ -88,12 +91,12 @@ pub fn major(tensor: &Tensor, dimension: usize) -> (f64, [f64; 3]) {
             }
         }
     }
-    // in the plane the third value is no stress of the grain
+    // in 2D the third value is no stress of the grain
     let best = (0..dimension).max_by(|&i, &j| a[i][i].total_cmp(&a[j][j])).unwrap_or(0);
     (a[best][best], [v[0][best], v[1][best], v[2][best]])
 }
 
-/// The scene's thickness in 2D, m; 1 where it says nothing.
+/// The scene's thickness in 2D, m; 1 where it gives none.
 ///
 /// # Errors
 /// Those of reading the history.
@@ -159,7 +162,7 @@ mod tests {
         assert!((along.abs() - 1.0).abs() < 1e-12);
         let (value, direction) = major(&[[1.0, 2.0, 0.0], [2.0, 1.0, 0.0], [0.0; 3]], 2);
         assert!((value - 3.0).abs() < 1e-12 && (direction[0] - direction[1]).abs() < 1e-12);
-        // all in tension: the zero of the third axis is not among the values in the plane
+        // all in tension: the zero of the third axis is not among the values in 2D
         assert_eq!(major(&[[-1.0, 0.0, 0.0], [0.0, -2.0, 0.0], [0.0; 3]], 2).0, -1.0);
     }
 }

@@ -1,4 +1,4 @@
-//! What stands in the datasets: numbers, order, and what one dataset says of another.
+//! Checks the content of the datasets: numbers, order, and agreement between datasets.
 
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
@@ -7,7 +7,8 @@ use dem_run::history::sound::{Surroundings, is_huge, is_plausible, may_be_observ
 use dem_run::history::{BondStatus, RuptureMode, SolverRoute};
 use hdf5::H5Type;
 
-use super::{Checker, Sizes, schema};
+use super::checker::{Checker, Sizes};
+use super::schema;
 
 const STEP: &str = "particles/grains/position/step";
 const TIME: &str = "particles/grains/position/time";
@@ -19,12 +20,12 @@ const ROUTE: &str = "observables/solver_route/value";
 /// Codes of an intact bond and of a contact that is one.
 const INTACT: u8 = 0;
 const BONDED: u8 = 3;
-/// Difference of the square of a unit vector from one: what single precision leaves.
+/// Tolerance on the squared norm of a unit vector: round-off of single precision.
 const UNIT: f64 = 1e-5;
-/// Share of a time by which that of a rupture may lie outside its frames.
+/// Relative tolerance on the time of a rupture between its frames.
 const SAME_TIME: f64 = 1e-9;
 
-/// A rupture with its mode as the number that stands there.
+/// A rupture as the file holds it, with its mode as a number.
 #[derive(Clone, Copy, H5Type)]
 #[repr(C)]
 struct Event {
@@ -44,17 +45,17 @@ struct Event {
     mode: i32,
 }
 
-/// Its twisting moment, which layouts before version 3 lack.
+/// The twisting moment of a rupture, which layouts before version 3 lack.
 #[derive(Clone, Copy, H5Type)]
 #[repr(C)]
 struct Twist {
     twist: f64,
 }
 
-/// When and how a bond broke, by its states: the first frame that does not show it intact.
+/// For each broken bond: the first frame that does not show it intact, and its state there.
 type Broken = BTreeMap<usize, (usize, u8)>;
 
-/// Checks all that is sound by its type and shape.
+/// Checks the content of all datasets that are sound by type and shape.
 pub(super) fn check(c: &mut Checker) {
     let steps = order(c);
     let rows = committed(c);
@@ -71,7 +72,8 @@ pub(super) fn check(c: &mut Checker) {
     events(c, &steps, &pairs, &broken);
 }
 
-/// Steps and times grow, and those of every quantity are those of the frames. The steps of the frames.
+/// Steps and times grow, and those of every quantity are those of the frames. The steps of the
+/// frames.
 fn order(c: &mut Checker) -> Vec<i64> {
     for (step, time) in [(STEP, TIME), ("observables/step", "observables/time")] {
         grows::<i64>(c, step);
@@ -117,7 +119,7 @@ fn grows<T: H5Type + PartialOrd + Copy + std::fmt::Display>(c: &mut Checker, pla
     });
 }
 
-/// Whether `place` says the same as `other`, which it is as a rule, under another name.
+/// Checks that `place` has the same values as `other`. As a rule it is a hard link to it.
 fn alike<T: H5Type + PartialEq>(c: &mut Checker, place: &str, other: &str) {
     let token = |c: &Checker, place: &str| c.file.loc_info_by_name(place).map(|info| info.token).ok();
     if token(c, place).is_some() && token(c, place) == token(c, other) {
@@ -133,8 +135,8 @@ fn alike<T: H5Type + PartialEq>(c: &mut Checker, place: &str, other: &str) {
     });
 }
 
-/// Rows complete at each frame: they never become fewer, contacts follow each other without gaps. First row and number
-/// of the contacts of each frame, where they can be trusted.
+/// Rows complete at each frame: they never become fewer, contacts follow each other without gaps.
+/// First row and number of the contacts of each frame, where they can be trusted.
 fn committed(c: &mut Checker) -> Vec<[u64; 2]> {
     let t = c.sizes.t;
     let mut committed = |name: &str| -> Vec<u64> {
@@ -167,7 +169,7 @@ fn committed(c: &mut Checker) -> Vec<[u64; 2]> {
     found
 }
 
-/// Every number of every dataset of floats is finite, and of a magnitude that something may have.
+/// Every number of every dataset of floats is finite and of a plausible magnitude.
 fn numbers(c: &mut Checker) {
     let whole = |place: &str| {
         ["step", "start", "count", "pair", "id", "bond"].contains(&place.rsplit('/').next().unwrap_or(""))
@@ -207,7 +209,8 @@ fn no_number(value: f64) -> String {
     if value.is_finite() { format!("{value:e} is no plausible number") } else { format!("{value} is no finite number") }
 }
 
-/// What is a size is above zero, and what may be nothing is not below; no radius is of another scale than all others.
+/// Sizes are positive, quantities that may be zero are not negative; no radius is of another scale
+/// than all others.
 fn signs(c: &mut Checker) {
     for place in [RADIUS, "particles/grains/mass", "bonds/mean_diameter"] {
         every(c, place, |value| (value <= 0.0).then(|| format!("{value} is not positive")));
@@ -223,7 +226,7 @@ fn signs(c: &mut Checker) {
     every(c, RADIUS, |value| huge(value).then(|| format!("{value:e}, where half the grains have at most {usual:e}")));
 }
 
-/// Names the rows of a list of which `wrong` says what is wrong.
+/// Reports the rows of a list for which `wrong` returns a violation.
 fn every(c: &mut Checker, place: &str, wrong: impl Fn(f64) -> Option<String>) {
     c.blocks::<f64>(place, |c, start, values| {
         for (k, what) in values.iter().enumerate().filter_map(|(k, value)| Some((k, wrong(*value)?))) {
@@ -232,7 +235,7 @@ fn every(c: &mut Checker, place: &str, wrong: impl Fn(f64) -> Option<String>) {
     });
 }
 
-/// Every grain is somewhere near the sample.
+/// Every grain is near the sample.
 fn places(c: &mut Checker) {
     let Sizes { d, n, t, .. } = c.sizes;
     if !c.is_sound(&[POSITION, RADIUS]) || n == 0 || t == 0 {
@@ -242,7 +245,7 @@ fn places(c: &mut Checker) {
     let surroundings = Surroundings::of(&radius, &first, d);
     c.blocks::<f64>(POSITION, |c, start, values| {
         for (k, centre) in values.chunks_exact(d).enumerate() {
-            // what is no number is named among the numbers
+            // numbers that are not finite are reported by `numbers`
             if centre.iter().all(|x| is_plausible(*x)) && !surroundings.hold(centre) {
                 let what = format!("grain {} is at {centre:?} m, far beyond a million sizes of the sample", k % n);
                 c.wrong(POSITION, Some(start + k / n), what);
@@ -287,7 +290,7 @@ fn bond_pairs(c: &mut Checker) -> Vec<[i32; 2]> {
     pairs
 }
 
-/// Bonds go from intact to one way of being broken, and stay.
+/// A bond changes from intact to one mode of rupture, once.
 fn states(c: &mut Checker) -> Broken {
     let b = c.sizes.b;
     let (mut last, mut broken) = (vec![INTACT; b], Broken::new());
@@ -311,7 +314,8 @@ fn states(c: &mut Checker) -> Broken {
     broken
 }
 
-/// Contacts name bodies and bonds that are there; one that is bonded has a bond of its grains that holds.
+/// Contacts name bodies and bonds that exist; a bonded contact has an intact bond between its
+/// grains.
 fn contacts(c: &mut Checker, rows: &[[u64; 2]], pairs: &[[i32; 2]], broken: &Broken) {
     let Sizes { n, w, .. } = c.sizes;
     for (frame, [start, count]) in rows.iter().enumerate() {
@@ -355,8 +359,8 @@ fn contacts(c: &mut Checker, rows: &[[u64; 2]], pairs: &[[i32; 2]], broken: &Bro
     }
 }
 
-/// Ruptures stand in the order of their steps, complete at the right frames, and each broken bond has one, at the frame
-/// where its state changes.
+/// Ruptures are in the order of their steps and complete at the right frames; each broken bond has
+/// exactly one, at the frame where its state changes.
 fn events(c: &mut Checker, steps: &[i64], pairs: &[[i32; 2]], broken: &Broken) {
     let complete = c.rows::<u64>("commit_rows/events", 0..c.sizes.t).unwrap_or_default();
     let times = c.rows::<f64>(TIME, 0..c.sizes.t).unwrap_or_default();
@@ -410,7 +414,7 @@ fn events(c: &mut Checker, steps: &[i64], pairs: &[[i32; 2]], broken: &Broken) {
     }
 }
 
-/// Where an event and the states of its bond disagree.
+/// How an event and the states of its bond disagree; `None` if they agree.
 fn disagreement(
     event: &Event,
     frame: usize,

@@ -1,10 +1,10 @@
-//! What the layout promises of names, types, shapes and units.
+//! Checks names, types, shapes and units against the layout.
 
 use dem_run::history::{BondStatus, ContactStatus, ROUTE, RuptureMode, SolverRoute, WallDrive, WallKind};
 use hdf5::Attribute;
 use hdf5::types::{CompoundField, EnumMember, EnumType, FloatSize, IntSize, TypeDescriptor, VarLenUnicode};
 
-use super::{Checker, Sizes};
+use super::checker::{Checker, Sizes};
 
 const F32: TypeDescriptor = TypeDescriptor::Float(FloatSize::U4);
 const F64: TypeDescriptor = TypeDescriptor::Float(FloatSize::U8);
@@ -14,11 +14,13 @@ const U32: TypeDescriptor = TypeDescriptor::Unsigned(IntSize::U4);
 const U64: TypeDescriptor = TypeDescriptor::Unsigned(IntSize::U8);
 const TEXT: TypeDescriptor = TypeDescriptor::VarLenUnicode;
 
-/// Members of a rupture: 64-bit integers and floats, then 32-bit integers. Layouts before version 3 have no `twist`.
+/// Members of a rupture: 64-bit integers and floats, then 32-bit integers. Layouts before version 3
+/// have no `twist`.
 pub(super) const RUPTURE: [&str; 16] =
     ["step", "time", "x", "y", "z", "rn", "rt", "m", "twist", "energy", "round", "bond", "i", "j", "mode", "pad"];
 
-/// Checks names, types, shapes and units; what is as promised is put down as sound, to be read afterwards.
+/// Checks names, types, shapes and units; datasets as promised are marked as sound, and their
+/// content is checked afterwards.
 pub(super) fn check(c: &mut Checker) {
     identity(c);
     commit(c);
@@ -55,7 +57,8 @@ fn bytes(names: impl Iterator<Item = &'static str>) -> TypeDescriptor {
     codes(IntSize::U1, false, 0, names)
 }
 
-/// Whether a type of the file is read as this one: the same, or modes of rupture from before there was twist.
+/// Whether a type of the file is read as this one: the same, or modes of rupture from before there
+/// was twist.
 fn is_read_as(found: &TypeDescriptor, kind: &TypeDescriptor) -> bool {
     match (found, kind) {
         (TypeDescriptor::Enum(found), TypeDescriptor::Enum(kind)) => {
@@ -79,7 +82,7 @@ fn name(kind: &TypeDescriptor) -> String {
 }
 
 impl Checker {
-    /// Checks a dataset of `rows` complete rows (more may stand behind them), each of shape `row`.
+    /// Checks a dataset of `rows` complete rows (more may follow), each of shape `row`.
     fn table(&mut self, place: &str, kind: &TypeDescriptor, rows: usize, row: &[usize], unit: &str) {
         let Some(found) = self.typed(place, kind) else { return };
         let shape_fits = found.first().is_some_and(|&count| count >= rows) && found[1..] == *row;
@@ -126,7 +129,8 @@ impl Checker {
         self.wrong(place, None, what);
     }
 
-    /// Checks a quantity over time: its values, and its steps and times, which are those of the frames.
+    /// Checks a quantity over time: its values, and its steps and times, which are those of the
+    /// frames.
     fn element(&mut self, place: &str, kind: &TypeDescriptor, row: &[usize], unit: &str) {
         let t = self.sizes.t;
         self.table(&format!("{place}/value"), kind, t, row, unit);
@@ -134,13 +138,13 @@ impl Checker {
         self.table(&format!("{place}/time"), &F64, t, &[], "s");
     }
 
-    /// Complete rows that the last frame vouches for.
+    /// Complete rows according to the last frame.
     fn complete(&mut self, place: &str) -> usize {
         let Some(last) = self.sizes.t.checked_sub(1) else { return 0 };
         self.rows::<u64>(place, last..last + 1).and_then(|rows| rows.first().copied()).unwrap_or(0) as usize
     }
 
-    /// The length of a list whose length nothing else tells.
+    /// The length of a list that only its own shape gives.
     fn count(&mut self, place: &str) -> usize {
         self.dataset(place).and_then(|dataset| dataset.shape().first().copied()).unwrap_or(0)
     }
@@ -300,7 +304,7 @@ fn contacts(c: &mut Checker) {
     if bonded {
         c.table("contacts/bond", &I32, m, &[], "");
     }
-    // a history may do without reactions (`output.reactions`): then it has none of what belongs to them
+    // a history may do without reactions (`output.reactions`): then it has none of their datasets
     if ["reaction", "tangent", "moment"].iter().any(|name| c.has(&format!("contacts/{name}"))) {
         reactions(c, &real);
     }
@@ -354,8 +358,8 @@ fn observables(c: &mut Checker) {
     }
 }
 
-/// The two slots of the state from which the run goes on. What stands in them vouches for itself by a sum: one of them
-/// may be torn, of a run that was killed while it wrote it.
+/// The two slots of the state from which the run goes on. A checksum guards the content: one slot
+/// may be incomplete, if the run was killed while writing it.
 fn checkpoint(c: &mut Checker) {
     c.table("checkpoint/index", &U64, 2, &[4], "");
     for slot in 0..2 {
@@ -363,7 +367,7 @@ fn checkpoint(c: &mut Checker) {
             let place = format!("checkpoint/{name}_{slot}");
             let rows = c.count(&place);
             c.table(&place, kind, rows, &[], "");
-            // they are read by their sum, not one by one
+            // the checksum covers them, they are not read one by one
             c.sound.remove(&place);
         }
     }

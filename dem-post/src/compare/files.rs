@@ -2,19 +2,19 @@
 
 use dem_run::history::History;
 
-use super::{Break, Fate, Report};
+use super::report::{Break, Fate, Gap, Report};
 use crate::map::{Key, Link, Panel, Sample, draw};
 use crate::output::{Folder, Result, cell};
-use crate::plot::{Chart, Drawing, Style, colour};
-use crate::row;
+use dem_run::plot::{Chart, Drawing, Style, colour};
+use dem_run::row;
 
 /// Colours of bonds that broke in both runs, only in the first, only in the second.
 const COLOURS: [&str; 3] = [colour::BLACK, colour::BLUE, colour::VERMILLION];
 /// Width of their lines.
 const WIDTH: f64 = 3.0;
 
-/// Writes `scene.csv`, `distance.csv`, `bonds.csv`, and as drawings `distance`, `broken`, `bonds` where any broke, and
-/// `load` where a wall is driven in either run. `a` is the first history.
+/// Writes `scene.csv`, `distance.csv`, `bonds.csv`, and as drawings `distance`, `broken`, `bonds`
+/// where any broke, and `load` where a wall is driven in either run. `a` is the first history.
 ///
 /// # Errors
 /// [`crate::output::PostError::Write`], and those of reading the history.
@@ -50,7 +50,7 @@ pub fn write(a: &History, report: &Report, folder: &mut Folder) -> Result<()> {
 fn distance_chart(report: &Report) -> Chart {
     let mut chart = Chart::new("time (s)", "distance of the grains' places (radii)");
     chart.log_y = report.gaps.iter().any(|gap| gap.greatest > 0.0);
-    let points = |value: fn(&super::Gap) -> f64| report.gaps.iter().map(|gap| (gap.time, value(gap))).collect();
+    let points = |value: fn(&Gap) -> f64| report.gaps.iter().map(|gap| (gap.time, value(gap))).collect();
     chart.curve("greatest", colour::BLUE, Style::Line, points(|gap| gap.greatest)).curve(
         "rms",
         colour::ORANGE,

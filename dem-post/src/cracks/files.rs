@@ -3,24 +3,27 @@
 use dem_run::history::History;
 
 use super::pictures::{broken_chart, crack_map, decohesion, fragment_charts, fragment_map, front_charts, surface_maps};
+use super::report::{Report, broken_over_time};
 use super::surfaces::Facet;
-use super::{Report, broken_over_time};
 use crate::fragments::{Fragment, fragment_list};
 use crate::map::Sample;
 use crate::moments;
 use crate::output::{Folder, Result, cell};
-use crate::plot::Chart;
-use crate::row;
+use dem_run::plot::Chart;
+use dem_run::row;
 
-/// Writes `ruptures.csv`, `broken.csv`, `fragments.csv` and `fragment-list.csv`, and as drawings `broken`, `fragments`,
-/// `fragment-map` and `decohesion`, of spheres also `decohesion-inside`; that list and these maps show the moments nearest
-/// to `times` (s), or chosen ones. Where cracks were found, also `cracks.csv`, `crack-growth.csv`, and the drawings `cracks`
-/// and, where one grew step by step or round by round, `crack-front`; in the plane `crack-segments.csv`, `crack-front.csv`
-/// and, where the cracks fill a small part of the sample, the drawing `cracks-near`; in space `crack-facets.csv`, their
-/// corners in `crack-facets.vtk`, and the drawings `cracks-along-y` and `cracks-along-x`.
+/// Writes `ruptures.csv`, `broken.csv`, `fragments.csv` and `fragment-list.csv`, and as drawings
+/// `broken`, `fragments`, `fragment-map` and `decohesion`, of spheres also `decohesion-inside`;
+/// that list and these maps show the moments nearest to `times` (s), or chosen ones. Where cracks
+/// were found, also `cracks.csv`, `crack-growth.csv`, and the drawings `cracks` and, where one grew
+/// step by step or round by round, `crack-front`; in 2D `crack-segments.csv`, `crack-front.csv`
+/// and, where the cracks fill a small part of the sample, the drawing `cracks-near`; in 3D
+/// `crack-facets.csv`, their corners in `crack-facets.vtk`, and the drawings `cracks-along-y` and
+/// `cracks-along-x`.
 ///
 /// # Errors
-/// [`crate::output::PostError::Write`], and [`crate::output::PostError::Usage`] for times outside the history.
+/// [`crate::output::PostError::Write`], and [`crate::output::PostError::Usage`] for times outside
+/// the history.
 pub fn write(history: &History, report: &Report, times: &[f64], folder: &mut Folder) -> Result<()> {
     let frames = moments::chosen(history, times)?;
     write_ruptures(report, folder)?;

@@ -1,13 +1,14 @@
-//! The front of a crack: how far it has come along its path's direction, break by break.
+//! The front of a crack: its position along the direction of the path, break by break.
 //!
-//! A crack here is one of the final cracks: before its parts met they count as one already. Its places are counted from
-//! where its first bond broke, along the line between the ends of its path, positive towards the end that broke later.
-//! The **front** is the greatest place that a broken segment reaches, the **back** the least. All breaks of one step have
-//! the same time; the round of the cascade gives them an order, not a speed. So a row is a round, and a **speed** is that
-//! of the tip from the last time at which the crack grew to this one.
+//! A crack here is one of the final cracks: its parts count as one crack even before they meet.
+//! Positions are measured from where its first bond broke, along the line between the ends of its
+//! path, positive towards the end that broke later. The **front** is the greatest position that a
+//! broken segment reaches, the **back** the least. All breaks of one step have the same time; the
+//! round of the cascade gives them an order, not a speed. So each row is a round, and a **speed**
+//! is the mean speed of the tip since the last time at which the crack grew.
 //!
-//! The **growth** takes the other view: after each round, the cracks as they are then, joined only by what has broken so
-//! far. Where cracks meet, the largest grows by the whole of the other.
+//! The **growth**, in contrast, lists the cracks as they are after each round, joined only by bonds
+//! that have broken so far. Where two cracks meet, the largest grows by the size of the other.
 
 use dem_run::history::Rupture;
 use petgraph::unionfind::UnionFind;
@@ -31,11 +32,12 @@ pub struct Front {
     pub bonds: usize,
     /// Length of all segments so far, m.
     pub length: f64,
-    /// Place of the rear tip, m, at most 0.
+    /// Position of the rear tip, m, at most 0.
     pub back: f64,
-    /// Place of the front tip, m, at least 0.
+    /// Position of the front tip, m, at least 0.
     pub front: f64,
-    /// Speed of the rear tip away from the origin, m/s; in the last round of a time, from the second time on.
+    /// Speed of the rear tip away from the origin, m/s. Only the last round of a time has it, and
+    /// not the first time.
     pub back_speed: Option<f64>,
     /// Speed of the front tip away from the origin, m/s.
     pub front_speed: Option<f64>,
@@ -112,7 +114,7 @@ pub struct Growth {
 pub fn growth<'a>(parts: impl Iterator<Item = Part<'a>> + Clone, ruptures: &[Rupture]) -> Vec<Growth> {
     let nodes = nodes(parts.clone());
     let mut joined = UnionFind::<usize>::new(nodes);
-    // of each crack at its root; none where no part has come yet
+    // size of each crack at its root; `None` where no part has broken yet
     let mut sizes = vec![None; nodes];
     let mut rows: Vec<Growth> = vec![];
     let (mut cracks, mut largest, mut size) = (0usize, 0.0f64, 0.0);

@@ -1,25 +1,31 @@
-//! The longest of the shortest ways through a graph, over all pairs of nodes.
+//! The longest of the shortest paths through a graph, over all pairs of nodes (its diameter).
 //!
-//! Dijkstra's search from every node finds it. Most nodes need none: where the node farthest from v is at the distance
-//! e(v), that of any other node w is at most e(v) + d(v, w) and at least max(d(v, w), e(v) − d(v, w)). A node that cannot
-//! reach as far as the longest way found is left out. Searches begin in turn at the node that may reach farthest, which
-//! lengthens the longest way, and at the one that may reach least, in the middle, which lowers the bounds of all.
+//! Dijkstra's search from every node finds it. Few nodes need to be searched. Let e(v), the
+//! eccentricity of v, be the distance of the node farthest from v. For any other node w, max(d(v,
+//! w), e(v) − d(v, w)) ≤ e(w) ≤ e(v) + d(v, w). A node whose upper bound is below the longest path
+//! found so far is skipped. Searches start alternately at the node with the greatest upper bound,
+//! which lengthens the longest path, and at the node with the least lower bound, in the middle of
+//! the graph, which tightens the upper bounds of all.
 //!
-//! Source: F. W. Takes and W. A. Kosters, *Computing the eccentricity distribution of large graphs*, Algorithms 6, 2013.
+//! Source: F. W. Takes and W. A. Kosters, *Computing the eccentricity distribution of large
+//! graphs*, Algorithms 6, 2013.
 
 use petgraph::algo::{astar, dijkstra};
 use petgraph::graph::{EdgeIndex, NodeIndex, UnGraph};
 use petgraph::visit::EdgeRef;
 
-use super::paths::distance;
-
-/// Share of a length below which two are equal: what rounding leaves of ways that are equally long.
+/// Relative difference below which two lengths are equal: round-off of paths of equal length.
 const EQUAL: f64 = 1e-9;
 
-/// Places (m) and the lengths (m) of what joins them.
+/// Nodes are points (m), edges have lengths (m).
 pub(super) type Ways = UnGraph<[f64; 2], f64>;
 
-/// What is known of the node farthest from one.
+/// Distance of two points, m.
+pub(super) fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (b[0] - a[0]).hypot(b[1] - a[1])
+}
+
+/// Bounds on the eccentricity of a node, and whether it was searched.
 #[derive(Clone, Copy)]
 struct Bounds {
     least: f64,
@@ -27,10 +33,11 @@ struct Bounds {
     searched: bool,
 }
 
-/// The longest of the shortest ways: the node where it begins, and the edges of the way. The graph must be connected.
+/// The longest of the shortest paths: its first node and its edges. The graph must be connected.
 ///
-/// Of several that are equally long, to 1e-9 of their length, the one whose ends are farthest apart, and of these, to the
-/// same measure, the one with the first nodes; it leads from the lesser node to the greater. None without an edge.
+/// Among paths of equal length (to 1e-9) it takes the one whose ends are farthest apart, and among
+/// those (to 1e-9) the one with the lowest node indices. It leads from the lower index to the
+/// higher. `None` without an edge.
 pub(super) fn longest(ways: &Ways) -> Option<(NodeIndex, Vec<EdgeIndex>)> {
     let pairs = farthest_pairs(ways);
     let apart = |&(a, b): &(NodeIndex, NodeIndex)| distance(ways[a], ways[b]);
@@ -45,7 +52,7 @@ pub(super) fn longest(ways: &Ways) -> Option<(NodeIndex, Vec<EdgeIndex>)> {
     (!edges.is_empty()).then_some((start, edges))
 }
 
-/// The pairs of nodes, the lesser first, whose shortest ways are the longest.
+/// The pairs of nodes, the lower index first, whose shortest paths are the longest.
 fn farthest_pairs(ways: &Ways) -> Vec<(NodeIndex, NodeIndex)> {
     let mut bounds = vec![Bounds { least: 0.0, most: f64::INFINITY, searched: false }; ways.node_count()];
     let (mut pairs, mut longest) = (vec![], 0.0);
@@ -82,7 +89,8 @@ mod tests {
 
     use super::*;
 
-    /// The length of the longest of the shortest ways by Floyd and Warshall, and of that between two nodes.
+    /// By Floyd and Warshall: the length of the longest of the shortest paths, and the length
+    /// between two nodes.
     fn by_force(ways: &Ways) -> (f64, impl Fn(NodeIndex, NodeIndex) -> f64) {
         let all = floyd_warshall(ways, |edge| *edge.weight()).unwrap();
         (all.values().copied().fold(0.0, f64::max), move |a, b| all[&(a, b)])
@@ -99,7 +107,7 @@ mod tests {
             if at == a { b } else { a }
         });
         assert!(start < end);
-        // of equally long ones that whose ends are farthest apart
+        // among paths of equal length: the one whose ends are farthest apart
         for a in ways.node_indices() {
             for b in ways.node_indices().filter(|&b| between(a, b) >= (1.0 - EQUAL) * expected) {
                 assert!(distance(ways[a], ways[b]) <= (1.0 + 2.0 * EQUAL) * distance(ways[start], ways[end]));
@@ -116,7 +124,8 @@ mod tests {
         }
     }
 
-    /// A tree of `nodes` random places with `more` edges; as long as the ways between them, or all of length one.
+    /// A tree of `nodes` random points with `more` extra edges; lengths are the distances, or all
+    /// one.
     fn graph(seed: u64, nodes: usize, more: usize, equal: bool) -> Ways {
         let mut next = random(seed);
         let mut ways = Ways::default();
@@ -166,7 +175,8 @@ mod tests {
 
     #[test]
     fn of_equal_ways_that_with_the_ends_farthest_apart_is_taken() {
-        // a ring of six equal edges, drawn as a flat hexagon: opposite corners are three edges apart
+        // a ring of six equal edges, drawn as a flat hexagon: opposite corners are three edges
+        // apart
         let mut ways = Ways::default();
         let at = [[-3.0, 0.0], [-1.0, 0.5], [1.0, 0.5], [3.0, 0.0], [1.0, -0.5], [-1.0, -0.5]];
         let nodes = at.map(|x| ways.add_node(x));
@@ -198,7 +208,7 @@ mod tests {
         let began = std::time::Instant::now();
         let (_, edges) = longest(&ways).unwrap();
         eprintln!("{} nodes, {} edges in the path, {:?}", ways.node_count(), edges.len(), began.elapsed());
-        // every node as a start
+        // one start in 97 nodes
         let far = |node| dijkstra(&ways, node, None, |edge| *edge.weight()).into_values().fold(0.0, f64::max);
         let starts = ways.node_indices().step_by(97);
         assert!(

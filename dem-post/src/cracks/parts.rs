@@ -1,4 +1,5 @@
-//! What the cracks of the plane and of space have in common: broken bonds as parts that meet in points.
+//! Cracks in 2D and in 3D alike: broken bonds are parts, and parts that share a point make one
+//! crack.
 
 use petgraph::unionfind::UnionFind;
 
@@ -13,24 +14,24 @@ pub struct Part<'a> {
     pub size: f64,
 }
 
-/// One more than the greatest number of a point.
+/// Number of points: one more than the greatest index of a point.
 pub(super) fn nodes<'a>(parts: impl Iterator<Item = Part<'a>>) -> usize {
     parts.flat_map(|part| part.nodes.iter().copied()).max().map_or(0, |last| last + 1)
 }
 
-/// Join all points of one part.
+/// Joins all points of one part.
 pub(super) fn join(points: &mut UnionFind<usize>, nodes: &[usize]) {
     nodes.windows(2).for_each(|pair| {
         points.union(pair[0], pair[1]);
     });
 }
 
-/// The parts of each crack by their places in the list, in order; the largest crack first.
+/// For each crack, the largest first: the indices of its parts in the list, in order.
 pub(super) fn groups<'a>(parts: impl Iterator<Item = Part<'a>> + Clone) -> Vec<Vec<usize>> {
     let count = nodes(parts.clone());
     let mut joined = UnionFind::<usize>::new(count);
     parts.clone().for_each(|part| join(&mut joined, part.nodes));
-    // in the order of their first bond, so that equal sizes have an order too
+    // in the order of their first bond, so that cracks of equal size have a fixed order too
     let mut groups: Vec<(f64, Vec<usize>)> = vec![];
     let mut group_of = vec![usize::MAX; count];
     for (k, part) in parts.enumerate() {

@@ -1,35 +1,38 @@
-//! Cracks as lines, in the plane: segments of broken bonds, joined through the voids between the grains.
+//! Cracks as lines, in 2D: segments of broken bonds, joined through the voids between the grains.
 //!
-//! All places are those of the first frame: where the crack runs in the sample as it was cemented, whatever the pieces
-//! did afterwards.
+//! All positions are those of the first frame: the crack is shown in the sample as it was cemented,
+//! whatever the fragments did afterwards.
 //!
-//! * **Segment** of a broken bond: from the middle of the void on its one side over its point of contact to the middle
-//!   of the void on its other side (the dual edge of the bond). Between equal disks on a lattice this is the facet that
-//!   their Voronoi cells share: as long as the diameter on a square lattice, diameter/√3 on a hexagonal one. Where
-//!   there is no void, at the edge of the sample, or where both sides are the same void, the segment ends half the
-//!   pair's mean diameter from the point of contact, perpendicular to the bond.
-//! * **Crack**: segments that meet in a void. Two broken bonds of one grain with an intact bond between them on either
-//!   side do not meet: the material between them holds.
-//! * **Path** of a crack: the longest of the shortest ways through it, over all pairs of its voids and free ends; of equally
-//!   long ones the one whose ends are farthest apart. Branches count in the length of the crack, not in that of its path.
-//! * **Orientation**: of the line between the ends of the path, from 0° to 180°, counter-clockwise from the first axis.
-//!   **Tortuosity**: length of the path over the distance of its ends, at least 1.
+//! * **Segment** of a broken bond: from the middle of the void on its one side over its point of
+//!   contact to the middle of the void on its other side (the dual edge of the bond). Between equal
+//!   disks on a lattice this is the facet that their Voronoi cells share: as long as the diameter
+//!   on a square lattice, diameter/√3 on a hexagonal one. Where there is no void, at the edge of
+//!   the sample, or where both sides are the same void, the segment ends half the pair's mean
+//!   diameter from the point of contact, perpendicular to the bond.
+//! * **Crack**: segments that meet in a void. Two broken bonds of one grain with an intact bond
+//!   between them on either side do not meet: the material between them holds.
+//! * **Path** of a crack: the longest of the shortest paths through it, over all pairs of its voids
+//!   and free ends; among paths of equal length the one whose ends are farthest apart. Branches
+//!   count in the length of the crack, not in that of its path.
+//! * **Orientation**: of the line between the ends of the path, from 0° to 180°, counter-clockwise
+//!   from the first axis. **Tortuosity**: length of the path over the distance of its ends, at
+//!   least 1.
 
 use dem_run::history::{Bonds, Rupture};
 use petgraph::graph::NodeIndex;
 use serde::Serialize;
 
-use super::Modes;
-use super::longest::{Ways, longest};
+use super::longest::{Ways, distance, longest};
+use super::modes::Modes;
 use super::parts::{Part, groups};
 use super::voids::Voids;
 
 /// A broken bond as a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Segment {
-    /// Its place in the list of ruptures.
+    /// Its index in the list of ruptures.
     pub event: usize,
-    /// Its ends in the graph of cracks: voids, and after them the free ends.
+    /// Its two nodes in the graph of cracks: voids, numbered first, or free ends.
     pub(super) nodes: [usize; 2],
     /// From the left of the bond over its point of contact to the right, m.
     pub line: [[f64; 2]; 3],
@@ -82,8 +85,8 @@ pub struct Paths {
 }
 
 impl Paths {
-    /// Finds the cracks that `ruptures` make in the sample whose grains had centres `position` (m) and radii `radius`
-    /// (m) when `bonds` were formed.
+    /// Finds the cracks that `ruptures` make in the sample whose grains had centres `position` (m)
+    /// and radii `radius` (m) when `bonds` were formed.
     pub fn find(position: &[[f64; 2]], radius: &[f64], bonds: &Bonds, ruptures: &[Rupture]) -> Self {
         let mut segments = segments(position, radius, bonds, ruptures);
         let groups = groups(parts(&segments));
@@ -146,11 +149,8 @@ fn segments(position: &[[f64; 2]], radius: &[f64], bonds: &Bonds, ruptures: &[Ru
     segments
 }
 
-pub(super) fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
-    (b[0] - a[0]).hypot(b[1] - a[1])
-}
-
-/// The segments from one end of a crack to the other, each with whether it is passed from its first node to its second.
+/// The segments from one end of a crack to the other, each with whether it is passed from its first
+/// node to its second.
 fn longest_path(segments: &[Segment], group: &[usize]) -> Vec<(usize, bool)> {
     let mut nodes: Vec<usize> = group.iter().flat_map(|&k| segments[k].nodes).collect();
     nodes.sort_unstable();

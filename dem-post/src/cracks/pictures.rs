@@ -4,12 +4,12 @@ use dem_run::history::{BondStatus, History};
 
 use super::front::Growth;
 use super::paths::Crack;
+use super::report::{Pieces, Report};
 use super::surfaces::Facet;
-use super::{Pieces, Report};
 use crate::fragments::{Fragment, Fragments};
 use crate::map::{Colour, Key, Link, Panel, Patch, Ramp, Sample, Scale, draw, draw_view};
 use crate::output::{Result, number};
-use crate::plot::{Chart, Drawing, Style, colour};
+use dem_run::plot::{Chart, Drawing, Style, colour};
 
 /// Fill of grains that kept all their bonds.
 const BONDED: &str = "#8c8c8c";
@@ -19,7 +19,8 @@ const RELEASED: &str = "#ffffff";
 const OUTLINE: &str = "#404040";
 /// Fill and outline of grains under cracks.
 const PALE: [&str; 2] = ["#f0f0f0", "#cfcfcf"];
-/// Fills of the heaviest fragments: colours that the colour-blind tell apart (Okabe & Ito 2008).
+/// Fills of the heaviest fragments: colours that colour-blind readers distinguish (Okabe & Ito
+/// 2008).
 const FRAGMENTS: [&str; 6] = ["#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#f0e442", "#d55e00"];
 /// Widths of a segment on the path of its crack and of another.
 const WIDTHS: [f64; 2] = [3.2, 1.8];
@@ -64,12 +65,13 @@ pub fn fragment_charts(pieces: &[Pieces]) -> Vec<Chart> {
     vec![number, largest]
 }
 
-/// The tips of the longest cracks over time; the size of all cracks and of the largest over time; and, where a step
-/// broke bonds in several rounds, these sizes over the rounds of the step that has most of them.
+/// The tips of the longest cracks over time; the size of all cracks and of the largest over time;
+/// and, where a step broke bonds in several rounds, these sizes over the rounds of the step that
+/// has most of them.
 pub fn front_charts(report: &Report) -> Vec<Chart> {
     let mut over_time = Chart::new("time (s)", "place of the tips along the crack (mm)");
     over_time.set_off = true;
-    // what broke at once has no way over time
+    // a crack whose bonds all broke at one time has no curve over time
     let grown = |crack: &&Crack| crack.first < crack.last;
     for crack in report.cracks.iter().filter(grown).take(FRONTS) {
         let rows = || report.fronts.iter().filter(|row| row.crack == crack.number);
@@ -180,8 +182,9 @@ fn pale_panel(history: &History, report: &Report, cracks: usize) -> Result<Panel
     })
 }
 
-/// The facets of cracks in space, coloured by the time at which each bond broke, or by the round of the cascade where all broke
-/// in one step: in perspective, and over the grains of the first frame along y and against x.
+/// The facets of cracks in 3D, coloured by the time at which each bond broke, or by the round of
+/// the cascade where all broke in one step: in perspective, and over the grains of the first frame
+/// along y and against x.
 ///
 /// # Errors
 /// Those of reading the history.
@@ -197,8 +200,9 @@ pub fn surface_maps(history: &History, report: &Report) -> Result<[Drawing; 3]> 
     Ok([map(&Sample::with_depth(history)?, &panel), front, side])
 }
 
-/// The cracks over the grains of the first frame, coloured by the time at which each bond broke, or by the round of the
-/// cascade where all broke in one step. The second drawing shows the part around the cracks, where that is small.
+/// The cracks over the grains of the first frame, coloured by the time at which each bond broke, or
+/// by the round of the cascade where all broke in one step. The second drawing shows the part
+/// around the cracks, where that is small.
 ///
 /// # Errors
 /// Those of reading the history.
@@ -234,8 +238,8 @@ fn filled_panel(history: &History, frame: usize, fills: Vec<Colour>, what: Strin
     })
 }
 
-/// The pieces of a sample at some frames, of which `lists` has one by one: the heaviest in colours of their own, in the order
-/// of their masses.
+/// The fragments of a sample at some frames, listed in `lists` frame by frame: the heaviest in
+/// colours of their own, in the order of their masses.
 ///
 /// # Errors
 /// Those of reading the history.

@@ -1,17 +1,19 @@
-//! Cracks as surfaces, in space: facets of broken bonds, joined where they meet.
+//! Cracks as surfaces, in 3D: facets of broken bonds, joined where they meet.
 //!
-//! All places are those of the first frame: where the crack runs in the sample as it was cemented, whatever the pieces
-//! did afterwards.
+//! All positions are those of the first frame: the crack is shown in the sample as it was cemented,
+//! whatever the fragments did afterwards.
 //!
-//! * **Facet** of a broken bond: the face that the cells of its two grains share in the power diagram of all grains (the
-//!   Voronoi diagram where they are equal), as far as it lies within half the pair's mean diameter from the line of
-//!   centres: at the edge of the sample, or beside a large void, a cell has no end near by. Between equal spheres that touch
-//!   it is d² on a cubic lattice, of which the polygon of 24 sides around a circle of diameter d counts, and d²/(2√2) on a
-//!   close packing.
-//! * **Crack**: facets that meet in a corner, which is a point of equal power to four grains: in the void between them, as in
-//!   the plane.
-//! * **Normal**: the direction to which the facets, weighed by their areas, are most perpendicular. **Flatness**: the mean of
-//!   cos², weighed alike, of the angle between the normals of the facets and it, 1 for a plane and 1/3 for a sphere.
+//! * **Facet** of a broken bond: the face that the cells of its two grains share in the power
+//!   diagram of all grains (the Voronoi diagram where they are equal), as far as it lies within
+//!   half the pair's mean diameter from the line of centres: at the edge of the sample, or beside a
+//!   large void, a cell has no end near by. Between equal spheres that touch it is d² on a cubic
+//!   lattice, of which the polygon of 24 sides around a circle of diameter d counts, and d²/(2√2)
+//!   on a close packing.
+//! * **Crack**: facets that meet in a corner, which is a point of equal power to four grains: in
+//!   the void between them, as in 2D.
+//! * **Normal**: the direction to which the facets, weighed by their areas, are most perpendicular.
+//!   **Flatness**: the mean of cos², weighed alike, of the angle between the normals of the facets
+//!   and it, 1 for a plane and 1/3 for a sphere.
 //! * **Extent**: the greatest distance of two corners.
 //!
 //! Source of the diagram: F. Aurenhammer, *Power diagrams*, SIAM J. Comput. 16, 1987.
@@ -22,14 +24,14 @@ use dem_run::history::{Bonds, Rupture};
 use nalgebra::Vector3;
 use serde::Serialize;
 
-use super::Modes;
+use super::modes::Modes;
 use super::parts::{Part, groups};
 use crate::chains::stress::major;
 
-/// Sides of the polygon that stands for a circle.
+/// Sides of the polygon that approximates a circle.
 const SIDES: usize = 24;
-/// Distance within which two corners are always one, and the one beyond which they never are, over the mean diameter: those
-/// between are one where they lie in one cell.
+/// Two corners closer than `ONE` mean diameters are always one, two farther apart than `CELL`
+/// never; in between they are one if they lie in the same cell of a grid.
 const ONE: f64 = 1e-6;
 const CELL: f64 = 1e-4;
 
@@ -38,11 +40,12 @@ type Point = Vector3<f64>;
 /// A broken bond as a polygon.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Facet {
-    /// Its place in the list of ruptures.
+    /// Its index in the list of ruptures.
     pub event: usize,
     /// The points in which it meets others.
     pub(super) nodes: Vec<usize>,
-    /// Its corners, one after the other, m; none where the cells do not meet near the line of centres.
+    /// Its corners, one after the other, m; none where the cells do not meet near the line of
+    /// centres.
     pub corners: Vec<[f64; 3]>,
     /// Area, m².
     pub area: f64,
@@ -85,8 +88,8 @@ pub struct Surfaces {
 }
 
 impl Surfaces {
-    /// Finds the cracks that `ruptures` make in the sample whose grains had centres `position` (m) and radii `radius` (m)
-    /// when `bonds` were formed.
+    /// Finds the cracks that `ruptures` make in the sample whose grains had centres `position` (m)
+    /// and radii `radius` (m) when `bonds` were formed.
     pub fn find(position: &[[f64; 3]], radius: &[f64], bonds: &Bonds, ruptures: &[Rupture]) -> Self {
         let mut facets = facets(position, radius, bonds, ruptures);
         let groups = groups(parts(&facets));
@@ -144,7 +147,7 @@ fn extent(points: Vec<Point>) -> f64 {
     let farthest = |from: Point| points.iter().copied().max_by(|a, b| (a - from).norm().total_cmp(&(b - from).norm()));
     let ends = points.first().and_then(|first| farthest(*first)).and_then(|end| Some((end, farthest(end)?)));
     let Some((a, b)) = ends else { return 0.0 };
-    // two points are at most as far apart as both are from the middle, together
+    // the distance of two points is at most the sum of their distances from the middle
     let (middle, mut greatest) = (0.5 * (a + b), (a - b).norm());
     let mut outwards: Vec<(f64, Point)> = points.iter().map(|x| ((x - middle).norm(), *x)).collect();
     outwards.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -186,8 +189,9 @@ impl Neighbours {
         candidates.map(|(_, k)| *k).filter(move |k| (self.centre[*k] - point).norm() < reach)
     }
 
-    /// Where the line of centres passes the plane of equal power, and the part of the plane within `reach` of it (m) that is
-    /// nearest, in the sense of the power diagram, to both grains.
+    /// The face that two grains share in the power diagram, cut off at the distance `reach` (m):
+    /// the point where the line of centres passes the plane of equal power, the normal of that
+    /// plane, and the corners of the face relative to the point.
     fn face(&self, [i, j]: [usize; 2], reach: f64) -> (Point, Point, Vec<Point>) {
         let (a, b) = (self.centre[i], self.centre[j]);
         let way = a - b;
@@ -195,7 +199,8 @@ impl Neighbours {
         let share = 0.5 * (length + (self.radius[j].powi(2) - self.radius[i].powi(2)) / length);
         let middle = b + normal * share;
         let mut polygon = circle(normal, reach);
-        // the power of a corner to either grain is at most this, so no grain farther away comes before them
+        // the power of a corner with respect to either grain is at most this, so a grain farther
+        // away cannot cut the face
         let power = reach * reach / (std::f64::consts::PI / SIDES as f64).cos().powi(2) + (middle - a).norm_squared()
             - self.radius[i].powi(2);
         let far = 1.01 * reach + (power + self.greatest.powi(2)).max(0.0).sqrt();
@@ -210,7 +215,8 @@ impl Neighbours {
     }
 }
 
-/// A regular polygon around the circle of a radius, perpendicular to the unit vector `normal`, around the origin.
+/// A regular polygon around the circle of a radius, perpendicular to the unit vector `normal`,
+/// around the origin.
 fn circle(normal: Point, radius: f64) -> Vec<Point> {
     let least = normal.iamin();
     let first = normal.cross(&Point::ith(least, 1.0)).normalize();
@@ -223,7 +229,7 @@ fn circle(normal: Point, radius: f64) -> Vec<Point> {
     (0..SIDES).map(corner).collect()
 }
 
-/// Leave of a convex polygon what has x·direction ≤ limit.
+/// Keeps the part of a convex polygon where x·direction ≤ limit.
 fn clip(polygon: &mut Vec<Point>, direction: Point, limit: f64) {
     let beyond = |x: &Point| x.dot(&direction) - limit;
     if polygon.iter().all(|x| beyond(x) <= 0.0) {
@@ -260,7 +266,7 @@ fn facets(position: &[[f64; 3]], radius: &[f64], bonds: &Bonds, ruptures: &[Rupt
         let mean = bonds.mean_diameter[bond];
         let (middle, normal, mut polygon) = neighbours.face(bonds.pair[bond].map(|k| k as usize), mean);
         let mut nodes = vec![];
-        // what lies on the rim is no corner of the diagram
+        // corners on the rim are no corners of the diagram
         for x in polygon.iter().filter(|x| x.norm() < mean) {
             for cell in cells(middle + x, diameter) {
                 let next = count;
@@ -291,7 +297,7 @@ fn facets(position: &[[f64; 3]], radius: &[f64], bonds: &Bonds, ruptures: &[Rupt
     list
 }
 
-/// The cells that a point, as large as the distance at which two are one, lies in.
+/// The cells of the grid that a point lies in, if it has the size `ONE`.
 fn cells(x: Point, diameter: f64) -> Vec<[i64; 3]> {
     let ends = |k: usize| [-ONE, ONE].map(|s| ((x[k] / diameter + s) / CELL).floor() as i64);
     let mut cells = vec![[0; 3]];

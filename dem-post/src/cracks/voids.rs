@@ -1,23 +1,24 @@
-//! Voids: the holes that the grains and bonds of a plane sample enclose.
+//! Voids: the holes that the grains and bonds of a 2D sample enclose.
 //!
-//! Bonds between disks that touch do not cross, so the bonds are the edges of a plane graph. Its bounded faces are the
-//! voids: going round a void, one bond follows the next at each grain. What lies outside the sample, and around a piece
-//! that floats inside a void, is no void.
+//! Bonds between disks that touch do not cross, so the bonds are the edges of a plane graph. Its
+//! bounded faces are the voids: going round a void, one bond follows the next at each grain. The
+//! face outside the sample, and the face around a fragment inside a void, are no voids.
 
-/// Area below which a face is one of a tree, over the sum of its squared edges.
+/// Area over the sum of the squared edges below which a face is that of a tree, not a void.
 const FLAT: f64 = 1e-6;
 
-/// The voids, and which of them a bond separates.
+/// The voids, and for each bond the two that it separates.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Voids {
     /// For each bond from i to j, the void on its left and on its right; `None` outside the sample.
     pub beside: Vec<[Option<usize>; 2]>,
-    /// The middle of each void, m: the mean of its points of contact.
+    /// The centre of each void, m: the mean of its points of contact.
     pub centre: Vec<[f64; 2]>,
 }
 
 impl Voids {
-    /// The voids between grains with centres `position` (m), bonded by `pair` with points of contact `point` (m).
+    /// The voids between grains with centres `position` (m), bonded by `pair` with points of
+    /// contact `point` (m).
     pub fn find(position: &[[f64; 2]], pair: &[[i32; 2]], point: &[[f64; 2]]) -> Self {
         let graph = Graph::new(position, pair);
         let mut voids = Self { beside: vec![[None; 2]; pair.len()], centre: vec![] };

@@ -1,19 +1,19 @@
-//! From where a sample is seen: straight along an axis, or in perspective from above and to the side.
+//! The viewpoint: parallel to an axis, or in perspective from above and from the side.
 
 use nalgebra::Vector3;
 
+use super::boxes::{Box2, EMPTY, around, union};
 use super::scale::{Colour, mixed};
-use super::{Box2, EMPTY, around, union};
 
 /// How the sample is seen.
 pub(super) enum Eye {
-    /// From far away, onto two axes: in space along y, or against x.
+    /// From far away, onto two axes: in 3D along y, or against x.
     Along([usize; 2]),
     /// From a place.
     At(Place),
 }
 
-/// A place from where spheres are seen in perspective.
+/// A viewpoint from which spheres are seen in perspective.
 pub(super) struct Place {
     /// The middle of the sample, which it looks at, and half the sides of the box around it, m.
     focus: Vector3<f64>,
@@ -24,14 +24,15 @@ pub(super) struct Place {
     ahead: Vector3<f64>,
 }
 
-/// How far the eye is, in halves of the diagonal of the box: near enough to show depth, far enough for spheres to look round.
+/// How far the eye is, in halves of the diagonal of the box: near enough to show depth, far enough
+/// for spheres to look round.
 const FAR: f64 = 5.0;
 /// Angles to the side and above (rad).
 const ASIDE: f64 = 0.45;
 const ABOVE: f64 = 0.3;
-/// Share of white over what is farthest.
+/// Share of white in the colours of the farthest grains.
 const HAZE: f64 = 0.6;
-/// Share of white over what the light passes by.
+/// Share of white on a polygon that is parallel to the light.
 const SHADE: f64 = 0.6;
 /// How much larger than the sample planes are drawn.
 const BEYOND: f64 = 1.15;
@@ -55,7 +56,7 @@ impl Place {
     /// How much larger a thing looks at this depth than in the middle of the sample.
     fn magnified(&self, depth: f64) -> f64 {
         let far = FAR * self.half.norm();
-        // what comes close to the eye grows no further
+        // points close to the eye are not magnified further
         far / (far + depth).max(0.2 * far)
     }
 
@@ -65,7 +66,8 @@ impl Place {
         [self.right, self.up].map(|axis| off.dot(&axis) * self.magnified(self.depth(point)))
     }
 
-    /// The corners of a plane through `point`, m, as large as the sample, and whether the sample is in front of it.
+    /// The corners of a plane through `point`, m, as large as the sample, and whether the sample is
+    /// in front of it.
     pub fn plane(&self, point: &[f64], normal: [f64; 3]) -> ([[f64; 3]; 4], bool) {
         let normal = Vector3::from(normal);
         let middle = self.focus + (Vector3::from_column_slice(point) - self.focus).dot(&normal) * normal;
@@ -83,7 +85,8 @@ impl Place {
         points.iter().fold(EMPTY, |found, point| union(found, around(self.flat(point), 0.0)))
     }
 
-    /// A colour as it looks on a flat polygon: the paler the less it faces the light, which comes from above and the left.
+    /// A colour as it looks on a flat polygon: the paler the less it faces the light, which comes
+    /// from above and the left.
     pub fn lit(&self, colour: &str, corners: &[[f64; 3]]) -> Colour {
         let [a, b, c] = [0, 1, 2].map(|k| corners.get(k).map_or_else(Vector3::default, |x| Vector3::from(*x)));
         let facing = (b - a).cross(&(c - a)).try_normalize(0.0).map_or(1.0, |normal| normal.dot(&self.light()).abs());
@@ -111,8 +114,8 @@ impl Eye {
         }
     }
 
-    /// How far a point of space is from the eye, m, from where it does not matter. To the right, up and to the eye are
-    /// right-handed: it looks along y, or against x.
+    /// Depth of a point in 3D, m, up to a constant. The axes right, up and towards the eye are
+    /// right-handed: the eye looks along y, or against x.
     pub fn depth(&self, point: &[f64]) -> f64 {
         match self {
             Self::Along([0, _]) => point[1],

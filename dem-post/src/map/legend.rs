@@ -1,8 +1,9 @@
-//! What stands below a map: the bar of length, and the legend in rows.
+//! Below a map: the bar of length, and the legend in rows.
 
-use super::{HATCH, Scale};
+use super::arrow::draw_arrow;
+use super::scale::Scale;
 use crate::output::short;
-use crate::plot::{Anchor, Canvas, colour};
+use dem_run::plot::{Anchor, Canvas, colour};
 
 /// Length of a bar of colours, and the strips it is made of.
 const BAR: f64 = 150.0;
@@ -22,13 +23,13 @@ pub enum Key {
     Arrow(String),
 }
 
-/// A bar of a round length, at most a third of the panel.
+/// A bar of a round length that begins at a point, at most a third of the panel wide.
 pub(super) fn scale_bar(canvas: &mut Canvas, (x, y): (f64, f64), scale: f64, width: f64) {
-    // beside a narrow panel the sheet has room
+    // beside a narrow panel the sheet has free space
     let longest = (width / 3.0).max(BAR / 2.0) / scale;
     let power = 10f64.powf(longest.log10().floor());
     let length = [5.0, 2.0, 1.0].into_iter().map(|m| m * power).find(|l| *l <= longest).unwrap_or(power);
-    let (from, to) = (x + 2.0 * HATCH, x + 2.0 * HATCH + length * scale);
+    let (from, to) = (x, x + length * scale);
     canvas.line((from, y), (to, y), colour::BLACK, 2.0);
     for end in [from, to] {
         canvas.line((end, y - 4.0), (end, y + 4.0), colour::BLACK, 1.2);
@@ -85,7 +86,7 @@ pub(super) fn draw_legend(canvas: &mut Canvas, row: &[&Key], (middle, y): (f64, 
                 continue;
             }
             Key::Arrow(text) => {
-                super::draw_arrow(canvas, (x + 4.0, y), (x + 28.0, y));
+                draw_arrow(canvas, (x + 4.0, y), (x + 28.0, y));
                 text
             }
             Key::Disk(fill, outline, text) => {

@@ -1,18 +1,19 @@
-//! Colours that stand for a value.
+//! Colour scales: colours that show a value.
 
 use std::borrow::Cow;
 
 /// A colour, as `#rrggbb`.
 pub type Colour = Cow<'static, str>;
 
-/// A sequence of colours of steadily changing lightness, for colour-blind readers and for print: after matplotlib's maps
-/// of S. van der Walt and N. Smith, in ten steps with straight lines between.
+/// A sequence of colours of steadily changing lightness, for colour-blind readers and for print:
+/// after matplotlib's maps of S. van der Walt and N. Smith, in ten steps with straight lines
+/// between.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ramp {
     /// From dark blue to yellow: viridis. For areas.
     Areas,
-    /// From near black over red to orange: inferno without its lightest part, which a white sheet would swallow. For
-    /// lines.
+    /// From near black over red to orange: inferno without its lightest part, which a white sheet
+    /// would swallow. For lines.
     Lines,
 }
 
@@ -69,7 +70,7 @@ impl Scale {
     }
 }
 
-/// The colour that is this part of the way from one to another.
+/// Interpolates between two colours; `part` is 0 to 1.
 fn between(from: [u8; 3], to: [u8; 3], part: f64) -> Colour {
     let mix = |c: usize| {
         let (from, to) = (f64::from(from[c]), f64::from(to[c]));

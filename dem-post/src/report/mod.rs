@@ -1,14 +1,18 @@
-//! A run on one page: an HTML file that needs nothing else, with pictures, curves, tables, the solver's own measures of
-//! its accuracy, the energy books and the scene.
+//! A run on one page: an HTML file that needs nothing else, with pictures, curves, tables, the
+//! solver's own measures of its accuracy, the energy balance and the scene.
 //!
-//! Curves are SVG, maps are PNG (a map of thousands of grains is far smaller so), all of them
-//! inside the page as `data:` addresses. Long curves are thinned as all charts are. A section that
-//! a scene has nothing for says why.
+//! Curves are SVG, maps are PNG (smaller than SVG for thousands of grains), all of them inside the
+//! page as `data:` addresses. Long curves are thinned as all charts are. A section without content
+//! gives the reason.
 
+use clap::Args;
 use dem_run::history::History;
 use serde::Serialize;
 
+use crate::analysis::Analysis;
+use crate::options::Moments;
 use crate::output::{Folder, PostError, Result, facts, number};
+use crate::section::{OnPage, Section};
 use crate::{chains, cracks, info, stress_strain, velocities};
 
 mod page;
@@ -17,7 +21,44 @@ pub mod solver;
 
 use solver::Accuracy;
 
-/// What the page tells.
+/// The run on one HTML page that needs nothing else: pictures, curves, tables, accuracy, energy,
+/// scene.
+#[derive(Debug, Args)]
+pub struct Command {
+    #[command(flatten)]
+    moments: Moments,
+    /// The load wall [default: that of the scene, else the only driven one].
+    #[arg(long, value_name = "NAME")]
+    wall: Option<String>,
+}
+
+impl Analysis for Command {
+    const NAME: &'static str = "report";
+    type Input = History;
+    type Report = Report;
+
+    fn open(&self) -> Result<History> {
+        self.moments.files.open()
+    }
+
+    fn read(&self, history: &History, quiet: bool) -> Result<Report> {
+        read(history, &self.moments.times, self.wall.as_deref(), quiet)
+    }
+
+    fn table(report: &Report) -> String {
+        report.table()
+    }
+
+    fn folder(&self, history: &History) -> Result<Option<Folder>> {
+        self.moments.files.folder(history, Self::NAME)
+    }
+
+    fn write(&self, history: &History, report: &mut Report, folder: &mut Folder, _: bool) -> Result<()> {
+        write(history, report, folder)
+    }
+}
+
+/// What the page shows.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     /// What the history holds.
@@ -40,13 +81,13 @@ pub struct Report {
 /// A section that has nothing to show.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct LeftOut {
-    /// What it is about.
+    /// Its [`OnPage::ID`].
     pub section: &'static str,
     /// Why there is nothing.
     pub why: String,
 }
 
-/// Reads all that the page tells; maps show the frames nearest to `times` (s), or chosen ones, and
+/// Reads all that the page shows; maps show the frames nearest to `times` (s), or chosen ones, and
 /// the load is that of `wall`, or of the scene's load wall.
 ///
 /// # Errors
@@ -54,27 +95,27 @@ pub struct LeftOut {
 /// several walls are driven and none is chosen; [`PostError::Lacking`] for a history without
 /// frames.
 pub fn read(history: &History, times: &[f64], wall: Option<&str>, quiet: bool) -> Result<Report> {
-    // the first to say that a time is wrong or that there is no frame
+    // read first: it reports wrong times and a history without frames
     let velocities = velocities::read(history, times)?;
     let mut left_out = vec![];
     Ok(Report {
         velocities,
         info: info::read(history)?,
         accuracy: solver::read(history)?,
-        // the first to say that a wall is wrong: cracks take their time
-        stress_strain: if_there("load", stress_strain::read(history, wall), &mut left_out)?,
-        cracks: if_there("cracks", cracks::read(history, quiet), &mut left_out)?,
-        chains: if_there("chains", chains::read(history, times), &mut left_out)?,
+        // before the cracks, which take long: it reports a wrong wall
+        stress_strain: if_there(stress_strain::read(history, wall), &mut left_out)?,
+        cracks: if_there(cracks::read(history, quiet), &mut left_out)?,
+        chains: if_there(chains::read(history, times), &mut left_out)?,
         left_out,
     })
 }
 
-/// What a scene lacks, it has no section of: the reason stands in its place.
-fn if_there<T>(section: &'static str, found: Result<T>, left_out: &mut Vec<LeftOut>) -> Result<Option<T>> {
+/// `None` for an analysis that the scene lacks something for; the reason goes to `left_out`.
+fn if_there<R: OnPage>(found: Result<R>, left_out: &mut Vec<LeftOut>) -> Result<Option<R>> {
     match found {
         Ok(found) => Ok(Some(found)),
         Err(PostError::Lacking { what, .. }) => {
-            left_out.push(LeftOut { section, why: what });
+            left_out.push(LeftOut { section: R::ID, why: what });
             Ok(None)
         }
         Err(error) => Err(error),
@@ -82,7 +123,31 @@ fn if_there<T>(section: &'static str, found: Result<T>, left_out: &mut Vec<LeftO
 }
 
 impl Report {
-    /// What stands on the page, in a few lines.
+    /// The sections of the page, in order.
+    fn sections(&self, history: &History) -> Result<Vec<Section>> {
+        let frames: Vec<usize> = self.velocities.fields.iter().map(|field| field.frame).collect();
+        Ok(vec![
+            self.info.section(history, &frames)?,
+            self.accuracy.section(history, &frames)?,
+            self.section_of(self.stress_strain.as_ref(), history, &frames)?,
+            self.section_of(self.cracks.as_ref(), history, &frames)?,
+            self.section_of(self.chains.as_ref(), history, &frames)?,
+            self.velocities.section(history, &frames)?,
+            sections::energy(history)?,
+        ])
+    }
+
+    /// The section of an analysis, or the reason why it found nothing.
+    fn section_of<R: OnPage>(&self, found: Option<&R>, history: &History, frames: &[usize]) -> Result<Section> {
+        if let Some(found) = found {
+            return found.section(history, frames);
+        }
+        let why = self.left_out.iter().find(|out| out.section == R::ID);
+        let text = why.map_or_else(String::new, |out| format!("None: {}.", out.why));
+        Ok(Section { text, ..Section::of::<R>() })
+    }
+
+    /// The page in a few lines.
     pub fn table(&self) -> String {
         let a = &self.accuracy;
         let broken = self.cracks.as_ref().map_or_else(
@@ -113,6 +178,6 @@ impl Report {
 /// # Errors
 /// [`PostError::Write`], and those of reading the history.
 pub fn write(history: &History, report: &Report, folder: &mut Folder) -> Result<()> {
-    let page = page::render(history, report)?;
+    let page = page::render(history, report.sections(history)?)?;
     Ok(folder.write("report.html", page.as_bytes())?)
 }

@@ -1,4 +1,4 @@
-//! How accurately a run was solved, by the measures that it recorded at every step.
+//! The accuracy of the solver, from the measures that the run recorded at every step.
 
 use dem_run::history::{FALSE_ACCELERATION, History, LOAD_ERROR, ROUTE, SolverRoute};
 use serde::Serialize;
@@ -18,7 +18,7 @@ pub struct Spread {
     pub time: f64,
 }
 
-/// The solver's own figures; `None` for what was not recorded.
+/// The figures of the solver; `None` for what was not recorded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Accuracy {
     /// Observed steps.

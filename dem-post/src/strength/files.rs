@@ -1,19 +1,19 @@
 //! What `dem-post strength` writes.
 
-use super::{Report, Run, axis};
+use super::report::{Report, Run, axis};
 use crate::output::{Folder, Result, cell};
-use crate::plot::{Bars, Chart, Style, colour};
-use crate::row;
+use dem_run::plot::{Bars, Chart, Style, colour};
+use dem_run::row;
 
 /// Values that span at least this ratio are shown on a logarithmic axis.
 const DECADE: f64 = 10.0;
 /// Points of a line that bends on logarithmic axes.
 const LINE_POINTS: usize = 100;
-/// How far the mean is drawn from its points, so that it hides none, as a share of the axis.
+/// Offset of the mean from its points, as a share of the axis, so that it hides none.
 const BESIDE: f64 = 0.018;
 
-/// Writes `strength.csv` with a row for each run, `strength-values.csv` with one for each value of the field,
-/// `strength-samples.csv` with one for each sample, and as a drawing `strength`.
+/// Writes `strength.csv` with a row for each run, `strength-values.csv` with one for each value of
+/// the field, `strength-samples.csv` with one for each sample, and as a drawing `strength`.
 ///
 /// # Errors
 /// [`crate::output::PostError::Write`].
@@ -71,7 +71,7 @@ fn chart(report: &Report) -> Chart {
     let points = |of: &dyn Fn(&Run) -> bool| {
         report.runs.iter().filter(|run| of(run)).map(|run| (run.value, run.strength)).collect()
     };
-    // more samples than there are colours are not told apart
+    // with more samples than colours all have one colour
     if report.samples.len() <= colour::CYCLE.len() {
         for (sample, colour) in report.samples.iter().zip(colour::CYCLE) {
             chart = chart.curve(&sample.sample, colour, Style::Points, points(&|run| run.sample == sample.sample));

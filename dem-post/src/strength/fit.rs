@@ -1,7 +1,7 @@
-//! A straight line through points, the spread of numbers, and how sure both are.
+//! A straight line through points, the spread of numbers, and the standard errors of both.
 //!
-//! Points (xₖ, yₖ), k = 1 … n, with means x̄, ȳ and sums of squares Sxx = Σ(xₖ − x̄)², Syy, Sxy. The least-squares line
-//! y = b x + a and its standard errors are
+//! Points (xₖ, yₖ), k = 1 … n, with means x̄, ȳ and sums of squares Sxx = Σ(xₖ − x̄)², Syy, Sxy.
+//! The least-squares line y = b x + a and its standard errors are
 //!
 //! ```text
 //! b = Sxy / Sxx                     s² = Σ(yₖ − b xₖ − a)² / (n − 2)
@@ -9,8 +9,9 @@
 //! R² = 1 − (n − 2) s² / Syy         σ_a = s √(1/n + x̄² / Sxx)
 //! ```
 //!
-//! and 95 % intervals are b ± t σ_b, a ± t σ_a with the quantile t = t₀.₉₇₅ of Student's distribution with n − 2 degrees of
-//! freedom; for the mean of n numbers with standard deviation s, ± t s/√n with n − 1.
+//! and 95 % intervals are b ± t σ_b, a ± t σ_a with the quantile t = t₀.₉₇₅ of Student's
+//! distribution with n − 2 degrees of freedom; for the mean of n numbers with standard deviation s,
+//! ± t s/√n with n − 1.
 
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -23,7 +24,7 @@ const UPPER: f64 = 0.975;
 pub struct Estimate {
     /// Its value.
     pub value: f64,
-    /// Its standard error; `None` for a line through two points, which has no rest to tell it from.
+    /// Its standard error; `None` for a line through two points, which has no residual.
     pub standard_error: Option<f64>,
     /// Its 95 % interval.
     pub interval: Option<[f64; 2]>,
@@ -97,7 +98,7 @@ pub fn spread(values: &[f64]) -> Option<Spread> {
     Some(Spread { count: values.len(), mean, deviation, interval })
 }
 
-/// The 95 % interval of a value with a standard error and the degrees of freedom of that, at least 1.
+/// The 95 % interval of a value from its standard error and its degrees of freedom, at least 1.
 fn around(value: f64, error: f64, freedom: usize) -> [f64; 2] {
     let half = student(freedom) * error;
     [value - half, value + half]
@@ -105,7 +106,7 @@ fn around(value: f64, error: f64, freedom: usize) -> [f64; 2] {
 
 /// The quantile t₀.₉₇₅ of Student's distribution with `freedom` degrees of freedom, at least 1.
 fn student(freedom: usize) -> f64 {
-    // the constructor refuses nothing but a scale or a freedom that is not positive
+    // the constructor refuses only a scale or a freedom that is not positive
     StudentsT::new(0.0, 1.0, freedom as f64).map_or(f64::INFINITY, |distribution| distribution.inverse_cdf(UPPER))
 }
 
@@ -128,7 +129,8 @@ mod tests {
 
     #[test]
     fn standard_errors_are_those_computed_by_hand() {
-        // x̄ = 3, ȳ = 4, Sxx = 10, Sxy = 6, Syy = 6: b = 0.6, a = 2.2; rests -0.8, 0.6, 1, -0.6, -0.2, of squares 2.4
+        // x̄ = 3, ȳ = 4, Sxx = 10, Sxy = 6, Syy = 6: b = 0.6, a = 2.2; residuals -0.8, 0.6, 1,
+        // -0.6, -0.2, of squares 2.4
         let found = line(&[(1.0, 2.0), (2.0, 4.0), (3.0, 5.0), (4.0, 4.0), (5.0, 5.0)]).unwrap();
         close(found.slope.value, 0.6, 1e-14);
         close(found.intercept.value, 2.2, 1e-14);

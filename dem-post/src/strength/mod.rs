@@ -1,477 +1,92 @@
-//! Strength against a field of the scene, over many runs: the paper's figure 9, strength against cohesion, and the like for
-//! rates, sizes, friction.
+//! Strength against a field of the scene, over many runs: the paper's figure 9, strength against
+//! cohesion, and the like for rates, sizes, friction.
 //!
 //! **Strength** of a run is the load at a step that [`Measure`] names, each as the run's own
 //! summary and `stress-strain` define it. The load is that of the load wall or, without a driven
-//! wall, the only force on a grain. The measure is 5 % of the bonds broken unless told otherwise:
-//! it is an event of the bonds, so it means the same for rigid and elastic bonds, under a
-//! prescribed force and a prescribed motion. A strain of 1e-4 may be the solver's own where its
-//! tolerance is coarse, and elastic bonds come to it whole; the first break is one weak bond; a
+//! wall, the only force on a grain. The default measure is 5 % of the bonds broken: it is an event
+//! of the bonds, so it means the same for rigid and elastic bonds, under a prescribed force and a
+//! prescribed motion. The others are less general: a strain of 1e-4 may be solver error where the
+//! tolerance is coarse, and intact elastic bonds can reach it; the first break is one weak bond; a
 //! peak needs a load that can fall.
 //!
-//! **Samples.** Runs are grouped by the value of the varied field and by sample ([`scenes`] says how both are found). Runs of
-//! one sample are not independent of each other: they are the same grains again. So beside the line through all points, whose
-//! standard errors take every run as independent, each sample has a line of its own, and the intervals over the samples are
-//! those of the mean of their slopes and intercepts.
+//! **Samples.** Runs are grouped by the value of the varied field and by sample ([`scenes`] says
+//! how both are found). Runs of one sample are not independent of each other: they are the same
+//! grains again. The standard errors of the line through all points take every run as independent.
+//! Therefore each sample also has its own line, and the intervals over the samples are those of the
+//! mean of their slopes and intercepts.
 
 use std::path::PathBuf;
 
-use serde::Serialize;
+use clap::Args;
 
+use crate::analysis::Analysis;
+use crate::output::{Folder, Result, Source, default_folder};
 pub use files::write;
-use fit::{Estimate, Line, Spread, line, spread};
+pub use report::{Options, Report, read};
 pub use runs::Measure;
-use runs::{Found, histories, name};
-use scenes::{design, unit};
-
-use crate::output::{PostError, Result, Text, facts, number, quantity};
 
 mod files;
 pub mod fit;
+pub mod report;
 pub mod runs;
 pub mod scenes;
 
-/// Rests of R² below this are rounding, and so are intercepts below this share of the greatest strength.
-const ROUNDING: f64 = 1e-12;
-/// Runs left out that the table names.
-const NAMED: usize = 12;
-
-/// What is asked for.
-#[derive(Clone, Debug, Default)]
-pub struct Options {
-    /// The varied field, as `--set` names it; found from the scenes where it is absent.
-    pub against: Option<String>,
-    /// What counts as the strength.
-    pub measure: Measure,
-    /// The load wall; that of the scenes where it is absent.
-    pub wall: Option<String>,
-}
-
-/// A run that has a strength.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Run {
-    /// Its file.
-    pub run: String,
-    /// Value of the varied field.
-    pub value: f64,
-    /// Its sample.
-    pub sample: String,
-    /// Its strength, N.
-    pub strength: f64,
-    /// When it was reached, s.
-    pub time: f64,
-    /// Strength over the field's value; `None` where that is zero.
-    pub ratio: Option<f64>,
-    /// Whether no rigid bond had broken by the collapse: of grains in one piece the strain is the
-    /// solver's.
-    pub early: bool,
-}
-
-/// A run without a strength.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct LeftOut {
-    /// Its file.
-    pub run: String,
-    /// Why it has none.
-    pub why: String,
-}
-
-/// The runs at one value of the field.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct AtValue {
-    /// The value.
-    pub value: f64,
-    /// Their strengths, N.
-    pub strength: Spread,
-    /// The least and the greatest of them, N.
-    pub range: [f64; 2],
-    /// Strength over the value; `None` where that is zero.
-    pub ratio: Option<Spread>,
-}
-
-/// The runs of one sample.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct OfSample {
-    /// The sample.
-    pub sample: String,
-    /// How many runs.
-    pub runs: usize,
-    /// Whether they are of the same grains with the same bonds.
-    pub same_grains: bool,
-    /// The line through them; `None` for runs at one value.
-    pub line: Option<Line>,
-    /// Mean of strength over value; `None` where a value is zero.
-    pub ratio: Option<f64>,
-    /// Greatest deviation of that ratio from its mean, as a share of the mean; `None` for runs at one value.
-    pub ratio_deviation: Option<f64>,
-}
-
-/// How the samples scatter; each is `None` where no sample has it.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct OverSamples {
-    /// Their slopes.
-    pub slope: Option<Spread>,
-    /// Their intercepts, N.
-    pub intercept: Option<Spread>,
-    /// Their means of strength over value.
-    pub ratio: Option<Spread>,
-}
-
-/// Strength against a field.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Report {
-    /// What counts as the strength.
-    pub measure: Measure,
-    /// The varied field.
-    pub field: String,
-    /// Its unit; empty for a number without.
-    pub unit: String,
-    /// Fields that move with it.
-    pub along: Vec<String>,
-    /// Fields that make the sample, of those that differ.
-    pub sample_fields: Vec<String>,
-    /// The runs, in the order given.
-    pub runs: Vec<Run>,
-    /// Runs that did not give way, or are not done.
-    pub left_out: Vec<LeftOut>,
-    /// The runs at each value, in order.
-    pub values: Vec<AtValue>,
-    /// The runs of each sample, in order.
-    pub samples: Vec<OfSample>,
-    /// The line through all points; `None` where they have one value.
-    pub line: Option<Line>,
-    /// How the samples scatter.
-    pub over_samples: OverSamples,
-    /// What cannot be told, and what to beware of.
-    pub notes: Vec<String>,
-}
-
-/// Reads the runs that `paths` name: histories, and folders of sweeps.
+/// Strength against a field of the scene over many runs, as against cohesion: a line, its errors,
+/// the scatter of samples.
 ///
-/// # Errors
-/// [`PostError::Usage`] for no runs, runs of different scenes, and where none gave way; [`PostError::Lacking`] for a run
-/// without a load; those of reading histories and manifests.
-pub fn read(paths: &[PathBuf], options: &Options) -> Result<Report> {
-    let (paths, mut left_out) = histories(paths)?;
-    let wall = options.wall.as_deref();
-    let found = paths.iter().map(|path| runs::read(path, options.measure, wall)).collect::<Result<Vec<Found>>>()?;
-    let scenes: Vec<(String, String)> = found.iter().map(|run| (name(&run.path), run.scene.clone())).collect();
-    let design = design(&scenes, options.against.as_deref())?;
-    let (mut runs, mut grains) = (vec![], vec![]);
-    for (k, one) in found.into_iter().enumerate() {
-        let (run, value) = (name(&one.path), design.values[k]);
-        match one.strength {
-            Ok(at) => {
-                let sample = design.samples[design.sample[k]].clone();
-                let ratio = (value != 0.0).then(|| at.load / value);
-                runs.push(Run { run, value, sample, strength: at.load, time: at.time, ratio, early: at.early });
-                grains.push(one.grains);
-            }
-            Err(why) => left_out.push(LeftOut { run, why }),
-        }
-    }
-    if runs.is_empty() {
-        let all: Vec<String> = left_out.iter().take(3).map(|out| format!("{}: {}", out.run, out.why)).collect();
-        let what = format!("no run has a {}", options.measure.title());
-        return Err(PostError::Usage(format!("{what}; choose another --measure, or load further; {}", all.join("; "))));
-    }
-    let samples = samples(&design.samples, &runs, &grains);
-    let mut report = Report {
-        measure: options.measure,
-        unit: unit(&design.field),
-        field: design.field,
-        along: design.along,
-        sample_fields: design.sample_fields,
-        values: at_values(&runs),
-        line: line(&points(runs.iter())),
-        over_samples: over_samples(&samples),
-        samples,
-        left_out,
-        runs,
-        notes: vec![],
-    };
-    report.notes = report.remarks();
-    Ok(report)
+/// The exit code is 1 where runs were left out because they did not give way, or are not done.
+#[derive(Debug, Args)]
+pub struct Command {
+    /// Histories, or the folder of a sweep.
+    #[arg(value_name = "RUNS", required = true)]
+    runs: Vec<PathBuf>,
+    /// The varied field, as --set names it [default: the one that differs].
+    #[arg(long, value_name = "FIELD")]
+    against: Option<String>,
+    /// What counts as the strength: the load at …
+    #[arg(long, value_enum, default_value_t)]
+    measure: Measure,
+    /// The load wall [default: that of the scene, else the only driven one].
+    #[arg(long, value_name = "NAME")]
+    wall: Option<String>,
+    /// Folder for the results, created if need be [default: RUNS-strength].
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Take the folder over from the history that it belongs to: its results are removed.
+    #[arg(long)]
+    force: bool,
 }
 
-fn points<'a>(runs: impl Iterator<Item = &'a Run>) -> Vec<(f64, f64)> {
-    runs.map(|run| (run.value, run.strength)).collect()
-}
+impl Analysis for Command {
+    const NAME: &'static str = "strength";
+    /// Runs are opened one by one as they are read.
+    type Input = ();
+    type Report = Report;
 
-/// The runs at each value of the field.
-fn at_values(runs: &[Run]) -> Vec<AtValue> {
-    let mut values: Vec<f64> = runs.iter().map(|run| run.value).collect();
-    values.sort_by(f64::total_cmp);
-    values.dedup();
-    let at = |value: f64| {
-        let here: Vec<&Run> = runs.iter().filter(|run| run.value == value).collect();
-        let strengths: Vec<f64> = here.iter().map(|run| run.strength).collect();
-        let ratios: Vec<f64> = here.iter().filter_map(|run| run.ratio).collect();
-        let range = strengths.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], &s| [l.min(s), h.max(s)]);
-        Some(AtValue { value, strength: spread(&strengths)?, range, ratio: spread(&ratios) })
-    };
-    values.into_iter().filter_map(at).collect()
-}
-
-/// The runs of each sample; `grains` are the radii and bonds of each run.
-fn samples(names: &[String], runs: &[Run], grains: &[(Vec<f64>, Vec<[i32; 2]>)]) -> Vec<OfSample> {
-    let of = |sample: &String| {
-        let here: Vec<usize> = (0..runs.len()).filter(|&k| runs[k].sample == *sample).collect();
-        let first = *here.first()?;
-        let ratios = here.iter().map(|&k| runs[k].ratio).collect::<Option<Vec<f64>>>().unwrap_or_default();
-        let ratio = spread(&ratios).map(|ratios| ratios.mean);
-        let deviation = |mean: f64| ratios.iter().map(|r| (r / mean - 1.0).abs()).fold(0.0, f64::max);
-        let line = line(&points(here.iter().map(|&k| &runs[k])));
-        Some(OfSample {
-            sample: sample.clone(),
-            runs: here.len(),
-            same_grains: here.iter().all(|&k| grains[k] == grains[first]),
-            ratio_deviation: line.and(ratio).filter(|mean| *mean != 0.0).map(deviation),
-            ratio,
-            line,
-        })
-    };
-    names.iter().filter_map(of).collect()
-}
-
-fn over_samples(samples: &[OfSample]) -> OverSamples {
-    let over = |of: &dyn Fn(&OfSample) -> Option<f64>| spread(&samples.iter().filter_map(of).collect::<Vec<f64>>());
-    OverSamples {
-        slope: over(&|sample| sample.line.map(|line| line.slope.value)),
-        intercept: over(&|sample| sample.line.map(|line| line.intercept.value)),
-        ratio: over(&|sample| sample.ratio),
-    }
-}
-
-impl Report {
-    /// Whether every run has a strength.
-    ///
-    /// # Errors
-    /// [`PostError::Incomplete`] where runs were left out.
-    pub fn complete(&self) -> Result<()> {
-        let (out, all) = (self.left_out.len(), self.left_out.len() + self.runs.len());
-        let Some(first) = self.left_out.first() else { return Ok(()) };
-        Err(PostError::Incomplete(format!(
-            "{out} of {all} runs are left out, as {}: {}; the results are those of the others",
-            first.run, first.why
-        )))
+    fn open(&self) -> Result<()> {
+        Ok(())
     }
 
-    /// The unit of strength over field, and of a slope.
-    pub fn slope_unit(&self) -> String {
-        match self.unit.as_str() {
-            "N" => String::new(),
-            "" => "N".into(),
-            unit if unit.contains(['/', ' ']) => format!("N/({unit})"),
-            unit => format!("N/{unit}"),
-        }
+    fn read(&self, (): &(), _: bool) -> Result<Report> {
+        let options = Options { against: self.against.clone(), measure: self.measure, wall: self.wall.clone() };
+        read(&self.runs, &options)
     }
 
-    /// What cannot be told, and what to beware of.
-    fn remarks(&self) -> Vec<String> {
-        let mut notes = vec![];
-        let lined = self.samples.iter().filter(|sample| sample.line.is_some()).count();
-        if self.values.len() == 1 {
-            notes.push(format!(
-                "one value of {} only: no line, and whether the ratio is constant cannot be told",
-                self.field
-            ));
-        } else if lined == 0 {
-            notes.push(
-                "no sample was run at two values: lines of samples and constancy of ratios cannot be told".into(),
-            );
-        } else if self.line.is_some_and(|line| line.slope.standard_error.is_none()) {
-            notes.push("two points: any line goes through them, and its errors cannot be told".into());
-        }
-        if self.line.is_some_and(|line| line.r_squared.is_none()) {
-            notes.push("all strengths are equal: there is no variance for R² to be a share of".into());
-        }
-        if self.samples.len() == 1 {
-            notes.push("one sample only: how strength scatters from sample to sample cannot be told".into());
-        } else if lined == 1 {
-            notes.push(
-                "one sample only was run at two values: the scatter of slopes over samples cannot be told".into(),
-            );
-        }
-        if self.values.iter().any(|at| at.value == 0.0) {
-            notes.push(format!("{} is zero in some runs: there is no ratio to it", self.field));
-        }
-        let other: Vec<&str> =
-            self.samples.iter().filter(|sample| !sample.same_grains).map(|sample| sample.sample.as_str()).collect();
-        if let Some(first) = other.first() {
-            let count = other.len();
-            notes.push(format!("{count} of the samples are other grains at another value, as {first}: a line of such a sample is one through different samples"));
-        }
-        let early = self.runs.iter().filter(|run| run.early).count();
-        if early > 0 {
-            notes.push(format!(
-                "in {early} runs no bond had broken by the collapse: where bonds join all grains to one piece, the strain is the \
-                 solver's own"
-            ));
-        }
-        notes
+    fn table(report: &Report) -> String {
+        report.table()
     }
 
-    /// The report as tables.
-    pub fn table(&self) -> String {
-        let slope_unit = self.slope_unit();
-        let varied =
-            format!("{}, {} {}", axis(&self.field, &self.unit), self.values.len(), plural(self.values.len(), "value"));
-        let by = if self.sample_fields.is_empty() {
-            String::new()
-        } else {
-            format!(", by {}", self.sample_fields.join(", "))
-        };
-        let left = if self.left_out.is_empty() { String::new() } else { format!(", {} left out", self.left_out.len()) };
-        let mut lines = vec![("strength", self.measure.title().to_string()), ("against", varied)];
-        if !self.along.is_empty() {
-            lines.push(("moves with it", self.along.join(", ")));
-        }
-        lines.extend([
-            ("samples", format!("{}{by}", self.samples.len())),
-            ("runs", format!("{}{left}", self.runs.len())),
-        ]);
-        if let Some(line) = &self.line {
-            lines.extend([
-                ("line through all runs", self.equation(line)),
-                ("  slope", estimate(&line.slope, &slope_unit)),
-                ("  intercept", estimate(&Estimate { value: self.plain(line.intercept.value), ..line.intercept }, "N")),
-            ]);
-            lines.extend(self.explained(line).map(|told| ("  R²", told)));
-        }
-        let over = &self.over_samples;
-        let intercept = over.intercept.map(|found| Spread { mean: self.plain(found.mean), ..found });
-        for (name, found, unit) in [
-            ("slope over samples", &over.slope, slope_unit.as_str()),
-            ("intercept over samples", &intercept, "N"),
-            ("strength/field over samples", &over.ratio, &slope_unit),
-        ] {
-            lines.extend(found.map(|found| (name, spread_line(&found, unit))));
-        }
-        let mut out = facts(&lines) + "\n" + &self.value_table() + "\n" + &self.sample_table();
-        let left_out = self.left_out.iter().take(NAMED).map(|out| format!("left out: {}: {}", out.run, out.why));
-        let more = self.left_out.len().saturating_sub(NAMED);
-        let more = (more > 0).then(|| format!("left out: … and {more} more in strength.csv"));
-        let remarks: Vec<String> =
-            left_out.chain(more).chain(self.notes.iter().map(|note| format!("note: {note}"))).collect();
-        if !remarks.is_empty() {
-            out += &format!("\n{}\n", remarks.join("\n"));
-        }
-        out
+    fn folder(&self, (): &()) -> Result<Option<Folder>> {
+        let path = self.output.clone().unwrap_or_else(|| default_folder(&self.runs[0], "-strength"));
+        let sources = self.runs.iter().map(|run| Source::new(run, None)).collect();
+        Ok(Some(Folder::of(path, Self::NAME, sources, self.force)?))
     }
 
-    fn value_table(&self) -> String {
-        let mut table =
-            Text::new(&[&self.field, "runs", "mean strength", "spread", "95 % of the mean", "strength/field"]);
-        for at in &self.values {
-            let s = &at.strength;
-            table.row(vec![
-                quantity(Some(at.value), &self.unit),
-                s.count.to_string(),
-                quantity(Some(s.mean), "N"),
-                quantity(s.deviation, "N"),
-                interval(s.interval),
-                quantity(at.ratio.map(|ratio| ratio.mean), &self.slope_unit()),
-            ]);
-        }
-        table.lines()
+    fn write(&self, (): &(), report: &mut Report, folder: &mut Folder, _: bool) -> Result<()> {
+        write(report, folder)
     }
 
-    fn sample_table(&self) -> String {
-        let mut table = Text::new(&["sample", "runs", "strength/field", "within", "slope", "intercept"]);
-        for sample in &self.samples {
-            table.row(vec![
-                sample.sample.clone(),
-                sample.runs.to_string(),
-                quantity(sample.ratio, &self.slope_unit()),
-                sample.ratio_deviation.map_or_else(|| "–".into(), within),
-                quantity(sample.line.map(|line| line.slope.value), &self.slope_unit()),
-                quantity(sample.line.map(|line| self.plain(line.intercept.value)), "N"),
-            ]);
-        }
-        table.lines()
+    fn verdict(report: &Report) -> Result<()> {
+        report.complete()
     }
-
-    /// An intercept, or zero for one that is rounding.
-    fn plain(&self, intercept: f64) -> f64 {
-        let greatest = self.runs.iter().map(|run| run.strength.abs()).fold(0.0, f64::max);
-        if intercept.abs() < ROUNDING * greatest { 0.0 } else { intercept }
-    }
-
-    /// How much of the variance the line explains: over all runs, where R² is below 1 by the
-    /// scatter of samples, and the least of the samples' own lines, which have none of it.
-    fn explained(&self, line: &Line) -> Option<String> {
-        let all = line.r_squared.map(share)?;
-        let lines = self.samples.iter().filter_map(|sample| sample.line);
-        // two points lie on any line
-        let own = lines.filter(|line| line.points > 2).filter_map(|line| line.r_squared).reduce(f64::min);
-        Some(match (self.samples.len(), own) {
-            (1, _) => all,
-            (_, None) => format!("{all} over all runs, with the scatter of samples"),
-            (_, Some(own)) => {
-                format!(
-                    "{all} over all runs, with the scatter of samples; {} at least in each sample's own line",
-                    share(own)
-                )
-            }
-        })
-    }
-
-    /// The line in numbers of the units on the axes.
-    pub fn equation(&self, line: &Line) -> String {
-        let intercept = match self.plain(line.intercept.value) {
-            0.0 => String::new(),
-            value if value < 0.0 => format!(" − {}", number(-value)),
-            value => format!(" + {}", number(value)),
-        };
-        format!("y = {} x{intercept}", number(line.slope.value))
-    }
-}
-
-/// A share by which a ratio deviates, in percent; rounding is told as such.
-fn within(share: f64) -> String {
-    if share < ROUNDING { "exact".into() } else { format!("±{} %", number(100.0 * share)) }
-}
-
-/// R², with what is left to 1 where four digits do not show it.
-fn share(r: f64) -> String {
-    match 1.0 - r {
-        rest if rest < ROUNDING => "1".into(),
-        rest if rest < 1e-3 => format!("1 − {rest:.1e}"),
-        _ => number(r),
-    }
-}
-
-/// A field or a load with its unit, as on an axis.
-fn axis(name: &str, unit: &str) -> String {
-    if unit.is_empty() { name.to_string() } else { format!("{name} ({unit})") }
-}
-
-fn plural(count: usize, word: &str) -> String {
-    if count == 1 { word.into() } else { format!("{word}s") }
-}
-
-fn estimate(found: &Estimate, unit: &str) -> String {
-    let value = quantity(Some(found.value), unit);
-    match found.standard_error {
-        Some(error) => format!("{value}, standard error {}, 95 % {}", number(error), interval(found.interval)),
-        None => value,
-    }
-}
-
-fn spread_line(found: &Spread, unit: &str) -> String {
-    let mean = quantity(Some(found.mean), unit);
-    match found.deviation {
-        Some(deviation) => format!(
-            "mean {mean}, spread {}, 95 % of the mean {}, {} samples",
-            number(deviation),
-            interval(found.interval),
-            found.count
-        ),
-        None => format!("{mean} in one sample"),
-    }
-}
-
-fn interval(found: Option<[f64; 2]>) -> String {
-    found.map_or_else(|| "–".into(), |[low, high]| format!("{} to {}", number(low), number(high)))
 }

@@ -1,4 +1,4 @@
-//! The runs that are asked for, and the load at which each gave way.
+//! The runs that are asked for, and the strength of each.
 
 use std::path::{Path, PathBuf};
 
@@ -10,7 +10,6 @@ use dem_run::sweep::store::{State, Store};
 use serde::Serialize;
 use serde_json::Value;
 
-use super::LeftOut;
 use crate::collapse::{Bonding, Collapse, peak};
 use crate::output::{PostError, Result, quantity};
 use crate::stress_strain;
@@ -49,28 +48,38 @@ pub struct Found {
     pub path: PathBuf,
     /// Its scene, JSON.
     pub scene: String,
-    /// Where it gave way; or how far it came, if it did not.
+    /// Its strength; or, for a run that did not fail, what it reached.
     pub strength: std::result::Result<Strength, String>,
     /// Radii of its grains and its bonds: equal in two runs of the same grains.
     pub grains: (Vec<f64>, Vec<[i32; 2]>),
 }
 
-/// Where a run gave way.
+/// A run without a strength.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct LeftOut {
+    /// Its file.
+    pub run: String,
+    /// Why it has none.
+    pub why: String,
+}
+
+/// The strength of a run, and when it was reached.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Strength {
     /// The load, N.
     pub load: f64,
     /// When, s.
     pub time: f64,
-    /// Whether rigid bonds were still whole when the strain counted as collapse.
+    /// Whether all rigid bonds were intact when the strain exceeded the limit of collapse.
     pub early: bool,
 }
 
-/// The histories that `paths` name: files, and of the folders of sweeps the runs that are done; with the runs that are not.
+/// The histories that `paths` name: files, and the finished runs in folders of sweeps; and,
+/// separately, the runs that are not finished.
 ///
 /// # Errors
-/// [`PostError::Usage`] for no path at all, a folder without a manifest, and where no run is done; [`PostError::Sweep`]
-/// for a manifest that cannot be read.
+/// [`PostError::Usage`] for no path at all, a folder without a manifest, and where no run is done;
+/// [`PostError::Sweep`] for a manifest that cannot be read.
 pub fn histories(paths: &[PathBuf]) -> Result<(Vec<PathBuf>, Vec<LeftOut>)> {
     let (mut found, mut left_out) = (vec![], vec![]);
     for path in paths {
@@ -114,10 +123,11 @@ pub fn name(path: &Path) -> String {
     path.display().to_string()
 }
 
-/// Reads where a run gave way; `wall` is the load wall, that of the scene where it is absent.
+/// Reads the strength of a run; `wall` is the load wall, by default that of the scene.
 ///
 /// # Errors
-/// [`PostError::Lacking`] for a run without a load, or without what the measure needs; those of reading it.
+/// [`PostError::Lacking`] for a run without a load, or without what the measure needs; those of
+/// reading it.
 pub fn read(path: &Path, measure: Measure, wall: Option<&str>) -> Result<Found> {
     let history = History::open(path)?;
     let bonds = history.bonds()?;
@@ -138,12 +148,12 @@ pub fn read(path: &Path, measure: Measure, wall: Option<&str>) -> Result<Found> 
     Ok(Found { path: path.into(), scene, strength, grains: (history.grains()?.radius, bonds.pair) })
 }
 
-/// What happens to a sample, one entry per observed step.
+/// The curves of a run, one entry per observed step.
 #[derive(Debug, Default)]
 struct Course {
     /// Times, s.
     time: Vec<f64>,
-    /// The load, N, counted in its own sense.
+    /// The load, N, positive in its own sense.
     load: Vec<f64>,
     /// Axial strain fitted to the grains, along the load; empty if not recorded.
     strain: Vec<f64>,
@@ -163,7 +173,7 @@ impl Course {
         }
     }
 
-    /// The course under the force on a grain, where the scene has one such force and no driven wall.
+    /// The curves of a scene that is loaded by one force on a grain and has no driven wall.
     fn of_grain(history: &History) -> Result<Self> {
         let scene = serde_json::from_str::<Value>(&history.parameters()?.scene).unwrap_or_default();
         let loads: Vec<Load> = serde_json::from_value(scene["grains"]["loads"].clone()).unwrap_or_default();
@@ -194,7 +204,7 @@ impl Course {
         Ok(Self { time: steps.time, load, strain, broken: steps.value })
     }
 
-    /// Where the sample collapses, or why it does not.
+    /// The collapse load, or the reason why there is none.
     fn collapse(&self, path: &Path, bonds: Bonding) -> Result<std::result::Result<Strength, String>> {
         recorded(path, &self.strain, "strain")?;
         let found = Collapse::read(&self.load, &self.strain, &self.broken, STRAINS[0], bonds);
@@ -205,7 +215,7 @@ impl Course {
         })
     }
 
-    /// The step at which the sample gives way by another measure; `None` if it does not.
+    /// The step at which the sample fails by another measure; `None` if it does not.
     fn gives_way(&self, path: &Path, measure: Measure, bonds: usize) -> Result<Option<usize>> {
         if measure == Measure::Peak {
             return Ok(peak(&self.load));
@@ -216,7 +226,7 @@ impl Course {
         Ok(step.filter(|&step| step < self.load.len()))
     }
 
-    /// What a run came to that did not give way.
+    /// What a run reached that did not fail.
     fn how_far(&self, measure: Measure, bonds: usize) -> String {
         let greatest = quantity(self.load.iter().copied().reduce(f64::max), "N");
         let broken = self.broken.last().copied().unwrap_or(0.0);
@@ -232,7 +242,7 @@ impl Course {
     }
 }
 
-/// What was not observed cannot be measured.
+/// Reports a measure that needs an observable which the history does not have.
 fn recorded(path: &Path, values: &[f64], name: &str) -> Result<()> {
     if !values.is_empty() {
         return Ok(());

@@ -1,13 +1,14 @@
-//! Which field of their scenes some runs vary, and which runs are of one sample.
+//! Which field is varied between the scenes of some runs, and which runs are of one sample.
 //!
 //! Fields are named as `--set` names them. Of the fields that differ between the runs,
 //!
-//! * titles and how often the history was written do not count;
+//! * titles and output intervals do not count;
 //! * `seed`, a sample's file and listed grains make the **sample**;
-//! * one is the **varied** field: the one that was asked for, or else the only one of the kind that comes first: what the
-//!   sample is (bonds, materials, its size), how it is loaded (walls, loads on grains), how it is computed (time, solver);
-//! * fields that have one value for each value of the varied one **move with it**, as a ramp that is scaled by the
-//!   cohesion does.
+//! * one is the **varied** field: the one that was asked for, or else the only one of the kind that
+//!   comes first: what the sample is (bonds, materials, its size), how it is loaded (walls, loads
+//!   on grains), how it is computed (time, solver);
+//! * fields that have one value for each value of the varied one **move with it**, as a ramp that
+//!   is scaled by the cohesion does.
 //!
 //! Any other difference makes them runs of different scenes, which are refused.
 
@@ -43,11 +44,12 @@ pub struct Design {
     pub samples: Vec<String>,
 }
 
-/// What runs with these names and scenes (JSON) vary; at least one run. `against` is the varied field where it is given.
+/// What runs with these names and scenes (JSON) vary; at least one run. `against` is the varied
+/// field where it is given.
 ///
 /// # Errors
-/// [`PostError::Usage`] where they are of different scenes, where two are the same, or where the field is not known or no
-/// number.
+/// [`PostError::Usage`] where they are of different scenes, where two are the same, or where the
+/// field is not known or no number.
 pub fn design(runs: &[(String, String)], against: Option<&str>) -> Result<Design> {
     let scenes = runs.iter().map(leaves).collect::<Result<Vec<Leaves>>>()?;
     let differing = differing(&scenes);
@@ -110,7 +112,7 @@ fn collect(path: String, value: Value, leaves: &mut Leaves) {
     }
 }
 
-/// Names of all fields that are not the same in all scenes.
+/// Names of all fields that differ between the scenes.
 fn differing(scenes: &[Leaves]) -> Vec<String> {
     let mut names: Vec<&String> = scenes.iter().flat_map(Leaves::keys).collect();
     names.sort_unstable();
@@ -179,10 +181,10 @@ fn follows(scenes: &[Leaves], values: &[f64], name: &str) -> bool {
     scenes.iter().zip(values).all(|(scene, &value)| first(value).is_some_and(|one| one.get(name) == scene.get(name)))
 }
 
-/// What samples are sorted by: numbers before words.
+/// Sort key of a sample: numbers before words.
 type Key = (u64, String);
 
-/// The name of a scene's sample, and what to sort it by; `fields` tell the samples apart, `varied` does not.
+/// The name of a scene's sample, and its sort key; samples differ in `fields`, not in `varied`.
 fn label(scene: &Leaves, fields: &[String], varied: &str) -> (Vec<Key>, String) {
     let value = |name: &str| scene.get(name).cloned().unwrap_or_default();
     let text = |name: &str| match value(name) {
@@ -209,7 +211,8 @@ fn list(names: &[String]) -> String {
     text
 }
 
-/// The unit of a field, as the scene's schema has it in parentheses; empty for a number without, or where it is unknown.
+/// The unit of a field, as the scene's schema has it in parentheses; empty for a number without, or
+/// where it is unknown.
 pub fn unit(field: &str) -> String {
     let root = json_schema();
     let mut forms = vec![root];

@@ -1,4 +1,5 @@
-//! An HDF5 file that maps data of a history: virtual datasets and external links, under a relative path.
+//! An HDF5 file that maps data of a history: virtual datasets and external links, under a relative
+//! path.
 
 use std::ops::Range;
 use std::path::{Component, Path, PathBuf};
@@ -8,7 +9,7 @@ use hdf5::types::FixedAscii;
 use hdf5::{Dataset, File, Group, H5Type, Hyperslab, SliceOrIndex};
 use ndarray::{ArrayViewD, ShapeError};
 
-/// The file of this name in a virtual dataset is the file that it stands in.
+/// In a virtual dataset, this name means the file that contains the dataset.
 const ITSELF: &str = ".";
 
 /// A companion while it is written.
@@ -19,7 +20,8 @@ pub(super) struct Companion<'a> {
     link: String,
 }
 
-/// One part of a virtual dataset: elements of a source and where they go, both in the order of their rows.
+/// One part of a virtual dataset: elements of a source and where they go, both in the order of
+/// their rows.
 pub(super) struct Piece {
     /// A dataset of the history, or of the companion if `own`.
     pub place: &'static str,
@@ -28,8 +30,8 @@ pub(super) struct Piece {
     pub to: Vec<SliceOrIndex>,
 }
 
-/// The shape of an array for a viewer: rows of `width` numbers, of which the columns `filled` are mapped and the others
-/// are zero. A width of one makes a list.
+/// The shape of an array for a viewer: rows of `width` numbers, of which the columns `filled` are
+/// mapped and the others are zero. A width of one makes a list.
 pub(super) struct Rows {
     pub count: usize,
     pub width: usize,
@@ -74,7 +76,7 @@ impl<'a> Companion<'a> {
     ///
     /// Without the history a link is an error; a virtual dataset would read as zeros.
     pub fn series<T: H5Type>(&self, group: &Group, name: &str, place: &'static str, rows: usize) -> hdf5::Result<()> {
-        // VTK overruns its memory where there are more times than steps
+        // VTK writes beyond its memory where there are more times than steps
         if self.shape(place)? == [rows] {
             return self.link(group, name, place);
         }

@@ -3,8 +3,8 @@
 use hdf5::types::VarLenUnicode;
 use hdf5::{Group, Location};
 
-use super::Outline;
 use super::companion::{Companion, Piece, first};
+use super::outline::Outline;
 use super::vtk::{POSITION, RADIUS, VELOCITY};
 
 const STEP: &str = "particles/grains/position/step";
@@ -12,8 +12,8 @@ const TIME: &str = "particles/grains/position/time";
 
 /// The motion of the grains, as the group `trajectory`, and what does not change about them.
 ///
-/// MDAnalysis knows no metre, and refuses units that it does not know. So lengths have no attribute `unit`, and it is
-/// to be told not to convert any.
+/// MDAnalysis knows no metre, and refuses units that it does not know. So lengths have no attribute
+/// `unit`, and the user must tell it not to convert any.
 pub(super) fn trajectory(companion: &Companion, o: &Outline) -> hdf5::Result<()> {
     let h5md = companion.file.create_group("h5md")?;
     h5md.new_attr_builder().with_data(&[1i32, 1]).create("version")?;

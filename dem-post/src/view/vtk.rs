@@ -1,15 +1,17 @@
-//! Companions in VTK's HDF5 format, as poly data over time: grains as points, contacts and bonds as lines.
+//! Companions in VTK's HDF5 format, as poly data over time: grains as points, contacts and bonds as
+//! lines.
 //!
-//! VTK wants all frames of an array behind each other and, for each frame, where it begins. Positions of shape [T,N,D]
-//! are such an array of T N points, and the pairs of a frame are lines between them.
+//! VTK expects all frames of an array one after the other and, for each frame, the index of its
+//! first element. Positions of shape [T,N,D] are such an array of T N points, and the pairs of a
+//! frame are lines between them.
 
 use dem_run::history::History;
 use hdf5::{Group, H5Type, Hyperslab, SliceOrIndex};
 use indicatif::ProgressBar;
 use ndarray::ArrayView3;
 
-use super::Outline;
 use super::companion::{Companion, Fault, Piece, Rows, append, blocks, first, label, span, wrong_shape};
+use super::outline::Outline;
 
 pub(super) const POSITION: &str = "particles/grains/position/value";
 pub(super) const VELOCITY: &str = "particles/grains/velocity/value";
@@ -50,8 +52,8 @@ impl<'a> Poly<'a> {
         Ok(Self { companion, root, steps, frames })
     }
 
-    /// Cells of `size` points each: frame k has `counts[k]`, and their points stand in `Connectivity` from `offsets[k]`
-    /// on. The group that takes `Connectivity` is returned.
+    /// Cells of `size` points each: frame k has `counts[k]`, and `Connectivity` lists their points
+    /// from `offsets[k]` on. The group that takes `Connectivity` is returned.
     fn cells(&self, kind: &str, size: usize, counts: &[i64], offsets: &[i64]) -> hdf5::Result<Group> {
         let frames = [self.frames];
         for name in CELLS.iter().filter(|name| **name != kind) {
@@ -86,7 +88,8 @@ impl<'a> Poly<'a> {
     }
 }
 
-/// Arrays of points or cells; those that change begin at `offsets[k]` at frame k. What the history lacks is left out.
+/// Arrays of points or cells; those that change begin at `offsets[k]` at frame k. What the history
+/// lacks is left out.
 struct Data<'a> {
     companion: &'a Companion<'a>,
     values: Group,
@@ -135,7 +138,7 @@ pub(super) fn grains(companion: &Companion, o: &Outline) -> hdf5::Result<()> {
         data.still(name, place)?;
     }
     data.moving::<f64>("velocity", VELOCITY, first(&[t, n, d]), &Rows::vectors(t * n, d))?;
-    // in the plane a grain turns about z
+    // in 2D a grain turns about z
     let (spin, axes) = if d == 2 { (first(&[t, n]), 2..3) } else { (first(&[t, n, 3]), 0..3) };
     let place = "particles/grains/angular_velocity/value";
     data.moving::<f64>("angular_velocity", place, spin, &Rows { count: t * n, width: 3, filled: axes })?;
@@ -161,11 +164,12 @@ pub(super) fn bonds(companion: &Companion, o: &Outline) -> hdf5::Result<()> {
     data.still("mean_diameter", "bonds/mean_diameter")
 }
 
-/// The contacts as lines between the centres of two grains, or from a grain's centre to where it touches a wall.
+/// The contacts as lines between the centres of two grains, or from a grain's centre to where it
+/// touches a wall.
 ///
-/// The points of a frame are the grains, mapped, and behind them the points on walls. These must be written, each frame
-/// with room for as many as the frame with the most, so that one mapping serves all frames; and so must the pairs,
-/// once for frames in a row that have the same.
+/// The points of a frame are the grains, mapped, and behind them the points on walls. These must be
+/// written, each frame with room for as many as the frame with the most, so that one mapping
+/// applies to all frames; and so must the pairs, once for consecutive frames that have the same.
 pub(super) fn contacts(companion: &Companion, history: &History, o: &Outline, bar: &ProgressBar) -> Result<(), Fault> {
     let (n, d) = (o.grains, o.dimension);
     let room = o.at_walls.iter().copied().max().unwrap_or(0) as usize;
@@ -182,7 +186,7 @@ pub(super) fn contacts(companion: &Companion, history: &History, o: &Outline, ba
     let rows = if companion.has("contacts/reaction") { companion.shape("contacts/reaction")?[1] } else { 0 };
     data.moving::<f64>("normal_force", "contacts/reaction", vec![span(0..m), span(0..1)], &scalars)?;
     if rows > 1 {
-        // in the plane along (−n_y, n_x), in space along t1 and t2
+        // in 2D along (−n_y, n_x), in 3D along t1 and t2
         let along = Rows { count: m, width: rows - 1, filled: 0..rows - 1 };
         data.moving::<f64>("tangential_force", "contacts/reaction", vec![span(0..m), span(1..rows)], &along)?;
     }
@@ -234,7 +238,8 @@ fn write_lines(
     Ok(offsets)
 }
 
-/// The lines of one frame as pairs of points, and the points on walls, which come behind the grains.
+/// The lines of one frame as pairs of points, and the points on walls, which come behind the
+/// grains.
 fn lines(pairs: &[[i32; 2]], points: &[f64], o: &Outline) -> (Vec<i32>, Vec<f64>) {
     let (mut lines, mut at_walls) = (Vec::with_capacity(2 * pairs.len()), vec![]);
     for (&[i, j], point) in pairs.iter().zip(points.chunks_exact(o.dimension)) {

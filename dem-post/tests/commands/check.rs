@@ -5,7 +5,8 @@ use hdf5::{File, H5Type, Hyperslab, SliceOrIndex};
 
 use super::*;
 
-/// A byte where one of an enumeration should stand: 0 for the states of bonds, 1 for contacts, 2 for walls, 3 for drives.
+/// A byte where one of an enumeration is expected: 0 for the states of bonds, 1 for contacts, 2 for
+/// walls, 3 for drives.
 #[derive(Clone, Copy)]
 #[repr(transparent)]
 pub struct Code<const OF: usize>(pub u8);
@@ -79,8 +80,8 @@ fn text(value: &str) -> VarLenUnicode {
 /// Place, row and words of the violation that a damage makes, and the damage.
 type Damage = (&'static str, Option<usize>, &'static str, fn(&File));
 
-/// Frames are at steps 0, 10 … 100 with four contacts each: 3–0, 2–1, and 0 and 3 with walls. Bond 0 (0–1) breaks in
-/// shear at step 30, bond 1 (1–2) in tension at step 60.
+/// Frames are at steps 0, 10 … 100 with four contacts each: 3–0, 2–1, and 0 and 3 with walls. Bond
+/// 0 (0–1) breaks in shear at step 30, bond 1 (1–2) in tension at step 60.
 const DAMAGES: &[Damage] = &[
     // names, types, shapes, units
     ("particles/grains/mass", None, "is missing", |f| f.unlink("particles/grains/mass").unwrap()),
@@ -199,7 +200,8 @@ const DAMAGES: &[Damage] = &[
     ("events/rupture", Some(1), "step 15 after step 30", |f| put(f, "events/rupture", &[1], EventStep { step: 15 })),
 ];
 
-/// Damages a file, and copies it: programs that other tests start meanwhile inherit the file and HDF5's lock on it.
+/// Damages a file, and copies it: programs that other tests start meanwhile inherit the file and
+/// HDF5's lock on it.
 pub fn damaged(path: &Path, damage: impl Fn(&File)) -> PathBuf {
     damage(&File::open_rw(path).unwrap());
     let copy = path.with_extension("damaged.h5");

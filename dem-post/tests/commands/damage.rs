@@ -1,5 +1,5 @@
-//! Histories spoilt by one value each, given to every analysis: nothing panics, nothing is drawn from them, and
-//! `info --check` names the place.
+//! Histories spoilt by one value each, given to every analysis: nothing panics, nothing is drawn
+//! from them, and `info --check` names the place.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -61,7 +61,7 @@ fn datasets(group: &hdf5::Group, seen: &mut Vec<String>) -> Vec<String> {
     let mut found = vec![];
     for dataset in group.datasets().unwrap() {
         let token = format!("{:?}", dataset.loc_info().unwrap().token);
-        // slots of the state vouch for themselves by a sum; texts are no numbers
+        // slots of the state have a checksum; texts are no numbers
         let name = dataset.name().trim_start_matches('/').to_string();
         let text = matches!(dataset.dtype().unwrap().to_descriptor(), Ok(TypeDescriptor::VarLenUnicode));
         if !seen.contains(&token) && !text && !name.starts_with("checkpoint/") && dataset.size() > 0 {
@@ -118,8 +118,8 @@ fn writes(good: &Path) -> Vec<Command<'_>> {
     ]
 }
 
-/// Gives a spoilt history to every command, and lets those draw that find nothing wrong, where none does; which of them
-/// refused it.
+/// Gives a spoilt history to every command, and lets those draw that find nothing wrong, where none
+/// does; which of them refused it.
 fn tried(path: &Path, good: &Path, what: &str) -> Vec<&'static str> {
     let output = tempfile::tempdir().unwrap();
     let mut refused = vec![];
@@ -129,7 +129,7 @@ fn tried(path: &Path, good: &Path, what: &str) -> Vec<&'static str> {
             let outcome = catch_unwind(AssertUnwindSafe(|| command(&History::open(path)?, &mut folder)));
             match outcome.unwrap_or_else(|_| panic!("{what}: {name} panics")) {
                 Ok(()) => {}
-                // runs that cannot be told apart have no strength against anything
+                // runs that do not differ have no strength against anything
                 Err(PostError::Usage(_) | PostError::Lacking { .. }) if name == "strength" => {}
                 Err(error) => {
                     let text = error.to_string();
@@ -174,7 +174,8 @@ fn no_spoilt_value_makes_an_analysis_panic_or_pass_unseen() {
         drop(file);
         for (place, kind, shape) in kinds {
             for (k, (value, spoil)) in spoils(place, &kind).into_iter().enumerate() {
-                // half of the values in the plane and the others in space, the last and the first number in turn
+                // half of the values in 2D and the others in 3D, the last and the first number in
+                // turn
                 if place != "events/rupture" && (k % 2 == 1) != space {
                     continue;
                 }

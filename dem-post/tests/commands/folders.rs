@@ -44,7 +44,7 @@ fn results_of_two_runs_do_not_mix() {
         refused(&run(here, &[command, "B/0001.h5"]), 4, &["0001-post", "A/0001.h5", "B/0001.h5", "-o", "--force"]);
     }
     assert!(content(&post) == before, "something was written");
-    // of the same run they stand together, and a second call writes its own files again
+    // results of the same run share a folder, and a second call replaces its own files
     succeeds(&run(here, &["stress-strain", "A/0001.h5"]));
     succeeds(&run(here, &["cracks", "A/0001.h5"]));
     assert!(
@@ -112,7 +112,7 @@ fn what_dem_post_did_not_write_is_not_replaced() {
     std::fs::write(here.join("mine/forces.csv"), "mine").unwrap();
     refused(&run(here, &["chains", "A/0001.h5", "-o", "mine"]), 4, &["mine/forces.csv", "--force"]);
     assert_eq!(std::fs::read(here.join("mine/forces.csv")).unwrap(), b"mine");
-    // other names stand beside it
+    // other files stay beside it
     succeeds(&run(here, &["velocities", "A/0001.h5", "-o", "mine"]));
     succeeds(&run(here, &["chains", "A/0001.h5", "-o", "mine", "--force"]));
     assert_ne!(std::fs::read(here.join("mine/forces.csv")).unwrap(), b"mine");
@@ -139,7 +139,7 @@ fn a_folder_holds_no_half_file() {
     let here = here.path();
     succeeds(&run(here, &["report", "A/0001.h5"]));
     let page = std::fs::read(here.join("0001-post/report.html")).unwrap();
-    // a folder stands where the next picture is to go
+    // a folder has the name of the next picture
     std::fs::create_dir(here.join("0001-post/chains.png")).unwrap();
     refused(&run(here, &["chains", "A/0001.h5"]), 4, &["chains.png"]);
     assert!(names(&here.join("0001-post")).iter().all(|name| !name.ends_with(".part")));

@@ -69,8 +69,8 @@ fn tensor(d: usize, yy: f64) -> Vec<f64> {
     t
 }
 
-/// Load 1 N a step up to 100 N; the sample gives way by 1e-3 of its height a step from step 41 on; bond 0 breaks at
-/// step 30 and bond 1 at step 60.
+/// Load 1 N a step up to 100 N; the sample shortens by 1e-3 of its height in each step from step 41
+/// on; bond 0 breaks at step 30 and bond 1 at step 60.
 fn write(path: &Path, l: &Layout) {
     write_course(path, l, COURSE);
 }
@@ -268,7 +268,7 @@ fn a_collapse_before_any_break_is_the_solver_s() {
     let (first, early, text) = collapse(&path);
     assert_eq!((first, early, own(&text)), (Some(30.0), serde_json::json!([false, false]), 0));
 
-    // it gives way at step 41, and by 1e-3 at step 42
+    // its strain exceeds 1e-4 at step 41, and 1e-3 at step 42
     let late = |elastic: bool, breaks: [i64; 2]| {
         let path = path.with_file_name("late.h5");
         std::fs::remove_file(&path).ok();
@@ -428,7 +428,8 @@ fn wrong_files_are_refused() {
 fn cracks_are_lines_with_ends_and_fronts() {
     let (_folder, path) = sample(&layout(2));
     let found = json(&dem_post(&path, &["cracks", "--json"]));
-    // neighbouring bonds of a ring share the void in its middle: one crack of two facets of one diameter, at right angles
+    // neighbouring bonds of a ring share the void in its middle: one crack of two facets of one
+    // diameter, at right angles
     let cracks = found["cracks"].as_array().unwrap();
     assert_eq!(cracks.len(), 1);
     let number = |name: &str| cracks[0][name].as_f64().unwrap();
@@ -442,7 +443,7 @@ fn cracks_are_lines_with_ends_and_fronts() {
     for file in ["cracks.csv", "crack-segments.csv", "crack-front.csv", "cracks.png", "crack-front.svg"] {
         assert!(path.with_file_name("run-post").join(file).exists(), "{file}");
     }
-    // in 3D ruptures are listed, and no lines are told
+    // in 3D ruptures are listed, and no lines
     let (_folder, path) = sample(&layout(3));
     let found = json(&dem_post(&path, &["cracks", "--json"]));
     assert_eq!((found["broken"]["shear"].as_u64(), found["cracks"].as_array().unwrap().len()), (Some(1), 0));
@@ -461,7 +462,7 @@ fn velocities_are_those_of_the_frame() {
 #[test]
 fn frames_are_numbered_and_alike() {
     let (_folder, path) = sample(&layout(2));
-    // the size of a PNG stands in its header
+    // the header of a PNG holds its size
     let size = |path: PathBuf| {
         let png = std::fs::read(path).unwrap();
         assert!(png.starts_with(b"\x89PNG"));
@@ -575,14 +576,14 @@ fn a_report_needs_nothing_but_itself() {
         for outside in ["http:", "https:", "url(", "@import", "<script", "<link", "<iframe"] {
             assert!(!page.contains(outside), "{outside}");
         }
-        // a picture says what it shows, and what a scene is called is text
+        // a picture has a description, and the title of a scene is text
         assert_eq!(addresses(" alt=\"").iter().filter(|alt| !alt.is_empty()).count(), pictures.len());
         assert!(!page.contains("<b>Press"));
     }
     let (_folder, path) = sample(&unbonded);
     assert!(dem_post(&path, &["report"]).status.success());
     let page = std::fs::read_to_string(path.with_file_name("run-post").join("report.html")).unwrap();
-    // a section that has nothing to show says why
+    // an empty section gives the reason
     let section = page.split("<section id=\"cracks\">").nth(1).unwrap().split("</section>").next().unwrap();
     assert!(section.contains("None: ") && section.contains("bonds"), "{section}");
 }

@@ -1,4 +1,4 @@
-//! What histories say of the solves of their steps.
+//! What histories record of the solves of their steps.
 
 use super::check::{damaged, put};
 use super::*;
@@ -42,8 +42,8 @@ fn solved() -> (tempfile::TempDir, PathBuf) {
     observed(observables, [&[1e-6, 0.0, 0.5], &[3e-6, 2.0, 0.5], &[f64::NAN, 3.0, 0.75], &[2e-6, 2.0, 0.25]])
 }
 
-/// What a report says of the solver, as JSON, and its page. No process is started: it would inherit the
-/// locks of files that other tests have open.
+/// The solver's figures of a report, as JSON, and its page. No process is started: it would inherit
+/// the locks of files that other tests have open.
 fn reported(path: &Path) -> (serde_json::Value, String) {
     let history = History::open(path).unwrap();
     let found = report::read(&history, &[], None, true).unwrap();

@@ -1,4 +1,5 @@
-//! Companions for viewers: what they map is what the history holds. That viewers read them, the Python tests see.
+//! Companions for viewers: what they map is what the history holds. That viewers read them, the
+//! Python tests see.
 
 use hdf5::{File, H5Type};
 
@@ -18,7 +19,8 @@ fn vectors(file: &File, place: &str) -> Vec<[f64; 3]> {
     padded(&numbers(file, place), 3)
 }
 
-/// The companions of the history at `path`, in a folder within its folder, and what the command printed.
+/// The companions of the history at `path`, in a folder within its folder, and what the command
+/// printed.
 fn view(path: &Path) -> (PathBuf, serde_json::Value) {
     let found = json(&dem_post(path, &["view", "--json", "-o", "post/deep"]));
     (path.with_file_name("post").join("deep"), found)

@@ -85,7 +85,8 @@ fn close(a: f64, b: f64) -> bool {
 fn a_row_of_upright_bonds_is_one_straight_crack() {
     let sample = square(8, 4);
     let bonds = sample.crossing(0.0..13e-3, 2.5e-3..3.5e-3);
-    // seven bonds, the first at the edge of the sample: half a diameter outside, and a facet of one diameter each
+    // seven bonds, the first at the edge of the sample: half a diameter outside, and a facet of one
+    // diameter each
     assert_eq!(bonds.len(), 7);
     let paths = sample.paths(&one_a_step(&bonds));
     assert_eq!(paths.cracks.len(), 1);
@@ -162,7 +163,7 @@ fn turning_the_sample_turns_the_crack() {
     }
     let after = sample.paths(&one_a_step(&bonds));
     assert_eq!(before.cracks.len(), after.cracks.len());
-    // where two ways are equally long the path may be another, but not its length
+    // where two paths are equally long, another may be chosen, but its length is the same
     for (before, after) in before.cracks.iter().zip(&after.cracks) {
         assert!(close(after.length, before.length) && close(after.path_length, before.path_length));
         assert_eq!(after.bonds, before.bonds);
@@ -258,7 +259,7 @@ fn the_path_of_a_crack_with_loops_is_the_longest_of_all_pairs() {
         let reached = all.iter().filter(|(_, length)| **length < 1.0);
         let longest = reached.map(|(_, length)| *length).fold(0.0, f64::max);
         assert!(close(crack.path_length, longest), "{} in place of {longest}", crack.path_length);
-        // the path is one line between two ends that are as far apart as told
+        // the path is one line between two ends whose distance is the reported one
         let on_path: Vec<&&Segment> = members.iter().filter(|segment| segment.on_path).collect();
         assert!(close(on_path.iter().map(|segment| segment.length).sum(), longest));
         let mut ends: Vec<(usize, [f64; 2])> =

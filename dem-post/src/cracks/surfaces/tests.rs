@@ -133,7 +133,8 @@ fn between_unequal_spheres_the_facet_passes_the_point_of_contact() {
 
 #[test]
 fn the_extent_is_that_of_all_pairs_of_corners() {
-    // from the first corner the farthest is the third, and from that the first: the second and fourth are farther apart
+    // from the first corner the farthest is the third, and from that the first: the second and
+    // fourth are farther apart
     let kite = [[0.0, 0.0], [2.0, -2.6], [5.0, 0.0], [2.0, 2.6]].map(|[x, y]| Point::new(x, y, 0.0));
     assert!(close(extent(kite.to_vec()), 5.2), "{}", extent(kite.to_vec()));
     assert_eq!((extent(vec![]), extent(vec![kite[0]])), (0.0, 0.0));

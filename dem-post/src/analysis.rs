@@ -1,0 +1,132 @@
+//! What an analysis is, and how its command runs.
+//!
+//! [`crate::ANALYSES`] lists all of them.
+
+use std::io::Write;
+
+use clap::{ArgMatches, Args};
+use serde::Serialize;
+
+use crate::output::{Folder, PostError, Result, escaped, print};
+
+/// Up to this number of files all are named on stderr.
+const MANY: usize = 24;
+
+/// An analysis as a command of `dem-post`. The type holds its options, and its doc comment is what
+/// `--help` says of it.
+pub trait Analysis: Args {
+    /// Name of the command.
+    const NAME: &'static str;
+    /// What it reads: a history, or several.
+    type Input;
+    /// What it finds; `--json` prints it.
+    type Report: Serialize;
+
+    /// Opens what is to be read.
+    ///
+    /// # Errors
+    /// Those of opening it.
+    fn open(&self) -> Result<Self::Input>;
+
+    /// Reads the input into a report; with a progress bar on a terminal unless `quiet`.
+    ///
+    /// # Errors
+    /// [`PostError::Lacking`], [`PostError::Usage`], and those of reading the input.
+    fn read(&self, input: &Self::Input, quiet: bool) -> Result<Self::Report>;
+
+    /// The report as text.
+    fn table(report: &Self::Report) -> String;
+
+    /// The folder for the files; `None` for an analysis that writes none.
+    ///
+    /// # Errors
+    /// [`PostError::Write`].
+    fn folder(&self, _input: &Self::Input) -> Result<Option<Folder>> {
+        Ok(None)
+    }
+
+    /// Writes tables and drawings into the folder.
+    ///
+    /// # Errors
+    /// [`PostError::Write`], and those of reading the input.
+    fn write(&self, _: &Self::Input, _: &mut Self::Report, _: &mut Folder, _quiet: bool) -> Result<()> {
+        Ok(())
+    }
+
+    /// What makes the exit code other than 0 after the report has been printed.
+    ///
+    /// # Errors
+    /// [`PostError::Incomplete`] or [`PostError::Unsound`].
+    fn verdict(_: &Self::Report) -> Result<()> {
+        Ok(())
+    }
+}
+
+/// An analysis in the list of all: its functions, without its type.
+#[derive(Clone, Copy, Debug)]
+pub struct Entry {
+    /// Name of the command.
+    pub name: &'static str,
+    /// The command with its options.
+    pub command: fn() -> clap::Command,
+    /// Runs the command with the options given.
+    pub run: fn(&ArgMatches, Shown) -> Result<()>,
+}
+
+/// How results are shown.
+#[derive(Clone, Copy, Debug)]
+pub struct Shown {
+    /// As JSON instead of a table.
+    pub json: bool,
+    /// Without anything on stderr but errors.
+    pub quiet: bool,
+}
+
+impl Entry {
+    /// The entry of an analysis.
+    pub const fn of<A: Analysis>() -> Self {
+        Self { name: A::NAME, command: || A::augment_args(clap::Command::new(A::NAME)), run: run::<A> }
+    }
+}
+
+fn run<A: Analysis>(options: &ArgMatches, shown: Shown) -> Result<()> {
+    let options = A::from_arg_matches(options).unwrap_or_else(|error| error.exit());
+    let input = options.open()?;
+    let mut report = options.read(&input, shown.quiet)?;
+    let mut folder = options.folder(&input)?;
+    if let Some(folder) = &mut folder {
+        options.write(&input, &mut report, folder, shown.quiet)?;
+        folder.finish()?;
+    }
+    if shown.json {
+        let json = serde_json::to_string_pretty(&report).map_err(|error| PostError::Usage(error.to_string()))?;
+        print(&(json + "\n"))?;
+    } else {
+        print(&A::table(&report))?;
+    }
+    if let Some(folder) = folder.filter(|_| !shown.quiet) {
+        name_files(&folder);
+    }
+    A::verdict(&report)
+}
+
+/// Names the files that were written, on stderr.
+fn name_files(folder: &Folder) {
+    if folder.removed() > 0 {
+        note(&format!("removed {} files of the history that the folder belonged to", folder.removed()));
+    }
+    // of a long series only the first and the last are named
+    let written = folder.written();
+    for (k, path) in written.iter().enumerate() {
+        if written.len() <= MANY || k == 0 || k + 1 == written.len() {
+            note(&format!("wrote {}", path.display()));
+        } else if k == 1 {
+            note(&format!("… {} more", written.len() - 2));
+        }
+    }
+}
+
+/// Prints a line on stderr; a closed stderr is no error.
+pub fn note(line: &str) {
+    let _ = writeln!(std::io::stderr(), "{}", escaped(line));
+}

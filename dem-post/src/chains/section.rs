@@ -1,0 +1,36 @@
+//! What the page of a report shows of contact forces and force chains.
+
+use dem_run::history::History;
+
+use super::pictures::{chain_map, distribution_chart, length_charts, network_map};
+use super::report::{CHAIN_HEAD, Report};
+use crate::output::{Result, number};
+use crate::section::{Figure, OnPage, Section, Table, capitalised, chart_figure, map_figure};
+
+impl OnPage for Report {
+    const ID: &'static str = "chains";
+    const TITLE: &'static str = "Forces and chains";
+
+    fn section(&self, history: &History, _: &[usize]) -> Result<Section> {
+        let mut figures: Vec<Figure> = vec![];
+        for network in &self.networks {
+            let one = Self { networks: vec![network.clone()] };
+            let time = number(network.time);
+            let alt =
+                format!("Contact forces as lines at t = {time} s: blue presses, orange pulls, wider is stronger.");
+            figures.push(map_figure(&network_map(history, &one)?, &alt, &format!("Force network at t = {time} s."))?);
+            let alt = format!("Grains in force chains at t = {time} s, blue in compression, orange in tension.");
+            figures.push(map_figure(&chain_map(history, &one)?, &alt, &format!("Force chains at t = {time} s."))?);
+        }
+        let alt = "Probability density of the normal forces over their mean, at each moment.";
+        figures.push(chart_figure(distribution_chart(self), alt, alt));
+        for curve in length_charts(self) {
+            let alt = format!("{}, by the number of their grains.", capitalised(&curve.y));
+            figures.push(chart_figure(curve, &alt, &alt));
+        }
+        let text = "A chain is a line of at least three grains whose greatest principal stress exceeds the mean, each \
+                    within 45° of the direction of that stress (Peters et al., Phys. Rev. E 72, 041307, 2005).";
+        let tables = vec![Table::new("Force chains", &CHAIN_HEAD, self.chain_rows())];
+        Ok(Section { text: text.into(), figures, tables, ..Section::of::<Self>() })
+    }
+}

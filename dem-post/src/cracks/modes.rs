@@ -1,0 +1,34 @@
+//! Broken bonds, counted by how they broke.
+
+use dem_run::history::RuptureMode;
+use serde::Serialize;
+
+/// A number for each mode of rupture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Modes {
+    /// In tension.
+    pub tension: usize,
+    /// In shear.
+    pub shear: usize,
+    /// By the rolling moment.
+    pub rolling: usize,
+    /// By the twisting moment.
+    pub twist: usize,
+}
+
+impl Modes {
+    /// All together.
+    pub fn total(self) -> usize {
+        self.tension + self.shear + self.rolling + self.twist
+    }
+
+    /// Counts one more.
+    pub fn add(&mut self, mode: RuptureMode) {
+        match mode {
+            RuptureMode::Tension => self.tension += 1,
+            RuptureMode::Shear => self.shear += 1,
+            RuptureMode::Rolling => self.rolling += 1,
+            RuptureMode::Twist => self.twist += 1,
+        }
+    }
+}

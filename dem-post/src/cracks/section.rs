@@ -1,0 +1,83 @@
+//! What the page of a report shows of cracks.
+
+use dem_run::history::History;
+
+use super::pictures::{broken_chart, crack_map, decohesion, fragment_charts, front_charts, surface_maps};
+use super::report::{Report, broken_over_time};
+use crate::map::Sample;
+use crate::output::{Result, number, quantity};
+use crate::section::{OnPage, Section, Table, capitalised, chart_figure, map_figure};
+
+impl OnPage for Report {
+    const ID: &'static str = "cracks";
+    const TITLE: &'static str = "Cracks";
+
+    fn section(&self, history: &History, frames: &[usize]) -> Result<Section> {
+        let end = history.times().last().copied().unwrap_or(0.0);
+        let mut figures = vec![];
+        if !self.cracks.is_empty() {
+            let (all, near) = crack_map(history, self)?;
+            let alt =
+                "Broken bonds as lines over the grains of the first frame, coloured by the time at which they broke.";
+            figures.push(map_figure(&all, alt, "Cracks by the time at which each bond broke.")?);
+            if let Some(near) = near {
+                figures.push(map_figure(&near, &format!("{alt} Enlarged."), "The part around the cracks.")?);
+            }
+        }
+        if !self.surfaces.is_empty() {
+            let alt =
+                "Facets of broken bonds at their places in the first frame, coloured by the time at which they broke.";
+            let [whole, front, side] = surface_maps(history, self)?;
+            figures.push(map_figure(&whole, alt, "Cracks by the time at which each bond broke.")?);
+            figures.push(map_figure(&front, alt, "The same, seen along y.")?);
+            figures.push(map_figure(&side, alt, "The same, seen against x.")?);
+        }
+        for &frame in frames {
+            let time = number(history.times()[frame]);
+            let alt = format!("Grains at t = {time} s; those that lost a bond are white.");
+            // spheres hide what breaks behind them
+            let (sample, seen) = if history.dimension() == 2 {
+                (Sample::read(history)?, "")
+            } else {
+                (Sample::cut_open(history)?, ", cut open along the middle")
+            };
+            let caption = format!("Lost bonds at t = {time} s{seen}.");
+            figures.push(map_figure(&decohesion(history, &sample, &[frame])?, &alt, &caption)?);
+        }
+        if self.broken.total() > 0 {
+            let curve = broken_chart(&broken_over_time(&self.events), end);
+            figures.push(chart_figure(curve, "Number of broken bonds over time, by mode.", "Broken bonds by mode."));
+            for curve in fragment_charts(&self.fragments) {
+                let alt = format!("{} over time.", capitalised(&curve.y));
+                figures.push(chart_figure(curve, &alt, &alt));
+            }
+        }
+        if !self.cracks.is_empty() || !self.surfaces.is_empty() {
+            for curve in front_charts(self) {
+                let alt = format!("{} over {}.", capitalised(&curve.y), curve.x);
+                figures.push(chart_figure(curve, &alt, &alt));
+            }
+        }
+        let caption = if self.surfaces.is_empty() {
+            "The largest cracks; T/S/R: bonds broken in tension, in shear, by rolling"
+        } else {
+            "The largest cracks; T/S/R/Tw: bonds broken in tension, in shear, by rolling, by twist"
+        };
+        let tables = self.crack_rows().into_iter().map(|(head, rows)| Table::new(caption, head, rows)).collect();
+        let facts = vec![
+            ("Bonds".into(), self.bonds.to_string()),
+            ("Broken".into(), self.broken.total().to_string()),
+            ("Cracks".into(), (self.cracks.len() + self.surfaces.len()).to_string()),
+            ("First break".into(), quantity(self.first_break, "s")),
+            ("5 % broken".into(), quantity(self.time_of_5_percent, "s")),
+        ];
+        let text = if history.dimension() == 2 {
+            "A crack is a set of broken bonds that meet in the voids between the grains; its path is the longest way through it, drawn \
+             thick. Places are those of the first frame."
+        } else {
+            "A crack is a set of broken bonds whose facets, the faces that the cells of two grains share, meet in the voids between the \
+             grains. Places are those of the first frame."
+        };
+        Ok(Section { text: text.into(), facts, figures, tables, ..Section::of::<Self>() })
+    }
+}

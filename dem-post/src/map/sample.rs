@@ -1,0 +1,163 @@
+//! A sample as maps show it: its grains and walls, the viewpoint, and the part of the plane that is
+//! drawn.
+
+use dem_run::history::{GrainState, Grains, History, Wall, WallKind, WallState};
+
+use super::boxes::{Box2, EMPTY, EVERYWHERE, around, union};
+use super::eye::{Eye, Place};
+use crate::output::Result;
+
+/// A part of the sample smaller than this share gets a picture of its own.
+const SMALL: f64 = 0.25;
+
+/// What all panels share: the grains' sizes, the walls, and the viewpoint.
+pub struct Sample {
+    pub(super) radius: Vec<f64>,
+    pub(super) walls: Vec<Wall>,
+    pub(super) dimension: usize,
+    pub(super) eye: Eye,
+    /// Depth of the plane that cuts the spheres open, m, where one does.
+    slice: Option<f64>,
+    /// Corners of the greatest part that is shown, m: the first frame with a margin of half its
+    /// size.
+    limits: Box2,
+}
+
+/// The part of the plane that a drawing shows: two corners, m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View(pub(super) Box2);
+
+impl View {
+    /// The part that shows nothing.
+    pub const EMPTY: Self = Self(EMPTY);
+
+    /// The smallest part that holds both.
+    pub fn join(self, other: Self) -> Self {
+        Self(union(self.0, other.0))
+    }
+}
+
+impl Sample {
+    /// Reads what all panels share.
+    ///
+    /// # Errors
+    /// Those of [`History::grains`], [`History::walls`] and [`History::grain_state`].
+    pub fn read(history: &History) -> Result<Self> {
+        Self::seen(history, Eye::Along([0, history.dimension() - 1]))
+    }
+
+    /// As [`Sample::read`], of spheres seen from the side, against the first axis.
+    ///
+    /// # Errors
+    /// As [`Sample::read`].
+    pub fn from_the_side(history: &History) -> Result<Self> {
+        Self::seen(history, Eye::Along([1, 2]))
+    }
+
+    /// As [`Sample::read`] of disks; spheres are seen in perspective, and what is farther is paler.
+    ///
+    /// # Errors
+    /// As [`Sample::read`].
+    pub fn with_depth(history: &History) -> Result<Self> {
+        if history.dimension() < 3 {
+            return Self::read(history);
+        }
+        let first = history.grain_state(0)?;
+        Self::seen(history, Eye::At(Place::of(first.position.chunks(3))))
+    }
+
+    /// As [`Sample::read`], of spheres cut open along the plane through the middle of their first
+    /// places, or of the grain nearest to it where it cuts none.
+    ///
+    /// # Errors
+    /// As [`Sample::read`].
+    pub fn cut_open(history: &History) -> Result<Self> {
+        let mut sample = Self::read(history)?;
+        let first = history.grain_state(0)?;
+        let depths = || first.position.chunks(sample.dimension).map(|x| sample.eye.depth(x));
+        let middle = 0.5 * (depths().fold(f64::INFINITY, f64::min) + depths().fold(f64::NEG_INFINITY, f64::max));
+        let off = |depth: &f64| (depth - middle).abs();
+        let cuts = depths().zip(&sample.radius).any(|(depth, radius)| off(&depth) < *radius);
+        let nearest = depths().min_by(|a, b| off(a).total_cmp(&off(b)));
+        sample.slice = if cuts { Some(middle) } else { nearest };
+        Ok(sample)
+    }
+
+    fn seen(history: &History, eye: Eye) -> Result<Self> {
+        let Grains { radius, .. } = history.grains()?;
+        let (walls, dimension) = (history.walls()?, history.dimension());
+        let mut sample = Self { radius, walls, dimension, eye, slice: None, limits: [[0.0; 2]; 2] };
+        let first = history.grain_state(0)?;
+        let [low, high] = sample.bounds(&first, EVERYWHERE);
+        let spread = |k: usize| 0.5 * (high[k] - low[k]);
+        sample.limits = [[low[0] - spread(0), low[1] - spread(1)], [high[0] + spread(0), high[1] + spread(1)]];
+        Ok(sample)
+    }
+
+    pub(super) fn flat(&self, point: &[f64]) -> [f64; 2] {
+        self.eye.flat(point)
+    }
+
+    /// The radius at which a grain shows, m; none where it is not cut.
+    pub(super) fn seen_radius(&self, state: &GrainState, grain: usize) -> Option<f64> {
+        let radius = self.radius[grain];
+        let place = &state.position[grain * self.dimension..];
+        let Some(plane) = self.slice else { return Some(radius * self.eye.magnified(place)) };
+        let off = self.eye.depth(place) - plane;
+        (off.abs() < radius).then(|| (radius * radius - off * off).sqrt())
+    }
+
+    pub(super) fn centre(&self, state: &GrainState, grain: usize) -> [f64; 2] {
+        self.flat(&state.position[grain * self.dimension..(grain + 1) * self.dimension])
+    }
+
+    /// The box around the grains within `limits`, `[low, high]`, m.
+    fn bounds(&self, state: &GrainState, limits: Box2) -> Box2 {
+        let mut found = EMPTY;
+        for (grain, &radius) in self.radius.iter().enumerate() {
+            let centre = self.centre(state, grain);
+            if (0..2).all(|k| (limits[0][k]..=limits[1][k]).contains(&centre[k])) {
+                let larger = self.eye.magnified(&state.position[grain * self.dimension..]);
+                found = union(found, around(centre, radius * larger));
+            }
+        }
+        found
+    }
+
+    /// The part that contains all of `states`, for drawings on one scale.
+    pub fn view<'a>(&self, states: impl Iterator<Item = (&'a GrainState, &'a WallState)>) -> View {
+        View(states.fold(EMPTY, |all, (grains, walls)| union(all, self.extent(grains, walls))))
+    }
+
+    /// The part that contains `points` (m, D numbers each) with a margin, at least five mean
+    /// diameters wide; `None` if that is no small part of the sample.
+    pub fn near<'a>(&self, points: impl Iterator<Item = &'a [f64]>, all: View) -> Option<View> {
+        let [low, high] = points.fold(EMPTY, |found, point| union(found, around(self.flat(point), 0.0)));
+        let diameter = 2.0 * self.radius.iter().sum::<f64>() / self.radius.len() as f64;
+        let margin = [0, 1].map(|k| (0.5 * (high[k] - low[k])).max(2.5 * diameter));
+        let near = [[low[0] - margin[0], low[1] - margin[1]], [high[0] + margin[0], high[1] + margin[1]]];
+        let size = |[low, high]: Box2| (high[0] - low[0]) * (high[1] - low[1]);
+        (size(near) < SMALL * size(all.0)).then_some(View(near))
+    }
+
+    /// The box around the grains, and of the round walls what is near.
+    fn extent(&self, grains: &GrainState, walls: &WallState) -> Box2 {
+        let mut found = self.bounds(grains, self.limits);
+        if found == EMPTY {
+            // all grains have left, as a disk on an incline does
+            found = self.bounds(grains, EVERYWHERE);
+        }
+        for (wall, position) in self.walls.iter().zip(walls.position.chunks(self.dimension)) {
+            if wall.kind == WallKind::Plane {
+                if let Some(place) = self.eye.place() {
+                    found = union(found, place.shows(&place.plane(position, wall.normal).0));
+                }
+            } else {
+                let [low, high] = around(self.flat(position), wall.radius.abs());
+                let near = |k: usize, x: f64| x.clamp(self.limits[0][k], self.limits[1][k]);
+                found = union(found, [[near(0, low[0]), near(1, low[1])], [near(0, high[0]), near(1, high[1])]]);
+            }
+        }
+        found
+    }
+}

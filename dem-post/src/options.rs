@@ -1,0 +1,56 @@
+//! Options that several commands have.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use dem_run::history::History;
+
+use crate::output::{Folder, Result, default_folder, source};
+
+/// A history and the folder for what is made of it.
+#[derive(Debug, Args)]
+pub struct Files {
+    /// The history.
+    #[arg(value_name = "FILE.h5")]
+    pub history: PathBuf,
+    /// Folder for the results, created if need be [default: FILE-post, of `frames` FILE-frames, in
+    /// the current folder].
+    #[arg(short, long, value_name = "DIR")]
+    pub output: Option<PathBuf>,
+    /// Take the folder over from the history that it belongs to: its results are removed.
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// Files, and the moments to draw.
+#[derive(Debug, Args)]
+pub struct Moments {
+    /// The files.
+    #[command(flatten)]
+    pub files: Files,
+    /// Times of the maps, s, as in 0.1,0.15 [default: first break, 5 % broken, end].
+    #[arg(long, value_name = "T,…", value_delimiter = ',')]
+    pub times: Vec<f64>,
+}
+
+impl Files {
+    /// Opens the history.
+    ///
+    /// # Errors
+    /// Those of [`History::open`].
+    pub fn open(&self) -> Result<History> {
+        Ok(History::open(&self.history)?)
+    }
+
+    /// The folder for the results of the command `command`: the one that was asked for, or the
+    /// history's own.
+    ///
+    /// # Errors
+    /// [`crate::output::PostError::Write`] for a folder that cannot be created, or that belongs to
+    /// another history.
+    pub fn folder(&self, history: &History, command: &str) -> Result<Option<Folder>> {
+        let suffix = if command == "frames" { "-frames" } else { "-post" };
+        let path = self.output.clone().unwrap_or_else(|| default_folder(&self.history, suffix));
+        Ok(Some(Folder::of(path, command, vec![source(history)?], self.force)?))
+    }
+}

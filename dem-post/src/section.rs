@@ -1,0 +1,112 @@
+//! Sections of the page that `dem-post report` writes: text, figures, tables.
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use dem_run::history::History;
+use dem_run::plot::{Chart, Drawing};
+
+use crate::output::{PostError, Result};
+
+/// Width and height of a chart: small, so that its text stays legible on a narrow screen.
+const CHART: (f64, f64) = (500.0, 400.0);
+/// Pixels of a map per unit of its drawing.
+const PIXELS: f32 = 2.0;
+
+/// The report of an analysis that has a section of the page.
+pub trait OnPage {
+    /// Anchor of the section in the page.
+    const ID: &'static str;
+    /// Its head.
+    const TITLE: &'static str;
+
+    /// The section; its maps show the frames `frames`.
+    ///
+    /// # Errors
+    /// Those of reading the history and of drawing.
+    fn section(&self, history: &History, frames: &[usize]) -> Result<Section>;
+}
+
+/// A part of the page with a head of its own.
+#[derive(Default)]
+pub struct Section {
+    /// Its anchor in the page.
+    pub id: &'static str,
+    /// Its head.
+    pub title: &'static str,
+    /// Its first paragraph.
+    pub text: String,
+    /// Names and values.
+    pub facts: Vec<(String, String)>,
+    /// Pictures.
+    pub figures: Vec<Figure>,
+    /// Tables.
+    pub tables: Vec<Table>,
+}
+
+impl Section {
+    /// The section of an analysis, without content.
+    pub fn of<R: OnPage>() -> Self {
+        Self { id: R::ID, title: R::TITLE, ..Self::default() }
+    }
+
+    /// The maps and then the charts, each with the name of their kind; kinds without a picture are
+    /// left out.
+    pub(crate) fn groups(&self) -> Vec<(&'static str, Vec<&Figure>)> {
+        let (charts, maps): (Vec<_>, Vec<_>) = self.figures.iter().partition(|figure| figure.class == "chart");
+        [("maps", maps), ("charts", charts)].into_iter().filter(|(_, figures)| !figures.is_empty()).collect()
+    }
+}
+
+/// A picture inside the page.
+pub struct Figure {
+    /// Its `data:` address.
+    pub source: String,
+    /// What it shows, for those who cannot see it.
+    pub alt: String,
+    /// The line below it.
+    pub caption: String,
+    /// How much room it takes: `chart`, `map` or `wide`.
+    pub class: &'static str,
+}
+
+/// A table.
+pub struct Table {
+    /// The line above it.
+    pub caption: String,
+    /// Titles of its columns.
+    pub head: Vec<String>,
+    /// Its rows.
+    pub rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    /// A table with the cells of a table on the terminal.
+    pub fn new(caption: &str, head: &[&str], rows: Vec<Vec<String>>) -> Self {
+        Self { caption: caption.into(), head: head.iter().map(ToString::to_string).collect(), rows }
+    }
+}
+
+/// A chart as SVG.
+pub fn chart_figure(chart: Chart, alt: &str, caption: &str) -> Figure {
+    let svg = STANDARD.encode(Chart::draw_sized(vec![chart], CHART).svg());
+    let source = format!("data:image/svg+xml;base64,{svg}");
+    Figure { source, alt: alt.into(), caption: caption.into(), class: "chart" }
+}
+
+/// A map as PNG.
+///
+/// # Errors
+/// [`PostError::Usage`] with the plotting crate's message.
+pub fn map_figure(drawing: &Drawing, alt: &str, caption: &str) -> Result<Figure> {
+    let png = drawing.png_scaled(PIXELS).map_err(|why| PostError::Usage(format!("the map {caption}: {why}")))?;
+    let (width, height) = drawing.size();
+    let class = if width > 1.2 * height { "wide" } else { "map" };
+    let source = format!("data:image/png;base64,{}", STANDARD.encode(png));
+    Ok(Figure { source, alt: alt.into(), caption: caption.into(), class })
+}
+
+/// A text with a capital first letter.
+pub fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().collect::<String>() + letters.as_str())
+}
