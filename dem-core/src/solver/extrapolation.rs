@@ -9,7 +9,7 @@
 //! does not, so its margin to closing or sticking is extrapolated with the reactions. At intervals
 //! a solve is compared with the extrapolation.
 
-use super::rest::Rest;
+use super::backoff::Backoff;
 use super::rows::{Row, Rows, mass_unit};
 use crate::contact::Padded;
 use crate::dim::{Dim, Moments, Vect};
@@ -41,7 +41,7 @@ pub(super) struct Extrapolation {
     /// momentum that it left, and say nothing about the growth.
     kicked: bool,
     /// Back-off after failed extrapolations.
-    rest: Rest,
+    backoff: Backoff,
 }
 
 impl Extrapolation {
@@ -53,7 +53,11 @@ impl Extrapolation {
         tolerance: f64,
         load_tolerance: f64,
     ) -> Option<(f64, f64)> {
-        if self.left == 0 || self.shape != problem.lengths() || !self.rest.is_over() {
+        if self.left == 0 || self.shape != problem.lengths() {
+            return None;
+        }
+        if !self.backoff.is_over() {
+            self.backoff.count_down();
             return None;
         }
         let brought = problem.reactions();
@@ -67,12 +71,12 @@ impl Extrapolation {
             && self.keeps_status();
         if holds && !problem.is_at_limit() {
             (self.steps, self.left, self.kicked) = (self.steps + 1, self.left - 1, true);
-            self.rest.forget();
+            self.backoff.forget();
             return Some((residual, load_error));
         }
         problem.set_reactions(&brought);
         self.left = 0;
-        self.rest.lengthen();
+        self.backoff.lengthen();
         None
     }
 
@@ -83,8 +87,8 @@ impl Extrapolation {
         let (solution, margins) = (problem.reactions(), margins.iter().map(|m| m * unit).collect::<Vec<_>>());
         if self.shape != problem.lengths() || self.base.is_empty() {
             let (rate, margin_rate) = (vec![0.0; solution.len()], vec![0.0; margins.len()]);
-            let (shape, rest) = (problem.lengths(), self.rest);
-            *self = Self { shape, base: solution, rate, margins, margin_rate, rest, ..Self::default() };
+            let (shape, backoff) = (problem.lengths(), self.backoff);
+            *self = Self { shape, base: solution, rate, margins, margin_rate, backoff, ..Self::default() };
             return;
         }
         if std::mem::take(&mut self.kicked) {
@@ -114,7 +118,7 @@ impl Extrapolation {
 
     /// Forget the growth; the back-off remains.
     pub fn forget(&mut self) {
-        *self = Self { rest: self.rest, ..Self::default() };
+        *self = Self { backoff: self.backoff, ..Self::default() };
     }
 
     /// `base` extrapolated at this rate to the next step.
@@ -133,7 +137,7 @@ impl Extrapolation {
         self.shape.iter().for_each(|n| to.count(*n));
         [self.steps, self.most, self.left].iter().for_each(|n| to.count(*n as usize));
         to.flag(self.kicked);
-        self.rest.save(to);
+        self.backoff.save(to);
         to.real(self.moves);
         for (base, rate) in [(&self.base, &self.rate), (&self.margins, &self.margin_rate)] {
             to.count(base.len());
@@ -152,13 +156,13 @@ impl Extrapolation {
         if most > tuning::MOST || left > most || steps > tuning::MOST + 1 {
             return Err(Mismatch);
         }
-        let (kicked, rest, moves) = (from.flag()?, Rest::restored(from)?, from.real()?);
+        let (kicked, backoff, moves) = (from.flag()?, Backoff::restored(from)?, from.real()?);
         let mut pair = || {
             let n = from.number_of()?;
             Ok((from.reals(n)?.to_vec(), from.reals(n)?.to_vec()))
         };
         let ((base, rate), (margins, margin_rate)) = (pair()?, pair()?);
-        Ok(Self { shape: [a, b, c, d], base, rate, margins, margin_rate, steps, most, left, moves, kicked, rest })
+        Ok(Self { shape: [a, b, c, d], base, rate, margins, margin_rate, steps, most, left, moves, kicked, backoff })
     }
 }
 

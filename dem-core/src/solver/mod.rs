@@ -4,6 +4,7 @@
 mod anderson;
 pub mod assembled;
 mod assembled_rows;
+mod backoff;
 pub mod certificate;
 mod extrapolation;
 mod gauss_seidel;
@@ -11,7 +12,6 @@ mod graph;
 mod history;
 mod interior;
 mod newton;
-mod rest;
 mod rows;
 mod solvable;
 mod stages;

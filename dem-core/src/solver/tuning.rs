@@ -120,7 +120,7 @@ pub(super) mod extrapolation {
     pub const SAME: f64 = 1e-6;
     pub const ROUNDING: f64 = 1e-12;
     /// Longest back-off of the extrapolation (solves).
-    pub const LONGEST_REST: u64 = 64;
+    pub const LONGEST_BACKOFF: u64 = 64;
 }
 
 /// The anchor: reactions from which those of a step are measured.

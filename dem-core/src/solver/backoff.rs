@@ -5,24 +5,27 @@ use crate::solver::tuning::extrapolation as tuning;
 
 /// State of a back-off. Similar steps fail alike.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Rest {
+pub(super) struct Backoff {
     left: u64,
     next: u64,
 }
 
-impl Rest {
-    /// Whether the method may be tried again; if not, counts down by one solve.
-    pub fn is_over(&mut self) -> bool {
-        let over = self.left == 0;
+impl Backoff {
+    /// Whether the method may be tried again.
+    pub fn is_over(&self) -> bool {
+        self.left == 0
+    }
+
+    /// Count a solve without the method.
+    pub fn count_down(&mut self) {
         self.left = self.left.saturating_sub(1);
-        over
     }
 
     /// Record a failure. The first has no effect, the second pauses for one solve, each further one
     /// for twice as many.
     pub fn lengthen(&mut self) {
         self.left = self.next;
-        self.next = (2 * self.next).clamp(1, tuning::LONGEST_REST);
+        self.next = (2 * self.next).clamp(1, tuning::LONGEST_BACKOFF);
     }
 
     /// Record a success.
@@ -36,9 +39,9 @@ impl Rest {
         to.count(self.next as usize);
     }
 
-    /// Read the state that [`Rest::save`] wrote.
+    /// Read the state that [`Backoff::save`] wrote.
     pub fn restored(from: &mut Reader) -> Result<Self, Mismatch> {
-        let rest = Self { left: from.count()? as u64, next: from.count()? as u64 };
-        if rest.left.max(rest.next) <= tuning::LONGEST_REST { Ok(rest) } else { Err(Mismatch) }
+        let backoff = Self { left: from.count()? as u64, next: from.count()? as u64 };
+        if backoff.left.max(backoff.next) <= tuning::LONGEST_BACKOFF { Ok(backoff) } else { Err(Mismatch) }
     }
 }
