@@ -15,8 +15,8 @@ pub(super) mod defaults {
     pub const MAX_ITERATIONS: u64 = 300;
     /// Most sweeps of Gauss–Seidel.
     pub const MAX_SWEEPS: u64 = 100_000;
-    /// Bending stiffness over the normal one times the square of the mean diameter: a bar as wide as
-    /// long has k_m = k_n a²/12.
+    /// Bending stiffness over the normal one times the square of the mean diameter: a bar as wide
+    /// as long has k_m = k_n a²/12.
     pub const ROLLING: f64 = 1.0 / 12.0;
 }
 
