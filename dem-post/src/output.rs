@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use dem_run::history::{History, HistoryError};
-use dem_run::run::RunError;
+use dem_run::sweep::store::SweepError;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 pub use dem_run::output::{
@@ -29,7 +29,7 @@ pub enum PostError {
     Usage(String),
     /// The manifest of a sweep cannot be read.
     #[error(transparent)]
-    Sweep(#[from] RunError),
+    Sweep(#[from] SweepError),
     /// The results are there, but not of all that was asked for.
     #[error("{0}")]
     Incomplete(String),
@@ -47,9 +47,8 @@ impl PostError {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Incomplete(_) => 1,
-            Self::Sweep(error) => error.exit_code(),
             Self::Lacking { .. } | Self::Usage(_) => 2,
-            Self::History(_) | Self::Unsound(_) | Self::Write(_) => 4,
+            Self::History(_) | Self::Sweep(_) | Self::Unsound(_) | Self::Write(_) => 4,
         }
     }
 }

@@ -1,10 +1,11 @@
 //! From a scene to a world: sample, walls, loads, bonds, settings.
 
+use crate::error::{NoConvergence, RunError};
 use crate::output::number;
 use crate::prepare::{self, Ball, PrepareError, Watch};
-use crate::run::RunError;
 use crate::sample_file;
 use crate::scene::{self, Drive as SceneDrive, Place, Sample, Scene, SolverKind, WallMass};
+use crate::tolerances::{DEEPEST, ROUNDED, TOUCHING};
 use crate::warnings;
 use dem_core::body::{Drive, Grain, Grains, Load, Schedule, Shape, Wall};
 use dem_core::bond::{self, Rupture};
@@ -39,13 +40,6 @@ pub struct Placed<D: Dim> {
     pub warnings: Vec<String>,
 }
 
-/// Overlap, in radii, that still counts as touching: decimal coordinates are not exact.
-pub(crate) const TOUCHING: f64 = 1e-6;
-/// Overlap of two rigid grains, over the smaller radius, up to which it may be an error of where they came from: soft
-/// grains of other programs overlap.
-const DEEPEST: f64 = 0.1;
-/// Overlap of two grains, over the smaller radius, that a table of few decimals brings: no word about it.
-const ROUNDED: f64 = 1e-3;
 /// Pairs of grains that are told one by one.
 const MOST_TOLD: usize = 10;
 
@@ -152,7 +146,7 @@ fn hold_fixed<D: Dim>(scene: &Scene, grains: &mut Grains<D>) -> Vec<String> {
 fn preparation_error(error: PrepareError) -> RunError {
     match error {
         PrepareError::Interrupted => RunError::Interrupted("the sample was not packed"),
-        PrepareError::Step(step) => RunError::NoConvergence(format!("the sample was not packed: {step}")),
+        PrepareError::Step(step) => NoConvergence::Packing(step.to_string()).into(),
         other => RunError::Sample(vec![other.to_string()]),
     }
 }

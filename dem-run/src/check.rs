@@ -9,10 +9,10 @@ use dem_core::dim::{D2, D3, Dim, Vect};
 use serde::Serialize;
 
 use crate::build::{Placed, place, walls};
+use crate::error::RunError;
 use crate::memory;
-use crate::output::number;
+use crate::output::{number, size};
 use crate::prepare;
-use crate::run::RunError;
 use crate::sample_file;
 use crate::scene::{Drive, Function, Lattice, Precision, Ramp, RandomSample, Sample, Scene, Shape};
 use crate::warnings;
@@ -91,8 +91,8 @@ impl Check {
     /// What a run of `scene` will be, its history in the current folder.
     ///
     /// # Errors
-    /// As the run would end before its first step, for a sample that is not random: [`RunError::InputOutput`],
-    /// [`RunError::Sample`].
+    /// As the run would end before its first step, for a sample that is not random: [`RunError::SampleFile`],
+    /// [`RunError::File`], [`RunError::Sample`].
     pub fn new(scene: &Scene) -> Result<Self, RunError> {
         let grains = count(scene)?;
         let (memory_bytes, free_memory_bytes) = (memory::expected(scene, grains), memory::free());
@@ -185,7 +185,7 @@ impl fmt::Display for Check {
 /// Number of grains of a scene, before a cut.
 ///
 /// # Errors
-/// [`RunError::InputOutput`]: a sample file that cannot be read.
+/// [`RunError::SampleFile`], [`RunError::File`]: a sample file that cannot be read.
 pub(crate) fn count(scene: &Scene) -> Result<usize, RunError> {
     match &scene.sample {
         Sample::File(file) => sample_file::count(&file.path),
@@ -304,15 +304,6 @@ pub(crate) fn free_space(_folder: &Path) -> Option<u64> {
     None
 }
 
-/// A size as a person reads it.
-pub(crate) fn size(bytes: u64) -> String {
-    match bytes {
-        0..1_000_000 => format!("{:.0} kB", bytes as f64 / 1e3),
-        1_000_000..1_000_000_000 => format!("{:.1} MB", bytes as f64 / 1e6),
-        _ => format!("{:.1} GB", bytes as f64 / 1e9),
-    }
-}
-
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
@@ -401,13 +392,5 @@ pub(crate) mod tests {
         }
         let shallow = with_sample("x,y,radius\n0,1,1\n1.98,1,1\n").expect("a little overlap").warnings;
         assert!(shallow[0].contains("one pair of grains overlaps, most of all 0 and 1, by 2.000e-2 m"), "{shallow:?}");
-    }
-
-    #[test]
-    fn sizes_are_short() {
-        assert_eq!(
-            (size(5_000), size(63_400_000), size(2_500_000_000)),
-            ("5 kB".into(), "63.4 MB".into(), "2.5 GB".into())
-        );
     }
 }

@@ -11,12 +11,13 @@ use clap::{Args, Parser, Subcommand};
 use crate::accuracy::trial::SolverName;
 use crate::accuracy::{self, AccuracyOptions};
 use crate::check::Check;
-use crate::destination::{apart, not_itself, unicode, writable};
+use crate::destination::{apart, folder_or_new, not_itself, unicode, writable};
+use crate::error::RunError;
 use crate::export::{self, ExportOptions};
 use crate::output::{default_folder, escaped, print_json, print_result};
 use crate::progress::ProgressMode;
 use crate::resume::{self, ResumeOptions};
-use crate::run::{self, Execution, RunError, RunOptions};
+use crate::run::{self, Execution, RunOptions};
 use crate::scene::{self, Scene, SceneError, schema};
 use crate::signals;
 use crate::solve::{self, SolveOptions, Solver};
@@ -408,7 +409,8 @@ impl SceneArgs {
 
 fn run(args: RunArgs) -> Result<(), RunError> {
     if args.end_with_parent {
-        signals::end_with_parent().map_err(|e| RunError::InputOutput(format!("the parent cannot be watched: {e}")))?;
+        signals::end_with_parent()
+            .map_err(|error| RunError::System { what: "the parent cannot be watched".into(), source: error.into() })?;
     }
     let scene = args.scene.load()?;
     let options = RunOptions {
@@ -498,13 +500,10 @@ fn accuracy(args: AccuracyArgs) -> Result<(), RunError> {
         scene.time.end = until;
     }
     let folder = args.output.unwrap_or_else(|| default_folder(&args.scene.scene, "-accuracy"));
-    let shown = folder.display();
-    if folder.exists() && !folder.is_dir() {
-        return Err(RunError::InputOutput(format!("{shown} is a file: name a folder with -o DIR")));
-    }
+    folder_or_new(&folder)?;
     if folder.join("accuracy.json").exists() && !args.manner.force {
-        let message = format!("{shown} holds results: --force overwrites them, -o DIR names another folder");
-        return Err(RunError::InputOutput(message));
+        let remedy = "--force overwrites them, -o DIR names another folder".into();
+        return Err(RunError::Unfit { path: folder, state: "holds results", remedy });
     }
     let options = AccuracyOptions {
         folder,

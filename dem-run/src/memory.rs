@@ -1,7 +1,6 @@
 //! The memory that a run needs, and what is free of it.
 
-use crate::check::size;
-use crate::run::RunError;
+use crate::error::RunError;
 use crate::scene::{Lattice, Sample, Scene, SolverKind};
 use std::path::{Path, PathBuf};
 
@@ -47,16 +46,11 @@ pub(crate) fn contacts_per_grain(scene: &Scene) -> f64 {
 /// Refuses a run that needs more memory than is free.
 ///
 /// # Errors
-/// [`RunError::InputOutput`].
+/// [`RunError::Memory`].
 pub fn refuse_too_large(scene: &Scene, grains: usize) -> Result<(), RunError> {
     let needed = expected(scene, grains);
     match free() {
-        Some(free) if free < needed => Err(RunError::InputOutput(format!(
-            "{grains} grains need about {} of memory, and {} are free: take fewer grains, or another machine; \
-             --ignore-memory tries it anyway",
-            size(needed),
-            size(free)
-        ))),
+        Some(free) if free < needed => Err(RunError::Memory { grains, needed, free }),
         _ => Ok(()),
     }
 }

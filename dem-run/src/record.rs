@@ -1,6 +1,7 @@
 //! From a world to its history: the layout, the frames, the rupture events and the observables of every step.
 
 use crate::build::Built;
+use crate::clock::cpu_time;
 use crate::history::{
     self, Background, Batch, BondStatus, Checkpoint, ContactRows, ContactStatus, Frame, GrainState, History, Kept,
     Layout, Observable, Parameters, Rupture, RuptureMode, SolverRoute, WallDrive, WallKind, WallState, Writer,
@@ -73,7 +74,7 @@ impl<D: Dim> Recorder<D> {
 
     /// Processor time of the whole run so far (s).
     pub fn cpu_time(&self) -> f64 {
-        self.cpu_before + crate::run::cpu_time()
+        self.cpu_before + cpu_time()
     }
 
     /// Record what every step records: observables and broken bonds.

@@ -1,10 +1,11 @@
 //! A run that goes on from its history, to the bit as if it had never stopped.
 
-use crate::check::{free_space, size};
+use crate::check::free_space;
+use crate::error::RunError;
 use crate::history::{Checkpoint, History, HistoryError, Kept, refuse_busy};
 use crate::output::{number, print_json, print_line};
 use crate::record::Recorder;
-use crate::run::{Execution, Run, RunError, RunOptions, State, handle_signals, run_in};
+use crate::run::{Execution, Run, RunOptions, State, handle_signals, run_in};
 use crate::scene::{self, Scene, differences};
 use crate::signals::Interrupt;
 use dem_core::dim::{D2, D3, D3Twist, Dim};
@@ -111,9 +112,11 @@ fn resume_in<D: Dim>(
             // killed before its first checkpoint stood: there is nothing to go on from, and nothing to lose
             return run_in::<D>(scene, &anew(options), interrupt);
         }
-        return Err(RunError::InputOutput(format!(
-            "{shown} holds no whole state to go on from: it is damaged, or of an older version; run the scene again"
-        )));
+        return Err(RunError::Unfit {
+            path: path.clone(),
+            state: "holds no whole state to go on from",
+            remedy: "it is damaged, or of an older version; run the scene again".into(),
+        });
     };
     let mut state = State::<D>::restored(scene, &checkpoint)
         .map_err(|mismatch| RunError::InputOutput(format!("{shown}: {mismatch}; run the scene again")))?;
@@ -174,12 +177,7 @@ fn refuse_full_disk(history: &History) -> Result<(), RunError> {
     let folder = history.path().parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let needed = history.length();
     match free_space(folder) {
-        Some(free) if free < needed => Err(RunError::InputOutput(format!(
-            "{} needs {} beside it to go on, and {} are free: make room first",
-            history.path().display(),
-            size(needed),
-            size(free)
-        ))),
+        Some(free) if free < needed => Err(RunError::Disk { path: history.path().into(), needed, free }),
         _ => Ok(()),
     }
 }

@@ -13,9 +13,10 @@ use dem_core::solver::{
 };
 use serde::Serialize;
 
+use crate::clock::cpu_time;
+use crate::error::{NoConvergence, RunError};
 use crate::fclib::Problem;
 use crate::output::{escaped, print_result};
-use crate::run::{RunError, cpu_time};
 use crate::scene;
 use crate::summary::told;
 
@@ -118,7 +119,7 @@ pub fn solve(options: &SolveOptions) -> Result<(), RunError> {
     };
     let printed = print_result(&solved, options.json);
     if !solved.converged {
-        return Err(RunError::NoConvergence(format!("{}: {}", options.problem.display(), solved.failure(&at))));
+        return Err(NoConvergence::Problem { path: options.problem.clone(), why: solved.failure(&at) }.into());
     }
     if let Some(output) = &options.output {
         problem.solution = Some(at.r);

@@ -1,16 +1,14 @@
 //! What a scene may not mean as it says it: no error, but a word before the run, with the place and the remedy.
 
-use crate::build::TOUCHING;
 use crate::output::number;
 use crate::prepare::MOST_STEPS;
 use crate::scene::{Sample, Scene};
+use crate::tolerances::{PARALLEL, TOUCHING};
 use dem_core::body::{Drive, Grains, Shape, Wall};
 use dem_core::dim::{Dim, Vect};
 
 /// Grains and loads of one kind that are told one by one.
 const MOST_TOLD: usize = 5;
-/// Sine or cosine of an angle below which two directions are along or across each other: directions in decimals are not exact.
-const PARALLEL: f64 = 1e-6;
 /// Moments of a run at which a drive is looked at.
 const MOMENTS: usize = 1000;
 

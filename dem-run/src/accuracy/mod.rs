@@ -4,6 +4,7 @@
 //! ([`report`]); over contact orders and starting reactions ([`spread`]); and the contact problems of the finest run are
 //! solved by every solver ([`profile`]).
 
+mod options;
 mod pictures;
 pub mod profile;
 pub mod report;
@@ -11,10 +12,13 @@ pub mod spread;
 mod tables;
 pub mod trial;
 
+pub use options::AccuracyOptions;
+
 use crate::build::build;
+use crate::error::RunError;
 use crate::output::Folder;
 use crate::progress::Progress;
-use crate::run::{Execution, RunError, handle_signals};
+use crate::run::{Execution, handle_signals};
 use crate::scene::Scene;
 use crate::signals::Interrupt;
 use dem_core::dim::{D2, D3, D3Twist, Dim};
@@ -22,33 +26,11 @@ use profile::Profile;
 use rayon::prelude::*;
 use report::{Asked, Indeterminacy, Report, Row, VariedRun};
 use spread::{Spread, Varied};
-use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 use trial::{Outcome, Posed, Sample, SolverName, Trial, Variant, Way};
 
 /// Contact problems taken from a run for the profile, at most.
 const MOST_PROBLEMS: usize = 50;
-
-/// What the command is asked for.
-#[derive(Debug, Clone, PartialEq)]
-pub struct AccuracyOptions {
-    /// The folder for the results.
-    pub folder: PathBuf,
-    /// Solvers, in the order of the tables.
-    pub solvers: Vec<SolverName>,
-    /// Tolerances (–).
-    pub tolerances: Vec<f64>,
-    /// Time steps over that of the scene (–).
-    pub steps: Vec<f64>,
-    /// Contact orders, and starting reactions, for each solver.
-    pub orders: u64,
-    /// Whether runs go on to the scene's end.
-    pub whole: bool,
-    /// How the command is carried out; the number of threads is that of the runs whose CPU time is not told.
-    pub execution: Execution,
-    /// Whether stdout is JSON.
-    pub json: bool,
-}
 
 /// Measure the accuracy of a scene, print the tables, and write them with their pictures.
 ///
@@ -70,7 +52,7 @@ pub fn accuracy(scene: &Scene, options: &AccuracyOptions) -> Result<(), RunError
         _ if scene.twists() => measure::<D3Twist>(scene, options, &interrupt)?,
         _ => measure::<D3>(scene, options, &interrupt)?,
     };
-    let json = serde_json::to_string_pretty(&report).map_err(|e| RunError::InputOutput(e.to_string()))? + "\n";
+    let json = serde_json::to_string_pretty(&report)? + "\n";
     folder.write("accuracy.json", json.as_bytes())?;
     tables::write(&report, &mut folder)?;
     pictures::draw(&report, &mut folder)?;
@@ -99,7 +81,8 @@ fn measure<D: Dim>(scene: &Scene, options: &AccuracyOptions, interrupt: &Interru
     let posed = measuring.runs(&mut report);
     if varied > 0 && !interrupt.requested() {
         let threads = rayon::ThreadPoolBuilder::new().num_threads(options.execution.threads.unwrap_or(0)).build();
-        let threads = threads.map_err(|e| RunError::InputOutput(format!("threads cannot be started: {e}")))?;
+        let threads = threads
+            .map_err(|error| RunError::System { what: "threads cannot be started".into(), source: error.into() })?;
         report.indeterminacy = Some(threads.install(|| measuring.indeterminacy(&report.runs)));
     }
     if !interrupt.requested() {

@@ -4,8 +4,9 @@
 //! solver. The profile of s is ρ_s(τ), the share of all problems with c(p, s) ≤ τ b(p): ρ_s(1) is how often s is the
 //! fastest, and ρ_s(τ) for large τ how often it solves at all.
 
-use super::trial::{Posed, SolverName, Way, thread_time};
+use super::trial::{Posed, SolverName, Way};
 use crate::build::settings;
+use crate::clock::thread_time;
 use crate::scene::Scene;
 use dem_core::dim::Dim;
 use dem_core::saved::Saved;

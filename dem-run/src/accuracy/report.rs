@@ -1,6 +1,6 @@
 //! What the command found, as it stands in `accuracy.json`.
 
-use super::AccuracyOptions;
+use super::options::AccuracyOptions;
 use super::profile::Profile;
 use super::spread::{Spread, Varied, jaccard};
 use super::trial::{Outcome, Sample, SolverName, Way};

@@ -1,6 +1,7 @@
 //! One run of the command: a scene stepped without a history, and what is read off it.
 
 use crate::build::{Built, settings};
+use crate::clock::thread_time;
 use crate::collapse::{Collapse, Failure};
 use crate::course::Course;
 use crate::scene::{GaussSeidel, Newton, Scene, SolverKind};
@@ -451,12 +452,6 @@ impl<D: Dim> Followed<D> {
             broken,
         }
     }
-}
-
-/// CPU time of this thread so far (s).
-pub fn thread_time() -> f64 {
-    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
-    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
 }
 
 #[cfg(test)]

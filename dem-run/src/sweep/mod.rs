@@ -17,9 +17,11 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use crate::check::{Check, size};
-use crate::output::{facts, print_line, print_result};
-use crate::run::{Execution, RunError, handle_signals};
+use crate::check::Check;
+use crate::destination::folder_or_new;
+use crate::error::RunError;
+use crate::output::{facts, print_line, print_result, size};
+use crate::run::{Execution, handle_signals};
 use plan::{Plan, describe};
 use reconcile::reconcile;
 use report::Standing;
@@ -69,10 +71,7 @@ pub enum Mode {
 /// [`RunError::Runs`] where runs failed. What was done before is kept.
 pub fn sweep(options: &SweepOptions) -> Result<(), RunError> {
     let store = Store::new(options.folder.clone());
-    if store.folder().exists() && !store.folder().is_dir() {
-        let shown = store.folder().display();
-        return Err(RunError::InputOutput(format!("{shown} is a file: name a folder with -o DIR")));
-    }
+    folder_or_new(store.folder())?;
     if options.mode == Mode::Status {
         return status(&store, options);
     }
@@ -83,7 +82,7 @@ pub fn sweep(options: &SweepOptions) -> Result<(), RunError> {
         mode => {
             let mut manifest = reconcile(&store, &plan, options.overwrite)?;
             store.create()?;
-            store.write(&mut manifest)?;
+            report::write(&store, &mut manifest)?;
             if *mode == Mode::Prepare {
                 prepare(&store, manifest, options)
             } else {
@@ -113,10 +112,12 @@ fn all(store: &Store, plan: &Plan, mut manifest: Manifest, options: &SweepOption
     let at_a_time = options.jobs.or_else(|| std::thread::available_parallelism().ok().map(usize::from)).unwrap_or(1);
     let carried = match jobs.is_empty() {
         true => Ok(()),
-        false => carry_out(store, &jobs, at_a_time, &interrupt, &mut progress, &mut || store.write(&mut manifest)),
+        false => {
+            carry_out(store, &jobs, at_a_time, &interrupt, &mut progress, &mut || report::write(store, &mut manifest))
+        }
     };
     // what was done is told whatever came in between
-    let written = store.write(&mut manifest);
+    let written = report::write(store, &mut manifest);
     let failed = failures(store, &manifest);
     let standing = Standing { folder: options.folder.clone(), manifest };
     let printed = print_result(&standing, options.json);
@@ -132,8 +133,7 @@ fn all(store: &Store, plan: &Plan, mut manifest: Manifest, options: &SweepOption
 fn one(store: &Store, plan: &Plan, id: &str, options: &SweepOptions) -> Result<(), RunError> {
     let (sweep, folder) = (options.sweep.display(), store.folder().display());
     let Some(manifest) = store.manifest()? else {
-        let remedy = format!("dem-run sweep {sweep} -o {folder} --prepare makes it");
-        return Err(RunError::InputOutput(format!("{folder} holds no manifest.json: {remedy}")));
+        return Err(without_manifest(store, format!("dem-run sweep {sweep} -o {folder} --prepare makes it")));
     };
     let Some(entry) = manifest.run(id) else {
         let last = manifest.runs.last().map_or("none", |run| &run.id);
@@ -186,13 +186,14 @@ fn prepare(store: &Store, manifest: Manifest, options: &SweepOptions) -> Result<
 /// Gathers the states of all runs and tells them.
 fn status(store: &Store, options: &SweepOptions) -> Result<(), RunError> {
     let Some(mut manifest) = store.manifest()? else {
-        let shown = store.folder().display();
-        return Err(RunError::InputOutput(format!(
-            "{shown} holds no manifest.json: the sweep was never started there"
-        )));
+        return Err(without_manifest(store, "the sweep was never started there".into()));
     };
-    store.write(&mut manifest)?;
+    report::write(store, &mut manifest)?;
     Ok(print_result(&Standing { folder: options.folder.clone(), manifest }, options.json)?)
+}
+
+fn without_manifest(store: &Store, remedy: String) -> RunError {
+    RunError::Unfit { path: store.folder().into(), state: "holds no manifest.json", remedy }
 }
 
 /// The exit code that a failed run's own stands for: what is neither a wrong scene nor a lack of convergence is the

@@ -9,7 +9,7 @@ use serde_json::Value;
 use sha2::{Digest, Sha256};
 
 use super::model::{Range, Spacing, Sweep, Values};
-use crate::run::RunError;
+use crate::error::RunError;
 use crate::scene::parse::{self, Document};
 use crate::scene::{self, Base, Change, Origin, Problem, Sample, Scene, SceneError, shorten};
 
@@ -52,10 +52,13 @@ impl Plan {
     /// Reads a sweep file and the scene that it names, and puts every value in.
     ///
     /// # Errors
-    /// [`RunError::Scene`] with all that is wrong; [`RunError::InputOutput`] for files that cannot be read.
+    /// [`RunError::Scene`] with all that is wrong; [`RunError::Content`] for files that cannot be read.
     pub fn read(path: &Path) -> Result<Self, RunError> {
-        let text = scene::text(path)
-            .map_err(|error| RunError::InputOutput(format!("{}: the sweep cannot be read: {error}", path.display())))?;
+        let unreadable = |path: &Path, what, error: std::io::Error| {
+            let source = error.into();
+            RunError::Content { path: path.into(), what, source }
+        };
+        let text = scene::text(path).map_err(|error| unreadable(path, "the sweep", error))?;
         let document = parse::parse(&path.display().to_string(), &text)?;
         let sweep: Sweep = document.decode().map_err(|problem| wrong(&document, vec![problem]))?;
         let problems = document.merge_non_finite(validate(&sweep));
@@ -73,8 +76,7 @@ impl Plan {
             if let Sample::File(file) = &run.scene.sample
                 && let Err(error) = std::fs::metadata(&file.path)
             {
-                let shown = file.path.display();
-                return Err(RunError::InputOutput(format!("{shown}: the sample cannot be read: {error}")));
+                return Err(unreadable(&file.path, "the sample", error));
             }
         }
         let fields = sweep.vary.iter().flat_map(BTreeMap::keys).cloned().collect();

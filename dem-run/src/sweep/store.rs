@@ -23,7 +23,36 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::history::History;
-use crate::run::RunError;
+use crate::replace;
+
+/// A file in the folder of a sweep that cannot be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum SweepError {
+    /// The manifest is not one, or one of another format.
+    #[error("{}: the manifest cannot be read: {why}", .path.display())]
+    Manifest {
+        /// The manifest.
+        path: PathBuf,
+        /// What is wrong with it.
+        why: String,
+    },
+    /// The operating system refused.
+    #[error("{} {doing}: {source}", .path.display())]
+    File {
+        /// The file or folder.
+        path: PathBuf,
+        /// What failed, as in "cannot be written".
+        doing: &'static str,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// A state cannot be written as JSON.
+    #[error(transparent)]
+    Json(#[from] serde_json::Error),
+}
+
+/// The result of reading or writing in the folder of a sweep.
+pub type Result<T> = std::result::Result<T, SweepError>;
 
 /// The format of the manifest.
 const FORMAT: u32 = 1;
@@ -158,10 +187,9 @@ impl Store {
     ///
     /// # Errors
     /// A manifest that cannot be read, or that another program wrote.
-    pub fn manifest(&self) -> Result<Option<Manifest>, RunError> {
+    pub fn manifest(&self) -> Result<Option<Manifest>> {
         let path = self.folder.join("manifest.json");
-        let failed =
-            |why: String| RunError::InputOutput(format!("{}: the manifest cannot be read: {why}", path.display()));
+        let failed = |why: String| SweepError::Manifest { path: path.clone(), why };
         match fs::read(&path) {
             Ok(bytes) => {
                 let manifest: Manifest = serde_json::from_slice(&bytes).map_err(|e| failed(e.to_string()))?;
@@ -185,7 +213,7 @@ impl Store {
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn record(&self, id: &str, outcome: &Outcome) -> Result<(), RunError> {
+    pub fn record(&self, id: &str, outcome: &Outcome) -> Result<()> {
         write_json(&self.path(id, ".state.json"), outcome)
     }
 
@@ -199,9 +227,9 @@ impl Store {
     ///
     /// # Errors
     /// The folder cannot be written.
-    pub fn claim(&self, id: &str) -> Result<Option<File>, RunError> {
+    pub fn claim(&self, id: &str) -> Result<Option<File>> {
         let path = self.path(id, ".json");
-        let failed = |e: std::io::Error| RunError::InputOutput(format!("{} cannot be locked: {e}", path.display()));
+        let failed = |source| SweepError::File { path: path.clone(), doing: "cannot be locked", source };
         let file = OpenOptions::new().write(true).create(true).truncate(false).open(&path).map_err(failed)?;
         // whoever gathers states looks at the lock for a moment
         for _ in 0..10 {
@@ -237,24 +265,29 @@ impl Store {
         }
     }
 
-    /// Gathers the states and writes the manifest and the table of runs.
+    /// Writes the manifest.
     ///
     /// # Errors
-    /// A file cannot be written.
-    pub fn write(&self, manifest: &mut Manifest) -> Result<(), RunError> {
-        self.gather(manifest);
-        write_json(&self.folder.join("manifest.json"), manifest)?;
-        let table = super::report::table(manifest, &|id| self.outcome(id)?.summary)?;
-        replace(&self.folder.join("runs.csv"), &table)
+    /// The file cannot be written.
+    pub fn write_manifest(&self, manifest: &Manifest) -> Result<()> {
+        write_json(&self.folder.join("manifest.json"), manifest)
+    }
+
+    /// Writes a file in the folder so that a reader, or a crash, finds the old content or the new one.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write(&self, name: &str, content: &[u8]) -> Result<()> {
+        write(&self.folder.join(name), content)
     }
 
     /// Makes the folder and that of the runs.
     ///
     /// # Errors
     /// They cannot be made.
-    pub fn create(&self) -> Result<(), RunError> {
+    pub fn create(&self) -> Result<()> {
         let runs = self.folder.join("runs");
-        fs::create_dir_all(&runs).map_err(|e| RunError::InputOutput(format!("{} cannot be made: {e}", runs.display())))
+        fs::create_dir_all(&runs).map_err(|source| SweepError::File { path: runs, doing: "cannot be made", source })
     }
 
     /// Deletes all files of a run.
@@ -292,13 +325,11 @@ impl Entry {
     }
 }
 
-fn write_json(path: &Path, value: &impl Serialize) -> Result<(), RunError> {
-    let text = serde_json::to_string_pretty(value).map_err(|e| RunError::InputOutput(e.to_string()))?;
-    replace(path, format!("{text}\n").as_bytes())
+fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
+    write(path, format!("{}\n", serde_json::to_string_pretty(value)?).as_bytes())
 }
 
-/// Writes a file so that a reader, or a crash, finds the old content or the new one.
-pub fn replace(path: &Path, content: &[u8]) -> Result<(), RunError> {
-    crate::replace::write(path, content)
-        .map_err(|error| RunError::InputOutput(format!("{} cannot be written: {error}", path.display())))
+fn write(path: &Path, content: &[u8]) -> Result<()> {
+    let failed = |source| SweepError::File { path: path.into(), doing: "cannot be written", source };
+    replace::write(path, content).map_err(failed)
 }

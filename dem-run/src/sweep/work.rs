@@ -13,9 +13,9 @@ use std::time::{Duration, Instant};
 
 use super::plan::PlannedRun;
 use super::store::{Outcome, State, Store};
+use crate::error::RunError;
 use crate::progress::{Progress, RunsProgress};
 use crate::replace::move_to;
-use crate::run::RunError;
 use crate::scene::Sample;
 use crate::signals::Interrupt;
 
@@ -123,7 +123,10 @@ impl Crew<'_> {
         if before.is_some_and(|outcome| outcome.state == State::Done) && store.is_complete(id) {
             return Ok(Some(State::Done));
         }
-        let failed = |doing: &str, e: std::io::Error| RunError::InputOutput(format!("run {id} cannot be {doing}: {e}"));
+        let failed = |doing: &str, error: std::io::Error| {
+            let what = format!("run {id} cannot be {doing}");
+            RunError::System { what, source: error.into() }
+        };
         write_scene(&mut scene, run).map_err(|e| failed("written", e))?;
         let began = Instant::now();
         let mut child = start(store, id).map_err(|e| failed("started", e))?;
