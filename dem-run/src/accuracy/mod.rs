@@ -18,7 +18,7 @@ use crate::build::build;
 use crate::error::RunError;
 use crate::output::Folder;
 use crate::progress::Progress;
-use crate::run::{Execution, handle_signals};
+use crate::run::handle_signals;
 use crate::scene::Scene;
 use crate::signals::Interrupt;
 use dem_core::dim::{D2, D3, D3Twist, Dim};

@@ -5,8 +5,8 @@ use std::thread::JoinHandle;
 
 use super::checkpoint::Checkpoint;
 use super::error::Result;
+use super::model::{Frame, Rupture};
 use super::writer::Writer;
-use super::{Frame, Rupture};
 
 /// Batches that may wait to be written: what a run may be ahead of the disk.
 const WAITING: usize = 4;

@@ -4,11 +4,11 @@ use hdf5::types::VarLenUnicode;
 use hdf5::{Dataset, File, Group};
 
 use super::codes::{BondCode, Coded, ContactCode, RouteCode, SolverRoute, WallDriveCode, WallKindCode};
-use super::copy::Visit;
 use super::error::{HistoryError, Result};
-use super::schema::{CREATOR, path, schema_version};
+use super::model::{Bonds, Frame, Layout, Observable, ValueKind, Wall};
+use super::schema::{CREATOR, FALSE_ACCELERATION, LOAD_ERROR, SCHEMA_VERSION, path};
 use super::table::{Growth, Storage, Table, fixed, text, text_attribute};
-use super::{Bonds, Frame, Layout, Observable, ValueKind, Wall};
+use super::visit::Visit;
 
 /// A table of doubles and where a frame keeps its values.
 pub(super) struct Column {
@@ -160,6 +160,13 @@ impl Commit {
 
 pub(super) fn check_length(place: &str, found: usize, expected: usize) -> Result<()> {
     if found == expected { Ok(()) } else { Err(HistoryError::Shape { place: place.into(), found, expected }) }
+}
+
+/// The version of a file of this layout: 3 where it is a copy of a history from before version 4,
+/// which keeps the load error as it was, without a false acceleration beside it.
+fn schema_version(layout: &Layout) -> u32 {
+    let observes = |name: &str| layout.observables.iter().any(|observable| observable.name == name);
+    if observes(LOAD_ERROR) && !observes(FALSE_ACCELERATION) { 3 } else { SCHEMA_VERSION }
 }
 
 pub(super) fn write_identity(file: &File, layout: &Layout) -> hdf5::Result<()> {

@@ -146,6 +146,11 @@ pub(crate) fn reason(error: &hdf5::Error) -> String {
     system.map_or_else(|| text.clone(), |(message, _)| message.into())
 }
 
+/// What is wrong at `place` of the file at `path`.
+pub(super) fn damaged(path: &Path, place: &str, why: impl Into<String>) -> HistoryError {
+    HistoryError::Damaged { path: path.into(), place: place.into(), why: why.into() }
+}
+
 /// Turns what the operating system refuses to do, as in "create", into [`HistoryError::Io`].
 pub(super) fn refused(path: &Path) -> impl Fn(&'static str, std::io::Error) -> HistoryError + '_ {
     move |doing, source| HistoryError::Io { path: path.into(), doing, source }

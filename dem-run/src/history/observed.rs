@@ -7,16 +7,10 @@ use hdf5::types::VarLenUnicode;
 
 use super::codes::{RouteCode, SolverRoute};
 use super::error::{Result, while_reading};
-use super::reader::History;
+use super::model::{Observable, ValueKind};
 use super::schema::path;
-use super::{Observable, ValueKind, sound};
-
-/// The observable that is an enumeration: the method that solved each step.
-pub const ROUTE: &str = "solver_route";
-/// The observable that is not a number in a step none of whose solves reports it.
-pub const LOAD_ERROR: &str = "solver_load_error";
-/// The observable that histories have from version 4 on; before it the load error held either.
-pub const FALSE_ACCELERATION: &str = "false_acceleration";
+use super::sound;
+use super::source::Source;
 
 /// One observable over the whole run.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -45,69 +39,54 @@ impl Series {
     }
 }
 
-impl History {
-    /// The names of what was observed, sorted.
-    ///
-    /// # Errors
-    /// [`HistoryError::Damaged`](super::HistoryError::Damaged).
-    pub fn observable_names(&self) -> Result<Vec<String>> {
-        let source = self.source();
-        let group = source.file.group(path::OBSERVABLES).map_err(while_reading(&source.path, path::OBSERVABLES))?;
-        let mut names = group.member_names().map_err(while_reading(&source.path, path::OBSERVABLES))?;
-        names.retain(|name| group.link_exists(&format!("{name}/value")));
-        names.sort_unstable();
-        Ok(names)
-    }
+/// The names of what was observed, sorted.
+pub(super) fn names(source: &Source) -> Result<Vec<String>> {
+    let group = source.file.group(path::OBSERVABLES).map_err(while_reading(&source.path, path::OBSERVABLES))?;
+    let mut names = group.member_names().map_err(while_reading(&source.path, path::OBSERVABLES))?;
+    names.retain(|name| group.link_exists(&format!("{name}/value")));
+    names.sort_unstable();
+    Ok(names)
+}
 
-    /// One observable over the whole run, `None` if it was not recorded.
-    ///
-    /// # Errors
-    /// [`HistoryError::Damaged`](super::HistoryError::Damaged).
-    pub fn observable(&self, name: &str) -> Result<Option<Series>> {
-        self.observable_of(name, 0..self.observed_steps())
-    }
+/// What was observed, in the order of the names.
+pub(super) fn observables(source: &Source) -> Result<Vec<Observable>> {
+    let observable = |name: String| -> Result<Observable> {
+        let Series { unit, shape, .. } = series(source, &name, 0..0)?.unwrap_or_default();
+        let kind = kind(source, &format!("{}/{name}/value", path::OBSERVABLES))?;
+        Ok(Observable { name, unit, shape, kind })
+    };
+    names(source)?.into_iter().map(observable).collect()
+}
 
-    /// What was observed, in the order of the names.
-    pub(super) fn observables(&self) -> Result<Vec<Observable>> {
-        let observable = |name: String| -> Result<Observable> {
-            let Series { unit, shape, .. } = self.observable_of(&name, 0..0)?.unwrap_or_default();
-            let kind = self.kind(&format!("{}/{name}/value", path::OBSERVABLES))?;
-            Ok(Observable { name, unit, shape, kind })
-        };
-        self.observable_names()?.into_iter().map(observable).collect()
+/// One observable over a range of its rows, `None` if it was not recorded.
+pub(super) fn series(source: &Source, name: &str, rows: Range<usize>) -> Result<Option<Series>> {
+    let place = format!("{}/{name}/value", path::OBSERVABLES);
+    if name.contains('/') || !source.has(&format!("{}/{name}", path::OBSERVABLES)) || !source.has(&place) {
+        return Ok(None);
     }
-
-    /// One observable over a range of its rows, `None` if it was not recorded.
-    fn observable_of(&self, name: &str, rows: Range<usize>) -> Result<Option<Series>> {
-        let source = self.source();
-        let place = format!("{}/{name}/value", path::OBSERVABLES);
-        if name.contains('/') || !source.has(&format!("{}/{name}", path::OBSERVABLES)) || !source.has(&place) {
-            return Ok(None);
+    let (shape, value) = match kind(source, &place)? {
+        ValueKind::Real => source.read(&place, rows.clone())?,
+        ValueKind::Route => {
+            let (shape, codes) = source.read::<RouteCode>(&place, rows.clone())?;
+            let routes: Vec<SolverRoute> = source.coded(&place, codes, rows.len())?;
+            (shape, routes.into_iter().map(SolverRoute::number).collect())
         }
-        let (shape, value) = match self.kind(&place)? {
-            ValueKind::Real => source.read(&place, rows.clone())?,
-            ValueKind::Route => {
-                let (shape, codes) = source.read::<RouteCode>(&place, rows.clone())?;
-                let routes: Vec<SolverRoute> = source.coded(&place, codes, rows.len())?;
-                (shape, routes.into_iter().map(SolverRoute::number).collect())
-            }
-        };
-        sound::observed(source, name, &place, rows.start, shape.iter().product(), &value)?;
-        let unit = match source.dataset(&place)?.attr("unit") {
-            Ok(unit) => unit.read_scalar::<VarLenUnicode>().map_err(while_reading(&source.path, &place))?.to_string(),
-            Err(_) => String::new(),
-        };
-        let step = source.read(&format!("{}/step", path::OBSERVABLES), rows.clone())?.1;
-        let times = format!("{}/time", path::OBSERVABLES);
-        let time = source.read(&times, rows.clone())?.1;
-        sound::reals(source, &times, rows.start, 1, &time)?;
-        Ok(Some(Series { unit, shape, step, time, value }))
-    }
+    };
+    sound::observed(&source.path, name, &place, rows.start, shape.iter().product(), &value)?;
+    let unit = match source.dataset(&place)?.attr("unit") {
+        Ok(unit) => unit.read_scalar::<VarLenUnicode>().map_err(while_reading(&source.path, &place))?.to_string(),
+        Err(_) => String::new(),
+    };
+    let step = source.read(&format!("{}/step", path::OBSERVABLES), rows.clone())?.1;
+    let times = format!("{}/time", path::OBSERVABLES);
+    let time = source.read(&times, rows.clone())?.1;
+    sound::reals(&source.path, &times, rows.start, 1, &time)?;
+    Ok(Some(Series { unit, shape, step, time, value }))
+}
 
-    /// What the values at `place` are, by their type in the file.
-    fn kind(&self, place: &str) -> Result<ValueKind> {
-        let found = self.source().dataset(place)?.dtype().and_then(|dtype| dtype.to_descriptor());
-        let found = found.map_err(while_reading(&self.source().path, place))?;
-        Ok(if found == RouteCode::type_descriptor() { ValueKind::Route } else { ValueKind::Real })
-    }
+/// What the values at `place` are, by their type in the file.
+fn kind(source: &Source, place: &str) -> Result<ValueKind> {
+    let found = source.dataset(place)?.dtype().and_then(|dtype| dtype.to_descriptor());
+    let found = found.map_err(while_reading(&source.path, place))?;
+    Ok(if found == RouteCode::type_descriptor() { ValueKind::Route } else { ValueKind::Real })
 }

@@ -8,12 +8,13 @@ use hdf5::types::VarLenUnicode;
 
 use super::checkpoint::Checkpoint;
 use super::codes::{BondCode, BondStatus, ContactCode, WallDriveCode, WallKindCode};
-use super::copy::Kept;
 use super::error::{HistoryError, Result, refused, while_reading};
-use super::schema::{RuptureRow, path};
+use super::model::{Bonds, ContactRows, GrainState, Grains, Kept, Layout, Parameters, Rupture, Wall, WallState};
+use super::observed::{self, Series};
+use super::rupture::RuptureRow;
+use super::schema::path;
 use super::sound::{self, Surroundings};
 use super::source::Source;
-use super::{Bonds, ContactRows, GrainState, Grains, Layout, Parameters, Rupture, Wall, WallState};
 use super::{checkpoint, lock};
 
 /// An open history, read-only. Only complete frames are seen; a file that a run still writes, or that a killed run left,
@@ -42,9 +43,9 @@ impl History {
     pub fn open(path: &Path) -> Result<Self> {
         let history = Self::open_as_is(path)?;
         let place = |name: &str| format!("{}/position/{name}", path::GRAINS);
-        sound::growing(&history.source, &place("step"), &history.steps)?;
-        sound::reals(&history.source, &place("time"), 0, 1, &history.times)?;
-        sound::growing(&history.source, &place("time"), &history.times)?;
+        sound::growing(&history.source.path, &place("step"), &history.steps)?;
+        sound::reals(&history.source.path, &place("time"), 0, 1, &history.times)?;
+        sound::growing(&history.source.path, &place("time"), &history.times)?;
         Ok(history)
     }
 
@@ -157,7 +158,7 @@ impl History {
             grains: self.grains()?,
             walls: self.walls()?,
             bonds: self.bonds()?,
-            observables: self.observables()?,
+            observables: observed::observables(&self.source)?,
             parameters: self.parameters()?,
         })
     }
@@ -244,8 +245,8 @@ impl History {
         if grains.id.is_empty() {
             return Err(self.source.damaged(&place("id"), "there is no grain"));
         }
-        sound::radii(&self.source, &place("radius"), &grains.radius)?;
-        sound::positive(&self.source, &place("mass"), &grains.mass)?;
+        sound::radii(&self.source.path, &place("radius"), &grains.radius)?;
+        sound::positive(&self.source.path, &place("mass"), &grains.mass)?;
         Ok(grains)
     }
 
@@ -296,7 +297,7 @@ impl History {
         let pair = pairs(&self.source.whole::<i32>(&place("pair"), 2)?);
         let unknown = |pair: &[i32; 2]| pair.iter().any(|grain| !(0..self.grains as i32).contains(grain));
         if let Some(bond) = pair.iter().position(unknown) {
-            return Err(sound::row(&self.source, &place("pair"), bond, "a bond names a grain that is not there"));
+            return Err(sound::row(&self.source.path, &place("pair"), bond, "a bond names a grain that is not there"));
         }
         let column = |name: &str| self.source.column(&place(name), pair.len());
         let bonds = Bonds {
@@ -306,7 +307,7 @@ impl History {
             mean_diameter: column("mean_diameter")?,
             pair,
         };
-        sound::positive(&self.source, &place("mean_diameter"), &bonds.mean_diameter)?;
+        sound::positive(&self.source.path, &place("mean_diameter"), &bonds.mean_diameter)?;
         Ok(bonds)
     }
 
@@ -323,7 +324,7 @@ impl History {
         if let Some(grain) = position.chunks(d).position(|centre| !surroundings.hold(centre)) {
             let centre = &position[grain * d..(grain + 1) * d];
             let why = format!("grain {grain} is at {centre:?} m, far beyond a million sizes of the sample");
-            return Err(sound::row(&self.source, &format!("{}/position/value", path::GRAINS), frame, why));
+            return Err(sound::row(&self.source.path, &format!("{}/position/value", path::GRAINS), frame, why));
         }
         Ok(GrainState {
             position,
@@ -375,7 +376,7 @@ impl History {
         let (before, end) = (if frame == 0 { 0 } else { complete[0] }, complete[complete.len() - 1]);
         if start != before || start.checked_add(rows) != Some(end) {
             let why = format!("{rows} rows from {start} on, where those from {before} to {end} belong to the frame");
-            return Err(sound::row(&self.source, &count, frame, why));
+            return Err(sound::row(&self.source.path, &count, frame, why));
         }
         Ok(start as usize..end as usize)
     }
@@ -426,6 +427,22 @@ impl History {
         })
     }
 
+    /// The names of what was observed, sorted.
+    ///
+    /// # Errors
+    /// [`HistoryError::Damaged`].
+    pub fn observable_names(&self) -> Result<Vec<String>> {
+        observed::names(&self.source)
+    }
+
+    /// One observable over the whole run, `None` if it was not recorded.
+    ///
+    /// # Errors
+    /// [`HistoryError::Damaged`].
+    pub fn observable(&self, name: &str) -> Result<Option<Series>> {
+        observed::series(&self.source, name, 0..self.observed_steps())
+    }
+
     /// Every bond that broke, in order; empty for a scene without bonds.
     ///
     /// # Errors
@@ -436,11 +453,11 @@ impl History {
         }
         let (_, events) = RuptureRow::read(&self.source, path::RUPTURE, 0..self.events)?;
         let event = |(k, row): (usize, &RuptureRow)| {
-            row.event().ok_or_else(|| sound::row(&self.source, path::RUPTURE, k, "a mode that is none"))
+            row.event().ok_or_else(|| sound::row(&self.source.path, path::RUPTURE, k, "a mode that is none"))
         };
         let known: Vec<Rupture> = events.iter().enumerate().map(event).collect::<Result<_>>()?;
         let (counts, last) = ([self.bonds()?.len(), self.grains], self.steps.last().copied().unwrap_or(i64::MAX));
-        sound::ruptures(&self.source, path::RUPTURE, &known, counts, last)?;
+        sound::ruptures(&self.source.path, path::RUPTURE, &known, counts, last)?;
         Ok(known)
     }
 }
@@ -476,7 +493,7 @@ impl History {
         if values.len() != expected {
             return Err(self.source.damaged(&place, &format!("it has {} values instead of {expected}", values.len())));
         }
-        sound::reals(&self.source, &place, frame, expected, &values)?;
+        sound::reals(&self.source.path, &place, frame, expected, &values)?;
         Ok(values)
     }
 
@@ -491,7 +508,7 @@ impl History {
         match bonds.iter().position(|bond| !(-1..known).contains(bond)) {
             Some(k) => {
                 let why = format!("{} is none of {known} bonds", bonds[k]);
-                Err(sound::row(&self.source, &place, range.start + k, why))
+                Err(sound::row(&self.source.path, &place, range.start + k, why))
             }
             None => Ok(bonds),
         }
@@ -507,7 +524,7 @@ impl History {
         if !widths.contains(&row.iter().product()) {
             return Err(self.source.damaged(&place, "its rows have another length"));
         }
-        sound::reals(&self.source, &place, range.start, row.iter().product(), &values)?;
+        sound::reals(&self.source.path, &place, range.start, row.iter().product(), &values)?;
         Ok(values)
     }
 
@@ -526,7 +543,7 @@ impl History {
                 let [i, j] = pairs[k];
                 let why =
                     format!("{i}, {j} are not a grain and another, or a wall, of {grains} grains and {walls} walls");
-                Err(sound::row(&self.source, &place, range.start + k, why))
+                Err(sound::row(&self.source.path, &place, range.start + k, why))
             }
             None => Ok(pairs),
         }

@@ -2,11 +2,11 @@
 //! from it. `dem-post info --check` lists all of it, and more.
 
 use std::fmt::Display;
+use std::path::Path;
 
-use super::Rupture;
-use super::error::{HistoryError, Result};
-use super::observed::LOAD_ERROR;
-use super::source::Source;
+use super::error::{HistoryError, Result, damaged};
+use super::model::Rupture;
+use super::schema::LOAD_ERROR;
 
 /// Magnitude that no quantity in SI units comes near; squares and cubes of lesser ones are finite.
 const GREATEST: f64 = 1e100;
@@ -69,67 +69,53 @@ pub fn median(mut values: Vec<f64>) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
-pub(super) fn row(source: &Source, place: &str, row: usize, why: impl Display) -> HistoryError {
-    source.damaged(place, &format!("row {row}: {why}"))
+pub(super) fn row(path: &Path, place: &str, row: usize, why: impl Display) -> HistoryError {
+    damaged(path, place, format!("row {row}: {why}"))
 }
 
 /// Refuses what is no plausible number among rows of `width` numbers, the first of which is row `first`.
-pub(super) fn reals(source: &Source, place: &str, first: usize, width: usize, values: &[f64]) -> Result<()> {
-    refused(source, place, first, width, values.iter().position(|value| !is_plausible(*value)), values)
+pub(super) fn reals(path: &Path, place: &str, first: usize, width: usize, values: &[f64]) -> Result<()> {
+    refused(path, place, first, width, values.iter().position(|value| !is_plausible(*value)), values)
 }
 
 /// The same among those of the observable `name`.
-pub(super) fn observed(
-    source: &Source,
-    name: &str,
-    place: &str,
-    first: usize,
-    width: usize,
-    values: &[f64],
-) -> Result<()> {
+pub(super) fn observed(path: &Path, name: &str, place: &str, first: usize, width: usize, values: &[f64]) -> Result<()> {
     let wrong = values.iter().position(|value| !may_be_observed(name, *value));
-    refused(source, place, first, width, wrong, values)
+    refused(path, place, first, width, wrong, values)
 }
 
 /// Refuses the value numbered `wrong`, if there is one.
-fn refused(
-    source: &Source,
-    place: &str,
-    first: usize,
-    width: usize,
-    wrong: Option<usize>,
-    values: &[f64],
-) -> Result<()> {
+fn refused(path: &Path, place: &str, first: usize, width: usize, wrong: Option<usize>, values: &[f64]) -> Result<()> {
     match wrong {
-        Some(k) => Err(row(source, place, first + k / width.max(1), format!("{:e} is no plausible number", values[k]))),
+        Some(k) => Err(row(path, place, first + k / width.max(1), format!("{:e} is no plausible number", values[k]))),
         None => Ok(()),
     }
 }
 
 /// Refuses numbers that are not above zero.
-pub(super) fn positive(source: &Source, place: &str, values: &[f64]) -> Result<()> {
+pub(super) fn positive(path: &Path, place: &str, values: &[f64]) -> Result<()> {
     match values.iter().position(|value| *value <= 0.0) {
-        Some(k) => Err(row(source, place, k, format!("{:e} is not above zero", values[k]))),
+        Some(k) => Err(row(path, place, k, format!("{:e} is not above zero", values[k]))),
         None => Ok(()),
     }
 }
 
 /// Refuses radii of another scale than all others.
-pub(super) fn radii(source: &Source, place: &str, values: &[f64]) -> Result<()> {
-    positive(source, place, values)?;
+pub(super) fn radii(path: &Path, place: &str, values: &[f64]) -> Result<()> {
+    positive(path, place, values)?;
     let usual = median(values.to_vec());
     match values.iter().position(|radius| is_huge(*radius, usual)) {
         Some(k) => {
-            Err(row(source, place, k, format!("{:e} m, where half the grains have at most {usual:e} m", values[k])))
+            Err(row(path, place, k, format!("{:e} m, where half the grains have at most {usual:e} m", values[k])))
         }
         None => Ok(()),
     }
 }
 
 /// Refuses values that do not grow from row to row.
-pub(super) fn growing<T: PartialOrd + Display>(source: &Source, place: &str, values: &[T]) -> Result<()> {
+pub(super) fn growing<T: PartialOrd + Display>(path: &Path, place: &str, values: &[T]) -> Result<()> {
     match values.windows(2).position(|pair| pair[0] >= pair[1]) {
-        Some(k) => Err(row(source, place, k + 1, format!("{} does not come after {}", values[k + 1], values[k]))),
+        Some(k) => Err(row(path, place, k + 1, format!("{} does not come after {}", values[k + 1], values[k]))),
         None => Ok(()),
     }
 }
@@ -137,7 +123,7 @@ pub(super) fn growing<T: PartialOrd + Display>(source: &Source, place: &str, val
 /// Refuses ruptures of bonds or grains that are not there, of steps out of order or after step `until`, or with numbers
 /// that are none.
 pub(super) fn ruptures(
-    source: &Source,
+    path: &Path,
     place: &str,
     events: &[Rupture],
     [bonds, grains]: [usize; 2],
@@ -150,7 +136,7 @@ pub(super) fn ruptures(
         // histories of before version 3 have none
         let twist = if e.twist.is_nan() { 0.0 } else { e.twist };
         let numbers = [e.time, x, y, z, e.normal_force, e.tangential_force, e.moment, twist, e.energy];
-        reals(source, place, k, numbers.len(), &numbers)?;
+        reals(path, place, k, numbers.len(), &numbers)?;
         let what = if !known(e.bond, bonds) {
             format!("{} is none of {bonds} bonds", e.bond)
         } else if !e.pair.iter().all(|grain| known(*grain, grains)) {
@@ -165,7 +151,7 @@ pub(super) fn ruptures(
             last = (e.step, e.time);
             continue;
         };
-        return Err(row(source, place, k, what));
+        return Err(row(path, place, k, what));
     }
     Ok(())
 }

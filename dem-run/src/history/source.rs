@@ -9,7 +9,7 @@ use hdf5::types::VarLenUnicode;
 use hdf5::{Dataset, File, H5Type, OpenMode};
 
 use super::codes::Coded;
-use super::error::{HistoryError, Result, reason, refused, while_reading};
+use super::error::{HistoryError, Result, damaged, reason, refused, while_reading};
 use super::schema::{CREATOR, SCHEMA_VERSION, path};
 use super::sound;
 use super::table::rows;
@@ -32,15 +32,14 @@ impl Source {
     pub fn open(path: &Path) -> Result<Self> {
         let (length, open_ended) = check_superblock(path)?;
         let texts = Texts::find(path).map_err(|error| refused(path)("read", error))?;
-        let damaged = |why| HistoryError::Damaged { path: path.into(), place: String::new(), why };
-        let texts = texts.map_err(damaged)?;
+        let texts = texts.map_err(|why| damaged(path, "", why))?;
         let file = open_file(path, open_ended)?;
         check_identity(path, &file)?;
         Ok(Self { path: path.into(), file, length, open_ended, texts })
     }
 
     pub fn damaged(&self, place: &str, why: &str) -> HistoryError {
-        HistoryError::Damaged { path: self.path.clone(), place: place.into(), why: why.into() }
+        damaged(&self.path, place, why)
     }
 
     pub fn has(&self, place: &str) -> bool {
@@ -87,7 +86,7 @@ impl Source {
         if values.len() != expected {
             return Err(self.damaged(place, &format!("it has {} values instead of {expected}", values.len())));
         }
-        sound::reals(self, place, 0, row.iter().product(), &values)?;
+        sound::reals(&self.path, place, 0, row.iter().product(), &values)?;
         Ok(values)
     }
 

@@ -9,15 +9,16 @@ use crate::replace::{replace_synced, sync};
 
 use super::checkpoint::{Checkpoint, Slots};
 use super::codes::{BondCode, Coded};
-use super::copy::{Bytes, Copy, Kept, Share, Visit};
 use super::create::{self, Column, Commit, ContactTables, Observables, check_length};
 use super::error::{HistoryError, Result, refused, while_writing};
 use super::lock;
+use super::model::{Frame, Kept, Layout, Rupture};
 use super::reader::History;
-use super::schema::{RuptureRow, chunk_cache, path};
+use super::rupture::RuptureRow;
+use super::schema::{chunk_cache, path};
 use super::source::{Source, end_of_file};
 use super::table::{Growth, Storage, Table};
-use super::{Frame, Layout, Rupture};
+use super::visit::{Bytes, Copy, Share, Visit};
 
 /// Steps of observables, and ruptures, that are held in memory before they are appended.
 const BLOCK: usize = 256;
