@@ -24,7 +24,9 @@ fn main() {
         }
     }
     // what the program is made of: a change makes the revision "dirty"
-    for source in ["build.rs", "src", "Cargo.toml", "../dem-core/src", "../Cargo.lock"] {
+    for source in
+        ["build.rs", "src", "drawing", "history", "output", "scene", "Cargo.toml", "../dem-core/src", "../Cargo.lock"]
+    {
         println!("cargo::rerun-if-changed={source}");
     }
 }

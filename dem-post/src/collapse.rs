@@ -1,7 +1,7 @@
 //! What is read off a curve: where it gives way, where it peaks, the work under it.
 
-use dem_run::collapse::in_one_piece;
-use dem_run::history::History;
+use dem_history::History;
+use dem_scene::failure::in_one_piece;
 use serde_json::Value;
 
 use crate::output::Result;

@@ -5,7 +5,7 @@
 //! more memory than a short one.
 
 use clap::ValueEnum;
-use dem_run::history::{BondStatus, History, RuptureMode};
+use dem_history::{BondStatus, History, RuptureMode};
 use serde::Serialize;
 
 use crate::chains::pictures::{force_legend, links};

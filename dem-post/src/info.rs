@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dem_run::history::{History, RuptureMode, Series, Wall, WallDrive};
+use dem_history::{History, RuptureMode, Series, Wall, WallDrive};
 use serde::Serialize;
 
 use crate::cracks::Modes;

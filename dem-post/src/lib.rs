@@ -1,7 +1,7 @@
 //! Analyses of histories: cracks and fragments, force chains, velocities, stress and strain; picture series,
 //! comparisons of two runs, strength over many, and reports; companions for viewers.
 //!
-//! Each analysis has a module with a function that reads a [`dem_run::history::History`] and returns a report, and a
+//! Each analysis has a module with a function that reads a [`dem_history::History`] and returns a report, and a
 //! function that writes the report as CSV, SVG and PNG. Reports know nothing of files or drawings.
 
 pub mod chains;
@@ -23,4 +23,5 @@ pub mod stress_strain;
 pub mod velocities;
 pub mod view;
 
-use dem_run::{plot, row};
+use dem_drawing as plot;
+use dem_output::row;

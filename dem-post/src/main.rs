@@ -4,10 +4,10 @@ use std::io::Write;
 use std::process::ExitCode;
 
 use clap::Parser;
+use dem_history::{CopyAs, History, HistoryError};
 use dem_post::cli::{Cli, Command, Files};
 use dem_post::output::{Folder, PostError, Result, Source, default_folder, escaped, print, source};
 use dem_post::{chains, check, compare, cracks, frames, info, pack, report, strength, stress_strain, velocities, view};
-use dem_run::history::{CopyAs, History, HistoryError};
 use serde::Serialize;
 
 /// Files beyond which not all are named.

@@ -1,12 +1,12 @@
-//! What an analysis can fail of, with its exit code; tables, files and numbers are those of [`dem_run::output`].
+//! What an analysis can fail of, with its exit code; tables, files and numbers are those of [`dem_output`].
 
 use std::path::PathBuf;
 
-use dem_run::history::{History, HistoryError};
-use dem_run::sweep::store::SweepError;
+use dem_history::sweep::SweepError;
+use dem_history::{History, HistoryError};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-pub use dem_run::output::{
+pub use dem_output::{
     Folder, Source, Text, WriteError, cell, default_folder, escaped, facts, in_shell, number, print, quantity, short,
 };
 

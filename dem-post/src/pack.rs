@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dem_run::history::{self, CopyAs, History};
+use dem_history::{self as history, CopyAs, History};
 use serde::Serialize;
 
 use crate::output::{Result, facts, progress};

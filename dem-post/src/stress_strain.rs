@@ -25,10 +25,10 @@
 
 use std::path::Path;
 
-use dem_run::collapse::Disk;
-use dem_run::history::{History, Series, Wall, WallDrive, WallKind};
-use dem_run::scene::{Scene, choose_load_wall};
-use dem_run::summary::Splitting;
+use dem_history::{History, Series, Wall, WallDrive, WallKind};
+use dem_scene::failure::Disk;
+use dem_scene::failure::Splitting;
+use dem_scene::{Scene, choose_load_wall};
 use serde::Serialize;
 use serde_json::Value;
 

@@ -7,7 +7,7 @@
 //! centres; the longest of a panel is as long as a square is wide. So both compare grains of one panel; the captions
 //! compare panels.
 
-use dem_run::history::{GrainState, History};
+use dem_history::{GrainState, History};
 use serde::Serialize;
 
 use crate::map::{Arrow, Key, Panel, Ramp, Sample, Scale, draw};

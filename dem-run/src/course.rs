@@ -1,6 +1,7 @@
 //! The course of a run: what is counted from step to step, and what ends it.
 
-use crate::collapse::{Collapse, LoadStep, in_one_piece};
+use crate::collapse::{Collapse, LoadStep};
+use crate::scene::failure::in_one_piece;
 use crate::scene::{Scene, TravelFrom};
 use crate::summary::Ending;
 use dem_core::body::{Drive, Wall};

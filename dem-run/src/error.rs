@@ -2,10 +2,10 @@
 
 use crate::fclib::FclibError;
 use crate::history::HistoryError;
+use crate::history::sweep::SweepError;
 use crate::output::{WriteError, size};
 use crate::scene::SceneError;
 use crate::signals::INTERRUPTED;
-use crate::sweep::store::SweepError;
 use std::error::Error;
 use std::path::PathBuf;
 

@@ -2,7 +2,7 @@
 
 use crate::build::{build, rebuild};
 use crate::check;
-use crate::collapse::{Disk, Failure};
+use crate::collapse::Failure;
 use crate::course::Course;
 use crate::error::{NoConvergence, RunError};
 use crate::history::Checkpoint;
@@ -11,9 +11,10 @@ use crate::output::print_result;
 use crate::progress::{Progress, ProgressMode, StepProgress};
 use crate::record::Recorder;
 use crate::sample_file;
+use crate::scene::failure::{Disk, Splitting};
 use crate::scene::{Scene, SolverKind};
 use crate::signals::{self, Interrupt};
-use crate::summary::{Ending, Splitting, Summary, WallLoads};
+use crate::summary::{Ending, Summary, WallLoads};
 use crate::warnings;
 use dem_core::body::{Drive, Wall};
 use dem_core::dim::{D2, D3, D3Twist, Dim, Vect};

@@ -1,7 +1,8 @@
 //! What a run tells at its end, on stdout.
 
-use crate::collapse::{Collapse, Disk, Failure, STRAINS};
+use crate::collapse::{Collapse, Failure};
 use crate::output::{in_shell, number, quantity};
+use crate::scene::failure::{STRAINS, Splitting};
 use dem_core::solver::Work;
 use serde::Serialize;
 use std::fmt;
@@ -148,39 +149,6 @@ impl WallLoads {
         let (load, displacement) = (self.peak_load?, self.peak_displacement?);
         let end = if self.rising { ", at the end of the run" } else { "" };
         Some(format!("{} N at a displacement of {} m{end}", number(load), number(displacement)))
-    }
-}
-
-/// Tensile stress 2P/(πDt) across the loaded diameter of a disk (Pa).
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Splitting {
-    /// Diameter D (m).
-    pub diameter: f64,
-    /// Length t (m).
-    pub length: f64,
-    /// Stress at the collapse load of the strain 1e-4, where bonds had broken by then (Pa).
-    pub collapse: Option<f64>,
-    /// Stress at the greatest load (Pa).
-    pub peak: Option<f64>,
-}
-
-impl Splitting {
-    /// The splitting strength of a disk, from its collapse load and its greatest load (N).
-    #[must_use]
-    pub fn of(disk: Disk, collapse: Option<f64>, peak: Option<f64>) -> Self {
-        let stress = |load: f64| disk.stress(load);
-        let Disk { diameter, length } = disk;
-        Self { diameter, length, collapse: collapse.map(stress), peak: peak.map(stress) }
-    }
-}
-
-impl fmt::Display for Splitting {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let at = |stress: Option<f64>, what: &str| Some(format!("{} Pa {what}", number(stress?)));
-        let told = [at(self.collapse, "at collapse (strain 1e-4)"), at(self.peak, "at the peak load")];
-        let told: Vec<String> = told.into_iter().flatten().collect();
-        let told = if told.is_empty() { "none".into() } else { told.join(", ") };
-        write!(f, "{told}: 2P/(πDt), D = {} m, t = {} m", number(self.diameter), number(self.length))
     }
 }
 

@@ -5,7 +5,7 @@
 //!
 //! **Chains** are lines of at least three grains: [`quasilinear`] says which.
 
-use dem_run::history::{ContactRows, History};
+use dem_history::{ContactRows, History};
 use serde::Serialize;
 
 use crate::moments;

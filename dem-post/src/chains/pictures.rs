@@ -1,6 +1,6 @@
 //! The drawings of forces and chains.
 
-use dem_run::history::{ContactRows, History};
+use dem_history::{ContactRows, History};
 
 use super::{CARRIES, Report};
 use crate::map::{Colour, Key, Link, Panel, Sample, draw};

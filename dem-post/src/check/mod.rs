@@ -10,7 +10,7 @@ mod schema;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use dem_run::history::History;
+use dem_history::History;
 use hdf5::{Dataset, File, H5Type, Hyperslab, OpenMode, SliceOrIndex};
 use indicatif::ProgressBar;
 use serde::Serialize;

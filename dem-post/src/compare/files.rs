@@ -1,6 +1,6 @@
 //! What `dem-post compare` writes.
 
-use dem_run::history::History;
+use dem_history::History;
 
 use super::{Break, Fate, Report};
 use crate::map::{Key, Link, Panel, Sample, draw};

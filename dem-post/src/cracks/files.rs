@@ -1,6 +1,6 @@
 //! What `dem-post cracks` writes.
 
-use dem_run::history::History;
+use dem_history::History;
 
 use super::pictures::{broken_chart, crack_map, decohesion, fragment_charts, fragment_map, front_charts, surface_maps};
 use super::surfaces::Facet;

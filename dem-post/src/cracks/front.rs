@@ -9,7 +9,7 @@
 //! The **growth** takes the other view: after each round, the cracks as they are then, joined only by what has broken so
 //! far. Where cracks meet, the largest grows by the whole of the other.
 
-use dem_run::history::Rupture;
+use dem_history::Rupture;
 use petgraph::unionfind::UnionFind;
 use serde::Serialize;
 

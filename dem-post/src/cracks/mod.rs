@@ -4,7 +4,7 @@
 //! What a crack, its path and its front are: [`paths`] and [`front`] in the plane; in space a crack is a surface,
 //! [`surfaces`].
 
-use dem_run::history::{History, Rupture, RuptureMode};
+use dem_history::{History, Rupture, RuptureMode};
 use serde::Serialize;
 
 use crate::fragments::{Fragments, fragments};

@@ -15,7 +15,7 @@
 //! * **Orientation**: of the line between the ends of the path, from 0° to 180°, counter-clockwise from the first axis.
 //!   **Tortuosity**: length of the path over the distance of its ends, at least 1.
 
-use dem_run::history::{Bonds, Rupture};
+use dem_history::{Bonds, Rupture};
 use petgraph::graph::NodeIndex;
 use serde::Serialize;
 

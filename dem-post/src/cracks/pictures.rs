@@ -1,6 +1,6 @@
 //! The drawings of cracks.
 
-use dem_run::history::{BondStatus, History};
+use dem_history::{BondStatus, History};
 
 use super::front::Growth;
 use super::paths::Crack;

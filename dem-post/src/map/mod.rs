@@ -1,6 +1,6 @@
 //! Maps of the sample: grains, walls and what joins them, several moments side by side on one scale.
 
-use dem_run::history::{GrainState, Grains, History, Wall, WallKind, WallState};
+use dem_history::{GrainState, Grains, History, Wall, WallKind, WallState};
 
 use crate::output::Result;
 use crate::plot::{Anchor, Canvas, Drawing, colour};

@@ -5,7 +5,7 @@
 //! inside the page as `data:` addresses. Long curves are thinned as all charts are. A section that
 //! a scene has nothing for says why.
 
-use dem_run::history::History;
+use dem_history::History;
 use serde::Serialize;
 
 use crate::output::{Folder, PostError, Result, facts, number};

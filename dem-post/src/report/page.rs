@@ -3,7 +3,7 @@
 use askama::Template;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use dem_run::history::History;
+use dem_history::History;
 
 use super::{Report, sections};
 use crate::output::{PostError, Result};

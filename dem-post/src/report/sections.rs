@@ -1,6 +1,6 @@
 //! What stands in the sections of the page.
 
-use dem_run::history::{History, Series};
+use dem_history::{History, Series};
 
 use super::Report;
 use super::page::{Figure, Section, Table, chart, map};

@@ -1,6 +1,6 @@
 //! How accurately a run was solved, by the measures that it recorded at every step.
 
-use dem_run::history::{FALSE_ACCELERATION, History, LOAD_ERROR, ROUTE, SolverRoute};
+use dem_history::{FALSE_ACCELERATION, History, LOAD_ERROR, ROUTE, SolverRoute};
 use serde::Serialize;
 
 use crate::output::{Result, number};

@@ -10,7 +10,7 @@ mod vtk;
 
 use std::path::Path;
 
-use dem_run::history::History;
+use dem_history::History;
 use serde::Serialize;
 
 use crate::output::{Folder, PostError, Result, WriteError, facts, progress};

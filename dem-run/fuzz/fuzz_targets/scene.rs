@@ -9,7 +9,7 @@
 //! ```
 #![no_main]
 
-use dem_run::scene::{self, Drive, Scene};
+use dem_scene::{self as scene, Drive, Scene};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {

@@ -4,8 +4,8 @@ use super::options::AccuracyOptions;
 use super::profile::Profile;
 use super::spread::{Spread, Varied, jaccard};
 use super::trial::{Outcome, Sample, SolverName, Way};
-use crate::collapse::in_one_piece;
 use crate::scene::Scene;
+use crate::scene::failure::in_one_piece;
 use dem_core::dim::Dim;
 use serde::Serialize;
 

@@ -18,7 +18,7 @@ pub struct Spread {
     pub first_break: Option<Range>,
     /// Different bonds that broke first.
     pub first_bonds: usize,
-    /// Collapse load (N) at each of [`crate::collapse::STRAINS`].
+    /// Collapse load (N) at each of [`crate::scene::failure::STRAINS`].
     pub collapse: [Option<Range>; 2],
     /// Mean Jaccard index over all pairs of broken sets (–); none for fewer than two runs.
     pub jaccard: Option<f64>,

@@ -7,7 +7,7 @@ use hdf5::{File, Group, H5Type};
 
 use super::{FclibError, Problem};
 use crate::history::reason;
-use crate::replace::replace;
+use crate::output::replace::replace;
 
 impl Problem {
     /// Writes the problem, its reactions as the first guess if they are not all zero, and its solution if there is one.

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::store::{Manifest, State, Store};
 use crate::error::RunError;
+use crate::history::sweep::{Manifest, State, Store};
 
 /// Writes `slurm.sh` and `Snakefile` beside the manifest; gives their paths.
 ///
@@ -102,7 +102,7 @@ fn shell(word: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sweep::store::Entry;
+    use crate::history::sweep::Entry;
 
     #[test]
     fn numbers_of_runs_are_spans_without_those_that_are_done() {

@@ -9,7 +9,6 @@ pub mod model;
 pub mod plan;
 mod reconcile;
 mod report;
-pub mod store;
 mod work;
 
 use std::fmt;
@@ -20,12 +19,12 @@ use serde::Serialize;
 use crate::check::Check;
 use crate::destination::folder_or_new;
 use crate::error::RunError;
+use crate::history::sweep::{Manifest, State, Store};
 use crate::output::{facts, print_line, print_result, size};
 use crate::run::{Execution, handle_signals};
 use plan::{Plan, describe};
 use reconcile::reconcile;
 use report::Standing;
-use store::{Manifest, State, Store};
 use work::{Job, carry_out};
 
 /// What is asked of a sweep.

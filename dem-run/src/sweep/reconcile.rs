@@ -9,8 +9,8 @@ use std::fs;
 use serde_json::Value;
 
 use super::plan::{Plan, PlannedRun, describe};
-use super::store::{Entry, Manifest, Store};
 use crate::error::RunError;
+use crate::history::sweep::{Entry, Manifest, Store};
 use crate::scene::parse::join;
 use crate::scene::shorten;
 

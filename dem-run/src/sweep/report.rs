@@ -7,8 +7,8 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::plan::describe;
-use super::store::{Entry, Manifest, State, Store};
 use crate::error::RunError;
+use crate::history::sweep::{Entry, Manifest, State, Store};
 use crate::output::number;
 
 /// Columns of the table that come from the summary of a run: name, and place in the summary.

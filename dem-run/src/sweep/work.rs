@@ -12,10 +12,10 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::plan::PlannedRun;
-use super::store::{Outcome, State, Store};
 use crate::error::RunError;
+use crate::history::sweep::{Outcome, State, Store};
+use crate::output::replace::move_to;
 use crate::progress::{Progress, RunsProgress};
-use crate::replace::move_to;
 use crate::scene::Sample;
 use crate::signals::Interrupt;
 

@@ -57,7 +57,7 @@ fn only(result: Result<Scene, SceneError>) -> Problem {
 }
 
 fn configs() -> Vec<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs");
     let entries = std::fs::read_dir(folder).expect("configs");
     entries
         .map(|entry| entry.expect("entry").path())

@@ -1,7 +1,7 @@
 //! Wrong values in a wall.
 
 use super::report::Report;
-use crate::scene::wall::{Drive, Place, Shape, Wall, WallMass};
+use crate::wall::{Drive, Place, Shape, Wall, WallMass};
 
 /// Checks the wall `name`.
 pub(super) fn wall(report: &mut Report, name: &str, wall: &Wall) {

@@ -14,7 +14,7 @@ use super::model::{Bonds, Load, Scene, Stiffness, TravelFrom};
 use super::solver::SolverKind;
 use super::suggest::nearest;
 use super::wall::Drive;
-pub(crate) use report::{LARGEST, MAX_GRAINS};
+pub use report::{LARGEST, MAX_GRAINS};
 use report::{Number, Report};
 
 /// Steps are whole numbers that a double holds with room to spare.

@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 
 use super::report::{MAX_GRAINS, Number, Report};
-use crate::scene::model::Scene;
-use crate::scene::sample::{Cut, Diameters, GrainSpec, Lattice, Preparation, RandomSample, Sample, Section};
+use crate::model::Scene;
+use crate::sample::{Cut, Diameters, GrainSpec, Lattice, Preparation, RandomSample, Sample, Section};
 
 /// Checks `sample`.
 pub(super) fn sample(report: &mut Report, scene: &Scene) {

@@ -1,4 +1,4 @@
-//! The history of a run: one HDF5 file. This module is the only place that knows its layout.
+//! The history of a run: one HDF5 file. This crate is the only place that knows its layout.
 //!
 //! D = dimension, N grains, W walls, B bonds, T frames, M rows of contacts in all frames, S observed steps, E ruptures.
 //! SI units; every dimensional dataset has an attribute `unit`. What a scene lacks is absent: without walls there is no
@@ -66,6 +66,7 @@ mod rupture;
 mod schema;
 pub mod sound;
 mod source;
+pub mod sweep;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -77,8 +78,7 @@ pub use background::{Background, Batch};
 pub use checkpoint::Checkpoint;
 pub use codes::{BondStatus, ContactStatus, RuptureMode, SolverRoute, WallDrive, WallKind};
 pub use copy::{CopyAs, copy};
-pub(crate) use error::reason;
-pub use error::{HistoryError, Result};
+pub use error::{HistoryError, Result, reason};
 pub use lock::refuse_busy;
 pub use model::{
     Bonds, ContactRows, Frame, GrainState, Grains, Kept, Layout, Observable, Parameters, Rupture, ValueKind, Wall,

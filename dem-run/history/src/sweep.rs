@@ -22,8 +22,9 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::history::History;
-use crate::replace;
+use dem_output::replace;
+
+use crate::reader::History;
 
 /// A file in the folder of a sweep that cannot be read or written.
 #[derive(Debug, thiserror::Error)]

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::replace::replace;
+use dem_output::replace::replace;
 
 use super::error::{Result, refused};
 use super::lock;
@@ -54,8 +54,8 @@ pub enum CopyAs {
 /// by false. Returns the length of the copy, bytes.
 ///
 /// # Errors
-/// [`HistoryError::Busy`] where the history, or what stands at `path`, is being written, and what reading and writing may fail of; `path` is then
-/// as it was.
+/// [`HistoryError::Busy`](super::HistoryError::Busy) while another process writes the history or the file at `path`, and
+/// those of reading and writing; the file at `path` is then as it was.
 pub fn copy(history: &History, path: &Path, how: CopyAs, tell: &mut dyn FnMut(f64) -> bool) -> Result<u64> {
     lock::refuse_busy(history.path())?;
     lock::refuse_busy(path)?;

@@ -126,7 +126,7 @@ impl fmt::Display for Problem {
 }
 
 /// At most 80 characters of a text, fit to be printed.
-pub(crate) fn shorten(text: &str) -> String {
+pub fn shorten(text: &str) -> String {
     cut(text, 80)
 }
 
@@ -139,7 +139,7 @@ fn cut(text: &str, limit: usize) -> String {
 }
 
 /// A blank for what would move the cursor of a terminal.
-pub(crate) fn printable(c: char) -> char {
+pub fn printable(c: char) -> char {
     if c.is_control() { ' ' } else { c }
 }
 

@@ -2,15 +2,15 @@
 
 use std::fmt;
 
-use crate::scene::error::Problem;
-use crate::scene::function::Function;
+use crate::error::Problem;
+use crate::function::Function;
 
 /// Grains are numbered by 32-bit signed integers in histories, and walls share them.
-pub(crate) const MAX_GRAINS: usize = 100_000_000;
+pub const MAX_GRAINS: usize = 100_000_000;
 
 /// Largest magnitude of a number, and the inverse of the smallest one that must not be zero: masses and
 /// energies, products of a few such numbers, then neither overflow nor vanish.
-pub(crate) const LARGEST: f64 = 1e60;
+pub const LARGEST: f64 = 1e60;
 
 /// What was found so far.
 pub(super) struct Report {

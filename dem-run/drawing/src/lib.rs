@@ -5,6 +5,7 @@
 
 use std::sync::Arc;
 
+use dem_output::Picture;
 use kuva::PngBackend;
 use kuva::backend::svg::SvgBackend;
 use kuva::plot::{LinePlot, ScatterPlot};
@@ -79,6 +80,16 @@ impl Drawing {
     /// The plotting crate's message.
     pub fn png_scaled(&self, scale: f32) -> Result<Vec<u8>, String> {
         PngBackend::new().with_scale(scale).render_scene(&self.0)
+    }
+}
+
+impl Picture for Drawing {
+    fn svg(&self) -> String {
+        self.svg()
+    }
+
+    fn png(&self) -> Result<Vec<u8>, String> {
+        self.png()
     }
 }
 

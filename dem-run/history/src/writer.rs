@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use hdf5::File;
 
-use crate::replace::{replace_synced, sync};
+use dem_output::replace::{replace_synced, sync};
 
 use super::checkpoint::{Checkpoint, Slots};
 use super::codes::{BondCode, Coded};
@@ -26,7 +26,7 @@ const BLOCK: usize = 256;
 /// An open history. Memory does not grow with the length of the run.
 ///
 /// ```no_run
-/// # use dem_run::history::*;
+/// # use dem_history::*;
 /// # fn run(layout: &Layout, frame: &Frame, last: &Frame) -> Result<()> {
 /// let mut writer = Writer::create("run.h5".as_ref(), layout, false)?;
 /// writer.frame(frame)?;

@@ -14,9 +14,10 @@
 
 mod difference;
 mod error;
+pub mod failure;
 mod function;
 mod model;
-pub(crate) mod parse;
+pub mod parse;
 mod sample;
 pub mod schema;
 mod set;
@@ -33,7 +34,7 @@ use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
 pub use difference::{Difference, differences};
-pub(crate) use error::shorten;
+pub use error::shorten;
 pub use error::{Origin, Problem, SceneError};
 pub use function::{Function, Ramp};
 pub use model::{
@@ -46,7 +47,7 @@ pub use sample::{
 };
 pub use solver::{GaussSeidel, LocalSolve, Newton, Solver, SolverKind, Start};
 pub use validate::validate;
-pub(crate) use validate::{LARGEST, MAX_GRAINS};
+pub use validate::{LARGEST, MAX_GRAINS};
 pub use wall::{Circle, Cylinder, Drive, Place, Plane, Shape, Sphere, Wall, WallMass};
 
 /// Reads the scene in the file `path`, applies the `--set` assignments and validates the result.
@@ -65,14 +66,14 @@ pub fn load(path: &Path, assignments: &[String]) -> Result<Scene, SceneError> {
 }
 
 /// Largest text of a scene or a sweep (bytes): some seven million grains listed one by one.
-const MAX_TEXT: u64 = 256 << 20;
+pub const MAX_TEXT: u64 = 256 << 20;
 
 fn read(path: &Path) -> Result<String, SceneError> {
     text(path).map_err(|source| SceneError::Read { path: path.to_path_buf(), source })
 }
 
 /// The text of a scene or a sweep: a regular file of at most [`MAX_TEXT`].
-pub(crate) fn text(path: &Path) -> io::Result<String> {
+pub fn text(path: &Path) -> io::Result<String> {
     let too_long = || io::Error::other(format!("it has more than {} MiB: {MANY_GRAINS}", MAX_TEXT >> 20));
     let file = open_regular(path)?;
     if file.metadata()?.len() > MAX_TEXT {
@@ -99,7 +100,7 @@ pub(crate) fn text(path: &Path) -> io::Result<String> {
 const MANY_GRAINS: &str = "list its grains in a CSV file (sample.file)";
 
 /// Opens a file that is one: opening a pipe would wait for its writer, and a device has no end.
-pub(crate) fn open_regular(path: &Path) -> io::Result<File> {
+pub fn open_regular(path: &Path) -> io::Result<File> {
     match std::fs::metadata(path)?.file_type() {
         kind if kind.is_file() => File::open(path),
         kind if kind.is_dir() => Err(io::Error::other("it is a folder: name a file in it")),
@@ -141,14 +142,14 @@ fn finish(document: &mut parse::Document) -> Result<Scene, Vec<Problem>> {
 
 /// A scene whose values are yet to be varied.
 #[derive(Debug)]
-pub(crate) struct Base {
+pub struct Base {
     path: PathBuf,
     document: parse::Document,
 }
 
 /// A value that a sweep puts in a scene.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Change {
+pub struct Change {
     /// Where in the scene.
     pub path: String,
     /// What.

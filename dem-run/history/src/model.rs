@@ -93,7 +93,7 @@ pub enum ValueKind {
     /// Real numbers.
     #[default]
     Real,
-    /// Codes of [`SolverRoute`].
+    /// Codes of [`SolverRoute`](super::SolverRoute).
     Route,
 }
 
@@ -116,7 +116,7 @@ impl Observable {
         Self { name: name.into(), unit: unit.into(), shape: shape.into(), kind: ValueKind::Real }
     }
 
-    /// The method that solved each step, as [`SolverRoute::number`] codes it.
+    /// The method that solved each step, as [`SolverRoute::number`](super::SolverRoute::number) codes it.
     pub fn route() -> Self {
         Self { kind: ValueKind::Route, ..Self::new(ROUTE, "", &[]) }
     }

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 /// Makes a file by `make`, which is given the name of an empty file beside `path`, and moves it to `path` once its content
 /// is on the disk. Where that fails, nothing is left behind and what stood at `path` stands. `failed` tells of what the
 /// operating system refused, as in "create".
-pub(crate) fn replace<T, E>(
+pub fn replace<T, E>(
     path: &Path,
     failed: impl Fn(&'static str, Error) -> E,
     make: impl FnOnce(&Path) -> std::result::Result<T, E>,
@@ -23,7 +23,7 @@ pub(crate) fn replace<T, E>(
 
 /// As [`replace`], of a file that `make` itself has synced: a process that locks a file loses the lock as soon as it closes
 /// any descriptor of it, so a file that is locked cannot be opened to be synced.
-pub(crate) fn replace_synced<T, E>(
+pub fn replace_synced<T, E>(
     path: &Path,
     failed: impl Fn(&'static str, Error) -> E,
     make: impl FnOnce(&Path) -> std::result::Result<T, E>,
@@ -48,7 +48,7 @@ pub(crate) fn replace_synced<T, E>(
 ///
 /// # Errors
 /// Those of the operating system; what stood at `path` then stands.
-pub(crate) fn write(path: &Path, content: &[u8]) -> Result<()> {
+pub fn write(path: &Path, content: &[u8]) -> Result<()> {
     let part = partial(path)?;
     fs::write(&part, content).and_then(|()| move_to(&part, path)).inspect_err(|_| {
         let _ = fs::remove_file(&part);
@@ -59,7 +59,7 @@ pub(crate) fn write(path: &Path, content: &[u8]) -> Result<()> {
 ///
 /// # Errors
 /// Those of the operating system.
-pub(crate) fn move_to(part: &Path, path: &Path) -> Result<()> {
+pub fn move_to(part: &Path, path: &Path) -> Result<()> {
     sync(part)?;
     rename(part, path)
 }
@@ -68,7 +68,7 @@ pub(crate) fn move_to(part: &Path, path: &Path) -> Result<()> {
 ///
 /// # Errors
 /// Those of the operating system.
-pub(crate) fn sync(path: &Path) -> Result<()> {
+pub fn sync(path: &Path) -> Result<()> {
     File::open(path)?.sync_all()
 }
 
@@ -92,7 +92,7 @@ fn partial(path: &Path) -> Result<PathBuf> {
 }
 
 /// Removes what processes that were killed left in a folder of files that they made: of the file `name`, or of all.
-pub(crate) fn remove_orphans(folder: &Path, name: Option<&OsStr>) {
+pub fn remove_orphans(folder: &Path, name: Option<&OsStr>) {
     let name = name.map(OsStr::to_string_lossy);
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let found = entry.file_name();

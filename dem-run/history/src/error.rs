@@ -135,7 +135,7 @@ pub enum HistoryError {
 pub type Result<T> = std::result::Result<T, HistoryError>;
 
 /// HDF5's error as one short line.
-pub(crate) fn reason(error: &hdf5::Error) -> String {
+pub fn reason(error: &hdf5::Error) -> String {
     let text = match error.stack() {
         // the innermost record is the cause, the outermost only says which call failed
         Some(stack) => stack.last().map_or_else(|| "unknown HDF5 error".into(), |frame| frame.desc().to_string()),

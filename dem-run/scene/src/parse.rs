@@ -18,7 +18,7 @@ use super::suggest::nearest;
 
 /// A JSON tree, with the text that it was read from.
 #[derive(Debug, Clone)]
-pub(crate) struct Document {
+pub struct Document {
     /// Where the text comes from, for messages.
     name: String,
     /// The text without its byte order mark. The places of wrong values are sought in it when there are some.
@@ -51,7 +51,7 @@ fn options() -> ParseOptions {
 ///
 /// # Errors
 /// Wrong syntax; names that are given twice in one object, all of them.
-pub(crate) fn parse(name: &str, text: &str) -> Result<Document, SceneError> {
+pub fn parse(name: &str, text: &str) -> Result<Document, SceneError> {
     // a byte order mark, as some editors write it, is not part of the text
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let (root, non_finite) = match parse_to_serde_value(text, &options()) {
@@ -306,7 +306,7 @@ impl Walk {
 }
 
 /// The path of `key` below `path`.
-pub(crate) fn join(path: &str, key: &str) -> String {
+pub fn join(path: &str, key: &str) -> String {
     if path.is_empty() { key.to_string() } else { format!("{path}.{key}") }
 }
 
@@ -358,12 +358,12 @@ impl Document {
     }
 
     /// The error of these problems, each with the place where it was written.
-    pub(crate) fn wrong(&self, problems: Vec<Problem>) -> SceneError {
+    pub fn wrong(&self, problems: Vec<Problem>) -> SceneError {
         SceneError::Wrong { name: self.name.clone(), problems: self.located(problems) }
     }
 
     /// The wrong values together with the numbers that overflow, which stand for anything found at their places.
-    pub(crate) fn merge_non_finite(&self, problems: Vec<Problem>) -> Vec<Problem> {
+    pub fn merge_non_finite(&self, problems: Vec<Problem>) -> Vec<Problem> {
         let mut overflows: Vec<Problem> =
             self.non_finite.iter().map(|(path, literal)| overflow(path, literal)).collect();
         overflows.sort_by(|a, b| a.path.cmp(&b.path));
@@ -376,7 +376,7 @@ impl Document {
     ///
     /// # Errors
     /// The first unknown name, missing name, or wrong type.
-    pub(crate) fn decode<T: DeserializeOwned>(&self) -> Result<T, Problem> {
+    pub fn decode<T: DeserializeOwned>(&self) -> Result<T, Problem> {
         serde_path_to_error::deserialize(&self.root).map_err(|error| {
             let path = error.path().iter().filter_map(segment).fold(String::new(), |path, key| join(&path, &key));
             match self.non_finite.get(&path) {
@@ -509,7 +509,7 @@ mod tests {
             "[0, -7, 18446744073709551615, 18446744073709551616, 1e5, 0.1, -0.0, 5e-324, 1.7976931348623157e308]";
         let quirks = r#"{ "a\u0041\n": [true, null, "é\ud83d\ude00"], // a comment
             "b": { /* and another */ "c": [] , "d": {} } }"#;
-        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs");
         let entries = std::fs::read_dir(folder).expect("configs").map(|entry| entry.expect("entry").path());
         let texts = entries.map(|path| std::fs::read_to_string(path).expect("text"));
         for text in texts.chain([numbers.to_string(), quirks.to_string()]) {
