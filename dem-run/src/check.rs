@@ -1,5 +1,6 @@
-//! What a run of a scene will be: grains and their sizes, walls and their drives, steps, frames, the size of its history and
-//! the memory that it takes. The sample is put in its place with the code of a run, but for a random one, which is not packed.
+//! What a run of a scene will be: grains and their sizes, walls and their drives, steps, frames,
+//! the size of its history and its memory. The code of a run puts the sample in its place; random
+//! samples are not packed.
 
 use std::fmt;
 use std::path::Path;
@@ -56,7 +57,8 @@ pub struct Check {
     pub file_bytes: u64,
     /// Free space where the history would stand by default (bytes), if known.
     pub free_bytes: Option<u64>,
-    /// What the scene may not mean as it says it, and what the machine may not have.
+    /// Warnings: what the scene probably does not mean as it says it, and disk space or memory that
+    /// may be missing.
     pub warnings: Vec<String>,
 }
 
@@ -67,7 +69,8 @@ pub struct Sizes {
     pub diameters: [f64; 3],
     /// Lowest corner of the box around the sample (m).
     pub box_from: Vec<f64>,
-    /// Highest corner of the box around the sample (m): of a random one at the solid fraction that it asks for, before a cut.
+    /// Highest corner of the box around the sample (m): of a random one at the solid fraction that
+    /// it asks for, before a cut.
     pub box_to: Vec<f64>,
     /// Mass of all grains (kg).
     pub mass: f64,
@@ -91,8 +94,8 @@ impl Check {
     /// What a run of `scene` will be, its history in the current folder.
     ///
     /// # Errors
-    /// As the run would end before its first step, for a sample that is not random: [`RunError::SampleFile`],
-    /// [`RunError::File`], [`RunError::Sample`].
+    /// For a sample that is not random, the errors with which a run would end before its first
+    /// step: [`RunError::SampleFile`], [`RunError::File`], [`RunError::Sample`].
     pub fn new(scene: &Scene) -> Result<Self, RunError> {
         let grains = count(scene)?;
         let (memory_bytes, free_memory_bytes) = (memory::expected(scene, grains), memory::free());
@@ -194,7 +197,7 @@ pub(crate) fn count(scene: &Scene) -> Result<usize, RunError> {
     }
 }
 
-/// The sizes of a scene, and what it may not mean as it says it.
+/// The sizes of a scene, and warnings.
 fn look<D: Dim>(scene: &Scene, enough_memory: bool) -> Result<(Option<Sizes>, Vec<String>), RunError> {
     let sizes = match &scene.sample {
         Sample::Random(random) if enough_memory => Some(random_sizes::<D>(scene, random)),
@@ -269,8 +272,8 @@ fn has_bonds(scene: &Scene) -> bool {
     scene.bonds.as_ref().is_some_and(|bonds| bonds.cohesion(scene.dimension, 1.0, 1.0) > 0.0)
 }
 
-/// Size of the history of `grains` grains (bytes): the layout of `dem_run::history` row by row, with
-/// a typical number of contacts. Compare with a real file before relying on it to better than a half.
+/// Size of the history of `grains` grains (bytes): the layout of `dem_run::history` row by row,
+/// with a typical number of contacts. It may be wrong by half.
 fn expected_bytes(scene: &Scene, grains: usize) -> u64 {
     const NUMBER: f64 = 8.0;
     /// Scalars that are written at every step, with their step and time.

@@ -45,10 +45,12 @@ enum Command {
     /// Go on with a run that was interrupted or killed, or that is to end later, from its history.
     #[command(after_help = RESUME_EXAMPLE)]
     Resume(ResumeArgs),
-    /// Check a scene without running it; tell grains and their sizes, walls, steps, frames, memory and disk space.
+    /// Check a scene without running it; tell grains and their sizes, walls, steps, frames, memory
+    /// and disk space.
     #[command(after_help = CHECK_EXAMPLE)]
     Check(CheckArgs),
-    /// Write the contact problem of one step of a history in FCLIB's format, to be solved by other programs too.
+    /// Write the contact problem of one step of a history in FCLIB's format, to be solved by other
+    /// programs too.
     #[command(after_help = EXPORT_EXAMPLE)]
     Export(ExportArgs),
     /// Solve a contact problem in FCLIB's format, ours or another program's.
@@ -145,7 +147,8 @@ Example:
 struct SceneArgs {
     /// Scene: a JSON file with comments.
     scene: PathBuf,
-    /// Put VALUE at PATH in the scene, as in bonds.strength=5; VALUE is JSON or a bare word. May be repeated.
+    /// Put VALUE at PATH in the scene, as in bonds.strength=5; VALUE is JSON or a bare word. May be
+    /// repeated.
     #[arg(long = "set", value_name = "PATH=VALUE")]
     set: Vec<String>,
 }
@@ -199,7 +202,8 @@ struct RunArgs {
     /// Run the scene even though it needs more memory than is free.
     #[arg(long)]
     ignore_memory: bool,
-    /// End when the process that started this one ends: a sweep that is killed takes its runs along.
+    /// End when the process that started this one ends: a sweep that is killed takes its runs
+    /// along.
     #[arg(long, hide = true)]
     end_with_parent: bool,
 }
@@ -215,7 +219,8 @@ struct ResumeArgs {
     /// Go on with this scene in place of the one in the history.
     #[arg(long, value_name = "SCENE")]
     scene: Option<PathBuf>,
-    /// Put VALUE at PATH in the scene, as in stop=null; VALUE is JSON or a bare word. May be repeated.
+    /// Put VALUE at PATH in the scene, as in stop=null; VALUE is JSON or a bare word. May be
+    /// repeated.
     #[arg(long = "set", value_name = "PATH=VALUE")]
     set: Vec<String>,
     /// Go on even though the scene differs.
@@ -233,7 +238,8 @@ struct SweepArgs {
     /// Sweep: a JSON file with comments.
     #[arg(value_name = "SWEEP.json")]
     sweep: PathBuf,
-    /// Folder for the results, created if need be [default: the sweep's name with -sweep, in the current folder].
+    /// Folder for the results, created if need be [default: the sweep's name with -sweep, in the
+    /// current folder].
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
     /// Runs at a time, one thread each [default: the number of processors].
@@ -245,7 +251,8 @@ struct SweepArgs {
     /// Write the manifest, slurm.sh and Snakefile for other schedulers; run nothing.
     #[arg(long, group = "mode")]
     prepare: bool,
-    /// Tell what ran, failed or is left, and bring manifest.json and runs.csv up to date; run nothing.
+    /// Tell what ran, failed or is left, and bring manifest.json and runs.csv up to date; run
+    /// nothing.
     #[arg(long, group = "mode")]
     status: bool,
     /// Carry out the run of this number alone, unless it is done: the task of a scheduler.
@@ -254,7 +261,8 @@ struct SweepArgs {
     /// Run again what failed for good.
     #[arg(long)]
     retry: bool,
-    /// Run again what was done of other scenes than the sweep gives now, and delete what it no longer gives.
+    /// Run again what was done of other scenes than the sweep gives now, and delete what it no
+    /// longer gives.
     #[arg(long)]
     force: bool,
     #[command(flatten)]
@@ -268,7 +276,8 @@ struct SweepArgs {
 struct AccuracyArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Folder for the results, created if need be [default: the scene's name with -accuracy, in the current folder].
+    /// Folder for the results, created if need be [default: the scene's name with -accuracy, in the
+    /// current folder].
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
     /// Solvers to compare.
@@ -283,7 +292,8 @@ struct AccuracyArgs {
     /// End of the runs (s), in place of the scene's time.end.
     #[arg(long, value_name = "T", value_parser = positive)]
     until: Option<f64>,
-    /// Contact orders, and as many starting reactions of rigid bonds, that each solver is tried with; 0 for none.
+    /// Contact orders, and as many starting reactions of rigid bonds, that each solver is tried
+    /// with; 0 for none.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u64).range(..=10_000))]
     orders: u64,
     /// Go on to the scene's end where a run would end at the collapse of the sample.
@@ -332,7 +342,8 @@ struct SolveArgs {
     /// Residual to reach.
     #[arg(long, value_name = "T", default_value_t = 1e-8, value_parser = positive)]
     tolerance: f64,
-    /// Iterations after which the solver gives up [default: 100000 sweeps, 300 of the interior-point method].
+    /// Iterations after which the solver gives up [default: 100000 sweeps, 300 of the
+    /// interior-point method].
     #[arg(long, value_name = "N")]
     max_iterations: Option<u64>,
     /// Steps that the acceleration of Gauss–Seidel remembers, 8 for one; 0 for plain sweeps.
@@ -357,7 +368,8 @@ fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
-/// The arguments, or what is wrong with them, without the control characters that they may hold.
+/// The arguments. An error message about them is printed without the control characters that they
+/// may contain.
 fn arguments() -> Cli {
     Cli::try_parse().unwrap_or_else(|error| {
         let controls = |argument: std::ffi::OsString| argument.to_string_lossy().contains(char::is_control);

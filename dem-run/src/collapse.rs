@@ -81,7 +81,7 @@ impl Collapse {
         self.last_load = load;
     }
 
-    /// Write what was found so far.
+    /// Write the state.
     pub fn save(&self, to: &mut Saved) {
         let Failure { first_break, collapse: [a, b], early, broken_share } = self.failure;
         for load in [first_break, a, b, broken_share] {

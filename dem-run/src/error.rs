@@ -1,4 +1,4 @@
-//! Why a command ends before its end, in words, and with which exit code.
+//! Errors of the commands: their messages and exit codes.
 
 use crate::fclib::FclibError;
 use crate::history::HistoryError;
@@ -12,7 +12,7 @@ use std::path::PathBuf;
 /// What the operating system, a library or this program says of a failure.
 pub type Cause = Box<dyn Error + Send + Sync>;
 
-/// Why a command ended before its end.
+/// An error of a command.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     /// The scene is wrong, or cannot be read.
@@ -52,7 +52,8 @@ pub enum RunError {
         /// Why.
         source: Cause,
     },
-    /// A file or folder that is not what the command needs: it is in the way of a result, or lacks something.
+    /// A file or folder that is not what the command needs: it is in the way of a result, or lacks
+    /// something.
     #[error("{} {state}: {remedy}", .path.display())]
     Unfit {
         /// The file or folder.
@@ -139,7 +140,7 @@ pub enum RunError {
     /// Runs of a sweep failed.
     #[error("{message}")]
     Runs {
-        /// The gravest exit code of theirs.
+        /// The gravest of their exit codes.
         code: u8,
         /// How many, and what to do.
         message: String,
@@ -152,10 +153,10 @@ pub enum RunError {
 /// A contact problem that was not solved within its limits.
 #[derive(Debug, thiserror::Error)]
 pub enum NoConvergence {
-    /// That of a step of the packing of a random sample.
+    /// In a step of the packing of a random sample.
     #[error("the sample was not packed: {0}")]
     Packing(String),
-    /// That of a step of a run.
+    /// In a step of a run.
     #[error("{error}\nthe history is complete up to there{remedy}")]
     Step {
         /// What happened, and when.
@@ -163,7 +164,7 @@ pub enum NoConvergence {
         /// What may help; empty, or with a semicolon in front.
         remedy: String,
     },
-    /// That of a step before the one whose problem is to be exported.
+    /// In a step before the one whose problem is to be exported.
     #[error("{error}\nstep {step} was not reached; step {last} is the last that can be exported")]
     Export {
         /// What happened, and when.
@@ -173,7 +174,7 @@ pub enum NoConvergence {
         /// The step that was not solved.
         last: u64,
     },
-    /// That of a file.
+    /// In a file.
     #[error("{}: {why}", .path.display())]
     Problem {
         /// The file.
@@ -184,7 +185,8 @@ pub enum NoConvergence {
 }
 
 impl RunError {
-    /// The exit code of the command: 2 wrong scene, 3 no convergence, 4 input/output, 130 interrupted.
+    /// The exit code of the command: 2 wrong scene, 3 no convergence, 4 input/output, 130
+    /// interrupted.
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {

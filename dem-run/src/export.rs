@@ -30,11 +30,12 @@ pub struct ExportOptions {
     pub execution: Execution,
 }
 
-/// Runs the scene of a history again up to a step and writes that step's problem: the first that it solves, before any
-/// bond breaks in it.
+/// Runs the scene of a history again up to a step and writes that step's problem: the first that it
+/// solves, before any bond breaks in it.
 ///
 /// # Errors
-/// [`RunError`]: an unreadable history, a step that the scene does not have, a run that does not come that far.
+/// [`RunError`]: an unreadable history, a step that the scene does not have, a run that does not
+/// come that far.
 pub fn export(options: &ExportOptions) -> Result<(), RunError> {
     let interrupt = handle_signals()?;
     options.execution.start_threads()?;

@@ -83,7 +83,7 @@ pub fn run(scene: &Scene, options: &RunOptions) -> Result<(), RunError> {
     }
 }
 
-/// Handles Ctrl-C and SIGTERM from now on.
+/// Installs the handlers of Ctrl-C and SIGTERM.
 pub(crate) fn handle_signals() -> Result<Interrupt, RunError> {
     signals::install().map_err(|error| RunError::System { what: "no handler for Ctrl-C".into(), source: error.into() })
 }
@@ -126,7 +126,8 @@ pub(crate) struct State<D: Dim> {
 const FORM: usize = 8;
 
 impl<D: Dim> State<D> {
-    /// The state as numbers. The processor time is not among them: two runs of a scene write the same file.
+    /// The state as numbers. The processor time is not among them: two runs of a scene write the
+    /// same file.
     fn save(&self) -> Checkpoint {
         let mut to = Saved::default();
         to.count(FORM);
@@ -159,7 +160,8 @@ pub(crate) struct Run<'a, D: Dim> {
     pub idle: Vec<usize>,
 }
 
-/// The driven walls of which it is told at the end if no force ever acted on them: not those that are taken away.
+/// The driven walls that are reported at the end if no force ever acted on them: all but those that
+/// move away.
 fn may_be_idle<D: Dim>(scene: &Scene, world: &World<D>) -> Vec<usize> {
     let driven = |wall: &Wall<D>| !matches!(wall.drive, Drive::Fixed);
     let walls = world.walls.iter().enumerate();
@@ -302,7 +304,7 @@ impl<D: Dim> Run<'_, D> {
             Err(error @ RunError::NoConvergence(_)) => (Ending::NoConvergence, Err(error)),
             Err(error) => return Err(error),
         };
-        // what is due was recorded in its turn
+        // frames and checkpoints that were due are recorded already
         let [framed, kept] = self.due();
         self.record(!framed, !kept)?;
         let cpu_time = self.recorder.cpu_time();

@@ -18,7 +18,8 @@ fn header<D: Dim>() -> &'static [&'static str] {
     if D::N == 2 { &["x", "y", "radius"] } else { &["x", "y", "z", "radius"] }
 }
 
-/// Number of grains in a sample file, without reading them: of its lines that are neither the header, empty nor a comment.
+/// Number of grains in a sample file, without reading them: lines that are not the header, empty or
+/// a comment.
 ///
 /// # Errors
 /// [`RunError::SampleFile`], [`RunError::File`], [`RunError::Sample`].
@@ -34,8 +35,8 @@ pub fn count(path: &Path) -> Result<usize, RunError> {
 /// The grains of a CSV file with the header `x,y,radius` or `x,y,z,radius` (m).
 ///
 /// # Errors
-/// [`RunError::SampleFile`] and [`RunError::File`] for a file that cannot be read, [`RunError::Sample`] with all lines
-/// that are wrong.
+/// [`RunError::SampleFile`] and [`RunError::File`] for a file that cannot be read,
+/// [`RunError::Sample`] with all lines that are wrong.
 pub fn read<D: Dim>(path: &Path) -> Result<Vec<Ball<D>>, RunError> {
     let mut lines = Lines::open(path)?;
     let mut wrong = Wrong { name: path.display().to_string(), told: vec![], count: 0 };
@@ -138,7 +139,7 @@ impl Lines {
         }
     }
 
-    /// What stands between the commas of the line in hand, which some programs write between quotes.
+    /// The fields of the current line, without the quotes that some programs write.
     fn fields(&self) -> Result<impl Iterator<Item = &str>, String> {
         let text = std::str::from_utf8(&self.line).map_err(|_| "it is not UTF-8 text".to_string())?;
         Ok(text.split(',').map(|field| field.trim().trim_matches('"')))

@@ -1,7 +1,8 @@
-//! Drawing: charts of curves, and a canvas for maps. The only module that knows the plotting crate (kuva).
+//! Drawing: charts of curves, and a canvas for maps. The only module that knows the plotting crate
+//! (kuva).
 //!
-//! Every drawing comes out as SVG and as PNG from the same scene; the PNG is drawn with a font that the crate carries,
-//! so that it looks the same on every machine.
+//! Every drawing comes out as SVG and as PNG from the same scene; the PNG is drawn with a font that
+//! the crate carries, so that it looks the same on every machine.
 
 use std::sync::Arc;
 
@@ -116,7 +117,8 @@ pub enum Style {
 pub struct Curve {
     /// Its name in the legend.
     pub label: String,
-    /// Points (x, y); those that are not finite, or not positive on a logarithmic axis, are left out.
+    /// Points (x, y); those that are not finite, or not positive on a logarithmic axis, are left
+    /// out.
     pub points: Vec<(f64, f64)>,
     /// How it is drawn.
     pub style: Style,
@@ -145,8 +147,8 @@ pub struct Chart {
     pub log_x: bool,
     /// Whether the vertical axis is logarithmic.
     pub log_y: bool,
-    /// Whether the horizontal axis begins a little before the first value and ends a little after the last, so that what
-    /// rises there can be seen.
+    /// Whether the horizontal axis begins a little before the first value and ends a little after
+    /// the last, so that what rises there can be seen.
     pub set_off: bool,
     /// Whether values on the vertical axis are counts.
     pub counts: bool,
@@ -244,15 +246,16 @@ impl Chart {
         (plots, layout)
     }
 
-    /// What the values on a logarithmic vertical axis are multiplied by, a power of ten: the plotting crate draws none
-    /// below 1e-10 in its place.
+    /// What the values on a logarithmic vertical axis are multiplied by, a power of ten: the
+    /// plotting crate draws none below 1e-10 in its place.
     fn lift(&self) -> f64 {
         let values = self.curves.iter().flat_map(|curve| &curve.points).map(|p| p.1);
         let low = values.filter(|y| self.log_y && *y > 0.0).fold(1.0, f64::min);
         if low < 1e-9 { 10f64.powi(-low.log10().floor() as i32) } else { 1.0 }
     }
 
-    /// Axes that end where the values end, with ticks that suit them. Values of y are multiplied by `lift`.
+    /// Axes that end where the values end, with ticks that suit them. Values of y are multiplied by
+    /// `lift`.
     fn scale_axes(&self, mut layout: Layout, lift: f64) -> Layout {
         let values = || self.curves.iter().flat_map(|curve| &curve.points);
         let low = values().map(|p| p.0).fold(f64::INFINITY, f64::min);
@@ -406,7 +409,8 @@ impl Bars {
     }
 }
 
-/// Keeps of a long curve the first, lowest, highest and last point of each stretch, so that no peak is lost.
+/// Keeps of a long curve the first, lowest, highest and last point of each stretch, so that no peak
+/// is lost.
 fn thin(points: &mut Vec<(f64, f64)>) {
     if points.len() <= CURVE_POINTS {
         return;

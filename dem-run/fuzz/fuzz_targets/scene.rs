@@ -5,7 +5,8 @@
 //!
 //! ```text
 //! cd dem-run && mkdir -p fuzz/corpus/scene
-//! cargo +nightly fuzz run scene fuzz/corpus/scene fuzz/seeds ../configs -- -dict=fuzz/scene.dict -max_total_time=600
+//! cargo +nightly fuzz run scene fuzz/corpus/scene fuzz/seeds ../configs -- \
+//!     -dict=fuzz/scene.dict -max_total_time=600
 //! ```
 #![no_main]
 

@@ -8,10 +8,11 @@ use super::error::Result;
 use super::model::{Frame, Rupture};
 use super::writer::Writer;
 
-/// Batches that may wait to be written: what a run may be ahead of the disk.
+/// Most batches that wait to be written.
 const WAITING: usize = 4;
 
-/// What is written together: observations and ruptures since the last batch, then a frame, then a checkpoint.
+/// What is written together: observations and ruptures since the last batch, then a frame, then a
+/// checkpoint.
 #[derive(Debug, Default)]
 pub struct Batch {
     /// Steps, times and observables, one row each.
@@ -70,7 +71,7 @@ impl Background {
 
 impl Drop for Background {
     fn drop(&mut self) {
-        // an error is on its way already, and the file is good up to its last frame
+        // an error is already returned elsewhere, and the file is good up to its last frame
         let _ = self.end();
     }
 }

@@ -8,7 +8,7 @@ use super::schema::path;
 use super::source::Source;
 use super::table::{Growth, Storage, Table};
 
-/// The numbers of a state (`dem_core::saved::Saved`), and the step after which it stood.
+/// The numbers of a state (`dem_core::saved::Saved`), and its step.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Checkpoint {
     /// Steps made.
@@ -60,7 +60,8 @@ impl Slots {
         Ok(Self { index, tables, next: 0 })
     }
 
-    /// Write a checkpoint over the older of the two. `flush` brings the numbers to the file before the index names them.
+    /// Write a checkpoint over the older of the two. `flush` brings the numbers to the file before
+    /// the index names them.
     pub fn write(&mut self, checkpoint: &Checkpoint, flush: impl FnOnce() -> hdf5::Result<()>) -> hdf5::Result<()> {
         let slot = self.next;
         self.tables[slot][0].overwrite(&checkpoint.reals)?;
@@ -73,7 +74,7 @@ impl Slots {
     }
 }
 
-/// The newest checkpoint that is whole and does not lie beyond `last`, a step; none where there is no such.
+/// The newest complete checkpoint of a step up to `last`, if there is one.
 pub(super) fn newest(source: &Source, last: i64) -> Result<Option<Checkpoint>> {
     let place = |name: &str| format!("{}/{name}", path::CHECKPOINT);
     if !source.has(path::CHECKPOINT) {
@@ -93,7 +94,7 @@ pub(super) fn newest(source: &Source, last: i64) -> Result<Option<Checkpoint>> {
                 counts: source.read(&place(counts), 0..row[2] as usize)?.1,
             })
         };
-        // a slot that cannot be read is one that is not whole
+        // a slot that cannot be read is incomplete
         if let Some(checkpoint) = read().ok().filter(|c| c.row() == row) {
             return Ok(Some(checkpoint));
         }

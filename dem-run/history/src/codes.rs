@@ -1,7 +1,8 @@
 //! The enumerations that a history stores, each a real HDF5 enum datatype.
 //!
-//! A file may hold any byte where an enum should stand, so values are read as raw codes (`…Code`, transparent over the
-//! integer, with the HDF5 enum as its datatype) and only then checked against the variants.
+//! A file may hold any byte in place of an enum. So values are read as raw codes (`…Code`,
+//! transparent over the integer, with the HDF5 enum as datatype) and then checked against the
+//! variants.
 
 use hdf5::H5Type;
 use hdf5::types::{EnumMember, EnumType, IntSize, TypeDescriptor};

@@ -1,4 +1,5 @@
-//! A copy of a history: packed, or as a run that ended leaves it. Memory does not grow with the length of the history.
+//! A copy of a history: packed, or as a run that ended leaves it. Memory does not grow with the
+//! length of the history.
 
 use std::path::Path;
 
@@ -14,7 +15,7 @@ use super::writer::Writer;
 
 type Check = dyn FnOnce(&Source, &Source, &mut Share) -> Result<()>;
 
-/// Gathers what compares the rows of two files to the bit, once the copy is closed.
+/// Gathers the comparisons of the rows of two files, bit by bit, which run once the copy is closed.
 #[derive(Default)]
 struct Comparison {
     tables: Vec<Box<Check>>,
@@ -45,17 +46,18 @@ const DIFFERS: &str = "the copy differs from the original";
 pub enum CopyAs {
     /// To be kept: compressed, with checksums.
     Packed,
-    /// To be opened by anything, as a run that ended leaves it.
+    /// Readable by any HDF5 program, as the history of a run that ended.
     Plain,
 }
 
-/// Writes a copy of all complete rows of `history` to `path`, which it replaces (the history itself too), and compares it
-/// with the original to the bit before it takes its place. `tell` hears how much is done, from 0 to 1, and ends the work
-/// by false. Returns the length of the copy, bytes.
+/// Writes a copy of all complete rows of `history` to `path`. The copy is compared with the
+/// original bit by bit before it replaces the file at `path`, which may be the history itself.
+/// `tell` gets the share that is done, from 0 to 1; if it returns false, the work ends. Returns the
+/// length of the copy, bytes.
 ///
 /// # Errors
-/// [`HistoryError::Busy`](super::HistoryError::Busy) while another process writes the history or the file at `path`, and
-/// those of reading and writing; the file at `path` is then as it was.
+/// [`HistoryError::Busy`](super::HistoryError::Busy) while another process writes the history or
+/// the file at `path`, and those of reading and writing; the file at `path` is then as it was.
 pub fn copy(history: &History, path: &Path, how: CopyAs, tell: &mut dyn FnMut(f64) -> bool) -> Result<u64> {
     lock::refuse_busy(history.path())?;
     lock::refuse_busy(path)?;

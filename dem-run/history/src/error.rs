@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-/// An error of reading or writing a history. Its message names the file, what is wrong and what to do.
+/// An error of reading or writing a history. Its message names the file, what is wrong and what to
+/// do.
 #[derive(Debug, thiserror::Error)]
 pub enum HistoryError {
     /// The output file stands already and overwriting was not asked for.
@@ -108,7 +109,7 @@ pub enum HistoryError {
         /// The file.
         path: PathBuf,
     },
-    /// The one who asked for it ended the work.
+    /// The caller ended the work.
     #[error("interrupted")]
     Interrupted,
     /// HDF5 could not write.
@@ -119,7 +120,8 @@ pub enum HistoryError {
         /// HDF5's reason.
         why: String,
     },
-    /// The caller handed over arrays that do not fit the layout: an error in the program, not in the file.
+    /// The caller handed over arrays that do not fit the layout: an error in the program, not in
+    /// the file.
     #[error("history: {place} has {found} values where the layout asks for {expected}")]
     Shape {
         /// The array.
@@ -141,7 +143,7 @@ pub fn reason(error: &hdf5::Error) -> String {
         Some(stack) => stack.last().map_or_else(|| "unknown HDF5 error".into(), |frame| frame.desc().to_string()),
         None => error.to_string(),
     };
-    // of a failed system call HDF5 tells everything, the time and the address of the buffer too
+    // HDF5's text about a failed system call includes the time and the address of the buffer
     let system = text.split_once("error message = '").and_then(|(_, rest)| rest.split_once('\''));
     system.map_or_else(|| text.clone(), |(message, _)| message.into())
 }

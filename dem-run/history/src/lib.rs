@@ -1,56 +1,65 @@
 //! The history of a run: one HDF5 file. This crate is the only place that knows its layout.
 //!
-//! D = dimension, N grains, W walls, B bonds, T frames, M rows of contacts in all frames, S observed steps, E ruptures.
-//! SI units; every dimensional dataset has an attribute `unit`. What a scene lacks is absent: without walls there is no
-//! `/walls`, without bonds no `/bonds`, `/events`, `moment` or `bond`.
+//! D = dimension, N grains, W walls, B bonds, T frames, M rows of contacts in all frames, S
+//! observed steps, E ruptures. SI units; every dimensional dataset has an attribute `unit`. What a
+//! scene lacks is absent: without walls there is no `/walls`, without bonds no `/bonds`, `/events`,
+//! `moment` or `bond`.
 //!
 //! ```text
-//! /h5md                    attribute version [1,1]; author{name}, creator{name, version}    (the H5MD convention)
+//! /h5md                    attribute version [1,1]; author{name}, creator{name, version}: as H5MD
+//!                          has them
 //! /commit                  u64: frames that are complete; readers trust no row beyond it
 //! /commit_rows/            contacts, events, steps: u64[T], rows complete at each frame
-//! /checkpoint/             the state from which the run goes on, in two slots that are written in turn:
-//!     index u64[2,4]       of each slot: step + 1 (0: empty), numbers of reals and counts, checksum
-//!     reals_0, counts_0, reals_1, counts_1    f64, u64: the numbers of the state, see `dem_core::saved`
+//! /checkpoint/             the state from which the run continues, in two slots written in turn:
+//!     index u64[2,4]       of each slot: step + 1 (0: empty), number of reals, of counts, checksum
+//!     reals_0, counts_0, reals_1, counts_1  f64, u64: the numbers of the state (`dem_core::saved`)
 //! /particles/grains/       box{dimension, boundary}
-//!     position, velocity   {step, time, value[T,N,D]}                                        m, m/s
-//!     angular_velocity     {step, time, value[T,N] in 2D, [T,N,3] in 3D}                     rad/s, if rotation
-//!     angle                {step, time, value[T,N]}, 2D only                                 rad, if rotation
-//!     orientation          {step, time, value[T,N,4]}, 3D only, quaternions w x y z          if rotation
+//!     position, velocity   {step, time, value[T,N,D]}: m, m/s
+//!     angular_velocity     {step, time, value[T,N] in 2D, [T,N,3] in 3D}: rad/s, if rotation
+//!     angle                {step, time, value[T,N]}: rad, 2D only, if rotation
+//!     orientation          {step, time, value[T,N,4]}: quaternions w x y z, 3D only, if rotation
 //!     id, radius, mass, inertia [N]
 //! /walls/                  name, kind [W]       enum PLANE, CIRCLE, CYLINDER, SPHERE
 //!     drive [W]            enum FIXED, VELOCITY, FORCE
 //!     normal [W,D]         plane: unit normal towards the grains; cylinder: unit axis; else 0
 //!     radius [W]           m; 0 for planes, negative where the grains are inside
 //!     direction [W,D]      unit direction of the drive; 0 for fixed walls
-//!     position, velocity   {step, time, value[T,W,D]}: a point of the plane, the centre      m, m/s
-//!     force                {step, time, value[T,W,D]}: of the grains on the wall             N
+//!     position, velocity   {step, time, value[T,W,D]}: m, m/s; of a point of the plane, of the centre
+//!     force                {step, time, value[T,W,D]}: N, of the grains on the wall
 //! /contacts/               step, time [T]; start u64[T], count u32[T]: rows of each frame
 //!     pair i32[M,2]        grains i, j; j < 0 is wall −1−j. The normal points from j to i
 //!     point, normal [M,D]; tangent [M,D] in 3D only (in 2D it is (−n_y, n_x))
-//!     reaction [M,D]       N, of j on i, rows n, t (2D) or n, t1, t2 (3D; t2 = n × t1); [M,1] with neither
-//!                          friction nor bonds
-//!     moment [M] (2D), [M,2] (3D, along t1 and t2), [M,3] (and n, where bonds resist twist)  N m, if bonds
-//!     gap [M], status (enum OPEN, STICK, SLIP, BONDED) [M], bond i32[M] (−1 for none)        bond: if bonds
-//! /bonds/                  pair i32[B,2]; rest_gap, strength, friction, mean_diameter [B]    m, N, –, m
+//!     reaction [M,D]       N, of j on i, rows n, t (2D) or n, t1, t2 (3D; t2 = n × t1);
+//!                          [M,1] with neither friction nor bonds
+//!     moment               N m, if bonds: [M] (2D), [M,2] (3D, along t1 and t2), [M,3] (and n,
+//!                          where bonds resist twist)
+//!     gap [M], status [M]  m; enum OPEN, STICK, SLIP, BONDED
+//!     bond i32[M]          −1 for none; if bonds
+//! /bonds/                  pair i32[B,2]; rest_gap (m), strength (N), friction,
+//!                          mean_diameter (m) [B]
 //!     status               {step, time, value[T,B]}: enum INTACT, TENSION, SHEAR, ROLLING, TWIST
-//! /events/rupture          compound [E]: step i64; time, x, y, z, rn, rt, m, twist, energy f64; round, bond, i, j i32;
-//!                          mode i32 enum TENSION, SHEAR, ROLLING, TWIST; pad i32 (0)
+//! /events/rupture          compound [E]: step i64; time, x, y, z, rn, rt, m, twist, energy f64;
+//!                          round, bond, i, j i32; mode i32 enum TENSION, SHEAR, ROLLING, TWIST;
+//!                          pad i32 (0)
 //! /observables/            step i64[S], time [S], shared by all (hard links, as H5MD allows)
 //!     NAME                 {step, time, value[S,…]}, f64
 //!     solver_route         the same, enum EXTRAPOLATION, ACTIVE_SET, INTERIOR_POINT, SWEEPS
-//! /parameters/             scene (the JSON as run); attributes schema_version, seed, version, git_revision, build,
-//!                          host, start; solid_fraction, of a sample that was packed
+//! /parameters/             scene (the JSON as run); attributes schema_version, seed, version,
+//!                          git_revision, build, host, start; solid_fraction, if packed
 //! ```
 //!
-//! **Writing.** Everything is created first; then the file turns to HDF5's single-writer mode, so that others may read
-//! it at any time and a killed run leaves a file that opens (`h5py.File(p, "r", swmr=True)`). Each frame writes its
-//! data, flushes, then writes `/commit` and flushes that. A finished file opens with plain `h5py.File(p)`.
+//! **Writing.** Everything is created first; then the file turns to HDF5's single-writer mode, so
+//! that others may read it at any time and a killed run leaves a file that opens
+//! (`h5py.File(p, "r", swmr=True)`). Each frame writes its data, flushes, then writes `/commit` and
+//! flushes that. A finished file opens with plain `h5py.File(p)`.
 //!
-//! **Precision.** With `output.precision` single the values of /particles, /walls and /contacts are f32; without
-//! `output.reactions` /contacts has no `tangent`, `reaction` and `moment`. What is fixed, observed or an event is f64.
+//! **Precision.** With `output.precision` single the values of /particles, /walls and /contacts are
+//! f32; without `output.reactions` /contacts has no `tangent`, `reaction` and `moment`. What is
+//! fixed, observed or an event is f64.
 //!
-//! **Size of chunks.** About 16 frames × 500 values: one frame and one grain's history are both quick to read. No
-//! compression while running: it costs more than the run (`dem-post pack` compresses afterwards).
+//! **Size of chunks.** About 16 frames × 500 values: one frame and one grain's history are both
+//! quick to read. No compression while running: it costs more than the run (`dem-post pack`
+//! compresses afterwards).
 
 mod background;
 mod checkpoint;

@@ -1,5 +1,6 @@
-//! Who writes a history. The lock is the system's record lock (POSIX `fcntl`): it ends with its process, however that
-//! ends, and does not meet the locks by which HDF5 keeps readers and writers apart.
+//! Which process writes a history. The lock is a record lock of the system (POSIX `fcntl`): it ends
+//! with its process, however that ends, and is independent of the locks of HDF5 between readers and
+//! writers.
 
 use std::fs::{File, OpenOptions};
 use std::io;
@@ -10,8 +11,8 @@ use rustix::process::{Flock, FlockType, fcntl_getlk};
 
 use super::error::{HistoryError, Result, refused};
 
-/// Locks the file at `path` until the value is dropped. A process must not open it a second time and close it again
-/// meanwhile: that would end the lock.
+/// Locks the file at `path` until the value is dropped. A process must not open it a second time
+/// and close it again meanwhile: that would end the lock.
 pub(super) fn hold(path: &Path) -> io::Result<File> {
     let file = OpenOptions::new().read(true).write(true).open(path)?;
     match fcntl_lock(&file, FlockOperation::NonBlockingLockExclusive) {

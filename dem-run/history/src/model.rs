@@ -3,7 +3,8 @@
 use super::codes::{BondStatus, ContactStatus, RuptureMode, WallDrive, WallKind};
 use super::schema::ROUTE;
 
-/// What a history will hold: everything that is known before the first step. Lengths: see each field.
+/// What a history will hold: everything that is known before the first step. Lengths: see each
+/// field.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Layout {
     /// Dimension D: 2 or 3.
@@ -116,7 +117,8 @@ impl Observable {
         Self { name: name.into(), unit: unit.into(), shape: shape.into(), kind: ValueKind::Real }
     }
 
-    /// The method that solved each step, as [`SolverRoute::number`](super::SolverRoute::number) codes it.
+    /// The method that solved each step, as [`SolverRoute::number`](super::SolverRoute::number)
+    /// codes it.
     pub fn route() -> Self {
         Self { kind: ValueKind::Route, ..Self::new(ROUTE, "", &[]) }
     }
@@ -201,8 +203,8 @@ pub struct ContactRows {
     /// First tangents, m × 3; empty without tangential reactions, and in 2D,
     /// where the tangent is (−n_y, n_x).
     pub tangent: Vec<f64>,
-    /// Reactions of j on i in the local frame (n, t…), N, m × D; m × 1 with neither friction nor bonds; empty where they
-    /// were not recorded.
+    /// Reactions of j on i in the local frame (n, t…), N, m × D; m × 1 with neither friction nor
+    /// bonds; empty where they were not recorded.
     pub reaction: Vec<f64>,
     /// Moments of j on i, N m: m in 2D, m × 2 in 3D; empty without bonds.
     pub moment: Vec<f64>,
@@ -255,9 +257,11 @@ pub struct Rupture {
     pub normal_force: f64,
     /// Magnitude of the tangential force at rupture, N.
     pub tangential_force: f64,
-    /// Magnitude of the bending moment at rupture, N m; in histories of before version 3 that of all moments.
+    /// Magnitude of the bending moment at rupture, N m; in histories of before version 3 that of
+    /// all moments.
     pub moment: f64,
-    /// Magnitude of the twisting moment at rupture, N m; not a number in histories of before version 3.
+    /// Magnitude of the twisting moment at rupture, N m; not a number in histories of before
+    /// version 3.
     pub twist: f64,
     /// Elastic energy released, J; 0 for a rigid bond.
     pub energy: f64,

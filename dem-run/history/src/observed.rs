@@ -28,7 +28,8 @@ pub struct Series {
 }
 
 impl Series {
-    /// Component `index` of every value, as `[1, 1]` of a tensor or `[]` of a scalar; `None` outside the shape.
+    /// Component `index` of every value, as `[1, 1]` of a tensor or `[]` of a scalar; `None`
+    /// outside the shape.
     pub fn component(&self, index: &[usize]) -> Option<Vec<f64>> {
         if index.len() != self.shape.len() || index.iter().zip(&self.shape).any(|(i, n)| i >= n) {
             return None;

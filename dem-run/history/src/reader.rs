@@ -17,8 +17,8 @@ use super::sound::{self, Surroundings};
 use super::source::Source;
 use super::{checkpoint, lock};
 
-/// An open history, read-only. Only complete frames are seen; a file that a run still writes, or that a killed run left,
-/// opens as well and shows what was complete when it was opened.
+/// An open history, read-only. Only complete frames are seen; a file that a run still writes, or
+/// that a killed run left, opens as well and shows what was complete when it was opened.
 pub struct History {
     source: Source,
     dimension: usize,
@@ -38,8 +38,9 @@ impl History {
     /// Opens a history and checks that it is one.
     ///
     /// # Errors
-    /// [`HistoryError::Missing`], [`HistoryError::Io`], [`HistoryError::NotHdf5`], [`HistoryError::Truncated`],
-    /// [`HistoryError::Foreign`], [`HistoryError::Newer`] or [`HistoryError::Damaged`], as the file deserves.
+    /// [`HistoryError::Missing`], [`HistoryError::Io`], [`HistoryError::NotHdf5`],
+    /// [`HistoryError::Truncated`], [`HistoryError::Foreign`], [`HistoryError::Newer`] or
+    /// [`HistoryError::Damaged`], as the file deserves.
     pub fn open(path: &Path) -> Result<Self> {
         let history = Self::open_as_is(path)?;
         let place = |name: &str| format!("{}/position/{name}", path::GRAINS);
@@ -113,8 +114,8 @@ impl History {
         })
     }
 
-    /// The state from which the run goes on, as of the newest frame that has one; none in a file of a version that
-    /// wrote none, or of a run that was killed before its first.
+    /// The newest checkpoint; none in a file of a version without checkpoints, or of a run that was
+    /// killed before its first.
     ///
     /// # Errors
     /// [`HistoryError::Damaged`].
@@ -481,7 +482,8 @@ impl History {
         Ok(self.surroundings.get_or_init(|| Surroundings::of(&radius, &first, d)))
     }
 
-    /// What H5MD element `place` holds at one frame, `expected` numbers; of what grains that do not turn lack, none.
+    /// The values of the H5MD element `place` at one frame, `expected` numbers; none for rotations
+    /// that were not recorded.
     fn frame_values(&self, frame: usize, place: &str, expected: usize) -> Result<Vec<f64>> {
         self.check_frame(frame)?;
         let turning = ["angular_velocity", "angle", "orientation"].iter().any(|name| place.ends_with(name));
@@ -514,7 +516,8 @@ impl History {
         }
     }
 
-    /// A column of the contacts; one that the scene lacks is empty, the others have rows of one of the lengths allowed.
+    /// A column of the contacts, with rows of one of the lengths `widths`; empty if the scene lacks
+    /// it.
     fn reals_in(&self, range: Range<usize>, name: &str, widths: &[usize]) -> Result<Vec<f64>> {
         let place = format!("{}/{name}", path::CONTACTS);
         if !self.source.has(&place) {

@@ -10,8 +10,8 @@ use super::error::{Result, while_reading};
 use super::model::Rupture;
 use super::source::Source;
 
-/// A rupture as the file holds it: scalars only (pandas refuses arrays), the padding a member of its own (its bytes
-/// would otherwise be whatever the memory held, and two runs would differ).
+/// A rupture as the file holds it: scalars only, because pandas refuses arrays. The padding is a
+/// member of its own; otherwise its bytes would be undefined, and two runs would differ.
 #[derive(Clone, Copy, Debug, H5Type)]
 #[repr(C)]
 pub(super) struct RuptureRow {
@@ -86,8 +86,8 @@ impl From<&Rupture> for RuptureRow {
 }
 
 impl RuptureRow {
-    /// The rows `range` of the dataset, with the shape of one; those of older versions lack the column of twist, and in
-    /// version 1 its mode.
+    /// The rows `range` of the dataset, with the shape of one; those of older versions lack the
+    /// column of twist, and in version 1 its mode.
     pub(super) fn read(source: &Source, place: &str, range: Range<usize>) -> Result<(Vec<usize>, Vec<Self>)> {
         let found = source.dataset(place)?.dtype().and_then(|dtype| dtype.to_descriptor());
         let found = found.map_err(while_reading(&source.path, place))?;

@@ -1,4 +1,5 @@
-//! Names, versions and chunk sizes of the layout; the layout itself stands in the module's documentation.
+//! Names, versions and chunk sizes of the layout; the layout itself stands in the module's
+//! documentation.
 
 /// Version of the layout. It grows with every change that an older reader would misread. 2: bonds
 /// break in twist, too. 3: a rupture has its twisting moment apart from the bending moment. 4: the
@@ -40,7 +41,8 @@ const CHUNK: usize = 16 * CHUNK_ROW;
 
 /// The chunk of a dataset that grows by whole frames: `[rows, first extents of one frame…]`.
 ///
-/// A frame of a large sample is split so that 16 frames fill a chunk; a small sample puts more frames in one.
+/// A frame of a large sample is split so that 16 frames fill a chunk; a small sample puts more
+/// frames in one.
 pub(super) fn frame_chunk(item: usize, row: &[usize]) -> Vec<usize> {
     let inner: usize = row.iter().skip(1).product::<usize>().max(1);
     let across = row.first().map_or(1, |&n| n.min((CHUNK_ROW / (inner * item)).max(1)));
@@ -61,9 +63,10 @@ pub(super) fn row_chunk(rows: usize, item: usize, row: &[usize]) -> Vec<usize> {
     chunk
 }
 
-/// Slots and bytes of the cache of chunks that each dataset of a file has, for `grains` grains: the chunks that a frame is
-/// appended to, or every frame would evict and reload partly filled ones. No more, for every append and every flush goes
-/// through all that is cached. (It is a setting of the file: single-writer mode forgets those of datasets.)
+/// Slots and bytes of the chunk cache of each dataset, for `grains` grains. It holds the chunks
+/// that a frame is appended to; with less, every frame would evict and reload partly filled chunks.
+/// It holds no more, because every append and every flush goes through the whole cache. (It is a
+/// setting of the file: single-writer mode ignores those of datasets.)
 pub(super) fn chunk_cache(grains: usize, dimension: usize) -> (usize, usize) {
     // positions, or in space quaternions, are the widest
     let chunk = frame_chunk(8, &[grains, if dimension == 2 { 2 } else { 4 }]);

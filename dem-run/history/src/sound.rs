@@ -1,5 +1,5 @@
-//! What no honest history holds: refused where it is read, with its place and row, before anything is computed or drawn
-//! from it. `dem-post info --check` lists all of it, and more.
+//! Checks of values that a sound history cannot hold. Reading refuses them, with their place and
+//! row, before anything is computed from them. `dem-post info --check` lists all of them, and more.
 
 use std::fmt::Display;
 use std::path::Path;
@@ -8,10 +8,10 @@ use super::error::{HistoryError, Result, damaged};
 use super::model::Rupture;
 use super::schema::LOAD_ERROR;
 
-/// Magnitude that no quantity in SI units comes near; squares and cubes of lesser ones are finite.
+/// Upper bound of every quantity in SI units; squares and cubes of smaller numbers are finite.
 const GREATEST: f64 = 1e100;
-/// Distance from the sample, over its size, beyond which a grain is nowhere: so far away a position in double precision
-/// no longer resolves the gaps of contacts.
+/// Largest distance of a grain from the sample, over the size of the sample. Farther away a
+/// position in double precision does not resolve the gaps of contacts.
 const FAR: f64 = 1e6;
 
 /// Whether a number can be a measure of anything.
@@ -20,14 +20,15 @@ pub fn is_plausible(value: f64) -> bool {
     value.abs() < GREATEST
 }
 
-/// Whether the observable `name` may have this value: a measure, or for the load error not a
-/// number, in a step none of whose solves reports one.
+/// Whether the observable `name` may have this value: a plausible number; or not a number for the
+/// load error, in a step whose solves report none.
 #[must_use]
 pub fn may_be_observed(name: &str, value: f64) -> bool {
     is_plausible(value) || (name == LOAD_ERROR && value.is_nan())
 }
 
-/// Where the grains of a sample may be at all: within a million sizes of the sample from its middle.
+/// Where the grains of a sample may be at all: within a million sizes of the sample from its
+/// middle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surroundings {
     /// Medians of the first coordinates, m, D of them: a single wrong grain does not move them.
@@ -37,8 +38,9 @@ pub struct Surroundings {
 }
 
 impl Surroundings {
-    /// Those of grains with these radii (m, N) and first centres (m, N × D). The size of the sample is the greater of all
-    /// grains in a row and twice the median distance of their centres from the middle.
+    /// Those of grains with these radii (m, N) and first centres (m, N × D). The size of the sample
+    /// is the greater of all grains in a row and twice the median distance of their centres from
+    /// the middle.
     #[must_use]
     pub fn of(radius: &[f64], position: &[f64], dimension: usize) -> Self {
         let middle: Vec<f64> =
@@ -73,7 +75,8 @@ pub(super) fn row(path: &Path, place: &str, row: usize, why: impl Display) -> Hi
     damaged(path, place, format!("row {row}: {why}"))
 }
 
-/// Refuses what is no plausible number among rows of `width` numbers, the first of which is row `first`.
+/// Refuses what is no plausible number among rows of `width` numbers, the first of which is row
+/// `first`.
 pub(super) fn reals(path: &Path, place: &str, first: usize, width: usize, values: &[f64]) -> Result<()> {
     refused(path, place, first, width, values.iter().position(|value| !is_plausible(*value)), values)
 }
@@ -120,8 +123,8 @@ pub(super) fn growing<T: PartialOrd + Display>(path: &Path, place: &str, values:
     }
 }
 
-/// Refuses ruptures of bonds or grains that are not there, of steps out of order or after step `until`, or with numbers
-/// that are none.
+/// Refuses ruptures of unknown bonds or grains, of steps out of order or after step `until`, and
+/// with implausible numbers.
 pub(super) fn ruptures(
     path: &Path,
     place: &str,

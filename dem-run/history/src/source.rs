@@ -15,7 +15,7 @@ use super::sound;
 use super::table::rows;
 use super::texts::Texts;
 
-/// Deflate cannot shrink anything further than this, so no honest dataset is larger than this many file lengths.
+/// Largest compression ratio of deflate: no dataset can be larger than this many file lengths.
 const GREATEST_COMPRESSION: u64 = 1032;
 
 /// The file, with its length in bytes and whether it was never closed.
@@ -137,9 +137,11 @@ impl Source {
     }
 }
 
-/// Length of the file, and whether it is marked as still being written; refuses what is no HDF5 and what is cut short.
+/// Length of the file, and whether it is marked as still being written. Refuses files that are not
+/// HDF5 and files that are truncated.
 ///
-/// HDF5 itself reads zeros beyond the end of a file that was never closed, so the end is checked here.
+/// HDF5 itself reads zeros beyond the end of a file that was never closed, so the end is checked
+/// here.
 fn check_superblock(path: &Path) -> Result<(u64, bool)> {
     let io = |error| refused(path)("read", error);
     let metadata = fs::metadata(path).map_err(|error| match error.kind() {

@@ -1,7 +1,7 @@
 //! The folder of a sweep: what is planned, what each run came to.
 //!
 //! ```text
-//! manifest.json        every run: its values, its digest, and its state when the folder was last gathered
+//! manifest.json        every run: its values, its digest, its state when it was last gathered
 //! runs.csv             the same as a table, with the numbers of each run's summary
 //! runs/0001.json       the scene of a run; locked while it is being run
 //! runs/0001.h5         its history, there as soon as it is complete
@@ -10,8 +10,9 @@
 //! runs/0001.state.json what it came to
 //! ```
 //!
-//! Only the state files tell what has been done, and each has one writer, the one that holds the lock of the run. The
-//! manifest and the table are gathered from them, so tasks that run at the same time never write the same file.
+//! Only the state files say what has been done. Each has one writer, the process that holds the
+//! lock of the run. The manifest and the table are gathered from them, so tasks that run at the
+//! same time never write the same file.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions, TryLockError};
@@ -146,7 +147,8 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// Whether another attempt would end the same way: no convergence, or a sample that cannot be made.
+    /// Whether another attempt would end the same way: no convergence, or a sample that cannot be
+    /// made.
     #[must_use]
     pub fn is_final(&self) -> bool {
         self.state == State::Failed && matches!(self.exit_code, Some(2 | 3))
@@ -224,7 +226,8 @@ impl Store {
         History::open(&self.path(id, ".h5")).is_ok_and(|history| history.frames() > 0 && !history.open_ended())
     }
 
-    /// The lock of a run; none while another process has it. It is released at the end of the process, however it ends.
+    /// The lock of a run; none while another process has it. It is released at the end of the
+    /// process, however it ends.
     ///
     /// # Errors
     /// The folder cannot be written.
@@ -237,7 +240,8 @@ impl Store {
             match file.try_lock() {
                 Ok(()) => return Ok(Some(file)),
                 Err(TryLockError::WouldBlock) => std::thread::sleep(Duration::from_millis(10)),
-                // a file system without locks, as some clusters have: what starts each run once must be the scheduler
+                // a file system without locks, as on some clusters: the scheduler must start each
+                // run only once
                 Err(TryLockError::Error(error)) if error.kind() == ErrorKind::Unsupported => return Ok(Some(file)),
                 Err(TryLockError::Error(error)) => return Err(failed(error)),
             }
@@ -274,7 +278,8 @@ impl Store {
         write_json(&self.folder.join("manifest.json"), manifest)
     }
 
-    /// Writes a file in the folder so that a reader, or a crash, finds the old content or the new one.
+    /// Writes a file in the folder so that a reader, or a crash, finds the old content or the new
+    /// one.
     ///
     /// # Errors
     /// The file cannot be written.

@@ -88,7 +88,7 @@ impl Table {
         self.width() * self.dataset.dtype().map_or(8, |dtype| dtype.size())
     }
 
-    /// Writes `values` over the first rows, more of which are made if need be.
+    /// Writes `values` over the first rows, and makes more rows if need be.
     pub fn overwrite<T: H5Type>(&mut self, values: &[T]) -> hdf5::Result<()> {
         let count = values.len() / self.width();
         if count > self.rows {

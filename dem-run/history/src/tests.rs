@@ -78,7 +78,8 @@ struct Sample {
     bonds: Vec<BondStatus>,
 }
 
-/// What a run with layout `l` might hand over at frame `k`; the number of contacts changes from frame to frame.
+/// What a run with layout `l` might hand over at frame `k`; the number of contacts changes from
+/// frame to frame.
 fn sample(l: &Layout, k: usize) -> Sample {
     let (d, n, w) = (l.dimension, l.grains.id.len(), l.walls.len());
     let (bonded, m, s) = (!l.bonds.is_empty(), k % 4, k as f64);

@@ -1,9 +1,10 @@
-//! Where the texts of a file are. HDF5 up to 1.10 believes the size and the place that a file names for a text, and a wrong
-//! one ends the process instead of being an error; so they are checked before HDF5 sees them.
+//! The places of texts in a file. HDF5 up to 1.10 trusts the size and the place that a file gives
+//! for a text; wrong values crash the process. So they are checked before HDF5 reads them.
 //!
-//! Texts lie in heaps ("GCOL", version 1): each follows the one before, with 16 bytes of index and size before it, filled
-//! up to 8 bytes; index 0 is what is left. A dataset of texts holds for each its length (u32), the address of its heap
-//! (u64) and its index there (u32). Source: HDF5 File Format Specification, version 3, III.E and IV.B.
+//! Texts lie in heaps ("GCOL", version 1): each follows the one before, with 16 bytes of index and
+//! size before it, filled up to 8 bytes; index 0 is what is left. A dataset of texts holds for each
+//! its length (u32), the address of its heap (u64) and its index there (u32). Source: HDF5 File
+//! Format Specification, version 3, III.E and IV.B.
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -11,7 +12,8 @@ use std::io::{self, Read};
 use std::os::unix::fs::FileExt;
 use std::path::Path;
 
-/// Bytes at the beginning of a file among which its heaps are: texts are written before anything else.
+/// Bytes at the beginning of a file among which its heaps are: texts are written before anything
+/// else.
 const HEAD: u64 = 1 << 20;
 /// Bytes by which a dataset names a text.
 const NAMED: usize = 16;
@@ -23,7 +25,8 @@ impl Texts {
     /// Finds the texts of a file.
     ///
     /// # Errors
-    /// Those of the operating system, and in words the place of a text that is longer than its heap.
+    /// Those of the operating system, and in words the place of a text that is longer than its
+    /// heap.
     pub fn find(path: &Path) -> io::Result<Result<Self, String>> {
         let mut head = vec![];
         File::open(path)?.take(HEAD).read_to_end(&mut head)?;

@@ -1,4 +1,4 @@
-//! What is done to every table of a history, one after the other: its rows counted, or copied.
+//! Operations on every table of a history, one after the other: counting and copying rows.
 
 use std::ops::Range;
 use std::path::Path;
@@ -91,7 +91,8 @@ impl Extract {
     }
 }
 
-/// Progress over the bytes of all tables: told how much is done, from 0 to 1; false ends the work.
+/// Progress over the bytes of all tables: `tell` gets the share that is done, from 0 to 1; if it
+/// returns false, the work ends.
 pub(super) struct Share<'a> {
     done: u64,
     all: u64,

@@ -49,7 +49,7 @@ pub struct Writer {
     observables: Observables,
     commit: Commit,
     slots: Slots,
-    /// The open file, as the system knows it: of a file that took its name, nothing would be found.
+    /// Device and inode of the open file: they differ if another file has taken its name.
     identity: Option<(u64, u64)>,
     /// The head of the file as of its last complete frame.
     head: Head,
@@ -61,12 +61,14 @@ pub struct Writer {
 impl Writer {
     /// Creates the file with everything that it will hold, ready for the first frame.
     ///
-    /// The file is made beside `path` and moved there when it is complete, so that a failure leaves nothing behind and
-    /// does not harm a file that stood there.
+    /// The file is made beside `path` and moved there when it is complete. A failure leaves no file
+    /// behind and does not change an old file at `path`.
     ///
     /// # Errors
-    /// [`HistoryError::Exists`] where `path` stands and `overwrite` is false; [`HistoryError::Busy`] while another process writes it; [`HistoryError::Io`] and
-    /// [`HistoryError::Write`] where the file cannot be made; [`HistoryError::Shape`] where `layout` contradicts itself.
+    /// [`HistoryError::Exists`] where `path` stands and `overwrite` is false;
+    /// [`HistoryError::Busy`] while another process writes it; [`HistoryError::Io`] and
+    /// [`HistoryError::Write`] where the file cannot be made; [`HistoryError::Shape`] where
+    /// `layout` contradicts itself.
     pub fn create(path: &Path, layout: &Layout, overwrite: bool) -> Result<Self> {
         if path.exists() && !overwrite {
             return Err(HistoryError::Exists { path: path.into() });
@@ -74,12 +76,13 @@ impl Writer {
         Self::begin(path, layout, |_| Ok(()))
     }
 
-    /// Goes on with `history` in the file at `path`, which may be its own: its rows `kept` stand, and `checkpoint` with
-    /// them; what else it holds is left out. `tell` hears how much is copied, from 0 to 1, and ends the work by false.
+    /// Continues `history` in the file at `path`, which may be that of `history`. The rows `kept`
+    /// and `checkpoint` are copied, other rows are not. `tell` gets the share that is copied, from
+    /// 0 to 1; if it returns false, the work ends.
     ///
     /// # Errors
-    /// As [`Writer::create`]; [`HistoryError::Damaged`] where the history does not hold what `layout` promises. The file
-    /// is then as it was.
+    /// As [`Writer::create`]; [`HistoryError::Damaged`] where the history does not hold what
+    /// `layout` promises. The file is then as it was.
     pub fn go_on(
         path: &Path,
         layout: &Layout,
@@ -95,7 +98,8 @@ impl Writer {
         })
     }
 
-    /// Makes the file beside `path`, fills it by `fill`, turns to HDF5's single-writer mode and moves it to `path`.
+    /// Makes the file beside `path`, fills it by `fill`, turns to HDF5's single-writer mode and
+    /// moves it to `path`.
     fn begin(path: &Path, layout: &Layout, fill: impl FnOnce(&mut Self) -> Result<()>) -> Result<Self> {
         lock::refuse_busy(path)?;
         let failed = refused(path);
@@ -224,11 +228,13 @@ impl Writer {
         self.step.rows()
     }
 
-    /// Appends a frame, and with it makes everything visible that was observed and that broke before.
+    /// Appends a frame, and with it makes everything visible that was observed and that broke
+    /// before.
     ///
     /// # Errors
-    /// [`HistoryError::Shape`] where an array does not fit the layout and [`HistoryError::Gone`] where the file was taken
-    /// away (nothing is written then); [`HistoryError::Write`] where the disk refuses.
+    /// [`HistoryError::Shape`] where an array does not fit the layout and [`HistoryError::Gone`]
+    /// where the file was taken away (nothing is written then); [`HistoryError::Write`] where the
+    /// disk refuses.
     pub fn frame(&mut self, frame: &Frame) -> Result<()> {
         self.check_frame(frame)?;
         if self.identity.is_some() && identity(&self.path) != self.identity {
@@ -241,7 +247,8 @@ impl Writer {
     /// Records a bond that broke; visible with the next frame.
     ///
     /// # Errors
-    /// [`HistoryError::Shape`] where the layout has no bonds; [`HistoryError::Write`] where the disk refuses.
+    /// [`HistoryError::Shape`] where the layout has no bonds; [`HistoryError::Write`] where the
+    /// disk refuses.
     pub fn rupture(&mut self, rupture: &Rupture) -> Result<()> {
         if self.ruptures.is_none() {
             return Err(HistoryError::Shape { place: path::RUPTURE.into(), found: 1, expected: 0 });
@@ -253,10 +260,12 @@ impl Writer {
         Ok(())
     }
 
-    /// Records the observables of one step, one after another in the order of the layout; visible with the next frame.
+    /// Records the observables of one step, one after another in the order of the layout; visible
+    /// with the next frame.
     ///
     /// # Errors
-    /// [`HistoryError::Shape`] where `values` has another length; [`HistoryError::Write`] where the disk refuses.
+    /// [`HistoryError::Shape`] where `values` has another length; [`HistoryError::Write`] where the
+    /// disk refuses.
     pub fn observe(&mut self, step: i64, time: f64, values: &[f64]) -> Result<()> {
         let observables = &mut self.observables;
         check_length(path::OBSERVABLES, values.len(), observables.width())?;
@@ -267,8 +276,8 @@ impl Writer {
         Ok(())
     }
 
-    /// Closes the file; afterwards it opens like any HDF5 file. What was observed after the last frame stays out of
-    /// sight, so write the last state as a frame first.
+    /// Closes the file; afterwards it opens like any HDF5 file. What was observed after the last
+    /// frame stays out of sight, so write the last state as a frame first.
     ///
     /// # Errors
     /// [`HistoryError::Write`] where the disk refuses.
@@ -281,8 +290,9 @@ impl Writer {
         flushed.map_err(while_writing(&path))
     }
 
-    /// Closes the file after an error, and leaves it as it was when its last frame was complete: what HDF5 began to write
-    /// since has no place in it, and on a full disk no end.
+    /// Closes the file after an error and restores the superblock of its last complete frame. What
+    /// HDF5 began to write after that frame is not part of the file, and on a full disk it is
+    /// incomplete.
     pub(super) fn abandon(mut self) {
         let (file, head) = (self.lock.take(), self.head);
         drop(self);
@@ -344,7 +354,8 @@ impl Writer {
     }
 }
 
-/// The superblock of a file: version 3, as this program writes it, with the address of the file's end.
+/// The superblock of a file: version 3, as this program writes it, with the address of the file's
+/// end.
 #[derive(Clone, Copy, Default)]
 struct Head(Option<[u8; 48]>);
 
@@ -386,7 +397,7 @@ fn check_layout(layout: &Layout) -> Result<()> {
     Ok(())
 }
 
-/// The file at `path` as the system knows it: device and number.
+/// Device and inode of the file at `path`.
 fn identity(path: &Path) -> Option<(u64, u64)> {
     std::fs::metadata(path).ok().map(|file| (file.dev(), file.ino()))
 }

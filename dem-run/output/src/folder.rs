@@ -19,7 +19,8 @@ pub trait Picture {
     fn png(&self) -> std::result::Result<Vec<u8>, String>;
 }
 
-/// The folder that takes the files of a command, and what has been written there. Every file comes into its place whole.
+/// The folder that takes the files of a command, and what has been written there. Every file comes
+/// into its place whole.
 pub struct Folder {
     path: PathBuf,
     written: Vec<PathBuf>,
@@ -37,11 +38,13 @@ impl Folder {
         Ok(Self { path, written: vec![], owner: None })
     }
 
-    /// As [`Folder::create`], for what `command` makes of `sources`: the folder takes results of no others, and a record
-    /// in it says which files are theirs. With `force` the folder is taken over, and what others wrote is removed.
+    /// As [`Folder::create`], for the results that `command` makes of `sources`. The folder takes
+    /// no results of other sources; a record in it lists the files. With `force` the folder is
+    /// taken over, and results of other sources are removed.
     ///
     /// # Errors
-    /// [`WriteError`], also where the folder belongs to others, and later for a file that is in no record.
+    /// [`WriteError`], also where the folder belongs to others, and later for a file that is in no
+    /// record.
     pub fn of(path: PathBuf, command: &str, sources: Vec<Source>, force: bool) -> Result<Self> {
         let mut folder = Self::create(path)?;
         let owner = Owner::claim(&folder.path, command, sources, force);
@@ -54,7 +57,8 @@ impl Folder {
         self.owner.as_ref().map_or(0, Owner::removed)
     }
 
-    /// Removes what an earlier call of the command wrote and this one did not: the last thing to do.
+    /// Removes files that an earlier call of the command wrote and this one did not. It must be
+    /// called last.
     ///
     /// # Errors
     /// [`WriteError`].
@@ -73,10 +77,10 @@ impl Folder {
         &self.path
     }
 
-    /// A file by `make`, which is given the name under which it is made, beside its place.
+    /// Makes a file by `make`, which gets the name of a temporary file beside its final place.
     ///
     /// # Errors
-    /// [`WriteError`], and those of `make`; what stood in its place then stands.
+    /// [`WriteError`], and those of `make`; the file that was there before then stays.
     pub fn make<T, E: From<WriteError>>(
         &mut self,
         name: &str,
@@ -100,7 +104,7 @@ impl Folder {
         Ok(())
     }
 
-    /// Puts down the names of many files that will be written: one by one each would write the record anew.
+    /// Records the names of many files before they are written, in one write of the record.
     ///
     /// # Errors
     /// [`WriteError`].
@@ -146,7 +150,8 @@ impl Folder {
     }
 }
 
-/// `<stem of the input><suffix>` in the current folder, as `compression-post` for `runs/compression.h5`.
+/// `<stem of the input><suffix>` in the current folder, as `compression-post` for
+/// `runs/compression.h5`.
 #[must_use]
 pub fn default_folder(input: &Path, suffix: &str) -> PathBuf {
     let mut name = input.file_stem().unwrap_or_default().to_os_string();

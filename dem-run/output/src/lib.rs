@@ -1,4 +1,5 @@
-//! Where results go: tables on stdout, files in one folder, each of which comes into its place whole.
+//! Where results go: tables on stdout, files in one folder, each of which comes into its place
+//! whole.
 
 mod error;
 mod folder;

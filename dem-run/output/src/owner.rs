@@ -1,5 +1,5 @@
-//! To which histories a results folder belongs. A record in the folder names them and what was made of them, so that the
-//! results of two runs never mix.
+//! To which histories a results folder belongs. A record in the folder names them and what was made
+//! of them, so that the results of two runs never mix.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
@@ -18,19 +18,21 @@ const RECORD: &str = ".dem-post.json";
 pub struct Source {
     /// Its absolute path.
     path: PathBuf,
-    /// The run that it is of, in words that stay the same while the run goes on; none for what is more than one run.
+    /// Its run, in words that stay the same while the run continues; none for a source of several
+    /// runs.
     run: Option<String>,
 }
 
 impl Source {
     /// A file or folder that is there.
     pub fn new(path: &Path, run: Option<String>) -> Self {
-        // a path that is no text can be compared, if not opened, by what it is shown as
+        // a path that is not Unicode cannot be opened by this text, but it can be compared
         let path = fs::canonicalize(path).unwrap_or_else(|_| path.into()).to_string_lossy().into_owned().into();
         Self { path, run }
     }
 
-    /// Whether both are the same run at the same place, or `self` has moved away to where `other` is.
+    /// Whether both are the same run at the same place, or `self` has moved away to where `other`
+    /// is.
     fn is(&self, other: &Self) -> bool {
         self.run == other.run && (self.path == other.path || (self.run.is_some() && !self.path.exists()))
     }
@@ -79,8 +81,8 @@ pub struct Owner {
 }
 
 impl Owner {
-    /// Takes the folder, which must be there, for the results that `command` makes of `sources`. With `force` what the
-    /// record lists of other sources is removed; other files stay.
+    /// Claims the folder, which must exist, for the results that `command` makes of `sources`. With
+    /// `force` it removes the files that the record lists for other sources; other files stay.
     ///
     /// # Errors
     /// In words, where the folder belongs to others, or the record cannot be read or written.
@@ -114,11 +116,11 @@ impl Owner {
         self.removed
     }
 
-    /// Puts files down as ones that the command is about to write.
+    /// Records files that the command is about to write.
     ///
     /// # Errors
-    /// In words, with the name of the file: where one stands there that no command has written, or where it is one of the
-    /// sources. Without a name where the folder was taken over meanwhile.
+    /// In words, with the name of the file: a file of that name exists that no command has written,
+    /// or it is one of the sources. Without a name: another command has taken over the folder.
     pub fn register(&self, names: &[String]) -> Result<(), (Option<String>, String)> {
         let _lock = self.lock();
         let unnamed = |why| (None, why);
@@ -141,7 +143,8 @@ impl Owner {
         if news { record.save(&self.folder).map_err(unnamed) } else { Ok(()) }
     }
 
-    /// Removes what an earlier call of the command wrote and this one, which wrote `written`, did not.
+    /// Removes what an earlier call of the command wrote and this one, which wrote `written`, did
+    /// not.
     ///
     /// # Errors
     /// In words, where the record cannot be read or written.
@@ -161,7 +164,7 @@ impl Owner {
         record.save(&self.folder)
     }
 
-    /// The record, which is still that of these sources.
+    /// The record, if it still lists these sources.
     fn current(&self) -> Result<Record, String> {
         match Record::read(&self.folder)? {
             Some(record) if record.sources == self.sources => Ok(record),
@@ -169,7 +172,8 @@ impl Owner {
         }
     }
 
-    /// Holds off others that change the record, as long as the file lives; not on file systems without locks on folders.
+    /// Locks the record against other processes until the file is dropped. File systems without
+    /// locks on folders do not lock.
     fn lock(&self) -> Option<File> {
         File::open(&self.folder).ok().filter(|folder| folder.lock().is_ok())
     }
@@ -188,7 +192,7 @@ impl Owner {
 /// Why a folder of results of `before` takes none of `now`.
 fn refusal(before: &[Source], now: &[Source]) -> String {
     let paths = |sources: &[Source]| -> Vec<PathBuf> { sources.iter().map(|source| source.path.clone()).collect() };
-    // of one place, the runs tell them apart
+    // two runs at one path differ by their descriptions
     let same_place = paths(before) == paths(now);
     let name = |sources: &[Source]| {
         let name = |source: &Source| match &source.run {

@@ -9,7 +9,8 @@ use serde::Serialize;
 
 use crate::error::{Result, WriteError};
 
-/// A path as a shell takes it: between quotes where it has more than letters, digits and what names usually have.
+/// A path as a shell takes it: between quotes where it has more than letters, digits and what names
+/// usually have.
 #[must_use]
 pub fn in_shell(path: &Path) -> String {
     let shown = path.display().to_string();
@@ -17,8 +18,9 @@ pub fn in_shell(path: &Path) -> String {
     if !shown.is_empty() && shown.chars().all(plain) { shown } else { format!("'{}'", shown.replace('\'', r"'\''")) }
 }
 
-/// A text in which a terminal obeys nothing but the ends of lines: other control characters are written as JSON escapes
-/// them, as in `\u001b`. In JSON they stand only within texts, so its meaning stays.
+/// The text with its control characters, except line ends, escaped as in JSON (`\u001b`), so that a
+/// terminal does not obey them. In JSON they occur only within strings, so the meaning of JSON
+/// stays the same.
 #[must_use]
 pub fn escaped(text: &str) -> Cow<'_, str> {
     let raw = |c: char| c.is_control() && c != '\n';

@@ -1,14 +1,15 @@
-//! Files that come into their place whole: made beside it under another name, then moved there. A reader, or a crash of
-//! the system, finds the old content or the new one.
+//! Atomic replacement of files: a file is made under another name beside its place, then moved
+//! there. A reader, also after a crash of the system, finds either the old content or the new one.
 
 use std::ffi::OsStr;
 use std::fs::{self, File};
 use std::io::{Error, ErrorKind, Result};
 use std::path::{Path, PathBuf};
 
-/// Makes a file by `make`, which is given the name of an empty file beside `path`, and moves it to `path` once its content
-/// is on the disk. Where that fails, nothing is left behind and what stood at `path` stands. `failed` tells of what the
-/// operating system refused, as in "create".
+/// Makes a file by `make`, which gets the name of an empty file beside `path`, and moves it to
+/// `path` once its content is on the disk. On failure the temporary file is removed and the old
+/// file at `path` stays. `failed` makes the error of a refused system call; its first argument
+/// names the call, as in "create".
 pub fn replace<T, E>(
     path: &Path,
     failed: impl Fn(&'static str, Error) -> E,
@@ -21,8 +22,8 @@ pub fn replace<T, E>(
     })
 }
 
-/// As [`replace`], of a file that `make` itself has synced: a process that locks a file loses the lock as soon as it closes
-/// any descriptor of it, so a file that is locked cannot be opened to be synced.
+/// As [`replace`], for a file that `make` itself has synced. A process loses its lock on a file
+/// when it closes any descriptor of that file, so a locked file cannot be opened again for a sync.
 pub fn replace_synced<T, E>(
     path: &Path,
     failed: impl Fn(&'static str, Error) -> E,
@@ -43,11 +44,11 @@ pub fn replace_synced<T, E>(
     made
 }
 
-/// Writes a file beside its place and moves it there. What a killed process left beside it stays: of many files in one
-/// folder, [`remove_orphans`] looks for all at once.
+/// Writes a file beside its place and moves it there. It does not look for temporary files of
+/// killed processes: [`remove_orphans`] removes those of a whole folder at once.
 ///
 /// # Errors
-/// Those of the operating system; what stood at `path` then stands.
+/// Those of the operating system; the old file at `path` then stays.
 pub fn write(path: &Path, content: &[u8]) -> Result<()> {
     let part = partial(path)?;
     fs::write(&part, content).and_then(|()| move_to(&part, path)).inspect_err(|_| {
@@ -91,7 +92,7 @@ fn partial(path: &Path) -> Result<PathBuf> {
     Ok(path.with_file_name(format!(".{}.{}.part", name.to_string_lossy(), std::process::id())))
 }
 
-/// Removes what processes that were killed left in a folder of files that they made: of the file `name`, or of all.
+/// Removes temporary files of killed processes from a folder: those of the file `name`, or all.
 pub fn remove_orphans(folder: &Path, name: Option<&OsStr>) {
     let name = name.map(OsStr::to_string_lossy);
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {

@@ -14,7 +14,8 @@ pub struct Difference {
     pub b: Option<String>,
 }
 
-/// The places at which the JSON texts `a` and `b` differ, in the order of their names; of what is no JSON, the whole.
+/// The paths at which the JSON texts `a` and `b` differ, sorted; for a text that is not JSON, the
+/// whole text.
 pub fn differences(a: &str, b: &str) -> Vec<Difference> {
     let mut found = vec![];
     match (serde_json::from_str::<Value>(a), serde_json::from_str::<Value>(b)) {

@@ -54,7 +54,8 @@ impl SceneError {
 /// One thing that is wrong in a scene.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Problem {
-    /// The place in the scene, as `--set` takes it: `materials.friction.grain_grain`; empty for the whole scene.
+    /// The place in the scene, as `--set` takes it: `materials.friction.grain_grain`; empty for the
+    /// whole scene.
     pub path: String,
     /// What stands there.
     pub found: String,

@@ -99,7 +99,7 @@ pub fn text(path: &Path) -> io::Result<String> {
 
 const MANY_GRAINS: &str = "list its grains in a CSV file (sample.file)";
 
-/// Opens a file that is one: opening a pipe would wait for its writer, and a device has no end.
+/// Opens a regular file. Opening a pipe would wait for its writer, and a device has no end.
 pub fn open_regular(path: &Path) -> io::Result<File> {
     match std::fs::metadata(path)?.file_type() {
         kind if kind.is_file() => File::open(path),
@@ -130,7 +130,7 @@ pub fn from_text(name: &str, text: &str, assignments: &[String]) -> Result<Scene
 
 /// The scene that a tree describes, or all that is wrong with it.
 ///
-/// It leaves nothing of the tree, which for millions of grains is larger than all that comes after it.
+/// It drops the tree, which for millions of grains is larger than all later data.
 fn finish(document: &mut parse::Document) -> Result<Scene, Vec<Problem>> {
     let mut scene: Scene = document.decode().map_err(|problem| vec![problem])?;
     document.root.take();

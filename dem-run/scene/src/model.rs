@@ -1,4 +1,5 @@
-//! The model of a scene: everything but the sample, the walls and the solver, which have their own files.
+//! The model of a scene: everything but the sample, the walls and the solver, which have their own
+//! files.
 
 use std::collections::BTreeMap;
 
@@ -364,7 +365,8 @@ impl Scene {
         }
     }
 
-    /// Number of frames of a run to the end: the initial state, one every [`Scene::steps_per_frame`], and the last.
+    /// Number of frames of a run to the end: the initial state, one every
+    /// [`Scene::steps_per_frame`], and the last.
     #[must_use]
     pub fn frames(&self) -> u64 {
         1 + self.time.steps().div_ceil(self.steps_per_frame())
@@ -408,8 +410,8 @@ impl Bonds {
         self.strength.or(self.stress).is_some_and(|limit| limit > 0.0)
     }
 
-    /// Tensile strength r_coh (N) of the bond between two grains of mean diameter `mean_diameter` (m):
-    /// the force given, or σ·a·t in 2D, σ·π·a²/4 in 3D, t the `thickness` (m).
+    /// Tensile strength r_coh (N) of the bond between two grains of mean diameter `mean_diameter`
+    /// (m): the force given, or σ·a·t in 2D, σ·π·a²/4 in 3D, t the `thickness` (m).
     #[must_use]
     pub fn cohesion(&self, dimension: u8, mean_diameter: f64, thickness: f64) -> f64 {
         match (self.strength, self.stress) {

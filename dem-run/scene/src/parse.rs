@@ -1,4 +1,5 @@
-//! From text to a JSON tree that knows its lines, and from the tree to what it describes: a scene, or a sweep.
+//! From text to a JSON tree that knows its lines, and from the tree to what it describes: a scene,
+//! or a sweep.
 
 use std::collections::HashSet;
 use std::collections::hash_map::{Entry, HashMap};
@@ -21,7 +22,8 @@ use super::suggest::nearest;
 pub struct Document {
     /// Where the text comes from, for messages.
     name: String,
-    /// The text without its byte order mark. The places of wrong values are sought in it when there are some.
+    /// The text without its byte order mark. The places of wrong values are sought in it when there
+    /// are some.
     text: Arc<str>,
     /// The tree, with ±`f64::MAX` in place of numbers that overflow.
     pub(super) root: Value,
@@ -63,7 +65,8 @@ pub fn parse(name: &str, text: &str) -> Result<Document, SceneError> {
     Ok(Document { name, text, root, replaced: HashMap::new(), non_finite })
 }
 
-/// The tree and the numbers that overflow, by way of the syntax tree, which knows the places of what is wrong.
+/// The tree and the numbers that overflow, by way of the syntax tree, which knows the places of
+/// what is wrong.
 fn by_syntax(name: &str, text: &str) -> Result<(Value, HashMap<String, String>), SceneError> {
     let parsed = parse_to_ast(text, &CollectOptions::default(), &options())
         .map_err(|error| syntax(name, text, error.line_display(), error.column_display(), &error.kind().to_string()))?;
@@ -98,7 +101,8 @@ fn syntax(name: &str, text: &str, line: usize, column: usize, message: &str) -> 
     SceneError::Syntax { name: name.to_string(), line, column, message: with_remedy(message, &rest), excerpt }
 }
 
-/// The parser's message about what starts with `rest`, with what to write instead where that is not plain.
+/// The parser's message about what starts with `rest`, with what to write instead where that is not
+/// plain.
 fn with_remedy(message: &str, rest: &str) -> String {
     let unsigned = rest.trim_start_matches(['-', '+']).to_lowercase();
     if unsigned.starts_with("nan") || unsigned.starts_with("inf") {
@@ -116,8 +120,8 @@ fn with_remedy(message: &str, rest: &str) -> String {
     }
 }
 
-/// A JSON tree of a text where nothing is wrong: no name is given twice and no number overflows. It is read without the
-/// syntax tree, which for millions of grains is larger.
+/// A JSON tree of a text where nothing is wrong: no name is given twice and no number overflows. It
+/// is read without the syntax tree, which for millions of grains is larger.
 struct Tree(Value);
 
 impl<'de> Deserialize<'de> for Tree {
@@ -186,8 +190,8 @@ fn places(text: &str, offsets: impl Iterator<Item = usize>) -> HashMap<usize, (u
     sorted.into_iter().zip(found).collect()
 }
 
-/// Line and column of offsets that do not decrease, in one pass: counting from the start of its line for each of them would
-/// be quadratic in a long line.
+/// Line and column of offsets that do not decrease, in one pass: counting from the start of its
+/// line for each of them would be quadratic in a long line.
 fn in_order(chars: impl Iterator<Item = (usize, char)>, offsets: &[usize]) -> Vec<(usize, usize)> {
     let (mut line, mut column) = (1, 1);
     let mut chars = chars.peekable();
@@ -362,7 +366,8 @@ impl Document {
         SceneError::Wrong { name: self.name.clone(), problems: self.located(problems) }
     }
 
-    /// The wrong values together with the numbers that overflow, which stand for anything found at their places.
+    /// The wrong values together with the numbers that overflow, which stand for anything found at
+    /// their places.
     pub fn merge_non_finite(&self, problems: Vec<Problem>) -> Vec<Problem> {
         let mut overflows: Vec<Problem> =
             self.non_finite.iter().map(|(path, literal)| overflow(path, literal)).collect();
@@ -389,7 +394,8 @@ impl Document {
         })
     }
 
-    /// The kinds that may stand at `path`, none where it is no place for one: what an unknown one would be told.
+    /// The kinds that may stand at `path`, none where it is no place for one: what an unknown one
+    /// would be told.
     fn kinds<T: DeserializeOwned>(&self, path: &str) -> Vec<String> {
         let mut root = self.root.clone();
         let Some(place) = root.pointer_mut(&format!("/{}", path.replace('.', "/"))) else { return Vec::new() };

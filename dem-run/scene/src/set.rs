@@ -1,4 +1,5 @@
-//! `--set path=value`: one value of a scene given on the command line; and the values that a sweep varies.
+//! `--set path=value`: one value of a scene given on the command line; and the values that a sweep
+//! varies.
 //!
 //! A path must exist in the model ([`super::schema`]), whether or not the scene gives a value
 //! there; names that are free, as those of walls, must exist in the scene.
@@ -83,12 +84,14 @@ fn check_path(root: &Value, path: &str) -> Result<(), Problem> {
     Ok(())
 }
 
-/// The forms of the value under `key`, where a value of one of `forms` is expected and `node` stands.
+/// The forms of the value under `key`, where a value of one of `forms` is expected and `node`
+/// stands.
 fn step(forms: &[Form], node: Option<&Value>, above: &str, key: &str) -> Result<Vec<Form>, Problem> {
     let below = join(above, key);
     let object = node.and_then(Value::as_object);
     if let Some((form, found)) = forms.iter().find_map(|form| Some((form, form.property(key)?))) {
-        // one kind of several: the scene may stand at another, whose values this path would mix with
+        // one kind of several: the scene may stand at another, whose values this path would mix
+        // with
         if form.kind
             && let Some(other) = other_kind(node, key)
         {
@@ -165,7 +168,8 @@ fn store(root: &mut Value, path: &str, value: Value) {
                 None => return,
             },
             Value::Object(map) => map.entry(key).or_insert(Value::Null),
-            // an optional object that the scene omits, or a value of a wrong type, which this one replaces
+            // an optional object that the scene omits, or a value of a wrong type, which this one
+            // replaces
             other => {
                 *other = Value::Object(Map::new());
                 match other {

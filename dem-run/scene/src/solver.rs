@@ -3,7 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Residual that is accepted where the scene does not say: bonds break for good, and want the better one.
+/// Residual that is accepted where the scene does not say: bonds break for good, and want the
+/// better one.
 #[must_use]
 pub(super) fn default_accept(tolerance: f64, bonds: bool) -> f64 {
     tolerance.max(if bonds { 1e-6 } else { 1e-4 })

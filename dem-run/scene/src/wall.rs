@@ -134,7 +134,8 @@ pub enum Drive {
 }
 
 impl Shape {
-    /// The direction in which a round wall is moved from its centre until it touches the sample, and its radius (m).
+    /// The direction in which a round wall is moved from its centre until it touches the sample,
+    /// and its radius (m).
     #[must_use]
     pub fn seat(&self) -> Option<(&[f64], f64)> {
         match self {

@@ -1,8 +1,9 @@
-//! `dem-run accuracy`: what a scene's numbers depend on that they should not depend on.
+//! `dem-run accuracy`: how far the results of a scene depend on solver, tolerance, time step,
+//! contact order and starting reactions.
 //!
-//! One sample is run over solvers, tolerances and time steps, and each run is compared with the finest of them
-//! ([`report`]); over contact orders and starting reactions ([`spread`]); and the contact problems of the finest run are
-//! solved by every solver ([`profile`]).
+//! One sample is run with several solvers, tolerances and time steps, and each run is compared with
+//! the finest of them ([`report`]). Then contact orders and starting reactions are varied
+//! ([`spread`]). Last, every solver solves the contact problems of the finest run ([`profile`]).
 
 mod options;
 mod pictures;
@@ -35,9 +36,9 @@ const MOST_PROBLEMS: usize = 50;
 /// Measure the accuracy of a scene, print the tables, and write them with their pictures.
 ///
 /// # Errors
-/// [`RunError`], as for a scene that drives several walls and does not say which loads the sample;
-/// what was measured before an interruption is written all the same. A run that does not converge
-/// is a row of the table, no error.
+/// [`RunError`], for example for a scene that drives several walls and does not say which one loads
+/// the sample. Measurements made before an interruption are written. A run that does not converge
+/// is a row of the table, not an error.
 pub fn accuracy(scene: &Scene, options: &AccuracyOptions) -> Result<(), RunError> {
     if let Some(names) = scene.load_unknown() {
         return Err(RunError::Usage(format!(
@@ -106,7 +107,8 @@ impl<'a> Meter<'a> {
         Self { progress: Mutex::new(progress), interrupt, shares: Mutex::new(vec![0.0; runs]) }
     }
 
-    /// Tells that run `k`, which is one of those called `label`, has come so far; false: it shall stop.
+    /// Reports the share of run `k` that is done; `label` names the kind of run. Returns false if
+    /// the run must stop.
     fn tell(&self, k: usize, label: &str, share: f64) -> bool {
         let done = {
             let mut shares = self.shares.lock().unwrap_or_else(PoisonError::into_inner);
@@ -133,7 +135,7 @@ struct Measuring<'a, D: Dim> {
 impl<D: Dim> Measuring<'_, D> {
     /// Run every way, and enter the rows; gives the contact problems of the reference.
     ///
-    /// One run after the other: their CPU times are told.
+    /// The runs are sequential, because their CPU times are reported.
     fn runs(&self, report: &mut Report) -> Vec<Posed<D>> {
         let ways = self.asked.ways();
         let mut posed = vec![];
@@ -156,16 +158,16 @@ impl<D: Dim> Measuring<'_, D> {
             posed.push(problems);
         }
         report.compare();
-        // where no finest run came to its end, one that got on serves as well
+        // where no finest run came to its end, the problems of another run are used
         let full = |k: &usize| !posed[*k].is_empty();
         let from = report.reference.filter(full).or_else(|| (0..posed.len()).find(full));
         from.map_or(vec![], |k| posed.swap_remove(k))
     }
 
-    /// Run the sample of every solver in other orders and from other starts, where those should not matter, at the finest
-    /// tolerance and the longest step.
+    /// Run the sample with every solver, in other contact orders and from other starting reactions,
+    /// at the finest tolerance and the longest step. The results should not depend on either.
     ///
-    /// As many at a time as there are threads; the results stand in a fixed order.
+    /// The runs are parallel; the order of the results is fixed.
     fn indeterminacy(&self, rows: &[Row]) -> Indeterminacy {
         let asked = self.asked;
         let kinds = Varied::of(self.sample.elastic());

@@ -19,7 +19,8 @@ pub struct AccuracyOptions {
     pub orders: u64,
     /// Whether runs go on to the scene's end.
     pub whole: bool,
-    /// How the command is carried out; the number of threads is that of the runs whose CPU time is not told.
+    /// How the command is carried out; the number of threads applies to the runs whose CPU time is
+    /// not reported.
     pub execution: Execution,
     /// Whether stdout is JSON.
     pub json: bool,

@@ -1,7 +1,8 @@
 //! `dem-run sweep`: one scene with many values, each run a process and a history of its own.
 //!
 //! ```text
-//! sweep file ──plan──▶ scenes, all checked ──reconcile──▶ what is left ──work──▶ histories and states ──store──▶ manifest
+//! sweep file ──plan──▶ scenes, all checked ──reconcile──▶ what is left
+//!            ──work──▶ histories and states ──report──▶ manifest, table
 //! ```
 
 mod cluster;
@@ -57,7 +58,7 @@ pub enum Mode {
     Check,
     /// The manifest is written, and the files for other schedulers.
     Prepare,
-    /// The states are gathered and told.
+    /// The states of the runs are gathered and printed.
     Status,
     /// One run is carried out, by its number.
     One(String),
@@ -66,8 +67,8 @@ pub enum Mode {
 /// Carries a sweep out, or one of its parts.
 ///
 /// # Errors
-/// [`RunError`]: a sweep or a scene that is wrong, results in the way, files that cannot be written, an interruption,
-/// [`RunError::Runs`] where runs failed. What was done before is kept.
+/// [`RunError`]: a sweep or a scene that is wrong, results in the way, files that cannot be
+/// written, an interruption, [`RunError::Runs`] where runs failed. What was done before is kept.
 pub fn sweep(options: &SweepOptions) -> Result<(), RunError> {
     let store = Store::new(options.folder.clone());
     folder_or_new(store.folder())?;
@@ -115,7 +116,7 @@ fn all(store: &Store, plan: &Plan, mut manifest: Manifest, options: &SweepOption
             carry_out(store, &jobs, at_a_time, &interrupt, &mut progress, &mut || report::write(store, &mut manifest))
         }
     };
-    // what was done is told whatever came in between
+    // the runs that are done are reported, also after an error
     let written = report::write(store, &mut manifest);
     let failed = failures(store, &manifest);
     let standing = Standing { folder: options.folder.clone(), manifest };
@@ -128,7 +129,8 @@ fn all(store: &Store, plan: &Plan, mut manifest: Manifest, options: &SweepOption
     failed
 }
 
-/// Carries out one run of a sweep that has been prepared; touches nothing but the files of this run.
+/// Carries out one run of a sweep that has been prepared; touches nothing but the files of this
+/// run.
 fn one(store: &Store, plan: &Plan, id: &str, options: &SweepOptions) -> Result<(), RunError> {
     let (sweep, folder) = (options.sweep.display(), store.folder().display());
     let Some(manifest) = store.manifest()? else {
@@ -182,7 +184,7 @@ fn prepare(store: &Store, manifest: Manifest, options: &SweepOptions) -> Result<
     ))?)
 }
 
-/// Gathers the states of all runs and tells them.
+/// Gathers the states of all runs and prints them.
 fn status(store: &Store, options: &SweepOptions) -> Result<(), RunError> {
     let Some(mut manifest) = store.manifest()? else {
         return Err(without_manifest(store, "the sweep was never started there".into()));
@@ -195,8 +197,8 @@ fn without_manifest(store: &Store, remedy: String) -> RunError {
     RunError::Unfit { path: store.folder().into(), state: "holds no manifest.json", remedy }
 }
 
-/// The exit code that a failed run's own stands for: what is neither a wrong scene nor a lack of convergence is the
-/// machine's.
+/// The exit code of the sweep for that of a failed run: 2 wrong scene, 3 no convergence, 4 all
+/// others.
 fn exit_code(code: Option<i32>) -> u8 {
     match code {
         Some(2) => 2,

@@ -52,7 +52,8 @@ impl Plan {
     /// Reads a sweep file and the scene that it names, and puts every value in.
     ///
     /// # Errors
-    /// [`RunError::Scene`] with all that is wrong; [`RunError::Content`] for files that cannot be read.
+    /// [`RunError::Scene`] with all that is wrong; [`RunError::Content`] for files that cannot be
+    /// read.
     pub fn read(path: &Path) -> Result<Self, RunError> {
         let unreadable = |path: &Path, what, error: std::io::Error| {
             let source = error.into();
@@ -230,7 +231,7 @@ fn runs(sweep: &Sweep, base: &Base, scene: &Path) -> Result<Vec<PlannedRun>, Vec
     if problems.is_empty() { Ok(runs) } else { Err(problems) }
 }
 
-/// A problem of a run's scene as one of the sweep, and by what to know it when it comes again.
+/// A problem of a run's scene as one of the sweep, with a key that finds repetitions in other runs.
 fn located(
     problem: Problem,
     changes: &[Change],
@@ -265,7 +266,7 @@ fn same_scene(runs: &[PlannedRun]) -> Option<Problem> {
     })
 }
 
-/// A run whose table of results could not say what the load is.
+/// A run in which several walls are driven and none is named as the load wall.
 fn load_unknown(runs: &[PlannedRun]) -> Option<Problem> {
     let (run, names) = runs.iter().find_map(|run| Some((run, run.scene.load_unknown()?)))?;
     let found =
@@ -290,14 +291,14 @@ fn content(path: &Path) -> std::io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// SHA-256 of all that a scene's history depends on: the scene without its title, and the grains of its sample file in
-/// place of the file's name.
+/// SHA-256 of all that a scene's history depends on: the scene without its title, and the grains of
+/// its sample file in place of the file's name.
 fn digest(scene: &Scene, samples: &mut HashMap<PathBuf, Vec<u8>>) -> String {
     let mut plain = Scene { schema: None, title: None, ..scene.clone() };
     let mut hash = Sha256::new();
     if let Sample::File(file) = &mut plain.sample {
         let path = std::mem::take(&mut file.path);
-        // one that cannot be read is told when all else is known to be right
+        // a sample file that cannot be read is reported after all other errors
         hash.update(samples.entry(path).or_insert_with_key(|path| content(path).unwrap_or_default()));
     }
     hash.update(plain.to_json().unwrap_or_default());

@@ -1,7 +1,7 @@
-//! A sweep that was begun, and the sweep file as it is now: which results still count.
+//! Which results of an earlier start of a sweep still agree with the sweep file.
 //!
-//! A run is known by the digest of its scene, not by its place in the sweep. So values may be added anywhere: runs that
-//! are there keep their numbers, new ones get the next.
+//! A run is known by the digest of its scene, not by its place in the sweep. So values may be added
+//! anywhere: runs that are there keep their numbers, new ones get the next.
 
 use std::collections::HashSet;
 use std::fs;

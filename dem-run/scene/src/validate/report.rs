@@ -8,8 +8,8 @@ use crate::function::Function;
 /// Grains are numbered by 32-bit signed integers in histories, and walls share them.
 pub const MAX_GRAINS: usize = 100_000_000;
 
-/// Largest magnitude of a number, and the inverse of the smallest one that must not be zero: masses and
-/// energies, products of a few such numbers, then neither overflow nor vanish.
+/// Largest magnitude of a number, and the inverse of the smallest one that must not be zero: masses
+/// and energies, products of a few such numbers, then neither overflow nor vanish.
 pub const LARGEST: f64 = 1e60;
 
 /// What was found so far.
