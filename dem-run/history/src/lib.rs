@@ -24,7 +24,7 @@
 //!     normal [W,D]         plane: unit normal towards the grains; cylinder: unit axis; else 0
 //!     radius [W]           m; 0 for planes, negative where the grains are inside
 //!     direction [W,D]      unit direction of the drive; 0 for fixed walls
-//!     position, velocity   {step, time, value[T,W,D]}: m, m/s; of a point of the plane, of the centre
+//!     position, velocity   {step, time, value[T,W,D]}: m, m/s; a point of a plane, else the centre
 //!     force                {step, time, value[T,W,D]}: N, of the grains on the wall
 //! /contacts/               step, time [T]; start u64[T], count u32[T]: rows of each frame
 //!     pair i32[M,2]        grains i, j; j < 0 is wall −1−j. The normal points from j to i

@@ -84,7 +84,7 @@ fn all_scenes_in_configs_are_right() {
 
 #[test]
 fn the_compression_scene_says_what_the_experiment_is() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/compression.json");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/compression.json");
     let sets = ["bonds.strength=5".to_string(), "walls.top.force_rate=100".to_string()];
     let scene = load(&path, &sets).expect("the scene is right");
     assert_eq!(scene.sample.count(), Some(430));
