@@ -16,7 +16,8 @@ fn main() {
     let describe = ["--no-optional-locks", "describe", "--always", "--dirty", "--abbrev=12"];
     if let Some(revision) = output("git", &describe) {
         println!("cargo::rustc-env=DEM_GIT_REVISION={revision}");
-        // grows with every commit and checkout; the index, which every `git status` may write, would have all built again
+        // the log grows with every commit and checkout; the index would not do, because every
+        // `git status` may write it
         if let Some(log) =
             output("git", &["rev-parse", "--git-path", "logs/HEAD"]).filter(|log| Path::new(log).exists())
         {
@@ -24,7 +25,9 @@ fn main() {
         }
     }
     // what the program is made of: a change makes the revision "dirty"
-    for source in ["build.rs", "src", "Cargo.toml", "../dem-core/src", "../Cargo.lock"] {
+    for source in
+        ["build.rs", "src", "drawing", "history", "output", "scene", "Cargo.toml", "../dem-core/src", "../Cargo.lock"]
+    {
         println!("cargo::rerun-if-changed={source}");
     }
 }

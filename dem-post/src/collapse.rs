@@ -1,7 +1,7 @@
 //! What follows from a load curve: collapse load, peak, work.
 
-use dem_run::collapse::in_one_piece;
-use dem_run::history::History;
+use dem_history::History;
+use dem_scene::failure::in_one_piece;
 use serde_json::Value;
 
 use crate::output::Result;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use dem_run::history::{BondStatus, Bonds, Grains};
+use dem_history::{BondStatus, Bonds, Grains};
 use petgraph::unionfind::UnionFind;
 use serde::Serialize;
 

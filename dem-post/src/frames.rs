@@ -5,7 +5,7 @@
 //! one, so a long series needs no more memory than a short one.
 
 use clap::{Args, ValueEnum};
-use dem_run::history::{BondStatus, History, RuptureMode};
+use dem_history::{BondStatus, History, RuptureMode};
 use serde::Serialize;
 
 use crate::analysis::Analysis;
@@ -16,7 +16,7 @@ use crate::options::Files;
 use crate::output::{Folder, PostError, Result, facts, number, progress, quantity, short};
 use crate::velocities::{speeds, usual_speed};
 use crate::{cracks, moments};
-use dem_run::plot::colour;
+use dem_drawing::colour;
 
 /// Pixels per unit of a drawing.
 const PIXELS: f32 = 2.0;

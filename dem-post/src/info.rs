@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use dem_run::history::{CopyAs, History, RuptureMode, Series, Wall, WallDrive};
+use dem_history::{CopyAs, History, RuptureMode, Series, Wall, WallDrive};
 use serde::Serialize;
 
 use crate::analysis::Analysis;

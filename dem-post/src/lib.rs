@@ -3,7 +3,7 @@
 //! viewers.
 //!
 //! Each analysis is a module with a [`analysis::Analysis`], and an entry of [`ANALYSES`]. Its
-//! functions read a [`dem_run::history::History`] into a report, and write the report as CSV, SVG
+//! functions read a [`dem_history::History`] into a report, and write the report as CSV, SVG
 //! and PNG. Reports know nothing of files or drawings.
 
 use analysis::Entry;

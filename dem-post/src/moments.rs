@@ -1,6 +1,6 @@
 //! The moments that maps show.
 
-use dem_run::history::History;
+use dem_history::History;
 
 use crate::output::{PostError, Result};
 

@@ -1,13 +1,13 @@
 //! The errors of an analysis with their exit codes; tables, files and numbers are those of
-//! [`dem_run::output`].
+//! [`dem_output`].
 
 use std::path::PathBuf;
 
-use dem_run::history::{History, HistoryError};
-use dem_run::run::RunError;
+use dem_history::sweep::SweepError;
+use dem_history::{History, HistoryError};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-pub use dem_run::output::{
+pub use dem_output::{
     Folder, Source, Text, WriteError, cell, default_folder, escaped, facts, in_shell, number, print, quantity, short,
 };
 
@@ -30,7 +30,7 @@ pub enum PostError {
     Usage(String),
     /// The manifest of a sweep cannot be read.
     #[error(transparent)]
-    Sweep(#[from] RunError),
+    Sweep(#[from] SweepError),
     /// There are results, but not of all runs that were asked for.
     #[error("{0}")]
     Incomplete(String),
@@ -48,9 +48,8 @@ impl PostError {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Incomplete(_) => 1,
-            Self::Sweep(error) => error.exit_code(),
             Self::Lacking { .. } | Self::Usage(_) => 2,
-            Self::History(_) | Self::Unsound(_) | Self::Write(_) => 4,
+            Self::History(_) | Self::Sweep(_) | Self::Unsound(_) | Self::Write(_) => 4,
         }
     }
 }

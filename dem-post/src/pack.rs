@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use dem_run::history::{self, CopyAs, History, HistoryError};
+use dem_history::{self as history, CopyAs, History, HistoryError};
 use serde::Serialize;
 
 use crate::analysis::Analysis;

@@ -2,8 +2,8 @@
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use dem_run::history::History;
-use dem_run::plot::{Chart, Drawing};
+use dem_drawing::{Chart, Drawing};
+use dem_history::History;
 
 use crate::output::{PostError, Result};
 

@@ -27,10 +27,10 @@
 use std::path::Path;
 
 use clap::Args;
-use dem_run::collapse::Disk;
-use dem_run::history::{History, Series, Wall, WallDrive, WallKind};
-use dem_run::scene::{Scene, choose_load_wall};
-use dem_run::summary::Splitting;
+use dem_history::{History, Series, Wall, WallDrive, WallKind};
+use dem_scene::failure::Disk;
+use dem_scene::failure::Splitting;
+use dem_scene::{Scene, choose_load_wall};
 use serde::Serialize;
 use serde_json::Value;
 
@@ -40,7 +40,7 @@ use crate::collapse::{Bonding, Collapse, peak, work};
 use crate::options::Files;
 use crate::output::{Folder, PostError, Result, cell, facts, quantity, short};
 use crate::section::{OnPage, Section, chart_figure};
-use dem_run::plot::{Chart, Style, colour};
+use dem_drawing::{Chart, Style, colour};
 
 /// Strains that define the collapse.
 const COLLAPSE: [f64; 2] = [1e-4, 1e-3];

@@ -8,7 +8,7 @@
 //! arrows compare grains within one panel; the captions compare panels.
 
 use clap::Args;
-use dem_run::history::{GrainState, History};
+use dem_history::{GrainState, History};
 use serde::Serialize;
 
 use crate::analysis::Analysis;
@@ -17,8 +17,8 @@ use crate::moments;
 use crate::options::Moments;
 use crate::output::{Folder, Result, Text, number, short};
 use crate::section::{OnPage, Section, map_figure};
-use dem_run::plot::{Drawing, colour};
-use dem_run::row;
+use dem_drawing::{Drawing, colour};
+use dem_output::row;
 
 /// Squares of the grid along the longer side of the sample.
 const SQUARES: f64 = 18.0;

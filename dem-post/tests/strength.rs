@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use dem_run::history::*;
+use dem_history::*;
 use serde_json::{Value, json};
 
 /// Two bonded grains: the load grows by 0.5 N a step, and the bond breaks under the given load.

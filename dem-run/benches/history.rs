@@ -1,8 +1,8 @@
-//! Frames into a history: 4,000 grains in the plane with 12,000 bonded contacts, about 1.3 MB each, in double and single
-//! precision.
+//! Frames into a history: 4,000 grains in the plane with 12,000 bonded contacts, about 1.3 MB each,
+//! in double and single precision.
 //!
-//! `cargo bench -p dem-run --bench history`; criterion's throughput line gives the bytes of the frames per second. The file
-//! lies in the folder for temporary files and stays in the page cache.
+//! `cargo bench -p dem-run --bench history`; criterion's throughput line gives the bytes of the
+//! frames per second. The file lies in the folder for temporary files and stays in the page cache.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use dem_run::history::{BondStatus, Bonds, ContactRows, ContactStatus, Frame, GrainState, Grains, Layout, Writer};

@@ -1,10 +1,11 @@
 //! From a scene to a world: sample, walls, loads, bonds, settings.
 
+use crate::error::{NoConvergence, RunError};
 use crate::output::number;
 use crate::prepare::{self, Ball, PrepareError, Watch};
-use crate::run::RunError;
 use crate::sample_file;
 use crate::scene::{self, Drive as SceneDrive, Place, Sample, Scene, SolverKind, WallMass};
+use crate::tolerances::{DEEPEST, ROUNDED, TOUCHING};
 use crate::warnings;
 use dem_core::body::{Drive, Grain, Grains, Load, Schedule, Shape, Wall};
 use dem_core::bond::{self, Rupture};
@@ -17,13 +18,13 @@ use dem_core::world::{Restitution, Settings, World};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-/// A world at time zero, and what is told about its sample.
+/// A world at time zero, with the solid fraction of its sample and warnings.
 pub struct Built<D: Dim> {
     /// The world.
     pub world: World<D>,
     /// Solid fraction of a random sample in its box (–).
     pub solid_fraction: Option<f64>,
-    /// What the scene may not mean as it says it.
+    /// Warnings: what the scene probably does not mean as it says it.
     pub warnings: Vec<String>,
 }
 
@@ -35,21 +36,15 @@ pub struct Placed<D: Dim> {
     pub walls: Vec<Wall<D>>,
     /// Solid fraction of a random sample in its box (–).
     pub solid_fraction: Option<f64>,
-    /// What the scene may not mean as it says it.
+    /// Warnings: what the scene probably does not mean as it says it.
     pub warnings: Vec<String>,
 }
 
-/// Overlap, in radii, that still counts as touching: decimal coordinates are not exact.
-pub(crate) const TOUCHING: f64 = 1e-6;
-/// Overlap of two rigid grains, over the smaller radius, up to which it may be an error of where they came from: soft
-/// grains of other programs overlap.
-const DEEPEST: f64 = 0.1;
-/// Overlap of two grains, over the smaller radius, that a table of few decimals brings: no word about it.
-const ROUNDED: f64 = 1e-3;
 /// Pairs of grains that are told one by one.
 const MOST_TOLD: usize = 10;
 
-/// Prepare the sample of a scene and put the world together. `watch` is told how far the preparation is.
+/// Prepare the sample of a scene and put the world together. `watch` gets the progress of the
+/// preparation.
 ///
 /// # Errors
 /// [`RunError`], with all that is wrong with the sample.
@@ -95,10 +90,10 @@ pub fn place<D: Dim>(scene: &Scene, watch: Watch) -> Result<Placed<D>, RunError>
     Ok(Placed { grains, walls, solid_fraction, warnings })
 }
 
-/// The world of a scene that goes on from what was saved of it.
+/// The world of a scene that continues from a saved state.
 ///
 /// # Errors
-/// [`Mismatch`] where it was saved of another scene.
+/// [`Mismatch`] where the state is that of another scene.
 pub fn rebuild<D: Dim>(scene: &Scene, from: &mut Reader) -> Result<World<D>, Mismatch> {
     let grains = Grains::restored(from)?;
     if scene.grains.iter().flat_map(|g| &g.loads).any(|load| load.grain >= grains.len()) {
@@ -152,7 +147,7 @@ fn hold_fixed<D: Dim>(scene: &Scene, grains: &mut Grains<D>) -> Vec<String> {
 fn preparation_error(error: PrepareError) -> RunError {
     match error {
         PrepareError::Interrupted => RunError::Interrupted("the sample was not packed"),
-        PrepareError::Step(step) => RunError::NoConvergence(format!("the sample was not packed: {step}")),
+        PrepareError::Step(step) => NoConvergence::Packing(step.to_string()).into(),
         other => RunError::Sample(vec![other.to_string()]),
     }
 }
@@ -178,7 +173,8 @@ fn listed<D: Dim>(spec: &scene::GrainSpec, scene: &Scene) -> Grain<D> {
     grain
 }
 
-/// Radii in another unit than the centres make everything overlap everything: more pairs than can be listed.
+/// Refuses radii in another unit than the centres: then every grain may overlap every other, which
+/// gives more pairs than can be listed.
 fn refuse_other_units<D: Dim>(grains: &Grains<D>) -> Result<(), RunError> {
     let (low, high) = grains.bounds();
     let space: f64 = (high - low).as_slice().iter().product();
@@ -193,9 +189,10 @@ fn refuse_other_units<D: Dim>(grains: &Grains<D>) -> Result<(), RunError> {
     )]))
 }
 
-/// The pairs of grains that overlap too deeply, each told; and a word about those that overlap by more than decimals bring.
+/// Messages about pairs of grains that overlap too deeply; and one warning about overlaps beyond
+/// the round-off of decimals.
 ///
-/// Two grains at one place have no normal between them, and rigid ones do not overlap.
+/// Two grains at the same place have no contact normal, and rigid grains do not overlap.
 fn overlapping<D: Dim>(grains: &Grains<D>) -> (Vec<String>, Option<String>) {
     let (mut wrong, mut deep) = (vec![], 0);
     let (mut shallow, mut deepest) = (0, ([0, 0], 0.0, 0.0));
@@ -297,7 +294,8 @@ fn seated<D: Dim>(shape: &scene::Shape, center: &[f64], grains: &Grains<D>) -> D
     center + unit::<D>(direction) * seat(shape, center, grains).unwrap_or(0.0)
 }
 
-/// How far a round wall moves from `center` until it touches a grain (m); none if none is in its way.
+/// The distance that a round wall moves from `center` until it touches a grain (m); none if no
+/// grain is in its way.
 fn seat<D: Dim>(shape: &scene::Shape, center: D::Vector, grains: &Grains<D>) -> Option<f64> {
     let (direction, radius) = shape.seat()?;
     let along = unit::<D>(direction);
@@ -311,7 +309,7 @@ fn seat<D: Dim>(shape: &scene::Shape, center: D::Vector, grains: &Grains<D>) -> 
     grains.position.iter().zip(&grains.radius).filter_map(touch).min_by(f64::total_cmp)
 }
 
-/// The round walls that are to touch the sample and do not find it.
+/// Messages about round walls that are to be seated and find no grain in their way.
 fn unseated<D: Dim>(scene: &Scene, grains: &Grains<D>) -> Vec<String> {
     let mut wrong = vec![];
     for (name, wall) in &scene.walls {
@@ -334,7 +332,7 @@ fn unseated<D: Dim>(scene: &Scene, grains: &Grains<D>) -> Vec<String> {
     wrong
 }
 
-/// The walls that grains reach into, each with the grain that is deepest in it.
+/// Messages about walls that grains overlap, each with the deepest grain.
 fn buried<D: Dim>(scene: &Scene, walls: &[Wall<D>], grains: &Grains<D>) -> Vec<String> {
     let mut wrong = vec![];
     for (name, wall) in scene.walls.keys().zip(walls) {
@@ -368,7 +366,7 @@ fn loads<D: Dim>(scene: &Scene) -> Vec<Load<D>> {
     scene.grains.iter().flat_map(|g| &g.loads).map(load).collect()
 }
 
-/// What holds for the whole of a run of `scene`.
+/// The settings of a run of `scene`.
 pub fn settings<D: Dim>(scene: &Scene) -> Settings<D> {
     let restitution = &scene.materials.restitution;
     let bouncing = restitution.grain_grain > 0.0 || restitution.grain_wall > 0.0;
@@ -431,9 +429,8 @@ fn staged(newton: &scene::Newton, stages: Stages, tolerance: f64, accept: f64) -
     }
 }
 
-/// Stiffness of a bond of mean diameter `a` (m). A bar of length a and width a, t thick or round, has E A/a along itself,
-/// G A/a across, E I/a in bending, and G 2I/a in twist where it is
-/// round.
+/// Stiffness of a bond of mean diameter `a` (m). A bar of length a and width a, t thick or round,
+/// has E A/a along itself, G A/a across, E I/a in bending, and G 2I/a in twist where it is round.
 fn bond_stiffness<D: Dim>(stiffness: scene::Stiffness, a: f64, thickness: f64) -> bond::Stiffness {
     match stiffness {
         scene::Stiffness::Springs(scene::Springs { normal, tangential, rolling, twist }) => {

@@ -1,5 +1,6 @@
-//! What a run of a scene will be: grains and their sizes, walls and their drives, steps, frames, the size of its history and
-//! the memory that it takes. The sample is put in its place with the code of a run, but for a random one, which is not packed.
+//! What a run of a scene will be: grains and their sizes, walls and their drives, steps, frames,
+//! the size of its history and its memory. The code of a run puts the sample in its place; random
+//! samples are not packed.
 
 use std::fmt;
 use std::path::Path;
@@ -9,10 +10,10 @@ use dem_core::dim::{D2, D3, Dim, Vect};
 use serde::Serialize;
 
 use crate::build::{Placed, place, walls};
+use crate::error::RunError;
 use crate::memory;
-use crate::output::number;
+use crate::output::{number, size};
 use crate::prepare;
-use crate::run::RunError;
 use crate::sample_file;
 use crate::scene::{Drive, Function, Lattice, Precision, Ramp, RandomSample, Sample, Scene, Shape};
 use crate::warnings;
@@ -56,7 +57,8 @@ pub struct Check {
     pub file_bytes: u64,
     /// Free space where the history would stand by default (bytes), if known.
     pub free_bytes: Option<u64>,
-    /// What the scene may not mean as it says it, and what the machine may not have.
+    /// Warnings: what the scene probably does not mean as it says it, and disk space or memory that
+    /// may be missing.
     pub warnings: Vec<String>,
 }
 
@@ -67,7 +69,8 @@ pub struct Sizes {
     pub diameters: [f64; 3],
     /// Lowest corner of the box around the sample (m).
     pub box_from: Vec<f64>,
-    /// Highest corner of the box around the sample (m): of a random one at the solid fraction that it asks for, before a cut.
+    /// Highest corner of the box around the sample (m): of a random one at the solid fraction that
+    /// it asks for, before a cut.
     pub box_to: Vec<f64>,
     /// Mass of all grains (kg).
     pub mass: f64,
@@ -91,8 +94,8 @@ impl Check {
     /// What a run of `scene` will be, its history in the current folder.
     ///
     /// # Errors
-    /// As the run would end before its first step, for a sample that is not random: [`RunError::InputOutput`],
-    /// [`RunError::Sample`].
+    /// For a sample that is not random, the errors with which a run would end before its first
+    /// step: [`RunError::SampleFile`], [`RunError::File`], [`RunError::Sample`].
     pub fn new(scene: &Scene) -> Result<Self, RunError> {
         let grains = count(scene)?;
         let (memory_bytes, free_memory_bytes) = (memory::expected(scene, grains), memory::free());
@@ -185,7 +188,7 @@ impl fmt::Display for Check {
 /// Number of grains of a scene, before a cut.
 ///
 /// # Errors
-/// [`RunError::InputOutput`]: a sample file that cannot be read.
+/// [`RunError::SampleFile`], [`RunError::File`]: a sample file that cannot be read.
 pub(crate) fn count(scene: &Scene) -> Result<usize, RunError> {
     match &scene.sample {
         Sample::File(file) => sample_file::count(&file.path),
@@ -194,7 +197,7 @@ pub(crate) fn count(scene: &Scene) -> Result<usize, RunError> {
     }
 }
 
-/// The sizes of a scene, and what it may not mean as it says it.
+/// The sizes of a scene, and warnings.
 fn look<D: Dim>(scene: &Scene, enough_memory: bool) -> Result<(Option<Sizes>, Vec<String>), RunError> {
     let sizes = match &scene.sample {
         Sample::Random(random) if enough_memory => Some(random_sizes::<D>(scene, random)),
@@ -269,8 +272,8 @@ fn has_bonds(scene: &Scene) -> bool {
     scene.bonds.as_ref().is_some_and(|bonds| bonds.cohesion(scene.dimension, 1.0, 1.0) > 0.0)
 }
 
-/// Size of the history of `grains` grains (bytes): the layout of `dem_run::history` row by row, with
-/// a typical number of contacts. Compare with a real file before relying on it to better than a half.
+/// Size of the history of `grains` grains (bytes): the layout of `dem_run::history` row by row,
+/// with a typical number of contacts. It may be wrong by half.
 fn expected_bytes(scene: &Scene, grains: usize) -> u64 {
     const NUMBER: f64 = 8.0;
     /// Scalars that are written at every step, with their step and time.
@@ -302,15 +305,6 @@ pub(crate) fn free_space(folder: &Path) -> Option<u64> {
 #[cfg(not(unix))]
 pub(crate) fn free_space(_folder: &Path) -> Option<u64> {
     None
-}
-
-/// A size as a person reads it.
-pub(crate) fn size(bytes: u64) -> String {
-    match bytes {
-        0..1_000_000 => format!("{:.0} kB", bytes as f64 / 1e3),
-        1_000_000..1_000_000_000 => format!("{:.1} MB", bytes as f64 / 1e6),
-        _ => format!("{:.1} GB", bytes as f64 / 1e9),
-    }
 }
 
 #[cfg(test)]
@@ -401,13 +395,5 @@ pub(crate) mod tests {
         }
         let shallow = with_sample("x,y,radius\n0,1,1\n1.98,1,1\n").expect("a little overlap").warnings;
         assert!(shallow[0].contains("one pair of grains overlaps, most of all 0 and 1, by 2.000e-2 m"), "{shallow:?}");
-    }
-
-    #[test]
-    fn sizes_are_short() {
-        assert_eq!(
-            (size(5_000), size(63_400_000), size(2_500_000_000)),
-            ("5 kB".into(), "63.4 MB".into(), "2.5 GB".into())
-        );
     }
 }

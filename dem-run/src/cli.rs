@@ -11,12 +11,13 @@ use clap::{Args, Parser, Subcommand};
 use crate::accuracy::trial::SolverName;
 use crate::accuracy::{self, AccuracyOptions};
 use crate::check::Check;
-use crate::destination::{apart, not_itself, unicode, writable};
+use crate::destination::{apart, folder_or_new, not_itself, unicode, writable};
+use crate::error::RunError;
 use crate::export::{self, ExportOptions};
 use crate::output::{default_folder, escaped, print_json, print_result};
 use crate::progress::ProgressMode;
 use crate::resume::{self, ResumeOptions};
-use crate::run::{self, Execution, RunError, RunOptions};
+use crate::run::{self, Execution, RunOptions};
 use crate::scene::{self, Scene, SceneError, schema};
 use crate::signals;
 use crate::solve::{self, SolveOptions, Solver};
@@ -44,10 +45,12 @@ enum Command {
     /// Go on with a run that was interrupted or killed, or that is to end later, from its history.
     #[command(after_help = RESUME_EXAMPLE)]
     Resume(ResumeArgs),
-    /// Check a scene without running it; tell grains and their sizes, walls, steps, frames, memory and disk space.
+    /// Check a scene without running it; tell grains and their sizes, walls, steps, frames, memory
+    /// and disk space.
     #[command(after_help = CHECK_EXAMPLE)]
     Check(CheckArgs),
-    /// Write the contact problem of one step of a history in FCLIB's format, to be solved by other programs too.
+    /// Write the contact problem of one step of a history in FCLIB's format, to be solved by other
+    /// programs too.
     #[command(after_help = EXPORT_EXAMPLE)]
     Export(ExportArgs),
     /// Solve a contact problem in FCLIB's format, ours or another program's.
@@ -144,7 +147,8 @@ Example:
 struct SceneArgs {
     /// Scene: a JSON file with comments.
     scene: PathBuf,
-    /// Put VALUE at PATH in the scene, as in bonds.strength=5; VALUE is JSON or a bare word. May be repeated.
+    /// Put VALUE at PATH in the scene, as in bonds.strength=5; VALUE is JSON or a bare word. May be
+    /// repeated.
     #[arg(long = "set", value_name = "PATH=VALUE")]
     set: Vec<String>,
 }
@@ -198,7 +202,8 @@ struct RunArgs {
     /// Run the scene even though it needs more memory than is free.
     #[arg(long)]
     ignore_memory: bool,
-    /// End when the process that started this one ends: a sweep that is killed takes its runs along.
+    /// End when the process that started this one ends: a sweep that is killed takes its runs
+    /// along.
     #[arg(long, hide = true)]
     end_with_parent: bool,
 }
@@ -214,7 +219,8 @@ struct ResumeArgs {
     /// Go on with this scene in place of the one in the history.
     #[arg(long, value_name = "SCENE")]
     scene: Option<PathBuf>,
-    /// Put VALUE at PATH in the scene, as in stop=null; VALUE is JSON or a bare word. May be repeated.
+    /// Put VALUE at PATH in the scene, as in stop=null; VALUE is JSON or a bare word. May be
+    /// repeated.
     #[arg(long = "set", value_name = "PATH=VALUE")]
     set: Vec<String>,
     /// Go on even though the scene differs.
@@ -232,7 +238,8 @@ struct SweepArgs {
     /// Sweep: a JSON file with comments.
     #[arg(value_name = "SWEEP.json")]
     sweep: PathBuf,
-    /// Folder for the results, created if need be [default: the sweep's name with -sweep, in the current folder].
+    /// Folder for the results, created if need be [default: the sweep's name with -sweep, in the
+    /// current folder].
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
     /// Runs at a time, one thread each [default: the number of processors].
@@ -244,7 +251,8 @@ struct SweepArgs {
     /// Write the manifest, slurm.sh and Snakefile for other schedulers; run nothing.
     #[arg(long, group = "mode")]
     prepare: bool,
-    /// Tell what ran, failed or is left, and bring manifest.json and runs.csv up to date; run nothing.
+    /// Tell what ran, failed or is left, and bring manifest.json and runs.csv up to date; run
+    /// nothing.
     #[arg(long, group = "mode")]
     status: bool,
     /// Carry out the run of this number alone, unless it is done: the task of a scheduler.
@@ -253,7 +261,8 @@ struct SweepArgs {
     /// Run again what failed for good.
     #[arg(long)]
     retry: bool,
-    /// Run again what was done of other scenes than the sweep gives now, and delete what it no longer gives.
+    /// Run again what was done of other scenes than the sweep gives now, and delete what it no
+    /// longer gives.
     #[arg(long)]
     force: bool,
     #[command(flatten)]
@@ -267,7 +276,8 @@ struct SweepArgs {
 struct AccuracyArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Folder for the results, created if need be [default: the scene's name with -accuracy, in the current folder].
+    /// Folder for the results, created if need be [default: the scene's name with -accuracy, in the
+    /// current folder].
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
     /// Solvers to compare.
@@ -282,7 +292,8 @@ struct AccuracyArgs {
     /// End of the runs (s), in place of the scene's time.end.
     #[arg(long, value_name = "T", value_parser = positive)]
     until: Option<f64>,
-    /// Contact orders, and as many starting reactions of rigid bonds, that each solver is tried with; 0 for none.
+    /// Contact orders, and as many starting reactions of rigid bonds, that each solver is tried
+    /// with; 0 for none.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u64).range(..=10_000))]
     orders: u64,
     /// Go on to the scene's end where a run would end at the collapse of the sample.
@@ -331,7 +342,8 @@ struct SolveArgs {
     /// Residual to reach.
     #[arg(long, value_name = "T", default_value_t = 1e-8, value_parser = positive)]
     tolerance: f64,
-    /// Iterations after which the solver gives up [default: 100000 sweeps, 300 of the interior-point method].
+    /// Iterations after which the solver gives up [default: 100000 sweeps, 300 of the
+    /// interior-point method].
     #[arg(long, value_name = "N")]
     max_iterations: Option<u64>,
     /// Steps that the acceleration of Gauss–Seidel remembers, 8 for one; 0 for plain sweeps.
@@ -356,7 +368,8 @@ fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
-/// The arguments, or what is wrong with them, without the control characters that they may hold.
+/// The arguments. An error message about them is printed without the control characters that they
+/// may contain.
 fn arguments() -> Cli {
     Cli::try_parse().unwrap_or_else(|error| {
         let controls = |argument: std::ffi::OsString| argument.to_string_lossy().contains(char::is_control);
@@ -408,7 +421,8 @@ impl SceneArgs {
 
 fn run(args: RunArgs) -> Result<(), RunError> {
     if args.end_with_parent {
-        signals::end_with_parent().map_err(|e| RunError::InputOutput(format!("the parent cannot be watched: {e}")))?;
+        signals::end_with_parent()
+            .map_err(|error| RunError::System { what: "the parent cannot be watched".into(), source: error.into() })?;
     }
     let scene = args.scene.load()?;
     let options = RunOptions {
@@ -498,13 +512,10 @@ fn accuracy(args: AccuracyArgs) -> Result<(), RunError> {
         scene.time.end = until;
     }
     let folder = args.output.unwrap_or_else(|| default_folder(&args.scene.scene, "-accuracy"));
-    let shown = folder.display();
-    if folder.exists() && !folder.is_dir() {
-        return Err(RunError::InputOutput(format!("{shown} is a file: name a folder with -o DIR")));
-    }
+    folder_or_new(&folder)?;
     if folder.join("accuracy.json").exists() && !args.manner.force {
-        let message = format!("{shown} holds results: --force overwrites them, -o DIR names another folder");
-        return Err(RunError::InputOutput(message));
+        let remedy = "--force overwrites them, -o DIR names another folder".into();
+        return Err(RunError::Unfit { path: folder, state: "holds results", remedy });
     }
     let options = AccuracyOptions {
         folder,

@@ -1,6 +1,7 @@
 //! The course of a run: what is counted from step to step, and what ends it.
 
-use crate::collapse::{Collapse, LoadStep, in_one_piece};
+use crate::collapse::{Collapse, LoadStep};
+use crate::scene::failure::in_one_piece;
 use crate::scene::{Scene, TravelFrom};
 use crate::summary::Ending;
 use dem_core::body::{Drive, Wall};
@@ -14,7 +15,7 @@ use dem_core::world::{StepReport, World};
 pub struct Course<D: Dim> {
     /// The driven walls with their loads, in the order of the walls.
     pub driven: Vec<Driven<D>>,
-    /// Which of them loads the sample, as the scene has it; none where it has none, or does not say
+    /// Which of them loads the sample; none where the scene has no driven wall, or does not say
     /// which.
     pub load_wall: Option<usize>,
     /// Lengths of the box around all grains at the start (m), one for each axis.
@@ -222,8 +223,8 @@ impl<D: Dim> Course<D> {
     }
 }
 
-/// The load of a driven wall in the last step (N): the force prescribed, or what a wall of
-/// prescribed velocity took against the grains before any bond broke in the step.
+/// The load of a driven wall in the last step (N): the prescribed force; for a prescribed velocity,
+/// the force of the wall on the grains before any bond broke in the step.
 fn load<D: Dim>(wall: &Wall<D>) -> f64 {
     match wall.drive {
         Drive::Fixed => 0.0,

@@ -1,25 +1,25 @@
-//! Which files results may be written to: what is refused before any work is done.
+//! Checks of the files that results are written to, before any work is done.
 
 use std::path::Path;
 
+use crate::error::RunError;
 use crate::history::refuse_busy;
-use crate::run::{RunError, RunOptions};
+use crate::run::RunOptions;
 use crate::scene::{Sample, Scene};
 
-/// Refuses, `--force` or not, to write over what is read.
+/// Refuses an output that is the input, with or without `--force`.
 pub(crate) fn not_itself(read: &Path, written: &Path) -> Result<(), RunError> {
     if !same_file(read, written) {
         return Ok(());
     }
-    let shown = written.display();
-    Err(RunError::InputOutput(format!("-o {shown} would overwrite what the command reads: name another file")))
+    Err(RunError::Overwrites { option: "-o", path: written.into(), reader: "command" })
 }
 
 fn same_file(a: &Path, b: &Path) -> bool {
     matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
 
-/// Refuses, `--force` or not, to write over what the run reads, or two results into one file.
+/// Refuses outputs that the run reads, and two outputs in one file, with or without `--force`.
 pub(crate) fn apart(path: &Path, scene: &Scene, options: &RunOptions) -> Result<(), RunError> {
     let mut read = vec![path];
     if let Sample::File(file) = &scene.sample {
@@ -28,9 +28,7 @@ pub(crate) fn apart(path: &Path, scene: &Scene, options: &RunOptions) -> Result<
     for (written, option) in [(Some(&options.output), "-o"), (options.write_sample.as_ref(), "--write-sample")] {
         let Some(written) = written else { continue };
         if read.iter().any(|read| same_file(read, written)) {
-            let shown = written.display();
-            let message = format!("{option} {shown} would overwrite what the run reads: name another file");
-            return Err(RunError::InputOutput(message));
+            return Err(RunError::Overwrites { option, path: written.clone(), reader: "run" });
         }
     }
     if options.write_sample.as_ref() == Some(&options.output) {
@@ -45,27 +43,28 @@ pub(crate) fn unicode(path: &Path, option: &str) -> Result<(), RunError> {
     if path.to_str().is_some() {
         return Ok(());
     }
-    Err(RunError::Usage(format!("{} is not UTF-8: name another with {option}", path.display())))
+    Err(RunError::NotUnicode { path: path.into(), option: option.into() })
 }
 
-/// Refuses, before any work is done, a file that exists or is being written, or whose folder is not there or takes no files.
+/// Refuses a file that exists or is being written, or whose folder is missing or not writable.
 pub(crate) fn writable(path: &Path, option: &str, overwrite: bool) -> Result<(), RunError> {
-    let shown = path.display();
+    let unfit = |state, remedy| Err(RunError::Unfit { path: path.into(), state, remedy });
     unicode(path, option)?;
     if path.is_dir() {
-        return Err(RunError::InputOutput(format!("{shown} is a folder: name a file with {option}")));
+        return unfit("is a folder", format!("name a file with {option}"));
     }
-    // a history comes into its place by renaming, which would put a file where a device was, /dev/null for one
+    // a history comes into its place by renaming, which would replace a device, such as /dev/null,
+    // by a file
     if path.exists() && !path.is_file() {
-        return Err(RunError::InputOutput(format!("{shown} is not a regular file: name another with {option}")));
+        return unfit("is not a regular file", format!("name another with {option}"));
     }
     if path.exists() && !overwrite {
-        let remedy = format!("--force overwrites it, {option} names another");
-        return Err(RunError::InputOutput(format!("{shown} exists: {remedy}")));
+        return unfit("exists", format!("--force overwrites it, {option} names another"));
     }
     refuse_busy(path)?;
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let refused = |why: String| Err(RunError::InputOutput(format!("{shown} cannot be written: {why}")));
+    let refused =
+        |why: String| Err(RunError::File { path: path.into(), doing: "cannot be written", source: why.into() });
     if !folder.is_dir() {
         return refused(format!("there is no folder {}; make it first", folder.display()));
     }
@@ -73,4 +72,12 @@ pub(crate) fn writable(path: &Path, option: &str, overwrite: bool) -> Result<(),
         Ok(_) => Ok(()),
         Err(why) => refused(format!("no file can be made in {}: {why}", folder.display())),
     }
+}
+
+/// Refuses a file where a folder is to be.
+pub(crate) fn folder_or_new(path: &Path) -> Result<(), RunError> {
+    if !path.exists() || path.is_dir() {
+        return Ok(());
+    }
+    Err(RunError::Unfit { path: path.into(), state: "is a file", remedy: "name a folder with -o DIR".into() })
 }

@@ -8,11 +8,12 @@ use dem_core::problem::assembled::Assembled;
 use dem_core::solver::SolveStatus;
 
 use crate::build::build;
+use crate::error::{NoConvergence, RunError};
 use crate::fclib::Problem;
 use crate::history::History;
 use crate::output::{escaped, print_line};
 use crate::progress::StepProgress;
-use crate::run::{Execution, RunError, handle_signals};
+use crate::run::{Execution, handle_signals};
 use crate::scene::{self, Scene};
 use crate::signals::Interrupt;
 
@@ -29,11 +30,12 @@ pub struct ExportOptions {
     pub execution: Execution,
 }
 
-/// Runs the scene of a history again up to a step and writes that step's problem: the first that it solves, before any
-/// bond breaks in it.
+/// Runs the scene of a history again up to a step and writes that step's problem: the first that it
+/// solves, before any bond breaks in it.
 ///
 /// # Errors
-/// [`RunError`]: an unreadable history, a step that the scene does not have, a run that does not come that far.
+/// [`RunError`]: an unreadable history, a step that the scene does not have, a run that does not
+/// come that far.
 pub fn export(options: &ExportOptions) -> Result<(), RunError> {
     let interrupt = handle_signals()?;
     options.execution.start_threads()?;
@@ -67,12 +69,10 @@ fn export_in<D: Dim>(scene: &Scene, options: &ExportOptions, interrupt: &Interru
     })?
     .world;
     while world.steps + 1 < options.step {
-        let report = world.step().map_err(|error| {
-            let way = format!("step {} was not reached", options.step);
-            RunError::NoConvergence(format!(
-                "{error}\n{way}; step {} is the last that can be exported",
-                world.steps + 1
-            ))
+        let report = world.step().map_err(|error| NoConvergence::Export {
+            error: error.to_string(),
+            step: options.step,
+            last: world.steps + 1,
         })?;
         progress.step(&StepProgress {
             step: world.steps,

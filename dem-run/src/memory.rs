@@ -1,7 +1,6 @@
 //! The memory that a run needs, and what is free of it.
 
-use crate::check::size;
-use crate::run::RunError;
+use crate::error::RunError;
 use crate::scene::{Lattice, Sample, Scene, SolverKind};
 use std::path::{Path, PathBuf};
 
@@ -10,8 +9,9 @@ const PROGRAM: f64 = 20e6;
 /// A grain, without its contacts (bytes).
 const GRAIN: f64 = 300.0;
 
-/// Memory that a run of `scene` with this many grains takes at its peak (bytes), to a fifth or so where the number of contacts
-/// is typical: fitted to runs of 500 to 250,000 grains (docs/cost.md). Newton's factor fills in, in 3D more in large samples.
+/// Peak memory of a run of `scene` with this many grains (bytes), fitted to runs of 500 to 250,000
+/// grains (docs/cost.md). The error is about 20 % where the number of contacts is typical. The
+/// fill-in of Newton's factor grows with the sample in 3D.
 #[must_use]
 pub fn expected(scene: &Scene, grains: usize) -> u64 {
     let bonded = scene.bonds.as_ref().is_some_and(|bonds| bonds.bear());
@@ -47,22 +47,18 @@ pub(crate) fn contacts_per_grain(scene: &Scene) -> f64 {
 /// Refuses a run that needs more memory than is free.
 ///
 /// # Errors
-/// [`RunError::InputOutput`].
+/// [`RunError::Memory`].
 pub fn refuse_too_large(scene: &Scene, grains: usize) -> Result<(), RunError> {
     let needed = expected(scene, grains);
     match free() {
-        Some(free) if free < needed => Err(RunError::InputOutput(format!(
-            "{grains} grains need about {} of memory, and {} are free: take fewer grains, or another machine; \
-             --ignore-memory tries it anyway",
-            size(needed),
-            size(free)
-        ))),
+        Some(free) if free < needed => Err(RunError::Memory { grains, needed, free }),
         _ => Ok(()),
     }
 }
 
-/// Memory that this process can still take (bytes): what the machine has left, swap space included, within the limits of
-/// the control groups and of the process; none where the system does not tell.
+/// Memory that this process can still take (bytes): free memory of the machine with swap space,
+/// within the limits of the control groups and of the process; none where the system does not
+/// report it.
 #[must_use]
 pub fn free() -> Option<u64> {
     let left = machine().into_iter().chain(control_groups()).chain(process());
@@ -79,7 +75,8 @@ fn machine() -> Option<u64> {
     Some(1024 * (kilobytes("MemAvailable")? + kilobytes("SwapFree").unwrap_or(0)))
 }
 
-/// What the limits of the control groups leave, a container's among them: of the group of this process and those above it.
+/// What the limits of the control groups leave, a container's among them: of the group of this
+/// process and those above it.
 fn control_groups() -> Vec<u64> {
     let own = std::fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
     let group = own.lines().find_map(|line| line.strip_prefix("0::/")).unwrap_or_default();
@@ -93,7 +90,7 @@ fn left_in_group(folder: &Path) -> Option<u64> {
     // "max" where there is no limit
     let limit: u64 = read("memory.max")?.trim().parse().ok()?;
     let used: u64 = read("memory.current")?.trim().parse().ok()?;
-    // files that the system keeps in memory give way
+    // cached files can be dropped
     let files = read("memory.stat")?.lines().find_map(|line| line.strip_prefix("inactive_file ")?.parse().ok());
     Some(limit.saturating_sub(used.saturating_sub(files.unwrap_or(0))))
 }

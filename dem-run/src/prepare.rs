@@ -1,10 +1,11 @@
 //! Sample preparation: where the grains are before the run starts.
 //!
-//! A random sample is packed without friction by steps from rest to rest. Each step solves
-//! min ½‖v − h g‖²_M subject to gap + h Hᵀv ≥ 0 with the contact solver of the run, moves the grains by h v and forgets
-//! the velocity: a sequence of linearised packings that ends where nothing can move. The last steps are solved under
-//! so little thrust that grains which carry the load touch to rounding, walls included. Time has no meaning here (h = 1), so the
-//! packing of a sample scales exactly with its lengths.
+//! A random sample is packed without friction by steps from rest to rest. Each step solves min ½‖v
+//! − h g‖²_M subject to gap + h Hᵀv ≥ 0 with the contact solver of the run, moves the grains by h v
+//! and forgets the velocity: a sequence of linearised packings that ends where nothing can move.
+//! The last steps are solved under so little thrust that grains which carry the load touch to
+//! rounding, walls included. Time has no meaning here (h = 1), so the packing of a sample scales
+//! exactly with its lengths.
 
 use crate::scene::{Cut, Diameters, Lattice, Preparation, RandomSample, Section};
 use dem_core::body::{Drive, Grain, Grains, Shape, Wall};
@@ -65,18 +66,19 @@ pub struct Packing<D: Dim> {
     pub balls: Vec<Ball<D>>,
     /// Volume of the grains over volume of the box between the walls (–).
     pub solid_fraction: f64,
-    /// What the last step still moved it by, in mean radii, where the steps of a packing were not enough to bring it to rest.
+    /// Displacement of the last step, in mean radii, where the packing did not come to rest within
+    /// its steps.
     pub unsettled: Option<f64>,
 }
 
-/// Told how far the packing is (0 to 1); false stops it.
+/// Gets the progress of the packing (0 to 1); returns false to stop it.
 pub type Watch<'a> = &'a mut dyn FnMut(f64) -> bool;
 
 /// Most steps of one packing.
 pub const MOST_STEPS: usize = 20_000;
 /// Packings that are tried, each from other places, until one is dense enough.
 const MOST_PACKINGS: usize = 8;
-/// Thrust at the start and at the end: what a free body would move in a step, in mean radii.
+/// Thrust at the start and at the end: displacement of a free body in a step, in mean radii.
 const THRUST: (f64, f64) = (0.5, 1e-11);
 /// Solid fraction of a dense packing in the plane and in space, by which progress is measured.
 const DENSE: [f64; 2] = [0.82, 0.62];
@@ -177,7 +179,7 @@ impl Container {
         walls
     }
 
-    /// The places of a layer: the lower corners of cells at least `size` (m) wide, and their widths (m).
+    /// The cells of a layer, at least `size` (m) wide: their lower corners and widths (m).
     fn cells<D: Dim>(&self, size: f64) -> (Vec<D::Vector>, [f64; 2]) {
         let mut number = [1; 2];
         let mut spacing = self.sides;
@@ -219,7 +221,8 @@ pub(crate) fn radii(sample: &RandomSample, seed: u64) -> Vec<f64> {
     draw_radii(&sample.diameter, sample.count, &mut Pcg64::seed_from_u64(seed))
 }
 
-/// Sides of the box of a random sample (m), as high as it is at the solid fraction that the sample asks for.
+/// Sides of the box of a random sample (m), as high as it is at the solid fraction that the sample
+/// asks for.
 pub(crate) fn sides<D: Dim>(sample: &RandomSample, radii: &[f64]) -> Vec<f64> {
     let container = Container::of(sample);
     let volume: f64 = radii.iter().map(|r| D::volume(*r)).sum();
@@ -333,7 +336,7 @@ fn packing_world<D: Dim>(grains: Grains<D>, container: &Container, top: f64, fro
 }
 
 fn solver() -> SolverSettings {
-    // a step that is solved less finely than asked is only a worse packing: the next one goes on from it
+    // a step that misses its tolerance only makes the packing less exact: the next step improves it
     SolverSettings::GaussSeidel(GaussSeidelSettings {
         local: LocalSolve::Exact,
         tolerance: 1e-4,
@@ -343,7 +346,8 @@ fn solver() -> SolverSettings {
     })
 }
 
-/// Push with the lid, or with gravity where there is none, so hard that a free body would move by `travel` (m).
+/// Push with the lid, or with gravity where there is none, so hard that a free body would move by
+/// `travel` (m).
 fn push<D: Dim>(world: &mut World<D>, from_top: bool, travel: f64) {
     let mut down = D::Vector::zero();
     down[D::N - 1] = -1.0;
@@ -368,10 +372,12 @@ fn height<D: Dim>(world: &World<D>, from_top: bool) -> f64 {
     2.0 * world.grains.position.iter().map(|x| x[up]).sum::<f64>() / world.grains.len() as f64
 }
 
-/// Step from rest to rest until nothing moves: at most so many steps. What the last of them moved, in mean radii, where it still moves.
+/// Step from rest to rest until nothing moves, at most `steps` times. Returns the displacement of
+/// the last step, in mean radii, if the packing still moves.
 ///
-/// The error of a step is a fraction of its thrust. Where the packing resists, the thrust is lowered, in the end to
-/// nearly nothing: a jammed packing is one for any thrust, and its contacts close to rounding.
+/// The error of a step is proportional to its thrust. Where the packing resists, the thrust is
+/// lowered, finally to nearly zero: a jammed packing is jammed under any thrust, and its gaps close
+/// to round-off.
 fn settle<D: Dim>(
     world: &mut World<D>,
     container: &Container,

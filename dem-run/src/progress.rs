@@ -1,4 +1,4 @@
-//! What a run tells while it runs, on stderr: a bar, plain lines, or JSON lines.
+//! Progress of a run on stderr: a bar, plain lines, or JSON lines.
 
 use std::io::{IsTerminal, Write};
 use std::time::{Duration, Instant};
@@ -52,7 +52,7 @@ pub struct RunsProgress {
     pub total: usize,
 }
 
-/// Shows progress. It looks at the clock, and nothing else may depend on what it sees.
+/// Shows progress. It reads the clock; no result may depend on that.
 pub struct Progress {
     sink: Sink,
     /// Least time between two messages.
@@ -106,7 +106,8 @@ impl Progress {
         Self { sink, interval, began, shown: None, phase, first: None, pending: None, quiet }
     }
 
-    /// Tells how far a phase of the preparation has come: its name, and the fraction done (0 to 1).
+    /// Reports the progress of a phase of the preparation: its name, and the fraction done (0 to
+    /// 1).
     pub fn phase(&mut self, message: &str, fraction: f64) {
         if self.phase == message && !self.due() {
             return;
@@ -125,7 +126,7 @@ impl Progress {
         }
     }
 
-    /// Tells where the run stands; shown when it is due.
+    /// Reports a step; shown when it is due.
     pub fn step(&mut self, step: &StepProgress) {
         if matches!(self.sink, Sink::None) {
             return;
@@ -139,7 +140,8 @@ impl Progress {
         }
     }
 
-    /// Tells how many bonds the step in hand has broken so far; shown when it is due. A step that breaks thousands takes long.
+    /// Reports the number of bonds that the current step has broken so far; shown when it is due. A
+    /// step that breaks thousands takes long.
     pub fn cascade(&mut self, step: u64, broken: usize) {
         if !self.due() {
             return;
@@ -154,7 +156,8 @@ impl Progress {
         }
     }
 
-    /// Tells where a family of runs stands; shown when it is due, or when it is the `last`.
+    /// Reports how many runs of a family have ended; shown when it is due, or when it is the
+    /// `last`.
     pub fn runs(&mut self, runs: &RunsProgress, last: bool) {
         if !self.due() && !last {
             return;
@@ -174,7 +177,7 @@ impl Progress {
         }
     }
 
-    /// Tells something that the user should know, a line of its own, whatever the mode unless it is quiet.
+    /// Prints a line that the user should read, in every mode but quiet.
     pub fn note(&mut self, text: &str) {
         match &mut self.sink {
             Sink::Bar(bar) => bar.suspend(|| line(&mut std::io::stderr(), text)),

@@ -1,6 +1,8 @@
-//! From a world to its history: the layout, the frames, the rupture events and the observables of every step.
+//! From a world to its history: the layout, the frames, the rupture events and the observables of
+//! every step.
 
 use crate::build::Built;
+use crate::clock::cpu_time;
 use crate::history::{
     self, Background, Batch, BondStatus, Checkpoint, ContactRows, ContactStatus, Frame, GrainState, History, Kept,
     Layout, Observable, Parameters, Rupture, RuptureMode, SolverRoute, WallDrive, WallKind, WallState, Writer,
@@ -25,7 +27,7 @@ pub struct Recorder<D: Dim> {
     reactions: bool,
     /// Processor time of the program before it went on with this run (s).
     cpu_before: f64,
-    /// What is observed goes to the writer with the next frame, or when so much has gathered.
+    /// Observables go to the writer with the next frame, or when [`GATHERED`] steps have gathered.
     batch: Batch,
 }
 
@@ -40,8 +42,9 @@ impl<D: Dim> Recorder<D> {
         Ok(Self::new(writer, &layout, measures, 0.0))
     }
 
-    /// Go on with `history`, in place of it: with what it held when `kept` was complete, and the world of `checkpoint`.
-    /// `cpu_before` is what the run took so far (s); `tell` hears how much of the history is copied, from 0 to 1.
+    /// Continue `history` in a new file that replaces it: with the rows `kept` and the world of
+    /// `checkpoint`. `cpu_before` is the processor time of the run so far (s); `tell` gets the
+    /// share of the history that is copied, from 0 to 1.
     pub fn go_on(
         history: &History,
         kept: Kept,
@@ -53,7 +56,7 @@ impl<D: Dim> Recorder<D> {
     ) -> history::Result<Self> {
         let origin = Parameters { scene: scene.to_json().unwrap_or_default(), ..history.parameters()? };
         let (layout, measures) = describe(scene, world, origin);
-        // what a scene without friction has no column for, it does not get later
+        // a history that began without friction keeps its layout
         let layout = Layout { friction: history.layout()?.friction, ..layout };
         let writer = Writer::go_on(history.path(), &layout, history, kept, checkpoint, tell)?;
         Ok(Self::new(writer, &layout, measures, cpu_before))
@@ -73,7 +76,7 @@ impl<D: Dim> Recorder<D> {
 
     /// Processor time of the whole run so far (s).
     pub fn cpu_time(&self) -> f64 {
-        self.cpu_before + crate::run::cpu_time()
+        self.cpu_before + cpu_time()
     }
 
     /// Record what every step records: observables and broken bonds.
@@ -147,7 +150,8 @@ impl<D: Dim> Recorder<D> {
                 }
             }
             if bonded && self.reactions {
-                // the bending rows of the solver are the components of m × n; those of the file are moments about the axes
+                // the bending rows of the solver are the components of m × n; those of the file are
+                // moments about the axes
                 let moment = D::torque_of_rows(&touch.frame, D::Tangent::zero(), touch.reaction.m);
                 rows.moment.extend(D::about_axes(&touch.frame, moment).as_slice());
             }
@@ -166,8 +170,8 @@ impl<D: Dim> Recorder<D> {
     }
 }
 
-/// What the history of a world holds, and what measures its observables; the processor time, the last, is told by the
-/// recorder.
+/// The layout of the history of a world, and the functions that measure its observables; the
+/// recorder adds the last one, the processor time.
 fn describe<D: Dim>(scene: &Scene, world: &World<D>, parameters: Parameters) -> (Layout, Vec<Measure<D>>) {
     let bonded = !world.bonds.is_empty();
     let friction = world.settings.friction > 0.0 || world.walls.iter().any(|w| w.friction > 0.0);
@@ -295,7 +299,8 @@ fn parameters(scene: &Scene, solid_fraction: Option<f64>) -> Parameters {
     }
 }
 
-/// The force that drives a wall (N): the one prescribed, or what the drive needs to keep its velocity.
+/// The force that drives a wall (N): the one prescribed, or what the drive needs to keep its
+/// velocity.
 fn applied_force<D: Dim>(wall: &Wall<D>) -> f64 {
     match wall.drive {
         Drive::Fixed => 0.0,

@@ -1,10 +1,12 @@
-//! A run that goes on from its history, to the bit as if it had never stopped.
+//! A run that continues from its history. Its results have the same bits as those of a run without
+//! interruption.
 
-use crate::check::{free_space, size};
+use crate::check::free_space;
+use crate::error::RunError;
 use crate::history::{Checkpoint, History, HistoryError, Kept, refuse_busy};
 use crate::output::{number, print_json, print_line};
 use crate::record::Recorder;
-use crate::run::{Execution, Run, RunError, RunOptions, State, handle_signals, run_in};
+use crate::run::{Execution, Run, RunOptions, State, handle_signals, run_in};
 use crate::scene::{self, Scene, differences};
 use crate::signals::Interrupt;
 use dem_core::dim::{D2, D3, D3Twist, Dim};
@@ -29,9 +31,9 @@ pub struct ResumeOptions {
     pub json: bool,
 }
 
-/// Fields that a run that has begun can change: nothing that came before them depends on them.
+/// Fields that may change: the steps already made do not depend on them.
 const FREE: [&str; 5] = ["title", "$schema", "time.end", "stop", "load_wall"];
-/// Fields that it can change with `--force`: from then on it is another run than the scene alone would give.
+/// Fields that may change with `--force`: the run then differs from a run of either scene alone.
 const OPEN: [&str; 7] =
     ["solver", "gravity", "rupture", "materials.friction", "materials.restitution", "grains.loads", "bonds.flow"];
 /// Fields of a wall, likewise.
@@ -40,7 +42,7 @@ const OPEN_WALL: [&str; 4] = ["force", "force_rate", "velocity", "friction"];
 /// Goes on with a run, prints its summary, and leaves its history.
 ///
 /// # Errors
-/// [`RunError`]; until the new history is complete up to where the run goes on, the old one stands as it was.
+/// [`RunError`]; the old history stays until the new one is complete up to the checkpoint.
 pub fn resume(options: &ResumeOptions) -> Result<(), RunError> {
     let interrupt = handle_signals()?;
     options.execution.start_threads()?;
@@ -108,12 +110,14 @@ fn resume_in<D: Dim>(
     let shown = path.display();
     let Some(checkpoint) = history.checkpoint()? else {
         if history.frames() as u64 <= 1 {
-            // killed before its first checkpoint stood: there is nothing to go on from, and nothing to lose
+            // killed before its first checkpoint: the run begins anew, and nothing is lost
             return run_in::<D>(scene, &anew(options), interrupt);
         }
-        return Err(RunError::InputOutput(format!(
-            "{shown} holds no whole state to go on from: it is damaged, or of an older version; run the scene again"
-        )));
+        return Err(RunError::Unfit {
+            path: path.clone(),
+            state: "holds no whole state to go on from",
+            remedy: "it is damaged, or of an older version; run the scene again".into(),
+        });
     };
     let mut state = State::<D>::restored(scene, &checkpoint)
         .map_err(|mismatch| RunError::InputOutput(format!("{shown}: {mismatch}; run the scene again")))?;
@@ -159,8 +163,9 @@ fn anew(options: &ResumeOptions) -> RunOptions {
     }
 }
 
-/// What of a history stands when the run goes on from `checkpoint`: the frames that were due by then. The frame of a run
-/// that ended between two of those is not among them, for a run without a stop would not have it; the steps before it are.
+/// The rows of a history that are kept when the run continues from `checkpoint`: the frames that
+/// were due by then. The last frame of a run that ended between two due frames is dropped, because
+/// a run without interruption would not have it; the steps before it are kept.
 fn kept(history: &History, scene: &Scene, checkpoint: &Checkpoint) -> Result<Kept, RunError> {
     let every = scene.steps_per_frame() as i64;
     let reached = history.steps().iter().take_while(|step| **step <= checkpoint.step).count();
@@ -174,12 +179,7 @@ fn refuse_full_disk(history: &History) -> Result<(), RunError> {
     let folder = history.path().parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let needed = history.length();
     match free_space(folder) {
-        Some(free) if free < needed => Err(RunError::InputOutput(format!(
-            "{} needs {} beside it to go on, and {} are free: make room first",
-            history.path().display(),
-            size(needed),
-            size(free)
-        ))),
+        Some(free) if free < needed => Err(RunError::Disk { path: history.path().into(), needed, free }),
         _ => Ok(()),
     }
 }

@@ -2,18 +2,19 @@
 
 use crate::build::{build, rebuild};
 use crate::check;
-use crate::collapse::{Disk, Failure};
+use crate::collapse::Failure;
 use crate::course::Course;
-use crate::fclib::FclibError;
-use crate::history::{Checkpoint, HistoryError};
+use crate::error::{NoConvergence, RunError};
+use crate::history::Checkpoint;
 use crate::memory;
-use crate::output::{WriteError, print_result};
+use crate::output::print_result;
 use crate::progress::{Progress, ProgressMode, StepProgress};
 use crate::record::Recorder;
 use crate::sample_file;
-use crate::scene::{Scene, SceneError, SolverKind};
-use crate::signals::{self, INTERRUPTED, Interrupt};
-use crate::summary::{Ending, Splitting, Summary, WallLoads};
+use crate::scene::failure::{Disk, Splitting};
+use crate::scene::{Scene, SolverKind};
+use crate::signals::{self, Interrupt};
+use crate::summary::{Ending, Summary, WallLoads};
 use crate::warnings;
 use dem_core::body::{Drive, Wall};
 use dem_core::dim::{D2, D3, D3Twist, Dim, Vect};
@@ -61,62 +62,10 @@ impl Execution {
     pub(crate) fn start_threads(&self) -> Result<(), RunError> {
         let Some(threads) = self.threads else { return Ok(()) };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
-        pool.map_err(|e| RunError::InputOutput(format!("{threads} threads cannot be started: {e}")))
-    }
-}
-
-/// Why a run ended before its end.
-#[derive(Debug, thiserror::Error)]
-pub enum RunError {
-    /// The scene is wrong, or cannot be read.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// The sample cannot be made as the scene asks: all that is wrong with it.
-    #[error("{}", .0.join("\n"))]
-    Sample(Vec<String>),
-    /// A contact problem was not solved within the limits of the scene.
-    #[error("{0}")]
-    NoConvergence(String),
-    /// A file cannot be read or written.
-    #[error("{0}")]
-    InputOutput(String),
-    /// The history cannot be written.
-    #[error(transparent)]
-    History(#[from] HistoryError),
-    /// A contact problem cannot be read or written.
-    #[error(transparent)]
-    Problem(#[from] FclibError),
-    /// What was asked for is not there.
-    #[error("{0}")]
-    Usage(String),
-    /// A result cannot be written.
-    #[error(transparent)]
-    Write(#[from] WriteError),
-    /// Runs of a sweep failed.
-    #[error("{message}")]
-    Runs {
-        /// The gravest exit code of theirs.
-        code: u8,
-        /// How many, and what to do.
-        message: String,
-    },
-    /// Ctrl-C or SIGTERM, and what that leaves.
-    #[error("interrupted: {0}")]
-    Interrupted(&'static str),
-}
-
-impl RunError {
-    /// The exit code of the command: 2 wrong scene, 3 no convergence, 4 input/output, 130 interrupted.
-    #[must_use]
-    pub fn exit_code(&self) -> u8 {
-        match self {
-            Self::Scene(SceneError::Read { .. }) | Self::InputOutput(_) | Self::History(_) => 4,
-            Self::Write(_) | Self::Problem(_) => 4,
-            Self::Scene(_) | Self::Sample(_) | Self::Usage(_) => 2,
-            Self::NoConvergence(_) => 3,
-            Self::Runs { code, .. } => *code,
-            Self::Interrupted(_) => INTERRUPTED,
-        }
+        pool.map_err(|error| RunError::System {
+            what: format!("{threads} threads cannot be started"),
+            source: error.into(),
+        })
     }
 }
 
@@ -134,9 +83,9 @@ pub fn run(scene: &Scene, options: &RunOptions) -> Result<(), RunError> {
     }
 }
 
-/// Handles Ctrl-C and SIGTERM from now on.
+/// Installs the handlers of Ctrl-C and SIGTERM.
 pub(crate) fn handle_signals() -> Result<Interrupt, RunError> {
-    signals::install().map_err(|e| RunError::InputOutput(format!("no handler for Ctrl-C: {e}")))
+    signals::install().map_err(|error| RunError::System { what: "no handler for Ctrl-C".into(), source: error.into() })
 }
 
 pub(crate) fn run_in<D: Dim>(scene: &Scene, options: &RunOptions, interrupt: &Interrupt) -> Result<(), RunError> {
@@ -152,8 +101,11 @@ pub(crate) fn run_in<D: Dim>(scene: &Scene, options: &RunOptions, interrupt: &In
         progress.note(&format!("warning: {warning}"));
     }
     if let Some(path) = &options.write_sample {
-        sample_file::write(&built.world.grains, path)
-            .map_err(|e| RunError::InputOutput(format!("{} cannot be written: {e}", path.display())))?;
+        sample_file::write(&built.world.grains, path).map_err(|error| RunError::File {
+            path: path.clone(),
+            doing: "cannot be written",
+            source: error.into(),
+        })?;
     }
     let recorder = Recorder::create(&options.output, options.overwrite, scene, &built)?;
     let course = Course::new(scene, &built.world);
@@ -174,7 +126,8 @@ pub(crate) struct State<D: Dim> {
 const FORM: usize = 8;
 
 impl<D: Dim> State<D> {
-    /// The state as numbers. The processor time is not among them: two runs of a scene write the same file.
+    /// The state as numbers. The processor time is not among them: two runs of a scene write the
+    /// same file.
     fn save(&self) -> Checkpoint {
         let mut to = Saved::default();
         to.count(FORM);
@@ -207,7 +160,8 @@ pub(crate) struct Run<'a, D: Dim> {
     pub idle: Vec<usize>,
 }
 
-/// The driven walls of which it is told at the end if no force ever acted on them: not those that are taken away.
+/// The driven walls that are reported at the end if no force ever acted on them: all but those that
+/// move away.
 fn may_be_idle<D: Dim>(scene: &Scene, world: &World<D>) -> Vec<usize> {
     let driven = |wall: &Wall<D>| !matches!(wall.drive, Drive::Fixed);
     let walls = world.walls.iter().enumerate();
@@ -264,9 +218,8 @@ impl<D: Dim> Run<'_, D> {
 
     fn failed(&mut self, error: StepError) -> Result<Ending, RunError> {
         self.state.course.rejected += u64::from(matches!(error, StepError::NotAccepted { .. }));
-        let help = self.remedy(&error);
-        let error = error.message(&|body| self.name(body));
-        Err(RunError::NoConvergence(format!("{error}\nthe history is complete up to there{help}")))
+        let remedy = self.remedy(&error);
+        Err(NoConvergence::Step { error: error.message(&|body| self.name(body)), remedy }.into())
     }
 
     /// What may help against an error, with the places in the scene.
@@ -351,7 +304,7 @@ impl<D: Dim> Run<'_, D> {
             Err(error @ RunError::NoConvergence(_)) => (Ending::NoConvergence, Err(error)),
             Err(error) => return Err(error),
         };
-        // what is due was recorded in its turn
+        // frames and checkpoints that were due are recorded already
         let [framed, kept] = self.due();
         self.record(!framed, !kept)?;
         let cpu_time = self.recorder.cpu_time();
@@ -423,10 +376,4 @@ impl<D: Dim> State<D> {
             cpu_time,
         }
     }
-}
-
-/// Processor time of the program so far (s).
-pub fn cpu_time() -> f64 {
-    let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
-    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
 }

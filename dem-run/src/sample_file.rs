@@ -1,13 +1,13 @@
 //! Samples as CSV tables: the grains that a scene reads, and those that a run writes.
 
+use crate::error::RunError;
 use crate::prepare::Ball;
-use crate::run::RunError;
 use crate::scene::{LARGEST, MAX_GRAINS, open_regular, shorten};
 use dem_core::body::Grains;
 use dem_core::dim::{Dim, Vect};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Wrong lines that are told one by one.
 const MOST_TOLD: usize = 20;
@@ -18,10 +18,11 @@ fn header<D: Dim>() -> &'static [&'static str] {
     if D::N == 2 { &["x", "y", "radius"] } else { &["x", "y", "z", "radius"] }
 }
 
-/// Number of grains in a sample file, without reading them: of its lines that are neither the header, empty nor a comment.
+/// Number of grains in a sample file, without reading them: lines that are not the header, empty or
+/// a comment.
 ///
 /// # Errors
-/// [`RunError::InputOutput`], [`RunError::Sample`].
+/// [`RunError::SampleFile`], [`RunError::File`], [`RunError::Sample`].
 pub fn count(path: &Path) -> Result<usize, RunError> {
     let mut lines = Lines::open(path)?;
     let mut count = 0_usize;
@@ -34,7 +35,8 @@ pub fn count(path: &Path) -> Result<usize, RunError> {
 /// The grains of a CSV file with the header `x,y,radius` or `x,y,z,radius` (m).
 ///
 /// # Errors
-/// [`RunError::InputOutput`] for a file that cannot be read, [`RunError::Sample`] with all lines that are wrong.
+/// [`RunError::SampleFile`] and [`RunError::File`] for a file that cannot be read,
+/// [`RunError::Sample`] with all lines that are wrong.
 pub fn read<D: Dim>(path: &Path) -> Result<Vec<Ball<D>>, RunError> {
     let mut lines = Lines::open(path)?;
     let mut wrong = Wrong { name: path.display().to_string(), told: vec![], count: 0 };
@@ -94,7 +96,7 @@ fn ball<D: Dim>(fields: &[&str]) -> Result<Ball<D>, String> {
 
 /// The lines of a table that are neither empty nor a comment.
 struct Lines {
-    name: String,
+    path: PathBuf,
     inner: BufReader<File>,
     line: Vec<u8>,
     /// Number of the line in hand, from 1.
@@ -103,9 +105,8 @@ struct Lines {
 
 impl Lines {
     fn open(path: &Path) -> Result<Self, RunError> {
-        let unreadable = |e| RunError::InputOutput(format!("sample.file.path: {} cannot be read: {e}", path.display()));
-        let inner = BufReader::new(open_regular(path).map_err(unreadable)?);
-        Ok(Self { name: path.display().to_string(), inner, line: vec![], number: 0 })
+        let file = open_regular(path).map_err(|source| RunError::SampleFile { path: path.into(), source })?;
+        Ok(Self { path: path.into(), inner: BufReader::new(file), line: vec![], number: 0 })
     }
 
     /// Goes to the next line; false at the end.
@@ -113,14 +114,17 @@ impl Lines {
         loop {
             self.line.clear();
             let most = LONGEST_LINE as u64 + 1;
-            let unreadable = |e| RunError::InputOutput(format!("{} cannot be read: {e}", self.name));
-            self.inner.by_ref().take(most).read_until(b'\n', &mut self.line).map_err(unreadable)?;
+            self.inner.by_ref().take(most).read_until(b'\n', &mut self.line).map_err(|error| RunError::File {
+                path: self.path.clone(),
+                doing: "cannot be read",
+                source: error.into(),
+            })?;
             if self.line.is_empty() {
                 return Ok(false);
             }
             self.number += 1;
             if self.line.len() > LONGEST_LINE {
-                let Self { name, number, .. } = self;
+                let (name, number) = (self.path.display(), self.number);
                 return Err(RunError::Sample(vec![format!(
                     "{name}, line {number}: it has more than {LONGEST_LINE} bytes: write one grain a line"
                 )]));
@@ -135,7 +139,7 @@ impl Lines {
         }
     }
 
-    /// What stands between the commas of the line in hand, which some programs write between quotes.
+    /// The fields of the current line, without the quotes that some programs write.
     fn fields(&self) -> Result<impl Iterator<Item = &str>, String> {
         let text = std::str::from_utf8(&self.line).map_err(|_| "it is not UTF-8 text".to_string())?;
         Ok(text.split(',').map(|field| field.trim().trim_matches('"')))
@@ -189,7 +193,7 @@ mod tests {
     use super::*;
     use dem_core::dim::{D2, D3};
 
-    fn file(text: &str) -> (tempfile::TempDir, std::path::PathBuf) {
+    fn file(text: &str) -> (tempfile::TempDir, PathBuf) {
         let folder = tempfile::tempdir().expect("folder");
         let path = folder.path().join("sample.csv");
         std::fs::write(&path, text).expect("write");

@@ -1,4 +1,5 @@
-//! Ctrl-C and SIGTERM: the first asks the command to end after the step in hand, the second ends it at once.
+//! Ctrl-C and SIGTERM: the first asks the command to end after the step in hand, the second ends it
+//! at once.
 
 use std::ffi::c_int;
 use std::io::Write;
@@ -53,12 +54,13 @@ pub fn end_with_parent() -> std::io::Result<()> {
 }
 
 unsafe extern "C" {
-    /// Ends the process without running what stands ready for its end (ISO C `_Exit`, POSIX `_exit`).
+    /// Ends the process without running what stands ready for its end (ISO C `_Exit`, POSIX
+    /// `_exit`).
     safe fn _exit(status: c_int) -> !;
 }
 
-/// The handler runs in a thread of its own, while the run may be inside the HDF5 library, whose
-/// clean-up at a regular exit would then meet it half-way: so no clean-up.
+/// The handler runs in a thread of its own, while the run may be inside the HDF5 library. A regular
+/// exit would clean up that library in the middle of its work, so there is no clean-up.
 fn exit_at_once() -> ! {
     _exit(c_int::from(INTERRUPTED))
 }

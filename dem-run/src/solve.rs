@@ -13,9 +13,10 @@ use dem_core::solver::{
 };
 use serde::Serialize;
 
+use crate::clock::cpu_time;
+use crate::error::{NoConvergence, RunError};
 use crate::fclib::Problem;
 use crate::output::{escaped, print_result};
-use crate::run::{RunError, cpu_time};
 use crate::scene;
 use crate::summary::told;
 
@@ -70,8 +71,9 @@ struct Solved {
     cpu_time: f64,
 }
 
-/// Velocity error (–) up to which a problem counts as solved where the tolerance is at most `FINE`, and in proportion where it is larger.
-/// In problems with a solution it is up to some hundred times the residual.
+/// Velocity error (–) up to which a problem counts as solved, for tolerances of at most [`FINE`];
+/// for larger tolerances the bound grows in proportion. In problems with a solution the velocity
+/// error is up to some hundred times the residual.
 const VELOCITY_ERROR: f64 = 1e-3;
 const FINE: f64 = 1e-6;
 
@@ -86,8 +88,8 @@ const MOST_SWEEPS: u64 = 100_000;
 /// Solves a problem from its first guess, or from zero, and prints how that went.
 ///
 /// # Errors
-/// [`RunError`]: a file that is no problem, an output that cannot be written, [`RunError::NoConvergence`] where the
-/// tolerance was not reached.
+/// [`RunError`]: a file that is no problem, an output that cannot be written,
+/// [`RunError::NoConvergence`] where the tolerance was not reached.
 pub fn solve(options: &SolveOptions) -> Result<(), RunError> {
     let mut problem = Problem::read(&options.problem)?;
     for warning in &problem.warnings {
@@ -118,7 +120,7 @@ pub fn solve(options: &SolveOptions) -> Result<(), RunError> {
     };
     let printed = print_result(&solved, options.json);
     if !solved.converged {
-        return Err(RunError::NoConvergence(format!("{}: {}", options.problem.display(), solved.failure(&at))));
+        return Err(NoConvergence::Problem { path: options.problem.clone(), why: solved.failure(&at) }.into());
     }
     if let Some(output) = &options.output {
         problem.solution = Some(at.r);
@@ -142,7 +144,7 @@ fn iterate(problem: &mut Assembled, options: &SolveOptions) -> SolveReport {
                 stages: Stages::Interior,
                 tolerance,
                 accept: tolerance,
-                // a file tells no load: only the residual counts
+                // a file has no load, so only the residual counts
                 load_tolerance: f64::INFINITY,
                 start: Start::StiffLimit,
                 stiffness: StiffnessRatio { tangential: scene.tangential_stiffness, rolling: scene.rolling_stiffness },

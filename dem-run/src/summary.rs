@@ -1,7 +1,8 @@
-//! What a run tells at its end, on stdout.
+//! The summary of a run, printed on stdout.
 
-use crate::collapse::{Collapse, Disk, Failure, STRAINS};
+use crate::collapse::{Collapse, Failure};
 use crate::output::{in_shell, number, quantity};
+use crate::scene::failure::{STRAINS, Splitting};
 use dem_core::solver::Work;
 use serde::Serialize;
 use std::fmt;
@@ -32,7 +33,8 @@ pub struct Summary {
     pub ending: Ending,
     /// Steps made.
     pub steps: u64,
-    /// Whether contacts carry normal forces at the end, and the history has them: then there are chains.
+    /// Whether contacts carry normal forces at the end, and the history has them: then there are
+    /// chains.
     #[serde(skip)]
     pub carries: bool,
     /// Simulated time (s).
@@ -43,7 +45,8 @@ pub struct Summary {
     pub solid_fraction: Option<f64>,
     /// Bonds at the start.
     pub bonds: usize,
-    /// Where the scene asks for bonds that bear anything, the gap up to which it bonds grains, over their mean diameter (–).
+    /// Where the scene asks for bonds that bear anything, the gap up to which it bonds grains, over
+    /// their mean diameter (–).
     #[serde(skip)]
     pub gap_tolerance: Option<f64>,
     /// Whether they are elastic: then the sample may deform before any breaks.
@@ -95,7 +98,7 @@ pub struct Summary {
     pub mean_diameter: f64,
     /// Work of forces and drives (J).
     pub external_work: f64,
-    /// Energy that the books do not account for (J).
+    /// Remainder of the energy balance (J).
     pub energy_remainder: f64,
     /// Energy lost in intact bonds, which rigid bonds should not lose (J).
     pub bond_remainder: f64,
@@ -108,8 +111,9 @@ pub struct Summary {
 pub struct WallLoads {
     /// Its name.
     pub wall: String,
-    /// Loads at which the sample failed (N). There is no collapse load where none acted in the step
-    /// before the strain, nor where elastic bonds strained so before any broke.
+    /// Loads at which the sample failed (N). There is no collapse load where no load acted in the
+    /// step before the strain was exceeded, nor where elastic bonds reached the strain before any
+    /// broke.
     pub failure: Failure,
     /// Greatest load (N), where the wall is driven by a velocity or bonds are elastic.
     pub peak_load: Option<f64>,
@@ -124,8 +128,8 @@ pub struct WallLoads {
 }
 
 impl WallLoads {
-    /// What a run tells of the wall `wall`: whether it is driven by a velocity, whether bonds are
-    /// elastic, and its loads.
+    /// The loads of the wall `wall`. `velocity`: it is driven by a velocity; `elastic`: bonds are
+    /// elastic.
     #[must_use]
     pub fn of(wall: &str, velocity: bool, elastic: bool, found: &Collapse) -> Self {
         let &Collapse { mut failure, passed, peak, rising, .. } = found;
@@ -148,39 +152,6 @@ impl WallLoads {
         let (load, displacement) = (self.peak_load?, self.peak_displacement?);
         let end = if self.rising { ", at the end of the run" } else { "" };
         Some(format!("{} N at a displacement of {} m{end}", number(load), number(displacement)))
-    }
-}
-
-/// Tensile stress 2P/(πDt) across the loaded diameter of a disk (Pa).
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Splitting {
-    /// Diameter D (m).
-    pub diameter: f64,
-    /// Length t (m).
-    pub length: f64,
-    /// Stress at the collapse load of the strain 1e-4, where bonds had broken by then (Pa).
-    pub collapse: Option<f64>,
-    /// Stress at the greatest load (Pa).
-    pub peak: Option<f64>,
-}
-
-impl Splitting {
-    /// The splitting strength of a disk, from its collapse load and its greatest load (N).
-    #[must_use]
-    pub fn of(disk: Disk, collapse: Option<f64>, peak: Option<f64>) -> Self {
-        let stress = |load: f64| disk.stress(load);
-        let Disk { diameter, length } = disk;
-        Self { diameter, length, collapse: collapse.map(stress), peak: peak.map(stress) }
-    }
-}
-
-impl fmt::Display for Splitting {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let at = |stress: Option<f64>, what: &str| Some(format!("{} Pa {what}", number(stress?)));
-        let told = [at(self.collapse, "at collapse (strain 1e-4)"), at(self.peak, "at the peak load")];
-        let told: Vec<String> = told.into_iter().flatten().collect();
-        let told = if told.is_empty() { "none".into() } else { told.join(", ") };
-        write!(f, "{told}: 2P/(πDt), D = {} m, t = {} m", number(self.diameter), number(self.length))
     }
 }
 
@@ -327,7 +298,7 @@ impl Summary {
         writeln!(f, "5 % broken       {}", load(failure.broken_share))
     }
 
-    /// What is said of a collapse load by which no bond of a rigid sample had broken.
+    /// Note on a collapse load of a rigid sample before any bond broke.
     fn early_note(&self, early: bool) -> &'static str {
         match (early, self.one_piece) {
             (false, _) => "",

@@ -1,20 +1,19 @@
-//! What a scene may not mean as it says it: no error, but a word before the run, with the place and the remedy.
+//! Warnings about a scene that is correct but probably not meant as it is written: printed before
+//! the run, with the place in the scene and the remedy.
 
-use crate::build::TOUCHING;
 use crate::output::number;
 use crate::prepare::MOST_STEPS;
 use crate::scene::{Sample, Scene};
+use crate::tolerances::{PARALLEL, TOUCHING};
 use dem_core::body::{Drive, Grains, Shape, Wall};
 use dem_core::dim::{Dim, Vect};
 
 /// Grains and loads of one kind that are told one by one.
 const MOST_TOLD: usize = 5;
-/// Sine or cosine of an angle below which two directions are along or across each other: directions in decimals are not exact.
-const PARALLEL: f64 = 1e-6;
 /// Moments of a run at which a drive is looked at.
 const MOMENTS: usize = 1000;
 
-/// What the scene itself shows.
+/// Warnings that follow from the scene alone.
 pub(crate) fn of_scene(scene: &Scene) -> Vec<String> {
     let mut told = vec![];
     let time = &scene.time;
@@ -51,7 +50,7 @@ pub(crate) fn of_scene(scene: &Scene) -> Vec<String> {
     told
 }
 
-/// That the steps of a packing did not bring it to rest: the last one moved it by `moved` mean radii.
+/// Warning about a packing that did not come to rest: its last step moved it by `moved` mean radii.
 pub(crate) fn of_packing(moved: f64) -> String {
     format!(
         "sample.random: the packing still moved by {moved:.1e} of the mean radius a step after {MOST_STEPS} steps: grains may lie apart \
@@ -67,7 +66,7 @@ fn first_few(mut lines: Vec<String>, what: &str) -> Vec<String> {
     lines
 }
 
-/// What driven walls show, with the grains where they are in their places.
+/// Warnings about driven walls; `grains` where the sample is in its place.
 pub(crate) fn of_walls<D: Dim>(scene: &Scene, walls: &[Wall<D>], grains: Option<&Grains<D>>) -> Vec<String> {
     let pushes: Vec<bool> =
         walls.iter().map(|wall| Course::of(wall, scene.time.end).is_some_and(|c| !c.along)).collect();
@@ -87,7 +86,7 @@ pub(crate) fn of_walls<D: Dim>(scene: &Scene, walls: &[Wall<D>], grains: Option<
     told
 }
 
-/// Whether something that is no wall may press grains together: gravity, a load, or a grain in motion.
+/// Whether gravity, a load or a moving grain may press grains together, apart from walls.
 fn others_push(scene: &Scene) -> bool {
     let nonzero = |values: &[f64]| values.iter().any(|value| *value != 0.0);
     let moving = |values: &Option<Vec<f64>>| values.as_deref().is_some_and(nonzero);
@@ -96,14 +95,14 @@ fn others_push(scene: &Scene) -> bool {
         || matches!(&scene.sample, Sample::Grains(list) if list.iter().any(|g| moving(&g.velocity) || moving(&g.spin)))
 }
 
-/// Whether a wall is driven away from the grains at all times, as one that is taken away.
+/// Whether a wall is driven away from the grains at all times.
 pub(crate) fn leaves<D: Dim>(wall: &Wall<D>, end: f64, grains: &Grains<D>) -> bool {
     let (Some(course), Some(towards)) = (Course::of(wall, end), towards(wall, grains)) else { return false };
     let sign = course.direction.dot(&towards);
     !course.along && course.range.0 * sign <= 0.0 && course.range.1 * sign <= 0.0
 }
 
-/// The way on which its drive alone leads a wall.
+/// The motion of a wall under its drive alone.
 struct Course<D: Dim> {
     /// Unit direction.
     direction: D::Vector,
@@ -163,7 +162,8 @@ fn along(friction: f64, alone: bool) -> Option<String> {
     })
 }
 
-/// Unit vector from a wall to the grains at it: that of its nearest grain; none inside a round wall.
+/// Unit vector from a wall to the grains at it: that of its nearest grain; none inside a round
+/// wall.
 fn towards<D: Dim>(wall: &Wall<D>, grains: &Grains<D>) -> Option<D::Vector> {
     match wall.shape {
         Shape::Plane { normal } => Some(normal),
@@ -178,7 +178,8 @@ fn nearest<D: Dim>(wall: &Wall<D>, grains: &Grains<D>) -> Option<(f64, D::Vector
     gaps.min_by(|a, b| a.0.total_cmp(&b.0))
 }
 
-/// A wall whose force pulls it away from the grains at all times: a confinement with the wrong sign.
+/// A wall whose force pulls it away from the grains at all times: a confinement with the wrong
+/// sign.
 fn pulled<D: Dim>(wall: &Wall<D>, course: &Course<D>, grains: &Grains<D>) -> Option<String> {
     let sign = course.direction.dot(&towards(wall, grains)?);
     let (low, high) = course.range;
@@ -193,7 +194,7 @@ fn pulled<D: Dim>(wall: &Wall<D>, course: &Course<D>, grains: &Grains<D>) -> Opt
     })
 }
 
-/// A wall that touches nothing and that its drive does not bring to the grains.
+/// A wall that touches no grain and does not reach one by its drive.
 fn apart<D: Dim>(wall: &Wall<D>, course: &Course<D>, grains: &Grains<D>) -> Option<String> {
     let (gap, _) = nearest(wall, grains)?;
     let mean = grains.radius.iter().sum::<f64>() / grains.len() as f64;

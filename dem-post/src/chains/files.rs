@@ -1,8 +1,8 @@
 //! What `dem-post chains` writes.
 
-use dem_run::history::History;
-use dem_run::plot::Chart;
-use dem_run::row;
+use dem_drawing::Chart;
+use dem_history::History;
+use dem_output::row;
 
 use super::pictures::{chain_map, distribution_chart, length_charts, network_map};
 use super::report::Report;

@@ -8,7 +8,7 @@
 //! **Chains** are lines of at least three grains: [`quasilinear`] says which.
 
 use clap::Args;
-use dem_run::history::History;
+use dem_history::History;
 
 use crate::analysis::Analysis;
 use crate::options::Moments;

@@ -1,11 +1,11 @@
 //! The drawings of forces and chains.
 
-use dem_run::history::{ContactRows, History};
+use dem_history::{ContactRows, History};
 
 use super::report::{CARRIES, Report};
 use crate::map::{Colour, Key, Link, Panel, Sample, draw};
 use crate::output::{Result, number, short};
-use dem_run::plot::{Chart, Drawing, Style, colour};
+use dem_drawing::{Chart, Drawing, Style, colour};
 
 /// Width of a line that carries ⟨f⟩, and the greatest width, units of the drawing: of disks, and of
 /// spheres.

@@ -17,7 +17,7 @@
 //!
 //! Chains in **tension** are the same with all signs turned.
 
-use dem_run::history::ContactRows;
+use dem_history::ContactRows;
 use serde::Serialize;
 
 use super::stress::{Tensor, major};

@@ -1,7 +1,7 @@
 //! The contact forces of some moments and the chains that carry most: the report, and how it is
 //! read from a history.
 
-use dem_run::history::{ContactRows, History};
+use dem_history::{ContactRows, History};
 use serde::Serialize;
 
 use super::quasilinear::{Chains, Kind, find};

@@ -1,6 +1,6 @@
 //! What the page of a report shows of contact forces and force chains.
 
-use dem_run::history::History;
+use dem_history::History;
 
 use super::pictures::{chain_map, distribution_chart, length_charts, network_map};
 use super::report::{CHAIN_HEAD, Report};

@@ -1,6 +1,6 @@
 //! The stress in a grain, and its principal values.
 
-use dem_run::history::{ContactRows, History};
+use dem_history::{ContactRows, History};
 
 use crate::output::Result;
 

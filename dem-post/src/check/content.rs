@@ -3,8 +3,8 @@
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
-use dem_run::history::sound::{Surroundings, is_huge, is_plausible, may_be_observed, median};
-use dem_run::history::{BondStatus, RuptureMode, SolverRoute};
+use dem_history::sound::{Surroundings, is_huge, is_plausible, may_be_observed, median};
+use dem_history::{BondStatus, RuptureMode, SolverRoute};
 use hdf5::H5Type;
 
 use super::checker::{Checker, Sizes};

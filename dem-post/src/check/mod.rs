@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use dem_run::history::History;
+use dem_history::History;
 use hdf5::{File, OpenMode};
 
 use crate::output::{Result, WriteError, progress};

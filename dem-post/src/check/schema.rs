@@ -1,6 +1,6 @@
 //! Checks names, types, shapes and units against the layout.
 
-use dem_run::history::{BondStatus, ContactStatus, ROUTE, RuptureMode, SolverRoute, WallDrive, WallKind};
+use dem_history::{BondStatus, ContactStatus, ROUTE, RuptureMode, SolverRoute, WallDrive, WallKind};
 use hdf5::Attribute;
 use hdf5::types::{CompoundField, EnumMember, EnumType, FloatSize, IntSize, TypeDescriptor, VarLenUnicode};
 

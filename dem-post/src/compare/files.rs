@@ -1,12 +1,12 @@
 //! What `dem-post compare` writes.
 
-use dem_run::history::History;
+use dem_history::History;
 
 use super::report::{Break, Fate, Gap, Report};
 use crate::map::{Key, Link, Panel, Sample, draw};
 use crate::output::{Folder, Result, cell};
-use dem_run::plot::{Chart, Drawing, Style, colour};
-use dem_run::row;
+use dem_drawing::{Chart, Drawing, Style, colour};
+use dem_output::row;
 
 /// Colours of bonds that broke in both runs, only in the first, only in the second.
 const COLOURS: [&str; 3] = [colour::BLACK, colour::BLUE, colour::VERMILLION];

@@ -12,7 +12,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use dem_run::history::History;
+use dem_history::History;
 
 use crate::analysis::Analysis;
 use crate::output::{Folder, Result, default_folder, source};

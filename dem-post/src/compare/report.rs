@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use dem_run::history::{History, Rupture};
-use dem_run::scene::{Difference, differences};
+use dem_history::{History, Rupture};
+use dem_scene::{Difference, differences};
 use serde::Serialize;
 
 use crate::output::{PostError, Result, Text, facts, number, quantity};

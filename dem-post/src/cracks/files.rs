@@ -1,6 +1,6 @@
 //! What `dem-post cracks` writes.
 
-use dem_run::history::History;
+use dem_history::History;
 
 use super::pictures::{broken_chart, crack_map, decohesion, fragment_charts, fragment_map, front_charts, surface_maps};
 use super::report::{Report, broken_over_time};
@@ -9,8 +9,8 @@ use crate::fragments::{Fragment, fragment_list};
 use crate::map::Sample;
 use crate::moments;
 use crate::output::{Folder, Result, cell};
-use dem_run::plot::Chart;
-use dem_run::row;
+use dem_drawing::Chart;
+use dem_output::row;
 
 /// Writes `ruptures.csv`, `broken.csv`, `fragments.csv` and `fragment-list.csv`, and as drawings
 /// `broken`, `fragments`, `fragment-map` and `decohesion`, of spheres also `decohesion-inside`;

@@ -10,7 +10,7 @@
 //! The **growth**, in contrast, lists the cracks as they are after each round, joined only by bonds
 //! that have broken so far. Where two cracks meet, the largest grows by the size of the other.
 
-use dem_run::history::Rupture;
+use dem_history::Rupture;
 use petgraph::unionfind::UnionFind;
 use serde::Serialize;
 

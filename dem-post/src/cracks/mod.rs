@@ -5,7 +5,7 @@
 //! surface, [`surfaces`].
 
 use clap::Args;
-use dem_run::history::History;
+use dem_history::History;
 
 use crate::analysis::Analysis;
 use crate::options::Moments;

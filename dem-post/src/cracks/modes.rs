@@ -1,6 +1,6 @@
 //! Broken bonds, counted by how they broke.
 
-use dem_run::history::RuptureMode;
+use dem_history::RuptureMode;
 use serde::Serialize;
 
 /// A number for each mode of rupture.

@@ -18,7 +18,7 @@
 //!   from the first axis. **Tortuosity**: length of the path over the distance of its ends, at
 //!   least 1.
 
-use dem_run::history::{Bonds, Rupture};
+use dem_history::{Bonds, Rupture};
 use petgraph::graph::NodeIndex;
 use serde::Serialize;
 

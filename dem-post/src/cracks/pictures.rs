@@ -1,6 +1,6 @@
 //! The drawings of cracks.
 
-use dem_run::history::{BondStatus, History};
+use dem_history::{BondStatus, History};
 
 use super::front::Growth;
 use super::paths::Crack;
@@ -9,7 +9,7 @@ use super::surfaces::Facet;
 use crate::fragments::{Fragment, Fragments};
 use crate::map::{Colour, Key, Link, Panel, Patch, Ramp, Sample, Scale, draw, draw_view};
 use crate::output::{Result, number};
-use dem_run::plot::{Chart, Drawing, Style, colour};
+use dem_drawing::{Chart, Drawing, Style, colour};
 
 /// Fill of grains that kept all their bonds.
 const BONDED: &str = "#8c8c8c";

@@ -1,6 +1,6 @@
 //! What became of the bonds of a run: the report, and how it is read from a history.
 
-use dem_run::history::{History, Rupture, RuptureMode};
+use dem_history::{History, Rupture, RuptureMode};
 use serde::Serialize;
 
 use super::front::{Front, Growth, fronts, growth};

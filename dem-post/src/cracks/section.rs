@@ -1,6 +1,6 @@
 //! What the page of a report shows of cracks.
 
-use dem_run::history::History;
+use dem_history::History;
 
 use super::pictures::{broken_chart, crack_map, decohesion, fragment_charts, front_charts, surface_maps};
 use super::report::{Report, broken_over_time};

@@ -20,7 +20,7 @@
 
 use std::collections::HashMap;
 
-use dem_run::history::{Bonds, Rupture};
+use dem_history::{Bonds, Rupture};
 use nalgebra::Vector3;
 use serde::Serialize;
 

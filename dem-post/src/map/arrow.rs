@@ -1,6 +1,6 @@
 //! Arrows.
 
-use dem_run::plot::{Canvas, colour};
+use dem_drawing::{Canvas, colour};
 
 /// An arrow with an open head that grows with it.
 pub(super) fn draw_arrow(canvas: &mut Canvas, from: (f64, f64), to: (f64, f64)) {

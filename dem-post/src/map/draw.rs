@@ -1,7 +1,7 @@
 //! Panels side by side or above each other on one sheet: grains, walls, lines, arrows and polygons.
 
-use dem_run::history::{Wall, WallKind};
-use dem_run::plot::{Anchor, Canvas, Drawing, colour};
+use dem_drawing::{Anchor, Canvas, Drawing, colour};
+use dem_history::{Wall, WallKind};
 
 use super::arrow::draw_arrow;
 use super::eye::Place;

@@ -3,7 +3,7 @@
 use super::arrow::draw_arrow;
 use super::scale::Scale;
 use crate::output::short;
-use dem_run::plot::{Anchor, Canvas, colour};
+use dem_drawing::{Anchor, Canvas, colour};
 
 /// Length of a bar of colours, and the strips it is made of.
 const BAR: f64 = 150.0;

@@ -1,6 +1,6 @@
 //! What one panel of a map shows.
 
-use dem_run::history::{GrainState, WallState};
+use dem_history::{GrainState, WallState};
 
 use super::scale::Colour;
 

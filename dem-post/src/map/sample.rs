@@ -1,7 +1,7 @@
 //! A sample as maps show it: its grains and walls, the viewpoint, and the part of the plane that is
 //! drawn.
 
-use dem_run::history::{GrainState, Grains, History, Wall, WallKind, WallState};
+use dem_history::{GrainState, Grains, History, Wall, WallKind, WallState};
 
 use super::boxes::{Box2, EMPTY, EVERYWHERE, around, union};
 use super::eye::{Eye, Place};

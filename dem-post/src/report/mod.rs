@@ -6,7 +6,7 @@
 //! gives the reason.
 
 use clap::Args;
-use dem_run::history::History;
+use dem_history::History;
 use serde::Serialize;
 
 use crate::analysis::Analysis;

@@ -1,7 +1,7 @@
 //! The page as HTML.
 
 use askama::Template;
-use dem_run::history::History;
+use dem_history::History;
 
 use crate::output::{PostError, Result};
 use crate::section::Section;

@@ -1,7 +1,7 @@
 //! Sections of the page that belong to no other analysis: the accuracy of the solver, the energy.
 
-use dem_run::history::{History, Series};
-use dem_run::plot::{Chart, Style, colour};
+use dem_drawing::{Chart, Style, colour};
+use dem_history::{History, Series};
 
 use super::solver::Accuracy;
 use crate::output::{Result, number};

@@ -1,6 +1,6 @@
 //! The accuracy of the solver, from the measures that the run recorded at every step.
 
-use dem_run::history::{FALSE_ACCELERATION, History, LOAD_ERROR, ROUTE, SolverRoute};
+use dem_history::{FALSE_ACCELERATION, History, LOAD_ERROR, ROUTE, SolverRoute};
 use serde::Serialize;
 
 use crate::output::{Result, number};

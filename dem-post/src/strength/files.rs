@@ -2,8 +2,8 @@
 
 use super::report::{Report, Run, axis};
 use crate::output::{Folder, Result, cell};
-use dem_run::plot::{Bars, Chart, Style, colour};
-use dem_run::row;
+use dem_drawing::{Bars, Chart, Style, colour};
+use dem_output::row;
 
 /// Values that span at least this ratio are shown on a logarithmic axis.
 const DECADE: f64 = 10.0;

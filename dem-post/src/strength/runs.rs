@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
-use dem_run::collapse::{BROKEN_SHARE, STRAINS};
-use dem_run::history::{History, WallDrive};
-use dem_run::scene::Load;
-use dem_run::sweep::store::{State, Store};
+use dem_history::sweep::{State, Store};
+use dem_history::{History, WallDrive};
+use dem_scene::Load;
+use dem_scene::failure::{BROKEN_SHARE, STRAINS};
 use serde::Serialize;
 use serde_json::Value;
 

@@ -14,7 +14,7 @@
 
 use std::collections::BTreeMap;
 
-use dem_run::scene::schema::json_schema;
+use dem_scene::schema::json_schema;
 use serde_json::Value;
 
 use crate::output::{PostError, Result};

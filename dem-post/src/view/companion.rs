@@ -4,7 +4,7 @@
 use std::ops::Range;
 use std::path::{Component, Path, PathBuf};
 
-use dem_run::history::HistoryError;
+use dem_history::HistoryError;
 use hdf5::types::FixedAscii;
 use hdf5::{Dataset, File, Group, H5Type, Hyperslab, SliceOrIndex};
 use ndarray::{ArrayViewD, ShapeError};

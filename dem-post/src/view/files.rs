@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dem_run::history::History;
+use dem_history::History;
 
 use super::companion::{Companion, Fault, relative};
 use super::outline::Outline;

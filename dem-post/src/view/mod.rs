@@ -5,7 +5,7 @@
 //! to themselves; almost nothing is copied (`docs/history.md` lists what, and its size).
 
 use clap::Args;
-use dem_run::history::History;
+use dem_history::History;
 
 use crate::analysis::Analysis;
 use crate::options::Files;

@@ -1,7 +1,7 @@
 //! The sizes of a history: numbers of grains, bonds and frames, and the rows of the contacts of
 //! each frame.
 
-use dem_run::history::History;
+use dem_history::History;
 
 use crate::output::{Result, progress};
 

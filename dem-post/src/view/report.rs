@@ -1,6 +1,6 @@
 //! Which companions a history can have: the report, and how it is read from the history.
 
-use dem_run::history::History;
+use dem_history::History;
 use serde::Serialize;
 
 use super::outline::Outline;

@@ -5,7 +5,7 @@
 //! first element. Positions of shape [T,N,D] are such an array of T N points, and the pairs of a
 //! frame are lines between them.
 
-use dem_run::history::History;
+use dem_history::History;
 use hdf5::{Group, H5Type, Hyperslab, SliceOrIndex};
 use indicatif::ProgressBar;
 use ndarray::ArrayView3;

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use dem_run::history::*;
+use dem_history::*;
 
 mod check;
 mod damage;

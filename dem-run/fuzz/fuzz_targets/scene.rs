@@ -5,11 +5,12 @@
 //!
 //! ```text
 //! cd dem-run && mkdir -p fuzz/corpus/scene
-//! cargo +nightly fuzz run scene fuzz/corpus/scene fuzz/seeds ../configs -- -dict=fuzz/scene.dict -max_total_time=600
+//! cargo +nightly fuzz run scene fuzz/corpus/scene fuzz/seeds ../configs -- \
+//!     -dict=fuzz/scene.dict -max_total_time=600
 //! ```
 #![no_main]
 
-use dem_run::scene::{self, Drive, Scene};
+use dem_scene::{self as scene, Drive, Scene};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {

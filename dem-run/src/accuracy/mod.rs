@@ -1,9 +1,11 @@
-//! `dem-run accuracy`: what a scene's numbers depend on that they should not depend on.
+//! `dem-run accuracy`: how far the results of a scene depend on solver, tolerance, time step,
+//! contact order and starting reactions.
 //!
-//! One sample is run over solvers, tolerances and time steps, and each run is compared with the finest of them
-//! ([`report`]); over contact orders and starting reactions ([`spread`]); and the contact problems of the finest run are
-//! solved by every solver ([`profile`]).
+//! One sample is run with several solvers, tolerances and time steps, and each run is compared with
+//! the finest of them ([`report`]). Then contact orders and starting reactions are varied
+//! ([`spread`]). Last, every solver solves the contact problems of the finest run ([`profile`]).
 
+mod options;
 mod pictures;
 pub mod profile;
 pub mod report;
@@ -11,10 +13,13 @@ pub mod spread;
 mod tables;
 pub mod trial;
 
+pub use options::AccuracyOptions;
+
 use crate::build::build;
+use crate::error::RunError;
 use crate::output::Folder;
 use crate::progress::Progress;
-use crate::run::{Execution, RunError, handle_signals};
+use crate::run::handle_signals;
 use crate::scene::Scene;
 use crate::signals::Interrupt;
 use dem_core::dim::{D2, D3, D3Twist, Dim};
@@ -22,40 +27,18 @@ use profile::Profile;
 use rayon::prelude::*;
 use report::{Asked, Indeterminacy, Report, Row, VariedRun};
 use spread::{Spread, Varied};
-use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 use trial::{Outcome, Posed, Sample, SolverName, Trial, Variant, Way};
 
 /// Contact problems taken from a run for the profile, at most.
 const MOST_PROBLEMS: usize = 50;
 
-/// What the command is asked for.
-#[derive(Debug, Clone, PartialEq)]
-pub struct AccuracyOptions {
-    /// The folder for the results.
-    pub folder: PathBuf,
-    /// Solvers, in the order of the tables.
-    pub solvers: Vec<SolverName>,
-    /// Tolerances (–).
-    pub tolerances: Vec<f64>,
-    /// Time steps over that of the scene (–).
-    pub steps: Vec<f64>,
-    /// Contact orders, and starting reactions, for each solver.
-    pub orders: u64,
-    /// Whether runs go on to the scene's end.
-    pub whole: bool,
-    /// How the command is carried out; the number of threads is that of the runs whose CPU time is not told.
-    pub execution: Execution,
-    /// Whether stdout is JSON.
-    pub json: bool,
-}
-
 /// Measure the accuracy of a scene, print the tables, and write them with their pictures.
 ///
 /// # Errors
-/// [`RunError`], as for a scene that drives several walls and does not say which loads the sample;
-/// what was measured before an interruption is written all the same. A run that does not converge
-/// is a row of the table, no error.
+/// [`RunError`], for example for a scene that drives several walls and does not say which one loads
+/// the sample. Measurements made before an interruption are written. A run that does not converge
+/// is a row of the table, not an error.
 pub fn accuracy(scene: &Scene, options: &AccuracyOptions) -> Result<(), RunError> {
     if let Some(names) = scene.load_unknown() {
         return Err(RunError::Usage(format!(
@@ -70,7 +53,7 @@ pub fn accuracy(scene: &Scene, options: &AccuracyOptions) -> Result<(), RunError
         _ if scene.twists() => measure::<D3Twist>(scene, options, &interrupt)?,
         _ => measure::<D3>(scene, options, &interrupt)?,
     };
-    let json = serde_json::to_string_pretty(&report).map_err(|e| RunError::InputOutput(e.to_string()))? + "\n";
+    let json = serde_json::to_string_pretty(&report)? + "\n";
     folder.write("accuracy.json", json.as_bytes())?;
     tables::write(&report, &mut folder)?;
     pictures::draw(&report, &mut folder)?;
@@ -99,7 +82,8 @@ fn measure<D: Dim>(scene: &Scene, options: &AccuracyOptions, interrupt: &Interru
     let posed = measuring.runs(&mut report);
     if varied > 0 && !interrupt.requested() {
         let threads = rayon::ThreadPoolBuilder::new().num_threads(options.execution.threads.unwrap_or(0)).build();
-        let threads = threads.map_err(|e| RunError::InputOutput(format!("threads cannot be started: {e}")))?;
+        let threads = threads
+            .map_err(|error| RunError::System { what: "threads cannot be started".into(), source: error.into() })?;
         report.indeterminacy = Some(threads.install(|| measuring.indeterminacy(&report.runs)));
     }
     if !interrupt.requested() {
@@ -123,7 +107,8 @@ impl<'a> Meter<'a> {
         Self { progress: Mutex::new(progress), interrupt, shares: Mutex::new(vec![0.0; runs]) }
     }
 
-    /// Tells that run `k`, which is one of those called `label`, has come so far; false: it shall stop.
+    /// Reports the share of run `k` that is done; `label` names the kind of run. Returns false if
+    /// the run must stop.
     fn tell(&self, k: usize, label: &str, share: f64) -> bool {
         let done = {
             let mut shares = self.shares.lock().unwrap_or_else(PoisonError::into_inner);
@@ -150,7 +135,7 @@ struct Measuring<'a, D: Dim> {
 impl<D: Dim> Measuring<'_, D> {
     /// Run every way, and enter the rows; gives the contact problems of the reference.
     ///
-    /// One run after the other: their CPU times are told.
+    /// The runs are sequential, because their CPU times are reported.
     fn runs(&self, report: &mut Report) -> Vec<Posed<D>> {
         let ways = self.asked.ways();
         let mut posed = vec![];
@@ -173,16 +158,16 @@ impl<D: Dim> Measuring<'_, D> {
             posed.push(problems);
         }
         report.compare();
-        // where no finest run came to its end, one that got on serves as well
+        // where no finest run came to its end, the problems of another run are used
         let full = |k: &usize| !posed[*k].is_empty();
         let from = report.reference.filter(full).or_else(|| (0..posed.len()).find(full));
         from.map_or(vec![], |k| posed.swap_remove(k))
     }
 
-    /// Run the sample of every solver in other orders and from other starts, where those should not matter, at the finest
-    /// tolerance and the longest step.
+    /// Run the sample with every solver, in other contact orders and from other starting reactions,
+    /// at the finest tolerance and the longest step. The results should not depend on either.
     ///
-    /// As many at a time as there are threads; the results stand in a fixed order.
+    /// The runs are parallel; the order of the results is fixed.
     fn indeterminacy(&self, rows: &[Row]) -> Indeterminacy {
         let asked = self.asked;
         let kinds = Varied::of(self.sample.elastic());

@@ -19,8 +19,8 @@ pub fn draw(report: &Report, folder: &mut Folder) -> Result<()> {
     }
 }
 
-/// For a bonded sample the two errors that a residual hides, the false strain and that of the collapse load; for
-/// another the residual.
+/// For a bonded sample the two errors that a residual hides, the false strain and that of the
+/// collapse load; for another the residual.
 fn work_precision(report: &Report) -> Vec<Chart> {
     let strain = over_time(report, "strain before the first break, all false", &|row| row.outcome.false_strain);
     let deviation =
@@ -36,15 +36,16 @@ fn work_precision(report: &Report) -> Vec<Chart> {
     charts.into_iter().flatten().collect()
 }
 
-/// Half of what the collapse load differs by from contact order to contact order, over its mean, for the solver in which
-/// it does most (–).
+/// Half the range of the collapse load over contact orders, over its mean, for the solver with the
+/// largest (–).
 fn indeterminate(report: &Report) -> Option<f64> {
     let spreads = report.indeterminacy.iter().flat_map(|i| &i.spreads);
     let share = spreads.filter_map(|s| s.collapse[0].map(|range| 0.5 * (range.max - range.min) / range.mean));
     share.filter(|share| *share > 0.0).max_by(f64::total_cmp)
 }
 
-/// A quantity over the CPU time of the runs, a curve for each solver and time step; none if it is never positive.
+/// A quantity over the CPU time of the runs, a curve for each solver and time step; none if it is
+/// never positive.
 fn over_time(report: &Report, title: &str, value: &dyn Fn(&Row) -> Option<f64>) -> Option<Chart> {
     let mut chart = Chart::new("CPU time of the steps (s)", title);
     (chart.log_x, chart.log_y) = (true, true);

@@ -1,19 +1,21 @@
-//! Performance profiles of the solvers over the contact problems of a run (Dolan & Moré, Math. Program. 91, 2002).
+//! Performance profiles of the solvers over the contact problems of a run (Dolan & Moré, Math.
+//! Program. 91, 2002).
 //!
-//! For solver s and problem p let c(p, s) be the cost, infinite if s does not solve p, and b(p) the least cost of any
-//! solver. The profile of s is ρ_s(τ), the share of all problems with c(p, s) ≤ τ b(p): ρ_s(1) is how often s is the
-//! fastest, and ρ_s(τ) for large τ how often it solves at all.
+//! For solver s and problem p let c(p, s) be the cost, infinite if s does not solve p, and b(p) the
+//! least cost of any solver. The profile of s is ρ_s(τ), the share of all problems with c(p, s) ≤ τ
+//! b(p): ρ_s(1) is how often s is the fastest, and ρ_s(τ) for large τ how often it solves at all.
 
-use super::trial::{Posed, SolverName, Way, thread_time};
+use super::trial::{Posed, SolverName, Way};
 use crate::build::settings;
+use crate::clock::thread_time;
 use crate::scene::Scene;
 use dem_core::dim::Dim;
 use dem_core::saved::Saved;
 use serde::Serialize;
 
-/// Solves of one problem, of which the fastest counts: the others were disturbed.
+/// Number of solves of one problem; the fastest counts, because other processes disturb the others.
 const REPEATS: usize = 3;
-/// Factors at which the table tells the profile.
+/// Factors τ at which the table gives the profile.
 pub const FACTORS: [f64; 6] = [1.0, 1.5, 2.0, 5.0, 10.0, 100.0];
 
 /// What a solver needed for one problem.
@@ -58,8 +60,8 @@ pub struct Profile {
 }
 
 impl Profile {
-    /// Solve every problem with every solver, to the tolerance of `way`. None if `watch`, which is told the share that is
-    /// done, says no.
+    /// Solve every problem with every solver, to the tolerance of `way`. `watch` gets the share
+    /// that is done; if it returns false, the result is none.
     pub fn measure<D: Dim>(
         posed: &[Posed<D>],
         scene: &Scene,
@@ -79,7 +81,7 @@ impl Profile {
         for (k, &solver) in solvers.iter().enumerate() {
             let mut scene = Way { solver, ..*way }.scene(scene);
             scene.solver.accept = None;
-            // one solver for all problems: as in a run, what it keeps from step to step serves the next
+            // one solver for all problems: as in a run, it keeps its state from step to step
             let mut built = settings::<D>(&scene).solver.build::<D>();
             let mut costs = vec![];
             for (p, posed) in posed.iter().enumerate() {
@@ -92,7 +94,8 @@ impl Profile {
                 built.save(&mut state);
                 for _ in 0..REPEATS {
                     let mut problem = posed.problem.clone();
-                    // what it learnt from this very problem would serve no run
+                    // a repeated solve must not start from what the solver learnt of the same
+                    // problem
                     built.restore(&mut state.read()).expect("its own state");
                     let began = thread_time();
                     solve = Some(built.solve(&mut problem));
@@ -119,8 +122,8 @@ impl Profile {
         self.solvers.iter().map(|solver| solver.costs.iter().map(time).collect()).collect()
     }
 
-    /// The profile of each solver as a curve of steps: (τ, share of the problems solved within τ times the best), from 1 to
-    /// a little beyond the largest ratio.
+    /// The profile of each solver as a curve of steps: (τ, share of the problems solved within τ
+    /// times the best), from 1 to a little beyond the largest ratio.
     #[must_use]
     pub fn curves(&self) -> Vec<Vec<(f64, f64)>> {
         let ratios = ratios(&self.cpu_times());
@@ -137,7 +140,8 @@ impl Profile {
     }
 }
 
-/// Cost over the least cost of any solver, for each solver and problem; infinite where it is not solved.
+/// Cost over the least cost of any solver, for each solver and problem; infinite where it is not
+/// solved.
 fn ratios(costs: &[Vec<Option<f64>>]) -> Vec<Vec<f64>> {
     let problems = costs.first().map_or(0, Vec::len);
     let best = |p: usize| costs.iter().filter_map(|costs| costs[p]).fold(f64::INFINITY, f64::min);

@@ -1,11 +1,11 @@
 //! What the command found, as it stands in `accuracy.json`.
 
-use super::AccuracyOptions;
+use super::options::AccuracyOptions;
 use super::profile::Profile;
 use super::spread::{Spread, Varied, jaccard};
 use super::trial::{Outcome, Sample, SolverName, Way};
-use crate::collapse::in_one_piece;
 use crate::scene::Scene;
+use crate::scene::failure::in_one_piece;
 use dem_core::dim::Dim;
 use serde::Serialize;
 
@@ -24,7 +24,8 @@ pub struct Asked {
     pub whole: bool,
     /// End of the scene's time (s).
     pub end: f64,
-    /// Largest residual that is accepted of a step that misses the tolerance, where that is larger than the tolerance (–).
+    /// Largest residual that is accepted of a step that misses the tolerance, where that is larger
+    /// than the tolerance (–).
     pub accept: f64,
 }
 
@@ -73,7 +74,7 @@ impl Asked {
         self.tolerances.last().copied().unwrap_or_default()
     }
 
-    /// Whether nothing is finer than this, whatever the solver.
+    /// Whether both tolerance and time step are the finest, for any solver.
     #[must_use]
     pub fn is_finest(&self, way: &Way) -> bool {
         way.tolerance == self.finest_tolerance() && Some(&way.step_factor) == self.steps.last()
@@ -203,8 +204,8 @@ impl Report {
 
     /// Choose the reference and compare all runs with it.
     ///
-    /// It is, of the runs that came to their end, one with the lowest tolerance, of these one with the shortest step, and of
-    /// these the one with the lowest median residual.
+    /// It is, of the runs that came to their end, one with the lowest tolerance, of these one with
+    /// the shortest step, and of these the one with the lowest median residual.
     pub fn compare(&mut self) {
         let key = |row: &Row| [row.way.tolerance, row.way.step_factor, row.outcome.median_residual];
         let finer = |a: &usize, b: &usize| {

@@ -1,4 +1,4 @@
-//! How far apart runs are whose answers should be one.
+//! How far runs differ that should give the same results.
 
 use super::trial::{Outcome, SolverName};
 use serde::Serialize;
@@ -12,13 +12,13 @@ pub struct Spread {
     pub varied: Varied,
     /// Runs that came to their end.
     pub runs: usize,
-    /// Runs in which a step was not solved: they count in nothing else.
+    /// Runs in which a step was not solved: they are left out of all other numbers.
     pub failed: usize,
     /// Applied force at the first break (N).
     pub first_break: Option<Range>,
     /// Different bonds that broke first.
     pub first_bonds: usize,
-    /// Collapse load (N) at each of [`crate::collapse::STRAINS`].
+    /// Collapse load (N) at each of [`crate::scene::failure::STRAINS`].
     pub collapse: [Option<Range>; 2],
     /// Mean Jaccard index over all pairs of broken sets (–); none for fewer than two runs.
     pub jaccard: Option<f64>,
@@ -35,8 +35,8 @@ pub enum Varied {
 }
 
 impl Varied {
-    /// What is varied of a bonded sample. Elastic bonds are not started: their reactions are the forces of springs, and others
-    /// would be another sample, one under stress.
+    /// What is varied of a bonded sample. Starting reactions of elastic bonds are not varied: they
+    /// are the forces of springs, so others would mean another sample, under stress.
     #[must_use]
     pub fn of(elastic: bool) -> &'static [Self] {
         if elastic { &[Self::Order] } else { &[Self::Order, Self::Start] }
@@ -103,8 +103,8 @@ impl Spread {
     }
 }
 
-/// Jaccard index |A ∩ B| / |A ∪ B| of two sorted sets (–): 1 if they are the same, 0 if they share nothing.
-/// Two empty sets are the same.
+/// Jaccard index |A ∩ B| / |A ∪ B| of two sorted sets (–): 1 if they are the same, 0 if they share
+/// nothing. Two empty sets are the same.
 #[must_use]
 pub fn jaccard(a: &[u32], b: &[u32]) -> f64 {
     let common = a.iter().filter(|k| b.binary_search(k).is_ok()).count();

@@ -1,6 +1,7 @@
-//! One run of the command: a scene stepped without a history, and what is read off it.
+//! One run of the command: time steps of a scene without a history, and the results.
 
 use crate::build::{Built, settings};
+use crate::clock::thread_time;
 use crate::collapse::{Collapse, Failure};
 use crate::course::Course;
 use crate::scene::{GaussSeidel, Newton, Scene, SolverKind};
@@ -19,7 +20,8 @@ use serde::{Serialize, Serializer};
 /// Random starting reactions of a bond, over what it can bear (–).
 const START_SHARE: f64 = 0.1;
 
-/// A solver by its name; its other settings are those of the scene where the scene has the same solver, else the defaults.
+/// A solver by its name; its other settings are those of the scene where the scene has the same
+/// solver, else the defaults.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum SolverName {
@@ -73,7 +75,8 @@ pub struct Way {
 }
 
 impl Way {
-    /// The scene as it is run this way. A step that misses the tolerance is taken where the scene would accept it.
+    /// The scene as it is run this way. A step that misses the tolerance is taken where the scene
+    /// would accept it.
     #[must_use]
     pub fn scene(&self, scene: &Scene) -> Scene {
         let mut scene = scene.clone();
@@ -91,7 +94,8 @@ impl Way {
 pub enum Variant {
     /// Nothing.
     AsGiven,
-    /// The order of the grains, and with it that of the contacts, by a number for the random generator.
+    /// The order of the grains, and with it that of the contacts, by a number for the random
+    /// generator.
     Order(u64),
     /// The reactions that the bonds start from, by a number for the random generator.
     Start(u64),
@@ -200,7 +204,8 @@ pub struct Posed<D: Dim> {
     pub problem: ContactProblem<D>,
 }
 
-/// Problems taken from a run at equal distances, at most a given number: when there are too many, every other is dropped.
+/// Contact problems taken from a run at equal intervals of steps, at most a given number: when
+/// there are too many, every second one is dropped and the interval is doubled.
 struct Problems<D: Dim> {
     list: Vec<Posed<D>>,
     most: usize,
@@ -227,7 +232,8 @@ impl<D: Dim> Problems<D> {
 /// What ended a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum End {
-    /// The strain is above 1e-3 and 5 % of the bonds are broken: the loads that are told are known.
+    /// The strain is above 1e-3 and 5 % of the bonds are broken: all loads that are reported are
+    /// known.
     Collapsed,
     /// The scene.
     Scene(Ending),
@@ -296,8 +302,8 @@ pub struct Outcome {
     /// Largest false acceleration of a step before the first break (–), see
     /// [`StepReport::false_acceleration`].
     pub false_acceleration: f64,
-    /// Largest component of the sample's strain before the first break (–), all of it false; none without bonds, or where they
-    /// are elastic.
+    /// Largest component of the sample's strain before the first break (–), all of it false; none
+    /// without bonds, or where they are elastic.
     pub false_strain: Option<f64>,
     /// Steps that were accepted and missed the tolerance.
     pub missed_tolerance: u64,
@@ -305,7 +311,7 @@ pub struct Outcome {
     pub rejected: u64,
     /// Deepest overlap (m).
     pub penetration: f64,
-    /// Energy that the books do not account for (J).
+    /// Remainder of the energy balance (J).
     pub energy_remainder: f64,
     /// Energy lost in intact bonds (J).
     pub bond_remainder: f64,
@@ -332,7 +338,8 @@ pub struct Trial<'a, D: Dim> {
 }
 
 impl<D: Dim> Trial<'_, D> {
-    /// Run. `watch` is told the share of the simulated time that is done; false stops the run, which then gives nothing.
+    /// Run. `watch` gets the share of the simulated time that is done; if it returns false, the run
+    /// stops and the result is none.
     pub fn run(&self, watch: &dyn Fn(f64) -> bool) -> Option<(Outcome, Vec<Posed<D>>)> {
         let (mut world, numbers) = self.sample.world(self.scene, self.variant);
         let mut state = Followed::new(self.scene, &world);
@@ -412,8 +419,9 @@ impl<D: Dim> Followed<D> {
         self.strain = world.strain().iter().fold(self.strain, |worst, e| worst.max(e.abs()));
     }
 
-    /// Whether the kinetic energy is beyond ten times all that was put in, and that of grains that move by their radius
-    /// in every step. Such a run means nothing any more, and would look for contacts among all pairs of grains.
+    /// Whether the kinetic energy exceeds both ten times the energy that was put in and the energy
+    /// of grains that move by their radius in every step. Such a run is meaningless, and its
+    /// detection would compare all pairs of grains.
     fn blown_up(&self, world: &World<D>) -> bool {
         let (ledger, g) = (&world.ledger, &world.grains);
         let fast = g.mass.iter().zip(&g.radius).map(|(m, r)| 0.5 * m * (r / world.settings.step).powi(2)).sum::<f64>();
@@ -451,12 +459,6 @@ impl<D: Dim> Followed<D> {
             broken,
         }
     }
-}
-
-/// CPU time of this thread so far (s).
-pub fn thread_time() -> f64 {
-    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
-    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
 }
 
 #[cfg(test)]

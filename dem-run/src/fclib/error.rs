@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-/// An error in reading or writing a problem. Its message names the file, the dataset and what is wrong.
+/// An error in reading or writing a problem. Its message names the file, the dataset and what is
+/// wrong.
 #[derive(Debug, thiserror::Error)]
 pub enum FclibError {
     /// The operating system refused.

@@ -1,18 +1,23 @@
-//! Contact problems in FCLIB's format (HDF5), the exchange format of the field: `dem-run export` and `dem-run solve`.
+//! Contact problems in FCLIB's format (HDF5), the exchange format of the field: `dem-run export`
+//! and `dem-run solve`.
 //!
-//! C contacts of S rows, N unknowns of bodies; every scalar is a dataset of one value, integers are 32 bits wide.
+//! C contacts of S rows, N unknowns of bodies; every scalar is a dataset of one value, integers are
+//! 32 bits wide.
 //!
 //! ```text
 //! /fclib_local/
-//!     spacedim             S: 2 (n, t), 3 (n, t1, t2); with mu_r 3 (n, t, m) or 5 (n, t1, t2, m1, m2); with mu_t, too,
-//!                          6 (…, twist), which other programs do not know
+//!     spacedim             S: 2 (n, t), 3 (n, t1, t2); with mu_r 3 (n, t, m) or
+//!                          5 (n, t1, t2, m1, m2); with mu_t, too, 6 (…, twist), which other
+//!                          programs do not know
 //!     W/                   m, n, nzmax, nz, p, i, x: the matrix, C·S × C·S
 //!         nz = −1          by columns: p[n + 1] where each starts, i[nzmax] rows, x[nzmax] values
 //!         nz = −2          by rows: p[m + 1] where each starts, i[nzmax] columns, x[nzmax] values
 //!         nz ≥ 0           nz triplets: i[nz] rows, p[nz] columns, x[nz] values
-//!     vectors/             q [C·S]; mu [C]; mu_r [C] where there are rolling rows; mu_t [C] where there is one of twist
+//!     vectors/             q [C·S]; mu [C]; mu_r [C] where there are rolling rows; mu_t [C]
+//!                          where there is one of twist
 //!     info/                title, description, math_info: text
-//! /fclib_global/           or this, read but not written: M v = H r + f, u = Hᵀ v + w over the velocities v of the bodies
+//! /fclib_global/           or this, read but not written: M v = H r + f, u = Hᵀ v + w over
+//!                          the velocities v of the bodies
 //! /fclib_global_rolling/   the same, with mu_r
 //!     spacedim, info/      as above
 //!     M/, H/               N × N and N × C·S, stored as W is
@@ -25,8 +30,8 @@
 //!     applied              norm of the applied impulses (N s), one scale of the residual
 //! ```
 //!
-//! FCLIB has all contacts follow Coulomb's law as the bipotential has it; that is what a file without `/cohesive_dem`
-//! means. What r, q and mu_r are for cohesive bonds: docs/theory/fclib.md.
+//! In FCLIB all contacts follow Coulomb's law in the form of the bipotential; so do those of a file
+//! without `/cohesive_dem`. For r, q and mu_r of cohesive bonds see docs/theory/fclib.md.
 
 mod error;
 mod reader;

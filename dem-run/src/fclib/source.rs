@@ -8,8 +8,7 @@ use hdf5::{File, H5Type};
 use super::FclibError;
 use crate::history::reason;
 
-/// Deflate cannot shrink anything further than this, so no honest dataset is larger than this many
-/// file lengths.
+/// Largest compression ratio of deflate: no dataset can be larger than this many file lengths.
 const GREATEST_COMPRESSION: u64 = 1032;
 
 /// An entry of a matrix: row, column, value.
@@ -44,7 +43,7 @@ impl Source {
         FclibError::Wrong { path: self.path.clone(), place: place.into(), why: why.into() }
     }
 
-    /// Whether there is such a link; each group on the way must be there, too.
+    /// Whether the link exists, with every group on its path.
     pub fn has(&self, place: &str) -> bool {
         let ends = place.match_indices('/').map(|(end, _)| end).chain([place.len()]);
         ends.into_iter().all(|end| self.file.link_exists(&place[..end]))
@@ -72,7 +71,7 @@ impl Source {
         }
     }
 
-    /// So many finite numbers.
+    /// A dataset of `expected` finite numbers.
     pub fn finite(&self, place: &str, expected: usize) -> Result<Vec<f64>, FclibError> {
         let values: Vec<f64> = self.counted(place, expected)?;
         match values.iter().position(|x| !x.is_finite()) {

@@ -7,10 +7,11 @@ use hdf5::{File, Group, H5Type};
 
 use super::{FclibError, Problem};
 use crate::history::reason;
-use crate::replace::replace;
+use crate::output::replace::replace;
 
 impl Problem {
-    /// Writes the problem, its reactions as the first guess if they are not all zero, and its solution if there is one.
+    /// Writes the problem, its reactions as the first guess if they are not all zero, and its
+    /// solution if there is one.
     ///
     /// The file is made beside `path` and moved there when it is complete.
     ///
@@ -102,7 +103,8 @@ fn integer(group: &Group, name: &str, value: usize) -> hdf5::Result<()> {
     dataset(group, name, &integers([value])?)
 }
 
-/// A text of fixed length, the only kind that FCLIB's library reads: ASCII, cut where it is too long.
+/// A text of fixed length, the only kind that FCLIB's library reads: ASCII, cut where it is too
+/// long.
 fn text<const N: usize>(group: &Group, name: &str, value: &str) -> hdf5::Result<()> {
     let ascii = |c: char| if c.is_ascii() && c != '\0' { c as u8 } else { b'?' };
     // one byte is left for the zero that ends it in C

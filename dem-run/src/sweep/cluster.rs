@@ -2,23 +2,24 @@
 
 use std::path::Path;
 
-use super::store::{Manifest, State, Store, replace};
-use crate::run::RunError;
+use crate::error::RunError;
+use crate::history::sweep::{Manifest, State, Store};
 
 /// Writes `slurm.sh` and `Snakefile` beside the manifest; gives their paths.
 ///
 /// # Errors
 /// A file cannot be written.
 pub fn write(store: &Store, sweep: &Path, manifest: &Manifest) -> Result<(), RunError> {
+    let system = |what: String, error: std::io::Error| RunError::System { what, source: error.into() };
     let absolute = |path: &Path| {
-        let path = std::path::absolute(path).map_err(|e| RunError::InputOutput(format!("{}: {e}", path.display())))?;
+        let path = std::path::absolute(path).map_err(|error| system(path.display().to_string(), error))?;
         Ok::<String, RunError>(path.display().to_string())
     };
-    let program = std::env::current_exe().map_err(|e| RunError::InputOutput(format!("this program: {e}")))?;
+    let program = std::env::current_exe().map_err(|error| system("this program".into(), error))?;
     let (program, sweep, folder) = (absolute(&program)?, absolute(sweep)?, absolute(store.folder())?);
     let name = &manifest.sweep;
-    replace(&store.folder().join("slurm.sh"), slurm(name, &numbers(manifest), &program, &sweep, &folder).as_bytes())?;
-    replace(&store.folder().join("Snakefile"), snakefile(name, &program, &sweep, &folder).as_bytes())
+    store.write("slurm.sh", slurm(name, &numbers(manifest), &program, &sweep, &folder).as_bytes())?;
+    Ok(store.write("Snakefile", snakefile(name, &program, &sweep, &folder).as_bytes())?)
 }
 
 /// The numbers of the runs that are not done, as Slurm takes them: 1-3,7.
@@ -101,7 +102,7 @@ fn shell(word: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sweep::store::Entry;
+    use crate::history::sweep::Entry;
 
     #[test]
     fn numbers_of_runs_are_spans_without_those_that_are_done() {

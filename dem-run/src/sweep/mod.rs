@@ -1,7 +1,8 @@
 //! `dem-run sweep`: one scene with many values, each run a process and a history of its own.
 //!
 //! ```text
-//! sweep file ──plan──▶ scenes, all checked ──reconcile──▶ what is left ──work──▶ histories and states ──store──▶ manifest
+//! sweep file ──plan──▶ scenes, all checked ──reconcile──▶ what is left
+//!            ──work──▶ histories and states ──report──▶ manifest, table
 //! ```
 
 mod cluster;
@@ -9,7 +10,6 @@ pub mod model;
 pub mod plan;
 mod reconcile;
 mod report;
-pub mod store;
 mod work;
 
 use std::fmt;
@@ -17,13 +17,15 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use crate::check::{Check, size};
-use crate::output::{facts, print_line, print_result};
-use crate::run::{Execution, RunError, handle_signals};
+use crate::check::Check;
+use crate::destination::folder_or_new;
+use crate::error::RunError;
+use crate::history::sweep::{Manifest, State, Store};
+use crate::output::{facts, print_line, print_result, size};
+use crate::run::{Execution, handle_signals};
 use plan::{Plan, describe};
 use reconcile::reconcile;
 use report::Standing;
-use store::{Manifest, State, Store};
 use work::{Job, carry_out};
 
 /// What is asked of a sweep.
@@ -56,7 +58,7 @@ pub enum Mode {
     Check,
     /// The manifest is written, and the files for other schedulers.
     Prepare,
-    /// The states are gathered and told.
+    /// The states of the runs are gathered and printed.
     Status,
     /// One run is carried out, by its number.
     One(String),
@@ -65,14 +67,11 @@ pub enum Mode {
 /// Carries a sweep out, or one of its parts.
 ///
 /// # Errors
-/// [`RunError`]: a sweep or a scene that is wrong, results in the way, files that cannot be written, an interruption,
-/// [`RunError::Runs`] where runs failed. What was done before is kept.
+/// [`RunError`]: a sweep or a scene that is wrong, results in the way, files that cannot be
+/// written, an interruption, [`RunError::Runs`] where runs failed. What was done before is kept.
 pub fn sweep(options: &SweepOptions) -> Result<(), RunError> {
     let store = Store::new(options.folder.clone());
-    if store.folder().exists() && !store.folder().is_dir() {
-        let shown = store.folder().display();
-        return Err(RunError::InputOutput(format!("{shown} is a file: name a folder with -o DIR")));
-    }
+    folder_or_new(store.folder())?;
     if options.mode == Mode::Status {
         return status(&store, options);
     }
@@ -83,7 +82,7 @@ pub fn sweep(options: &SweepOptions) -> Result<(), RunError> {
         mode => {
             let mut manifest = reconcile(&store, &plan, options.overwrite)?;
             store.create()?;
-            store.write(&mut manifest)?;
+            report::write(&store, &mut manifest)?;
             if *mode == Mode::Prepare {
                 prepare(&store, manifest, options)
             } else {
@@ -113,10 +112,12 @@ fn all(store: &Store, plan: &Plan, mut manifest: Manifest, options: &SweepOption
     let at_a_time = options.jobs.or_else(|| std::thread::available_parallelism().ok().map(usize::from)).unwrap_or(1);
     let carried = match jobs.is_empty() {
         true => Ok(()),
-        false => carry_out(store, &jobs, at_a_time, &interrupt, &mut progress, &mut || store.write(&mut manifest)),
+        false => {
+            carry_out(store, &jobs, at_a_time, &interrupt, &mut progress, &mut || report::write(store, &mut manifest))
+        }
     };
-    // what was done is told whatever came in between
-    let written = store.write(&mut manifest);
+    // the runs that are done are reported, also after an error
+    let written = report::write(store, &mut manifest);
     let failed = failures(store, &manifest);
     let standing = Standing { folder: options.folder.clone(), manifest };
     let printed = print_result(&standing, options.json);
@@ -128,12 +129,12 @@ fn all(store: &Store, plan: &Plan, mut manifest: Manifest, options: &SweepOption
     failed
 }
 
-/// Carries out one run of a sweep that has been prepared; touches nothing but the files of this run.
+/// Carries out one run of a sweep that has been prepared; touches nothing but the files of this
+/// run.
 fn one(store: &Store, plan: &Plan, id: &str, options: &SweepOptions) -> Result<(), RunError> {
     let (sweep, folder) = (options.sweep.display(), store.folder().display());
     let Some(manifest) = store.manifest()? else {
-        let remedy = format!("dem-run sweep {sweep} -o {folder} --prepare makes it");
-        return Err(RunError::InputOutput(format!("{folder} holds no manifest.json: {remedy}")));
+        return Err(without_manifest(store, format!("dem-run sweep {sweep} -o {folder} --prepare makes it")));
     };
     let Some(entry) = manifest.run(id) else {
         let last = manifest.runs.last().map_or("none", |run| &run.id);
@@ -183,20 +184,21 @@ fn prepare(store: &Store, manifest: Manifest, options: &SweepOptions) -> Result<
     ))?)
 }
 
-/// Gathers the states of all runs and tells them.
+/// Gathers the states of all runs and prints them.
 fn status(store: &Store, options: &SweepOptions) -> Result<(), RunError> {
     let Some(mut manifest) = store.manifest()? else {
-        let shown = store.folder().display();
-        return Err(RunError::InputOutput(format!(
-            "{shown} holds no manifest.json: the sweep was never started there"
-        )));
+        return Err(without_manifest(store, "the sweep was never started there".into()));
     };
-    store.write(&mut manifest)?;
+    report::write(store, &mut manifest)?;
     Ok(print_result(&Standing { folder: options.folder.clone(), manifest }, options.json)?)
 }
 
-/// The exit code that a failed run's own stands for: what is neither a wrong scene nor a lack of convergence is the
-/// machine's.
+fn without_manifest(store: &Store, remedy: String) -> RunError {
+    RunError::Unfit { path: store.folder().into(), state: "holds no manifest.json", remedy }
+}
+
+/// The exit code of the sweep for that of a failed run: 2 wrong scene, 3 no convergence, 4 all
+/// others.
 fn exit_code(code: Option<i32>) -> u8 {
     match code {
         Some(2) => 2,

@@ -67,7 +67,8 @@ pub enum Spacing {
     Geometric,
 }
 
-/// A list or an object, told by its bracket: serde's own choice between the two would lose the place of an error.
+/// A list or an object, told by its bracket: serde's own choice between the two would lose the
+/// place of an error.
 impl<'de> Deserialize<'de> for Values {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         struct ByBracket;

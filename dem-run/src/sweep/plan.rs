@@ -9,7 +9,7 @@ use serde_json::Value;
 use sha2::{Digest, Sha256};
 
 use super::model::{Range, Spacing, Sweep, Values};
-use crate::run::RunError;
+use crate::error::RunError;
 use crate::scene::parse::{self, Document};
 use crate::scene::{self, Base, Change, Origin, Problem, Sample, Scene, SceneError, shorten};
 
@@ -52,10 +52,14 @@ impl Plan {
     /// Reads a sweep file and the scene that it names, and puts every value in.
     ///
     /// # Errors
-    /// [`RunError::Scene`] with all that is wrong; [`RunError::InputOutput`] for files that cannot be read.
+    /// [`RunError::Scene`] with all that is wrong; [`RunError::Content`] for files that cannot be
+    /// read.
     pub fn read(path: &Path) -> Result<Self, RunError> {
-        let text = scene::text(path)
-            .map_err(|error| RunError::InputOutput(format!("{}: the sweep cannot be read: {error}", path.display())))?;
+        let unreadable = |path: &Path, what, error: std::io::Error| {
+            let source = error.into();
+            RunError::Content { path: path.into(), what, source }
+        };
+        let text = scene::text(path).map_err(|error| unreadable(path, "the sweep", error))?;
         let document = parse::parse(&path.display().to_string(), &text)?;
         let sweep: Sweep = document.decode().map_err(|problem| wrong(&document, vec![problem]))?;
         let problems = document.merge_non_finite(validate(&sweep));
@@ -73,8 +77,7 @@ impl Plan {
             if let Sample::File(file) = &run.scene.sample
                 && let Err(error) = std::fs::metadata(&file.path)
             {
-                let shown = file.path.display();
-                return Err(RunError::InputOutput(format!("{shown}: the sample cannot be read: {error}")));
+                return Err(unreadable(&file.path, "the sample", error));
             }
         }
         let fields = sweep.vary.iter().flat_map(BTreeMap::keys).cloned().collect();
@@ -228,7 +231,7 @@ fn runs(sweep: &Sweep, base: &Base, scene: &Path) -> Result<Vec<PlannedRun>, Vec
     if problems.is_empty() { Ok(runs) } else { Err(problems) }
 }
 
-/// A problem of a run's scene as one of the sweep, and by what to know it when it comes again.
+/// A problem of a run's scene as one of the sweep, with a key that finds repetitions in other runs.
 fn located(
     problem: Problem,
     changes: &[Change],
@@ -263,7 +266,7 @@ fn same_scene(runs: &[PlannedRun]) -> Option<Problem> {
     })
 }
 
-/// A run whose table of results could not say what the load is.
+/// A run in which several walls are driven and none is named as the load wall.
 fn load_unknown(runs: &[PlannedRun]) -> Option<Problem> {
     let (run, names) = runs.iter().find_map(|run| Some((run, run.scene.load_unknown()?)))?;
     let found =
@@ -288,14 +291,14 @@ fn content(path: &Path) -> std::io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// SHA-256 of all that a scene's history depends on: the scene without its title, and the grains of its sample file in
-/// place of the file's name.
+/// SHA-256 of all that a scene's history depends on: the scene without its title, and the grains of
+/// its sample file in place of the file's name.
 fn digest(scene: &Scene, samples: &mut HashMap<PathBuf, Vec<u8>>) -> String {
     let mut plain = Scene { schema: None, title: None, ..scene.clone() };
     let mut hash = Sha256::new();
     if let Sample::File(file) = &mut plain.sample {
         let path = std::mem::take(&mut file.path);
-        // one that cannot be read is told when all else is known to be right
+        // a sample file that cannot be read is reported after all other errors
         hash.update(samples.entry(path).or_insert_with_key(|path| content(path).unwrap_or_default()));
     }
     hash.update(plain.to_json().unwrap_or_default());

@@ -1,7 +1,7 @@
-//! A sweep that was begun, and the sweep file as it is now: which results still count.
+//! Which results of an earlier start of a sweep still agree with the sweep file.
 //!
-//! A run is known by the digest of its scene, not by its place in the sweep. So values may be added anywhere: runs that
-//! are there keep their numbers, new ones get the next.
+//! A run is known by the digest of its scene, not by its place in the sweep. So values may be added
+//! anywhere: runs that are there keep their numbers, new ones get the next.
 
 use std::collections::HashSet;
 use std::fs;
@@ -9,8 +9,8 @@ use std::fs;
 use serde_json::Value;
 
 use super::plan::{Plan, PlannedRun, describe};
-use super::store::{Entry, Manifest, Store};
-use crate::run::RunError;
+use crate::error::RunError;
+use crate::history::sweep::{Entry, Manifest, Store};
 use crate::scene::parse::join;
 use crate::scene::shorten;
 
@@ -25,9 +25,9 @@ pub fn reconcile(store: &Store, plan: &Plan, give_up: bool) -> Result<Manifest, 
     let mut manifest = Manifest::new(&plan.sweep, &plan.scene, plan.fields.clone());
     let old = store.manifest()?;
     if old.is_none() && store.path("", "").exists() && !give_up {
-        let shown = store.folder().display();
-        let remedy = "-o DIR names another, --force puts this sweep's runs there";
-        return Err(RunError::InputOutput(format!("{shown} holds runs and no manifest.json: {remedy}")));
+        let remedy = "-o DIR names another, --force puts this sweep's runs there".into();
+        let state = "holds runs and no manifest.json";
+        return Err(RunError::Unfit { path: store.folder().into(), state, remedy });
     }
     let old = old.map(|manifest| manifest.runs).unwrap_or_default();
     let known: HashSet<&str> = old.iter().map(|run| run.digest.as_str()).collect();

@@ -7,9 +7,9 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::plan::describe;
-use super::store::{Entry, Manifest, State};
+use crate::error::RunError;
+use crate::history::sweep::{Entry, Manifest, State, Store};
 use crate::output::number;
-use crate::run::RunError;
 
 /// Columns of the table that come from the summary of a run: name, and place in the summary.
 const MEASURED: [(&str, &str); 15] = [
@@ -30,18 +30,28 @@ const MEASURED: [(&str, &str); 15] = [
     ("missed_tolerance", "/missed_tolerance"),
 ];
 
+/// Brings the states in the manifest up to date and writes it, with the table of runs.
+///
+/// # Errors
+/// A file cannot be written.
+pub fn write(store: &Store, manifest: &mut Manifest) -> Result<(), RunError> {
+    store.gather(manifest);
+    store.write_manifest(manifest)?;
+    let table = table(manifest, &|id| store.outcome(id)?.summary)?;
+    Ok(store.write("runs.csv", &table)?)
+}
+
 /// `runs.csv`: a row for each run; what a run has no value for is empty.
 ///
 /// # Errors
 /// None that is known: the table is made in memory.
-pub fn table(manifest: &Manifest, summary: &dyn Fn(&str) -> Option<Value>) -> Result<Vec<u8>, RunError> {
-    let failed = |error: csv::Error| RunError::InputOutput(error.to_string());
+fn table(manifest: &Manifest, summary: &dyn Fn(&str) -> Option<Value>) -> Result<Vec<u8>, RunError> {
     let mut writer = csv::Writer::from_writer(vec![]);
     let fields = manifest.fields.iter().map(String::as_str);
     let measured = MEASURED.iter().map(|(name, _)| *name);
     let head = ["id"].into_iter().chain(fields).chain(["state"]).chain(measured);
     let tail = ["broken", "wall_time", "cpu_time", "history", "message"];
-    writer.write_record(head.chain(tail)).map_err(failed)?;
+    writer.write_record(head.chain(tail))?;
     for run in &manifest.runs {
         let summary = if run.state == State::Left { None } else { summary(&run.id) }.unwrap_or_default();
         let broken = summary["broken"].as_array().map(|modes| modes.iter().filter_map(Value::as_u64).sum::<u64>());
@@ -52,9 +62,9 @@ pub fn table(manifest: &Manifest, summary: &dyn Fn(&str) -> Option<Value>) -> Re
         row.extend(MEASURED.iter().map(|(_, place)| summary.pointer(place).map_or(String::new(), plain)));
         row.extend([broken.map_or(String::new(), |n| n.to_string()), time(run.wall_time), time(run.cpu_time)]);
         row.extend([run.history.clone(), run.message.clone().unwrap_or_default()]);
-        writer.write_record(row).map_err(failed)?;
+        writer.write_record(row)?;
     }
-    writer.into_inner().map_err(|error| RunError::InputOutput(error.to_string()))
+    writer.into_inner().map_err(|error| csv::Error::from(error.into_error()).into())
 }
 
 /// A value as a cell: a text without its quotes, nothing for null.

@@ -1,7 +1,7 @@
 //! Carrying runs out: each as a process of its own, some at a time.
 //!
-//! A process, not a thread: one that runs out of memory or crashes inside the HDF5 library ends alone, and its threads,
-//! its processor time and its signals are its own.
+//! A process, not a thread: one that runs out of memory or crashes inside the HDF5 library ends
+//! alone, and its threads, its processor time and its signals are its own.
 
 use std::fs::{self, File};
 use std::io::{Read as _, Write as _};
@@ -12,10 +12,10 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::plan::PlannedRun;
-use super::store::{Outcome, State, Store};
+use crate::error::RunError;
+use crate::history::sweep::{Outcome, State, Store};
+use crate::output::replace::move_to;
 use crate::progress::{Progress, RunsProgress};
-use crate::replace::move_to;
-use crate::run::RunError;
 use crate::scene::Sample;
 use crate::signals::Interrupt;
 
@@ -34,13 +34,14 @@ pub struct Job<'a> {
     pub run: &'a PlannedRun,
 }
 
-/// Carries runs out, in their order, `at_a_time` of them at the same time, until all have ended, the interruption, or a
-/// file that cannot be written.
+/// Carries runs out in their order, `at_a_time` at the same time, until all have ended, the sweep
+/// is interrupted, or a file cannot be written.
 ///
 /// `gather` is called every few seconds where runs have ended.
 ///
 /// # Errors
-/// A file that cannot be written, or a process that cannot be started. A run that fails is no error.
+/// A file that cannot be written, or a process that cannot be started. A run that fails is no
+/// error.
 pub fn carry_out(
     store: &Store,
     jobs: &[Job<'_>],
@@ -81,11 +82,11 @@ struct Crew<'a> {
     next: AtomicUsize,
     /// Runs that have ended, and of these the failed ones.
     ended: Mutex<(usize, usize)>,
-    /// What makes it senseless to go on.
+    /// The error that stops all runs.
     error: Mutex<Option<RunError>>,
 }
 
-/// What is guarded is whole after every statement, so a panic elsewhere does not spoil it.
+/// The guarded data is consistent after every statement, so a panic in another thread does no harm.
 fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -123,7 +124,10 @@ impl Crew<'_> {
         if before.is_some_and(|outcome| outcome.state == State::Done) && store.is_complete(id) {
             return Ok(Some(State::Done));
         }
-        let failed = |doing: &str, e: std::io::Error| RunError::InputOutput(format!("run {id} cannot be {doing}: {e}"));
+        let failed = |doing: &str, error: std::io::Error| {
+            let what = format!("run {id} cannot be {doing}");
+            RunError::System { what, source: error.into() }
+        };
         write_scene(&mut scene, run).map_err(|e| failed("written", e))?;
         let began = Instant::now();
         let mut child = start(store, id).map_err(|e| failed("started", e))?;
@@ -181,7 +185,8 @@ fn write_scene(file: &mut File, run: &PlannedRun) -> std::io::Result<()> {
     file.write_all(b"\n")
 }
 
-/// This program, also where its file has been replaced since it was started: all runs of a sweep are of one version.
+/// This program, also where its file has been replaced since it was started: all runs of a sweep
+/// are of one version.
 fn this_program() -> std::io::Result<PathBuf> {
     let running = Path::new("/proc/self/exe");
     if cfg!(target_os = "linux") && running.exists() { Ok(running.into()) } else { std::env::current_exe() }
@@ -214,7 +219,7 @@ fn terminate(child: &mut Child) {
     let _ = child.kill();
 }
 
-/// What a run came to, by its exit code and what it said.
+/// The outcome of a run, from its exit code and its output.
 fn outcome(store: &Store, job: &Job<'_>, status: ExitStatus, summary: &str, wall_time: Duration) -> Outcome {
     let log = store.path(job.id, ".log");
     let said = fs::read_to_string(&log).unwrap_or_default();
@@ -222,7 +227,7 @@ fn outcome(store: &Store, job: &Job<'_>, status: ExitStatus, summary: &str, wall
         let _ = fs::remove_file(&log);
     }
     let summary: Option<serde_json::Value> = serde_json::from_str(summary).ok();
-    // a run that ended well and says nothing is not believed
+    // exit code 0 without a summary counts as a failure
     let done = status.success() && summary.is_some();
     let why = match said.trim().trim_start_matches("error: ") {
         "" => format!("the run ended with {status} and said nothing"),

@@ -1,4 +1,4 @@
-use dem_run::history::RuptureMode;
+use dem_history::RuptureMode;
 
 use petgraph::algo::floyd_warshall;
 use petgraph::graph::UnGraph;

@@ -1,4 +1,4 @@
-use dem_run::history::RuptureMode;
+use dem_history::RuptureMode;
 
 use super::super::front::growth;
 use super::*;

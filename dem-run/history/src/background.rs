@@ -1,0 +1,103 @@
+//! A writer on its own thread, so that the run does not wait for the disk.
+
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread::JoinHandle;
+
+use super::checkpoint::Checkpoint;
+use super::error::Result;
+use super::model::{Frame, Rupture};
+use super::writer::Writer;
+
+/// Most batches that wait to be written.
+const WAITING: usize = 4;
+
+/// What is written together: observations and ruptures since the last batch, then a frame, then a
+/// checkpoint.
+#[derive(Debug, Default)]
+pub struct Batch {
+    /// Steps, times and observables, one row each.
+    pub observations: Vec<(i64, f64, Vec<f64>)>,
+    /// Bonds that broke.
+    pub ruptures: Vec<Rupture>,
+    /// The frame that makes them visible.
+    pub frame: Option<Frame>,
+    /// The state of that frame.
+    pub checkpoint: Option<Checkpoint>,
+}
+
+/// A [`Writer`] on its own thread.
+pub struct Background {
+    batches: Option<SyncSender<Batch>>,
+    thread: Option<JoinHandle<Result<()>>>,
+}
+
+impl Background {
+    /// Lets a thread write what is handed over from now on.
+    pub fn start(writer: Writer) -> Self {
+        let (batches, waiting) = sync_channel(WAITING);
+        let thread = std::thread::spawn(move || write_all(writer, &waiting));
+        Self { batches: Some(batches), thread: Some(thread) }
+    }
+
+    /// Hands over a batch; waits while too many are before it.
+    ///
+    /// # Errors
+    /// The error that ended the writer, for this batch or one before it.
+    pub fn write(&mut self, batch: Batch) -> Result<()> {
+        match &self.batches {
+            Some(batches) if batches.send(batch).is_ok() => Ok(()),
+            // the thread ended, by an error that it returns
+            _ => self.end(),
+        }
+    }
+
+    /// Waits until everything is written, and closes the file.
+    ///
+    /// # Errors
+    /// The error that ended the writer.
+    pub fn finish(mut self) -> Result<()> {
+        self.end()
+    }
+
+    fn end(&mut self) -> Result<()> {
+        self.batches = None;
+        match self.thread.take().map(JoinHandle::join) {
+            Some(Ok(result)) => result,
+            Some(Err(panic)) => std::panic::resume_unwind(panic),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Drop for Background {
+    fn drop(&mut self) {
+        // an error is already returned elsewhere, and the file is good up to its last frame
+        let _ = self.end();
+    }
+}
+
+fn write_all(mut writer: Writer, batches: &Receiver<Batch>) -> Result<()> {
+    for batch in batches {
+        if let Err(error) = write(&mut writer, &batch) {
+            writer.abandon();
+            return Err(error);
+        }
+    }
+    writer.finish()
+}
+
+fn write(writer: &mut Writer, batch: &Batch) -> Result<()> {
+    for (step, time, values) in &batch.observations {
+        writer.observe(*step, *time, values)?;
+    }
+    for rupture in &batch.ruptures {
+        writer.rupture(rupture)?;
+    }
+    if let Some(frame) = &batch.frame {
+        writer.frame(frame)?;
+    }
+    if let Some(checkpoint) = &batch.checkpoint {
+        writer.checkpoint(checkpoint)?;
+    }
+    Ok(())
+}

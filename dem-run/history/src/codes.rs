@@ -1,0 +1,164 @@
+//! The enumerations that a history stores, each a real HDF5 enum datatype.
+//!
+//! A file may hold any byte in place of an enum. So values are read as raw codes (`…Code`,
+//! transparent over the integer, with the HDF5 enum as datatype) and then checked against the
+//! variants.
+
+use hdf5::H5Type;
+use hdf5::types::{EnumMember, EnumType, IntSize, TypeDescriptor};
+
+/// A Rust enum and its raw code in the file.
+pub(super) trait Coded: Copy {
+    /// The stored integer, of HDF5 enum type.
+    type Code: H5Type + Copy;
+    /// The raw code of this value.
+    fn code(self) -> Self::Code;
+    /// The value of a raw code, `None` if no variant has it.
+    fn from_code(code: Self::Code) -> Option<Self>;
+}
+
+macro_rules! codes {
+    ($(#[$doc:meta])* $name:ident, $code:ident($raw:ty, $size:ident, signed = $signed:literal),
+     $($(#[$vdoc:meta])* $variant:ident = $value:literal $label:literal),+) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        pub enum $name { $($(#[$vdoc])* $variant),+ }
+
+        impl $name {
+            /// Every variant, in the order of their codes.
+            pub const ALL: &[Self] = &[$(Self::$variant),+];
+
+            /// The name that the file and the tables use, as in `TENSION`.
+            pub fn label(self) -> &'static str {
+                match self { $(Self::$variant => $label),+ }
+            }
+        }
+
+        #[doc = concat!("The stored form of [`", stringify!($name), "`].")]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[repr(transparent)]
+        pub(super) struct $code(pub(super) $raw);
+
+        // Sound: the type is transparent over the integer that is the enum's base type.
+        unsafe impl H5Type for $code {
+            fn type_descriptor() -> TypeDescriptor {
+                TypeDescriptor::Enum(EnumType {
+                    size: IntSize::$size,
+                    signed: $signed,
+                    members: vec![$(EnumMember { name: $label.into(), value: $value }),+],
+                })
+            }
+        }
+
+        impl Coded for $name {
+            type Code = $code;
+            fn code(self) -> $code {
+                match self { $(Self::$variant => $code($value)),+ }
+            }
+            fn from_code(code: $code) -> Option<Self> {
+                match code.0 { $($value => Some(Self::$variant),)+ _ => None }
+            }
+        }
+    };
+}
+
+codes! {
+    /// What a contact did in the last solve.
+    ContactStatus, ContactCode(u8, U1, signed = false),
+    /// It carries no reaction.
+    Open = 0 "OPEN",
+    /// It touches without sliding.
+    Stick = 1 "STICK",
+    /// It slides at the limit of friction.
+    Slip = 2 "SLIP",
+    /// An intact bond.
+    Bonded = 3 "BONDED"
+}
+
+codes! {
+    /// Whether a bond holds, and if not, how it broke.
+    BondStatus, BondCode(u8, U1, signed = false),
+    /// It holds.
+    Intact = 0 "INTACT",
+    /// It broke in tension.
+    Tension = 1 "TENSION",
+    /// It broke in shear.
+    Shear = 2 "SHEAR",
+    /// It broke by its rolling moment.
+    Rolling = 3 "ROLLING",
+    /// It broke by its twisting moment.
+    Twist = 4 "TWIST"
+}
+
+codes! {
+    /// How a bond broke.
+    RuptureMode, ModeCode(i32, U4, signed = true),
+    /// The normal force reached the cohesion.
+    Tension = 1 "TENSION",
+    /// The tangential force reached its limit.
+    Shear = 2 "SHEAR",
+    /// The rolling moment reached its limit.
+    Rolling = 3 "ROLLING",
+    /// The twisting moment reached its limit.
+    Twist = 4 "TWIST"
+}
+
+codes! {
+    /// The shape of a wall.
+    WallKind, WallKindCode(u8, U1, signed = false),
+    /// A half-space bounded by a plane (a line in 2D).
+    Plane = 0 "PLANE",
+    /// A circle in 2D.
+    Circle = 1 "CIRCLE",
+    /// An endless cylinder in 3D.
+    Cylinder = 2 "CYLINDER",
+    /// A sphere in 3D.
+    Sphere = 3 "SPHERE"
+}
+
+codes! {
+    /// What drives a wall.
+    WallDrive, WallDriveCode(u8, U1, signed = false),
+    /// Nothing: it stands still.
+    Fixed = 0 "FIXED",
+    /// Its velocity is prescribed.
+    Velocity = 1 "VELOCITY",
+    /// The force along one direction is prescribed.
+    Force = 2 "FORCE"
+}
+
+codes! {
+    /// The method that solved a step: of those of its solves the last in this order.
+    SolverRoute, RouteCode(u8, U1, signed = false),
+    /// The reactions grew as in the steps before, and a check confirmed it.
+    Extrapolation = 0 "EXTRAPOLATION",
+    /// Newton from the active set of the last step.
+    ActiveSet = 1 "ACTIVE_SET",
+    /// The interior-point method.
+    InteriorPoint = 2 "INTERIOR_POINT",
+    /// Sweeps of Gauss–Seidel.
+    Sweeps = 3 "SWEEPS"
+}
+
+impl SolverRoute {
+    /// Its code as an observation holds it.
+    pub fn number(self) -> f64 {
+        f64::from(self.code().0)
+    }
+
+    /// The route that an observation holds; `None` for a number that is no code.
+    pub fn of_number(number: f64) -> Option<Self> {
+        Self::ALL.iter().copied().find(|route| route.number() == number)
+    }
+}
+
+impl From<RuptureMode> for BondStatus {
+    fn from(mode: RuptureMode) -> Self {
+        match mode {
+            RuptureMode::Tension => Self::Tension,
+            RuptureMode::Shear => Self::Shear,
+            RuptureMode::Rolling => Self::Rolling,
+            RuptureMode::Twist => Self::Twist,
+        }
+    }
+}

@@ -1,0 +1,87 @@
+//! A copy of a history: packed, or as a run that ended leaves it. Memory does not grow with the
+//! length of the history.
+
+use std::path::Path;
+
+use dem_output::replace::replace;
+
+use super::error::{Result, refused};
+use super::lock;
+use super::reader::History;
+use super::source::Source;
+use super::table::Table;
+use super::visit::{Extract, Share, Stored, Visit};
+use super::writer::Writer;
+
+type Check = dyn FnOnce(&Source, &Source, &mut Share) -> Result<()>;
+
+/// Gathers the comparisons of the rows of two files, bit by bit, which run once the copy is closed.
+#[derive(Default)]
+struct Comparison {
+    tables: Vec<Box<Check>>,
+}
+
+impl Visit for Comparison {
+    fn table<T: Stored>(&mut self, table: &mut Table, rows: usize) -> Result<()> {
+        let extract = Extract::of(table, rows);
+        self.tables.push(Box::new(move |source, copy, share| {
+            for range in extract.ranges() {
+                let bytes = range.len() * extract.row_bytes;
+                let (a, b) = (extract.read::<T>(source, range.clone())?, extract.read::<T>(copy, range)?);
+                if !a.iter().zip(&b).all(|(a, b)| a.same(b)) {
+                    return Err(copy.damaged(&extract.place, DIFFERS));
+                }
+                share.add(bytes)?;
+            }
+            Ok(())
+        }));
+        Ok(())
+    }
+}
+
+const DIFFERS: &str = "the copy differs from the original";
+
+/// What a copy is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CopyAs {
+    /// To be kept: compressed, with checksums.
+    Packed,
+    /// Readable by any HDF5 program, as the history of a run that ended.
+    Plain,
+}
+
+/// Writes a copy of all complete rows of `history` to `path`. The copy is compared with the
+/// original bit by bit before it replaces the file at `path`, which may be the history itself.
+/// `tell` gets the share that is done, from 0 to 1; if it returns false, the work ends. Returns the
+/// length of the copy, bytes.
+///
+/// # Errors
+/// [`HistoryError::Busy`](super::HistoryError::Busy) while another process writes the history or
+/// the file at `path`, and those of reading and writing; the file at `path` is then as it was.
+pub fn copy(history: &History, path: &Path, how: CopyAs, tell: &mut dyn FnMut(f64) -> bool) -> Result<u64> {
+    lock::refuse_busy(history.path())?;
+    lock::refuse_busy(path)?;
+    replace(path, refused(path), |part| copy_to(history, part, how, tell))
+}
+
+fn copy_to(history: &History, part: &Path, how: CopyAs, tell: &mut dyn FnMut(f64) -> bool) -> Result<u64> {
+    let (layout, kept) = (history.layout()?, history.complete()?);
+    let checkpoint = history.checkpoint()?;
+    let mut writer = Writer::closed_copy(part, &layout, how == CopyAs::Packed)?;
+    let mut comparison = Comparison::default();
+    // read to be written, and to be compared
+    let mut share = Share::of(2 * writer.bytes(kept)?, tell);
+    writer.take_over(history.source(), kept, &mut share)?;
+    if let Some(checkpoint) = &checkpoint {
+        writer.checkpoint(checkpoint)?;
+    }
+    writer.visit(kept, &mut comparison)?;
+    writer.finish()?;
+    let copy = History::open(part)?;
+    let same = copy.layout()? == layout && copy.complete()? == kept && copy.checkpoint()? == checkpoint;
+    if !same {
+        return Err(copy.source().damaged("", DIFFERS));
+    }
+    comparison.tables.into_iter().try_for_each(|check| check(history.source(), copy.source(), &mut share))?;
+    Ok(copy.length())
+}

@@ -1,0 +1,289 @@
+//! What a history holds, as plain data.
+
+use super::codes::{BondStatus, ContactStatus, RuptureMode, WallDrive, WallKind};
+use super::schema::ROUTE;
+
+/// What a history will hold: everything that is known before the first step. Lengths: see each
+/// field.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Layout {
+    /// Dimension D: 2 or 3.
+    pub dimension: usize,
+    /// Whether angles and angular velocities are recorded.
+    pub rotation: bool,
+    /// Whether contacts carry tangential reactions; with bonds they always do.
+    pub friction: bool,
+    /// Whether bonds carry twisting moments, 3D only.
+    pub twist: bool,
+    /// Whether reactions and moments are left out.
+    pub without_reactions: bool,
+    /// Whether what a frame holds is stored in single precision.
+    pub single: bool,
+    /// The grains, N ≥ 1.
+    pub grains: Grains,
+    /// The walls, W; empty for a scene without any.
+    pub walls: Vec<Wall>,
+    /// The bonds, B; empty for a scene without any.
+    pub bonds: Bonds,
+    /// What is observed at every step.
+    pub observables: Vec<Observable>,
+    /// Where the run comes from.
+    pub parameters: Parameters,
+}
+
+/// What does not change about the grains; each array has N entries.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Grains {
+    /// Names of the grains.
+    pub id: Vec<i32>,
+    /// Radii, m.
+    pub radius: Vec<f64>,
+    /// Masses, kg.
+    pub mass: Vec<f64>,
+    /// Moments of inertia about the centre, kg m².
+    pub inertia: Vec<f64>,
+}
+
+/// What does not change about a wall. In 2D the third components are zero.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Wall {
+    /// Its name in the scene.
+    pub name: String,
+    /// Its shape.
+    pub kind: WallKind,
+    /// Plane: unit normal towards the grains; cylinder: unit axis; else zero.
+    pub normal: [f64; 3],
+    /// Radius, m: 0 for a plane, negative where the grains are inside.
+    pub radius: f64,
+    /// What moves it.
+    pub drive: WallDrive,
+    /// Unit direction of the drive; zero for fixed walls.
+    pub direction: [f64; 3],
+}
+
+/// The bonds as they were formed; each array has B entries.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Bonds {
+    /// The two grains, as indices.
+    pub pair: Vec<[i32; 2]>,
+    /// Gap at rest g₀, m.
+    pub rest_gap: Vec<f64>,
+    /// Cohesion r_coh, N.
+    pub strength: Vec<f64>,
+    /// Coefficient of friction μ.
+    pub friction: Vec<f64>,
+    /// Mean diameter a_moy, m.
+    pub mean_diameter: Vec<f64>,
+}
+
+impl Bonds {
+    /// The number of bonds B.
+    pub fn len(&self) -> usize {
+        self.pair.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.pair.is_empty()
+    }
+}
+
+/// What the values of an observable are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ValueKind {
+    /// Real numbers.
+    #[default]
+    Real,
+    /// Codes of [`SolverRoute`](super::SolverRoute).
+    Route,
+}
+
+/// A quantity that is recorded at every step.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Observable {
+    /// Its name: the group under `/observables`.
+    pub name: String,
+    /// Its unit, as in "J"; empty for a number.
+    pub unit: String,
+    /// The shape of one value: empty for a scalar, `[D, D]` for a tensor.
+    pub shape: Vec<usize>,
+    /// What its values are.
+    pub kind: ValueKind,
+}
+
+impl Observable {
+    /// An observable of real numbers from its name, unit and shape.
+    pub fn new(name: &str, unit: &str, shape: &[usize]) -> Self {
+        Self { name: name.into(), unit: unit.into(), shape: shape.into(), kind: ValueKind::Real }
+    }
+
+    /// The method that solved each step, as [`SolverRoute::number`](super::SolverRoute::number)
+    /// codes it.
+    pub fn route() -> Self {
+        Self { kind: ValueKind::Route, ..Self::new(ROUTE, "", &[]) }
+    }
+
+    /// Numbers in one value.
+    pub fn width(&self) -> usize {
+        self.shape.iter().product()
+    }
+}
+
+/// Where a run comes from.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Parameters {
+    /// The scene as it was run, JSON.
+    pub scene: String,
+    /// The seed of every random choice.
+    pub seed: u64,
+    /// Version of the program.
+    pub version: String,
+    /// Git revision of the program, empty if unknown.
+    pub git_revision: String,
+    /// How the program was built, as in "release, rustc 1.95".
+    pub build: String,
+    /// The host that ran it.
+    pub host: String,
+    /// When it started, ISO 8601.
+    pub start: String,
+    /// Solid fraction that the sample was packed to (–); none where it was not packed.
+    pub solid_fraction: Option<f64>,
+}
+
+/// One frame to be written. Arrays of what the layout lacks are empty.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Frame {
+    /// Number of the step.
+    pub step: i64,
+    /// Time, s.
+    pub time: f64,
+    /// The grains.
+    pub grains: GrainState,
+    /// The walls.
+    pub walls: WallState,
+    /// The contacts.
+    pub contacts: ContactRows,
+    /// The state of each bond, B.
+    pub bonds: Vec<BondStatus>,
+}
+
+/// The motion of the grains at one frame, row by row.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct GrainState {
+    /// Centres, m, N × D.
+    pub position: Vec<f64>,
+    /// Velocities, m/s, N × D.
+    pub velocity: Vec<f64>,
+    /// Angular velocities, rad/s: N in 2D, N × 3 in 3D; empty without rotation.
+    pub angular_velocity: Vec<f64>,
+    /// In 2D angles, rad, N; in 3D quaternions w x y z, N × 4; empty without rotation.
+    pub orientation: Vec<f64>,
+}
+
+/// The motion of the walls at one frame, row by row, each W × D.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct WallState {
+    /// A point of the plane, or the centre, m.
+    pub position: Vec<f64>,
+    /// Velocities, m/s.
+    pub velocity: Vec<f64>,
+    /// Forces of the grains on the wall, N.
+    pub force: Vec<f64>,
+}
+
+/// The contacts of one frame, row by row; m rows.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ContactRows {
+    /// Grains i and j as indices; j < 0 is wall −1−j.
+    pub pair: Vec<[i32; 2]>,
+    /// Points of contact, m, m × D.
+    pub point: Vec<f64>,
+    /// Unit normals from j to i, m × D.
+    pub normal: Vec<f64>,
+    /// First tangents, m × 3; empty without tangential reactions, and in 2D,
+    /// where the tangent is (−n_y, n_x).
+    pub tangent: Vec<f64>,
+    /// Reactions of j on i in the local frame (n, t…), N, m × D; m × 1 with neither friction nor
+    /// bonds; empty where they were not recorded.
+    pub reaction: Vec<f64>,
+    /// Moments of j on i, N m: m in 2D, m × 2 in 3D; empty without bonds.
+    pub moment: Vec<f64>,
+    /// Gaps, m, negative where bodies overlap.
+    pub gap: Vec<f64>,
+    /// What each contact did.
+    pub status: Vec<ContactStatus>,
+    /// The bond of each contact, −1 for none; empty without bonds.
+    pub bond: Vec<i32>,
+}
+
+impl ContactRows {
+    /// The number of contacts m.
+    pub fn len(&self) -> usize {
+        self.pair.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.pair.is_empty()
+    }
+
+    /// Rows of the reaction of one contact: 1 without friction, else D.
+    pub fn reaction_rows(&self) -> usize {
+        if self.is_empty() { 0 } else { self.reaction.len() / self.len() }
+    }
+
+    /// Normal force of contact `c`, N; positive in compression.
+    pub fn normal_force(&self, c: usize) -> f64 {
+        self.reaction[c * self.reaction_rows()]
+    }
+
+    /// Magnitude of the tangential force of contact `c`, N.
+    pub fn tangential_force(&self, c: usize) -> f64 {
+        let rows = self.reaction_rows();
+        self.reaction[c * rows + 1..(c + 1) * rows].iter().map(|r| r * r).sum::<f64>().sqrt()
+    }
+}
+
+/// A bond that broke.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rupture {
+    /// Number of the step.
+    pub step: i64,
+    /// Time, s.
+    pub time: f64,
+    /// Point of contact, m; z = 0 in 2D.
+    pub point: [f64; 3],
+    /// Normal force at rupture, N; positive in compression.
+    pub normal_force: f64,
+    /// Magnitude of the tangential force at rupture, N.
+    pub tangential_force: f64,
+    /// Magnitude of the bending moment at rupture, N m; in histories of before version 3 that of
+    /// all moments.
+    pub moment: f64,
+    /// Magnitude of the twisting moment at rupture, N m; not a number in histories of before
+    /// version 3.
+    pub twist: f64,
+    /// Elastic energy released, J; 0 for a rigid bond.
+    pub energy: f64,
+    /// Round of the cascade within the step, from 0.
+    pub round: i32,
+    /// The bond.
+    pub bond: i32,
+    /// Its grains.
+    pub pair: [i32; 2],
+    /// How it broke.
+    pub mode: RuptureMode,
+}
+
+/// Complete rows of each kind of table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Kept {
+    /// Frames.
+    pub frames: usize,
+    /// Contacts of all frames.
+    pub contacts: usize,
+    /// Steps of observables.
+    pub steps: usize,
+    /// Events.
+    pub events: usize,
+}

@@ -1,0 +1,558 @@
+//! Reading a history, one frame or one observable at a time.
+
+use std::cell::OnceCell;
+use std::ops::Range;
+use std::path::Path;
+
+use hdf5::types::VarLenUnicode;
+
+use super::checkpoint::Checkpoint;
+use super::codes::{BondCode, BondStatus, ContactCode, WallDriveCode, WallKindCode};
+use super::error::{HistoryError, Result, refused, while_reading};
+use super::model::{Bonds, ContactRows, GrainState, Grains, Kept, Layout, Parameters, Rupture, Wall, WallState};
+use super::observed::{self, Series};
+use super::rupture::RuptureRow;
+use super::schema::path;
+use super::sound::{self, Surroundings};
+use super::source::Source;
+use super::{checkpoint, lock};
+
+/// An open history, read-only. Only complete frames are seen; a file that a run still writes, or
+/// that a killed run left, opens as well and shows what was complete when it was opened.
+pub struct History {
+    source: Source,
+    dimension: usize,
+    /// Numbers of grains and walls.
+    grains: usize,
+    walls: usize,
+    steps: Vec<i64>,
+    times: Vec<f64>,
+    /// Complete rows of ruptures and of observables.
+    events: usize,
+    observed: usize,
+    /// Where grains may be, once it was asked.
+    surroundings: OnceCell<Surroundings>,
+}
+
+impl History {
+    /// Opens a history and checks that it is one.
+    ///
+    /// # Errors
+    /// [`HistoryError::Missing`], [`HistoryError::Io`], [`HistoryError::NotHdf5`],
+    /// [`HistoryError::Truncated`], [`HistoryError::Foreign`], [`HistoryError::Newer`] or
+    /// [`HistoryError::Damaged`], as the file deserves.
+    pub fn open(path: &Path) -> Result<Self> {
+        let history = Self::open_as_is(path)?;
+        let place = |name: &str| format!("{}/position/{name}", path::GRAINS);
+        sound::growing(&history.source.path, &place("step"), &history.steps)?;
+        sound::reals(&history.source.path, &place("time"), 0, 1, &history.times)?;
+        sound::growing(&history.source.path, &place("time"), &history.times)?;
+        Ok(history)
+    }
+
+    /// As [`History::open`], of a file whose frames may be in no order: to be checked.
+    ///
+    /// # Errors
+    /// As [`History::open`].
+    pub fn open_as_is(path: &Path) -> Result<Self> {
+        hdf5::silence_errors(true);
+        let mut history = Self {
+            source: Source::open(path)?,
+            dimension: 0,
+            grains: 0,
+            walls: 0,
+            steps: vec![],
+            times: vec![],
+            events: 0,
+            observed: 0,
+            surroundings: OnceCell::new(),
+        };
+        history.read_commit()?;
+        Ok(history)
+    }
+
+    fn read_commit(&mut self) -> Result<()> {
+        // first the commit: what is read after it is at least as new
+        let frames = self.source.scalar::<u64>(path::COMMIT)? as usize;
+        self.dimension = self.source.attribute::<i32>(&format!("{}/box", path::GRAINS), "dimension")? as usize;
+        if !(2..=3).contains(&self.dimension) {
+            return Err(self.source.damaged("particles/grains/box", "the dimension is neither 2 nor 3"));
+        }
+        self.grains = self.source.count(&format!("{}/id", path::GRAINS))?;
+        self.walls =
+            if self.source.has(path::WALLS) { self.source.count(&format!("{}/name", path::WALLS))? } else { 0 };
+        self.steps = self.source.read(&format!("{}/position/step", path::GRAINS), 0..frames)?.1;
+        self.times = self.source.read(&format!("{}/position/time", path::GRAINS), 0..frames)?.1;
+        let complete = self.complete_at(frames)?;
+        (self.observed, self.events) = (complete.steps, complete.events);
+        Ok(())
+    }
+
+    /// Rows that are complete.
+    ///
+    /// # Errors
+    /// [`HistoryError::Damaged`].
+    pub fn complete(&self) -> Result<Kept> {
+        self.complete_at(self.frames())
+    }
+
+    /// Rows that were complete when `frames` frames were.
+    ///
+    /// # Errors
+    /// [`HistoryError::Damaged`].
+    pub fn complete_at(&self, frames: usize) -> Result<Kept> {
+        let rows = |place: &str| -> Result<usize> {
+            let last = frames.saturating_sub(1)..frames;
+            Ok(self.source.read::<u64>(place, last)?.1.first().map_or(0, |&rows| rows as usize))
+        };
+        let bonded = self.source.has(path::RUPTURE);
+        Ok(Kept {
+            frames,
+            contacts: rows(path::COMMIT_CONTACTS)?,
+            steps: rows(path::COMMIT_STEPS)?,
+            events: if bonded { rows(path::COMMIT_EVENTS)? } else { 0 },
+        })
+    }
+
+    /// The newest checkpoint; none in a file of a version without checkpoints, or of a run that was
+    /// killed before its first.
+    ///
+    /// # Errors
+    /// [`HistoryError::Damaged`].
+    pub fn checkpoint(&self) -> Result<Option<Checkpoint>> {
+        match self.steps.last() {
+            Some(last) => checkpoint::newest(&self.source, *last),
+            None => Ok(None),
+        }
+    }
+
+    /// The process that writes the file, if one does.
+    ///
+    /// # Errors
+    /// [`HistoryError::Io`].
+    pub fn writer(&self) -> Result<Option<i32>> {
+        let path = &self.source.path;
+        lock::holder(path).map_err(|error| refused(path)("read", error))
+    }
+
+    pub(super) fn source(&self) -> &Source {
+        &self.source
+    }
+
+    /// What the history holds; observables in the order of their names.
+    ///
+    /// # Errors
+    /// [`HistoryError::Damaged`].
+    pub fn layout(&self) -> Result<Layout> {
+        let contacts = |name: &str| format!("{}/{name}", path::CONTACTS);
+        let width = |place: &str| -> Result<usize> { Ok(self.source.read::<f64>(place, 0..0)?.0.iter().product()) };
+        let without_reactions = !self.source.has(&contacts("reaction"));
+        let position = self.source.dataset(&format!("{}/position/value", path::GRAINS))?;
+        let size = position.dtype().map_err(while_reading(self.path(), path::GRAINS))?.size();
+        Ok(Layout {
+            dimension: self.dimension,
+            rotation: self.source.has(&format!("{}/angular_velocity", path::GRAINS)),
+            friction: !without_reactions && width(&contacts("reaction"))? > 1,
+            twist: self.source.has(&contacts("moment")) && width(&contacts("moment"))? > 2,
+            without_reactions,
+            single: size == 4,
+            grains: self.grains()?,
+            walls: self.walls()?,
+            bonds: self.bonds()?,
+            observables: observed::observables(&self.source)?,
+            parameters: self.parameters()?,
+        })
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.source.path
+    }
+
+    /// Length of the file, bytes.
+    pub fn length(&self) -> u64 {
+        self.source.length
+    }
+
+    /// Whether the file was never closed: its run still goes on, or was killed.
+    pub fn open_ended(&self) -> bool {
+        self.source.open_ended
+    }
+
+    /// Dimension D.
+    pub fn dimension(&self) -> usize {
+        self.dimension
+    }
+
+    /// Number of complete frames T.
+    pub fn frames(&self) -> usize {
+        self.times.len()
+    }
+
+    /// Step of each frame, T.
+    pub fn steps(&self) -> &[i64] {
+        &self.steps
+    }
+
+    /// Time of each frame, s, T.
+    pub fn times(&self) -> &[f64] {
+        &self.times
+    }
+
+    /// The frame nearest to `time` (s); `None` for a history without frames.
+    pub fn frame_at(&self, time: f64) -> Option<usize> {
+        let distance = |frame: &usize| (self.times[*frame] - time).abs();
+        (0..self.frames()).min_by(|a, b| distance(a).total_cmp(&distance(b)))
+    }
+
+    /// Number of rows of observables S.
+    pub fn observed_steps(&self) -> usize {
+        self.observed
+    }
+
+    /// Whether the reactions of the contacts were recorded.
+    pub fn has_reactions(&self) -> bool {
+        self.source.has(&format!("{}/reaction", path::CONTACTS))
+    }
+
+    /// Where the run comes from.
+    ///
+    /// # Errors
+    /// [`HistoryError::Damaged`].
+    pub fn parameters(&self) -> Result<Parameters> {
+        let text =
+            |name| Ok::<_, HistoryError>(self.source.attribute::<VarLenUnicode>(path::PARAMETERS, name)?.to_string());
+        Ok(Parameters {
+            scene: self.source.texts(path::SCENE)?.concat(),
+            seed: self.source.attribute(path::PARAMETERS, "seed")?,
+            version: text("version")?,
+            git_revision: text("git_revision")?,
+            build: text("build")?,
+            host: text("host")?,
+            start: text("start")?,
+            solid_fraction: self.source.optional_attribute(path::PARAMETERS, "solid_fraction")?,
+        })
+    }
+
+    /// What does not change about the grains.
+    ///
+    /// # Errors
+    /// [`HistoryError::Damaged`].
+    pub fn grains(&self) -> Result<Grains> {
+        let id: Vec<i32> = self.source.whole(&format!("{}/id", path::GRAINS), 1)?;
+        let place = |name: &str| format!("{}/{name}", path::GRAINS);
+        let column = |name: &str| self.source.column(&place(name), self.grains);
+        let grains = Grains { radius: column("radius")?, mass: column("mass")?, inertia: column("inertia")?, id };
+        if grains.id.is_empty() {
+            return Err(self.source.damaged(&place("id"), "there is no grain"));
+        }
+        sound::radii(&self.source.path, &place("radius"), &grains.radius)?;
+        sound::positive(&self.source.path, &place("mass"), &grains.mass)?;
+        Ok(grains)
+    }
+
+    /// The walls; empty for a scene without any.
+    ///
+    /// # Errors
+    /// [`HistoryError::Damaged`].
+    pub fn walls(&self) -> Result<Vec<Wall>> {
+        if !self.source.has(path::WALLS) {
+            return Ok(vec![]);
+        }
+        let place = |name: &str| format!("{}/{name}", path::WALLS);
+        let names = self.source.texts(&place("name"))?;
+        if names.len() != self.walls {
+            return Err(self.source.damaged(&place("name"), "it is no list of names"));
+        }
+        let (w, d) = (self.walls, self.dimension);
+        let kinds = self.source.coded(&place("kind"), self.source.whole::<WallKindCode>(&place("kind"), 1)?, w)?;
+        let drives = self.source.coded(&place("drive"), self.source.whole::<WallDriveCode>(&place("drive"), 1)?, w)?;
+        let normals = self.source.column(&place("normal"), w * d)?;
+        let directions = self.source.column(&place("direction"), w * d)?;
+        let radii = self.source.column(&place("radius"), w)?;
+        let vector = |values: &[f64], k: usize| {
+            let mut vector = [0.0; 3];
+            vector[..d].copy_from_slice(&values[k * d..(k + 1) * d]);
+            vector
+        };
+        let wall = |k: usize| Wall {
+            name: names[k].clone(),
+            kind: kinds[k],
+            normal: vector(&normals, k),
+            radius: radii[k],
+            drive: drives[k],
+            direction: vector(&directions, k),
+        };
+        Ok((0..w).map(wall).collect())
+    }
+
+    /// The bonds as they were formed; empty for a scene without any.
+    ///
+    /// # Errors
+    /// [`HistoryError::Damaged`].
+    pub fn bonds(&self) -> Result<Bonds> {
+        if !self.source.has(path::BONDS) {
+            return Ok(Bonds::default());
+        }
+        let place = |name: &str| format!("{}/{name}", path::BONDS);
+        let pair = pairs(&self.source.whole::<i32>(&place("pair"), 2)?);
+        let unknown = |pair: &[i32; 2]| pair.iter().any(|grain| !(0..self.grains as i32).contains(grain));
+        if let Some(bond) = pair.iter().position(unknown) {
+            return Err(sound::row(&self.source.path, &place("pair"), bond, "a bond names a grain that is not there"));
+        }
+        let column = |name: &str| self.source.column(&place(name), pair.len());
+        let bonds = Bonds {
+            rest_gap: column("rest_gap")?,
+            strength: column("strength")?,
+            friction: column("friction")?,
+            mean_diameter: column("mean_diameter")?,
+            pair,
+        };
+        sound::positive(&self.source.path, &place("mean_diameter"), &bonds.mean_diameter)?;
+        Ok(bonds)
+    }
+
+    /// The grains at frame `frame`.
+    ///
+    /// # Errors
+    /// [`HistoryError::NoFrame`], [`HistoryError::Damaged`].
+    pub fn grain_state(&self, frame: usize) -> Result<GrainState> {
+        let orientation = if self.dimension == 2 { "angle" } else { "orientation" };
+        let (n, d) = (self.grains, self.dimension);
+        let column = |name: &str, width| self.frame_values(frame, &format!("{}/{name}", path::GRAINS), n * width);
+        let position = column("position", d)?;
+        let surroundings = self.surroundings()?;
+        if let Some(grain) = position.chunks(d).position(|centre| !surroundings.hold(centre)) {
+            let centre = &position[grain * d..(grain + 1) * d];
+            let why = format!("grain {grain} is at {centre:?} m, far beyond a million sizes of the sample");
+            return Err(sound::row(&self.source.path, &format!("{}/position/value", path::GRAINS), frame, why));
+        }
+        Ok(GrainState {
+            position,
+            velocity: column("velocity", d)?,
+            angular_velocity: column("angular_velocity", if d == 2 { 1 } else { 3 })?,
+            orientation: column(orientation, if d == 2 { 1 } else { 4 })?,
+        })
+    }
+
+    /// The walls at frame `frame`; empty arrays for a scene without any.
+    ///
+    /// # Errors
+    /// [`HistoryError::NoFrame`], [`HistoryError::Damaged`].
+    pub fn wall_state(&self, frame: usize) -> Result<WallState> {
+        let column =
+            |name: &str| self.frame_values(frame, &format!("{}/{name}", path::WALLS), self.walls * self.dimension);
+        Ok(WallState { position: column("position")?, velocity: column("velocity")?, force: column("force")? })
+    }
+
+    /// The state of each bond at frame `frame`; empty for a scene without any.
+    ///
+    /// # Errors
+    /// [`HistoryError::NoFrame`], [`HistoryError::Damaged`].
+    pub fn bond_status(&self, frame: usize) -> Result<Vec<BondStatus>> {
+        self.check_frame(frame)?;
+        let place = format!("{}/status/value", path::BONDS);
+        if !self.source.has(path::BONDS) {
+            return Ok(vec![]);
+        }
+        let (_, codes) = self.source.read::<BondCode>(&place, frame..frame + 1)?;
+        let bonds = self.source.count(&format!("{}/pair", path::BONDS))?;
+        self.source.coded(&place, codes, bonds)
+    }
+
+    /// The rows of `/contacts` that belong to frame `frame`.
+    ///
+    /// # Errors
+    /// [`HistoryError::NoFrame`], [`HistoryError::Damaged`].
+    pub fn contact_rows(&self, frame: usize) -> Result<Range<usize>> {
+        self.check_frame(frame)?;
+        let number = |place: &str| -> Result<u64> {
+            let (_, values) = self.source.read::<u64>(place, frame..frame + 1)?;
+            values.first().copied().ok_or_else(|| self.source.damaged(place, "its rows are empty"))
+        };
+        let count = format!("{}/count", path::CONTACTS);
+        let (start, rows) = (number(&format!("{}/start", path::CONTACTS))?, number(&count)?);
+        // the frames stand behind each other without gaps
+        let complete = self.source.read::<u64>(path::COMMIT_CONTACTS, frame.saturating_sub(1)..frame + 1)?.1;
+        let (before, end) = (if frame == 0 { 0 } else { complete[0] }, complete[complete.len() - 1]);
+        if start != before || start.checked_add(rows) != Some(end) {
+            let why = format!("{rows} rows from {start} on, where those from {before} to {end} belong to the frame");
+            return Err(sound::row(&self.source.path, &count, frame, why));
+        }
+        Ok(start as usize..end as usize)
+    }
+
+    /// The bodies of the contacts at frame `frame`: grains i and j as indices; j < 0 is wall −1−j.
+    ///
+    /// # Errors
+    /// [`HistoryError::NoFrame`], [`HistoryError::Damaged`].
+    pub fn contact_pairs(&self, frame: usize) -> Result<Vec<[i32; 2]>> {
+        self.pairs_in(self.contact_rows(frame)?)
+    }
+
+    /// The points of the contacts at frame `frame`, m, m × D.
+    ///
+    /// # Errors
+    /// [`HistoryError::NoFrame`], [`HistoryError::Damaged`].
+    pub fn contact_points(&self, frame: usize) -> Result<Vec<f64>> {
+        self.reals_in(self.contact_rows(frame)?, "point", &[self.dimension])
+    }
+
+    /// The contacts at frame `frame`.
+    ///
+    /// # Errors
+    /// [`HistoryError::NoFrame`], [`HistoryError::Damaged`].
+    pub fn contacts(&self, frame: usize) -> Result<ContactRows> {
+        let range = self.contact_rows(frame)?;
+        let place = |name: &str| format!("{}/{name}", path::CONTACTS);
+        let column = |name: &str, widths: &[usize]| self.reals_in(range.clone(), name, widths);
+        let d = self.dimension;
+        let codes = self.source.read::<ContactCode>(&place("status"), range.clone())?.1;
+        let bond = self.bonds_in(range.clone())?;
+        let required = ["point", "normal", "gap"].iter().find(|name| !self.source.has(&place(name)));
+        let tangential = d == 3 && self.has_reactions() && self.source.read::<f64>(&place("reaction"), 0..0)?.0 == [3];
+        let required = required.or((tangential && !self.source.has(&place("tangent"))).then_some(&"tangent"));
+        if let Some(missing) = required {
+            return Err(self.source.damaged(&place(missing), "it is missing"));
+        }
+        Ok(ContactRows {
+            pair: self.pairs_in(range.clone())?,
+            point: column("point", &[d])?,
+            normal: column("normal", &[d])?,
+            tangent: column("tangent", &[d])?,
+            reaction: column("reaction", &[1, d])?,
+            moment: column("moment", if d == 2 { &[1] } else { &[2, 3] })?,
+            gap: column("gap", &[1])?,
+            status: self.source.coded(&place("status"), codes, range.len())?,
+            bond,
+        })
+    }
+
+    /// The names of what was observed, sorted.
+    ///
+    /// # Errors
+    /// [`HistoryError::Damaged`].
+    pub fn observable_names(&self) -> Result<Vec<String>> {
+        observed::names(&self.source)
+    }
+
+    /// One observable over the whole run, `None` if it was not recorded.
+    ///
+    /// # Errors
+    /// [`HistoryError::Damaged`].
+    pub fn observable(&self, name: &str) -> Result<Option<Series>> {
+        observed::series(&self.source, name, 0..self.observed_steps())
+    }
+
+    /// Every bond that broke, in order; empty for a scene without bonds.
+    ///
+    /// # Errors
+    /// [`HistoryError::Damaged`].
+    pub fn ruptures(&self) -> Result<Vec<Rupture>> {
+        if !self.source.has(path::RUPTURE) {
+            return Ok(vec![]);
+        }
+        let (_, events) = RuptureRow::read(&self.source, path::RUPTURE, 0..self.events)?;
+        let event = |(k, row): (usize, &RuptureRow)| {
+            row.event().ok_or_else(|| sound::row(&self.source.path, path::RUPTURE, k, "a mode that is none"))
+        };
+        let known: Vec<Rupture> = events.iter().enumerate().map(event).collect::<Result<_>>()?;
+        let (counts, last) = ([self.bonds()?.len(), self.grains], self.steps.last().copied().unwrap_or(i64::MAX));
+        sound::ruptures(&self.source.path, path::RUPTURE, &known, counts, last)?;
+        Ok(known)
+    }
+}
+
+/// The small parts that the methods above are made of.
+impl History {
+    fn check_frame(&self, frame: usize) -> Result<()> {
+        if frame < self.frames() {
+            return Ok(());
+        }
+        Err(HistoryError::NoFrame { path: self.source.path.clone(), frame, frames: self.frames() })
+    }
+
+    /// Where the grains may be, from the first frame.
+    fn surroundings(&self) -> Result<&Surroundings> {
+        if let Some(known) = self.surroundings.get() {
+            return Ok(known);
+        }
+        let (radius, d) = (self.grains()?.radius, self.dimension);
+        let first = self.frame_values(0, &format!("{}/position", path::GRAINS), self.grains * d)?;
+        Ok(self.surroundings.get_or_init(|| Surroundings::of(&radius, &first, d)))
+    }
+
+    /// The values of the H5MD element `place` at one frame, `expected` numbers; none for rotations
+    /// that were not recorded.
+    fn frame_values(&self, frame: usize, place: &str, expected: usize) -> Result<Vec<f64>> {
+        self.check_frame(frame)?;
+        let turning = ["angular_velocity", "angle", "orientation"].iter().any(|name| place.ends_with(name));
+        if expected == 0 || (turning && !self.source.has(place)) {
+            return Ok(vec![]);
+        }
+        let place = format!("{place}/value");
+        let (_, values) = self.source.read(&place, frame..frame + 1)?;
+        if values.len() != expected {
+            return Err(self.source.damaged(&place, &format!("it has {} values instead of {expected}", values.len())));
+        }
+        sound::reals(&self.source.path, &place, frame, expected, &values)?;
+        Ok(values)
+    }
+
+    /// The bond of each contact; empty without bonds.
+    fn bonds_in(&self, range: Range<usize>) -> Result<Vec<i32>> {
+        let place = format!("{}/bond", path::CONTACTS);
+        if !self.source.has(&place) {
+            return Ok(vec![]);
+        }
+        let bonds: Vec<i32> = self.source.read(&place, range.clone())?.1;
+        let known = self.source.count(&format!("{}/pair", path::BONDS))? as i32;
+        match bonds.iter().position(|bond| !(-1..known).contains(bond)) {
+            Some(k) => {
+                let why = format!("{} is none of {known} bonds", bonds[k]);
+                Err(sound::row(&self.source.path, &place, range.start + k, why))
+            }
+            None => Ok(bonds),
+        }
+    }
+
+    /// A column of the contacts, with rows of one of the lengths `widths`; empty if the scene lacks
+    /// it.
+    fn reals_in(&self, range: Range<usize>, name: &str, widths: &[usize]) -> Result<Vec<f64>> {
+        let place = format!("{}/{name}", path::CONTACTS);
+        if !self.source.has(&place) {
+            return Ok(vec![]);
+        }
+        let (row, values) = self.source.read::<f64>(&place, range.clone())?;
+        if !widths.contains(&row.iter().product()) {
+            return Err(self.source.damaged(&place, "its rows have another length"));
+        }
+        sound::reals(&self.source.path, &place, range.start, row.iter().product(), &values)?;
+        Ok(values)
+    }
+
+    /// Pairs of contacts, whose grains and walls must all be there.
+    fn pairs_in(&self, range: Range<usize>) -> Result<Vec<[i32; 2]>> {
+        let place = format!("{}/pair", path::CONTACTS);
+        let (row, flat) = self.source.read::<i32>(&place, range.clone())?;
+        if row != [2] {
+            return Err(self.source.damaged(&place, "its rows have another length"));
+        }
+        let (grains, walls) = (self.grains as i32, self.walls as i32);
+        let pairs = pairs(&flat);
+        let known = |&[i, j]: &[i32; 2]| (0..grains).contains(&i) && (-walls..grains).contains(&j);
+        match pairs.iter().position(|pair| !known(pair)) {
+            Some(k) => {
+                let [i, j] = pairs[k];
+                let why =
+                    format!("{i}, {j} are not a grain and another, or a wall, of {grains} grains and {walls} walls");
+                Err(sound::row(&self.source.path, &place, range.start + k, why))
+            }
+            None => Ok(pairs),
+        }
+    }
+}
+
+fn pairs(flat: &[i32]) -> Vec<[i32; 2]> {
+    flat.as_chunks().0.to_vec()
+}

@@ -1,0 +1,76 @@
+//! Names, versions and chunk sizes of the layout; the layout itself stands in the module's
+//! documentation.
+
+/// Version of the layout. It grows with every change that an older reader would misread. 2: bonds
+/// break in twist, too. 3: a rupture has its twisting moment apart from the bending moment. 4: the
+/// load error is that of the solver alone, not a number where no solve reports one, beside the
+/// false acceleration; observables may be enumerations.
+pub const SCHEMA_VERSION: u32 = 4;
+
+/// The program's name as `/h5md/creator` records it.
+pub(super) const CREATOR: &str = "dem-run";
+
+/// The observable that is an enumeration: the method that solved each step.
+pub const ROUTE: &str = "solver_route";
+/// The observable that is not a number in a step none of whose solves reports it.
+pub const LOAD_ERROR: &str = "solver_load_error";
+/// The observable that histories have from version 4 on; before it the load error held either.
+pub const FALSE_ACCELERATION: &str = "false_acceleration";
+
+/// Paths in the file.
+pub(super) mod path {
+    pub const CHECKPOINT: &str = "checkpoint";
+    pub const COMMIT: &str = "commit";
+    pub const COMMIT_CONTACTS: &str = "commit_rows/contacts";
+    pub const COMMIT_EVENTS: &str = "commit_rows/events";
+    pub const COMMIT_STEPS: &str = "commit_rows/steps";
+    pub const GRAINS: &str = "particles/grains";
+    pub const WALLS: &str = "walls";
+    pub const CONTACTS: &str = "contacts";
+    pub const BONDS: &str = "bonds";
+    pub const RUPTURE: &str = "events/rupture";
+    pub const OBSERVABLES: &str = "observables";
+    pub const PARAMETERS: &str = "parameters";
+    pub const SCENE: &str = "parameters/scene";
+}
+
+/// Bytes across one row of a chunk, about 500 doubles.
+const CHUNK_ROW: usize = 4000;
+/// Bytes of a chunk, about 16 such rows.
+const CHUNK: usize = 16 * CHUNK_ROW;
+
+/// The chunk of a dataset that grows by whole frames: `[rows, first extents of one frame…]`.
+///
+/// A frame of a large sample is split so that 16 frames fill a chunk; a small sample puts more
+/// frames in one.
+pub(super) fn frame_chunk(item: usize, row: &[usize]) -> Vec<usize> {
+    let inner: usize = row.iter().skip(1).product::<usize>().max(1);
+    let across = row.first().map_or(1, |&n| n.min((CHUNK_ROW / (inner * item)).max(1)));
+    let rows = (CHUNK / (across * inner * item)).clamp(16, 256);
+    let mut chunk = vec![rows];
+    chunk.extend(row);
+    if let Some(first) = chunk.get_mut(1) {
+        *first = across;
+    }
+    chunk
+}
+
+/// The chunk of a dataset that grows by about `rows` rows every 16 frames.
+pub(super) fn row_chunk(rows: usize, item: usize, row: &[usize]) -> Vec<usize> {
+    let width: usize = row.iter().product::<usize>().max(1) * item;
+    let mut chunk = vec![rows.clamp(64, (4 * CHUNK / width).max(64))];
+    chunk.extend(row);
+    chunk
+}
+
+/// Slots and bytes of the chunk cache of each dataset, for `grains` grains. It holds the chunks
+/// that a frame is appended to; with less, every frame would evict and reload partly filled chunks.
+/// It holds no more, because every append and every flush goes through the whole cache. (It is a
+/// setting of the file: single-writer mode ignores those of datasets.)
+pub(super) fn chunk_cache(grains: usize, dimension: usize) -> (usize, usize) {
+    // positions, or in space quaternions, are the widest
+    let chunk = frame_chunk(8, &[grains, if dimension == 2 { 2 } else { 4 }]);
+    let band = grains.div_ceil(chunk[1]);
+    let bytes = 8 * band * chunk.iter().product::<usize>();
+    (2 * band + 1, bytes.max(8 * CHUNK))
+}

@@ -1,0 +1,160 @@
+//! Checks of values that a sound history cannot hold. Reading refuses them, with their place and
+//! row, before anything is computed from them. `dem-post info --check` lists all of them, and more.
+
+use std::fmt::Display;
+use std::path::Path;
+
+use super::error::{HistoryError, Result, damaged};
+use super::model::Rupture;
+use super::schema::LOAD_ERROR;
+
+/// Upper bound of every quantity in SI units; squares and cubes of smaller numbers are finite.
+const GREATEST: f64 = 1e100;
+/// Largest distance of a grain from the sample, over the size of the sample. Farther away a
+/// position in double precision does not resolve the gaps of contacts.
+const FAR: f64 = 1e6;
+
+/// Whether a number can be a measure of anything.
+#[must_use]
+pub fn is_plausible(value: f64) -> bool {
+    value.abs() < GREATEST
+}
+
+/// Whether the observable `name` may have this value: a plausible number; or not a number for the
+/// load error, in a step whose solves report none.
+#[must_use]
+pub fn may_be_observed(name: &str, value: f64) -> bool {
+    is_plausible(value) || (name == LOAD_ERROR && value.is_nan())
+}
+
+/// Where the grains of a sample may be at all: within a million sizes of the sample from its
+/// middle.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Surroundings {
+    /// Medians of the first coordinates, m, D of them: a single wrong grain does not move them.
+    middle: Vec<f64>,
+    /// Greatest distance along an axis, m.
+    reach: f64,
+}
+
+impl Surroundings {
+    /// Those of grains with these radii (m, N) and first centres (m, N × D). The size of the sample
+    /// is the greater of all grains in a row and twice the median distance of their centres from
+    /// the middle.
+    #[must_use]
+    pub fn of(radius: &[f64], position: &[f64], dimension: usize) -> Self {
+        let middle: Vec<f64> =
+            (0..dimension).map(|k| median(position.iter().skip(k).step_by(dimension).copied().collect())).collect();
+        let distance = |x: &[f64]| x.iter().zip(&middle).map(|(x, m)| (x - m).abs()).fold(0.0, f64::max);
+        let spread = median(position.chunks(dimension).map(distance).collect());
+        let row = radius.len() as f64 * median(radius.to_vec());
+        Self { reach: FAR * 2.0 * row.max(spread), middle }
+    }
+
+    /// Whether a centre (m, D) lies within them.
+    #[must_use]
+    pub fn hold(&self, centre: &[f64]) -> bool {
+        centre.iter().zip(&self.middle).all(|(x, m)| (x - m).abs() <= self.reach)
+    }
+}
+
+/// Whether the radius of a grain (m) is beyond a million times `usual`, the median of all.
+#[must_use]
+pub fn is_huge(radius: f64, usual: f64) -> bool {
+    radius > FAR * usual
+}
+
+/// The median, the greater of two; 0 of none.
+#[must_use]
+pub fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
+
+pub(super) fn row(path: &Path, place: &str, row: usize, why: impl Display) -> HistoryError {
+    damaged(path, place, format!("row {row}: {why}"))
+}
+
+/// Refuses what is no plausible number among rows of `width` numbers, the first of which is row
+/// `first`.
+pub(super) fn reals(path: &Path, place: &str, first: usize, width: usize, values: &[f64]) -> Result<()> {
+    refused(path, place, first, width, values.iter().position(|value| !is_plausible(*value)), values)
+}
+
+/// The same among those of the observable `name`.
+pub(super) fn observed(path: &Path, name: &str, place: &str, first: usize, width: usize, values: &[f64]) -> Result<()> {
+    let wrong = values.iter().position(|value| !may_be_observed(name, *value));
+    refused(path, place, first, width, wrong, values)
+}
+
+/// Refuses the value numbered `wrong`, if there is one.
+fn refused(path: &Path, place: &str, first: usize, width: usize, wrong: Option<usize>, values: &[f64]) -> Result<()> {
+    match wrong {
+        Some(k) => Err(row(path, place, first + k / width.max(1), format!("{:e} is no plausible number", values[k]))),
+        None => Ok(()),
+    }
+}
+
+/// Refuses numbers that are not above zero.
+pub(super) fn positive(path: &Path, place: &str, values: &[f64]) -> Result<()> {
+    match values.iter().position(|value| *value <= 0.0) {
+        Some(k) => Err(row(path, place, k, format!("{:e} is not above zero", values[k]))),
+        None => Ok(()),
+    }
+}
+
+/// Refuses radii of another scale than all others.
+pub(super) fn radii(path: &Path, place: &str, values: &[f64]) -> Result<()> {
+    positive(path, place, values)?;
+    let usual = median(values.to_vec());
+    match values.iter().position(|radius| is_huge(*radius, usual)) {
+        Some(k) => {
+            Err(row(path, place, k, format!("{:e} m, where half the grains have at most {usual:e} m", values[k])))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Refuses values that do not grow from row to row.
+pub(super) fn growing<T: PartialOrd + Display>(path: &Path, place: &str, values: &[T]) -> Result<()> {
+    match values.windows(2).position(|pair| pair[0] >= pair[1]) {
+        Some(k) => Err(row(path, place, k + 1, format!("{} does not come after {}", values[k + 1], values[k]))),
+        None => Ok(()),
+    }
+}
+
+/// Refuses ruptures of unknown bonds or grains, of steps out of order or after step `until`, and
+/// with implausible numbers.
+pub(super) fn ruptures(
+    path: &Path,
+    place: &str,
+    events: &[Rupture],
+    [bonds, grains]: [usize; 2],
+    until: i64,
+) -> Result<()> {
+    let known = |number: i32, count: usize| usize::try_from(number).is_ok_and(|number| number < count);
+    let mut last = (i64::MIN, f64::NEG_INFINITY);
+    for (k, e) in events.iter().enumerate() {
+        let [x, y, z] = e.point;
+        // histories of before version 3 have none
+        let twist = if e.twist.is_nan() { 0.0 } else { e.twist };
+        let numbers = [e.time, x, y, z, e.normal_force, e.tangential_force, e.moment, twist, e.energy];
+        reals(path, place, k, numbers.len(), &numbers)?;
+        let what = if !known(e.bond, bonds) {
+            format!("{} is none of {bonds} bonds", e.bond)
+        } else if !e.pair.iter().all(|grain| known(*grain, grains)) {
+            format!("{}, {} are not two of {grains} grains", e.pair[0], e.pair[1])
+        } else if e.step < last.0 || e.time < last.1 {
+            format!("step {} at {} s does not come after step {} at {} s", e.step, e.time, last.0, last.1)
+        } else if e.step > until {
+            format!("step {} comes after the last frame, of step {until}", e.step)
+        } else if e.round < 0 {
+            format!("{} is no round of a cascade", e.round)
+        } else {
+            last = (e.step, e.time);
+            continue;
+        };
+        return Err(row(path, place, k, what));
+    }
+    Ok(())
+}

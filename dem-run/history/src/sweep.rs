@@ -1,0 +1,341 @@
+//! The folder of a sweep: what is planned, what each run came to.
+//!
+//! ```text
+//! manifest.json        every run: its values, its digest, its state when it was last gathered
+//! runs.csv             the same as a table, with the numbers of each run's summary
+//! runs/0001.json       the scene of a run; locked while it is being run
+//! runs/0001.h5         its history, there as soon as it is complete
+//! runs/0001.part.h5    its history while it is written
+//! runs/0001.failed.h5  its history up to where it failed
+//! runs/0001.state.json what it came to
+//! ```
+//!
+//! Only the state files say what has been done. Each has one writer, the process that holds the
+//! lock of the run. The manifest and the table are gathered from them, so tasks that run at the
+//! same time never write the same file.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use dem_output::replace;
+
+use crate::reader::History;
+
+/// A file in the folder of a sweep that cannot be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum SweepError {
+    /// The manifest is not one, or one of another format.
+    #[error("{}: the manifest cannot be read: {why}", .path.display())]
+    Manifest {
+        /// The manifest.
+        path: PathBuf,
+        /// What is wrong with it.
+        why: String,
+    },
+    /// The operating system refused.
+    #[error("{} {doing}: {source}", .path.display())]
+    File {
+        /// The file or folder.
+        path: PathBuf,
+        /// What failed, as in "cannot be written".
+        doing: &'static str,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// A state cannot be written as JSON.
+    #[error(transparent)]
+    Json(#[from] serde_json::Error),
+}
+
+/// The result of reading or writing in the folder of a sweep.
+pub type Result<T> = std::result::Result<T, SweepError>;
+
+/// The format of the manifest.
+const FORMAT: u32 = 1;
+
+/// Every run of a sweep, planned and done.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Manifest {
+    /// Format of this file.
+    pub format: u32,
+    /// Version of the program.
+    pub program: String,
+    /// The sweep file's name.
+    pub sweep: String,
+    /// The base scene's name.
+    pub scene: String,
+    /// Fields that are varied, in the order of the sweep.
+    pub fields: Vec<String>,
+    /// The runs.
+    pub runs: Vec<Entry>,
+}
+
+/// A run in the manifest.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Entry {
+    /// Its number with zeros in front, as 0003: the name of its files.
+    pub id: String,
+    /// Its values.
+    pub values: BTreeMap<String, Value>,
+    /// What stands for its scene.
+    pub digest: String,
+    /// Its history, from the folder of the sweep; not there before the run is done.
+    pub history: String,
+    /// How far it is.
+    pub state: State,
+    /// Why it failed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub message: Option<String>,
+    /// Duration by the clock (s).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wall_time: Option<f64>,
+    /// Processor time (s).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cpu_time: Option<f64>,
+}
+
+/// How far a run is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum State {
+    /// It is yet to be run.
+    Left,
+    /// It is being run.
+    Running,
+    /// Its history is complete.
+    Done,
+    /// It ended with an error.
+    Failed,
+}
+
+impl State {
+    /// Its name in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Left => "left",
+            Self::Running => "running",
+            Self::Done => "done",
+            Self::Failed => "failed",
+        }
+    }
+}
+
+/// What a run came to: the content of its state file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Outcome {
+    /// The scene that was run.
+    pub digest: String,
+    /// Done or failed.
+    pub state: State,
+    /// Exit code of the run; none if a signal ended it.
+    pub exit_code: Option<i32>,
+    /// Why it failed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub message: Option<String>,
+    /// Duration by the clock (s).
+    pub wall_time: f64,
+    /// The summary that the run printed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub summary: Option<Value>,
+}
+
+impl Outcome {
+    /// Whether another attempt would end the same way: no convergence, or a sample that cannot be
+    /// made.
+    #[must_use]
+    pub fn is_final(&self) -> bool {
+        self.state == State::Failed && matches!(self.exit_code, Some(2 | 3))
+    }
+
+    /// Processor time (s), where there is a summary.
+    #[must_use]
+    pub fn cpu_time(&self) -> Option<f64> {
+        self.summary.as_ref()?.get("cpu_time")?.as_f64()
+    }
+}
+
+/// The folder of a sweep.
+#[derive(Debug, Clone)]
+pub struct Store {
+    folder: PathBuf,
+}
+
+impl Store {
+    /// The folder, which need not be there yet.
+    #[must_use]
+    pub fn new(folder: PathBuf) -> Self {
+        Self { folder }
+    }
+
+    /// Its path.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// The path of a file of a run, by its ending.
+    #[must_use]
+    pub fn path(&self, id: &str, ending: &str) -> PathBuf {
+        self.folder.join("runs").join(format!("{id}{ending}"))
+    }
+
+    /// The manifest, if there is one.
+    ///
+    /// # Errors
+    /// A manifest that cannot be read, or that another program wrote.
+    pub fn manifest(&self) -> Result<Option<Manifest>> {
+        let path = self.folder.join("manifest.json");
+        let failed = |why: String| SweepError::Manifest { path: path.clone(), why };
+        match fs::read(&path) {
+            Ok(bytes) => {
+                let manifest: Manifest = serde_json::from_slice(&bytes).map_err(|e| failed(e.to_string()))?;
+                match manifest.format {
+                    FORMAT => Ok(Some(manifest)),
+                    other => Err(failed(format!("its format is {other}, and this program knows {FORMAT}"))),
+                }
+            }
+            Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+            Err(error) => Err(failed(error.to_string())),
+        }
+    }
+
+    /// What a run came to; none if it has not ended, or if what is written there cannot be read.
+    #[must_use]
+    pub fn outcome(&self, id: &str) -> Option<Outcome> {
+        serde_json::from_slice(&fs::read(self.path(id, ".state.json")).ok()?).ok()
+    }
+
+    /// Writes what a run came to.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn record(&self, id: &str, outcome: &Outcome) -> Result<()> {
+        write_json(&self.path(id, ".state.json"), outcome)
+    }
+
+    /// Whether the history of a run is there and complete.
+    #[must_use]
+    pub fn is_complete(&self, id: &str) -> bool {
+        History::open(&self.path(id, ".h5")).is_ok_and(|history| history.frames() > 0 && !history.open_ended())
+    }
+
+    /// The lock of a run; none while another process has it. It is released at the end of the
+    /// process, however it ends.
+    ///
+    /// # Errors
+    /// The folder cannot be written.
+    pub fn claim(&self, id: &str) -> Result<Option<File>> {
+        let path = self.path(id, ".json");
+        let failed = |source| SweepError::File { path: path.clone(), doing: "cannot be locked", source };
+        let file = OpenOptions::new().write(true).create(true).truncate(false).open(&path).map_err(failed)?;
+        // whoever gathers states looks at the lock for a moment
+        for _ in 0..10 {
+            match file.try_lock() {
+                Ok(()) => return Ok(Some(file)),
+                Err(TryLockError::WouldBlock) => std::thread::sleep(Duration::from_millis(10)),
+                // a file system without locks, as on some clusters: the scheduler must start each
+                // run only once
+                Err(TryLockError::Error(error)) if error.kind() == ErrorKind::Unsupported => return Ok(Some(file)),
+                Err(TryLockError::Error(error)) => return Err(failed(error)),
+            }
+        }
+        Ok(None)
+    }
+
+    fn is_claimed(&self, id: &str) -> bool {
+        let file = File::open(self.path(id, ".json"));
+        file.is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
+    }
+
+    /// Brings the states in the manifest up to date.
+    pub fn gather(&self, manifest: &mut Manifest) {
+        for run in &mut manifest.runs {
+            let outcome = self.outcome(&run.id).filter(|outcome| outcome.digest == run.digest);
+            run.state = match &outcome {
+                // a failed run may be on its second attempt
+                None | Some(Outcome { state: State::Failed, .. }) if self.is_claimed(&run.id) => State::Running,
+                None => State::Left,
+                Some(outcome) => outcome.state,
+            };
+            run.wall_time = outcome.as_ref().map(|outcome| outcome.wall_time);
+            run.cpu_time = outcome.as_ref().and_then(Outcome::cpu_time);
+            run.message = outcome.and_then(|outcome| outcome.message);
+        }
+    }
+
+    /// Writes the manifest.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write_manifest(&self, manifest: &Manifest) -> Result<()> {
+        write_json(&self.folder.join("manifest.json"), manifest)
+    }
+
+    /// Writes a file in the folder so that a reader, or a crash, finds the old content or the new
+    /// one.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write(&self, name: &str, content: &[u8]) -> Result<()> {
+        write(&self.folder.join(name), content)
+    }
+
+    /// Makes the folder and that of the runs.
+    ///
+    /// # Errors
+    /// They cannot be made.
+    pub fn create(&self) -> Result<()> {
+        let runs = self.folder.join("runs");
+        fs::create_dir_all(&runs).map_err(|source| SweepError::File { path: runs, doing: "cannot be made", source })
+    }
+
+    /// Deletes all files of a run.
+    pub fn delete(&self, id: &str) {
+        for ending in [".state.json", ".h5", ".failed.h5", ".part.h5", ".log", ".json"] {
+            // most of them are not there
+            let _ = fs::remove_file(self.path(id, ending));
+        }
+    }
+}
+
+impl Manifest {
+    /// A manifest without runs.
+    #[must_use]
+    pub fn new(sweep: &Path, scene: &Path, fields: Vec<String>) -> Self {
+        let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let program = format!("dem-run {}", env!("CARGO_PKG_VERSION"));
+        Self { format: FORMAT, program, sweep: name(sweep), scene: name(scene), fields, runs: vec![] }
+    }
+
+    /// The run of this number, with or without zeros in front.
+    #[must_use]
+    pub fn run(&self, id: &str) -> Option<&Entry> {
+        let number = |id: &str| id.parse::<u64>().ok();
+        self.runs.iter().find(|run| run.id == id || (number(id).is_some() && number(&run.id) == number(id)))
+    }
+}
+
+impl Entry {
+    /// A run that is yet to be run.
+    #[must_use]
+    pub fn new(id: String, values: BTreeMap<String, Value>, digest: String) -> Self {
+        let history = format!("runs/{id}.h5");
+        Self { id, values, digest, history, state: State::Left, message: None, wall_time: None, cpu_time: None }
+    }
+}
+
+fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
+    write(path, format!("{}\n", serde_json::to_string_pretty(value)?).as_bytes())
+}
+
+fn write(path: &Path, content: &[u8]) -> Result<()> {
+    let failed = |source| SweepError::File { path: path.into(), doing: "cannot be written", source };
+    replace::write(path, content).map_err(failed)
+}

@@ -1,0 +1,67 @@
+//! The places of texts in a file. HDF5 up to 1.10 trusts the size and the place that a file gives
+//! for a text; wrong values crash the process. So they are checked before HDF5 reads them.
+//!
+//! Texts lie in heaps ("GCOL", version 1): each follows the one before, with 16 bytes of index and
+//! size before it, filled up to 8 bytes; index 0 is what is left. A dataset of texts holds for each
+//! its length (u32), the address of its heap (u64) and its index there (u32). Source: HDF5 File
+//! Format Specification, version 3, III.E and IV.B.
+
+use std::collections::HashMap;
+use std::fs::File;
+use std::io::{self, Read};
+use std::os::unix::fs::FileExt;
+use std::path::Path;
+
+/// Bytes at the beginning of a file among which its heaps are: texts are written before anything
+/// else.
+const HEAD: u64 = 1 << 20;
+/// Bytes by which a dataset names a text.
+const NAMED: usize = 16;
+
+/// Sizes of the texts, bytes, by the address of their heap and their index there.
+pub(super) struct Texts(HashMap<(u64, u32), u64>);
+
+impl Texts {
+    /// Finds the texts of a file.
+    ///
+    /// # Errors
+    /// Those of the operating system, and in words the place of a text that is longer than its
+    /// heap.
+    pub fn find(path: &Path) -> io::Result<Result<Self, String>> {
+        let mut head = vec![];
+        File::open(path)?.take(HEAD).read_to_end(&mut head)?;
+        let number = |at: usize| Some(u64::from_le_bytes(head.get(at..at + 8)?.try_into().ok()?));
+        let mut texts = HashMap::new();
+        for start in (0..head.len()).step_by(8).filter(|start| head[*start..].starts_with(b"GCOL\x01\0\0\0")) {
+            let end = number(start + 8).unwrap_or(0).saturating_add(start as u64);
+            let mut at = start + 16;
+            while let Some(size) = number(at + 8).filter(|_| (at as u64) < end) {
+                let index = u32::from(u16::from_le_bytes([head[at], head[at + 1]]));
+                let room = if index == 0 { size } else { size.saturating_add(7) / 8 * 8 + 16 };
+                if room == 0 || room > end - at as u64 {
+                    return Ok(Err(format!("the text at byte {at} is longer than the room for texts")));
+                }
+                texts.insert((start as u64, index), size);
+                at += room as usize;
+            }
+        }
+        Ok(Ok(Self(texts)))
+    }
+
+    /// Whether the `count` texts that are named from byte `offset` of the file on are among them.
+    ///
+    /// # Errors
+    /// Those of the operating system.
+    pub fn hold(&self, path: &Path, offset: u64, count: usize) -> io::Result<bool> {
+        let mut named = vec![0; NAMED * count];
+        File::open(path)?.read_exact_at(&mut named, offset)?;
+        let is_held = |text: &[u8; NAMED]| {
+            let [a, b, c, d, heap @ .., e, f, g, h] = *text;
+            let length = u64::from(u32::from_le_bytes([a, b, c, d]));
+            let place = (u64::from_le_bytes(heap), u32::from_le_bytes([e, f, g, h]));
+            // a text that was never written has no place
+            length == 0 || self.0.get(&place).is_some_and(|size| length <= *size)
+        };
+        Ok(named.as_chunks::<NAMED>().0.iter().all(is_held))
+    }
+}

@@ -1,0 +1,170 @@
+//! The folder that takes the results of a command.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::error::{Result, WriteError};
+use crate::owner::{Owner, Source};
+use crate::replace::{self, remove_orphans, replace};
+
+/// A picture that comes as SVG and as PNG.
+pub trait Picture {
+    /// The picture as SVG.
+    fn svg(&self) -> String;
+
+    /// The picture as PNG.
+    ///
+    /// # Errors
+    /// In words, where it cannot be drawn.
+    fn png(&self) -> std::result::Result<Vec<u8>, String>;
+}
+
+/// The folder that takes the files of a command, and what has been written there. Every file comes
+/// into its place whole.
+pub struct Folder {
+    path: PathBuf,
+    written: Vec<PathBuf>,
+    owner: Option<Owner>,
+}
+
+impl Folder {
+    /// Creates the folder if it is not there.
+    ///
+    /// # Errors
+    /// [`WriteError`].
+    pub fn create(path: PathBuf) -> Result<Self> {
+        fs::create_dir_all(&path).map_err(|error| WriteError { path: path.clone(), why: error.to_string() })?;
+        remove_orphans(&path, None);
+        Ok(Self { path, written: vec![], owner: None })
+    }
+
+    /// As [`Folder::create`], for the results that `command` makes of `sources`. The folder takes
+    /// no results of other sources; a record in it lists the files. With `force` the folder is
+    /// taken over, and results of other sources are removed.
+    ///
+    /// # Errors
+    /// [`WriteError`], also where the folder belongs to others, and later for a file that is in no
+    /// record.
+    pub fn of(path: PathBuf, command: &str, sources: Vec<Source>, force: bool) -> Result<Self> {
+        let mut folder = Self::create(path)?;
+        let owner = Owner::claim(&folder.path, command, sources, force);
+        folder.owner = Some(owner.map_err(|why| WriteError { path: folder.path.clone(), why })?);
+        Ok(folder)
+    }
+
+    /// Files of others that were removed when the folder was taken over.
+    pub fn removed(&self) -> usize {
+        self.owner.as_ref().map_or(0, Owner::removed)
+    }
+
+    /// Removes files that an earlier call of the command wrote and this one did not. It must be
+    /// called last.
+    ///
+    /// # Errors
+    /// [`WriteError`].
+    pub fn finish(&self) -> Result<()> {
+        let finished = self.owner.as_ref().map_or(Ok(()), |owner| owner.finish(&self.written));
+        finished.map_err(|why| WriteError { path: self.path.clone(), why })
+    }
+
+    /// The files written so far.
+    pub fn written(&self) -> &[PathBuf] {
+        &self.written
+    }
+
+    /// The folder itself.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Makes a file by `make`, which gets the name of a temporary file beside its final place.
+    ///
+    /// # Errors
+    /// [`WriteError`], and those of `make`; the file that was there before then stays.
+    pub fn make<T, E: From<WriteError>>(
+        &mut self,
+        name: &str,
+        make: impl FnOnce(&Path) -> std::result::Result<T, E>,
+    ) -> std::result::Result<T, E> {
+        let path = self.place(name)?;
+        let failed = |_, error: std::io::Error| WriteError { path: path.clone(), why: error.to_string() }.into();
+        let made = replace(&path, failed, make)?;
+        self.written.push(path);
+        Ok(made)
+    }
+
+    /// Writes a file.
+    ///
+    /// # Errors
+    /// [`WriteError`].
+    pub fn write(&mut self, name: &str, content: &[u8]) -> Result<()> {
+        let path = self.place(name)?;
+        replace::write(&path, content).map_err(|error| WriteError { path: path.clone(), why: error.to_string() })?;
+        self.written.push(path);
+        Ok(())
+    }
+
+    /// Records the names of many files before they are written, in one write of the record.
+    ///
+    /// # Errors
+    /// [`WriteError`].
+    pub fn announce(&self, names: &[String]) -> Result<()> {
+        let registered = self.owner.as_ref().map_or(Ok(()), |owner| owner.register(names));
+        registered.map_err(|(name, why)| {
+            let path = name.map_or_else(|| self.path.clone(), |name| self.path.join(name));
+            WriteError { path, why }
+        })
+    }
+
+    /// The path of a file that may be written.
+    fn place(&self, name: &str) -> Result<PathBuf> {
+        self.announce(&[name.to_string()])?;
+        Ok(self.path.join(name))
+    }
+
+    /// Writes `NAME.svg` and `NAME.png`.
+    ///
+    /// # Errors
+    /// [`WriteError`].
+    pub fn draw(&mut self, name: &str, picture: &impl Picture) -> Result<()> {
+        self.write(&format!("{name}.svg"), picture.svg().as_bytes())?;
+        let file = format!("{name}.png");
+        let png = picture.png().map_err(|why| WriteError { path: self.path.join(&file), why })?;
+        self.write(&file, &png)
+    }
+
+    /// Writes `NAME.csv`.
+    ///
+    /// # Errors
+    /// [`WriteError`].
+    pub fn table(&mut self, name: &str, head: &[&str], rows: impl Iterator<Item = Vec<String>>) -> Result<()> {
+        let file = format!("{name}.csv");
+        let failed = |why: String| WriteError { path: self.path.join(&file), why };
+        let mut writer = csv::Writer::from_writer(vec![]);
+        writer.write_record(head).map_err(|error| failed(error.to_string()))?;
+        for row in rows {
+            writer.write_record(row).map_err(|error| failed(error.to_string()))?;
+        }
+        let content = writer.into_inner().map_err(|error| failed(error.to_string()))?;
+        self.write(&file, &content)
+    }
+}
+
+/// `<stem of the input><suffix>` in the current folder, as `compression-post` for
+/// `runs/compression.h5`.
+#[must_use]
+pub fn default_folder(input: &Path, suffix: &str) -> PathBuf {
+    let mut name = input.file_stem().unwrap_or_default().to_os_string();
+    name.push(suffix);
+    name.into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_is_named_after_its_input() {
+        assert_eq!(default_folder(Path::new("runs/compression.h5"), "-post"), Path::new("compression-post"));
+    }
+}

@@ -1,0 +1,15 @@
+//! Where results go: tables on stdout, files in one folder, each of which comes into its place
+//! whole.
+
+mod error;
+mod folder;
+mod owner;
+mod print;
+pub mod replace;
+mod text;
+
+pub use error::{Result, WriteError};
+pub use folder::{Folder, Picture, default_folder};
+pub use owner::Source;
+pub use print::{escaped, in_shell, print, print_json, print_line, print_result};
+pub use text::{Text, cell, facts, number, quantity, short, size};

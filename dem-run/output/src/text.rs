@@ -1,0 +1,135 @@
+//! Tables and numbers for people, cells of CSV files.
+
+use std::fmt::Display;
+
+/// A row of a CSV file from numbers and words.
+#[macro_export]
+macro_rules! row {
+    ($($cell:expr),* $(,)?) => { vec![$($cell.to_string()),*] };
+}
+
+/// A table of text with right-aligned numbers.
+#[derive(Default)]
+pub struct Text {
+    rows: Vec<Vec<String>>,
+}
+
+impl Text {
+    /// A table with a head.
+    pub fn new(head: &[&str]) -> Self {
+        Self { rows: vec![head.iter().map(ToString::to_string).collect()] }
+    }
+
+    /// Adds a row.
+    pub fn row(&mut self, cells: Vec<String>) {
+        self.rows.push(cells);
+    }
+
+    /// The table as lines, the first column to the left, the others to the right.
+    pub fn lines(&self) -> String {
+        let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
+        let cell = |row: &[String], c: usize| row.get(c).cloned().unwrap_or_default();
+        let width = |c: usize| self.rows.iter().map(|row| cell(row, c).chars().count()).max().unwrap_or(0);
+        let widths: Vec<usize> = (0..columns).map(width).collect();
+        let line = |row: &Vec<String>| {
+            let mut line = String::new();
+            for (c, &width) in widths.iter().enumerate() {
+                let text = cell(row, c);
+                match c {
+                    0 => line += &format!("{text:<width$}"),
+                    _ => line += &format!("  {text:>width$}"),
+                }
+            }
+            line.trim_end().to_string() + "\n"
+        };
+        self.rows.iter().map(line).collect()
+    }
+}
+
+/// A list of names and values, one a line.
+pub fn facts(facts: &[(&str, String)]) -> String {
+    let width = facts.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
+    facts.iter().map(|(name, value)| format!("{name:<width$}  {value}\n")).collect()
+}
+
+/// A number for people: four digits, and a power of ten where it is very large or small.
+pub fn number(value: f64) -> String {
+    digits(value, 4)
+}
+
+/// A number for captions: three digits.
+pub fn short(value: f64) -> String {
+    digits(value, 3)
+}
+
+fn digits(value: f64, digits: i32) -> String {
+    let magnitude = value.abs();
+    if value == 0.0 {
+        return "0".into();
+    }
+    if !(1e-3..1e6).contains(&magnitude) {
+        return format!("{value:.*e}", digits as usize - 1);
+    }
+    let decimals = (digits - 1 - magnitude.log10().floor() as i32).max(0) as usize;
+    let text = format!("{value:.decimals$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
+}
+
+/// A number with its unit, or a dash where there is none.
+pub fn quantity(value: Option<impl Into<f64>>, unit: &str) -> String {
+    value.map_or_else(|| "–".into(), |value| with_unit(number(value.into()), unit))
+}
+
+fn with_unit(number: impl Display, unit: &str) -> String {
+    if unit.is_empty() { number.to_string() } else { format!("{number} {unit}") }
+}
+
+/// An optional number as a cell of a CSV file: empty where there is none.
+pub fn cell(value: Option<f64>) -> String {
+    value.map_or_else(String::new, |value| value.to_string())
+}
+
+/// A size as a person reads it.
+#[must_use]
+pub fn size(bytes: u64) -> String {
+    match bytes {
+        0..1_000_000 => format!("{:.0} kB", bytes as f64 / 1e3),
+        1_000_000..1_000_000_000 => format!("{:.1} MB", bytes as f64 / 1e6),
+        _ => format!("{:.1} GB", bytes as f64 / 1e9),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short_and_right() {
+        for (value, text) in [
+            (0.0, "0"),
+            (1.0, "1"),
+            (15.975, "15.97"),
+            (-0.25, "-0.25"),
+            (123456.0, "123456"),
+            (1.5e-5, "1.500e-5"),
+            (0.001234, "0.001234"),
+        ] {
+            assert_eq!(number(value), text);
+        }
+    }
+
+    #[test]
+    fn sizes_are_short() {
+        assert_eq!(
+            (size(5_000), size(63_400_000), size(2_500_000_000)),
+            ("5 kB".into(), "63.4 MB".into(), "2.5 GB".into())
+        );
+    }
+
+    #[test]
+    fn a_table_is_aligned() {
+        let mut text = Text::new(&["mode", "bonds"]);
+        text.row(vec!["TENSION".into(), "7".into()]);
+        assert_eq!(text.lines(), "mode     bonds\nTENSION      7\n");
+    }
+}

@@ -1,0 +1,182 @@
+//! Scenes: what is simulated, as a JSON text with comments, in SI units.
+//!
+//! A text becomes a scene in four steps, each in its own file:
+//!
+//! ```text
+//! text ──parse──▶ JSON tree ──set──▶ JSON tree ──decode──▶ Scene ──validate──▶ Scene
+//!       syntax,              --set            unknown names,      wrong values,
+//!       duplicate keys       assignments      wrong types         all at once
+//! ```
+//!
+//! The types of the model are plain numbers, so that a scene can be written back as JSON
+//! ([`Scene::to_json`]) and described as a JSON Schema ([`schema::json_schema`]). What they
+//! mean in the simulation is decided where the sample is built.
+
+mod difference;
+mod error;
+pub mod failure;
+mod function;
+mod model;
+pub mod parse;
+mod sample;
+pub mod schema;
+mod set;
+mod solver;
+mod suggest;
+mod validate;
+mod wall;
+
+#[cfg(test)]
+mod tests;
+
+use std::fs::File;
+use std::io::{self, Read as _};
+use std::path::{Path, PathBuf};
+
+pub use difference::{Difference, differences};
+pub use error::shorten;
+pub use error::{Origin, Problem, SceneError};
+pub use function::{Function, Ramp};
+pub use model::{
+    Bonds, Flow, Friction, Grains, Load, Materials, Output, Precision, Restitution, Rupture, Scene, Springs, Stiffness,
+    Stop, Time, TravelFrom, WallTravel, Young, choose_load_wall,
+};
+pub use sample::{
+    Compaction, Cut, Deposition, Diameters, GrainSpec, Lattice, Preparation, RandomSample, Sample, SampleFile, Section,
+    UniformRange,
+};
+pub use solver::{GaussSeidel, LocalSolve, Newton, Solver, SolverKind, Start};
+pub use validate::validate;
+pub use validate::{LARGEST, MAX_GRAINS};
+pub use wall::{Circle, Cylinder, Drive, Place, Plane, Shape, Sphere, Wall, WallMass};
+
+/// Reads the scene in the file `path`, applies the `--set` assignments and validates the result.
+///
+/// A sample file named by the scene is sought beside the scene; the path in the scene that
+/// comes back is already joined to the scene's folder.
+///
+/// # Errors
+/// [`SceneError`]: an unreadable file, wrong syntax, wrong structure, or all wrong values.
+pub fn load(path: &Path, assignments: &[String]) -> Result<Scene, SceneError> {
+    let mut document = parse::parse(&path.display().to_string(), &read(path)?)?;
+    set::apply(&mut document, assignments).map_err(|problems| document.wrong(problems))?;
+    let mut scene = finish(&mut document).map_err(|problems| document.wrong(problems))?;
+    join_sample(&mut scene, path);
+    Ok(scene)
+}
+
+/// Largest text of a scene or a sweep (bytes): some seven million grains listed one by one.
+pub const MAX_TEXT: u64 = 256 << 20;
+
+fn read(path: &Path) -> Result<String, SceneError> {
+    text(path).map_err(|source| SceneError::Read { path: path.to_path_buf(), source })
+}
+
+/// The text of a scene or a sweep: a regular file of at most [`MAX_TEXT`].
+pub fn text(path: &Path) -> io::Result<String> {
+    let too_long = || io::Error::other(format!("it has more than {} MiB: {MANY_GRAINS}", MAX_TEXT >> 20));
+    let file = open_regular(path)?;
+    if file.metadata()?.len() > MAX_TEXT {
+        return Err(too_long());
+    }
+    let mut bytes = Vec::new();
+    // the length of some files, as in /proc, is not that of what is read
+    file.take(MAX_TEXT + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > MAX_TEXT {
+        return Err(too_long());
+    }
+    if bytes.starts_with(b"\x89HDF\r\n\x1a\n") {
+        return Err(io::Error::other(
+            "it is an HDF5 file: `dem-run resume` goes on with a history, `dem-post` reads it",
+        ));
+    }
+    String::from_utf8(bytes).map_err(|error| {
+        let before = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
+        io::Error::new(io::ErrorKind::InvalidData, format!("line {line} is not UTF-8 text: save it as UTF-8"))
+    })
+}
+
+const MANY_GRAINS: &str = "list its grains in a CSV file (sample.file)";
+
+/// Opens a regular file. Opening a pipe would wait for its writer, and a device has no end.
+pub fn open_regular(path: &Path) -> io::Result<File> {
+    match std::fs::metadata(path)?.file_type() {
+        kind if kind.is_file() => File::open(path),
+        kind if kind.is_dir() => Err(io::Error::other("it is a folder: name a file in it")),
+        _ => Err(io::Error::other("it is not a regular file: save what a pipe or a device gives as a file first")),
+    }
+}
+
+/// A sample file is sought beside the scene.
+fn join_sample(scene: &mut Scene, path: &Path) {
+    if let (Sample::File(file), Some(folder)) = (&mut scene.sample, path.parent()) {
+        file.path = folder.join(&file.path);
+    }
+}
+
+/// Reads a scene from `text`, applies the `--set` assignments and validates the result.
+///
+/// `name` stands in the error messages for the place that the text comes from. Paths inside
+/// the scene stay as they are written.
+///
+/// # Errors
+/// [`SceneError`]: wrong syntax, wrong structure, or all wrong values.
+pub fn from_text(name: &str, text: &str, assignments: &[String]) -> Result<Scene, SceneError> {
+    let mut document = parse::parse(name, text)?;
+    set::apply(&mut document, assignments).map_err(|problems| document.wrong(problems))?;
+    finish(&mut document).map_err(|problems| document.wrong(problems))
+}
+
+/// The scene that a tree describes, or all that is wrong with it.
+///
+/// It drops the tree, which for millions of grains is larger than all later data.
+fn finish(document: &mut parse::Document) -> Result<Scene, Vec<Problem>> {
+    let mut scene: Scene = document.decode().map_err(|problem| vec![problem])?;
+    document.root.take();
+    let accept = solver::default_accept(scene.solver.tolerance, scene.bonds.is_some());
+    scene.solver.accept.get_or_insert(accept);
+    let problems = document.merge_non_finite(validate(&scene));
+    if problems.is_empty() { Ok(scene) } else { Err(problems) }
+}
+
+/// A scene whose values are yet to be varied.
+#[derive(Debug)]
+pub struct Base {
+    path: PathBuf,
+    document: parse::Document,
+}
+
+/// A value that a sweep puts in a scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Change {
+    /// Where in the scene.
+    pub path: String,
+    /// What.
+    pub value: serde_json::Value,
+    /// The place in the sweep that says so.
+    pub place: String,
+}
+
+impl Base {
+    /// Reads the text; it need not be a right scene before its values are put in.
+    pub fn read(path: &Path) -> Result<Self, SceneError> {
+        let document = parse::parse(&path.display().to_string(), &read(path)?)?;
+        Ok(Self { path: path.to_path_buf(), document })
+    }
+
+    /// The scene with these values.
+    ///
+    /// # Errors
+    /// All that is wrong with it, with the place that it was written: in the sweep or in the scene.
+    pub fn with(&self, changes: &[Change]) -> Result<Scene, Vec<Problem>> {
+        let mut document = self.document.clone();
+        for Change { path, value, place } in changes {
+            set::put(&mut document, path, value.clone(), place)
+                .map_err(|problem| vec![problem.with_origin(Origin::Sweep(place.as_str().into()))])?;
+        }
+        let mut scene = finish(&mut document).map_err(|problems| document.located(problems))?;
+        join_sample(&mut scene, &self.path);
+        Ok(scene)
+    }
+}

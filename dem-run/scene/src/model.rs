@@ -1,0 +1,468 @@
+//! The model of a scene: everything but the sample, the walls and the solver, which have their own
+//! files.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::function::Function;
+use super::sample::Sample;
+use super::solver::Solver;
+use super::wall::{Drive, Wall};
+
+/// A scene: what is simulated, in SI units.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// The JSON Schema that an editor checks the scene against, as `dem-run schema` prints it.
+    #[serde(default, rename = "$schema", skip_serializing_if = "Option::is_none")]
+    pub schema: Option<String>,
+    /// What the scene shows, in a line.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub title: Option<String>,
+    /// Dimension of space: 2 (disks) or 3 (spheres).
+    pub dimension: u8,
+    /// Seed of all random numbers of the preparation.
+    #[serde(default = "default_seed")]
+    pub seed: u64,
+    /// Thickness of the disks in 2D (m); 1 m where it is absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub thickness: Option<f64>,
+    /// The grains.
+    pub sample: Sample,
+    /// Density, friction and restitution.
+    pub materials: Materials,
+    /// Cohesive bonds between grains; none where it is absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bonds: Option<Bonds>,
+    /// Grains that are held fixed or loaded.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub grains: Option<Grains>,
+    /// Walls, by name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub walls: BTreeMap<String, Wall>,
+    /// Name of the driven wall whose force is the load of the sample: of the first break, of the
+    /// collapse, and the greatest. Where it is absent, the wall of `stop.wall_travel`, else the
+    /// only driven one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub load_wall: Option<String>,
+    /// Gravity: one number for each dimension (m/s²); none where it is absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gravity: Option<Vec<f64>>,
+    /// Time step and end of the run.
+    pub time: Time,
+    /// The contact solver.
+    #[serde(default)]
+    pub solver: Solver,
+    /// How bonds break within a step.
+    #[serde(default)]
+    pub rupture: Rupture,
+    /// How often the history is written.
+    pub output: Output,
+    /// What ends the run before `time.end`; nothing where it is absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stop: Option<Stop>,
+}
+
+/// Density, friction and restitution.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Materials {
+    /// Density of the grains (kg/m³).
+    pub density: f64,
+    /// Coefficients of friction.
+    pub friction: Friction,
+    /// Coefficients of restitution; zero where they are absent.
+    #[serde(default)]
+    pub restitution: Restitution,
+}
+
+/// Coefficients of friction, for each pair of kinds.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Friction {
+    /// Between grains.
+    pub grain_grain: f64,
+    /// Between grains and walls.
+    pub grain_wall: f64,
+}
+
+/// Coefficients of normal restitution, for each pair of kinds.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Restitution {
+    /// Between grains (0 to 1).
+    pub grain_grain: f64,
+    /// Between grains and walls (0 to 1).
+    pub grain_wall: f64,
+    /// Approach speed below which restitution is zero (m/s).
+    pub threshold_speed: f64,
+}
+
+/// Cohesive bonds, formed once at the start between grains that are near enough.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Bonds {
+    /// Tensile strength of every bond (N); zero means no bonds. Either this or `stress`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub strength: Option<f64>,
+    /// Tensile strength as a stress over the section of a bond (Pa); zero means no bonds. Either this or `strength`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stress: Option<f64>,
+    /// Two grains are bonded if their gap is at most this fraction of their mean diameter.
+    pub gap_tolerance: f64,
+    /// Friction of intact bonds; that between grains where it is absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub friction: Option<f64>,
+    /// Coefficient of the twisting moment of bonds in 3D, which an intact bond bears up to this times the mean diameter times
+    /// (r_n + r_coh); where it is absent two grains are free to spin about their normal.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub twist: Option<f64>,
+    /// Flow of an intact bond at its limit.
+    #[serde(default)]
+    pub flow: Flow,
+    /// Stiffness of elastic bonds; bonds are rigid where it is absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stiffness: Option<Stiffness>,
+}
+
+/// Stiffness of elastic bonds.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Stiffness {
+    /// The same springs in every bond.
+    Springs(Springs),
+    /// Bars as long as they are wide, the mean diameter of the pair: of square section across the plane's thickness in
+    /// 2D, of round section in 3D.
+    Young(Young),
+}
+
+/// Springs of a bond.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Springs {
+    /// Along the normal (N/m).
+    pub normal: f64,
+    /// Across it (N/m).
+    pub tangential: f64,
+    /// In bending (N m/rad).
+    pub rolling: f64,
+    /// In twist (N m/rad), of bonds that resist it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub twist: Option<f64>,
+}
+
+/// Material of a bond.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Young {
+    /// Young's modulus (Pa).
+    pub modulus: f64,
+    /// Poisson's ratio, above −1 and at most 0.5.
+    pub poisson_ratio: f64,
+}
+
+/// Flow of an intact bond at its limit.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Flow {
+    /// Without the shift μ‖u_t‖: a convex problem; the bond breaks at its limit anyway.
+    #[default]
+    Associated,
+    /// With the shift, as between dry grains.
+    Bipotential,
+}
+
+/// Grains that are held fixed or loaded. Grains are counted from 0, in the order of the sample.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Grains {
+    /// Numbers of the grains that are held fixed.
+    pub fixed: Vec<usize>,
+    /// Forces and torques on grains.
+    pub loads: Vec<Load>,
+}
+
+/// A force and a torque on one grain, at its centre.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Load {
+    /// Number of the grain.
+    pub grain: usize,
+    /// Force: one number for each dimension (N); zero where it is absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub force: Option<Vec<f64>>,
+    /// Torque: `[t]` in 2D, counter-clockwise, `[tx, ty, tz]` in 3D (N m); zero where it is absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub torque: Option<Vec<f64>>,
+    /// Factor on both, a function of time; 1 where it is absent.
+    #[serde(default = "one")]
+    pub time: Function,
+}
+
+/// Time step and end of the run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Time {
+    /// Time step (s).
+    pub step: f64,
+    /// End of the run (s): no step ends after it. The last one ends before it where it is not a multiple of the step.
+    pub end: f64,
+}
+
+/// How bonds break within a step.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Rupture {
+    /// All bonds at their limit break and the same step is solved again, until none breaks.
+    #[default]
+    Cascade,
+    /// The same, but only the bond whose grains move apart fastest breaks each time.
+    CascadeWorst,
+    /// Bonds at their limit break at the end of the step.
+    EndOfStep,
+}
+
+/// What the history holds, and how often it is written: either every_steps or interval.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Output {
+    /// Number of steps from frame to frame.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub every_steps: Option<u64>,
+    /// Time from frame to frame (s), rounded to whole steps.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub interval: Option<f64>,
+    /// Whether frames hold the reactions and moments of the contacts.
+    pub reactions: bool,
+    /// Precision of what frames hold. Observables and events are always double.
+    pub precision: Precision,
+    /// Number of frames from checkpoint to checkpoint. A run that is killed goes on from its last checkpoint; the last
+    /// state of one that ends is always one.
+    pub checkpoint_every: u64,
+}
+
+impl Default for Output {
+    fn default() -> Self {
+        Self { every_steps: None, interval: None, reactions: true, precision: Precision::Double, checkpoint_every: 10 }
+    }
+}
+
+/// Precision of stored numbers.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Precision {
+    /// 16 digits.
+    #[default]
+    Double,
+    /// 7 digits, half the size.
+    Single,
+}
+
+/// What ends the run before its time.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Stop {
+    /// A wall has moved far enough.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wall_travel: Option<WallTravel>,
+    /// This fraction of the bonds has broken (above 0, up to 1).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub broken_fraction: Option<f64>,
+}
+
+/// A wall has moved far enough.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct WallTravel {
+    /// Name of the wall, one that is driven.
+    pub wall: String,
+    /// Distance along the wall's direction, as a fraction of the sample's extent along it at the start.
+    pub fraction_of_height: f64,
+    /// From when on the distance is counted.
+    #[serde(default)]
+    pub after: TravelFrom,
+}
+
+/// From when on the travel of a wall is counted.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum TravelFrom {
+    /// From the start of the run.
+    #[default]
+    Start,
+    /// From the first break of a bond.
+    FirstBreak,
+}
+
+fn default_seed() -> u64 {
+    1
+}
+
+fn one() -> Function {
+    Function::Constant(1.0)
+}
+
+/// The wall that loads the sample: the first of `named` that is among the `driven` ones, else the
+/// only driven one. `named` are the scene's `load_wall` and the wall of its `stop.wall_travel`.
+#[must_use]
+pub fn choose_load_wall<'a>(named: [Option<&str>; 2], driven: &[&'a str]) -> Option<&'a str> {
+    let find = |name: &str| driven.iter().copied().find(|other| *other == name);
+    let only = if let [only] = driven { Some(*only) } else { None };
+    named.into_iter().flatten().find_map(find).or(only)
+}
+
+impl Scene {
+    /// Names of the driven walls, in order.
+    #[must_use]
+    pub fn driven_walls(&self) -> Vec<&str> {
+        let driven = self.walls.iter().filter(|(_, wall)| wall.drive() != Drive::Fixed);
+        driven.map(|(name, _)| name.as_str()).collect()
+    }
+
+    /// The wall that loads the sample ([`choose_load_wall`]); none where no wall is driven, or
+    /// where several are and the scene does not say which.
+    #[must_use]
+    pub fn load_wall(&self) -> Option<&str> {
+        let travels = self.stop.as_ref().and_then(|stop| stop.wall_travel.as_ref()).map(|travel| travel.wall.as_str());
+        choose_load_wall([self.load_wall.as_deref(), travels], &self.driven_walls())
+    }
+
+    /// Names of the driven walls where there are several and the scene does not say which loads the
+    /// sample: then no result can say what the load is.
+    #[must_use]
+    pub fn load_unknown(&self) -> Option<String> {
+        let driven = self.driven_walls();
+        (driven.len() > 1 && self.load_wall().is_none()).then(|| driven.join(", "))
+    }
+
+    /// Thickness of the disks (m): 1 where the scene is silent, and in 3D, where it has no meaning.
+    #[must_use]
+    pub fn thickness(&self) -> f64 {
+        self.thickness.unwrap_or(1.0)
+    }
+
+    /// Whether there are bonds that resist twist.
+    #[must_use]
+    pub fn twists(&self) -> bool {
+        self.bonds.as_ref().is_some_and(|bonds| bonds.twist.is_some())
+    }
+
+    /// Number of components of a spin or a torque: 1 in 2D, 3 in 3D.
+    #[must_use]
+    pub fn spin_components(&self) -> usize {
+        if self.dimension == 2 { 1 } else { 3 }
+    }
+
+    /// Number of steps from frame to frame.
+    #[must_use]
+    pub fn steps_per_frame(&self) -> u64 {
+        match (self.output.every_steps, self.output.interval) {
+            (Some(steps), _) => steps.max(1),
+            (None, Some(interval)) => (interval / self.time.step).round().max(1.0) as u64,
+            (None, None) => 1,
+        }
+    }
+
+    /// Number of frames of a run to the end: the initial state, one every
+    /// [`Scene::steps_per_frame`], and the last.
+    #[must_use]
+    pub fn frames(&self) -> u64 {
+        1 + self.time.steps().div_ceil(self.steps_per_frame())
+    }
+
+    /// The scene as JSON, from which [`super::from_text`] reads the same scene, bit for bit.
+    ///
+    /// # Errors
+    /// The path of a sample file that is not Unicode, which JSON cannot hold.
+    pub fn to_json(&self) -> Result<String, serde_json::Error> {
+        serde_json::to_string_pretty(self)
+    }
+}
+
+impl Time {
+    /// Number of steps to the end: `end / step`, rounded down unless it is whole to rounding.
+    #[must_use]
+    pub fn steps(&self) -> u64 {
+        let ratio = self.end / self.step;
+        if self.is_multiple() { ratio.round() as u64 } else { ratio.floor() as u64 }
+    }
+
+    /// Whether the end is a multiple of the step, to rounding.
+    #[must_use]
+    pub fn is_multiple(&self) -> bool {
+        let ratio = self.end / self.step;
+        (ratio - ratio.round()).abs() <= 1e-9 * ratio.round()
+    }
+
+    /// End of the last step (s).
+    #[must_use]
+    pub fn last(&self) -> f64 {
+        self.steps() as f64 * self.step
+    }
+}
+
+impl Bonds {
+    /// Whether a bond bears anything.
+    #[must_use]
+    pub fn bear(&self) -> bool {
+        self.strength.or(self.stress).is_some_and(|limit| limit > 0.0)
+    }
+
+    /// Tensile strength r_coh (N) of the bond between two grains of mean diameter `mean_diameter`
+    /// (m): the force given, or σ·a·t in 2D, σ·π·a²/4 in 3D, t the `thickness` (m).
+    #[must_use]
+    pub fn cohesion(&self, dimension: u8, mean_diameter: f64, thickness: f64) -> f64 {
+        match (self.strength, self.stress) {
+            (Some(strength), _) => strength,
+            (None, Some(stress)) if dimension == 2 => stress * mean_diameter * thickness,
+            (None, Some(stress)) => stress * std::f64::consts::PI * mean_diameter * mean_diameter / 4.0,
+            (None, None) => 0.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_load_wall_is_named_or_that_of_the_travel_or_the_only_driven_one() {
+        let driven = ["left", "top"];
+        assert_eq!(choose_load_wall([Some("top"), Some("left")], &driven), Some("top"));
+        assert_eq!(choose_load_wall([None, Some("left")], &driven), Some("left"));
+        assert_eq!(choose_load_wall([None, None], &driven), None);
+        // a wall that is not driven loads nothing
+        assert_eq!(choose_load_wall([Some("floor"), None], &["top"]), Some("top"));
+        assert_eq!(choose_load_wall([None, None], &[]), None);
+    }
+
+    #[test]
+    fn steps_are_whole_where_the_ratio_is_whole_to_rounding() {
+        assert_eq!(Time { step: 1e-4, end: 0.5 }.steps(), 5000);
+        assert_eq!(Time { step: 0.1, end: 0.3 }.steps(), 3);
+        assert_eq!(Time { step: 0.1, end: 0.31 }.steps(), 3);
+        assert_eq!(Time { step: 0.1, end: 0.39 }.steps(), 3);
+        // it was 34, to 0.102 s
+        assert_eq!(Time { step: 3e-3, end: 0.1 }.steps(), 33);
+        assert!(Time { step: 0.1, end: 0.3 }.is_multiple() && !Time { step: 3e-3, end: 0.1 }.is_multiple());
+        assert_eq!(Time { step: 0.1, end: 0.0 }.steps(), 0);
+    }
+
+    #[test]
+    fn a_stress_acts_on_the_section_of_the_bond() {
+        let bonds = Bonds {
+            strength: None,
+            stress: Some(1e6),
+            gap_tolerance: 1e-3,
+            friction: None,
+            twist: None,
+            flow: Flow::Associated,
+            stiffness: None,
+        };
+        assert!((bonds.cohesion(2, 4e-3, 0.01) - 40.0).abs() < 1e-12);
+        assert!((bonds.cohesion(3, 4e-3, 0.01) - 4.0 * std::f64::consts::PI).abs() < 1e-12);
+        assert_eq!(Bonds { strength: Some(5.0), stress: None, ..bonds }.cohesion(2, 4e-3, 0.01), 5.0);
+    }
+}

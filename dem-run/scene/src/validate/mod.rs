@@ -1,0 +1,252 @@
+//! Wrong values in a scene, all at once.
+//!
+//! Only what the scene itself shows is judged here. Whether a wall overlaps the sample is known
+//! when the sample is.
+
+mod report;
+mod sample;
+mod wall;
+
+use std::collections::HashMap;
+
+use super::error::Problem;
+use super::model::{Bonds, Load, Scene, Stiffness, TravelFrom};
+use super::solver::SolverKind;
+use super::suggest::nearest;
+use super::wall::Drive;
+pub use report::{LARGEST, MAX_GRAINS};
+use report::{Number, Report};
+
+/// Steps are whole numbers that a double holds with room to spare.
+const MAX_STEPS: f64 = 1e12;
+
+/// All wrong values of a scene, in its order; none if the scene is right.
+#[must_use]
+pub fn validate(scene: &Scene) -> Vec<Problem> {
+    let mut report = Report { dimension: usize::from(scene.dimension), problems: vec![] };
+    if !matches!(scene.dimension, 2 | 3) {
+        report.wrong("dimension", scene.dimension, "2 (disks) or 3 (spheres)");
+        // lengths of vectors cannot be judged
+        return report.problems;
+    }
+    match (scene.dimension, scene.thickness) {
+        (3, Some(thickness)) => report.wrong("thickness", Number(thickness), "nothing: spheres have no thickness"),
+        (_, Some(thickness)) => report.positive("thickness", thickness, "m"),
+        (_, None) => {}
+    }
+    sample::sample(&mut report, scene);
+    materials(&mut report, scene);
+    if let Some(bonds) = &scene.bonds {
+        self::bonds(&mut report, bonds, scene.dimension);
+    }
+    grains(&mut report, scene);
+    for (name, wall) in &scene.walls {
+        wall::wall(&mut report, name, wall);
+    }
+    if let Some(name) = &scene.load_wall {
+        driven_wall(&mut report, scene, "load_wall", name);
+    }
+    if let Some(gravity) = &scene.gravity {
+        report.vector("gravity", gravity);
+    }
+    time_and_output(&mut report, scene);
+    solver(&mut report, scene);
+    stop(&mut report, scene);
+    report.problems
+}
+
+fn materials(report: &mut Report, scene: &Scene) {
+    let materials = &scene.materials;
+    report.positive("materials.density", materials.density, "kg/m³");
+    report.non_negative("materials.friction.grain_grain", materials.friction.grain_grain, "no unit");
+    report.non_negative("materials.friction.grain_wall", materials.friction.grain_wall, "no unit");
+    report.fraction("materials.restitution.grain_grain", materials.restitution.grain_grain);
+    report.fraction("materials.restitution.grain_wall", materials.restitution.grain_wall);
+    report.non_negative("materials.restitution.threshold_speed", materials.restitution.threshold_speed, "m/s");
+}
+
+fn bonds(report: &mut Report, bonds: &Bonds, dimension: u8) {
+    match (bonds.strength, bonds.stress) {
+        (Some(strength), Some(stress)) => {
+            let found = format!("strength {strength:?} N and stress {stress:?} Pa");
+            report.wrong("bonds", found, "one of them; `--set bonds.stress=null` takes a value away");
+        }
+        (None, None) => {
+            report.wrong("bonds", "neither strength nor stress", "one of them: strength (N) or stress (Pa)")
+        }
+        _ => {}
+    }
+    for (name, value, unit) in [("strength", bonds.strength, "N"), ("stress", bonds.stress, "Pa")] {
+        if let Some(value) = value {
+            report.non_negative(format!("bonds.{name}"), value, &format!("{unit}; 0 means no bonds"));
+        }
+    }
+    report.non_negative("bonds.gap_tolerance", bonds.gap_tolerance, "a fraction of the mean diameter");
+    if let Some(friction) = bonds.friction {
+        report.non_negative("bonds.friction", friction, "no unit");
+    }
+    if let Some(twist) = bonds.twist {
+        report.positive("bonds.twist", twist, "no unit; without it bonds are free to spin about their normal");
+        if dimension == 2 {
+            report.wrong("bonds.twist", "a value in a scene of dimension 2", "left out: disks do not twist");
+        }
+    }
+    match &bonds.stiffness {
+        Some(Stiffness::Springs(springs)) => {
+            let path = |name: &str| format!("bonds.stiffness.springs.{name}");
+            report.positive(path("normal"), springs.normal, "N/m");
+            report.positive(path("tangential"), springs.tangential, "N/m");
+            report.positive(path("rolling"), springs.rolling, "N m/rad");
+            match (bonds.twist, springs.twist) {
+                (Some(_), Some(twist)) => report.positive(path("twist"), twist, "N m/rad"),
+                (Some(_), None) => {
+                    report.wrong(path("twist"), "nothing", "a stiffness (N m/rad), as bonds.twist is given")
+                }
+                (None, Some(_)) => {
+                    report.wrong(path("twist"), "a value", "left out, or bonds.twist given: bonds resist no twist")
+                }
+                (None, None) => {}
+            }
+        }
+        Some(Stiffness::Young(young)) => {
+            report.positive("bonds.stiffness.young.modulus", young.modulus, "Pa");
+            let (path, ratio) = ("bonds.stiffness.young.poisson_ratio", young.poisson_ratio);
+            report.range(path, ratio, ratio > -1.0 && ratio <= 0.5, "a number above -1, at most 0.5".to_string());
+        }
+        None => {}
+    }
+}
+
+fn grains(report: &mut Report, scene: &Scene) {
+    let Some(grains) = &scene.grains else { return };
+    // a file or a cut sample is counted when it is made
+    let count = scene.sample.count();
+    let exists = |report: &mut Report, path: String, grain: usize| {
+        if let Some(count) = count.filter(|count| grain >= *count && *count > 0) {
+            report.wrong(path, grain, format!("the number of a grain, from 0 to {}", count - 1));
+        }
+    };
+    let mut first = HashMap::new();
+    for (k, grain) in grains.fixed.iter().enumerate() {
+        let path = format!("grains.fixed.{k}");
+        if first.insert(*grain, k).is_some() {
+            report.wrong(&path, format!("{grain} a second time"), "each grain once");
+        }
+        exists(report, path, *grain);
+    }
+    for (k, load) in grains.loads.iter().enumerate() {
+        exists(report, format!("grains.loads.{k}.grain"), load.grain);
+        self::load(report, &format!("grains.loads.{k}"), load);
+    }
+}
+
+fn load(report: &mut Report, path: &str, load: &Load) {
+    if load.force.is_none() && load.torque.is_none() {
+        report.wrong(path, "neither force nor torque", "at least one of them");
+    }
+    if let Some(force) = &load.force {
+        report.vector(&format!("{path}.force"), force);
+    }
+    if let Some(torque) = &load.torque {
+        report.spin(&format!("{path}.torque"), torque);
+    }
+    report.function(&format!("{path}.time"), &load.time);
+}
+
+fn time_and_output(report: &mut Report, scene: &Scene) {
+    let time = &scene.time;
+    let before = report.problems.len();
+    report.positive("time.step", time.step, "s");
+    report.positive("time.end", time.end, "s");
+    let steps = time.end / time.step;
+    if report.problems.len() == before && time.step > time.end {
+        report.wrong("time.step", format!("{:?}", time.step), format!("at most time.end ({:?} s)", time.end));
+    }
+    if report.problems.len() == before && steps > MAX_STEPS {
+        let found = format!("{:?}, which makes {steps:.1e} steps", time.step);
+        report.wrong("time.step", found, format!("at most {MAX_STEPS:.0e} steps to time.end"));
+    }
+    if scene.output.checkpoint_every == 0 {
+        report.wrong("output.checkpoint_every", 0, "a whole number of frames, at least 1");
+    }
+    match (scene.output.every_steps, scene.output.interval) {
+        (Some(0), None) => report.wrong("output.every_steps", 0, "a whole number of steps, at least 1"),
+        (None, Some(interval)) => {
+            let allowed = format!("a finite number, at least the time step ({:?} s)", time.step);
+            report.range("output.interval", interval, interval > 0.0 && interval >= time.step, allowed);
+        }
+        (Some(_), Some(_)) => report.wrong("output", "every_steps and interval", "exactly one of them"),
+        (None, None) => report.wrong("output", "neither every_steps nor interval", "exactly one of them"),
+        (Some(_), None) => {}
+    }
+}
+
+fn solver(report: &mut Report, scene: &Scene) {
+    let solver = &scene.solver;
+    report.positive("solver.tolerance", solver.tolerance, "no unit");
+    if let Some(accept) = solver.accept {
+        report.positive("solver.accept", accept, "no unit");
+        if accept < solver.tolerance {
+            report.wrong("solver.accept", Number(accept), format!("at least solver.tolerance, {:?}", solver.tolerance));
+        }
+    }
+    if solver.max_step_halvings > 30 {
+        report.wrong("solver.max_step_halvings", solver.max_step_halvings, "a whole number from 0 to 30");
+    }
+    let limit = match &solver.kind {
+        SolverKind::GaussSeidel(gs) => ("solver.kind.gauss_seidel.max_sweeps".to_string(), gs.max_sweeps),
+        SolverKind::Newton(newton) | SolverKind::Interior(newton) | SolverKind::Auto(newton) => {
+            let kind = match solver.kind {
+                SolverKind::Auto(_) => "auto",
+                SolverKind::Interior(_) => "interior",
+                _ => "newton",
+            };
+            let path = |name: &str| format!("solver.kind.{kind}.{name}");
+            report.positive(path("load_tolerance"), newton.load_tolerance, "no unit");
+            report.positive(path("tangential_stiffness"), newton.tangential_stiffness, "no unit");
+            report.positive(path("rolling_stiffness"), newton.rolling_stiffness, "no unit");
+            (path("max_iterations"), newton.max_iterations)
+        }
+    };
+    if limit.1 == 0 {
+        report.wrong(limit.0, 0, "a whole number, at least 1");
+    }
+}
+
+/// Checks that `name`, which stands at `path`, is that of a driven wall.
+fn driven_wall(report: &mut Report, scene: &Scene, path: &str, name: &str) {
+    match scene.walls.get(name) {
+        None => {
+            let names: Vec<&str> = scene.walls.keys().map(String::as_str).collect();
+            let allowed = match names.is_empty() {
+                true => "a wall of the scene: it has none".to_string(),
+                false => format!("the name of a wall: {}", names.join(", ")),
+            };
+            let problem = Problem::new(path, format!("\"{name}\""), allowed);
+            report.problems.push(problem.with_nearest(nearest(name, names)));
+        }
+        Some(wall) if wall.drive() == Drive::Fixed => {
+            report.wrong(path, format!("\"{name}\", which is fixed"), "a wall that is driven");
+        }
+        Some(_) => {}
+    }
+}
+
+fn stop(report: &mut Report, scene: &Scene) {
+    let Some(stop) = &scene.stop else { return };
+    let bonds_needed = "bonds in the scene: it has none";
+    if let Some(travel) = &stop.wall_travel {
+        driven_wall(report, scene, "stop.wall_travel.wall", &travel.wall);
+        report.positive("stop.wall_travel.fraction_of_height", travel.fraction_of_height, "no unit");
+        if travel.after == TravelFrom::FirstBreak && scene.bonds.is_none() {
+            report.wrong("stop.wall_travel.after", "first_break", bonds_needed);
+        }
+    }
+    if let Some(fraction) = stop.broken_fraction {
+        let allowed = "a number above 0, at most 1";
+        report.range("stop.broken_fraction", fraction, fraction > 0.0 && fraction <= 1.0, allowed);
+        if scene.bonds.is_none() {
+            report.wrong("stop.broken_fraction", Number(fraction), bonds_needed);
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! The list of problems, and the checks that recur.
+
+use std::fmt;
+
+use crate::error::Problem;
+use crate::function::Function;
+
+/// Grains are numbered by 32-bit signed integers in histories, and walls share them.
+pub const MAX_GRAINS: usize = 100_000_000;
+
+/// Largest magnitude of a number, and the inverse of the smallest one that must not be zero: masses
+/// and energies, products of a few such numbers, then neither overflow nor vanish.
+pub const LARGEST: f64 = 1e60;
+
+/// What was found so far.
+pub(super) struct Report {
+    /// Dimension of space, 2 or 3.
+    pub(super) dimension: usize,
+    /// The problems, in the order of the scene.
+    pub(super) problems: Vec<Problem>,
+}
+
+/// A number as it is shown in a message.
+pub(super) struct Number(pub(super) f64);
+
+impl fmt::Display for Number {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // the shortest digits that tell the number, with an exponent where it is large or small
+        write!(f, "{:?}", self.0)
+    }
+}
+
+impl Report {
+    pub(super) fn wrong(&mut self, path: impl Into<String>, found: impl fmt::Display, allowed: impl Into<String>) {
+        self.problems.push(Problem::new(path, found.to_string(), allowed));
+    }
+
+    /// A finite number for which `inside` holds; `allowed` says what that is.
+    pub(super) fn range(&mut self, path: impl Into<String>, value: f64, inside: bool, allowed: impl Into<String>) {
+        if inside && value.abs() <= LARGEST {
+            return;
+        }
+        let allowed = match value.is_finite() && inside {
+            true => format!("{}, of magnitude at most {LARGEST:.0e}", allowed.into()),
+            false => allowed.into(),
+        };
+        self.wrong(path, Number(value), allowed);
+    }
+
+    pub(super) fn positive(&mut self, path: impl Into<String>, value: f64, unit: &str) {
+        let allowed = match value > 0.0 {
+            true => format!("a finite number > 0 ({unit}), at least {:.0e}", 1.0 / LARGEST),
+            false => format!("a finite number > 0 ({unit})"),
+        };
+        self.range(path, value, value >= 1.0 / LARGEST, allowed);
+    }
+
+    pub(super) fn non_negative(&mut self, path: impl Into<String>, value: f64, unit: &str) {
+        self.range(path, value, value >= 0.0, format!("a finite number ≥ 0 ({unit})"));
+    }
+
+    pub(super) fn finite(&mut self, path: impl Into<String>, value: f64) {
+        self.range(path, value, true, "a finite number");
+    }
+
+    pub(super) fn fraction(&mut self, path: impl Into<String>, value: f64) {
+        self.range(path, value, (0.0..=1.0).contains(&value), "a number from 0 to 1");
+    }
+
+    fn components(&mut self, path: &str, vector: &[f64], length: usize) {
+        if vector.len() == length {
+            for (k, value) in vector.iter().enumerate() {
+                self.finite(format!("{path}.{k}"), *value);
+            }
+        } else {
+            let allowed = format!("an array of {length} in {} dimensions", self.dimension);
+            self.wrong(path, format!("an array of {}", vector.len()), allowed);
+        }
+    }
+
+    pub(super) fn vector(&mut self, path: &str, vector: &[f64]) {
+        self.components(path, vector, self.dimension);
+    }
+
+    pub(super) fn spin(&mut self, path: &str, vector: &[f64]) {
+        let length = if self.dimension == 2 { 1 } else { 3 };
+        self.components(path, vector, length);
+    }
+
+    /// A vector whose length is not zero.
+    pub(super) fn direction(&mut self, path: &str, vector: &[f64]) {
+        self.vector(path, vector);
+        let length = vector.iter().fold(0.0_f64, |length, value| length.hypot(*value));
+        // below this the vector cannot be normalised
+        if vector.len() == self.dimension && !vector.iter().any(|value| value.is_nan()) && length < 1.0 / LARGEST {
+            self.wrong(path, format!("{vector:?}"), "a vector whose length is not zero");
+        }
+    }
+
+    pub(super) fn function(&mut self, path: &str, function: &Function) {
+        match function {
+            Function::Constant(value) => self.finite(format!("{path}.constant"), *value),
+            Function::Ramp(ramp) => {
+                self.finite(format!("{path}.ramp.rate"), ramp.rate);
+                self.finite(format!("{path}.ramp.start"), ramp.start);
+            }
+            Function::Table(rows) => self.table(&format!("{path}.table"), rows),
+        }
+    }
+
+    fn table(&mut self, path: &str, rows: &[[f64; 2]]) {
+        if rows.is_empty() {
+            self.wrong(path, "no rows", "at least one pair [time, value]");
+        }
+        for (k, row) in rows.iter().enumerate() {
+            self.finite(format!("{path}.{k}.0"), row[0]);
+            self.finite(format!("{path}.{k}.1"), row[1]);
+            if k > 0 && row[0] <= rows[k - 1][0] {
+                let allowed = format!("a time after that of the row before, {:?} s", rows[k - 1][0]);
+                self.wrong(format!("{path}.{k}.0"), Number(row[0]), allowed);
+            }
+        }
+    }
+
+    /// A number that the scene must not give here.
+    pub(super) fn absent(&mut self, path: impl Into<String>, value: Option<f64>, reason: &str) {
+        if let Some(value) = value {
+            self.wrong(path, Number(value), format!("nothing: {reason}"));
+        }
+    }
+
+    pub(super) fn count(&mut self, path: &str, value: usize) {
+        if value == 0 || value > MAX_GRAINS {
+            self.wrong(path, value, format!("a whole number from 1 to {MAX_GRAINS}"));
+        }
+    }
+}

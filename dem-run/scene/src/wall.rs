@@ -1,0 +1,203 @@
+//! Walls: rigid shapes that are fixed, or driven along one direction.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::function::{Function, Ramp};
+
+/// A rigid wall. It is fixed, or driven by one of `velocity`, `force` and `force_rate` along one direction.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Wall {
+    /// Shape and place.
+    pub shape: Shape,
+    /// Friction with grains instead of `materials.friction.grain_wall`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub friction: Option<f64>,
+    /// Drive: velocity along the direction, a function of time (m/s).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub velocity: Option<Function>,
+    /// Drive: force along the direction, a function of time (N). The wall needs a mass.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub force: Option<Function>,
+    /// Drive: force along the direction that grows from zero at this rate (N/s). The wall needs a mass.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub force_rate: Option<f64>,
+    /// Mass of a wall that is driven by a force.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mass: Option<WallMass>,
+    /// Direction of the drive, of any length. A plane's is its normal where it is absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub direction: Option<Vec<f64>>,
+}
+
+/// The shape of a wall.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Shape {
+    /// A plane (a line in 2D), without ends.
+    Plane(Plane),
+    /// 2D: a disk, or the outside of one.
+    Circle(Circle),
+    /// 3D: a sphere, or the outside of one.
+    Sphere(Sphere),
+    /// 3D: a cylinder without ends, or the outside of one.
+    Cylinder(Cylinder),
+}
+
+/// A plane.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Plane {
+    /// Normal, of any length, pointing to the side where the grains are.
+    pub normal: Vec<f64>,
+    /// Where the plane stands.
+    pub place: Place,
+}
+
+/// Where a plane stands.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Place {
+    /// Against the sample: moved along its normal until it touches the first grain.
+    Seated,
+    /// Through this point: one number for each dimension (m).
+    At(Vec<f64>),
+}
+
+/// A circular wall (2D).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Circle {
+    /// Centre `[x, y]` (m).
+    pub center: Vec<f64>,
+    /// Radius (m).
+    pub radius: f64,
+    /// Whether the grains are inside it, as in a drum.
+    #[serde(default)]
+    pub inside: bool,
+    /// Against the sample: moved from the centre in this direction, of any length, until it touches the first grain.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seated: Option<Vec<f64>>,
+}
+
+/// A spherical wall (3D).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Sphere {
+    /// Centre `[x, y, z]` (m).
+    pub center: Vec<f64>,
+    /// Radius (m).
+    pub radius: f64,
+    /// Whether the grains are inside it.
+    #[serde(default)]
+    pub inside: bool,
+    /// Against the sample: moved from the centre in this direction, of any length, until it touches the first grain.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seated: Option<Vec<f64>>,
+}
+
+/// A cylindrical wall without ends (3D).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cylinder {
+    /// A point of the axis `[x, y, z]` (m).
+    pub center: Vec<f64>,
+    /// Direction of the axis, of any length.
+    pub axis: Vec<f64>,
+    /// Radius (m).
+    pub radius: f64,
+    /// Whether the grains are inside it, as in a drum.
+    #[serde(default)]
+    pub inside: bool,
+}
+
+/// The mass of a wall that is driven by a force.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum WallMass {
+    /// The mass of all grains together.
+    Sample,
+    /// This mass (kg).
+    Kg(f64),
+}
+
+/// How a wall moves.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Drive {
+    /// Not at all.
+    Fixed,
+    /// At this velocity along its direction (m/s).
+    Velocity(Function),
+    /// Under this force along its direction (N).
+    Force(Function),
+}
+
+impl Shape {
+    /// The direction in which a round wall is moved from its centre until it touches the sample,
+    /// and its radius (m).
+    #[must_use]
+    pub fn seat(&self) -> Option<(&[f64], f64)> {
+        match self {
+            Self::Circle(Circle { seated: Some(direction), radius, .. })
+            | Self::Sphere(Sphere { seated: Some(direction), radius, .. }) => Some((direction, *radius)),
+            _ => None,
+        }
+    }
+}
+
+impl Wall {
+    /// How the wall moves: `force_rate` is a ramp from zero at t = 0.
+    #[must_use]
+    pub fn drive(&self) -> Drive {
+        match (&self.velocity, &self.force, self.force_rate) {
+            (Some(velocity), ..) => Drive::Velocity(velocity.clone()),
+            (None, Some(force), _) => Drive::Force(force.clone()),
+            (None, None, Some(rate)) => Drive::Force(Function::Ramp(Ramp { rate, start: 0.0 })),
+            (None, None, None) => Drive::Fixed,
+        }
+    }
+
+    /// The direction of the drive, not normalised: the one given, or else a plane's normal.
+    #[must_use]
+    pub fn drive_direction(&self) -> Option<&[f64]> {
+        match (&self.direction, &self.shape) {
+            (Some(direction), _) => Some(direction),
+            (None, Shape::Plane(plane)) => Some(&plane.normal),
+            (None, _) => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plane() -> Wall {
+        Wall {
+            shape: Shape::Plane(Plane { normal: vec![0.0, -1.0], place: Place::Seated }),
+            friction: None,
+            velocity: None,
+            force: None,
+            force_rate: None,
+            mass: None,
+            direction: None,
+        }
+    }
+
+    #[test]
+    fn a_force_rate_is_a_ramp_from_zero() {
+        let Drive::Force(force) = (Wall { force_rate: Some(200.0), ..plane() }).drive() else { panic!("no force") };
+        assert_eq!((force.at(0.0), force.at(0.5)), (0.0, 100.0));
+        assert_eq!(plane().drive(), Drive::Fixed);
+    }
+
+    #[test]
+    fn a_plane_moves_along_its_normal_unless_told_otherwise() {
+        assert_eq!(plane().drive_direction(), Some(&[0.0, -1.0][..]));
+        let tilted = Wall { direction: Some(vec![1.0, 0.0]), ..plane() };
+        assert_eq!(tilted.drive_direction(), Some(&[1.0, 0.0][..]));
+        let circle = Shape::Circle(Circle { center: vec![0.0, 0.0], radius: 1.0, inside: false, seated: None });
+        assert_eq!(Wall { shape: circle, ..plane() }.drive_direction(), None);
+    }
+}

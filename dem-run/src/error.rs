@@ -1,0 +1,204 @@
+//! Errors of the commands: their messages and exit codes.
+
+use crate::fclib::FclibError;
+use crate::history::HistoryError;
+use crate::history::sweep::SweepError;
+use crate::output::{WriteError, size};
+use crate::scene::SceneError;
+use crate::signals::INTERRUPTED;
+use std::error::Error;
+use std::path::PathBuf;
+
+/// What the operating system, a library or this program says of a failure.
+pub type Cause = Box<dyn Error + Send + Sync>;
+
+/// An error of a command.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The scene is wrong, or cannot be read.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The sample cannot be made as the scene asks: all that is wrong with it.
+    #[error("{}", .0.join("\n"))]
+    Sample(Vec<String>),
+    /// A contact problem was not solved within its limits.
+    #[error(transparent)]
+    NoConvergence(#[from] NoConvergence),
+    /// A file or folder that cannot be read, written or made.
+    #[error("{} {doing}: {source}", .path.display())]
+    File {
+        /// The file or folder.
+        path: PathBuf,
+        /// What failed, as in "cannot be read".
+        doing: &'static str,
+        /// Why.
+        source: Cause,
+    },
+    /// The sample file that a scene names cannot be opened.
+    #[error("sample.file.path: {} cannot be read: {source}", .path.display())]
+    SampleFile {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A file from which something cannot be read.
+    #[error("{}: {what} cannot be read: {source}", .path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What should be in it, as in "the sweep".
+        what: &'static str,
+        /// Why.
+        source: Cause,
+    },
+    /// A file or folder that is not what the command needs: it is in the way of a result, or lacks
+    /// something.
+    #[error("{} {state}: {remedy}", .path.display())]
+    Unfit {
+        /// The file or folder.
+        path: PathBuf,
+        /// What it is, as in "is a folder".
+        state: &'static str,
+        /// What to do.
+        remedy: String,
+    },
+    /// A result would take the place of something that is read.
+    #[error("{option} {} would overwrite what the {reader} reads: name another file", .path.display())]
+    Overwrites {
+        /// The option that names the result.
+        option: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// What reads the file: "command" or "run".
+        reader: &'static str,
+    },
+    /// The name of a result that the HDF5 library and `dem-post` cannot open.
+    #[error("{} is not UTF-8: name another with {option}", .path.display())]
+    NotUnicode {
+        /// The file or folder.
+        path: PathBuf,
+        /// The option that names it.
+        option: String,
+    },
+    /// There is less memory than the run needs.
+    #[error(
+        "{grains} grains need about {} of memory, and {} are free: take fewer grains, or another machine; \
+         --ignore-memory tries it anyway", size(*.needed), size(*.free))]
+    Memory {
+        /// Number of grains.
+        grains: usize,
+        /// Memory that the run needs (bytes).
+        needed: u64,
+        /// Memory that is free (bytes).
+        free: u64,
+    },
+    /// There is less room on the disk than a run needs to go on.
+    #[error(
+        "{} needs {} beside it to go on, and {} are free: make room first",
+        .path.display(), size(*.needed), size(*.free))]
+    Disk {
+        /// The history.
+        path: PathBuf,
+        /// Room that its copy needs (bytes).
+        needed: u64,
+        /// Room that is free (bytes).
+        free: u64,
+    },
+    /// The operating system refused something else than a file.
+    #[error("{what}: {source}")]
+    System {
+        /// What failed, as in "the parent cannot be watched".
+        what: String,
+        /// Why.
+        source: Cause,
+    },
+    /// Input or output is not as it must be.
+    #[error("{0}")]
+    InputOutput(String),
+    /// The history cannot be read or written.
+    #[error(transparent)]
+    History(#[from] HistoryError),
+    /// A contact problem cannot be read or written.
+    #[error(transparent)]
+    Problem(#[from] FclibError),
+    /// What was asked for is not there.
+    #[error("{0}")]
+    Usage(String),
+    /// A result cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// A result cannot be written as JSON.
+    #[error(transparent)]
+    Json(#[from] serde_json::Error),
+    /// A result cannot be written as a table.
+    #[error(transparent)]
+    Table(#[from] csv::Error),
+    /// A file in the folder of a sweep cannot be read or written.
+    #[error(transparent)]
+    Sweep(#[from] SweepError),
+    /// Runs of a sweep failed.
+    #[error("{message}")]
+    Runs {
+        /// The gravest of their exit codes.
+        code: u8,
+        /// How many, and what to do.
+        message: String,
+    },
+    /// Ctrl-C or SIGTERM, and what that leaves.
+    #[error("interrupted: {0}")]
+    Interrupted(&'static str),
+}
+
+/// A contact problem that was not solved within its limits.
+#[derive(Debug, thiserror::Error)]
+pub enum NoConvergence {
+    /// In a step of the packing of a random sample.
+    #[error("the sample was not packed: {0}")]
+    Packing(String),
+    /// In a step of a run.
+    #[error("{error}\nthe history is complete up to there{remedy}")]
+    Step {
+        /// What happened, and when.
+        error: String,
+        /// What may help; empty, or with a semicolon in front.
+        remedy: String,
+    },
+    /// In a step before the one whose problem is to be exported.
+    #[error("{error}\nstep {step} was not reached; step {last} is the last that can be exported")]
+    Export {
+        /// What happened, and when.
+        error: String,
+        /// The step asked for.
+        step: u64,
+        /// The step that was not solved.
+        last: u64,
+    },
+    /// In a file.
+    #[error("{}: {why}", .path.display())]
+    Problem {
+        /// The file.
+        path: PathBuf,
+        /// How far the solver came, and what is proved of the problem.
+        why: String,
+    },
+}
+
+impl RunError {
+    /// The exit code of the command: 2 wrong scene, 3 no convergence, 4 input/output, 130
+    /// interrupted.
+    #[must_use]
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Scene(SceneError::Read { .. }) => 4,
+            Self::Scene(_) | Self::Sample(_) | Self::Usage(_) | Self::NotUnicode { .. } => 2,
+            Self::NoConvergence(_) => 3,
+            Self::File { .. } | Self::SampleFile { .. } | Self::Content { .. } | Self::Unfit { .. } => 4,
+            Self::Overwrites { .. } | Self::Memory { .. } | Self::Disk { .. } | Self::System { .. } => 4,
+            Self::InputOutput(_) | Self::History(_) | Self::Problem(_) | Self::Write(_) => 4,
+            Self::Json(_) | Self::Table(_) | Self::Sweep(_) => 4,
+            Self::Runs { code, .. } => *code,
+            Self::Interrupted(_) => INTERRUPTED,
+        }
+    }
+}
