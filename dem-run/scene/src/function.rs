@@ -11,7 +11,8 @@ pub enum Function {
     Constant(f64),
     /// Zero until `start`, then growing at a constant rate.
     Ramp(Ramp),
-    /// Pairs `[time, value]`, times in s and growing: linear in between, held before the first and after the last.
+    /// Pairs `[time, value]`, times in s and growing: linear in between, held before the first and
+    /// after the last.
     Table(Vec<[f64; 2]>),
 }
 

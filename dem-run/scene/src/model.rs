@@ -107,7 +107,8 @@ pub struct Bonds {
     /// Tensile strength of every bond (N); zero means no bonds. Either this or `stress`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub strength: Option<f64>,
-    /// Tensile strength as a stress over the section of a bond (Pa); zero means no bonds. Either this or `strength`.
+    /// Tensile strength as a stress over the section of a bond (Pa); zero means no bonds. Either
+    /// this or `strength`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stress: Option<f64>,
     /// Two grains are bonded if their gap is at most this fraction of their mean diameter.
@@ -115,8 +116,9 @@ pub struct Bonds {
     /// Friction of intact bonds; that between grains where it is absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub friction: Option<f64>,
-    /// Coefficient of the twisting moment of bonds in 3D, which an intact bond bears up to this times the mean diameter times
-    /// (r_n + r_coh); where it is absent two grains are free to spin about their normal.
+    /// Coefficient of the twisting moment of bonds in 3D, which an intact bond bears up to this
+    /// times the mean diameter times (r_n + r_coh); where it is absent two grains are free to spin
+    /// about their normal.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub twist: Option<f64>,
     /// Flow of an intact bond at its limit.
@@ -133,8 +135,8 @@ pub struct Bonds {
 pub enum Stiffness {
     /// The same springs in every bond.
     Springs(Springs),
-    /// Bars as long as they are wide, the mean diameter of the pair: of square section across the plane's thickness in
-    /// 2D, of round section in 3D.
+    /// Bars as long as they are wide, the mean diameter of the pair: of square section across the
+    /// plane's thickness in 2D, of round section in 3D.
     Young(Young),
 }
 
@@ -207,7 +209,8 @@ pub struct Load {
 pub struct Time {
     /// Time step (s).
     pub step: f64,
-    /// End of the run (s): no step ends after it. The last one ends before it where it is not a multiple of the step.
+    /// End of the run (s): no step ends after it. The last one ends before it where it is not a
+    /// multiple of the step.
     pub end: f64,
 }
 
@@ -238,8 +241,8 @@ pub struct Output {
     pub reactions: bool,
     /// Precision of what frames hold. Observables and events are always double.
     pub precision: Precision,
-    /// Number of frames from checkpoint to checkpoint. A run that is killed goes on from its last checkpoint; the last
-    /// state of one that ends is always one.
+    /// Number of frames from checkpoint to checkpoint. A run that is killed goes on from its last
+    /// checkpoint; the last state of one that ends is always one.
     pub checkpoint_every: u64,
 }
 
@@ -278,7 +281,8 @@ pub struct Stop {
 pub struct WallTravel {
     /// Name of the wall, one that is driven.
     pub wall: String,
-    /// Distance along the wall's direction, as a fraction of the sample's extent along it at the start.
+    /// Distance along the wall's direction, as a fraction of the sample's extent along it at the
+    /// start.
     pub fraction_of_height: f64,
     /// From when on the distance is counted.
     #[serde(default)]

@@ -46,8 +46,9 @@ pub struct RandomSample {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Cut {
-    /// A circle of this diameter (m) around the middle of the packing, upright along x: a disk in 2D, in 3D a cylinder
-    /// along y. Grains that it would cut are left out. Higher than the packing, it has flats where floor and lid were.
+    /// A circle of this diameter (m) around the middle of the packing, upright along x: a disk in
+    /// 2D, in 3D a cylinder along y. Grains that it would cut are left out. Higher than the
+    /// packing, it has flats where floor and lid were.
     Circle(f64),
 }
 
@@ -76,7 +77,8 @@ pub enum Diameters {
     Constant(f64),
     /// Uniform between two diameters.
     Uniform(UniformRange),
-    /// Pairs `[diameter in m, weight]`: each grain has one of these diameters, with a chance proportional to its weight.
+    /// Pairs `[diameter in m, weight]`: each grain has one of these diameters, with a chance
+    /// proportional to its weight.
     Table(Vec<[f64; 2]>),
 }
 
@@ -132,8 +134,8 @@ pub struct Deposition {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Lattice {
-    /// Close packed: rows of `columns` and `columns` − 1 grains in turn, in 3D in layers, of which every second begins with
-    /// the shorter row.
+    /// Close packed: rows of `columns` and `columns` − 1 grains in turn, in 3D in layers, of which
+    /// every second begins with the shorter row.
     Hexagonal {
         /// Diameter of the grains (m).
         diameter: f64,
@@ -194,8 +196,8 @@ impl Lattice {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SampleFile {
-    /// CSV file with the header `x,y,radius` (2D) or `x,y,z,radius` (3D), all in m, sought beside the scene. Lines that begin
-    /// with `#` are comments.
+    /// CSV file with the header `x,y,radius` (2D) or `x,y,z,radius` (3D), all in m, sought beside
+    /// the scene. Lines that begin with `#` are comments.
     pub path: PathBuf,
 }
 
@@ -210,7 +212,8 @@ pub struct GrainSpec {
     /// Velocity at the start: one number for each dimension (m/s); zero where it is absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub velocity: Option<Vec<f64>>,
-    /// Angular velocity at the start: `[w]` in 2D, counter-clockwise, `[wx, wy, wz]` in 3D (rad/s); zero where it is absent.
+    /// Angular velocity at the start: `[w]` in 2D, counter-clockwise, `[wx, wy, wz]` in 3D (rad/s);
+    /// zero where it is absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spin: Option<Vec<f64>>,
     /// Density instead of the material's (kg/m³).

@@ -18,8 +18,8 @@ pub struct Solver {
     pub kind: SolverKind,
     /// Relative residual that the solver aims at.
     pub tolerance: f64,
-    /// Largest relative residual of a solve that is accepted, at least the tolerance; where it is absent 1e-6 with bonds
-    /// and 1e-4 without, or the tolerance if that is larger.
+    /// Largest relative residual of a solve that is accepted, at least the tolerance; where it is
+    /// absent 1e-6 with bonds and 1e-4 without, or the tolerance if that is larger.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accept: Option<f64>,
     /// How many times a step whose solve was not accepted is cut in half before the run stops.
@@ -30,13 +30,14 @@ pub struct Solver {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SolverKind {
-    /// One method after the other, until one solves the problem: Gauss–Seidel where all contacts are dry, Newton from the active set of the
-    /// last step where there are bonds, the interior-point method.
+    /// One method after the other, until one solves the problem: Gauss–Seidel where all contacts
+    /// are dry, Newton from the active set of the last step where there are bonds, the
+    /// interior-point method.
     Auto(Newton),
     /// Non-linear Gauss–Seidel: one contact after the other, until none changes.
     GaussSeidel(GaussSeidel),
-    /// Semismooth Newton on the augmented Lagrangian from the active set of the last step, with a sparse factorisation: all contacts at
-    /// once; the interior-point method where that fails.
+    /// Semismooth Newton on the augmented Lagrangian from the active set of the last step, with a
+    /// sparse factorisation: all contacts at once; the interior-point method where that fails.
     Newton(Newton),
     /// The interior-point method in every step.
     Interior(Newton),
@@ -50,8 +51,8 @@ pub struct GaussSeidel {
     pub local: LocalSolve,
     /// Sweeps over all contacts after which a solve gives up.
     pub max_sweeps: u64,
-    /// Steps that Anderson's acceleration remembers, 0 for plain sweeps; 8 takes some ten times fewer sweeps where bonds
-    /// abound.
+    /// Steps that Anderson's acceleration remembers, 0 for plain sweeps; 8 takes some ten times
+    /// fewer sweeps where bonds abound.
     pub acceleration: usize,
 }
 
@@ -59,14 +60,16 @@ pub struct GaussSeidel {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Newton {
-    /// Load error that the solver aims at, how far the net force on the bodies still changed, over itself; the velocity error
-    /// likewise, how far contacts are from their laws, over the free velocities.
+    /// Load error that the solver aims at, how far the net force on the bodies still changed, over
+    /// itself; the velocity error likewise, how far contacts are from their laws, over the free
+    /// velocities.
     pub load_tolerance: f64,
     /// Where the reactions start from in every step.
     pub start: Start,
     /// Tangential stiffness over the normal one, in the metric of the stiff limit.
     pub tangential_stiffness: f64,
-    /// Bending stiffness over the normal one times the square of the mean diameter, in the metric of the stiff limit.
+    /// Bending stiffness over the normal one times the square of the mean diameter, in the metric
+    /// of the stiff limit.
     pub rolling_stiffness: f64,
     /// Iterations of one of these methods after which it gives up.
     pub max_iterations: u64,

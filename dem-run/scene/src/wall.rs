@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use super::function::{Function, Ramp};
 
-/// A rigid wall. It is fixed, or driven by one of `velocity`, `force` and `force_rate` along one direction.
+/// A rigid wall. It is fixed, or driven by one of `velocity`, `force` and `force_rate` along one
+/// direction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Wall {
@@ -20,7 +21,8 @@ pub struct Wall {
     /// Drive: force along the direction, a function of time (N). The wall needs a mass.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub force: Option<Function>,
-    /// Drive: force along the direction that grows from zero at this rate (N/s). The wall needs a mass.
+    /// Drive: force along the direction that grows from zero at this rate (N/s). The wall needs a
+    /// mass.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub force_rate: Option<f64>,
     /// Mass of a wall that is driven by a force.
@@ -76,7 +78,8 @@ pub struct Circle {
     /// Whether the grains are inside it, as in a drum.
     #[serde(default)]
     pub inside: bool,
-    /// Against the sample: moved from the centre in this direction, of any length, until it touches the first grain.
+    /// Against the sample: moved from the centre in this direction, of any length, until it touches
+    /// the first grain.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seated: Option<Vec<f64>>,
 }
@@ -92,7 +95,8 @@ pub struct Sphere {
     /// Whether the grains are inside it.
     #[serde(default)]
     pub inside: bool,
-    /// Against the sample: moved from the centre in this direction, of any length, until it touches the first grain.
+    /// Against the sample: moved from the centre in this direction, of any length, until it touches
+    /// the first grain.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seated: Option<Vec<f64>>,
 }

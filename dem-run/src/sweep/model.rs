@@ -10,11 +10,13 @@ use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// A sweep: one scene, run with many values. Fields of the scene are named as `--set` names them: bonds.strength.
+/// A sweep: one scene, run with many values. Fields of the scene are named as `--set` names them:
+/// bonds.strength.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Sweep {
-    /// The JSON Schema that an editor checks the sweep against, as `dem-run schema --sweep` prints it.
+    /// The JSON Schema that an editor checks the sweep against, as `dem-run schema --sweep` prints
+    /// it.
     #[serde(default, rename = "$schema", skip_serializing_if = "Option::is_none")]
     pub schema: Option<String>,
     /// What the sweep shows, in a line.
@@ -25,8 +27,8 @@ pub struct Sweep {
     /// Values that all runs have in place of the scene's.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub set: BTreeMap<String, Value>,
-    /// What is varied. The fields of one object vary together: the first run has the first value of each, and so on.
-    /// Several objects are combined, each with each; the last varies fastest.
+    /// What is varied. The fields of one object vary together: the first run has the first value of
+    /// each, and so on. Several objects are combined, each with each; the last varies fastest.
     pub vary: Vec<BTreeMap<String, Values>>,
 }
 
@@ -40,7 +42,8 @@ pub enum Values {
     Range(Range),
 }
 
-/// Numbers at equal distances, rounded to 12 digits; those that are whole are written as whole numbers.
+/// Numbers at equal distances, rounded to 12 digits; those that are whole are written as whole
+/// numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Range {
