@@ -208,3 +208,43 @@ fn numbers_that_do_not_fit_are_refused() {
     let walls = World::new(world.grains.clone(), Vec::new(), Vec::new(), world.settings.clone());
     assert!(restored(&state, &walls).is_err(), "other walls");
 }
+
+#[test]
+fn bonds_that_are_added_between_steps_keep_the_numbers_of_the_others_right() {
+    // a chain; at first its middle alone is bonded, so that later bonds come before and after it
+    let mut set = common::settings(1e-4);
+    set.solver = SolverSettings::Staged(settings());
+    let chain = (0..5).map(|k| common::grain::<D2>(&[0.02 * f64::from(k), 0.0], 0.01)).collect();
+    let mut world = common::world(chain, vec![], set);
+    world.form_bonds(1e-6, |_| 5.0, 0.3);
+    let middle = world.bonds[2];
+    assert_eq!(world.bonds.iter().map(|b| b.pair).collect::<Vec<_>>(), [[0, 1], [1, 2], [2, 3], [3, 4]]);
+    world.bonds = vec![middle].into();
+    world.grains.velocity[2][1] = 1e-5;
+    common::run(&mut world, 1);
+    let carried = world.touches().find(|t| t.pair == [2, 3]).unwrap();
+    assert!(carried.bond == Some(0) && carried.reaction.t.norm() > 0.0);
+    // twice: pairs that have a bond keep it
+    for _ in 0..2 {
+        world.form_bonds(1e-2, |_| 7.0, 0.3);
+        assert_eq!(world.bonds.iter().map(|b| b.strength).collect::<Vec<_>>(), [7.0, 7.0, 5.0, 7.0]);
+    }
+    let after = world.touches().find(|t| t.pair == [2, 3]).unwrap();
+    assert_eq!((after.bond, after.reaction), (Some(2), carried.reaction));
+    common::run(&mut world, 3);
+    assert_eq!(world.touches().filter(|t| t.bond.is_some()).count(), 4);
+}
+
+#[test]
+fn settings_that_change_between_steps_are_followed() {
+    let mut world = pressed::<D2>(3, 6, 0.3, Some(BondFlow::Associated));
+    common::run(&mut world, 2);
+    let mut other = pressed::<D2>(3, 6, 0.3, Some(BondFlow::Associated));
+    common::run(&mut other, 2);
+    world.settings.solver = SolverSettings::Staged(settings());
+    other.set_solver(SolverSettings::Staged(settings()));
+    for _ in 0..3 {
+        assert_eq!(world.step().unwrap().route, other.step().unwrap().route);
+    }
+    assert_eq!(bits(&saved(&world)), bits(&saved(&other)));
+}

@@ -462,6 +462,16 @@ mod tests {
     }
 
     #[test]
+    fn the_defaults_of_a_scene_are_those_of_the_library() {
+        let scene = scene::Solver { accept: Some(StagedSettings::default().accept), ..scene::Solver::default() };
+        assert_eq!(solver(&scene), SolverSettings::default());
+        assert_eq!(scene.max_step_halvings, Settings::<D2>::default().max_halvings);
+        let gauss_seidel = SolverKind::GaussSeidel(scene::GaussSeidel::default());
+        let expected = SolverSettings::GaussSeidel(GaussSeidelSettings::default());
+        assert_eq!(solver(&scene::Solver { kind: gauss_seidel, ..scene }), expected);
+    }
+
+    #[test]
     fn a_bond_is_as_stiff_as_a_bar_of_its_size() {
         let (young, poisson, a, thickness) = (2e9, 0.25, 4e-3, 0.01);
         let shear = young / (2.0 * (1.0 + poisson));

@@ -6,11 +6,12 @@ use std::fmt;
 use std::path::Path;
 
 use dem_core::body::Grains;
-use dem_core::dim::{D2, D3, Dim, Vect};
+use dem_core::dim::{Dim, Vect};
 use serde::Serialize;
 
 use crate::build::{Placed, place, walls};
 use crate::error::RunError;
+use crate::in_dimension;
 use crate::memory;
 use crate::output::{number, size};
 use crate::prepare;
@@ -100,10 +101,7 @@ impl Check {
         let grains = count(scene)?;
         let (memory_bytes, free_memory_bytes) = (memory::expected(scene, grains), memory::free());
         let enough = free_memory_bytes.is_none_or(|free| memory_bytes <= free);
-        let (sizes, warnings) = match scene.dimension {
-            2 => look::<D2>(scene, enough)?,
-            _ => look::<D3>(scene, enough)?,
-        };
+        let (sizes, warnings) = in_dimension!(scene, D => look::<D>(scene, enough)?);
         let end = scene.time.end;
         let walls = scene.walls.iter().map(|(name, wall)| {
             let (drive, course) = match wall.drive() {

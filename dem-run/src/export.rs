@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::PathBuf;
 
-use dem_core::dim::{D2, D3, D3Twist, Dim};
+use dem_core::dim::Dim;
 use dem_core::problem::assembled::Assembled;
 use dem_core::solver::SolveStatus;
 
@@ -11,6 +11,7 @@ use crate::build::build;
 use crate::error::{NoConvergence, RunError};
 use crate::fclib::Problem;
 use crate::history::History;
+use crate::in_dimension;
 use crate::output::{escaped, print_line};
 use crate::progress::StepProgress;
 use crate::run::{Execution, handle_signals};
@@ -54,11 +55,7 @@ pub fn export(options: &ExportOptions) -> Result<(), RunError> {
         let note = "it was written by another version of the program: the states of this run may differ from it";
         let _ = writeln!(std::io::stderr(), "{}", escaped(&format!("note: {shown}: {note}")));
     }
-    match scene.dimension {
-        2 => export_in::<D2>(&scene, options, &interrupt),
-        _ if scene.twists() => export_in::<D3Twist>(&scene, options, &interrupt),
-        _ => export_in::<D3>(&scene, options, &interrupt),
-    }
+    in_dimension!(scene, D => export_in::<D>(&scene, options, &interrupt))
 }
 
 fn export_in<D: Dim>(scene: &Scene, options: &ExportOptions, interrupt: &Interrupt) -> Result<(), RunError> {

@@ -8,6 +8,7 @@ pub mod clock;
 pub mod collapse;
 pub mod course;
 mod destination;
+mod dimension;
 pub mod error;
 pub mod export;
 pub mod fclib;

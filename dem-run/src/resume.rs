@@ -4,12 +4,13 @@
 use crate::check::free_space;
 use crate::error::RunError;
 use crate::history::{Checkpoint, History, HistoryError, Kept, refuse_busy};
+use crate::in_dimension;
 use crate::output::{number, print_json, print_line};
 use crate::record::Recorder;
 use crate::run::{Execution, Run, RunOptions, State, handle_signals, run_in};
 use crate::scene::{self, Scene, differences};
 use crate::signals::Interrupt;
-use dem_core::dim::{D2, D3, D3Twist, Dim};
+use dem_core::dim::Dim;
 use std::path::{Path, PathBuf};
 
 /// How a run is resumed.
@@ -49,11 +50,7 @@ pub fn resume(options: &ResumeOptions) -> Result<(), RunError> {
     let history = History::open(&options.history)?;
     refuse_busy(&options.history)?;
     let scene = scene_of(&history, options)?;
-    match scene.dimension {
-        2 => resume_in::<D2>(&scene, &history, options, &interrupt),
-        _ if scene.twists() => resume_in::<D3Twist>(&scene, &history, options, &interrupt),
-        _ => resume_in::<D3>(&scene, &history, options, &interrupt),
-    }
+    in_dimension!(scene, D => resume_in::<D>(&scene, &history, options, &interrupt))
 }
 
 /// The scene that the run goes on with.

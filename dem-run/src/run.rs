@@ -6,6 +6,7 @@ use crate::collapse::Failure;
 use crate::course::Course;
 use crate::error::{NoConvergence, RunError};
 use crate::history::Checkpoint;
+use crate::in_dimension;
 use crate::memory;
 use crate::output::print_result;
 use crate::progress::{Progress, ProgressMode, StepProgress};
@@ -17,7 +18,7 @@ use crate::signals::{self, Interrupt};
 use crate::summary::{Ending, Summary, WallLoads};
 use crate::warnings;
 use dem_core::body::{Drive, Wall};
-use dem_core::dim::{D2, D3, D3Twist, Dim, Vect};
+use dem_core::dim::{Dim, Vect};
 use dem_core::saved::{Mismatch, Reader, Saved};
 use dem_core::solver::certificate::Verdict;
 use dem_core::world::{StepError, StepReport, World};
@@ -76,11 +77,7 @@ impl Execution {
 pub fn run(scene: &Scene, options: &RunOptions) -> Result<(), RunError> {
     let interrupt = handle_signals()?;
     options.execution.start_threads()?;
-    match scene.dimension {
-        2 => run_in::<D2>(scene, options, &interrupt),
-        _ if scene.twists() => run_in::<D3Twist>(scene, options, &interrupt),
-        _ => run_in::<D3>(scene, options, &interrupt),
-    }
+    in_dimension!(scene, D => run_in::<D>(scene, options, &interrupt))
 }
 
 /// Installs the handlers of Ctrl-C and SIGTERM.

@@ -11,12 +11,13 @@
 //! /cohesive_dem/work     factorisations of the solve
 //! ```
 
-use dem_core::dim::{D2, D3, D3Twist, Dim, Vect};
+use dem_core::dim::{Dim, Vect};
 use dem_core::problem::ContactProblem;
 use dem_core::problem::assembled::Assembled;
 use dem_core::solver::{SolveStatus, SolverSettings, StagedSettings, Stages, Start};
 use dem_run::build::build;
 use dem_run::fclib::Problem;
+use dem_run::in_dimension;
 use dem_run::scene::{self, Scene};
 use std::error::Error;
 use std::path::Path;
@@ -30,11 +31,7 @@ fn main() -> Outcome {
     };
     let (scene, steps) = (scene::load(Path::new(file), values)?, listed(steps)?);
     std::fs::create_dir_all(folder)?;
-    match scene.dimension {
-        2 => problems::<D2>(&scene, Path::new(folder), &steps),
-        _ if scene.twists() => problems::<D3Twist>(&scene, Path::new(folder), &steps),
-        _ => problems::<D3>(&scene, Path::new(folder), &steps),
-    }
+    in_dimension!(scene, D => problems::<D>(&scene, Path::new(folder), &steps))
 }
 
 fn listed(steps: &str) -> Result<Vec<u64>, std::num::ParseIntError> {

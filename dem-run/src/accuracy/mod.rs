@@ -17,12 +17,13 @@ pub use options::AccuracyOptions;
 
 use crate::build::build;
 use crate::error::RunError;
+use crate::in_dimension;
 use crate::output::Folder;
 use crate::progress::Progress;
 use crate::run::handle_signals;
 use crate::scene::Scene;
 use crate::signals::Interrupt;
-use dem_core::dim::{D2, D3, D3Twist, Dim};
+use dem_core::dim::Dim;
 use profile::Profile;
 use rayon::prelude::*;
 use report::{Asked, Indeterminacy, Report, Row, VariedRun};
@@ -48,11 +49,7 @@ pub fn accuracy(scene: &Scene, options: &AccuracyOptions) -> Result<(), RunError
     }
     let interrupt = handle_signals()?;
     let mut folder = Folder::create(options.folder.clone())?;
-    let report = match scene.dimension {
-        2 => measure::<D2>(scene, options, &interrupt)?,
-        _ if scene.twists() => measure::<D3Twist>(scene, options, &interrupt)?,
-        _ => measure::<D3>(scene, options, &interrupt)?,
-    };
+    let report = in_dimension!(scene, D => measure::<D>(scene, options, &interrupt)?);
     let json = serde_json::to_string_pretty(&report)? + "\n";
     folder.write("accuracy.json", json.as_bytes())?;
     tables::write(&report, &mut folder)?;
