@@ -197,8 +197,8 @@ impl<D: Dim> World<D> {
         }
     }
 
-    /// Give the twisting moment of every bond the limit ξ a (r_n + r_coh) with this ξ (–), in 3D with
-    /// twist rows. A bond without such a limit twists freely.
+    /// Give the twisting moment of every bond the limit ξ a (r_n + r_coh) with this ξ (–), in 3D
+    /// with twist rows. A bond without such a limit twists freely.
     pub fn limit_twist(&mut self, xi: f64) {
         self.bonds.iter_mut().for_each(|bond| bond.twist = xi);
     }
