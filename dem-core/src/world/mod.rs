@@ -176,8 +176,8 @@ impl<D: Dim> World<D> {
             let held = self.grains.fixed[i] && self.grains.fixed[j];
             if rest_gap <= gap_tolerance * mean_diameter && strength > 0.0 && !held {
                 let status = BondStatus::Intact;
-                let (twist, stiffness) = (0.0, None);
-                bonds.push(Bond { pair, rest_gap, mean_diameter, strength, friction, twist, stiffness, status });
+                let (shear, rolling, twist, stiffness) = (friction, friction, 0.0, None);
+                bonds.push(Bond { pair, rest_gap, mean_diameter, strength, shear, rolling, twist, stiffness, status });
             }
         }
         self.add_bonds(bonds);
@@ -197,8 +197,8 @@ impl<D: Dim> World<D> {
         }
     }
 
-    /// Give the twisting moment of every bond the limit ξ a (r_n + r_coh) with this ξ (–), in 3D with
-    /// twist rows. A bond without such a limit twists freely.
+    /// Give the twisting moment of every bond the limit ξ a (r_n + r_coh) with this ξ (–), in 3D
+    /// with twist rows. A bond without such a limit twists freely.
     pub fn limit_twist(&mut self, xi: f64) {
         self.bonds.iter_mut().for_each(|bond| bond.twist = xi);
     }
