@@ -47,8 +47,10 @@ pub struct Bond {
     pub mean_diameter: f64,
     /// Tensile strength r_coh (N).
     pub strength: f64,
-    /// Friction coefficient μ of its limits (–).
-    pub friction: f64,
+    /// Coefficient μ of the shear limit (–).
+    pub shear: f64,
+    /// Coefficient ν of the rolling limit (–).
+    pub rolling: f64,
     /// Coefficient ξ of the twisting moment, where bonds resist it (–).
     pub twist: f64,
     /// Stiffness; none for a rigid bond.
@@ -121,10 +123,9 @@ impl<'a> IntoIterator for &'a mut Bonds {
 }
 
 impl Bond {
-    /// The cone of its shifted reaction. Moments are divided by the mean diameter, so shear and
-    /// bending have one coefficient, μ.
+    /// The cone of its shifted reaction, with moments divided by the mean diameter.
     pub fn cone(&self) -> Cone {
-        Cone { mu: self.friction, nu: self.friction, xi: self.twist }
+        Cone { mu: self.shear, nu: self.rolling, xi: self.twist }
     }
 
     /// Compliance of its rows over an implicit step `h` (s), 1/(k h²) (1/kg); none for a rigid

@@ -50,7 +50,7 @@ fn shown<D: Dim>(w: &World<D>) -> Vec<u64> {
         all.push(wall.applied);
     }
     for b in &w.bonds {
-        all.extend([b.rest_gap, b.mean_diameter, b.strength, b.friction, b.twist]);
+        all.extend([b.rest_gap, b.mean_diameter, b.strength, b.shear, b.rolling, b.twist]);
         all.extend(b.stiffness.iter().flat_map(|k| [k.normal, k.tangential, k.rolling, k.twist]));
     }
     for t in w.touches() {

@@ -46,6 +46,7 @@ impl Run {
                 rest_gap: vec![0.0],
                 strength: vec![self.cohesion],
                 friction: vec![0.3],
+                rolling: vec![],
                 mean_diameter: vec![2e-3],
             },
             observables: vec![

@@ -28,6 +28,7 @@ fn layout(single: bool) -> Layout {
             rest_gap: vec![0.0; CONTACTS],
             strength: vec![10.0; CONTACTS],
             friction: vec![0.3; CONTACTS],
+            rolling: vec![],
             mean_diameter: vec![2e-3; CONTACTS],
         },
         ..Layout::default()

@@ -8,15 +8,20 @@ use crate::scene::{self, Drive as SceneDrive, Place, Sample, Scene, SolverKind, 
 use crate::tolerances::{DEEPEST, ROUNDED, TOUCHING};
 use crate::warnings;
 use dem_core::body::{Drive, Grain, Grains, Load, Schedule, Shape, Wall};
-use dem_core::bond::{self, Rupture};
+use dem_core::bond::{self, Bond, Rupture};
 use dem_core::contact::{BondFlow, LocalSolve};
 use dem_core::detection::pairs_within;
 use dem_core::dim::{Dim, Vect};
 use dem_core::saved::{Mismatch, Reader};
 use dem_core::solver::{GaussSeidelSettings, SolverSettings, StagedSettings, Stages, Start, StiffnessRatio};
 use dem_core::world::{Restitution, Settings, World};
+use rand::RngExt;
+use rand_pcg::Pcg64;
 use std::f64::consts::PI;
 use std::sync::Arc;
+
+/// Stream of the random generator from which strengths of bonds are drawn.
+const SCATTER_STREAM: u128 = 1;
 
 /// A world at time zero, with the solid fraction of its sample and warnings.
 pub struct Built<D: Dim> {
@@ -53,7 +58,14 @@ pub fn build<D: Dim>(scene: &Scene, watch: Watch) -> Result<Built<D>, RunError> 
     let mut world = World::new(grains, walls, loads(scene), settings(scene));
     if let Some(bonds) = &scene.bonds {
         let strength = |mean_diameter| bonds.cohesion(scene.dimension, mean_diameter, scene.thickness());
-        world.form_bonds(bonds.gap_tolerance, strength, bonds.friction.unwrap_or(scene.materials.friction.grain_grain));
+        let friction = bonds.friction.unwrap_or(scene.materials.friction.grain_grain);
+        world.form_bonds(bonds.gap_tolerance, strength, friction);
+        for bond in &mut world.bonds {
+            (bond.shear, bond.rolling) = (bonds.shear.unwrap_or(friction), bonds.rolling.unwrap_or(friction));
+        }
+        if let Some(scatter) = bonds.scatter {
+            scatter_strengths(&mut world.bonds, scatter, scene.seed);
+        }
         if let Some(twist) = bonds.twist {
             world.limit_twist(twist);
         }
@@ -429,6 +441,31 @@ fn staged(newton: &scene::Newton, stages: Stages, tolerance: f64, accept: f64) -
     }
 }
 
+/// Multiply the strength of each bond by a random factor, in the order of their pairs.
+fn scatter_strengths(bonds: &mut [Bond], scatter: scene::Scatter, seed: u64) {
+    // a stream of its own: the packing draws from the seed itself
+    let mut rng = Pcg64::new(u128::from(seed), SCATTER_STREAM);
+    let mut share = || loop {
+        let share = rng.random::<f64>();
+        if share > 0.0 {
+            break share;
+        }
+    };
+    for bond in bonds {
+        bond.strength *= match scatter {
+            scene::Scatter::Weibull { modulus } => (-share().ln()).powf(1.0 / modulus),
+            scene::Scatter::Normal { deviation } => loop {
+                // Box & Muller 1958
+                let normal = (-2.0 * share().ln()).sqrt() * (2.0 * PI * share()).cos();
+                let factor = 1.0 + deviation * normal;
+                if factor > 0.0 {
+                    break factor;
+                }
+            },
+        };
+    }
+}
+
 /// Stiffness of a bond of mean diameter `a` (m). A bar of length a and width a, t thick or round,
 /// has E A/a along itself, G A/a across, E I/a in bending, and G 2I/a in twist where it is round.
 fn bond_stiffness<D: Dim>(stiffness: scene::Stiffness, a: f64, thickness: f64) -> bond::Stiffness {
@@ -459,6 +496,51 @@ mod tests {
         {
             assert!((found / expected - 1.0).abs() < 1e-14, "{found} against {expected}");
         }
+    }
+
+    fn scattered(scatter: scene::Scatter, count: u32, seed: u64) -> Vec<f64> {
+        let grains = (0..count + 1).map(|k| Grain::<D2>::at_rest([f64::from(k), 0.0].into(), 0.5, 1.0)).collect();
+        let mut world = World::new(grains, vec![], vec![], Settings::default());
+        world.form_bonds(1e-6, |_| 10.0, 0.3);
+        scatter_strengths(&mut world.bonds, scatter, seed);
+        world.bonds.iter().map(|bond| bond.strength).collect()
+    }
+
+    /// The largest distance of an empirical distribution from a given one (Kolmogorov & Smirnov).
+    fn distance(mut values: Vec<f64>, below: impl Fn(f64) -> f64) -> f64 {
+        values.sort_by(f64::total_cmp);
+        let count = values.len() as f64;
+        let apart = |(k, value): (usize, &f64)| {
+            let (low, high, exact) = (k as f64 / count, (k + 1) as f64 / count, below(*value));
+            (exact - low).abs().max((high - exact).abs())
+        };
+        values.iter().enumerate().map(apart).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn the_weakest_of_weibull_bonds_is_a_weibull_bond() {
+        // 1,000 chains of 20 bonds: weakest links of scale σ₀ N^(−1/m)
+        let (modulus, links, chains) = (5.0, 20, 1000);
+        let weakest = |seed: u64| {
+            let bonds = scattered(scene::Scatter::Weibull { modulus }, links, seed);
+            bonds.into_iter().fold(f64::INFINITY, f64::min)
+        };
+        let scale = 10.0 * f64::from(links).powf(-1.0 / modulus);
+        let off = distance((0..chains).map(weakest).collect(), |s| 1.0 - (-(s / scale).powf(modulus)).exp());
+        // a true sample is further off than this once in a thousand times
+        assert!(off < 1.95 / (chains as f64).sqrt(), "{off}");
+    }
+
+    #[test]
+    fn normal_strengths_have_their_mean_and_deviation() {
+        let bonds = scattered(scene::Scatter::Normal { deviation: 0.2 }, 10_000, 3);
+        let mean = bonds.iter().sum::<f64>() / bonds.len() as f64;
+        let variance = bonds.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / bonds.len() as f64;
+        assert!((mean - 10.0).abs() < 0.08 && (variance.sqrt() - 2.0).abs() < 0.06, "{mean} {variance}");
+        assert!(bonds.iter().all(|s| *s > 0.0));
+        // the same seed gives the same bonds, another seed others
+        assert_eq!(bonds, scattered(scene::Scatter::Normal { deviation: 0.2 }, 10_000, 3));
+        assert_ne!(bonds, scattered(scene::Scatter::Normal { deviation: 0.2 }, 10_000, 4));
     }
 
     #[test]

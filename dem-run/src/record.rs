@@ -281,7 +281,11 @@ fn describe_bonds<D: Dim>(world: &World<D>) -> history::Bonds {
         pair: bonds.iter().map(|b| b.pair.map(|k| k as i32)).collect(),
         rest_gap: bonds.iter().map(|b| b.rest_gap).collect(),
         strength: bonds.iter().map(|b| b.strength).collect(),
-        friction: bonds.iter().map(|b| b.friction).collect(),
+        friction: bonds.iter().map(|b| b.shear).collect(),
+        rolling: match bonds.iter().all(|b| b.rolling == b.shear) {
+            true => Vec::new(),
+            false => bonds.iter().map(|b| b.rolling).collect(),
+        },
         mean_diameter: bonds.iter().map(|b| b.mean_diameter).collect(),
     }
 }

@@ -120,7 +120,7 @@ pub(crate) struct State<D: Dim> {
 }
 
 /// The form of what [`State::save`] writes; another form has another number.
-const FORM: usize = 8;
+const FORM: usize = 9;
 
 impl<D: Dim> State<D> {
     /// The state as numbers. The processor time is not among them: two runs of a scene write the

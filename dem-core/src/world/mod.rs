@@ -176,8 +176,8 @@ impl<D: Dim> World<D> {
             let held = self.grains.fixed[i] && self.grains.fixed[j];
             if rest_gap <= gap_tolerance * mean_diameter && strength > 0.0 && !held {
                 let status = BondStatus::Intact;
-                let (twist, stiffness) = (0.0, None);
-                bonds.push(Bond { pair, rest_gap, mean_diameter, strength, friction, twist, stiffness, status });
+                let (shear, rolling, twist, stiffness) = (friction, friction, 0.0, None);
+                bonds.push(Bond { pair, rest_gap, mean_diameter, strength, shear, rolling, twist, stiffness, status });
             }
         }
         self.add_bonds(bonds);

@@ -156,7 +156,7 @@ fn restored_pair(bodies: usize, from: &mut Reader) -> Result<[u32; 2], Mismatch>
 
 fn save_bond(bond: &Bond, to: &mut Saved) {
     save_pair(bond.pair, to);
-    to.reals.extend([bond.rest_gap, bond.mean_diameter, bond.strength, bond.friction, bond.twist]);
+    to.reals.extend([bond.rest_gap, bond.mean_diameter, bond.strength, bond.shear, bond.rolling, bond.twist]);
     to.flag(bond.stiffness.is_some());
     if let Some(Stiffness { normal, tangential, rolling, twist }) = bond.stiffness {
         to.reals.extend([normal, tangential, rolling, twist]);
@@ -167,7 +167,7 @@ fn save_bond(bond: &Bond, to: &mut Saved) {
 fn restored_bond(grains: usize, from: &mut Reader) -> Result<Bond, Mismatch> {
     let pair = restored_pair(grains, from)?;
     let (rest_gap, mean_diameter, strength) = (from.real()?, from.real()?, from.real()?);
-    let (friction, twist) = (from.real()?, from.real()?);
+    let (shear, rolling, twist) = (from.real()?, from.real()?, from.real()?);
     let stiffness = match from.flag()? {
         true => {
             let (normal, tangential) = (from.real()?, from.real()?);
@@ -176,7 +176,7 @@ fn restored_bond(grains: usize, from: &mut Reader) -> Result<Bond, Mismatch> {
         false => None,
     };
     let status = coded(&BONDS, from)?;
-    Ok(Bond { pair, rest_gap, mean_diameter, strength, friction, twist, stiffness, status })
+    Ok(Bond { pair, rest_gap, mean_diameter, strength, shear, rolling, twist, stiffness, status })
 }
 
 fn save_kept<D: Dim>(kept: &Kept<D>, to: &mut Saved) {

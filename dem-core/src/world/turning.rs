@@ -30,14 +30,16 @@ impl<D: Dim> World<D> {
     fn turn(&self, mid: &Midpoint<D>, kept: &Kept<D>, number: usize, motion: &Motion<D>, h: f64) -> Turn {
         let bond = &self.bonds[number];
         let elastic = bond.stiffness.is_some();
+        // the grains turn with a bond that resists shear and rolling
+        let turns_with_it = bond.shear > 0.0 && bond.rolling > 0.0;
         // the velocities before a frictionless bond formed do not satisfy its constraint
-        if !elastic && bond.friction == 0.0 && !kept.held {
+        if !elastic && !turns_with_it && !kept.held {
             return Turn::default();
         }
         // rigid bonds respond to any misfit with forces, even to round-off
         let rounding = if elastic { 0.0 } else { f64::EPSILON * bond.mean_diameter };
         let hidden = |span: f64| {
-            if !elastic && bond.friction > 0.0 {
+            if !elastic && turns_with_it {
                 return self.turning(mid, motion, kept.pair, span);
             }
             let (speed, _) = self.lengthening(mid, motion, kept.pair, span);

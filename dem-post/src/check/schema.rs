@@ -252,6 +252,9 @@ fn bonds(c: &mut Checker) {
     for (name, unit) in [("rest_gap", "m"), ("strength", "N"), ("friction", ""), ("mean_diameter", "m")] {
         c.table(&format!("bonds/{name}"), &F64, b, &[], unit);
     }
+    if c.has("bonds/rolling") {
+        c.table("bonds/rolling", &F64, b, &[], "");
+    }
     c.element("bonds/status", &bytes(BondStatus::ALL.iter().map(|status| status.label())), &[b], "");
     events(c);
 }

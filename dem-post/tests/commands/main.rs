@@ -41,6 +41,7 @@ fn layout(dimension: usize) -> Layout {
             rest_gap: vec![0.0; 4],
             strength: vec![10.0; 4],
             friction: vec![0.3; 4],
+            rolling: vec![],
             mean_diameter: vec![2e-3; 4],
         },
         observables: vec![

@@ -288,6 +288,9 @@ pub(super) fn bonds(file: &File, bonds: &Bonds, storage: Storage) -> hdf5::Resul
     fixed(&group, "rest_gap", "m", &[b], &bonds.rest_gap)?;
     fixed(&group, "strength", "N", &[b], &bonds.strength)?;
     fixed(&group, "friction", "", &[b], &bonds.friction)?;
+    if !bonds.rolling.is_empty() {
+        fixed(&group, "rolling", "", &[b], &bonds.rolling)?;
+    }
     fixed(&group, "mean_diameter", "m", &[b], &bonds.mean_diameter)?;
     Table::create::<BondCode>(&element(&group, "status")?, "value", "", &[b], Growth::Frames, storage)
 }

@@ -36,7 +36,7 @@
 //!     gap [M], status [M]  m; enum OPEN, STICK, SLIP, BONDED
 //!     bond i32[M]          −1 for none; if bonds
 //! /bonds/                  pair i32[B,2]; rest_gap (m), strength (N), friction,
-//!                          mean_diameter (m) [B]
+//!                          mean_diameter (m) [B]; rolling [B] if it differs from friction
 //!     status               {step, time, value[T,B]}: enum INTACT, TENSION, SHEAR, ROLLING, TWIST
 //! /events/rupture          compound [E]: step i64; time, x, y, z, rn, rt, m, twist, energy f64;
 //!                          round, bond, i, j i32; mode i32 enum TENSION, SHEAR, ROLLING, TWIST;

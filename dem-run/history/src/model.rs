@@ -70,8 +70,10 @@ pub struct Bonds {
     pub rest_gap: Vec<f64>,
     /// Cohesion r_coh, N.
     pub strength: Vec<f64>,
-    /// Coefficient of friction μ.
+    /// Coefficient of the shear limit μ, and of the rolling limit where `rolling` is empty.
     pub friction: Vec<f64>,
+    /// Coefficient of the rolling limit ν; empty if it is μ for all bonds.
+    pub rolling: Vec<f64>,
     /// Mean diameter a_moy, m.
     pub mean_diameter: Vec<f64>,
 }

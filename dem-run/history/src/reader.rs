@@ -305,6 +305,7 @@ impl History {
             rest_gap: column("rest_gap")?,
             strength: column("strength")?,
             friction: column("friction")?,
+            rolling: if self.source.has(&place("rolling")) { column("rolling")? } else { Vec::new() },
             mean_diameter: column("mean_diameter")?,
             pair,
         };

@@ -37,6 +37,7 @@ fn full(dimension: usize) -> Layout {
             rest_gap: vec![1e-9, -1e-9],
             strength: vec![5.0, 10.0],
             friction: vec![0.3, 0.2],
+            rolling: vec![0.1, 0.25],
             mean_diameter: vec![0.3, 0.5],
         },
         observables: vec![

@@ -391,6 +391,9 @@ fn check_layout(layout: &Layout) -> Result<()> {
     ] {
         check_length(place, column.len(), bonds.len())?;
     }
+    if !bonds.rolling.is_empty() {
+        check_length("bonds/rolling", bonds.rolling.len(), bonds.len())?;
+    }
     for observable in &layout.observables {
         check_length(&format!("observables/{}", observable.name), observable.width(), observable.width().max(1))?;
     }

@@ -38,8 +38,8 @@ pub use error::shorten;
 pub use error::{Origin, Problem, SceneError};
 pub use function::{Function, Ramp};
 pub use model::{
-    Bonds, Flow, Friction, Grains, Load, Materials, Output, Precision, Restitution, Rupture, Scene, Springs, Stiffness,
-    Stop, Time, TravelFrom, WallTravel, Young, choose_load_wall,
+    Bonds, Flow, Friction, Grains, Load, Materials, Output, Precision, Restitution, Rupture, Scatter, Scene, Springs,
+    Stiffness, Stop, Time, TravelFrom, WallTravel, Young, choose_load_wall,
 };
 pub use sample::{
     Compaction, Cut, Deposition, Diameters, GrainSpec, Lattice, Preparation, RandomSample, Sample, SampleFile, Section,

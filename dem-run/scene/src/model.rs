@@ -113,20 +113,49 @@ pub struct Bonds {
     pub stress: Option<f64>,
     /// Two grains are bonded if their gap is at most this fraction of their mean diameter.
     pub gap_tolerance: f64,
-    /// Friction of intact bonds; that between grains where it is absent.
+    /// Friction of intact bonds, for shear and rolling; that between grains where it is absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub friction: Option<f64>,
+    /// Coefficient of the shear limit: an intact bond bears tangential forces up to this times
+    /// (r_n + r_coh); `friction` where it is absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shear: Option<f64>,
+    /// Coefficient of the rolling limit: an intact bond bears bending moments up to this times the
+    /// mean diameter times (r_n + r_coh); `friction` where it is absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rolling: Option<f64>,
     /// Coefficient of the twisting moment of bonds in 3D, which an intact bond bears up to this
     /// times the mean diameter times (r_n + r_coh); where it is absent two grains are free to spin
     /// about their normal.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub twist: Option<f64>,
+    /// Scatter of the strengths from bond to bond, drawn with `seed`; without it all bonds of one
+    /// size are equally strong.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scatter: Option<Scatter>,
     /// Flow of an intact bond at its limit.
     #[serde(default)]
     pub flow: Flow,
     /// Stiffness of elastic bonds; bonds are rigid where it is absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<Stiffness>,
+}
+
+/// Distribution of the strengths of bonds, relative to `strength` or `stress`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Scatter {
+    /// Weibull: a share exp(−(s/s₀)^m) of the bonds is stronger than s, with the given strength
+    /// as s₀.
+    Weibull {
+        /// Modulus m: the larger, the more alike the bonds are.
+        modulus: f64,
+    },
+    /// Normal, with the given strength as mean and no strength below zero.
+    Normal {
+        /// Standard deviation over the mean.
+        deviation: f64,
+    },
 }
 
 /// Stiffness of elastic bonds.
@@ -461,6 +490,9 @@ mod tests {
             stress: Some(1e6),
             gap_tolerance: 1e-3,
             friction: None,
+            shear: None,
+            rolling: None,
+            scatter: None,
             twist: None,
             flow: Flow::Associated,
             stiffness: None,

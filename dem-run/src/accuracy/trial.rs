@@ -180,7 +180,7 @@ fn start_anywhere<D: Dim>(world: &mut World<D>, seed: u64) {
     let mut random = Pcg64::seed_from_u64(seed);
     let mut upto = |limit: f64| START_SHARE * limit * (2.0 * random.random::<f64>() - 1.0);
     world.start_from(|bond| {
-        let (shear, arm) = (bond.friction * bond.strength, bond.mean_diameter);
+        let (shear, arm) = (bond.shear.min(bond.rolling) * bond.strength, bond.mean_diameter);
         let mut start = Local::<D::Tangent, D::Moment>::zero();
         start.n = upto(bond.strength);
         for k in 0..D::Tangent::LEN {

@@ -48,6 +48,56 @@ fn two_grains_part_when_the_load_reaches_the_strength() {
 }
 
 #[test]
+fn shear_and_rolling_have_limits_of_their_own() {
+    let sideways = "grains.loads.0.force=[0, 1]";
+    let turned = r#"grains.loads.0={"grain": 1, "torque": [1e-3], "time": {"ramp": {"rate": 100}}}"#;
+    // 10 N · 0.2 at 100 N/s; sideways the force bends by half the mean diameter: a F/2 = 0.05 · a ·
+    // 10 N at 1 N; 0.5 · 4 mm · 10 N at 0.1 N m/s
+    for (sets, mode, time) in [
+        (["bonds.shear=0.2", "bonds.rolling=0.5", sideways], RuptureMode::Shear, 0.02),
+        (["bonds.shear=0.2", "bonds.rolling=0.05", sideways], RuptureMode::Rolling, 0.01),
+        (["bonds.shear=0.2", "bonds.rolling=0.25", turned], RuptureMode::Rolling, 0.1),
+        (["bonds.shear=0", "bonds.rolling=0.25", turned], RuptureMode::Rolling, 0.1),
+    ] {
+        for solver in [r#"solver.kind={"auto": {}}"#, r#"solver.kind={"gauss_seidel": {}}"#] {
+            let args = ["--set", sets[0], "--set", sets[1], "--set", sets[2], "--set", solver];
+            let here = Folder::new();
+            let history = run(&here, "two-grains.json", &args);
+            let ruptures = history.ruptures().expect("ruptures");
+            let [rupture] = ruptures[..] else { panic!("{} ruptures", ruptures.len()) };
+            assert_eq!(rupture.mode, mode, "{sets:?}");
+            assert!((rupture.time - time).abs() < 1.01e-4, "{sets:?}: {mode:?} at {} s", rupture.time);
+            let bonds = history.bonds().expect("bonds");
+            let rolling: f64 = sets[1].trim_start_matches("bonds.rolling=").parse().expect("number");
+            assert_eq!(bonds.rolling, [rolling]);
+            assert!(here.dem_post(&["info", "--check", "a.h5"]).succeeds().stdout.contains("sound    yes"));
+        }
+    }
+}
+
+#[test]
+fn a_chain_of_scattered_bonds_breaks_at_its_weakest() {
+    let grains: Vec<String> =
+        (0..6).map(|k| format!(r#"{{"center": [{}, 0], "radius": 2e-3}}"#, 4e-3 * f64::from(k))).collect();
+    let sample = format!(r#"sample={{"grains": [{}]}}"#, grains.join(", "));
+    let load = r#"grains.loads.0={"grain": 5, "force": [1, 0], "time": {"ramp": {"rate": 100}}}"#;
+    for seed in ["seed=1", "seed=2"] {
+        let scatter = r#"bonds.scatter={"weibull": {"modulus": 4}}"#;
+        let args = ["--set", &sample, "--set", load, "--set", scatter, "--set", seed, "--set", "time.end=0.3"];
+        let history =
+            run(&Folder::new(), "two-grains.json", &[&args[..], &["--set", "stop.broken_fraction=0.2"]].concat());
+        let strength = history.bonds().expect("bonds").strength;
+        assert_eq!(strength.len(), 5);
+        let weakest = strength.iter().copied().fold(f64::INFINITY, f64::min);
+        assert!(strength.iter().all(|s| *s == weakest || *s > 1.001 * weakest), "{strength:?}");
+        let ruptures = history.ruptures().expect("ruptures");
+        assert_eq!((ruptures.len(), strength[ruptures[0].bond as usize]), (1, weakest));
+        close(ruptures[0].normal_force, -weakest, 1e-9);
+        assert!((ruptures[0].time - weakest / 100.0).abs() < 1.01e-4);
+    }
+}
+
+#[test]
 fn two_grains_pressed_together_never_part() {
     let history = run(&Folder::new(), "two-grains.json", &["--set", "grains.loads.0.force=[-1, 0]"]);
     assert!(history.ruptures().expect("ruptures").is_empty());

@@ -33,6 +33,10 @@ const FLAT_CASES: &[(&str, &str)] = &[
     ("bonds.stress=1", "bonds"),
     ("bonds.gap_tolerance=-1e-3", "bonds.gap_tolerance"),
     ("bonds.friction=-1", "bonds.friction"),
+    ("bonds.shear=-1", "bonds.shear"),
+    ("bonds.rolling=-1", "bonds.rolling"),
+    (r#"bonds.scatter={"weibull": {"modulus": 0}}"#, "bonds.scatter.weibull.modulus"),
+    (r#"bonds.scatter={"normal": {"deviation": 0.6}}"#, "bonds.scatter.normal.deviation"),
     // loads
     ("grains.fixed=[2]", "grains.fixed.0"),
     ("grains.fixed=[1, 1]", "grains.fixed.1"),

@@ -10,7 +10,7 @@ mod wall;
 use std::collections::HashMap;
 
 use super::error::Problem;
-use super::model::{Bonds, Load, Scene, Stiffness, TravelFrom};
+use super::model::{Bonds, Load, Scatter, Scene, Stiffness, TravelFrom};
 use super::solver::SolverKind;
 use super::suggest::nearest;
 use super::wall::Drive;
@@ -82,8 +82,23 @@ fn bonds(report: &mut Report, bonds: &Bonds, dimension: u8) {
         }
     }
     report.non_negative("bonds.gap_tolerance", bonds.gap_tolerance, "a fraction of the mean diameter");
-    if let Some(friction) = bonds.friction {
-        report.non_negative("bonds.friction", friction, "no unit");
+    for (name, value) in [("friction", bonds.friction), ("shear", bonds.shear), ("rolling", bonds.rolling)] {
+        if let Some(value) = value {
+            report.non_negative(format!("bonds.{name}"), value, "no unit");
+        }
+    }
+    match bonds.scatter {
+        Some(Scatter::Weibull { modulus }) => report.positive("bonds.scatter.weibull.modulus", modulus, "no unit"),
+        Some(Scatter::Normal { deviation }) => {
+            let allowed = "a number from 0 to 0.5: with more, strengths below zero would be left out often";
+            report.range(
+                "bonds.scatter.normal.deviation",
+                deviation,
+                (0.0..=0.5).contains(&deviation),
+                allowed.to_string(),
+            );
+        }
+        None => {}
     }
     if let Some(twist) = bonds.twist {
         report.positive("bonds.twist", twist, "no unit; without it bonds are free to spin about their normal");
