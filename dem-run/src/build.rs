@@ -403,7 +403,7 @@ pub fn settings<D: Dim>(scene: &Scene) -> Settings<D> {
         solver: solver(&scene.solver),
         max_halvings: scene.solver.max_step_halvings,
         thickness: if D::N == 2 { scene.thickness() } else { 1.0 },
-        expel_overlaps: false,
+        ..Settings::default()
     }
 }
 

@@ -9,8 +9,7 @@
 
 use crate::scene::{Cut, Diameters, Lattice, Preparation, RandomSample, Section};
 use dem_core::body::{Drive, Grain, Grains, Shape, Wall};
-use dem_core::bond::Rupture;
-use dem_core::contact::{BondFlow, LocalSolve};
+use dem_core::contact::LocalSolve;
 use dem_core::dim::{Dim, Vect};
 use dem_core::solver::{GaussSeidelSettings, SolverSettings};
 use dem_core::world::{Settings, StepError, World};
@@ -320,18 +319,8 @@ fn packing_world<D: Dim>(grains: Grains<D>, container: &Container, top: f64, fro
     if from_top {
         walls.push(Wall::fixed(Shape::Plane { normal: unit::<D>(up, -1.0) }, unit::<D>(up, top), 0.0));
     }
-    let settings = Settings {
-        step: 1.0,
-        gravity: None,
-        friction: 0.0,
-        restitution: None,
-        bond_flow: BondFlow::Associated,
-        rupture: Rupture::Cascade,
-        solver: solver(),
-        max_halvings: 0,
-        thickness: 1.0,
-        expel_overlaps: true,
-    };
+    let settings =
+        Settings { step: 1.0, solver: solver(), max_halvings: 0, expel_overlaps: true, ..Settings::default() };
     World::new(grains, walls, Vec::new(), settings)
 }
 

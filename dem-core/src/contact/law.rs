@@ -88,7 +88,14 @@ pub trait Law: Copy + Send + Sync + 'static {
         0.0
     }
 
-    /// Velocity that the law adds to u_n (m/s).
+    /// Whether the contact is a bond: it breaks for good where its shifted reaction is on the
+    /// boundary of the cone.
+    fn breaks(&self) -> bool {
+        false
+    }
+
+    /// Velocity that the law adds to u_n (m/s). [`Law::improve`] and [`Law::natural_map`] receive
+    /// the relative velocity without it and add it themselves.
     fn bias(&self) -> f64 {
         0.0
     }
@@ -400,6 +407,10 @@ impl<A: Vect, B: Moments> Law for Bonded<A, B> {
         self.shift
     }
 
+    fn breaks(&self) -> bool {
+        true
+    }
+
     #[inline(always)]
     fn arms(&self) -> Arms {
         self.arms
@@ -529,6 +540,10 @@ impl<A: Vect, B: Moments> Law for Elastic<A, B> {
     #[inline(always)]
     fn shift(&self) -> f64 {
         self.bond.shift
+    }
+
+    fn breaks(&self) -> bool {
+        true
     }
 
     #[inline(always)]

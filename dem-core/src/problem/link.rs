@@ -88,8 +88,7 @@ impl<D: Dim, L: Law> Contact<D, L> {
     /// Failure mode of a bond under its impulse; `None` for a bond below its limit and for a dry
     /// contact.
     pub(crate) fn failure(&self) -> Option<BondStatus> {
-        let shift = self.law.shift();
-        if shift > 0.0 { failure(&self.r, shift, self.law.cone()) } else { None }
+        if self.law.breaks() { failure(&self.r, self.law.shift(), self.law.cone()) } else { None }
     }
 }
 

@@ -37,6 +37,8 @@ impl Solvable for Assembled {
                 rows: places(rows.tangents, rows.moments),
                 cone: self.cone(c),
                 associated: parts.associated[c],
+                // a matrix tells no more of a bond
+                breaks: parts.shift[c] > 0.0,
                 shift: parts.shift[c],
                 given: rows.padded(&given),
                 weights,

@@ -147,12 +147,11 @@ impl Extrapolation {
     }
 
     pub fn restored(from: &mut Reader) -> Result<Self, Mismatch> {
-        let mut counts = [0; 7];
-        for count in &mut counts {
+        let mut shape = [0; KINDS];
+        for count in &mut shape {
             *count = from.count()?;
         }
-        let [a, b, c, d, steps, most, left] = counts;
-        let [steps, most, left] = [steps, most, left].map(|n| n as u64);
+        let [steps, most, left] = [from.count()?, from.count()?, from.count()?].map(|n| n as u64);
         if most > tuning::MOST || left > most || steps > tuning::MOST + 1 {
             return Err(Mismatch);
         }
@@ -162,7 +161,7 @@ impl Extrapolation {
             Ok((from.reals(n)?.to_vec(), from.reals(n)?.to_vec()))
         };
         let ((base, rate), (margins, margin_rate)) = (pair()?, pair()?);
-        Ok(Self { shape: [a, b, c, d], base, rate, margins, margin_rate, steps, most, left, moves, kicked, backoff })
+        Ok(Self { shape, base, rate, margins, margin_rate, steps, most, left, moves, kicked, backoff })
     }
 }
 

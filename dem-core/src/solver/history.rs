@@ -23,7 +23,7 @@ use std::sync::Arc;
 /// if the matrix is singular.
 pub(super) fn history(rows: &Rows, graph: &mut Option<Arc<Graph>>) -> Vec<Padded> {
     let all: Vec<Padded> = rows.list.iter().map(|row| row.multiplier).collect();
-    let is_bond = |row: &Row| row.shift > 0.0 && row.compliance.n == 0.0;
+    let is_bond = |row: &Row| row.breaks && row.compliance.n == 0.0;
     let Some(graph) = rows.list.iter().any(is_bond).then(|| Graph::of(rows, graph)).flatten() else { return all };
     let stiff = stiffness(rows);
     let mut lu = Lu::default();
@@ -96,6 +96,7 @@ mod tests {
                     rows: places(1, 1),
                     cone: Cone { mu: 0.3, nu: 0.3, xi: 0.0 },
                     associated: true,
+                    breaks: true,
                     shift: 1.0,
                     given: Padded::zero(),
                     weights: Weights { n: 1.0, t: 2.0, m: 12.0, w: 1.0 },
@@ -137,7 +138,7 @@ mod tests {
     #[test]
     fn dry_contacts_keep_their_reactions() {
         let mut rows = network();
-        rows.list[3].shift = 0.0;
+        rows.list[3].breaks = false;
         let after = history(&rows, &mut None);
         assert_eq!(after[3], rows.list[3].multiplier);
         assert_ne!(after[4], rows.list[4].multiplier);

@@ -58,6 +58,8 @@ pub(super) struct Row {
     pub rows: &'static [usize],
     pub cone: Cone,
     pub associated: bool,
+    /// Whether it is a bond.
+    pub breaks: bool,
     /// Shift of the normal reaction (N s).
     pub shift: f64,
     /// Relative velocity due to given velocities, with the bias (m/s).
@@ -481,6 +483,7 @@ impl<D: Dim> Visitor<D> for Flatten<'_, D> {
             rows,
             cone: c.law.cone(),
             associated: c.law.associated(),
+            breaks: c.law.breaks(),
             shift: c.law.shift() / unit,
             given,
             weights: self.ratio.weights(soft),

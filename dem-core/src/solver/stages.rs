@@ -179,7 +179,7 @@ impl Staged {
         let start = (!is_cold(rows)).then_some(&begun[..]);
         // bonds break by the load that they bear and need minimum-energy reactions; dry contacts
         // need only reactions that balance
-        let least = problem.matrix().is_none() && rows.list.iter().any(|row| row.shift > 0.0);
+        let least = problem.matrix().is_none() && rows.list.iter().any(|row| row.breaks);
         let aims = self.aims(least);
         let graph = &mut self.newton.graph;
         let mut best = self.interior.solve(problem, rows, graph, &anchor, start, aims);

@@ -263,39 +263,46 @@ impl<D: Dim> World<D> {
             let lever = self.levers(touch);
             let start = touch.reaction * h;
             let kind = self.kind(kept);
-            if let Some((number, bond)) = touch.bond.map(|b| (b as usize, &self.bonds[b as usize])) {
-                let arm = bond.mean_diameter;
-                let arms = Arms { lever, bending: arm };
-                let block = problem.nodes.block(&link, arms);
-                let r = over_arm(start, arm);
-                let (shift, cone, flow) = (h * bond.strength, bond.cone(), self.settings.bond_flow);
-                let bias = brought.turns[number].bias;
-                if let Some(compliance) = bond.compliance(h) {
-                    let carried = over_arm(brought.carried[number] * h, arm);
-                    let law = Elastic::new(block, compliance, carried, arms, shift, cone, flow).with_bias(bias);
-                    problem.elastic.push(Contact { link, law, r });
-                } else {
-                    let law = Bonded::new(block, arms, shift, cone, flow).with_bias(bias);
-                    problem.bonded.push(Contact { link, law, r });
+            let bias = match touch.bond {
+                Some(bond) => Some(brought.turns[bond as usize].bias),
+                None => self.bias(touch, kept.closed, motion, h),
+            };
+            // without a bias the contact cannot act in this step
+            let Some(bias) = bias else { continue };
+            match kind {
+                Kind::Bonded | Kind::Elastic => {
+                    let number = touch.bond.map_or(0, |bond| bond as usize);
+                    let bond = &self.bonds[number];
+                    let arm = bond.mean_diameter;
+                    let arms = Arms { lever, bending: arm };
+                    let (block, r) = (problem.nodes.block(&link, arms), over_arm(start, arm));
+                    let (shift, cone, flow) = (h * bond.strength, bond.cone(), self.settings.bond_flow);
+                    if let Some(compliance) = bond.compliance(h) {
+                        let carried = over_arm(brought.carried[number] * h, arm);
+                        let law = Elastic::new(block, compliance, carried, arms, shift, cone, flow).with_bias(bias);
+                        problem.elastic.push(Contact { link, law, r });
+                    } else {
+                        let law = Bonded::new(block, arms, shift, cone, flow).with_bias(bias);
+                        problem.bonded.push(Contact { link, law, r });
+                    }
                 }
-            } else if let Some(bias) = self.bias(touch, kept.closed, motion, h) {
-                let block = problem.nodes.block(&link, Arms { lever, bending: 0.0 });
-                let mu = self.friction_of(touch.pair);
-                if mu > 0.0 {
+                Kind::Dry => {
+                    let block = problem.nodes.block(&link, Arms { lever, bending: 0.0 });
+                    let t = of_frame::<D, _>(&link.axes, start.t);
                     problem.dry.push(Contact {
                         link: Link::new(link.nodes, link.axes),
-                        law: Coulomb::new(block, lever, mu, bias),
-                        r: Local { n: start.n, t: of_frame::<D, _>(&link.axes, start.t), ..Local::zero() },
+                        law: Coulomb::new(block, lever, self.friction_of(touch.pair), bias),
+                        r: Local { n: start.n, t, ..Local::zero() },
                     });
-                } else {
+                }
+                Kind::Frictionless => {
+                    let block = problem.nodes.block(&link, Arms { lever, bending: 0.0 });
                     problem.frictionless.push(Contact {
                         link: Link::new(link.nodes, link.axes),
                         law: Frictionless::new(block, bias),
                         r: Local { n: start.n, ..Local::zero() },
                     });
                 }
-            } else {
-                continue;
             }
             places.0[kind as usize].push(place as u32);
         }

@@ -258,7 +258,7 @@ impl<D: Dim> Visitor<D> for Yielding<'_, D> {
     #[inline(always)]
     fn visit<L: Law>(&mut self, nodes: &Nodes<D>, c: &Contact<D, L>) {
         let Some(closing) = beyond_law(nodes, c) else { return };
-        let speed = if c.law.shift() > 0.0 { closing.abs() } else { closing };
+        let speed = if c.law.breaks() { closing.abs() } else { closing };
         let share = self.world.settings.step * speed / self.world.smaller(c.link.nodes);
         if share > self.share {
             (self.pair, self.share) = (c.link.nodes, share);
