@@ -165,6 +165,39 @@ impl<D: Dim> Shape<D> {
         }
     }
 
+    /// The length (m) to which tolerances at this wall are relative; infinite for a plane.
+    pub fn size(&self) -> f64 {
+        match *self {
+            Self::Plane { .. } => f64::INFINITY,
+            Self::Round { radius, .. } => radius,
+        }
+    }
+
+    /// The normal of a wall that has the same everywhere.
+    pub fn flat_normal(&self) -> Option<D::Vector> {
+        match *self {
+            Self::Plane { normal } => Some(normal),
+            Self::Round { .. } => None,
+        }
+    }
+
+    /// How far a displacement by this unit vector moves the surface across itself (–): zero for a
+    /// direction along a plane or along the axis of a cylinder.
+    pub fn moves_across(&self, direction: D::Vector) -> f64 {
+        match *self {
+            Self::Plane { normal } => direction.dot(&normal).abs(),
+            Self::Round { axis, .. } => across::<D>(direction, axis).norm(),
+        }
+    }
+
+    /// Whether the wall is around the grains.
+    pub fn encloses(&self) -> bool {
+        match *self {
+            Self::Plane { .. } => false,
+            Self::Round { inside, .. } => inside,
+        }
+    }
+
     /// Smallest gap (m) of a grain that moves from `offset` along the straight displacement `way`
     /// (m).
     pub(crate) fn smallest_gap(&self, offset: D::Vector, way: D::Vector, radius: f64) -> f64 {

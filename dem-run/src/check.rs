@@ -16,7 +16,7 @@ use crate::memory;
 use crate::output::{number, size};
 use crate::prepare;
 use crate::sample_file;
-use crate::scene::{Drive, Function, Lattice, Precision, Ramp, RandomSample, Sample, Scene, Shape};
+use crate::scene::{Drive, Function, Lattice, Precision, Ramp, RandomSample, Sample, Scene};
 use crate::warnings;
 
 /// What a run of a scene will be.
@@ -109,7 +109,7 @@ impl Check {
                 Drive::Velocity(velocity) => ("velocity", Some(over_time(&velocity, "m/s", end))),
                 Drive::Force(force) => ("force", Some(over_time(&force, "N", end))),
             };
-            CheckedWall { name: name.clone(), shape: shape_name(&wall.shape), drive, course }
+            CheckedWall { name: name.clone(), shape: wall.shape.name(), drive, course }
         });
         let mut check = Self {
             title: scene.title.clone(),
@@ -254,15 +254,6 @@ fn sample_name(sample: &Sample) -> &'static str {
         Sample::Lattice(Lattice::Cubic { .. }) => "cubic lattice",
         Sample::File(_) => "from a file",
         Sample::Grains(_) => "listed",
-    }
-}
-
-fn shape_name(shape: &Shape) -> &'static str {
-    match shape {
-        Shape::Plane(_) => "plane",
-        Shape::Circle(_) => "circle",
-        Shape::Sphere(_) => "sphere",
-        Shape::Cylinder(_) => "cylinder",
     }
 }
 

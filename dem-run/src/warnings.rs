@@ -5,7 +5,7 @@ use crate::output::number;
 use crate::prepare::MOST_STEPS;
 use crate::scene::{Sample, Scene};
 use crate::tolerances::{PARALLEL, TOUCHING};
-use dem_core::body::{Drive, Grains, Shape, Wall};
+use dem_core::body::{Drive, Grains, Wall};
 use dem_core::dim::{Dim, Vect};
 
 /// Grains and loads of one kind that are told one by one.
@@ -133,11 +133,7 @@ impl<D: Dim> Course<D> {
             travel = widened(travel, place);
             place += speed * step;
         }
-        let along = match wall.shape {
-            Shape::Plane { normal } => direction.dot(&normal).abs() < PARALLEL,
-            Shape::Round { axis: Some(axis), .. } => (direction - axis * axis.dot(&direction)).norm() < PARALLEL,
-            Shape::Round { axis: None, .. } => false,
-        };
+        let along = wall.shape.moves_across(direction) < PARALLEL;
         (range != (0.0, 0.0)).then_some(Self { direction, along, force: mass.is_some(), range, travel })
     }
 }
@@ -165,11 +161,7 @@ fn along(friction: f64, alone: bool) -> Option<String> {
 /// Unit vector from a wall to the grains at it: that of its nearest grain; none inside a round
 /// wall.
 fn towards<D: Dim>(wall: &Wall<D>, grains: &Grains<D>) -> Option<D::Vector> {
-    match wall.shape {
-        Shape::Plane { normal } => Some(normal),
-        Shape::Round { inside: true, .. } => None,
-        Shape::Round { .. } => nearest(wall, grains).map(|(_, normal)| normal),
-    }
+    if wall.shape.encloses() { None } else { nearest(wall, grains).map(|(_, normal)| normal) }
 }
 
 /// Gap (m) of the grain nearest to a wall, and the unit normal towards it.
@@ -198,13 +190,13 @@ fn pulled<D: Dim>(wall: &Wall<D>, course: &Course<D>, grains: &Grains<D>) -> Opt
 fn apart<D: Dim>(wall: &Wall<D>, course: &Course<D>, grains: &Grains<D>) -> Option<String> {
     let (gap, _) = nearest(wall, grains)?;
     let mean = grains.radius.iter().sum::<f64>() / grains.len() as f64;
-    let near = match wall.shape {
-        Shape::Plane { normal } => {
+    let near = match wall.shape.flat_normal() {
+        Some(normal) => {
             let sign = course.direction.dot(&normal);
             (course.travel.0 * sign).max(course.travel.1 * sign)
         }
         // at most, whichever way it goes
-        Shape::Round { .. } => course.travel.1.max(-course.travel.0),
+        None => course.travel.1.max(-course.travel.0),
     };
     (gap > TOUCHING * mean && near < gap).then(|| {
         format!(

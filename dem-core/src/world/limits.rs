@@ -203,11 +203,7 @@ impl<D: Dim> World<D> {
     /// The radius of the smaller body of a pair (m); at a plane, the radius of the grain.
     pub(super) fn smaller(&self, pair: [u32; 2]) -> f64 {
         let [i, j] = pair.map(|k| k as usize);
-        let other = match self.surface(j) {
-            Shape::Plane { .. } => f64::INFINITY,
-            Shape::Round { radius, .. } => radius,
-        };
-        self.grains.radius[i].min(other)
+        self.grains.radius[i].min(self.surface(j).size())
     }
 }
 

@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
 use dem_history::sound::{Surroundings, is_huge, is_plausible, may_be_observed, median};
-use dem_history::{BondStatus, RuptureMode, SolverRoute};
+use dem_history::{BondStatus, RuptureMode, SolverRoute, WallDrive, WallKind};
 use hdf5::H5Type;
 
 use super::checker::{Checker, Sizes};
@@ -60,8 +60,8 @@ pub(super) fn check(c: &mut Checker) {
     let steps = order(c);
     let rows = committed(c);
     numbers(c);
-    codes(c, "walls/kind", 4);
-    codes(c, "walls/drive", 3);
+    codes(c, "walls/kind", WallKind::ALL.len() as u8);
+    codes(c, "walls/drive", WallDrive::ALL.len() as u8);
     codes(c, ROUTE, SolverRoute::ALL.len() as u8);
     signs(c);
     places(c);
@@ -266,12 +266,15 @@ fn directions(c: &mut Checker) {
             }
         });
     }
-    // codes of planes and cylinders, and of walls that are driven
-    for (place, of, codes) in [("walls/normal", "walls/kind", [0, 2]), ("walls/direction", "walls/drive", [1, 2])] {
+    let has_normal = |kind: u8| WallKind::ALL.get(usize::from(kind)).is_some_and(|kind| kind.has_normal());
+    let is_driven = |drive: u8| WallDrive::ALL.get(usize::from(drive)).is_some_and(|drive| *drive != WallDrive::Fixed);
+    let directed: [(&str, &str, &dyn Fn(u8) -> bool); 2] =
+        [("walls/normal", "walls/kind", &has_normal), ("walls/direction", "walls/drive", &is_driven)];
+    for (place, of, has) in directed {
         let vectors = c.rows::<f64>(place, 0..w).unwrap_or_default();
         let kinds = c.rows::<u8>(of, 0..w).unwrap_or_default();
         for (k, (v, kind)) in vectors.chunks_exact(d).zip(kinds).enumerate() {
-            if codes.contains(&kind) && finite(v) && !is_unit(v) {
+            if has(kind) && finite(v) && !is_unit(v) {
                 c.wrong(place, Some(k), format!("{v:?} is no unit vector"));
             }
         }

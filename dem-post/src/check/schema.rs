@@ -57,14 +57,13 @@ fn bytes(names: impl Iterator<Item = &'static str>) -> TypeDescriptor {
     codes(IntSize::U1, false, 0, names)
 }
 
-/// Whether a type of the file is read as this one: the same, or modes of rupture from before there
-/// was twist.
+/// Whether a type of the file is read as this one: the same, or an enumeration from before its last
+/// members were added.
 fn is_read_as(found: &TypeDescriptor, kind: &TypeDescriptor) -> bool {
     match (found, kind) {
         (TypeDescriptor::Enum(found), TypeDescriptor::Enum(kind)) => {
-            let twist = RuptureMode::Twist.label();
-            let before = kind.members.iter().filter(|mode| mode.name != twist).cloned().collect();
-            found == kind || *found == EnumType { members: before, ..kind.clone() }
+            let before = kind.members.iter().take(found.members.len()).cloned().collect();
+            !found.members.is_empty() && *found == EnumType { members: before, ..kind.clone() }
         }
         _ => found == kind,
     }

@@ -1,14 +1,14 @@
 //! Panels side by side or above each other on one sheet: grains, walls, lines, arrows and polygons.
 
-use dem_drawing::{Anchor, Canvas, Drawing, colour};
-use dem_history::{Wall, WallKind};
+use dem_drawing::{Anchor, Canvas, Drawing};
 
 use super::arrow::draw_arrow;
-use super::eye::Place;
+use super::frame::{Frame, HATCH};
 use super::legend::{Key, draw_legend, legend_rows, scale_bar};
 use super::panel::{Link, Panel, Patch};
 use super::sample::{Sample, View};
 use super::scale::mixed;
+use super::wall;
 
 /// Width and greatest height of one panel, units of the drawing.
 const PANEL: (f64, f64) = (400.0, 560.0);
@@ -24,32 +24,6 @@ const STACKED: f64 = 1.6;
 /// The size of a sheet is a multiple of this, so that its PNG has an even number of pixels: video
 /// encoders ask for that.
 const EVEN: f64 = 4.0;
-/// Lines of a wall's hatching: their distance and length.
-const HATCH: f64 = 7.0;
-
-/// From metres to units of the drawing, for one panel.
-struct Frame {
-    low: [f64; 2],
-    scale: f64,
-    /// Upper left corner and size on the sheet.
-    corner: (f64, f64),
-    size: (f64, f64),
-}
-
-impl Frame {
-    fn at(&self, point: [f64; 2]) -> (f64, f64) {
-        let x = self.corner.0 + (point[0] - self.low[0]) * self.scale;
-        let y = self.corner.1 + self.size.1 - (point[1] - self.low[1]) * self.scale;
-        (x, y)
-    }
-
-    fn shows(&self, (x, y): (f64, f64), margin: f64) -> bool {
-        let (right, bottom) = (self.corner.0 + self.size.0, self.corner.1 + self.size.1);
-        (self.corner.0 - margin..=right + margin).contains(&x)
-            && (self.corner.1 - margin..=bottom + margin).contains(&y)
-    }
-}
-
 /// Draws the panels on one scale, side by side or, if the sample is wide, above each other; with a
 /// scale bar and the legend below.
 pub fn draw(sample: &Sample, panels: &[Panel], legend: &[Key]) -> Drawing {
@@ -94,7 +68,7 @@ fn draw_panel(canvas: &mut Canvas, sample: &Sample, panel: &Panel, frame: &Frame
     }
     canvas.clip(frame.corner, frame.size);
     for (wall, position) in sample.walls.iter().zip(panel.walls.position.chunks(sample.dimension)) {
-        draw_wall(canvas, sample, wall, position, frame);
+        wall::draw(canvas, &sample.eye, wall, position, frame);
     }
     let mut order: Vec<usize> = (0..panel.fills.len()).collect();
     if sample.dimension == 3 {
@@ -104,11 +78,7 @@ fn draw_panel(canvas: &mut Canvas, sample: &Sample, panel: &Panel, frame: &Frame
         draw_grain(canvas, sample, panel, grain, frame);
     }
     for (wall, position) in sample.walls.iter().zip(panel.walls.position.chunks(sample.dimension)) {
-        if wall.kind == WallKind::Plane
-            && let Some(place) = sample.eye.place()
-        {
-            draw_plate(canvas, place, wall, position, frame, false);
-        }
+        wall::draw_in_front(canvas, &sample.eye, wall, position, frame);
     }
     // lines between grains that are drawn tiny must not run into one another
     let diameter = 2.0 * frame.scale * sample.radius.iter().sum::<f64>() / sample.radius.len() as f64;
@@ -176,57 +146,4 @@ fn draw_grain(canvas: &mut Canvas, sample: &Sample, panel: &Panel, grain: usize,
     disk(&fill, &hazy(panel.outline));
     let (lit, light) = ((at.0 - 0.25 * radius, at.1 - 0.25 * radius), mixed(&fill, 0.3));
     canvas.disk(lit, 0.5 * radius, &light, &light, 0.0);
-}
-
-fn draw_wall(canvas: &mut Canvas, sample: &Sample, wall: &Wall, position: &[f64], frame: &Frame) {
-    let point = sample.flat(position);
-    if wall.kind == WallKind::Plane {
-        if let Some(place) = sample.eye.place() {
-            return draw_plate(canvas, place, wall, position, frame, true);
-        }
-        let normal = sample.flat(&wall.normal[..sample.dimension]);
-        // a plane parallel to the sheet has no line
-        if normal[0].hypot(normal[1]) > 1e-6 {
-            draw_plane(canvas, point, normal, frame);
-        }
-        return;
-    }
-    let (at, radius) = (frame.at(point), wall.radius.abs() * frame.scale);
-    let fill = if wall.radius < 0.0 { "none" } else { "#d0d0d0" };
-    canvas.disk(at, radius, fill, colour::BLACK, 1.5);
-}
-
-/// A plane in perspective, as a plate of the sample's size, if it is behind the grains or before
-/// them: full, or its edges alone.
-fn draw_plate(canvas: &mut Canvas, place: &Place, wall: &Wall, position: &[f64], frame: &Frame, behind: bool) {
-    let (corners, is_behind) = place.plane(position, wall.normal);
-    if is_behind == behind {
-        let on_sheet = corners.map(|corner| frame.at(place.flat(&corner)));
-        canvas.polygon(&on_sheet, if behind { "#e4e4e4" } else { "none" }, colour::GREY, 1.2);
-    }
-}
-
-/// A line across the panel, hatched on the side away from the grains.
-fn draw_plane(canvas: &mut Canvas, point: [f64; 2], normal: [f64; 2], frame: &Frame) {
-    let length = normal[0].hypot(normal[1]);
-    // on the sheet y points down
-    let (n, t) = ((normal[0] / length, -normal[1] / length), (normal[1] / length, normal[0] / length));
-    // from the place on the line that is nearest to the middle of the panel, in whole lines of the
-    // hatching
-    let (from, middle) = (frame.at(point), [0.5 * frame.size.0, 0.5 * frame.size.1]);
-    let off = [frame.corner.0 + middle[0] - from.0, frame.corner.1 + middle[1] - from.1];
-    let nearest = HATCH * ((off[0] * t.0 + off[1] * t.1) / HATCH).round();
-    let centre = (from.0 + nearest * t.0, from.1 + nearest * t.1);
-    let at = |s: f64| (centre.0 + s * t.0, centre.1 + s * t.1);
-    let steps = ((frame.size.0 + frame.size.1) / HATCH) as i64;
-    let inside: Vec<f64> = (-steps..=steps).map(|k| k as f64 * HATCH).filter(|&s| frame.shows(at(s), 0.0)).collect();
-    let (Some(&first), Some(&last)) = (inside.first(), inside.last()) else {
-        return;
-    };
-    canvas.line(at(first), at(last), colour::BLACK, 1.8);
-    for s in inside {
-        let from = at(s);
-        let to = (from.0 - HATCH * (n.0 + t.0) * 0.8, from.1 - HATCH * (n.1 + t.1) * 0.8);
-        canvas.line(from, to, colour::GREY, 0.8);
-    }
 }

@@ -5,6 +5,7 @@ use dem_history::{GrainState, Grains, History, Wall, WallKind, WallState};
 
 use super::boxes::{Box2, EMPTY, EVERYWHERE, around, union};
 use super::eye::{Eye, Place};
+use super::wall;
 use crate::output::Result;
 
 /// A part of the sample smaller than this share gets a picture of its own.
@@ -148,12 +149,10 @@ impl Sample {
             found = self.bounds(grains, EVERYWHERE);
         }
         for (wall, position) in self.walls.iter().zip(walls.position.chunks(self.dimension)) {
+            let Some([low, high]) = wall::extent(&self.eye, wall, position) else { continue };
             if wall.kind == WallKind::Plane {
-                if let Some(place) = self.eye.place() {
-                    found = union(found, place.shows(&place.plane(position, wall.normal).0));
-                }
+                found = union(found, [low, high]);
             } else {
-                let [low, high] = around(self.flat(position), wall.radius.abs());
                 let near = |k: usize, x: f64| x.clamp(self.limits[0][k], self.limits[1][k]);
                 found = union(found, [[near(0, low[0]), near(1, low[1])], [near(0, high[0]), near(1, high[1])]]);
             }

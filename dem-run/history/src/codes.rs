@@ -116,6 +116,17 @@ codes! {
     Sphere = 3 "SPHERE"
 }
 
+impl WallKind {
+    /// Whether `/walls/normal` has a unit vector for it: the normal of a plane, the axis of a
+    /// cylinder.
+    pub fn has_normal(self) -> bool {
+        match self {
+            Self::Plane | Self::Cylinder => true,
+            Self::Circle | Self::Sphere => false,
+        }
+    }
+}
+
 codes! {
     /// What drives a wall.
     WallDrive, WallDriveCode(u8, U1, signed = false),

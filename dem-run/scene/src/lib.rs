@@ -48,7 +48,7 @@ pub use sample::{
 pub use solver::{GaussSeidel, LocalSolve, Newton, Solver, SolverKind, Start};
 pub use validate::validate;
 pub use validate::{LARGEST, MAX_GRAINS};
-pub use wall::{Circle, Cylinder, Drive, Place, Plane, Shape, Sphere, Wall, WallMass};
+pub use wall::*;
 
 /// Reads the scene in the file `path`, applies the `--set` assignments and validates the result.
 ///

@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::function::{Function, Ramp};
+use super::validate::report::Report;
 
 /// A rigid wall. It is fixed, or driven by one of `velocity`, `force` and `force_rate` along one
 /// direction.
@@ -138,6 +139,67 @@ pub enum Drive {
 }
 
 impl Shape {
+    /// What it is called, in a scene and in words.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Plane(_) => "plane",
+            Self::Circle(_) => "circle",
+            Self::Sphere(_) => "sphere",
+            Self::Cylinder(_) => "cylinder",
+        }
+    }
+
+    /// The dimension that it belongs to; none if it has a meaning in both.
+    fn dimension(&self) -> Option<usize> {
+        match self {
+            Self::Plane(_) => None,
+            Self::Circle(_) => Some(2),
+            Self::Sphere(_) | Self::Cylinder(_) => Some(3),
+        }
+    }
+
+    /// Reports its wrong values.
+    pub(crate) fn check(&self, report: &mut Report, path: &str) {
+        let (name, path) = (self.name(), format!("{path}.{}", self.name()));
+        if self.dimension().is_some_and(|dimension| dimension != report.dimension) {
+            let allowed = if report.dimension == 3 { "plane, sphere or cylinder" } else { "plane or circle" };
+            report.wrong(&path, format!("a {name} in {} dimensions", report.dimension), allowed);
+            return;
+        }
+        let round = |report: &mut Report, center: &[f64], radius: f64| {
+            report.vector(&format!("{path}.center"), center);
+            report.positive(format!("{path}.radius"), radius, "m");
+        };
+        let seated = |report: &mut Report, direction: &Option<Vec<f64>>, inside: bool| match direction {
+            Some(_) if inside => {
+                report.wrong(format!("{path}.seated"), "a direction", "nothing: the grains are inside")
+            }
+            Some(direction) => report.direction(&format!("{path}.seated"), direction),
+            None => {}
+        };
+        match self {
+            Self::Plane(plane) => {
+                report.direction(&format!("{path}.normal"), &plane.normal);
+                if let Place::At(point) = &plane.place {
+                    report.vector(&format!("{path}.place.at"), point);
+                }
+            }
+            Self::Circle(circle) => {
+                round(report, &circle.center, circle.radius);
+                seated(report, &circle.seated, circle.inside);
+            }
+            Self::Sphere(sphere) => {
+                round(report, &sphere.center, sphere.radius);
+                seated(report, &sphere.seated, sphere.inside);
+            }
+            Self::Cylinder(cylinder) => {
+                report.direction(&format!("{path}.axis"), &cylinder.axis);
+                round(report, &cylinder.center, cylinder.radius);
+            }
+        }
+    }
+
     /// The direction in which a round wall is moved from its centre until it touches the sample,
     /// and its radius (m).
     #[must_use]

@@ -3,7 +3,7 @@
 //! Only what the scene itself shows is judged here. Whether a wall overlaps the sample is known
 //! when the sample is.
 
-mod report;
+pub(crate) mod report;
 mod sample;
 mod wall;
 

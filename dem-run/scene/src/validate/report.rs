@@ -13,15 +13,15 @@ pub const MAX_GRAINS: usize = 100_000_000;
 pub const LARGEST: f64 = 1e60;
 
 /// What was found so far.
-pub(super) struct Report {
+pub(crate) struct Report {
     /// Dimension of space, 2 or 3.
-    pub(super) dimension: usize,
+    pub(crate) dimension: usize,
     /// The problems, in the order of the scene.
-    pub(super) problems: Vec<Problem>,
+    pub(crate) problems: Vec<Problem>,
 }
 
 /// A number as it is shown in a message.
-pub(super) struct Number(pub(super) f64);
+pub(crate) struct Number(pub(crate) f64);
 
 impl fmt::Display for Number {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -31,12 +31,12 @@ impl fmt::Display for Number {
 }
 
 impl Report {
-    pub(super) fn wrong(&mut self, path: impl Into<String>, found: impl fmt::Display, allowed: impl Into<String>) {
+    pub(crate) fn wrong(&mut self, path: impl Into<String>, found: impl fmt::Display, allowed: impl Into<String>) {
         self.problems.push(Problem::new(path, found.to_string(), allowed));
     }
 
     /// A finite number for which `inside` holds; `allowed` says what that is.
-    pub(super) fn range(&mut self, path: impl Into<String>, value: f64, inside: bool, allowed: impl Into<String>) {
+    pub(crate) fn range(&mut self, path: impl Into<String>, value: f64, inside: bool, allowed: impl Into<String>) {
         if inside && value.abs() <= LARGEST {
             return;
         }
@@ -47,7 +47,7 @@ impl Report {
         self.wrong(path, Number(value), allowed);
     }
 
-    pub(super) fn positive(&mut self, path: impl Into<String>, value: f64, unit: &str) {
+    pub(crate) fn positive(&mut self, path: impl Into<String>, value: f64, unit: &str) {
         let allowed = match value > 0.0 {
             true => format!("a finite number > 0 ({unit}), at least {:.0e}", 1.0 / LARGEST),
             false => format!("a finite number > 0 ({unit})"),
@@ -55,15 +55,15 @@ impl Report {
         self.range(path, value, value >= 1.0 / LARGEST, allowed);
     }
 
-    pub(super) fn non_negative(&mut self, path: impl Into<String>, value: f64, unit: &str) {
+    pub(crate) fn non_negative(&mut self, path: impl Into<String>, value: f64, unit: &str) {
         self.range(path, value, value >= 0.0, format!("a finite number ≥ 0 ({unit})"));
     }
 
-    pub(super) fn finite(&mut self, path: impl Into<String>, value: f64) {
+    pub(crate) fn finite(&mut self, path: impl Into<String>, value: f64) {
         self.range(path, value, true, "a finite number");
     }
 
-    pub(super) fn fraction(&mut self, path: impl Into<String>, value: f64) {
+    pub(crate) fn fraction(&mut self, path: impl Into<String>, value: f64) {
         self.range(path, value, (0.0..=1.0).contains(&value), "a number from 0 to 1");
     }
 
@@ -78,17 +78,17 @@ impl Report {
         }
     }
 
-    pub(super) fn vector(&mut self, path: &str, vector: &[f64]) {
+    pub(crate) fn vector(&mut self, path: &str, vector: &[f64]) {
         self.components(path, vector, self.dimension);
     }
 
-    pub(super) fn spin(&mut self, path: &str, vector: &[f64]) {
+    pub(crate) fn spin(&mut self, path: &str, vector: &[f64]) {
         let length = if self.dimension == 2 { 1 } else { 3 };
         self.components(path, vector, length);
     }
 
     /// A vector whose length is not zero.
-    pub(super) fn direction(&mut self, path: &str, vector: &[f64]) {
+    pub(crate) fn direction(&mut self, path: &str, vector: &[f64]) {
         self.vector(path, vector);
         let length = vector.iter().fold(0.0_f64, |length, value| length.hypot(*value));
         // below this the vector cannot be normalised
@@ -97,7 +97,7 @@ impl Report {
         }
     }
 
-    pub(super) fn function(&mut self, path: &str, function: &Function) {
+    pub(crate) fn function(&mut self, path: &str, function: &Function) {
         match function {
             Function::Constant(value) => self.finite(format!("{path}.constant"), *value),
             Function::Ramp(ramp) => {
@@ -123,13 +123,13 @@ impl Report {
     }
 
     /// A number that the scene must not give here.
-    pub(super) fn absent(&mut self, path: impl Into<String>, value: Option<f64>, reason: &str) {
+    pub(crate) fn absent(&mut self, path: impl Into<String>, value: Option<f64>, reason: &str) {
         if let Some(value) = value {
             self.wrong(path, Number(value), format!("nothing: {reason}"));
         }
     }
 
-    pub(super) fn count(&mut self, path: &str, value: usize) {
+    pub(crate) fn count(&mut self, path: &str, value: usize) {
         if value == 0 || value > MAX_GRAINS {
             self.wrong(path, value, format!("a whole number from 1 to {MAX_GRAINS}"));
         }

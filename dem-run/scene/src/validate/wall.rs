@@ -1,7 +1,7 @@
 //! Wrong values in a wall.
 
 use super::report::Report;
-use crate::wall::{Drive, Place, Shape, Wall, WallMass};
+use crate::wall::{Drive, Wall, WallMass};
 
 /// Checks the wall `name`.
 pub(super) fn wall(report: &mut Report, name: &str, wall: &Wall) {
@@ -9,7 +9,7 @@ pub(super) fn wall(report: &mut Report, name: &str, wall: &Wall) {
     if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-') {
         report.wrong(&path, format!("the name \"{name}\""), "a name of letters, digits, _ and -");
     }
-    shape(report, &format!("{path}.shape"), &wall.shape);
+    wall.shape.check(report, &format!("{path}.shape"));
     if let Some(friction) = wall.friction {
         report.non_negative(format!("{path}.friction"), friction, "no unit");
     }
@@ -56,43 +56,5 @@ fn mass_and_direction(report: &mut Report, path: &str, wall: &Wall) {
             report.wrong(direction, "nothing", "a vector: only a plane has a direction of its own, its normal");
         }
         _ => {}
-    }
-}
-
-fn shape(report: &mut Report, path: &str, shape: &Shape) {
-    let (name, dimension) = match shape {
-        Shape::Plane(plane) => {
-            report.direction(&format!("{path}.plane.normal"), &plane.normal);
-            if let Place::At(point) = &plane.place {
-                report.vector(&format!("{path}.plane.place.at"), point);
-            }
-            return;
-        }
-        Shape::Circle(_) => ("circle", 2),
-        Shape::Sphere(_) => ("sphere", 3),
-        Shape::Cylinder(_) => ("cylinder", 3),
-    };
-    let path = format!("{path}.{name}");
-    if dimension != report.dimension {
-        let allowed = if dimension == 2 { "plane, sphere or cylinder" } else { "plane or circle" };
-        report.wrong(&path, format!("a {name} in {} dimensions", report.dimension), allowed);
-        return;
-    }
-    let (center, radius) = match shape {
-        Shape::Circle(circle) => (&circle.center, circle.radius),
-        Shape::Sphere(sphere) => (&sphere.center, sphere.radius),
-        Shape::Cylinder(cylinder) => {
-            report.direction(&format!("{path}.axis"), &cylinder.axis);
-            (&cylinder.center, cylinder.radius)
-        }
-        Shape::Plane(_) => return,
-    };
-    report.vector(&format!("{path}.center"), center);
-    report.positive(format!("{path}.radius"), radius, "m");
-    let inside = matches!(shape, Shape::Circle(c) if c.inside) || matches!(shape, Shape::Sphere(s) if s.inside);
-    match shape.seat() {
-        Some(_) if inside => report.wrong(format!("{path}.seated"), "a direction", "nothing: the grains are inside"),
-        Some((direction, _)) => report.direction(&format!("{path}.seated"), direction),
-        None => {}
     }
 }

@@ -1,0 +1,80 @@
+//! How each kind of wall is drawn, and how much of the drawing it takes.
+
+use dem_drawing::{Canvas, colour};
+use dem_history::{Wall, WallKind};
+
+use super::boxes::{Box2, around};
+use super::eye::{Eye, Place};
+use super::frame::{Frame, HATCH};
+
+/// Draws a wall behind the grains.
+pub(super) fn draw(canvas: &mut Canvas, eye: &Eye, wall: &Wall, position: &[f64], frame: &Frame) {
+    let point = eye.flat(position);
+    match wall.kind {
+        WallKind::Plane => {
+            if let Some(place) = eye.place() {
+                return draw_plate(canvas, place, wall, position, frame, true);
+            }
+            let normal = eye.flat(&wall.normal[..position.len()]);
+            // a plane parallel to the sheet has no line
+            if normal[0].hypot(normal[1]) > 1e-6 {
+                draw_plane(canvas, point, normal, frame);
+            }
+        }
+        WallKind::Circle | WallKind::Sphere | WallKind::Cylinder => {
+            let (at, radius) = (frame.at(point), wall.radius.abs() * frame.scale);
+            let fill = if wall.radius < 0.0 { "none" } else { "#d0d0d0" };
+            canvas.disk(at, radius, fill, colour::BLACK, 1.5);
+        }
+    }
+}
+
+/// Draws what is in front of the grains: in perspective, the edges of a plane.
+pub(super) fn draw_in_front(canvas: &mut Canvas, eye: &Eye, wall: &Wall, position: &[f64], frame: &Frame) {
+    if let (WallKind::Plane, Some(place)) = (wall.kind, eye.place()) {
+        draw_plate(canvas, place, wall, position, frame, false);
+    }
+}
+
+/// The box around a wall, as it is shown; `None` for a plane without ends.
+pub(super) fn extent(eye: &Eye, wall: &Wall, position: &[f64]) -> Option<Box2> {
+    match wall.kind {
+        WallKind::Plane => eye.place().map(|place| place.shows(&place.plane(position, wall.normal).0)),
+        WallKind::Circle | WallKind::Sphere | WallKind::Cylinder => Some(around(eye.flat(position), wall.radius.abs())),
+    }
+}
+
+/// A plane in perspective, as a plate of the sample's size, if it is behind the grains or before
+/// them: full, or its edges alone.
+fn draw_plate(canvas: &mut Canvas, place: &Place, wall: &Wall, position: &[f64], frame: &Frame, behind: bool) {
+    let (corners, is_behind) = place.plane(position, wall.normal);
+    if is_behind == behind {
+        let on_sheet = corners.map(|corner| frame.at(place.flat(&corner)));
+        canvas.polygon(&on_sheet, if behind { "#e4e4e4" } else { "none" }, colour::GREY, 1.2);
+    }
+}
+
+/// A line across the panel, hatched on the side away from the grains.
+fn draw_plane(canvas: &mut Canvas, point: [f64; 2], normal: [f64; 2], frame: &Frame) {
+    let length = normal[0].hypot(normal[1]);
+    // on the sheet y points down
+    let (n, t) = ((normal[0] / length, -normal[1] / length), (normal[1] / length, normal[0] / length));
+    // from the place on the line that is nearest to the middle of the panel, in whole lines of the
+    // hatching
+    let (from, middle) = (frame.at(point), [0.5 * frame.size.0, 0.5 * frame.size.1]);
+    let off = [frame.corner.0 + middle[0] - from.0, frame.corner.1 + middle[1] - from.1];
+    let nearest = HATCH * ((off[0] * t.0 + off[1] * t.1) / HATCH).round();
+    let centre = (from.0 + nearest * t.0, from.1 + nearest * t.1);
+    let at = |s: f64| (centre.0 + s * t.0, centre.1 + s * t.1);
+    let steps = ((frame.size.0 + frame.size.1) / HATCH) as i64;
+    let inside: Vec<f64> = (-steps..=steps).map(|k| k as f64 * HATCH).filter(|&s| frame.shows(at(s), 0.0)).collect();
+    let (Some(&first), Some(&last)) = (inside.first(), inside.last()) else {
+        return;
+    };
+    canvas.line(at(first), at(last), colour::BLACK, 1.8);
+    for s in inside {
+        let from = at(s);
+        let to = (from.0 - HATCH * (n.0 + t.0) * 0.8, from.1 - HATCH * (n.1 + t.1) * 0.8);
+        canvas.line(from, to, colour::GREY, 0.8);
+    }
+}
