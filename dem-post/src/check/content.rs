@@ -268,9 +268,7 @@ fn directions(c: &mut Checker) {
     }
     let has_normal = |kind: u8| WallKind::ALL.get(usize::from(kind)).is_some_and(|kind| kind.has_normal());
     let is_driven = |drive: u8| WallDrive::ALL.get(usize::from(drive)).is_some_and(|drive| *drive != WallDrive::Fixed);
-    let directed: [(&str, &str, &dyn Fn(u8) -> bool); 2] =
-        [("walls/normal", "walls/kind", &has_normal), ("walls/direction", "walls/drive", &is_driven)];
-    for (place, of, has) in directed {
+    let mut check = |place: &str, of: &str, has: &dyn Fn(u8) -> bool| {
         let vectors = c.rows::<f64>(place, 0..w).unwrap_or_default();
         let kinds = c.rows::<u8>(of, 0..w).unwrap_or_default();
         for (k, (v, kind)) in vectors.chunks_exact(d).zip(kinds).enumerate() {
@@ -278,7 +276,9 @@ fn directions(c: &mut Checker) {
                 c.wrong(place, Some(k), format!("{v:?} is no unit vector"));
             }
         }
-    }
+    };
+    check("walls/normal", "walls/kind", &has_normal);
+    check("walls/direction", "walls/drive", &is_driven);
 }
 
 /// The grains of each bond.
