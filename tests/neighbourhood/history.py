@@ -132,6 +132,7 @@ class History:
         self.rest_gap, self.strength, self.bond_friction, self.mean_diameter = (
             group[k][:] for k in ("rest_gap", "strength", "friction", "mean_diameter")
         )
+        self.bond_rolling = group["rolling"][:] if "rolling" in group else self.bond_friction
         self.K = len(self.strength)
         self.bond_status = np.array(enum_names(group["status/value"], self.S + 1)).reshape(self.S + 1, self.K)
         self.xi = float(self.scene["bonds"].get("twist") or 0.0)

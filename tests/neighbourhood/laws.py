@@ -73,7 +73,7 @@ class Solved:
         )
         bond = h.bond_friction[h.bond] if h.K else np.zeros(h.M)
         self.mu = np.where(self.bonds, bond, dry)
-        self.nu = np.where(self.bonds, bond, 0.0)
+        self.nu = np.where(self.bonds, h.bond_rolling[h.bond], 0.0) if h.K else np.zeros(h.M)
         self.xi = np.where(self.bonds, h.xi, 0.0) if h.K else np.zeros(h.M)
 
     def _blocks(self, h, c, smooth):
@@ -232,11 +232,12 @@ def turning(h, c):
 
 
 def turned(h, c):
-    """What a rigid bond that turned is given back (m/s). The spins of bonds without friction do not tell that they
-    turn: their length does, from the second step on, and as far as rounding does not hide it."""
+    """What a rigid bond that turned is given back (m/s). The grains of bonds without a limit of shear or of rolling need not
+    turn with them: their length tells that they turn, from the second step on, as far as rounding does not hide it."""
     longer = np.where(h.row_step > 0, lengthening(h, c), 0.0)
     longer[h.h * longer <= np.finfo(float).eps * h.mean_diameter[h.bond]] = 0.0
-    return np.where(h.bond_friction[h.bond] > 0, turning(h, c), longer)
+    with_it = (h.bond_friction[h.bond] > 0) & (h.bond_rolling[h.bond] > 0)
+    return np.where(with_it, turning(h, c), longer)
 
 
 def lengthening(h, c):

@@ -41,8 +41,12 @@ def check_formed(h, report):
         "rest_gap": (h.rest_gap, rest, norm(h.x[0, bi]) + norm(h.x[0, bj]) + a),
         "mean_diameter": (h.mean_diameter, a, a),
     }
-    told["strength"] = (h.strength, prescribed.strength(h.scene, a), np.abs(h.strength))
-    told["friction"] = (h.bond_friction, np.full(h.K, mu), np.full(h.K, mu))
+    if h.scene["bonds"].get("scatter") is None:
+        told["strength"] = (h.strength, prescribed.strength(h.scene, a), np.abs(h.strength))
+    for name, found in (("shear", h.bond_friction), ("rolling", h.bond_rolling)):
+        given = h.scene["bonds"].get(name)
+        expected = np.full(h.K, mu if given is None else given)
+        told[name] = (found, expected, expected)
     for name, (found, expected, scale) in told.items():
         off = np.abs(found - expected)
         report.expect("bonds formed", off, tolerances.rounding(scale), lambda k, name=name: f"bond {k}: {name}")
@@ -105,11 +109,11 @@ def check_elongation(h, longer, report):
     report.expect("bond_elongation", off, tolerances.rounding(scale), lambda s: f"step {s + 1}: bond_elongation (m)")
 
 
-def failure(n, t, b, w, strength, mu, a, xi):
-    """Distance to rupture of reactions (N, N m): r̂_n, and the largest of ‖r_t‖/μ, ‖m‖/(μ a), |τ|/(ξ a)
+def failure(n, t, b, w, strength, mu, nu, a, xi):
+    """Distance to rupture of reactions (N, N m): r̂_n, and the largest of ‖r_t‖/μ, ‖m‖/(ν a), |τ|/(ξ a)
     with its mode."""
     over = lambda size, c: np.divide(size, c, out=np.zeros_like(size), where=c > 0)
-    ratios = np.stack([over(t, mu), over(b, mu * a), over(w, xi * a)])
+    ratios = np.stack([over(t, mu), over(b, nu * a), over(w, xi * a)])
     return n + strength, ratios.max(0), np.array(["SHEAR", "ROLLING", "TWIST"])[ratios.argmax(0)], ratios
 
 
@@ -125,6 +129,7 @@ def check_intact(h, p, report):
         np.abs(h.twist[rows]),
         h.strength[b],
         h.bond_friction[b],
+        h.bond_rolling[b],
         h.mean_diameter[b],
         np.full(len(b), h.xi),
     )
@@ -253,9 +258,8 @@ def check_limits_of_events(h, report):
     twist = np.abs(e["twist"]) if two_columns else np.zeros(len(e))
     # before version 3 `m` is the norm of bending and twist together: less is said of both
     mixed = h.moment.shape[1] > 2 and not two_columns
-    n, ratio, mode, ratios = failure(
-        e["rn"], e["rt"], e["m"], twist, strength, h.bond_friction[b], h.mean_diameter[b], np.full(len(b), h.xi)
-    )
+    mu, nu, xi = h.bond_friction[b], h.bond_rolling[b], np.full(len(b), h.xi)
+    n, ratio, mode, ratios = failure(e["rn"], e["rt"], e["m"], twist, strength, mu, nu, h.mean_diameter[b], xi)
     slack = tolerances.rounding(np.abs(e["rn"]) + strength + ratio)
     describe = lambda k: f"event {k} ({h.event_mode[k]}) at step {e['step'][k]}, bond {e['bond'][k]}"
     tension = n <= eps * strength + slack
