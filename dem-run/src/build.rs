@@ -23,13 +23,13 @@ use std::sync::Arc;
 /// Stream of the random generator from which strengths of bonds are drawn.
 const SCATTER_STREAM: u128 = 1;
 
-/// A world at time zero, with the solid fraction of its sample and warnings.
+/// A world at time zero, the solid fraction of its sample, and warnings.
 pub struct Built<D: Dim> {
     /// The world.
     pub world: World<D>,
     /// Solid fraction of a random sample in its box (–).
     pub solid_fraction: Option<f64>,
-    /// Warnings: what the scene probably does not mean as it says it.
+    /// Warnings about probable mistakes in the scene.
     pub warnings: Vec<String>,
 }
 
@@ -41,18 +41,18 @@ pub struct Placed<D: Dim> {
     pub walls: Vec<Wall<D>>,
     /// Solid fraction of a random sample in its box (–).
     pub solid_fraction: Option<f64>,
-    /// Warnings: what the scene probably does not mean as it says it.
+    /// Warnings about probable mistakes in the scene.
     pub warnings: Vec<String>,
 }
 
-/// Pairs of grains that are told one by one.
+/// Maximum number of grain pairs that are reported individually.
 const MOST_TOLD: usize = 10;
 
-/// Prepare the sample of a scene and put the world together. `watch` gets the progress of the
+/// Prepares the sample of a scene and assembles its world. `watch` receives the progress of the
 /// preparation.
 ///
 /// # Errors
-/// [`RunError`], with all that is wrong with the sample.
+/// [`RunError`], with all errors of the sample.
 pub fn build<D: Dim>(scene: &Scene, watch: Watch) -> Result<Built<D>, RunError> {
     let Placed { grains, walls, solid_fraction, warnings } = place::<D>(scene, watch)?;
     let mut world = World::new(grains, walls, loads(scene), settings(scene));
@@ -76,7 +76,7 @@ pub fn build<D: Dim>(scene: &Scene, watch: Watch) -> Result<Built<D>, RunError> 
     Ok(Built { world, solid_fraction, warnings })
 }
 
-/// Prepare the sample of a scene and put its walls in their places.
+/// Prepares the sample of a scene and positions its walls.
 ///
 /// # Errors
 /// As [`build`].
@@ -102,10 +102,10 @@ pub fn place<D: Dim>(scene: &Scene, watch: Watch) -> Result<Placed<D>, RunError>
     Ok(Placed { grains, walls, solid_fraction, warnings })
 }
 
-/// The world of a scene that continues from a saved state.
+/// The world of a scene, restored from a saved state.
 ///
 /// # Errors
-/// [`Mismatch`] where the state is that of another scene.
+/// [`Mismatch`] if the state belongs to another scene.
 pub fn rebuild<D: Dim>(scene: &Scene, from: &mut Reader) -> Result<World<D>, Mismatch> {
     let grains = Grains::restored(from)?;
     if scene.grains.iter().flat_map(|g| &g.loads).any(|load| load.grain >= grains.len()) {
@@ -115,7 +115,7 @@ pub fn rebuild<D: Dim>(scene: &Scene, from: &mut Reader) -> Result<World<D>, Mis
     World::restored(grains, walls, loads(scene), settings(scene), from)
 }
 
-/// The grains of a scene, and of a random packing what [`prepare::Packing`] says.
+/// The grains of a scene; the other fields as in [`prepare::Packing`], for a random sample.
 struct Sampled<D: Dim> {
     grains: Grains<D>,
     solid_fraction: Option<f64>,
@@ -140,7 +140,7 @@ fn grains<D: Dim>(scene: &Scene, watch: Watch) -> Result<Sampled<D>, RunError> {
     Ok(Sampled { grains, solid_fraction: None, unsettled: None })
 }
 
-/// Hold the grains of `grains.fixed`; returns those that are not there.
+/// Fixes the grains of `grains.fixed`; returns messages about numbers without a grain.
 fn hold_fixed<D: Dim>(scene: &Scene, grains: &mut Grains<D>) -> Vec<String> {
     let mut wrong = vec![];
     for &k in scene.grains.iter().flat_map(|g| &g.fixed) {
@@ -149,7 +149,7 @@ fn hold_fixed<D: Dim>(scene: &Scene, grains: &mut Grains<D>) -> Vec<String> {
             continue;
         }
         grains.fixed[k] = true;
-        // whatever velocity the list gives it
+        // overrides the velocity of the list
         grains.velocity[k] = D::Vector::zero();
         grains.spin[k] = D::Spin::zero();
     }
@@ -185,13 +185,14 @@ fn listed<D: Dim>(spec: &scene::GrainSpec, scene: &Scene) -> Grain<D> {
     grain
 }
 
-/// Refuses radii in another unit than the centres: then every grain may overlap every other, which
-/// gives more pairs than can be listed.
+/// Rejects radii in another unit than the centres: if all grains overlap each other, the list of
+/// pairs does not fit in memory.
 fn refuse_other_units<D: Dim>(grains: &Grains<D>) -> Result<(), RunError> {
     let (low, high) = grains.bounds();
     let space: f64 = (high - low).as_slice().iter().product();
     let solid: f64 = grains.radius.iter().map(|r| D::volume(*r)).sum();
-    // grains that overlap by no more than is allowed fill less than 1.4 times their box
+    // at the largest accepted overlap, the volume of the grains is less than 1.4 times that of
+    // their box
     if grains.len() < 1000 || solid <= 2.0 * space {
         return Ok(());
     }
@@ -201,7 +202,7 @@ fn refuse_other_units<D: Dim>(grains: &Grains<D>) -> Result<(), RunError> {
     )]))
 }
 
-/// Messages about pairs of grains that overlap too deeply; and one warning about overlaps beyond
+/// Messages about pairs of grains with too large an overlap, and one warning about overlaps above
 /// the round-off of decimals.
 ///
 /// Two grains at the same place have no contact normal, and rigid grains do not overlap.
@@ -299,15 +300,16 @@ fn build_wall<D: Dim>(scene: &Scene, wall: &scene::Wall, grains: &Grains<D>) -> 
     built
 }
 
-/// The centre of a round wall: where it stands, or where it touches the first grain on its way.
+/// The centre of a round wall: the given one, or for a seated wall the one at its first contact
+/// with a grain.
 fn seated<D: Dim>(shape: &scene::Shape, center: &[f64], grains: &Grains<D>) -> D::Vector {
     let center = D::Vector::from_slice(center);
     let Some((direction, _)) = shape.seat() else { return center };
     center + unit::<D>(direction) * seat(shape, center, grains).unwrap_or(0.0)
 }
 
-/// The distance that a round wall moves from `center` until it touches a grain (m); none if no
-/// grain is in its way.
+/// The distance from `center` to the first contact of a seated round wall with a grain (m); none if
+/// its path meets no grain.
 fn seat<D: Dim>(shape: &scene::Shape, center: D::Vector, grains: &Grains<D>) -> Option<f64> {
     let (direction, radius) = shape.seat()?;
     let along = unit::<D>(direction);
@@ -321,7 +323,7 @@ fn seat<D: Dim>(shape: &scene::Shape, center: D::Vector, grains: &Grains<D>) -> 
     grains.position.iter().zip(&grains.radius).filter_map(touch).min_by(f64::total_cmp)
 }
 
-/// Messages about round walls that are to be seated and find no grain in their way.
+/// Messages about seated round walls whose path meets no grain.
 fn unseated<D: Dim>(scene: &Scene, grains: &Grains<D>) -> Vec<String> {
     let mut wrong = vec![];
     for (name, wall) in &scene.walls {
@@ -344,7 +346,7 @@ fn unseated<D: Dim>(scene: &Scene, grains: &Grains<D>) -> Vec<String> {
     wrong
 }
 
-/// Messages about walls that grains overlap, each with the deepest grain.
+/// Messages about walls that overlap grains, each with the grain of largest overlap.
 fn buried<D: Dim>(scene: &Scene, walls: &[Wall<D>], grains: &Grains<D>) -> Vec<String> {
     let mut wrong = vec![];
     for (name, wall) in scene.walls.keys().zip(walls) {
@@ -441,9 +443,9 @@ fn staged(newton: &scene::Newton, stages: Stages, tolerance: f64, accept: f64) -
     }
 }
 
-/// Multiply the strength of each bond by a random factor, in the order of their pairs.
+/// Multiplies the strength of each bond by a random factor, in the order of the bonds' pairs.
 fn scatter_strengths(bonds: &mut [Bond], scatter: scene::Scatter, seed: u64) {
-    // a stream of its own: the packing draws from the seed itself
+    // a separate stream: the packing uses the default stream of the seed
     let mut rng = Pcg64::new(u128::from(seed), SCATTER_STREAM);
     let mut share = || loop {
         let share = rng.random::<f64>();
@@ -466,8 +468,9 @@ fn scatter_strengths(bonds: &mut [Bond], scatter: scene::Scatter, seed: u64) {
     }
 }
 
-/// Stiffness of a bond of mean diameter `a` (m). A bar of length a and width a, t thick or round,
-/// has E A/a along itself, G A/a across, E I/a in bending, and G 2I/a in twist where it is round.
+/// Stiffness of a bond of mean diameter `a` (m). A bar of length a and width a, either round or of
+/// thickness t, has the axial stiffness E A/a, the shear stiffness G A/a and the bending stiffness
+/// E I/a; a round bar has the twist stiffness G 2I/a.
 fn bond_stiffness<D: Dim>(stiffness: scene::Stiffness, a: f64, thickness: f64) -> bond::Stiffness {
     match stiffness {
         scene::Stiffness::Springs(scene::Springs { normal, tangential, rolling, twist }) => {
@@ -527,7 +530,7 @@ mod tests {
         };
         let scale = 10.0 * f64::from(links).powf(-1.0 / modulus);
         let off = distance((0..chains).map(weakest).collect(), |s| 1.0 - (-(s / scale).powf(modulus)).exp());
-        // a true sample is further off than this once in a thousand times
+        // a sample of the distribution exceeds this distance with probability 1/1000
         assert!(off < 1.95 / (chains as f64).sqrt(), "{off}");
     }
 
@@ -562,11 +565,11 @@ mod tests {
         let round =
             [young * PI * a / 4.0, shear * PI * a / 4.0, young * PI * a.powi(3) / 64.0, shear * PI * a.powi(3) / 32.0];
         assert_near(bond_stiffness::<D3Twist>(bar, a, 1.0), round);
-        // a plate as long as wide: A = a t, I = t a³/12; nothing twists in the plane
+        // a square plate: A = a t, I = t a³/12; no twist in 2D
         let plate = bond_stiffness::<D2>(bar, a, thickness);
         let expected = [young * thickness, shear * thickness, young * thickness * a * a / 12.0];
         assert_near(bond::Stiffness { twist: 1.0, ..plate }, [expected[0], expected[1], expected[2], 1.0]);
-        // springs are what the scene says, whatever the size
+        // springs of the scene do not depend on the diameter
         let springs = scene::Springs { normal: 1.0, tangential: 2.0, rolling: 3.0, twist: Some(4.0) };
         assert_near(bond_stiffness::<D3Twist>(scene::Stiffness::Springs(springs), a, 1.0), [1.0, 2.0, 3.0, 4.0]);
     }

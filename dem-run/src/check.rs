@@ -1,6 +1,6 @@
-//! What a run of a scene will be: grains and their sizes, walls and their drives, steps, frames,
-//! the size of its history and its memory. The code of a run puts the sample in its place; random
-//! samples are not packed.
+//! Preview of a run: grains and their sizes, walls and their drives, steps, frames, the size of the
+//! history and the memory. The sample is placed by the code of a run; random samples are not
+//! packed.
 
 use std::fmt;
 use std::path::Path;
@@ -19,19 +19,19 @@ use crate::sample_file;
 use crate::scene::{Drive, Function, Lattice, Precision, Ramp, RandomSample, Sample, Scene};
 use crate::warnings;
 
-/// What a run of a scene will be.
+/// Preview of a run of a scene.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Check {
-    /// What the scene shows.
+    /// Title of the scene.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub title: Option<String>,
     /// Dimension of space.
     pub dimension: u8,
     /// Number of grains.
     pub grains: usize,
-    /// Where they come from.
+    /// Source of the grains.
     pub sample: &'static str,
-    /// Sizes of the grains and of the sample; none where there is not enough memory for them.
+    /// Sizes of the grains and of the sample; none if the memory does not suffice to compute them.
     #[serde(flatten)]
     pub sizes: Option<Sizes>,
     /// Whether there are bonds.
@@ -56,10 +56,9 @@ pub struct Check {
     pub free_memory_bytes: Option<u64>,
     /// Size of the history, roughly (bytes).
     pub file_bytes: u64,
-    /// Free space where the history would stand by default (bytes), if known.
+    /// Free disk space at the default place of the history (bytes), if known.
     pub free_bytes: Option<u64>,
-    /// Warnings: what the scene probably does not mean as it says it, and disk space or memory that
-    /// may be missing.
+    /// Warnings about probable mistakes in the scene, and about too little disk space or memory.
     pub warnings: Vec<String>,
 }
 
@@ -70,8 +69,8 @@ pub struct Sizes {
     pub diameters: [f64; 3],
     /// Lowest corner of the box around the sample (m).
     pub box_from: Vec<f64>,
-    /// Highest corner of the box around the sample (m): of a random one at the solid fraction that
-    /// it asks for, before a cut.
+    /// Highest corner of the box around the sample (m). For a random sample: at the requested solid
+    /// fraction, before a cut.
     pub box_to: Vec<f64>,
     /// Mass of all grains (kg).
     pub mass: f64,
@@ -86,17 +85,17 @@ pub struct CheckedWall {
     pub shape: &'static str,
     /// How it is driven.
     pub drive: &'static str,
-    /// Force or velocity over time, of a wall that is driven.
+    /// Force or velocity over time, if the wall is driven.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub course: Option<String>,
 }
 
 impl Check {
-    /// What a run of `scene` will be, its history in the current folder.
+    /// Preview of a run of `scene`, with the history in the current folder.
     ///
     /// # Errors
-    /// For a sample that is not random, the errors with which a run would end before its first
-    /// step: [`RunError::SampleFile`], [`RunError::File`], [`RunError::Sample`].
+    /// For a sample that is not random, the errors of a run before its first step:
+    /// [`RunError::SampleFile`], [`RunError::File`], [`RunError::Sample`].
     pub fn new(scene: &Scene) -> Result<Self, RunError> {
         let grains = count(scene)?;
         let (memory_bytes, free_memory_bytes) = (memory::expected(scene, grains), memory::free());
@@ -140,7 +139,7 @@ impl Check {
         Ok(check)
     }
 
-    /// Whether the history will not fit.
+    /// Whether the history exceeds the free disk space.
     #[must_use]
     pub fn disk_is_too_small(&self) -> bool {
         self.free_bytes.is_some_and(|free| free < self.file_bytes)
@@ -261,8 +260,8 @@ fn has_bonds(scene: &Scene) -> bool {
     scene.bonds.as_ref().is_some_and(|bonds| bonds.cohesion(scene.dimension, 1.0, 1.0) > 0.0)
 }
 
-/// Size of the history of `grains` grains (bytes): the layout of `dem_run::history` row by row,
-/// with a typical number of contacts. It may be wrong by half.
+/// Estimated size of the history of `grains` grains (bytes), from the rows of `dem_run::history`
+/// and a typical number of contacts. The error may be 50 %.
 fn expected_bytes(scene: &Scene, grains: usize) -> u64 {
     const NUMBER: f64 = 8.0;
     /// Scalars that are written at every step, with their step and time.
@@ -284,7 +283,7 @@ fn expected_bytes(scene: &Scene, grains: usize) -> u64 {
     (FIXED + frames + scene.time.steps() as f64 * PER_STEP) as u64
 }
 
-/// Free space for the user on the disk of `folder` (bytes), if the system tells.
+/// Free space for the user on the disk of `folder` (bytes), if the system reports it.
 #[cfg(unix)]
 pub(crate) fn free_space(folder: &Path) -> Option<u64> {
     let disk = rustix::fs::statvfs(folder).ok()?;
@@ -373,7 +372,7 @@ pub(crate) mod tests {
                 "x,y,radius\n0,1,1\n1,1,1\n5,1,1\n5,2,1\n",
                 &["grains 0 and 1 overlap by 1", "grains 2 and 3 overlap by 1"],
             ),
-            // a wall that stands in the sample as well
+            // the wall also overlaps grains
             ("x,y,radius\n0,1,1\n1,1,1\n0,9,1\n", &["grains 0 and 1 overlap"]),
         ] {
             let error = with_sample(table).expect_err(table);

@@ -1,29 +1,29 @@
-//! The loads that mark the failure of a sample, and the greatest load, step by step.
+//! Failure loads and peak load of a sample, updated at every step.
 
 use crate::scene::failure::{BROKEN_SHARE, STRAINS};
 use dem_core::saved::{Mismatch, Reader, Saved};
 use serde::Serialize;
 
-/// Loads (N) that mark the failure of a sample; none where it did not come to that.
+/// Failure loads of a sample (N); none if the sample did not reach that state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Failure {
     /// Load at the step of the first break.
     pub first_break: Option<f64>,
-    /// Load at the last step before the axial strain exceeded each of [`STRAINS`]; none where none
+    /// Load of the last step before the axial strain exceeded each of [`STRAINS`]; none if no load
     /// acted in that step.
     pub collapse: [Option<f64>; 2],
-    /// Whether no bond had broken when the strain exceeded each of [`STRAINS`].
+    /// Whether the strain exceeded each of [`STRAINS`] before any bond broke.
     pub early: [bool; 2],
-    /// Load at the step by whose end [`BROKEN_SHARE`] of the bonds had broken.
+    /// Load of the first step after which at least [`BROKEN_SHARE`] of the bonds are broken.
     pub broken_share: Option<f64>,
 }
 
 /// The load of greatest magnitude.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Peak {
-    /// The load (N); zero where none ever acted.
+    /// The load (N); zero if no load ever acted.
     pub load: f64,
-    /// Displacement of the wall along its direction at the end of that step (m).
+    /// Displacement of the wall along its direction at the end of the step of this load (m).
     pub displacement: f64,
 }
 
@@ -45,19 +45,19 @@ pub struct LoadStep {
 /// Follows the load of one wall step by step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Collapse {
-    /// What was found so far.
+    /// Failure loads found so far.
     pub failure: Failure,
     /// Whether the strain has exceeded each of [`STRAINS`].
     pub passed: [bool; 2],
-    /// The greatest load so far.
+    /// The peak load so far.
     pub peak: Peak,
-    /// Whether the last step brought it.
+    /// Whether the peak load is that of the last step.
     pub rising: bool,
     last_load: f64,
 }
 
 impl Collapse {
-    /// Enter one step.
+    /// Updates the loads with a step.
     pub fn push(&mut self, step: LoadStep) {
         let LoadStep { load, displacement, strain, broken, bonds } = step;
         let failure = &mut self.failure;
@@ -81,7 +81,7 @@ impl Collapse {
         self.last_load = load;
     }
 
-    /// Write the state.
+    /// Saves the state.
     pub fn save(&self, to: &mut Saved) {
         let Failure { first_break, collapse: [a, b], early, broken_share } = self.failure;
         for load in [first_break, a, b, broken_share] {
@@ -92,7 +92,7 @@ impl Collapse {
         to.reals.extend([self.peak.load, self.peak.displacement, self.last_load]);
     }
 
-    /// What [`Collapse::save`] wrote.
+    /// Restores the state saved by [`Collapse::save`].
     ///
     /// # Errors
     /// [`Mismatch`].

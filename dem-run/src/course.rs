@@ -1,4 +1,4 @@
-//! The course of a run: what is counted from step to step, and what ends it.
+//! The course of a run: its counters, updated at every step, and its stop conditions.
 
 use crate::collapse::{Collapse, LoadStep};
 use crate::scene::failure::in_one_piece;
@@ -15,20 +15,20 @@ use dem_core::world::{StepReport, World};
 pub struct Course<D: Dim> {
     /// The driven walls with their loads, in the order of the walls.
     pub driven: Vec<Driven<D>>,
-    /// Which of them loads the sample; none where the scene has no driven wall, or does not say
-    /// which.
+    /// Index in `driven` of the wall that loads the sample; none if the scene has no driven wall,
+    /// or does not name the load wall.
     pub load_wall: Option<usize>,
     /// Lengths of the box around all grains at the start (m), one for each axis.
     pub extents: Vec<f64>,
-    /// Whether the bonds joined all grains to one piece at the start.
+    /// Whether all grains were bonded into one piece at the start.
     pub one_piece: bool,
     /// Bonds broken in tension, shear, rolling and twist.
     pub broken: [usize; 4],
     /// Largest residual of an accepted solve (–).
     pub worst_residual: f64,
-    /// Largest load error of an accepted solve (–); none where no solve reported one.
+    /// Largest load error of an accepted solve (–); none if no solve reported one.
     pub worst_load_error: Option<f64>,
-    /// What all solves took.
+    /// Work of all solves.
     pub work: Work,
     /// Steps with a solve: those that were not extrapolated.
     pub solved_steps: u64,
@@ -49,11 +49,11 @@ pub struct Course<D: Dim> {
 
 /// A driven wall and its load.
 pub struct Driven<D: Dim> {
-    /// Its number among the walls.
+    /// Its index among the walls.
     pub wall: usize,
-    /// Loads at failure, and the greatest.
+    /// Loads at failure, and peak load.
     pub collapse: Collapse,
-    /// Its place at the start (m).
+    /// Its initial position (m).
     start: D::Vector,
 }
 
@@ -92,7 +92,7 @@ impl<D: Dim> Course<D> {
         }
     }
 
-    /// Write the course so far.
+    /// Saves the course.
     pub fn save(&self, to: &mut Saved) {
         to.count(self.driven.len());
         for Driven { wall, collapse, start } in &self.driven {
@@ -116,7 +116,7 @@ impl<D: Dim> Course<D> {
         }
     }
 
-    /// The course that [`Course::save`] wrote, of a run of `scene` that goes on with `world`.
+    /// The course saved by [`Course::save`], for a run of `scene` that is resumed with `world`.
     ///
     /// # Errors
     /// [`Mismatch`].
@@ -124,7 +124,7 @@ impl<D: Dim> Course<D> {
         let mut course = Self::new(scene, world);
         for _ in 0..from.count()? {
             let (wall, start, collapse) = (from.count()?, from.vector()?, Collapse::restored(from)?);
-            // a wall that is no longer driven is forgotten
+            // a wall that is no longer driven is dropped
             if let Some(driven) = course.driven.iter_mut().find(|driven| driven.wall == wall) {
                 *driven = Driven { wall, start, collapse };
             }
@@ -142,7 +142,7 @@ impl<D: Dim> Course<D> {
         course.rejected = count()?;
         if from.flag()? {
             let (distance, begun, place) = (from.real()?, from.flag()?, from.vector()?);
-            // a stop that the scene no longer has is forgotten
+            // a stop condition that the scene no longer has is dropped
             if let Some(stop) = &mut course.stop {
                 (stop.distance, stop.from) = (distance, begun.then_some(place));
             }
@@ -155,7 +155,7 @@ impl<D: Dim> Course<D> {
         self.broken.iter().sum()
     }
 
-    /// What the load wall did, where the scene has one.
+    /// The loads of the load wall, if the scene has one.
     pub fn loads(&self) -> Option<&Collapse> {
         Some(&self.driven[self.load_wall?].collapse)
     }
@@ -165,7 +165,7 @@ impl<D: Dim> Course<D> {
         Some(load(&world.walls[self.driven[self.load_wall?].wall]))
     }
 
-    /// Enter a step; `world` is the state after it.
+    /// Counts a step; `world` is the state after the step.
     pub fn count(&mut self, world: &World<D>, report: &StepReport<D>) {
         for failed in &report.breaks {
             match failed.mode {
@@ -173,7 +173,7 @@ impl<D: Dim> Course<D> {
                 BondStatus::Shear => self.broken[1] += 1,
                 BondStatus::Rolling => self.broken[2] += 1,
                 BondStatus::Twist => self.broken[3] += 1,
-                // no break: a bond that holds counts under no mode
+                // an intact bond counts under no mode
                 BondStatus::Intact => {}
             }
         }
@@ -192,7 +192,7 @@ impl<D: Dim> Course<D> {
         }
     }
 
-    /// Enter the solves of a step.
+    /// Counts the solves of a step.
     fn count_solves(&mut self, world: &World<D>, report: &StepReport<D>) {
         let solver = &world.settings.solver;
         self.worst_residual = self.worst_residual.max(report.residual);
@@ -205,7 +205,7 @@ impl<D: Dim> Course<D> {
         self.rejected += u64::from(report.rejected);
     }
 
-    /// Whether a stop condition of the scene ends the run here, and which.
+    /// The stop condition of the scene that ends the run after this step, if any.
     pub fn ending(&mut self, world: &World<D>) -> Option<Ending> {
         let broken = self.broken();
         if let Some(stop) = &mut self.stop {
@@ -223,8 +223,8 @@ impl<D: Dim> Course<D> {
     }
 }
 
-/// The load of a driven wall in the last step (N): the prescribed force; for a prescribed velocity,
-/// the force of the wall on the grains before any bond broke in the step.
+/// The load of a driven wall in the last step (N): the prescribed force, or for a prescribed
+/// velocity the force of the wall on the grains before any bond broke in that step.
 fn load<D: Dim>(wall: &Wall<D>) -> f64 {
     match wall.drive {
         Drive::Fixed => 0.0,
@@ -292,12 +292,12 @@ mod tests {
             })
             .into();
         course.count(&world, &report);
-        // before, what is no mode counted as tension: 3
+        // earlier, intact bonds counted as tension: 3
         assert_eq!(course.broken, [1, 1, 1, 1]);
     }
 
-    /// Steps that miss the tolerance are those whose residual exceeds it, and no others; those
-    /// whose load error exceeds its own are counted apart.
+    /// Only steps whose residual exceeds the tolerance count as missing it. Steps whose load error
+    /// exceeds the load tolerance are counted separately.
     #[test]
     fn a_step_that_misses_its_load_tolerance_alone_does_not_miss_the_tolerance() {
         let scene = crate::scene::load(TWO_GRAINS.as_ref(), &[]).expect("scene");
@@ -315,11 +315,11 @@ mod tests {
         enter(0.5 * tolerance, Some(2.0 * load_tolerance), Route::ActiveSet, Accepted);
         enter(0.5 * tolerance, Some(3.0 * load_tolerance), Route::InteriorPoint, Accepted);
         enter(2.0 * tolerance, None, Route::Sweeps, Accepted);
-        // sweeps that aimed at less than the tolerance, and met it
+        // sweeps with a stricter tolerance, which they met
         enter(0.5 * tolerance, None, Route::Sweeps, Accepted);
         assert_eq!((course.missed_tolerance, course.missed_load_tolerance), (1, 2));
         assert_eq!((course.solved_steps, course.worst_load_error), (4, Some(3.0 * load_tolerance)));
-        // and a run that goes on has them
+        // a resumed run keeps the counts
         let mut saved = Saved::default();
         course.save(&mut saved);
         let restored = Course::restored(&scene, &world, &mut Reader::new(&saved.reals, &saved.counts));

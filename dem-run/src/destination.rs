@@ -1,4 +1,4 @@
-//! Checks of the files that results are written to, before any work is done.
+//! Checks of the output files, before any work is done.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use crate::history::refuse_busy;
 use crate::run::RunOptions;
 use crate::scene::{Sample, Scene};
 
-/// Refuses an output that is the input, with or without `--force`.
+/// Rejects an output that is the input, with or without `--force`.
 pub(crate) fn not_itself(read: &Path, written: &Path) -> Result<(), RunError> {
     if !same_file(read, written) {
         return Ok(());
@@ -19,7 +19,7 @@ fn same_file(a: &Path, b: &Path) -> bool {
     matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
 
-/// Refuses outputs that the run reads, and two outputs in one file, with or without `--force`.
+/// Rejects outputs that the run reads, and two outputs in one file, with or without `--force`.
 pub(crate) fn apart(path: &Path, scene: &Scene, options: &RunOptions) -> Result<(), RunError> {
     let mut read = vec![path];
     if let Sample::File(file) = &scene.sample {
@@ -38,7 +38,7 @@ pub(crate) fn apart(path: &Path, scene: &Scene, options: &RunOptions) -> Result<
     Ok(())
 }
 
-/// Refuses a name that the HDF5 library and `dem-post` cannot open again.
+/// Rejects a name with which the HDF5 library and `dem-post` cannot open the file.
 pub(crate) fn unicode(path: &Path, option: &str) -> Result<(), RunError> {
     if path.to_str().is_some() {
         return Ok(());
@@ -46,15 +46,15 @@ pub(crate) fn unicode(path: &Path, option: &str) -> Result<(), RunError> {
     Err(RunError::NotUnicode { path: path.into(), option: option.into() })
 }
 
-/// Refuses a file that exists or is being written, or whose folder is missing or not writable.
+/// Rejects a file that exists or is being written, or whose folder is missing or not writable.
 pub(crate) fn writable(path: &Path, option: &str, overwrite: bool) -> Result<(), RunError> {
     let unfit = |state, remedy| Err(RunError::Unfit { path: path.into(), state, remedy });
     unicode(path, option)?;
     if path.is_dir() {
         return unfit("is a folder", format!("name a file with {option}"));
     }
-    // a history comes into its place by renaming, which would replace a device, such as /dev/null,
-    // by a file
+    // a history is renamed to its final name, which would replace a device such as /dev/null by a
+    // file
     if path.exists() && !path.is_file() {
         return unfit("is not a regular file", format!("name another with {option}"));
     }
@@ -74,7 +74,7 @@ pub(crate) fn writable(path: &Path, option: &str, overwrite: bool) -> Result<(),
     }
 }
 
-/// Refuses a file where a folder is to be.
+/// Rejects a file in the place of a folder.
 pub(crate) fn folder_or_new(path: &Path) -> Result<(), RunError> {
     if !path.exists() || path.is_dir() {
         return Ok(());

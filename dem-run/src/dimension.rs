@@ -1,7 +1,7 @@
-//! From the dimension of a scene to a type: the only place that chooses one.
+//! Selects the type for the dimension of a scene; no other code does.
 
-/// Evaluate an expression with `$D` as the dimension of the scene, in 3D with a row for twist where
-/// its bonds resist it.
+/// Evaluates an expression with `$D` as the dimension of the scene; in 3D, `$D` has a twist row if
+/// bonds resist twist.
 #[macro_export]
 macro_rules! in_dimension {
     ($scene:expr, $D:ident => $body:expr) => {

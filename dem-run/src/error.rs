@@ -9,7 +9,7 @@ use crate::signals::INTERRUPTED;
 use std::error::Error;
 use std::path::PathBuf;
 
-/// What the operating system, a library or this program says of a failure.
+/// The cause of a failure, from the operating system, a library or this program.
 pub type Cause = Box<dyn Error + Send + Sync>;
 
 /// An error of a command.
@@ -18,7 +18,7 @@ pub enum RunError {
     /// The scene is wrong, or cannot be read.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// The sample cannot be made as the scene asks: all that is wrong with it.
+    /// The sample cannot be prepared: all its errors.
     #[error("{}", .0.join("\n"))]
     Sample(Vec<String>),
     /// A contact problem was not solved within its limits.
@@ -42,28 +42,28 @@ pub enum RunError {
         /// Why.
         source: std::io::Error,
     },
-    /// A file from which something cannot be read.
+    /// The content of a file cannot be read.
     #[error("{}: {what} cannot be read: {source}", .path.display())]
     Content {
         /// The file.
         path: PathBuf,
-        /// What should be in it, as in "the sweep".
+        /// The expected content, as in "the sweep".
         what: &'static str,
         /// Why.
         source: Cause,
     },
-    /// A file or folder that is not what the command needs: it is in the way of a result, or lacks
-    /// something.
+    /// A file or folder that the command cannot use: it is in the place of a result, or is
+    /// incomplete.
     #[error("{} {state}: {remedy}", .path.display())]
     Unfit {
         /// The file or folder.
         path: PathBuf,
-        /// What it is, as in "is a folder".
+        /// Its state, as in "is a folder".
         state: &'static str,
         /// What to do.
         remedy: String,
     },
-    /// A result would take the place of something that is read.
+    /// A result would overwrite an input.
     #[error("{option} {} would overwrite what the {reader} reads: name another file", .path.display())]
     Overwrites {
         /// The option that names the result.
@@ -73,7 +73,7 @@ pub enum RunError {
         /// What reads the file: "command" or "run".
         reader: &'static str,
     },
-    /// The name of a result that the HDF5 library and `dem-post` cannot open.
+    /// A name of a result with which the HDF5 library and `dem-post` cannot open it.
     #[error("{} is not UTF-8: name another with {option}", .path.display())]
     NotUnicode {
         /// The file or folder.
@@ -93,19 +93,19 @@ pub enum RunError {
         /// Memory that is free (bytes).
         free: u64,
     },
-    /// There is less room on the disk than a run needs to go on.
+    /// There is less disk space than a run needs to resume.
     #[error(
         "{} needs {} beside it to go on, and {} are free: make room first",
         .path.display(), size(*.needed), size(*.free))]
     Disk {
         /// The history.
         path: PathBuf,
-        /// Room that its copy needs (bytes).
+        /// Disk space for its copy (bytes).
         needed: u64,
-        /// Room that is free (bytes).
+        /// Free disk space (bytes).
         free: u64,
     },
-    /// The operating system refused something else than a file.
+    /// The operating system refused an operation other than one on a file.
     #[error("{what}: {source}")]
     System {
         /// What failed, as in "the parent cannot be watched".
@@ -113,7 +113,7 @@ pub enum RunError {
         /// Why.
         source: Cause,
     },
-    /// Input or output is not as it must be.
+    /// Invalid input or output.
     #[error("{0}")]
     InputOutput(String),
     /// The history cannot be read or written.
@@ -122,7 +122,7 @@ pub enum RunError {
     /// A contact problem cannot be read or written.
     #[error(transparent)]
     Problem(#[from] FclibError),
-    /// What was asked for is not there.
+    /// The requested item does not exist.
     #[error("{0}")]
     Usage(String),
     /// A result cannot be written.
@@ -140,12 +140,12 @@ pub enum RunError {
     /// Runs of a sweep failed.
     #[error("{message}")]
     Runs {
-        /// The gravest of their exit codes.
+        /// The largest of their exit codes.
         code: u8,
-        /// How many, and what to do.
+        /// Number of failed runs, and the remedy.
         message: String,
     },
-    /// Ctrl-C or SIGTERM, and what that leaves.
+    /// Ctrl-C or SIGTERM, and the state of the results.
     #[error("interrupted: {0}")]
     Interrupted(&'static str),
 }
@@ -161,15 +161,15 @@ pub enum NoConvergence {
     Step {
         /// What happened, and when.
         error: String,
-        /// What may help; empty, or with a semicolon in front.
+        /// The remedy; empty, or with a leading semicolon.
         remedy: String,
     },
-    /// In a step before the one whose problem is to be exported.
+    /// In a step before the requested step of an export.
     #[error("{error}\nstep {step} was not reached; step {last} is the last that can be exported")]
     Export {
         /// What happened, and when.
         error: String,
-        /// The step asked for.
+        /// The requested step.
         step: u64,
         /// The step that was not solved.
         last: u64,
@@ -179,7 +179,7 @@ pub enum NoConvergence {
     Problem {
         /// The file.
         path: PathBuf,
-        /// How far the solver came, and what is proved of the problem.
+        /// The accuracy reached, and the proven verdict on the problem's feasibility.
         why: String,
     },
 }

@@ -1,4 +1,4 @@
-//! `dem-run export`: the contact problem of one step of a history, in FCLIB's format.
+//! `dem-run export`: writes the contact problem of one step of a history in FCLIB's format.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -18,10 +18,10 @@ use crate::run::{Execution, handle_signals};
 use crate::scene::{self, Scene};
 use crate::signals::Interrupt;
 
-/// What is exported, and how.
+/// Options of `dem-run export`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ExportOptions {
-    /// The history whose scene is run again.
+    /// The history whose scene is rerun.
     pub history: PathBuf,
     /// The step whose problem is written, counted from 1.
     pub step: u64,
@@ -31,12 +31,12 @@ pub struct ExportOptions {
     pub execution: Execution,
 }
 
-/// Runs the scene of a history again up to a step and writes that step's problem: the first that it
-/// solves, before any bond breaks in it.
+/// Reruns the scene of a history up to a step and writes the first problem of that step, before any
+/// bond breaks in the step.
 ///
 /// # Errors
-/// [`RunError`]: an unreadable history, a step that the scene does not have, a run that does not
-/// come that far.
+/// [`RunError`]: an unreadable history, a step that the scene does not have, a run that ends before
+/// the step.
 pub fn export(options: &ExportOptions) -> Result<(), RunError> {
     let interrupt = handle_signals()?;
     options.execution.start_threads()?;
@@ -96,7 +96,7 @@ fn export_in<D: Dim>(scene: &Scene, options: &ExportOptions, interrupt: &Interru
         let _ = writeln!(std::io::stderr(), "note: {what}: the problem is written without a solution");
     }
     let (step, source) = (options.step, options.history.file_name().unwrap_or_default().to_string_lossy());
-    // what the format cannot say is in the description: it is read by people
+    // the description states, for readers, what the format cannot express
     let associated = assembled.parts().associated.iter().filter(|flag| **flag).count();
     let problem = Problem {
         title: format!("{}, step {step}", scene.title.as_deref().unwrap_or("A scene of dem-run")),

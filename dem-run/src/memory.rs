@@ -1,17 +1,17 @@
-//! The memory that a run needs, and what is free of it.
+//! The memory that a run needs, and the free memory.
 
 use crate::error::RunError;
 use crate::scene::{Lattice, Sample, Scene, SolverKind};
 use std::path::{Path, PathBuf};
 
-/// The program itself, its threads and the HDF5 library (bytes).
+/// Memory of the program, its threads and the HDF5 library (bytes).
 const PROGRAM: f64 = 20e6;
-/// A grain, without its contacts (bytes).
+/// Memory of a grain without its contacts (bytes).
 const GRAIN: f64 = 300.0;
 
 /// Peak memory of a run of `scene` with this many grains (bytes), fitted to runs of 500 to 250,000
-/// grains (docs/cost.md). The error is about 20 % where the number of contacts is typical. The
-/// fill-in of Newton's factor grows with the sample in 3D.
+/// grains (docs/cost.md). The error is about 20 % for a typical number of contacts. In 3D, the
+/// fill-in of Newton's factor per grain grows with the sample.
 #[must_use]
 pub fn expected(scene: &Scene, grains: usize) -> u64 {
     let bonded = scene.bonds.as_ref().is_some_and(|bonds| bonds.bear());
@@ -32,7 +32,7 @@ pub fn expected(scene: &Scene, grains: usize) -> u64 {
     (PROGRAM + GRAIN * grains as f64 + contact * contacts) as u64
 }
 
-/// Contacts over grains, in a large sample (–).
+/// Contacts per grain in a large sample (–).
 pub(crate) fn contacts_per_grain(scene: &Scene) -> f64 {
     match (&scene.sample, scene.dimension) {
         (Sample::Lattice(Lattice::Square { .. }), _) => 2.0,
@@ -44,7 +44,7 @@ pub(crate) fn contacts_per_grain(scene: &Scene) -> f64 {
     }
 }
 
-/// Refuses a run that needs more memory than is free.
+/// Rejects a run that needs more memory than is free.
 ///
 /// # Errors
 /// [`RunError::Memory`].
@@ -56,16 +56,16 @@ pub fn refuse_too_large(scene: &Scene, grains: usize) -> Result<(), RunError> {
     }
 }
 
-/// Memory that this process can still take (bytes): free memory of the machine with swap space,
-/// within the limits of the control groups and of the process; none where the system does not
-/// report it.
+/// Memory that this process can still allocate (bytes): free memory and swap space of the machine,
+/// within the limits of the control groups and of the process; none if the system does not report
+/// it.
 #[must_use]
 pub fn free() -> Option<u64> {
     let left = machine().into_iter().chain(control_groups()).chain(process());
     left.min()
 }
 
-/// What the whole machine has left.
+/// Free memory and swap space of the machine (bytes).
 fn machine() -> Option<u64> {
     let text = std::fs::read_to_string("/proc/meminfo").ok()?;
     let kilobytes = |name: &str| -> Option<u64> {
@@ -75,8 +75,8 @@ fn machine() -> Option<u64> {
     Some(1024 * (kilobytes("MemAvailable")? + kilobytes("SwapFree").unwrap_or(0)))
 }
 
-/// What the limits of the control groups leave, a container's among them: of the group of this
-/// process and those above it.
+/// Memory left (bytes) within the limits of the control group of this process and of its parents,
+/// such as a container.
 fn control_groups() -> Vec<u64> {
     let own = std::fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
     let group = own.lines().find_map(|line| line.strip_prefix("0::/")).unwrap_or_default();
@@ -87,7 +87,7 @@ fn control_groups() -> Vec<u64> {
 
 fn left_in_group(folder: &Path) -> Option<u64> {
     let read = |name: &str| std::fs::read_to_string(PathBuf::from(folder).join(name)).ok();
-    // "max" where there is no limit
+    // without a limit, the file contains "max"
     let limit: u64 = read("memory.max")?.trim().parse().ok()?;
     let used: u64 = read("memory.current")?.trim().parse().ok()?;
     // cached files can be dropped
@@ -95,7 +95,7 @@ fn left_in_group(folder: &Path) -> Option<u64> {
     Some(limit.saturating_sub(used.saturating_sub(files.unwrap_or(0))))
 }
 
-/// What the limit of this process leaves (`ulimit -v`).
+/// Memory left within the limit of this process (`ulimit -v`) (bytes).
 #[cfg(unix)]
 fn process() -> Option<u64> {
     rustix::process::getrlimit(rustix::process::Resource::As).current

@@ -1,11 +1,11 @@
-//! Sample preparation: where the grains are before the run starts.
+//! Sample preparation: initial positions of the grains.
 //!
 //! A random sample is packed without friction by steps from rest to rest. Each step solves min ½‖v
 //! − h g‖²_M subject to gap + h Hᵀv ≥ 0 with the contact solver of the run, moves the grains by h v
-//! and forgets the velocity: a sequence of linearised packings that ends where nothing can move.
-//! The last steps are solved under so little thrust that grains which carry the load touch to
-//! rounding, walls included. Time has no meaning here (h = 1), so the packing of a sample scales
-//! exactly with its lengths.
+//! and resets their velocity to zero. This sequence of linearised packings ends when no grain can
+//! move. The thrust of the last steps is so small that the gaps of loaded contacts, walls included,
+//! close to round-off. Time has no meaning here (h = 1), so the packing of a sample scales exactly
+//! with its lengths.
 
 use crate::scene::{Cut, Diameters, Lattice, Preparation, RandomSample, Section};
 use dem_core::body::{Drive, Grain, Grains, Shape, Wall};
@@ -33,7 +33,7 @@ pub enum PrepareError {
     TooLoose {
         /// Solid fraction reached (–).
         reached: f64,
-        /// Solid fraction asked for (–).
+        /// Requested solid fraction (–).
         wanted: f64,
     },
     /// The box is too narrow.
@@ -53,7 +53,7 @@ pub enum PrepareError {
     /// A step of the packing was not solved.
     #[error("the packing of the sample failed: {0}")]
     Step(#[from] StepError),
-    /// The interruption that the caller asked for.
+    /// The caller requested an interruption.
     #[error("interrupted while the sample was packed")]
     Interrupted,
 }
@@ -65,24 +65,24 @@ pub struct Packing<D: Dim> {
     pub balls: Vec<Ball<D>>,
     /// Volume of the grains over volume of the box between the walls (–).
     pub solid_fraction: f64,
-    /// Displacement of the last step, in mean radii, where the packing did not come to rest within
-    /// its steps.
+    /// Displacement of the last step, in mean radii, if the packing did not come to rest within its
+    /// steps.
     pub unsettled: Option<f64>,
 }
 
-/// Gets the progress of the packing (0 to 1); returns false to stop it.
+/// Callback: receives the progress of the packing (0 to 1), returns false to stop the packing.
 pub type Watch<'a> = &'a mut dyn FnMut(f64) -> bool;
 
-/// Most steps of one packing.
+/// Maximum number of steps of one packing.
 pub const MOST_STEPS: usize = 20_000;
-/// Packings that are tried, each from other places, until one is dense enough.
+/// Maximum number of packings, each from other initial positions; the first dense enough is used.
 const MOST_PACKINGS: usize = 8;
-/// Thrust at the start and at the end: displacement of a free body in a step, in mean radii.
+/// First and last thrust: displacement of a free body in a step, in mean radii.
 const THRUST: (f64, f64) = (0.5, 1e-11);
-/// Solid fraction of a dense packing in the plane and in space, by which progress is measured.
+/// Solid fraction of a dense packing in 2D and 3D; the scale of progress.
 const DENSE: [f64; 2] = [0.82, 0.62];
 
-/// Grains on a regular lattice, the lowest corner of whose box is the origin.
+/// Grains on a regular lattice. The lowest corner of its box is the origin.
 pub fn lattice<D: Dim>(lattice: &Lattice) -> Vec<Ball<D>> {
     let r = 0.5 * lattice.diameter();
     let mut balls = Vec::new();
@@ -194,7 +194,7 @@ impl Container {
         match self.section {
             Section::Rectangle => (corners.collect(), spacing),
             Section::Circle => {
-                // cells whose corners all lie in the circle; one in the middle if there is none
+                // cells with all corners in the circle; if there is none, one cell in the middle
                 let radius = 0.5 * self.sides[0];
                 let far = |x: f64| (x - radius).abs().max((x + spacing[0] - radius).abs());
                 let inside: Vec<_> = corners.filter(|x| far(x[0]).hypot(far(x[1])) <= radius).collect();
@@ -220,8 +220,7 @@ pub(crate) fn radii(sample: &RandomSample, seed: u64) -> Vec<f64> {
     draw_radii(&sample.diameter, sample.count, &mut Pcg64::seed_from_u64(seed))
 }
 
-/// Sides of the box of a random sample (m), as high as it is at the solid fraction that the sample
-/// asks for.
+/// Sides of the box of a random sample (m); its height follows from the requested solid fraction.
 pub(crate) fn sides<D: Dim>(sample: &RandomSample, radii: &[f64]) -> Vec<f64> {
     let container = Container::of(sample);
     let volume: f64 = radii.iter().map(|r| D::volume(*r)).sum();
@@ -231,7 +230,7 @@ pub(crate) fn sides<D: Dim>(sample: &RandomSample, radii: &[f64]) -> Vec<f64> {
     sides
 }
 
-/// The solid fraction that a sample asks for (–), and whether a lid presses it together.
+/// The requested solid fraction of a sample (–), and whether a lid compacts it.
 fn wanted(sample: &RandomSample) -> (f64, bool) {
     match &sample.preparation {
         Preparation::Compaction(c) => (c.solid_fraction, true),
@@ -271,7 +270,7 @@ pub fn pack<D: Dim>(sample: &RandomSample, seed: u64, watch: Watch) -> Result<Pa
     Err(PrepareError::TooLoose { reached, wanted })
 }
 
-/// The grains of a packing and their solid fraction under the highest of them.
+/// The grains of a packing, and the solid fraction below the top of the highest grain.
 fn measured<D: Dim>(world: &World<D>, container: &Container) -> Packing<D> {
     let balls: Vec<Ball<D>> = world.grains.position.iter().copied().zip(world.grains.radius.iter().copied()).collect();
     let height = balls.iter().map(|(x, r)| x[D::N - 1] + r).fold(0.0, f64::max);
@@ -280,7 +279,7 @@ fn measured<D: Dim>(world: &World<D>, container: &Container) -> Packing<D> {
     Packing { balls, solid_fraction, unsettled: None }
 }
 
-/// Keep the grains that lie within the shape around the middle of the packing.
+/// Removes the grains outside the shape, which is centred on the packing.
 fn cut_out<D: Dim>(balls: &mut Vec<Ball<D>>, cut: Cut) -> Result<(), PrepareError> {
     let Cut::Circle(diameter) = cut;
     let middle = [0, D::N - 1].map(|axis| {
@@ -292,7 +291,7 @@ fn cut_out<D: Dim>(balls: &mut Vec<Ball<D>>, cut: Cut) -> Result<(), PrepareErro
     if balls.is_empty() { Err(PrepareError::NothingLeft { diameter }) } else { Ok(()) }
 }
 
-/// Grains on a loose grid with random offsets, and the height above them all.
+/// Grains on a loose grid with random offsets, and the height of the grid.
 fn scatter<D: Dim>(radii: &[f64], container: &Container, rng: &mut Pcg64) -> (Grains<D>, f64) {
     let rise = 1.05 * 2.0 * radii.iter().copied().fold(0.0, f64::max);
     let (cells, widths) = container.cells::<D>(rise);
@@ -301,7 +300,7 @@ fn scatter<D: Dim>(radii: &[f64], container: &Container, rng: &mut Pcg64) -> (Gr
         for axis in 0..D::N - 1 {
             let slack = widths[axis] - 2.0 * r;
             let offset = slack * rng.random::<f64>();
-            // a grain wider than the square in a narrow tube stands in its middle
+            // in a narrow tube, a grain wider than its square is centred in it
             x[axis] = if slack >= 0.0 { x[axis] + r + offset } else { x[axis] + 0.5 * widths[axis] };
         }
         x[D::N - 1] = (k / cells.len()) as f64 * rise + r + (rise - 2.0 * r) * rng.random::<f64>();
@@ -312,7 +311,7 @@ fn scatter<D: Dim>(radii: &[f64], container: &Container, rng: &mut Pcg64) -> (Gr
     (grains, top)
 }
 
-/// A frictionless box: floor and sides fixed, and either a lid that is pressed down or gravity.
+/// A frictionless box with fixed floor and sides, loaded by a lid or by gravity.
 fn packing_world<D: Dim>(grains: Grains<D>, container: &Container, top: f64, from_top: bool) -> World<D> {
     let up = D::N - 1;
     let mut walls = container.walls();
@@ -325,7 +324,7 @@ fn packing_world<D: Dim>(grains: Grains<D>, container: &Container, top: f64, fro
 }
 
 fn solver() -> SolverSettings {
-    // a step that misses its tolerance only makes the packing less exact: the next step improves it
+    // a step may miss its tolerance: the next step corrects the packing
     SolverSettings::GaussSeidel(GaussSeidelSettings {
         local: LocalSolve::Exact,
         tolerance: 1e-4,
@@ -335,13 +334,13 @@ fn solver() -> SolverSettings {
     })
 }
 
-/// Push with the lid, or with gravity where there is none, so hard that a free body would move by
-/// `travel` (m).
+/// Sets the force of the lid, or gravity if there is no lid, such that a free body moves by
+/// `travel` (m) in one step.
 fn push<D: Dim>(world: &mut World<D>, from_top: bool, travel: f64) {
     let mut down = D::Vector::zero();
     down[D::N - 1] = -1.0;
     if from_top {
-        // the lid is as heavy as the sample
+        // the lid has the mass of the sample
         let mass: f64 = world.grains.mass.iter().sum();
         let force = mass * travel;
         if let Some(lid) = world.walls.last_mut() {
@@ -352,7 +351,7 @@ fn push<D: Dim>(world: &mut World<D>, from_top: bool, travel: f64) {
     }
 }
 
-/// Height of the lid, or where there is none twice that of the mean grain (m).
+/// Height of the lid (m); without a lid, twice the mean height of the grains.
 fn height<D: Dim>(world: &World<D>, from_top: bool) -> f64 {
     let up = D::N - 1;
     if from_top {
@@ -361,12 +360,12 @@ fn height<D: Dim>(world: &World<D>, from_top: bool) -> f64 {
     2.0 * world.grains.position.iter().map(|x| x[up]).sum::<f64>() / world.grains.len() as f64
 }
 
-/// Step from rest to rest until nothing moves, at most `steps` times. Returns the displacement of
+/// Makes at most `steps` steps from rest to rest, until no grain moves. Returns the displacement of
 /// the last step, in mean radii, if the packing still moves.
 ///
-/// The error of a step is proportional to its thrust. Where the packing resists, the thrust is
-/// lowered, finally to nearly zero: a jammed packing is jammed under any thrust, and its gaps close
-/// to round-off.
+/// The error of a step is proportional to its thrust. When the packing resists, the thrust is
+/// reduced, finally to nearly zero: a packing that is jammed under one thrust is jammed under any,
+/// and its gaps close to round-off.
 fn settle<D: Dim>(
     world: &mut World<D>,
     container: &Container,
@@ -383,7 +382,7 @@ fn settle<D: Dim>(
         push(world, from_top, thrust * mean);
         world.stop_motion();
         world.step()?;
-        // h = 1: a velocity is a displacement a step
+        // h = 1: the velocity is the displacement per step
         let moved = if from_top {
             world.walls.last().map_or(0.0, |lid| lid.velocity.norm())
         } else {

@@ -24,7 +24,7 @@ pub enum ProgressMode {
     None,
 }
 
-/// Where a run stands after a step.
+/// Progress of a run after a step.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StepProgress {
     /// Steps done.
@@ -41,7 +41,7 @@ pub struct StepProgress {
     pub broken: usize,
 }
 
-/// Where a family of runs stands.
+/// Progress of a family of runs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct RunsProgress {
     /// Runs that have ended, those that failed included.
@@ -52,7 +52,7 @@ pub struct RunsProgress {
     pub total: usize,
 }
 
-/// Shows progress. It reads the clock; no result may depend on that.
+/// Shows progress. It reads the clock; no result may depend on the clock.
 pub struct Progress {
     sink: Sink,
     /// Least time between two messages.
@@ -60,9 +60,9 @@ pub struct Progress {
     began: Instant,
     shown: Option<Instant>,
     phase: String,
-    /// When the first step was done, and its simulated time (s).
+    /// End of the first step, in real and in simulated time (s).
     first: Option<(Instant, f64)>,
-    /// A step that was not shown yet.
+    /// A step that is not shown yet.
     pending: Option<StepProgress>,
     quiet: bool,
 }
@@ -74,7 +74,7 @@ enum Sink {
     None,
 }
 
-/// Steps of the bar from 0 to 1.
+/// Number of increments of the bar.
 const BAR_LENGTH: u64 = 1000;
 
 impl Progress {
@@ -140,8 +140,8 @@ impl Progress {
         }
     }
 
-    /// Reports the number of bonds that the current step has broken so far; shown when it is due. A
-    /// step that breaks thousands takes long.
+    /// Reports the number of bonds broken so far in the current step; shown when due. A step that
+    /// breaks thousands of bonds takes long.
     pub fn cascade(&mut self, step: u64, broken: usize) {
         if !self.due() {
             return;
@@ -156,8 +156,7 @@ impl Progress {
         }
     }
 
-    /// Reports how many runs of a family have ended; shown when it is due, or when it is the
-    /// `last`.
+    /// Reports the number of ended runs of a family; shown when due, or if it is the `last` report.
     pub fn runs(&mut self, runs: &RunsProgress, last: bool) {
         if !self.due() && !last {
             return;
@@ -188,7 +187,7 @@ impl Progress {
         }
     }
 
-    /// Shows the last step and takes the bar away.
+    /// Shows the last step and removes the bar.
     pub fn finish(&mut self) {
         self.show_step();
         if let Sink::Bar(bar) = &self.sink {
@@ -196,7 +195,7 @@ impl Progress {
         }
     }
 
-    /// Whether the last message is old enough.
+    /// Whether the interval since the last message has passed.
     fn due(&self) -> bool {
         self.shown.unwrap_or(self.began).elapsed() >= self.interval
     }
@@ -220,7 +219,7 @@ impl Progress {
         }
     }
 
-    /// Time to the end (s), as if it went on at the mean pace since the first step.
+    /// Remaining time (s), extrapolated from the mean speed since the first step.
     fn time_left(&self, step: &StepProgress) -> Option<f64> {
         let (start, first) = self.first?;
         let done = step.time - first;
@@ -229,7 +228,7 @@ impl Progress {
 }
 
 impl StepProgress {
-    /// Fraction of the simulated time that is done (0 to 1).
+    /// Completed fraction of the simulated time (0 to 1).
     fn fraction(&self) -> f64 {
         if self.end > 0.0 { (self.time / self.end).clamp(0.0, 1.0) } else { 0.0 }
     }
@@ -288,14 +287,14 @@ enum Event<'a> {
 
 fn bar() -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(BAR_LENGTH), ProgressDrawTarget::stderr());
-    // a template that does not parse is a bar without numbers, no reason to stop a run
+    // if the template does not parse, the bar has no numbers; the run continues
     if let Ok(style) = ProgressStyle::with_template("{bar:24} {percent:>3} %  {wide_msg}") {
         bar.set_style(style);
     }
     bar
 }
 
-/// A closed stderr does not stop a run, so what cannot be written is lost.
+/// Ignores write errors: a closed stderr does not stop a run.
 fn line(out: &mut dyn Write, text: &str) {
     let _ = writeln!(out, "{}", escaped(text));
 }
@@ -310,7 +309,7 @@ fn bonds(count: usize) -> &'static str {
     if count == 1 { "bond" } else { "bonds" }
 }
 
-/// A duration in s as a person reads it.
+/// A duration (s) in readable units.
 fn duration(seconds: f64) -> String {
     let whole = seconds.round() as u64;
     match (whole / 3600, whole / 60 % 60, whole % 60) {

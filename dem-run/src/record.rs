@@ -25,13 +25,13 @@ pub struct Recorder<D: Dim> {
     rotation: bool,
     tangents: bool,
     reactions: bool,
-    /// Processor time of the program before it went on with this run (s).
+    /// Processor time of the run before it was resumed (s).
     cpu_before: f64,
-    /// Observables go to the writer with the next frame, or when [`GATHERED`] steps have gathered.
+    /// Rows for the writer, passed on with the next frame or after [`GATHERED`] steps.
     batch: Batch,
 }
 
-/// Steps of observables that gather before they are handed to the writer.
+/// Maximum number of steps whose observables are batched for the writer.
 const GATHERED: usize = 256;
 
 impl<D: Dim> Recorder<D> {
@@ -42,9 +42,9 @@ impl<D: Dim> Recorder<D> {
         Ok(Self::new(writer, &layout, measures, 0.0))
     }
 
-    /// Continue `history` in a new file that replaces it: with the rows `kept` and the world of
-    /// `checkpoint`. `cpu_before` is the processor time of the run so far (s); `tell` gets the
-    /// share of the history that is copied, from 0 to 1.
+    /// Continues `history` in a new file that replaces it and starts with the rows `kept` and
+    /// `checkpoint`. `cpu_before` is the processor time of the run so far (s); `tell` receives the
+    /// copied share of the history (0 to 1).
     pub fn go_on(
         history: &History,
         kept: Kept,
@@ -56,7 +56,7 @@ impl<D: Dim> Recorder<D> {
     ) -> history::Result<Self> {
         let origin = Parameters { scene: scene.to_json().unwrap_or_default(), ..history.parameters()? };
         let (layout, measures) = describe(scene, world, origin);
-        // a history that began without friction keeps its layout
+        // the layout of a history does not change: without friction at the start, none later
         let layout = Layout { friction: history.layout()?.friction, ..layout };
         let writer = Writer::go_on(history.path(), &layout, history, kept, checkpoint, tell)?;
         Ok(Self::new(writer, &layout, measures, cpu_before))
@@ -79,7 +79,7 @@ impl<D: Dim> Recorder<D> {
         self.cpu_before + cpu_time()
     }
 
-    /// Record what every step records: observables and broken bonds.
+    /// Records the observables and broken bonds of a step.
     pub fn step(&mut self, world: &World<D>, report: &StepReport<D>) -> history::Result<()> {
         let mut row = Vec::new();
         for measure in &self.measures {
@@ -92,7 +92,7 @@ impl<D: Dim> Recorder<D> {
         if self.batch.observations.len() < GATHERED { Ok(()) } else { self.hand_over() }
     }
 
-    /// Record the state as a frame, or a checkpoint from which the run can go on, or both.
+    /// Records the state as a frame, as a checkpoint to resume from, or as both.
     pub fn record(&mut self, world: &World<D>, frame: bool, checkpoint: Option<Checkpoint>) -> history::Result<()> {
         self.batch.frame = frame.then(|| self.frame(world));
         self.batch.checkpoint = checkpoint;
@@ -150,8 +150,8 @@ impl<D: Dim> Recorder<D> {
                 }
             }
             if bonded && self.reactions {
-                // the bending rows of the solver are the components of m × n; those of the file are
-                // moments about the axes
+                // the solver's bending rows are the components of m × n; the file's are moments
+                // about the axes
                 let moment = D::torque_of_rows(&touch.frame, D::Tangent::zero(), touch.reaction.m);
                 rows.moment.extend(D::about_axes(&touch.frame, moment).as_slice());
             }
@@ -170,12 +170,12 @@ impl<D: Dim> Recorder<D> {
     }
 }
 
-/// The layout of the history of a world, and the functions that measure its observables; the
-/// recorder adds the last one, the processor time.
+/// The layout of the history of a world, and the functions that measure its observables except the
+/// last, the processor time, which the recorder adds.
 fn describe<D: Dim>(scene: &Scene, world: &World<D>, parameters: Parameters) -> (Layout, Vec<Measure<D>>) {
     let bonded = !world.bonds.is_empty();
     let friction = world.settings.friction > 0.0 || world.walls.iter().any(|w| w.friction > 0.0);
-    // without friction, bonds and torques nothing ever turns, unless it turns from the start
+    // without friction, bonds and torques, grains keep their spin
     let turning = world.grains.spin.iter().any(|w| w.norm() > 0.0) || world.loads.iter().any(|l| l.torque.norm() > 0.0);
     let (mut observables, measures): (Vec<_>, _) = observables(world).into_iter().unzip();
     observables.push(Observable::new("cpu_time", "s", &[]));
@@ -303,8 +303,8 @@ fn parameters(scene: &Scene, solid_fraction: Option<f64>) -> Parameters {
     }
 }
 
-/// The force that drives a wall (N): the one prescribed, or what the drive needs to keep its
-/// velocity.
+/// The force that drives a wall (N): the prescribed force, or the force that maintains the
+/// prescribed velocity.
 fn applied_force<D: Dim>(wall: &Wall<D>) -> f64 {
     match wall.drive {
         Drive::Fixed => 0.0,
@@ -313,7 +313,7 @@ fn applied_force<D: Dim>(wall: &Wall<D>) -> f64 {
     }
 }
 
-/// What is measured at every step, in order. What the world lacks is not measured.
+/// The observables of every step, in order. Observables of absent features are omitted.
 fn observables<D: Dim>(world: &World<D>) -> Vec<(Observable, Measure<D>)> {
     let (d, spins) = (D::N, D::Spin::LEN);
     let scalar: &[usize] = &[];
@@ -344,7 +344,7 @@ fn observables<D: Dim>(world: &World<D>) -> Vec<(Observable, Measure<D>)> {
     list
 }
 
-/// The same of bonds and walls.
+/// The observables of bonds and walls.
 fn of_bonds_and_walls<D: Dim>(world: &World<D>) -> Vec<(Observable, Measure<D>)> {
     let (d, walls, scalar) = (D::N, world.walls.len(), &[][..]);
     let mut list: Vec<(Observable, Measure<D>)> = Vec::new();

@@ -1,5 +1,5 @@
-//! A run that continues from its history. Its results have the same bits as those of a run without
-//! interruption.
+//! Resumes a run from its history. The results are bitwise identical to those of an uninterrupted
+//! run.
 
 use crate::check::free_space;
 use crate::error::RunError;
@@ -13,18 +13,18 @@ use crate::signals::Interrupt;
 use dem_core::dim::Dim;
 use std::path::{Path, PathBuf};
 
-/// How a run is resumed.
+/// Options of `dem-run resume`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResumeOptions {
-    /// The history to go on with.
+    /// The history to resume.
     pub history: PathBuf,
     /// A later end of the run (s).
     pub until: Option<f64>,
-    /// A scene that may differ from the one in the history, and values to put in it.
+    /// A scene that may differ from that of the history.
     pub scene: Option<PathBuf>,
-    /// Values to put in the scene, as in `time.end=1`.
+    /// Values set in the scene, as in `time.end=1`.
     pub set: Vec<String>,
-    /// Whether a scene that differs is taken.
+    /// Whether a different scene is accepted.
     pub force: bool,
     /// How the command is carried out.
     pub execution: Execution,
@@ -37,13 +37,13 @@ const FREE: [&str; 5] = ["title", "$schema", "time.end", "stop", "load_wall"];
 /// Fields that may change with `--force`: the run then differs from a run of either scene alone.
 const OPEN: [&str; 7] =
     ["solver", "gravity", "rupture", "materials.friction", "materials.restitution", "grains.loads", "bonds.flow"];
-/// Fields of a wall, likewise.
+/// Fields of a wall that may change with `--force`.
 const OPEN_WALL: [&str; 4] = ["force", "force_rate", "velocity", "friction"];
 
-/// Goes on with a run, prints its summary, and leaves its history.
+/// Resumes a run, writes its history and prints its summary.
 ///
 /// # Errors
-/// [`RunError`]; the old history stays until the new one is complete up to the checkpoint.
+/// [`RunError`]. The old history is kept until the new one is complete up to the checkpoint.
 pub fn resume(options: &ResumeOptions) -> Result<(), RunError> {
     let interrupt = handle_signals()?;
     options.execution.start_threads()?;
@@ -53,7 +53,7 @@ pub fn resume(options: &ResumeOptions) -> Result<(), RunError> {
     in_dimension!(scene, D => resume_in::<D>(&scene, &history, options, &interrupt))
 }
 
-/// The scene that the run goes on with.
+/// The scene of the resumed run.
 fn scene_of(history: &History, options: &ResumeOptions) -> Result<Scene, RunError> {
     let shown = options.history.display();
     let stored = history.parameters()?.scene;
@@ -92,7 +92,7 @@ fn scene_of(history: &History, options: &ResumeOptions) -> Result<Scene, RunErro
     Ok(scene)
 }
 
-/// Whether a path is that of a field or lies within it.
+/// Whether `path` is `field` or a part of it.
 fn is_in(path: &str, field: &str) -> bool {
     path.strip_prefix(field).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
 }
@@ -107,7 +107,7 @@ fn resume_in<D: Dim>(
     let shown = path.display();
     let Some(checkpoint) = history.checkpoint()? else {
         if history.frames() as u64 <= 1 {
-            // killed before its first checkpoint: the run begins anew, and nothing is lost
+            // killed before its first checkpoint: the run restarts from time zero, without loss
             return run_in::<D>(scene, &anew(options), interrupt);
         }
         return Err(RunError::Unfit {
@@ -142,13 +142,13 @@ fn resume_in<D: Dim>(
         HistoryError::Interrupted => RunError::Interrupted("the history is as it was"),
         error => error.into(),
     })?;
-    // what acted on the walls before is not looked at again
+    // idle walls are not reported: the earlier forces on the walls are unknown
     let mut run = Run { scene, state, recorder, solid_fraction: history.parameters()?.solid_fraction, idle: vec![] };
     let outcome = run.step_on(interrupt, &mut progress);
     run.conclude(path, outcome, options.json, progress)
 }
 
-/// How a run is begun anew in the place of its history.
+/// Options of a run that restarts from time zero and replaces its history.
 fn anew(options: &ResumeOptions) -> RunOptions {
     RunOptions {
         output: options.history.clone(),
@@ -160,9 +160,9 @@ fn anew(options: &ResumeOptions) -> RunOptions {
     }
 }
 
-/// The rows of a history that are kept when the run continues from `checkpoint`: the frames that
-/// were due by then. The last frame of a run that ended between two due frames is dropped, because
-/// a run without interruption would not have it; the steps before it are kept.
+/// The rows of a history that are kept when the run resumes from `checkpoint`: the frames that were
+/// due by then. If the run ended between two due frames, its last frame is dropped, because an
+/// uninterrupted run would not have it; the steps before it are kept.
 fn kept(history: &History, scene: &Scene, checkpoint: &Checkpoint) -> Result<Kept, RunError> {
     let every = scene.steps_per_frame() as i64;
     let reached = history.steps().iter().take_while(|step| **step <= checkpoint.step).count();
@@ -171,7 +171,8 @@ fn kept(history: &History, scene: &Scene, checkpoint: &Checkpoint) -> Result<Kep
     Ok(Kept { frames: due, contacts: frames.contacts, ..all })
 }
 
-/// The new history stands beside the old one before it takes its place.
+/// Rejects a disk without space for the new history: it is written beside the old one before it
+/// replaces it.
 fn refuse_full_disk(history: &History) -> Result<(), RunError> {
     let folder = history.path().parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let needed = history.length();

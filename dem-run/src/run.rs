@@ -35,31 +35,31 @@ pub struct RunOptions {
     pub execution: Execution,
     /// Whether the summary on stdout is JSON.
     pub json: bool,
-    /// Where the prepared sample is written as CSV, if at all.
+    /// CSV file to which the prepared sample is written, if any.
     pub write_sample: Option<PathBuf>,
-    /// Whether a scene is run that needs more memory than is free.
+    /// Whether a scene runs although it needs more memory than is free.
     pub ignore_memory: bool,
 }
 
-/// How a command is carried out. No result depends on it.
+/// Execution of a command. No result depends on it.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Execution {
-    /// Number of threads; as many as the machine has where it is absent.
+    /// Number of threads; if absent, as many as the machine has.
     pub threads: Option<usize>,
     /// How progress is shown.
     pub progress: ProgressMode,
-    /// Whether stderr stays silent but for errors.
+    /// Whether stderr shows only errors.
     pub quiet: bool,
 }
 
 impl Execution {
-    /// Shows progress as asked.
+    /// The progress display for these options.
     #[must_use]
     pub fn show(&self) -> Progress {
         Progress::new(self.progress, self.quiet)
     }
 
-    /// Starts the threads of the whole program.
+    /// Starts the global thread pool.
     pub(crate) fn start_threads(&self) -> Result<(), RunError> {
         let Some(threads) = self.threads else { return Ok(()) };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
@@ -70,10 +70,10 @@ impl Execution {
     }
 }
 
-/// Runs a scene, prints its summary, and leaves its history.
+/// Runs a scene, writes its history and prints its summary.
 ///
 /// # Errors
-/// [`RunError`]; a history that was begun is complete up to its last frame.
+/// [`RunError`]. After an error, the history is complete up to its last frame.
 pub fn run(scene: &Scene, options: &RunOptions) -> Result<(), RunError> {
     let interrupt = handle_signals()?;
     options.execution.start_threads()?;
@@ -113,18 +113,17 @@ pub(crate) fn run_in<D: Dim>(scene: &Scene, options: &RunOptions, interrupt: &In
     run.conclude(&options.output, outcome, options.json, progress)
 }
 
-/// What changes from step to step.
+/// The variables of a run that change with each step.
 pub(crate) struct State<D: Dim> {
     pub world: World<D>,
     pub course: Course<D>,
 }
 
-/// The form of what [`State::save`] writes; another form has another number.
+/// Version number of the data that [`State::save`] writes.
 const FORM: usize = 9;
 
 impl<D: Dim> State<D> {
-    /// The state as numbers. The processor time is not among them: two runs of a scene write the
-    /// same file.
+    /// The state as numbers, without the processor time: two runs of a scene write identical files.
     fn save(&self) -> Checkpoint {
         let mut to = Saved::default();
         to.count(FORM);
@@ -153,12 +152,12 @@ pub(crate) struct Run<'a, D: Dim> {
     pub recorder: Recorder<D>,
     /// Solid fraction that the sample was packed to (–).
     pub solid_fraction: Option<f64>,
-    /// Driven walls on which no force has acted yet, by their place among the walls.
+    /// Driven walls on which no force has acted yet, by index.
     pub idle: Vec<usize>,
 }
 
-/// The driven walls that are reported at the end if no force ever acted on them: all but those that
-/// move away.
+/// Driven walls that are reported at the end if no force ever acted on them: all except those that
+/// move away from the grains.
 fn may_be_idle<D: Dim>(scene: &Scene, world: &World<D>) -> Vec<usize> {
     let driven = |wall: &Wall<D>| !matches!(wall.drive, Drive::Fixed);
     let walls = world.walls.iter().enumerate();
@@ -172,7 +171,7 @@ impl<D: Dim> Run<'_, D> {
         self.record(true, true)
     }
 
-    /// Step until the time, a stop condition, an interruption or a failure ends the run.
+    /// Makes steps until the end time, a stop condition, an interruption or a failure ends the run.
     pub fn step_on(&mut self, interrupt: &Interrupt, progress: &mut Progress) -> Result<Ending, RunError> {
         let steps = self.scene.time.steps();
         while self.state.world.steps < steps {
@@ -201,7 +200,7 @@ impl<D: Dim> Run<'_, D> {
         Ok(Ending::Time)
     }
 
-    /// Whether the state is one to record as a frame, and as a checkpoint too.
+    /// Whether the state is due as a frame, and whether it is due as a checkpoint.
     fn due(&self) -> [bool; 2] {
         let (steps, every) = (self.state.world.steps, self.scene.steps_per_frame());
         [every, every * self.scene.output.checkpoint_every].map(|every| steps.is_multiple_of(every))
@@ -219,7 +218,7 @@ impl<D: Dim> Run<'_, D> {
         Err(NoConvergence::Step { error: error.message(&|body| self.name(body)), remedy }.into())
     }
 
-    /// What may help against an error, with the places in the scene.
+    /// Possible remedies for an error, with the fields of the scene.
     fn remedy(&self, error: &StepError) -> String {
         let newton = !matches!(self.scene.solver.kind, SolverKind::GaussSeidel(_));
         let grains = self.state.world.grains.len();
@@ -248,13 +247,13 @@ impl<D: Dim> Run<'_, D> {
             }
             StepError::NotFinite { .. } => "; a smaller time.step may help",
             StepError::Yielded { .. } => "; a smaller solver.tolerance or time.step may help",
-            // the message of a step too fast names the remedy
+            // the message about too fast a step includes the remedy
             _ => "",
         };
         help.into()
     }
 
-    /// What a person calls a body: grains by number, walls by their name in the scene.
+    /// Name of a body in messages: the number of a grain, or the scene's name of a wall.
     fn name(&self, body: u32) -> String {
         match (body as usize).checked_sub(self.state.world.grains.len()) {
             None => format!("grain {body}"),
@@ -284,7 +283,7 @@ impl<D: Dim> Run<'_, D> {
         mut progress: Progress,
     ) -> Result<(), RunError> {
         progress.finish();
-        // a run without a step says nothing of them
+        // without a step, idle walls are not reported
         let idle = self.idle.iter().filter(|_| self.state.world.steps > 0);
         for wall in idle.filter_map(|wall| self.scene.walls.keys().nth(*wall)) {
             progress.note(&format!(
@@ -301,14 +300,14 @@ impl<D: Dim> Run<'_, D> {
             Err(error @ RunError::NoConvergence(_)) => (Ending::NoConvergence, Err(error)),
             Err(error) => return Err(error),
         };
-        // frames and checkpoints that were due are recorded already
+        // due frames and checkpoints are already recorded
         let [framed, kept] = self.due();
         self.record(!framed, !kept)?;
         let cpu_time = self.recorder.cpu_time();
         self.recorder.finish()?;
         let summary = self.state.summary(self.scene, self.solid_fraction, path, ending, cpu_time);
         let printed = print_result(&summary, json);
-        // why the run ended matters more than where its summary went
+        // an error of the run takes precedence over an error in printing the summary
         end.and(printed.map_err(RunError::from))
     }
 }

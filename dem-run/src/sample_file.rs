@@ -1,4 +1,4 @@
-//! Samples as CSV tables: the grains that a scene reads, and those that a run writes.
+//! Samples as CSV tables: reads the grains of a scene, writes those of a run.
 
 use crate::error::RunError;
 use crate::prepare::Ball;
@@ -9,17 +9,17 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
-/// Wrong lines that are told one by one.
+/// Maximum number of wrong lines that are reported individually.
 const MOST_TOLD: usize = 20;
-/// Longest line (bytes): a file without line breaks would be read into memory as one.
+/// Maximum length of a line (bytes), so that a file without line breaks is not read into memory.
 const LONGEST_LINE: usize = 4096;
 
 fn header<D: Dim>() -> &'static [&'static str] {
     if D::N == 2 { &["x", "y", "radius"] } else { &["x", "y", "z", "radius"] }
 }
 
-/// Number of grains in a sample file, without reading them: lines that are not the header, empty or
-/// a comment.
+/// Number of grains in a sample file, without parsing them: lines except the header, empty lines
+/// and comments.
 ///
 /// # Errors
 /// [`RunError::SampleFile`], [`RunError::File`], [`RunError::Sample`].
@@ -36,7 +36,7 @@ pub fn count(path: &Path) -> Result<usize, RunError> {
 ///
 /// # Errors
 /// [`RunError::SampleFile`] and [`RunError::File`] for a file that cannot be read,
-/// [`RunError::Sample`] with all lines that are wrong.
+/// [`RunError::Sample`] with all wrong lines.
 pub fn read<D: Dim>(path: &Path) -> Result<Vec<Ball<D>>, RunError> {
     let mut lines = Lines::open(path)?;
     let mut wrong = Wrong { name: path.display().to_string(), told: vec![], count: 0 };
@@ -51,7 +51,7 @@ pub fn read<D: Dim>(path: &Path) -> Result<Vec<Ball<D>>, RunError> {
         }
         Err(what) => wrong.tell(lines.number, what),
     }
-    // what stands below a wrong header cannot be judged
+    // below a wrong header, lines cannot be checked
     wrong.end()?;
     let mut balls = Vec::new();
     while lines.next()? {
@@ -72,7 +72,7 @@ pub fn read<D: Dim>(path: &Path) -> Result<Vec<Ball<D>>, RunError> {
     Ok(balls)
 }
 
-/// The grain of a line, or what is wrong with it.
+/// The grain of a line, or the error of the line.
 fn ball<D: Dim>(fields: &[&str]) -> Result<Ball<D>, String> {
     let header = header::<D>();
     if fields.len() != header.len() {
@@ -99,7 +99,7 @@ struct Lines {
     path: PathBuf,
     inner: BufReader<File>,
     line: Vec<u8>,
-    /// Number of the line in hand, from 1.
+    /// Number of the current line, from 1.
     number: u64,
 }
 
@@ -109,7 +109,7 @@ impl Lines {
         Ok(Self { path: path.into(), inner: BufReader::new(file), line: vec![], number: 0 })
     }
 
-    /// Goes to the next line; false at the end.
+    /// Reads the next line; returns false at the end of the file.
     fn next(&mut self) -> Result<bool, RunError> {
         loop {
             self.line.clear();
@@ -139,14 +139,14 @@ impl Lines {
         }
     }
 
-    /// The fields of the current line, without the quotes that some programs write.
+    /// The fields of the current line, without enclosing quotes.
     fn fields(&self) -> Result<impl Iterator<Item = &str>, String> {
         let text = std::str::from_utf8(&self.line).map_err(|_| "it is not UTF-8 text".to_string())?;
         Ok(text.split(',').map(|field| field.trim().trim_matches('"')))
     }
 }
 
-/// What is wrong with a file.
+/// The errors of a file.
 struct Wrong {
     name: String,
     told: Vec<String>,
@@ -161,7 +161,7 @@ impl Wrong {
         }
     }
 
-    /// Ends the reading where something is wrong.
+    /// Returns the errors found so far, if any.
     fn end(&mut self) -> Result<(), RunError> {
         if self.count == 0 {
             return Ok(());
@@ -174,7 +174,7 @@ impl Wrong {
     }
 }
 
-/// Write the grains as a CSV file that [`read`] reads back bit for bit.
+/// Writes the grains as a CSV file that [`read`] reads back bit for bit.
 ///
 /// # Errors
 /// A file that cannot be written.

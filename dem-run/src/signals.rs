@@ -1,5 +1,4 @@
-//! Ctrl-C and SIGTERM: the first asks the command to end after the step in hand, the second ends it
-//! at once.
+//! Ctrl-C and SIGTERM: the first ends the command after the current step, the second at once.
 
 use std::ffi::c_int;
 use std::io::Write;
@@ -9,18 +8,18 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Exit code of a run that was interrupted.
 pub const INTERRUPTED: u8 = 130;
 
-/// Whether the run has been asked to end. Clones share one answer.
+/// A request to end the run, shared by all clones.
 #[derive(Debug, Clone, Default)]
 pub struct Interrupt(Arc<AtomicBool>);
 
 impl Interrupt {
-    /// Whether the run has been asked to end.
+    /// Whether the end of the run has been requested.
     #[must_use]
     pub fn requested(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
 
-    /// Asks the run to end; returns whether that had been asked before.
+    /// Requests the end of the run; returns whether it had been requested before.
     pub fn request(&self) -> bool {
         self.0.swap(true, Ordering::Relaxed)
     }
@@ -29,7 +28,7 @@ impl Interrupt {
 /// Handles Ctrl-C, SIGTERM and SIGHUP from now on.
 ///
 /// # Errors
-/// The system refuses, or a handler is in place already: a process has one.
+/// The system refuses, or the process already has a handler.
 pub fn install() -> Result<Interrupt, ctrlc::Error> {
     let interrupt = Interrupt::default();
     let shared = interrupt.clone();
@@ -37,13 +36,14 @@ pub fn install() -> Result<Interrupt, ctrlc::Error> {
         if shared.request() {
             exit_at_once();
         }
-        // eprintln! would end this thread, and with it the second signal, where stderr is closed
+        // if stderr is closed, eprintln! would panic and end this thread, so that a second signal
+        // has no effect
         let _ = writeln!(std::io::stderr(), "\nending after the step in hand; once more to end at once");
     })?;
     Ok(interrupt)
 }
 
-/// Interrupts this process when the one that started it ends, where the system can (Linux).
+/// Interrupts this process when its parent ends (Linux only).
 ///
 /// # Errors
 /// The system refuses.
@@ -54,13 +54,12 @@ pub fn end_with_parent() -> std::io::Result<()> {
 }
 
 unsafe extern "C" {
-    /// Ends the process without running what stands ready for its end (ISO C `_Exit`, POSIX
-    /// `_exit`).
+    /// Ends the process without exit handlers (ISO C `_Exit`, POSIX `_exit`).
     safe fn _exit(status: c_int) -> !;
 }
 
-/// The handler runs in a thread of its own, while the run may be inside the HDF5 library. A regular
-/// exit would clean up that library in the middle of its work, so there is no clean-up.
+/// The handler has its own thread, and the run may be inside the HDF5 library. Exit handlers would
+/// close that library during a call, so none is run.
 fn exit_at_once() -> ! {
     _exit(c_int::from(INTERRUPTED))
 }
@@ -83,7 +82,7 @@ mod tests {
         assert!(clone.request());
     }
 
-    /// The process that is interrupted by the test below: not a test of its own.
+    /// The process that the test below interrupts; not a test itself.
     #[test]
     #[ignore = "run by the_second_signal_ends_the_process"]
     fn interrupted_process() {
@@ -111,7 +110,7 @@ mod tests {
             let mut lines = BufReader::new(child.stdout.take().expect("stdout")).lines();
             let mut wait_for = |word: &str| lines.any(|line| line.expect("line").contains(word));
             let send = |id: u32| {
-                // of the shell: the program of that name is not on every machine
+                // the shell's built-in `kill`: not every machine has the program
                 let status = Command::new("sh").args(["-c", &format!("kill {signal} {id}")]).status();
                 assert!(status.expect("sh").success());
             };

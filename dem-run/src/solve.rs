@@ -1,4 +1,4 @@
-//! `dem-run solve`: a contact problem from a file of FCLIB's format.
+//! `dem-run solve`: solves a contact problem from an FCLIB file.
 
 use std::fmt;
 use std::io::Write;
@@ -32,26 +32,26 @@ pub enum Solver {
     Interior,
 }
 
-/// What is solved, and how.
+/// Options of `dem-run solve`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SolveOptions {
     /// The problem.
     pub problem: PathBuf,
     /// The solver.
     pub solver: Solver,
-    /// Residual that it aims at (–).
+    /// Tolerance of the residual (–).
     pub tolerance: f64,
-    /// Iterations after which it gives up; as many as the solver sees fit where it is absent.
+    /// Maximum number of iterations; if absent, the default of the solver.
     pub max_iterations: Option<u64>,
-    /// Steps that the acceleration of Gauss–Seidel remembers; 0 for plain sweeps.
+    /// Memory of the acceleration of Gauss–Seidel (steps); 0 for plain sweeps.
     pub acceleration: usize,
-    /// Where the problem is written with its solution, if at all.
+    /// File to which the problem is written with its solution, if any.
     pub output: Option<PathBuf>,
     /// Whether the result on stdout is JSON.
     pub json: bool,
 }
 
-/// How a problem was solved.
+/// Result of a solve.
 #[derive(Debug, Clone, Serialize)]
 struct Solved {
     problem: PathBuf,
@@ -77,19 +77,19 @@ struct Solved {
 const VELOCITY_ERROR: f64 = 1e-3;
 const FINE: f64 = 1e-6;
 
-/// What may help where a solution may exist.
+/// Remedy if a solution may exist.
 const REMEDY: &str = "; a larger --max-iterations, another --solver or a larger --tolerance may help";
-/// Most contacts that a message names.
+/// Maximum number of contacts in a message.
 const SHOWN: usize = 8;
 
-/// Sweeps of Gauss–Seidel after which it gives up.
+/// Default maximum number of Gauss–Seidel sweeps.
 const MOST_SWEEPS: u64 = 100_000;
 
-/// Solves a problem from its first guess, or from zero, and prints how that went.
+/// Solves a problem from its first guess, or from zero, and prints the result.
 ///
 /// # Errors
-/// [`RunError`]: a file that is no problem, an output that cannot be written,
-/// [`RunError::NoConvergence`] where the tolerance was not reached.
+/// [`RunError`]: a file without a problem, an output that cannot be written,
+/// [`RunError::NoConvergence`] if the tolerance was not reached.
 pub fn solve(options: &SolveOptions) -> Result<(), RunError> {
     let mut problem = Problem::read(&options.problem)?;
     for warning in &problem.warnings {
@@ -144,7 +144,7 @@ fn iterate(problem: &mut Assembled, options: &SolveOptions) -> SolveReport {
                 stages: Stages::Interior,
                 tolerance,
                 accept: tolerance,
-                // a file has no load, so only the residual counts
+                // a file has no load: only the residual is checked
                 load_tolerance: f64::INFINITY,
                 start: Start::StiffLimit,
                 stiffness: StiffnessRatio { tangential: scene.tangential_stiffness, rolling: scene.rolling_stiffness },
@@ -156,7 +156,7 @@ fn iterate(problem: &mut Assembled, options: &SolveOptions) -> SolveReport {
 }
 
 impl Solved {
-    /// Why the problem counts as not solved, and what is proved of it.
+    /// Why the problem counts as unsolved, with the proven verdict on its feasibility.
     fn failure(&self, problem: &Assembled) -> String {
         let (verdict, remedy) = match verdict_of_assembled(problem) {
             Verdict::NoSolution(contacts) => {

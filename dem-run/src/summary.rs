@@ -33,8 +33,8 @@ pub struct Summary {
     pub ending: Ending,
     /// Steps made.
     pub steps: u64,
-    /// Whether contacts carry normal forces at the end, and the history has them: then there are
-    /// chains.
+    /// Whether the last state has normal contact forces and the history records them, so that force
+    /// chains can be drawn.
     #[serde(skip)]
     pub carries: bool,
     /// Simulated time (s).
@@ -45,29 +45,29 @@ pub struct Summary {
     pub solid_fraction: Option<f64>,
     /// Bonds at the start.
     pub bonds: usize,
-    /// Where the scene asks for bonds that bear anything, the gap up to which it bonds grains, over
-    /// their mean diameter (–).
+    /// Gap up to which the scene bonds grains, over their mean diameter (–), if its bonds have any
+    /// strength.
     #[serde(skip)]
     pub gap_tolerance: Option<f64>,
-    /// Whether they are elastic: then the sample may deform before any breaks.
+    /// Whether bonds are elastic: then the sample may deform before the first break.
     pub elastic: bool,
     /// Bonds broken in tension, shear, rolling and twist.
     pub broken: [usize; 4],
     /// Whether bonds resist twist.
     pub twists: bool,
-    /// Whether the bonds joined all grains to one piece at the start.
+    /// Whether all grains were bonded into one piece at the start.
     #[serde(skip)]
     pub one_piece: bool,
-    /// Name of the wall that loads the sample; none where no wall is driven, or where several are
-    /// and the scene does not say which.
+    /// Name of the wall that loads the sample; none if no wall is driven, or if several are driven
+    /// and the scene does not name one.
     pub load_wall: Option<String>,
     /// Loads of this wall at which the sample failed (N).
     pub failure: Failure,
-    /// Its greatest load (N), where it is driven by a velocity or bonds are elastic.
+    /// Peak load of this wall (N), if it is driven by a velocity or bonds are elastic.
     pub peak_load: Option<f64>,
-    /// Its displacement along its direction at the end of that step (m).
+    /// Displacement of this wall along its direction at the end of the step of peak load (m).
     pub peak_displacement: Option<f64>,
-    /// The splitting strength, where it splits a disk.
+    /// The splitting strength, if this wall splits a disk.
     pub splitting: Option<Splitting>,
     /// The loads of all driven walls.
     pub driven_walls: Vec<WallLoads>,
@@ -75,11 +75,11 @@ pub struct Summary {
     pub tolerance: f64,
     /// Largest residual of an accepted solve (–).
     pub worst_residual: f64,
-    /// Load error that the solver aims at (–); none where it reports no load error.
+    /// Tolerance of the load error (–); none if the solver reports no load error.
     pub load_tolerance: Option<f64>,
-    /// Largest load error of an accepted solve (–); none where no solve reported one.
+    /// Largest load error of an accepted solve (–); none if no solve reported one.
     pub worst_load_error: Option<f64>,
-    /// What all accepted solves took.
+    /// Work of all accepted solves.
     #[serde(serialize_with = "counts")]
     pub work: Work,
     /// Solved steps: those with a solve that was not an extrapolation.
@@ -111,25 +111,25 @@ pub struct Summary {
 pub struct WallLoads {
     /// Its name.
     pub wall: String,
-    /// Loads at which the sample failed (N). There is no collapse load where no load acted in the
-    /// step before the strain was exceeded, nor where elastic bonds reached the strain before any
-    /// broke.
+    /// Loads at which the sample failed (N). The collapse load is absent if no load acted in the
+    /// step before the strain was exceeded, or if an elastic sample exceeded the strain before any
+    /// bond broke.
     pub failure: Failure,
-    /// Greatest load (N), where the wall is driven by a velocity or bonds are elastic.
+    /// Peak load (N), if the wall is driven by a velocity or bonds are elastic.
     pub peak_load: Option<f64>,
-    /// Displacement along its direction at the end of that step (m).
+    /// Displacement along its direction at the end of the step of peak load (m).
     pub peak_displacement: Option<f64>,
     /// Whether the strain has exceeded each of [`STRAINS`].
     #[serde(skip)]
     pub passed: [bool; 2],
-    /// Whether the greatest load is that of the last step.
+    /// Whether the peak load is that of the last step.
     #[serde(skip)]
     pub rising: bool,
 }
 
 impl WallLoads {
-    /// The loads of the wall `wall`. `velocity`: it is driven by a velocity; `elastic`: bonds are
-    /// elastic.
+    /// The loads of the wall `wall`. `velocity`: the wall is driven by a velocity; `elastic`: bonds
+    /// are elastic.
     #[must_use]
     pub fn of(wall: &str, velocity: bool, elastic: bool, found: &Collapse) -> Self {
         let &Collapse { mut failure, passed, peak, rising, .. } = found;
@@ -147,7 +147,7 @@ impl WallLoads {
         }
     }
 
-    /// The greatest load in words, where there is one.
+    /// The peak load in words, if there is one.
     fn peak(&self) -> Option<String> {
         let (load, displacement) = (self.peak_load?, self.peak_displacement?);
         let end = if self.rising { ", at the end of the run" } else { "" };
@@ -196,7 +196,7 @@ impl fmt::Display for Summary {
     }
 }
 
-/// The kinds of work that were done, each as `count` tells it; none where nothing was.
+/// The nonzero kinds of work in words, each number formatted by `count`; none if all are zero.
 pub(crate) fn told(work: Work, count: impl Fn(u64) -> String) -> Option<String> {
     let Work { sweeps, newton, factorisations } = work;
     let kinds = [(newton, "Newton iterations"), (factorisations, "factorisations"), (sweeps, "sweeps")];
@@ -257,8 +257,7 @@ impl Summary {
         Ok(())
     }
 
-    /// The loads of the load wall; where several walls are driven and none is chosen, those of
-    /// each.
+    /// Writes the loads of the load wall, or of each driven wall if the scene names no load wall.
     fn write_loads(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let chosen = self.driven_walls.iter().find(|loads| Some(&loads.wall) == self.load_wall.as_ref());
         let Some(loads) = chosen else { return self.write_walls(f) };
@@ -302,13 +301,13 @@ impl Summary {
     fn early_note(&self, early: bool) -> &'static str {
         match (early, self.one_piece) {
             (false, _) => "",
-            // rigid grains and bonds in one piece: before the first break nothing can have moved
+            // one rigid piece: no motion is possible before the first break
             (true, true) => ", before any bond broke: the solver's own strain, not the sample's",
             (true, false) => ", before any bond broke: not all grains are bonded to one piece",
         }
     }
 
-    /// The loads of each driven wall.
+    /// Writes the loads of each driven wall.
     fn write_walls(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let lines: Vec<(&str, String)> =
             self.driven_walls.iter().map(|loads| (loads.wall.as_str(), self.wall_line(loads))).collect();

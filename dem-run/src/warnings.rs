@@ -1,5 +1,5 @@
-//! Warnings about a scene that is correct but probably not meant as it is written: printed before
-//! the run, with the place in the scene and the remedy.
+//! Warnings about probable mistakes in a valid scene, printed before the run with the field of the
+//! scene and the remedy.
 
 use crate::output::number;
 use crate::prepare::MOST_STEPS;
@@ -8,9 +8,9 @@ use crate::tolerances::{PARALLEL, TOUCHING};
 use dem_core::body::{Drive, Grains, Wall};
 use dem_core::dim::{Dim, Vect};
 
-/// Grains and loads of one kind that are told one by one.
+/// Maximum number of grains, or loads of one kind, that are reported individually.
 const MOST_TOLD: usize = 5;
-/// Moments of a run at which a drive is looked at.
+/// Number of times at which a drive is sampled.
 const MOMENTS: usize = 1000;
 
 /// Warnings that follow from the scene alone.
@@ -50,7 +50,8 @@ pub(crate) fn of_scene(scene: &Scene) -> Vec<String> {
     told
 }
 
-/// Warning about a packing that did not come to rest: its last step moved it by `moved` mean radii.
+/// Warning about a packing that did not come to rest; `moved` is the displacement of its last step,
+/// in mean radii.
 pub(crate) fn of_packing(moved: f64) -> String {
     format!(
         "sample.random: the packing still moved by {moved:.1e} of the mean radius a step after {MOST_STEPS} steps: grains may lie apart \
@@ -58,7 +59,7 @@ pub(crate) fn of_packing(moved: f64) -> String {
     )
 }
 
-/// The first of many lines of one kind, and how many more there are.
+/// The first lines of one kind, and the number of the others.
 fn first_few(mut lines: Vec<String>, what: &str) -> Vec<String> {
     let more = lines.len().saturating_sub(MOST_TOLD);
     lines.truncate(MOST_TOLD);
@@ -66,7 +67,7 @@ fn first_few(mut lines: Vec<String>, what: &str) -> Vec<String> {
     lines
 }
 
-/// Warnings about driven walls; `grains` where the sample is in its place.
+/// Warnings about driven walls; `grains` if the sample is prepared.
 pub(crate) fn of_walls<D: Dim>(scene: &Scene, walls: &[Wall<D>], grains: Option<&Grains<D>>) -> Vec<String> {
     let pushes: Vec<bool> =
         walls.iter().map(|wall| Course::of(wall, scene.time.end).is_some_and(|c| !c.along)).collect();
@@ -86,7 +87,8 @@ pub(crate) fn of_walls<D: Dim>(scene: &Scene, walls: &[Wall<D>], grains: Option<
     told
 }
 
-/// Whether gravity, a load or a moving grain may press grains together, apart from walls.
+/// Whether something other than a wall may press grains together: gravity, a load or a moving
+/// grain.
 fn others_push(scene: &Scene) -> bool {
     let nonzero = |values: &[f64]| values.iter().any(|value| *value != 0.0);
     let moving = |values: &Option<Vec<f64>>| values.as_deref().is_some_and(nonzero);
@@ -106,9 +108,9 @@ pub(crate) fn leaves<D: Dim>(wall: &Wall<D>, end: f64, grains: &Grains<D>) -> bo
 struct Course<D: Dim> {
     /// Unit direction.
     direction: D::Vector,
-    /// Whether the direction is that of the surface.
+    /// Whether the direction is parallel to the surface.
     along: bool,
-    /// Whether it is a force that drives the wall.
+    /// Whether a force drives the wall.
     force: bool,
     /// Least and largest value of the drive (N or m/s).
     range: (f64, f64),
@@ -117,7 +119,7 @@ struct Course<D: Dim> {
 }
 
 impl<D: Dim> Course<D> {
-    /// None where the wall stands still at all times.
+    /// None if the wall never moves.
     fn of(wall: &Wall<D>, end: f64) -> Option<Self> {
         let (direction, mass, drive) = match &wall.drive {
             Drive::Fixed => return None,
@@ -142,7 +144,7 @@ fn widened((low, high): (f64, f64), value: f64) -> (f64, f64) {
     (value.min(low), value.max(high))
 }
 
-/// A wall that is driven along its own surface.
+/// Warning about a wall that is driven along its own surface.
 fn along(friction: f64, alone: bool) -> Option<String> {
     let way = "it is driven along its own surface";
     if friction == 0.0 {
@@ -158,8 +160,7 @@ fn along(friction: f64, alone: bool) -> Option<String> {
     })
 }
 
-/// Unit vector from a wall to the grains at it: that of its nearest grain; none inside a round
-/// wall.
+/// Unit vector from a wall to its nearest grain; none inside a round wall.
 fn towards<D: Dim>(wall: &Wall<D>, grains: &Grains<D>) -> Option<D::Vector> {
     if wall.shape.encloses() { None } else { nearest(wall, grains).map(|(_, normal)| normal) }
 }
@@ -170,8 +171,8 @@ fn nearest<D: Dim>(wall: &Wall<D>, grains: &Grains<D>) -> Option<(f64, D::Vector
     gaps.min_by(|a, b| a.0.total_cmp(&b.0))
 }
 
-/// A wall whose force pulls it away from the grains at all times: a confinement with the wrong
-/// sign.
+/// Warning about a wall whose force always pulls it away from the grains: a confinement with the
+/// wrong sign.
 fn pulled<D: Dim>(wall: &Wall<D>, course: &Course<D>, grains: &Grains<D>) -> Option<String> {
     let sign = course.direction.dot(&towards(wall, grains)?);
     let (low, high) = course.range;
@@ -186,7 +187,7 @@ fn pulled<D: Dim>(wall: &Wall<D>, course: &Course<D>, grains: &Grains<D>) -> Opt
     })
 }
 
-/// A wall that touches no grain and does not reach one by its drive.
+/// Warning about a wall that touches no grain and whose drive does not move it to one.
 fn apart<D: Dim>(wall: &Wall<D>, course: &Course<D>, grains: &Grains<D>) -> Option<String> {
     let (gap, _) = nearest(wall, grains)?;
     let mean = grains.radius.iter().sum::<f64>() / grains.len() as f64;
@@ -195,7 +196,7 @@ fn apart<D: Dim>(wall: &Wall<D>, course: &Course<D>, grains: &Grains<D>) -> Opti
             let sign = course.direction.dot(&normal);
             (course.travel.0 * sign).max(course.travel.1 * sign)
         }
-        // at most, whichever way it goes
+        // upper bound for either direction
         None => course.travel.1.max(-course.travel.0),
     };
     (gap > TOUCHING * mean && near < gap).then(|| {
@@ -214,7 +215,7 @@ mod tests {
     use crate::scene::from_text;
     use dem_core::dim::D2;
 
-    /// What is told of two grains on a floor below a lid, with one change.
+    /// The warnings for two grains on a floor below a lid, with one change.
     fn told(lid: &str, sets: &[&str]) -> Vec<String> {
         let text = format!(
             r#"{{ "dimension": 2,
@@ -256,7 +257,8 @@ mod tests {
                 assert!(told[0].contains(part), "{part} is not in\n{}", told[0]);
             }
         }
-        // what presses, leads to the grains, is taken away, or may be met by grains that move
+        // no warning: the wall presses, moves to the grains or away from them, or moving grains may
+        // reach it
         for (place, drive, sets) in [
             (seated, r#""velocity": { "constant": 1 }"#, &[][..]),
             (seated, r#""velocity": { "constant": -1 }"#, &[]),

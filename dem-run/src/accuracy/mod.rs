@@ -1,4 +1,4 @@
-//! `dem-run accuracy`: how far the results of a scene depend on solver, tolerance, time step,
+//! `dem-run accuracy`: dependence of the results of a scene on solver, tolerance, time step,
 //! contact order and starting reactions.
 //!
 //! One sample is run with several solvers, tolerances and time steps, and each run is compared with
@@ -31,15 +31,15 @@ use spread::{Spread, Varied};
 use std::sync::{Mutex, PoisonError};
 use trial::{Outcome, Posed, Sample, SolverName, Trial, Variant, Way};
 
-/// Contact problems taken from a run for the profile, at most.
+/// Maximum number of contact problems sampled from a run for the profile.
 const MOST_PROBLEMS: usize = 50;
 
-/// Measure the accuracy of a scene, print the tables, and write them with their pictures.
+/// Measures the accuracy of a scene, prints the tables, and writes tables and pictures.
 ///
 /// # Errors
-/// [`RunError`], for example for a scene that drives several walls and does not say which one loads
-/// the sample. Measurements made before an interruption are written. A run that does not converge
-/// is a row of the table, not an error.
+/// [`RunError`], for example for a scene that drives several walls and names no load wall.
+/// Measurements made before an interruption are written. A run that does not converge is a row of
+/// the table, not an error.
 pub fn accuracy(scene: &Scene, options: &AccuracyOptions) -> Result<(), RunError> {
     if let Some(names) = scene.load_unknown() {
         return Err(RunError::Usage(format!(
@@ -91,11 +91,11 @@ fn measure<D: Dim>(scene: &Scene, options: &AccuracyOptions, interrupt: &Interru
     Ok(report)
 }
 
-/// Shows one bar over all runs, and asks whether to go on.
+/// One progress bar over all runs, and the check for an interruption.
 struct Meter<'a> {
     progress: Mutex<Progress>,
     interrupt: &'a Interrupt,
-    /// Share of each run that is done (0 to 1).
+    /// Completed share of each run (0 to 1).
     shares: Mutex<Vec<f64>>,
 }
 
@@ -104,8 +104,8 @@ impl<'a> Meter<'a> {
         Self { progress: Mutex::new(progress), interrupt, shares: Mutex::new(vec![0.0; runs]) }
     }
 
-    /// Reports the share of run `k` that is done; `label` names the kind of run. Returns false if
-    /// the run must stop.
+    /// Reports the completed share of run `k`; `label` names the kind of run. Returns false if the
+    /// run must stop.
     fn tell(&self, k: usize, label: &str, share: f64) -> bool {
         let done = {
             let mut shares = self.shares.lock().unwrap_or_else(PoisonError::into_inner);
@@ -121,7 +121,7 @@ impl<'a> Meter<'a> {
     }
 }
 
-/// What all measurements share.
+/// Input of all measurements.
 struct Measuring<'a, D: Dim> {
     scene: &'a Scene,
     sample: &'a Sample<D>,
@@ -130,7 +130,8 @@ struct Measuring<'a, D: Dim> {
 }
 
 impl<D: Dim> Measuring<'_, D> {
-    /// Run every way, and enter the rows; gives the contact problems of the reference.
+    /// Runs the scene in every way, adds the rows, and returns the contact problems of the
+    /// reference.
     ///
     /// The runs are sequential, because their CPU times are reported.
     fn runs(&self, report: &mut Report) -> Vec<Posed<D>> {
@@ -155,14 +156,15 @@ impl<D: Dim> Measuring<'_, D> {
             posed.push(problems);
         }
         report.compare();
-        // where no finest run came to its end, the problems of another run are used
+        // if no finest run was completed, the problems of another run are used
         let full = |k: &usize| !posed[*k].is_empty();
         let from = report.reference.filter(full).or_else(|| (0..posed.len()).find(full));
         from.map_or(vec![], |k| posed.swap_remove(k))
     }
 
-    /// Run the sample with every solver, in other contact orders and from other starting reactions,
-    /// at the finest tolerance and the longest step. The results should not depend on either.
+    /// Runs the sample with every solver, in other contact orders and from other starting
+    /// reactions, at the finest tolerance and the longest step. The results should depend on
+    /// neither order nor start.
     ///
     /// The runs are parallel; the order of the results is fixed.
     fn indeterminacy(&self, rows: &[Row]) -> Indeterminacy {
@@ -193,7 +195,7 @@ impl<D: Dim> Measuring<'_, D> {
         Indeterminacy { tolerance: asked.finest_tolerance(), step_factor: asked.steps[0], spreads, runs }
     }
 
-    /// Solve the problems of the reference with every solver.
+    /// Solves the problems of the reference with every solver.
     fn profile(&self, posed: &[Posed<D>]) -> Option<Profile> {
         if posed.is_empty() {
             return None;

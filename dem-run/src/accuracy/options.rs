@@ -1,10 +1,10 @@
-//! What is measured, and how.
+//! Options of `dem-run accuracy`.
 
 use super::trial::SolverName;
 use crate::run::Execution;
 use std::path::PathBuf;
 
-/// What the command is asked for.
+/// Options of the command.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AccuracyOptions {
     /// The folder for the results.
@@ -15,12 +15,12 @@ pub struct AccuracyOptions {
     pub tolerances: Vec<f64>,
     /// Time steps over that of the scene (–).
     pub steps: Vec<f64>,
-    /// Contact orders, and starting reactions, for each solver.
+    /// Number of contact orders, and of starting reactions, for each solver.
     pub orders: u64,
-    /// Whether runs go on to the scene's end.
+    /// Whether runs continue to the scene's end.
     pub whole: bool,
-    /// How the command is carried out; the number of threads applies to the runs whose CPU time is
-    /// not reported.
+    /// Execution of the command. The number of threads applies only to runs whose CPU time is not
+    /// reported.
     pub execution: Execution,
     /// Whether stdout is JSON.
     pub json: bool,

@@ -4,7 +4,7 @@ use super::report::{Report, Row};
 use crate::output::{Folder, Result, short};
 use crate::plot::{Chart, Style, colour};
 
-/// Draw what there is to draw.
+/// Draws the charts for which the report has data.
 ///
 /// # Errors
 /// A file cannot be written.
@@ -19,8 +19,8 @@ pub fn draw(report: &Report, folder: &mut Folder) -> Result<()> {
     }
 }
 
-/// For a bonded sample the two errors that a residual hides, the false strain and that of the
-/// collapse load; for another the residual.
+/// For a bonded sample, two errors that the residual does not show: the false strain and the error
+/// of the collapse load. For other samples, the residual.
 fn work_precision(report: &Report) -> Vec<Chart> {
     let strain = over_time(report, "strain before the first break, all false", &|row| row.outcome.false_strain);
     let deviation =
@@ -36,16 +36,16 @@ fn work_precision(report: &Report) -> Vec<Chart> {
     charts.into_iter().flatten().collect()
 }
 
-/// Half the range of the collapse load over contact orders, over its mean, for the solver with the
-/// largest (–).
+/// Half the range of the collapse load, over its mean, among runs that should agree (–); the
+/// largest of all solvers.
 fn indeterminate(report: &Report) -> Option<f64> {
     let spreads = report.indeterminacy.iter().flat_map(|i| &i.spreads);
     let share = spreads.filter_map(|s| s.collapse[0].map(|range| 0.5 * (range.max - range.min) / range.mean));
     share.filter(|share| *share > 0.0).max_by(f64::total_cmp)
 }
 
-/// A quantity over the CPU time of the runs, a curve for each solver and time step; none if it is
-/// never positive.
+/// A quantity over the CPU time of the runs, one curve per solver and time step; none if the
+/// quantity is never positive.
 fn over_time(report: &Report, title: &str, value: &dyn Fn(&Row) -> Option<f64>) -> Option<Chart> {
     let mut chart = Chart::new("CPU time of the steps (s)", title);
     (chart.log_x, chart.log_y) = (true, true);

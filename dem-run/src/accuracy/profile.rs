@@ -3,7 +3,8 @@
 //!
 //! For solver s and problem p let c(p, s) be the cost, infinite if s does not solve p, and b(p) the
 //! least cost of any solver. The profile of s is ρ_s(τ), the share of all problems with c(p, s) ≤ τ
-//! b(p): ρ_s(1) is how often s is the fastest, and ρ_s(τ) for large τ how often it solves at all.
+//! b(p): ρ_s(1) is the share of problems that s solves fastest, and ρ_s(τ) for large τ the share
+//! that s solves.
 
 use super::trial::{Posed, SolverName, Way};
 use crate::build::settings;
@@ -13,12 +14,13 @@ use dem_core::dim::Dim;
 use dem_core::saved::Saved;
 use serde::Serialize;
 
-/// Number of solves of one problem; the fastest counts, because other processes disturb the others.
+/// Number of solves of one problem. The fastest counts: it is the least disturbed by other
+/// processes.
 const REPEATS: usize = 3;
-/// Factors τ at which the table gives the profile.
+/// Factors τ of the table.
 pub const FACTORS: [f64; 6] = [1.0, 1.5, 2.0, 5.0, 10.0, 100.0];
 
-/// What a solver needed for one problem.
+/// Cost of one problem for a solver.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Cost {
     /// Whether the residual reached the tolerance.
@@ -47,21 +49,21 @@ pub struct SolverCosts {
 pub struct Profile {
     /// Tolerance that all solvers had to reach (–).
     pub tolerance: f64,
-    /// Step of each problem: how many had been made.
+    /// Number of steps made before each problem.
     pub step: Vec<u64>,
     /// Time of each problem (s).
     pub time: Vec<f64>,
     /// Contacts of each problem.
     pub contacts: Vec<usize>,
-    /// Factors at which the shares are told (–).
+    /// Factors at which the shares are reported (–).
     pub factors: Vec<f64>,
     /// One for each solver.
     pub solvers: Vec<SolverCosts>,
 }
 
 impl Profile {
-    /// Solve every problem with every solver, to the tolerance of `way`. `watch` gets the share
-    /// that is done; if it returns false, the result is none.
+    /// Solves every problem with every solver, to the tolerance of `way`. `watch` receives the
+    /// completed share; if it returns false, the result is none.
     pub fn measure<D: Dim>(
         posed: &[Posed<D>],
         scene: &Scene,
@@ -81,7 +83,7 @@ impl Profile {
         for (k, &solver) in solvers.iter().enumerate() {
             let mut scene = Way { solver, ..*way }.scene(scene);
             scene.solver.accept = None;
-            // one solver for all problems: as in a run, it keeps its state from step to step
+            // one solver for all problems: as in a run, its state is kept between steps
             let mut built = settings::<D>(&scene).solver.build::<D>();
             let mut costs = vec![];
             for (p, posed) in posed.iter().enumerate() {
@@ -94,8 +96,7 @@ impl Profile {
                 built.save(&mut state);
                 for _ in 0..REPEATS {
                     let mut problem = posed.problem.clone();
-                    // a repeated solve must not start from what the solver learnt of the same
-                    // problem
+                    // a repeated solve must not use solver state from the same problem
                     built.restore(&mut state.read()).expect("its own state");
                     let began = thread_time();
                     solve = Some(built.solve(&mut problem));
@@ -140,14 +141,14 @@ impl Profile {
     }
 }
 
-/// Cost over the least cost of any solver, for each solver and problem; infinite where it is not
-/// solved.
+/// Cost over the least cost of any solver, for each solver and problem; infinite if the solver does
+/// not solve the problem.
 fn ratios(costs: &[Vec<Option<f64>>]) -> Vec<Vec<f64>> {
     let problems = costs.first().map_or(0, Vec::len);
     let best = |p: usize| costs.iter().filter_map(|costs| costs[p]).fold(f64::INFINITY, f64::min);
     let best: Vec<f64> = (0..problems).map(best).collect();
     let ratio = |(cost, best): (&Option<f64>, &f64)| match cost {
-        // what costs nothing is the best, and nothing else is within any factor of it
+        // if the least cost is zero, its ratio is 1 and all others are infinite
         Some(cost) if cost == best => 1.0,
         Some(cost) => cost / best,
         None => f64::INFINITY,
@@ -164,7 +165,7 @@ fn share(ratios: &[f64], factor: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Four problems: A is best on the first two, B on the third, nobody solves the last.
+    /// Four problems: A is fastest on the first two, B on the third; neither solves the last.
     fn hand_made() -> Vec<Vec<f64>> {
         ratios(&[vec![Some(1.0), Some(2.0), Some(6.0), None], vec![Some(3.0), None, Some(2.0), None]])
     }

@@ -1,4 +1,4 @@
-//! What the command found, as it stands in `accuracy.json`.
+//! The results of the command, as written to `accuracy.json`.
 
 use super::options::AccuracyOptions;
 use super::profile::Profile;
@@ -9,7 +9,7 @@ use crate::scene::failure::in_one_piece;
 use dem_core::dim::Dim;
 use serde::Serialize;
 
-/// What was asked for: no value twice, coarse before fine.
+/// The requested values, without repetitions, coarse before fine.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Asked {
     /// Solvers.
@@ -18,14 +18,14 @@ pub struct Asked {
     pub tolerances: Vec<f64>,
     /// Time steps over that of the scene (–), falling.
     pub steps: Vec<f64>,
-    /// Contact orders, and starting reactions, for each solver.
+    /// Number of contact orders, and of starting reactions, for each solver.
     pub orders: u64,
-    /// Whether runs went on to the scene's end.
+    /// Whether runs continue to the scene's end.
     pub whole: bool,
     /// End of the scene's time (s).
     pub end: f64,
-    /// Largest residual that is accepted of a step that misses the tolerance, where that is larger
-    /// than the tolerance (–).
+    /// Largest accepted residual of a step that misses the tolerance, if larger than the tolerance
+    /// (–).
     pub accept: f64,
 }
 
@@ -74,7 +74,7 @@ impl Asked {
         self.tolerances.last().copied().unwrap_or_default()
     }
 
-    /// Whether both tolerance and time step are the finest, for any solver.
+    /// Whether both tolerance and time step are the finest, whatever the solver.
     #[must_use]
     pub fn is_finest(&self, way: &Way) -> bool {
         way.tolerance == self.finest_tolerance() && Some(&way.step_factor) == self.steps.last()
@@ -101,7 +101,7 @@ pub struct Row {
 }
 
 impl Row {
-    /// A row that is not compared yet.
+    /// A row without comparison to the reference.
     #[must_use]
     pub fn new(way: Way, step: f64, outcome: Outcome) -> Self {
         Self { way, step, outcome, jaccard: None, collapse_deviation: [None; 2], first_break_deviation: None }
@@ -114,27 +114,27 @@ impl Row {
     }
 }
 
-/// Runs over what should not matter.
+/// Runs with variations on which the results should not depend.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Indeterminacy {
-    /// Tolerance of all of them (–).
+    /// Tolerance of all these runs (–).
     pub tolerance: f64,
     /// Time step over that of the scene (–).
     pub step_factor: f64,
-    /// How far apart they are.
+    /// Spreads of the results.
     pub spreads: Vec<Spread>,
-    /// Each of them, besides the one of the work–precision table.
+    /// The runs, without the one of the work–precision table.
     pub runs: Vec<VariedRun>,
 }
 
-/// A run over something that should not matter.
+/// A run with a variation on which its results should not depend.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct VariedRun {
     /// The solver.
     pub solver: SolverName,
     /// What is varied.
     pub varied: Varied,
-    /// Number for the random generator.
+    /// Seed of the random generator.
     pub number: u64,
     /// What came out.
     #[serde(flatten)]
@@ -154,25 +154,25 @@ pub struct Report {
     pub elastic: bool,
     /// Solid fraction of a random sample (–).
     pub solid_fraction: Option<f64>,
-    /// Whether bonds join all grains to one piece.
+    /// Whether all grains are bonded into one piece.
     pub one_piece: bool,
     /// Whether a wall is driven: then there are loads.
     pub driven: bool,
-    /// The wall whose loads are told, where one is driven.
+    /// The wall whose loads are reported, if a wall is driven.
     pub load_wall: Option<String>,
     /// Time step of the scene (s).
     pub step: f64,
-    /// What was asked for.
+    /// The requested values.
     pub asked: Asked,
-    /// Whether it was interrupted, so that something is missing.
+    /// Whether the command was interrupted, so that the report is incomplete.
     pub interrupted: bool,
-    /// Which of the runs the others are compared with; none if none came to its end.
+    /// Index of the reference run; none if no run was completed.
     pub reference: Option<usize>,
     /// The work–precision table.
     pub runs: Vec<Row>,
-    /// The indeterminacy, where it was measured.
+    /// The indeterminacy, if measured.
     pub indeterminacy: Option<Indeterminacy>,
-    /// The performance profiles, where they were measured.
+    /// The performance profiles, if measured.
     pub profile: Option<Profile>,
     /// The scene, as it was read.
     pub scene: serde_json::Value,
@@ -202,10 +202,10 @@ impl Report {
         }
     }
 
-    /// Choose the reference and compare all runs with it.
+    /// Chooses the reference and compares all runs with it.
     ///
-    /// It is, of the runs that came to their end, one with the lowest tolerance, of these one with
-    /// the shortest step, and of these the one with the lowest median residual.
+    /// The reference is the completed run with the lowest tolerance, then the shortest step, then
+    /// the lowest median residual.
     pub fn compare(&mut self) {
         let key = |row: &Row| [row.way.tolerance, row.way.step_factor, row.outcome.median_residual];
         let finer = |a: &usize, b: &usize| {

@@ -1,26 +1,26 @@
-//! How far runs differ that should give the same results.
+//! Differences of runs that should give the same results.
 
 use super::trial::{Outcome, SolverName};
 use serde::Serialize;
 
-/// The runs of a solver over one thing that should not matter.
+/// The runs of a solver with one variation on which the results should not depend.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Spread {
     /// The solver.
     pub solver: SolverName,
     /// What was varied: the order of the contacts, or the starting reactions.
     pub varied: Varied,
-    /// Runs that came to their end.
+    /// Completed runs.
     pub runs: usize,
-    /// Runs in which a step was not solved: they are left out of all other numbers.
+    /// Runs in which a step was not solved. They are excluded from all other numbers.
     pub failed: usize,
     /// Applied force at the first break (N).
     pub first_break: Option<Range>,
-    /// Different bonds that broke first.
+    /// Number of different bonds that broke first.
     pub first_bonds: usize,
     /// Collapse load (N) at each of [`crate::scene::failure::STRAINS`].
     pub collapse: [Option<Range>; 2],
-    /// Mean Jaccard index over all pairs of broken sets (–); none for fewer than two runs.
+    /// Mean Jaccard index over all pairs of sets of broken bonds (–); none for fewer than two runs.
     pub jaccard: Option<f64>,
 }
 
@@ -35,14 +35,14 @@ pub enum Varied {
 }
 
 impl Varied {
-    /// What is varied of a bonded sample. Starting reactions of elastic bonds are not varied: they
-    /// are the forces of springs, so others would mean another sample, under stress.
+    /// Variations of a bonded sample. Starting reactions of elastic bonds are not varied: they are
+    /// spring forces, so other values would mean another, prestressed sample.
     #[must_use]
     pub fn of(elastic: bool) -> &'static [Self] {
         if elastic { &[Self::Order] } else { &[Self::Order, Self::Start] }
     }
 
-    /// In words.
+    /// Name in words.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -64,7 +64,7 @@ pub struct Range {
 }
 
 impl Range {
-    /// The range of the values; none without any.
+    /// The range of the values; none if there are no values.
     #[must_use]
     pub fn of(values: &[f64]) -> Option<Self> {
         (!values.is_empty()).then(|| Self {
@@ -103,8 +103,8 @@ impl Spread {
     }
 }
 
-/// Jaccard index |A ∩ B| / |A ∪ B| of two sorted sets (–): 1 if they are the same, 0 if they share
-/// nothing. Two empty sets are the same.
+/// Jaccard index |A ∩ B| / |A ∪ B| of two sorted sets (–): 1 if equal, 0 if disjoint. Two empty
+/// sets are equal.
 #[must_use]
 pub fn jaccard(a: &[u32], b: &[u32]) -> f64 {
     let common = a.iter().filter(|k| b.binary_search(k).is_ok()).count();

@@ -1,4 +1,4 @@
-//! The report as tables: for people on stdout, and as CSV.
+//! The report as tables: as text on stdout, and as CSV.
 
 use super::report::{Indeterminacy, Report, Row};
 use super::spread::Range;
@@ -66,7 +66,7 @@ fn labels(report: &Report, k: usize) -> Vec<String> {
 
 fn work(report: &Report) -> String {
     let bonded = report.bonds > 0;
-    // only a rigid sample keeps its shape until a bond breaks
+    // a rigid sample does not deform before the first break
     let rigid = bonded && !report.elastic;
     let mut heads = row!["solver", "tolerance", "step", "CPU", "steps", "iterations", "residual", "false accel."];
     let mut units = row!["", "", "s", "s", "", "", "worst", if bonded { "to 1st break" } else { "worst" }];
@@ -151,7 +151,7 @@ fn quantity(value: Option<f64>) -> String {
     value.map_or("–".into(), number)
 }
 
-/// A collapse load; one before the first break carries a star.
+/// A collapse load, with a star if before the first break.
 fn collapse(outcome: &Outcome, k: usize) -> String {
     let star = if outcome.failure.early[k] { "*" } else { "" };
     quantity(outcome.failure.collapse[k]) + star
@@ -267,7 +267,7 @@ fn profile(report: &Report) -> String {
     text + &table.lines()
 }
 
-/// Write the tables as CSV: a row for each run, or for each problem and solver, with all digits.
+/// Writes the tables as CSV with all digits: a row for each run, or for each problem and solver.
 ///
 /// # Errors
 /// A file cannot be written.

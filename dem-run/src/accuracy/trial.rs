@@ -17,7 +17,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use serde::{Serialize, Serializer};
 
-/// Random starting reactions of a bond, over what it can bear (–).
+/// Largest random starting reaction of a bond, over its strength (–).
 const START_SHARE: f64 = 0.1;
 
 /// A solver by its name; its other settings are those of the scene where the scene has the same
@@ -37,7 +37,7 @@ pub enum SolverName {
 }
 
 impl SolverName {
-    /// The name as the command line has it.
+    /// The name on the command line.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -63,7 +63,7 @@ impl SolverName {
     }
 }
 
-/// How a run is solved.
+/// Solver settings of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Way {
     /// The solver.
@@ -75,8 +75,8 @@ pub struct Way {
 }
 
 impl Way {
-    /// The scene as it is run this way. A step that misses the tolerance is taken where the scene
-    /// would accept it.
+    /// The scene with these settings. A step that misses the tolerance is accepted if the scene
+    /// accepts its residual.
     #[must_use]
     pub fn scene(&self, scene: &Scene) -> Scene {
         let mut scene = scene.clone();
@@ -89,19 +89,18 @@ impl Way {
     }
 }
 
-/// What is varied of a run whose answer should not depend on it.
+/// A variation on which the results of a run should not depend.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Variant {
     /// Nothing.
     AsGiven,
-    /// The order of the grains, and with it that of the contacts, by a number for the random
-    /// generator.
+    /// The order of the grains, and so of the contacts, from this seed.
     Order(u64),
-    /// The reactions that the bonds start from, by a number for the random generator.
+    /// The starting reactions of the bonds, from this seed.
     Start(u64),
 }
 
-/// The prepared sample that all runs start from.
+/// The prepared sample, common to all runs.
 pub struct Sample<D: Dim> {
     /// Solid fraction of a random sample (–).
     pub solid_fraction: Option<f64>,
@@ -114,7 +113,7 @@ pub struct Sample<D: Dim> {
 }
 
 impl<D: Dim> Sample<D> {
-    /// The sample of a world that has just been built.
+    /// The sample of a world at time zero.
     #[must_use]
     pub fn of(built: Built<D>) -> Self {
         let World { grains, walls, loads, bonds, .. } = built.world;
@@ -127,7 +126,7 @@ impl<D: Dim> Sample<D> {
         self.bonds.iter().any(|bond| bond.stiffness.is_some())
     }
 
-    /// A world at time zero, and for each of its bonds the number of the same bond in the sample.
+    /// A world at time zero, and for each of its bonds the number of that bond in the sample.
     fn world(&self, scene: &Scene, variant: Variant) -> (World<D>, Vec<u32>) {
         let mut world = World::new(self.grains.clone(), self.walls.clone(), self.loads.clone(), settings(scene));
         let mut numbers: Vec<u32> = (0..self.bonds.len() as u32).collect();
@@ -140,7 +139,7 @@ impl<D: Dim> Sample<D> {
         (world, numbers)
     }
 
-    /// The same world with its grains numbered in another order.
+    /// A world as in [`Self::world`], with its grains in another order.
     fn reordered(&self, scene: &Scene, seed: u64) -> (World<D>, Vec<u32>) {
         let mut order: Vec<usize> = (0..self.grains.len()).collect();
         order.shuffle(&mut Pcg64::seed_from_u64(seed));
@@ -175,7 +174,7 @@ impl<D: Dim> Sample<D> {
     }
 }
 
-/// Start from random reactions of the bonds, up to [`START_SHARE`] of what each bears.
+/// Sets random starting reactions of the bonds, up to [`START_SHARE`] of the strength of each.
 fn start_anywhere<D: Dim>(world: &mut World<D>, seed: u64) {
     let mut random = Pcg64::seed_from_u64(seed);
     let mut upto = |limit: f64| START_SHARE * limit * (2.0 * random.random::<f64>() - 1.0);
@@ -194,9 +193,9 @@ fn start_anywhere<D: Dim>(world: &mut World<D>, seed: u64) {
     });
 }
 
-/// A contact problem as a run posed it at a step.
+/// A contact problem of a step of a run.
 pub struct Posed<D: Dim> {
-    /// Steps that had been made.
+    /// Number of steps made before.
     pub step: u64,
     /// Time (s).
     pub time: f64,
@@ -204,8 +203,8 @@ pub struct Posed<D: Dim> {
     pub problem: ContactProblem<D>,
 }
 
-/// Contact problems taken from a run at equal intervals of steps, at most a given number: when
-/// there are too many, every second one is dropped and the interval is doubled.
+/// A limited number of contact problems, sampled from a run at equal intervals of steps. When the
+/// limit is exceeded, every second problem is dropped and the interval doubles.
 struct Problems<D: Dim> {
     list: Vec<Posed<D>>,
     most: usize,
@@ -232,17 +231,16 @@ impl<D: Dim> Problems<D> {
 /// What ended a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum End {
-    /// The strain is above 1e-3 and 5 % of the bonds are broken: all loads that are reported are
-    /// known.
+    /// The strain is above 1e-3 and 5 % of the bonds are broken: all reported loads are known.
     Collapsed,
-    /// The scene.
+    /// An ending of the scene.
     Scene(Ending),
     /// A step was not solved, or wrongly: the message.
     Failed(String),
 }
 
 impl End {
-    /// In a word or two.
+    /// Short name.
     #[must_use]
     pub fn name(&self) -> &'static str {
         match self {
@@ -265,24 +263,24 @@ impl Serialize for End {
 /// The first bond that broke.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FirstBreak {
-    /// Load (N), where the scene has a load wall.
+    /// Load (N), if the scene has a load wall.
     pub load: Option<f64>,
     /// Time at the end of the step (s).
     pub time: f64,
     /// Step, counted from 1.
     pub step: u64,
-    /// Number of the bond; of several in one step, the first of the first round.
+    /// Number of the bond. Of several in one step, the first of the first cascade round.
     pub bond: u32,
     /// Its two grains.
     pub pair: [u32; 2],
-    /// Where it was (m).
+    /// Position of the bond (m).
     pub place: Vec<f64>,
 }
 
-/// What a run gave.
+/// The results of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Outcome {
-    /// What ended it.
+    /// Why the run ended.
     pub ended: End,
     /// Why a step was not solved.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -302,10 +300,10 @@ pub struct Outcome {
     /// Largest false acceleration of a step before the first break (–), see
     /// [`StepReport::false_acceleration`].
     pub false_acceleration: f64,
-    /// Largest component of the sample's strain before the first break (–), all of it false; none
-    /// without bonds, or where they are elastic.
+    /// Largest component of the sample's strain before the first break (–), which is entirely
+    /// false; none without bonds or with elastic bonds.
     pub false_strain: Option<f64>,
-    /// Steps that were accepted and missed the tolerance.
+    /// Accepted steps that missed the tolerance.
     pub missed_tolerance: u64,
     /// Solves that were not accepted: their steps were halved.
     pub rejected: u64,
@@ -323,23 +321,23 @@ pub struct Outcome {
     pub broken: Vec<u32>,
 }
 
-/// One run to be made.
+/// A run to be carried out.
 pub struct Trial<'a, D: Dim> {
     /// The sample.
     pub sample: &'a Sample<D>,
-    /// The scene as it is to be solved.
+    /// The scene, with the solver settings of the run.
     pub scene: &'a Scene,
     /// What is varied.
     pub variant: Variant,
-    /// Whether it goes on to the scene's end.
+    /// Whether the run continues to the scene's end.
     pub whole: bool,
-    /// How many contact problems are taken from it at most.
+    /// Maximum number of contact problems sampled from the run.
     pub problems: usize,
 }
 
 impl<D: Dim> Trial<'_, D> {
-    /// Run. `watch` gets the share of the simulated time that is done; if it returns false, the run
-    /// stops and the result is none.
+    /// Carries out the run. `watch` receives the completed share of the simulated time; if it
+    /// returns false, the run stops and the result is none.
     pub fn run(&self, watch: &dyn Fn(f64) -> bool) -> Option<(Outcome, Vec<Posed<D>>)> {
         let (mut world, numbers) = self.sample.world(self.scene, self.variant);
         let mut state = Followed::new(self.scene, &world);
@@ -378,7 +376,7 @@ impl<D: Dim> Trial<'_, D> {
     }
 }
 
-/// A run as it goes on.
+/// Results of a run in progress.
 struct Followed<D: Dim> {
     course: Course<D>,
     /// Kinetic energy at the start (J).
@@ -397,7 +395,7 @@ impl<D: Dim> Followed<D> {
         Self { course, kinetic, cpu_time: 0.0, residuals: vec![], false_acceleration: 0.0, strain: 0.0, first: None }
     }
 
-    /// Enter a step.
+    /// Adds a step.
     fn follow(&mut self, world: &World<D>, report: &StepReport<D>) {
         self.course.count(world, report);
         self.residuals.push(report.residual);
@@ -419,8 +417,8 @@ impl<D: Dim> Followed<D> {
         self.strain = world.strain().iter().fold(self.strain, |worst, e| worst.max(e.abs()));
     }
 
-    /// Whether the kinetic energy exceeds both ten times the energy that was put in and the energy
-    /// of grains that move by their radius in every step. Such a run is meaningless, and its
+    /// Whether the kinetic energy exceeds both ten times the energy input and the kinetic energy of
+    /// grains that move by their radius in a step. Such a run is meaningless, and its contact
     /// detection would compare all pairs of grains.
     fn blown_up(&self, world: &World<D>) -> bool {
         let (ledger, g) = (&world.ledger, &world.grains);
@@ -428,7 +426,7 @@ impl<D: Dim> Followed<D> {
         ledger.kinetic > (10.0 * (ledger.external_work.abs() + self.kinetic)).max(fast)
     }
 
-    /// The outcome, with bonds and grains by the numbers of the sample.
+    /// The outcome, with the sample's numbers of bonds and grains.
     fn outcome(mut self, ended: End, world: &World<D>, numbers: &[u32], bonds: &[Bond]) -> Outcome {
         if let Some(first) = &mut self.first {
             first.bond = numbers[first.bond as usize];
@@ -504,7 +502,7 @@ mod tests {
         assert_eq!(place(&world.grains, fixed), place(&sample.grains, 0));
     }
 
-    /// The first breaks of a run: step, round of the cascade, bond as the sample numbers it, mode.
+    /// The first breaks of a run: step, cascade round, the sample's number of the bond, mode.
     fn first_breaks(
         scene: &Scene,
         sample: &Sample<D2>,
@@ -523,10 +521,10 @@ mod tests {
         list
     }
 
-    /// The first breaks of `compression` with these settings beside those of ten variants.
+    /// Compares the first breaks of `compression` with these settings to those of ten variants.
     fn breaks_are_the_same(settings: &[&str], variant: fn(u64) -> Variant) {
         let path = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../configs/compression.json"));
-        // ten times faster than the scene: a tenth of the steps
+        // ten times the scene's loading rate: a tenth of the steps
         let settings = [&["walls.top.force_rate=2000"], settings].concat();
         let settings: Vec<String> = settings.into_iter().map(String::from).collect();
         let scene = crate::scene::load(path, &settings).expect("scene");

@@ -2,8 +2,7 @@
 
 use std::path::PathBuf;
 
-/// An error in reading or writing a problem. Its message names the file, the dataset and what is
-/// wrong.
+/// An error in reading or writing a problem. Its message names the file, the dataset and the error.
 #[derive(Debug, thiserror::Error)]
 pub enum FclibError {
     /// The operating system refused.
@@ -11,7 +10,7 @@ pub enum FclibError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What was tried, as in "read".
+        /// The operation, as in "read".
         doing: &'static str,
         /// The system's reason.
         source: std::io::Error,
@@ -31,17 +30,17 @@ pub enum FclibError {
     Foreign {
         /// The file.
         path: PathBuf,
-        /// What is there instead.
+        /// What the file contains instead.
         why: String,
     },
-    /// A dataset is missing, or holds what it must not.
+    /// A dataset is missing, or has an invalid value.
     #[error("{}, /{place}: {why}", .path.display())]
     Wrong {
         /// The file.
         path: PathBuf,
         /// The dataset or group.
         place: String,
-        /// What is wrong with it.
+        /// The error.
         why: String,
     },
     /// HDF5 could not write.

@@ -7,31 +7,30 @@
 //! ```text
 //! /fclib_local/
 //!     spacedim             S: 2 (n, t), 3 (n, t1, t2); with mu_r 3 (n, t, m) or
-//!                          5 (n, t1, t2, m1, m2); with mu_t, too, 6 (…, twist), which other
-//!                          programs do not know
+//!                          5 (n, t1, t2, m1, m2); with mu_t also 6 (…, twist), which other
+//!                          programs do not support
 //!     W/                   m, n, nzmax, nz, p, i, x: the matrix, C·S × C·S
 //!         nz = −1          by columns: p[n + 1] where each starts, i[nzmax] rows, x[nzmax] values
 //!         nz = −2          by rows: p[m + 1] where each starts, i[nzmax] columns, x[nzmax] values
 //!         nz ≥ 0           nz triplets: i[nz] rows, p[nz] columns, x[nz] values
-//!     vectors/             q [C·S]; mu [C]; mu_r [C] where there are rolling rows; mu_t [C]
-//!                          where there is one of twist
+//!     vectors/             q [C·S]; mu [C]; mu_r [C] with rolling rows; mu_t [C] with a twist row
 //!     info/                title, description, math_info: text
 //! /fclib_global/           or this, read but not written: M v = H r + f, u = Hᵀ v + w over
 //!                          the velocities v of the bodies
 //! /fclib_global_rolling/   the same, with mu_r
 //!     spacedim, info/      as above
 //!     M/, H/               N × N and N × C·S, stored as W is
-//!     vectors/             f [N]; w [C·S]; mu [C]; mu_r [C] where there are rolling rows
+//!     vectors/             f [N]; w [C·S]; mu [C]; mu_r [C] with rolling rows
 //! /guesses/                number_of_guesses; 1, 2, …: u, r [C·S]
 //! /solution/               u, r [C·S]
-//! /cohesive_dem/           ours; other programs do not look for it
-//!     associated           i32 [C]: 1 where the flow of a contact is normal to its cone
-//!     shift                [C]: what r is above the reaction in the normal row (N s)
+//! /cohesive_dem/           our extension, ignored by other programs
+//!     associated           i32 [C]: 1 if the flow of a contact is normal to its cone
+//!     shift                [C]: r minus the reaction, in the normal row (N s)
 //!     applied              norm of the applied impulses (N s), one scale of the residual
 //! ```
 //!
-//! In FCLIB all contacts follow Coulomb's law in the form of the bipotential; so do those of a file
-//! without `/cohesive_dem`. For r, q and mu_r of cohesive bonds see docs/theory/fclib.md.
+//! In FCLIB, and so in a file without `/cohesive_dem`, all contacts follow Coulomb's law in the
+//! form of the bipotential. For r, q and mu_r of cohesive bonds see docs/theory/fclib.md.
 
 mod error;
 mod reader;
@@ -42,19 +41,19 @@ pub use error::FclibError;
 
 use dem_core::problem::assembled::Assembled;
 
-/// What a file of FCLIB holds.
+/// The content of an FCLIB file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Problem {
-    /// Its title, in a line.
+    /// Title on one line.
     pub title: String,
-    /// What it is and where it comes from.
+    /// Description and origin.
     pub description: String,
-    /// What is known of its mathematics.
+    /// Known mathematical properties.
     pub math_info: String,
-    /// The problem. Its reactions are the first guess of the file, or zero.
+    /// The assembled problem. Its reactions are the first guess of the file, or zero.
     pub assembled: Assembled,
-    /// Reactions r̂ (N s) that solve it, if they are known.
+    /// Reactions r̂ (N s) of a solution, if known.
     pub solution: Option<Vec<f64>>,
-    /// What was changed in reading, in words.
+    /// Messages about changes made in reading.
     pub warnings: Vec<String>,
 }

@@ -8,17 +8,18 @@ use dem_core::problem::global::Global;
 use super::source::{Entry, Source};
 use super::{FclibError, Problem};
 
-/// The groups that a problem may be in, and whether it is over the velocities of bodies.
+/// The possible groups of a problem, and whether the problem is global (with the velocities of
+/// bodies as unknowns).
 const GROUPS: [(&str, bool); 3] = [("fclib_local", false), ("fclib_global", true), ("fclib_global_rolling", true)];
-/// Largest change of an entry that makes W symmetric, over the largest entry (–): beyond that W is
-/// refused.
+/// Largest accepted change of an entry to make W symmetric, over the largest entry (–).
 const MOST_ASYMMETRY: f64 = 1e-3;
 
 impl Problem {
-    /// Reads a problem of FCLIB, whatever way its matrices are stored. A global one is made local.
+    /// Reads an FCLIB problem with any storage of its matrices. A global problem is reduced to a
+    /// local one.
     ///
     /// # Errors
-    /// [`FclibError`], which names the dataset that is missing or wrong.
+    /// [`FclibError`] with the name of the missing or wrong dataset.
     pub fn read(path: &Path) -> Result<Self, FclibError> {
         hdf5::silence_errors(true);
         let source = Source::open(path)?;
@@ -47,7 +48,7 @@ impl Problem {
     }
 }
 
-/// An open file, the group of its problem, and what was changed in reading.
+/// An open file, the group of its problem, and messages about changes made in reading.
 struct Reader {
     source: Source,
     group: &'static str,
@@ -109,13 +110,13 @@ impl Reader {
     fn local(&self, size: usize) -> Result<(BlockMatrix, Vec<f64>), FclibError> {
         let place = self.at("W");
         let total = self.multiple(&format!("{place}/m"), self.source.order(&place)?, size)?;
-        // q before the matrix: a forged m must not ask for memory
+        // q is read before the matrix, so that a forged m cannot allocate memory
         let q = self.source.finite(&self.at("vectors/q"), total)?;
         let entries = self.source.entries(&place, total, total)?;
         Ok((BlockMatrix::from_entries(total / size, size, &entries), q))
     }
 
-    /// The same of a global problem, from M (N × N), H (N × C·S), f (N) and w (C·S).
+    /// W and q of a global problem, from M (N × N), H (N × C·S), f (N) and w (C·S).
     fn condensed(&mut self, size: usize) -> Result<(BlockMatrix, Vec<f64>), FclibError> {
         let (m, h) = (self.at("M"), self.at("H"));
         let unknowns = self.source.order(&m)?;
@@ -125,7 +126,7 @@ impl Reader {
             return Err(self.source.wrong(&format!("{h}/m"), why));
         }
         let total = self.multiple(&format!("{h}/n"), columns, size)?;
-        // vectors before matrices: forged sizes must not ask for memory
+        // vectors are read before matrices, so that forged sizes cannot allocate memory
         let impulses = self.source.finite(&self.at("vectors/f"), unknowns)?;
         let given = self.source.finite(&self.at("vectors/w"), total)?;
         let (mass, directions) = (self.finite_entries(&m, unknowns, unknowns)?, self.finite_entries(&h, rows, total)?);
@@ -151,8 +152,8 @@ impl Reader {
         }
     }
 
-    /// W itself where it is symmetric up to rounding; made symmetric, with a warning, where it
-    /// nearly is.
+    /// Returns W if symmetric up to round-off. If W is nearly symmetric, it is symmetrised, with a
+    /// warning.
     fn symmetric(&mut self, matrix: BlockMatrix) -> Result<BlockMatrix, FclibError> {
         let Some(worst) = matrix.asymmetry().filter(|worst| worst.relative > ROUNDING) else { return Ok(matrix) };
         let (relative, row, column) = (worst.relative, worst.row, worst.column);
@@ -196,7 +197,7 @@ impl Reader {
         })
     }
 
-    /// A number of rows of all contacts, of which each has `size`.
+    /// Returns `found`, the number of rows of all contacts, if it is a positive multiple of `size`.
     fn multiple(&self, place: &str, found: usize, size: usize) -> Result<usize, FclibError> {
         if found == 0 || !found.is_multiple_of(size) {
             let why = format!("it is {found}, it must be a multiple of {size} above zero: {size} rows a contact");

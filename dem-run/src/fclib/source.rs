@@ -1,4 +1,4 @@
-//! Datasets of an open file. Whatever a file claims is checked before it is believed.
+//! Datasets of an open file. All sizes and indices in a file are checked before use.
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,8 @@ use hdf5::{File, H5Type};
 use super::FclibError;
 use crate::history::reason;
 
-/// Largest compression ratio of deflate: no dataset can be larger than this many file lengths.
+/// Largest compression ratio of deflate, and so the largest size of a dataset over that of its
+/// file.
 const GREATEST_COMPRESSION: u64 = 1032;
 
 /// An entry of a matrix: row, column, value.
@@ -34,7 +35,7 @@ impl Source {
         Ok(Self { path: path.into(), file, length: metadata.len() })
     }
 
-    /// The file holds no problem.
+    /// The error that the file has no problem.
     pub fn foreign(&self, why: &str) -> FclibError {
         FclibError::Foreign { path: self.path.clone(), why: why.into() }
     }
@@ -56,7 +57,7 @@ impl Source {
         }
         let unreadable = |error| self.wrong(place, format!("it cannot be read ({})", reason(&error)));
         let dataset = self.file.dataset(place).map_err(unreadable)?;
-        // a forged shape must not ask for more memory than the file can fill
+        // a forged shape must not allocate more memory than the file can fill
         if dataset.size() as u64 > self.length.saturating_mul(GREATEST_COMPRESSION) {
             return Err(self.wrong(place, "it claims to be larger than the file"));
         }
@@ -80,7 +81,7 @@ impl Source {
         }
     }
 
-    /// The one value of a dataset.
+    /// The value of a dataset with a single integer.
     pub fn integer(&self, place: &str) -> Result<i64, FclibError> {
         Ok(self.counted(place, 1)?[0])
     }
@@ -108,7 +109,7 @@ impl Source {
         found.into_iter().enumerate().map(index).collect()
     }
 
-    /// A text; empty where there is none. It is shown and decides nothing.
+    /// A text, empty if absent; only for display.
     pub fn text(&self, place: &str) -> String {
         let dataset = if self.has(place) { self.file.dataset(place).ok() } else { None };
         let read = |dataset: hdf5::Dataset| match dataset.read_scalar::<FixedAscii<1024>>() {
@@ -135,8 +136,8 @@ impl Source {
         }
     }
 
-    /// The entries of a sparse matrix of `m` rows and `n` columns, whatever way it is stored;
-    /// values may not be finite.
+    /// The entries of a sparse matrix of `m` rows and `n` columns, with any storage; the values are
+    /// not checked to be finite.
     pub fn entries(&self, matrix: &str, m: usize, n: usize) -> Result<Vec<Entry>, FclibError> {
         let at = |name: &str| format!("{matrix}/{name}");
         let nz = self.integer(&at("nz"))?;
@@ -155,7 +156,7 @@ impl Source {
             self.wrong(&at("nz"), format!("it is {nz}, it must be {meaning}"))
         })?;
         let (i, p) = (self.indices(&at("i"), count, m)?, self.indices(&at("p"), count, n)?);
-        // nzmax may leave room behind the last triplet
+        // with nzmax > nz, the dataset is longer than the number of triplets
         let x = self.leading::<f64>(&at("x"), count)?;
         Ok(i.into_iter().zip(p).zip(x).map(|((i, p), x)| (i, p, x)).collect())
     }
@@ -170,7 +171,7 @@ impl Source {
         Ok(values)
     }
 
-    /// Where each row or column starts: from zero, never falling.
+    /// The start of each row or column: from zero, non-decreasing.
     fn starts(&self, place: &str, lines: usize) -> Result<Vec<usize>, FclibError> {
         let starts = self.indices(place, lines + 1, usize::MAX)?;
         if starts[0] != 0 || starts.windows(2).any(|pair| pair[0] > pair[1]) {

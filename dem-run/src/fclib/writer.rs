@@ -1,4 +1,4 @@
-//! Writing a problem, as FCLIB's own library writes and reads it.
+//! Writes a problem in the form that FCLIB's own library writes and reads.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ impl Problem {
     /// Writes the problem, its reactions as the first guess if they are not all zero, and its
     /// solution if there is one.
     ///
-    /// The file is made beside `path` and moved there when it is complete.
+    /// The file is written beside `path` and renamed to `path` when complete.
     ///
     /// # Errors
     /// [`FclibError::Io`] and [`FclibError::Write`].
@@ -60,7 +60,7 @@ impl Problem {
         file.flush()
     }
 
-    /// W by columns, which every reader knows.
+    /// Writes W by columns, the storage that every reader supports.
     fn matrix(&self, group: &Group) -> hdf5::Result<()> {
         let mut entries = self.assembled.parts().matrix.entries();
         entries.sort_by_key(|(row, column, _)| (*column, *row));
@@ -103,11 +103,11 @@ fn integer(group: &Group, name: &str, value: usize) -> hdf5::Result<()> {
     dataset(group, name, &integers([value])?)
 }
 
-/// A text of fixed length, the only kind that FCLIB's library reads: ASCII, cut where it is too
-/// long.
+/// Writes an ASCII text of fixed length, truncated if too long: FCLIB's library reads no other
+/// kind.
 fn text<const N: usize>(group: &Group, name: &str, value: &str) -> hdf5::Result<()> {
     let ascii = |c: char| if c.is_ascii() && c != '\0' { c as u8 } else { b'?' };
-    // one byte is left for the zero that ends it in C
+    // one byte is reserved for the terminating zero of C
     let bytes: Vec<u8> = value.chars().map(ascii).take(N - 1).collect();
     let fixed = FixedAscii::<N>::from_ascii(&bytes).map_err(|error| hdf5::Error::from(error.to_string()))?;
     group.new_dataset::<FixedAscii<N>>().obj_track_times(false).create(name)?.write_scalar(&fixed)

@@ -1,11 +1,11 @@
-//! What other schedulers need to carry a sweep out: a job array for Slurm, a Snakefile.
+//! Files with which other schedulers carry out a sweep: a job array for Slurm, a Snakefile.
 
 use std::path::Path;
 
 use crate::error::RunError;
 use crate::history::sweep::{Manifest, State, Store};
 
-/// Writes `slurm.sh` and `Snakefile` beside the manifest; gives their paths.
+/// Writes `slurm.sh` and `Snakefile` beside the manifest; returns their paths.
 ///
 /// # Errors
 /// A file cannot be written.
@@ -22,7 +22,7 @@ pub fn write(store: &Store, sweep: &Path, manifest: &Manifest) -> Result<(), Run
     Ok(store.write("Snakefile", snakefile(name, &program, &sweep, &folder).as_bytes())?)
 }
 
-/// The numbers of the runs that are not done, as Slurm takes them: 1-3,7.
+/// The numbers of the runs that are not done, in Slurm's format: 1-3,7.
 fn numbers(manifest: &Manifest) -> String {
     let undone = manifest.runs.iter().filter(|run| run.state != State::Done);
     let mut spans: Vec<(u64, u64)> = vec![];
@@ -38,7 +38,7 @@ fn numbers(manifest: &Manifest) -> String {
 
 fn slurm(name: &str, numbers: &str, program: &str, sweep: &str, folder: &str) -> String {
     let (program, quoted_sweep, quoted_folder) = (shell(program), shell(sweep), shell(folder));
-    // Slurm ends a word of its own lines at a blank
+    // in `#SBATCH` lines a blank ends a word
     let title: String = name.chars().map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '-' }).collect();
     let log = folder.replace('\\', "\\\\").replace('%', "%%").replace('"', "\\\"");
     format!(
@@ -58,7 +58,7 @@ exec {program} sweep {quoted_sweep} -o {quoted_folder} --run "$SLURM_ARRAY_TASK_
 
 fn snakefile(name: &str, program: &str, sweep: &str, folder: &str) -> String {
     let json = |text: &str| serde_json::Value::from(text).to_string();
-    // braces are Snakemake's own in commands
+    // in commands, braces are Snakemake's placeholders
     let command = |rest: &str| {
         let words = format!("{} sweep {} -o {}", shell(program), shell(sweep), shell(folder));
         json(&format!("{}{rest}", words.replace('{', "{{").replace('}', "}}")))

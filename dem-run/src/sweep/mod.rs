@@ -1,7 +1,7 @@
-//! `dem-run sweep`: one scene with many values, each run a process and a history of its own.
+//! `dem-run sweep`: one scene with many values; each run has its own process and history.
 //!
 //! ```text
-//! sweep file ──plan──▶ scenes, all checked ──reconcile──▶ what is left
+//! sweep file ──plan──▶ scenes, all checked ──reconcile──▶ remaining runs
 //!            ──work──▶ histories and states ──report──▶ manifest, table
 //! ```
 
@@ -28,20 +28,20 @@ use reconcile::reconcile;
 use report::Standing;
 use work::{Job, carry_out};
 
-/// What is asked of a sweep.
+/// Options of `dem-run sweep`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SweepOptions {
     /// The sweep file.
     pub sweep: PathBuf,
     /// The folder for the results.
     pub folder: PathBuf,
-    /// What is done.
+    /// The action.
     pub mode: Mode,
-    /// Runs at a time; as many as the machine has processors where it is absent.
+    /// Number of simultaneous runs; if absent, as many as the machine has processors.
     pub jobs: Option<usize>,
-    /// Whether runs that failed, and would fail again, are run again.
+    /// Whether runs that failed reproducibly are repeated.
     pub retry: bool,
-    /// Whether results that the sweep no longer gives are given up.
+    /// Whether results that are no longer part of the sweep may be discarded.
     pub overwrite: bool,
     /// How the command is carried out; each run has one thread.
     pub execution: Execution,
@@ -49,10 +49,10 @@ pub struct SweepOptions {
     pub json: bool,
 }
 
-/// What is done with a sweep.
+/// Action on a sweep.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Mode {
-    /// All runs that are left are carried out.
+    /// All remaining runs are carried out.
     All,
     /// The sweep is checked, and nothing is written.
     Check,
@@ -67,8 +67,8 @@ pub enum Mode {
 /// Carries a sweep out, or one of its parts.
 ///
 /// # Errors
-/// [`RunError`]: a sweep or a scene that is wrong, results in the way, files that cannot be
-/// written, an interruption, [`RunError::Runs`] where runs failed. What was done before is kept.
+/// [`RunError`]: a wrong sweep or scene, results that would be overwritten, files that cannot be
+/// written, an interruption, [`RunError::Runs`] if runs failed. Earlier results are kept.
 pub fn sweep(options: &SweepOptions) -> Result<(), RunError> {
     let store = Store::new(options.folder.clone());
     folder_or_new(store.folder())?;
@@ -92,7 +92,7 @@ pub fn sweep(options: &SweepOptions) -> Result<(), RunError> {
     }
 }
 
-/// Carries out all that is left.
+/// Carries out all remaining runs.
 fn all(store: &Store, plan: &Plan, mut manifest: Manifest, options: &SweepOptions) -> Result<(), RunError> {
     let interrupt = handle_signals()?;
     let mut progress = options.execution.show();
@@ -116,7 +116,7 @@ fn all(store: &Store, plan: &Plan, mut manifest: Manifest, options: &SweepOption
             carry_out(store, &jobs, at_a_time, &interrupt, &mut progress, &mut || report::write(store, &mut manifest))
         }
     };
-    // the runs that are done are reported, also after an error
+    // completed runs are reported, also after an error
     let written = report::write(store, &mut manifest);
     let failed = failures(store, &manifest);
     let standing = Standing { folder: options.folder.clone(), manifest };
@@ -129,8 +129,7 @@ fn all(store: &Store, plan: &Plan, mut manifest: Manifest, options: &SweepOption
     failed
 }
 
-/// Carries out one run of a sweep that has been prepared; touches nothing but the files of this
-/// run.
+/// Carries out one run of a prepared sweep; writes only the files of this run.
 fn one(store: &Store, plan: &Plan, id: &str, options: &SweepOptions) -> Result<(), RunError> {
     let (sweep, folder) = (options.sweep.display(), store.folder().display());
     let Some(manifest) = store.manifest()? else {
@@ -207,7 +206,7 @@ fn exit_code(code: Option<i32>) -> u8 {
     }
 }
 
-/// The error that stands for all failed runs: the gravest of their exit codes.
+/// The common error of all failed runs, with the largest of their exit codes.
 fn failures(store: &Store, manifest: &Manifest) -> Result<(), RunError> {
     let failed: Vec<_> = manifest.runs.iter().filter(|run| run.state == State::Failed).collect();
     let code = failed.iter().map(|run| exit_code(store.outcome(&run.id).and_then(|outcome| outcome.exit_code))).max();
@@ -222,7 +221,7 @@ fn failures(store: &Store, manifest: &Manifest) -> Result<(), RunError> {
     Err(RunError::Runs { code, message })
 }
 
-/// What a sweep will be.
+/// Preview of a sweep.
 #[derive(Debug, Serialize)]
 struct Checked {
     sweep: PathBuf,

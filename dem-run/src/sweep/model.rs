@@ -70,8 +70,8 @@ pub enum Spacing {
     Geometric,
 }
 
-/// A list or an object, told by its bracket: serde's own choice between the two would lose the
-/// place of an error.
+/// A list or an object, distinguished by its bracket: serde's untagged enum would lose the position
+/// of an error.
 impl<'de> Deserialize<'de> for Values {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         struct ByBracket;
@@ -110,14 +110,14 @@ impl Range {
     }
 }
 
-/// At 12 digits, what the last bits of a power are, which depend on the machine, is out of sight.
+/// Rounds to 12 digits, because the last bits of a power depend on the machine.
 fn round(number: f64) -> f64 {
     format!("{number:.11e}").parse().unwrap_or(number)
 }
 
-/// Whole numbers without a point, as fields that count want them.
+/// Writes a whole number without a decimal point, as integer fields require.
 fn plain(number: f64) -> Value {
-    /// Above it, not every whole number is a double.
+    /// Above this limit, not every whole number is a double.
     const WHOLE: f64 = 9_007_199_254_740_992.0;
     if number.fract() == 0.0 && number.abs() <= WHOLE { Value::from(number as i64) } else { Value::from(number) }
 }

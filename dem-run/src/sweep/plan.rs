@@ -1,4 +1,4 @@
-//! From a sweep file to the scenes of its runs, each of them checked before any is run.
+//! From a sweep file to the scenes of its runs. All scenes are checked before the first run.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fmt::Write as _;
@@ -13,7 +13,7 @@ use crate::error::RunError;
 use crate::scene::parse::{self, Document};
 use crate::scene::{self, Base, Change, Origin, Problem, Sample, Scene, SceneError, shorten};
 
-/// Runs of a sweep, at most: each is a file.
+/// Maximum number of runs of a sweep: each run has its own files.
 const MOST_RUNS: u64 = 100_000;
 
 /// The runs of a sweep, in their order.
@@ -21,13 +21,13 @@ const MOST_RUNS: u64 = 100_000;
 pub struct Plan {
     /// The sweep file.
     pub sweep: PathBuf,
-    /// The scene that all runs start from.
+    /// The base scene of all runs.
     pub scene: PathBuf,
     /// The fields that are varied.
     pub fields: Vec<String>,
     /// The runs, no two of the same scene.
     pub runs: Vec<PlannedRun>,
-    /// The place of each digest among the runs.
+    /// The index of the run with each digest.
     places: HashMap<String, usize>,
 }
 
@@ -38,7 +38,7 @@ pub struct PlannedRun {
     pub values: BTreeMap<String, Value>,
     /// The scene with these values.
     pub scene: Scene,
-    /// What stands for the scene: two scenes with one digest give the same history.
+    /// Digest of the scene: two scenes with the same digest give the same history.
     pub digest: String,
 }
 
@@ -49,11 +49,10 @@ impl Plan {
         self.runs.get(*self.places.get(digest)?)
     }
 
-    /// Reads a sweep file and the scene that it names, and puts every value in.
+    /// Reads a sweep file and the scene that it names, and sets the values of every run.
     ///
     /// # Errors
-    /// [`RunError::Scene`] with all that is wrong; [`RunError::Content`] for files that cannot be
-    /// read.
+    /// [`RunError::Scene`] with all errors; [`RunError::Content`] for files that cannot be read.
     pub fn read(path: &Path) -> Result<Self, RunError> {
         let unreadable = |path: &Path, what, error: std::io::Error| {
             let source = error.into();
@@ -68,7 +67,7 @@ impl Plan {
         }
         let scene = path.parent().unwrap_or(Path::new("")).join(&sweep.scene);
         let base = Base::read(&scene).map_err(|error| match error {
-            // the user named the sweep, and may not know the scene
+            // the user named only the sweep: the message says where the scene is named
             SceneError::Read { .. } => RunError::InputOutput(format!("{} names a scene: {error}", path.display())),
             error => error.into(),
         })?;
@@ -93,7 +92,7 @@ fn wrong(document: &Document, problems: Vec<Problem>) -> RunError {
     document.wrong(problems.into_iter().map(named).collect()).into()
 }
 
-/// What is wrong with the sweep itself, without a look at the scene.
+/// The errors of the sweep itself, independent of the scene.
 fn validate(sweep: &Sweep) -> Vec<Problem> {
     let mut problems = vec![];
     if sweep.vary.is_empty() {
@@ -104,7 +103,7 @@ fn validate(sweep: &Sweep) -> Vec<Problem> {
         ));
     }
     let mut count = Some(1u64);
-    // every field with the place that gives its values
+    // every field with the place of its values
     let mut given: Vec<(&str, String)> = sweep.set.keys().map(|path| (path.as_str(), format!("set.{path}"))).collect();
     for (k, fields) in sweep.vary.iter().enumerate() {
         let place = format!("vary.{k}");
@@ -193,7 +192,7 @@ fn together(k: usize, fields: &BTreeMap<String, Values>) -> Vec<Vec<Change>> {
     (0..length).map(|n| columns.iter().map(|column| column[n].clone()).collect()).collect()
 }
 
-/// Every run, or all that is wrong with any.
+/// All runs, or all their errors.
 fn runs(sweep: &Sweep, base: &Base, scene: &Path) -> Result<Vec<PlannedRun>, Vec<Problem>> {
     let set: Vec<Change> = (sweep.set.iter())
         .map(|(path, value)| Change { path: path.clone(), value: value.clone(), place: format!("set.{path}") })
@@ -217,7 +216,7 @@ fn runs(sweep: &Sweep, base: &Base, scene: &Path) -> Result<Vec<PlannedRun>, Vec
             Err(wrong) => {
                 for problem in wrong {
                     let (key, problem) = located(problem, &changes, scene, &values);
-                    // the same value is wrong in many runs
+                    // a wrong value is reported once, not for every run
                     if told.insert(key) {
                         problems.push(problem);
                     }
@@ -231,7 +230,8 @@ fn runs(sweep: &Sweep, base: &Base, scene: &Path) -> Result<Vec<PlannedRun>, Vec
     if problems.is_empty() { Ok(runs) } else { Err(problems) }
 }
 
-/// A problem of a run's scene as one of the sweep, with a key that finds repetitions in other runs.
+/// Converts a problem of a run's scene to one of the sweep, with a key that identifies repetitions
+/// in other runs.
 fn located(
     problem: Problem,
     changes: &[Change],
@@ -242,7 +242,7 @@ fn located(
     if let Some(Origin::Sweep(place)) = origin {
         let place = String::from(place);
         let change = changes.iter().find(|change| change.place == place);
-        // a part of the value, or a name on the way to it
+        // the problem is in a part of the value or in a parent of the field
         let found = if change.is_some_and(|change| change.path == path) { found } else { format!("{path}: {found}") };
         let key = [place.clone(), path, allowed.clone()];
         return (key, Problem::new(place, found, allowed).with_nearest(nearest));
@@ -255,7 +255,7 @@ fn located(
     ([path, found, allowed.clone()], Problem::new("scene", shown, allowed).with_nearest(nearest))
 }
 
-/// Two runs that would be the same.
+/// The error that two runs have the same scene.
 fn same_scene(runs: &[PlannedRun]) -> Option<Problem> {
     let mut first: HashMap<&str, &PlannedRun> = HashMap::new();
     runs.iter().find_map(|run| {
@@ -266,7 +266,7 @@ fn same_scene(runs: &[PlannedRun]) -> Option<Problem> {
     })
 }
 
-/// A run in which several walls are driven and none is named as the load wall.
+/// The error that a run has several driven walls and no load wall.
 fn load_unknown(runs: &[PlannedRun]) -> Option<Problem> {
     let (run, names) = runs.iter().find_map(|run| Some((run, run.scene.load_unknown()?)))?;
     let found =
@@ -275,7 +275,7 @@ fn load_unknown(runs: &[PlannedRun]) -> Option<Problem> {
     Some(Problem::new("scene", found, allowed))
 }
 
-/// The values of a run in a line: `bonds.strength = 5, seed = 1`.
+/// The values of a run on one line: `bonds.strength = 5, seed = 1`.
 pub fn describe(values: &BTreeMap<String, Value>) -> String {
     values
         .iter()
@@ -284,15 +284,15 @@ pub fn describe(values: &BTreeMap<String, Value>) -> String {
         .join(", ")
 }
 
-/// What a sample file holds.
+/// The content of a sample file.
 fn content(path: &Path) -> std::io::Result<Vec<u8>> {
     let mut bytes = vec![];
     scene::open_regular(path)?.read_to_end(&mut bytes)?;
     Ok(bytes)
 }
 
-/// SHA-256 of all that a scene's history depends on: the scene without its title, and the grains of
-/// its sample file in place of the file's name.
+/// SHA-256 of all data that determine a scene's history: the scene without its title, and the
+/// content of its sample file instead of the file's name.
 fn digest(scene: &Scene, samples: &mut HashMap<PathBuf, Vec<u8>>) -> String {
     let mut plain = Scene { schema: None, title: None, ..scene.clone() };
     let mut hash = Sha256::new();
@@ -345,7 +345,7 @@ mod tests {
         let digests = |vary: &str| plan(vary).expect("plan").runs.into_iter().map(|run| run.digest).collect::<Vec<_>>();
         let a = digests(r#""vary": [{"seed": [1, 2]}]"#);
         assert_ne!(a[0], a[1]);
-        // a default that is spelt out, another title: the same run
+        // an explicit default or another title gives the same run
         assert_eq!(a, digests(r#""set": {"title": "another", "rupture": "cascade"}, "vary": [{"seed": [1, 2]}]"#));
         assert_ne!(a, digests(r#""set": {"thickness": 0.02}, "vary": [{"seed": [1, 2]}]"#));
     }

@@ -1,7 +1,7 @@
-//! Which results of an earlier start of a sweep still agree with the sweep file.
+//! Reconciles the results of an earlier start of a sweep with the sweep file.
 //!
-//! A run is known by the digest of its scene, not by its place in the sweep. So values may be added
-//! anywhere: runs that are there keep their numbers, new ones get the next.
+//! A run is identified by the digest of its scene, not by its position in the sweep. Values may
+//! therefore be added anywhere: existing runs keep their numbers, new runs get the next ones.
 
 use std::collections::HashSet;
 use std::fs;
@@ -14,13 +14,13 @@ use crate::history::sweep::{Entry, Manifest, Store};
 use crate::scene::parse::join;
 use crate::scene::shorten;
 
-/// Runs that are named in a refusal.
+/// Maximum number of runs that an error names.
 const MOST_TOLD: usize = 10;
 
-/// The manifest of the plan, with the numbers of runs that are there already.
+/// The manifest of the plan, in which existing runs keep their numbers.
 ///
 /// # Errors
-/// Results that the plan no longer gives, unless they may be given up.
+/// Results that are no longer part of the plan, unless `give_up`.
 pub fn reconcile(store: &Store, plan: &Plan, give_up: bool) -> Result<Manifest, RunError> {
     let mut manifest = Manifest::new(&plan.sweep, &plan.scene, plan.fields.clone());
     let old = store.manifest()?;
@@ -78,7 +78,7 @@ fn refusal(store: &Store, told: &[String]) -> RunError {
     ))
 }
 
-/// What differs between the scene that was run and the one that would be.
+/// The difference between the scene of the earlier run and that of the plan.
 fn difference(store: &Store, id: &str, run: &PlannedRun) -> String {
     let before = fs::read(store.path(id, ".json")).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
     let now = run.scene.to_json().ok().and_then(|text| serde_json::from_str::<Value>(&text).ok());
@@ -89,7 +89,7 @@ fn difference(store: &Store, id: &str, run: &PlannedRun) -> String {
 }
 
 fn first_difference(path: &str, before: &Value, now: &Value) -> Option<(String, String, String)> {
-    // these change no run
+    // these fields change no results
     if before == now || matches!(path, "title" | "$schema" | "sample.file.path") {
         return None;
     }

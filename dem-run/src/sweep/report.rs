@@ -1,4 +1,4 @@
-//! What a sweep tells: a summary for people, a table for programs.
+//! The results of a sweep: a text summary, and a table for programs.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -11,7 +11,7 @@ use crate::error::RunError;
 use crate::history::sweep::{Entry, Manifest, State, Store};
 use crate::output::number;
 
-/// Columns of the table that come from the summary of a run: name, and place in the summary.
+/// Columns of the table from the summary of a run: name, and path in the summary.
 const MEASURED: [(&str, &str); 15] = [
     ("ending", "/ending"),
     ("steps", "/steps"),
@@ -30,7 +30,7 @@ const MEASURED: [(&str, &str); 15] = [
     ("missed_tolerance", "/missed_tolerance"),
 ];
 
-/// Brings the states in the manifest up to date and writes it, with the table of runs.
+/// Updates the states in the manifest and writes manifest and table of runs.
 ///
 /// # Errors
 /// A file cannot be written.
@@ -41,10 +41,10 @@ pub fn write(store: &Store, manifest: &mut Manifest) -> Result<(), RunError> {
     Ok(store.write("runs.csv", &table)?)
 }
 
-/// `runs.csv`: a row for each run; what a run has no value for is empty.
+/// `runs.csv`: a row for each run; missing values are empty.
 ///
 /// # Errors
-/// None that is known: the table is made in memory.
+/// None known: the table is made in memory.
 fn table(manifest: &Manifest, summary: &dyn Fn(&str) -> Option<Value>) -> Result<Vec<u8>, RunError> {
     let mut writer = csv::Writer::from_writer(vec![]);
     let fields = manifest.fields.iter().map(String::as_str);
@@ -76,7 +76,7 @@ fn plain(value: &Value) -> String {
     }
 }
 
-/// How a sweep stands.
+/// Progress of a sweep.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Standing {
     /// Its folder.
@@ -98,7 +98,7 @@ impl Standing {
     }
 }
 
-/// Failed runs that are told one by one.
+/// Maximum number of failed runs that are reported individually.
 const MOST_TOLD: usize = 20;
 
 impl fmt::Display for Standing {

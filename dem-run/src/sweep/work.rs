@@ -1,7 +1,7 @@
-//! Carrying runs out: each as a process of its own, some at a time.
+//! Carries out runs, each in its own process, several at a time.
 //!
-//! A process, not a thread: one that runs out of memory or crashes inside the HDF5 library ends
-//! alone, and its threads, its processor time and its signals are its own.
+//! Processes, not threads: a run that runs out of memory or crashes in the HDF5 library does not
+//! end the others, and each run has separate threads, processor time and signals.
 
 use std::fs::{self, File};
 use std::io::{Read as _, Write as _};
@@ -19,28 +19,28 @@ use crate::progress::{Progress, RunsProgress};
 use crate::scene::Sample;
 use crate::signals::Interrupt;
 
-/// Pause between two looks at what has ended.
+/// Interval between two checks for ended processes.
 const PAUSE: Duration = Duration::from_millis(10);
 
-/// Pause between two writings of the manifest while runs go on.
+/// Interval between two updates of the manifest during the runs.
 const GATHERING: Duration = Duration::from_secs(2);
 
-/// A run that is to be carried out.
+/// A run to be carried out.
 #[derive(Debug, Clone, Copy)]
 pub struct Job<'a> {
     /// Its number.
     pub id: &'a str,
-    /// What is run.
+    /// Its scene and values.
     pub run: &'a PlannedRun,
 }
 
 /// Carries runs out in their order, `at_a_time` at the same time, until all have ended, the sweep
 /// is interrupted, or a file cannot be written.
 ///
-/// `gather` is called every few seconds where runs have ended.
+/// `gather` is called every few seconds if runs have ended.
 ///
 /// # Errors
-/// A file that cannot be written, or a process that cannot be started. A run that fails is no
+/// A file that cannot be written, or a process that cannot be started. A failed run is not an
 /// error.
 pub fn carry_out(
     store: &Store,
@@ -74,7 +74,7 @@ pub fn carry_out(
     lock(&crew.error).take().map_or(Ok(()), Err)
 }
 
-/// What the workers share.
+/// Data shared by the workers.
 struct Crew<'a> {
     store: &'a Store,
     jobs: &'a [Job<'a>],
@@ -86,7 +86,7 @@ struct Crew<'a> {
     error: Mutex<Option<RunError>>,
 }
 
-/// The guarded data is consistent after every statement, so a panic in another thread does no harm.
+/// Ignores poisoning: the guarded data are consistent after every statement.
 fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -115,11 +115,12 @@ impl Crew<'_> {
         }
     }
 
-    /// Carries one run out; none if it was interrupted, or if another process has it.
+    /// Carries out one run; returns none if it was interrupted, or if another process carries it
+    /// out.
     fn one(&self, job: &Job<'_>) -> Result<Option<State>, RunError> {
         let (store, Job { id, run }) = (self.store, *job);
         let Some(mut scene) = store.claim(id)? else { return Ok(None) };
-        // another process may have carried it out since it was planned
+        // another process may have completed the run since it was planned
         let before = store.outcome(id).filter(|outcome| outcome.digest == run.digest);
         if before.is_some_and(|outcome| outcome.state == State::Done) && store.is_complete(id) {
             return Ok(Some(State::Done));
@@ -134,7 +135,7 @@ impl Crew<'_> {
         let status = self.wait(&mut child).map_err(|e| failed("waited for", e))?;
         let mut summary = String::new();
         if let Some(mut stdout) = child.stdout.take() {
-            // what is no text is no summary
+            // output that is not text is not a summary
             let _ = stdout.read_to_string(&mut summary);
         }
         let part = store.path(id, ".part.h5");
@@ -145,19 +146,19 @@ impl Crew<'_> {
         }
         let outcome = outcome(store, job, status, &summary, began.elapsed());
         let history = store.path(id, if outcome.state == State::Done { ".h5" } else { ".failed.h5" });
-        // there is none where a run failed before its first frame
+        // a run that failed before its first frame has no history
         if outcome.state == State::Done || part.is_file() {
             move_to(&part, &history).map_err(|e| failed("put in its place", e))?;
         }
         if outcome.state == State::Done {
             let _ = fs::remove_file(store.path(id, ".failed.h5"));
         }
-        // last: what is recorded is there
+        // last, so that a recorded run has all its files
         store.record(id, &outcome)?;
         Ok(Some(outcome.state))
     }
 
-    /// Waits for a run to end, or ends it where all is to stop.
+    /// Waits for a run to end, and terminates it if all runs must stop.
     fn wait(&self, child: &mut Child) -> std::io::Result<ExitStatus> {
         let mut asked = false;
         loop {
@@ -173,11 +174,11 @@ impl Crew<'_> {
     }
 }
 
-/// Writes the scene of a run into its file, from the start.
+/// Writes the scene of a run to the start of its file.
 fn write_scene(file: &mut File, run: &PlannedRun) -> std::io::Result<()> {
     let mut scene = run.scene.clone();
     if let Sample::File(sample) = &mut scene.sample {
-        // the file of the scene stands in another folder
+        // the scene file is in another folder
         sample.path = std::path::absolute(&sample.path)?;
     }
     file.set_len(0)?;
@@ -185,14 +186,14 @@ fn write_scene(file: &mut File, run: &PlannedRun) -> std::io::Result<()> {
     file.write_all(b"\n")
 }
 
-/// This program, also where its file has been replaced since it was started: all runs of a sweep
-/// are of one version.
+/// Path of this program, valid even if its file was replaced after the start: all runs of a sweep
+/// use the same version.
 fn this_program() -> std::io::Result<PathBuf> {
     let running = Path::new("/proc/self/exe");
     if cfg!(target_os = "linux") && running.exists() { Ok(running.into()) } else { std::env::current_exe() }
 }
 
-/// Starts `dem-run run` of a run, one thread, its errors in a file.
+/// Starts `dem-run run` with one thread and stderr in a file.
 fn start(store: &Store, id: &str) -> std::io::Result<Child> {
     let mut command = Command::new(this_program()?);
     command.arg("run").arg(store.path(id, ".json")).arg("-o").arg(store.path(id, ".part.h5"));
@@ -201,18 +202,18 @@ fn start(store: &Store, id: &str) -> std::io::Result<Child> {
     #[cfg(unix)]
     {
         use std::os::unix::process::CommandExt;
-        // Ctrl-C goes to the sweep alone, which ends its runs
+        // only the sweep receives Ctrl-C; it terminates its runs
         command.process_group(0);
     }
     command.spawn()
 }
 
-/// Asks a process to end.
+/// Sends SIGTERM to a process.
 fn terminate(child: &mut Child) {
     #[cfg(unix)]
     {
         use rustix::process::{Pid, Signal, kill_process};
-        // one that has just ended needs no asking
+        // fails only if the process has just ended
         let _ = kill_process(Pid::from_child(child), Signal::TERM);
     }
     #[cfg(not(unix))]
