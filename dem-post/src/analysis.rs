@@ -1,4 +1,4 @@
-//! What an analysis is, and how its command runs.
+//! The trait of analyses, and how their commands run.
 //!
 //! [`crate::ANALYSES`] lists all of them.
 
@@ -9,20 +9,20 @@ use serde::Serialize;
 
 use crate::output::{Folder, PostError, Result, escaped, print};
 
-/// Up to this number of files all are named on stderr.
+/// Maximum number of files for which stderr names each file.
 const MANY: usize = 24;
 
-/// An analysis as a command of `dem-post`. The type holds its options, and its doc comment is what
-/// `--help` says of it.
+/// An analysis as a command of `dem-post`. The type holds its options; its doc comment is its text
+/// in `--help`.
 pub trait Analysis: Args {
     /// Name of the command.
     const NAME: &'static str;
-    /// What it reads: a history, or several.
+    /// The input: one history or several.
     type Input;
-    /// What it finds; `--json` prints it.
+    /// The result; `--json` prints it.
     type Report: Serialize;
 
-    /// Opens what is to be read.
+    /// Opens the input.
     ///
     /// # Errors
     /// Those of opening it.
@@ -53,7 +53,7 @@ pub trait Analysis: Args {
         Ok(())
     }
 
-    /// What makes the exit code other than 0 after the report has been printed.
+    /// The error, if any, that sets the exit code after the report has been printed.
     ///
     /// # Errors
     /// [`PostError::Incomplete`] or [`PostError::Unsound`].
@@ -62,7 +62,7 @@ pub trait Analysis: Args {
     }
 }
 
-/// An analysis in the list of all: its functions, without its type.
+/// An entry of the list of analyses: its functions, without its type.
 #[derive(Clone, Copy, Debug)]
 pub struct Entry {
     /// Name of the command.
@@ -73,7 +73,7 @@ pub struct Entry {
     pub run: fn(&ArgMatches, Shown) -> Result<()>,
 }
 
-/// How results are shown.
+/// Format of the output.
 #[derive(Clone, Copy, Debug)]
 pub struct Shown {
     /// As JSON instead of a table.
@@ -115,7 +115,7 @@ fn name_files(folder: &Folder) {
     if folder.removed() > 0 {
         note(&format!("removed {} files of the history that the folder belonged to", folder.removed()));
     }
-    // of a long series only the first and the last are named
+    // for a long series stderr names only the first and the last file
     let written = folder.written();
     for (k, path) in written.iter().enumerate() {
         if written.len() <= MANY || k == 0 || k + 1 == written.len() {

@@ -17,14 +17,13 @@ struct Cli {
     quiet: bool,
 }
 
-/// The analysis that the command line asks for, its options, and how its results are shown. Wrong
-/// usage ends the process.
+/// The requested analysis, its options, and the format of its output. Wrong usage ends the process.
 pub fn parse() -> (&'static Entry, ArgMatches, Shown) {
     let mut matches = command().get_matches();
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let asked = matches.remove_subcommand();
     let found = asked.and_then(|(name, options)| Some((ANALYSES.iter().find(|one| one.name == name)?, options)));
-    // clap refuses a command line without one of these commands
+    // clap rejects a command line without one of these commands
     let (analysis, options) = found.unwrap_or_else(|| unreachable!("a command that is not listed"));
     (analysis, options, Shown { json: cli.json, quiet: cli.quiet })
 }

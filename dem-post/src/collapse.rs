@@ -1,4 +1,4 @@
-//! What follows from a load curve: collapse load, peak, work.
+//! Quantities derived from a load curve: collapse load, peak, work.
 
 use dem_history::History;
 use dem_scene::failure::in_one_piece;
@@ -12,11 +12,11 @@ const PEAK_DROP: f64 = 0.05;
 /// The kind of bonds of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bonding {
-    /// There are none.
+    /// No bonds.
     None,
-    /// They deform before they break.
+    /// Elastic: they deform before they break.
     Elastic,
-    /// They do not deform.
+    /// Rigid: they do not deform.
     Rigid {
         /// Whether they joined all grains to one piece at the start.
         one_piece: bool,
@@ -45,11 +45,11 @@ impl Bonding {
     }
 }
 
-/// Where a sample collapses.
+/// The collapse of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Collapse {
-    /// The last step before the strain exceeds its limit; `None` if it never does, and where there
-    /// is no collapse load.
+    /// The last step before the strain exceeds its limit; `None` if the strain never exceeds it or
+    /// there is no collapse load.
     pub step: Option<usize>,
     /// Whether no rigid bond had broken by then.
     pub early: bool,
@@ -59,8 +59,8 @@ pub struct Collapse {
 }
 
 impl Collapse {
-    /// Reads it off the curves, which have an entry for each step: `load` (N), `strain` (–),
-    /// `broken` bonds; `limit` is that of the strain (–).
+    /// Finds the collapse from curves with one entry per step: `load` (N), `strain` (–), `broken`
+    /// bonds; `limit` is the limit of the strain (–).
     pub fn read(load: &[f64], strain: &[f64], broken: &[f64], limit: f64, bonds: Bonding) -> Self {
         let Some(passed) = strain.iter().position(|e| e.abs() > limit) else {
             return Self { step: None, early: false, note: "" };
@@ -80,15 +80,16 @@ impl Collapse {
     }
 }
 
-/// Where the load is greatest, if it falls by at least 5 % afterwards.
+/// The step of the greatest load, if the load falls by at least 5 % afterwards.
 pub fn peak(load: &[f64]) -> Option<usize> {
     let top = (0..load.len()).max_by(|&a, &b| load[a].total_cmp(&load[b]).then(b.cmp(&a)))?;
     let lowest = load[top..].iter().copied().fold(f64::INFINITY, f64::min);
     (load[top] > 0.0 && lowest < (1.0 - PEAK_DROP) * load[top]).then_some(top)
 }
 
-/// Work of a force along a displacement from zero (J): `force` is the mean of each step (N), `way`
-/// the displacement at its end (m). The energy balance of the run sums it the same way.
+/// Work of a force along a displacement from zero (J): `force` is the mean over each step (N),
+/// `way` the displacement at the end of the step (m). The energy balance of the run uses the same
+/// sum.
 pub fn work(force: &[f64], way: &[f64]) -> f64 {
     let from = [0.0].into_iter().chain(way.iter().copied());
     force.iter().zip(way).zip(from).map(|((force, to), from)| force * (to - from)).sum()

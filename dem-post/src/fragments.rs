@@ -1,4 +1,4 @@
-//! Fragments: the pieces of a sample that intact bonds hold together.
+//! Fragments: the pieces of a sample joined by intact bonds.
 
 use std::f64::consts::PI;
 
@@ -43,7 +43,7 @@ fn pieces(count: usize, bonds: &Bonds, status: &[BondStatus]) -> Vec<usize> {
     pieces.into_labeling()
 }
 
-/// The pieces that the intact bonds of `bonds` make of grains with masses `mass` (kg).
+/// The pieces of grains with masses `mass` (kg) that are joined by the intact bonds of `bonds`.
 ///
 /// `status` has one entry per bond; bonds must name grains within `mass`.
 pub fn fragments(mass: &[f64], bonds: &Bonds, status: &[BondStatus]) -> Fragments {
@@ -62,7 +62,7 @@ pub fn fragments(mass: &[f64], bonds: &Bonds, status: &[BondStatus]) -> Fragment
     }
 }
 
-/// The same pieces one by one, the heaviest first; `position` has D numbers for each grain (m).
+/// The list of the pieces, the heaviest first; `position` has D numbers for each grain (m).
 pub fn fragment_list(sample: &Grains, position: &[f64], bonds: &Bonds, status: &[BondStatus]) -> Vec<Fragment> {
     let dimension = position.len() / sample.mass.len().max(1);
     let mut list: Vec<Option<Fragment>> = vec![None; sample.mass.len()];

@@ -1,8 +1,8 @@
-//! A series of pictures, one a frame, numbered for viewers and video encoders.
+//! A series of pictures, one per frame, numbered for viewers and video encoders.
 //!
-//! All pictures have one scale, one part of the plane, the same even number of pixels and, where a
-//! colour or a width shows a value, the same scale for it. They are read, drawn and written one by
-//! one, so a long series needs no more memory than a short one.
+//! All pictures have the same scale, the same part of the plane and the same even number of pixels.
+//! Colours and widths that represent a value have the same scale in all pictures. Frames are read,
+//! drawn and written one by one, so the memory does not grow with the length of the series.
 
 use clap::{Args, ValueEnum};
 use dem_history::{BondStatus, History, RuptureMode};
@@ -83,7 +83,7 @@ pub enum Subject {
     Speed,
 }
 
-/// Which frames, and what of them.
+/// The selected frames and their subject.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     /// What the pictures show.
@@ -100,8 +100,7 @@ pub struct Report {
 ///
 /// # Errors
 /// [`PostError::Usage`] for times outside the history or `every` of zero; [`PostError::Lacking`]
-/// for a history without frames, without bonds where bonds are to be drawn, or without any force or
-/// motion where these are.
+/// for a history without frames, or without the subject of the pictures: bonds, forces or motion.
 pub fn read(history: &History, subject: Subject, every: usize, times: &[f64]) -> Result<Report> {
     let lacking = |what: &str| PostError::Lacking { path: history.path().into(), what: what.into() };
     if every == 0 {
@@ -222,7 +221,7 @@ fn picture(history: &History, report: &Report, frame: usize) -> Result<(Panel, V
     Ok((panel, legend))
 }
 
-/// A line for each bond, in the colour of how it broke.
+/// A line for each bond, in the colour of its mode of rupture.
 fn bonds(history: &History, frame: usize, panel: &mut Panel) -> Result<Vec<Key>> {
     let (d, bonds, status) = (history.dimension(), history.bonds()?, history.bond_status(frame)?);
     let mut modes = cracks::Modes::default();
@@ -236,7 +235,7 @@ fn bonds(history: &History, frame: usize, panel: &mut Panel) -> Result<Vec<Key>>
         pair.iter().for_each(|&grain| panel.fills[grain as usize] = RELEASED.into());
         let (from, to) = (centre(panel, pair[0]), centre(panel, pair[1]));
         let distance = from.iter().zip(&to).map(|(a, b)| (b - a).powi(2)).sum::<f64>().sqrt();
-        // no long line across the sample between grains that have moved apart
+        // no line across the sample between grains that have moved apart
         if distance < 1.5 * bonds.mean_diameter[k] {
             panel.links.push(Link { from, to, width: CRACK, colour });
         }

@@ -1,4 +1,4 @@
-//! What a history holds, in about twenty lines.
+//! A summary of a history, in about twenty lines.
 
 use std::path::{Path, PathBuf};
 
@@ -31,7 +31,7 @@ pub struct Command {
     repair: bool,
 }
 
-/// What the command reports.
+/// The report of the command.
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
 pub enum Answer {
@@ -39,7 +39,7 @@ pub enum Answer {
     Contents(Box<Report>),
     /// Whether it is sound: `--check`.
     Check(check::Report),
-    /// The copy that took its place: `--repair`.
+    /// The copy that replaced it: `--repair`.
     Repair(pack::Report),
 }
 
@@ -99,7 +99,7 @@ pub struct Report {
     /// The walls: name, shape and drive.
     pub walls: Vec<[String; 3]>,
     /// The wall that loads the sample; `None` where no wall is driven, or where several are driven
-    /// and the scene names none of them.
+    /// and the scene does not name the load wall.
     pub load_wall: Option<String>,
     /// How many walls are driven.
     #[serde(skip)]
@@ -136,11 +136,11 @@ pub struct Report {
     pub friction: Option<f64>,
     /// Remainder of the energy balance, J.
     pub energy_remainder: Option<f64>,
-    /// Names of everything observed.
+    /// Names of all observables.
     pub observables: Vec<String>,
 }
 
-/// Reads what a history holds.
+/// Reads the summary of a history.
 ///
 /// # Errors
 /// Those of reading it.
@@ -271,7 +271,7 @@ impl Report {
         lines
     }
 
-    /// What was measured, one line each.
+    /// The measured values, one per line.
     fn measure_lines(&self) -> Vec<(&'static str, String)> {
         vec![
             ("contacts", self.contacts.map_or_else(|| "–".into(), |n| format!("{n} at the last frame"))),

@@ -3,8 +3,8 @@
 //! viewers.
 //!
 //! Each analysis is a module with a [`analysis::Analysis`], and an entry of [`ANALYSES`]. Its
-//! functions read a [`dem_history::History`] into a report, and write the report as CSV, SVG
-//! and PNG. Reports know nothing of files or drawings.
+//! functions read a [`dem_history::History`] into a report, and write the report as CSV, SVG and
+//! PNG. Reports do not depend on files or drawings.
 
 use analysis::Entry;
 
@@ -21,7 +21,7 @@ pub mod stress_strain;
 pub mod velocities;
 pub mod view;
 
-// what they are made of
+// their common parts
 pub mod analysis;
 pub mod check;
 pub mod cli;

@@ -1,4 +1,4 @@
-//! The moments that maps show.
+//! Selection of the frames shown in maps.
 
 use dem_history::History;
 
@@ -7,8 +7,8 @@ use crate::output::{PostError, Result};
 /// Share of broken bonds at which a map is drawn.
 const BROKEN: f64 = 0.05;
 
-/// The frames nearest to `times` (s), or, where none is given: the first after the first rupture,
-/// the first after 5 % of the bonds have broken, and the last. In order and without repetition.
+/// The frames nearest to `times` (s). Without times: the first frame after the first rupture, the
+/// first after 5 % of the bonds have broken, and the last. In order, without repetition.
 ///
 /// # Errors
 /// [`PostError::Usage`] for a time outside the history, [`PostError::Lacking`] for a history
@@ -20,7 +20,7 @@ pub fn chosen(history: &History, times: &[f64]) -> Result<Vec<usize>> {
     };
     let mut frames = vec![];
     for &time in times {
-        // this form refuses NaN too
+        // this form also rejects NaN
         if !(first..=last).contains(&time) {
             return Err(PostError::Usage(format!("--times {time}: the history runs from {first} s to {last} s")));
         }

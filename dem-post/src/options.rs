@@ -1,4 +1,4 @@
-//! Options that several commands have.
+//! Options common to several commands.
 
 use std::path::PathBuf;
 
@@ -42,8 +42,8 @@ impl Files {
         Ok(History::open(&self.history)?)
     }
 
-    /// The folder for the results of the command `command`: the one that was asked for, or the
-    /// history's own.
+    /// The folder for the results of the command `command`: the requested one, or the default of
+    /// the history.
     ///
     /// # Errors
     /// [`crate::output::PostError::Write`] for a folder that cannot be created, or that belongs to

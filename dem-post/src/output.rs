@@ -11,7 +11,7 @@ pub use dem_output::{
     Folder, Source, Text, WriteError, cell, default_folder, escaped, facts, in_shell, number, print, quantity, short,
 };
 
-/// What can go wrong in an analysis.
+/// The errors of an analysis.
 #[derive(Debug, thiserror::Error)]
 pub enum PostError {
     /// The history cannot be read.
@@ -22,19 +22,19 @@ pub enum PostError {
     Lacking {
         /// The history.
         path: PathBuf,
-        /// What is lacking, and what to do.
+        /// The missing data, and what to do.
         what: String,
     },
-    /// An argument that makes no sense.
+    /// An invalid argument.
     #[error("{0}")]
     Usage(String),
     /// The manifest of a sweep cannot be read.
     #[error(transparent)]
     Sweep(#[from] SweepError),
-    /// There are results, but not of all runs that were asked for.
+    /// Some of the requested runs have no result.
     #[error("{0}")]
     Incomplete(String),
-    /// The history breaks the promises of its layout.
+    /// The history violates its layout.
     #[error("{0}")]
     Unsound(String),
     /// A result cannot be written.
@@ -43,8 +43,8 @@ pub enum PostError {
 }
 
 impl PostError {
-    /// The exit code of this error: 1 for results that lack something, 2 for wrong usage or scene,
-    /// 4 for input and output.
+    /// The exit code of this error: 1 for incomplete results, 2 for wrong usage or scene, 4 for
+    /// input and output.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Incomplete(_) => 1,
@@ -65,8 +65,8 @@ pub(crate) fn progress(length: u64, quiet: bool, template: &str) -> ProgressBar 
     bar
 }
 
-/// A history as the source of results: its path, and the properties of its run that stay the same
-/// while the run goes on and when the history is packed.
+/// A history as the source of results: its path, and the properties of its run that do not change
+/// while the run continues or when the history is packed.
 ///
 /// # Errors
 /// Those of reading it.

@@ -1,4 +1,4 @@
-//! Copies that replace a history: compressed, for keeping, or plain, to repair the file of a killed
+//! Copies that replace a history: compressed for archiving, or plain to repair the file of a killed
 //! run.
 
 use std::path::{Path, PathBuf};
@@ -47,12 +47,12 @@ impl Analysis for Command {
     }
 }
 
-/// The copy that was made.
+/// The copy.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
     /// The copy.
     pub file: String,
-    /// Its frames, all that were complete.
+    /// Its frames: all complete frames of the history.
     pub frames: usize,
     /// Length of the history before, bytes.
     pub before: u64,
@@ -77,7 +77,8 @@ impl Report {
 /// Copies `history` to `path`, which may be its own, with a bar unless `quiet`.
 ///
 /// # Errors
-/// A history that is being written or damaged, a disk without room; `path` is then as it was.
+/// The history is being written or is damaged, or the disk is full; the file at `path` is then
+/// unchanged.
 pub fn write(history: &History, path: &Path, how: CopyAs, quiet: bool) -> Result<Report> {
     const STEPS: u64 = 1000;
     let bar = progress(STEPS, quiet, "{msg} {bar:40} {percent} %  {eta} left");

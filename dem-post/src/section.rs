@@ -1,4 +1,4 @@
-//! Sections of the page that `dem-post report` writes: text, figures, tables.
+//! Sections of the page of `dem-post report`: text, figures, tables.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -12,7 +12,7 @@ const CHART: (f64, f64) = (500.0, 400.0);
 /// Pixels of a map per unit of its drawing.
 const PIXELS: f32 = 2.0;
 
-/// The report of an analysis that has a section of the page.
+/// The report of an analysis with a section on the page.
 pub trait OnPage {
     /// Anchor of the section in the page.
     const ID: &'static str;
@@ -26,7 +26,7 @@ pub trait OnPage {
     fn section(&self, history: &History, frames: &[usize]) -> Result<Section>;
 }
 
-/// A part of the page with a head of its own.
+/// A section of the page.
 #[derive(Default)]
 pub struct Section {
     /// Its anchor in the page.
@@ -49,8 +49,8 @@ impl Section {
         Self { id: R::ID, title: R::TITLE, ..Self::default() }
     }
 
-    /// The maps and then the charts, each with the name of their kind; kinds without a picture are
-    /// left out.
+    /// The maps and then the charts, each with the name of its kind; kinds without a picture are
+    /// omitted.
     pub(crate) fn groups(&self) -> Vec<(&'static str, Vec<&Figure>)> {
         let (charts, maps): (Vec<_>, Vec<_>) = self.figures.iter().partition(|figure| figure.class == "chart");
         [("maps", maps), ("charts", charts)].into_iter().filter(|(_, figures)| !figures.is_empty()).collect()
@@ -61,11 +61,11 @@ impl Section {
 pub struct Figure {
     /// Its `data:` address.
     pub source: String,
-    /// What it shows, for those who cannot see it.
+    /// Alternative text.
     pub alt: String,
     /// The line below it.
     pub caption: String,
-    /// How much room it takes: `chart`, `map` or `wide`.
+    /// Its size class: `chart`, `map` or `wide`.
     pub class: &'static str,
 }
 

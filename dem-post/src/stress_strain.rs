@@ -1,28 +1,28 @@
 //! Force and displacement of the load wall; axial stress and strain, from the walls and from the
 //! particles.
 //!
-//! **The load wall** is the one that is asked for, else the scene's `load_wall`, else the wall of
-//! its `stop.wall_travel`, else the only driven one.
+//! **The load wall** is the requested wall, else the scene's `load_wall`, else the wall of its
+//! `stop.wall_travel`, else the only driven one.
 //!
-//! **Signs.** Everything counts positive along the load: the displacement of the wall in the sense
-//! in which its force does work, compressive stress and shortening under a wall that pushes,
-//! tensile stress and elongation under one that pulls. The history has stress positive in
-//! compression and strain positive in elongation.
+//! **Signs.** All quantities are positive along the load: the displacement of the wall in the sense
+//! in which its force does work; compressive stress and shortening under a wall that pushes;
+//! tensile stress and elongation under a wall that pulls. In the history stress is positive in
+//! compression and strain is positive in elongation.
 //!
-//! **Size of the sample.** Height H along the drive and cross-section A across it are those of the
-//! box around all grains at the first frame; in 2D, A is the width times the scene's `thickness`.
-//! Only a plane that moves along its normal has a section: of a round loader no stress or strain is
-//! reported from the walls.
+//! **Size of the sample.** Height H along the drive and cross-section A perpendicular to it are
+//! those of the box around all grains at the first frame; in 2D, A is the width times the scene's
+//! `thickness`. Only a plane that moves along its normal has a section: for a round loader no
+//! stress or strain from the walls is reported.
 //!
 //! **The load** is the prescribed force, or, where the motion is prescribed, the force of the wall
 //! on the grains before any bond broke in the step (`wall_force_at_limit`; in histories without it
 //! `wall_force`, the force after the breaks).
 //!
 //! **Collapse load** (under an ever-growing force there is no peak): the load at the last step
-//! before the strain fitted to the grains exceeds 1e-4; also reported at 1e-3. There is none where
-//! no load acted in that step, nor where elastic bonds reached that strain before any broke. If
-//! rigid bonds join all grains to one piece and none has broken by then, the strain is solver error
-//! and the load is meaningless: the tables note this, and the drawings leave the load out.
+//! before the strain fitted to the grains exceeds 1e-4; also reported at 1e-3. There is no collapse
+//! load where no load acted in that step, or where elastic bonds reached that strain before any
+//! broke. If rigid bonds join all grains to one piece and none has broken by then, the strain is
+//! solver error and the load is meaningless: the tables note this, and the drawings omit the load.
 
 use std::path::Path;
 
@@ -46,7 +46,7 @@ use dem_drawing::{Chart, Style, colour};
 const COLLAPSE: [f64; 2] = [1e-4, 1e-3];
 /// Share of broken bonds whose load is reported.
 const BROKEN: f64 = 0.05;
-/// Least strain that the logarithmic axis shows.
+/// Least strain on the logarithmic axis.
 const LEAST_STRAIN: f64 = 1e-9;
 
 /// Force–displacement, stress–strain, the collapse load.
@@ -85,7 +85,7 @@ impl Analysis for Command {
     }
 }
 
-/// The results in numbers. `None`: it did not happen, or was not recorded.
+/// The results in numbers. `None`: the event did not occur, or the quantity was not recorded.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Summary {
     /// The load wall.
@@ -103,9 +103,9 @@ pub struct Summary {
     pub collapse_time: Option<f64>,
     /// Load before the fitted strain exceeds 1e-3, N.
     pub collapse_load_1e3: Option<f64>,
-    /// Whether no rigid bond had broken by each of the two.
+    /// Whether no rigid bond had broken by each of the two steps.
     pub collapse_early: [bool; 2],
-    /// A caveat on each of the two, or the reason why there is none.
+    /// A caveat on each of the two loads, or the reason why there is none.
     #[serde(skip)]
     pub collapse_note: [&'static str; 2],
     /// Load when 5 % of the bonds have broken, N.
@@ -136,7 +136,7 @@ pub struct Summary {
     pub worst_residual: Option<f64>,
 }
 
-/// The curves, one entry per observed step, and what follows from them; JSON has the summary.
+/// The curves, one entry per observed step, and their summary; JSON contains only the summary.
 #[derive(Clone, Debug, Default, Serialize)]
 #[serde(transparent)]
 pub struct Report {
@@ -164,22 +164,22 @@ pub struct Report {
     /// Bonds broken; empty if not recorded.
     #[serde(skip)]
     pub broken: Vec<f64>,
-    /// What follows.
+    /// The summary.
     pub summary: Summary,
 }
 
 /// Reads the curves of the wall `wall`, or of the load wall.
 ///
 /// # Errors
-/// [`PostError::Lacking`] for a scene without a driven wall or without its force and place at every
-/// step; [`PostError::Usage`] for a wall that is none, or where several are driven and the scene
-/// names none of them as the load wall.
+/// [`PostError::Lacking`] for a scene without a driven wall, or without its force and position at
+/// every step; [`PostError::Usage`] for an unknown or fixed wall, or where several walls are driven
+/// and the scene does not name the load wall.
 pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
     let walls = history.walls()?;
     let scene = history.parameters()?.scene;
     let k = driven(history.path(), &walls, &scene, wall)?;
     let direction = walls[k].direction;
-    // the axis along which a direction points most
+    // the axis nearest to a direction
     let axis_of = |direction: &[f64; 3]| {
         let size = |&d: &usize| direction[d].abs();
         (0..history.dimension()).max_by(|a, b| size(a).total_cmp(&size(b))).unwrap_or(0)
@@ -195,7 +195,7 @@ pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
     let mut report = Report {
         displacement: motion.way.iter().map(|x| motion.sense * x).collect(),
         load: motion.load.iter().map(|f| motion.sense * f).collect(),
-        // the grains push back
+        // the reaction of the grains has the opposite sign
         reaction: motion.reaction.iter().map(|f| -motion.sense * f).collect(),
         strain: tensor("strain")?.iter().map(|e| -push * e).collect(),
         stress: tensor("stress")?.iter().map(|s| push * s).collect(),
@@ -220,7 +220,7 @@ pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
     Ok(report)
 }
 
-/// What the driven wall does, along its direction and with the signs of that direction.
+/// Motion and forces of the driven wall along its direction, with the signs of that direction.
 struct Motion {
     step: Vec<i64>,
     time: Vec<f64>,
@@ -264,7 +264,7 @@ fn sense(values: &[f64]) -> f64 {
     values.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(1.0).signum()
 }
 
-/// The component along `direction` of a vector that is observed for each wall.
+/// The component along `direction` of a vector observed for each wall.
 fn along(history: &History, series: &Series, wall: usize, direction: &[f64; 3], name: &str) -> Result<Vec<f64>> {
     let mut sum = vec![0.0; series.step.len()];
     for d in 0..history.dimension() {
@@ -288,7 +288,7 @@ pub(crate) fn load_wall<'a>(walls: &'a [Wall], scene: &str) -> (Vec<&'a str>, Op
     (driven, chosen)
 }
 
-/// The load wall: the one asked for, or that of the scene.
+/// The load wall: the requested one, or that of the scene.
 fn driven(path: &Path, walls: &[Wall], scene: &str, asked: Option<&str>) -> Result<usize> {
     let (driven, chosen) = load_wall(walls, scene);
     let names = || driven.join(", ");
@@ -328,7 +328,7 @@ fn component(history: &History, series: &Series, index: &[usize], name: &str) ->
     })
 }
 
-/// Place of wall `k` along the drive at the first frame, m.
+/// Position of wall `k` along the drive at the first frame, m.
 fn start_of(history: &History, k: usize, direction: &[f64; 3]) -> Result<f64> {
     let d = history.dimension();
     if history.frames() == 0 {
@@ -535,8 +535,8 @@ pub fn force_displacement(report: &Report) -> Chart {
     chart
 }
 
-/// The load over the logarithm of the fitted strain: it shows how little the sample deforms before
-/// it collapses.
+/// The load over the logarithm of the fitted strain: it shows the small strains before the
+/// collapse.
 pub fn onset(report: &Report) -> Option<Chart> {
     let visible = |&(strain, _): &(f64, f64)| strain >= LEAST_STRAIN;
     let points: Vec<(f64, f64)> =

@@ -1,11 +1,11 @@
 //! Velocity field: speeds and directions of the grains, at some moments.
 //!
-//! The map fills each grain with the colour of its speed, relative to the speed v that 99 % of the
-//! grains of the panel do not exceed. Each panel has its own v: speeds grow by orders of magnitude
-//! in a collapse, and one scale would leave all but one panel dark. Arrows show the mean velocity
-//! of the grains in each square of a grid, so that a large sample stays legible. An arrow begins at
-//! the mean of the centres; the longest of a panel is as long as a square is wide. So colours and
-//! arrows compare grains within one panel; the captions compare panels.
+//! The colour of a grain shows its speed relative to v, the 99th percentile of the speeds in the
+//! panel. Each panel has its own v: speeds grow by orders of magnitude in a collapse, and one scale
+//! would leave all but one panel dark. Arrows show the mean velocity of the grains in each square
+//! of a grid, so that a large sample stays legible. An arrow begins at the mean of the centres; the
+//! longest arrow of a panel is as long as a square is wide. So compare grains within one panel by
+//! colours and arrows, and panels by their captions.
 
 use clap::Args;
 use dem_history::{GrainState, History};
@@ -74,7 +74,7 @@ pub struct Field {
     pub rms_speed: f64,
     /// Greatest speed, m/s.
     pub greatest_speed: f64,
-    /// The grain that has it.
+    /// The grain with the greatest speed.
     pub fastest: usize,
     /// Velocity of the centre of mass, m/s, D numbers.
     pub drift: Vec<f64>,
@@ -135,7 +135,7 @@ pub fn speeds(state: &GrainState, d: usize) -> Vec<f64> {
     state.velocity.chunks(d).map(|v| v.iter().map(|x| x * x).sum::<f64>().sqrt()).collect()
 }
 
-/// The speed (m/s) that 99 % do not exceed; 0 without grains.
+/// The 99th percentile of the speeds (m/s); 0 without grains.
 pub fn usual_speed(mut speeds: Vec<f64>) -> f64 {
     speeds.sort_by(f64::total_cmp);
     let place = (COVERED * speeds.len() as f64).ceil() as usize;
@@ -245,7 +245,7 @@ impl OnPage for Report {
     }
 }
 
-/// The mean velocities of the squares of a grid over disks as arrows, the longest as long as a
+/// Arrows of the mean velocities of disks in the squares of a grid; the longest is as long as a
 /// square is wide.
 fn arrows(state: &GrainState) -> Vec<Arrow> {
     let range = [0, 1].map(|k| {

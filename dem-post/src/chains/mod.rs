@@ -1,11 +1,11 @@
-//! Force chains: the network of contact forces, how the forces are distributed, and the lines of
-//! grains that carry most.
+//! Force chains: the network of contact forces, the distribution of the forces, and the lines of
+//! the most loaded grains.
 //!
 //! **Network.** A force here is the normal component r_n of a contact, positive in compression. ⟨f⟩
 //! is the mean of |r_n| over the contacts that carry a force; the strong network is the contacts
 //! with |r_n| > ⟨f⟩.
 //!
-//! **Chains** are lines of at least three grains: [`quasilinear`] says which.
+//! **Chains** are lines of at least three grains, as defined in [`quasilinear`].
 
 use clap::Args;
 use dem_history::History;

@@ -10,7 +10,7 @@ use dem_drawing::{Chart, Drawing, Style, colour};
 /// Width of a line that carries ⟨f⟩, and the greatest width, units of the drawing: of disks, and of
 /// spheres.
 const WIDTH: [(f64, f64); 2] = [(1.3, 8.0), (0.6, 4.0)];
-/// Colours of the weak network, compression and tension; of grains in chains, too.
+/// Colours of the weak network, compression and tension; also of grains in chains.
 const PALE: [&str; 2] = ["#9cc9e3", "#f0b27a"];
 /// Fill and outline of other grains.
 const GRAIN: [&str; 2] = ["#f4f4f4", "#c4c4c4"];
@@ -31,13 +31,13 @@ pub fn force_legend(d: usize) -> Vec<Key> {
     legend
 }
 
-/// Fills of the grains behind lines; of spheres none, for they would hide those.
+/// Fills of the grains behind lines; none for spheres, which would hide the lines.
 fn behind_lines(grains: usize, d: usize) -> Vec<Colour> {
     if d == 2 { vec![GRAIN[0].into(); grains] } else { vec![] }
 }
 
-/// How many chains have at least so many grains, at each moment: a chart for each kind of
-/// which there are chains of two lengths.
+/// Number of chains with at least so many grains, at each moment: one chart for each kind with
+/// chains of two or more lengths.
 pub fn length_charts(report: &Report) -> Vec<Chart> {
     let mut charts = vec![];
     for (kind, label) in [(0, "chains in compression"), (1, "chains in tension")] {
@@ -150,8 +150,8 @@ pub fn network_map(history: &History, report: &Report) -> Result<Drawing> {
     Ok(draw(&sample, &panels, &force_legend(d)))
 }
 
-/// The lines of a network, the strongest last, so that they lie on top; of spheres only those above
-/// the mean, for so many more lie behind each other.
+/// The lines of a network, the strongest last, so that they lie on top. For spheres only the lines
+/// above the mean, because many more lie behind each other.
 pub fn links(contacts: &ContactRows, position: &[f64], mean: f64, d: usize) -> Vec<Link> {
     let centre = |grain: i32| position[grain as usize * d..(grain as usize + 1) * d].to_vec();
     let (width, greatest) = WIDTH[d - 2];

@@ -4,18 +4,19 @@
 //!
 //! 1. The **load** of a grain is the greatest principal value of its mean stress, positive in
 //!    compression ([`super::stress`]); its **direction** is the axis of that value.
-//! 2. Only grains whose load exceeds the mean take part: that of all grains whose load is positive.
-//! 3. Two of them that press on each other are **linked** if the line between their centres is
-//!    within 45° of the direction of either.
+//! 2. Only grains whose load exceeds the mean load take part. The mean is over all grains with a
+//!    positive load.
+//! 3. Two such grains in contact under compression are **linked** if the line between their centres
+//!    is within 45° of the directions of both.
 //! 4. A **chain** is a line of at least three linked grains.
 //!
 //! The paper searches from grain to grain. Here each grain has two ends, one on either side of its
-//! direction, and at most one link at each: links are taken in the order of their normal force, the
-//! greatest first, where both ends are still free. So chains share no grain, and do not depend on
-//! where a search begins; where one forks, it follows the greater force. A closed ring is possible;
+//! direction, with at most one link each. Links are accepted in the order of their normal force,
+//! the greatest first, if both ends are still free. So chains share no grain and do not depend on
+//! the start of a search; at a fork a chain follows the greater force. A closed ring is possible;
 //! it is reported as a chain that begins at its first grain.
 //!
-//! Chains in **tension** are the same with all signs turned.
+//! Chains in **tension** are defined alike, with all signs reversed.
 
 use dem_history::ContactRows;
 use serde::Serialize;
@@ -43,7 +44,7 @@ impl Kind {
         if self == Self::Compression { 1.0 } else { -1.0 }
     }
 
-    /// The word for it.
+    /// Its name.
     pub fn label(self) -> &'static str {
         if self == Self::Compression { "compression" } else { "tension" }
     }
@@ -62,8 +63,7 @@ pub struct Chains {
     pub direction: Vec<[f64; 3]>,
     /// Mean load of the grains whose load is positive, Pa.
     pub mean: f64,
-    /// Share of the sum of normal forces of this kind, walls included, that the links of chains
-    /// carry.
+    /// Share of the links of chains in the sum of normal forces of this kind, walls included.
     pub share: f64,
 }
 
@@ -95,7 +95,7 @@ pub fn find(kind: Kind, contacts: &ContactRows, position: &[f64], stress: &[Tens
             links.extend(link([i, j], force, position, &direction, dimension));
         }
     }
-    // the order of the contacts decides between equal forces: the sort is stable
+    // a stable sort: equal forces keep the order of the contacts
     links.sort_by(|a, b| b.force.total_cmp(&a.force));
     let mut next: Vec<[Option<(usize, f64)>; 2]> = vec![[None; 2]; load.len()];
     for Link { grains: [i, j], ends: [a, b], force } in links {
@@ -105,7 +105,7 @@ pub fn find(kind: Kind, contacts: &ContactRows, position: &[f64], stress: &[Tens
     }
     let mut chains = lines(&next);
     chains.retain(|chain| chain.len() >= LEAST);
-    // stable again: of equal length, the one with the first grain
+    // a stable sort: chains of equal length keep the order of their first grains
     chains.sort_by_key(|chain| std::cmp::Reverse(chain.len()));
     let carried: f64 =
         chains.iter().flatten().flat_map(|&grain| next[grain]).flatten().map(|(_, force)| 0.5 * force).sum();
@@ -123,12 +123,12 @@ fn link(grains: [usize; 2], force: f64, position: &[f64], direction: &[[f64; 3]]
     (from.abs() >= COSINE && to.abs() >= COSINE).then_some(Link { grains, ends, force })
 }
 
-/// The lines that the links of each grain make, rings cut open at their first grain.
+/// The lines formed by the links of the grains; a ring is cut open at its first grain.
 fn lines(next: &[[Option<(usize, f64)>; 2]]) -> Vec<Vec<usize>> {
     let mut seen = vec![false; next.len()];
     let mut lines = vec![];
     let is_end = |grain: &usize| next[*grain].iter().flatten().count() == 1;
-    // all that has an end first; what is left then are rings
+    // open lines first; the remaining ones are rings
     let ends = (0..next.len()).filter(is_end);
     let rest = (0..next.len()).filter(|grain| next[*grain].iter().flatten().count() == 2);
     for start in ends.chain(rest) {
@@ -179,8 +179,8 @@ mod tests {
         find(kind, &contacts, &position, &stress, 2)
     }
 
-    /// A line of five disks, and five aside that hardly carry, so that the mean lies below the load
-    /// of the line.
+    /// A line of five disks, and five nearly unloaded disks beside it, so that the mean is below
+    /// the load of the line.
     fn row(turn_after: usize, degrees: f64) -> Vec<[f64; 2]> {
         let (sin, cos) = degrees.to_radians().sin_cos();
         let mut centres = vec![[0.0, 0.0]];
@@ -210,7 +210,7 @@ mod tests {
         assert!((found.share - 4.0 / 6.05).abs() < 1e-12);
         assert!((found.load[2] - 14.0 / std::f64::consts::PI).abs() < 1e-12);
         assert!(found.direction[2][0].abs() > 1.0 - 1e-12);
-        // what presses does not pull
+        // pressed grains form no chain in tension
         assert!(pressed(9, 0.0, 7.0, Kind::Tension).chains.is_empty());
     }
 
@@ -227,7 +227,7 @@ mod tests {
         for degrees in [30.0, 60.0, 80.0] {
             assert_eq!(pressed(2, degrees, 7.0, Kind::Compression).chains, [vec![0, 1, 2, 3, 4]]);
         }
-        // beyond, both branches lie on one side of the direction: one of them is taken, and two
+        // beyond, both branches lie on one side of the direction: one of them is linked, and two
         // grains are too few
         assert_eq!(pressed(2, 100.0, 7.0, Kind::Compression).chains, [vec![0, 1, 2]]);
     }

@@ -1,5 +1,5 @@
-//! The contact forces of some moments and the chains that carry most: the report, and how it is
-//! read from a history.
+//! The contact forces and force chains at some moments: the report, and how it is computed from a
+//! history.
 
 use dem_history::{ContactRows, History};
 use serde::Serialize;
@@ -9,7 +9,7 @@ use super::stress::{grain_stress, thickness};
 use crate::moments;
 use crate::output::{PostError, Result, Text, number};
 
-/// A contact carries a force if it has at least this share of the greatest.
+/// A contact carries a force if the force is at least this share of the greatest one.
 pub(super) const CARRIES: f64 = 1e-9;
 /// Width of a bin of |f|/⟨f⟩, and the least number of forces in one.
 const BIN: f64 = 0.25;
@@ -106,7 +106,7 @@ pub struct Report {
 ///
 /// # Errors
 /// [`PostError::Usage`] for times outside the history; [`PostError::Lacking`] where no contact
-/// carries a force at any of them, or where forces were not recorded.
+/// carries a force at any of these moments, or where forces were not recorded.
 pub fn read(history: &History, times: &[f64]) -> Result<Report> {
     require_reactions(history)?;
     let mut networks = vec![];
@@ -122,10 +122,10 @@ pub fn read(history: &History, times: &[f64]) -> Result<Report> {
     Ok(Report { networks })
 }
 
-/// Refuses a history without the reactions of its contacts.
+/// Rejects a history without the reactions of its contacts.
 ///
 /// # Errors
-/// [`PostError::Lacking`] where its scene left them out.
+/// [`PostError::Lacking`] where the scene excluded them.
 pub fn require_reactions(history: &History) -> Result<()> {
     if history.has_reactions() {
         return Ok(());
@@ -154,8 +154,8 @@ fn network(history: &History, frame: usize) -> Result<Network> {
     })
 }
 
-/// Normal force of each contact, N, positive in compression; zero where it is negligible beside the
-/// greatest tangential force, that is, solver error.
+/// Normal force of each contact, N, positive in compression; zero where it is negligible relative
+/// to the greatest tangential force, that is, solver error.
 pub fn normal_forces(contacts: &ContactRows) -> Vec<f64> {
     let greatest = (0..contacts.len()).map(|c| contacts.tangential_force(c)).fold(0.0, f64::max);
     let force = |c| Some(contacts.normal_force(c)).filter(|f| f.abs() > CARRIES * greatest).unwrap_or(0.0);
@@ -187,7 +187,7 @@ fn figures(chains: &Chains, grains: usize) -> ChainFigures {
     }
 }
 
-/// Magnitudes of the forces that count.
+/// Magnitudes of the forces above the threshold.
 fn carried(forces: &[f64]) -> Vec<f64> {
     let greatest = forces.iter().fold(0.0f64, |max, f| max.max(f.abs()));
     forces.iter().map(|f| f.abs()).filter(|&f| f > CARRIES * greatest).collect()
@@ -221,7 +221,7 @@ pub fn statistics(forces: &[f64]) -> Statistics {
 
 /// Density of |f|/⟨f⟩, as (middle of the bin, density); its integral is 1.
 ///
-/// Bins are 1/4 wide; where fewer than five forces fall into one, it is widened until that many do.
+/// Bins are 1/4 wide; a bin with fewer than five forces is widened until it has at least five.
 pub fn distribution(forces: &[f64], mean: f64) -> Vec<(f64, f64)> {
     let mut ratios: Vec<f64> = carried(forces).iter().map(|f| f / mean).collect();
     ratios.sort_by(f64::total_cmp);
@@ -232,7 +232,7 @@ pub fn distribution(forces: &[f64], mean: f64) -> Vec<(f64, f64)> {
     while let Some(last) = rest.last() {
         let enough = rest[rest.len().min(LEAST) - 1];
         let mut high = low + BIN * ((enough - low) / BIN).floor() + BIN;
-        // too few forces would be left for a bin of their own
+        // the remaining forces would be too few for another bin
         if rest.len() - rest.partition_point(|&ratio| ratio < high) < LEAST {
             high = low + BIN * ((last - low) / BIN).floor() + BIN;
         }
@@ -274,7 +274,7 @@ impl Report {
         table.lines() + "\n" + &self.chain_table()
     }
 
-    /// The chains at each moment, one kind a line, as [`CHAIN_HEAD`] has them.
+    /// The chains at each moment, one kind per line, in the columns of [`CHAIN_HEAD`].
     pub fn chain_rows(&self) -> Vec<Vec<String>> {
         let rows = self.networks.iter().flat_map(|network| network.chain_figures.iter().map(|f| (network.time, f)));
         let row = |(time, f): (f64, &ChainFigures)| {

@@ -70,7 +70,7 @@ fn force(contacts: &ContactRows, c: usize, d: usize) -> [f64; 3] {
 /// The greatest principal value of a symmetric tensor and its unit direction, by Jacobi's
 /// rotations.
 ///
-/// The direction of a repeated value is one of the possible ones.
+/// For a repeated value the direction is one of the possible ones.
 pub fn major(tensor: &Tensor, dimension: usize) -> (f64, [f64; 3]) {
     let (mut a, mut v) = (*tensor, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
     for _ in 0..12 {

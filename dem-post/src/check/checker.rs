@@ -1,4 +1,4 @@
-//! A history under examination: how its datasets are read, and what is noted of them.
+//! A history under examination: reading of its datasets and record of the violations.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -8,7 +8,7 @@ use indicatif::ProgressBar;
 
 use super::report::{Report, Violation};
 
-/// Violations of one place that are listed; the others are counted.
+/// Maximum number of violations listed per place; the others are counted.
 pub(super) const MANY: usize = 10;
 /// Numbers read at once.
 const BLOCK: usize = 1 << 20;
@@ -20,8 +20,8 @@ pub(super) struct Checker {
     /// Whether it holds a complete checkpoint.
     pub resumable: bool,
     pub report: Report,
-    /// Datasets of the type and shape that the layout promises, with the rows that are complete and
-    /// the numbers in each.
+    /// Datasets with the type and shape of the layout, with the number of complete rows and of
+    /// numbers per row.
     pub sound: BTreeMap<String, [usize; 2]>,
     pub told: BTreeMap<String, usize>,
     pub bar: ProgressBar,
@@ -65,7 +65,7 @@ impl Checker {
         places.iter().all(|place| self.sound.contains_key(*place))
     }
 
-    /// Rows `range` of a sound dataset; what cannot be read is a violation.
+    /// Rows `range` of a sound dataset; a failure to read is a violation.
     pub fn rows<T: H5Type>(&mut self, place: &str, range: Range<usize>) -> Option<Vec<T>> {
         if !self.sound.contains_key(place) || range.is_empty() {
             return Some(vec![]).filter(|_| self.sound.contains_key(place));
@@ -88,7 +88,7 @@ impl Checker {
         }
     }
 
-    /// Hands the complete rows of a sound dataset to `see`, block by block, with the number of the
+    /// Passes the complete rows of a sound dataset to `see`, block by block, with the index of the
     /// first row.
     pub fn blocks<T: H5Type>(&mut self, place: &str, mut see: impl FnMut(&mut Self, usize, &[T])) {
         let Some(&[rows, width]) = self.sound.get(place) else { return };

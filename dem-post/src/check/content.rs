@@ -17,7 +17,7 @@ const RADIUS: &str = "particles/grains/radius";
 const STATUS: &str = "bonds/status/value";
 const RUPTURE: &str = "events/rupture";
 const ROUTE: &str = "observables/solver_route/value";
-/// Codes of an intact bond and of a contact that is one.
+/// Codes of an intact bond and of a bonded contact.
 const INTACT: u8 = 0;
 const BONDED: u8 = 3;
 /// Tolerance on the squared norm of a unit vector: round-off of single precision.
@@ -25,7 +25,7 @@ const UNIT: f64 = 1e-5;
 /// Relative tolerance on the time of a rupture between its frames.
 const SAME_TIME: f64 = 1e-9;
 
-/// A rupture as the file holds it, with its mode as a number.
+/// A rupture as the file stores it, with its mode as a number.
 #[derive(Clone, Copy, H5Type)]
 #[repr(C)]
 struct Event {
@@ -45,7 +45,7 @@ struct Event {
     mode: i32,
 }
 
-/// The twisting moment of a rupture, which layouts before version 3 lack.
+/// The twisting moment of a rupture; absent before version 3 of the layout.
 #[derive(Clone, Copy, H5Type)]
 #[repr(C)]
 struct Twist {
@@ -55,7 +55,7 @@ struct Twist {
 /// For each broken bond: the first frame that does not show it intact, and its state there.
 type Broken = BTreeMap<usize, (usize, u8)>;
 
-/// Checks the content of all datasets that are sound by type and shape.
+/// Checks the content of all datasets of valid type and shape.
 pub(super) fn check(c: &mut Checker) {
     let steps = order(c);
     let rows = committed(c);
@@ -72,8 +72,8 @@ pub(super) fn check(c: &mut Checker) {
     events(c, &steps, &pairs, &broken);
 }
 
-/// Steps and times grow, and those of every quantity are those of the frames. The steps of the
-/// frames.
+/// Checks that steps and times increase, and that those of every quantity equal those of the
+/// frames. Returns the steps of the frames.
 fn order(c: &mut Checker) -> Vec<i64> {
     for (step, time) in [(STEP, TIME), ("observables/step", "observables/time")] {
         grows::<i64>(c, step);
@@ -93,7 +93,7 @@ fn order(c: &mut Checker) -> Vec<i64> {
     c.rows(STEP, 0..c.sizes.t).unwrap_or_default()
 }
 
-/// The time of a step is its number times the time step.
+/// Checks that the time of a step is its number times the time step.
 fn keeps_time(c: &mut Checker, step: &str, time: &str) {
     let Some(&[rows, _]) = c.sound.get(step) else { return };
     let steps = c.rows::<i64>(step, 0..rows).unwrap_or_default();
@@ -119,7 +119,7 @@ fn grows<T: H5Type + PartialOrd + Copy + std::fmt::Display>(c: &mut Checker, pla
     });
 }
 
-/// Checks that `place` has the same values as `other`. As a rule it is a hard link to it.
+/// Checks that `place` has the same values as `other`. Usually it is a hard link to `other`.
 fn alike<T: H5Type + PartialEq>(c: &mut Checker, place: &str, other: &str) {
     let token = |c: &Checker, place: &str| c.file.loc_info_by_name(place).map(|info| info.token).ok();
     if token(c, place).is_some() && token(c, place) == token(c, other) {
@@ -135,8 +135,9 @@ fn alike<T: H5Type + PartialEq>(c: &mut Checker, place: &str, other: &str) {
     });
 }
 
-/// Rows complete at each frame: they never become fewer, contacts follow each other without gaps.
-/// First row and number of the contacts of each frame, where they can be trusted.
+/// Checks the rows complete at each frame: their number never decreases, and contacts follow each
+/// other without gaps. Returns the first row and the number of the contacts of each frame, where
+/// these are valid.
 fn committed(c: &mut Checker) -> Vec<[u64; 2]> {
     let t = c.sizes.t;
     let mut committed = |name: &str| -> Vec<u64> {
@@ -169,7 +170,7 @@ fn committed(c: &mut Checker) -> Vec<[u64; 2]> {
     found
 }
 
-/// Every number of every dataset of floats is finite and of a plausible magnitude.
+/// Checks that every number of every dataset of floats is finite and of a plausible magnitude.
 fn numbers(c: &mut Checker) {
     let whole = |place: &str| {
         ["step", "start", "count", "pair", "id", "bond"].contains(&place.rsplit('/').next().unwrap_or(""))
@@ -196,7 +197,7 @@ fn numbers(c: &mut Checker) {
     }
 }
 
-/// Every code is one of the first `many`.
+/// Checks that every code is one of the first `many`.
 fn codes(c: &mut Checker, place: &str, many: u8) {
     c.blocks::<u8>(place, |c, start, values| {
         for (k, code) in values.iter().enumerate().filter(|(_, code)| **code >= many) {
@@ -209,8 +210,8 @@ fn no_number(value: f64) -> String {
     if value.is_finite() { format!("{value:e} is no plausible number") } else { format!("{value} is no finite number") }
 }
 
-/// Sizes are positive, quantities that may be zero are not negative; no radius is of another scale
-/// than all others.
+/// Checks that radii, masses and diameters are positive, that inertia and bond parameters are not
+/// negative, and that no radius is far larger than the median.
 fn signs(c: &mut Checker) {
     for place in [RADIUS, "particles/grains/mass", "bonds/mean_diameter"] {
         every(c, place, |value| (value <= 0.0).then(|| format!("{value} is not positive")));
@@ -235,7 +236,7 @@ fn every(c: &mut Checker, place: &str, wrong: impl Fn(f64) -> Option<String>) {
     });
 }
 
-/// Every grain is near the sample.
+/// Checks that every grain is near the sample.
 fn places(c: &mut Checker) {
     let Sizes { d, n, t, .. } = c.sizes;
     if !c.is_sound(&[POSITION, RADIUS]) || n == 0 || t == 0 {
@@ -254,7 +255,7 @@ fn places(c: &mut Checker) {
     });
 }
 
-/// Directions are unit vectors: of contacts, of planes and cylinders, of drives.
+/// Checks that the directions of contacts, of planes and cylinders, and of drives are unit vectors.
 fn directions(c: &mut Checker) {
     let Sizes { d, w, .. } = c.sizes;
     let is_unit = |v: &[f64]| (v.iter().map(|x| x * x).sum::<f64>() - 1.0).abs() <= UNIT;
@@ -293,7 +294,7 @@ fn bond_pairs(c: &mut Checker) -> Vec<[i32; 2]> {
     pairs
 }
 
-/// A bond changes from intact to one mode of rupture, once.
+/// Checks that a bond changes at most once, from intact to one mode of rupture.
 fn states(c: &mut Checker) -> Broken {
     let b = c.sizes.b;
     let (mut last, mut broken) = (vec![INTACT; b], Broken::new());
@@ -317,8 +318,8 @@ fn states(c: &mut Checker) -> Broken {
     broken
 }
 
-/// Contacts name bodies and bonds that exist; a bonded contact has an intact bond between its
-/// grains.
+/// Checks that contacts name existing bodies and bonds, and that a bonded contact has an intact
+/// bond between its grains.
 fn contacts(c: &mut Checker, rows: &[[u64; 2]], pairs: &[[i32; 2]], broken: &Broken) {
     let Sizes { n, w, .. } = c.sizes;
     for (frame, [start, count]) in rows.iter().enumerate() {
@@ -362,8 +363,8 @@ fn contacts(c: &mut Checker, rows: &[[u64; 2]], pairs: &[[i32; 2]], broken: &Bro
     }
 }
 
-/// Ruptures are in the order of their steps and complete at the right frames; each broken bond has
-/// exactly one, at the frame where its state changes.
+/// Checks that ruptures are in the order of their steps and complete at the right frames, and that
+/// each broken bond has exactly one rupture, at the frame where its state changes.
 fn events(c: &mut Checker, steps: &[i64], pairs: &[[i32; 2]], broken: &Broken) {
     let complete = c.rows::<u64>("commit_rows/events", 0..c.sizes.t).unwrap_or_default();
     let times = c.rows::<f64>(TIME, 0..c.sizes.t).unwrap_or_default();
@@ -405,7 +406,7 @@ fn events(c: &mut Checker, steps: &[i64], pairs: &[[i32; 2]], broken: &Broken) {
     });
     if c.sound.get(RUPTURE).is_some_and(|[_, members]| *members == schema::RUPTURE.len()) {
         c.blocks::<Twist>(RUPTURE, |c, start, events| {
-            // copies of histories that lack it have not a number there
+            // copies of histories without this moment have NaN
             let wrong = |event: &&Twist| !event.twist.is_nan() && !is_plausible(event.twist);
             for (k, event) in events.iter().enumerate().filter(|(_, event)| wrong(event)) {
                 c.wrong(RUPTURE, Some(start + k), no_number(event.twist));
@@ -417,7 +418,7 @@ fn events(c: &mut Checker, steps: &[i64], pairs: &[[i32; 2]], broken: &Broken) {
     }
 }
 
-/// How an event and the states of its bond disagree; `None` if they agree.
+/// The contradiction between an event and the states of its bond, if any.
 fn disagreement(
     event: &Event,
     frame: usize,

@@ -1,8 +1,8 @@
-//! Whether a history is what its layout promises: `dem-post info --check`.
+//! Check of a history against its layout: `dem-post info --check`.
 //!
 //! First every dataset is checked by name, type, shape and unit, then its content, block by block,
-//! so that memory does not grow with the file. Later checks rely only on what earlier ones found
-//! sound: a dataset of another shape is reported once and not read.
+//! so that memory does not grow with the file. Later checks use only datasets that earlier checks
+//! found sound: a dataset of another shape is reported once and not read.
 
 use std::collections::BTreeMap;
 
@@ -21,8 +21,8 @@ mod schema;
 /// Checks a history; with a bar on a terminal unless `quiet`.
 ///
 /// # Errors
-/// [`crate::output::PostError::Write`] where the file cannot be opened once more. What is wrong in
-/// the file is listed in the report.
+/// [`crate::output::PostError::Write`] where the file cannot be opened once more. Violations in the
+/// file are listed in the report.
 pub fn read(history: &History, quiet: bool) -> Result<Report> {
     let mode = if history.open_ended() { OpenMode::ReadSWMR } else { OpenMode::Read };
     let file = File::open_as(history.path(), mode)

@@ -1,4 +1,4 @@
-//! What was checked in a history, and what is wrong with it.
+//! The report of a check of a history.
 
 use std::collections::BTreeMap;
 
@@ -6,29 +6,29 @@ use serde::Serialize;
 
 use crate::output::{PostError, Result, facts};
 
-/// What was checked, and what is wrong.
+/// The extent of the check, and the violations.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Report {
     /// The file.
     pub file: String,
     /// Number of frames.
     pub frames: usize,
-    /// Datasets that were found as promised.
+    /// Datasets that conform to the layout.
     pub datasets: usize,
     /// Numbers that were read.
     pub numbers: u64,
-    /// What is wrong, at most ten of each place.
+    /// The violations, at most ten per place.
     pub violations: Vec<Violation>,
-    /// What is wrong beyond that, by place.
+    /// The number of further violations, by place.
     pub more: BTreeMap<String, usize>,
 }
 
-/// Something that should not be.
+/// A violation of the layout.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Violation {
     /// The dataset, group or attribute.
     pub place: String,
-    /// The row of it, counted from 0; for series and contacts over time, of the whole dataset.
+    /// Its row, counted from 0; for series and contacts over time, the row of the whole dataset.
     pub row: Option<usize>,
     /// What is wrong.
     pub what: String,

@@ -19,7 +19,7 @@ const TEXT: TypeDescriptor = TypeDescriptor::VarLenUnicode;
 pub(super) const RUPTURE: [&str; 16] =
     ["step", "time", "x", "y", "z", "rn", "rt", "m", "twist", "energy", "round", "bond", "i", "j", "mode", "pad"];
 
-/// Checks names, types, shapes and units; datasets as promised are marked as sound, and their
+/// Checks names, types, shapes and units; datasets that conform are marked as sound, and their
 /// content is checked afterwards.
 pub(super) fn check(c: &mut Checker) {
     identity(c);
@@ -40,7 +40,7 @@ pub(super) fn check(c: &mut Checker) {
     checkpoint(c);
 }
 
-/// The type of the reals of frames (`output.precision`): all are as the positions are.
+/// The type of the reals of frames (`output.precision`): all have the type of the positions.
 fn reals(c: &Checker) -> TypeDescriptor {
     let positions = c.dataset("particles/grains/position/value");
     let found = positions.and_then(|positions| positions.dtype().and_then(|dtype| dtype.to_descriptor()).ok());
@@ -57,8 +57,8 @@ fn bytes(names: impl Iterator<Item = &'static str>) -> TypeDescriptor {
     codes(IntSize::U1, false, 0, names)
 }
 
-/// Whether a type of the file is read as this one: the same, or an enumeration from before its last
-/// members were added.
+/// Whether a type of the file is read as this one: the same type, or an older enumeration without
+/// its last members.
 fn is_read_as(found: &TypeDescriptor, kind: &TypeDescriptor) -> bool {
     match (found, kind) {
         (TypeDescriptor::Enum(found), TypeDescriptor::Enum(kind)) => {
@@ -69,7 +69,7 @@ fn is_read_as(found: &TypeDescriptor, kind: &TypeDescriptor) -> bool {
     }
 }
 
-/// A type for people.
+/// A readable name of a type.
 fn name(kind: &TypeDescriptor) -> String {
     match kind {
         TypeDescriptor::Enum(codes) => {
@@ -96,7 +96,7 @@ impl Checker {
         }
     }
 
-    /// The shape of a dataset, if it is there and of this type.
+    /// The shape of a dataset, if it exists and has this type.
     fn typed(&mut self, place: &str, kind: &TypeDescriptor) -> Option<Vec<usize>> {
         let Some(dataset) = self.dataset(place) else {
             self.wrong(place, None, "is missing");
@@ -128,8 +128,8 @@ impl Checker {
         self.wrong(place, None, what);
     }
 
-    /// Checks a quantity over time: its values, and its steps and times, which are those of the
-    /// frames.
+    /// Checks a quantity over time: its values, its steps and its times. The steps and times are
+    /// those of the frames.
     fn element(&mut self, place: &str, kind: &TypeDescriptor, row: &[usize], unit: &str) {
         let t = self.sizes.t;
         self.table(&format!("{place}/value"), kind, t, row, unit);
@@ -143,7 +143,7 @@ impl Checker {
         self.rows::<u64>(place, last..last + 1).and_then(|rows| rows.first().copied()).unwrap_or(0) as usize
     }
 
-    /// The length of a list that only its own shape gives.
+    /// The length of a list, known only from its own shape.
     fn count(&mut self, place: &str) -> usize {
         self.dataset(place).and_then(|dataset| dataset.shape().first().copied()).unwrap_or(0)
     }
@@ -231,7 +231,7 @@ fn walls(c: &mut Checker) {
     c.sizes.w = c.count("walls/name");
     let Sizes { d, w, .. } = c.sizes;
     c.table("walls/name", &TEXT, w, &[], "");
-    // texts have no numbers to be read
+    // texts contain no numbers to check
     c.sound.remove("walls/name");
     c.table("walls/kind", &bytes(WallKind::ALL.iter().map(|kind| kind.label())), w, &[], "");
     c.table("walls/drive", &bytes(WallDrive::ALL.iter().map(|drive| drive.label())), w, &[], "");
@@ -306,7 +306,7 @@ fn contacts(c: &mut Checker) {
     if bonded {
         c.table("contacts/bond", &I32, m, &[], "");
     }
-    // a history may do without reactions (`output.reactions`): then it has none of their datasets
+    // reactions are optional (`output.reactions`): without them all their datasets are absent
     if ["reaction", "tangent", "moment"].iter().any(|name| c.has(&format!("contacts/{name}"))) {
         reactions(c, &real);
     }
@@ -317,7 +317,7 @@ fn reactions(c: &mut Checker, real: &TypeDescriptor) {
     let tangential = bonded
         || c.has("contacts/tangent")
         || c.dataset("contacts/reaction").is_some_and(|r| {
-            // without bonds the friction decides
+            // without bonds this depends on friction
             r.shape().get(1) != Some(&1)
         });
     c.table("contacts/reaction", real, m, &[if tangential { d } else { 1 }], "N");
@@ -348,7 +348,7 @@ fn observables(c: &mut Checker) {
         let place = format!("observables/{name}/value");
         let routes = || bytes(SolverRoute::ALL.iter().map(|route| route.label()));
         let kind = if name == ROUTE { routes() } else { F64 };
-        // the shape and the unit of an observable are its own
+        // each observable has its own shape and unit
         let Some(shape) = c.typed(&place, &kind) else { continue };
         if shape.first().is_none_or(|&rows| rows < s) {
             c.wrong(&place, None, format!("has shape {shape:?}, and {s} rows are promised"));
@@ -360,7 +360,7 @@ fn observables(c: &mut Checker) {
     }
 }
 
-/// The two slots of the state from which the run goes on. A checksum guards the content: one slot
+/// The two slots of the state from which the run resumes. A checksum protects the content: one slot
 /// may be incomplete, if the run was killed while writing it.
 fn checkpoint(c: &mut Checker) {
     c.table("checkpoint/index", &U64, 2, &[4], "");
@@ -369,7 +369,7 @@ fn checkpoint(c: &mut Checker) {
             let place = format!("checkpoint/{name}_{slot}");
             let rows = c.count(&place);
             c.table(&place, kind, rows, &[], "");
-            // the checksum covers them, they are not read one by one
+            // the checksum covers these numbers; they are not checked individually
             c.sound.remove(&place);
         }
     }

@@ -46,7 +46,7 @@ pub fn write(a: &History, report: &Report, folder: &mut Folder) -> Result<()> {
     Ok(())
 }
 
-/// Distances over time; those of zero cannot be shown on its logarithmic axis.
+/// Distances over time; the logarithmic axis cannot show zero distances.
 fn distance_chart(report: &Report) -> Chart {
     let mut chart = Chart::new("time (s)", "distance of the grains' places (radii)");
     chart.log_y = report.gaps.iter().any(|gap| gap.greatest > 0.0);

@@ -1,13 +1,13 @@
-//! Where two runs of one sample part: their scenes, their frames, their broken bonds, their curves.
+//! The differences between two runs of one sample: scenes, frames, broken bonds, curves.
 //!
-//! * **Frames** are compared at equal times. The distance of two frames is the greatest distance of
-//!   a grain's centres in the two, over the grain's radius. They differ if it exceeds the
-//!   tolerance, by default zero: equal then means equal in every bit.
-//! * **Bonds** are known by their two grains. Events are compared in their order: the first that
-//!   differs is the first place at which the two lists have another bond or another mode.
+//! * **Frames** are compared at equal times. The distance of two frames is the greatest distance
+//!   between the two centres of a grain, relative to its radius. Frames differ if their distance
+//!   exceeds the tolerance. The default tolerance is zero: equal then means equal in every bit.
+//! * **Bonds** are identified by their two grains. Events are compared in order: the first
+//!   difference is the first place at which bond or mode differ between the two lists.
 //!
-//! Grains are compared by number, so the two samples must have equally many. Other differences of
-//! the samples are allowed and reported.
+//! Grains are compared by number, so the two samples must have the same number of grains. Other
+//! differences of the samples are allowed and reported.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! Where two runs part: the report, and how it is read from their histories.
+//! The differences between two runs: the report, and how it is computed from their histories.
 
 use std::collections::BTreeMap;
 
@@ -12,25 +12,25 @@ use crate::stress_strain;
 /// Times closer than this share of the later one are equal: the clocks of two time steps round
 /// differently.
 const SAME_TIME: f64 = 1e-9;
-/// Differences of the scenes, and bonds, that the table shows.
+/// Maximum number of differences of the scenes, and of bonds, in the table.
 const SHOWN: usize = 12;
 
-/// How far the two runs are apart at a time that both have.
+/// The distance of the two runs at a common time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Gap {
     /// Time, s.
     pub time: f64,
     /// Frames of the two runs.
     pub frames: [usize; 2],
-    /// Greatest distance of a grain's two places over its radius.
+    /// Greatest distance between a grain's two positions, over its radius.
     pub greatest: f64,
-    /// The grain that has it.
+    /// The grain with the greatest distance.
     pub grain: usize,
     /// Root of the mean square over all grains.
     pub rms: f64,
 }
 
-/// A break, reduced to what is compared.
+/// A break, reduced to the data compared.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Break {
     /// Time, s.
@@ -57,7 +57,7 @@ pub struct Fate {
 /// The first place at which the lists of breaks differ.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Parting {
-    /// Number of breaks before it that are alike.
+    /// Number of equal breaks before it.
     pub alike: usize,
     /// The break of the first run; `None` if its list ends.
     pub a: Option<Break>,
@@ -74,26 +74,26 @@ pub struct Curve {
     pub wall: [Vec<f64>; 2],
 }
 
-/// Where two runs part.
+/// The differences between two runs.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     /// The two files.
     pub files: [String; 2],
     /// Distance over radius up to which frames count as equal.
     pub tolerance: f64,
-    /// Where the scenes differ.
+    /// The differences between the scenes.
     pub scene: Vec<Difference>,
     /// Whether the grains have the same radii, and the same bonds were formed.
     pub same_sample: bool,
-    /// Where the two runs end, s: breaks are compared up to the earlier of the two.
+    /// The ends of the two runs, s: breaks are compared up to the earlier end.
     pub ends: [f64; 2],
-    /// How far the runs are apart, at each time that both have.
+    /// The distance of the runs at each common time.
     pub gaps: Vec<Gap>,
-    /// The first of these that differs by more than the tolerance.
+    /// The first distance that exceeds the tolerance.
     pub first_difference: Option<Gap>,
     /// Bonds that broke in both runs, only in the first, only in the second.
     pub broken: [usize; 3],
-    /// The first place at which the lists of breaks differ; `None` if they are alike.
+    /// The first place at which the lists of breaks differ; `None` if the lists are equal.
     pub parting: Option<Parting>,
     /// For each bond that broke: its break in each run.
     #[serde(skip)]
@@ -110,7 +110,7 @@ pub struct Report {
 ///
 /// # Errors
 /// [`PostError::Lacking`] for runs of another dimension, another number of grains, or without a
-/// common time; [`PostError::Usage`] for a tolerance that is negative or no number.
+/// common time; [`PostError::Usage`] for a tolerance that is negative or NaN.
 pub fn read(a: &History, b: &History, tolerance: f64) -> Result<Report> {
     if tolerance.is_nan() || tolerance < 0.0 {
         return Err(PostError::Usage(format!("--tolerance {tolerance}: give 0 or more, in radii")));
@@ -158,7 +158,7 @@ pub fn read(a: &History, b: &History, tolerance: f64) -> Result<Report> {
     })
 }
 
-/// The distances at all times that both runs have a frame of.
+/// The distances at all times for which both runs have a frame.
 fn gaps(a: &History, b: &History, radius: &[f64]) -> Result<Vec<Gap>> {
     let mut gaps = vec![];
     for (frame, &time) in a.times().iter().enumerate() {
@@ -200,7 +200,7 @@ fn breaks(ruptures: &[Rupture]) -> Vec<Break> {
     ruptures.iter().map(of).collect()
 }
 
-/// What became of each bond that broke, in the order of its grains.
+/// The breaks of each bond that broke, in the order of its grains.
 fn fates(breaks: &[Vec<Break>; 2]) -> Vec<Fate> {
     let mut fates: BTreeMap<[i32; 2], Fate> = BTreeMap::new();
     for (run, list) in breaks.iter().enumerate() {
@@ -265,7 +265,7 @@ impl Report {
 }
 
 impl Report {
-    /// Up to when breaks are compared, in words.
+    /// The time up to which breaks are compared, in words.
     fn until(&self) -> String {
         let [a, b] = self.ends;
         let time = quantity(Some(a.min(b)), "s");
@@ -291,7 +291,7 @@ fn parting_line(parting: &Parting) -> String {
     format!("after {} alike: A {}, B {}", parting.alike, side(parting.a), side(parting.b))
 }
 
-/// A value of a scene that fits a line.
+/// A value of a scene, shortened to fit a line.
 fn shortened(text: &str) -> String {
     let mut short: String = text.chars().take(40).collect();
     if short.len() < text.len() {

@@ -13,8 +13,8 @@ use dem_drawing::Chart;
 use dem_output::row;
 
 /// Writes `ruptures.csv`, `broken.csv`, `fragments.csv` and `fragment-list.csv`, and as drawings
-/// `broken`, `fragments`, `fragment-map` and `decohesion`, of spheres also `decohesion-inside`;
-/// that list and these maps show the moments nearest to `times` (s), or chosen ones. Where cracks
+/// `broken`, `fragments`, `fragment-map` and `decohesion`, for spheres also `decohesion-inside`.
+/// The list and the maps are at the moments nearest to `times` (s), or at chosen ones. Where cracks
 /// were found, also `cracks.csv`, `crack-growth.csv`, and the drawings `cracks` and, where one grew
 /// step by step or round by round, `crack-front`; in 2D `crack-segments.csv`, `crack-front.csv`
 /// and, where the cracks fill a small part of the sample, the drawing `cracks-near`; in 3D
@@ -152,7 +152,7 @@ fn write_surfaces(report: &Report, folder: &mut Folder) -> Result<()> {
     Ok(folder.table("cracks", &head, rows)?)
 }
 
-/// A table of the facets, and the same with their corners as poly data that ParaView opens.
+/// A table of the facets, and the facets with their corners as poly data for ParaView.
 fn write_facets(report: &Report, folder: &mut Folder) -> Result<()> {
     let head = [
         "crack", "step", "time_s", "round", "bond", "mode", "area_m2", "normal_x", "normal_y", "normal_z", "x_m",

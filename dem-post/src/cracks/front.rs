@@ -1,14 +1,14 @@
 //! The front of a crack: its position along the direction of the path, break by break.
 //!
 //! A crack here is one of the final cracks: its parts count as one crack even before they meet.
-//! Positions are measured from where its first bond broke, along the line between the ends of its
-//! path, positive towards the end that broke later. The **front** is the greatest position that a
-//! broken segment reaches, the **back** the least. All breaks of one step have the same time; the
-//! round of the cascade gives them an order, not a speed. So each row is a round, and a **speed**
-//! is the mean speed of the tip since the last time at which the crack grew.
+//! Positions are measured from its first break along the line between the ends of its path,
+//! positive towards the end that broke later. The **front** is the greatest position reached by a
+//! broken segment, the **back** the least. All breaks of one step have the same time; the rounds of
+//! the cascade define an order, not a speed. So each row is a round, and a **speed** is the mean
+//! speed of the tip since the last time at which the crack grew.
 //!
-//! The **growth**, in contrast, lists the cracks as they are after each round, joined only by bonds
-//! that have broken so far. Where two cracks meet, the largest grows by the size of the other.
+//! The **growth**, in contrast, lists the cracks after each round, joined only by bonds that have
+//! broken so far. Where two cracks meet, the largest grows by the size of the other.
 
 use dem_history::Rupture;
 use petgraph::unionfind::UnionFind;
@@ -36,8 +36,8 @@ pub struct Front {
     pub back: f64,
     /// Position of the front tip, m, at least 0.
     pub front: f64,
-    /// Speed of the rear tip away from the origin, m/s. Only the last round of a time has it, and
-    /// not the first time.
+    /// Speed of the rear tip away from the origin, m/s. Only the last round of a time has a speed;
+    /// the first time has none.
     pub back_speed: Option<f64>,
     /// Speed of the front tip away from the origin, m/s.
     pub front_speed: Option<f64>,
@@ -91,7 +91,7 @@ fn speeds(rows: &mut [Front]) {
     }
 }
 
-/// The cracks after a round of breaks, as they are then.
+/// The cracks after a round of breaks.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Growth {
     /// Step.
@@ -106,7 +106,7 @@ pub struct Growth {
     pub cracks: usize,
     /// Length (m) or area (m²) of all of them.
     pub size: f64,
-    /// That of the largest.
+    /// Length or area of the largest crack.
     pub largest: f64,
 }
 

@@ -35,8 +35,8 @@ struct Bounds {
 
 /// The longest of the shortest paths: its first node and its edges. The graph must be connected.
 ///
-/// Among paths of equal length (to 1e-9) it takes the one whose ends are farthest apart, and among
-/// those (to 1e-9) the one with the lowest node indices. It leads from the lower index to the
+/// Among paths of equal length (to 1e-9) it is the one whose ends are farthest apart, and among
+/// those (to 1e-9) the one with the lowest node indices. The path leads from the lower index to the
 /// higher. `None` without an edge.
 pub(super) fn longest(ways: &Ways) -> Option<(NodeIndex, Vec<EdgeIndex>)> {
     let pairs = farthest_pairs(ways);

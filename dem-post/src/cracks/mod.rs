@@ -1,8 +1,8 @@
-//! Cracks: the bonds that broke, when, where and how; the lines they make, how these grow, and what
-//! they leave of the sample.
+//! Cracks: time, place and mode of the broken bonds; the cracks that they form, the growth of the
+//! cracks, and the fragments of the sample.
 //!
-//! What a crack, its path and its front are: [`paths`] and [`front`] in 2D; in 3D a crack is a
-//! surface, [`surfaces`].
+//! Definitions: of cracks, paths and fronts in 2D, [`paths`] and [`front`]; of cracks as surfaces
+//! in 3D, [`surfaces`].
 
 use clap::Args;
 use dem_history::History;

@@ -1,4 +1,4 @@
-//! Broken bonds, counted by how they broke.
+//! Broken bonds, counted by mode of rupture.
 
 use dem_history::RuptureMode;
 use serde::Serialize;
@@ -17,7 +17,7 @@ pub struct Modes {
 }
 
 impl Modes {
-    /// All together.
+    /// The sum over the modes.
     pub fn total(self) -> usize {
         self.tension + self.shear + self.rolling + self.twist
     }

@@ -1,4 +1,4 @@
-//! Cracks in 2D and in 3D alike: broken bonds are parts, and parts that share a point make one
+//! Cracks in 2D and in 3D: broken bonds are parts, and parts that share a point belong to one
 //! crack.
 
 use petgraph::unionfind::UnionFind;
@@ -8,7 +8,7 @@ use petgraph::unionfind::UnionFind;
 pub struct Part<'a> {
     /// Its place in the list of ruptures.
     pub event: usize,
-    /// The points in which it meets others, at least one.
+    /// The points that it may share with other parts, at least one.
     pub nodes: &'a [usize],
     /// Its length (m) or area (m²).
     pub size: f64,
@@ -31,7 +31,7 @@ pub(super) fn groups<'a>(parts: impl Iterator<Item = Part<'a>> + Clone) -> Vec<V
     let count = nodes(parts.clone());
     let mut joined = UnionFind::<usize>::new(count);
     parts.clone().for_each(|part| join(&mut joined, part.nodes));
-    // in the order of their first bond, so that cracks of equal size have a fixed order too
+    // in the order of their first bond, so that cracks of equal size also have a fixed order
     let mut groups: Vec<(f64, Vec<usize>)> = vec![];
     let mut group_of = vec![usize::MAX; count];
     for (k, part) in parts.enumerate() {

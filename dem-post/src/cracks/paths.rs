@@ -1,16 +1,16 @@
 //! Cracks as lines, in 2D: segments of broken bonds, joined through the voids between the grains.
 //!
-//! All positions are those of the first frame: the crack is shown in the sample as it was cemented,
-//! whatever the fragments did afterwards.
+//! All positions are those of the first frame: the crack is drawn in the cemented sample,
+//! independent of the later motion of the fragments.
 //!
-//! * **Segment** of a broken bond: from the middle of the void on its one side over its point of
-//!   contact to the middle of the void on its other side (the dual edge of the bond). Between equal
-//!   disks on a lattice this is the facet that their Voronoi cells share: as long as the diameter
-//!   on a square lattice, diameter/√3 on a hexagonal one. Where there is no void, at the edge of
-//!   the sample, or where both sides are the same void, the segment ends half the pair's mean
-//!   diameter from the point of contact, perpendicular to the bond.
-//! * **Crack**: segments that meet in a void. Two broken bonds of one grain with an intact bond
-//!   between them on either side do not meet: the material between them holds.
+//! * **Segment** of a broken bond: from the middle of the void on one side through its point of
+//!   contact to the middle of the void on the other side (the dual edge of the bond). Between equal
+//!   disks on a lattice this is the common facet of their Voronoi cells: its length is the diameter
+//!   on a square lattice and diameter/√3 on a hexagonal one. Where there is no void (at the edge of
+//!   the sample), or where both sides are the same void, the segment is perpendicular to the bond
+//!   and ends half the pair's mean diameter from the point of contact.
+//! * **Crack**: segments that meet in a void. Two broken bonds of one grain that are separated on
+//!   either side by an intact bond do not meet: the material between them is intact.
 //! * **Path** of a crack: the longest of the shortest paths through it, over all pairs of its voids
 //!   and free ends; among paths of equal length the one whose ends are farthest apart. Branches
 //!   count in the length of the crack, not in that of its path.
@@ -27,14 +27,14 @@ use super::modes::Modes;
 use super::parts::{Part, groups};
 use super::voids::Voids;
 
-/// A broken bond as a line.
+/// A broken bond as a segment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Segment {
     /// Its index in the list of ruptures.
     pub event: usize,
     /// Its two nodes in the graph of cracks: voids, numbered first, or free ends.
     pub(super) nodes: [usize; 2],
-    /// From the left of the bond over its point of contact to the right, m.
+    /// Its points from the left of the bond through the point of contact to the right, m.
     pub line: [[f64; 2]; 3],
     /// Length, m.
     pub length: f64,
@@ -67,7 +67,7 @@ pub struct Crack {
     pub first: f64,
     /// Time at which its last bond broke, s.
     pub last: f64,
-    /// How its bonds broke.
+    /// Number of its bonds by mode of rupture.
     pub modes: Modes,
     /// Where the first bond broke, m.
     pub origin: [f64; 2],
@@ -85,8 +85,8 @@ pub struct Paths {
 }
 
 impl Paths {
-    /// Finds the cracks that `ruptures` make in the sample whose grains had centres `position` (m)
-    /// and radii `radius` (m) when `bonds` were formed.
+    /// Finds the cracks made by `ruptures` in a sample; `position` and `radius` are the centres and
+    /// radii of its grains (m) at the formation of `bonds`.
     pub fn find(position: &[[f64; 2]], radius: &[f64], bonds: &Bonds, ruptures: &[Rupture]) -> Self {
         let mut segments = segments(position, radius, bonds, ruptures);
         let groups = groups(parts(&segments));

@@ -15,7 +15,7 @@ use dem_drawing::{Chart, Drawing, Style, colour};
 const BONDED: &str = "#8c8c8c";
 /// Fill of grains that lost a bond: white, as in the paper.
 const RELEASED: &str = "#ffffff";
-/// Outline of grains in a map of what became of them.
+/// Outline of grains in maps of fragments and decohesion.
 const OUTLINE: &str = "#404040";
 /// Fill and outline of grains under cracks.
 const PALE: [&str; 2] = ["#f0f0f0", "#cfcfcf"];
@@ -66,12 +66,12 @@ pub fn fragment_charts(pieces: &[Pieces]) -> Vec<Chart> {
 }
 
 /// The tips of the longest cracks over time; the size of all cracks and of the largest over time;
-/// and, where a step broke bonds in several rounds, these sizes over the rounds of the step that
-/// has most of them.
+/// and, where a step broke bonds in several rounds, these sizes over the rounds of the step with
+/// the most rounds.
 pub fn front_charts(report: &Report) -> Vec<Chart> {
     let mut over_time = Chart::new("time (s)", "place of the tips along the crack (mm)");
     over_time.set_off = true;
-    // a crack whose bonds all broke at one time has no curve over time
+    // a crack has no curve over time if all its bonds broke at one time
     let grown = |crack: &&Crack| crack.first < crack.last;
     for crack in report.cracks.iter().filter(grown).take(FRONTS) {
         let rows = || report.fronts.iter().filter(|row| row.crack == crack.number);
@@ -89,7 +89,7 @@ pub fn front_charts(report: &Report) -> Vec<Chart> {
     charts
 }
 
-/// What the size of cracks is, and the factor from SI to its unit.
+/// Name of the size of cracks, and the factor from SI to its unit.
 fn size_of_cracks(report: &Report) -> (&'static str, f64) {
     if report.surfaces.is_empty() { ("length of cracks (mm)", 1e3) } else { ("area of cracks (mm²)", 1e6) }
 }
@@ -98,7 +98,7 @@ fn largest(report: &Report) -> &'static str {
     if report.surfaces.is_empty() { "the longest" } else { "the largest" }
 }
 
-/// The size of all cracks and of the largest over time, unless all broke at once.
+/// The size of all cracks and of the largest over time, unless all bonds broke at once.
 fn growth_chart(report: &Report) -> Option<Chart> {
     report.growth.first().zip(report.growth.last()).filter(|(first, last)| first.time < last.time)?;
     let (label, unit) = size_of_cracks(report);
@@ -124,7 +124,8 @@ fn cascade_chart(report: &Report) -> Option<Chart> {
     Some(chart)
 }
 
-/// Colours for when bonds broke: the time, or the round of the cascade where all broke in one step.
+/// Colours by the time of rupture, or by the round of the cascade where all bonds broke in one
+/// step.
 struct When<'a> {
     report: &'a Report,
     one_step: bool,
@@ -159,13 +160,13 @@ impl<'a> When<'a> {
         self.scale.colour(self.value(event))
     }
 
-    /// The key of the colours; a single value needs none.
+    /// The legend of the colours; a single value needs none.
     fn key(self) -> Option<Key> {
         (self.scale.low < self.scale.high).then_some(Key::Bar(self.scale))
     }
 }
 
-/// The grains of the first frame, pale, below what the caption counts.
+/// The grains of the first frame, pale; the caption gives the numbers of cracks and broken bonds.
 fn pale_panel(history: &History, report: &Report, cracks: usize) -> Result<Panel> {
     let plural = |count: usize| if count == 1 { "" } else { "s" };
     let broken = report.broken.total();
@@ -202,14 +203,14 @@ pub fn surface_maps(history: &History, report: &Report) -> Result<[Drawing; 3]> 
 
 /// The cracks over the grains of the first frame, coloured by the time at which each bond broke, or
 /// by the round of the cascade where all broke in one step. The second drawing shows the part
-/// around the cracks, where that is small.
+/// around the cracks, if this part is small.
 ///
 /// # Errors
 /// Those of reading the history.
 pub fn crack_map(history: &History, report: &Report) -> Result<(Drawing, Option<Drawing>)> {
     let when = When::of(report);
     let mut panel = pale_panel(history, report, report.cracks.len())?;
-    // the latest first, so that where the crack began is on top
+    // the latest first, so that the origin of the crack is on top
     for segment in report.paths.segments.iter().rev() {
         let [a, b, c] = segment.line.map(Vec::from);
         let (width, colour) = (WIDTHS[usize::from(!segment.on_path)], when.colour(segment.event));
@@ -226,7 +227,7 @@ pub fn crack_map(history: &History, report: &Report) -> Result<(Drawing, Option<
     Ok((draw_view(&sample, all, &panels, &legend), near))
 }
 
-/// The grains at a frame in these colours, below its time and `what`.
+/// The grains at a frame in these colours; the caption is the time and `what`.
 fn filled_panel(history: &History, frame: usize, fills: Vec<Colour>, what: String) -> Result<Panel> {
     Ok(Panel {
         caption: vec![format!("t = {} s", number(history.times()[frame])), what],
@@ -238,8 +239,8 @@ fn filled_panel(history: &History, frame: usize, fills: Vec<Colour>, what: Strin
     })
 }
 
-/// The fragments of a sample at some frames, listed in `lists` frame by frame: the heaviest in
-/// colours of their own, in the order of their masses.
+/// The fragments of a sample at some frames, listed in `lists` frame by frame: the heaviest have
+/// separate colours, in the order of their masses.
 ///
 /// # Errors
 /// Those of reading the history.

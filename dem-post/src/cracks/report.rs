@@ -1,4 +1,4 @@
-//! What became of the bonds of a run: the report, and how it is read from a history.
+//! The ruptures of a run: the report, and how it is computed from a history.
 
 use dem_history::{History, Rupture, RuptureMode};
 use serde::Serialize;
@@ -10,9 +10,9 @@ use super::surfaces::{Surface, Surfaces};
 use crate::fragments::{Fragments, fragments};
 use crate::output::{PostError, Result, Text, facts, number, progress, quantity};
 
-/// Events that the table on the terminal shows; the CSV has them all.
+/// Maximum number of events in the table on the terminal; the CSV has all.
 const SHOWN: usize = 12;
-/// Cracks that the table on the terminal shows.
+/// Maximum number of cracks in the table on the terminal.
 const CRACKS: usize = 6;
 
 /// The columns of the table of cracks.
@@ -66,15 +66,15 @@ pub struct Event {
     pub normal_force: f64,
     /// Tangential force, N.
     pub tangential_force: f64,
-    /// Bending moment, N m; in histories of before version 3 the norm of all moments.
+    /// Bending moment, N m; in histories older than version 3, norm of all moments.
     pub moment: f64,
-    /// Twisting moment, N m; unknown in histories of before version 3.
+    /// Twisting moment, N m; unknown in histories older than version 3.
     pub twist: Option<f64>,
     /// Energy released, J.
     pub energy: f64,
 }
 
-/// What became of the bonds.
+/// The ruptures, fragments and cracks of a run.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     /// Bonds at the start.
@@ -93,9 +93,9 @@ pub struct Report {
     pub cracks: Vec<Crack>,
     /// The cracks in 3D, the largest first.
     pub surfaces: Vec<Surface>,
-    /// How they grew, crack by crack.
+    /// Growth of the cracks, crack by crack.
     pub fronts: Vec<Front>,
-    /// The cracks as they were after each round of breaks.
+    /// The cracks after each round of breaks.
     pub growth: Vec<Growth>,
     /// The cracks with their segments.
     #[serde(skip)]
@@ -105,7 +105,7 @@ pub struct Report {
     pub faces: Surfaces,
 }
 
-/// Reads what became of the bonds, with a bar unless `quiet`.
+/// Reads the report, with a bar unless `quiet`.
 ///
 /// # Errors
 /// [`PostError::Lacking`] for a scene without bonds.
@@ -184,8 +184,8 @@ impl From<&Rupture> for Event {
     }
 }
 
-/// Broken bonds by mode after each time at which any broke: (time s, [tension, shear, rolling,
-/// twist]), from zero on.
+/// Cumulative number of broken bonds by mode after each time of a rupture: (time s, [tension,
+/// shear, rolling, twist]).
 pub fn broken_over_time(events: &[Event]) -> Vec<(f64, [usize; 4])> {
     let mut curve: Vec<(f64, [usize; 4])> = vec![];
     let mut count = [0; 4];
@@ -264,7 +264,7 @@ impl Report {
         table.lines() + &if rest > 0 { format!("… and {rest} more in ruptures.csv\n") } else { String::new() }
     }
 
-    /// The largest cracks, one a line, below the heads of their columns; none where nothing broke.
+    /// The largest cracks, one per line, below the titles of the columns; none without ruptures.
     pub fn crack_rows(&self) -> Option<(&'static [&'static str], Vec<Vec<String>>)> {
         let row = |place: usize, bonds: usize, modes: Modes, own: Vec<String>, times: [f64; 2]| {
             let Modes { tension, shear, rolling, twist } = modes;

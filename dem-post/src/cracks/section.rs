@@ -1,4 +1,4 @@
-//! What the page of a report shows of cracks.
+//! The section on cracks in the page of a report.
 
 use dem_history::History;
 
@@ -35,7 +35,7 @@ impl OnPage for Report {
         for &frame in frames {
             let time = number(history.times()[frame]);
             let alt = format!("Grains at t = {time} s; those that lost a bond are white.");
-            // spheres hide what breaks behind them
+            // spheres hide the breaks behind them
             let (sample, seen) = if history.dimension() == 2 {
                 (Sample::read(history)?, "")
             } else {

@@ -1,19 +1,19 @@
 //! Cracks as surfaces, in 3D: facets of broken bonds, joined where they meet.
 //!
-//! All positions are those of the first frame: the crack is shown in the sample as it was cemented,
-//! whatever the fragments did afterwards.
+//! All positions are those of the first frame: the crack is drawn in the cemented sample,
+//! independent of the later motion of the fragments.
 //!
-//! * **Facet** of a broken bond: the face that the cells of its two grains share in the power
-//!   diagram of all grains (the Voronoi diagram where they are equal), as far as it lies within
-//!   half the pair's mean diameter from the line of centres: at the edge of the sample, or beside a
-//!   large void, a cell has no end near by. Between equal spheres that touch it is d² on a cubic
-//!   lattice, of which the polygon of 24 sides around a circle of diameter d counts, and d²/(2√2)
-//!   on a close packing.
-//! * **Crack**: facets that meet in a corner, which is a point of equal power to four grains: in
-//!   the void between them, as in 2D.
-//! * **Normal**: the direction to which the facets, weighed by their areas, are most perpendicular.
-//!   **Flatness**: the mean of cos², weighed alike, of the angle between the normals of the facets
-//!   and it, 1 for a plane and 1/3 for a sphere.
+//! * **Facet** of a broken bond: the common face of the cells of its two grains in the power
+//!   diagram of all grains (the Voronoi diagram for equal grains), cut off at half the pair's mean
+//!   diameter from the line of centres. The cut is needed at the edge of the sample and beside
+//!   large voids, where cells are large or unbounded. Between touching equal spheres of diameter d
+//!   the area of the face is d² on a cubic lattice, reduced by the cut to the polygon of 24 sides
+//!   around a circle of diameter d, and d²/(2√2) in a close packing.
+//! * **Crack**: facets that meet in a corner. A corner is a point of equal power to four grains: it
+//!   lies in the void between them, as in 2D.
+//! * **Normal**: the direction that is most perpendicular to the facets, weighted by area.
+//!   **Flatness**: the area-weighted mean of cos² of the angle between this direction and the
+//!   normals of the facets; 1 for a plane and 1/3 for a sphere.
 //! * **Extent**: the greatest distance of two corners.
 //!
 //! Source of the diagram: F. Aurenhammer, *Power diagrams*, SIAM J. Comput. 16, 1987.
@@ -30,8 +30,8 @@ use crate::chains::stress::major;
 
 /// Sides of the polygon that approximates a circle.
 const SIDES: usize = 24;
-/// Two corners closer than `ONE` mean diameters are always one, two farther apart than `CELL`
-/// never; in between they are one if they lie in the same cell of a grid.
+/// Two corners closer than `ONE` mean diameters are always merged; two farther apart than `CELL`
+/// never are. In between they are merged if they lie in the same cell of a grid.
 const ONE: f64 = 1e-6;
 const CELL: f64 = 1e-4;
 
@@ -42,7 +42,7 @@ type Point = Vector3<f64>;
 pub struct Facet {
     /// Its index in the list of ruptures.
     pub event: usize,
-    /// The points in which it meets others.
+    /// The points that it may share with other facets.
     pub(super) nodes: Vec<usize>,
     /// Its corners, one after the other, m; none where the cells do not meet near the line of
     /// centres.
@@ -74,7 +74,7 @@ pub struct Surface {
     pub first: f64,
     /// Time at which its last bond broke, s.
     pub last: f64,
-    /// How its bonds broke.
+    /// Number of its bonds by mode of rupture.
     pub modes: Modes,
 }
 
@@ -88,8 +88,8 @@ pub struct Surfaces {
 }
 
 impl Surfaces {
-    /// Finds the cracks that `ruptures` make in the sample whose grains had centres `position` (m)
-    /// and radii `radius` (m) when `bonds` were formed.
+    /// Finds the cracks made by `ruptures` in a sample; `position` and `radius` are the centres and
+    /// radii of its grains (m) at the formation of `bonds`.
     pub fn find(position: &[[f64; 3]], radius: &[f64], bonds: &Bonds, ruptures: &[Rupture]) -> Self {
         let mut facets = facets(position, radius, bonds, ruptures);
         let groups = groups(parts(&facets));
@@ -142,7 +142,7 @@ fn surface(number: usize, facets: &[Facet], group: &[usize], ruptures: &[Rupture
     }
 }
 
-/// The greatest distance of two points, m; 0 of none.
+/// The greatest distance of two points, m; 0 without points.
 fn extent(points: Vec<Point>) -> f64 {
     let farthest = |from: Point| points.iter().copied().max_by(|a, b| (a - from).norm().total_cmp(&(b - from).norm()));
     let ends = points.first().and_then(|first| farthest(*first)).and_then(|end| Some((end, farthest(end)?)));
@@ -189,9 +189,9 @@ impl Neighbours {
         candidates.map(|(_, k)| *k).filter(move |k| (self.centre[*k] - point).norm() < reach)
     }
 
-    /// The face that two grains share in the power diagram, cut off at the distance `reach` (m):
-    /// the point where the line of centres passes the plane of equal power, the normal of that
-    /// plane, and the corners of the face relative to the point.
+    /// The common face of two grains in the power diagram, cut off at the distance `reach` (m): the
+    /// intersection of the line of centres with the plane of equal power, the normal of that plane,
+    /// and the corners of the face relative to the intersection.
     fn face(&self, [i, j]: [usize; 2], reach: f64) -> (Point, Point, Vec<Point>) {
         let (a, b) = (self.centre[i], self.centre[j]);
         let way = a - b;
@@ -266,7 +266,7 @@ fn facets(position: &[[f64; 3]], radius: &[f64], bonds: &Bonds, ruptures: &[Rupt
         let mean = bonds.mean_diameter[bond];
         let (middle, normal, mut polygon) = neighbours.face(bonds.pair[bond].map(|k| k as usize), mean);
         let mut nodes = vec![];
-        // corners on the rim are no corners of the diagram
+        // corners on the cut are not corners of the diagram
         for x in polygon.iter().filter(|x| x.norm() < mean) {
             for cell in cells(middle + x, diameter) {
                 let next = count;
@@ -276,7 +276,7 @@ fn facets(position: &[[f64; 3]], radius: &[f64], bonds: &Bonds, ruptures: &[Rupt
             }
         }
         if nodes.is_empty() {
-            // it meets nothing
+            // the facet meets no other
             nodes.push(count);
             count += 1;
         }
@@ -297,7 +297,7 @@ fn facets(position: &[[f64; 3]], radius: &[f64], bonds: &Bonds, ruptures: &[Rupt
     list
 }
 
-/// The cells of the grid that a point lies in, if it has the size `ONE`.
+/// The cells of the grid that meet the cube of half-width `ONE` mean diameters around a point.
 fn cells(x: Point, diameter: f64) -> Vec<[i64; 3]> {
     let ends = |k: usize| [-ONE, ONE].map(|s| ((x[k] / diameter + s) / CELL).floor() as i64);
     let mut cells = vec![[0; 3]];

@@ -1,13 +1,13 @@
-//! Voids: the holes that the grains and bonds of a 2D sample enclose.
+//! Voids: the holes enclosed by the grains and bonds of a 2D sample.
 //!
 //! Bonds between disks that touch do not cross, so the bonds are the edges of a plane graph. Its
-//! bounded faces are the voids: going round a void, one bond follows the next at each grain. The
-//! face outside the sample, and the face around a fragment inside a void, are no voids.
+//! bounded faces are the voids; the boundary of a void passes from one bond to the next at each
+//! grain. The face outside the sample and the face around a fragment inside a void are not voids.
 
-/// Area over the sum of the squared edges below which a face is that of a tree, not a void.
+/// A face with a smaller ratio of area to the sum of squared edges is that of a tree, not a void.
 const FLAT: f64 = 1e-6;
 
-/// The voids, and for each bond the two that it separates.
+/// The voids, and for each bond the two voids that it separates.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Voids {
     /// For each bond from i to j, the void on its left and on its right; `None` outside the sample.
@@ -82,7 +82,8 @@ impl<'a> Graph<'a> {
         [to[0] - from[0], to[1] - from[1]]
     }
 
-    /// The edge after `edge` around the face on its left: the first to the right of going back.
+    /// The edge after `edge` around the face on its left: the next edge clockwise from the reverse
+    /// edge.
     fn next(&self, edge: usize) -> usize {
         let back = edge ^ 1;
         let around = &self.around[self.from(back)];

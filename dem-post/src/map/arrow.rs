@@ -2,7 +2,7 @@
 
 use dem_drawing::{Canvas, colour};
 
-/// An arrow with an open head that grows with it.
+/// An arrow with an open head proportional to its length.
 pub(super) fn draw_arrow(canvas: &mut Canvas, from: (f64, f64), to: (f64, f64)) {
     let (x, y) = (to.0 - from.0, to.1 - from.1);
     let length = x.hypot(y);

@@ -3,10 +3,10 @@
 /// Lower and upper corner of a box, m.
 pub(super) type Box2 = [[f64; 2]; 2];
 
-/// The box that holds nothing.
+/// The empty box.
 pub(super) const EMPTY: Box2 = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
 
-/// The box that holds everything.
+/// The unbounded box.
 pub(super) const EVERYWHERE: Box2 = [[f64::NEG_INFINITY; 2], [f64::INFINITY; 2]];
 
 pub(super) fn around(centre: [f64; 2], radius: f64) -> Box2 {

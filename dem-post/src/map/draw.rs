@@ -12,17 +12,17 @@ use super::wall;
 
 /// Width and greatest height of one panel, units of the drawing.
 const PANEL: (f64, f64) = (400.0, 560.0);
-/// Free space around each panel.
+/// Margin around each panel.
 const MARGIN: f64 = 14.0;
 /// Height of a panel's caption, and of one row of the legend.
 const CAPTION: f64 = 44.0;
 const LEGEND: f64 = 30.0;
-/// Width of a panel where panels are stacked: samples that are much wider than high.
+/// Width of a stacked panel, for samples much wider than high.
 const WIDE: f64 = 860.0;
-/// Width over height of a sample from which on panels are stacked.
+/// Ratio of width to height of a sample above which panels are stacked.
 const STACKED: f64 = 1.6;
 /// The size of a sheet is a multiple of this, so that its PNG has an even number of pixels: video
-/// encoders ask for that.
+/// encoders require that.
 const EVEN: f64 = 4.0;
 /// Draws the panels on one scale, side by side or, if the sample is wide, above each other; with a
 /// scale bar and the legend below.
@@ -80,7 +80,7 @@ fn draw_panel(canvas: &mut Canvas, sample: &Sample, panel: &Panel, frame: &Frame
     for (wall, position) in sample.walls.iter().zip(panel.walls.position.chunks(sample.dimension)) {
         wall::draw_in_front(canvas, &sample.eye, wall, position, frame);
     }
-    // lines between grains that are drawn tiny must not run into one another
+    // lines between tiny grains must not merge
     let diameter = 2.0 * frame.scale * sample.radius.iter().sum::<f64>() / sample.radius.len() as f64;
     let widest = (0.6 * diameter).max(1.0);
     let mut patches: Vec<&Patch> = panel.patches.iter().collect();
@@ -100,12 +100,12 @@ fn draw_panel(canvas: &mut Canvas, sample: &Sample, panel: &Panel, frame: &Frame
     canvas.end_clip();
 }
 
-/// The order in which things are drawn so that what is nearer to the eye covers what is farther.
+/// The drawing order: the farthest first, so that nearer objects cover it.
 fn farthest_first<T: Copy>(things: &mut [T], depth: impl Fn(T) -> f64) {
     things.sort_by(|&a, &b| depth(b).total_cmp(&depth(a)));
 }
 
-/// Lines no wider than `widest`; in perspective the nearest last, the farther the thinner and
+/// Lines no wider than `widest`; in perspective the nearest last, and farther lines thinner and
 /// paler.
 fn draw_links(canvas: &mut Canvas, sample: &Sample, links: &[Link], frame: &Frame, widest: f64) {
     let mut line = |link: &Link, width: f64, colour: &str| {
@@ -127,7 +127,8 @@ fn draw_links(canvas: &mut Canvas, sample: &Sample, links: &[Link], frame: &Fram
     }
 }
 
-/// A grain as a disk; in perspective the paler the farther, and lit from above and the left.
+/// A grain as a disk; in perspective farther grains are paler, and the light comes from above and
+/// the left.
 fn draw_grain(canvas: &mut Canvas, sample: &Sample, panel: &Panel, grain: usize, frame: &Frame) {
     let Some(radius) = sample.seen_radius(&panel.grains, grain) else { return };
     let (at, radius) = (frame.at(sample.centre(&panel.grains, grain)), radius * frame.scale);

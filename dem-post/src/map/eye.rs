@@ -5,17 +5,18 @@ use nalgebra::Vector3;
 use super::boxes::{Box2, EMPTY, around, union};
 use super::scale::{Colour, mixed};
 
-/// How the sample is seen.
+/// A projection of the sample.
 pub(super) enum Eye {
-    /// From far away, onto two axes: in 3D along y, or against x.
+    /// Parallel projection onto two axes: in 3D along y, or against x.
     Along([usize; 2]),
-    /// From a place.
+    /// Perspective from a viewpoint.
     At(Place),
 }
 
 /// A viewpoint from which spheres are seen in perspective.
 pub(super) struct Place {
-    /// The middle of the sample, which it looks at, and half the sides of the box around it, m.
+    /// The middle of the sample, at which the eye looks, and half the sides of the box around the
+    /// sample, m.
     focus: Vector3<f64>,
     half: Vector3<f64>,
     /// Unit vectors to the right, up, and away from the eye.
@@ -24,7 +25,7 @@ pub(super) struct Place {
     ahead: Vector3<f64>,
 }
 
-/// How far the eye is, in halves of the diagonal of the box: near enough to show depth, far enough
+/// Distance of the eye, in halves of the diagonal of the box: near enough to show depth, far enough
 /// for spheres to look round.
 const FAR: f64 = 5.0;
 /// Angles to the side and above (rad).
@@ -34,11 +35,11 @@ const ABOVE: f64 = 0.3;
 const HAZE: f64 = 0.6;
 /// Share of white on a polygon that is parallel to the light.
 const SHADE: f64 = 0.6;
-/// How much larger than the sample planes are drawn.
+/// Size of a drawn plane relative to the sample.
 const BEYOND: f64 = 1.15;
 
 impl Place {
-    /// The place for a sample of these centres (m): z points up, y into the sheet.
+    /// The viewpoint for a sample with these centres (m): z points up, y into the sheet.
     pub fn of<'a>(centres: impl Iterator<Item = &'a [f64]> + Clone) -> Self {
         let corner = |pick: fn(&Vector3<f64>, &Vector3<f64>) -> Vector3<f64>| {
             centres.clone().map(Vector3::from_column_slice).reduce(|a, b| pick(&a, &b)).unwrap_or_default()
@@ -53,14 +54,14 @@ impl Place {
         (Vector3::from_column_slice(&point[..3]) - self.focus).dot(&self.ahead)
     }
 
-    /// How much larger a thing looks at this depth than in the middle of the sample.
+    /// Magnification at this depth, relative to the middle of the sample.
     fn magnified(&self, depth: f64) -> f64 {
         let far = FAR * self.half.norm();
         // points close to the eye are not magnified further
         far / (far + depth).max(0.2 * far)
     }
 
-    /// Where a point is in the picture, m.
+    /// Position of a point in the picture, m.
     pub fn flat(&self, point: &[f64]) -> [f64; 2] {
         let off = Vector3::from_column_slice(&point[..3]) - self.focus;
         [self.right, self.up].map(|axis| off.dot(&axis) * self.magnified(self.depth(point)))
@@ -85,20 +86,20 @@ impl Place {
         points.iter().fold(EMPTY, |found, point| union(found, around(self.flat(point), 0.0)))
     }
 
-    /// A colour as it looks on a flat polygon: the paler the less it faces the light, which comes
-    /// from above and the left.
+    /// The shaded colour of a flat polygon: the less the polygon faces the light, the paler. The
+    /// light comes from above and the left.
     pub fn lit(&self, colour: &str, corners: &[[f64; 3]]) -> Colour {
         let [a, b, c] = [0, 1, 2].map(|k| corners.get(k).map_or_else(Vector3::default, |x| Vector3::from(*x)));
         let facing = (b - a).cross(&(c - a)).try_normalize(0.0).map_or(1.0, |normal| normal.dot(&self.light()).abs());
         mixed(colour, SHADE * (1.0 - facing))
     }
 
-    /// Unit vector to where the light comes from.
+    /// Unit vector towards the light.
     fn light(&self) -> Vector3<f64> {
         (self.up - self.right - 1.5 * self.ahead).normalize()
     }
 
-    /// A colour as it looks from here at a point: the paler the farther.
+    /// The colour of a point seen from here: the farther, the paler.
     pub fn hazy(&self, colour: &str, point: &[f64]) -> Colour {
         let part = 0.5 * (1.0 + (self.depth(point) / self.half.norm()).clamp(-1.0, 1.0));
         mixed(colour, HAZE * part)
@@ -106,7 +107,7 @@ impl Place {
 }
 
 impl Eye {
-    /// Where a point is in the picture, m; in perspective m in the middle of the sample.
+    /// Position of a point in the picture, m; in perspective, to scale at the middle of the sample.
     pub fn flat(&self, point: &[f64]) -> [f64; 2] {
         match self {
             Self::Along(axes) => axes.map(|axis| point[axis]),
@@ -124,7 +125,7 @@ impl Eye {
         }
     }
 
-    /// How much larger a thing looks than it is.
+    /// Magnification.
     pub fn magnified(&self, point: &[f64]) -> f64 {
         match self {
             Self::Along(_) => 1.0,
@@ -132,7 +133,7 @@ impl Eye {
         }
     }
 
-    /// The place, if it sees in perspective.
+    /// The viewpoint of a perspective.
     pub fn place(&self) -> Option<&Place> {
         match self {
             Self::Along(_) => None,

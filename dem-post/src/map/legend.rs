@@ -1,11 +1,11 @@
-//! Below a map: the bar of length, and the legend in rows.
+//! The scale bar and the legend below a map.
 
 use super::arrow::draw_arrow;
 use super::scale::Scale;
 use crate::output::short;
 use dem_drawing::{Anchor, Canvas, colour};
 
-/// Length of a bar of colours, and the strips it is made of.
+/// Length of a colour bar, and the number of its strips.
 const BAR: f64 = 150.0;
 const STRIPS: usize = 50;
 /// Width of a character.
@@ -17,13 +17,13 @@ pub enum Key {
     Disk(&'static str, &'static str, String),
     /// A line of this colour and width.
     Line(&'static str, f64, String),
-    /// A bar of colours with its least and greatest value.
+    /// A colour bar with its least and greatest value.
     Bar(Scale),
     /// An arrow.
     Arrow(String),
 }
 
-/// A bar of a round length that begins at a point, at most a third of the panel wide.
+/// A scale bar of a round length that begins at a point; at most a third of the panel wide.
 pub(super) fn scale_bar(canvas: &mut Canvas, (x, y): (f64, f64), scale: f64, width: f64) {
     // beside a narrow panel the sheet has free space
     let longest = (width / 3.0).max(BAR / 2.0) / scale;
@@ -37,7 +37,7 @@ pub(super) fn scale_bar(canvas: &mut Canvas, (x, y): (f64, f64), scale: f64, wid
     canvas.text((to + 8.0, y + 5.0), &metres(length), 14, Anchor::Start);
 }
 
-/// A round length with the unit that suits it.
+/// A round length with a suitable unit.
 fn metres(length: f64) -> String {
     let (value, unit) = match length {
         l if l < 1e-3 => (l * 1e6, "µm"),
@@ -112,7 +112,7 @@ fn draw_bar(canvas: &mut Canvas, scale: &Scale, (x, y): (f64, f64)) {
     let strip = BAR / STRIPS as f64;
     for k in 0..STRIPS {
         let value = scale.low + (scale.high - scale.low) * (k as f64 + 0.5) / STRIPS as f64;
-        // strips overlap, so that no seam shows between them
+        // strips overlap, so that no seam is visible between them
         canvas.rectangle((from + k as f64 * strip, y - 7.0), (strip + 0.5, 14.0), &scale.colour(value));
     }
     canvas.text((from + BAR + 8.0, y + 5.0), &short(scale.high), 14, Anchor::Start);

@@ -1,4 +1,4 @@
-//! Maps of the sample: grains, walls and what joins them, several moments side by side on one
+//! Maps of the sample: grains, walls, contacts and bonds, several moments side by side on one
 //! scale.
 
 pub use draw::{draw, draw_view};

@@ -1,4 +1,4 @@
-//! What one panel of a map shows.
+//! Content of one panel of a map.
 
 use dem_history::{GrainState, WallState};
 
@@ -21,7 +21,7 @@ pub struct Panel {
     pub links: Vec<Link>,
     /// Arrows on top of all.
     pub arrows: Vec<Arrow>,
-    /// Polygons over the grains; what is nearer to the eye covers what is behind it.
+    /// Polygons over the grains; nearer polygons cover farther ones.
     pub patches: Vec<Patch>,
 }
 

@@ -1,5 +1,4 @@
-//! A sample as maps show it: its grains and walls, the viewpoint, and the part of the plane that is
-//! drawn.
+//! A sample in a map: its grains and walls, the viewpoint, and the part of the plane drawn.
 
 use dem_history::{GrainState, Grains, History, Wall, WallKind, WallState};
 
@@ -8,19 +7,18 @@ use super::eye::{Eye, Place};
 use super::wall;
 use crate::output::Result;
 
-/// A part of the sample smaller than this share gets a picture of its own.
+/// A part of the sample smaller than this share has a separate picture.
 const SMALL: f64 = 0.25;
 
-/// What all panels share: the grains' sizes, the walls, and the viewpoint.
+/// The common data of all panels: the grains' sizes, the walls, and the viewpoint.
 pub struct Sample {
     pub(super) radius: Vec<f64>,
     pub(super) walls: Vec<Wall>,
     pub(super) dimension: usize,
     pub(super) eye: Eye,
-    /// Depth of the plane that cuts the spheres open, m, where one does.
+    /// Depth of the plane that cuts the spheres open, m, if any.
     slice: Option<f64>,
-    /// Corners of the greatest part that is shown, m: the first frame with a margin of half its
-    /// size.
+    /// Corners of the greatest part drawn, m: the first frame with a margin of half its size.
     limits: Box2,
 }
 
@@ -29,17 +27,17 @@ pub struct Sample {
 pub struct View(pub(super) Box2);
 
 impl View {
-    /// The part that shows nothing.
+    /// The empty part.
     pub const EMPTY: Self = Self(EMPTY);
 
-    /// The smallest part that holds both.
+    /// The smallest part that contains both.
     pub fn join(self, other: Self) -> Self {
         Self(union(self.0, other.0))
     }
 }
 
 impl Sample {
-    /// Reads what all panels share.
+    /// Reads the common data of all panels.
     ///
     /// # Errors
     /// Those of [`History::grains`], [`History::walls`] and [`History::grain_state`].
@@ -55,7 +53,8 @@ impl Sample {
         Self::seen(history, Eye::Along([1, 2]))
     }
 
-    /// As [`Sample::read`] of disks; spheres are seen in perspective, and what is farther is paler.
+    /// As [`Sample::read`] of disks; spheres are seen in perspective, and farther spheres are
+    /// paler.
     ///
     /// # Errors
     /// As [`Sample::read`].
@@ -67,8 +66,8 @@ impl Sample {
         Self::seen(history, Eye::At(Place::of(first.position.chunks(3))))
     }
 
-    /// As [`Sample::read`], of spheres cut open along the plane through the middle of their first
-    /// places, or of the grain nearest to it where it cuts none.
+    /// As [`Sample::read`], of spheres cut open by a plane: through the middle of their first
+    /// positions or, where this plane cuts no grain, through the nearest grain.
     ///
     /// # Errors
     /// As [`Sample::read`].
@@ -99,7 +98,7 @@ impl Sample {
         self.eye.flat(point)
     }
 
-    /// The radius at which a grain shows, m; none where it is not cut.
+    /// The radius at which a grain is drawn, m; none where the plane does not cut it.
     pub(super) fn seen_radius(&self, state: &GrainState, grain: usize) -> Option<f64> {
         let radius = self.radius[grain];
         let place = &state.position[grain * self.dimension..];
@@ -131,7 +130,7 @@ impl Sample {
     }
 
     /// The part that contains `points` (m, D numbers each) with a margin, at least five mean
-    /// diameters wide; `None` if that is no small part of the sample.
+    /// diameters wide; `None` if this part is not small compared with the sample.
     pub fn near<'a>(&self, points: impl Iterator<Item = &'a [f64]>, all: View) -> Option<View> {
         let [low, high] = points.fold(EMPTY, |found, point| union(found, around(self.flat(point), 0.0)));
         let diameter = 2.0 * self.radius.iter().sum::<f64>() / self.radius.len() as f64;
@@ -141,7 +140,7 @@ impl Sample {
         (size(near) < SMALL * size(all.0)).then_some(View(near))
     }
 
-    /// The box around the grains, and of the round walls what is near.
+    /// The box around the grains and the near parts of round walls.
     fn extent(&self, grains: &GrainState, walls: &WallState) -> Box2 {
         let mut found = self.bounds(grains, self.limits);
         if found == EMPTY {

@@ -1,4 +1,4 @@
-//! Colour scales: colours that show a value.
+//! Colour scales: colours that represent a value.
 
 use std::borrow::Cow;
 
@@ -12,8 +12,8 @@ pub type Colour = Cow<'static, str>;
 pub enum Ramp {
     /// From dark blue to yellow: viridis. For areas.
     Areas,
-    /// From near black over red to orange: inferno without its lightest part, which a white sheet
-    /// would swallow. For lines.
+    /// From near black over red to orange: inferno without its lightest part, which is invisible on
+    /// a white sheet. For lines.
     Lines,
 }
 
@@ -48,7 +48,7 @@ impl Ramp {
 /// A range of values and its colours.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scale {
-    /// What the values are, with their unit.
+    /// The quantity, with its unit.
     pub title: String,
     /// The value of the first colour.
     pub low: f64,
@@ -59,7 +59,7 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// The colour of a value; values outside the range have that of its ends.
+    /// The colour of a value; a value outside the range has the colour of the nearer end.
     pub fn colour(&self, value: f64) -> Colour {
         let stops = self.ramp.stops();
         let span = self.high - self.low;

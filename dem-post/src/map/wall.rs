@@ -1,4 +1,4 @@
-//! How each kind of wall is drawn, and how much of the drawing it takes.
+//! Drawing of each kind of wall, and its extent in the drawing.
 
 use dem_drawing::{Canvas, colour};
 use dem_history::{Wall, WallKind};
@@ -29,14 +29,14 @@ pub(super) fn draw(canvas: &mut Canvas, eye: &Eye, wall: &Wall, position: &[f64]
     }
 }
 
-/// Draws what is in front of the grains: in perspective, the edges of a plane.
+/// Draws the parts in front of the grains: in perspective, the edges of a plane.
 pub(super) fn draw_in_front(canvas: &mut Canvas, eye: &Eye, wall: &Wall, position: &[f64], frame: &Frame) {
     if let (WallKind::Plane, Some(place)) = (wall.kind, eye.place()) {
         draw_plate(canvas, place, wall, position, frame, false);
     }
 }
 
-/// The box around a wall, as it is shown; `None` for a plane without ends.
+/// The box around a wall in the drawing; `None` for an unbounded plane.
 pub(super) fn extent(eye: &Eye, wall: &Wall, position: &[f64]) -> Option<Box2> {
     match wall.kind {
         WallKind::Plane => eye.place().map(|place| place.shows(&place.plane(position, wall.normal).0)),
@@ -44,8 +44,8 @@ pub(super) fn extent(eye: &Eye, wall: &Wall, position: &[f64]) -> Option<Box2> {
     }
 }
 
-/// A plane in perspective, as a plate of the sample's size, if it is behind the grains or before
-/// them: full, or its edges alone.
+/// A plane in perspective, as a plate of the sample's size: filled if it is behind the grains, only
+/// its edges if it is in front of them.
 fn draw_plate(canvas: &mut Canvas, place: &Place, wall: &Wall, position: &[f64], frame: &Frame, behind: bool) {
     let (corners, is_behind) = place.plane(position, wall.normal);
     if is_behind == behind {
@@ -59,8 +59,7 @@ fn draw_plane(canvas: &mut Canvas, point: [f64; 2], normal: [f64; 2], frame: &Fr
     let length = normal[0].hypot(normal[1]);
     // on the sheet y points down
     let (n, t) = ((normal[0] / length, -normal[1] / length), (normal[1] / length, normal[0] / length));
-    // from the place on the line that is nearest to the middle of the panel, in whole lines of the
-    // hatching
+    // from the point of the line nearest to the middle of the panel, in whole lines of the hatching
     let (from, middle) = (frame.at(point), [0.5 * frame.size.0, 0.5 * frame.size.1]);
     let off = [frame.corner.0 + middle[0] - from.0, frame.corner.1 + middle[1] - from.1];
     let nearest = HATCH * ((off[0] * t.0 + off[1] * t.1) / HATCH).round();

@@ -1,8 +1,8 @@
-//! A run on one page: an HTML file that needs nothing else, with pictures, curves, tables, the
-//! solver's own measures of its accuracy, the energy balance and the scene.
+//! A run on one page: a self-contained HTML file with pictures, curves, tables, the solver's own
+//! measures of its accuracy, the energy balance and the scene.
 //!
 //! Curves are SVG, maps are PNG (smaller than SVG for thousands of grains), all of them inside the
-//! page as `data:` addresses. Long curves are thinned as all charts are. A section without content
+//! page as `data:` addresses. Long curves are thinned, as in all charts. A section without content
 //! gives the reason.
 
 use clap::Args;
@@ -58,51 +58,51 @@ impl Analysis for Command {
     }
 }
 
-/// What the page shows.
+/// Content of the page.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
-    /// What the history holds.
+    /// The summary of the history.
     pub info: info::Report,
-    /// How accurately the run was solved, by its own measures.
+    /// The accuracy of the solver, from the observables of the run.
     pub accuracy: Accuracy,
     /// The bonds that broke; `None` for a scene without bonds.
     pub cracks: Option<cracks::Report>,
-    /// The forces; `None` where there is none at the chosen moments.
+    /// The forces; `None` where no contact carries a force at the chosen moments.
     pub chains: Option<chains::Report>,
     /// The velocities.
     pub velocities: velocities::Report,
     /// Force and displacement of the load wall; `None` without a driven wall that was observed.
     #[serde(skip)]
     pub stress_strain: Option<stress_strain::Report>,
-    /// The sections that have nothing to show.
+    /// The sections without content.
     pub left_out: Vec<LeftOut>,
 }
 
-/// A section that has nothing to show.
+/// A section without content.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct LeftOut {
     /// Its [`OnPage::ID`].
     pub section: &'static str,
-    /// Why there is nothing.
+    /// The reason.
     pub why: String,
 }
 
-/// Reads all that the page shows; maps show the frames nearest to `times` (s), or chosen ones, and
-/// the load is that of `wall`, or of the scene's load wall.
+/// Reads the content of the page. Maps show the frames nearest to `times` (s), or chosen ones; the
+/// load is that of `wall`, or of the scene's load wall.
 ///
 /// # Errors
 /// [`PostError::Usage`] for times outside the history, for a wall that is not driven, and where
 /// several walls are driven and none is chosen; [`PostError::Lacking`] for a history without
 /// frames.
 pub fn read(history: &History, times: &[f64], wall: Option<&str>, quiet: bool) -> Result<Report> {
-    // read first: it reports wrong times and a history without frames
+    // called first: it reports wrong times and a history without frames
     let velocities = velocities::read(history, times)?;
     let mut left_out = vec![];
     Ok(Report {
         velocities,
         info: info::read(history)?,
         accuracy: solver::read(history)?,
-        // before the cracks, which take long: it reports a wrong wall
+        // called before the slow analysis of cracks: it reports a wrong wall
         stress_strain: if_there(stress_strain::read(history, wall), &mut left_out)?,
         cracks: if_there(cracks::read(history, quiet), &mut left_out)?,
         chains: if_there(chains::read(history, times), &mut left_out)?,
@@ -110,7 +110,7 @@ pub fn read(history: &History, times: &[f64], wall: Option<&str>, quiet: bool) -
     })
 }
 
-/// `None` for an analysis that the scene lacks something for; the reason goes to `left_out`.
+/// `None` for an analysis whose data the scene lacks; the reason is added to `left_out`.
 fn if_there<R: OnPage>(found: Result<R>, left_out: &mut Vec<LeftOut>) -> Result<Option<R>> {
     match found {
         Ok(found) => Ok(Some(found)),
@@ -137,7 +137,7 @@ impl Report {
         ])
     }
 
-    /// The section of an analysis, or the reason why it found nothing.
+    /// The section of an analysis, or the reason why it has none.
     fn section_of<R: OnPage>(&self, found: Option<&R>, history: &History, frames: &[usize]) -> Result<Section> {
         if let Some(found) = found {
             return found.section(history, frames);

@@ -27,7 +27,7 @@ pub fn render(history: &History, sections: Vec<Section>) -> Result<String> {
         .get("title")
         .and_then(|title| title.as_str())
         .map_or_else(|| name.clone(), |title| format!("{name}: {title}"));
-    // a scene that is no JSON is shown unchanged
+    // a scene that is not JSON is printed unchanged
     let scene = if tree.is_null() { scene } else { serde_json::to_string_pretty(&tree).unwrap_or(scene) };
     let page = Page { title, sections, scene };
     page.render().map_err(|error| PostError::Usage(format!("the page: {error}")))

@@ -1,4 +1,4 @@
-//! Sections of the page that belong to no other analysis: the accuracy of the solver, the energy.
+//! Sections of the page without an analysis of their own: the accuracy of the solver, the energy.
 
 use dem_drawing::{Chart, Style, colour};
 use dem_history::{History, Series};
@@ -26,7 +26,7 @@ impl OnPage for Accuracy {
             ("penetration", "penetration (m)", "Deepest penetration of each step over time.", false),
         ] {
             let points: Vec<(f64, f64)> = points(history.observable(name)?).into_iter().filter(|p| p.1 > 0.0).collect();
-            // an axis of powers of ten shows no zeros
+            // a logarithmic axis shows no zeros
             if points.len() < 2 {
                 continue;
             }

@@ -1,4 +1,4 @@
-//! The accuracy of the solver, from the measures that the run recorded at every step.
+//! The accuracy of the solver, from the observables of every step.
 
 use dem_history::{FALSE_ACCELERATION, History, LOAD_ERROR, ROUTE, SolverRoute};
 use serde::Serialize;
@@ -8,9 +8,9 @@ use crate::output::{Result, number};
 /// The spread of a measure over the steps.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Spread {
-    /// Middle value.
+    /// Median.
     pub median: f64,
-    /// Value that one step in a hundred exceeds.
+    /// 99th percentile: one step in a hundred exceeds it.
     pub high: f64,
     /// Greatest value.
     pub worst: f64,
@@ -23,23 +23,23 @@ pub struct Spread {
 pub struct Accuracy {
     /// Observed steps.
     pub steps: usize,
-    /// The residual aimed at, from the scene.
+    /// The target residual, from the scene.
     pub tolerance: Option<f64>,
-    /// The residual accepted, from the scene.
+    /// The tolerated residual, from the scene.
     pub accept: Option<f64>,
     /// Residuals.
     pub residual: Option<Spread>,
-    /// Load errors of the steps whose solves reported one; in histories of before version 4 false
-    /// accelerations among them.
+    /// Load errors of the steps whose solves reported one; in histories older than version 4 some
+    /// of them are false accelerations.
     pub load_error: Option<Spread>,
-    /// False accelerations; none in histories of before version 4.
+    /// False accelerations; none in histories older than version 4.
     pub false_acceleration: Option<Spread>,
     /// Steps by the method that solved them, in the order of [`SolverRoute::ALL`]; none in
-    /// histories of before version 4.
+    /// histories older than version 4.
     pub routes: Option<[usize; 4]>,
     /// Steps whose residual exceeds the tolerance.
     pub missed: Option<usize>,
-    /// Solves that were not accepted.
+    /// Refused solves.
     pub rejected: Option<f64>,
     /// Iterations of a step.
     pub iterations: Option<Spread>,
@@ -60,7 +60,7 @@ pub fn read(history: &History) -> Result<Accuracy> {
     let setting = |name: &str| scene.get("solver").and_then(|solver| solver.get(name)).and_then(|value| value.as_f64());
     let series = |name: &str| -> Result<Option<(Vec<f64>, Vec<f64>)>> {
         let Some(found) = history.observable(name)? else { return Ok(None) };
-        // a load error is not a number where no solve reported one
+        // a load error is NaN where no solve reported one
         let told = found.time.into_iter().zip(found.value).filter(|(_, value)| !value.is_nan());
         let (time, value): (Vec<f64>, Vec<f64>) = told.unzip();
         Ok((!value.is_empty()).then_some((time, value)))

@@ -5,11 +5,11 @@ use crate::output::{Folder, Result, cell};
 use dem_drawing::{Bars, Chart, Style, colour};
 use dem_output::row;
 
-/// Values that span at least this ratio are shown on a logarithmic axis.
+/// Ratio of the greatest to the least value from which the axis is logarithmic.
 const DECADE: f64 = 10.0;
-/// Points of a line that bends on logarithmic axes.
+/// Points of a line that is curved on logarithmic axes.
 const LINE_POINTS: usize = 100;
-/// Offset of the mean from its points, as a share of the axis, so that it hides none.
+/// Offset of the mean from its points, as a share of the axis, so that the mean hides no point.
 const BESIDE: f64 = 0.018;
 
 /// Writes `strength.csv` with a row for each run, `strength-values.csv` with one for each value of
@@ -71,7 +71,7 @@ fn chart(report: &Report) -> Chart {
     let points = |of: &dyn Fn(&Run) -> bool| {
         report.runs.iter().filter(|run| of(run)).map(|run| (run.value, run.strength)).collect()
     };
-    // with more samples than colours all have one colour
+    // with more samples than colours, all samples have the same colour
     if report.samples.len() <= colour::CYCLE.len() {
         for (sample, colour) in report.samples.iter().zip(colour::CYCLE) {
             chart = chart.curve(&sample.sample, colour, Style::Points, points(&|run| run.sample == sample.sample));

@@ -43,10 +43,10 @@ pub struct Line {
     pub r_squared: Option<f64>,
 }
 
-/// How some numbers scatter.
+/// The spread of some numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Spread {
-    /// How many numbers.
+    /// Count.
     pub count: usize,
     /// Their mean.
     pub mean: f64,
@@ -56,7 +56,7 @@ pub struct Spread {
     pub interval: Option<[f64; 2]>,
 }
 
-/// The line through `points` (x, y), all finite; `None` where they have fewer than two places x.
+/// The line through `points` (x, y), all finite; `None` for fewer than two distinct x.
 pub fn line(points: &[(f64, f64)]) -> Option<Line> {
     let n = points.len() as f64;
     let first = points.first()?.0;
@@ -84,7 +84,7 @@ pub fn line(points: &[(f64, f64)]) -> Option<Line> {
     })
 }
 
-/// How `values` scatter; `None` of nothing.
+/// The spread of `values`; `None` without values.
 pub fn spread(values: &[f64]) -> Option<Spread> {
     if values.is_empty() {
         return None;
@@ -106,7 +106,7 @@ fn around(value: f64, error: f64, freedom: usize) -> [f64; 2] {
 
 /// The quantile t₀.₉₇₅ of Student's distribution with `freedom` degrees of freedom, at least 1.
 fn student(freedom: usize) -> f64 {
-    // the constructor refuses only a scale or a freedom that is not positive
+    // the constructor rejects only a scale or a freedom that is not positive
     StudentsT::new(0.0, 1.0, freedom as f64).map_or(f64::INFINITY, |distribution| distribution.inverse_cdf(UPPER))
 }
 

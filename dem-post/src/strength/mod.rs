@@ -1,19 +1,19 @@
-//! Strength against a field of the scene, over many runs: the paper's figure 9, strength against
-//! cohesion, and the like for rates, sizes, friction.
+//! Strength against a field of the scene, over many runs: the paper's figure 9 (strength against
+//! cohesion), and the same for rates, sizes, friction.
 //!
-//! **Strength** of a run is the load at a step that [`Measure`] names, each as the run's own
-//! summary and `stress-strain` define it. The load is that of the load wall or, without a driven
-//! wall, the only force on a grain. The default measure is 5 % of the bonds broken: it is an event
-//! of the bonds, so it means the same for rigid and elastic bonds, under a prescribed force and a
-//! prescribed motion. The others are less general: a strain of 1e-4 may be solver error where the
-//! tolerance is coarse, and intact elastic bonds can reach it; the first break is one weak bond; a
-//! peak needs a load that can fall.
+//! **Strength** of a run is the load at the step chosen by [`Measure`], with the definitions of the
+//! run's own summary and of `stress-strain`. The load is that of the load wall or, without a driven
+//! wall, the only force on a grain. The default measure is 5 % of the bonds broken. It is an event
+//! of the bonds, so it has the same meaning for rigid and elastic bonds, under a prescribed force
+//! and a prescribed motion. The other measures are less general: a strain of 1e-4 may be solver
+//! error where the tolerance is coarse, and intact elastic bonds can reach it; the first break is
+//! one weak bond; a peak requires a load that can fall.
 //!
 //! **Samples.** Runs are grouped by the value of the varied field and by sample ([`scenes`] says
-//! how both are found). Runs of one sample are not independent of each other: they are the same
-//! grains again. The standard errors of the line through all points take every run as independent.
-//! Therefore each sample also has its own line, and the intervals over the samples are those of the
-//! mean of their slopes and intercepts.
+//! how both are found). Runs of one sample are not independent: they have the same grains. The
+//! standard errors of the line through all points assume independent runs. Therefore each sample
+//! also has its own line, and the intervals over the samples are those of the mean of their slopes
+//! and intercepts.
 
 use std::path::PathBuf;
 
@@ -59,7 +59,7 @@ pub struct Command {
 
 impl Analysis for Command {
     const NAME: &'static str = "strength";
-    /// Runs are opened one by one as they are read.
+    /// Runs are opened one by one, when they are read.
     type Input = ();
     type Report = Report;
 

@@ -1,4 +1,4 @@
-//! Strength over many runs: the report, and how it is read from their histories.
+//! Strength over many runs: the report, and how it is computed from their histories.
 
 use std::path::PathBuf;
 
@@ -9,13 +9,12 @@ use super::runs::{self, Found, LeftOut, Measure, histories, name};
 use super::scenes::{design, unit};
 use crate::output::{PostError, Result, Text, facts, number, quantity};
 
-/// 1 − R² below this is round-off, and so is an intercept below this share of the greatest
-/// strength.
+/// Threshold of round-off: of 1 − R², and of the ratio of an intercept to the greatest strength.
 const ROUNDING: f64 = 1e-12;
-/// Runs left out that the table names.
+/// Maximum number of omitted runs named in the table.
 const NAMED: usize = 12;
 
-/// What is asked for.
+/// Options of the analysis.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
     /// The varied field, as `--set` names it; found from the scenes where it is absent.
@@ -37,12 +36,12 @@ pub struct Run {
     pub sample: String,
     /// Its strength, N.
     pub strength: f64,
-    /// When it was reached, s.
+    /// Its time, s.
     pub time: f64,
     /// Strength over the field's value; `None` where that is zero.
     pub ratio: Option<f64>,
-    /// Whether no rigid bond had broken by the collapse: then the strain of grains in one piece is
-    /// solver error.
+    /// Whether no rigid bond had broken before the collapse. If so, the strain of a sample in one
+    /// piece is solver error.
     pub early: bool,
 }
 
@@ -53,7 +52,7 @@ pub struct AtValue {
     pub value: f64,
     /// Their strengths, N.
     pub strength: Spread,
-    /// The least and the greatest of them, N.
+    /// The least and the greatest strength, N.
     pub range: [f64; 2],
     /// Strength over the value; `None` where that is zero.
     pub ratio: Option<Spread>,
@@ -64,11 +63,11 @@ pub struct AtValue {
 pub struct OfSample {
     /// The sample.
     pub sample: String,
-    /// How many runs.
+    /// Number of runs.
     pub runs: usize,
-    /// Whether they are of the same grains with the same bonds.
+    /// Whether the runs have the same grains and bonds.
     pub same_grains: bool,
-    /// The line through them; `None` for runs at one value.
+    /// The line through the runs; `None` for runs at one value.
     pub line: Option<Line>,
     /// Mean of strength over value; `None` where a value is zero.
     pub ratio: Option<f64>,
@@ -95,7 +94,7 @@ pub struct Report {
     pub measure: Measure,
     /// The varied field.
     pub field: String,
-    /// Its unit; empty for a number without.
+    /// Its unit; empty for a number without unit.
     pub unit: String,
     /// Fields that vary with it.
     pub along: Vec<String>,
@@ -103,7 +102,7 @@ pub struct Report {
     pub sample_fields: Vec<String>,
     /// The runs, in the order given.
     pub runs: Vec<Run>,
-    /// Runs that did not fail, or are not finished.
+    /// Runs that did not fail or are unfinished.
     pub left_out: Vec<LeftOut>,
     /// The runs at each value, in order.
     pub values: Vec<AtValue>,
@@ -111,7 +110,7 @@ pub struct Report {
     pub samples: Vec<OfSample>,
     /// The line through all points; `None` where they have one value.
     pub line: Option<Line>,
-    /// How the samples scatter.
+    /// The spread of the samples.
     pub over_samples: OverSamples,
     /// Notes: what the runs do not show, and caveats.
     pub notes: Vec<String>,
@@ -369,8 +368,8 @@ impl Report {
         if intercept.abs() < ROUNDING * greatest { 0.0 } else { intercept }
     }
 
-    /// How much of the variance the line explains: over all runs, where R² is below 1 by the
-    /// scatter of samples, and the least of the samples' own lines, which have none of it.
+    /// R² of the line through all runs, which includes the scatter of samples, and the least R² of
+    /// the samples' own lines, which does not.
     fn explained(&self, line: &Line) -> Option<String> {
         let all = line.r_squared.map(share)?;
         let lines = self.samples.iter().filter_map(|sample| sample.line);
@@ -388,7 +387,7 @@ impl Report {
         })
     }
 
-    /// The line in numbers of the units on the axes.
+    /// The equation of the line in the units of the axes.
     pub fn equation(&self, line: &Line) -> String {
         let intercept = match self.plain(line.intercept.value) {
             0.0 => String::new(),
@@ -399,7 +398,7 @@ impl Report {
     }
 }
 
-/// A relative deviation in percent; round-off is shown as exact.
+/// A relative deviation in percent; round-off is printed as exact.
 fn within(share: f64) -> String {
     if share < ROUNDING { "exact".into() } else { format!("±{} %", number(100.0 * share)) }
 }

@@ -1,4 +1,4 @@
-//! The runs that are asked for, and the strength of each.
+//! The requested runs, and the strength of each.
 
 use std::path::{Path, PathBuf};
 
@@ -30,7 +30,7 @@ pub enum Measure {
 }
 
 impl Measure {
-    /// The strength that it measures, in words.
+    /// Name of the strength.
     pub fn title(self) -> &'static str {
         match self {
             Self::FirstBreak => "load at the first break",
@@ -41,14 +41,14 @@ impl Measure {
     }
 }
 
-/// A run as it was read.
+/// A run as read from its history.
 #[derive(Clone, Debug)]
 pub struct Found {
     /// Its file.
     pub path: PathBuf,
     /// Its scene, JSON.
     pub scene: String,
-    /// Its strength; or, for a run that did not fail, what it reached.
+    /// Its strength; for a run that did not fail, the state it reached.
     pub strength: std::result::Result<Strength, String>,
     /// Radii of its grains and its bonds: equal in two runs of the same grains.
     pub grains: (Vec<f64>, Vec<[i32; 2]>),
@@ -59,7 +59,7 @@ pub struct Found {
 pub struct LeftOut {
     /// Its file.
     pub run: String,
-    /// Why it has none.
+    /// The reason.
     pub why: String,
 }
 
@@ -68,17 +68,17 @@ pub struct LeftOut {
 pub struct Strength {
     /// The load, N.
     pub load: f64,
-    /// When, s.
+    /// Its time, s.
     pub time: f64,
     /// Whether all rigid bonds were intact when the strain exceeded the limit of collapse.
     pub early: bool,
 }
 
 /// The histories that `paths` name: files, and the finished runs in folders of sweeps; and,
-/// separately, the runs that are not finished.
+/// separately, the unfinished runs.
 ///
 /// # Errors
-/// [`PostError::Usage`] for no path at all, a folder without a manifest, and where no run is done;
+/// [`PostError::Usage`] for no path, for a folder without a manifest, and where no run is done;
 /// [`PostError::Sweep`] for a manifest that cannot be read.
 pub fn histories(paths: &[PathBuf]) -> Result<(Vec<PathBuf>, Vec<LeftOut>)> {
     let (mut found, mut left_out) = (vec![], vec![]);
@@ -126,8 +126,8 @@ pub fn name(path: &Path) -> String {
 /// Reads the strength of a run; `wall` is the load wall, by default that of the scene.
 ///
 /// # Errors
-/// [`PostError::Lacking`] for a run without a load, or without what the measure needs; those of
-/// reading it.
+/// [`PostError::Lacking`] for a run without a load, or without the observables of the measure;
+/// those of reading it.
 pub fn read(path: &Path, measure: Measure, wall: Option<&str>) -> Result<Found> {
     let history = History::open(path)?;
     let bonds = history.bonds()?;
@@ -226,7 +226,7 @@ impl Course {
         Ok(step.filter(|&step| step < self.load.len()))
     }
 
-    /// What a run reached that did not fail.
+    /// The state reached by a run that did not fail.
     fn how_far(&self, measure: Measure, bonds: usize) -> String {
         let greatest = quantity(self.load.iter().copied().reduce(f64::max), "N");
         let broken = self.broken.last().copied().unwrap_or(0.0);
@@ -242,7 +242,7 @@ impl Course {
     }
 }
 
-/// Reports a measure that needs an observable which the history does not have.
+/// The error of a measure whose observable is not in the history.
 fn recorded(path: &Path, values: &[f64], name: &str) -> Result<()> {
     if !values.is_empty() {
         return Ok(());

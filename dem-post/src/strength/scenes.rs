@@ -1,16 +1,16 @@
-//! Which field is varied between the scenes of some runs, and which runs are of one sample.
+//! Finds the field varied between the scenes of some runs, and the runs of each sample.
 //!
-//! Fields are named as `--set` names them. Of the fields that differ between the runs,
+//! Fields are named as in `--set`. Of the fields that differ between the runs,
 //!
-//! * titles and output intervals do not count;
-//! * `seed`, a sample's file and listed grains make the **sample**;
-//! * one is the **varied** field: the one that was asked for, or else the only one of the kind that
-//!   comes first: what the sample is (bonds, materials, its size), how it is loaded (walls, loads
-//!   on grains), how it is computed (time, solver);
-//! * fields that have one value for each value of the varied one **move with it**, as a ramp that
-//!   is scaled by the cohesion does.
+//! * titles and output intervals are ignored;
+//! * `seed`, a sample's file and listed grains define the **sample**;
+//! * one is the **varied** field: the requested one, or else the only one of the first kind with a
+//!   difference. The kinds are, in order: the sample (bonds, materials, its size), the loading
+//!   (walls, loads on grains), the computation (time, solver);
+//! * fields that are functions of the varied field **move with it**, as a ramp scaled by the
+//!   cohesion.
 //!
-//! Any other difference makes them runs of different scenes, which are refused.
+//! With any other difference the runs have different scenes and are rejected.
 
 use std::collections::BTreeMap;
 
@@ -19,22 +19,22 @@ use serde_json::Value;
 
 use crate::output::{PostError, Result};
 
-/// The field that is varied where nothing differs but the sample: that of the paper's figure 9.
+/// The varied field where only the sample differs: that of the paper's figure 9.
 const DEFAULT: &str = "bonds.strength";
-/// Fields that a message names.
+/// Maximum number of fields named in a message.
 const NAMED: usize = 8;
 
 /// The leaves of a scene by their names.
 type Leaves = BTreeMap<String, Value>;
 
-/// What some runs vary.
+/// The varied field and the samples of some runs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Design {
     /// The varied field.
     pub field: String,
     /// Fields that move with it.
     pub along: Vec<String>,
-    /// Fields that make the sample, of those that differ.
+    /// Differing fields that define the sample.
     pub sample_fields: Vec<String>,
     /// The field's value in each run.
     pub values: Vec<f64>,
@@ -44,12 +44,12 @@ pub struct Design {
     pub samples: Vec<String>,
 }
 
-/// What runs with these names and scenes (JSON) vary; at least one run. `against` is the varied
-/// field where it is given.
+/// The varied field and the samples of runs with these names and scenes (JSON); at least one run.
+/// `against`, if given, is the varied field.
 ///
 /// # Errors
-/// [`PostError::Usage`] where they are of different scenes, where two are the same, or where the
-/// field is not known or no number.
+/// [`PostError::Usage`] where the scenes are different, where two runs are the same, or where the
+/// field is unknown or not a number.
 pub fn design(runs: &[(String, String)], against: Option<&str>) -> Result<Design> {
     let scenes = runs.iter().map(leaves).collect::<Result<Vec<Leaves>>>()?;
     let differing = differing(&scenes);
@@ -89,7 +89,7 @@ pub fn design(runs: &[(String, String)], against: Option<&str>) -> Result<Design
     Ok(Design { field, along, sample_fields, values, sample, samples: sorted.into_iter().map(|s| s.1).collect() })
 }
 
-/// The leaves of a run's scene that count.
+/// The leaves of a run's scene that are compared.
 fn leaves((name, scene): &(String, String)) -> Result<Leaves> {
     let tree: Value = serde_json::from_str(scene)
         .map_err(|error| PostError::Usage(format!("{name}: its scene cannot be read: {error}")))?;
@@ -106,7 +106,7 @@ fn collect(path: String, value: Value, leaves: &mut Leaves) {
         Value::Array(list) if !list.is_empty() => {
             list.into_iter().enumerate().for_each(|(k, v)| collect(below(&k.to_string()), v, leaves));
         }
-        // 1 and 1.0 are one number
+        // 1 and 1.0 are equal
         Value::Number(number) => drop(leaves.insert(path, number.as_f64().map_or(Value::Number(number), Value::from))),
         leaf => drop(leaves.insert(path, leaf)),
     }
@@ -129,7 +129,7 @@ fn is_number(scenes: &[Leaves], name: &str) -> bool {
     scenes.iter().all(|scene| scene.get(name).is_some_and(Value::is_number))
 }
 
-/// The varied field where none was asked for.
+/// The varied field where none was requested.
 fn choose(scenes: &[Leaves], differing: &[String]) -> Result<String> {
     let candidates: Vec<&String> =
         differing.iter().filter(|name| !makes_sample(name) && is_number(scenes, name)).collect();
@@ -175,7 +175,7 @@ fn values(runs: &[(String, String)], scenes: &[Leaves], field: &str, differing: 
     runs.iter().zip(scenes).map(number).collect()
 }
 
-/// Whether a field has one value for each of `values`.
+/// Whether a field is a function of `values`.
 fn follows(scenes: &[Leaves], values: &[f64], name: &str) -> bool {
     let first = |value: f64| values.iter().position(|v| *v == value).map(|k| &scenes[k]);
     scenes.iter().zip(values).all(|(scene, &value)| first(value).is_some_and(|one| one.get(name) == scene.get(name)))
@@ -192,7 +192,7 @@ fn label(scene: &Leaves, fields: &[String], varied: &str) -> (Vec<Key>, String) 
         value => value.as_f64().map_or_else(|| value.to_string(), |number| number.to_string()),
     };
     let key = |name: &String| (value(name).as_f64().map_or(u64::MAX, |n| n.max(0.0) as u64), text(name));
-    // listed grains are too many to be named one by one
+    // listed grains are too many to be named individually
     let named: Vec<&String> = fields.iter().filter(|name| !name.starts_with("sample.grains.")).collect();
     let label = match named.as_slice() {
         [] if fields.is_empty() && varied == "seed" => "the only one".into(),
@@ -211,8 +211,8 @@ fn list(names: &[String]) -> String {
     text
 }
 
-/// The unit of a field, as the scene's schema has it in parentheses; empty for a number without, or
-/// where it is unknown.
+/// The unit of a field, from the parentheses in the scene's schema; empty for a number without unit
+/// or an unknown unit.
 pub fn unit(field: &str) -> String {
     let root = json_schema();
     let mut forms = vec![root];
@@ -240,7 +240,7 @@ pub fn unit(field: &str) -> String {
     parts.into_iter().find(|text| is_unit(text)).unwrap_or_default().to_string()
 }
 
-/// All the forms that a schema may take.
+/// All alternatives of a schema.
 fn expand<'a>(root: &'a Value, schema: &'a Value, forms: &mut Vec<&'a Value>) {
     if let Some(target) =
         schema.get("$ref").and_then(Value::as_str).and_then(|path| root.pointer(path.trim_start_matches('#')))
@@ -311,7 +311,7 @@ mod tests {
             runs(&[r#"{"bonds": {"strength": 1}, "thickness": 1}"#, r#"{"bonds": {"strength": 2}, "thickness": 2}"#]);
         let message = refusal(&scenes, None);
         assert!(message.contains("--against") && message.contains("bonds.strength, thickness"), "{message}");
-        // with a name each moves with the other
+        // with an explicit field the other one moves with it
         assert_eq!(design(&scenes, Some("thickness")).unwrap().along, ["bonds.strength"]);
         let lacking = runs(&[r#"{"bonds": {"strength": 1}}"#, r#"{"bonds": null}"#]);
         assert!(

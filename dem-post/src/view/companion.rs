@@ -1,4 +1,4 @@
-//! An HDF5 file that maps data of a history: virtual datasets and external links, under a relative
+//! An HDF5 file that maps data of a history by virtual datasets and external links with a relative
 //! path.
 
 use std::ops::Range;
@@ -16,11 +16,11 @@ const ITSELF: &str = ".";
 pub(super) struct Companion<'a> {
     pub file: File,
     history: &'a File,
-    /// The history as the companion names it.
+    /// Path of the history, relative to the companion.
     link: String,
 }
 
-/// One part of a virtual dataset: elements of a source and where they go, both in the order of
+/// One part of a virtual dataset: elements of a source and their destination, both in the order of
 /// their rows.
 pub(super) struct Piece {
     /// A dataset of the history, or of the companion if `own`.
@@ -52,7 +52,7 @@ impl Rows {
 impl<'a> Companion<'a> {
     /// Makes the file at `path`.
     pub fn create(path: &Path, history: &'a File, link: &str) -> hdf5::Result<Self> {
-        // the oldest format that knows virtual datasets
+        // the oldest format with virtual datasets
         let file = File::with_options().with_fapl(|fapl| fapl.libver_v110()).create(path)?;
         Ok(Self { file, history, link: link.into() })
     }
@@ -72,25 +72,25 @@ impl<'a> Companion<'a> {
         group.link_external(&self.link, place, name)
     }
 
-    /// A link to the first `rows` of a series, whole if it has no more.
+    /// A link to the first `rows` rows of a series; to the whole series if it has no more.
     ///
     /// Without the history a link is an error; a virtual dataset would read as zeros.
     pub fn series<T: H5Type>(&self, group: &Group, name: &str, place: &'static str, rows: usize) -> hdf5::Result<()> {
-        // VTK writes beyond its memory where there are more times than steps
+        // VTK writes out of bounds if there are more times than steps
         if self.shape(place)? == [rows] {
             return self.link(group, name, place);
         }
         self.array::<T>(group, name, place, first(&[rows]), &Rows::scalars(rows))
     }
 
-    /// A dataset of shape `shape` made of `pieces`; what they leave out is zero.
+    /// A dataset of shape `shape` made of `pieces`; elements outside them are zero.
     pub fn map<T: H5Type>(&self, group: &Group, name: &str, shape: &[usize], pieces: &[Piece]) -> hdf5::Result<()> {
         let mut builder = group.new_dataset::<T>().shape(shape);
         for piece in pieces {
             let (source, file) = if piece.own { (&self.file, ITSELF) } else { (self.history, &*self.link) };
             let extents = source.dataset(piece.place)?.shape();
             let [from, to] = [&piece.from, &piece.to].map(|slices| Hyperslab::from(slices.clone()));
-            // HDF5 reads %b in this name as a number to fill in
+            // HDF5 would replace %b in this name by a number
             let file = file.replace('%', "%%");
             builder = builder.virtual_map(file, format!("/{}", piece.place), extents, from, shape, to);
         }
@@ -98,7 +98,7 @@ impl<'a> Companion<'a> {
         Ok(())
     }
 
-    /// An array whose numbers are those of `from` of a dataset of the history.
+    /// An array of the elements `from` of a dataset of the history.
     pub fn array<T: H5Type>(
         &self,
         group: &Group,
@@ -139,7 +139,7 @@ impl From<hdf5::Error> for Fault {
     }
 }
 
-/// An array whose length is not that of its shape, as an error of HDF5.
+/// The HDF5 error for an array whose length does not match its shape.
 pub(super) fn wrong_shape(error: ShapeError) -> hdf5::Error {
     hdf5::Error::Internal(error.to_string())
 }
@@ -172,7 +172,7 @@ pub(super) fn label(group: &Group, name: &str, text: &str) -> hdf5::Result<()> {
     group.new_attr::<FixedAscii<8>>().create(name)?.write_scalar(&text)
 }
 
-/// `file` as a file in `folder` names it. Both must be absolute.
+/// Path of `file` relative to `folder`. Both must be absolute.
 pub(super) fn relative(folder: &Path, file: &Path) -> PathBuf {
     let (from, to): (Vec<Component>, Vec<Component>) = (folder.components().collect(), file.components().collect());
     let common = from.iter().zip(&to).take_while(|(a, b)| a == b).count();

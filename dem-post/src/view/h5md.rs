@@ -10,10 +10,10 @@ use super::vtk::{POSITION, RADIUS, VELOCITY};
 const STEP: &str = "particles/grains/position/step";
 const TIME: &str = "particles/grains/position/time";
 
-/// The motion of the grains, as the group `trajectory`, and what does not change about them.
+/// The motion of the grains, as the group `trajectory`, and their constant properties.
 ///
-/// MDAnalysis knows no metre, and refuses units that it does not know. So lengths have no attribute
-/// `unit`, and the user must tell it not to convert any.
+/// MDAnalysis has no unit metre and rejects unknown units. So lengths have no attribute `unit`, and
+/// the user must disable the conversion of units.
 pub(super) fn trajectory(companion: &Companion, o: &Outline) -> hdf5::Result<()> {
     let h5md = companion.file.create_group("h5md")?;
     h5md.new_attr_builder().with_data(&[1i32, 1]).create("version")?;

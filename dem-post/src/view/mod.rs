@@ -1,8 +1,8 @@
 //! Companions of a history: small files that map its data for viewers.
 //!
 //! ParaView and VTK read `grains.vtkhdf`, `contacts.vtkhdf` and `bonds.vtkhdf`, MDAnalysis reads
-//! `grains.h5md`. They hold links and virtual datasets that lead to the history by a path relative
-//! to themselves; almost nothing is copied (`docs/history.md` lists what, and its size).
+//! `grains.h5md`. They contain links and virtual datasets that refer to the history by a relative
+//! path. Almost nothing is copied (`docs/history.md` lists the copied data and their size).
 
 use clap::Args;
 use dem_history::History;

@@ -1,4 +1,4 @@
-//! Which companions a history can have: the report, and how it is read from the history.
+//! The possible companions of a history: the report, and how it is read from the history.
 
 use dem_history::History;
 use serde::Serialize;
@@ -6,10 +6,10 @@ use serde::Serialize;
 use super::outline::Outline;
 use crate::output::{PostError, Result, facts};
 
-/// All that a history may have.
+/// All companions.
 pub(super) const NAMES: [&str; 4] = ["grains.vtkhdf", "contacts.vtkhdf", "bonds.vtkhdf", "grains.h5md"];
 
-/// What is mapped.
+/// The companions of a history.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     /// The history.
@@ -30,13 +30,13 @@ pub struct Report {
 pub struct Mapped {
     /// Its name in the folder.
     pub name: &'static str,
-    /// What it shows.
+    /// Its content.
     pub shows: String,
     /// Its length, bytes; 0 before it is written.
     pub bytes: u64,
 }
 
-/// Reads what there is to map; with a bar on a terminal unless `quiet`, here and below.
+/// Finds the data to map; with a bar on a terminal unless `quiet`, here and below.
 ///
 /// # Errors
 /// [`PostError::Lacking`] for a history without frames, or one that was never closed and that

@@ -17,13 +17,13 @@ pub(super) const POSITION: &str = "particles/grains/position/value";
 pub(super) const VELOCITY: &str = "particles/grains/velocity/value";
 pub(super) const RADIUS: &str = "particles/grains/radius";
 const TIME: &str = "particles/grains/position/time";
-/// Where the lines of contacts, and the points on walls, are written.
+/// Names of the datasets of the lines of contacts and of the points on walls.
 const LINES: &str = "lines";
 const PLACES: &str = "wall_points";
-/// Numbers of the chunks of lists whose length is not known beforehand.
+/// Chunk size, in numbers, of lists of unknown length.
 const CHUNK: usize = 1 << 14;
 
-/// The groups of cells that poly data has; ours has one kind.
+/// The groups of cells of poly data; a companion uses one of them.
 const CELLS: [&str; 4] = ["Vertices", "Lines", "Strips", "Polygons"];
 
 /// `/VTKHDF` while it is written.
@@ -53,7 +53,7 @@ impl<'a> Poly<'a> {
     }
 
     /// Cells of `size` points each: frame k has `counts[k]`, and `Connectivity` lists their points
-    /// from `offsets[k]` on. The group that takes `Connectivity` is returned.
+    /// from `offsets[k]` on. Returns the group for `Connectivity`.
     fn cells(&self, kind: &str, size: usize, counts: &[i64], offsets: &[i64]) -> hdf5::Result<Group> {
         let frames = [self.frames];
         for name in CELLS.iter().filter(|name| **name != kind) {
@@ -80,7 +80,7 @@ impl<'a> Poly<'a> {
         Ok(group)
     }
 
-    /// The group of what belongs to points ("Point") or cells ("Cell"), ready for arrays.
+    /// The group of the data of points ("Point") or cells ("Cell"), ready for arrays.
     fn data(&self, of: &str, offsets: &[i64]) -> hdf5::Result<Data<'_>> {
         let values = self.root.create_group(&format!("{of}Data"))?;
         let starts = self.steps.create_group(&format!("{of}DataOffsets"))?;
@@ -88,8 +88,8 @@ impl<'a> Poly<'a> {
     }
 }
 
-/// Arrays of points or cells; those that change begin at `offsets[k]` at frame k. What the history
-/// lacks is left out.
+/// Arrays of points or cells; those that change begin at `offsets[k]` at frame k. Arrays that the
+/// history lacks are omitted.
 struct Data<'a> {
     companion: &'a Companion<'a>,
     values: Group,
@@ -98,7 +98,7 @@ struct Data<'a> {
 }
 
 impl Data<'_> {
-    /// An array that is the same at every frame.
+    /// An array that is constant over the frames.
     fn still(&self, name: &str, place: &str) -> hdf5::Result<()> {
         if !self.companion.has(place) {
             return Ok(());
@@ -107,7 +107,7 @@ impl Data<'_> {
         self.companion.write(&self.starts, name, &[self.offsets.len()], &vec![0i64; self.offsets.len()])
     }
 
-    /// An array that changes.
+    /// An array with values at each frame.
     fn moving<T: H5Type>(
         &self,
         name: &str,
@@ -156,7 +156,7 @@ pub(super) fn bonds(companion: &Companion, o: &Outline) -> hdf5::Result<()> {
     companion.array::<i32>(&cells, "Connectivity", "bonds/pair", first(&[b, 2]), &Rows::scalars(2 * b))?;
 
     let data = poly.data("Cell", &o.every(b))?;
-    // HDF5 turns the enum into the number that VTK can read
+    // HDF5 converts the enum to a number that VTK can read
     data.moving::<u8>("status", "bonds/status/value", first(&[t, b]), &Rows::scalars(t * b))?;
     data.still("strength", "bonds/strength")?;
     data.still("friction", "bonds/friction")?;
@@ -164,12 +164,13 @@ pub(super) fn bonds(companion: &Companion, o: &Outline) -> hdf5::Result<()> {
     data.still("mean_diameter", "bonds/mean_diameter")
 }
 
-/// The contacts as lines between the centres of two grains, or from a grain's centre to where it
-/// touches a wall.
+/// The contacts as lines between the centres of two grains, or from a grain's centre to its point
+/// of contact with a wall.
 ///
-/// The points of a frame are the grains, mapped, and behind them the points on walls. These must be
-/// written, each frame with room for as many as the frame with the most, so that one mapping
-/// applies to all frames; and so must the pairs, once for consecutive frames that have the same.
+/// The points of a frame are the grains, which are mapped, followed by the points on walls, which
+/// must be written. Every frame has room for the greatest number of points on walls of any frame,
+/// so that one mapping applies to all frames. The pairs must also be written, once for consecutive
+/// frames with equal pairs.
 pub(super) fn contacts(companion: &Companion, history: &History, o: &Outline, bar: &ProgressBar) -> Result<(), Fault> {
     let (n, d) = (o.grains, o.dimension);
     let room = o.at_walls.iter().copied().max().unwrap_or(0) as usize;
@@ -182,7 +183,7 @@ pub(super) fn contacts(companion: &Companion, history: &History, o: &Outline, ba
 
     let data = poly.data("Cell", &o.starts)?;
     let (m, scalars) = (o.rows, Rows::scalars(o.rows));
-    // a history may do without reactions
+    // reactions are optional in a history
     let rows = if companion.has("contacts/reaction") { companion.shape("contacts/reaction")?[1] } else { 0 };
     data.moving::<f64>("normal_force", "contacts/reaction", vec![span(0..m), span(0..1)], &scalars)?;
     if rows > 1 {
@@ -206,7 +207,7 @@ pub(super) fn contacts(companion: &Companion, history: &History, o: &Outline, ba
     Ok(data.moving::<i32>("bond", "contacts/bond", first(&[m]), &scalars)?)
 }
 
-/// Writes the lines and the points on walls; where the lines of each frame begin.
+/// Writes the lines and the points on walls; returns the first line of each frame.
 fn write_lines(
     companion: &Companion,
     history: &History,
@@ -238,8 +239,7 @@ fn write_lines(
     Ok(offsets)
 }
 
-/// The lines of one frame as pairs of points, and the points on walls, which come behind the
-/// grains.
+/// The lines of one frame as pairs of points, and the points on walls, which follow the grains.
 fn lines(pairs: &[[i32; 2]], points: &[f64], o: &Outline) -> (Vec<i32>, Vec<f64>) {
     let (mut lines, mut at_walls) = (Vec::with_capacity(2 * pairs.len()), vec![]);
     for (&[i, j], point) in pairs.iter().zip(points.chunks_exact(o.dimension)) {
@@ -253,7 +253,7 @@ fn lines(pairs: &[[i32; 2]], points: &[f64], o: &Outline) -> (Vec<i32>, Vec<f64>
     (lines, at_walls)
 }
 
-/// Maps the points of all frames: the grains, and behind them those on walls.
+/// Maps the points of all frames: the grains, followed by the points on walls.
 fn points(poly: &Poly, o: &Outline, room: usize) -> hdf5::Result<()> {
     let (t, n, d) = (o.frames, o.grains, o.dimension);
     let each = |start, block| vec![blocks(start, n + room, t, block), span(0..d)];

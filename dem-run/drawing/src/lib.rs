@@ -1,8 +1,8 @@
-//! Drawing: charts of curves, and a canvas for maps. The only module that knows the plotting crate
+//! Drawing: charts of curves, and a canvas for maps. No other crate depends on the plotting crate
 //! (kuva).
 //!
-//! Every drawing comes out as SVG and as PNG from the same scene; the PNG is drawn with a font that
-//! the crate carries, so that it looks the same on every machine.
+//! SVG and PNG of a drawing are made from the same scene. The PNG uses a font embedded in the
+//! crate, so that it is the same on every machine.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use kuva::render::layout::{Layout, TickFormat};
 use kuva::render::plots::Plot;
 use kuva::render::render::{PathData, Primitive, Scene, TextAnchor};
 
-/// Colours that stay apart for colour-blind readers and in print (Okabe & Ito).
+/// Colours that colour-blind readers can distinguish, also in print (Okabe & Ito).
 pub mod colour {
     /// Black.
     pub const BLACK: &str = "#000000";
@@ -40,17 +40,18 @@ pub mod colour {
 const PNG_SCALE: f32 = 2.5;
 /// Width and height of one chart, in units of a drawing.
 const CHART: (f64, f64) = (640.0, 460.0);
-/// Room around the cells of a figure, and between them.
+/// Margin around the cells of a figure, and between them.
 const PADDING: f64 = 6.0;
 const SPACING: f64 = 20.0;
-/// Room above the axes, which takes the legend, and below.
+/// Margins above the axes, for the legend, and below.
 const ABOVE: f64 = 44.0;
 const BELOW: f64 = 62.0;
-/// Distance of the rows of a legend.
+/// Distance between the rows of a legend.
 const LEGEND_ROW: f64 = 19.0;
-/// Counts below this have an axis up to it.
+/// The axis of smaller counts ends at this value.
 const FEW: f64 = 5.0;
-/// Points that one curve keeps: more than the pixels of its width, so none that shows is lost.
+/// Maximum number of points of a curve: more than the pixels of its width, so that no visible point
+/// is lost.
 const CURVE_POINTS: usize = 4000;
 
 /// A finished drawing.
@@ -94,12 +95,12 @@ impl Picture for Drawing {
     }
 }
 
-/// How a curve is drawn.
+/// Style of a curve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Style {
     /// Joined points.
     Line,
-    /// Joined points by a thin line, for what scatters.
+    /// Points joined by a thin line, for scattered values.
     Thin,
     /// A value that holds until the next point.
     Steps,
@@ -107,7 +108,7 @@ pub enum Style {
     Marked,
     /// Dots alone.
     Points,
-    /// Upright bars around a mean; see [`Bars`].
+    /// Error bars around a mean; see [`Bars`].
     Bars,
     /// A dashed level in the legend.
     Level,
@@ -117,22 +118,22 @@ pub enum Style {
 pub struct Curve {
     /// Its name in the legend.
     pub label: String,
-    /// Points (x, y); those that are not finite, or not positive on a logarithmic axis, are left
-    /// out.
+    /// Points (x, y). Points that are not finite, or not positive on a logarithmic axis, are
+    /// omitted.
     pub points: Vec<(f64, f64)>,
-    /// How it is drawn.
+    /// Its style.
     pub style: Style,
     /// Its colour.
     pub colour: &'static str,
 }
 
-/// Means with a bar up and down.
+/// Means with error bars.
 pub struct Bars {
     /// Their name in the legend.
     pub label: String,
     /// Their colour.
     pub colour: &'static str,
-    /// Place x, mean y, and how far the bar goes either way.
+    /// Position x, mean y, and half-length of the bar.
     pub bars: Vec<(f64, f64, f64)>,
 }
 
@@ -147,8 +148,8 @@ pub struct Chart {
     pub log_x: bool,
     /// Whether the vertical axis is logarithmic.
     pub log_y: bool,
-    /// Whether the horizontal axis begins a little before the first value and ends a little after
-    /// the last, so that what rises there can be seen.
+    /// Whether the horizontal axis extends a little beyond the first and the last value, so that a
+    /// steep rise there is visible.
     pub set_off: bool,
     /// Whether values on the vertical axis are counts.
     pub counts: bool,
@@ -156,7 +157,7 @@ pub struct Chart {
     pub curves: Vec<Curve>,
     /// Means with bars, over the curves.
     pub bars: Option<Bars>,
-    /// Marked values of y, with what they are for the legend.
+    /// Marked values of y, with their names in the legend.
     pub levels: Vec<(f64, String)>,
     /// Marked values of x.
     pub moments: Vec<f64>,
@@ -206,7 +207,7 @@ impl Chart {
         canvas.finish()
     }
 
-    /// Name, colour and style of each curve and each marked level; what stands alone needs no name.
+    /// Name, colour and style of each curve and each marked level; a single entry needs no name.
     fn legend(&self) -> Vec<Named> {
         let curves = self.curves.iter().map(|curve| (curve.label.clone(), curve.colour, curve.style));
         let bars = self.bars.iter().map(|bars| (bars.label.clone(), bars.colour, Style::Bars));
@@ -246,15 +247,15 @@ impl Chart {
         (plots, layout)
     }
 
-    /// What the values on a logarithmic vertical axis are multiplied by, a power of ten: the
-    /// plotting crate draws none below 1e-10 in its place.
+    /// Factor, a power of ten, of the values on a logarithmic vertical axis: the plotting crate
+    /// misplaces values below 1e-10.
     fn lift(&self) -> f64 {
         let values = self.curves.iter().flat_map(|curve| &curve.points).map(|p| p.1);
         let low = values.filter(|y| self.log_y && *y > 0.0).fold(1.0, f64::min);
         if low < 1e-9 { 10f64.powi(-low.log10().floor() as i32) } else { 1.0 }
     }
 
-    /// Axes that end where the values end, with ticks that suit them. Values of y are multiplied by
+    /// Axes limited to the range of the values, with matching ticks. Values of y are multiplied by
     /// `lift`.
     fn scale_axes(&self, mut layout: Layout, lift: f64) -> Layout {
         let values = || self.curves.iter().flat_map(|curve| &curve.points);
@@ -263,14 +264,14 @@ impl Chart {
         if self.log_x {
             layout = layout.with_log_x().with_x_tick_format(TickFormat::Custom(Arc::new(power_of_ten)));
             if self.set_off && 0.0 < low && low < high {
-                // as much of the axis as below
+                // the same share of the axis as in the linear case
                 let off = (high / low).powf(0.04);
                 layout = layout.with_x_axis_min(low / off).with_x_axis_max(high * off);
             }
         } else if low < high {
             let off = if self.set_off { 0.03 * (high - low) } else { 0.0 };
             layout = layout.with_x_axis_min(low - off).with_x_axis_max(high + off);
-            // the plotting crate's three digits would give one text to several ticks
+            // with the plotting crate's three digits several ticks would have the same label
             if high - low < 0.05 * low.abs().max(high.abs()) {
                 let decimals = (10.0 / (high - low)).log10().ceil().max(0.0) as usize;
                 let tick = move |value: f64| format!("{value:.decimals$}");
@@ -278,7 +279,7 @@ impl Chart {
             }
         }
         if self.log_y {
-            // a level that cannot be seen tells nothing
+            // the axis includes the marked levels, so that they are visible
             let levels = self.levels.iter().map(|(value, _)| value * lift).filter(|value| *value > 0.0);
             let shown: Vec<f64> = values().map(|p| p.1).chain(levels).collect();
             let low = shown.iter().copied().fold(f64::INFINITY, f64::min);
@@ -290,7 +291,7 @@ impl Chart {
             } else if low <= high {
                 // within a decade there may be no tick at all: show the whole decade
                 let decade = |x: f64| 10f64.powf(x);
-                // a point on the edge would be cut in half
+                // a point on the edge would be clipped
                 let (below, above) = ((0.8 * low).log10().floor(), (1.25 * high).log10().ceil());
                 layout = layout.with_y_axis_min(decade(below)).with_y_axis_max(decade(above));
             }
@@ -312,7 +313,7 @@ fn power_of_ten(value: f64) -> String {
     let exponent = value.log10();
     let whole = (exponent - exponent.round()).abs() < 1e-6;
     if (!whole && exponent > -3.0) || (-0.5..1.5).contains(&exponent) {
-        // what was computed as 4.9999999e-6 is 5e-6
+        // round-off: 4.9999999e-6 is 5e-6
         let rounded = format!("{value:.3e}").parse().unwrap_or(value);
         return format!("{rounded}");
     }
@@ -335,7 +336,7 @@ fn legend_width(legend: &[Named]) -> f64 {
     legend.iter().map(|(text, ..)| 50.0 + 7.8 * text.chars().count() as f64).sum()
 }
 
-/// A legend in as many rows as it needs beside the letter of a chart of width `width`.
+/// A legend beside the letter of a chart of width `width`, in as many rows as necessary.
 fn legend_rows(legend: &[Named], width: f64) -> Vec<&[Named]> {
     let mut rows = vec![];
     let mut rest = legend;
@@ -397,7 +398,7 @@ impl Curve {
 
 impl Bars {
     fn plot(&self, lift: f64, log_y: bool) -> Plot {
-        // a bar that goes below zero cannot end on a logarithmic axis: it ends a hundredth above
+        // a bar below zero has no end on a logarithmic axis: it is cut at a hundredth of the mean
         let down = |mean: f64, half: f64| if log_y { half.min(0.99 * mean) } else { half };
         let errors = self.bars.iter().map(|&(_, mean, half)| (lift * down(mean, half), lift * half));
         ScatterPlot::new()
@@ -409,8 +410,8 @@ impl Bars {
     }
 }
 
-/// Keeps of a long curve the first, lowest, highest and last point of each stretch, so that no peak
-/// is lost.
+/// Thins a long curve: keeps the first, lowest, highest and last point of each interval, so that no
+/// peak is lost.
 fn thin(points: &mut Vec<(f64, f64)>) {
     if points.len() <= CURVE_POINTS {
         return;
@@ -428,7 +429,7 @@ fn thin(points: &mut Vec<(f64, f64)>) {
     *points = kept;
 }
 
-/// Where a text stands relative to its point.
+/// Alignment of a text at its point.
 #[derive(Clone, Copy, Debug)]
 pub enum Anchor {
     /// It begins there.
@@ -448,7 +449,7 @@ impl Canvas {
         Self(Scene::new(width, height))
     }
 
-    /// Shows of what is drawn until [`Canvas::end_clip`] only what lies in a rectangle.
+    /// Clips all drawing to a rectangle until [`Canvas::end_clip`].
     pub fn clip(&mut self, corner: (f64, f64), size: (f64, f64)) {
         self.0.add(Primitive::ClipStart {
             x: corner.0,
@@ -459,7 +460,7 @@ impl Canvas {
         });
     }
 
-    /// Ends what [`Canvas::clip`] began.
+    /// Ends the clip of [`Canvas::clip`].
     pub fn end_clip(&mut self) {
         self.0.add(Primitive::ClipEnd);
     }
@@ -520,7 +521,7 @@ impl Canvas {
         });
     }
 
-    /// A line of text; `at` is on its base line.
+    /// A line of text; `at` is on its baseline.
     pub fn text(&mut self, at: (f64, f64), text: &str, size: u32, anchor: Anchor) {
         self.0.add(Primitive::Text {
             x: at.0,

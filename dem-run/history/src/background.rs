@@ -8,11 +8,10 @@ use super::error::Result;
 use super::model::{Frame, Rupture};
 use super::writer::Writer;
 
-/// Most batches that wait to be written.
+/// Maximum number of batches in the queue.
 const WAITING: usize = 4;
 
-/// What is written together: observations and ruptures since the last batch, then a frame, then a
-/// checkpoint.
+/// A batch: observations and ruptures since the last batch, then a frame, then a checkpoint.
 #[derive(Debug, Default)]
 pub struct Batch {
     /// Steps, times and observables, one row each.
@@ -32,14 +31,14 @@ pub struct Background {
 }
 
 impl Background {
-    /// Lets a thread write what is handed over from now on.
+    /// Starts a thread that writes the batches.
     pub fn start(writer: Writer) -> Self {
         let (batches, waiting) = sync_channel(WAITING);
         let thread = std::thread::spawn(move || write_all(writer, &waiting));
         Self { batches: Some(batches), thread: Some(thread) }
     }
 
-    /// Hands over a batch; waits while too many are before it.
+    /// Queues a batch; waits while the queue is full.
     ///
     /// # Errors
     /// The error that ended the writer, for this batch or one before it.
@@ -71,7 +70,7 @@ impl Background {
 
 impl Drop for Background {
     fn drop(&mut self) {
-        // an error is already returned elsewhere, and the file is good up to its last frame
+        // the error is already returned elsewhere; the file is valid up to its last frame
         let _ = self.end();
     }
 }

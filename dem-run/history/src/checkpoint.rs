@@ -1,4 +1,5 @@
-//! The state from which a run goes on, in two slots: while one is written, the other stays whole.
+//! The state from which a run resumes, in two slots: while one is written, the other stays
+//! complete.
 
 use hdf5::{Dataset, File, Group};
 use sha2::{Digest, Sha256};
@@ -60,8 +61,8 @@ impl Slots {
         Ok(Self { index, tables, next: 0 })
     }
 
-    /// Write a checkpoint over the older of the two. `flush` brings the numbers to the file before
-    /// the index names them.
+    /// Overwrites the older of the two checkpoints. `flush` writes the numbers to the file before
+    /// the index refers to them.
     pub fn write(&mut self, checkpoint: &Checkpoint, flush: impl FnOnce() -> hdf5::Result<()>) -> hdf5::Result<()> {
         let slot = self.next;
         self.tables[slot][0].overwrite(&checkpoint.reals)?;
@@ -74,7 +75,7 @@ impl Slots {
     }
 }
 
-/// The newest complete checkpoint of a step up to `last`, if there is one.
+/// The newest complete checkpoint at or before step `last`, if any.
 pub(super) fn newest(source: &Source, last: i64) -> Result<Option<Checkpoint>> {
     let place = |name: &str| format!("{}/{name}", path::CHECKPOINT);
     if !source.has(path::CHECKPOINT) {

@@ -1,6 +1,6 @@
 //! The enumerations that a history stores, each a real HDF5 enum datatype.
 //!
-//! A file may hold any byte in place of an enum. So values are read as raw codes (`…Code`,
+//! A file may hold any byte as the value of an enum. So values are read as raw codes (`…Code`,
 //! transparent over the integer, with the HDF5 enum as datatype) and then checked against the
 //! variants.
 
@@ -63,7 +63,7 @@ macro_rules! codes {
 }
 
 codes! {
-    /// What a contact did in the last solve.
+    /// Status of a contact in the last solve.
     ContactStatus, ContactCode(u8, U1, signed = false),
     /// It carries no reaction.
     Open = 0 "OPEN",
@@ -130,7 +130,7 @@ impl WallKind {
 codes! {
     /// What drives a wall.
     WallDrive, WallDriveCode(u8, U1, signed = false),
-    /// Nothing: it stands still.
+    /// Nothing: the wall is fixed.
     Fixed = 0 "FIXED",
     /// Its velocity is prescribed.
     Velocity = 1 "VELOCITY",
@@ -139,9 +139,9 @@ codes! {
 }
 
 codes! {
-    /// The method that solved a step: of those of its solves the last in this order.
+    /// The method that solved a step; for several solves, the last in this order.
     SolverRoute, RouteCode(u8, U1, signed = false),
-    /// The reactions grew as in the steps before, and a check confirmed it.
+    /// The reactions were extrapolated from the steps before, and a check accepted them.
     Extrapolation = 0 "EXTRAPOLATION",
     /// Newton from the active set of the last step.
     ActiveSet = 1 "ACTIVE_SET",
@@ -152,12 +152,12 @@ codes! {
 }
 
 impl SolverRoute {
-    /// Its code as an observation holds it.
+    /// Its code in the values of an observable.
     pub fn number(self) -> f64 {
         f64::from(self.code().0)
     }
 
-    /// The route that an observation holds; `None` for a number that is no code.
+    /// The route with this code; `None` for an invalid code.
     pub fn of_number(number: f64) -> Option<Self> {
         Self::ALL.iter().copied().find(|route| route.number() == number)
     }

@@ -1,4 +1,4 @@
-//! A copy of a history: packed, or as a run that ended leaves it. Memory does not grow with the
+//! A copy of a history: packed, or in the form of a finished run. The memory does not grow with the
 //! length of the history.
 
 use std::path::Path;
@@ -15,7 +15,7 @@ use super::writer::Writer;
 
 type Check = dyn FnOnce(&Source, &Source, &mut Share) -> Result<()>;
 
-/// Gathers the comparisons of the rows of two files, bit by bit, which run once the copy is closed.
+/// Collects the bitwise comparisons of the rows of two files; they run once the copy is closed.
 #[derive(Default)]
 struct Comparison {
     tables: Vec<Box<Check>>,
@@ -41,23 +41,23 @@ impl Visit for Comparison {
 
 const DIFFERS: &str = "the copy differs from the original";
 
-/// What a copy is for.
+/// Purpose of a copy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CopyAs {
-    /// To be kept: compressed, with checksums.
+    /// For archiving: compressed, with checksums.
     Packed,
-    /// Readable by any HDF5 program, as the history of a run that ended.
+    /// For any HDF5 program: uncompressed, as the history of a finished run.
     Plain,
 }
 
 /// Writes a copy of all complete rows of `history` to `path`. The copy is compared with the
 /// original bit by bit before it replaces the file at `path`, which may be the history itself.
-/// `tell` gets the share that is done, from 0 to 1; if it returns false, the work ends. Returns the
+/// `tell` receives the completed share, from 0 to 1; copying stops if it returns false. Returns the
 /// length of the copy, bytes.
 ///
 /// # Errors
 /// [`HistoryError::Busy`](super::HistoryError::Busy) while another process writes the history or
-/// the file at `path`, and those of reading and writing; the file at `path` is then as it was.
+/// the file at `path`, and those of reading and writing; the file at `path` is then unchanged.
 pub fn copy(history: &History, path: &Path, how: CopyAs, tell: &mut dyn FnMut(f64) -> bool) -> Result<u64> {
     lock::refuse_busy(history.path())?;
     lock::refuse_busy(path)?;
@@ -69,7 +69,7 @@ fn copy_to(history: &History, part: &Path, how: CopyAs, tell: &mut dyn FnMut(f64
     let checkpoint = history.checkpoint()?;
     let mut writer = Writer::closed_copy(part, &layout, how == CopyAs::Packed)?;
     let mut comparison = Comparison::default();
-    // read to be written, and to be compared
+    // read twice: for writing and for the comparison
     let mut share = Share::of(2 * writer.bytes(kept)?, tell);
     writer.take_over(history.source(), kept, &mut share)?;
     if let Some(checkpoint) = &checkpoint {

@@ -48,7 +48,7 @@ pub(super) struct Observables {
     times: Vec<f64>,
 }
 
-/// The values of one observable, and those that wait to be appended.
+/// The table of one observable, and the values not yet appended to it.
 struct Values {
     table: Table,
     kind: ValueKind,
@@ -162,8 +162,8 @@ pub(super) fn check_length(place: &str, found: usize, expected: usize) -> Result
     if found == expected { Ok(()) } else { Err(HistoryError::Shape { place: place.into(), found, expected }) }
 }
 
-/// The version of a file of this layout: 3 where it is a copy of a history from before version 4,
-/// which keeps the load error as it was, without a false acceleration beside it.
+/// The version of a file of this layout. A copy of a history older than version 4 has version 3:
+/// its load error is unchanged, and it has no separate false acceleration.
 fn schema_version(layout: &Layout) -> u32 {
     let observes = |name: &str| layout.observables.iter().any(|observable| observable.name == name);
     if observes(LOAD_ERROR) && !observes(FALSE_ACCELERATION) { 3 } else { SCHEMA_VERSION }
@@ -304,7 +304,7 @@ pub(super) fn contacts(file: &File, layout: &Layout, storage: Storage) -> hdf5::
     let column = |place, name, unit, row: &[usize], take| -> hdf5::Result<Column> {
         Ok(Column { place, table: Table::reals(&group, name, unit, row, growth, storage)?, take })
     };
-    // a bond has tangential rows whatever its friction
+    // a bond has tangential rows, also without friction
     let tangential = layout.friction || bonded;
     let reaction_rows = if tangential { d } else { 1 };
     let mut columns = vec![

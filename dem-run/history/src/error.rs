@@ -1,4 +1,4 @@
-//! What can go wrong with a history, each with its remedy.
+//! The errors of a history, each with its remedy.
 
 use std::path::{Path, PathBuf};
 
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 /// do.
 #[derive(Debug, thiserror::Error)]
 pub enum HistoryError {
-    /// The output file stands already and overwriting was not asked for.
+    /// The output file exists and overwriting was not requested.
     #[error(
         "{} exists already: pass --force to replace it, or -o FILE to write elsewhere", .path.display())]
     Exists {
@@ -54,7 +54,7 @@ pub enum HistoryError {
     Foreign {
         /// The file.
         path: PathBuf,
-        /// How that shows.
+        /// The evidence.
         why: String,
     },
     /// Written by a newer program.
@@ -65,10 +65,10 @@ pub enum HistoryError {
         path: PathBuf,
         /// Its schema version.
         found: u32,
-        /// The newest that is known here.
+        /// The newest version known to this program.
         known: u32,
     },
-    /// The file does not hold what its schema promises.
+    /// The content of the file violates its schema.
     #[error("{} is damaged at /{place} ({why}): `dem-post info --check` lists all that is wrong with it; copy it again, \
         or run the scene again", .path.display())]
     Damaged {
@@ -79,17 +79,17 @@ pub enum HistoryError {
         /// What is wrong with it.
         why: String,
     },
-    /// A frame that the file does not hold.
+    /// A frame that does not exist in the file.
     #[error("{} has no frame {frame}: it holds frames 0 to {}", .path.display(), .frames.saturating_sub(1))]
     NoFrame {
         /// The file.
         path: PathBuf,
         /// The frame asked for.
         frame: usize,
-        /// The number of frames that are there.
+        /// The number of frames in the file.
         frames: usize,
     },
-    /// The file that is written is no longer where it was.
+    /// The file being written was moved or removed.
     #[error("{} has been moved, deleted or replaced while it was being written", .path.display())]
     Gone {
         /// The file.
@@ -103,7 +103,7 @@ pub enum HistoryError {
         /// The process.
         process: i32,
     },
-    /// Another program has the file open for writing, by HDF5's own lock.
+    /// Another program has the file open for writing (HDF5's own lock).
     #[error("{} is open for writing in another program (h5py, a viewer): close it there, or read a copy", .path.display())]
     Locked {
         /// The file.
@@ -139,7 +139,7 @@ pub type Result<T> = std::result::Result<T, HistoryError>;
 /// HDF5's error as one short line.
 pub fn reason(error: &hdf5::Error) -> String {
     let text = match error.stack() {
-        // the innermost record is the cause, the outermost only says which call failed
+        // the innermost record is the cause; the outermost only names the failed call
         Some(stack) => stack.last().map_or_else(|| "unknown HDF5 error".into(), |frame| frame.desc().to_string()),
         None => error.to_string(),
     };
@@ -153,7 +153,7 @@ pub(super) fn damaged(path: &Path, place: &str, why: impl Into<String>) -> Histo
     HistoryError::Damaged { path: path.into(), place: place.into(), why: why.into() }
 }
 
-/// Turns what the operating system refuses to do, as in "create", into [`HistoryError::Io`].
+/// Turns an error of the system call `doing`, as in "create", into [`HistoryError::Io`].
 pub(super) fn refused(path: &Path) -> impl Fn(&'static str, std::io::Error) -> HistoryError + '_ {
     move |doing, source| HistoryError::Io { path: path.into(), doing, source }
 }

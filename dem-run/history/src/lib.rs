@@ -1,9 +1,9 @@
 //! The history of a run: one HDF5 file. This crate is the only place that knows its layout.
 //!
 //! D = dimension, N grains, W walls, B bonds, T frames, M rows of contacts in all frames, S
-//! observed steps, E ruptures. SI units; every dimensional dataset has an attribute `unit`. What a
-//! scene lacks is absent: without walls there is no `/walls`, without bonds no `/bonds`, `/events`,
-//! `moment` or `bond`.
+//! observed steps, E ruptures. SI units; every dimensional dataset has an attribute `unit`. Groups
+//! and datasets that a scene does not need are absent: without walls there is no `/walls`; without
+//! bonds there is no `/bonds`, `/events`, `moment` or `bond`.
 //!
 //! ```text
 //! /h5md                    attribute version [1,1]; author{name}, creator{name, version}: as H5MD
@@ -48,18 +48,18 @@
 //!                          git_revision, build, host, start; solid_fraction, if packed
 //! ```
 //!
-//! **Writing.** Everything is created first; then the file turns to HDF5's single-writer mode, so
-//! that others may read it at any time and a killed run leaves a file that opens
-//! (`h5py.File(p, "r", swmr=True)`). Each frame writes its data, flushes, then writes `/commit` and
+//! **Writing.** All objects are created first; then the file switches to HDF5's single-writer mode.
+//! So other programs can read it during the run and after a kill, with
+//! `h5py.File(p, "r", swmr=True)`. Each frame writes its data, flushes, then writes `/commit` and
 //! flushes that. A finished file opens with plain `h5py.File(p)`.
 //!
 //! **Precision.** With `output.precision` single the values of /particles, /walls and /contacts are
-//! f32; without `output.reactions` /contacts has no `tangent`, `reaction` and `moment`. What is
-//! fixed, observed or an event is f64.
+//! f32; without `output.reactions` /contacts has no `tangent`, `reaction` and `moment`. Constants,
+//! observables and events are f64.
 //!
-//! **Size of chunks.** About 16 frames × 500 values: one frame and one grain's history are both
-//! quick to read. No compression while running: it costs more than the run (`dem-post pack`
-//! compresses afterwards).
+//! **Size of chunks.** About 16 frames × 500 values: both one frame and the history of one grain
+//! are quick to read. Files are not compressed during the run, since compression would cost more
+//! than the run (`dem-post pack` compresses afterwards).
 
 mod background;
 mod checkpoint;

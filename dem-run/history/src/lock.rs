@@ -1,6 +1,6 @@
-//! Which process writes a history. The lock is a record lock of the system (POSIX `fcntl`): it ends
-//! with its process, however that ends, and is independent of the locks of HDF5 between readers and
-//! writers.
+//! The lock of the process that writes a history: a record lock of the system (POSIX `fcntl`). The
+//! system releases it when the process ends, also by a crash. It is independent of HDF5's own locks
+//! between readers and writers.
 
 use std::fs::{File, OpenOptions};
 use std::io;
@@ -11,18 +11,18 @@ use rustix::process::{Flock, FlockType, fcntl_getlk};
 
 use super::error::{HistoryError, Result, refused};
 
-/// Locks the file at `path` until the value is dropped. A process must not open it a second time
-/// and close it again meanwhile: that would end the lock.
+/// Locks the file at `path` until the value is dropped. Until then the process must not open and
+/// close the file a second time: closing would release the lock.
 pub(super) fn hold(path: &Path) -> io::Result<File> {
     let file = OpenOptions::new().read(true).write(true).open(path)?;
     match fcntl_lock(&file, FlockOperation::NonBlockingLockExclusive) {
-        // a file system without locks: the run must not fail for that
+        // a file system without locks: the run continues without one
         Ok(()) | Err(rustix::io::Errno::NOLCK | rustix::io::Errno::NOTSUP | rustix::io::Errno::INVAL) => Ok(file),
         Err(error) => Err(error.into()),
     }
 }
 
-/// Refuses the file at `path`, if there is one, while another process writes it.
+/// Rejects the file at `path`, if it exists, while another process writes it.
 ///
 /// # Errors
 /// [`HistoryError::Busy`]; [`HistoryError::Io`] where the file cannot be read.
@@ -36,7 +36,7 @@ pub fn refuse_busy(path: &Path) -> Result<()> {
     }
 }
 
-/// The process that holds the lock of the file at `path`, if one does.
+/// The process that holds the lock of the file at `path`, if any.
 pub(super) fn holder(path: &Path) -> io::Result<Option<i32>> {
     let file = File::open(path)?;
     let found = fcntl_getlk(&file, &Flock::from(FlockType::WriteLock)).unwrap_or(None);

@@ -3,8 +3,7 @@
 use super::codes::{BondStatus, ContactStatus, RuptureMode, WallDrive, WallKind};
 use super::schema::ROUTE;
 
-/// What a history will hold: everything that is known before the first step. Lengths: see each
-/// field.
+/// The layout of a history: everything known before the first step. Each field states its length.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Layout {
     /// Dimension D: 2 or 3.
@@ -17,7 +16,7 @@ pub struct Layout {
     pub twist: bool,
     /// Whether reactions and moments are left out.
     pub without_reactions: bool,
-    /// Whether what a frame holds is stored in single precision.
+    /// Whether the values of frames are stored in single precision.
     pub single: bool,
     /// The grains, N ≥ 1.
     pub grains: Grains,
@@ -25,13 +24,13 @@ pub struct Layout {
     pub walls: Vec<Wall>,
     /// The bonds, B; empty for a scene without any.
     pub bonds: Bonds,
-    /// What is observed at every step.
+    /// The observables recorded at every step.
     pub observables: Vec<Observable>,
-    /// Where the run comes from.
+    /// Provenance of the run.
     pub parameters: Parameters,
 }
 
-/// What does not change about the grains; each array has N entries.
+/// The constant properties of the grains; each array has N entries.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Grains {
     /// Names of the grains.
@@ -44,7 +43,7 @@ pub struct Grains {
     pub inertia: Vec<f64>,
 }
 
-/// What does not change about a wall. In 2D the third components are zero.
+/// The constant properties of a wall. In 2D the third components are zero.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Wall {
     /// Its name in the scene.
@@ -55,7 +54,7 @@ pub struct Wall {
     pub normal: [f64; 3],
     /// Radius, m: 0 for a plane, negative where the grains are inside.
     pub radius: f64,
-    /// What moves it.
+    /// Its drive.
     pub drive: WallDrive,
     /// Unit direction of the drive; zero for fixed walls.
     pub direction: [f64; 3],
@@ -72,7 +71,7 @@ pub struct Bonds {
     pub strength: Vec<f64>,
     /// Coefficient of the shear limit μ, and of the rolling limit where `rolling` is empty.
     pub friction: Vec<f64>,
-    /// Coefficient of the rolling limit ν; empty if it is μ for all bonds.
+    /// Coefficient of the rolling limit ν; empty if ν = μ for all bonds.
     pub rolling: Vec<f64>,
     /// Mean diameter a_moy, m.
     pub mean_diameter: Vec<f64>,
@@ -90,7 +89,7 @@ impl Bonds {
     }
 }
 
-/// What the values of an observable are.
+/// Type of the values of an observable.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ValueKind {
     /// Real numbers.
@@ -109,12 +108,12 @@ pub struct Observable {
     pub unit: String,
     /// The shape of one value: empty for a scalar, `[D, D]` for a tensor.
     pub shape: Vec<usize>,
-    /// What its values are.
+    /// Type of its values.
     pub kind: ValueKind,
 }
 
 impl Observable {
-    /// An observable of real numbers from its name, unit and shape.
+    /// An observable of real numbers with this name, unit and shape.
     pub fn new(name: &str, unit: &str, shape: &[usize]) -> Self {
         Self { name: name.into(), unit: unit.into(), shape: shape.into(), kind: ValueKind::Real }
     }
@@ -131,7 +130,7 @@ impl Observable {
     }
 }
 
-/// Where a run comes from.
+/// Provenance of a run.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Parameters {
     /// The scene as it was run, JSON.
@@ -146,13 +145,13 @@ pub struct Parameters {
     pub build: String,
     /// The host that ran it.
     pub host: String,
-    /// When it started, ISO 8601.
+    /// Start time, ISO 8601.
     pub start: String,
-    /// Solid fraction that the sample was packed to (–); none where it was not packed.
+    /// Solid fraction to which the sample was packed (–); none for a sample that was not packed.
     pub solid_fraction: Option<f64>,
 }
 
-/// One frame to be written. Arrays of what the layout lacks are empty.
+/// One frame to be written. An array of a quantity that the layout lacks is empty.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Frame {
     /// Number of the step.
@@ -208,11 +207,11 @@ pub struct ContactRows {
     /// Reactions of j on i in the local frame (n, t…), N, m × D; m × 1 with neither friction nor
     /// bonds; empty where they were not recorded.
     pub reaction: Vec<f64>,
-    /// Moments of j on i, N m: m in 2D, m × 2 in 3D; empty without bonds.
+    /// Moments of j on i, N m; shape m in 2D, m × 2 in 3D; empty without bonds.
     pub moment: Vec<f64>,
     /// Gaps, m, negative where bodies overlap.
     pub gap: Vec<f64>,
-    /// What each contact did.
+    /// Status of each contact.
     pub status: Vec<ContactStatus>,
     /// The bond of each contact, −1 for none; empty without bonds.
     pub bond: Vec<i32>,
@@ -259,11 +258,10 @@ pub struct Rupture {
     pub normal_force: f64,
     /// Magnitude of the tangential force at rupture, N.
     pub tangential_force: f64,
-    /// Magnitude of the bending moment at rupture, N m; in histories of before version 3 that of
+    /// Magnitude of the bending moment at rupture, N m; in histories older than version 3, norm of
     /// all moments.
     pub moment: f64,
-    /// Magnitude of the twisting moment at rupture, N m; not a number in histories of before
-    /// version 3.
+    /// Magnitude of the twisting moment at rupture, N m; NaN in histories older than version 3.
     pub twist: f64,
     /// Elastic energy released, J; 0 for a rigid bond.
     pub energy: f64,

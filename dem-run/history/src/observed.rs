@@ -1,4 +1,4 @@
-//! What was observed at every step: its names, its values, and which values it may have.
+//! The observables: names, values, and checks of the values.
 
 use std::ops::Range;
 
@@ -23,7 +23,7 @@ pub struct Series {
     pub step: Vec<i64>,
     /// Times, s, S.
     pub time: Vec<f64>,
-    /// Values, S × shape, row by row; of an enumeration their codes.
+    /// Values, S × shape, row by row; for an enumeration, its codes.
     pub value: Vec<f64>,
 }
 
@@ -40,7 +40,7 @@ impl Series {
     }
 }
 
-/// The names of what was observed, sorted.
+/// The names of the observables, sorted.
 pub(super) fn names(source: &Source) -> Result<Vec<String>> {
     let group = source.file.group(path::OBSERVABLES).map_err(while_reading(&source.path, path::OBSERVABLES))?;
     let mut names = group.member_names().map_err(while_reading(&source.path, path::OBSERVABLES))?;
@@ -49,7 +49,7 @@ pub(super) fn names(source: &Source) -> Result<Vec<String>> {
     Ok(names)
 }
 
-/// What was observed, in the order of the names.
+/// The observables, in the order of their names.
 pub(super) fn observables(source: &Source) -> Result<Vec<Observable>> {
     let observable = |name: String| -> Result<Observable> {
         let Series { unit, shape, .. } = series(source, &name, 0..0)?.unwrap_or_default();
@@ -85,7 +85,7 @@ pub(super) fn series(source: &Source, name: &str, rows: Range<usize>) -> Result<
     Ok(Some(Series { unit, shape, step, time, value }))
 }
 
-/// What the values at `place` are, by their type in the file.
+/// The type of the values at `place`, from their type in the file.
 fn kind(source: &Source, place: &str) -> Result<ValueKind> {
     let found = source.dataset(place)?.dtype().and_then(|dtype| dtype.to_descriptor());
     let found = found.map_err(while_reading(&source.path, place))?;

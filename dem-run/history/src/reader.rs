@@ -17,8 +17,8 @@ use super::sound::{self, Surroundings};
 use super::source::Source;
 use super::{checkpoint, lock};
 
-/// An open history, read-only. Only complete frames are seen; a file that a run still writes, or
-/// that a killed run left, opens as well and shows what was complete when it was opened.
+/// An open history, read-only. Only complete frames are visible. The file of a running or killed
+/// run opens as well and shows the frames that were complete at opening.
 pub struct History {
     source: Source,
     dimension: usize,
@@ -30,7 +30,7 @@ pub struct History {
     /// Complete rows of ruptures and of observables.
     events: usize,
     observed: usize,
-    /// Where grains may be, once it was asked.
+    /// Admissible positions of grains, computed on first use.
     surroundings: OnceCell<Surroundings>,
 }
 
@@ -40,7 +40,7 @@ impl History {
     /// # Errors
     /// [`HistoryError::Missing`], [`HistoryError::Io`], [`HistoryError::NotHdf5`],
     /// [`HistoryError::Truncated`], [`HistoryError::Foreign`], [`HistoryError::Newer`] or
-    /// [`HistoryError::Damaged`], as the file deserves.
+    /// [`HistoryError::Damaged`], depending on the file.
     pub fn open(path: &Path) -> Result<Self> {
         let history = Self::open_as_is(path)?;
         let place = |name: &str| format!("{}/position/{name}", path::GRAINS);
@@ -50,7 +50,7 @@ impl History {
         Ok(history)
     }
 
-    /// As [`History::open`], of a file whose frames may be in no order: to be checked.
+    /// As [`History::open`], but accepts frames out of order: for the check of a file.
     ///
     /// # Errors
     /// As [`History::open`].
@@ -72,7 +72,7 @@ impl History {
     }
 
     fn read_commit(&mut self) -> Result<()> {
-        // first the commit: what is read after it is at least as new
+        // the commit is read first: data read later are at least as new
         let frames = self.source.scalar::<u64>(path::COMMIT)? as usize;
         self.dimension = self.source.attribute::<i32>(&format!("{}/box", path::GRAINS), "dimension")? as usize;
         if !(2..=3).contains(&self.dimension) {
@@ -96,7 +96,7 @@ impl History {
         self.complete_at(self.frames())
     }
 
-    /// Rows that were complete when `frames` frames were.
+    /// Rows that were complete at the commit of `frames` frames.
     ///
     /// # Errors
     /// [`HistoryError::Damaged`].
@@ -114,8 +114,8 @@ impl History {
         })
     }
 
-    /// The newest checkpoint; none in a file of a version without checkpoints, or of a run that was
-    /// killed before its first.
+    /// The newest checkpoint; none in a file of a version without checkpoints, or of a run killed
+    /// before its first checkpoint.
     ///
     /// # Errors
     /// [`HistoryError::Damaged`].
@@ -126,7 +126,7 @@ impl History {
         }
     }
 
-    /// The process that writes the file, if one does.
+    /// The process that writes the file, if any.
     ///
     /// # Errors
     /// [`HistoryError::Io`].
@@ -174,7 +174,7 @@ impl History {
         self.source.length
     }
 
-    /// Whether the file was never closed: its run still goes on, or was killed.
+    /// Whether the file was never closed: its run continues or was killed.
     pub fn open_ended(&self) -> bool {
         self.source.open_ended
     }
@@ -215,7 +215,7 @@ impl History {
         self.source.has(&format!("{}/reaction", path::CONTACTS))
     }
 
-    /// Where the run comes from.
+    /// Provenance of the run.
     ///
     /// # Errors
     /// [`HistoryError::Damaged`].
@@ -234,7 +234,7 @@ impl History {
         })
     }
 
-    /// What does not change about the grains.
+    /// The constant properties of the grains.
     ///
     /// # Errors
     /// [`HistoryError::Damaged`].
@@ -373,7 +373,7 @@ impl History {
         };
         let count = format!("{}/count", path::CONTACTS);
         let (start, rows) = (number(&format!("{}/start", path::CONTACTS))?, number(&count)?);
-        // the frames stand behind each other without gaps
+        // frames follow each other without gaps
         let complete = self.source.read::<u64>(path::COMMIT_CONTACTS, frame.saturating_sub(1)..frame + 1)?.1;
         let (before, end) = (if frame == 0 { 0 } else { complete[0] }, complete[complete.len() - 1]);
         if start != before || start.checked_add(rows) != Some(end) {
@@ -429,7 +429,7 @@ impl History {
         })
     }
 
-    /// The names of what was observed, sorted.
+    /// The names of the observables, sorted.
     ///
     /// # Errors
     /// [`HistoryError::Damaged`].
@@ -464,7 +464,7 @@ impl History {
     }
 }
 
-/// The small parts that the methods above are made of.
+/// Helpers of the methods above.
 impl History {
     fn check_frame(&self, frame: usize) -> Result<()> {
         if frame < self.frames() {
@@ -473,7 +473,7 @@ impl History {
         Err(HistoryError::NoFrame { path: self.source.path.clone(), frame, frames: self.frames() })
     }
 
-    /// Where the grains may be, from the first frame.
+    /// Admissible positions of grains, computed from the first frame.
     fn surroundings(&self) -> Result<&Surroundings> {
         if let Some(known) = self.surroundings.get() {
             return Ok(known);
@@ -517,8 +517,8 @@ impl History {
         }
     }
 
-    /// A column of the contacts, with rows of one of the lengths `widths`; empty if the scene lacks
-    /// it.
+    /// A column of the contacts; the length of a row is one of `widths`. Empty if the scene has no
+    /// such column.
     fn reals_in(&self, range: Range<usize>, name: &str, widths: &[usize]) -> Result<Vec<f64>> {
         let place = format!("{}/{name}", path::CONTACTS);
         if !self.source.has(&place) {
@@ -532,7 +532,7 @@ impl History {
         Ok(values)
     }
 
-    /// Pairs of contacts, whose grains and walls must all be there.
+    /// Pairs of contacts; all their grains and walls must exist.
     fn pairs_in(&self, range: Range<usize>) -> Result<Vec<[i32; 2]>> {
         let place = format!("{}/pair", path::CONTACTS);
         let (row, flat) = self.source.read::<i32>(&place, range.clone())?;

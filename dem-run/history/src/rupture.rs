@@ -1,4 +1,4 @@
-//! Bonds that broke, as the file holds them, and as older versions held them.
+//! Ruptures as the file stores them, in this version and in older ones.
 
 use std::ops::Range;
 
@@ -10,8 +10,9 @@ use super::error::{Result, while_reading};
 use super::model::Rupture;
 use super::source::Source;
 
-/// A rupture as the file holds it: scalars only, because pandas refuses arrays. The padding is a
-/// member of its own; otherwise its bytes would be undefined, and two runs would differ.
+/// A rupture as the file stores it: scalars only, because pandas rejects arrays. The padding is an
+/// explicit member; otherwise its bytes would be undefined, and the files of two equal runs would
+/// differ.
 #[derive(Clone, Copy, Debug, H5Type)]
 #[repr(C)]
 pub(super) struct RuptureRow {
@@ -86,8 +87,8 @@ impl From<&Rupture> for RuptureRow {
 }
 
 impl RuptureRow {
-    /// The rows `range` of the dataset, with the shape of one; those of older versions lack the
-    /// column of twist, and in version 1 its mode.
+    /// The rows `range` of the dataset, with the shape of one row. Versions 1 and 2 lack the column
+    /// `twist`; version 1 also lacks the mode TWIST.
     pub(super) fn read(source: &Source, place: &str, range: Range<usize>) -> Result<(Vec<usize>, Vec<Self>)> {
         let found = source.dataset(place)?.dtype().and_then(|dtype| dtype.to_descriptor());
         let found = found.map_err(while_reading(&source.path, place))?;
@@ -108,14 +109,14 @@ impl RuptureRow {
         Ok((row, old.into_iter().map(Self::from).collect()))
     }
 
-    /// Whether two rows are alike to the bit.
+    /// Whether two rows are equal bit by bit.
     pub(super) fn same(&self, other: &Self) -> bool {
         let reals = |r: &Self| [r.time, r.x, r.y, r.z, r.rn, r.rt, r.m, r.twist, r.energy].map(f64::to_bits);
         let integers = |r: &Self| [r.round, r.bond, r.i, r.j, r.pad];
         (self.step, reals(self), integers(self), self.mode) == (other.step, reals(other), integers(other), other.mode)
     }
 
-    /// The event, `None` if its mode is no known one.
+    /// The event; `None` if its mode is unknown.
     pub(super) fn event(&self) -> Option<Rupture> {
         Some(Rupture {
             step: self.step,

@@ -1,10 +1,10 @@
-//! Names, versions and chunk sizes of the layout; the layout itself stands in the module's
-//! documentation.
+//! Names, versions and chunk sizes of the layout; the layout itself is in the documentation of the
+//! crate.
 
-/// Version of the layout. It grows with every change that an older reader would misread. 2: bonds
-/// break in twist, too. 3: a rupture has its twisting moment apart from the bending moment. 4: the
-/// load error is that of the solver alone, not a number where no solve reports one, beside the
-/// false acceleration; observables may be enumerations.
+/// Version of the layout. It increases with every change that an older reader would misread. 2:
+/// bonds also break in twist. 3: a rupture stores its twisting moment apart from the bending
+/// moment. 4: the load error is that of the solver alone (NaN where no solve reports one), and the
+/// false acceleration is separate; observables may be enumerations.
 pub const SCHEMA_VERSION: u32 = 4;
 
 /// The program's name as `/h5md/creator` records it.
@@ -12,9 +12,9 @@ pub(super) const CREATOR: &str = "dem-run";
 
 /// The observable that is an enumeration: the method that solved each step.
 pub const ROUTE: &str = "solver_route";
-/// The observable that is not a number in a step none of whose solves reports it.
+/// The observable that is NaN in a step whose solves do not report it.
 pub const LOAD_ERROR: &str = "solver_load_error";
-/// The observable that histories have from version 4 on; before it the load error held either.
+/// The observable added in version 4; before, the load error held either quantity.
 pub const FALSE_ACCELERATION: &str = "false_acceleration";
 
 /// Paths in the file.
@@ -41,8 +41,8 @@ const CHUNK: usize = 16 * CHUNK_ROW;
 
 /// The chunk of a dataset that grows by whole frames: `[rows, first extents of one frame…]`.
 ///
-/// A frame of a large sample is split so that 16 frames fill a chunk; a small sample puts more
-/// frames in one.
+/// A frame of a large sample is split so that 16 frames fill a chunk; a chunk of a small sample
+/// holds more frames.
 pub(super) fn frame_chunk(item: usize, row: &[usize]) -> Vec<usize> {
     let inner: usize = row.iter().skip(1).product::<usize>().max(1);
     let across = row.first().map_or(1, |&n| n.min((CHUNK_ROW / (inner * item)).max(1)));
@@ -63,12 +63,12 @@ pub(super) fn row_chunk(rows: usize, item: usize, row: &[usize]) -> Vec<usize> {
     chunk
 }
 
-/// Slots and bytes of the chunk cache of each dataset, for `grains` grains. It holds the chunks
-/// that a frame is appended to; with less, every frame would evict and reload partly filled chunks.
-/// It holds no more, because every append and every flush goes through the whole cache. (It is a
-/// setting of the file: single-writer mode ignores those of datasets.)
+/// Slots and bytes of the chunk cache of each dataset, for `grains` grains. The cache holds exactly
+/// the chunks to which a frame is appended. A smaller cache would evict and reload partly filled
+/// chunks at every frame; a larger one is slower, because every append and every flush scans the
+/// whole cache. (This is a setting of the file: single-writer mode ignores settings of datasets.)
 pub(super) fn chunk_cache(grains: usize, dimension: usize) -> (usize, usize) {
-    // positions, or in space quaternions, are the widest
+    // positions (2D) or quaternions (3D) are the widest
     let chunk = frame_chunk(8, &[grains, if dimension == 2 { 2 } else { 4 }]);
     let band = grains.div_ceil(chunk[1]);
     let bytes = 8 * band * chunk.iter().product::<usize>();

@@ -1,5 +1,6 @@
-//! Checks of values that a sound history cannot hold. Reading refuses them, with their place and
-//! row, before anything is computed from them. `dem-post info --check` lists all of them, and more.
+//! Checks for values that a sound history cannot hold. The reader rejects such a value, with its
+//! place and row, before anything is computed from it. `dem-post info --check` lists all such
+//! values and makes further checks.
 
 use std::fmt::Display;
 use std::path::Path;
@@ -10,25 +11,24 @@ use super::schema::LOAD_ERROR;
 
 /// Upper bound of every quantity in SI units; squares and cubes of smaller numbers are finite.
 const GREATEST: f64 = 1e100;
-/// Largest distance of a grain from the sample, over the size of the sample. Farther away a
-/// position in double precision does not resolve the gaps of contacts.
+/// Largest distance of a grain from the sample, relative to the size of the sample. At larger
+/// distances double precision does not resolve the gaps of contacts.
 const FAR: f64 = 1e6;
 
-/// Whether a number can be a measure of anything.
+/// Whether a number is finite and below `GREATEST` in magnitude.
 #[must_use]
 pub fn is_plausible(value: f64) -> bool {
     value.abs() < GREATEST
 }
 
-/// Whether the observable `name` may have this value: a plausible number; or not a number for the
-/// load error, in a step whose solves report none.
+/// Whether the observable `name` may have this value: a plausible number or, for the load error of
+/// a step whose solves report none, NaN.
 #[must_use]
 pub fn may_be_observed(name: &str, value: f64) -> bool {
     is_plausible(value) || (name == LOAD_ERROR && value.is_nan())
 }
 
-/// Where the grains of a sample may be at all: within a million sizes of the sample from its
-/// middle.
+/// The admissible positions of grains: within a million sizes of the sample from its middle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surroundings {
     /// Medians of the first coordinates, m, D of them: a single wrong grain does not move them.
@@ -38,9 +38,9 @@ pub struct Surroundings {
 }
 
 impl Surroundings {
-    /// Those of grains with these radii (m, N) and first centres (m, N × D). The size of the sample
-    /// is the greater of all grains in a row and twice the median distance of their centres from
-    /// the middle.
+    /// The surroundings of grains with these radii (m, N) and first centres (m, N × D). The size of
+    /// the sample is the greater of two lengths: all grains in a row, and twice the median distance
+    /// of the centres from the middle.
     #[must_use]
     pub fn of(radius: &[f64], position: &[f64], dimension: usize) -> Self {
         let middle: Vec<f64> =
@@ -51,20 +51,20 @@ impl Surroundings {
         Self { reach: FAR * 2.0 * row.max(spread), middle }
     }
 
-    /// Whether a centre (m, D) lies within them.
+    /// Whether a centre (m, D) lies within the surroundings.
     #[must_use]
     pub fn hold(&self, centre: &[f64]) -> bool {
         centre.iter().zip(&self.middle).all(|(x, m)| (x - m).abs() <= self.reach)
     }
 }
 
-/// Whether the radius of a grain (m) is beyond a million times `usual`, the median of all.
+/// Whether the radius of a grain (m) exceeds a million times `usual`, the median of all radii.
 #[must_use]
 pub fn is_huge(radius: f64, usual: f64) -> bool {
     radius > FAR * usual
 }
 
-/// The median, the greater of two; 0 of none.
+/// The median, the upper one of an even number of values; 0 without values.
 #[must_use]
 pub fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
@@ -75,19 +75,18 @@ pub(super) fn row(path: &Path, place: &str, row: usize, why: impl Display) -> Hi
     damaged(path, place, format!("row {row}: {why}"))
 }
 
-/// Refuses what is no plausible number among rows of `width` numbers, the first of which is row
-/// `first`.
+/// Rejects implausible numbers in rows of `width` numbers; the first row has index `first`.
 pub(super) fn reals(path: &Path, place: &str, first: usize, width: usize, values: &[f64]) -> Result<()> {
     refused(path, place, first, width, values.iter().position(|value| !is_plausible(*value)), values)
 }
 
-/// The same among those of the observable `name`.
+/// The same for the values of the observable `name`.
 pub(super) fn observed(path: &Path, name: &str, place: &str, first: usize, width: usize, values: &[f64]) -> Result<()> {
     let wrong = values.iter().position(|value| !may_be_observed(name, *value));
     refused(path, place, first, width, wrong, values)
 }
 
-/// Refuses the value numbered `wrong`, if there is one.
+/// Rejects the value with index `wrong`, if any.
 fn refused(path: &Path, place: &str, first: usize, width: usize, wrong: Option<usize>, values: &[f64]) -> Result<()> {
     match wrong {
         Some(k) => Err(row(path, place, first + k / width.max(1), format!("{:e} is no plausible number", values[k]))),
@@ -95,7 +94,7 @@ fn refused(path: &Path, place: &str, first: usize, width: usize, wrong: Option<u
     }
 }
 
-/// Refuses numbers that are not above zero.
+/// Rejects numbers that are not positive.
 pub(super) fn positive(path: &Path, place: &str, values: &[f64]) -> Result<()> {
     match values.iter().position(|value| *value <= 0.0) {
         Some(k) => Err(row(path, place, k, format!("{:e} is not above zero", values[k]))),
@@ -103,7 +102,7 @@ pub(super) fn positive(path: &Path, place: &str, values: &[f64]) -> Result<()> {
     }
 }
 
-/// Refuses radii of another scale than all others.
+/// Rejects radii far larger than the median.
 pub(super) fn radii(path: &Path, place: &str, values: &[f64]) -> Result<()> {
     positive(path, place, values)?;
     let usual = median(values.to_vec());
@@ -115,7 +114,7 @@ pub(super) fn radii(path: &Path, place: &str, values: &[f64]) -> Result<()> {
     }
 }
 
-/// Refuses values that do not grow from row to row.
+/// Rejects values that do not increase from row to row.
 pub(super) fn growing<T: PartialOrd + Display>(path: &Path, place: &str, values: &[T]) -> Result<()> {
     match values.windows(2).position(|pair| pair[0] >= pair[1]) {
         Some(k) => Err(row(path, place, k + 1, format!("{} does not come after {}", values[k + 1], values[k]))),
@@ -123,8 +122,8 @@ pub(super) fn growing<T: PartialOrd + Display>(path: &Path, place: &str, values:
     }
 }
 
-/// Refuses ruptures of unknown bonds or grains, of steps out of order or after step `until`, and
-/// with implausible numbers.
+/// Rejects ruptures of unknown bonds or grains, ruptures out of order or after step `until`, and
+/// implausible numbers.
 pub(super) fn ruptures(
     path: &Path,
     place: &str,
@@ -136,7 +135,7 @@ pub(super) fn ruptures(
     let mut last = (i64::MIN, f64::NEG_INFINITY);
     for (k, e) in events.iter().enumerate() {
         let [x, y, z] = e.point;
-        // histories of before version 3 have none
+        // histories older than version 3 have no twisting moment
         let twist = if e.twist.is_nan() { 0.0 } else { e.twist };
         let numbers = [e.time, x, y, z, e.normal_force, e.tangential_force, e.moment, twist, e.energy];
         reals(path, place, k, numbers.len(), &numbers)?;

@@ -1,4 +1,4 @@
-//! An open HDF5 file that is a history, and the checked reads that everything else is made of.
+//! An open HDF5 file that is a history, and the checked reads on which the reader is built.
 
 use std::fs;
 use std::io::Read;
@@ -60,7 +60,7 @@ impl Source {
         if count < range.end {
             return Err(self.damaged(place, &format!("it has {count} rows, and {} are promised", range.end)));
         }
-        // a forged shape must not ask for more memory than the file can fill
+        // a forged shape must not allocate more memory than the file can fill
         let bytes = row.iter().fold(range.len() as u64, |b, &n| b.saturating_mul(n as u64));
         let bytes = bytes.saturating_mul(size_of::<T>() as u64);
         if bytes > self.length.saturating_mul(GREATEST_COMPRESSION) {
@@ -112,7 +112,7 @@ impl Source {
         read.map_err(while_reading(&self.path, &format!("{place}@{name}")))
     }
 
-    /// An attribute that not every history has.
+    /// An optional attribute.
     pub fn optional_attribute<T: H5Type>(&self, place: &str, name: &str) -> Result<Option<T>> {
         let names = self.file.group(place).and_then(|group| group.attr_names());
         match names.map_err(while_reading(&self.path, place))?.iter().any(|found| found == name) {
@@ -137,11 +137,11 @@ impl Source {
     }
 }
 
-/// Length of the file, and whether it is marked as still being written. Refuses files that are not
-/// HDF5 and files that are truncated.
+/// Length of the file, and whether it is marked as still being written. Rejects files that are not
+/// HDF5 and truncated files.
 ///
-/// HDF5 itself reads zeros beyond the end of a file that was never closed, so the end is checked
-/// here.
+/// HDF5 itself reads zeros beyond the end of a file that was never closed, so this function checks
+/// the end.
 fn check_superblock(path: &Path) -> Result<(u64, bool)> {
     let io = |error| refused(path)("read", error);
     let metadata = fs::metadata(path).map_err(|error| match error.kind() {
@@ -161,7 +161,7 @@ fn check_superblock(path: &Path) -> Result<(u64, bool)> {
     if head.len() < 48 {
         return Err(HistoryError::Truncated { path: path.into(), found, expected: 48 });
     }
-    // only version 3 is ours; HDF5 judges the others
+    // this program writes only version 3; HDF5 checks the others
     let (version, sizes, flags) = (head[8], head[9], head[11]);
     if version != 3 || sizes != 8 {
         return Ok((found, false));

@@ -1,18 +1,18 @@
-//! The folder of a sweep: what is planned, what each run came to.
+//! The folder of a sweep: the planned runs and the outcome of each.
 //!
 //! ```text
 //! manifest.json        every run: its values, its digest, its state when it was last gathered
 //! runs.csv             the same as a table, with the numbers of each run's summary
 //! runs/0001.json       the scene of a run; locked while it is being run
-//! runs/0001.h5         its history, there as soon as it is complete
+//! runs/0001.h5         its complete history
 //! runs/0001.part.h5    its history while it is written
-//! runs/0001.failed.h5  its history up to where it failed
-//! runs/0001.state.json what it came to
+//! runs/0001.failed.h5  its history up to the failure
+//! runs/0001.state.json its outcome
 //! ```
 //!
-//! Only the state files say what has been done. Each has one writer, the process that holds the
-//! lock of the run. The manifest and the table are gathered from them, so tasks that run at the
-//! same time never write the same file.
+//! The state files alone record outcomes. Each has one writer, the process that holds the lock of
+//! the run. The manifest and the table are compiled from the state files, so simultaneous tasks
+//! never write the same file.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions, TryLockError};
@@ -30,7 +30,7 @@ use crate::reader::History;
 /// A file in the folder of a sweep that cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum SweepError {
-    /// The manifest is not one, or one of another format.
+    /// The file is not a manifest, or has another format.
     #[error("{}: the manifest cannot be read: {why}", .path.display())]
     Manifest {
         /// The manifest.
@@ -83,11 +83,11 @@ pub struct Entry {
     pub id: String,
     /// Its values.
     pub values: BTreeMap<String, Value>,
-    /// What stands for its scene.
+    /// Digest of its scene.
     pub digest: String,
-    /// Its history, from the folder of the sweep; not there before the run is done.
+    /// Path of its history relative to the folder of the sweep; absent until the run is done.
     pub history: String,
-    /// How far it is.
+    /// State of the run.
     pub state: State,
     /// Why it failed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -100,13 +100,13 @@ pub struct Entry {
     pub cpu_time: Option<f64>,
 }
 
-/// How far a run is.
+/// State of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum State {
-    /// It is yet to be run.
+    /// Not started.
     Left,
-    /// It is being run.
+    /// Running.
     Running,
     /// Its history is complete.
     Done,
@@ -127,7 +127,7 @@ impl State {
     }
 }
 
-/// What a run came to: the content of its state file.
+/// Outcome of a run: the content of its state file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// The scene that was run.
@@ -147,8 +147,7 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// Whether another attempt would end the same way: no convergence, or a sample that cannot be
-    /// made.
+    /// Whether a retry would fail again: no convergence, or a sample that cannot be made.
     #[must_use]
     pub fn is_final(&self) -> bool {
         self.state == State::Failed && matches!(self.exit_code, Some(2 | 3))
@@ -168,7 +167,7 @@ pub struct Store {
 }
 
 impl Store {
-    /// The folder, which need not be there yet.
+    /// The folder, which need not exist yet.
     #[must_use]
     pub fn new(folder: PathBuf) -> Self {
         Self { folder }
@@ -189,7 +188,7 @@ impl Store {
     /// The manifest, if there is one.
     ///
     /// # Errors
-    /// A manifest that cannot be read, or that another program wrote.
+    /// The manifest cannot be read, or another program wrote it.
     pub fn manifest(&self) -> Result<Option<Manifest>> {
         let path = self.folder.join("manifest.json");
         let failed = |why: String| SweepError::Manifest { path: path.clone(), why };
@@ -206,13 +205,13 @@ impl Store {
         }
     }
 
-    /// What a run came to; none if it has not ended, or if what is written there cannot be read.
+    /// Outcome of a run; none if the run has not ended or its state file cannot be read.
     #[must_use]
     pub fn outcome(&self, id: &str) -> Option<Outcome> {
         serde_json::from_slice(&fs::read(self.path(id, ".state.json")).ok()?).ok()
     }
 
-    /// Writes what a run came to.
+    /// Writes the outcome of a run.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -220,14 +219,14 @@ impl Store {
         write_json(&self.path(id, ".state.json"), outcome)
     }
 
-    /// Whether the history of a run is there and complete.
+    /// Whether the history of a run exists and is complete.
     #[must_use]
     pub fn is_complete(&self, id: &str) -> bool {
         History::open(&self.path(id, ".h5")).is_ok_and(|history| history.frames() > 0 && !history.open_ended())
     }
 
-    /// The lock of a run; none while another process has it. It is released at the end of the
-    /// process, however it ends.
+    /// The lock of a run; none while another process holds it. The lock is released when its
+    /// process ends, also by a crash.
     ///
     /// # Errors
     /// The folder cannot be written.
@@ -235,13 +234,13 @@ impl Store {
         let path = self.path(id, ".json");
         let failed = |source| SweepError::File { path: path.clone(), doing: "cannot be locked", source };
         let file = OpenOptions::new().write(true).create(true).truncate(false).open(&path).map_err(failed)?;
-        // whoever gathers states looks at the lock for a moment
+        // `gather` takes a shared lock for a moment
         for _ in 0..10 {
             match file.try_lock() {
                 Ok(()) => return Ok(Some(file)),
                 Err(TryLockError::WouldBlock) => std::thread::sleep(Duration::from_millis(10)),
-                // a file system without locks, as on some clusters: the scheduler must start each
-                // run only once
+                // a file system without locks, as on some clusters: here the scheduler must start
+                // each run only once
                 Err(TryLockError::Error(error)) if error.kind() == ErrorKind::Unsupported => return Ok(Some(file)),
                 Err(TryLockError::Error(error)) => return Err(failed(error)),
             }
@@ -254,7 +253,7 @@ impl Store {
         file.is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
     }
 
-    /// Brings the states in the manifest up to date.
+    /// Updates the states in the manifest.
     pub fn gather(&self, manifest: &mut Manifest) {
         for run in &mut manifest.runs {
             let outcome = self.outcome(&run.id).filter(|outcome| outcome.digest == run.digest);
@@ -278,8 +277,8 @@ impl Store {
         write_json(&self.folder.join("manifest.json"), manifest)
     }
 
-    /// Writes a file in the folder so that a reader, or a crash, finds the old content or the new
-    /// one.
+    /// Writes a file in the folder atomically: a reader, also after a crash, finds the old content
+    /// or the new one.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -287,7 +286,7 @@ impl Store {
         write(&self.folder.join(name), content)
     }
 
-    /// Makes the folder and that of the runs.
+    /// Creates the folder and its subfolder `runs`.
     ///
     /// # Errors
     /// They cannot be made.
@@ -299,7 +298,7 @@ impl Store {
     /// Deletes all files of a run.
     pub fn delete(&self, id: &str) {
         for ending in [".state.json", ".h5", ".failed.h5", ".part.h5", ".log", ".json"] {
-            // most of them are not there
+            // most of them do not exist
             let _ = fs::remove_file(self.path(id, ending));
         }
     }
@@ -323,7 +322,7 @@ impl Manifest {
 }
 
 impl Entry {
-    /// A run that is yet to be run.
+    /// A run not yet started.
     #[must_use]
     pub fn new(id: String, values: BTreeMap<String, Value>, digest: String) -> Self {
         let history = format!("runs/{id}.h5");

@@ -20,7 +20,7 @@ pub(super) enum Growth {
 pub(super) struct Storage {
     /// Reals of frames in single precision.
     pub single: bool,
-    /// Compressed, with checksums; for files that are complete.
+    /// Compressed, with checksums; for complete files.
     pub packed: bool,
 }
 
@@ -31,7 +31,7 @@ pub(super) struct Table {
     row: Vec<usize>,
 }
 
-/// Level of compression: higher ones take longer and gain little.
+/// Level of compression: higher levels take longer and save little.
 const DEFLATE: u8 = 4;
 
 impl Table {
@@ -73,7 +73,7 @@ impl Table {
         }
     }
 
-    /// Where it stands in the file.
+    /// Its path in the file.
     pub fn place(&self) -> String {
         self.dataset.name().trim_start_matches('/').into()
     }
@@ -88,7 +88,7 @@ impl Table {
         self.width() * self.dataset.dtype().map_or(8, |dtype| dtype.size())
     }
 
-    /// Writes `values` over the first rows, and makes more rows if need be.
+    /// Overwrites the first rows with `values`; adds rows where needed.
     pub fn overwrite<T: H5Type>(&mut self, values: &[T]) -> hdf5::Result<()> {
         let count = values.len() / self.width();
         if count > self.rows {

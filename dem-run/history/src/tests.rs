@@ -58,7 +58,7 @@ fn full(dimension: usize) -> Layout {
     }
 }
 
-/// The least that a history holds: one grain, nothing else.
+/// The smallest history: one grain, nothing else.
 fn bare() -> Layout {
     Layout {
         dimension: 2,
@@ -79,8 +79,7 @@ struct Sample {
     bonds: Vec<BondStatus>,
 }
 
-/// What a run with layout `l` might hand over at frame `k`; the number of contacts changes from
-/// frame to frame.
+/// Plausible data of frame `k` for layout `l`; the number of contacts changes from frame to frame.
 fn sample(l: &Layout, k: usize) -> Sample {
     let (d, n, w) = (l.dimension, l.grains.id.len(), l.walls.len());
     let (bonded, m, s) = (!l.bonds.is_empty(), k % 4, k as f64);
@@ -253,7 +252,7 @@ fn only_complete_frames_are_seen_in_an_open_file() {
     for k in 0..1000 {
         writer.observe(k, 0.0, &numbers(6, 0.0)).unwrap();
     }
-    // what a killed run leaves behind
+    // the file of a killed run
     let killed = folder.path().join("killed.h5");
     fs::copy(&path, &killed).unwrap();
     check(&killed, &layout, 5);
@@ -274,11 +273,11 @@ fn an_existing_file_is_replaced_only_when_asked() {
     for remedy in ["--force", "-o"] {
         assert!(error.to_string().contains(remedy), "{error}");
     }
-    // a layout that contradicts itself does no harm, even with leave to overwrite
+    // an inconsistent layout leaves the old file unchanged, even where overwriting is allowed
     let mut wrong = full(2);
     wrong.bonds.strength.pop();
     assert!(matches!(Writer::create(&path, &wrong, true), Err(HistoryError::Shape { .. })));
-    // nor does one that HDF5 refuses half-way
+    // so does a layout that HDF5 rejects half-way
     wrong = full(2);
     wrong.observables.push(wrong.observables[0].clone());
     assert!(matches!(Writer::create(&path, &wrong, true), Err(HistoryError::Write { .. })));
@@ -361,7 +360,7 @@ fn values_that_name_nothing_are_refused() {
     }
 }
 
-/// Reads everything; any answer is right but a panic.
+/// Reads everything; every result or error is accepted, a panic is not.
 fn read_all(path: &Path) -> Result<usize> {
     let h = History::open(path)?;
     h.parameters()?;
@@ -442,7 +441,7 @@ fn a_packed_history_is_the_same_and_smaller() {
         let checkpoint = Checkpoint { step: 299, reals: numbers(1000, 0.5), counts: (0..70).collect() };
         writer.checkpoint(&Checkpoint { step: 17, ..checkpoint.clone() }).unwrap();
         writer.checkpoint(&checkpoint).unwrap();
-        // of a file whose run was killed, too
+        // also for the file of a killed run
         std::mem::forget(writer);
         let history = History::open(&path).unwrap();
         let mut last = 0.0;
@@ -495,7 +494,7 @@ fn of_two_checkpoints_the_newest_whole_one_counts() {
     writer.finish().unwrap();
     let newest = || History::open(&path).unwrap().checkpoint().unwrap();
     assert_eq!(newest(), Some(checkpoint(30)));
-    // one that was being written when the run was killed
+    // a checkpoint that was being written when the run was killed
     let file = hdf5::File::open_rw(&path).unwrap();
     file.dataset("checkpoint/reals_1").unwrap().write_slice(&[7.5], 3..4).unwrap();
     drop(file);
@@ -506,7 +505,7 @@ fn of_two_checkpoints_the_newest_whole_one_counts() {
     assert_eq!(newest(), None);
 }
 
-/// A bare history of what the solver reports, with these routes, as numbers, and load errors.
+/// A minimal history of the solver's observables: these routes (as numbers) and load errors.
 fn solved(path: &Path, observables: Vec<Observable>, rows: &[&[f64]]) -> Writer {
     let layout = Layout { observables, ..bare() };
     let mut writer = Writer::create(path, &layout, false).unwrap();
@@ -577,7 +576,7 @@ fn only_a_load_error_may_be_no_number() {
     }
 }
 
-/// A copy of a history whose load error may be a false acceleration says so by its version.
+/// The version of a copy shows whether its load error may be a false acceleration.
 #[test]
 fn a_copy_keeps_the_meaning_of_its_load_error() {
     for (observables, version) in [(of_solver(), SCHEMA_VERSION), (vec![Observable::new(LOAD_ERROR, "", &[])], 3)] {

@@ -1,10 +1,10 @@
-//! The places of texts in a file. HDF5 up to 1.10 trusts the size and the place that a file gives
-//! for a text; wrong values crash the process. So they are checked before HDF5 reads them.
+//! The places of texts in a file. HDF5 up to 1.10 trusts the size and the place of a text in a
+//! file; wrong values crash the process. So this module checks both before HDF5 reads the text.
 //!
-//! Texts lie in heaps ("GCOL", version 1): each follows the one before, with 16 bytes of index and
-//! size before it, filled up to 8 bytes; index 0 is what is left. A dataset of texts holds for each
-//! its length (u32), the address of its heap (u64) and its index there (u32). Source: HDF5 File
-//! Format Specification, version 3, III.E and IV.B.
+//! Texts lie in heaps ("GCOL", version 1), one after the other. Each has a header of 16 bytes
+//! (index and size) and is padded to 8 bytes; index 0 is the free space. A dataset of texts holds
+//! for each text its length (u32), the address of its heap (u64) and its index in the heap (u32).
+//! Source: HDF5 File Format Specification, version 3, III.E and IV.B.
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -12,10 +12,9 @@ use std::io::{self, Read};
 use std::os::unix::fs::FileExt;
 use std::path::Path;
 
-/// Bytes at the beginning of a file among which its heaps are: texts are written before anything
-/// else.
+/// Bytes at the beginning of a file that contain its heaps: texts are written first.
 const HEAD: u64 = 1 << 20;
-/// Bytes by which a dataset names a text.
+/// Bytes of a reference to a text in a dataset.
 const NAMED: usize = 16;
 
 /// Sizes of the texts, bytes, by the address of their heap and their index there.
@@ -25,8 +24,7 @@ impl Texts {
     /// Finds the texts of a file.
     ///
     /// # Errors
-    /// Those of the operating system, and in words the place of a text that is longer than its
-    /// heap.
+    /// Those of the operating system; for a text longer than its heap, a message with its place.
     pub fn find(path: &Path) -> io::Result<Result<Self, String>> {
         let mut head = vec![];
         File::open(path)?.take(HEAD).read_to_end(&mut head)?;
@@ -48,7 +46,7 @@ impl Texts {
         Ok(Ok(Self(texts)))
     }
 
-    /// Whether the `count` texts that are named from byte `offset` of the file on are among them.
+    /// Whether the `count` references from byte `offset` of the file name texts in this list.
     ///
     /// # Errors
     /// Those of the operating system.
@@ -59,7 +57,7 @@ impl Texts {
             let [a, b, c, d, heap @ .., e, f, g, h] = *text;
             let length = u64::from(u32::from_le_bytes([a, b, c, d]));
             let place = (u64::from_le_bytes(heap), u32::from_le_bytes([e, f, g, h]));
-            // a text that was never written has no place
+            // a text that was never written has no address
             length == 0 || self.0.get(&place).is_some_and(|size| length <= *size)
         };
         Ok(named.as_chunks::<NAMED>().0.iter().all(is_held))

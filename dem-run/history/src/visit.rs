@@ -11,7 +11,7 @@ use super::rupture::RuptureRow;
 use super::source::Source;
 use super::table::Table;
 
-/// What a table may hold, and whether two values of it are the same to the bit.
+/// Types of table values, with bitwise comparison.
 pub(super) trait Stored: H5Type + Sized {
     fn same(&self, other: &Self) -> bool;
 
@@ -53,16 +53,16 @@ impl Stored for RuptureRow {
     }
 }
 
-/// Something that is done to every table of a history.
+/// An operation on every table of a history.
 pub(super) trait Visit {
-    /// `rows` of the table are complete in the history that is read.
+    /// `rows` of the table are complete in the source history.
     fn table<T: Stored>(&mut self, table: &mut Table, rows: usize) -> Result<()>;
 }
 
-/// Bytes that are read at a time.
+/// Bytes read at a time.
 const BLOCK: usize = 1 << 23;
 
-/// What is read of a table.
+/// The part of a table to read.
 #[derive(Clone)]
 pub(super) struct Extract {
     pub place: String,
@@ -76,7 +76,7 @@ impl Extract {
         Self { place: table.place(), row: table.row().to_vec(), row_bytes: table.row_bytes(), rows }
     }
 
-    /// Ranges of rows that are read one after the other.
+    /// Ranges of rows, read in turn.
     pub fn ranges(&self) -> impl Iterator<Item = Range<usize>> + use<> {
         let (rows, step) = (self.rows, (BLOCK / self.row_bytes.max(1)).max(1));
         (0..rows).step_by(step).map(move |start| start..rows.min(start + step))
@@ -91,8 +91,8 @@ impl Extract {
     }
 }
 
-/// Progress over the bytes of all tables: `tell` gets the share that is done, from 0 to 1; if it
-/// returns false, the work ends.
+/// Progress over the bytes of all tables: `tell` receives the completed share, from 0 to 1; the
+/// operation stops if it returns false.
 pub(super) struct Share<'a> {
     done: u64,
     all: u64,

@@ -1,4 +1,4 @@
-//! Writing a history while the run goes on.
+//! Writing a history during the run.
 
 use std::os::unix::fs::{FileExt, MetadataExt};
 use std::path::{Path, PathBuf};
@@ -31,7 +31,7 @@ const BLOCK: usize = 256;
 /// let mut writer = Writer::create("run.h5".as_ref(), layout, false)?;
 /// writer.frame(frame)?;
 /// writer.observe(1, 1e-4, &[0.0])?; // at every step
-/// writer.frame(last)?; // what was observed becomes visible with the next frame
+/// writer.frame(last)?; // observations become visible with the next frame
 /// writer.finish()
 /// # }
 /// ```
@@ -49,23 +49,23 @@ pub struct Writer {
     observables: Observables,
     commit: Commit,
     slots: Slots,
-    /// Device and inode of the open file: they differ if another file has taken its name.
+    /// Device and inode of the open file: those of `path` differ once another file has its name.
     identity: Option<(u64, u64)>,
     /// The head of the file as of its last complete frame.
     head: Head,
-    // these last: the file closes after every dataset, and the lock ends after the file is closed
+    // declared last: the file closes after every dataset, and the lock is released after that
     file: File,
     lock: Option<std::fs::File>,
 }
 
 impl Writer {
-    /// Creates the file with everything that it will hold, ready for the first frame.
+    /// Creates the file with all its datasets, ready for the first frame.
     ///
     /// The file is made beside `path` and moved there when it is complete. A failure leaves no file
     /// behind and does not change an old file at `path`.
     ///
     /// # Errors
-    /// [`HistoryError::Exists`] where `path` stands and `overwrite` is false;
+    /// [`HistoryError::Exists`] where `path` exists and `overwrite` is false;
     /// [`HistoryError::Busy`] while another process writes it; [`HistoryError::Io`] and
     /// [`HistoryError::Write`] where the file cannot be made; [`HistoryError::Shape`] where
     /// `layout` contradicts itself.
@@ -76,13 +76,13 @@ impl Writer {
         Self::begin(path, layout, |_| Ok(()))
     }
 
-    /// Continues `history` in the file at `path`, which may be that of `history`. The rows `kept`
-    /// and `checkpoint` are copied, other rows are not. `tell` gets the share that is copied, from
-    /// 0 to 1; if it returns false, the work ends.
+    /// Continues `history` in the file at `path`, which may be the file of `history`. Only the rows
+    /// `kept` and `checkpoint` are copied. `tell` receives the copied share, from 0 to 1; copying
+    /// stops if it returns false.
     ///
     /// # Errors
-    /// As [`Writer::create`]; [`HistoryError::Damaged`] where the history does not hold what
-    /// `layout` promises. The file is then as it was.
+    /// As [`Writer::create`]; [`HistoryError::Damaged`] where the history does not match `layout`.
+    /// The file at `path` is then unchanged.
     pub fn go_on(
         path: &Path,
         layout: &Layout,
@@ -98,8 +98,8 @@ impl Writer {
         })
     }
 
-    /// Makes the file beside `path`, fills it by `fill`, turns to HDF5's single-writer mode and
-    /// moves it to `path`.
+    /// Creates the file beside `path`, fills it with `fill`, switches to HDF5's single-writer mode
+    /// and moves the file to `path`.
     fn begin(path: &Path, layout: &Layout, fill: impl FnOnce(&mut Self) -> Result<()>) -> Result<Self> {
         lock::refuse_busy(path)?;
         let failed = refused(path);
@@ -117,7 +117,7 @@ impl Writer {
         })
     }
 
-    /// A file that no one reads before it is closed: compressed, with checksums, if `packed`.
+    /// A file without readers until it is closed: compressed, with checksums, if `packed`.
     pub(super) fn closed_copy(path: &Path, layout: &Layout, packed: bool) -> Result<Self> {
         Self::build(path, path, layout, packed)
     }
@@ -129,7 +129,7 @@ impl Writer {
         Ok(bytes.0)
     }
 
-    /// The file `part` with everything that the layout asks for; errors name `path`.
+    /// Creates the file `part` with all datasets of the layout; errors name `path`.
     fn build(path: &Path, part: &Path, layout: &Layout, packed: bool) -> Result<Self> {
         hdf5::silence_errors(true);
         check_layout(layout)?;
@@ -197,19 +197,19 @@ impl Writer {
         self.commit.visit(frames, visit)
     }
 
-    /// Takes the rows `kept` from `source` into the empty tables.
+    /// Copies the rows `kept` of `source` into the empty tables.
     pub(super) fn take_over(&mut self, source: &Source, kept: Kept, share: &mut Share) -> Result<()> {
         let path = self.path.clone();
         self.visit(kept, &mut Copy { source, to: &path, share })?;
         self.commit.frames.write_scalar(&(kept.frames as u64)).map_err(while_writing(&path))
     }
 
-    /// Brings everything to the file.
+    /// Writes all buffered rows to the file.
     pub(super) fn flush(&self) -> Result<()> {
         self.file.flush().map_err(while_writing(&self.path))
     }
 
-    /// Records the state from which the run goes on, that of the frame written last.
+    /// Records the state from which the run can resume: that of the last frame written.
     ///
     /// # Errors
     /// [`HistoryError::Write`] where the disk refuses.
@@ -228,13 +228,12 @@ impl Writer {
         self.step.rows()
     }
 
-    /// Appends a frame, and with it makes everything visible that was observed and that broke
-    /// before.
+    /// Appends a frame and makes all earlier observations and ruptures visible.
     ///
     /// # Errors
     /// [`HistoryError::Shape`] where an array does not fit the layout and [`HistoryError::Gone`]
-    /// where the file was taken away (nothing is written then); [`HistoryError::Write`] where the
-    /// disk refuses.
+    /// where the file was moved or removed (nothing is written then); [`HistoryError::Write`] where
+    /// the disk refuses.
     pub fn frame(&mut self, frame: &Frame) -> Result<()> {
         self.check_frame(frame)?;
         if self.identity.is_some() && identity(&self.path) != self.identity {
@@ -276,8 +275,8 @@ impl Writer {
         Ok(())
     }
 
-    /// Closes the file; afterwards it opens like any HDF5 file. What was observed after the last
-    /// frame stays out of sight, so write the last state as a frame first.
+    /// Closes the file; afterwards it opens like any HDF5 file. Observations after the last frame
+    /// stay invisible, so write the last state as a frame first.
     ///
     /// # Errors
     /// [`HistoryError::Write`] where the disk refuses.
@@ -290,14 +289,13 @@ impl Writer {
         flushed.map_err(while_writing(&path))
     }
 
-    /// Closes the file after an error and restores the superblock of its last complete frame. What
-    /// HDF5 began to write after that frame is not part of the file, and on a full disk it is
-    /// incomplete.
+    /// Closes the file after an error and restores the superblock of its last complete frame. Later
+    /// writes of HDF5 are then not part of the file; on a full disk they are incomplete.
     pub(super) fn abandon(mut self) {
         let (file, head) = (self.lock.take(), self.head);
         drop(self);
         if let Some(file) = file {
-            // there is an error to report already
+            // the first error is reported already
             let _ = head.put_back(&file);
         }
     }
@@ -339,7 +337,7 @@ impl Writer {
         self.observables.append()?;
         self.append_ruptures()?;
         self.commit.rows(self.contacts.pair.rows(), self.observables.step.rows(), self.ruptures.as_ref())?;
-        // the data must stand on disk before the commit that vouches for it
+        // the data must be on disk before the commit that declares it complete
         self.file.flush()?;
         self.commit.frames.write_scalar(&(self.step.rows() as u64))?;
         self.commit.frames.flush()
@@ -366,7 +364,7 @@ impl Head {
         Ok(Self(Some(bytes)))
     }
 
-    /// Writes it back to a file that ends before the address that it names.
+    /// Writes the superblock back to a file that ends before the address it names.
     fn put_back(self, file: &std::fs::File) -> std::io::Result<()> {
         match (self.0, Self::of(file)?.0) {
             (Some(good), Some(found)) if file.metadata()?.len() < end_of_file(&found) => file.write_all_at(&good, 0),

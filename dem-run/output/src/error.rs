@@ -8,9 +8,9 @@ use std::path::PathBuf;
 pub struct WriteError {
     /// The file or folder.
     pub path: PathBuf,
-    /// Why not.
+    /// The reason.
     pub why: String,
 }
 
-/// Whether something was written.
+/// The result of writing.
 pub type Result<T> = std::result::Result<T, WriteError>;

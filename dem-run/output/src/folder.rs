@@ -1,4 +1,4 @@
-//! The folder that takes the results of a command.
+//! The results folder of a command.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use crate::error::{Result, WriteError};
 use crate::owner::{Owner, Source};
 use crate::replace::{self, remove_orphans, replace};
 
-/// A picture that comes as SVG and as PNG.
+/// A picture, as SVG and as PNG.
 pub trait Picture {
     /// The picture as SVG.
     fn svg(&self) -> String;
@@ -15,12 +15,11 @@ pub trait Picture {
     /// The picture as PNG.
     ///
     /// # Errors
-    /// In words, where it cannot be drawn.
+    /// A message, where the picture cannot be drawn.
     fn png(&self) -> std::result::Result<Vec<u8>, String>;
 }
 
-/// The folder that takes the files of a command, and what has been written there. Every file comes
-/// into its place whole.
+/// The results folder of a command, and the files written to it. Every file is replaced atomically.
 pub struct Folder {
     path: PathBuf,
     written: Vec<PathBuf>,
@@ -28,7 +27,7 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// Creates the folder if it is not there.
+    /// Creates the folder if it does not exist.
     ///
     /// # Errors
     /// [`WriteError`].
@@ -38,13 +37,13 @@ impl Folder {
         Ok(Self { path, written: vec![], owner: None })
     }
 
-    /// As [`Folder::create`], for the results that `command` makes of `sources`. The folder takes
-    /// no results of other sources; a record in it lists the files. With `force` the folder is
-    /// taken over, and results of other sources are removed.
+    /// As [`Folder::create`], for the results that `command` makes of `sources`. A folder with
+    /// results of other sources is rejected; a record in the folder lists the files. With `force`
+    /// the command takes over the folder and removes results of other sources.
     ///
     /// # Errors
-    /// [`WriteError`], also where the folder belongs to others, and later for a file that is in no
-    /// record.
+    /// [`WriteError`], also where the folder belongs to other sources; later also for an existing
+    /// file that is not in the record.
     pub fn of(path: PathBuf, command: &str, sources: Vec<Source>, force: bool) -> Result<Self> {
         let mut folder = Self::create(path)?;
         let owner = Owner::claim(&folder.path, command, sources, force);
@@ -52,13 +51,13 @@ impl Folder {
         Ok(folder)
     }
 
-    /// Files of others that were removed when the folder was taken over.
+    /// Files of other sources that were removed when the command took over the folder.
     pub fn removed(&self) -> usize {
         self.owner.as_ref().map_or(0, Owner::removed)
     }
 
-    /// Removes files that an earlier call of the command wrote and this one did not. It must be
-    /// called last.
+    /// Removes files of an earlier call of the command that this call did not write. Must be called
+    /// last.
     ///
     /// # Errors
     /// [`WriteError`].
@@ -77,10 +76,11 @@ impl Folder {
         &self.path
     }
 
-    /// Makes a file by `make`, which gets the name of a temporary file beside its final place.
+    /// Makes a file with `make`, whose argument is the path of a temporary file beside the final
+    /// one.
     ///
     /// # Errors
-    /// [`WriteError`], and those of `make`; the file that was there before then stays.
+    /// [`WriteError`], and those of `make`; an existing file then stays.
     pub fn make<T, E: From<WriteError>>(
         &mut self,
         name: &str,
@@ -116,7 +116,7 @@ impl Folder {
         })
     }
 
-    /// The path of a file that may be written.
+    /// The path of a file, once its name is recorded.
     fn place(&self, name: &str) -> Result<PathBuf> {
         self.announce(&[name.to_string()])?;
         Ok(self.path.join(name))

@@ -1,5 +1,4 @@
-//! Where results go: tables on stdout, files in one folder, each of which comes into its place
-//! whole.
+//! Output of results: tables on stdout, files in one folder, each replaced atomically.
 
 mod error;
 mod folder;

@@ -1,5 +1,5 @@
-//! To which histories a results folder belongs. A record in the folder names them and what was made
-//! of them, so that the results of two runs never mix.
+//! Ownership of a results folder. A record in the folder names its histories and the files made
+//! from them, so that the results of two runs never mix.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
@@ -13,42 +13,41 @@ use crate::replace::write;
 /// The name of the record.
 const RECORD: &str = ".dem-post.json";
 
-/// Something that results are made of.
+/// A source of results, as a history.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Source {
     /// Its absolute path.
     path: PathBuf,
-    /// Its run, in words that stay the same while the run continues; none for a source of several
-    /// runs.
+    /// A description of its run that does not change while the run continues; none for a source of
+    /// several runs.
     run: Option<String>,
 }
 
 impl Source {
-    /// A file or folder that is there.
+    /// An existing file or folder.
     pub fn new(path: &Path, run: Option<String>) -> Self {
-        // a path that is not Unicode cannot be opened by this text, but it can be compared
+        // the text of a path that is not Unicode does not open the file, but it can be compared
         let path = fs::canonicalize(path).unwrap_or_else(|_| path.into()).to_string_lossy().into_owned().into();
         Self { path, run }
     }
 
-    /// Whether both are the same run at the same place, or `self` has moved away to where `other`
-    /// is.
+    /// Whether both are the same run at the same path, or `other` is `self` after a move.
     fn is(&self, other: &Self) -> bool {
         self.run == other.run && (self.path == other.path || (self.run.is_some() && !self.path.exists()))
     }
 }
 
-/// What stands in the record.
+/// Content of the record.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 struct Record {
-    /// What all results are of.
+    /// The sources of all results.
     sources: Vec<Source>,
     /// The files of each command.
     files: BTreeMap<String, BTreeSet<String>>,
 }
 
 impl Record {
-    /// The record of a folder; none where it has none.
+    /// The record of a folder, if any.
     fn read(folder: &Path) -> Result<Option<Self>, String> {
         match fs::read(folder.join(RECORD)) {
             Ok(text) => serde_json::from_slice(&text).map(Some).map_err(|error| format!("{RECORD} in it: {error}")),
@@ -74,9 +73,9 @@ pub struct Owner {
     folder: PathBuf,
     command: String,
     sources: Vec<Source>,
-    /// Whether files that stand there and are not in the record are replaced.
+    /// Whether existing files that are not in the record are replaced.
     force: bool,
-    /// Files that were removed, of other sources.
+    /// Removed files of other sources.
     removed: usize,
 }
 
@@ -85,7 +84,8 @@ impl Owner {
     /// `force` it removes the files that the record lists for other sources; other files stay.
     ///
     /// # Errors
-    /// In words, where the folder belongs to others, or the record cannot be read or written.
+    /// A message, where the folder belongs to other sources, or the record cannot be read or
+    /// written.
     pub fn claim(folder: &Path, command: &str, sources: Vec<Source>, force: bool) -> Result<Self, String> {
         let mut owner = Self { folder: folder.into(), command: command.into(), sources, force, removed: 0 };
         let _lock = owner.lock();
@@ -104,7 +104,7 @@ impl Owner {
             owner.removed = listed.iter().filter(|name| owner.remove(name)).count();
             record.files = BTreeMap::new();
         }
-        // a history that was moved is from now on known by its new place
+        // the record keeps the new path of a history that was moved
         record.sources.clone_from(&owner.sources);
         record.save(folder)?;
         Ok(owner)
@@ -119,8 +119,8 @@ impl Owner {
     /// Records files that the command is about to write.
     ///
     /// # Errors
-    /// In words, with the name of the file: a file of that name exists that no command has written,
-    /// or it is one of the sources. Without a name: another command has taken over the folder.
+    /// A message, with the name of the file where it exists and no command has written it, or where
+    /// it is one of the sources; without a name where another command has taken over the folder.
     pub fn register(&self, names: &[String]) -> Result<(), (Option<String>, String)> {
         let _lock = self.lock();
         let unnamed = |why| (None, why);
@@ -143,11 +143,10 @@ impl Owner {
         if news { record.save(&self.folder).map_err(unnamed) } else { Ok(()) }
     }
 
-    /// Removes what an earlier call of the command wrote and this one, which wrote `written`, did
-    /// not.
+    /// Removes the files of an earlier call of the command that are not in `written`.
     ///
     /// # Errors
-    /// In words, where the record cannot be read or written.
+    /// A message, where the record cannot be read or written.
     pub fn finish(&self, written: &[PathBuf]) -> Result<(), String> {
         let _lock = self.lock();
         let mut record = self.current()?;
@@ -172,8 +171,8 @@ impl Owner {
         }
     }
 
-    /// Locks the record against other processes until the file is dropped. File systems without
-    /// locks on folders do not lock.
+    /// Locks the record against other processes until the file is dropped. Without effect on file
+    /// systems without locks on folders.
     fn lock(&self) -> Option<File> {
         File::open(&self.folder).ok().filter(|folder| folder.lock().is_ok())
     }
@@ -182,14 +181,14 @@ impl Owner {
         fs::canonicalize(self.folder.join(name)).is_ok_and(|path| self.sources.iter().any(|source| source.path == path))
     }
 
-    /// Removes a file of the folder; a name that leads out of it is none.
+    /// Removes a file of the folder; ignores a name that leads out of the folder.
     fn remove(&self, name: &str) -> bool {
         let inside = Path::new(name).file_name().is_some_and(|file| file == name);
         inside && !self.is_source(name) && fs::remove_file(self.folder.join(name)).is_ok()
     }
 }
 
-/// Why a folder of results of `before` takes none of `now`.
+/// The reason why a folder with results of `before` rejects results of `now`.
 fn refusal(before: &[Source], now: &[Source]) -> String {
     let paths = |sources: &[Source]| -> Vec<PathBuf> { sources.iter().map(|source| source.path.clone()).collect() };
     // two runs at one path differ by their descriptions

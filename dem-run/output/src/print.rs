@@ -9,8 +9,8 @@ use serde::Serialize;
 
 use crate::error::{Result, WriteError};
 
-/// A path as a shell takes it: between quotes where it has more than letters, digits and what names
-/// usually have.
+/// A path for a shell: in quotes unless it has only letters, digits and the usual characters of
+/// names.
 #[must_use]
 pub fn in_shell(path: &Path) -> String {
     let shown = path.display().to_string();
@@ -19,7 +19,7 @@ pub fn in_shell(path: &Path) -> String {
 }
 
 /// The text with its control characters, except line ends, escaped as in JSON (`\u001b`), so that a
-/// terminal does not obey them. In JSON they occur only within strings, so the meaning of JSON
+/// terminal does not interpret them. In JSON they occur only within strings, so the meaning of JSON
 /// stays the same.
 #[must_use]
 pub fn escaped(text: &str) -> Cow<'_, str> {
@@ -59,7 +59,7 @@ pub fn print_json(value: &serde_json::Value) -> Result<()> {
     print_line(&format!("{value:#}"))
 }
 
-/// Prints a result on stdout, for people or as JSON, as [`print()`].
+/// Prints a result on stdout, as text or as JSON, as [`print()`].
 ///
 /// # Errors
 /// [`WriteError`].

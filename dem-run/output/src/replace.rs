@@ -1,14 +1,15 @@
-//! Atomic replacement of files: a file is made under another name beside its place, then moved
-//! there. A reader, also after a crash of the system, finds either the old content or the new one.
+//! Atomic replacement of files: a file is made under a temporary name in the same folder, then
+//! renamed. A reader, also after a crash of the system, finds either the old content or the new
+//! one.
 
 use std::ffi::OsStr;
 use std::fs::{self, File};
 use std::io::{Error, ErrorKind, Result};
 use std::path::{Path, PathBuf};
 
-/// Makes a file by `make`, which gets the name of an empty file beside `path`, and moves it to
-/// `path` once its content is on the disk. On failure the temporary file is removed and the old
-/// file at `path` stays. `failed` makes the error of a refused system call; its first argument
+/// Makes a file with `make`, whose argument is the path of an empty file beside `path`, and moves
+/// it to `path` once its content is on the disk. On failure the temporary file is removed and the
+/// old file at `path` stays. `failed` makes the error of a refused system call; its first argument
 /// names the call, as in "create".
 pub fn replace<T, E>(
     path: &Path,
@@ -22,8 +23,9 @@ pub fn replace<T, E>(
     })
 }
 
-/// As [`replace`], for a file that `make` itself has synced. A process loses its lock on a file
-/// when it closes any descriptor of that file, so a locked file cannot be opened again for a sync.
+/// As [`replace`], for a file that `make` itself synchronises. A process loses its lock on a file
+/// when it closes any descriptor of that file, so a locked file must not be opened again to be
+/// synchronised.
 pub fn replace_synced<T, E>(
     path: &Path,
     failed: impl Fn(&'static str, Error) -> E,
@@ -44,8 +46,8 @@ pub fn replace_synced<T, E>(
     made
 }
 
-/// Writes a file beside its place and moves it there. It does not look for temporary files of
-/// killed processes: [`remove_orphans`] removes those of a whole folder at once.
+/// Writes a file under a temporary name and moves it to `path`. Temporary files of killed processes
+/// stay; [`remove_orphans`] removes them.
 ///
 /// # Errors
 /// Those of the operating system; the old file at `path` then stays.
@@ -84,7 +86,7 @@ fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// The name under which a file is made: in the same folder, so that the move is atomic.
+/// The temporary name of a file: in the same folder, so that the move is atomic.
 fn partial(path: &Path) -> Result<PathBuf> {
     let Some(name) = path.file_name().filter(|_| !path.is_dir()) else {
         return Err(Error::new(ErrorKind::IsADirectory, "it is a folder, give a file name"));
@@ -104,7 +106,7 @@ pub fn remove_orphans(folder: &Path, name: Option<&OsStr>) {
             .and_then(|(_, process)| rustix::process::Pid::from_raw(process.parse().ok()?));
         let gone = |process| rustix::process::test_kill_process(process) == Err(rustix::io::Errno::SRCH);
         if process.is_some_and(gone) {
-            // one that cannot be removed does no harm
+            // an orphan that cannot be removed is harmless
             let _ = fs::remove_file(entry.path());
         }
     }

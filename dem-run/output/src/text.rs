@@ -1,4 +1,4 @@
-//! Tables and numbers for people, cells of CSV files.
+//! Readable tables and numbers, cells of CSV files.
 
 use std::fmt::Display;
 
@@ -15,7 +15,7 @@ pub struct Text {
 }
 
 impl Text {
-    /// A table with a head.
+    /// A table with a header.
     pub fn new(head: &[&str]) -> Self {
         Self { rows: vec![head.iter().map(ToString::to_string).collect()] }
     }
@@ -25,7 +25,7 @@ impl Text {
         self.rows.push(cells);
     }
 
-    /// The table as lines, the first column to the left, the others to the right.
+    /// The table as lines: the first column aligned left, the others right.
     pub fn lines(&self) -> String {
         let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
         let cell = |row: &[String], c: usize| row.get(c).cloned().unwrap_or_default();
@@ -52,7 +52,7 @@ pub fn facts(facts: &[(&str, String)]) -> String {
     facts.iter().map(|(name, value)| format!("{name:<width$}  {value}\n")).collect()
 }
 
-/// A number for people: four digits, and a power of ten where it is very large or small.
+/// A readable number: four digits, and a power of ten for very large or small values.
 pub fn number(value: f64) -> String {
     digits(value, 4)
 }
@@ -75,7 +75,7 @@ fn digits(value: f64, digits: i32) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
 }
 
-/// A number with its unit, or a dash where there is none.
+/// A number with its unit, or a dash for no number.
 pub fn quantity(value: Option<impl Into<f64>>, unit: &str) -> String {
     value.map_or_else(|| "–".into(), |value| with_unit(number(value.into()), unit))
 }
@@ -84,12 +84,12 @@ fn with_unit(number: impl Display, unit: &str) -> String {
     if unit.is_empty() { number.to_string() } else { format!("{number} {unit}") }
 }
 
-/// An optional number as a cell of a CSV file: empty where there is none.
+/// An optional number as a cell of a CSV file; empty for none.
 pub fn cell(value: Option<f64>) -> String {
     value.map_or_else(String::new, |value| value.to_string())
 }
 
-/// A size as a person reads it.
+/// A readable file size.
 #[must_use]
 pub fn size(bytes: u64) -> String {
     match bytes {

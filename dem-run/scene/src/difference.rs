@@ -1,4 +1,4 @@
-//! Where two scenes differ.
+//! Differences between two scenes.
 
 use serde::Serialize;
 use serde_json::Value;
@@ -6,11 +6,11 @@ use serde_json::Value;
 /// A place at which two scenes differ.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Difference {
-    /// The place, as `--set` writes it: `bonds.strength`.
+    /// The path, in the notation of `--set`: `bonds.strength`.
     pub path: String,
-    /// What the first scene has there, as JSON; `None` if nothing.
+    /// The value in the first scene, as JSON; `None` if absent.
     pub a: Option<String>,
-    /// What the second has.
+    /// The value in the second scene.
     pub b: Option<String>,
 }
 
@@ -29,7 +29,7 @@ pub fn differences(a: &str, b: &str) -> Vec<Difference> {
 fn collect(path: String, a: Option<&Value>, b: Option<&Value>, found: &mut Vec<Difference>) {
     let below = |name: &str| if path.is_empty() { name.to_string() } else { format!("{path}.{name}") };
     match (a, b) {
-        // 1 and 1.0 are one number
+        // 1 and 1.0 are equal
         (Some(Value::Number(x)), Some(Value::Number(y))) if x.as_f64() == y.as_f64() => {}
         (Some(Value::Object(x)), Some(Value::Object(y))) => {
             let mut names: Vec<&String> = x.keys().chain(y.keys()).collect();

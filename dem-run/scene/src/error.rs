@@ -1,4 +1,4 @@
-//! What is wrong with a scene, said so that it can be put right.
+//! The errors of a scene, each with the information to correct it.
 
 use std::fmt::{self, Write as _};
 use std::path::PathBuf;
@@ -30,7 +30,7 @@ pub enum SceneError {
         /// The line itself, with a mark below the place.
         excerpt: String,
     },
-    /// The text is JSON, but not a scene: everything that is wrong, in the order of the scene.
+    /// The text is JSON, but not a scene: all problems, in the order of the scene.
     #[error("{}", render(name, problems))]
     Wrong {
         /// Where the text comes from.
@@ -54,22 +54,22 @@ impl SceneError {
 /// One thing that is wrong in a scene.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Problem {
-    /// The place in the scene, as `--set` takes it: `materials.friction.grain_grain`; empty for the
-    /// whole scene.
+    /// The path in the scene, in the notation of `--set`: `materials.friction.grain_grain`; empty
+    /// for the whole scene.
     pub path: String,
-    /// What stands there.
+    /// The value found.
     pub found: String,
-    /// What may stand there, or what to do.
+    /// The values allowed, or what to do.
     pub allowed: String,
     /// The valid name nearest to a wrong one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nearest: Option<String>,
-    /// Where it was written, if known.
+    /// The origin of the value, if known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub origin: Option<Origin>,
 }
 
-/// Where a value was written.
+/// Origin of a value.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Origin {
@@ -93,13 +93,13 @@ impl Problem {
         Self { path: path.into(), found: found.into(), allowed: allowed.into(), nearest: None, origin: None }
     }
 
-    /// The same with the valid name nearest to the wrong one.
+    /// The same problem with the valid name nearest to the wrong one.
     #[must_use]
     pub fn with_nearest(self, nearest: Option<String>) -> Self {
         Self { nearest, ..self }
     }
 
-    /// The same with its origin.
+    /// The same problem with its origin.
     pub(super) fn with_origin(self, origin: Origin) -> Self {
         Self { origin: Some(origin), ..self }
     }
@@ -126,12 +126,12 @@ impl fmt::Display for Problem {
     }
 }
 
-/// At most 80 characters of a text, fit to be printed.
+/// At most 80 characters of a text, printable.
 pub fn shorten(text: &str) -> String {
     cut(text, 80)
 }
 
-/// At most `limit` characters of a text, fit to be printed.
+/// At most `limit` characters of a text, printable.
 fn cut(text: &str, limit: usize) -> String {
     match text.char_indices().nth(limit) {
         None => text.chars().map(printable).collect(),
@@ -139,12 +139,12 @@ fn cut(text: &str, limit: usize) -> String {
     }
 }
 
-/// A blank for what would move the cursor of a terminal.
+/// A blank for a control character, which could move the cursor of a terminal.
 pub fn printable(c: char) -> char {
     if c.is_control() { ' ' } else { c }
 }
 
-/// Problems that are told one by one: lists of grains may be long.
+/// Maximum number of problems listed: lists of grains may be long.
 const MOST_TOLD: usize = 100;
 
 /// The problems under one heading.

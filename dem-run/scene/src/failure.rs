@@ -1,4 +1,4 @@
-//! What counts as the failure of a sample, and the strength of a disk that plates split.
+//! Criteria for the failure of a sample, and the splitting strength of a disk (Brazilian test).
 
 use std::f64::consts::PI;
 use std::fmt;
@@ -11,20 +11,20 @@ use crate::model::Scene;
 use crate::sample::{Cut, Sample, Section};
 use crate::wall::{Drive, Shape};
 
-/// Axial strains (–) at which the collapse load is told.
+/// Axial strains (–) at which the collapse load is reported.
 pub const STRAINS: [f64; 2] = [1e-4, 1e-3];
-/// Share of broken bonds (–) at which the load is told.
+/// Share of broken bonds (–) at which the load is reported.
 pub const BROKEN_SHARE: f64 = 0.05;
 
-/// Whether bonds join all of `grains` grains to one piece: then rigid bonds let none of them move
-/// until one breaks.
+/// Whether bonds join all of `grains` grains to one piece. If so, and the bonds are rigid, no grain
+/// moves relative to another until a bond breaks.
 #[must_use]
 pub fn in_one_piece(grains: usize, bonds: impl Iterator<Item = [u32; 2]>) -> bool {
     let mut pieces = UnionFind::<u32>::new(grains);
     bonds.filter(|[i, j]| pieces.union(*i, *j)).count() + 1 == grains
 }
 
-/// A disk, or a cylinder, that two plates split.
+/// A disk, or a cylinder, split between two plates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Disk {
     /// Diameter D (m).
@@ -34,9 +34,9 @@ pub struct Disk {
 }
 
 impl Disk {
-    /// The disk of a scene whose wall `wall` loads it across its axis, against another plane wall;
-    /// none for another test. The diameter is that of the scene; the length is the thickness in 2D
-    /// and in 3D the `extents` of the sample (m) along the axis, at the start.
+    /// The disk of a scene in which the wall `wall` loads it across its axis against another plane
+    /// wall; none for another test. The diameter is from the scene. The length is the thickness in
+    /// 2D; in 3D it is the initial extent of the sample along the axis (`extents`, m).
     #[must_use]
     pub fn of(scene: &Scene, wall: &str, extents: &[f64]) -> Option<Self> {
         let Sample::Random(random) = &scene.sample else { return None };
@@ -70,7 +70,7 @@ fn normal(shape: &Shape) -> Option<&[f64]> {
     if let Shape::Plane(plane) = shape { Some(&plane.normal) } else { None }
 }
 
-/// The axis along which a vector points, where it points along one.
+/// The axis parallel to a vector, if any.
 fn only_axis(vector: &[f64]) -> Option<usize> {
     let axis = vector.iter().position(|x| *x != 0.0)?;
     vector[axis + 1..].iter().all(|x| *x == 0.0).then_some(axis)
@@ -83,7 +83,7 @@ pub struct Splitting {
     pub diameter: f64,
     /// Length t (m).
     pub length: f64,
-    /// Stress at the collapse load of the strain 1e-4, where bonds had broken by then (Pa).
+    /// Stress at the collapse load of the strain 1e-4 (Pa); none if no bond had broken by then.
     pub collapse: Option<f64>,
     /// Stress at the greatest load (Pa).
     pub peak: Option<f64>,
@@ -132,7 +132,7 @@ mod tests {
     fn only_a_disk_that_is_loaded_across_its_axis_splits() {
         assert_eq!(disk("brazilian-2d.json", &[]), Some(Disk { diameter: 0.041, length: 1.0 }));
         assert_eq!(disk("brazilian-3d.json", &[]), Some(Disk { diameter: 0.041, length: 0.015 }));
-        // along its axis, or not cut at all
+        // loaded along the axis, or not cut
         let along = r#"walls.top.shape.plane.normal=[0, -1, 0]"#;
         assert_eq!(disk("brazilian-3d.json", &[along, "walls.bottom.shape.plane.normal=[0, 1, 0]"]), None);
         assert_eq!(disk("brazilian-2d.json", &["sample.random.cut=null"]), None);

@@ -1,4 +1,4 @@
-//! Scenes: what is simulated, as a JSON text with comments, in SI units.
+//! Scenes: the input of a simulation, a JSON text with comments, in SI units.
 //!
 //! A text becomes a scene in four steps, each in its own file:
 //!
@@ -8,9 +8,9 @@
 //!       duplicate keys       assignments      wrong types         all at once
 //! ```
 //!
-//! The types of the model are plain numbers, so that a scene can be written back as JSON
-//! ([`Scene::to_json`]) and described as a JSON Schema ([`schema::json_schema`]). What they
-//! mean in the simulation is decided where the sample is built.
+//! The types of the model are plain data, so that a scene can be written back as JSON
+//! ([`Scene::to_json`]) and described as a JSON Schema ([`schema::json_schema`]). The code that
+//! builds the sample interprets them.
 
 mod difference;
 mod error;
@@ -52,8 +52,8 @@ pub use wall::*;
 
 /// Reads the scene in the file `path`, applies the `--set` assignments and validates the result.
 ///
-/// A sample file named by the scene is sought beside the scene; the path in the scene that
-/// comes back is already joined to the scene's folder.
+/// The path of a sample file is relative to the scene file; in the returned scene it is already
+/// joined to the scene's folder.
 ///
 /// # Errors
 /// [`SceneError`]: an unreadable file, wrong syntax, wrong structure, or all wrong values.
@@ -65,7 +65,7 @@ pub fn load(path: &Path, assignments: &[String]) -> Result<Scene, SceneError> {
     Ok(scene)
 }
 
-/// Largest text of a scene or a sweep (bytes): some seven million grains listed one by one.
+/// Largest text of a scene or a sweep (bytes): about seven million grains in a list.
 pub const MAX_TEXT: u64 = 256 << 20;
 
 fn read(path: &Path) -> Result<String, SceneError> {
@@ -80,7 +80,7 @@ pub fn text(path: &Path) -> io::Result<String> {
         return Err(too_long());
     }
     let mut bytes = Vec::new();
-    // the length of some files, as in /proc, is not that of what is read
+    // the reported length of some files, as in /proc, is not that of their content
     file.take(MAX_TEXT + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > MAX_TEXT {
         return Err(too_long());
@@ -108,7 +108,7 @@ pub fn open_regular(path: &Path) -> io::Result<File> {
     }
 }
 
-/// A sample file is sought beside the scene.
+/// Resolves the path of a sample file relative to the scene file.
 fn join_sample(scene: &mut Scene, path: &Path) {
     if let (Sample::File(file), Some(folder)) = (&mut scene.sample, path.parent()) {
         file.path = folder.join(&file.path);
@@ -117,8 +117,7 @@ fn join_sample(scene: &mut Scene, path: &Path) {
 
 /// Reads a scene from `text`, applies the `--set` assignments and validates the result.
 ///
-/// `name` stands in the error messages for the place that the text comes from. Paths inside
-/// the scene stay as they are written.
+/// `name` is the source of the text in error messages. Paths in the scene are not changed.
 ///
 /// # Errors
 /// [`SceneError`]: wrong syntax, wrong structure, or all wrong values.
@@ -128,9 +127,9 @@ pub fn from_text(name: &str, text: &str, assignments: &[String]) -> Result<Scene
     finish(&mut document).map_err(|problems| document.wrong(problems))
 }
 
-/// The scene that a tree describes, or all that is wrong with it.
+/// The scene that a tree describes, or all its problems.
 ///
-/// It drops the tree, which for millions of grains is larger than all later data.
+/// The tree is dropped: for millions of grains it is larger than all later data.
 fn finish(document: &mut parse::Document) -> Result<Scene, Vec<Problem>> {
     let mut scene: Scene = document.decode().map_err(|problem| vec![problem])?;
     document.root.take();
@@ -140,7 +139,7 @@ fn finish(document: &mut parse::Document) -> Result<Scene, Vec<Problem>> {
     if problems.is_empty() { Ok(scene) } else { Err(problems) }
 }
 
-/// A scene whose values are yet to be varied.
+/// The base scene of a sweep, before its values are varied.
 #[derive(Debug)]
 pub struct Base {
     path: PathBuf,
@@ -150,16 +149,16 @@ pub struct Base {
 /// A value that a sweep puts in a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Change {
-    /// Where in the scene.
+    /// Its path in the scene.
     pub path: String,
-    /// What.
+    /// The value.
     pub value: serde_json::Value,
-    /// The place in the sweep that says so.
+    /// Its place in the sweep.
     pub place: String,
 }
 
 impl Base {
-    /// Reads the text; it need not be a right scene before its values are put in.
+    /// Reads the text; the scene may be invalid until the values are set.
     pub fn read(path: &Path) -> Result<Self, SceneError> {
         let document = parse::parse(&path.display().to_string(), &read(path)?)?;
         Ok(Self { path: path.to_path_buf(), document })
@@ -168,7 +167,7 @@ impl Base {
     /// The scene with these values.
     ///
     /// # Errors
-    /// All that is wrong with it, with the place that it was written: in the sweep or in the scene.
+    /// All its problems, each with its place in the sweep or in the scene.
     pub fn with(&self, changes: &[Change]) -> Result<Scene, Vec<Problem>> {
         let mut document = self.document.clone();
         for Change { path, value, place } in changes {

@@ -1,5 +1,4 @@
-//! From text to a JSON tree that knows its lines, and from the tree to what it describes: a scene,
-//! or a sweep.
+//! Parses a text into a JSON tree with line numbers, and decodes the tree into a scene or a sweep.
 
 use std::collections::HashSet;
 use std::collections::hash_map::{Entry, HashMap};
@@ -22,12 +21,11 @@ use super::suggest::nearest;
 pub struct Document {
     /// Where the text comes from, for messages.
     name: String,
-    /// The text without its byte order mark. The places of wrong values are sought in it when there
-    /// are some.
+    /// The text without its byte order mark. Used to locate wrong values, if any.
     text: Arc<str>,
     /// The tree, with ±`f64::MAX` in place of numbers that overflow.
     pub(super) root: Value,
-    /// Where values that are not from the text come from, by path.
+    /// Origins of values that are not from the text, by path.
     replaced: HashMap<String, Origin>,
     /// Numbers that overflow, as they were written, by path.
     non_finite: HashMap<String, String>,
@@ -52,12 +50,12 @@ fn options() -> ParseOptions {
 /// Reads JSON with comments.
 ///
 /// # Errors
-/// Wrong syntax; names that are given twice in one object, all of them.
+/// Wrong syntax; all names that occur twice in one object.
 pub fn parse(name: &str, text: &str) -> Result<Document, SceneError> {
     // a byte order mark, as some editors write it, is not part of the text
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let (root, non_finite) = match parse_to_serde_value(text, &options()) {
-        // an empty text is null to this reader
+        // this parser reads an empty text as null
         Ok(Tree(root)) if !root.is_null() => (root, HashMap::new()),
         _ => by_syntax(name, text)?,
     };
@@ -65,8 +63,7 @@ pub fn parse(name: &str, text: &str) -> Result<Document, SceneError> {
     Ok(Document { name, text, root, replaced: HashMap::new(), non_finite })
 }
 
-/// The tree and the numbers that overflow, by way of the syntax tree, which knows the places of
-/// what is wrong.
+/// The tree and the numbers that overflow, from the syntax tree, which has the places of errors.
 fn by_syntax(name: &str, text: &str) -> Result<(Value, HashMap<String, String>), SceneError> {
     let parsed = parse_to_ast(text, &CollectOptions::default(), &options())
         .map_err(|error| syntax(name, text, error.line_display(), error.column_display(), &error.kind().to_string()))?;
@@ -81,7 +78,7 @@ fn by_syntax(name: &str, text: &str) -> Result<(Value, HashMap<String, String>),
     Ok((root, walk.non_finite))
 }
 
-/// The problems of names that an object has twice.
+/// The problems of duplicate names in an object.
 fn given_twice(text: &str, twice: &[Twice]) -> Vec<Problem> {
     let places = places(text, twice.iter().flat_map(|twice| [twice.first, twice.second]));
     let problem = |Twice { path, first, second }: &Twice| {
@@ -93,7 +90,7 @@ fn given_twice(text: &str, twice: &[Twice]) -> Vec<Problem> {
 
 fn syntax(name: &str, text: &str, line: usize, column: usize, message: &str) -> SceneError {
     let content = text.lines().nth(line.saturating_sub(1)).unwrap_or_default();
-    // a window around the place, for lines without end
+    // a window around the place, for very long lines
     let start = column.saturating_sub(60);
     let window: String = content.chars().skip(start).take(100).map(printable).collect();
     let rest: String = content.chars().skip(column.saturating_sub(1)).collect();
@@ -101,8 +98,8 @@ fn syntax(name: &str, text: &str, line: usize, column: usize, message: &str) -> 
     SceneError::Syntax { name: name.to_string(), line, column, message: with_remedy(message, &rest), excerpt }
 }
 
-/// The parser's message about what starts with `rest`, with what to write instead where that is not
-/// plain.
+/// The parser's message about the text at the start of `rest`, with a remedy where it is not
+/// obvious.
 fn with_remedy(message: &str, rest: &str) -> String {
     let unsigned = rest.trim_start_matches(['-', '+']).to_lowercase();
     if unsigned.starts_with("nan") || unsigned.starts_with("inf") {
@@ -120,8 +117,8 @@ fn with_remedy(message: &str, rest: &str) -> String {
     }
 }
 
-/// A JSON tree of a text where nothing is wrong: no name is given twice and no number overflows. It
-/// is read without the syntax tree, which for millions of grains is larger.
+/// The JSON tree of a valid text: no name occurs twice and no number overflows. It is read without
+/// the syntax tree, which for millions of grains is larger.
 struct Tree(Value);
 
 impl<'de> Deserialize<'de> for Tree {
@@ -208,7 +205,7 @@ fn in_text((line, column): (usize, usize)) -> Origin {
     Origin::Text { line, column }
 }
 
-/// Where the value at `path` begins in the text, or else the nearest thing around it (bytes).
+/// Offset of the value at `path` in the text, or else of the innermost value around it (bytes).
 fn offset(node: &Node<'_>, path: &str) -> usize {
     let below = match node {
         _ if path.is_empty() => None,
@@ -233,7 +230,7 @@ fn key<'a>(name: &'a ObjectPropName<'_>) -> &'a str {
     }
 }
 
-/// A name that an object has twice: its path, and where it stands (bytes).
+/// A duplicate name in an object: its path and its offset (bytes).
 struct Twice {
     path: String,
     first: usize,
@@ -242,7 +239,7 @@ struct Twice {
 
 /// One pass over the syntax tree.
 struct Walk {
-    /// The path of the value in hand.
+    /// The path of the current value.
     path: String,
     non_finite: HashMap<String, String>,
     twice: Vec<Twice>,
@@ -263,7 +260,7 @@ impl Walk {
         }
     }
 
-    /// What `visit` makes of the value under `key`.
+    /// The result of `visit` for the value under `key`.
     fn below<T>(&mut self, key: &str, visit: impl FnOnce(&mut Self) -> T) -> T {
         let above = self.path.len();
         if above > 0 {
@@ -315,7 +312,7 @@ pub fn join(path: &str, key: &str) -> String {
 }
 
 impl Document {
-    /// Records that what stands at `path` comes from elsewhere.
+    /// Records that the value at `path` does not come from the text.
     pub(super) fn mark_set(&mut self, path: &str, origin: Origin) {
         let below = format!("{path}.");
         self.replaced.retain(|key, _| key != path && !key.starts_with(&below));
@@ -333,7 +330,7 @@ impl Document {
         &self.non_finite
     }
 
-    /// Where the value at `path` comes from, if not from the text.
+    /// The origin of the value at `path`, if not the text.
     fn replacement(&self, path: &str) -> Option<Origin> {
         let mut path = path;
         loop {
@@ -347,7 +344,7 @@ impl Document {
     /// The problems, each with the place where it was written.
     pub(super) fn located(&self, mut problems: Vec<Problem>) -> Vec<Problem> {
         let parsed = parse_to_ast(&self.text, &CollectOptions::default(), &options());
-        // it was parsed before
+        // the text was parsed before, so this succeeds
         let Some(node) = parsed.ok().and_then(|parsed| parsed.value) else { return problems };
         let mut written = vec![];
         for (k, problem) in problems.iter_mut().enumerate().filter(|(_, problem)| problem.origin.is_none()) {
@@ -366,8 +363,8 @@ impl Document {
         SceneError::Wrong { name: self.name.clone(), problems: self.located(problems) }
     }
 
-    /// The wrong values together with the numbers that overflow, which stand for anything found at
-    /// their places.
+    /// The wrong values together with the numbers that overflow. An overflow replaces every other
+    /// problem at its path.
     pub fn merge_non_finite(&self, problems: Vec<Problem>) -> Vec<Problem> {
         let mut overflows: Vec<Problem> =
             self.non_finite.iter().map(|(path, literal)| overflow(path, literal)).collect();
@@ -377,7 +374,7 @@ impl Document {
         overflows
     }
 
-    /// What the tree describes.
+    /// Decodes the tree.
     ///
     /// # Errors
     /// The first unknown name, missing name, or wrong type.
@@ -394,8 +391,8 @@ impl Document {
         })
     }
 
-    /// The kinds that may stand at `path`, none where it is no place for one: what an unknown one
-    /// would be told.
+    /// The kinds allowed at `path`, from the message about an unknown kind; none where the path has
+    /// no kind.
     fn kinds<T: DeserializeOwned>(&self, path: &str) -> Vec<String> {
         let mut root = self.root.clone();
         let Some(place) = root.pointer_mut(&format!("/{}", path.replace('.', "/"))) else { return Vec::new() };
@@ -447,7 +444,7 @@ fn explain(path: String, message: &str, kinds: &[String]) -> Problem {
     Problem::new(path, "a value that does not fit", shorten(message))
 }
 
-/// A name that the model does not have, where serde lists those it `expected`.
+/// The problem of a name that the model does not have; `expected` is serde's list of valid names.
 fn unknown_name(path: String, wrong: &str, expected: &str) -> Problem {
     let names: Vec<&str> = quoted(expected).collect();
     let inside = path.rsplit('.').next() == Some(wrong);
@@ -462,7 +459,7 @@ fn quoted(text: &str) -> impl Iterator<Item = &str> {
     text.split('`').skip(1).step_by(2)
 }
 
-/// What serde found, in the terms of JSON.
+/// The value that serde found, in the terms of JSON.
 fn plain_value(found: &str) -> String {
     match found {
         "unit variant" => "the name alone".to_string(),
@@ -475,7 +472,7 @@ fn plain_value(found: &str) -> String {
     }
 }
 
-/// What serde expected, in the terms of JSON.
+/// The type that serde expected, in the terms of JSON.
 fn plain_type(expected: &str) -> String {
     match expected {
         "f64" => "a number".to_string(),

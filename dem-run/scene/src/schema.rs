@@ -1,4 +1,4 @@
-//! The model of a scene as a JSON Schema: for editors, and to know which paths exist.
+//! The model of a scene as a JSON Schema: for editors, and for the check of paths.
 
 use std::sync::LazyLock;
 
@@ -14,11 +14,11 @@ pub fn json_schema() -> &'static Value {
     &SCHEMA
 }
 
-/// One form that a value may take.
+/// One admissible form of a value.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Form {
     schema: &'static Value,
-    /// Whether it is one kind of several, told by its only name.
+    /// Whether it is one kind of several, identified by its only name.
     pub(super) kind: bool,
 }
 
@@ -30,7 +30,7 @@ impl Form {
         forms
     }
 
-    /// The names that an object of this form may have.
+    /// The names allowed in an object of this form.
     pub(super) fn names(&self) -> impl Iterator<Item = &'static str> + use<> {
         self.schema.get("properties").and_then(Value::as_object).into_iter().flatten().map(|(name, _)| name.as_str())
     }
@@ -43,7 +43,7 @@ impl Form {
         Some(forms)
     }
 
-    /// The forms of the values of a map whose names are free.
+    /// The forms of the values of a map with free names.
     pub(super) fn entries(&self) -> Option<Vec<Self>> {
         let schema = self.schema.get("additionalProperties").filter(|schema| schema.is_object())?;
         let mut forms = vec![];
@@ -94,7 +94,7 @@ mod tests {
                 if alternative.get("description").is_none() {
                     silent.push(format!("{path}: {alternative}"));
                 }
-                // the name of a kind is described by the kind
+                // the description of the kind also describes its name
                 for inner in alternative["properties"].as_object().into_iter().flatten().map(|(_, inner)| inner) {
                     check(path, inner, silent);
                 }

@@ -2,7 +2,7 @@
 //! varies.
 //!
 //! A path must exist in the model ([`super::schema`]), whether or not the scene gives a value
-//! there; names that are free, as those of walls, must exist in the scene.
+//! there; free names, as those of walls, must exist in the scene.
 
 use std::collections::BTreeSet;
 
@@ -16,7 +16,7 @@ use super::suggest::nearest;
 /// Applies the assignments in turn.
 ///
 /// # Errors
-/// All assignments that are no `path=value`, or whose path does not exist.
+/// All assignments that are not `path=value`, or whose path does not exist.
 pub(super) fn apply(document: &mut Document, assignments: &[String]) -> Result<(), Vec<Problem>> {
     let mut problems = vec![];
     for assignment in assignments {
@@ -40,7 +40,7 @@ fn assign(document: &mut Document, assignment: &str) -> Result<(), Problem> {
     Ok(())
 }
 
-/// Puts `value` at `path`, as the sweep has it at `place`.
+/// Puts `value` at `path`; `place` is its place in the sweep.
 ///
 /// # Errors
 /// A path that does not exist.
@@ -53,7 +53,7 @@ pub(super) fn put(document: &mut Document, path: &str, value: Value, place: &str
 
 type Overflows = Vec<(String, String)>;
 
-/// The value of an assignment: JSON, or a bare word as a text.
+/// The value of an assignment: JSON, or a bare word as a string.
 fn read_value(path: &str, literal: &str) -> Result<(Value, Overflows), Problem> {
     if let Ok(parsed) = parse::parse("--set", literal) {
         let overflows = parsed.non_finite().iter();
@@ -84,14 +84,13 @@ fn check_path(root: &Value, path: &str) -> Result<(), Problem> {
     Ok(())
 }
 
-/// The forms of the value under `key`, where a value of one of `forms` is expected and `node`
-/// stands.
+/// The forms of the value under `key` in `node`, for which one of `forms` is expected.
 fn step(forms: &[Form], node: Option<&Value>, above: &str, key: &str) -> Result<Vec<Form>, Problem> {
     let below = join(above, key);
     let object = node.and_then(Value::as_object);
     if let Some((form, found)) = forms.iter().find_map(|form| Some((form, form.property(key)?))) {
-        // one kind of several: the scene may stand at another, whose values this path would mix
-        // with
+        // one kind of several: where the scene has another kind, this path would mix the values of
+        // two kinds
         if form.kind
             && let Some(other) = other_kind(node, key)
         {
@@ -121,7 +120,7 @@ fn step(forms: &[Form], node: Option<&Value>, above: &str, key: &str) -> Result<
     Err(unknown(above, key, forms.iter().flat_map(Form::names)))
 }
 
-/// The kind that stands at `node`, if it is not `key`.
+/// The kind at `node`, if it is not `key`.
 fn other_kind(node: Option<&Value>, key: &str) -> Option<String> {
     match node? {
         Value::Object(map) => map.keys().find(|name| *name != key).map(|name| shorten(name)),
@@ -158,7 +157,7 @@ fn child<'a>(node: &'a Value, key: &str) -> Option<&'a Value> {
     }
 }
 
-/// Puts `value` at `path`, which has been checked; objects that are missing on the way are made.
+/// Puts `value` at `path`, which has been checked; creates missing objects along the path.
 fn store(root: &mut Value, path: &str, value: Value) {
     let mut node = root;
     for key in path.split('.') {
@@ -168,7 +167,7 @@ fn store(root: &mut Value, path: &str, value: Value) {
                 None => return,
             },
             Value::Object(map) => map.entry(key).or_insert(Value::Null),
-            // an optional object that the scene omits, or a value of a wrong type, which this one
+            // the scene omits an optional object, or has a value of a wrong type, which an object
             // replaces
             other => {
                 *other = Value::Object(Map::new());

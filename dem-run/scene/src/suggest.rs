@@ -1,12 +1,13 @@
 //! The valid name nearest to a wrong one.
 
-/// The nearest of `names` to `wrong`, if one is near enough to have been meant.
+/// The name in `names` nearest to `wrong`, if it is near enough.
 ///
-/// Near enough is a third of the letters, at least two edits for names of four letters and more;
-/// names that differ only in case and in `-` for `_` always are. Ties go to the first name.
+/// The limit is a third of the letters, but at least two edits for names of four letters and more.
+/// Names that differ only in case and in `-` for `_` are always near enough. The first name wins a
+/// tie.
 pub(super) fn nearest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> Option<String> {
     let wrong = plain(wrong);
-    // a very long word is no misprint of a name, and the distance is quadratic
+    // a very long word is no misprint of a name, and the cost of the distance is quadratic
     if wrong.len() > 64 {
         return None;
     }

@@ -1,7 +1,7 @@
-//! Wrong values in a scene, all at once.
+//! Finds all wrong values of a scene.
 //!
-//! Only what the scene itself shows is judged here. Whether a wall overlaps the sample is known
-//! when the sample is.
+//! Only the scene itself is checked here. Whether a wall overlaps the sample is checked once the
+//! sample exists.
 
 pub(crate) mod report;
 mod sample;
@@ -17,16 +17,16 @@ use super::wall::Drive;
 pub use report::{LARGEST, MAX_GRAINS};
 use report::{Number, Report};
 
-/// Steps are whole numbers that a double holds with room to spare.
+/// Maximum number of steps, far below the largest integer that a double represents exactly.
 const MAX_STEPS: f64 = 1e12;
 
-/// All wrong values of a scene, in its order; none if the scene is right.
+/// All wrong values of a scene, in its order; empty if the scene is valid.
 #[must_use]
 pub fn validate(scene: &Scene) -> Vec<Problem> {
     let mut report = Report { dimension: usize::from(scene.dimension), problems: vec![] };
     if !matches!(scene.dimension, 2 | 3) {
         report.wrong("dimension", scene.dimension, "2 (disks) or 3 (spheres)");
-        // lengths of vectors cannot be judged
+        // lengths of vectors cannot be checked
         return report.problems;
     }
     match (scene.dimension, scene.thickness) {
@@ -134,7 +134,7 @@ fn bonds(report: &mut Report, bonds: &Bonds, dimension: u8) {
 
 fn grains(report: &mut Report, scene: &Scene) {
     let Some(grains) = &scene.grains else { return };
-    // a file or a cut sample is counted when it is made
+    // the number of grains of a file or a cut sample is known only once it is made
     let count = scene.sample.count();
     let exists = |report: &mut Report, path: String, grain: usize| {
         if let Some(count) = count.filter(|count| grain >= *count && *count > 0) {
@@ -228,7 +228,7 @@ fn solver(report: &mut Report, scene: &Scene) {
     }
 }
 
-/// Checks that `name`, which stands at `path`, is that of a driven wall.
+/// Checks that `name`, found at `path`, is the name of a driven wall.
 fn driven_wall(report: &mut Report, scene: &Scene, path: &str, name: &str) {
     match scene.walls.get(name) {
         None => {

@@ -1,18 +1,18 @@
-//! The list of problems, and the checks that recur.
+//! The list of problems, and the common checks.
 
 use std::fmt;
 
 use crate::error::Problem;
 use crate::function::Function;
 
-/// Grains are numbered by 32-bit signed integers in histories, and walls share them.
+/// Histories number grains and walls by the same 32-bit signed integers.
 pub const MAX_GRAINS: usize = 100_000_000;
 
-/// Largest magnitude of a number, and the inverse of the smallest one that must not be zero: masses
-/// and energies, products of a few such numbers, then neither overflow nor vanish.
+/// Largest magnitude of a number, and the inverse of the smallest positive one. Products of a few
+/// such numbers, as masses and energies, then neither overflow nor underflow.
 pub const LARGEST: f64 = 1e60;
 
-/// What was found so far.
+/// The problems found so far.
 pub(crate) struct Report {
     /// Dimension of space, 2 or 3.
     pub(crate) dimension: usize,
@@ -20,12 +20,12 @@ pub(crate) struct Report {
     pub(crate) problems: Vec<Problem>,
 }
 
-/// A number as it is shown in a message.
+/// A number as printed in a message.
 pub(crate) struct Number(pub(crate) f64);
 
 impl fmt::Display for Number {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // the shortest digits that tell the number, with an exponent where it is large or small
+        // the shortest exact digits, with an exponent for large or small numbers
         write!(f, "{:?}", self.0)
     }
 }
@@ -35,7 +35,7 @@ impl Report {
         self.problems.push(Problem::new(path, found.to_string(), allowed));
     }
 
-    /// A finite number for which `inside` holds; `allowed` says what that is.
+    /// Checks that a number is finite and `inside` holds; `allowed` describes the range.
     pub(crate) fn range(&mut self, path: impl Into<String>, value: f64, inside: bool, allowed: impl Into<String>) {
         if inside && value.abs() <= LARGEST {
             return;
@@ -87,11 +87,11 @@ impl Report {
         self.components(path, vector, length);
     }
 
-    /// A vector whose length is not zero.
+    /// Checks that the length of a vector is not zero.
     pub(crate) fn direction(&mut self, path: &str, vector: &[f64]) {
         self.vector(path, vector);
         let length = vector.iter().fold(0.0_f64, |length, value| length.hypot(*value));
-        // below this the vector cannot be normalised
+        // a shorter vector cannot be normalised
         if vector.len() == self.dimension && !vector.iter().any(|value| value.is_nan()) && length < 1.0 / LARGEST {
             self.wrong(path, format!("{vector:?}"), "a vector whose length is not zero");
         }
@@ -122,7 +122,7 @@ impl Report {
         }
     }
 
-    /// A number that the scene must not give here.
+    /// Reports a number that the scene must not give here.
     pub(crate) fn absent(&mut self, path: impl Into<String>, value: Option<f64>, reason: &str) {
         if let Some(value) = value {
             self.wrong(path, Number(value), format!("nothing: {reason}"));

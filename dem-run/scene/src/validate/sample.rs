@@ -23,7 +23,7 @@ pub(super) fn sample(report: &mut Report, scene: &Scene) {
             let mut centers = HashMap::new();
             for (k, grain) in grains.iter().enumerate() {
                 self::grain(report, k, grain);
-                // adding zero makes −0 and 0 one place
+                // adding zero turns −0 into 0, so that both are one place
                 let key: Vec<u64> = grain.center.iter().map(|x| (x + 0.0).to_bits()).collect();
                 if let Some(first) = centers.insert(key, k) {
                     let found = format!("{:?}, which is also the centre of grain {first}", grain.center);
