@@ -82,20 +82,7 @@ impl<D: Dim, A: Axes<D>> Link<D, A> {
             }
         }
     }
-}
 
-impl<D: Dim, L: Law> Contact<D, L> {
-    /// Failure mode of a bond under its impulse; `None` for a bond below its limit and for a dry
-    /// contact.
-    pub(crate) fn failure(&self) -> Option<BondStatus> {
-        if self.law.breaks() { failure(&self.r, self.law.shift(), self.law.cone()) } else { None }
-    }
-}
-
-/// Contacts with the same rows, sorted by key; in a large problem, by the blocks of a sweep.
-pub type Group<D, L> = Vec<Contact<D, L>>;
-
-impl<D: Dim, A: Axes<D>> Link<D, A> {
     /// Relative velocity of body i with respect to body j at the contact point, from the velocity
     /// (m/s) and spin (rad/s) of each.
     #[inline(always)]
@@ -126,3 +113,14 @@ impl<D: Dim, A: Axes<D>> Link<D, A> {
         Local { n, t: resized(t - turn), m }
     }
 }
+
+impl<D: Dim, L: Law> Contact<D, L> {
+    /// Failure mode of a bond under its impulse; `None` for a bond below its limit and for a dry
+    /// contact.
+    pub(crate) fn failure(&self) -> Option<BondStatus> {
+        if self.law.breaks() { failure(&self.r, self.law.shift(), self.law.cone()) } else { None }
+    }
+}
+
+/// Contacts with the same rows, sorted by key; in a large problem, by the blocks of a sweep.
+pub type Group<D, L> = Vec<Contact<D, L>>;

@@ -271,7 +271,7 @@ impl<D: Dim> World<D> {
             let Some(bias) = bias else { continue };
             match kind {
                 Kind::Bonded | Kind::Elastic => {
-                    let number = touch.bond.map_or(0, |bond| bond as usize);
+                    let Some(number) = touch.bond.map(|bond| bond as usize) else { continue };
                     let bond = &self.bonds[number];
                     let arm = bond.mean_diameter;
                     let arms = Arms { lever, bending: arm };

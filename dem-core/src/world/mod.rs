@@ -98,6 +98,8 @@ pub struct World<D: Dim> {
     built_with: Option<SolverSettings>,
     /// Positions of the grains at time zero (m).
     reference: Vec<D::Vector>,
+    /// Volume of the box around them, over the thickness.
+    reference_box: f64,
 }
 
 /// Everything that a step changes, saved while a step is attempted in halves.
@@ -136,7 +138,8 @@ impl<D: Dim> World<D> {
     /// A world at time zero, without bonds.
     pub fn new(grains: Grains<D>, walls: Vec<Wall<D>>, loads: Vec<Load<D>>, settings: Settings<D>) -> Self {
         let mut world = Self {
-            reference: grains.position.clone(),
+            reference: Vec::new(),
+            reference_box: 0.0,
             solver: settings.solver.build(),
             built_with: Some(settings.solver),
             candidates: Candidates::default(),
@@ -153,6 +156,7 @@ impl<D: Dim> World<D> {
             loads,
             settings,
         };
+        world.refer_to(world.grains.position.clone());
         world.ledger.kinetic = world.kinetic_energy();
         world
     }
@@ -262,8 +266,14 @@ impl<D: Dim> World<D> {
 
     /// Volume of the box around the sample at time zero (m³), the reference of the stress.
     pub fn reference_volume(&self) -> f64 {
-        let (low, high) = self.grains.bounds_at(&self.reference);
-        (0..D::N).map(|axis| high[axis] - low[axis]).product::<f64>() * self.settings.thickness
+        self.reference_box * self.settings.thickness
+    }
+
+    /// Take these positions of the grains (m) as those at time zero.
+    fn refer_to(&mut self, places: Vec<D::Vector>) {
+        let (low, high) = self.grains.bounds_at(&places);
+        self.reference_box = (0..D::N).map(|axis| high[axis] - low[axis]).product();
+        self.reference = places;
     }
 
     /// Set all velocities and spins to zero and keep everything else: in quasi-static preparation

@@ -4,8 +4,7 @@
 //! Nor does it include the list of candidate pairs: any list that is valid for a step gives the
 //! same contacts.
 
-use super::motion::Midpoint;
-use super::motion::Turn;
+use super::motion::{Midpoint, Turn};
 use super::touch::Kept;
 use super::{Ledger, Settings, TouchStatus, World};
 use crate::body::{Grains, Load, Wall};
@@ -110,7 +109,7 @@ impl<D: Dim> World<D> {
         world.time = from.real()?;
         // the reference volume, which follows from the positions at time zero
         from.real()?;
-        world.reference = from.vectors(n)?;
+        world.refer_to(from.vectors(n)?);
         if from.count()? != world.walls.len() {
             return Err(Mismatch);
         }

@@ -47,7 +47,7 @@ impl<D: Dim> Kept<D> {
     pub fn new(pair: [u32; 2], bond: Option<u32>) -> Self {
         Self {
             pair,
-            bond_from_one: bond.and_then(|bond| NonZeroU32::new(bond + 1)),
+            bond_from_one: from_one(bond),
             status: if bond.is_some() { TouchStatus::Bonded } else { TouchStatus::Open },
             wide: bond.is_some(),
             closed: false,
@@ -65,8 +65,13 @@ impl<D: Dim> Kept<D> {
 
     /// Set the index of the bond of the pair.
     pub fn tie(&mut self, bond: Option<u32>) {
-        self.bond_from_one = bond.and_then(|bond| NonZeroU32::new(bond + 1));
+        self.bond_from_one = from_one(bond);
     }
+}
+
+/// The index of a bond, counted from one.
+fn from_one(bond: Option<u32>) -> Option<NonZeroU32> {
+    bond.and_then(|bond| NonZeroU32::new(bond + 1))
 }
 
 /// A contact of one step, with its reaction.

@@ -1,6 +1,6 @@
 //! A sample in a map: its grains and walls, the viewpoint, and the part of the plane drawn.
 
-use dem_history::{GrainState, Grains, History, Wall, WallKind, WallState};
+use dem_history::{GrainState, Grains, History, Wall, WallState};
 
 use super::boxes::{Box2, EMPTY, EVERYWHERE, around, union};
 use super::eye::{Eye, Place};
@@ -148,12 +148,8 @@ impl Sample {
             found = self.bounds(grains, EVERYWHERE);
         }
         for (wall, position) in self.walls.iter().zip(walls.position.chunks(self.dimension)) {
-            let Some([low, high]) = wall::extent(&self.eye, wall, position) else { continue };
-            if wall.kind == WallKind::Plane {
-                found = union(found, [low, high]);
-            } else {
-                let near = |k: usize, x: f64| x.clamp(self.limits[0][k], self.limits[1][k]);
-                found = union(found, [[near(0, low[0]), near(1, low[1])], [near(0, high[0]), near(1, high[1])]]);
+            if let Some(shown) = wall::extent(&self.eye, wall, position, self.limits) {
+                found = union(found, shown);
             }
         }
         found

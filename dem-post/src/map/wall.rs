@@ -36,11 +36,15 @@ pub(super) fn draw_in_front(canvas: &mut Canvas, eye: &Eye, wall: &Wall, positio
     }
 }
 
-/// The box around a wall in the drawing; `None` for an unbounded plane.
-pub(super) fn extent(eye: &Eye, wall: &Wall, position: &[f64]) -> Option<Box2> {
+/// The box around a wall in the drawing, of a round wall its part within `limits`; `None` for an
+/// unbounded plane.
+pub(super) fn extent(eye: &Eye, wall: &Wall, position: &[f64], limits: Box2) -> Option<Box2> {
     match wall.kind {
         WallKind::Plane => eye.place().map(|place| place.shows(&place.plane(position, wall.normal).0)),
-        WallKind::Circle | WallKind::Sphere | WallKind::Cylinder => Some(around(eye.flat(position), wall.radius.abs())),
+        WallKind::Circle | WallKind::Sphere | WallKind::Cylinder => {
+            let corners = around(eye.flat(position), wall.radius.abs());
+            Some(corners.map(|[x, y]| [x.clamp(limits[0][0], limits[1][0]), y.clamp(limits[0][1], limits[1][1])]))
+        }
     }
 }
 

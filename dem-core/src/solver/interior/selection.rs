@@ -37,9 +37,9 @@ pub(super) struct Selection {
     enough: f64,
     turn: Option<State>,
     anchored: u32,
-    /// Of the points that were not measured the one of least gap, and that gap.
-    nearest: Option<State>,
-    least_gap: f64,
+    /// Of the points that were not measured the one of least gap: the gaps of all its pairs, the
+    /// change of the net impulses in the iteration that led to it, and the point.
+    nearest: Option<(f64, f64, State)>,
     iterations: u64,
 }
 
@@ -58,7 +58,6 @@ impl Selection {
             turn: None,
             anchored: 0,
             nearest: None,
-            least_gap: f64::INFINITY,
             iterations: 0,
         }
     }
@@ -76,13 +75,13 @@ impl Selection {
         self.iterations = iteration;
         // far from the reactions of least energy a point is no solution, and is measured only if
         // the path ends without one
-        if !selected && (self.nearest.is_none() || gaps < self.least_gap) {
-            (self.least_gap, self.nearest) = (gaps, Some(at.clone()));
+        if !selected && self.nearest.as_ref().is_none_or(|(least, ..)| gaps < *least) {
+            self.nearest = Some((gaps, self.change, at.clone()));
         }
-        let mut solved = selected && self.measure(problem, sites, at, &[], iteration) <= 1.0;
+        let mut solved = selected && self.measure(problem, sites, at, &[]) <= 1.0;
         if selected && self.aims.least {
             let limits = self.limits.take().unwrap_or_default();
-            let at_limits = self.measure(problem, sites, at, &limits, iteration);
+            let at_limits = self.measure(problem, sites, at, &limits);
             self.limits = Some(limits);
             // reactions near r* need not be at its limits
             solved |= at_limits <= 1.0;
@@ -114,11 +113,12 @@ impl Selection {
     /// The best point; of a path that ended before any was measured, that of least gap.
     pub fn found(mut self, problem: &mut impl Solvable, sites: &Sites) -> Option<Found> {
         if self.best.as_ref().is_none_or(|best| best.missed(self.aims) > 1.0)
-            && let Some(nearest) = self.nearest.take()
+            && let Some((_, change, nearest)) = self.nearest.take()
         {
-            self.measure(problem, sites, &nearest, &[], self.iterations);
+            self.change = change;
+            self.measure(problem, sites, &nearest, &[]);
         }
-        self.best
+        self.best.map(|best| Found { iterations: self.iterations, ..best })
     }
 
     /// Whether the compliance of the metric takes much of the tolerance of the residual or of the
@@ -132,23 +132,14 @@ impl Selection {
     /// By which factor the reactions of a point, projected on their limits, [miss](Aims::missed)
     /// the tolerances. The best are kept: of those within the tolerances the last, which are
     /// nearest to r*, else those that miss least.
-    fn measure(
-        &mut self,
-        problem: &mut impl Solvable,
-        sites: &Sites,
-        at: &State,
-        limits: &[Limit],
-        iterations: u64,
-    ) -> f64 {
+    fn measure(&mut self, problem: &mut impl Solvable, sites: &Sites, at: &State, limits: &[Limit]) -> f64 {
         let reactions = sites.snapped(at, limits);
         problem.write_back(&reactions);
         let (residual, velocity_error, load_error) = (problem.residual(), problem.velocity_error(), self.change);
-        let found = Found { reactions, residual, load_error, velocity_error, iterations };
+        let found = Found { reactions, residual, load_error, velocity_error, iterations: self.iterations };
         let missed = found.missed(self.aims);
         if self.best.as_ref().is_none_or(|best| missed <= 1.0 || missed < best.missed(self.aims)) {
             self.best = Some(found);
-        } else if let Some(best) = &mut self.best {
-            best.iterations = iterations;
         }
         missed
     }
