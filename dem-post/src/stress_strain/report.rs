@@ -1,89 +1,21 @@
-//! Force and displacement of the load wall; axial stress and strain, from the walls and from the
-//! particles.
-//!
-//! **The load wall** is the requested wall, else the scene's `load_wall`, else the wall of its
-//! `stop.wall_travel`, else the only driven one.
-//!
-//! **Signs.** All quantities are positive along the load: the displacement of the wall in the sense
-//! in which its force does work; compressive stress and shortening under a wall that pushes;
-//! tensile stress and elongation under a wall that pulls. In the history stress is positive in
-//! compression and strain is positive in elongation.
-//!
-//! **Size of the sample.** Height H along the drive and cross-section A perpendicular to it are
-//! those of the box around all grains at the first frame; in 2D, A is the width times the scene's
-//! `thickness`. Only a plane that moves along its normal has a section: for a round loader no
-//! stress or strain from the walls is reported.
-//!
-//! **The load** is the prescribed force, or, where the motion is prescribed, the force of the wall
-//! on the grains before any bond broke in the step (`wall_force_at_limit`; in histories without it
-//! `wall_force`, the force after the breaks).
-//!
-//! **Collapse load** (under an ever-growing force there is no peak): the load at the last step
-//! before the strain fitted to the grains exceeds 1e-4; also reported at 1e-3. There is no collapse
-//! load where no load acted in that step, or where elastic bonds reached that strain before any
-//! broke. If rigid bonds join all grains to one piece and none has broken by then, the strain is
-//! solver error and the load is meaningless: the tables note this, and the drawings omit the load.
+//! The report of the load: curves of the run and the numbers that follow from them.
 
 use std::path::Path;
 
-use clap::Args;
 use dem_history::{History, Series, Wall, WallDrive, WallKind};
-use dem_scene::failure::Disk;
-use dem_scene::failure::Splitting;
+use dem_scene::failure::{Disk, Splitting};
 use dem_scene::{Scene, choose_load_wall};
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::analysis::Analysis;
 use crate::chains::stress::thickness;
 use crate::collapse::{Bonding, Collapse, peak, work};
-use crate::options::Files;
-use crate::output::{Folder, PostError, Result, cell, facts, quantity, short};
-use crate::section::{OnPage, Section, chart_figure};
-use dem_drawing::{Chart, Style, colour};
+use crate::output::{PostError, Result, facts, quantity};
 
 /// Strains that define the collapse.
-const COLLAPSE: [f64; 2] = [1e-4, 1e-3];
+pub(super) const COLLAPSE: [f64; 2] = [1e-4, 1e-3];
 /// Share of broken bonds whose load is reported.
 const BROKEN: f64 = 0.05;
-/// Least strain on the logarithmic axis.
-const LEAST_STRAIN: f64 = 1e-9;
-
-/// Force–displacement, stress–strain, the collapse load.
-#[derive(Debug, Args)]
-pub struct Command {
-    #[command(flatten)]
-    files: Files,
-    /// The load wall [default: that of the scene, else the only driven one].
-    #[arg(long, value_name = "NAME")]
-    wall: Option<String>,
-}
-
-impl Analysis for Command {
-    const NAME: &'static str = "stress-strain";
-    type Input = History;
-    type Report = Report;
-
-    fn open(&self) -> Result<History> {
-        self.files.open()
-    }
-
-    fn read(&self, history: &History, _: bool) -> Result<Report> {
-        read(history, self.wall.as_deref())
-    }
-
-    fn table(report: &Report) -> String {
-        report.table()
-    }
-
-    fn folder(&self, history: &History) -> Result<Option<Folder>> {
-        self.files.folder(history, Self::NAME)
-    }
-
-    fn write(&self, _: &History, report: &mut Report, folder: &mut Folder, _: bool) -> Result<()> {
-        write(report, folder)
-    }
-}
 
 /// The results in numbers. `None`: the event did not occur, or the quantity was not recorded.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -401,7 +333,7 @@ impl Summary {
     }
 
     /// The collapse load to draw (N): that at 1e-4, if it is the sample's.
-    fn level(&self) -> Option<f64> {
+    pub(super) fn level(&self) -> Option<f64> {
         self.collapse_load.filter(|_| !self.collapse_early[0])
     }
 }
@@ -472,153 +404,5 @@ impl Report {
             lines.insert(10, ("splitting strength", splitting.to_string()));
         }
         facts(&lines)
-    }
-}
-
-/// Writes `stress-strain.csv`, and as drawings `force-displacement` and `stress-strain`.
-///
-/// # Errors
-/// [`PostError::Write`].
-pub fn write(report: &Report, folder: &mut Folder) -> Result<()> {
-    let head = [
-        "step",
-        "time_s",
-        "wall_displacement_m",
-        "applied_force_N",
-        "wall_reaction_N",
-        "wall_strain",
-        "wall_stress_Pa",
-        "particle_strain",
-        "particle_stress_Pa",
-        "bonds_broken",
-    ];
-    let (height, area) = (report.summary.height, report.summary.area);
-    let at = |values: &[f64], k: usize| values.get(k).copied();
-    let rows = (0..report.step.len()).map(|k| {
-        vec![
-            report.step[k].to_string(),
-            report.time[k].to_string(),
-            report.displacement[k].to_string(),
-            report.load[k].to_string(),
-            cell(at(&report.reaction, k)),
-            cell(area.map(|_| report.displacement[k] / height)),
-            cell(at(&report.reaction, k).zip(area).map(|(f, area)| f / area)),
-            cell(at(&report.strain, k)),
-            cell(at(&report.stress, k)),
-            cell(at(&report.broken, k)),
-        ]
-    });
-    folder.table("stress-strain", &head, rows)?;
-    folder.draw("force-displacement", &Chart::draw(vec![force_displacement(report)]))?;
-    let mut charts = vec![stress_strain(report)];
-    charts.extend(onset(report));
-    Ok(folder.draw("stress-strain", &Chart::draw(charts))?)
-}
-
-fn pairs(x: &[f64], x_scale: f64, y: &[f64], y_scale: f64) -> Vec<(f64, f64)> {
-    x.iter().zip(y).map(|(x, y)| (x * x_scale, y * y_scale)).collect()
-}
-
-/// Force over displacement of the wall.
-pub fn force_displacement(report: &Report) -> Chart {
-    let mut chart = Chart::new("displacement of the wall (mm)", "force (N)");
-    chart.set_off = true;
-    if !report.reaction.is_empty() {
-        let points = pairs(&report.displacement, 1e3, &report.reaction, 1.0);
-        chart = chart.curve("reaction of the grains", colour::ORANGE, Style::Thin, points);
-    }
-    let points = pairs(&report.displacement, 1e3, &report.load, 1.0);
-    chart = chart.curve("applied force", colour::BLUE, Style::Line, points);
-    if let Some(load) = report.summary.level() {
-        chart.levels.push((load, format!("at strain 10⁻⁴: {} N", short(load))));
-    }
-    chart
-}
-
-/// The load over the logarithm of the fitted strain: it shows the small strains before the
-/// collapse.
-pub fn onset(report: &Report) -> Option<Chart> {
-    let visible = |&(strain, _): &(f64, f64)| strain >= LEAST_STRAIN;
-    let points: Vec<(f64, f64)> =
-        report.strain.iter().map(|e| e.abs()).zip(report.load.iter().copied()).filter(visible).collect();
-    if points.len() < 2 {
-        return None;
-    }
-    let mut chart = Chart::new("magnitude of the axial strain, from the particles", "applied force (N)");
-    chart = chart.curve("applied force", colour::BLUE, Style::Line, points);
-    chart.log_x = true;
-    chart.moments = COLLAPSE.to_vec();
-    if let Some(load) = report.summary.level() {
-        chart.levels.push((load, format!("at strain 10⁻⁴: {} N", short(load))));
-    }
-    Some(chart)
-}
-
-/// Stress over strain.
-pub fn stress_strain(report: &Report) -> Chart {
-    let mut chart = Chart::new("axial strain (%)", "axial stress (kPa)");
-    chart.set_off = true;
-    let wall_strain = 1e2 / report.summary.height;
-    let wall_stress = report.summary.area.map(|area| 1e-3 / area);
-    if let Some(wall_stress) = wall_stress.filter(|_| !report.reaction.is_empty()) {
-        let points = pairs(&report.displacement, wall_strain, &report.reaction, wall_stress);
-        chart = chart.curve("from walls", colour::ORANGE, Style::Thin, points);
-    }
-    let points = pairs(&report.strain, 1e2, &report.stress, 1e-3);
-    if !points.is_empty() {
-        chart = chart.curve("from particles", colour::BLUE, Style::Thin, points);
-    }
-    if let Some((load, wall_stress)) = report.summary.level().zip(wall_stress) {
-        chart.levels.push((load * wall_stress, format!("at strain 10⁻⁴: {} kPa", short(load * wall_stress))));
-    }
-    chart
-}
-
-impl OnPage for Report {
-    const ID: &'static str = "load";
-    const TITLE: &'static str = "Load and displacement";
-
-    fn section(&self, _: &History, _: &[usize]) -> Result<Section> {
-        let mut figures = vec![
-            chart_figure(
-                force_displacement(self),
-                "Applied force and reaction of the grains over the displacement of the driven wall.",
-                "Force over displacement of the driven wall.",
-            ),
-            chart_figure(
-                stress_strain(self),
-                "Axial stress over axial strain, from the walls and from the particles.",
-                "Axial stress over strain.",
-            ),
-        ];
-        figures.extend(onset(self).map(|onset| {
-            let alt =
-                "Applied force over the logarithm of the axial strain, with the strains that define the collapse.";
-            chart_figure(onset, alt, "The onset of collapse: force over the logarithm of the strain.")
-        }));
-        let s = &self.summary;
-        let mut facts = vec![
-            ("Driven wall", s.wall.clone()),
-            ("Sample", s.sample()),
-            ("First break", quantity(s.first_break, "N")),
-            ("Collapse load (strain 1e-4)", s.collapse(0)),
-            ("Collapse load (strain 1e-3)", s.collapse(1)),
-            ("Load with 5 % of the bonds broken", quantity(s.load_at_5_percent_broken, "N")),
-            ("Collapse load over cohesion", quantity(s.collapse_over_cohesion, "")),
-            ("Peak load", s.peak()),
-            ("Greatest load", quantity(Some(s.greatest_load), "N")),
-            ("Work of the wall", quantity(Some(s.work), "J")),
-        ];
-        facts.extend(s.splitting.as_ref().map(|splitting| ("Splitting strength", splitting.to_string())));
-        Ok(Section {
-            text:
-                "Of rigid grains that bonds join to one piece a strain before the first bond breaks is solver error: believe a \
-                   collapse load only where it lies above the load of the first break. A wall that moves at a prescribed \
-                   velocity loads the sample with the force that acted before any bond broke in the step."
-                    .into(),
-            facts: facts.into_iter().map(|(name, value)| (name.into(), value)).collect(),
-            figures,
-            ..Section::of::<Self>()
-        })
     }
 }
