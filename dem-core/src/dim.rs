@@ -1,7 +1,8 @@
 //! The dimension of space as a type: one source for 2D and 3D.
 //!
 //! The rest of the crate is generic over [`Dim`]; [`D2`] and [`Space`] define vectors, spins,
-//! contact frames and orientations. Outside tests no other file names a dimension.
+//! contact frames and orientations. Outside tests and the prelude no other file of the
+//! crate names a dimension.
 //!
 //! Symbols: n normal from body j to body i; t tangent(s), in 2D t = (−n_y, n_x), in 3D n = t₁ × t₂;
 //! ω spin, counter-clockwise in 2D.

@@ -269,7 +269,7 @@ impl<D: Dim> World<D> {
         self.reference_box * self.settings.thickness
     }
 
-    /// Take these positions of the grains (m) as those at time zero.
+    /// Use these positions of the grains (m) as those at time zero.
     fn refer_to(&mut self, places: Vec<D::Vector>) {
         let (low, high) = self.grains.bounds_at(&places);
         self.reference_box = (0..D::N).map(|axis| high[axis] - low[axis]).product();

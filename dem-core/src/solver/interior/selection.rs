@@ -37,8 +37,8 @@ pub(super) struct Selection {
     enough: f64,
     turn: Option<State>,
     anchored: u32,
-    /// Of the points that were not measured the one of least gap: the gaps of all its pairs, the
-    /// change of the net impulses in the iteration that led to it, and the point.
+    /// The unmeasured point of least gap: the sum of its complementarity gaps, the change of the
+    /// net impulses in the iteration that led to it, and the point.
     nearest: Option<(f64, f64, State)>,
     iterations: u64,
 }
@@ -73,8 +73,8 @@ impl Selection {
         }
         let selected = self.limits.is_some() && gaps <= self.enough;
         self.iterations = iteration;
-        // far from the reactions of least energy a point is no solution, and is measured only if
-        // the path ends without one
+        // a point far from the minimum-energy reactions is no solution: it is measured only if the
+        // path ends without one
         if !selected && self.nearest.as_ref().is_none_or(|(least, ..)| gaps < *least) {
             self.nearest = Some((gaps, self.change, at.clone()));
         }
@@ -110,7 +110,8 @@ impl Selection {
         }
     }
 
-    /// The best point; of a path that ended before any was measured, that of least gap.
+    /// The best point, or the unmeasured point of least gap if no measured one is a solution and
+    /// that one misses less.
     pub fn found(mut self, problem: &mut impl Solvable, sites: &Sites) -> Option<Found> {
         if self.best.as_ref().is_none_or(|best| best.missed(self.aims) > 1.0)
             && let Some((_, change, nearest)) = self.nearest.take()
