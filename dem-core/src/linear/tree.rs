@@ -12,6 +12,11 @@ const WORK_OF_A_FRONT: f64 = 8e3;
 /// Share by which merged fronts may take more operations than separate ones.
 const MORE_WORK: f64 = 0.1;
 
+/// Largest share of all operations in one part, so that many threads are busy to the end.
+const SHARE_OF_A_PART: f64 = 1.0 / 32.0;
+/// Operations of a part that are worth a task: some 4 ms.
+const WORK_OF_A_PART: f64 = 2e7;
+
 /// One element in a front.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
@@ -24,7 +29,10 @@ pub(super) struct Place {
 /// Unknowns that are eliminated together.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Front {
-    /// The unknowns that are eliminated here, then those that they are coupled to.
+    /// The part that it belongs to.
+    pub part: usize,
+    /// The unknowns that are eliminated here, then those that they are coupled to, as places among
+    /// the unknowns of the part.
     pub unknowns: Vec<usize>,
     /// How many are eliminated.
     pub pivots: usize,
@@ -44,6 +52,17 @@ impl Front {
     }
 }
 
+/// Fronts that one task works on.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Part {
+    /// The fronts, each after those below it.
+    pub fronts: Vec<usize>,
+    /// The unknowns that are eliminated in these fronts, then those that they are coupled to.
+    pub unknowns: Vec<usize>,
+    /// How many are eliminated.
+    pub pivots: usize,
+}
+
 /// Nodes, elements, and the fronts made of them.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tree {
@@ -52,6 +71,8 @@ pub(crate) struct Tree {
     /// Nodes of each element; an element of one node names it twice.
     elements: Vec<[usize; 2]>,
     pub(super) fronts: Vec<Front>,
+    /// Subtrees, which are independent of each other, and last the fronts above them.
+    pub(super) parts: Vec<Part>,
     unknowns: usize,
 }
 
@@ -60,10 +81,11 @@ impl Tree {
     /// between them; an element of one node names it twice. None if no order is found.
     pub fn new(sizes: Vec<usize>, elements: Vec<[usize; 2]>) -> Option<Self> {
         let unknowns = sizes.iter().sum();
-        let mut tree = Self { sizes, elements, fronts: Vec::new(), unknowns };
+        let mut tree = Self { sizes, elements, fronts: Vec::new(), parts: Vec::new(), unknowns };
         let adjacency = tree.adjacency();
         let order = ordered(&adjacency)?;
         tree.fronts = tree.joined(&order, &adjacency);
+        tree.divide();
         Some(tree)
     }
 
@@ -177,6 +199,67 @@ impl Tree {
         }
         self.place(&mut fronts, &firsts, |node| front_of[position[node]]);
         fronts
+    }
+
+    /// Divide the fronts into parts: subtrees that are at most a share of the work, several of
+    /// them if they are small, and the fronts above them.
+    fn divide(&mut self) {
+        let own = |front: &Front| work(front.pivots as f64, front.border() as f64);
+        let mut subtree: Vec<f64> = self.fronts.iter().map(own).collect();
+        for (k, front) in self.fronts.iter().enumerate() {
+            if let Some(parent) = front.parent {
+                subtree[parent] += subtree[k];
+            }
+        }
+        let all: f64 = self.fronts.iter().map(own).sum();
+        let most = (SHARE_OF_A_PART * all).max(WORK_OF_A_PART);
+        // the parents come after their children
+        let mut top = vec![false; self.fronts.len()];
+        if all > most {
+            (0..self.fronts.len()).for_each(|k| top[k] = subtree[k] > most);
+        }
+        let (mut parts, mut filled) = (vec![Part::default()], 0.0);
+        let mut of_root = vec![0; self.fronts.len()];
+        for k in (0..self.fronts.len()).rev().filter(|k| !top[*k]) {
+            let inside = self.fronts[k].parent.filter(|parent| !top[*parent]);
+            of_root[k] = match inside {
+                Some(parent) => of_root[parent],
+                None => {
+                    if filled + subtree[k] > most && filled > 0.0 {
+                        parts.push(Part::default());
+                        filled = 0.0;
+                    }
+                    filled += subtree[k];
+                    parts.len() - 1
+                }
+            };
+        }
+        if all > most {
+            parts.push(Part::default());
+        }
+        let last = parts.len() - 1;
+        for (k, front) in self.fronts.iter_mut().enumerate() {
+            front.part = if top[k] { last } else { of_root[k] };
+            parts[front.part].fronts.push(k);
+        }
+        let mut at = vec![usize::MAX; self.unknowns];
+        for part in &mut parts {
+            let pivots = |k: &usize| self.fronts[*k].unknowns[..self.fronts[*k].pivots].iter().copied();
+            part.unknowns = part.fronts.iter().flat_map(pivots).collect();
+            part.pivots = part.unknowns.len();
+            part.unknowns.iter().enumerate().for_each(|(place, unknown)| at[*unknown] = place);
+            for k in &part.fronts {
+                for unknown in &mut self.fronts[*k].unknowns {
+                    if at[*unknown] == usize::MAX {
+                        at[*unknown] = part.unknowns.len();
+                        part.unknowns.push(*unknown);
+                    }
+                    *unknown = at[*unknown];
+                }
+            }
+            part.unknowns.iter().for_each(|unknown| at[*unknown] = usize::MAX);
+        }
+        self.parts = parts;
     }
 
     fn firsts(&self) -> Vec<usize> {
