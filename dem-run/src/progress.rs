@@ -14,11 +14,11 @@ pub enum ProgressMode {
     /// A bar on a terminal, else plain lines.
     #[default]
     Auto,
-    /// A bar that is redrawn.
+    /// A bar, redrawn in place.
     Bar,
     /// A line every few seconds.
     Plain,
-    /// A JSON object a line, every second.
+    /// One JSON object per line, every second.
     Json,
     /// Nothing.
     None,

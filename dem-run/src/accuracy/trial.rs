@@ -25,7 +25,7 @@ const START_SHARE: f64 = 0.1;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum SolverName {
-    /// One method after the other, until one solves the problem.
+    /// Methods in a fixed order until one solves the problem.
     Auto,
     /// Non-linear Gauss–Seidel.
     #[value(alias = "gauss_seidel")]
