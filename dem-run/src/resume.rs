@@ -80,13 +80,14 @@ fn scene_of(history: &History, options: &ResumeOptions) -> Result<Scene, RunErro
     if !refused.is_empty() {
         let lines = refused.concat();
         return Err(RunError::Usage(format!(
-            "{shown} is of another scene, and a run that has begun cannot change:{lines}\nrun the scene anew, to another file"
+            "the scene in {shown} differs in fields that cannot change during a run:{lines}\nrun the scene anew, \
+             with another history"
         )));
     }
     if !forced.is_empty() && !options.force {
         let lines = forced.concat();
         return Err(RunError::Usage(format!(
-            "{shown} is of another scene:{lines}\n--force goes on with the scene as it is now"
+            "the scene in {shown} differs:{lines}\n--force resumes the run with the new scene"
         )));
     }
     Ok(scene)
@@ -112,7 +113,7 @@ fn resume_in<D: Dim>(
         }
         return Err(RunError::Unfit {
             path: path.clone(),
-            state: "holds no whole state to go on from",
+            state: "holds no complete state to resume from",
             remedy: "it is damaged, or of an older version; run the scene again".into(),
         });
     };
@@ -124,7 +125,7 @@ fn resume_in<D: Dim>(
             return Ok(print_json(&serde_json::json!({ "history": path, "time": time, "steps_made": 0 }))?);
         }
         return Ok(print_line(&format!(
-            "nothing to do: the run ended at t = {} s; --until T goes on to a later end, --set stop=null beyond a stop",
+            "nothing to do: the run ended at t = {} s; --until T resumes it to a later end, --set stop=null beyond a stop",
             number(time)
         ))?);
     }
@@ -139,7 +140,7 @@ fn resume_in<D: Dim>(
     };
     let recorder = Recorder::go_on(history, kept, &checkpoint, scene, &state.world, cpu_before, &mut tell);
     let recorder = recorder.map_err(|error| match error {
-        HistoryError::Interrupted => RunError::Interrupted("the history is as it was"),
+        HistoryError::Interrupted => RunError::Interrupted("the history is unchanged"),
         error => error.into(),
     })?;
     // idle walls are not reported: the earlier forces on the walls are unknown

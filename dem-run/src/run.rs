@@ -63,10 +63,7 @@ impl Execution {
     pub(crate) fn start_threads(&self) -> Result<(), RunError> {
         let Some(threads) = self.threads else { return Ok(()) };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
-        pool.map_err(|error| RunError::System {
-            what: format!("{threads} threads cannot be started"),
-            source: error.into(),
-        })
+        pool.map_err(|error| RunError::System { what: format!("cannot start {threads} threads"), source: error.into() })
     }
 }
 
@@ -82,7 +79,7 @@ pub fn run(scene: &Scene, options: &RunOptions) -> Result<(), RunError> {
 
 /// Installs the handlers of Ctrl-C and SIGTERM.
 pub(crate) fn handle_signals() -> Result<Interrupt, RunError> {
-    signals::install().map_err(|error| RunError::System { what: "no handler for Ctrl-C".into(), source: error.into() })
+    signals::install().map_err(|error| RunError::System { what: "cannot handle Ctrl-C".into(), source: error.into() })
 }
 
 pub(crate) fn run_in<D: Dim>(scene: &Scene, options: &RunOptions, interrupt: &Interrupt) -> Result<(), RunError> {
@@ -236,7 +233,7 @@ impl<D: Dim> Run<'_, D> {
             return match places.is_empty() {
                 true => "; leave room between the bodies".into(),
                 false => {
-                    format!("; let a force drive {walls} in place of velocity, end that motion earlier, or leave room")
+                    format!("; let a force drive {walls} instead of a velocity, end that motion earlier, or leave room")
                 }
             };
         }
@@ -287,13 +284,13 @@ impl<D: Dim> Run<'_, D> {
         let idle = self.idle.iter().filter(|_| self.state.world.steps > 0);
         for wall in idle.filter_map(|wall| self.scene.walls.keys().nth(*wall)) {
             progress.note(&format!(
-                "warning: walls.{wall}: no force ever acted on this driven wall: it touched no grain, or slid along grains that \
-                 nothing pressed on it; look at its place and its direction"
+                "warning: walls.{wall}: no force ever acted on this driven wall: it touched no grain, or slid along grains \
+                 without pressure; check its position and its direction"
             ));
         }
         let (ending, end) = match outcome {
             Ok(Ending::Interrupted) => {
-                let way = "the history is complete up to there; `dem-run resume` goes on with it";
+                let way = "the history is complete up to there; `dem-run resume` continues the run";
                 (Ending::Interrupted, Err(RunError::Interrupted(way)))
             }
             Ok(ending) => (ending, Ok(())),

@@ -20,7 +20,7 @@ pub(crate) fn of_scene(scene: &Scene) -> Vec<String> {
     if !time.is_multiple() {
         let (last, next) = (time.last(), (time.steps() + 1) as f64 * time.step);
         told.push(format!(
-            "time.end: {} s is not a multiple of time.step, {} s: the last step ends at {} s; {} or {} would be",
+            "time.end: {} s is not a multiple of time.step, {} s: the last step ends at {} s; {} s and {} s are multiples",
             time.end,
             time.step,
             number(last),
@@ -35,8 +35,8 @@ pub(crate) fn of_scene(scene: &Scene) -> Vec<String> {
             let grain = list.get(k).filter(|grain| moves(&grain.velocity) || moves(&grain.spin))?;
             let name = if moves(&grain.velocity) { "velocity" } else { "spin" };
             Some(format!(
-                "sample.grains.{k}.{name}: it is ignored, as grains.fixed holds grain {k}: take the grain from grains.fixed, or \
-                 its {name} away"
+                "sample.grains.{k}.{name}: it has no effect because grain {k} is in grains.fixed: remove the grain from \
+                 grains.fixed, or its {name}"
             ))
         });
         told.extend(first_few(lines.collect(), "fixed grains have a velocity or a spin"));
@@ -44,7 +44,9 @@ pub(crate) fn of_scene(scene: &Scene) -> Vec<String> {
     let loads = held.loads.iter().enumerate().filter(|(_, load)| held.fixed.contains(&load.grain));
     let lines = loads.map(|(k, load)| {
         let grain = load.grain;
-        format!("grains.loads.{k}: it moves nothing, as grains.fixed holds grain {grain}: take it from one of them")
+        format!(
+            "grains.loads.{k}: it has no effect because grain {grain} is in grains.fixed: remove it from one of them"
+        )
     });
     told.extend(first_few(lines.collect(), "loads are on fixed grains"));
     told
@@ -54,8 +56,8 @@ pub(crate) fn of_scene(scene: &Scene) -> Vec<String> {
 /// in mean radii.
 pub(crate) fn of_packing(moved: f64) -> String {
     format!(
-        "sample.random: the packing still moved by {moved:.1e} of the mean radius a step after {MOST_STEPS} steps: grains may lie apart \
-         where they should touch; try another seed or a wider container, or see it with `dem-post view`"
+        "sample.random: the packing still moved by {moved:.1e} mean radii per step after {MOST_STEPS} steps: some grains may not touch \
+         their neighbours; try another seed or a wider container, or look at it with `dem-post view`"
     )
 }
 
@@ -149,13 +151,13 @@ fn along(friction: f64, alone: bool) -> Option<String> {
     let way = "it is driven along its own surface";
     if friction == 0.0 {
         return Some(format!(
-            "{way}, without friction, so it carries nothing: give it friction, or a direction that is not across its normal"
+            "{way}, without friction, so it carries no load: give it friction, or a direction not perpendicular to its normal"
         ));
     }
     alone.then(|| {
         format!(
-            "{way} and presses on nothing; friction carries a load only where something presses grains on it, and nothing in \
-             this scene does: drive another wall along its normal, or give gravity or a load"
+            "{way}, and nothing in this scene presses grains on it, so its friction carries no load: drive another wall \
+             along its normal, or add gravity or a load"
         )
     })
 }
@@ -180,8 +182,8 @@ fn pulled<D: Dim>(wall: &Wall<D>, course: &Course<D>, grains: &Grains<D>) -> Opt
     let most = if sign > 0.0 { low } else { high };
     away.then(|| {
         format!(
-            "its force, {} N, pulls it away from the grains at all times, so it carries nothing: give the force the other sign \
-             to press on them, or turn its direction",
+            "its force, {} N, pulls it away from the grains at all times, so it carries no load: change the sign of the force, \
+             or reverse the direction",
             number(most)
         )
     })
@@ -202,7 +204,7 @@ fn apart<D: Dim>(wall: &Wall<D>, course: &Course<D>, grains: &Grains<D>) -> Opti
     (gap > TOUCHING * mean && near < gap).then(|| {
         format!(
             "it touches nothing at the start: its nearest grain is {} m away, and its drive brings it at most {} m nearer by \
-             time.end, so it carries nothing: seat it (\"place\": \"seated\"), or turn its direction",
+             time.end, so it carries no load: seat it (\"place\": \"seated\"), or turn its direction",
             number(gap),
             number(near.max(0.0))
         )
@@ -245,7 +247,7 @@ mod tests {
                 &["along its own surface", "nothing in this scene"][..],
             ),
             (seated, r#""friction": 0, "direction": [1, 0], "velocity": { "constant": 1 }"#, &["without friction"]),
-            (seated, pulled, &["-22 N, pulls it away", "the other sign"]),
+            (seated, pulled, &["-22 N, pulls it away", "change the sign"]),
             (seated, r#""mass": "sample", "direction": [0, 1], "force_rate": 3"#, &["3 N, pulls it away"]),
             (high, r#""velocity": { "constant": 0.5 }"#, &["touches nothing", "is 1 m away", "at most 0.5 m nearer"]),
             (high, r#""velocity": { "constant": -2 }"#, &["touches nothing", "at most 0 m nearer"]),
@@ -279,16 +281,16 @@ mod tests {
         for (sets, parts) in [
             (
                 &["grains.fixed=[1]", "sample.grains.1.velocity=[0, 2]"][..],
-                &["sample.grains.1.velocity: it is ignored, as grains.fixed holds grain 1"][..],
+                &["sample.grains.1.velocity: it has no effect because grain 1 is in grains.fixed"][..],
             ),
-            (&["grains.fixed=[0]", "sample.grains.0.spin=[2]"], &["sample.grains.0.spin: it is ignored"]),
+            (&["grains.fixed=[0]", "sample.grains.0.spin=[2]"], &["sample.grains.0.spin: it has no effect"]),
             (
                 &["grains.fixed=[1]", r#"grains.loads=[{"grain": 1, "force": [1, 0]}]"#],
-                &["grains.loads.0: it moves nothing, as grains.fixed holds grain 1"],
+                &["grains.loads.0: it has no effect because grain 1 is in grains.fixed"],
             ),
             (
                 &["time.end=1.05"],
-                &["time.end: 1.05 s is not a multiple of time.step, 0.1 s", "ends at 1 s; 1 or 1.1 would be"],
+                &["time.end: 1.05 s is not a multiple of time.step, 0.1 s", "ends at 1 s; 1 s and 1.1 s are multiples"],
             ),
         ] {
             let told = told(&lid, sets);

@@ -360,7 +360,7 @@ impl<D: Dim> Trial<'_, D> {
             }
             if state.blown_up(&world) {
                 break End::Failed(format!(
-                    "the motion has far more energy than was put in at t = {:.6e} s: the solves that were accepted are wrong",
+                    "the energy of the motion far exceeds the energy supplied at t = {:.6e} s: solves were accepted that are wrong",
                     world.time
                 ));
             }
