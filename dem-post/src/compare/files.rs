@@ -48,7 +48,7 @@ pub fn write(a: &History, report: &Report, folder: &mut Folder) -> Result<()> {
 
 /// Distances over time; the logarithmic axis cannot show zero distances.
 fn distance_chart(report: &Report) -> Chart {
-    let mut chart = Chart::new("time (s)", "distance of the grains' places (radii)");
+    let mut chart = Chart::new("time (s)", "distance between the grains of the two runs (radii)");
     chart.log_y = report.gaps.iter().any(|gap| gap.greatest > 0.0);
     let points = |value: fn(&Gap) -> f64| report.gaps.iter().map(|gap| (gap.time, value(gap))).collect();
     chart.curve("greatest", colour::BLUE, Style::Line, points(|gap| gap.greatest)).curve(
@@ -112,7 +112,7 @@ fn bond_map(history: &History, report: &Report) -> Result<Drawing> {
         colour: COLOURS[kind(fate)].into(),
     });
     let panel = Panel {
-        caption: vec!["bonds that broke".into(), "places of the first frame of A".into()],
+        caption: vec!["bonds that broke".into(), "positions in the first frame of A".into()],
         links: links.collect(),
         walls: history.wall_state(0)?,
         fills: vec!["#f4f4f4".into(); history.grains()?.radius.len()],

@@ -69,7 +69,7 @@ pub fn fragment_charts(pieces: &[Pieces]) -> Vec<Chart> {
 /// and, where a step broke bonds in several rounds, these sizes over the rounds of the step with
 /// the most rounds.
 pub fn front_charts(report: &Report) -> Vec<Chart> {
-    let mut over_time = Chart::new("time (s)", "place of the tips along the crack (mm)");
+    let mut over_time = Chart::new("time (s)", "position of the tips along the crack (mm)");
     over_time.set_off = true;
     // a crack has no curve over time if all its bonds broke at one time
     let grown = |crack: &&Crack| crack.first < crack.last;
@@ -173,7 +173,7 @@ fn pale_panel(history: &History, report: &Report, cracks: usize) -> Result<Panel
     Ok(Panel {
         caption: vec![
             format!("{cracks} crack{} of {broken} broken bond{}", plural(cracks), plural(broken)),
-            "places of the first frame".into(),
+            "positions in the first frame".into(),
         ],
         grains: history.grain_state(0)?,
         walls: history.wall_state(0)?,

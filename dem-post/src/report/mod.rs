@@ -21,13 +21,13 @@ pub mod solver;
 
 use solver::Accuracy;
 
-/// The run on one HTML page that needs nothing else: pictures, curves, tables, accuracy, energy,
+/// Report of the run as one self-contained HTML page: pictures, curves, tables, accuracy, energy,
 /// scene.
 #[derive(Debug, Args)]
 pub struct Command {
     #[command(flatten)]
     moments: Moments,
-    /// The load wall [default: that of the scene, else the only driven one].
+    /// Name of the load wall [default: that of the scene, else the only driven wall].
     #[arg(long, value_name = "NAME")]
     wall: Option<String>,
 }
@@ -166,7 +166,7 @@ impl Report {
             ("worst residual", percent(a.residual.map(|r| r.worst))),
             ("worst load error", percent(a.load_error.map(|r| r.worst))),
             ("worst false acceleration", percent(a.false_acceleration.map(|r| r.worst))),
-            ("steps whose residual missed it", missed),
+            ("steps whose residual missed the tolerance", missed),
         ];
         lines.extend(self.left_out.iter().map(|out| ("left out", format!("{}: {}", out.section, out.why))));
         facts(&lines)

@@ -111,7 +111,7 @@ impl Accuracy {
                 || "not recorded".into(),
                 |s| {
                     let [median, high, worst, time] = [s.median, s.high, s.worst, s.time].map(number);
-                    format!("median {median}; one step in a hundred above {high}; worst {worst} at t = {time} s")
+                    format!("median {median}; 1 % of the steps above {high}; worst {worst} at t = {time} s")
                 },
             )
         };
@@ -132,7 +132,7 @@ impl Accuracy {
             |[n, f]| format!("{} iterations and {} factorisations a step", number(n), number(f)),
         );
         [
-            ("Residual aimed at, accepted", format!("{}, {}", plain(self.tolerance), plain(self.accept))),
+            ("Residual: tolerance, accepted", format!("{}, {}", plain(self.tolerance), plain(self.accept))),
             ("Residual", spread(self.residual)),
             (
                 match self.false_acceleration {
@@ -143,7 +143,7 @@ impl Accuracy {
             ),
             ("False acceleration", spread(self.false_acceleration)),
             ("Steps by method", routes),
-            ("Steps that missed the residual aimed at", missed),
+            ("Steps that missed the tolerance of the residual", missed),
             ("Solves not accepted", plain(self.rejected)),
             ("Iterations of a step", format!("mean {}; {}", plain(self.mean_iterations), spread(self.iterations))),
             ("Newton", newton),
