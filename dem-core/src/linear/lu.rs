@@ -39,7 +39,7 @@ impl Lu {
         for (k, front) in tree.fronts.iter().enumerate() {
             let (n, p, b) = (front.unknowns.len(), front.pivots, front.border());
             let (columns, across) = self.values[self.starts[k]..][..p * (n + b)].split_at_mut(n * p);
-            let mut parts = Parts { n, p, columns, across, rest: vec![0.0; b * b] };
+            let mut parts = FrontValues { n, p, columns, across, rest: vec![0.0; b * b] };
             (0..p).for_each(|d| *parts.at(d, d) = 1.0);
             for place in &front.elements {
                 let [first, second] = tree.widths(place.element);
@@ -106,7 +106,7 @@ impl Lu {
 }
 
 /// The numeric values of a front.
-struct Parts<'a> {
+struct FrontValues<'a> {
     n: usize,
     p: usize,
     /// Columns of the pivots (n each), rows of the pivots in the columns of the border (p each),
@@ -116,7 +116,7 @@ struct Parts<'a> {
     rest: Vec<f64>,
 }
 
-impl Parts<'_> {
+impl FrontValues<'_> {
     #[inline]
     fn at(&mut self, row: usize, column: usize) -> &mut f64 {
         let (n, p) = (self.n, self.p);
