@@ -3,11 +3,11 @@
 
 use crate::check::free_space;
 use crate::error::RunError;
-use crate::history::{Checkpoint, History, HistoryError, Kept, refuse_busy};
+use crate::history::{Checkpoint, History, HistoryError, RowCounts, refuse_busy};
 use crate::in_dimension;
 use crate::output::{number, print_json, print_line};
 use crate::record::Recorder;
-use crate::run::{Execution, Run, RunOptions, State, handle_signals, run_in};
+use crate::run::{Execution, Run, RunOptions, RunState, handle_signals, run_in};
 use crate::scene::{self, Scene, differences};
 use crate::signals::Interrupt;
 use dem_core::dim::Dim;
@@ -117,7 +117,7 @@ fn resume_in<D: Dim>(
             remedy: "it is damaged, or of an older version; run the scene again".into(),
         });
     };
-    let mut state = State::<D>::restored(scene, &checkpoint)
+    let mut state = RunState::<D>::restored(scene, &checkpoint)
         .map_err(|mismatch| RunError::InputOutput(format!("{shown}: {mismatch}; run the scene again")))?;
     if state.world.steps >= scene.time.steps() || state.course.ending(&state.world).is_some() {
         let time = state.world.time;
@@ -164,12 +164,12 @@ fn anew(options: &ResumeOptions) -> RunOptions {
 /// The rows of a history that are kept when the run resumes from `checkpoint`: the frames that were
 /// due by then. If the run ended between two due frames, its last frame is dropped, because an
 /// uninterrupted run would not have it; the steps before it are kept.
-fn kept(history: &History, scene: &Scene, checkpoint: &Checkpoint) -> Result<Kept, RunError> {
+fn kept(history: &History, scene: &Scene, checkpoint: &Checkpoint) -> Result<RowCounts, RunError> {
     let every = scene.steps_per_frame() as i64;
     let reached = history.steps().iter().take_while(|step| **step <= checkpoint.step).count();
     let due = history.steps()[..reached].iter().take_while(|step| **step % every == 0).count();
     let (all, frames) = (history.complete_at(reached)?, history.complete_at(due)?);
-    Ok(Kept { frames: due, contacts: frames.contacts, ..all })
+    Ok(RowCounts { frames: due, contacts: frames.contacts, ..all })
 }
 
 /// Rejects a disk without space for the new history: it is written beside the old one before it

@@ -36,7 +36,7 @@ pub struct Summary {
     /// Whether the last state has normal contact forces and the history records them, so that force
     /// chains can be drawn.
     #[serde(skip)]
-    pub carries: bool,
+    pub has_reactions: bool,
     /// Simulated time (s).
     pub time: f64,
     /// Grains.
@@ -187,7 +187,8 @@ impl fmt::Display for Summary {
         let file = in_shell(&self.history);
         write!(f, "  dem-post info {file}")?;
         let driven = !self.driven_walls.is_empty();
-        let more = [("report", true), ("cracks", self.bonds > 0), ("chains", self.carries), ("stress-strain", driven)];
+        let more =
+            [("report", true), ("cracks", self.bonds > 0), ("chains", self.has_reactions), ("stress-strain", driven)];
         for (command, _) in more.into_iter().filter(|(_, there)| *there && self.steps > 0) {
             let choose = driven && self.load_wall.is_none() && matches!(command, "report" | "stress-strain");
             write!(f, "\n  dem-post {command} {file}{}", if choose { " --wall NAME" } else { "" })?;

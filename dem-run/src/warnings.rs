@@ -72,17 +72,17 @@ fn first_few(mut lines: Vec<String>, what: &str) -> Vec<String> {
 /// Warnings about driven walls; `grains` if the sample is prepared.
 pub(crate) fn of_walls<D: Dim>(scene: &Scene, walls: &[Wall<D>], grains: Option<&Grains<D>>) -> Vec<String> {
     let pushes: Vec<bool> =
-        walls.iter().map(|wall| Course::of(wall, scene.time.end).is_some_and(|c| !c.along)).collect();
+        walls.iter().map(|wall| DriveMotion::of(wall, scene.time.end).is_some_and(|c| !c.along_surface)).collect();
     let mut told = vec![];
     for (k, (name, wall)) in scene.walls.keys().zip(walls).enumerate() {
-        let Some(course) = Course::of(wall, scene.time.end) else { continue };
+        let Some(motion) = DriveMotion::of(wall, scene.time.end) else { continue };
         let alone = !others_push(scene) && !pushes.iter().enumerate().any(|(other, push)| *push && other != k);
         let word = match grains {
-            _ if course.along => along(wall.friction, alone),
+            _ if motion.along_surface => along(wall.friction, alone),
             Some(grains) => {
-                pulled(wall, &course, grains).or_else(|| alone.then(|| apart(wall, &course, grains)).flatten())
+                pulled(wall, &motion, grains).or_else(|| alone.then(|| apart(wall, &motion, grains)).flatten())
             }
-            None => pulled(wall, &course, &Grains::from_iter([])),
+            None => pulled(wall, &motion, &Grains::from_iter([])),
         };
         told.extend(word.map(|word| format!("walls.{name}: {word}")));
     }
@@ -101,26 +101,26 @@ fn others_push(scene: &Scene) -> bool {
 
 /// Whether a wall is driven away from the grains at all times.
 pub(crate) fn leaves<D: Dim>(wall: &Wall<D>, end: f64, grains: &Grains<D>) -> bool {
-    let (Some(course), Some(towards)) = (Course::of(wall, end), towards(wall, grains)) else { return false };
-    let sign = course.direction.dot(&towards);
-    !course.along && course.range.0 * sign <= 0.0 && course.range.1 * sign <= 0.0
+    let (Some(motion), Some(towards)) = (DriveMotion::of(wall, end), towards(wall, grains)) else { return false };
+    let sign = motion.direction.dot(&towards);
+    !motion.along_surface && motion.range.0 * sign <= 0.0 && motion.range.1 * sign <= 0.0
 }
 
 /// The motion of a wall under its drive alone.
-struct Course<D: Dim> {
+struct DriveMotion<D: Dim> {
     /// Unit direction.
     direction: D::Vector,
     /// Whether the direction is parallel to the surface.
-    along: bool,
+    along_surface: bool,
     /// Whether a force drives the wall.
-    force: bool,
+    by_force: bool,
     /// Least and largest value of the drive (N or m/s).
     range: (f64, f64),
     /// Least and largest displacement along the direction until the end of the run (m).
     travel: (f64, f64),
 }
 
-impl<D: Dim> Course<D> {
+impl<D: Dim> DriveMotion<D> {
     /// None if the wall never moves.
     fn of(wall: &Wall<D>, end: f64) -> Option<Self> {
         let (direction, mass, drive) = match &wall.drive {
@@ -137,8 +137,8 @@ impl<D: Dim> Course<D> {
             travel = widened(travel, place);
             place += speed * step;
         }
-        let along = wall.shape.moves_across(direction) < PARALLEL;
-        (range != (0.0, 0.0)).then_some(Self { direction, along, force: mass.is_some(), range, travel })
+        let along_surface = wall.shape.moves_across(direction) < PARALLEL;
+        (range != (0.0, 0.0)).then_some(Self { direction, along_surface, by_force: mass.is_some(), range, travel })
     }
 }
 
@@ -175,10 +175,10 @@ fn nearest<D: Dim>(wall: &Wall<D>, grains: &Grains<D>) -> Option<(f64, D::Vector
 
 /// Warning about a wall whose force always pulls it away from the grains: a confinement with the
 /// wrong sign.
-fn pulled<D: Dim>(wall: &Wall<D>, course: &Course<D>, grains: &Grains<D>) -> Option<String> {
-    let sign = course.direction.dot(&towards(wall, grains)?);
-    let (low, high) = course.range;
-    let away = course.force && (if sign > 0.0 { high <= 0.0 } else { low >= 0.0 }) && sign != 0.0;
+fn pulled<D: Dim>(wall: &Wall<D>, motion: &DriveMotion<D>, grains: &Grains<D>) -> Option<String> {
+    let sign = motion.direction.dot(&towards(wall, grains)?);
+    let (low, high) = motion.range;
+    let away = motion.by_force && (if sign > 0.0 { high <= 0.0 } else { low >= 0.0 }) && sign != 0.0;
     let most = if sign > 0.0 { low } else { high };
     away.then(|| {
         format!(
@@ -190,16 +190,16 @@ fn pulled<D: Dim>(wall: &Wall<D>, course: &Course<D>, grains: &Grains<D>) -> Opt
 }
 
 /// Warning about a wall that touches no grain and whose drive does not move it to one.
-fn apart<D: Dim>(wall: &Wall<D>, course: &Course<D>, grains: &Grains<D>) -> Option<String> {
+fn apart<D: Dim>(wall: &Wall<D>, motion: &DriveMotion<D>, grains: &Grains<D>) -> Option<String> {
     let (gap, _) = nearest(wall, grains)?;
     let mean = grains.radius.iter().sum::<f64>() / grains.len() as f64;
     let near = match wall.shape.flat_normal() {
         Some(normal) => {
-            let sign = course.direction.dot(&normal);
-            (course.travel.0 * sign).max(course.travel.1 * sign)
+            let sign = motion.direction.dot(&normal);
+            (motion.travel.0 * sign).max(motion.travel.1 * sign)
         }
         // upper bound for either direction
-        None => course.travel.1.max(-course.travel.0),
+        None => motion.travel.1.max(-motion.travel.0),
     };
     (gap > TOUCHING * mean && near < gap).then(|| {
         format!(

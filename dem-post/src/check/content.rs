@@ -28,7 +28,7 @@ const SAME_TIME: f64 = 1e-9;
 /// A rupture as the file stores it, with its mode as a number.
 #[derive(Clone, Copy, H5Type)]
 #[repr(C)]
-struct Event {
+struct StoredRupture {
     step: i64,
     time: f64,
     x: f64,
@@ -376,7 +376,7 @@ fn events(c: &mut Checker, steps: &[i64], pairs: &[[i32; 2]], broken: &Broken) {
         return;
     }
     let (mut told, mut last): (BTreeMap<usize, usize>, _) = (BTreeMap::new(), i64::MIN);
-    c.blocks::<Event>(RUPTURE, |c, start, events| {
+    c.blocks::<StoredRupture>(RUPTURE, |c, start, events| {
         for (k, event) in events.iter().enumerate() {
             let row = start + k;
             if event.step < last {
@@ -424,7 +424,7 @@ fn events(c: &mut Checker, steps: &[i64], pairs: &[[i32; 2]], broken: &Broken) {
 
 /// The contradiction between an event and the states of its bond, if any.
 fn disagreement(
-    event: &Event,
+    event: &StoredRupture,
     frame: usize,
     pairs: &[[i32; 2]],
     broken: &Broken,

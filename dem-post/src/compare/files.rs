@@ -62,7 +62,7 @@ fn distance_chart(report: &Report) -> Chart {
 fn broken_chart(report: &Report) -> Chart {
     let end = report.gaps.last().map_or(0.0, |gap| gap.time);
     let mut chart = Chart::new("time (s)", "broken bonds");
-    chart.counts = true;
+    chart.y_is_count = true;
     for (k, list) in report.breaks.iter().enumerate() {
         let steps = list.iter().enumerate().map(|(n, found)| (found.time, (n + 1) as f64));
         let last = list.last().map_or(end, |found| found.time.max(end));
@@ -92,7 +92,7 @@ fn load_charts(report: &Report) -> Vec<Chart> {
             .map(|(chart, points)| chart.curve(name, colour, if k == 0 { Style::Line } else { Style::Thin }, points))
             .collect();
     }
-    charts.iter_mut().for_each(|chart| chart.set_off = true);
+    charts.iter_mut().for_each(|chart| chart.pad_x = true);
     charts
 }
 

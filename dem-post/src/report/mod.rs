@@ -75,12 +75,12 @@ pub struct Report {
     #[serde(skip)]
     pub stress_strain: Option<stress_strain::Report>,
     /// The sections without content.
-    pub left_out: Vec<LeftOut>,
+    pub left_out: Vec<EmptySection>,
 }
 
 /// A section without content.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct LeftOut {
+pub struct EmptySection {
     /// Its [`OnPage::ID`].
     pub section: &'static str,
     /// The reason.
@@ -111,11 +111,11 @@ pub fn read(history: &History, times: &[f64], wall: Option<&str>, quiet: bool) -
 }
 
 /// `None` for an analysis whose data the scene lacks; the reason is added to `left_out`.
-fn if_there<R: OnPage>(found: Result<R>, left_out: &mut Vec<LeftOut>) -> Result<Option<R>> {
+fn if_there<R: OnPage>(found: Result<R>, left_out: &mut Vec<EmptySection>) -> Result<Option<R>> {
     match found {
         Ok(found) => Ok(Some(found)),
         Err(PostError::Lacking { what, .. }) => {
-            left_out.push(LeftOut { section: R::ID, why: what });
+            left_out.push(EmptySection { section: R::ID, why: what });
             Ok(None)
         }
         Err(error) => Err(error),

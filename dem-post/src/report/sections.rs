@@ -86,7 +86,7 @@ pub fn energy(history: &History) -> Result<Section> {
             curves = curves.curve(label, colour, Style::Line, points);
         }
     }
-    curves.set_off = true;
+    curves.pad_x = true;
     let alt = "External work, kinetic energy and dissipation over time.";
     let figures = if curves.curves.is_empty() { vec![] } else { vec![chart_figure(curves, alt, alt)] };
     Ok(Section { id: "energy", title: "Energy", facts, figures, ..Section::default() })

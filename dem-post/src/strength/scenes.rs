@@ -75,7 +75,7 @@ pub fn design(runs: &[(String, String)], against: Option<&str>) -> Result<Design
             list(&other)
         )));
     }
-    let labels: Vec<(Vec<Key>, String)> = scenes.iter().map(|scene| label(scene, &sample_fields, &field)).collect();
+    let labels: Vec<(Vec<SortKey>, String)> = scenes.iter().map(|scene| label(scene, &sample_fields, &field)).collect();
     let mut sorted = labels.clone();
     sorted.sort();
     sorted.dedup();
@@ -182,10 +182,10 @@ fn follows(scenes: &[Leaves], values: &[f64], name: &str) -> bool {
 }
 
 /// Sort key of a sample: numbers before words.
-type Key = (u64, String);
+type SortKey = (u64, String);
 
 /// The name of a scene's sample, and its sort key; samples differ in `fields`, not in `varied`.
-fn label(scene: &Leaves, fields: &[String], varied: &str) -> (Vec<Key>, String) {
+fn label(scene: &Leaves, fields: &[String], varied: &str) -> (Vec<SortKey>, String) {
     let value = |name: &str| scene.get(name).cloned().unwrap_or_default();
     let text = |name: &str| match value(name) {
         Value::String(text) => text,

@@ -9,7 +9,7 @@ use hdf5::types::VarLenUnicode;
 use super::checkpoint::Checkpoint;
 use super::codes::{BondCode, BondStatus, ContactCode, WallDriveCode, WallKindCode};
 use super::error::{HistoryError, Result, refused, while_reading};
-use super::model::{Bonds, ContactRows, GrainState, Grains, Kept, Layout, Parameters, Rupture, Wall, WallState};
+use super::model::{Bonds, ContactRows, GrainState, Grains, Layout, Parameters, RowCounts, Rupture, Wall, WallState};
 use super::observed::{self, Series};
 use super::rupture::RuptureRow;
 use super::schema::path;
@@ -92,7 +92,7 @@ impl History {
     ///
     /// # Errors
     /// [`HistoryError::Damaged`].
-    pub fn complete(&self) -> Result<Kept> {
+    pub fn complete(&self) -> Result<RowCounts> {
         self.complete_at(self.frames())
     }
 
@@ -100,13 +100,13 @@ impl History {
     ///
     /// # Errors
     /// [`HistoryError::Damaged`].
-    pub fn complete_at(&self, frames: usize) -> Result<Kept> {
+    pub fn complete_at(&self, frames: usize) -> Result<RowCounts> {
         let rows = |place: &str| -> Result<usize> {
             let last = frames.saturating_sub(1)..frames;
             Ok(self.source.read::<u64>(place, last)?.1.first().map_or(0, |&rows| rows as usize))
         };
         let bonded = self.source.has(path::RUPTURE);
-        Ok(Kept {
+        Ok(RowCounts {
             frames,
             contacts: rows(path::COMMIT_CONTACTS)?,
             steps: rows(path::COMMIT_STEPS)?,

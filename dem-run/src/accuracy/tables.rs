@@ -1,7 +1,7 @@
 //! The report as tables: as text on stdout, and as CSV.
 
 use super::report::{Indeterminacy, Report, Row};
-use super::spread::Range;
+use super::spread::MinMeanMax;
 use super::trial::{End, Outcome};
 use crate::output::{Folder, Result, Text, cell, number, short};
 use crate::row;
@@ -221,9 +221,9 @@ fn spreads(report: &Report, indeterminacy: &Indeterminacy) -> String {
     text
 }
 
-fn range(range: Option<Range>) -> Vec<String> {
+fn range(range: Option<MinMeanMax>) -> Vec<String> {
     match range {
-        Some(Range { min, mean, max }) => row![number(min), number(mean), number(max)],
+        Some(MinMeanMax { min, mean, max }) => row![number(min), number(mean), number(max)],
         None => row!["–", "–", "–"],
     }
 }
