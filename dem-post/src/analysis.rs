@@ -113,7 +113,7 @@ fn run<A: Analysis>(options: &ArgMatches, shown: Shown) -> Result<()> {
 /// Names the files that were written, on stderr.
 fn name_files(folder: &Folder) {
     if folder.removed() > 0 {
-        note(&format!("removed {} files of the history that the folder belonged to", folder.removed()));
+        note(&format!("removed {} files of the history to which the folder belonged", folder.removed()));
     }
     // for a long series stderr names only the first and the last file
     let written = folder.written();

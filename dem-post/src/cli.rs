@@ -5,14 +5,14 @@ use clap::{ArgMatches, Args, Command, FromArgMatches};
 use crate::ANALYSES;
 use crate::analysis::{Entry, Shown};
 
-/// Looks at the histories that `dem-run run` writes.
+/// Analyses the histories that `dem-run run` writes.
 #[derive(Debug, Args)]
 #[command(version, propagate_version = true, subcommand_required = true, arg_required_else_help = true)]
 struct Cli {
     /// Print results as JSON.
     #[arg(long, global = true)]
     json: bool,
-    /// Say nothing on standard error but errors.
+    /// Print only errors on standard error.
     #[arg(long, short, global = true)]
     quiet: bool,
 }

@@ -70,7 +70,7 @@ impl Collapse {
         let (step, early, note) = match bonds {
             Bonding::Elastic if whole => (None, false, "the sample strained elastically, before any bond broke"),
             Bonding::Rigid { one_piece } if whole && step.is_some() => match one_piece {
-                true => (step, true, "before any bond broke: the solver's own strain"),
+                true => (step, true, "before any bond broke: solver error, not strain of the sample"),
                 false => (step, true, "before any bond broke: not all grains are bonded to one piece"),
             },
             _ if step.is_none() => (None, false, "no load acted in the step before"),
@@ -119,7 +119,7 @@ mod tests {
         for (one_piece, told) in [(true, true), (false, false)] {
             let found = read(5.0, 0.0, rigid(one_piece));
             assert_eq!((found.step, found.early), (Some(0), true));
-            assert_eq!(found.note.contains("solver's own"), told, "{}", found.note);
+            assert_eq!(found.note.contains("solver error"), told, "{}", found.note);
         }
     }
 

@@ -28,7 +28,7 @@ const RELEASED: &str = "#ffffff";
 const BOND: f64 = 1.6;
 const CRACK: f64 = 2.8;
 
-/// A series of numbered pictures, for a viewer or a film.
+/// Series of numbered pictures, for a viewer or a film.
 #[derive(Debug, Args)]
 pub struct Command {
     #[command(flatten)]
@@ -36,10 +36,10 @@ pub struct Command {
     /// What to draw.
     #[arg(long, value_enum, default_value_t)]
     draw: Subject,
-    /// Take every N-th frame, and the last.
+    /// Draw every N-th frame, and the last.
     #[arg(long, value_name = "N", default_value_t = 1, conflicts_with = "times")]
     every: usize,
-    /// Take the frames nearest to these times, s.
+    /// Draw the frames nearest to these times (s).
     #[arg(long, value_name = "T,…", value_delimiter = ',')]
     times: Vec<f64>,
 }
@@ -74,7 +74,7 @@ impl Analysis for Command {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Subject {
-    /// Bonds that hold, and those that broke while the two grains are still neighbours.
+    /// Intact bonds, and broken bonds whose grains are still neighbours.
     #[default]
     Bonds,
     /// Contact forces.
@@ -130,7 +130,7 @@ pub fn read(history: &History, subject: Subject, every: usize, times: &[f64]) ->
     };
     if scale == Some(0.0) {
         let what = if subject == Subject::Forces { "no contact carries a force" } else { "nothing moves" };
-        return Err(lacking(&format!("{what} in these frames: choose others by --times, or another --draw")));
+        return Err(lacking(&format!("{what} in these frames: choose others with --times, or another --draw")));
     }
     let time = |frame: Option<&usize>| frame.map_or(0.0, |&frame| history.times()[frame]);
     Ok(Report { subject, span: [time(frames.first()), time(frames.last())], frames, scale })

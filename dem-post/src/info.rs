@@ -12,20 +12,20 @@ use crate::output::{Result, facts, in_shell, number, quantity};
 use crate::section::{OnPage, Section};
 use crate::{check, pack, stress_strain};
 
-/// What a history holds, in about twenty lines; with --check, whether it is sound; with --repair,
-/// after a kill.
+/// Print the content of a history in about twenty lines; --check verifies the file, --repair closes
+/// it after a kill.
 #[derive(Debug, Args)]
 pub struct Command {
     /// The history.
     #[arg(value_name = "FILE.h5")]
     history: PathBuf,
-    /// Read everything and name each place that breaks the promises of the layout: types, shapes,
-    /// units, order, numbers that are not finite, bonds and their ruptures. The exit code is 4
-    /// where there is one.
+    /// Read everything and report each violation of the layout: types, shapes, units, order,
+    /// numbers that are not finite, bonds and their ruptures. The exit code is 4 if there is a
+    /// violation.
     #[arg(long)]
     check: bool,
-    /// Make a file that any program opens of one whose run was killed: its complete frames are
-    /// copied, and the copy takes its place. `dem-run resume` does the same and goes on with the
+    /// Repair the file of a killed run so that any program opens it: its complete frames are
+    /// copied, and the copy replaces the file. `dem-run resume` does the same and continues the
     /// run.
     #[arg(long, conflicts_with = "check")]
     repair: bool,
@@ -247,7 +247,7 @@ impl Report {
 
     /// Names and values, in order.
     pub fn facts(&self) -> Vec<(&'static str, String)> {
-        let state = if self.open_ended { "not closed: the run goes on or was stopped" } else { "closed" };
+        let state = if self.open_ended { "not closed: the run is in progress or was stopped" } else { "closed" };
         let [least, most] = self.diameters.map(|d| number(1e3 * d));
         let mut lines = vec![
             ("file", format!("{} ({:.1} MB, {state})", self.file, self.bytes as f64 / 1e6)),

@@ -13,11 +13,11 @@ pub struct Files {
     /// The history.
     #[arg(value_name = "FILE.h5")]
     pub history: PathBuf,
-    /// Folder for the results, created if need be [default: FILE-post, of `frames` FILE-frames, in
+    /// Folder for the results, created if missing [default: FILE-post, for `frames` FILE-frames, in
     /// the current folder].
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
-    /// Take the folder over from the history that it belongs to: its results are removed.
+    /// Overwrite a results folder of another history: its results are removed.
     #[arg(long)]
     pub force: bool,
 }
@@ -28,7 +28,7 @@ pub struct Moments {
     /// The files.
     #[command(flatten)]
     pub files: Files,
-    /// Times of the maps, s, as in 0.1,0.15 [default: first break, 5 % broken, end].
+    /// Times of the maps (s), as in 0.1,0.15 [default: first break, 5 % broken, end].
     #[arg(long, value_name = "T,…", value_delimiter = ',')]
     pub times: Vec<f64>,
 }

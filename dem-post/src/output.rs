@@ -74,7 +74,7 @@ pub fn source(history: &History) -> Result<Source> {
     let p = history.parameters()?;
     let revision = if p.git_revision.is_empty() { "unknown" } else { &p.git_revision };
     let run = format!(
-        "begun {} on {}, seed {}, with dem-run {} (git {revision}, {})",
+        "started {} on {}, seed {}, with dem-run {} (git {revision}, {})",
         p.start, p.host, p.seed, p.version, p.build
     );
     Ok(Source::new(history.path(), Some(run)))

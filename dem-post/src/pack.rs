@@ -10,17 +10,17 @@ use serde::Serialize;
 use crate::analysis::Analysis;
 use crate::output::{Result, facts, progress};
 
-/// Compress a history: a copy with checksums takes its place once it is found to be the same to the
+/// Compress a history: a copy with checksums replaces it, after a check that both are equal bit for
 /// bit.
 #[derive(Debug, Args)]
 pub struct Command {
     /// The history.
     #[arg(value_name = "FILE.h5")]
     history: PathBuf,
-    /// Write the copy there, and leave the history as it is.
+    /// Write the copy to this file and leave the history unchanged.
     #[arg(short, long, value_name = "PACKED.h5")]
     output: Option<PathBuf>,
-    /// Replace a file that stands at PACKED.h5.
+    /// Overwrite an existing PACKED.h5.
     #[arg(long)]
     force: bool,
 }
@@ -67,7 +67,7 @@ impl Report {
         let share = 100.0 * self.after as f64 / self.before.max(1) as f64;
         facts(&[
             ("file", self.file.clone()),
-            ("frames", format!("{}, the same to the bit", self.frames)),
+            ("frames", format!("{}, equal bit for bit", self.frames)),
             ("before", megabytes(self.before)),
             ("after", format!("{}, {share:.0} %", megabytes(self.after))),
         ])

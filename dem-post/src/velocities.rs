@@ -26,7 +26,7 @@ const SQUARES: f64 = 18.0;
 /// scale.
 const COVERED: f64 = 0.99;
 
-/// Maps and table of the velocities.
+/// Velocities of the grains as maps and a table.
 #[derive(Debug, Args)]
 pub struct Command {
     #[command(flatten)]
@@ -224,7 +224,7 @@ pub fn map(history: &History, report: &Report) -> Result<Drawing> {
     }
     let mut legend = vec![Key::Bar(scale("speed over v", 1.0))];
     if flat {
-        legend.push(Key::Arrow("mean velocity of a square".into()));
+        legend.push(Key::Arrow("mean velocity in a square".into()));
     }
     Ok(draw(&Sample::with_depth(history)?, &panels, &legend))
 }

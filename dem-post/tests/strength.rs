@@ -14,7 +14,7 @@ struct Run {
     breaks_at: f64,
     /// Whether a wall is driven; else a grain is pulled.
     driven: bool,
-    /// More of the scene.
+    /// Further fields of the scene.
     scene: Value,
 }
 
@@ -23,7 +23,7 @@ impl Run {
         Self { cohesion, seed, breaks_at, driven: true, scene: json!({}) }
     }
 
-    /// The scene that the history keeps.
+    /// The scene stored in the history.
     fn text(&self) -> String {
         let mut scene = json!({ "seed": self.seed, "thickness": 0.5, "bonds": { "strength": self.cohesion } });
         scene.as_object_mut().unwrap().extend(self.scene.as_object().unwrap().clone());
@@ -137,7 +137,7 @@ fn the_force_at_the_first_break_is_the_strength() {
             assert!(found["samples"][0]["ratio_deviation"].as_f64().unwrap() < 1e-12);
             // one sample shows no scatter
             assert!(found["over_samples"]["slope"]["deviation"].is_null());
-            assert!(found["notes"][0].as_str().unwrap().contains("one sample only"), "{}", found["notes"]);
+            assert!(found["notes"][0].as_str().unwrap().contains("only one sample"), "{}", found["notes"]);
         }
     }
 }
@@ -179,7 +179,7 @@ fn samples_have_lines_and_their_slopes_an_interval() {
     for part in ["bonds.strength (N), 3 values", "3, by seed", "slope over samples", "y = 1 x + 1"] {
         assert!(table.contains(part), "{table} lacks {part}");
     }
-    // each sample lies on its own line: what is short of 1 over all runs is the scatter of samples
+    // each sample lies on its own line: R² of all runs is below 1 only because samples differ
     let line = table.lines().find(|line| line.contains("R²")).unwrap();
     assert!(
         line.contains("over all runs, with the scatter of samples; 1 at least in each sample's own line"),
@@ -213,7 +213,7 @@ fn what_one_value_cannot_tell_is_said() {
     let found = json_of(&strength(folder.path(), &["--json"]), 0);
     assert!(found["line"].is_null() && found["over_samples"]["slope"].is_null());
     assert_eq!(found["values"][0]["strength"]["mean"], 5.5);
-    assert!(found["notes"][0].as_str().unwrap().contains("one value of bonds.strength only"));
+    assert!(found["notes"][0].as_str().unwrap().contains("only one value of bonds.strength"));
     let output = strength(folder.path(), &[]);
     assert!(output.status.success() && !String::from_utf8_lossy(&output.stdout).contains("NaN"));
     assert!(!std::fs::read_to_string(folder.path().join("1-strength/strength.svg")).unwrap().contains("NaN"));

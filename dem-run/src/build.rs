@@ -197,7 +197,7 @@ fn refuse_other_units<D: Dim>(grains: &Grains<D>) -> Result<(), RunError> {
         return Ok(());
     }
     Err(RunError::Sample(vec![format!(
-        "sample: the grains fill the box around them {} times: are their radii in the same unit as their centres?",
+        "sample: the volume of the grains is {} times that of the box around them: are radii and centres in the same unit?",
         number(solid / space)
     )]))
 }
@@ -224,7 +224,7 @@ fn overlapping<D: Dim>(grains: &Grains<D>) -> (Vec<String>, Option<String>) {
             } else {
                 format!(
                     "sample: grains {i} and {j} overlap by {overlap:.3e} m, more than a tenth of the smaller radius; rigid \
-                     grains do not: move one of them, or make it smaller"
+                     grains cannot: move one of them, or make it smaller"
                 )
             });
         } else if overlap > ROUNDED * smaller {
@@ -237,10 +237,14 @@ fn overlapping<D: Dim>(grains: &Grains<D>) -> (Vec<String>, Option<String>) {
     wrong.extend((deep > MOST_TOLD).then(|| format!("sample: {} more pairs of grains overlap", deep - MOST_TOLD)));
     let ([i, j], overlap, share) = deepest;
     let word = (shallow > 0).then(|| {
-        let pairs = if shallow == 1 { "one pair of grains overlaps".into() } else { format!("{shallow} pairs of grains overlap") };
+        let pairs = if shallow == 1 {
+            "one pair of grains overlaps".into()
+        } else {
+            format!("{shallow} pairs of grains overlap")
+        };
         format!(
-            "sample: {pairs}, most of all {i} and {j}, by {overlap:.3e} m ({} % of the smaller radius); rigid grains do not: \
-             such a pair is not pushed apart, its gap counts from there",
+            "sample: {pairs}, most of all {i} and {j}, by {overlap:.3e} m ({} % of the smaller radius); they are \
+             not pushed apart: the gap of such a pair is measured from its initial overlap",
             number(100.0 * share)
         )
     });
@@ -336,7 +340,7 @@ fn unseated<D: Dim>(scene: &Scene, grains: &Grains<D>) -> Vec<String> {
             let (low, high) = grains.bounds();
             let corner = |x: D::Vector| x.as_slice().iter().map(|x| number(*x)).collect::<Vec<_>>().join(", ");
             wrong.push(format!(
-                "walls.{name}: no grain is in the way of the wall that is to be seated; move its centre, or turn its direction: \
+                "walls.{name}: the seated wall meets no grain along its direction; move its centre, or turn its direction: \
                  the sample reaches from ({}) to ({}) m",
                 corner(low),
                 corner(high)

@@ -131,7 +131,7 @@ impl Check {
             warnings,
         };
         if !enough {
-            check.warnings.push("the run needs more memory than is free: take fewer grains, or another machine".into());
+            check.warnings.push("the run needs more memory than is free: use fewer grains, or another machine".into());
         }
         if check.disk_is_too_small() {
             check.warnings.push("the history will not fit on the disk of the current folder".into());

@@ -42,102 +42,107 @@ enum Command {
     /// Run a scene and write its history.
     #[command(after_help = RUN_EXAMPLE)]
     Run(RunArgs),
-    /// Go on with a run that was interrupted or killed, or that is to end later, from its history.
+    /// Resume an interrupted or killed run from its history, or continue a finished one to a later
+    /// end.
     #[command(after_help = RESUME_EXAMPLE)]
     Resume(ResumeArgs),
-    /// Check a scene without running it; tell grains and their sizes, walls, steps, frames, memory
+    /// Check a scene without running it; print grains and their sizes, walls, steps, frames, memory
     /// and disk space.
     #[command(after_help = CHECK_EXAMPLE)]
     Check(CheckArgs),
-    /// Write the contact problem of one step of a history in FCLIB's format, to be solved by other
-    /// programs too.
+    /// Write the contact problem of one step of a history in FCLIB's format, which other programs
+    /// can solve too.
     #[command(after_help = EXPORT_EXAMPLE)]
     Export(ExportArgs),
-    /// Solve a contact problem in FCLIB's format, ours or another program's.
+    /// Solve a contact problem in FCLIB's format, from `dem-run export` or another program.
     #[command(after_help = SOLVE_EXAMPLE)]
     Solve(SolveArgs),
     /// Measure how accurate a scene's results are, and what more accuracy costs.
     #[command(after_help = ACCURACY_EXAMPLE)]
     Accuracy(AccuracyArgs),
-    /// Run a scene with many values: a parameter study.
+    /// Run a scene with many values of its fields: a parameter study.
     #[command(after_help = SWEEP_EXAMPLE)]
     Sweep(SweepArgs),
     /// Print the JSON Schema of scenes, for editors.
     #[command(after_help = SCHEMA_EXAMPLE)]
     Schema {
-        /// That of sweeps instead.
+        /// Print the schema of sweeps instead.
         #[arg(long)]
         sweep: bool,
     },
 }
 
 const RUN_EXAMPLE: &str = "\
-Ctrl-C ends the run after the step in hand, a second one at once; `dem-run resume` goes on with it.
+Ctrl-C ends the run after the current step, a second Ctrl-C immediately; `dem-run resume` continues it.
 
 Example:
   dem-run run configs/compression.json -o weak.h5 --set bonds.strength=5 --set walls.top.force_rate=100";
 
 const RESUME_EXAMPLE: &str = "\
-The run goes on from its last checkpoint (output.checkpoint_every; a run that ended, by Ctrl-C too, has one at its end), to
-the bit as if it had never stopped. What the history holds up to there is copied to a new file beside it, which then takes
-its place: that needs as much disk space again, and readers that have the file open keep the old one.
+The run continues from its last checkpoint (output.checkpoint_every; a run that ended, also by Ctrl-C, has one at its
+end). Its results are bit for bit those of an uninterrupted run. The history up to the checkpoint is copied to a new
+file, which then replaces the old one: this needs as much disk space again. Readers that have the file open keep the old
+one.
 
-A scene that differs from the one in the history is refused with the fields named; --force takes it where a run that has
-begun can change them.
+A scene that differs from the one in the history is rejected with a list of the fields that differ; --force accepts it,
+except for fields that cannot change during a run.
 
 Example:
   dem-run resume compression.h5 --until 0.6";
 
 const CHECK_EXAMPLE: &str = "\
-All values out of range are told at once, each with its place, what stood there and what is allowed; wrong syntax, names and
-types before them, one at a time. A sample file is read as a run reads it, and grains and walls are put in their places; a
-random sample is not packed. What the scene may not mean as it says it is a warning on stderr, in a run too.
+Values out of range are reported all together, each with its place, the value found and the values allowed. Errors of
+syntax, names and types are reported before them, one at a time. The sample file is read, and grains and walls are
+placed, as in a run; a random sample is not packed. Scenes that are valid but probably not as intended give warnings on
+stderr, as in a run.
 
-A scene is a regular file of at most 256 MiB; a sample file has at most 100,000,000 grains, in lines of at most 4096 bytes.
+A scene is a regular file of at most 256 MiB; a sample file has at most 100,000,000 grains, in lines of at most 4096
+bytes.
 
 Example:
   dem-run check configs/compression.json --set time.step=5e-5";
 
 const ACCURACY_EXAMPLE: &str = "\
-Runs the scene over solvers, tolerances and time steps, all from one sample; compares each run with the finest; then
-varies the order of the contacts and the reactions that rigid bonds start from, which should change nothing. Runs of a
-bonded sample end at its collapse. docs/accuracy.md says how to read the tables.
---threads is the number for the runs whose CPU time is not told; the others have one.
-A step that misses its tolerance is taken if its residual is at most the scene's solver.accept, and is counted.
+Runs the scene with several solvers, tolerances and time steps, all from one sample, and compares each run with the
+finest. Then varies the order of the contacts and the starting reactions of rigid bonds; neither should change the
+results. Runs of a bonded sample end at its collapse. docs/accuracy.md explains the tables.
+--threads applies to the runs whose CPU time is not reported; the others use one thread. A step that misses its
+tolerance is accepted if its residual is at most the scene's solver.accept; such steps are counted.
 
 Example:
   dem-run accuracy configs/compression.json --tolerances 1e-3,1e-5 --steps 1 --orders 2";
 
 const SCHEMA_EXAMPLE: &str = "\
-Editors that know JSON Schema complete and explain a scene that names it:
+Editors that support JSON Schema complete and explain a scene that names the schema:
   { \"$schema\": \"../docs/scene.schema.json\", … }
 
 Example:
   dem-run schema > docs/scene.schema.json";
 
 const SWEEP_EXAMPLE: &str = "\
-A sweep file names a scene and what is varied. Fields in one object vary together; objects are combined, each with each:
+A sweep file names a scene and the fields to vary. Fields in one object vary together; objects are combined, each with
+each:
   { \"scene\": \"compression.json\",
     \"vary\": [ { \"bonds.strength\": [5, 10], \"walls.top.force_rate\": [100, 200] },
               { \"seed\": { \"from\": 1, \"count\": 10 } } ] }
-All runs are checked before the first starts. Each is a process of its own with one thread, and a history of its own.
+All runs are checked before the first starts. Each run is a separate process with one thread and writes its own history.
 
-The same command again goes on where it stopped: runs that are done stay, those that were interrupted, killed or could not
-write are run again from their start, those that failed for good (no convergence) with --retry only. Values that are added
-to the sweep file are new runs. Exit codes 3 and 4: some runs failed, the others are done. More: docs/sweep.md.
+Repeating the command continues the sweep: finished runs are kept; runs that were interrupted, killed or could not write
+start again from the beginning; runs that failed for good (no convergence) are repeated only with --retry. Values added
+to the sweep file make new runs. Exit codes 3 and 4: some runs failed, the others are done. More: docs/sweep.md.
 
 Example:
   dem-run sweep configs/sweep-cohesion.json --jobs 4";
 
 const EXPORT_EXAMPLE: &str = "\
-The scene in the history is run again up to the step: a sample file that it names must be in its place. The problem is
-the first that the step solves, with the solution of the scene's solver. What is in it: docs/theory/fclib.md.
+The scene in the history is run again up to the step, so its sample file, if any, must still exist. The problem written
+is the first one of the step, with the solution of the scene's solver. Its contents: docs/theory/fclib.md.
 
 Example:
   dem-run export compression.h5 --step 1800 -o problem.hdf5";
 
 const SOLVE_EXAMPLE: &str = "\
-The solver starts from the first guess in the file, or from zero. Exit code 3 where the tolerance is not reached.
+The solver starts from the initial guess in the file, or from zero. The exit code is 3 if the tolerance is not reached.
 
 Example:
   dem-run solve problem.hdf5 --tolerance 1e-8 -o solved.hdf5";
@@ -147,8 +152,8 @@ Example:
 struct SceneArgs {
     /// Scene: a JSON file with comments.
     scene: PathBuf,
-    /// Put VALUE at PATH in the scene, as in bonds.strength=5; VALUE is JSON or a bare word. May be
-    /// repeated.
+    /// Set the field PATH of the scene to VALUE, as in bonds.strength=5; VALUE is JSON or a bare
+    /// word. May be repeated.
     #[arg(long = "set", value_name = "PATH=VALUE")]
     set: Vec<String>,
 }
@@ -159,7 +164,7 @@ struct ShowArgs {
     /// How progress is shown on stderr.
     #[arg(long, value_enum, default_value_t)]
     progress: ProgressMode,
-    /// Show nothing on stderr but errors.
+    /// Print only errors on stderr.
     #[arg(short, long)]
     quiet: bool,
 }
@@ -167,7 +172,7 @@ struct ShowArgs {
 /// How a command is carried out.
 #[derive(Debug, Args)]
 struct ExecutionArgs {
-    /// Number of threads; the result does not depend on it [default: all].
+    /// Number of threads; results do not depend on it [default: all].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
     #[command(flatten)]
@@ -196,34 +201,33 @@ struct RunArgs {
     /// Print the summary as JSON.
     #[arg(long)]
     json: bool,
-    /// Write the prepared sample, to be read back as a sample file.
+    /// Write the prepared sample; scenes can read it as sample.file.
     #[arg(long, value_name = "FILE.csv")]
     write_sample: Option<PathBuf>,
     /// Run the scene even though it needs more memory than is free.
     #[arg(long)]
     ignore_memory: bool,
-    /// End when the process that started this one ends: a sweep that is killed takes its runs
-    /// along.
+    /// End when the parent process ends, so that killing a sweep also ends its runs.
     #[arg(long, hide = true)]
     end_with_parent: bool,
 }
 
 #[derive(Debug, Args)]
 struct ResumeArgs {
-    /// History to go on with.
+    /// History of the run to resume.
     #[arg(value_name = "FILE.h5")]
     history: PathBuf,
-    /// A later end of the run (s).
+    /// New, later end of the run (s).
     #[arg(long, value_name = "T", value_parser = positive)]
     until: Option<f64>,
-    /// Go on with this scene in place of the one in the history.
+    /// Resume with this scene instead of the one in the history.
     #[arg(long, value_name = "SCENE")]
     scene: Option<PathBuf>,
-    /// Put VALUE at PATH in the scene, as in stop=null; VALUE is JSON or a bare word. May be
-    /// repeated.
+    /// Set the field PATH of the scene to VALUE, as in stop=null; VALUE is JSON or a bare word. May
+    /// be repeated.
     #[arg(long = "set", value_name = "PATH=VALUE")]
     set: Vec<String>,
-    /// Go on even though the scene differs.
+    /// Resume even if the scene differs from the one in the history.
     #[arg(long)]
     force: bool,
     #[command(flatten)]
@@ -238,31 +242,30 @@ struct SweepArgs {
     /// Sweep: a JSON file with comments.
     #[arg(value_name = "SWEEP.json")]
     sweep: PathBuf,
-    /// Folder for the results, created if need be [default: the sweep's name with -sweep, in the
+    /// Folder for the results, created if missing [default: the sweep's name with -sweep, in the
     /// current folder].
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// Runs at a time, one thread each [default: the number of processors].
+    /// Number of runs at a time, one thread each [default: the number of processors].
     #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     jobs: Option<u16>,
-    /// Check every run and tell their number, steps and disk space; write nothing.
+    /// Check every run; print their number, steps and disk space; write nothing.
     #[arg(long, group = "mode")]
     check: bool,
     /// Write the manifest, slurm.sh and Snakefile for other schedulers; run nothing.
     #[arg(long, group = "mode")]
     prepare: bool,
-    /// Tell what ran, failed or is left, and bring manifest.json and runs.csv up to date; run
+    /// Print which runs are done, failed or left, and update manifest.json and runs.csv; run
     /// nothing.
     #[arg(long, group = "mode")]
     status: bool,
-    /// Carry out the run of this number alone, unless it is done: the task of a scheduler.
+    /// Run only the run with this number, unless it is done; for the tasks of a scheduler.
     #[arg(long, group = "mode", value_name = "NUMBER")]
     run: Option<String>,
-    /// Run again what failed for good.
+    /// Also repeat runs that failed for good.
     #[arg(long)]
     retry: bool,
-    /// Run again what was done of other scenes than the sweep gives now, and delete what it no
-    /// longer gives.
+    /// Repeat runs whose scene has changed in the sweep, and delete runs that are no longer in it.
     #[arg(long)]
     force: bool,
     #[command(flatten)]
@@ -276,7 +279,7 @@ struct SweepArgs {
 struct AccuracyArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Folder for the results, created if need be [default: the scene's name with -accuracy, in the
+    /// Folder for the results, created if missing [default: the scene's name with -accuracy, in the
     /// current folder].
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
@@ -286,22 +289,22 @@ struct AccuracyArgs {
     /// Tolerances of the residual.
     #[arg(long, value_delimiter = ',', value_name = "TOL,…", default_value = "1e-4,1e-6", value_parser = positive)]
     tolerances: Vec<f64>,
-    /// Time steps, as factors on that of the scene.
+    /// Time steps, as factors on the scene's time.step.
     #[arg(long, value_delimiter = ',', value_name = "FACTOR,…", default_value = "1,0.5", value_parser = positive)]
     steps: Vec<f64>,
-    /// End of the runs (s), in place of the scene's time.end.
+    /// End of the runs (s), instead of the scene's time.end.
     #[arg(long, value_name = "T", value_parser = positive)]
     until: Option<f64>,
-    /// Contact orders, and as many starting reactions of rigid bonds, that each solver is tried
+    /// Number of contact orders, and of starting reactions of rigid bonds, that each solver is run
     /// with; 0 for none.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u64).range(..=10_000))]
     orders: u64,
-    /// Go on to the scene's end where a run would end at the collapse of the sample.
+    /// Continue each run to the scene's end, beyond the collapse of the sample.
     #[arg(long)]
     whole: bool,
     #[command(flatten)]
     manner: MannerArgs,
-    /// Print all that was measured as JSON, in place of the tables.
+    /// Print all measurements as JSON instead of the tables.
     #[arg(long)]
     json: bool,
 }
@@ -310,7 +313,7 @@ struct AccuracyArgs {
 struct CheckArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Print JSON: the run, or what is wrong with the scene.
+    /// Print JSON: the description of the run, or the problems of the scene.
     #[arg(long)]
     json: bool,
 }
@@ -342,14 +345,15 @@ struct SolveArgs {
     /// Residual to reach.
     #[arg(long, value_name = "T", default_value_t = 1e-8, value_parser = positive)]
     tolerance: f64,
-    /// Iterations after which the solver gives up [default: 100000 sweeps, 300 of the
+    /// Maximum number of iterations [default: 100000 sweeps of Gauss–Seidel, 300 iterations of the
     /// interior-point method].
     #[arg(long, value_name = "N")]
     max_iterations: Option<u64>,
-    /// Steps that the acceleration of Gauss–Seidel remembers, 8 for one; 0 for plain sweeps.
+    /// Memory of Anderson's acceleration of Gauss–Seidel, in iterations; 8 is a good value, 0 means
+    /// plain sweeps.
     #[arg(long, value_name = "N", default_value_t = 0)]
     acceleration: usize,
-    /// Write the problem with its solution, if the tolerance is reached.
+    /// Write the problem with its solution if the tolerance is reached.
     #[arg(short, long, value_name = "SOLVED.hdf5")]
     output: Option<PathBuf>,
     /// Overwrite a file that exists.
@@ -421,8 +425,10 @@ impl SceneArgs {
 
 fn run(args: RunArgs) -> Result<(), RunError> {
     if args.end_with_parent {
-        signals::end_with_parent()
-            .map_err(|error| RunError::System { what: "the parent cannot be watched".into(), source: error.into() })?;
+        signals::end_with_parent().map_err(|error| RunError::System {
+            what: "cannot watch the parent process".into(),
+            source: error.into(),
+        })?;
     }
     let scene = args.scene.load()?;
     let options = RunOptions {

@@ -32,7 +32,7 @@ pub(crate) fn apart(path: &Path, scene: &Scene, options: &RunOptions) -> Result<
         }
     }
     if options.write_sample.as_ref() == Some(&options.output) {
-        let message = "-o and --write-sample name the same file: name two".into();
+        let message = "-o and --write-sample name the same file: give two different names".into();
         return Err(RunError::InputOutput(message));
     }
     Ok(())
@@ -66,11 +66,11 @@ pub(crate) fn writable(path: &Path, option: &str, overwrite: bool) -> Result<(),
     let refused =
         |why: String| Err(RunError::File { path: path.into(), doing: "cannot be written", source: why.into() });
     if !folder.is_dir() {
-        return refused(format!("there is no folder {}; make it first", folder.display()));
+        return refused(format!("there is no folder {}; create it first", folder.display()));
     }
     match tempfile::tempfile_in(folder) {
         Ok(_) => Ok(()),
-        Err(why) => refused(format!("no file can be made in {}: {why}", folder.display())),
+        Err(why) => refused(format!("no file can be created in {}: {why}", folder.display())),
     }
 }
 

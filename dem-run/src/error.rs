@@ -83,8 +83,8 @@ pub enum RunError {
     },
     /// There is less memory than the run needs.
     #[error(
-        "{grains} grains need about {} of memory, and {} are free: take fewer grains, or another machine; \
-         --ignore-memory tries it anyway", size(*.needed), size(*.free))]
+        "{grains} grains need about {} of memory, but {} are free: use fewer grains, or another machine; \
+         --ignore-memory runs the scene anyway", size(*.needed), size(*.free))]
     Memory {
         /// Number of grains.
         grains: usize,
@@ -95,7 +95,7 @@ pub enum RunError {
     },
     /// There is less disk space than a run needs to resume.
     #[error(
-        "{} needs {} beside it to go on, and {} are free: make room first",
+        "resuming {} needs {} of disk space in its folder, but {} are free: free some space first",
         .path.display(), size(*.needed), size(*.free))]
     Disk {
         /// The history.
@@ -108,7 +108,7 @@ pub enum RunError {
     /// The operating system refused an operation other than one on a file.
     #[error("{what}: {source}")]
     System {
-        /// What failed, as in "the parent cannot be watched".
+        /// What failed, as in "cannot watch the parent process".
         what: String,
         /// Why.
         source: Cause,

@@ -87,7 +87,7 @@ fn export_in<D: Dim>(scene: &Scene, options: &ExportOptions, interrupt: &Interru
     let assembled = Assembled::of(&contacts);
     progress.finish();
     if assembled.is_empty() {
-        return Err(RunError::Usage(format!("nothing touches in step {}: name a step with contacts", options.step)));
+        return Err(RunError::Usage(format!("step {} has no contacts: choose a step with contacts", options.step)));
     }
     let solve = world.settings.solver.build::<D>().solve(&mut contacts);
     let solved = solve.status != SolveStatus::Failed;

@@ -14,11 +14,11 @@ pub enum ProgressMode {
     /// A bar on a terminal, else plain lines.
     #[default]
     Auto,
-    /// A bar that is redrawn.
+    /// A bar, redrawn in place.
     Bar,
     /// A line every few seconds.
     Plain,
-    /// A JSON object a line, every second.
+    /// One JSON object per line, every second.
     Json,
     /// Nothing.
     None,
@@ -147,7 +147,7 @@ impl Progress {
             return;
         }
         self.shown = Some(Instant::now());
-        let text = format!("step {step} goes on: {broken} {} broken in it so far", bonds(broken));
+        let text = format!("step {step} continues: {broken} {} broken in it so far", bonds(broken));
         match &mut self.sink {
             Sink::Bar(bar) => bar.set_message(text),
             Sink::Plain(out) => line(out, &format!("       {text}")),
@@ -367,7 +367,7 @@ mod tests {
         progress.step(&at(2));
         assert!(out.lines()[3].ends_with(" s left"), "{:?}", out.lines());
         progress.cascade(3, 187);
-        assert_eq!(out.lines()[4], "       step 3 goes on: 187 bonds broken in it so far");
+        assert_eq!(out.lines()[4], "       step 3 continues: 187 bonds broken in it so far");
     }
 
     #[test]

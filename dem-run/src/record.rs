@@ -4,8 +4,8 @@
 use crate::build::Built;
 use crate::clock::cpu_time;
 use crate::history::{
-    self, Background, Batch, BondStatus, Checkpoint, ContactRows, ContactStatus, Frame, GrainState, History, Kept,
-    Layout, Observable, Parameters, Rupture, RuptureMode, SolverRoute, WallDrive, WallKind, WallState, Writer,
+    self, Background, Batch, BondStatus, Checkpoint, ContactRows, ContactStatus, Frame, GrainState, History, Layout,
+    Observable, Parameters, RowCounts, Rupture, RuptureMode, SolverRoute, WallDrive, WallKind, WallState, Writer,
 };
 use crate::scene::{Precision, Scene};
 use dem_core::body::{Drive, Shape, Wall};
@@ -47,7 +47,7 @@ impl<D: Dim> Recorder<D> {
     /// copied share of the history (0 to 1).
     pub fn go_on(
         history: &History,
-        kept: Kept,
+        kept: RowCounts,
         checkpoint: &Checkpoint,
         scene: &Scene,
         world: &World<D>,

@@ -3,11 +3,11 @@
 
 use crate::check::free_space;
 use crate::error::RunError;
-use crate::history::{Checkpoint, History, HistoryError, Kept, refuse_busy};
+use crate::history::{Checkpoint, History, HistoryError, RowCounts, refuse_busy};
 use crate::in_dimension;
 use crate::output::{number, print_json, print_line};
 use crate::record::Recorder;
-use crate::run::{Execution, Run, RunOptions, State, handle_signals, run_in};
+use crate::run::{Execution, Run, RunOptions, RunState, handle_signals, run_in};
 use crate::scene::{self, Scene, differences};
 use crate::signals::Interrupt;
 use dem_core::dim::Dim;
@@ -80,13 +80,14 @@ fn scene_of(history: &History, options: &ResumeOptions) -> Result<Scene, RunErro
     if !refused.is_empty() {
         let lines = refused.concat();
         return Err(RunError::Usage(format!(
-            "{shown} is of another scene, and a run that has begun cannot change:{lines}\nrun the scene anew, to another file"
+            "the scene in {shown} differs in fields that cannot change during a run:{lines}\nrun the scene anew, \
+             with another history"
         )));
     }
     if !forced.is_empty() && !options.force {
         let lines = forced.concat();
         return Err(RunError::Usage(format!(
-            "{shown} is of another scene:{lines}\n--force goes on with the scene as it is now"
+            "the scene in {shown} differs:{lines}\n--force resumes the run with the new scene"
         )));
     }
     Ok(scene)
@@ -112,11 +113,11 @@ fn resume_in<D: Dim>(
         }
         return Err(RunError::Unfit {
             path: path.clone(),
-            state: "holds no whole state to go on from",
+            state: "holds no complete state to resume from",
             remedy: "it is damaged, or of an older version; run the scene again".into(),
         });
     };
-    let mut state = State::<D>::restored(scene, &checkpoint)
+    let mut state = RunState::<D>::restored(scene, &checkpoint)
         .map_err(|mismatch| RunError::InputOutput(format!("{shown}: {mismatch}; run the scene again")))?;
     if state.world.steps >= scene.time.steps() || state.course.ending(&state.world).is_some() {
         let time = state.world.time;
@@ -124,7 +125,7 @@ fn resume_in<D: Dim>(
             return Ok(print_json(&serde_json::json!({ "history": path, "time": time, "steps_made": 0 }))?);
         }
         return Ok(print_line(&format!(
-            "nothing to do: the run ended at t = {} s; --until T goes on to a later end, --set stop=null beyond a stop",
+            "nothing to do: the run ended at t = {} s; --until T resumes it to a later end, --set stop=null beyond a stop",
             number(time)
         ))?);
     }
@@ -139,7 +140,7 @@ fn resume_in<D: Dim>(
     };
     let recorder = Recorder::go_on(history, kept, &checkpoint, scene, &state.world, cpu_before, &mut tell);
     let recorder = recorder.map_err(|error| match error {
-        HistoryError::Interrupted => RunError::Interrupted("the history is as it was"),
+        HistoryError::Interrupted => RunError::Interrupted("the history is unchanged"),
         error => error.into(),
     })?;
     // idle walls are not reported: the earlier forces on the walls are unknown
@@ -163,12 +164,12 @@ fn anew(options: &ResumeOptions) -> RunOptions {
 /// The rows of a history that are kept when the run resumes from `checkpoint`: the frames that were
 /// due by then. If the run ended between two due frames, its last frame is dropped, because an
 /// uninterrupted run would not have it; the steps before it are kept.
-fn kept(history: &History, scene: &Scene, checkpoint: &Checkpoint) -> Result<Kept, RunError> {
+fn kept(history: &History, scene: &Scene, checkpoint: &Checkpoint) -> Result<RowCounts, RunError> {
     let every = scene.steps_per_frame() as i64;
     let reached = history.steps().iter().take_while(|step| **step <= checkpoint.step).count();
     let due = history.steps()[..reached].iter().take_while(|step| **step % every == 0).count();
     let (all, frames) = (history.complete_at(reached)?, history.complete_at(due)?);
-    Ok(Kept { frames: due, contacts: frames.contacts, ..all })
+    Ok(RowCounts { frames: due, contacts: frames.contacts, ..all })
 }
 
 /// Rejects a disk without space for the new history: it is written beside the old one before it

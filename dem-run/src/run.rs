@@ -63,10 +63,7 @@ impl Execution {
     pub(crate) fn start_threads(&self) -> Result<(), RunError> {
         let Some(threads) = self.threads else { return Ok(()) };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
-        pool.map_err(|error| RunError::System {
-            what: format!("{threads} threads cannot be started"),
-            source: error.into(),
-        })
+        pool.map_err(|error| RunError::System { what: format!("cannot start {threads} threads"), source: error.into() })
     }
 }
 
@@ -82,7 +79,7 @@ pub fn run(scene: &Scene, options: &RunOptions) -> Result<(), RunError> {
 
 /// Installs the handlers of Ctrl-C and SIGTERM.
 pub(crate) fn handle_signals() -> Result<Interrupt, RunError> {
-    signals::install().map_err(|error| RunError::System { what: "no handler for Ctrl-C".into(), source: error.into() })
+    signals::install().map_err(|error| RunError::System { what: "cannot handle Ctrl-C".into(), source: error.into() })
 }
 
 pub(crate) fn run_in<D: Dim>(scene: &Scene, options: &RunOptions, interrupt: &Interrupt) -> Result<(), RunError> {
@@ -107,22 +104,22 @@ pub(crate) fn run_in<D: Dim>(scene: &Scene, options: &RunOptions, interrupt: &In
     let recorder = Recorder::create(&options.output, options.overwrite, scene, &built)?;
     let course = Course::new(scene, &built.world);
     let idle = may_be_idle(scene, &built.world);
-    let state = State { world: built.world, course };
+    let state = RunState { world: built.world, course };
     let mut run = Run { scene, state, recorder, solid_fraction: built.solid_fraction, idle };
     let outcome = run.begin().and_then(|()| run.step_on(interrupt, &mut progress));
     run.conclude(&options.output, outcome, options.json, progress)
 }
 
 /// The variables of a run that change with each step.
-pub(crate) struct State<D: Dim> {
+pub(crate) struct RunState<D: Dim> {
     pub world: World<D>,
     pub course: Course<D>,
 }
 
-/// Version number of the data that [`State::save`] writes.
+/// Version number of the data that [`RunState::save`] writes.
 const FORM: usize = 9;
 
-impl<D: Dim> State<D> {
+impl<D: Dim> RunState<D> {
     /// The state as numbers, without the processor time: two runs of a scene write identical files.
     fn save(&self) -> Checkpoint {
         let mut to = Saved::default();
@@ -132,7 +129,7 @@ impl<D: Dim> State<D> {
         Checkpoint { step: self.world.steps as i64, reals: to.reals, counts: to.counts }
     }
 
-    /// The state that [`State::save`] wrote.
+    /// The state that [`RunState::save`] wrote.
     pub fn restored(scene: &Scene, checkpoint: &Checkpoint) -> Result<Self, Mismatch> {
         let mut from = Reader::new(&checkpoint.reals, &checkpoint.counts);
         if from.count()? != FORM {
@@ -148,7 +145,7 @@ impl<D: Dim> State<D> {
 /// A run between its first and its last step.
 pub(crate) struct Run<'a, D: Dim> {
     pub scene: &'a Scene,
-    pub state: State<D>,
+    pub state: RunState<D>,
     pub recorder: Recorder<D>,
     /// Solid fraction that the sample was packed to (–).
     pub solid_fraction: Option<f64>,
@@ -180,7 +177,7 @@ impl<D: Dim> Run<'_, D> {
                 Ok(report) => report,
                 Err(error) => return self.failed(error),
             };
-            let State { world, course, .. } = &mut self.state;
+            let RunState { world, course, .. } = &mut self.state;
             self.recorder.step(world, &report)?;
             course.count(world, &report);
             self.idle.retain(|wall| world.walls[*wall].reaction.norm() == 0.0);
@@ -189,7 +186,7 @@ impl<D: Dim> Run<'_, D> {
             if frame {
                 self.record(true, checkpoint)?;
             }
-            let State { world, course, .. } = &mut self.state;
+            let RunState { world, course, .. } = &mut self.state;
             if let Some(ending) = course.ending(world) {
                 return Ok(ending);
             }
@@ -236,7 +233,7 @@ impl<D: Dim> Run<'_, D> {
             return match places.is_empty() {
                 true => "; leave room between the bodies".into(),
                 false => {
-                    format!("; let a force drive {walls} in place of velocity, end that motion earlier, or leave room")
+                    format!("; let a force drive {walls} instead of a velocity, end that motion earlier, or leave room")
                 }
             };
         }
@@ -287,13 +284,13 @@ impl<D: Dim> Run<'_, D> {
         let idle = self.idle.iter().filter(|_| self.state.world.steps > 0);
         for wall in idle.filter_map(|wall| self.scene.walls.keys().nth(*wall)) {
             progress.note(&format!(
-                "warning: walls.{wall}: no force ever acted on this driven wall: it touched no grain, or slid along grains that \
-                 nothing pressed on it; look at its place and its direction"
+                "warning: walls.{wall}: no force ever acted on this driven wall: it touched no grain, or slid along grains \
+                 without pressure; check its position and its direction"
             ));
         }
         let (ending, end) = match outcome {
             Ok(Ending::Interrupted) => {
-                let way = "the history is complete up to there; `dem-run resume` goes on with it";
+                let way = "the history is complete up to there; `dem-run resume` continues the run";
                 (Ending::Interrupted, Err(RunError::Interrupted(way)))
             }
             Ok(ending) => (ending, Ok(())),
@@ -312,7 +309,7 @@ impl<D: Dim> Run<'_, D> {
     }
 }
 
-impl<D: Dim> State<D> {
+impl<D: Dim> RunState<D> {
     fn summary(
         &self,
         scene: &Scene,
@@ -335,7 +332,7 @@ impl<D: Dim> State<D> {
             history: history.to_path_buf(),
             ending,
             steps: world.steps,
-            carries: scene.output.reactions && world.touches().any(|t| t.reaction.n != 0.0),
+            has_reactions: scene.output.reactions && world.touches().any(|t| t.reaction.n != 0.0),
             time: world.time,
             grains: world.grains.len(),
             solid_fraction,

@@ -126,7 +126,7 @@ impl Lines {
             if self.line.len() > LONGEST_LINE {
                 let (name, number) = (self.path.display(), self.number);
                 return Err(RunError::Sample(vec![format!(
-                    "{name}, line {number}: it has more than {LONGEST_LINE} bytes: write one grain a line"
+                    "{name}, line {number}: it has more than {LONGEST_LINE} bytes: write one grain per line"
                 )]));
             }
             if self.number == 1 && self.line.starts_with("\u{feff}".as_bytes()) {

@@ -38,7 +38,7 @@ pub fn install() -> Result<Interrupt, ctrlc::Error> {
         }
         // if stderr is closed, eprintln! would panic and end this thread, so that a second signal
         // has no effect
-        let _ = writeln!(std::io::stderr(), "\nending after the step in hand; once more to end at once");
+        let _ = writeln!(std::io::stderr(), "\nending after the current step; press Ctrl-C again to end immediately");
     })?;
     Ok(interrupt)
 }

@@ -171,13 +171,13 @@ impl Solved {
         let residual = self.residual;
         if residual <= self.tolerance {
             return format!(
-                "{verdict}: the residual is {residual:.2e} only because the reactions are as large as they are, the contacts still move at \
-                 {:.2e} of the free velocities against their laws",
+                "{verdict}: the residual is {residual:.2e} only because the reactions are very large; the contacts still \
+                 violate their laws by {:.2e} of the free velocities",
                 self.velocity_error
             );
         }
         format!(
-            "{verdict}: residual {residual:.2e} after {}, and {:.0e} was asked for{remedy}",
+            "{verdict}: residual {residual:.2e} after {}, but the tolerance is {:.0e}{remedy}",
             self.took(),
             self.tolerance
         )

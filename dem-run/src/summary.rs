@@ -36,7 +36,7 @@ pub struct Summary {
     /// Whether the last state has normal contact forces and the history records them, so that force
     /// chains can be drawn.
     #[serde(skip)]
-    pub carries: bool,
+    pub has_reactions: bool,
     /// Simulated time (s).
     pub time: f64,
     /// Grains.
@@ -158,9 +158,9 @@ impl WallLoads {
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let ending = match self.ending {
-            Ending::Time => "the end of its time",
-            Ending::WallTravel => "the wall has moved as far as the scene lets it",
-            Ending::BrokenFraction => "as many bonds broken as the scene lets break",
+            Ending::Time => "time.end was reached",
+            Ending::WallTravel => "stop.wall_travel was reached",
+            Ending::BrokenFraction => "stop.broken_fraction was reached",
             Ending::Interrupted => "interrupted",
             Ending::NoConvergence => "a step was not solved",
         };
@@ -173,7 +173,7 @@ impl fmt::Display for Summary {
             _ if self.bonds > 0 => self.write_bonds(f)?,
             Some(gap) => writeln!(
                 f,
-                "bonds            none, though the scene asks for them: no two grains are within bonds.gap_tolerance, {gap} mean \
+                "bonds            none, although the scene has bonds: no two grains are within bonds.gap_tolerance, {gap} mean \
                  diameters"
             )?,
             None => {}
@@ -187,7 +187,8 @@ impl fmt::Display for Summary {
         let file = in_shell(&self.history);
         write!(f, "  dem-post info {file}")?;
         let driven = !self.driven_walls.is_empty();
-        let more = [("report", true), ("cracks", self.bonds > 0), ("chains", self.carries), ("stress-strain", driven)];
+        let more =
+            [("report", true), ("cracks", self.bonds > 0), ("chains", self.has_reactions), ("stress-strain", driven)];
         for (command, _) in more.into_iter().filter(|(_, there)| *there && self.steps > 0) {
             let choose = driven && self.load_wall.is_none() && matches!(command, "report" | "stress-strain");
             write!(f, "\n  dem-post {command} {file}{}", if choose { " --wall NAME" } else { "" })?;
@@ -230,7 +231,7 @@ impl Summary {
             self.penetration / self.mean_diameter
         )?;
         if self.bonds > 0 {
-            writeln!(f, "bond elongation  {:.2e} m at most, of bonds that held", self.bond_elongation)?;
+            writeln!(f, "bond elongation  {:.2e} m at most, of intact bonds", self.bond_elongation)?;
         }
         writeln!(f, "external work    {:.4e} J", self.external_work)?;
         writeln!(f, "energy remainder {:.2e} J", self.energy_remainder)?;
@@ -302,7 +303,7 @@ impl Summary {
         match (early, self.one_piece) {
             (false, _) => "",
             // one rigid piece: no motion is possible before the first break
-            (true, true) => ", before any bond broke: the solver's own strain, not the sample's",
+            (true, true) => ", before any bond broke: solver error, not strain of the sample",
             (true, false) => ", before any bond broke: not all grains are bonded to one piece",
         }
     }
@@ -314,7 +315,7 @@ impl Summary {
         if lines.is_empty() && self.bonds > 0 {
             return match self.broken {
                 [0, 0, 0, 0] => self.write_failure(f, &WallLoads::of("", false, false, &Collapse::default())),
-                _ => writeln!(f, "                 no wall is driven: there is no applied force to tell"),
+                _ => writeln!(f, "                 no wall is driven: there is no applied force to report"),
             };
         }
         if lines.iter().all(|(_, line)| line.is_empty()) {

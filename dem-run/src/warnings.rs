@@ -20,7 +20,7 @@ pub(crate) fn of_scene(scene: &Scene) -> Vec<String> {
     if !time.is_multiple() {
         let (last, next) = (time.last(), (time.steps() + 1) as f64 * time.step);
         told.push(format!(
-            "time.end: {} s is not a multiple of time.step, {} s: the last step ends at {} s; {} or {} would be",
+            "time.end: {} s is not a multiple of time.step, {} s: the last step ends at {} s; {} s and {} s are multiples",
             time.end,
             time.step,
             number(last),
@@ -35,8 +35,8 @@ pub(crate) fn of_scene(scene: &Scene) -> Vec<String> {
             let grain = list.get(k).filter(|grain| moves(&grain.velocity) || moves(&grain.spin))?;
             let name = if moves(&grain.velocity) { "velocity" } else { "spin" };
             Some(format!(
-                "sample.grains.{k}.{name}: it is ignored, as grains.fixed holds grain {k}: take the grain from grains.fixed, or \
-                 its {name} away"
+                "sample.grains.{k}.{name}: it has no effect because grain {k} is in grains.fixed: remove the grain from \
+                 grains.fixed, or its {name}"
             ))
         });
         told.extend(first_few(lines.collect(), "fixed grains have a velocity or a spin"));
@@ -44,7 +44,9 @@ pub(crate) fn of_scene(scene: &Scene) -> Vec<String> {
     let loads = held.loads.iter().enumerate().filter(|(_, load)| held.fixed.contains(&load.grain));
     let lines = loads.map(|(k, load)| {
         let grain = load.grain;
-        format!("grains.loads.{k}: it moves nothing, as grains.fixed holds grain {grain}: take it from one of them")
+        format!(
+            "grains.loads.{k}: it has no effect because grain {grain} is in grains.fixed: remove it from one of them"
+        )
     });
     told.extend(first_few(lines.collect(), "loads are on fixed grains"));
     told
@@ -54,8 +56,8 @@ pub(crate) fn of_scene(scene: &Scene) -> Vec<String> {
 /// in mean radii.
 pub(crate) fn of_packing(moved: f64) -> String {
     format!(
-        "sample.random: the packing still moved by {moved:.1e} of the mean radius a step after {MOST_STEPS} steps: grains may lie apart \
-         where they should touch; try another seed or a wider container, or see it with `dem-post view`"
+        "sample.random: the packing still moved by {moved:.1e} mean radii per step after {MOST_STEPS} steps: some grains may not touch \
+         their neighbours; try another seed or a wider container, or look at it with `dem-post view`"
     )
 }
 
@@ -70,17 +72,17 @@ fn first_few(mut lines: Vec<String>, what: &str) -> Vec<String> {
 /// Warnings about driven walls; `grains` if the sample is prepared.
 pub(crate) fn of_walls<D: Dim>(scene: &Scene, walls: &[Wall<D>], grains: Option<&Grains<D>>) -> Vec<String> {
     let pushes: Vec<bool> =
-        walls.iter().map(|wall| Course::of(wall, scene.time.end).is_some_and(|c| !c.along)).collect();
+        walls.iter().map(|wall| DriveMotion::of(wall, scene.time.end).is_some_and(|c| !c.along_surface)).collect();
     let mut told = vec![];
     for (k, (name, wall)) in scene.walls.keys().zip(walls).enumerate() {
-        let Some(course) = Course::of(wall, scene.time.end) else { continue };
+        let Some(motion) = DriveMotion::of(wall, scene.time.end) else { continue };
         let alone = !others_push(scene) && !pushes.iter().enumerate().any(|(other, push)| *push && other != k);
         let word = match grains {
-            _ if course.along => along(wall.friction, alone),
+            _ if motion.along_surface => along(wall.friction, alone),
             Some(grains) => {
-                pulled(wall, &course, grains).or_else(|| alone.then(|| apart(wall, &course, grains)).flatten())
+                pulled(wall, &motion, grains).or_else(|| alone.then(|| apart(wall, &motion, grains)).flatten())
             }
-            None => pulled(wall, &course, &Grains::from_iter([])),
+            None => pulled(wall, &motion, &Grains::from_iter([])),
         };
         told.extend(word.map(|word| format!("walls.{name}: {word}")));
     }
@@ -99,26 +101,26 @@ fn others_push(scene: &Scene) -> bool {
 
 /// Whether a wall is driven away from the grains at all times.
 pub(crate) fn leaves<D: Dim>(wall: &Wall<D>, end: f64, grains: &Grains<D>) -> bool {
-    let (Some(course), Some(towards)) = (Course::of(wall, end), towards(wall, grains)) else { return false };
-    let sign = course.direction.dot(&towards);
-    !course.along && course.range.0 * sign <= 0.0 && course.range.1 * sign <= 0.0
+    let (Some(motion), Some(towards)) = (DriveMotion::of(wall, end), towards(wall, grains)) else { return false };
+    let sign = motion.direction.dot(&towards);
+    !motion.along_surface && motion.range.0 * sign <= 0.0 && motion.range.1 * sign <= 0.0
 }
 
 /// The motion of a wall under its drive alone.
-struct Course<D: Dim> {
+struct DriveMotion<D: Dim> {
     /// Unit direction.
     direction: D::Vector,
     /// Whether the direction is parallel to the surface.
-    along: bool,
+    along_surface: bool,
     /// Whether a force drives the wall.
-    force: bool,
+    by_force: bool,
     /// Least and largest value of the drive (N or m/s).
     range: (f64, f64),
     /// Least and largest displacement along the direction until the end of the run (m).
     travel: (f64, f64),
 }
 
-impl<D: Dim> Course<D> {
+impl<D: Dim> DriveMotion<D> {
     /// None if the wall never moves.
     fn of(wall: &Wall<D>, end: f64) -> Option<Self> {
         let (direction, mass, drive) = match &wall.drive {
@@ -135,8 +137,8 @@ impl<D: Dim> Course<D> {
             travel = widened(travel, place);
             place += speed * step;
         }
-        let along = wall.shape.moves_across(direction) < PARALLEL;
-        (range != (0.0, 0.0)).then_some(Self { direction, along, force: mass.is_some(), range, travel })
+        let along_surface = wall.shape.moves_across(direction) < PARALLEL;
+        (range != (0.0, 0.0)).then_some(Self { direction, along_surface, by_force: mass.is_some(), range, travel })
     }
 }
 
@@ -149,13 +151,13 @@ fn along(friction: f64, alone: bool) -> Option<String> {
     let way = "it is driven along its own surface";
     if friction == 0.0 {
         return Some(format!(
-            "{way}, without friction, so it carries nothing: give it friction, or a direction that is not across its normal"
+            "{way}, without friction, so it carries no load: give it friction, or a direction not perpendicular to its normal"
         ));
     }
     alone.then(|| {
         format!(
-            "{way} and presses on nothing; friction carries a load only where something presses grains on it, and nothing in \
-             this scene does: drive another wall along its normal, or give gravity or a load"
+            "{way}, and nothing in this scene presses grains on it, so its friction carries no load: drive another wall \
+             along its normal, or add gravity or a load"
         )
     })
 }
@@ -173,36 +175,36 @@ fn nearest<D: Dim>(wall: &Wall<D>, grains: &Grains<D>) -> Option<(f64, D::Vector
 
 /// Warning about a wall whose force always pulls it away from the grains: a confinement with the
 /// wrong sign.
-fn pulled<D: Dim>(wall: &Wall<D>, course: &Course<D>, grains: &Grains<D>) -> Option<String> {
-    let sign = course.direction.dot(&towards(wall, grains)?);
-    let (low, high) = course.range;
-    let away = course.force && (if sign > 0.0 { high <= 0.0 } else { low >= 0.0 }) && sign != 0.0;
+fn pulled<D: Dim>(wall: &Wall<D>, motion: &DriveMotion<D>, grains: &Grains<D>) -> Option<String> {
+    let sign = motion.direction.dot(&towards(wall, grains)?);
+    let (low, high) = motion.range;
+    let away = motion.by_force && (if sign > 0.0 { high <= 0.0 } else { low >= 0.0 }) && sign != 0.0;
     let most = if sign > 0.0 { low } else { high };
     away.then(|| {
         format!(
-            "its force, {} N, pulls it away from the grains at all times, so it carries nothing: give the force the other sign \
-             to press on them, or turn its direction",
+            "its force, {} N, pulls it away from the grains at all times, so it carries no load: change the sign of the force, \
+             or reverse the direction",
             number(most)
         )
     })
 }
 
 /// Warning about a wall that touches no grain and whose drive does not move it to one.
-fn apart<D: Dim>(wall: &Wall<D>, course: &Course<D>, grains: &Grains<D>) -> Option<String> {
+fn apart<D: Dim>(wall: &Wall<D>, motion: &DriveMotion<D>, grains: &Grains<D>) -> Option<String> {
     let (gap, _) = nearest(wall, grains)?;
     let mean = grains.radius.iter().sum::<f64>() / grains.len() as f64;
     let near = match wall.shape.flat_normal() {
         Some(normal) => {
-            let sign = course.direction.dot(&normal);
-            (course.travel.0 * sign).max(course.travel.1 * sign)
+            let sign = motion.direction.dot(&normal);
+            (motion.travel.0 * sign).max(motion.travel.1 * sign)
         }
         // upper bound for either direction
-        None => course.travel.1.max(-course.travel.0),
+        None => motion.travel.1.max(-motion.travel.0),
     };
     (gap > TOUCHING * mean && near < gap).then(|| {
         format!(
             "it touches nothing at the start: its nearest grain is {} m away, and its drive brings it at most {} m nearer by \
-             time.end, so it carries nothing: seat it (\"place\": \"seated\"), or turn its direction",
+             time.end, so it carries no load: seat it (\"place\": \"seated\"), or turn its direction",
             number(gap),
             number(near.max(0.0))
         )
@@ -245,7 +247,7 @@ mod tests {
                 &["along its own surface", "nothing in this scene"][..],
             ),
             (seated, r#""friction": 0, "direction": [1, 0], "velocity": { "constant": 1 }"#, &["without friction"]),
-            (seated, pulled, &["-22 N, pulls it away", "the other sign"]),
+            (seated, pulled, &["-22 N, pulls it away", "change the sign"]),
             (seated, r#""mass": "sample", "direction": [0, 1], "force_rate": 3"#, &["3 N, pulls it away"]),
             (high, r#""velocity": { "constant": 0.5 }"#, &["touches nothing", "is 1 m away", "at most 0.5 m nearer"]),
             (high, r#""velocity": { "constant": -2 }"#, &["touches nothing", "at most 0 m nearer"]),
@@ -279,16 +281,16 @@ mod tests {
         for (sets, parts) in [
             (
                 &["grains.fixed=[1]", "sample.grains.1.velocity=[0, 2]"][..],
-                &["sample.grains.1.velocity: it is ignored, as grains.fixed holds grain 1"][..],
+                &["sample.grains.1.velocity: it has no effect because grain 1 is in grains.fixed"][..],
             ),
-            (&["grains.fixed=[0]", "sample.grains.0.spin=[2]"], &["sample.grains.0.spin: it is ignored"]),
+            (&["grains.fixed=[0]", "sample.grains.0.spin=[2]"], &["sample.grains.0.spin: it has no effect"]),
             (
                 &["grains.fixed=[1]", r#"grains.loads=[{"grain": 1, "force": [1, 0]}]"#],
-                &["grains.loads.0: it moves nothing, as grains.fixed holds grain 1"],
+                &["grains.loads.0: it has no effect because grain 1 is in grains.fixed"],
             ),
             (
                 &["time.end=1.05"],
-                &["time.end: 1.05 s is not a multiple of time.step, 0.1 s", "ends at 1 s; 1 or 1.1 would be"],
+                &["time.end: 1.05 s is not a multiple of time.step, 0.1 s", "ends at 1 s; 1 s and 1.1 s are multiples"],
             ),
         ] {
             let told = told(&lid, sets);

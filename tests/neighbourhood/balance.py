@@ -1,4 +1,5 @@
-"""Observables recomputed from frames: energy, momentum, stress, strain, forces on walls, penetration."""
+"""Observables recomputed from frames: energy, momentum, stress, strain, forces on walls,
+penetration."""
 
 import numpy as np
 
@@ -28,7 +29,8 @@ def of_step(what):
 
 
 def kinetic(h):
-    """Kinetic energy (J) of grains that are not fixed and of walls that a force drives, at every frame."""
+    """Kinetic energy (J) of grains that are not fixed and of walls that a force drives, at every
+    frame."""
     free = ~h.fixed
     grains = 0.5 * (h.mass * (h.v**2).sum(2) + h.inertia * (h.w**2).sum(2))[:, free].sum(1)
     mass = np.where(np.isfinite(h.wall_mass), h.wall_mass, 0.0)
@@ -47,8 +49,8 @@ def check_kinetic(h, report):
 
 
 def works(h, c, p):
-    """Work of each step (J) [S] and the size of its summands: external, and what rows took from the
-    bodies."""
+    """External work, and work of the contact rows on the bodies, of each step (J) [S], with the
+    sizes of their summands."""
     mean = tuple(0.5 * (a + b) for a, b in zip(c.before, c.after))
     un, ut, turn, spin = mean
     rn, rt = h.rn * un, (h.rt * ut).sum(1)
@@ -59,7 +61,7 @@ def works(h, c, p):
         "friction": np.where(dry, rt, 0.0),
         "bonds": np.where(bonds, rn + rt + moment, 0.0),
     }
-    # rounding of velocities shows in a work as if it were done with them
+    # the round-off of a velocity enters the work like a velocity
     reach = c.speed + norm(h.body_v[h.row_step, h.i]) + norm(h.body_v[h.row_step, h.j])
     size = (norm(h.force) + norm(h.torque) / h.radius[h.i]) * reach if h.M else np.zeros(0)
     total = {name: -h.h * np.bincount(h.row_step, part, minlength=h.S) for name, part in parts.items()}
@@ -81,7 +83,8 @@ def works(h, c, p):
 
 
 def check_works(h, c, p, report):
-    """The increments of the books in every step, from forces and velocities of its two frames."""
+    """The increments of the energy balance in every step, from forces and velocities of its two
+    frames."""
     total, sizes = works(h, c, p)
     columns = {"external_work": "external", "dissipation_impact": "impact", "dissipation_friction": "friction"}
     elastic = "elastic_energy" in h.observed
@@ -98,7 +101,7 @@ def check_works(h, c, p, report):
 
 
 def check_elastic(h, losses, sizes, report):
-    """Energy stored in intact bonds, set free by those that broke, and the damping that is left."""
+    """Elastic energy of intact bonds, energy released by broken ones, and the remaining damping."""
     rows = np.flatnonzero(h.bond >= 0)
     rows = rows[h.bond_status[h.row_step[rows] + 1, h.bond[rows]] == "INTACT"]
     stored = np.bincount(h.row_step[rows], energy_of_rows(h, rows), minlength=h.S)
@@ -123,8 +126,8 @@ def check_elastic(h, losses, sizes, report):
 
 
 def check_books(h, report, sizes):
-    """work = change of kinetic energy + all that was lost or stored + remainder, and the remainder is
-    rounding.
+    """work = change of kinetic energy + dissipated and stored energy + remainder, and the remainder
+    is round-off.
 
     `sizes` are the sums of the absolute values of what the works of each step are summed from (J)."""
     o, zero = h.observed, np.zeros(h.S)
@@ -146,8 +149,8 @@ def check_books(h, report, sizes):
 
 
 def kicks(h):
-    """Σ (h Σ|f|)²/m over bodies (J) [S]: energies that their velocities, differences of impulses, are
-    rounded against."""
+    """Σ (h Σ|f|)²/m over bodies (J) [S]: scale of the round-off of kinetic energies, since
+    velocities are differences of impulses."""
     bodies = h.N + h.W
     size = norm(h.force)
     total = sum(np.bincount(h.row_step * bodies + k, size, minlength=h.S * bodies) for k in (h.i, h.j)).reshape(
@@ -178,7 +181,8 @@ def check_momentum(h, report):
 
 
 def wall_forces(h):
-    """Forces of the grains on the walls (N) [S,W,D] by contacts, and the sums of their sizes [S,W]."""
+    """Forces of the grains on the walls (N) [S,W,D] by contacts, and the sums of their sizes
+    [S,W]."""
     rows = np.flatnonzero(h.on_wall)
     index = h.row_step[rows] * h.W + h.j[rows] - h.N
     force = -sums(index, h.force[rows], h.S * h.W).reshape(h.S, h.W, h.D)
@@ -211,8 +215,8 @@ def reference_volume(h):
 
 
 def check_stress(h, c, report):
-    """Love and Weber: Σ ℓ ⊗ f over contacts; ℓ joins the centres, at a wall the contact point to the
-    centre."""
+    """Love and Weber: Σ ℓ ⊗ f over contacts; ℓ joins the centres, at a wall the contact point to
+    the centre."""
     single = h.row_single
     branch = c.n * (c.lever_i + c.lever_j)[:, None]
     tensor = branch[:, :, None] * h.force[:, None, :]
@@ -224,8 +228,8 @@ def check_stress(h, c, report):
 
 
 def check_virial(h, c, report):
-    """V σ = Σ x_g ⊗ (m a − F) − Σ p ⊗ f over wall contacts: the stress against forces at the walls and
-    accelerations."""
+    """V σ = Σ x_g ⊗ (m a − F) − Σ p ⊗ f over wall contacts: the stress against forces at the walls
+    and accelerations."""
     outer, _ = h.external()
     moved = h.mass[:, None] * (h.v[1:] - h.v[:-1]) / h.h - outer
     held = np.zeros((h.S, h.N, h.D))
@@ -251,8 +255,8 @@ def check_virial(h, c, report):
 
 
 def fitted_strain(h):
-    """Displacement gradients [S,D,D] of the affine motion that fits that of all grains since time zero
-    best."""
+    """Displacement gradients [S,D,D] of the affine motion that fits that of all grains since time
+    zero best."""
     x = h.x[0] - h.x[0].mean(0)
     moved = h.x[1:] - h.x[0]
     moved = moved - moved.mean(1, keepdims=True)
@@ -283,7 +287,8 @@ def check_penetration(h, c, report):
 
 
 def check_false_acceleration(h, report):
-    """The false acceleration is the inertial force of the grains over the norm of all that loads the sample."""
+    """The false acceleration is the inertial force of the grains over the norm of all loads on the
+    sample."""
     if "false_acceleration" not in h.observed:
         return
     free = ~h.fixed
@@ -302,7 +307,7 @@ def check_false_acceleration(h, report):
 
 
 def check_counts(h, report):
-    """Numbers of what was done are whole and not negative; processor time does not run back."""
+    """Counts of work are whole and not negative; processor time does not decrease."""
     for name in (
         "solver_iterations",
         "solver_newton_iterations",

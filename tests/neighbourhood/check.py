@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Checks a history with a frame at every step against the theory, without the program that made it.
+"""Checks a history with a frame at every step against the theory, independently of the program that
+wrote it.
 
     check.py run.h5 [--summary run.json] [--text run.txt]
 
@@ -26,8 +27,8 @@ from report import Report
 
 
 def check(path, told=None, text=None):
-    """The report on the history at `path`, on its summary `told` (a dictionary) and on the summary's
-    text."""
+    """The report on the history at `path`, on its summary `told` (a dictionary) and on the
+    summary's text."""
     h, report = History(path), Report()
     report.figures["steps"] = h.S
     if h.S == 0:
@@ -63,7 +64,7 @@ def check_finite(h, report):
         "moments": h.moment,
     }
     arrays |= {"gaps": h.gap, "points": h.point, "normals": h.normal, **h.observed}
-    # not a number in a step none of whose solves reports one
+    # NaN in a step in which no solve reports a load error
     error = h.observed["solver_load_error"]
     arrays["solver_load_error"] = error[~np.isnan(error)]
     for name, array in arrays.items():

@@ -1,5 +1,5 @@
-"""Geometry and relative velocities of contacts at mid-step, recomputed from positions and radii; and the
-checks of it."""
+"""Geometry and relative velocities of contacts at mid-step, recomputed from positions and radii;
+and the checks of it."""
 
 import numpy as np
 
@@ -8,8 +8,8 @@ from history import norm, turning_velocity
 
 
 def gap_and_normal(h, i, j, xi, xj):
-    """Gap (m) and unit normal from j to i, of grains `i` at `xi` and bodies `j` at `xj` (arrays of one
-    length)."""
+    """Gap (m) and unit normal from j to i, of grains `i` at `xi` and bodies `j` at `xj` (arrays of
+    one length)."""
     apart = xi - xj
     normal, gap = np.zeros(apart.shape), np.zeros(len(apart))
     grains = j < h.N
@@ -38,8 +38,8 @@ def gap_and_normal(h, i, j, xi, xj):
 
 
 class Contacts:
-    """What the rows of contacts mean at mid-step. Rows are n, t (one or two), bending (likewise), twist;
-    moments over a."""
+    """Geometry of the rows of contacts at mid-step. Rows are n, t (one or two), bending (likewise),
+    twist; moments are divided by a."""
 
     def __init__(self, h):
         s, i, j = h.row_step, h.i, h.j
@@ -48,7 +48,7 @@ class Contacts:
         self.lever_i = h.radius[i] + 0.5 * self.gap
         self.lever_j = np.where(h.on_wall, 0.0, h.body_radius[j] + 0.5 * self.gap)
         self.point = xi - self.n * self.lever_i[:, None]
-        # rounding of a gap: of the places it is the difference of
+        # round-off of a gap: that of the positions whose difference it is
         self.place = norm(xi) + norm(xj) + h.radius[i] + np.abs(np.append(h.body_radius, 0)[j])
         self.smaller = smaller_radius(h, i, j)
         self.before = self.relative(h, h.body_v[s, i], h.body_v[s, j], h.body_w[s, i], h.body_w[s, j])
@@ -61,12 +61,12 @@ class Contacts:
         )
 
     def relative(self, h, vi, vj, wi, wj):
-        """u_n [M], u_t [M,D-1], Δω along the axes of the moments: bending [M,1 or 2] and twist [M] (m/s,
-        rad/s)."""
+        """u_n [M], u_t [M,D-1], Δω along the axes of the moments: bending [M,1 or 2] and twist [M]
+        (m/s, rad/s)."""
         at_i = vi + turning_velocity(wi, -self.n * self.lever_i[:, None])
         at_j = vj + turning_velocity(wj, self.n * self.lever_j[:, None])
         u, turn = at_i - at_j, wi - wj
-        # the normal part from the centres alone: what turns about them does not close a gap
+        # the normal part from the centres alone: rotation about them does not close a gap
         un = ((vi - vj) * self.n).sum(1)
         ut = np.einsum("md,mkd->mk", u, h.tangents)
         if h.D == 2:
@@ -112,8 +112,8 @@ def check(h, c, report):
 
 
 def check_left_out(h, c, report):
-    """Pairs that are not among the contacts do not close; with restitution those that touch are among
-    them."""
+    """Pairs that are not among the contacts do not close; with restitution those that touch are
+    among them."""
     report.margins.setdefault("pairs left out", 0.0)
     bodies = h.N + h.W
     i, j = np.triu_indices(bodies, 1)
@@ -129,7 +129,7 @@ def check_left_out(h, c, report):
 
 
 def near_pairs(h, i, j, steps):
-    """Of these pairs those that may come together within the steps."""
+    """The pairs, of these, that may touch within the steps."""
     path = norm(h.mid[steps] - h.mid[steps[0]]).max(0) + h.h * norm(h.body_v[steps + 1]).max(0)
     gap, _ = gap_and_normal(h, i, j, h.mid[steps[0], i], h.mid[steps[0], j])
     near = gap <= path[i] + path[j] + 1e-6 * h.radius[i]
@@ -137,7 +137,7 @@ def near_pairs(h, i, j, steps):
 
 
 def left_out_of_step(h, report, s, i, j):
-    """The same of one step."""
+    """The same for one step."""
     if len(i) == 0:
         return
     xi, xj = h.mid[s, i], h.mid[s, j]
@@ -151,7 +151,7 @@ def left_out_of_step(h, report, s, i, j):
         other = h.wall_names[j[m] - h.N] if j[m] >= h.N else j[m]
         return f"step {s + 1}, pair {i[m]}-{other} is no contact, its gap (m) after the step would be negative"
 
-    # with restitution only what touches acts
+    # with restitution only touching pairs act
     touching = tolerances.value("touching") * smaller_radius(h, i, j)
     report.expect("pairs left out", np.where(restitution == 0, closing - gap, -np.inf), slack, describe)
     bounces = (restitution > 0) & (closing > 0)
@@ -165,7 +165,8 @@ def restitution_of(h, j):
 
 
 def check_crossing(h, report):
-    """No pair goes deeper into one another within half a step than half the smaller radius, nor through."""
+    """Within half a step no pair overlaps by more than half the smaller radius, or passes
+    through."""
     report.margins.setdefault("crossing", 0.0)
     bodies = h.N + h.W
     i, j = np.triu_indices(bodies, 1)

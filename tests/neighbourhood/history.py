@@ -1,7 +1,7 @@
 """A history with a frame at every step, as arrays.
 
-Bodies are grains, then walls. `step` s leads from frame s to frame s + 1; rows of contacts stand behind
-each other, and `row_step` says to which step each belongs. SI units throughout.
+Bodies are grains, then walls. `step` s leads from frame s to frame s + 1; rows of contacts are
+concatenated, and `row_step` is the step of each. SI units throughout.
 """
 
 import json
@@ -19,8 +19,8 @@ class Unfit(Exception):
 class History:
     """All of a history that the checks read.
 
-    N grains, W walls, B bodies (N + W), S steps, M rows of contacts, D dimensions, Q components of a spin
-    (1 or 3).
+    N grains, W walls, B bodies (N + W), S steps, M rows of contacts, D dimensions, Q components of
+    a spin (1 or 3).
     """
 
     def __init__(self, path):
@@ -36,7 +36,7 @@ class History:
             self.observed = {
                 name: group["value"][: self.S] for name, group in file["observables"].items() if "value" in group
             }
-            # the method that solved each step; histories of before version 4 do not say
+            # the method that solved each step; not recorded before version 4
             route = file.get("observables/solver_route/value")
             self.route = None if route is None else np.array(enum_names(route, self.S))
             self.observed_step = file["observables/step"][: self.S]
@@ -92,7 +92,7 @@ class History:
         pair = group["pair"][: self.M].astype(int)
         self.i, self.j = pair[:, 0], np.where(pair[:, 1] < 0, self.N - 1 - pair[:, 1], pair[:, 1])
         if self.M and (self.i.min() < 0 or self.i.max() >= self.N or self.j.max() >= self.N + self.W):
-            raise Unfit("a contact names a body that is not there")
+            raise Unfit("a contact refers to a body that does not exist")
         self.on_wall = pair[:, 1] < 0
         self.point, self.normal, self.gap = (group[k][: self.M] for k in ("point", "normal", "gap"))
         reaction = group["reaction"][: self.M]
@@ -154,7 +154,7 @@ class History:
         still = np.zeros((self.S + 1, W, self.Q))
         self.body_x, self.body_v = np.concatenate([self.x, self.X], 1), np.concatenate([self.v, self.V], 1)
         self.body_w = np.concatenate([self.w, still], 1)
-        # where contacts are solved: half a step on from the frame before
+        # positions at mid-step, where contacts are solved
         self.mid = self.body_x[:-1] + 0.5 * self.h * self.body_v[:-1]
         self.inverse_mass = np.concatenate([np.where(self.fixed, 0.0, 1 / self.mass), np.zeros(W)])
         self.inverse_inertia = np.concatenate([np.where(self.fixed, 0.0, 1 / self.inertia), np.zeros(W)])
@@ -166,19 +166,19 @@ class History:
         self._parts()
 
     def _parts(self):
-        """Steps that one solve made, and not parts of it: only there the frames before and after tell what
-        was solved."""
+        """Steps made whole, not in parts: only for them do the frames before and after determine
+        the problem that was solved."""
         if "substeps" in self.observed:
             self.single = self.observed["substeps"] == 1
         else:
             self.single = self.observed["solver_rejected"] == 0
         self.row_single = self.single[self.row_step]
-        # steps whose last mid-step lies in a step in parts
+        # steps after a step in parts: the mid-step before them is in no frame
         self.after_parts = np.append(False, ~self.single[:-1])[: self.S]
 
     def external(self):
-        """Prescribed forces (N) [S,N,D] and torques (N m) [S,N,Q] on the grains at the middle of each
-        step."""
+        """Prescribed forces (N) [S,N,D] and torques (N m) [S,N,Q] on the grains at the middle of
+        each step."""
         force = np.broadcast_to(self.mass[:, None] * self.gravity, (self.S, self.N, self.D)).copy()
         torque = np.zeros((self.S, self.N, self.Q))
         for load in (self.scene.get("grains") or {}).get("loads", []):
@@ -188,8 +188,8 @@ class History:
         return force, torque
 
     def wall_drive_force(self):
-        """Prescribed forces (N) [S,W] on the walls that a force drives, at the middle of each step; 0 for
-        the others."""
+        """Prescribed forces (N) [S,W] on the walls that a force drives, at the middle of each step;
+        0 for the others."""
         middle = self.times[:-1] + 0.5 * self.h
         columns = [prescribed.at(f, middle) if kind == "force" else np.zeros(self.S) for kind, f in self.drives]
         return np.stack(columns, 1) if columns else np.zeros((self.S, 0))

@@ -1,11 +1,11 @@
 """The contact law: cones, Signorini, Coulomb, bonds, with velocities and geometry recomputed from
 positions.
 
-A contact obeys K ∋ r̂ ⊥ ũ ∈ K* (docs/theory/contact-law.md, (2)). With D, the largest diagonal entry of its
-Delassus block, its natural map is r̂ − P_K(r̂ − ũ/D), and the residual of a step is the norm of all maps
-over that of the reactions or the load. So the recorded residual bounds each map: by δ = residual × scale +
-rounding. Let p = P_K(r̂ − ũ/D), ũ' = ũ + D (p − r̂). Then p and ũ' obey the law to the last bit, ‖p − r̂‖ ≤
-δ and ‖ũ' − ũ‖ ≤ D δ, and what the checks allow follows:
+A contact obeys K ∋ r̂ ⊥ ũ ∈ K* (docs/theory/contact-law.md, (2)). With D, the largest diagonal
+entry of its Delassus block, its natural map is r̂ − P_K(r̂ − ũ/D), and the residual of a step is
+the norm of all maps over that of the reactions or the load. So the recorded residual bounds each
+map: by δ = residual × scale + rounding. Let p = P_K(r̂ − ũ/D), ũ' = ũ + D (p − r̂). Then p and ũ'
+obey the law to the last bit, ‖p − r̂‖ ≤ δ and ‖ũ' − ũ‖ ≤ D δ, and what the checks allow follows:
 
 * the distance of r̂ from K is at most δ;
 * u_n ≥ −(1 + μ) D δ, since ũ'_n ≥ μ ‖ũ'_t‖; where r_n > δ also u_n ≤ (1 + μ) D δ;
@@ -23,12 +23,13 @@ from history import norm
 
 
 def project(x, mu, nu, xi, d):
-    """The points of the cones K nearest to rows `x` [M,R]: n, t (d of them), bending (d), twist where there
-    is one more."""
+    """Projections of rows `x` [M,R] on their cones K: n, t (d of them), bending (d), twist where
+    there is one more."""
     t, b = x[:, 1 : 1 + d], x[:, 1 + d : 1 + 2 * d]
     w = x[:, 1 + 2 * d :]
     pulls = [(mu, norm(t)), (nu, norm(b)), (xi, norm(w))]
-    # n − x_n = Σ c (‖x‖ − c n)⁺ has the largest of the roots with any set of brackets taken as active
+    # n − x_n = Σ c (‖x‖ − c n)⁺ has the largest of the roots with any set of brackets taken as
+    # active
     n = np.zeros(len(x))
     for active in itertools.product((0.0, 1.0), repeat=3):
         pull = sum(a * c * size for a, (c, size) in zip(active, pulls))
@@ -41,8 +42,8 @@ def project(x, mu, nu, xi, d):
 
 
 class Solved:
-    """The contact problem of every step as the history shows it: reactions as impulses, velocities, biases,
-    D and δ."""
+    """The contact problem of every step as the history shows it: reactions as impulses, velocities,
+    biases, D and δ."""
 
     def __init__(self, h, c):
         self.bonds = h.bond >= 0
@@ -77,7 +78,8 @@ class Solved:
         self.xi = np.where(self.bonds, h.xi, 0.0) if h.K else np.zeros(h.M)
 
     def _blocks(self, h, c, smooth):
-        """D: the largest diagonal entry of each Delassus block (1/kg), docs/theory/gauss-seidel.md."""
+        """D: the largest diagonal entry of each Delassus block (1/kg),
+        docs/theory/gauss-seidel.md."""
         mi, mj, qi, qj = h.inverse_mass[h.i], h.inverse_mass[h.j], h.inverse_inertia[h.i], h.inverse_inertia[h.j]
         n, t = mi + mj, mi + mj + c.lever_i**2 * qi + c.lever_j**2 * qj
         for k in np.flatnonzero(np.isfinite(h.wall_mass)):
@@ -95,8 +97,8 @@ class Solved:
         self.entries = np.stack([n, t, bend, bend], 1)
 
     def _bias(self, h, c):
-        """What is added to u_n: of gaps, restitution, bonds that turn. `other` is a second value that the
-        law admits."""
+        """Bias of u_n from gaps, restitution and bonds that turn. `other` is a second admissible
+        value."""
         self.acts = np.ones(h.M, bool)
         before = c.before[0]
         restitution = np.where(self.bonds, 0.0, restitution_of(h, h.j))
@@ -111,8 +113,8 @@ class Solved:
         bouncy = restitution > 0
         self.bias = np.where(bouncy, bounce, np.maximum(c.gap, 0.0) / h.h)
         self.other = np.where((near & ~bouncy) | (at_rest & bouncy), 0.0, self.bias)
-        # with restitution a contact acts where it touches; nearer than a rounding it must,
-        # farther than the limit it must not
+        # with restitution touching contacts act: certainly those within round-off, never those
+        # beyond the limit
         self.acts = ~bouncy | (c.gap <= may_touch)
         self.idle_too = bouncy & (c.gap > must_touch) & self.acts
         rigid = self.bonds if h.K and h.stiffness is None else np.zeros(h.M, bool)
@@ -120,7 +122,7 @@ class Solved:
         self.bias = np.where(self.bonds, of_bond, self.bias)
         self.other = np.where(self.bonds, self.bias, self.other)
         self.rigid = rigid
-        # where the last mid-step of a step in parts was, no frame tells
+        # no frame holds the last mid-step of a step in parts
         self.unknown = self.bonds & h.after_parts[h.row_step]
 
     def _elastic(self, h):
@@ -144,7 +146,8 @@ class Solved:
         self.D = np.where(self.bonds, stiff, self.D)
 
     def _map(self, h, c):
-        """Natural maps with the bias that suits best, their rounding, and δ of every row (N s)."""
+        """Natural maps with the better of the two biases, their round-off, and δ of every row (N
+        s)."""
         flow = (h.scene.get("bonds") or {}).get("flow", "associated")
         shifts = ~self.bonds | (flow == "bipotential")
         self.raw = self.u[:, 0].copy()
@@ -162,7 +165,8 @@ class Solved:
         self.bias, self.u[:, 0] = chosen, self.raw + chosen
         self.map = np.where(idle[:, None], 0.0, best)
         moving = c.speed + np.abs(self.bias) + np.where(c.gap > 0, c.place / h.h, 0.0)
-        # a map that is not ũ/D is a difference of shifted reactions, and where it is zero ũ/D may be the rounding of these
+        # outside the cone a map is a difference of shifted reactions; where it is zero, ũ/D may be
+        # their round-off
         size = norm(self.r) + np.where(self.sticks, 0.0, self.shift)
         stored = norm(self.compliance * np.abs(self.r)) + norm(self.compliance * np.abs(self.carried))
         self.rounding = tolerances.rounding((moving + stored) / self.D + size)
@@ -209,13 +213,14 @@ def row_before(h):
 
 
 def pushed_before(h):
-    """Whether the pair of a row pushed in the step before."""
+    """Whether the pair of a row carried a normal force in the step before."""
     last = row_before(h)
     return (last >= 0) & (h.rn[last] > 0) if h.M else np.zeros(0, bool)
 
 
 def turning(h, c):
-    """b = ½ n·(1 − R) u⁻ of bonds that turn (m/s): R about the mean spin of the pair, by arcsin(h‖ω‖)."""
+    """b = ½ n·(1 − R) u⁻ of bonds that turn (m/s): R about the mean spin of the pair, by
+    arcsin(h‖ω‖)."""
     s, i, j = h.row_step, h.i, h.j
     u = h.body_v[s, i] - h.body_v[s, j]
     sine = 0.5 * h.h * (h.body_w[s, i] + h.body_w[s, j])
@@ -232,8 +237,9 @@ def turning(h, c):
 
 
 def turned(h, c):
-    """What a rigid bond that turned is given back (m/s). The grains of bonds without a limit of shear or of rolling need not
-    turn with them: their length tells that they turn, from the second step on, as far as rounding does not hide it."""
+    """Length correction of rigid bonds that turned (m/s). Grains of bonds without a limit of shear
+    or rolling need not turn with the bond: then its rotation follows from its length, from the
+    second step on and within round-off."""
     longer = np.where(h.row_step > 0, lengthening(h, c), 0.0)
     longer[h.h * longer <= np.finfo(float).eps * h.mean_diameter[h.bond]] = 0.0
     with_it = (h.bond_friction[h.bond] > 0) & (h.bond_rolling[h.bond] > 0)
@@ -241,11 +247,11 @@ def turned(h, c):
 
 
 def lengthening(h, c):
-    """What an elastic bond grew since the last mid-step beyond its way along the normal of then, over h
-    (m/s).
+    """Elongation of an elastic bond since the last mid-step minus its displacement along the normal
+    of then, over h (m/s).
 
-    Its force follows its length: with the way d between two mid-steps, ℓ' − ℓ − d_n = d_t² / (ℓ' + ℓ + d_n) is what the
-    normal velocity has not told it."""
+    Its force follows its length: with the displacement d between two mid-steps, ℓ' − ℓ − d_n = d_t²
+    / (ℓ' + ℓ + d_n) is missing in the normal velocity."""
     s, i, j = h.row_step, h.i, h.j
     last = np.where((s > 0)[:, None], h.mid[s - 1, i] - h.mid[s - 1, j], h.body_x[0, i] - h.body_x[0, j])
     now = h.mid[s, i] - h.mid[s, j]
@@ -277,8 +283,8 @@ def check(h, c, p, report):
 
 
 def check_residual(h, p, report):
-    """The natural maps of all contacts together, over the reactions or the load, are what the history says,
-    or less."""
+    """The residual, recomputed from the natural maps of all contacts, is at most the recorded
+    one."""
     total = np.sqrt(np.bincount(h.row_step, (p.map**2).sum(1), minlength=h.S))
     allowed = h.observed["solver_residual"] * p.scale + p.rounded
     report.expect(
@@ -290,8 +296,8 @@ def check_residual(h, p, report):
 
 
 def check_cones(h, p, report, rows):
-    """Reactions are in their cones: Coulomb's, and the shifted ones of bonds with limits of bending and
-    twist."""
+    """Reactions are in their cones: Coulomb's, and the shifted ones of bonds with limits of bending
+    and twist."""
     shifted = p.r[rows].copy()
     shifted[:, 0] += p.shift[rows]
     off = norm(shifted - project(shifted, p.mu[rows], p.nu[rows], p.xi[rows], h.D - 1))
@@ -311,7 +317,7 @@ def check_signorini(h, p, report, rows):
 
 
 def check_coulomb(h, p, report, rows):
-    """What sticks does not slip; what slips does so against friction."""
+    """Sticking contacts do not slip; slip is opposite to friction."""
     d, mu = p.delta[rows], p.mu[rows]
     rn, rt, ut = p.r[rows, 0], p.r[rows, 1 : h.D], p.u[rows, 1 : h.D]
     slip, size = norm(ut), norm(rt)
@@ -323,7 +329,8 @@ def check_coulomb(h, p, report, rows):
 
 
 def check_bonds(h, p, report, rows):
-    """A bond inside its cone does not move; an elastic one by its springs: u + C (r − r₀) = 0."""
+    """A bond inside its cone does not move; an elastic one obeys its springs: u + C (r − r₀) =
+    0."""
     r, d, k = p.r[rows], p.delta[rows], h.D - 1
     n = r[:, 0] + p.shift[rows]
     mu, nu, xi = p.mu[rows], p.nu[rows], p.xi[rows]
@@ -338,8 +345,8 @@ def check_bonds(h, p, report, rows):
 
 
 def check_status(h, p, report, rows):
-    """The status is that of the reaction: nothing carried is OPEN, within the cone STICK, on it SLIP; bonds
-    are BONDED."""
+    """The status is that of the reaction: nothing carried is OPEN, within the cone STICK, on it
+    SLIP; bonds are BONDED."""
     status, open_ = h.status[rows], h.rn[rows] == 0
     size, limit = norm(h.rt[rows]), p.mu[rows] * h.rn[rows]
     near = np.abs(size - limit) <= 2e-9 * limit + tolerances.rounding(limit)
@@ -350,8 +357,8 @@ def check_status(h, p, report, rows):
 
 
 def check_closing(h, c, p, report):
-    """No step closes a pair, or stretches a rigid bond, beyond its law by more than a share of its radius;
-    nor what adds up."""
+    """No step closes a pair, or stretches a rigid bond, beyond its law by more than a share of its
+    radius; nor does the sum over the steps."""
     intact = np.ones(h.M, bool)
     if h.K:
         intact = p.bonds & (h.bond_status[h.row_step + 1, h.bond] == "INTACT")
@@ -370,7 +377,7 @@ def check_closing(h, c, p, report):
     for s in range(h.S):
         rows = slice(begin[s], begin[s + 1])
         k = pair[rows]
-        # what opens again is free to; a broken bond begins anew
+        # contacts may open again; a broken bond starts anew
         last = np.where(bond[k] == p.bonds[rows], total[k], 0.0) + closing[rows]
         now = np.where(p.bonds[rows], last, np.maximum(last, 0.0))
         total[:], bond[:] = 0.0, False

@@ -1,5 +1,5 @@
-"""Checks of motion: positions from velocities, Newton's law of every grain and wall, prescribed motion,
-time."""
+"""Checks of motion: positions from velocities, Newton's law of every grain and wall, prescribed
+motion, time."""
 
 import numpy as np
 
@@ -92,7 +92,7 @@ def contact_sums(h):
     lever_i, lever_j = h.point - h.mid[s, i], h.point - h.mid[s, j]
     torque_i, torque_j = cross(lever_i, h.force) + h.torque, -cross(lever_j, h.force) - h.torque
     torque_j[h.on_wall] = 0.0
-    # the point is a difference of places
+    # the lever is a difference of positions
     reach = norm(h.mid[s, i]) + h.radius[i]
     size, turn = norm(h.force), reach * norm(h.force) + norm(h.torque)
 
@@ -115,7 +115,7 @@ def check_grains(h, report, forces, torques):
     )
     off = norm(h.inertia[:, None] * dw - h.h * (outer_torque + torque[:, : h.N]))
     scale = h.inertia * (norm(h.w[1:]) + norm(h.w[:-1])) + h.h * (norm(outer_torque) + turn[:, : h.N])
-    # where nothing can turn the file has no spins
+    # without rotation the file has no spins
     off = np.where(single & free, off, 0) if h.turns else np.zeros((h.S, h.N))
     report.expect("law of spins", off, tolerances.rounding(scale), of_grain("I Δω − h Σ(torques) (N m s)"))
     still = norm(h.v) + norm(h.w) + norm(h.x - h.x[0])
@@ -123,8 +123,8 @@ def check_grains(h, report, forces, torques):
 
 
 def check_walls(h, report, forces):
-    """Walls: a force drives m Δv·d = h (F + ΣR·d); a velocity is that of the step's end; a fixed one does
-    not move."""
+    """Walls: a force drives m Δv·d = h (F + ΣR·d); a velocity is that of the step's end; a fixed
+    one does not move."""
     drive = h.wall_drive_force()
     force, size = (part[:, h.N :] for part in forces)
     for k, (kind, function) in enumerate(h.drives):
@@ -138,7 +138,7 @@ def check_walls(h, report, forces):
             moved = norm(v) + norm(h.X[:, k] - h.X[0, k])
             report.expect("fixed walls", moved, 0.0, describe)
             continue
-        # what a wall gets is a difference of forces
+        # the net force on a wall is a difference of forces
         given = np.append(0.0, np.abs(drive[:, k]) + size[:, k]) * (h.h / h.wall_mass[k])
         report.expect("wall motion", across, tolerances.rounding(norm(v) + np.cumsum(given)), describe)
         if kind == "velocity":
@@ -162,7 +162,7 @@ def check_walls(h, report, forces):
 
 
 def slope(function, h):
-    """By how much a function of time changes for the rounding of time, over that rounding."""
+    """Change of a function of time due to the round-off of time, over that round-off."""
     if "ramp" in function:
         return np.abs(function["ramp"]["rate"]) * (h.times + abs(function["ramp"].get("start", 0.0)))
     return 0.0

@@ -1,5 +1,5 @@
-"""What a scene prescribes: functions of time, drives, loads, strengths and stiffnesses, from the scene in
-the history."""
+"""What a scene prescribes: functions of time, drives, loads, strengths and stiffnesses, from the
+scene in the history."""
 
 import numpy as np
 
@@ -17,8 +17,8 @@ def at(function, times):
 
 
 def drive(wall):
-    """Kind of drive of a wall of the scene and its function of time: ("force", f), ("velocity", f) or
-    ("fixed", None)."""
+    """Kind of drive of a wall of the scene and its function of time: ("force", f), ("velocity", f)
+    or ("fixed", None)."""
     if wall.get("force_rate") is not None:
         return "force", {"ramp": {"rate": wall["force_rate"]}}
     for kind in ("force", "velocity"):
@@ -71,10 +71,11 @@ def thickness(scene):
 
 
 def stiffness(scene, a):
-    """Stiffness of bonds of mean diameter `a` (m): normal and tangential (N/m), bending and twist (N m);
-    none if rigid.
+    """Stiffness of bonds of mean diameter `a` (m): normal and tangential (N/m), bending and twist
+    (N m); none if rigid.
 
-    A bar as long as it is wide: E A/a, G A/a, E I/a and, round, G 2I/a (docs/theory/elastic-bonds.md).
+    A bar as long as it is wide: E A/a, G A/a, E I/a and, round, G 2I/a
+    (docs/theory/elastic-bonds.md).
     """
     given = (scene.get("bonds") or {}).get("stiffness")
     if given is None:

@@ -18,8 +18,8 @@ def dem_run():
 
 
 def run(scene, folder, name="run", text=False):
-    """Runs a scene (a dictionary) in `folder`: the history's path, the summary from --json, its text if
-    asked for."""
+    """Runs a scene (a dictionary) in `folder`: the history's path, the summary from --json, its
+    text if asked for."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / f"{name}.json").write_text(json.dumps(scene, indent=1))
     command = [dem_run(), "run", f"{name}.json", "-o", f"{name}.h5", "--force", "--quiet", "--threads", "1"]

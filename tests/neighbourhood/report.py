@@ -1,10 +1,11 @@
-"""What a checked history is found to be: the violations, and how near each check came to its tolerance."""
+"""Result of the checks of a history: the violations, and the largest value of each check over its
+tolerance."""
 
 from dataclasses import dataclass, field
 
 import numpy as np
 
-# violations that are kept of one check; the rest is counted
+# most violations stored per check; the others are counted
 KEPT = 3
 
 
@@ -15,12 +16,12 @@ class Report:
     violations: dict = field(default_factory=dict)
     counts: dict = field(default_factory=dict)
     margins: dict = field(default_factory=dict)
-    # numbers of the history that are reported, not judged
+    # numbers of the history that are reported without a check
     figures: dict = field(default_factory=dict)
 
     def expect(self, check, measured, allowed, describe):
-        """`measured` ≤ `allowed`, element by element; not a number is a violation. `describe(index)` says
-        where."""
+        """`measured` ≤ `allowed`, element by element; not a number is a violation.
+        `describe(index)` says where."""
         measured, allowed = np.broadcast_arrays(np.asarray(measured, float), np.asarray(allowed, float))
         self.margins.setdefault(check, 0.0)
         if measured.size == 0:
@@ -39,7 +40,7 @@ class Report:
             kept.append(f"{describe(*place)}: {measured[place]:.6g}, allowed {allowed[place]:.3g}")
 
     def require(self, check, holds, text):
-        """A condition that holds or not."""
+        """Records a condition as fulfilled or violated."""
         self.margins.setdefault(check, 0.0)
         if not holds:
             self.counts[check] = self.counts.get(check, 0) + 1

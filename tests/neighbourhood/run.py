@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
-"""Runs the neighbours of the shipped scenes and checks each of them; goes on where an earlier call stopped.
+"""Runs the neighbours of the shipped scenes and checks each of them; continues where an earlier
+call stopped.
 
     .venv/bin/python tests/neighbourhood/run.py [--seed N] [--folder DIR] [--page FILE.md] [--only TEXT] [--quick]
 
-What is known of a neighbour is kept in the folder under a digest of its scene, the program and the checker,
-so a call that was cut goes on, and after a change what it concerns is done anew. Histories of wrong
-neighbours stay in the folder. Exit code: 0 all right, 1 something is wrong, 3 the time was up and
-neighbours are left.
+The result of each neighbour is stored in the folder under a digest of its scene, the program and
+the checker. So an interrupted call can be continued, and a change repeats only the neighbours that
+it affects. Histories of wrong neighbours stay in the folder. Exit code: 0 all right, 1 something is
+wrong, 3 the time is up and neighbours are left.
 """
 
 import argparse
@@ -28,7 +29,7 @@ import tolerances
 from check import check
 from history import Unfit
 
-# processor time of a neighbour (s): then it is told to stop, and killed where it does not within GRACE
+# most processor time of a neighbour (s): then it is asked to stop, and killed after another GRACE
 CPU, GRACE = 60.0, 30.0
 # time of a call (s)
 CALL = 2 * 3600.0
@@ -68,7 +69,7 @@ def digest(*parts):
 
 
 def sources():
-    """What the checker and the generator are, for the digest."""
+    """Source of checker and generator, for the digest."""
     here = Path(__file__).parent
     return "".join(
         (here / name).read_text()
@@ -77,7 +78,8 @@ def sources():
 
 
 def sample_of(base, folder, program):
-    """The grains of a base (a function) as rows of centre and radius: prepared once for each sample."""
+    """The grains of a base (a function) as rows of centre and radius: prepared once for each
+    sample."""
     plain = base()
     key = digest(json.dumps([plain["dimension"], plain.get("seed"), plain["sample"]]))
     path = folder / f"sample-{key}.csv"
@@ -127,7 +129,8 @@ def processor_time(pid):
 
 
 def execute(folder, key, program, limit):
-    """Runs a scene that is written: exit code, what it printed, whether it was cut, processor time (s)."""
+    """Runs a scene that is written: exit code, what it printed, whether it was cut, processor time
+    (s)."""
     command = [program, "run", f"{key}.json", "-o", f"{key}.h5", "--force", "--quiet", "--json", "--threads", "1"]
     hard = lambda: resource.setrlimit(resource.RLIMIT_CPU, (int(limit + GRACE), int(limit + GRACE)))
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -149,7 +152,7 @@ def execute(folder, key, program, limit):
 
 
 def judged(name, scene, folder, key, program, limit):
-    """Runs and checks a neighbour: what is known of it, as it is kept."""
+    """Runs and checks a neighbour; returns its result in the stored form."""
     written(scene, scenes.base_of(name), folder, key, program)
     code, printed, complaint, cut, cpu = execute(folder, key, program, limit)
     known = {
@@ -194,13 +197,13 @@ def judged(name, scene, folder, key, program, limit):
 
 
 def told_rightly(known, scene):
-    """What is wrong with what a run says that stopped: whoever is squeezed has a name, and that no motion
-    exists is true."""
+    """Errors in the message of a run that stopped: it must name the squeezed bodies, and a claim
+    that no motion exists must be true."""
     if known["exit"] != 3:
         return None
     first = (known["message"].splitlines() or ["no message"])[0]
     if "no motion" in first and not scenes.moves_walls(scene):
-        # what no wall pushes at a prescribed velocity can stay where it is
+        # bodies that no wall pushes at a prescribed velocity can stay in place
         return ["no wall moves at a prescribed velocity, and it says: " + first]
     if scenes.may_have_no_motion(scene) and not known.get("named"):
         return ["it stopped without the names of who is squeezed: " + first]
@@ -208,7 +211,7 @@ def told_rightly(known, scene):
 
 
 def all_neighbours(arguments, names, folder, program, until):
-    """What is known of each neighbour, from the folder or found now; less where the time was up."""
+    """Results of the neighbours, from the folder or new; incomplete if the time is up."""
     ours = sources()
     binary = program.read_bytes()
     out = {}
@@ -231,7 +234,7 @@ def all_neighbours(arguments, names, folder, program, until):
 
 
 def verdict(known):
-    """In words."""
+    """The result in words."""
     if known["wrong"]:
         return "WRONG: " + ", ".join(sorted(known["wrong"]))
     return "right" + (", cut off" if known["cut"] else "") + (", stopped" if known["exit"] == 3 else "")
@@ -246,27 +249,27 @@ PAGE = """\
 # Neighbours of the shipped scenes
 
 Each row is a small scene, one or two changes away from a base. It is run, and its history is checked step by step by a
-program that knows the theory and not the code ([tests/neighbourhood](../tests/neighbourhood)). *Wrong* means that a
-check failed; steps that missed the solver's tolerance are counted. This page is written by
+program that implements the theory independently of the code ([tests/neighbourhood](../tests/neighbourhood)). *Wrong*
+means that a check failed; steps that missed the solver's tolerance are counted. This page is written by
 
 ```sh
 .venv/bin/python tests/neighbourhood/run.py --seed {seed} --page docs/neighbourhood.md
 ```
 
-which goes on where an earlier call stopped.
+which continues where an earlier call stopped.
 
 **{found} neighbours of {all} with seed {seed}: {right} right, {wrong} wrong.** {cut} were cut off after {cpu:g} s of
 processor time and checked up to there; {stopped} stopped because a step was not solved (exit code 3), {named} of them
 with the names of the bodies.
 
-A run that stopped is right where all up to there is, where it names who is squeezed, and where it says that no motion
-exists only with a wall that moves at a prescribed velocity.
+A run that stopped counts as right if its history is right, if it names the squeezed bodies, and if it reports that no
+motion exists only where a wall moves at a prescribed velocity.
 
 ## What is checked
 
 {checks}
 
-A step that was made in parts has one frame for all of them: of it only what holds without the parts is checked.
+A step in parts has one frame for all its parts, so only the checks that do not need the parts apply to it.
 
 ```text
 {tolerances}
@@ -304,7 +307,7 @@ def page(found, names, seed, cpu):
 
 
 def row(name, known, base):
-    """The row of a neighbour; `base` is what is known of its base."""
+    """The row of a neighbour; `base` is the result of its base."""
     cost = per_step(known) / per_step(base) if base else float("nan")
     ended = "cut off" if known["cut"] else {0: "", 3: "stopped"}.get(known["exit"], f"exit code {known['exit']}")
     result = "right" if not known["wrong"] else "**wrong**: " + ", ".join(sorted(known["wrong"]))
@@ -315,7 +318,7 @@ def row(name, known, base):
 
 
 def checks(found):
-    """The checks, each with the largest value over its tolerance that a right neighbour came to."""
+    """The checks, each with the largest value over its tolerance among the right neighbours."""
     names, most = {}, {}
     for known in found.values():
         for check_name, margin in known.get("margins", {}).items():

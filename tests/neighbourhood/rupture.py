@@ -1,4 +1,5 @@
-"""Bonds: how they form, their lengths, and that they break where equation (5) says and nowhere else."""
+"""Bonds: how they form, their lengths, and that they break where equation (5) says and nowhere
+else."""
 
 import numpy as np
 
@@ -22,7 +23,7 @@ def check(h, c, p, report):
 
 
 def check_formed(h, report):
-    """Bonds join the pairs that the scene says, with its strength, and none else."""
+    """Bonds join exactly the pairs given by the scene, with its strength."""
     i, j = np.triu_indices(h.N, 1)
     gap, _ = gap_and_normal(h, i, j, h.x[0, i], h.x[0, j])
     a = h.radius[i] + h.radius[j]
@@ -54,15 +55,15 @@ def check_formed(h, report):
 
 
 def check_lengths(h, p, report):
-    """An intact rigid bond keeps its length; an elastic one is as long as its force says. At mid-step,
-    where bonds act.
+    """An intact rigid bond keeps its length; an elastic one is as long as its force says. At
+    mid-step, where bonds act.
 
-    A bond that turns by θ in a step is longer at mid-step by the chord, θ²/2 of its length: half of what a
-    step along the tangent adds is given back by the next (docs/theory/time-stepping.md, bonds that turn),
-    so it does not add up. A step in parts has mid-steps that no frame tells, and what a change of the length of
-    steps leaves is given back by the first whole step after it: lengths are judged at the mid-steps of whole
-    steps that follow whole ones. By what the solves miss the law of a spring, which `elastic bonds` bounds in each
-    step, force and length part over the run.
+    A bond that turns by θ in a step is longer at mid-step by the chord, θ²/2 of its length. The
+    next step corrects half of the elongation along the tangent (docs/theory/time-stepping.md, bonds
+    that turn), so it does not accumulate. No frame holds the mid-steps of a step in parts, and the
+    first whole step after it corrects the change of the step length: lengths are checked at the
+    mid-steps of whole steps that follow whole ones. Solver errors in the law of a spring, which
+    `elastic bonds` bounds in each step, accumulate in its length over the run.
     """
     bi, bj = h.bond_pair.T
     gap, tangential = np.zeros((h.S, h.K)), np.zeros((h.S, h.K))
@@ -86,7 +87,7 @@ def check_lengths(h, p, report):
         off = np.where(judged, np.abs(longer), 0.0)
         report.expect("length of rigid bonds", off, tolerances.value("rigid length") * smaller + chord, describe)
     else:
-        # what a bond carries after a step follows the length of the next mid-step
+        # the force of a bond after a step follows its length at the next mid-step
         rows = np.flatnonzero((h.bond >= 0) & (h.row_step + 1 < h.S))
         s, b = h.row_step[rows] + 1, h.bond[rows]
         off = np.abs(longer[s, b] + h.rn[rows] / h.stiffness[0][b])
@@ -110,16 +111,16 @@ def check_elongation(h, longer, report):
 
 
 def failure(n, t, b, w, strength, mu, nu, a, xi):
-    """Distance to rupture of reactions (N, N m): r̂_n, and the largest of ‖r_t‖/μ, ‖m‖/(ν a), |τ|/(ξ a)
-    with its mode."""
+    """Distance to rupture of reactions (N, N m): r̂_n, and the largest of ‖r_t‖/μ, ‖m‖/(ν a),
+    |τ|/(ξ a) with its mode."""
     over = lambda size, c: np.divide(size, c, out=np.zeros_like(size), where=c > 0)
     ratios = np.stack([over(t, mu), over(b, nu * a), over(w, xi * a)])
     return n + strength, ratios.max(0), np.array(["SHEAR", "ROLLING", "TWIST"])[ratios.argmax(0)], ratios
 
 
 def check_intact(h, p, report):
-    """After a step no intact bond is at its limit; with `end_of_step` those that are break, and no
-    others."""
+    """After a step no intact bond is at its limit; with `end_of_step` exactly the bonds at their
+    limit break."""
     rows = np.flatnonzero(h.bond >= 0)
     b, s = h.bond[rows], h.row_step[rows]
     n, ratio, _, _ = failure(
@@ -146,8 +147,8 @@ def check_intact(h, p, report):
 
 
 def check_statuses(h, report):
-    """Statuses, events and contacts say the same: a bond breaks once, at its event, and has contacts as a
-    bond before."""
+    """Statuses, events and contacts agree: a bond breaks once, at its event, and has bonded
+    contacts only before."""
     broke_at = np.full(h.K, h.S + 1)
     mode = np.full(h.K, "INTACT", dtype=object)
     for event, name in zip(h.events, h.event_mode):
@@ -171,13 +172,13 @@ def check_statuses(h, report):
     broken = h.observed["bonds_broken"]
     count = (np.arange(1, h.S + 1)[:, None] >= broke_at).sum(1)
     report.expect("bonds_broken", np.abs(broken - count), 0.0, lambda s: f"step {s + 1}: bonds_broken")
-    # one row for each bond that holds, and, where it breaks at the end of a step, for that step
+    # one row for each intact bond, and for each bond that breaks at the end of the step
     late = 1 if h.scene.get("rupture") == "end_of_step" else 0
     rows = np.flatnonzero(h.bond >= 0)
     held = np.arange(1, h.S + 1)[:, None] < broke_at + late
     seen = np.zeros((h.S, h.K), int)
     np.add.at(seen, (h.row_step[rows], h.bond[rows]), 1)
-    # the last part of a step that was made in parts knows less bonds
+    # the last part of a step in parts has fewer bonds
     off = np.where(h.single[:, None] | (late == 0), np.abs(seen - held), 0)
     report.expect("contacts of bonds", off, 0.0, lambda s, b: f"step {s + 1}, bond {b}: {seen[s, b]} contacts")
     pairs = (h.bond_pair[h.bond[rows]] != np.stack([h.i, h.j], 1)[rows]).any(1)
@@ -192,7 +193,7 @@ def check_events(h, c, p, report):
         return
     b, step = e["bond"].astype(int), e["step"].astype(int)
     inside = (b >= 0) & (b < h.K) & (step >= 1) & (step <= h.S)
-    report.require("events", bool(inside.all()), "an event names a bond or a step that is not there")
+    report.require("events", bool(inside.all()), "an event refers to a bond or a step that does not exist")
     if not inside.all():
         return
     report.require(
@@ -214,7 +215,7 @@ def check_events(h, c, p, report):
     point = np.concatenate([point, np.zeros((len(e), 3 - h.D))], 1)
     single = h.single[step - 1]
     off = np.where(single, norm(told - point), 0.0)
-    # of a normal: the rounding of places over the distance, times the lever
+    # round-off of a normal: that of positions over the distance, times the lever
     scale = 2 * (norm(xi) + norm(xj) + h.radius[i])
     report.expect("events", off, tolerances.rounding(scale), lambda k: f"event {k}: place (m)")
     energy, size = stored_energy(h, b, step)
@@ -223,7 +224,7 @@ def check_events(h, c, p, report):
 
 
 def stored_energy(h, b, step):
-    """½ Σ f²/k of bonds `b` that broke in steps `step`: what they held as it began, or at its end with
+    """½ Σ f²/k of bonds `b` that broke in steps `step`: their energy at its start, or at its end with
     `end_of_step`."""
     if h.stiffness is None:
         return np.zeros(len(b)), np.zeros(len(b))
@@ -248,7 +249,8 @@ def energy_of_rows(h, rows):
 
 
 def check_limits_of_events(h, report):
-    """Every event is at its limit, in its cone, and named by the row that is nearest to its limit."""
+    """Every event is at its limit, in its cone, and named by the row that is nearest to its
+    limit."""
     e = h.events
     if len(e) == 0:
         return
@@ -256,7 +258,7 @@ def check_limits_of_events(h, report):
     eps, strength = tolerances.value("limit"), h.strength[b]
     two_columns = "twist" in e.dtype.names
     twist = np.abs(e["twist"]) if two_columns else np.zeros(len(e))
-    # before version 3 `m` is the norm of bending and twist together: less is said of both
+    # before version 3 `m` is the norm of bending and twist together: weaker bounds on both
     mixed = h.moment.shape[1] > 2 and not two_columns
     mu, nu, xi = h.bond_friction[b], h.bond_rolling[b], np.full(len(b), h.xi)
     n, ratio, mode, ratios = failure(e["rn"], e["rt"], e["m"], twist, strength, mu, nu, h.mean_diameter[b], xi)
@@ -273,7 +275,7 @@ def check_limits_of_events(h, report):
     short = np.where(h.event_mode == "TENSION", n - eps * strength, (1 - eps) * n - ratio)
     report.expect("events at their limit", short, slack, describe)
     accepted = h.scene["solver"].get("accept") or 1e-6
-    # reactions lie in their cones, but for what the solver's acceptance leaves
+    # reactions lie in their cones within the solver's tolerance
     judged = (h.event_mode != "TENSION") & ~(moments if mixed else np.zeros(len(e), bool))
     beyond = np.maximum(-n, np.where(judged, ratio - n, 0.0))
     size = largest_reaction(h)[np.clip(e["step"].astype(int) - 1, 0, max(h.S - 1, 0))] + np.abs(e["rn"])
@@ -290,8 +292,8 @@ def check_limits_of_events(h, report):
 
 
 def largest_reaction(h):
-    """Norm of all reactions (N) of each step or of the one before, whichever is larger: what residuals are
-    relative to."""
+    """Norm of all reactions (N) of each step or of the one before, whichever is larger: the scale
+    of residuals."""
     square = np.bincount(h.row_step, h.rn**2 + (h.rt**2).sum(1), minlength=h.S)
     outer, _ = h.external()
     load = np.sqrt((outer**2).sum((1, 2)) + (h.wall_drive_force() ** 2).sum(1))
@@ -300,8 +302,8 @@ def largest_reaction(h):
 
 
 def check_order_of_events(h, report):
-    """Events stand by step and round; rounds of a step begin at 0 and leave none out; in a round as the
-    rule says."""
+    """Events are ordered by step and round; the rounds of a step count from 0 without gaps; within
+    a round the order is that of the rule."""
     e = h.events
     report.margins.setdefault("order of events", 0.0)
     steps = e["step"].astype(int)

@@ -1,8 +1,8 @@
-"""Small scenes, and what is changed of them: the neighbours of the shipped scenes.
+"""Small scenes and changes of them: the neighbours of the shipped scenes.
 
-A *base* is a scene that runs in a second or two. A *change* alters one thing of a base, a *pair* two. The
-same seed gives the same neighbours. All scenes are dictionaries in SI units; `transformed` turns, mirrors,
-shifts or rescales one with its sample.
+A *base* is a scene that runs in a second or two. A *change* alters one thing of a base, a *pair*
+two. The same seed gives the same neighbours. All scenes are dictionaries in SI units; `transformed`
+turns, mirrors, shifts or rescales one with its sample.
 """
 
 import copy
@@ -123,7 +123,7 @@ BASES = {"disks": disks, "spheres": spheres, "beam": beam, "heap": heap, "elasti
 
 
 class Inapplicable(Exception):
-    """The base has not what the change would alter."""
+    """The base lacks the property that the change alters."""
 
 
 def needs(holds):
@@ -355,8 +355,8 @@ CHANGES = {
 
 
 def neighbours(seed):
-    """Neighbours by name: the bases, each single change of each, and pairs of changes drawn with the
-    seed."""
+    """Neighbours by name: the bases, each single change of each, and pairs of changes drawn with
+    the seed."""
     out = {}
     for base in BASES:
         out[base] = neighbour(base)
@@ -385,8 +385,8 @@ def put(out, base, names):
 
 
 def neighbour(name):
-    """The neighbour of this name: a base and its changes, which are made in an order in which each finds
-    what it scales by."""
+    """The neighbour of this name: a base and its changes, in an order in which each change finds
+    the values that it scales."""
     base, *names = name.split(", ")
     scene = BASES[base]()
     # loads and springs follow the strength, which `stress` then takes away
@@ -414,15 +414,14 @@ def moves_walls(scene):
 
 
 def may_have_no_motion(scene):
-    """Whether nothing may give way to a wall that closes in: between walls on all sides, or held by
-    bonds."""
+    """Whether nothing can move out of the way of a closing wall: walls on all sides, or bonds."""
     sides = any(name.startswith("side_") for name in scene["walls"])
     return moves_walls(scene) and (sides or bool(scene.get("bonds")))
 
 
 class Transform:
-    """How a scene is turned about the vertical plane (rad), mirrored, shifted (m), in an order drawn with
-    the seed `permute`, and with units `units` times smaller (length, mass, time)."""
+    """How a scene is turned about the vertical plane (rad), mirrored, shifted (m), in an order
+    drawn with the seed `permute`, and with units `units` times smaller (length, mass, time)."""
 
     def __init__(self, dimension, turn=0.0, mirror=False, permute=None, units=None, shift=None):
         self.length, self.mass, self.time = units or (1.0, 1.0, 1.0)
@@ -445,7 +444,7 @@ class Transform:
         return (unit * (self.R @ np.asarray(x, float))).tolist()
 
     def points(self, points):
-        """Of grains, rows of centre and radius, and their numbers as they were."""
+        """Of grains: rows of centre and radius, and their former numbers."""
         order = np.arange(len(points))
         if self.permute is not None:
             order = np.random.default_rng(self.permute).permutation(len(points))
@@ -490,7 +489,7 @@ class Transform:
 
 
 def transformed(scene, points, **way):
-    """The scene and its sample, rows of centre and radius, turned and so on as `Transform` says.
+    """The scene and its sample, rows of centre and radius, transformed by `Transform`.
 
     Returns the scene without its sample, the points, and a dictionary: the matrix `R` that turned it, the
     `order` in which the grains stand now, and the units of `force` and `length`."""

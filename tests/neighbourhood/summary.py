@@ -31,7 +31,8 @@ def check(h, report, told, text=None):
 
 
 def compare(report, check, name, found, expected):
-    """`found` is `expected`: the same structure, numbers within rounding or within a pair of bounds."""
+    """`found` is `expected`: the same structure, numbers within rounding or within a pair of
+    bounds."""
     if isinstance(expected, dict):
         report.require(
             check, isinstance(found, dict) and set(found) == set(expected), f"{name} is {found}, expected {expected}"
@@ -57,7 +58,7 @@ def compare(report, check, name, found, expected):
 
 
 def recomputed(h, told):
-    """What the summary must say; pairs of numbers are bounds."""
+    """The expected summary; pairs of numbers are bounds."""
     o = h.observed
     last = lambda name: float(o[name][-1]) if h.S and name in o else 0.0
     modes = list(h.event_mode) if h.K else []
@@ -104,7 +105,8 @@ def recomputed(h, told):
 
 
 def of_solves(o, route, newton):
-    """Solved steps, and load errors, of a solver with the settings `newton`; there are none of Gauss–Seidel."""
+    """Solved steps, and load errors, of a solver with the settings `newton`; there are none of
+    Gauss–Seidel."""
     error = o["solver_load_error"][~np.isnan(o["solver_load_error"])]
     tolerance = newton.get("load_tolerance")
     return {
@@ -116,7 +118,7 @@ def of_solves(o, route, newton):
 
 
 def loads(h, told):
-    """The loads of driven walls, as the summary has them."""
+    """The loads of driven walls in the form of the summary."""
     driven = [k for k, (kind, _) in enumerate(h.drives) if kind != "fixed"]
     walls = {h.wall_names[k]: wall_loads(h, k, "driven_walls" in told) for k in driven}
     none = {"first_break": None, "collapse": [None, None], "early": [False, False], "broken_share": None}
@@ -140,8 +142,8 @@ def loads(h, told):
 
 
 def load_of(h, k):
-    """Load (N) of the driven wall `k` in every step: prescribed, or what it took against the grains before
-    a bond broke."""
+    """Load (N) of the driven wall `k` in every step: the prescribed force, or its force on the
+    grains before a bond broke."""
     kind, function = h.drives[k]
     if kind == "force":
         parts = h.observed.get("substeps")
@@ -186,7 +188,8 @@ def wall_loads(h, k, new):
 
 
 def check_ending(h, report, told):
-    """Why the run ended: at its time, or at the first step in which a condition of the scene holds."""
+    """Why the run ended: at its time, or at the first step in which a condition of the scene
+    holds."""
     stop, ending = h.scene.get("stop") or {}, told["ending"]
     holds = {}
     broken = h.observed["bonds_broken"] if h.K else np.zeros(h.S)
@@ -219,7 +222,8 @@ def check_ending(h, report, told):
 
 
 def text_lines(h, told):
-    """The numbers that each line of the text shows, by its label; nothing for a line without one."""
+    """The numbers that each line of the text shows, by its label; nothing for a line without
+    one."""
     f, K = told["failure"], told["bonds"]
     new = "solved_steps" in told
     per_step = lambda n: n / max(told["solved_steps" if new else "steps"], 1)
@@ -268,7 +272,7 @@ def load_lines(h, told, failure):
 
 
 def line_of_wall(told, wall):
-    """The numbers of the line of one of several driven walls; none that is a dash is looked for."""
+    """The numbers of the line of one of several driven walls; dashes are skipped."""
     numbers, failure = [], wall["failure"]
     if told["bonds"]:
         numbers += [failure["first_break"]]
@@ -296,7 +300,8 @@ def check_text(h, report, told, text):
 
 
 def match_line(report, label, rest, numbers):
-    """The numbers of a line, in order, to the digits that it prints. Names of walls are no numbers."""
+    """The numbers of a line, in order, to the digits that it prints. Names of walls are no
+    numbers."""
     plain = re.sub(r"\(?\bwall [\w-]+\)?", "", rest)
     found = [m.group() for m in NUMBER.finditer(plain)]
     for number in numbers:

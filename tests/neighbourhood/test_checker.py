@@ -1,4 +1,4 @@
-"""The checker finds what is spoilt: one number of a good history is altered, and the check that it concerns
+"""The checker finds errors: one number of a good history is altered, and the check of this number
 must fail."""
 
 import copy
@@ -20,8 +20,8 @@ DRY = {"density": 2500, "friction": {"grain_grain": 0.3, "grain_wall": 0.2}}
 
 
 def pressed(**changes):
-    """A few cemented disks of several sizes under a plate, until most bonds are broken; side walls are far
-    away."""
+    """A few cemented disks of several sizes under a plate, until most bonds are broken; side walls
+    are far away."""
     scene = {
         "dimension": 2,
         "seed": 3,
@@ -115,14 +115,15 @@ SCENES = {
 
 
 class Good:
-    """A good run, and where in it there is something to spoil."""
+    """A good run, and places in it that can be altered."""
 
     def __init__(self, path, told, text):
         self.path, self.told, self.text = path, told, text
         self.h = History(path)
 
     def row(self, holds):
-        """A row of contacts for which `holds` (an array) is true: the one that carries most."""
+        """A row of contacts for which `holds` (an array) is true: the one with the largest
+        reaction."""
         return int(np.argmax(np.where(holds, np.abs(self.h.rn) + 1e-300, -1.0)))
 
     def slipping(self):
@@ -134,7 +135,7 @@ class Good:
         return self.row(self.h.status == "STICK")
 
     def bonded(self):
-        """A row of a bond that holds."""
+        """A row of an intact bond."""
         h = self.h
         return self.row((h.bond >= 0) & (h.bond_status[h.row_step + 1, h.bond] == "INTACT"))
 
@@ -224,7 +225,7 @@ def apart(good):
 
 other_mode = lambda mode: 1 if mode != 1 else 2
 
-# scene, what is spoilt, how, the check that must fail
+# scene, what is altered, how, the check that must fail
 SPOILT = (
     [
         ("pressed", "a frame's time", add("contacts/time", lambda g: 30), "time"),
@@ -625,10 +626,10 @@ def test_every_check_has_a_history_that_it_fails(good):
 
 
 def stopped(stiffness, friction):
-    """Two bonded disks that a force of one step makes turn, by 0.1 rad a step, until two fixed ones stop them; a fast
-    one that bounces off a wall makes the fifth step in parts."""
+    """Two bonded disks that a force of one step makes turn, by 0.1 rad a step, until two fixed ones
+    stop them; a fast one that bounces off a wall makes the fifth step in parts."""
     r, h = 1e-2, 1e-3
-    # what turns with them has half as much inertia again
+    # bodies that turn with them have half as much inertia again
     force = (1.5 if friction else 1.0) * 2500 * np.pi * r**2 * 0.1 * r / h**2
     pulse = {"table": [[0.0, 1.0], [h, 1.0], [1.01 * h, 0.0]]}
     grains = [

@@ -1,8 +1,8 @@
-"""One sample as it is, turned, mirrored, shifted, in other units and in other orders breaks the same bond
-in the same step.
+"""One sample as it is, turned, mirrored, shifted, in other units and in other orders breaks the
+same bond in the same step.
 
-The forces of the step before are the same within 1e-6 of the largest: positions differ by rounding, and
-reactions are those of the stiff limit, which is unique.
+The forces of the step before are the same within 1e-6 of the largest: positions differ by rounding,
+and reactions are those of the stiff limit, which is unique.
 """
 
 import numpy as np
@@ -35,8 +35,8 @@ def scene_of(dimension, restitution):
 
 
 class FirstBreak:
-    """Step and pairs of the first break, and the forces of all pairs in the step before, turned back to the
-    sample as it is."""
+    """Step and pairs of the first break, and the forces of all pairs in the step before, turned
+    back to the sample as it is."""
 
     def __init__(self, path, how):
         h = History(path)
@@ -57,7 +57,7 @@ class FirstBreak:
 
 
 def first_break(scene, way, folder, name):
-    """The first break of a scene whose sample is turned and so on this way."""
+    """The first break of a scene with its sample transformed in this way."""
     plain = {**scene}
     points = run.sample_of(scenes.disks if scene["dimension"] == 2 else scenes.spheres, folder, programs.dem_run())
     scene, points, how = scenes.transformed(plain, points, **way)

@@ -1,4 +1,5 @@
-"""The quick part of the neighbours: a few of them, right to the last number. All of them: run.py."""
+"""The quick part of the neighbours: a few of them, right to the last number. All of them:
+run.py."""
 
 import argparse
 import time
@@ -27,8 +28,8 @@ def test_a_neighbour_is_right(name, folder):
     assert not known["cut"], f"cut off after {known['cpu']:.0f} s"
 
 
-# walls that close on what cannot give way: rows of disks between two plates, a grain between two walls, a
-# box that shrinks
+# walls that close on bodies that cannot move away: rows of disks between two plates, a grain
+# between two walls, a box that shrinks
 def squeezed(bonded):
     """A square lattice of disks under a plate that comes down, on another."""
     scene = {

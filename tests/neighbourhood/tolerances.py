@@ -1,5 +1,5 @@
-"""Every tolerance of the checker, in one place. A tolerance without a unit is relative to the scale that
-its text names.
+"""Every tolerance of the checker, in one place. A tolerance without a unit is relative to the scale
+that its text names.
 
 Two scales recur. *Rounding*: `ROUNDING` units in the last place of the absolute values of all summands.
 *Solver*: the residual that the history records for the step, times the norm of the reactions or of the

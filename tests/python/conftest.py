@@ -22,7 +22,8 @@ def built(*what):
 
 @pytest.fixture(scope="session")
 def programs():
-    """The paths of `dem-run` and `dem-post`: `scripts/test` says where they are, or they are built."""
+    """The paths of `dem-run` and `dem-post`: `scripts/test` says where they are, or they are
+    built."""
     if "DEM_PROGRAMS" in os.environ:
         return {name: Path(os.environ["DEM_PROGRAMS"]) / name for name in ("dem-run", "dem-post")}
     return built("-p", "dem-run", "-p", "dem-post")

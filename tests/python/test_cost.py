@@ -1,7 +1,7 @@
-"""What a scene does not use costs nothing: instructions and bytes of a contact, counted, not timed.
+"""Unused features cost nothing: instructions and bytes of a contact are counted, not timed.
 
 `dem-core/examples/cost.rs` runs one scene with each feature; valgrind counts. The figures of `cost.json` were counted with
-the compiler that it names; `DEM_RECORD=1 .venv/bin/python -m pytest tests/python/test_cost.py` counts them anew.
+the compiler that it names; `DEM_RECORD=1 .venv/bin/python -m pytest tests/python/test_cost.py` counts them again.
 """
 
 import json
@@ -44,7 +44,8 @@ def counted(program, grains, feature, what, times):
 
 @pytest.fixture(scope="module")
 def cost(program):
-    """Bytes of a contact, and instructions of a contact in a sweep and in a step of 20 sweeps, for each feature."""
+    """Bytes of a contact, and instructions of a contact in a sweep and in a step of 20 sweeps, for
+    each feature."""
 
     def measured(of):
         grains, feature = of
@@ -62,8 +63,9 @@ def cost(program):
     return cost
 
 
-# Instructions and bytes of a contact without friction over those of a dry one, and of that over those of a bond. Of spheres they
-# are smaller than asked for, and held near what was counted (0.316 since dry spheres take 5 % fewer instructions).
+# Instructions and bytes of a contact without friction over those of a dry one, and of that over
+# those of a bond. Of spheres they are smaller than required, and limited to near the counted value
+# (0.316 since dry spheres take 5 % fewer instructions).
 LIMITS = {"disks": [0.5, 0.6, 0.7, 0.7], "spheres": [0.32, 0.6, 0.7, 0.55]}
 
 
@@ -88,7 +90,8 @@ def test_nothing_costs_more_than_it_did(cost):
                 assert cost[grains][feature][what] <= 1.02 * figure, (grains, feature, what)
 
 
-# what docs/cost.md calls the rows of its first table; those of spheres whose bonds resist twist say that too
+# names of the rows of the first table of docs/cost.md; rows of spheres whose bonds resist twist
+# name that too
 NAMES = {
     "frictionless": "of {grains}, without friction",
     "dry": "dry",

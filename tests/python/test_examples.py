@@ -1,4 +1,5 @@
-"""The examples of docs/examples, which docs/history.md shows, do what they say on a real history."""
+"""The examples of docs/examples, which docs/history.md shows, work as described on a real
+history."""
 
 import subprocess
 import sys

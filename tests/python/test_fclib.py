@@ -29,7 +29,7 @@ def check(path):
         u, r = solution["u"][:], solution["r"][:]
         associated = file["cohesive_dem/associated"][:]
         assert local["W/p"].dtype == numpy.int32 and local["W/x"].dtype == numpy.float64
-        # who does not look there solves another problem
+        # without these data it is another problem
         assert not associated.any() or b"associated" in local["info/description"][()]
     assert numpy.allclose(matrix, matrix.T, rtol=0, atol=1e-12 * abs(matrix).max())
     assert numpy.linalg.eigvalsh(matrix).min() >= -1e-12 * abs(matrix).max()
@@ -40,7 +40,7 @@ def check(path):
     tangents = (size - 1) // 2 if rolling else size - 1
     groups = slice(1, 1 + tangents), slice(1 + tangents, None)
     (rt, rm), (ut, um) = ([numpy.linalg.norm(v[:, group], axis=1) for group in groups] for v in (r, u))
-    # the scene's solver may miss its aim, up to solver.accept = 1e-6
+    # the scene's solver may miss its tolerance, up to solver.accept = 1e-6
     force, speed = 1e-6 * numpy.linalg.norm(r), 1e-6 * scale
     assert (r[:, 0] >= -force).all()
     assert (rt <= mu * r[:, 0] + force).all() and (rm <= mu_r * r[:, 0] + force).all()
@@ -63,7 +63,8 @@ def test_the_collection(path):
 
 
 def random_problem(path, seed, rolling):
-    """Chains of bodies that branch, written as FCLIB's header says: W as triplets, columns or rows."""
+    """Chains of bodies that branch, written as FCLIB's header says: W as triplets, columns or
+    rows."""
     draw = numpy.random.default_rng(seed)
     bodies, contacts, size = 20, 19, 5 if rolling else 3
     mass, radius = draw.uniform(0.5, 2, bodies), draw.uniform(0.5, 1, bodies)

@@ -1,6 +1,7 @@
-"""docs/history.md says what a history holds, and its examples do what they say.
+"""docs/history.md describes the content of a history, and its examples work as described.
 
-Of a section with several examples the last one is run here; the others are files of docs/examples, see test_examples.
+Of a section with several examples the last one is run here; the others are files of docs/examples,
+see test_examples.
 """
 
 import re

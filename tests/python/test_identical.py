@@ -1,4 +1,4 @@
-"""What must not change a bit: a second run, another number of threads, a sample read back from its file."""
+"""Equal bits: a second run, another number of threads, a sample read back from its file."""
 
 import json
 import os
@@ -12,7 +12,7 @@ SCENE = ROOT / "configs/compression.json"
 
 
 def content(path):
-    """Every object of a history with its bytes and attributes, but what tells of the run and its clock."""
+    """Every object of a history with its bytes and attributes, except data about host and clock."""
     found = {}
 
     def enter(name, item):
@@ -41,7 +41,8 @@ def assert_identical(one, other):
 
 @pytest.fixture(scope="module")
 def runs(compression, dem_run, tmp_path_factory):
-    """The same run over and over, as many at a time as there are cores: by name, its folder with compression.h5."""
+    """The same run over and over, as many at a time as there are cores: by name, its folder with
+    compression.h5."""
     folders = {name: tmp_path_factory.mktemp("run") for name in ["packed", "second", "1", "2", "3", "read"]}
 
     def again(name, *options):
@@ -62,7 +63,8 @@ def runs(compression, dem_run, tmp_path_factory):
 
 @pytest.mark.parametrize("other", ["second", "1", "2", "3", "packed", "read"])
 def test_a_run_is_the_same_again(compression, runs, other):
-    """Run once more, with any number of threads, writing its sample, and with that sample read back."""
+    """Run once more, with any number of threads, writing its sample, and with that sample read
+    back."""
     assert_identical(compression / "compression.h5", runs[other] / "compression.h5")
 
 

@@ -1,4 +1,5 @@
-"""What VTK, pyvista and MDAnalysis read through the companions of `dem-post view` is what the history holds."""
+"""VTK, pyvista and MDAnalysis read the values of the history through the companions of `dem-post
+view`."""
 
 import json
 import shutil
@@ -28,7 +29,7 @@ FLAT = {
     "time": {"step": 1e-3, "end": 0.1},
     "output": {"every_steps": 5},
 }
-# the same in space, without bonds
+# the same in 3D, without bonds
 SPACE = FLAT | {
     "dimension": 3,
     "sample": {
@@ -42,7 +43,7 @@ SPACE = FLAT | {
     "gravity": [0, 0, -9.81],
 }
 del SPACE["bonds"]
-# the plane again, in single precision, and without reactions
+# 2D again, in single precision and without reactions
 SINGLE = FLAT | {"output": {"every_steps": 5, "precision": "single"}}
 LESS = FLAT | {"output": {"every_steps": 5, "reactions": False}}
 # nothing that could touch
@@ -164,7 +165,7 @@ def test_vtk_reads_bonds(scene):
             ends = mesh.points[mesh.lines.reshape(-1, 3)[:, 1:]]
             assert (ends == padded(history["particles/grains/position/value"][k])[bonds["pair"][:]]).all()
             states.update(mesh["status"])
-        # it holds, and it breaks
+        # intact, then broken
         assert len(states) > 1
 
 

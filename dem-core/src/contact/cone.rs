@@ -171,13 +171,13 @@ impl Cone {
         let (slip, bend) = (q.t.norm(), q.m.bending());
         // an active group contributes pull − stiff n, with pull = coefficient × norm and stiff =
         // coefficient² × weight
-        let slip = Group { pull: self.mu * slip, stiff: self.mu * self.mu * w.t };
-        let bend = Group { pull: self.nu * bend, stiff: self.nu * self.nu * w.m };
+        let slip = RowGroup { pull: self.mu * slip, stiff: self.mu * self.mu * w.t };
+        let bend = RowGroup { pull: self.nu * bend, stiff: self.nu * self.nu * w.m };
         let mut n = root(w.n, q.n, slip, bend);
         if B::TWISTS {
             // the left side is the minimum of two increasing functions, without and with the twist
             // row at its limit: its root is the larger of their roots
-            let twist = Group { pull: self.xi * q.m.twist(), stiff: self.xi * self.xi * w.w };
+            let twist = RowGroup { pull: self.xi * q.m.twist(), stiff: self.xi * self.xi * w.w };
             n = n.max(root(w.n + twist.stiff, q.n - twist.pull, slip, bend));
         }
         if n <= 0.0 {
@@ -193,7 +193,7 @@ impl Cone {
 
 /// The contribution (pull − stiff n)⁺ of a row group to the equation of r_n.
 #[derive(Clone, Copy)]
-struct Group {
+struct RowGroup {
     pull: f64,
     stiff: f64,
 }
@@ -204,7 +204,7 @@ struct Group {
 /// at their limit, so the root is the largest of the four roots. Selecting the set by comparison
 /// would depend on round-off at a kink.
 #[inline(always)]
-fn root(w: f64, q: f64, t: Group, m: Group) -> f64 {
+fn root(w: f64, q: f64, t: RowGroup, m: RowGroup) -> f64 {
     let [none, slips] = [-q / w, (t.pull - q) / (w + t.stiff)];
     let [bends, both] = [(m.pull - q) / (w + m.stiff), (t.pull + m.pull - q) / (w + t.stiff + m.stiff)];
     none.max(slips).max(bends).max(both)

@@ -22,7 +22,7 @@ use std::sync::Arc;
 /// The law of a dry contact in dimension D.
 pub type Dry<D> = Coulomb<<D as Dim>::Slide>;
 /// The law of an intact rigid bond in dimension D.
-pub type Bond<D> = Bonded<<D as Dim>::Tangent, <D as Dim>::Moment>;
+pub type RigidBond<D> = Bonded<<D as Dim>::Tangent, <D as Dim>::Moment>;
 /// The law of an intact elastic bond in dimension D.
 pub type ElasticBond<D> = Elastic<<D as Dim>::Tangent, <D as Dim>::Moment>;
 
@@ -50,7 +50,7 @@ pub struct ContactProblem<D: Dim> {
     /// Free velocities v_f (m/s) and spins (rad/s) of the nodes.
     pub free: Arc<[(D::Vector, D::Spin)]>,
     /// Intact rigid bonds.
-    pub bonded: Group<D, Bond<D>>,
+    pub bonded: Group<D, RigidBond<D>>,
     /// Intact elastic bonds.
     pub elastic: Group<D, ElasticBond<D>>,
     /// Dry contacts with friction.

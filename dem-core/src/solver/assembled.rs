@@ -13,26 +13,26 @@ use crate::problem::assembled::Assembled;
 use crate::solver::tuning::gauss_seidel as tuning;
 use nalgebra::SMatrix;
 
-type Block = SMatrix<f64, PADDED, PADDED>;
+type PaddedMatrix = SMatrix<f64, PADDED, PADDED>;
 
 /// The block of a contact, padded, with the data of its local solve.
-struct Site {
-    block: Block,
+struct LocalProblem {
+    block: PaddedMatrix,
     /// Inverse on the rows that are not zero, if the block has one.
-    inverse: Option<Block>,
+    inverse: Option<PaddedMatrix>,
     gamma: f64,
 }
 
 /// Data of all local solves of a problem, computed once.
-pub(super) struct Sites(Vec<Site>);
+pub(super) struct LocalProblems(Vec<LocalProblem>);
 
-impl Site {
+impl LocalProblem {
     fn new(problem: &Assembled, contact: usize, scale: f64) -> Self {
         let parts = problem.parts();
         let (rows, values) = (parts.rows, parts.matrix.diagonal(contact));
         let size = rows.count();
         let place = |k: usize| if k > rows.tangents { k - rows.tangents + 2 } else { k };
-        let mut block = Block::zeros();
+        let mut block = PaddedMatrix::zeros();
         for (k, w) in values.iter().enumerate() {
             block[(place(k / size), place(k % size))] = *w;
         }
@@ -82,19 +82,19 @@ impl Site {
 
 /// Non-linear Gauss–Seidel, from the reactions that the problem holds.
 pub fn gauss_seidel(problem: &mut Assembled, settings: &GaussSeidelSettings) -> SolveReport {
-    let sites = Sites::of(problem);
-    iterate(&mut Visited { problem, sites: &sites }, settings)
+    let locals = LocalProblems::of(problem);
+    iterate(&mut Visited { problem, locals: &locals }, settings)
 }
 
 /// A problem with the data of its local solves.
 struct Visited<'a> {
     problem: &'a mut Assembled,
-    sites: &'a Sites,
+    locals: &'a LocalProblems,
 }
 
 impl Sweepable for Visited<'_> {
     fn sweep(&mut self, local: LocalSolve) {
-        self.sites.sweep(self.problem, local);
+        self.locals.sweep(self.problem, local);
     }
 
     /// Nothing: velocities are computed from W when they are needed.
@@ -113,20 +113,20 @@ impl Sweepable for Visited<'_> {
     }
 }
 
-impl Sites {
+impl LocalProblems {
     pub(super) fn of(problem: &Assembled) -> Self {
         let scales = problem.scales().into_iter().enumerate();
-        Self(scales.map(|(c, scale)| Site::new(problem, c, scale)).collect())
+        Self(scales.map(|(c, scale)| LocalProblem::new(problem, c, scale)).collect())
     }
 
     /// One visit of every contact.
     pub(super) fn sweep(&self, problem: &mut Assembled, local: LocalSolve) {
         let (rows, size) = (problem.parts().rows, problem.parts().rows.count());
-        for (c, site) in self.0.iter().enumerate() {
+        for (c, data) in self.0.iter().enumerate() {
             let (r, u) = (problem.reaction(c), problem.velocity(c));
             let r = match local {
-                LocalSolve::Exact => site.exact(problem, c, r, u),
-                LocalSolve::PredictorCorrector => r + problem.correction(c, site.gamma, r, u),
+                LocalSolve::Exact => data.exact(problem, c, r, u),
+                LocalSolve::PredictorCorrector => r + problem.correction(c, data.gamma, r, u),
             };
             rows.write(&r, &mut problem.r[c * size..(c + 1) * size]);
         }

@@ -1,7 +1,7 @@
 //! A problem given by its matrix W, as a [`Solvable`]: its rows have no coefficients and no
 //! unknowns, and the methods use W itself ([`Solvable::matrix`]).
 
-use super::assembled::{Sites, gauss_seidel};
+use super::assembled::{LocalProblems, gauss_seidel};
 use super::rows::{Row, Rows, StiffnessRatio, places};
 use super::solvable::Solvable;
 use super::{GaussSeidelSettings, SolveReport};
@@ -38,7 +38,7 @@ impl Solvable for Assembled {
                 cone: self.cone(c),
                 associated: parts.associated[c],
                 // a matrix tells no more of a bond
-                breaks: parts.shift[c] > 0.0,
+                is_bond: parts.shift[c] > 0.0,
                 shift: parts.shift[c],
                 given: rows.padded(&given),
                 weights,
@@ -69,7 +69,7 @@ impl Solvable for Assembled {
     }
 
     fn swept(&mut self, sweeps: usize) -> Vec<Padded> {
-        let sites = Sites::of(self);
+        let sites = LocalProblems::of(self);
         for _ in 0..sweeps {
             sites.sweep(self, LocalSolve::Exact);
         }

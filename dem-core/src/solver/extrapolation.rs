@@ -39,7 +39,7 @@ pub(super) struct Extrapolation {
     moves: f64,
     /// Whether the last step was extrapolated. The reactions of the next solve then include the
     /// momentum that it left, and say nothing about the growth.
-    kicked: bool,
+    last_extrapolated: bool,
     /// Back-off after failed extrapolations.
     backoff: Backoff,
 }
@@ -70,7 +70,7 @@ impl Extrapolation {
             && velocity_error(problem) <= load_tolerance
             && self.keeps_status();
         if holds && !problem.is_at_limit() {
-            (self.steps, self.left, self.kicked) = (self.steps + 1, self.left - 1, true);
+            (self.steps, self.left, self.last_extrapolated) = (self.steps + 1, self.left - 1, true);
             self.backoff.forget();
             return Some((residual, load_error));
         }
@@ -91,7 +91,7 @@ impl Extrapolation {
             *self = Self { shape, base: solution, rate, margins, margin_rate, backoff, ..Self::default() };
             return;
         }
-        if std::mem::take(&mut self.kicked) {
+        if std::mem::take(&mut self.last_extrapolated) {
             self.steps += 1;
             self.left = 0;
             return;
@@ -136,7 +136,7 @@ impl Extrapolation {
     pub fn save(&self, to: &mut Saved) {
         self.shape.iter().for_each(|n| to.count(*n));
         [self.steps, self.most, self.left].iter().for_each(|n| to.count(*n as usize));
-        to.flag(self.kicked);
+        to.flag(self.last_extrapolated);
         self.backoff.save(to);
         to.real(self.moves);
         for (base, rate) in [(&self.base, &self.rate), (&self.margins, &self.margin_rate)] {
@@ -155,13 +155,13 @@ impl Extrapolation {
         if most > tuning::MOST || left > most || steps > tuning::MOST + 1 {
             return Err(Mismatch);
         }
-        let (kicked, backoff, moves) = (from.flag()?, Backoff::restored(from)?, from.real()?);
+        let (last_extrapolated, backoff, moves) = (from.flag()?, Backoff::restored(from)?, from.real()?);
         let mut pair = || {
             let n = from.number_of()?;
             Ok((from.reals(n)?.to_vec(), from.reals(n)?.to_vec()))
         };
         let ((base, rate), (margins, margin_rate)) = (pair()?, pair()?);
-        Ok(Self { shape, base, rate, margins, margin_rate, steps, most, left, moves, kicked, backoff })
+        Ok(Self { shape, base, rate, margins, margin_rate, steps, most, left, moves, last_extrapolated, backoff })
     }
 }
 

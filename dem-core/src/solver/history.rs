@@ -23,13 +23,13 @@ use std::sync::Arc;
 /// if the matrix is singular.
 pub(super) fn history(rows: &Rows, graph: &mut Option<Arc<Graph>>) -> Vec<Padded> {
     let all: Vec<Padded> = rows.list.iter().map(|row| row.multiplier).collect();
-    let is_bond = |row: &Row| row.breaks && row.compliance.n == 0.0;
-    let Some(graph) = rows.list.iter().any(is_bond).then(|| Graph::of(rows, graph)).flatten() else { return all };
+    let is_rigid_bond = |row: &Row| row.is_bond && row.compliance.n == 0.0;
+    let Some(graph) = rows.list.iter().any(is_rigid_bond).then(|| Graph::of(rows, graph)).flatten() else { return all };
     let stiff = stiffness(rows);
     let mut lu = Lu::default();
     let made = lu.factorise(&graph.tree, |e, out| {
         let row = &rows.list[graph.contacts[e]];
-        if is_bond(row) {
+        if is_rigid_bond(row) {
             let every: Vec<usize> = (0..row.rows.len()).collect();
             let weights = row.weights.in_order();
             let entry = |i: usize, j: usize| if i == j { stiff / weights[row.rows[i]] } else { 0.0 };
@@ -40,18 +40,22 @@ pub(super) fn history(rows: &Rows, graph: &mut Option<Arc<Graph>>) -> Vec<Padded
         return all;
     }
     let mut pushed = vec![0.0; rows.unknowns];
-    rows.list.iter().zip(&all).filter(|(row, _)| is_bond(row)).for_each(|(row, r)| rows.apply(row, r, &mut pushed));
+    rows.list
+        .iter()
+        .zip(&all)
+        .filter(|(row, _)| is_rigid_bond(row))
+        .for_each(|(row, r)| rows.apply(row, r, &mut pushed));
     // one step of refinement removes the effect of the identity
     let mut moved = vec![0.0; rows.unknowns];
     for _ in 0..2 {
         let mut left = pushed.clone();
-        for row in rows.list.iter().filter(|row| is_bond(row)) {
+        for row in rows.list.iter().filter(|row| is_rigid_bond(row)) {
             rows.apply(row, &(stiffened(rows, row, stiff, &moved) * -1.0), &mut left);
         }
         lu.solve(&graph.tree, &mut left);
         moved.iter_mut().zip(&left).for_each(|(x, d)| *x += d);
     }
-    let history = |(row, r): (&Row, Padded)| if is_bond(row) { stiffened(rows, row, stiff, &moved) } else { r };
+    let history = |(row, r): (&Row, Padded)| if is_rigid_bond(row) { stiffened(rows, row, stiff, &moved) } else { r };
     rows.list.iter().zip(all).map(history).collect()
 }
 
@@ -96,7 +100,7 @@ mod tests {
                     rows: places(1, 1),
                     cone: Cone { mu: 0.3, nu: 0.3, xi: 0.0 },
                     associated: true,
-                    breaks: true,
+                    is_bond: true,
                     shift: 1.0,
                     given: Padded::zero(),
                     weights: Weights { n: 1.0, t: 2.0, m: 12.0, w: 1.0 },
@@ -138,7 +142,7 @@ mod tests {
     #[test]
     fn dry_contacts_keep_their_reactions() {
         let mut rows = network();
-        rows.list[3].breaks = false;
+        rows.list[3].is_bond = false;
         let after = history(&rows, &mut None);
         assert_eq!(after[3], rows.list[3].multiplier);
         assert_ne!(after[4], rows.list[4].multiplier);

@@ -59,7 +59,7 @@ pub(super) struct Row {
     pub cone: Cone,
     pub associated: bool,
     /// Whether it is a bond.
-    pub breaks: bool,
+    pub is_bond: bool,
     /// Shift of the normal reaction (N s).
     pub shift: f64,
     /// Relative velocity due to given velocities, with the bias (m/s).
@@ -483,7 +483,7 @@ impl<D: Dim> Visitor<D> for Flatten<'_, D> {
             rows,
             cone: c.law.cone(),
             associated: c.law.associated(),
-            breaks: c.law.breaks(),
+            is_bond: c.law.breaks(),
             shift: c.law.shift() / unit,
             given,
             weights: self.ratio.weights(soft),

@@ -102,9 +102,9 @@ impl StagedSettings {
     /// Report of a solve with this residual, load error and velocity error.
     pub(super) fn report(&self, work: Work, residual: f64, load_error: f64, velocity_error: f64) -> SolveReport {
         // with a residual of zero only round-off still changes
-        let settled = load_error.max(velocity_error) <= self.load_tolerance || residual == 0.0;
+        let load_converged = load_error.max(velocity_error) <= self.load_tolerance || residual == 0.0;
         let status = match SolveStatus::of(residual, self.tolerance, self.accept) {
-            SolveStatus::Converged if !settled => SolveStatus::Accepted,
+            SolveStatus::Converged if !load_converged => SolveStatus::Accepted,
             status => status,
         };
         SolveReport { status, route: Route::ActiveSet, work, residual, load_error: Some(load_error) }
@@ -179,7 +179,7 @@ impl Staged {
         let start = (!is_cold(rows)).then_some(&begun[..]);
         // bonds break by the load that they bear and need minimum-energy reactions; dry contacts
         // need only reactions that balance
-        let least = problem.matrix().is_none() && rows.list.iter().any(|row| row.breaks);
+        let least = problem.matrix().is_none() && rows.list.iter().any(|row| row.is_bond);
         let aims = self.aims(least);
         let graph = &mut self.newton.graph;
         let mut best = self.interior.solve(problem, rows, graph, &anchor, start, aims);

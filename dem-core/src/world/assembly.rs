@@ -3,7 +3,7 @@
 
 use super::World;
 use super::motion::{Midpoint, Motion, Turn};
-use super::touch::{Kept, Touch, TouchStatus};
+use super::touch::{StoredTouch, Touch, TouchStatus};
 use crate::body::{Grains, direction, separation};
 use crate::bond::{Bond, BondStatus};
 use crate::contact::{Arms, Bonded, Coulomb, Elastic, Frictionless, Law, Local};
@@ -77,19 +77,27 @@ impl<D: Dim> World<D> {
     }
 
     /// A contact with its geometry at mid-step.
-    pub(super) fn touch(&self, mid: &Midpoint<D>, kept: &Kept<D>) -> Touch<D> {
-        let (gap, normal, point) = self.geometry(mid, kept.pair);
-        let frame = D::with_tangents(normal, &kept.tangents);
-        Touch { pair: kept.pair, frame, point, gap, bond: kept.bond(), reaction: kept.reaction, status: kept.status }
+    pub(super) fn touch(&self, mid: &Midpoint<D>, stored: &StoredTouch<D>) -> Touch<D> {
+        let (gap, normal, point) = self.geometry(mid, stored.pair);
+        let frame = D::with_tangents(normal, &stored.tangents);
+        Touch {
+            pair: stored.pair,
+            frame,
+            point,
+            gap,
+            bond: stored.bond(),
+            reaction: stored.reaction,
+            status: stored.status,
+        }
     }
 
     /// All contacts of the step, sorted by pair, with the reactions of the last step as warm start.
-    pub(super) fn detect(&mut self, mid: &Midpoint<D>, motion: &Motion<D>, h: f64) -> Vec<Kept<D>> {
+    pub(super) fn detect(&mut self, mid: &Midpoint<D>, motion: &Motion<D>, h: f64) -> Vec<StoredTouch<D>> {
         self.refresh_candidates(mid, motion, h);
-        let mut touches: Vec<Kept<D>> = Vec::with_capacity(self.kept.len() + self.kept.len() / 8 + 16);
+        let mut touches: Vec<StoredTouch<D>> = Vec::with_capacity(self.stored.len() + self.stored.len() / 8 + 16);
         let intact = |b: &Bond| b.status == BondStatus::Intact;
         for (k, bond) in self.bonds.iter().enumerate().filter(|(_, b)| intact(b)) {
-            touches.push(Kept::new(bond.pair, Some(k as u32)));
+            touches.push(StoredTouch::new(bond.pair, Some(k as u32)));
         }
         let mut bonded = self.bonds.iter().filter(|b| intact(b)).map(|b| b.pair).peekable();
         for &pair in &self.candidates.pairs {
@@ -102,7 +110,7 @@ impl<D: Dim> World<D> {
             let closing = -(approach[0] - approach[1]).dot(&normal);
             let near = NEAR * self.grains.radius[pair[0] as usize];
             if gap <= near + 2.0 * h * closing.max(0.0) {
-                touches.push(Kept { wide: self.is_wide(pair, gap), ..Kept::new(pair, None) });
+                touches.push(StoredTouch { wide: self.is_wide(pair, gap), ..StoredTouch::new(pair, None) });
             }
         }
         touches.sort_by_key(|t| t.pair);
@@ -111,8 +119,8 @@ impl<D: Dim> World<D> {
     }
 
     /// Copy the reactions of the last step; the frame of each contact turns with its normal.
-    fn recall(&self, mid: &Midpoint<D>, touches: &mut [Kept<D>]) {
-        let mut old = self.kept.iter().peekable();
+    fn recall(&self, mid: &Midpoint<D>, touches: &mut [StoredTouch<D>]) {
+        let mut old = self.stored.iter().peekable();
         for touch in touches {
             while old.next_if(|o| o.pair < touch.pair).is_some() {}
             let last = old.peek().filter(|o| o.pair == touch.pair);
@@ -125,19 +133,25 @@ impl<D: Dim> World<D> {
             }
             if let Some(o) = same {
                 (touch.reaction, touch.yielded) = (o.reaction, o.yielded);
-                touch.held = o.bond().is_some();
+                touch.was_bonded = o.bond().is_some();
             }
         }
     }
 
     /// State of the bonds at the start of a step of length `h`.
-    pub(super) fn brought(&self, mid: &Midpoint<D>, touches: &[Kept<D>], motion: &Motion<D>, h: f64) -> Brought<D> {
+    pub(super) fn brought(
+        &self,
+        mid: &Midpoint<D>,
+        touches: &[StoredTouch<D>],
+        motion: &Motion<D>,
+        h: f64,
+    ) -> Brought<D> {
         Brought { carried: self.carried(touches), turns: self.turns(mid, touches, motion, h) }
     }
 
     /// Reactions (N, N m) of elastic bonds at the start of a step, by bond index; empty if all
     /// bonds are rigid.
-    fn carried(&self, touches: &[Kept<D>]) -> Vec<Local<D::Tangent, D::Moment>> {
+    fn carried(&self, touches: &[StoredTouch<D>]) -> Vec<Local<D::Tangent, D::Moment>> {
         if self.bonds.iter().all(|b| b.stiffness.is_none()) {
             return Vec::new();
         }
@@ -161,7 +175,13 @@ impl<D: Dim> World<D> {
 
     /// Pairs that the problem lacks and that its velocities would close. The step adds them and
     /// solves again.
-    pub(super) fn missed(&mut self, mid: &Midpoint<D>, touches: &[Kept<D>], nodes: &Nodes<D>, h: f64) -> Vec<Kept<D>> {
+    pub(super) fn missed(
+        &mut self,
+        mid: &Midpoint<D>,
+        touches: &[StoredTouch<D>],
+        nodes: &Nodes<D>,
+        h: f64,
+    ) -> Vec<StoredTouch<D>> {
         let way = |k: usize| h * nodes.all[k].velocity.norm();
         // enough for the next step too
         let spare = |k: usize| (SPARE * radius_of(&self.grains, k)).max(0.5 * way(k));
@@ -177,7 +197,7 @@ impl<D: Dim> World<D> {
             let [i, j] = pair.map(|k| nodes.all[k as usize].velocity);
             if gap + h * (i - j).dot(&normal) < 0.0 && self.restitution_of(pair) == 0.0 {
                 let (wide, tangents) = (self.is_wide(pair, gap), D::tangents(&D::frame(normal)));
-                missed.push(Kept { wide, tangents, ..Kept::new(pair, None) });
+                missed.push(StoredTouch { wide, tangents, ..StoredTouch::new(pair, None) });
             }
         }
         missed
@@ -240,7 +260,7 @@ impl<D: Dim> World<D> {
     pub(super) fn assemble(
         &self,
         mid: &Midpoint<D>,
-        touches: &[Kept<D>],
+        touches: &[StoredTouch<D>],
         motion: &Motion<D>,
         brought: &Brought<D>,
         applied: f64,
@@ -257,15 +277,15 @@ impl<D: Dim> World<D> {
         let order = blocks::order(touches.iter().map(|t| t.pair), self.grains.len());
         for k in 0..touches.len() {
             let place = order.as_ref().map_or(k, |order| order[k] as usize);
-            let kept = &touches[place];
-            let touch = &self.touch(mid, kept);
+            let stored = &touches[place];
+            let touch = &self.touch(mid, stored);
             let link = Link::<D>::new(touch.pair, touch.frame);
             let lever = self.levers(touch);
             let start = touch.reaction * h;
-            let kind = self.kind(kept);
+            let kind = self.kind(stored);
             let bias = match touch.bond {
                 Some(bond) => Some(brought.turns[bond as usize].bias),
-                None => self.bias(touch, kept.closed, motion, h),
+                None => self.bias(touch, stored.closed, motion, h),
             };
             // without a bias the contact cannot act in this step
             let Some(bias) = bias else { continue };
@@ -310,11 +330,11 @@ impl<D: Dim> World<D> {
     }
 
     /// The kind of a contact.
-    fn kind(&self, kept: &Kept<D>) -> Kind {
-        match kept.bond() {
+    fn kind(&self, stored: &StoredTouch<D>) -> Kind {
+        match stored.bond() {
             Some(bond) if self.bonds[bond as usize].stiffness.is_some() => Kind::Elastic,
             Some(_) => Kind::Bonded,
-            None if self.friction_of(kept.pair) > 0.0 => Kind::Dry,
+            None if self.friction_of(stored.pair) > 0.0 => Kind::Dry,
             None => Kind::Frictionless,
         }
     }
@@ -336,7 +356,12 @@ fn over_arm<T: Vect, B: Moments>(r: Local<T, B>, arm: f64) -> Local<T, B> {
 }
 
 /// Write the impulses of a problem back to the contacts of the step, as forces.
-pub(super) fn write_reactions<D: Dim>(touches: &mut [Kept<D>], problem: &ContactProblem<D>, places: &Places, h: f64) {
+pub(super) fn write_reactions<D: Dim>(
+    touches: &mut [StoredTouch<D>],
+    problem: &ContactProblem<D>,
+    places: &Places,
+    h: f64,
+) {
     for touch in touches.iter_mut() {
         touch.reaction = Local::zero();
         touch.status = TouchStatus::Open;
@@ -346,7 +371,7 @@ pub(super) fn write_reactions<D: Dim>(touches: &mut [Kept<D>], problem: &Contact
 
 /// Writes each contact to its place.
 struct ReadBack<'a, D: Dim, P> {
-    touches: &'a mut [Kept<D>],
+    touches: &'a mut [StoredTouch<D>],
     places: P,
     h: f64,
 }

@@ -21,7 +21,7 @@ use super::World;
 use super::assembly::Places;
 use super::motion::Midpoint;
 use super::report::Violation;
-use super::touch::Kept;
+use super::touch::StoredTouch;
 use crate::body::{Drive, Shape, separation};
 use crate::contact::Law;
 use crate::dim::{Dim, Vect};
@@ -88,15 +88,15 @@ impl<D: Dim> World<D> {
     pub(super) fn pushes_at_a_distance(
         &self,
         mid: &Midpoint<D>,
-        touches: &[Kept<D>],
+        touches: &[StoredTouch<D>],
         nodes: &Nodes<D>,
         h: f64,
     ) -> Option<[u32; 2]> {
-        let far = |kept: &&Kept<D>| {
-            if !kept.wide || kept.bond().is_some() || kept.reaction.n <= 0.0 {
+        let far = |stored: &&StoredTouch<D>| {
+            if !stored.wide || stored.bond().is_some() || stored.reaction.n <= 0.0 {
                 return false;
             }
-            let t = self.touch(mid, kept);
+            let t = self.touch(mid, stored);
             let margin = PASSING * self.smaller(t.pair);
             if t.gap <= margin {
                 return false;
@@ -128,7 +128,7 @@ impl<D: Dim> World<D> {
     /// returns the pair with the largest sum, if too large.
     pub(super) fn accumulate(
         &self,
-        touches: &mut [Kept<D>],
+        touches: &mut [StoredTouch<D>],
         problem: &ContactProblem<D>,
         places: &Places,
         h: f64,
@@ -220,7 +220,7 @@ fn beyond_law<D: Dim, L: Law>(nodes: &Nodes<D>, c: &Contact<D, L>) -> Option<f64
 /// Adds up displacements beyond the contact laws, and finds the largest sum.
 struct Accumulating<'a, D: Dim, P> {
     world: &'a World<D>,
-    touches: &'a mut [Kept<D>],
+    touches: &'a mut [StoredTouch<D>],
     places: P,
     h: f64,
     pair: [u32; 2],
@@ -232,13 +232,13 @@ impl<D: Dim, P: Iterator<Item = usize>> Visitor<D> for Accumulating<'_, D, P> {
     fn visit<L: Law>(&mut self, nodes: &Nodes<D>, c: &Contact<D, L>) {
         let Some(place) = self.places.next() else { return };
         let Some(speed) = beyond_law(nodes, c) else { return };
-        let kept = &mut self.touches[place];
-        let sum = kept.yielded + self.h * speed;
+        let stored = &mut self.touches[place];
+        let sum = stored.yielded + self.h * speed;
         // a dry contact may open
-        kept.yielded = if kept.bond().is_some() { sum } else { sum.max(0.0) };
-        let share = kept.yielded.abs() / self.world.smaller(kept.pair);
+        stored.yielded = if stored.bond().is_some() { sum } else { sum.max(0.0) };
+        let share = stored.yielded.abs() / self.world.smaller(stored.pair);
         if share > self.share {
-            (self.pair, self.share) = (kept.pair, share);
+            (self.pair, self.share) = (stored.pair, share);
         }
     }
 }

@@ -20,7 +20,7 @@ pub use report::{StepError, StepReport, Violation};
 pub use touch::{Break, Counts, Touch, TouchStatus};
 
 use motion::{Midpoint, Turn};
-use touch::Kept;
+use touch::StoredTouch;
 
 use crate::body::{Grains, Load, Wall, separation};
 use crate::bond::{Bond, BondStatus, Bonds, Rupture, Stiffness};
@@ -85,7 +85,7 @@ pub struct World<D: Dim> {
     /// Energy balance since the start.
     pub ledger: Ledger,
     /// Contacts of the last accepted step, sorted by pair, with their reactions.
-    kept: Vec<Kept<D>>,
+    stored: Vec<StoredTouch<D>>,
     /// Positions at mid-step of that step, which determine the geometry of its contacts.
     mid: Midpoint<D>,
     /// Length of the last accepted step, or of the last part of it (s); zero before the first.
@@ -103,11 +103,11 @@ pub struct World<D: Dim> {
 }
 
 /// Everything that a step changes, saved while a step is attempted in halves.
-struct State<D: Dim> {
+struct Snapshot<D: Dim> {
     grains: Grains<D>,
     walls: Vec<Wall<D>>,
     bonds: Bonds,
-    kept: Vec<Kept<D>>,
+    stored: Vec<StoredTouch<D>>,
     mid: Midpoint<D>,
     last_part: f64,
     turns: Vec<Turn>,
@@ -143,7 +143,7 @@ impl<D: Dim> World<D> {
             solver: settings.solver.build(),
             built_with: Some(settings.solver),
             candidates: Candidates::default(),
-            kept: Vec::new(),
+            stored: Vec::new(),
             mid: Midpoint::of(&grains, &walls),
             last_part: 0.0,
             turns: Vec::new(),
@@ -177,8 +177,8 @@ impl<D: Dim> World<D> {
             let apart = separation::<D>(self.grains.position[i], self.grains.position[j]);
             let rest_gap = apart.norm() - mean_diameter;
             let strength = strength(mean_diameter);
-            let held = self.grains.fixed[i] && self.grains.fixed[j];
-            if rest_gap <= gap_tolerance * mean_diameter && strength > 0.0 && !held {
+            let was_bonded = self.grains.fixed[i] && self.grains.fixed[j];
+            if rest_gap <= gap_tolerance * mean_diameter && strength > 0.0 && !was_bonded {
                 let status = BondStatus::Intact;
                 let (shear, rolling, twist, stiffness) = (friction, friction, 0.0, None);
                 bonds.push(Bond { pair, rest_gap, mean_diameter, strength, shear, rolling, twist, stiffness, status });
@@ -195,9 +195,9 @@ impl<D: Dim> World<D> {
             self.turns.iter().zip(&numbers).for_each(|(turn, number)| turns[*number as usize] = *turn);
             self.turns = turns;
         }
-        for kept in &mut self.kept {
-            let number = kept.bond().map(|bond| numbers[bond as usize]);
-            kept.tie(number);
+        for stored in &mut self.stored {
+            let number = stored.bond().map(|bond| numbers[bond as usize]);
+            stored.tie(number);
         }
     }
 
@@ -234,12 +234,12 @@ impl<D: Dim> World<D> {
     }
 
     /// A copy of everything that a step changes.
-    fn state(&self) -> State<D> {
-        State {
+    fn snapshot(&self) -> Snapshot<D> {
+        Snapshot {
             grains: self.grains.clone(),
             walls: self.walls.clone(),
             bonds: self.bonds.clone(),
-            kept: self.kept.clone(),
+            stored: self.stored.clone(),
             mid: self.mid.clone(),
             last_part: self.last_part,
             turns: self.turns.clone(),
@@ -248,15 +248,15 @@ impl<D: Dim> World<D> {
         }
     }
 
-    fn restore(&mut self, state: State<D>) {
-        self.grains = state.grains;
-        self.walls = state.walls;
-        self.bonds = state.bonds;
-        self.kept = state.kept;
-        self.mid = state.mid;
-        (self.last_part, self.turns) = (state.last_part, state.turns);
-        self.ledger = state.ledger;
-        self.time = state.time;
+    fn restore(&mut self, snapshot: Snapshot<D>) {
+        self.grains = snapshot.grains;
+        self.walls = snapshot.walls;
+        self.bonds = snapshot.bonds;
+        self.stored = snapshot.stored;
+        self.mid = snapshot.mid;
+        (self.last_part, self.turns) = (snapshot.last_part, snapshot.turns);
+        self.ledger = snapshot.ledger;
+        self.time = snapshot.time;
     }
 
     /// Number of intact bonds.

@@ -53,7 +53,7 @@ impl<D: Dim> World<D> {
     /// Contacts of the last accepted step, sorted by pair, with their reactions. Gaps and points
     /// are those of mid-step, with the present radii and shapes of the bodies.
     pub fn touches(&self) -> impl ExactSizeIterator<Item = Touch<D>> {
-        self.kept.iter().map(|kept| self.touch(&self.mid, kept))
+        self.stored.iter().map(|stored| self.touch(&self.mid, stored))
     }
 
     fn branch(&self, touch: &Touch<D>) -> D::Vector {

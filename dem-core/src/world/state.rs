@@ -5,7 +5,7 @@
 //! same contacts.
 
 use super::motion::{Midpoint, Turn};
-use super::touch::Kept;
+use super::touch::StoredTouch;
 use super::{Ledger, Settings, TouchStatus, World};
 use crate::body::{Grains, Load, Wall};
 use crate::bond::{Bond, BondStatus, Stiffness};
@@ -82,8 +82,8 @@ impl<D: Dim> World<D> {
         to.real(self.last_part);
         to.count(self.turns.len());
         self.turns.iter().for_each(|turn| to.reals.extend([turn.bias, turn.owed]));
-        to.count(self.kept.len());
-        self.kept.iter().for_each(|kept| save_kept(kept, to));
+        to.count(self.stored.len());
+        self.stored.iter().for_each(|stored| save_touch(stored, to));
         let l = &self.ledger;
         to.reals.extend([l.kinetic, l.external_work, l.impact, l.friction, l.bonds]);
         to.reals.extend([l.elastic, l.damping, l.fracture, l.remainder]);
@@ -126,7 +126,7 @@ impl<D: Dim> World<D> {
         world.turns = (0..from.number_of()?)
             .map(|_| Ok(Turn { bias: from.real()?, owed: from.real()? }))
             .collect::<Result<_, _>>()?;
-        world.kept = (0..from.number_of()?).map(|_| restored_kept(bodies, bonds, from)).collect::<Result<_, _>>()?;
+        world.stored = (0..from.number_of()?).map(|_| restored_touch(bodies, bonds, from)).collect::<Result<_, _>>()?;
         let mut next = || from.real();
         world.ledger = Ledger {
             kinetic: next()?,
@@ -178,18 +178,18 @@ fn restored_bond(grains: usize, from: &mut Reader) -> Result<Bond, Mismatch> {
     Ok(Bond { pair, rest_gap, mean_diameter, strength, shear, rolling, twist, stiffness, status })
 }
 
-fn save_kept<D: Dim>(kept: &Kept<D>, to: &mut Saved) {
-    save_pair(kept.pair, to);
-    to.vector(&kept.tangents);
-    to.counts.push(kept.bond().map_or(NONE, u64::from));
-    to.real(kept.reaction.n);
-    to.vector(&kept.reaction.t);
-    to.vector(&kept.reaction.m);
-    to.real(kept.yielded);
-    to.count(code(&TOUCHES, &kept.status));
+fn save_touch<D: Dim>(stored: &StoredTouch<D>, to: &mut Saved) {
+    save_pair(stored.pair, to);
+    to.vector(&stored.tangents);
+    to.counts.push(stored.bond().map_or(NONE, u64::from));
+    to.real(stored.reaction.n);
+    to.vector(&stored.reaction.t);
+    to.vector(&stored.reaction.m);
+    to.real(stored.yielded);
+    to.count(code(&TOUCHES, &stored.status));
 }
 
-fn restored_kept<D: Dim>(bodies: usize, bonds: usize, from: &mut Reader) -> Result<Kept<D>, Mismatch> {
+fn restored_touch<D: Dim>(bodies: usize, bonds: usize, from: &mut Reader) -> Result<StoredTouch<D>, Mismatch> {
     let pair = restored_pair(bodies, from)?;
     let tangents = from.vector()?;
     let bond = match from.count()? {
@@ -199,5 +199,5 @@ fn restored_kept<D: Dim>(bodies: usize, bonds: usize, from: &mut Reader) -> Resu
     };
     let reaction = Local { n: from.real()?, t: from.vector()?, m: from.vector()? };
     let yielded = from.real()?;
-    Ok(Kept { tangents, reaction, yielded, status: coded(&TOUCHES, from)?, ..Kept::new(pair, bond) })
+    Ok(StoredTouch { tangents, reaction, yielded, status: coded(&TOUCHES, from)?, ..StoredTouch::new(pair, bond) })
 }

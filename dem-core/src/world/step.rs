@@ -5,7 +5,7 @@ use super::assembly::{Places, write_reactions};
 use super::ledger::{elastic_energy, losses};
 use super::motion::{Midpoint, Motion};
 use super::report::{PARTS, Solves, StepError, StepReport, Violation};
-use super::touch::{Break, Kept};
+use super::touch::{Break, StoredTouch};
 use super::{Counts, World};
 use crate::body::Drive;
 use crate::bond::{BondStatus, Rupture};
@@ -50,8 +50,8 @@ impl<D: Dim> World<D> {
         parts: u32,
         watch: &mut dyn FnMut(usize),
     ) -> Result<StepReport<D>, StepError> {
-        let last = halvings == self.settings.max_halvings;
-        let refused = match self.attempt(h, last, watch) {
+        let last_attempt = halvings == self.settings.max_halvings;
+        let refused = match self.attempt(h, last_attempt, watch) {
             Err(StepError::NotAccepted { .. }) if halvings < self.settings.max_halvings => 1,
             Err(StepError::Yielded { violation, .. })
                 if violation.is_of_the_solve() && halvings < self.settings.max_halvings =>
@@ -61,7 +61,7 @@ impl<D: Dim> World<D> {
             Err(StepError::TooFast { .. }) if parts < PARTS => 0,
             outcome => return outcome,
         };
-        let before = self.state();
+        let before = self.snapshot();
         let first = self.advance(0.5 * h, halvings + refused, 2 * parts, watch)?;
         let at_limit = self.walls.iter().map(|w| w.reaction_at_limit).collect::<Vec<_>>();
         let mut watch_second = |broken| watch(first.breaks.len() + broken);
@@ -83,14 +83,19 @@ impl<D: Dim> World<D> {
 
     /// One step of length `h`. An error leaves the world unchanged; that of the `last` attempt
     /// includes the verdict on its problem.
-    fn attempt(&mut self, h: f64, last: bool, watch: &mut dyn FnMut(usize)) -> Result<StepReport<D>, StepError> {
+    fn attempt(
+        &mut self,
+        h: f64,
+        last_attempt: bool,
+        watch: &mut dyn FnMut(usize),
+    ) -> Result<StepReport<D>, StepError> {
         let mid = self.midpoint(h);
         let motion = self.free_motion(h);
         let applied = self.applied_impulse(h);
         let mut touches = self.detect(&mid, &motion, h);
         // sample preparation pushes grains apart at speeds without physical meaning
-        let limited = !self.settings.expel_overlaps;
-        if limited {
+        let limits_apply = !self.settings.expel_overlaps;
+        if limits_apply {
             self.refuse_crossing(self.crossing(|k| self.place(k), |k| motion.before[k].0, 0.5 * h))?;
         }
         let brought = self.brought(&mid, &touches, &motion, h);
@@ -99,11 +104,11 @@ impl<D: Dim> World<D> {
         let mut walls_at_limit = None;
         let (problem, places) = loop {
             let (mut problem, places) = self.assemble(&mid, &touches, &motion, &brought, applied, h);
-            let solve = self.solve(&mut problem, limited);
+            let solve = self.solve(&mut problem, limits_apply);
             done.add(solve);
-            self.refuse_unaccepted(solve, &problem, h, last)?;
-            if limited {
-                self.refuse_violation(self.yielding(&problem), &problem, last)?;
+            self.refuse_unaccepted(solve, &problem, h, last_attempt)?;
+            if limits_apply {
+                self.refuse_violation(self.yielding(&problem), &problem, last_attempt)?;
             }
             write_reactions(&mut touches, &problem, &places, h);
             let missed = self.missed(&mid, &touches, &problem.nodes, h);
@@ -124,13 +129,13 @@ impl<D: Dim> World<D> {
             }
             watch(breaks.len());
         };
-        if limited {
+        if limits_apply {
             let velocity = |k: usize| problem.nodes.all[k].velocity;
             self.refuse_crossing(self.pushes_at_a_distance(&mid, &touches, &problem.nodes, h))?;
             self.refuse_crossing(self.crossing(|k| mid.place(k), velocity, 0.5 * h))?;
-            self.refuse_violation(self.accumulate(&mut touches, &problem, &places, h), &problem, last)?;
+            self.refuse_violation(self.accumulate(&mut touches, &problem, &places, h), &problem, last_attempt)?;
         }
-        self.settle(h, mid, &motion, &problem, touches, &breaks);
+        self.commit(h, mid, &motion, &problem, touches, &breaks);
         (self.turns, self.last_part) = (brought.turns, h);
         if let Some(forces) = walls_at_limit {
             self.walls.iter_mut().zip(forces).for_each(|(wall, force)| wall.reaction_at_limit = force);
@@ -138,11 +143,11 @@ impl<D: Dim> World<D> {
         Ok(self.report(h, &motion, &problem, done, breaks))
     }
 
-    /// Solve a contact problem. If `limited` and an accepted solution yields, solve again with the
-    /// solver's finer method, if it has one.
-    fn solve(&mut self, problem: &mut ContactProblem<D>, limited: bool) -> SolveReport {
+    /// Solve a contact problem. If `limits_apply` and an accepted solution yields, solve again with
+    /// the solver's finer method, if it has one.
+    fn solve(&mut self, problem: &mut ContactProblem<D>, limits_apply: bool) -> SolveReport {
         let solve = self.solver.solve(problem);
-        if !limited || solve.status != SolveStatus::Accepted || self.yielding(problem).is_none() {
+        if !limits_apply || solve.status != SolveStatus::Accepted || self.yielding(problem).is_none() {
             return solve;
         }
         let finer = self.solver.solve_finer(problem);
@@ -228,7 +233,7 @@ impl<D: Dim> World<D> {
         solve: SolveReport,
         problem: &ContactProblem<D>,
         h: f64,
-        last: bool,
+        last_attempt: bool,
     ) -> Result<(), StepError> {
         let finite = |v: &[f64]| v.iter().all(|c| c.is_finite());
         if let Some(body) =
@@ -239,7 +244,7 @@ impl<D: Dim> World<D> {
         if solve.status == SolveStatus::Failed {
             let SolveReport { residual, work, .. } = solve;
             let (iterations, verdict) =
-                (work.iterations(), if last { self.verdict(problem) } else { Verdict::Undecided });
+                (work.iterations(), if last_attempt { self.verdict(problem) } else { Verdict::Undecided });
             let pair = furthest_from_law(problem);
             return Err(StepError::NotAccepted { time: self.time, step: h, residual, iterations, pair, verdict });
         }
@@ -250,11 +255,11 @@ impl<D: Dim> World<D> {
         &self,
         found: Option<Violation>,
         problem: &ContactProblem<D>,
-        last: bool,
+        last_attempt: bool,
     ) -> Result<(), StepError> {
         let Some(violation) = found else { return Ok(()) };
-        let last = last || !violation.is_of_the_solve();
-        let verdict = if last { self.verdict(problem) } else { Verdict::Undecided };
+        let last_attempt = last_attempt || !violation.is_of_the_solve();
+        let verdict = if last_attempt { self.verdict(problem) } else { Verdict::Undecided };
         Err(StepError::Yielded { time: self.time, violation: Violation { verdict, ..violation } })
     }
 
@@ -267,7 +272,7 @@ impl<D: Dim> World<D> {
     fn at_limit(
         &self,
         mid: &Midpoint<D>,
-        touches: &[Kept<D>],
+        touches: &[StoredTouch<D>],
         problem: &ContactProblem<D>,
         places: &Places,
         round: u32,
@@ -287,7 +292,7 @@ impl<D: Dim> World<D> {
     fn group_at_limit<L: Law<T = D::Tangent, B = D::Moment>>(
         &self,
         mid: &Midpoint<D>,
-        touches: &[Kept<D>],
+        touches: &[StoredTouch<D>],
         nodes: &Nodes<D>,
         group: &Group<D, L>,
         places: &[u32],
@@ -316,13 +321,13 @@ impl<D: Dim> World<D> {
 
     /// Apply the result: energy balance, velocities, second half of the positions, broken bonds,
     /// reactions.
-    fn settle(
+    fn commit(
         &mut self,
         h: f64,
         mid: Midpoint<D>,
         motion: &Motion<D>,
         problem: &ContactProblem<D>,
-        touches: Vec<Kept<D>>,
+        touches: Vec<StoredTouch<D>>,
         breaks: &[Break<D>],
     ) {
         self.book(h, motion, problem, breaks);
@@ -346,16 +351,16 @@ impl<D: Dim> World<D> {
         for failed in breaks {
             self.bonds[failed.bond as usize].status = failed.mode;
         }
-        (self.kept, self.mid) = (touches, mid);
+        (self.stored, self.mid) = (touches, mid);
         self.time += h;
     }
 
     /// Force of the grains on each wall (N).
-    fn wall_forces(&self, mid: &Midpoint<D>, touches: &[Kept<D>]) -> Vec<D::Vector> {
+    fn wall_forces(&self, mid: &Midpoint<D>, touches: &[StoredTouch<D>]) -> Vec<D::Vector> {
         let mut forces = vec![D::Vector::zero(); self.walls.len()];
-        for kept in touches {
-            if let Some(wall) = (kept.pair[1] as usize).checked_sub(self.grains.len()) {
-                let touch = self.touch(mid, kept);
+        for stored in touches {
+            if let Some(wall) = (stored.pair[1] as usize).checked_sub(self.grains.len()) {
+                let touch = self.touch(mid, stored);
                 forces[wall] -= D::compose(&touch.frame, touch.reaction.n, touch.reaction.t);
             }
         }
@@ -443,7 +448,7 @@ impl<D: Dim> World<D> {
         if applied > 0.0 { change.sqrt() / applied.sqrt() } else { 0.0 }
     }
 
-    /// The report of a step of length `h` that has been settled.
+    /// The report of a step of length `h` that has been committed.
     fn report(
         &self,
         h: f64,
@@ -453,9 +458,9 @@ impl<D: Dim> World<D> {
         breaks: Vec<Break<D>>,
     ) -> StepReport<D> {
         let (mut penetration, mut bond_elongation) = (0.0, 0.0);
-        for kept in &self.kept {
-            let gap = self.geometry(&self.mid, kept.pair).0;
-            match kept.bond().map(|bond| &self.bonds[bond as usize]) {
+        for stored in &self.stored {
+            let gap = self.geometry(&self.mid, stored.pair).0;
+            match stored.bond().map(|bond| &self.bonds[bond as usize]) {
                 None => penetration = f64::max(penetration, -gap),
                 Some(bond) if bond.status == BondStatus::Intact => {
                     bond_elongation = f64::max(bond_elongation, (gap - bond.rest_gap).abs());
@@ -471,7 +476,7 @@ impl<D: Dim> World<D> {
             residual: done.residual,
             load_error: done.load_error,
             false_acceleration: self.false_acceleration(h, motion, problem),
-            counts: Counts::of(self.kept.iter().map(|t| t.status)),
+            counts: Counts::of(self.stored.iter().map(|t| t.status)),
             breaks,
             penetration,
             bond_elongation,
@@ -497,11 +502,11 @@ fn wall_impulses<D: Dim>(problem: &ContactProblem<D>, walls: usize) -> Vec<D::Ve
 }
 
 /// Turn the contacts of broken bonds into dry ones that start without reaction.
-fn forget_bonds<D: Dim>(touches: &mut [Kept<D>], broken: &[Break<D>]) {
+fn forget_bonds<D: Dim>(touches: &mut [StoredTouch<D>], broken: &[Break<D>]) {
     for failed in broken {
         if let Ok(place) = touches.binary_search_by_key(&failed.pair, |t| t.pair) {
-            let Kept { tangents, wide, closed, .. } = touches[place];
-            touches[place] = Kept { tangents, wide, closed, ..Kept::new(failed.pair, None) };
+            let StoredTouch { tangents, wide, closed, .. } = touches[place];
+            touches[place] = StoredTouch { tangents, wide, closed, ..StoredTouch::new(failed.pair, None) };
         }
     }
 }

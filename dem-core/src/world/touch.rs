@@ -1,5 +1,5 @@
-//! The contacts of a step, with reactions as forces. `Kept` is a contact as the world stores it,
-//! [`Touch`] the same with its geometry, for reading.
+//! The contacts of a step, with reactions as forces. `StoredTouch` is a contact as the world stores
+//! it, [`Touch`] the same with its geometry, for reading.
 
 use crate::bond::BondStatus;
 use crate::contact::Local;
@@ -23,7 +23,7 @@ pub enum TouchStatus {
 /// positions at mid-step and are not stored: a million grains have three million contacts, stored
 /// twice during a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Kept<D: Dim> {
+pub(super) struct StoredTouch<D: Dim> {
     pub pair: [u32; 2],
     /// Index of its bond plus one: four bytes, including the case of no bond.
     pub bond_from_one: Option<NonZeroU32>,
@@ -33,7 +33,7 @@ pub(super) struct Kept<D: Dim> {
     /// Whether its normal reaction was positive in the previous step.
     pub closed: bool,
     /// Whether its bond was intact in the previous step.
-    pub held: bool,
+    pub was_bonded: bool,
     /// The tangents of its frame.
     pub tangents: D::Tangents,
     pub reaction: Local<D::Tangent, D::Moment>,
@@ -42,7 +42,7 @@ pub(super) struct Kept<D: Dim> {
     pub yielded: f64,
 }
 
-impl<D: Dim> Kept<D> {
+impl<D: Dim> StoredTouch<D> {
     /// A contact without reaction, with this bond or none; `wide` is set for a bond only.
     pub fn new(pair: [u32; 2], bond: Option<u32>) -> Self {
         Self {
@@ -51,7 +51,7 @@ impl<D: Dim> Kept<D> {
             status: if bond.is_some() { TouchStatus::Bonded } else { TouchStatus::Open },
             wide: bond.is_some(),
             closed: false,
-            held: false,
+            was_bonded: false,
             tangents: D::Tangents::zero(),
             reaction: Local::zero(),
             yielded: 0.0,

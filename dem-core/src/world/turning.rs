@@ -10,39 +10,39 @@
 
 use super::World;
 use super::motion::{Midpoint, Motion, Turn};
-use super::touch::Kept;
+use super::touch::StoredTouch;
 use crate::body::{direction, separation};
 use crate::dim::{Dim, Vect};
 
 impl<D: Dim> World<D> {
     /// Length corrections of all bonds in a step of length `h`, by bond index.
-    pub(super) fn turns(&self, mid: &Midpoint<D>, touches: &[Kept<D>], motion: &Motion<D>, h: f64) -> Vec<Turn> {
+    pub(super) fn turns(&self, mid: &Midpoint<D>, touches: &[StoredTouch<D>], motion: &Motion<D>, h: f64) -> Vec<Turn> {
         let mut turns = vec![Turn::default(); self.bonds.len()];
-        for kept in touches {
-            if let Some(bond) = kept.bond() {
-                turns[bond as usize] = self.turn(mid, kept, bond as usize, motion, h);
+        for stored in touches {
+            if let Some(bond) = stored.bond() {
+                turns[bond as usize] = self.turn(mid, stored, bond as usize, motion, h);
             }
         }
         turns
     }
 
     /// Length correction of the bond of this contact in a step of length `h`.
-    fn turn(&self, mid: &Midpoint<D>, kept: &Kept<D>, number: usize, motion: &Motion<D>, h: f64) -> Turn {
+    fn turn(&self, mid: &Midpoint<D>, stored: &StoredTouch<D>, number: usize, motion: &Motion<D>, h: f64) -> Turn {
         let bond = &self.bonds[number];
         let elastic = bond.stiffness.is_some();
         // the grains turn with a bond that resists shear and rolling
         let turns_with_it = bond.shear > 0.0 && bond.rolling > 0.0;
         // the velocities before a frictionless bond formed do not satisfy its constraint
-        if !elastic && !turns_with_it && !kept.held {
+        if !elastic && !turns_with_it && !stored.was_bonded {
             return Turn::default();
         }
         // rigid bonds respond to any misfit with forces, even to round-off
         let rounding = if elastic { 0.0 } else { f64::EPSILON * bond.mean_diameter };
         let hidden = |span: f64| {
             if !elastic && turns_with_it {
-                return self.turning(mid, motion, kept.pair, span);
+                return self.turning(mid, motion, stored.pair, span);
             }
-            let (speed, _) = self.lengthening(mid, motion, kept.pair, span);
+            let (speed, _) = self.lengthening(mid, motion, stored.pair, span);
             if span * speed <= rounding { 0.0 } else { speed }
         };
         let before = self.turns.get(number).copied().unwrap_or_default();
@@ -54,7 +54,7 @@ impl<D: Dim> World<D> {
             let span = 0.5 * (last + h);
             // for a rigid bond the velocity required by its law: solver errors of different bonds
             // are incompatible
-            let speed = if elastic { self.lengthening(mid, motion, kept.pair, span).1 } else { -before.bias };
+            let speed = if elastic { self.lengthening(mid, motion, stored.pair, span).1 } else { -before.bias };
             owed += (span - last) * speed + span * hidden(span) - h * own;
         }
         if owed.abs() <= rounding {

@@ -23,7 +23,7 @@ pub mod report;
 mod section;
 pub mod stress;
 
-/// The force network, the distribution of its forces, force chains.
+/// Force network, distribution of its forces, force chains.
 #[derive(Debug, Args)]
 pub struct Command {
     #[command(flatten)]

@@ -42,7 +42,7 @@ pub fn length_charts(report: &Report) -> Vec<Chart> {
     let mut charts = vec![];
     for (kind, label) in [(0, "chains in compression"), (1, "chains in tension")] {
         let mut chart = Chart::new("grains, at least", label);
-        (chart.set_off, chart.log_y) = (true, true);
+        (chart.pad_x, chart.log_y) = (true, true);
         for (k, network) in report.networks.iter().enumerate() {
             let Some(figures) = network.chain_figures.get(kind).filter(|figures| figures.count > 0) else {
                 continue;
@@ -116,7 +116,7 @@ pub fn chain_map(history: &History, report: &Report) -> Result<Drawing> {
 /// The distributions of the forces at each moment.
 pub fn distribution_chart(report: &Report) -> Chart {
     let mut chart = Chart::new("normal force over its mean, |f|/⟨f⟩", "probability density");
-    (chart.log_y, chart.set_off) = (true, true);
+    (chart.log_y, chart.pad_x) = (true, true);
     for (k, network) in report.networks.iter().enumerate() {
         let colour = colour::CYCLE[k % colour::CYCLE.len()];
         let label = format!("t = {} s", number(network.time));

@@ -68,7 +68,7 @@ pub struct Chains {
 }
 
 /// A candidate for a link.
-struct Link {
+struct LinkCandidate {
     grains: [usize; 2],
     /// The end of each grain: 0 against its direction, 1 along it.
     ends: [usize; 2],
@@ -98,7 +98,7 @@ pub fn find(kind: Kind, contacts: &ContactRows, position: &[f64], stress: &[Tens
     // a stable sort: equal forces keep the order of the contacts
     links.sort_by(|a, b| b.force.total_cmp(&a.force));
     let mut next: Vec<[Option<(usize, f64)>; 2]> = vec![[None; 2]; load.len()];
-    for Link { grains: [i, j], ends: [a, b], force } in links {
+    for LinkCandidate { grains: [i, j], ends: [a, b], force } in links {
         if next[i][a].is_none() && next[j][b].is_none() {
             (next[i][a], next[j][b]) = (Some((j, force)), Some((i, force)));
         }
@@ -112,7 +112,7 @@ pub fn find(kind: Kind, contacts: &ContactRows, position: &[f64], stress: &[Tens
     Chains { kind, chains, load, direction, mean, share: if carried > 0.0 { carried / all } else { 0.0 } }
 }
 
-fn link(grains: [usize; 2], force: f64, position: &[f64], direction: &[[f64; 3]], d: usize) -> Option<Link> {
+fn link(grains: [usize; 2], force: f64, position: &[f64], direction: &[[f64; 3]], d: usize) -> Option<LinkCandidate> {
     let centre = |grain: usize| &position[grain * d..(grain + 1) * d];
     let branch: Vec<f64> = centre(grains[1]).iter().zip(centre(grains[0])).map(|(b, a)| b - a).collect();
     let length = branch.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -120,7 +120,7 @@ fn link(grains: [usize; 2], force: f64, position: &[f64], direction: &[[f64; 3]]
     let [from, to] = grains.map(along);
     // the branch leaves the first grain and enters the second
     let ends = [usize::from(from > 0.0), usize::from(to < 0.0)];
-    (from.abs() >= COSINE && to.abs() >= COSINE).then_some(Link { grains, ends, force })
+    (from.abs() >= COSINE && to.abs() >= COSINE).then_some(LinkCandidate { grains, ends, force })
 }
 
 /// The lines formed by the links of the grains; a ring is cut open at its first grain.

@@ -116,7 +116,7 @@ pub fn read(history: &History, times: &[f64]) -> Result<Report> {
     if networks.iter().all(|network| network.statistics.contacts == 0) {
         let moments: Vec<String> = networks.iter().map(|network| format!("{} s", number(network.time))).collect();
         let what =
-            format!("no contact carries a normal force at {}: choose other moments by --times", moments.join(", "));
+            format!("no contact carries a normal force at {}: choose other times with --times", moments.join(", "));
         return Err(PostError::Lacking { path: history.path().into(), what });
     }
     Ok(Report { networks })
@@ -130,7 +130,7 @@ pub fn require_reactions(history: &History) -> Result<()> {
     if history.has_reactions() {
         return Ok(());
     }
-    let what = "its scene left the reactions out: run it with output.reactions=true".into();
+    let what = "its scene does not record reactions: run it with output.reactions=true".into();
     Err(PostError::Lacking { path: history.path().into(), what })
 }
 

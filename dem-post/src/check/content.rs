@@ -28,7 +28,7 @@ const SAME_TIME: f64 = 1e-9;
 /// A rupture as the file stores it, with its mode as a number.
 #[derive(Clone, Copy, H5Type)]
 #[repr(C)]
-struct Event {
+struct StoredRupture {
     step: i64,
     time: f64,
     x: f64,
@@ -102,7 +102,7 @@ fn keeps_time(c: &mut Checker, step: &str, time: &str) {
     let h = median(pairs().filter(|(step, _)| *step != 0.0).map(|(step, time)| time / step).collect());
     for (k, (number, at)) in pairs().enumerate() {
         if (at - h * number).abs() > SAME_TIME * (at.abs() + (h * number).abs()) {
-            c.wrong(step, Some(k), format!("step {} at {at} s, where most steps take {h} s", steps[k]));
+            c.wrong(step, Some(k), format!("step {} at {at} s, but most steps take {h} s", steps[k]));
         }
     }
 }
@@ -159,10 +159,10 @@ fn committed(c: &mut Checker) -> Vec<[u64; 2]> {
     for (k, ((&start, &count), &complete)) in starts.iter().zip(&counts).zip(&complete).enumerate() {
         let end = start.saturating_add(count.into());
         if start != next {
-            c.wrong("contacts/start", Some(k), format!("{start}, where the frame before ends at {next}"));
+            c.wrong("contacts/start", Some(k), format!("{start}, but the frame before ends at {next}"));
         }
         if end != complete {
-            c.wrong("contacts/count", Some(k), format!("ends at row {end}, and {complete} rows are complete"));
+            c.wrong("contacts/count", Some(k), format!("ends at row {end}, but {complete} rows are complete"));
         }
         found.push(if end <= c.sizes.m as u64 { [start, count.into()] } else { [0, 0] });
         next = end;
@@ -201,13 +201,17 @@ fn numbers(c: &mut Checker) {
 fn codes(c: &mut Checker, place: &str, many: u8) {
     c.blocks::<u8>(place, |c, start, values| {
         for (k, code) in values.iter().enumerate().filter(|(_, code)| **code >= many) {
-            c.wrong(place, Some(start + k), format!("code {code} names nothing"));
+            c.wrong(place, Some(start + k), format!("unknown code {code}"));
         }
     });
 }
 
 fn no_number(value: f64) -> String {
-    if value.is_finite() { format!("{value:e} is no plausible number") } else { format!("{value} is no finite number") }
+    if value.is_finite() {
+        format!("{value:e} is not a plausible number")
+    } else {
+        format!("{value} is not a finite number")
+    }
 }
 
 /// Checks that radii, masses and diameters are positive, that inertia and bond parameters are not
@@ -224,7 +228,7 @@ fn signs(c: &mut Checker) {
     }
     let usual = median(c.rows::<f64>(RADIUS, 0..c.sizes.n).unwrap_or_default());
     let huge = |value| is_huge(value, usual) && is_plausible(value);
-    every(c, RADIUS, |value| huge(value).then(|| format!("{value:e}, where half the grains have at most {usual:e}")));
+    every(c, RADIUS, |value| huge(value).then(|| format!("{value:e}, but half the grains have at most {usual:e}")));
 }
 
 /// Reports the rows of a list for which `wrong` returns a violation.
@@ -263,7 +267,7 @@ fn directions(c: &mut Checker) {
     for place in ["contacts/normal", "contacts/tangent"] {
         c.blocks::<f64>(place, |c, start, values| {
             for (k, v) in values.chunks_exact(d).enumerate().filter(|(_, v)| finite(v) && !is_unit(v)) {
-                c.wrong(place, Some(start + k), format!("{v:?} is no unit vector"));
+                c.wrong(place, Some(start + k), format!("{v:?} is not a unit vector"));
             }
         });
     }
@@ -274,7 +278,7 @@ fn directions(c: &mut Checker) {
         let kinds = c.rows::<u8>(of, 0..w).unwrap_or_default();
         for (k, (v, kind)) in vectors.chunks_exact(d).zip(kinds).enumerate() {
             if has(kind) && finite(v) && !is_unit(v) {
-                c.wrong(place, Some(k), format!("{v:?} is no unit vector"));
+                c.wrong(place, Some(k), format!("{v:?} is not a unit vector"));
             }
         }
     };
@@ -288,7 +292,7 @@ fn bond_pairs(c: &mut Checker) -> Vec<[i32; 2]> {
     let pairs = c.rows::<i32>("bonds/pair", 0..b).unwrap_or_default().as_chunks().0.to_vec();
     for (k, [i, j]) in pairs.iter().enumerate() {
         if i == j || [i, j].iter().any(|grain| !(0..n as i32).contains(*grain)) {
-            c.wrong("bonds/pair", Some(k), format!("{i}, {j} are not two of {n} grains"));
+            c.wrong("bonds/pair", Some(k), format!("{i}, {j} are not two different grains of {n}"));
         }
     }
     pairs
@@ -305,9 +309,9 @@ fn states(c: &mut Checker) -> Broken {
             {
                 let frame = start + k;
                 if now as usize >= BondStatus::ALL.len() {
-                    c.wrong(STATUS, Some(frame), format!("bond {bond}: code {now} names nothing"));
+                    c.wrong(STATUS, Some(frame), format!("bond {bond}: unknown code {now}"));
                 } else if *before != INTACT {
-                    c.wrong(STATUS, Some(frame), format!("bond {bond}: {now} after {before}, broken once and for all"));
+                    c.wrong(STATUS, Some(frame), format!("bond {bond}: {now} after {before}, which is irreversible"));
                 } else {
                     broken.entry(bond).or_insert((frame, now));
                 }
@@ -329,19 +333,19 @@ fn contacts(c: &mut Checker, rows: &[[u64; 2]], pairs: &[[i32; 2]], broken: &Bro
         let bonds = c.rows::<i32>("contacts/bond", start..end).unwrap_or_default();
         for (k, [i, j]) in bodies.as_chunks().0.iter().enumerate() {
             if i == j || !(0..n as i32).contains(i) || !(-(w as i32)..n as i32).contains(j) {
-                let what = format!("{i}, {j} are not a grain and another, or a wall, of {n} grains and {w} walls");
+                let what = format!("{i}, {j} are not a pair of bodies: there are {n} grains and {w} walls");
                 c.wrong("contacts/pair", Some(start + k), what);
             }
         }
         for (k, code) in status.iter().enumerate().filter(|(_, code)| **code > BONDED) {
-            c.wrong("contacts/status", Some(start + k), format!("code {code} names nothing"));
+            c.wrong("contacts/status", Some(start + k), format!("unknown code {code}"));
         }
         for (k, &bond) in bonds.iter().enumerate().filter(|_| !pairs.is_empty()) {
             let what = match usize::try_from(bond).ok().map(|bond| (bond, pairs.get(bond))) {
                 None if bond == -1 => {
-                    status.get(k).filter(|code| **code == BONDED).map(|_| "-1, of a BONDED contact".into())
+                    status.get(k).filter(|code| **code == BONDED).map(|_| "-1, but the contact is BONDED".into())
                 }
-                None | Some((_, None)) => Some(format!("{bond} is none of {} bonds", pairs.len())),
+                None | Some((_, None)) => Some(format!("{bond} is not one of the {} bonds", pairs.len())),
                 Some((bond, Some(pair))) => {
                     let gone = broken.get(&bond).is_some_and(|(at, _)| *at <= frame);
                     let same = bodies
@@ -372,7 +376,7 @@ fn events(c: &mut Checker, steps: &[i64], pairs: &[[i32; 2]], broken: &Broken) {
         return;
     }
     let (mut told, mut last): (BTreeMap<usize, usize>, _) = (BTreeMap::new(), i64::MIN);
-    c.blocks::<Event>(RUPTURE, |c, start, events| {
+    c.blocks::<StoredRupture>(RUPTURE, |c, start, events| {
         for (k, event) in events.iter().enumerate() {
             let row = start + k;
             if event.step < last {
@@ -381,12 +385,12 @@ fn events(c: &mut Checker, steps: &[i64], pairs: &[[i32; 2]], broken: &Broken) {
             last = event.step;
             let numbers = [event.time, event.x, event.y, event.z, event.rn, event.rt, event.m, event.energy];
             if numbers.iter().any(|value| !value.is_finite()) {
-                c.wrong(RUPTURE, Some(row), "a member is no finite number");
+                c.wrong(RUPTURE, Some(row), "a member is not a finite number");
             } else if let Some(value) = numbers.iter().find(|value| !is_plausible(**value)) {
                 c.wrong(RUPTURE, Some(row), no_number(*value));
             }
             if event.round < 0 {
-                c.wrong(RUPTURE, Some(row), format!("{} is no round of a cascade", event.round));
+                c.wrong(RUPTURE, Some(row), format!("{} is not a round of a cascade", event.round));
             }
             let frame = steps.partition_point(|step| *step < event.step);
             let seen = complete.partition_point(|rows| *rows <= row as u64);
@@ -414,13 +418,13 @@ fn events(c: &mut Checker, steps: &[i64], pairs: &[[i32; 2]], broken: &Broken) {
         });
     }
     for (bond, (frame, _)) in broken.iter().filter(|(bond, _)| !told.contains_key(bond)) {
-        c.wrong(STATUS, Some(*frame), format!("bond {bond} is broken, and no event in /{RUPTURE} tells of it"));
+        c.wrong(STATUS, Some(*frame), format!("bond {bond} is broken, but /{RUPTURE} has no event of it"));
     }
 }
 
 /// The contradiction between an event and the states of its bond, if any.
 fn disagreement(
-    event: &Event,
+    event: &StoredRupture,
     frame: usize,
     pairs: &[[i32; 2]],
     broken: &Broken,
@@ -428,10 +432,10 @@ fn disagreement(
     row: usize,
 ) -> Option<String> {
     if !(1..=RuptureMode::ALL.len() as i32).contains(&event.mode) {
-        return Some(format!("mode {} names nothing", event.mode));
+        return Some(format!("unknown mode {}", event.mode));
     }
     let Some((bond, pair)) = usize::try_from(event.bond).ok().and_then(|bond| Some((bond, pairs.get(bond)?))) else {
-        return Some(format!("{} is none of {} bonds", event.bond, pairs.len()));
+        return Some(format!("{} is not one of the {} bonds", event.bond, pairs.len()));
     };
     if let Some(first) = told.insert(bond, row) {
         return Some(format!("bond {bond} broke before, in row {first}"));
@@ -440,12 +444,12 @@ fn disagreement(
         return Some(format!("bond {bond} joins other grains, {} and {}", pair[0], pair[1]));
     }
     match broken.get(&bond) {
-        None => Some(format!("bond {bond} is intact to the end")),
+        None => Some(format!("bond {bond} is intact until the end")),
         Some((at, _)) if *at != frame => {
-            Some(format!("bond {bond} breaks by frame {frame}, its state changes at frame {at}"))
+            Some(format!("bond {bond} breaks by frame {frame}, but its state changes at frame {at}"))
         }
         Some((_, mode)) if i32::from(*mode) != event.mode => {
-            Some(format!("bond {bond} broke by mode {}, its state is {mode}", event.mode))
+            Some(format!("bond {bond} broke by mode {}, but its state is {mode}", event.mode))
         }
         Some(_) => None,
     }

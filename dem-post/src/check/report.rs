@@ -66,7 +66,7 @@ impl Report {
         match self.count() {
             0 => Ok(()),
             count => Err(PostError::Unsound(format!(
-                "{} is not sound: {count} violations of its layout. Copy it again, or run the scene again",
+                "{} is damaged: {count} violations of its layout. Copy it again, or run the scene again",
                 self.file
             ))),
         }

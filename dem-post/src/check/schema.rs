@@ -33,7 +33,7 @@ pub(super) fn check(c: &mut Checker) {
     } else if let Some(place) =
         ["events", "commit_rows/events", "contacts/bond", "contacts/moment"].iter().find(|place| c.has(place))
     {
-        c.wrong("bonds", None, format!("is missing, and /{place} stands"));
+        c.wrong("bonds", None, format!("is missing, but /{place} exists"));
     }
     contacts(c);
     observables(c);
@@ -88,7 +88,7 @@ impl Checker {
         if !shape_fits {
             let expected: Vec<String> =
                 std::iter::once(rows).chain(row.iter().copied()).map(|n| n.to_string()).collect();
-            self.wrong(place, None, format!("has shape {found:?} in place of [{}]", expected.join(", ")));
+            self.wrong(place, None, format!("has shape {found:?} instead of [{}]", expected.join(", ")));
         }
         self.unit(place, unit);
         if shape_fits {
@@ -105,7 +105,7 @@ impl Checker {
         match dataset.dtype().and_then(|dtype| dtype.to_descriptor()) {
             Ok(found) if is_read_as(&found, kind) => Some(dataset.shape()),
             Ok(found) => {
-                self.wrong(place, None, format!("is of type {} in place of {}", name(&found), name(kind)));
+                self.wrong(place, None, format!("is of type {} instead of {}", name(&found), name(kind)));
                 None
             }
             Err(error) => {
@@ -121,9 +121,9 @@ impl Checker {
         let found = if named { text(dataset.attr("unit")) } else { Some(String::new()) };
         let what = match found.as_deref() {
             Some(found) if found == expected => return,
-            Some("") => format!("has no attribute unit, where {expected:?} is promised"),
-            Some(found) => format!("has the unit {found:?} in place of {expected:?}"),
-            None => "has an attribute unit that is no text".into(),
+            Some("") => format!("has no attribute unit, but {expected:?} is required"),
+            Some(found) => format!("has the unit {found:?} instead of {expected:?}"),
+            None => "has an attribute unit that is not a text".into(),
         };
         self.wrong(place, None, what);
     }
@@ -166,7 +166,7 @@ fn identity(c: &mut Checker) {
     ] {
         let found = if c.has(group) { c.file.group(group).and_then(|group| group.attr(name)) } else { Err("".into()) };
         if text(found).is_none() {
-            c.wrong(&format!("{group}@{name}"), None, "is missing, or no text");
+            c.wrong(&format!("{group}@{name}"), None, "is missing, or not a text");
         }
     }
     let number = |c: &Checker, group: &str, name: &str| c.file.group(group).and_then(|group| group.attr(name));
@@ -174,13 +174,13 @@ fn identity(c: &mut Checker) {
         c.wrong("h5md@version", None, "is not [1, 1]");
     }
     if !number(c, "parameters", "seed").is_ok_and(|seed| seed.read_scalar::<u64>().is_ok()) {
-        c.wrong("parameters@seed", None, "is missing, or no number");
+        c.wrong("parameters@seed", None, "is missing, or not a number");
     }
     if let Some(shape) = c.typed("parameters/scene", &TEXT) {
         let scene = c.file.dataset("parameters/scene").and_then(|scene| scene.read_scalar::<VarLenUnicode>());
         let valid = scene.is_ok_and(|scene| serde_json::from_str::<serde_json::Value>(&scene).is_ok());
         if !shape.is_empty() || !valid {
-            c.wrong("parameters/scene", None, "is no JSON text");
+            c.wrong("parameters/scene", None, "is not a JSON text");
         }
     }
 }
@@ -188,7 +188,7 @@ fn identity(c: &mut Checker) {
 fn commit(c: &mut Checker) {
     let t = c.sizes.t;
     if c.typed("commit", &U64).is_some_and(|shape| !shape.is_empty()) {
-        c.wrong("commit", None, "is no single number");
+        c.wrong("commit", None, "is not a single number");
     }
     for name in ["contacts", "steps"] {
         c.table(&format!("commit_rows/{name}"), &U64, t, &[], "");
@@ -283,9 +283,9 @@ fn events(c: &mut Checker) {
     };
     let shape = dataset.shape();
     if !is(&expected) && !is(&before) {
-        c.wrong(PLACE, None, format!("is no compound of {} with their types", RUPTURE.join(", ")));
+        c.wrong(PLACE, None, format!("is not a compound of {} with their types", RUPTURE.join(", ")));
     } else if shape.len() != 1 || shape[0] < c.sizes.e {
-        c.wrong(PLACE, None, format!("has shape {shape:?} in place of [{}]", c.sizes.e));
+        c.wrong(PLACE, None, format!("has shape {shape:?} instead of [{}]", c.sizes.e));
     } else {
         c.sound.insert(PLACE.into(), [c.sizes.e, members.len()]);
     }
@@ -351,7 +351,7 @@ fn observables(c: &mut Checker) {
         // each observable has its own shape and unit
         let Some(shape) = c.typed(&place, &kind) else { continue };
         if shape.first().is_none_or(|&rows| rows < s) {
-            c.wrong(&place, None, format!("has shape {shape:?}, and {s} rows are promised"));
+            c.wrong(&place, None, format!("has shape {shape:?}, but {s} rows are required"));
         } else {
             c.sound.insert(place, [s, shape[1..].iter().product()]);
         }
@@ -375,6 +375,6 @@ fn checkpoint(c: &mut Checker) {
     }
     let written = c.rows::<u64>("checkpoint/index", 0..2).unwrap_or_default().iter().any(|number| *number > 0);
     if written && !c.resumable {
-        c.wrong("checkpoint", None, "holds no whole state to go on from");
+        c.wrong("checkpoint", None, "holds no complete state to resume from");
     }
 }

@@ -48,7 +48,7 @@ pub fn write(a: &History, report: &Report, folder: &mut Folder) -> Result<()> {
 
 /// Distances over time; the logarithmic axis cannot show zero distances.
 fn distance_chart(report: &Report) -> Chart {
-    let mut chart = Chart::new("time (s)", "distance of the grains' places (radii)");
+    let mut chart = Chart::new("time (s)", "distance between the grains of the two runs (radii)");
     chart.log_y = report.gaps.iter().any(|gap| gap.greatest > 0.0);
     let points = |value: fn(&Gap) -> f64| report.gaps.iter().map(|gap| (gap.time, value(gap))).collect();
     chart.curve("greatest", colour::BLUE, Style::Line, points(|gap| gap.greatest)).curve(
@@ -62,7 +62,7 @@ fn distance_chart(report: &Report) -> Chart {
 fn broken_chart(report: &Report) -> Chart {
     let end = report.gaps.last().map_or(0.0, |gap| gap.time);
     let mut chart = Chart::new("time (s)", "broken bonds");
-    chart.counts = true;
+    chart.y_is_count = true;
     for (k, list) in report.breaks.iter().enumerate() {
         let steps = list.iter().enumerate().map(|(n, found)| (found.time, (n + 1) as f64));
         let last = list.last().map_or(end, |found| found.time.max(end));
@@ -92,7 +92,7 @@ fn load_charts(report: &Report) -> Vec<Chart> {
             .map(|(chart, points)| chart.curve(name, colour, if k == 0 { Style::Line } else { Style::Thin }, points))
             .collect();
     }
-    charts.iter_mut().for_each(|chart| chart.set_off = true);
+    charts.iter_mut().for_each(|chart| chart.pad_x = true);
     charts
 }
 
@@ -112,7 +112,7 @@ fn bond_map(history: &History, report: &Report) -> Result<Drawing> {
         colour: COLOURS[kind(fate)].into(),
     });
     let panel = Panel {
-        caption: vec!["bonds that broke".into(), "places of the first frame of A".into()],
+        caption: vec!["bonds that broke".into(), "positions in the first frame of A".into()],
         links: links.collect(),
         walls: history.wall_state(0)?,
         fills: vec!["#f4f4f4".into(); history.grains()?.radius.len()],

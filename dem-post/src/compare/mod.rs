@@ -22,7 +22,7 @@ pub use report::{Report, read};
 mod files;
 pub mod report;
 
-/// Where two runs of one sample part: scenes, frames, broken bonds, curves.
+/// Compare two runs of one sample: first differences of scenes, frames, broken bonds and curves.
 #[derive(Debug, Args)]
 pub struct Command {
     /// The first history.
@@ -31,14 +31,14 @@ pub struct Command {
     /// The second history.
     #[arg(value_name = "B.h5")]
     b: PathBuf,
-    /// Distance of a grain's two places, in radii, up to which frames count as equal; 0 is equal in
-    /// every bit.
+    /// Largest distance between the positions of a grain in the two runs, in radii, for frames to
+    /// count as equal; 0: equal in every bit.
     #[arg(long, value_name = "RADII", default_value_t = 0.0)]
     tolerance: f64,
-    /// Folder for the results, created if need be [default: A-compare].
+    /// Folder for the results, created if missing [default: A-compare].
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// Take the folder over from the history that it belongs to: its results are removed.
+    /// Overwrite a results folder of other histories: their results are removed.
     #[arg(long)]
     force: bool,
 }

@@ -125,11 +125,11 @@ pub fn read(a: &History, b: &History, tolerance: f64) -> Result<Report> {
     }
     let [n, m] = [&radii[0], &radii[1]].map(Vec::len);
     if n != m {
-        return Err(differs(format!("{n} grains there, {m} here; choose two runs of one sample")));
+        return Err(differs(format!("{n} grains there, {m} here: choose two runs of one sample")));
     }
     let gaps = gaps(a, b, &radii[0])?;
     if gaps.is_empty() {
-        return Err(differs("no frame of one has the time of a frame of the other".into()));
+        return Err(differs("the two runs have no frame at a common time".into()));
     }
     let mut breaks = [breaks(&a.ruptures()?), breaks(&b.ruptures()?)];
     let ends = [end(a, &breaks[0]), end(b, &breaks[1])];
@@ -288,7 +288,7 @@ fn parting_line(parting: &Parting) -> String {
             |f| format!("{}–{} {} at {}", f.grains[0], f.grains[1], f.mode, quantity(Some(f.time), "s")),
         )
     };
-    format!("after {} alike: A {}, B {}", parting.alike, side(parting.a), side(parting.b))
+    format!("after {} equal breaks: A {}, B {}", parting.alike, side(parting.a), side(parting.b))
 }
 
 /// A value of a scene, shortened to fit a line.

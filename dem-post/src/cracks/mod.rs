@@ -26,7 +26,7 @@ mod section;
 pub mod surfaces;
 pub mod voids;
 
-/// Ruptures, broken bonds over time, cracks as lines and their fronts, fragments.
+/// Ruptures, broken bonds over time, cracks and their fronts, fragments.
 #[derive(Debug, Args)]
 pub struct Command {
     #[command(flatten)]

@@ -44,7 +44,7 @@ pub fn broken_chart(curve: &[(f64, [usize; 4])], end: f64) -> Chart {
     if curve.last().is_some_and(|(_, n)| n[3] > 0) {
         chart = chart.curve("twist", colour::PURPLE, Style::Steps, points(&|n| n[3]));
     }
-    (chart.counts, chart.set_off) = (true, true);
+    (chart.y_is_count, chart.pad_x) = (true, true);
     chart
 }
 
@@ -54,14 +54,14 @@ pub fn fragment_charts(pieces: &[Pieces]) -> Vec<Chart> {
     let mut number = Chart::new("time (s)", "number of fragments")
         .curve("all", colour::BLACK, Style::Steps, points(&|f| f.count as f64))
         .curve("single grains", colour::VERMILLION, Style::Steps, points(&|f| f.singles as f64));
-    (number.counts, number.set_off) = (true, true);
+    (number.y_is_count, number.pad_x) = (true, true);
     let mut largest = Chart::new("time (s)", "largest fragment (% of the mass)").curve(
         "largest fragment",
         colour::BLUE,
         Style::Steps,
         points(&|f| 100.0 * f.largest_mass_fraction),
     );
-    largest.set_off = true;
+    largest.pad_x = true;
     vec![number, largest]
 }
 
@@ -69,8 +69,8 @@ pub fn fragment_charts(pieces: &[Pieces]) -> Vec<Chart> {
 /// and, where a step broke bonds in several rounds, these sizes over the rounds of the step with
 /// the most rounds.
 pub fn front_charts(report: &Report) -> Vec<Chart> {
-    let mut over_time = Chart::new("time (s)", "place of the tips along the crack (mm)");
-    over_time.set_off = true;
+    let mut over_time = Chart::new("time (s)", "position of the tips along the crack (mm)");
+    over_time.pad_x = true;
     // a crack has no curve over time if all its bonds broke at one time
     let grown = |crack: &&Crack| crack.first < crack.last;
     for crack in report.cracks.iter().filter(grown).take(FRONTS) {
@@ -106,7 +106,7 @@ fn growth_chart(report: &Report) -> Option<Chart> {
     let mut chart = Chart::new("time (s)", label)
         .curve("all", colour::BLACK, Style::Steps, points(|row| row.size))
         .curve(largest(report), colour::BLUE, Style::Steps, points(|row| row.largest));
-    chart.set_off = true;
+    chart.pad_x = true;
     Some(chart)
 }
 
@@ -120,7 +120,7 @@ fn cascade_chart(report: &Report) -> Option<Chart> {
     let mut chart = Chart::new(&format!("round of the cascade in step {}", rounds[0].step), label)
         .curve("all", colour::BLACK, Style::Marked, points(|row| row.size))
         .curve(largest(report), colour::BLUE, Style::Marked, points(|row| row.largest));
-    chart.set_off = true;
+    chart.pad_x = true;
     Some(chart)
 }
 
@@ -173,7 +173,7 @@ fn pale_panel(history: &History, report: &Report, cracks: usize) -> Result<Panel
     Ok(Panel {
         caption: vec![
             format!("{cracks} crack{} of {broken} broken bond{}", plural(cracks), plural(broken)),
-            "places of the first frame".into(),
+            "positions in the first frame".into(),
         ],
         grains: history.grain_state(0)?,
         walls: history.wall_state(0)?,

@@ -25,12 +25,11 @@ impl OnPage for Report {
             }
         }
         if !self.surfaces.is_empty() {
-            let alt =
-                "Facets of broken bonds at their places in the first frame, coloured by the time at which they broke.";
+            let alt = "Facets of broken bonds at their positions in the first frame, coloured by the time at which they broke.";
             let [whole, front, side] = surface_maps(history, self)?;
             figures.push(map_figure(&whole, alt, "Cracks by the time at which each bond broke.")?);
             figures.push(map_figure(&front, alt, "The same, seen along y.")?);
-            figures.push(map_figure(&side, alt, "The same, seen against x.")?);
+            figures.push(map_figure(&side, alt, "The same, seen in the direction −x.")?);
         }
         for &frame in frames {
             let time = number(history.times()[frame]);
@@ -72,11 +71,11 @@ impl OnPage for Report {
             ("5 % broken".into(), quantity(self.time_of_5_percent, "s")),
         ];
         let text = if history.dimension() == 2 {
-            "A crack is a set of broken bonds that meet in the voids between the grains; its path is the longest way through it, drawn \
-             thick. Places are those of the first frame."
+            "A crack is a set of broken bonds that meet in the voids between the grains; its path is the longest line through it, drawn \
+             thick. Positions are those of the first frame."
         } else {
-            "A crack is a set of broken bonds whose facets, the faces that the cells of two grains share, meet in the voids between the \
-             grains. Places are those of the first frame."
+            "A crack is a set of broken bonds whose facets (the common faces of the cells of two grains) meet in the voids between the \
+             grains. Positions are those of the first frame."
         };
         Ok(Section { text: text.into(), facts, figures, tables, ..Section::of::<Self>() })
     }

@@ -21,13 +21,13 @@ pub mod solver;
 
 use solver::Accuracy;
 
-/// The run on one HTML page that needs nothing else: pictures, curves, tables, accuracy, energy,
+/// Report of the run as one self-contained HTML page: pictures, curves, tables, accuracy, energy,
 /// scene.
 #[derive(Debug, Args)]
 pub struct Command {
     #[command(flatten)]
     moments: Moments,
-    /// The load wall [default: that of the scene, else the only driven one].
+    /// Name of the load wall [default: that of the scene, else the only driven wall].
     #[arg(long, value_name = "NAME")]
     wall: Option<String>,
 }
@@ -75,12 +75,12 @@ pub struct Report {
     #[serde(skip)]
     pub stress_strain: Option<stress_strain::Report>,
     /// The sections without content.
-    pub left_out: Vec<LeftOut>,
+    pub left_out: Vec<EmptySection>,
 }
 
 /// A section without content.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct LeftOut {
+pub struct EmptySection {
     /// Its [`OnPage::ID`].
     pub section: &'static str,
     /// The reason.
@@ -111,11 +111,11 @@ pub fn read(history: &History, times: &[f64], wall: Option<&str>, quiet: bool) -
 }
 
 /// `None` for an analysis whose data the scene lacks; the reason is added to `left_out`.
-fn if_there<R: OnPage>(found: Result<R>, left_out: &mut Vec<LeftOut>) -> Result<Option<R>> {
+fn if_there<R: OnPage>(found: Result<R>, left_out: &mut Vec<EmptySection>) -> Result<Option<R>> {
     match found {
         Ok(found) => Ok(Some(found)),
         Err(PostError::Lacking { what, .. }) => {
-            left_out.push(LeftOut { section: R::ID, why: what });
+            left_out.push(EmptySection { section: R::ID, why: what });
             Ok(None)
         }
         Err(error) => Err(error),
@@ -166,7 +166,7 @@ impl Report {
             ("worst residual", percent(a.residual.map(|r| r.worst))),
             ("worst load error", percent(a.load_error.map(|r| r.worst))),
             ("worst false acceleration", percent(a.false_acceleration.map(|r| r.worst))),
-            ("steps whose residual missed it", missed),
+            ("steps whose residual missed the tolerance", missed),
         ];
         lines.extend(self.left_out.iter().map(|out| ("left out", format!("{}: {}", out.section, out.why))));
         facts(&lines)

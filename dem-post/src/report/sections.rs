@@ -34,18 +34,19 @@ impl OnPage for Accuracy {
             curve.log_y = true;
             let tolerance = self.tolerance.filter(|_| name == "solver_residual");
             if let Some(tolerance) = tolerance {
-                curve.levels.push((tolerance, format!("aimed at: {tolerance:e}")));
+                curve.levels.push((tolerance, format!("tolerance: {tolerance:e}")));
             }
             let what = if steps { "steps without any are left out" } else { "steps where it is zero are left out" };
             figures.push(chart_figure(curve, alt, &format!("{alt} {}.", capitalised(what))));
         }
         Ok(Section {
-            text: "The residual tells how far the contact laws are from being met, over the size of the reactions and the \
-                   load. The load error is the estimated error of the net impulses of the contacts on the bodies, over \
-                   those impulses, as the direct solvers report it. The false acceleration is the force that the \
-                   accelerations of the grains stand for, over the load: in a scene at rest it should be zero, and a \
-                   small residual can hide a large one."
-                .into(),
+            text:
+                "The residual is the violation of the contact laws, relative to the reactions and the load. The load \
+                   error is the estimated error of the net impulses of the contacts on the bodies, relative to those \
+                   impulses; only the direct solvers report it. The false acceleration is the inertial force of the \
+                   grains relative to the load. It should be zero in a scene at rest; it can be large although the \
+                   residual is small."
+                    .into(),
             facts: self.lines(),
             figures,
             ..Section::of::<Self>()
@@ -59,15 +60,15 @@ impl OnPage for Accuracy {
 /// Those of reading the history.
 pub fn energy(history: &History) -> Result<Section> {
     let books = [
-        ("external_work", "work from outside"),
+        ("external_work", "external work"),
         ("kinetic_energy", "kinetic energy"),
-        ("dissipation_friction", "lost to friction"),
-        ("dissipation_impact", "lost to impacts"),
+        ("dissipation_friction", "dissipated by friction"),
+        ("dissipation_impact", "dissipated by impacts"),
         ("elastic_energy", "elastic energy"),
         ("dissipation_damping", "damping of the time step"),
         ("fracture_energy", "fracture energy"),
         ("bond_remainder", "work of rigid bonds (should be 0)"),
-        ("energy_remainder", "not accounted for (should be 0)"),
+        ("energy_remainder", "energy remainder (should be 0)"),
     ];
     let mut facts = vec![];
     let mut curves = Chart::new("time (s)", "energy (J)");
@@ -85,8 +86,8 @@ pub fn energy(history: &History) -> Result<Section> {
             curves = curves.curve(label, colour, Style::Line, points);
         }
     }
-    curves.set_off = true;
-    let alt = "Work from outside, kinetic energy and losses over time.";
+    curves.pad_x = true;
+    let alt = "External work, kinetic energy and dissipation over time.";
     let figures = if curves.curves.is_empty() { vec![] } else { vec![chart_figure(curves, alt, alt)] };
     Ok(Section { id: "energy", title: "Energy", facts, figures, ..Section::default() })
 }

@@ -5,9 +5,9 @@ use serde::Serialize;
 
 use crate::output::{Result, number};
 
-/// The spread of a measure over the steps.
+/// The distribution of a measure over the steps.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Spread {
+pub struct Distribution {
     /// Median.
     pub median: f64,
     /// 99th percentile: one step in a hundred exceeds it.
@@ -28,12 +28,12 @@ pub struct Accuracy {
     /// The tolerated residual, from the scene.
     pub accept: Option<f64>,
     /// Residuals.
-    pub residual: Option<Spread>,
+    pub residual: Option<Distribution>,
     /// Load errors of the steps whose solves reported one; in histories older than version 4 some
     /// of them are false accelerations.
-    pub load_error: Option<Spread>,
+    pub load_error: Option<Distribution>,
     /// False accelerations; none in histories older than version 4.
-    pub false_acceleration: Option<Spread>,
+    pub false_acceleration: Option<Distribution>,
     /// Steps by the method that solved them, in the order of [`SolverRoute::ALL`]; none in
     /// histories older than version 4.
     pub routes: Option<[usize; 4]>,
@@ -42,7 +42,7 @@ pub struct Accuracy {
     /// Refused solves.
     pub rejected: Option<f64>,
     /// Iterations of a step.
-    pub iterations: Option<Spread>,
+    pub iterations: Option<Distribution>,
     /// Mean number of iterations of a step.
     pub mean_iterations: Option<f64>,
     /// Newton iterations and factorisations of a step, means.
@@ -65,7 +65,9 @@ pub fn read(history: &History) -> Result<Accuracy> {
         let (time, value): (Vec<f64>, Vec<f64>) = told.unzip();
         Ok((!value.is_empty()).then_some((time, value)))
     };
-    let of = |name: &str| -> Result<Option<Spread>> { Ok(series(name)?.map(|(time, value)| spread(&time, value))) };
+    let of = |name: &str| -> Result<Option<Distribution>> {
+        Ok(series(name)?.map(|(time, value)| distribution(&time, value)))
+    };
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     let mean_of = |name: &str| -> Result<Option<f64>> { Ok(series(name)?.map(|(_, value)| mean(&value))) };
     let tolerance = setting("tolerance");
@@ -93,25 +95,25 @@ pub fn read(history: &History) -> Result<Accuracy> {
     })
 }
 
-/// The spread of `value` over the times `time` (s), of at least one step.
-pub fn spread(time: &[f64], value: Vec<f64>) -> Spread {
+/// The distribution of `value` over the times `time` (s), of at least one step.
+pub fn distribution(time: &[f64], value: Vec<f64>) -> Distribution {
     let worst = (0..value.len()).max_by(|&a, &b| value[a].total_cmp(&value[b]).then(b.cmp(&a))).unwrap_or(0);
     let (greatest, at) = (value[worst], time.get(worst).copied().unwrap_or(0.0));
     let mut sorted = value;
     sorted.sort_by(f64::total_cmp);
     let place = |share: f64| sorted[((share * sorted.len() as f64).ceil() as usize).clamp(1, sorted.len()) - 1];
-    Spread { median: place(0.5), high: place(0.99), worst: greatest, time: at }
+    Distribution { median: place(0.5), high: place(0.99), worst: greatest, time: at }
 }
 
 impl Accuracy {
     /// The figures as names and values, for people.
     pub fn lines(&self) -> Vec<(String, String)> {
-        let spread = |found: Option<Spread>| {
+        let distribution = |found: Option<Distribution>| {
             found.map_or_else(
                 || "not recorded".into(),
                 |s| {
                     let [median, high, worst, time] = [s.median, s.high, s.worst, s.time].map(number);
-                    format!("median {median}; one step in a hundred above {high}; worst {worst} at t = {time} s")
+                    format!("median {median}; 1 % of the steps above {high}; worst {worst} at t = {time} s")
                 },
             )
         };
@@ -132,20 +134,23 @@ impl Accuracy {
             |[n, f]| format!("{} iterations and {} factorisations a step", number(n), number(f)),
         );
         [
-            ("Residual aimed at, accepted", format!("{}, {}", plain(self.tolerance), plain(self.accept))),
-            ("Residual", spread(self.residual)),
+            ("Residual: tolerance, accepted", format!("{}, {}", plain(self.tolerance), plain(self.accept))),
+            ("Residual", distribution(self.residual)),
             (
                 match self.false_acceleration {
                     Some(_) => "Load error",
                     None => "Load error; false acceleration where none was reported",
                 },
-                spread(self.load_error),
+                distribution(self.load_error),
             ),
-            ("False acceleration", spread(self.false_acceleration)),
+            ("False acceleration", distribution(self.false_acceleration)),
             ("Steps by method", routes),
-            ("Steps that missed the residual aimed at", missed),
+            ("Steps that missed the tolerance of the residual", missed),
             ("Solves not accepted", plain(self.rejected)),
-            ("Iterations of a step", format!("mean {}; {}", plain(self.mean_iterations), spread(self.iterations))),
+            (
+                "Iterations of a step",
+                format!("mean {}; {}", plain(self.mean_iterations), distribution(self.iterations)),
+            ),
             ("Newton", newton),
             ("Processor time", self.cpu_time.map_or_else(|| "–".into(), |t| format!("{} s", number(t)))),
         ]
@@ -162,8 +167,8 @@ mod tests {
     fn a_spread_tells_middle_tail_and_worst() {
         let time: Vec<f64> = (0..200).map(|k| f64::from(k) * 0.5).collect();
         // 0 … 199 in reverse: the worst comes first
-        let found = spread(&time, (0..200).rev().map(f64::from).collect());
-        assert_eq!(found, Spread { median: 99.0, high: 197.0, worst: 199.0, time: 0.0 });
-        assert_eq!(spread(&[2.0], vec![7.0]), Spread { median: 7.0, high: 7.0, worst: 7.0, time: 2.0 });
+        let found = distribution(&time, (0..200).rev().map(f64::from).collect());
+        assert_eq!(found, Distribution { median: 99.0, high: 197.0, worst: 199.0, time: 0.0 });
+        assert_eq!(distribution(&[2.0], vec![7.0]), Distribution { median: 7.0, high: 7.0, worst: 7.0, time: 2.0 });
     }
 }

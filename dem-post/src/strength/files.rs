@@ -55,7 +55,7 @@ pub fn write(report: &Report, folder: &mut Folder) -> Result<()> {
 /// Strengths by sample, their means with the spread, and the line.
 fn chart(report: &Report) -> Chart {
     let mut chart = Chart::new(&axis(&report.field, &report.unit), &axis(report.measure.title(), "N"));
-    chart.set_off = true;
+    chart.pad_x = true;
     chart.log_x = spans_decades(report.runs.iter().map(|run| run.value));
     chart.log_y = chart.log_x && spans_decades(report.runs.iter().map(|run| run.strength));
     if let Some(line) = &report.line {

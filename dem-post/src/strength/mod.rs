@@ -31,10 +31,10 @@ pub mod report;
 pub mod runs;
 pub mod scenes;
 
-/// Strength against a field of the scene over many runs, as against cohesion: a line, its errors,
-/// the scatter of samples.
+/// Strength as a function of a field of the scene over many runs, such as cohesion: fitted line,
+/// its errors, scatter of samples.
 ///
-/// The exit code is 1 where runs were left out because they did not give way, or are not done.
+/// The exit code is 1 if runs were left out because they did not fail or are not done.
 #[derive(Debug, Args)]
 pub struct Command {
     /// Histories, or the folder of a sweep.
@@ -43,16 +43,16 @@ pub struct Command {
     /// The varied field, as --set names it [default: the one that differs].
     #[arg(long, value_name = "FIELD")]
     against: Option<String>,
-    /// What counts as the strength: the load at …
+    /// Definition of the strength: the load at …
     #[arg(long, value_enum, default_value_t)]
     measure: Measure,
-    /// The load wall [default: that of the scene, else the only driven one].
+    /// Name of the load wall [default: that of the scene, else the only driven wall].
     #[arg(long, value_name = "NAME")]
     wall: Option<String>,
-    /// Folder for the results, created if need be [default: RUNS-strength].
+    /// Folder for the results, created if missing [default: RUNS-strength].
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// Take the folder over from the history that it belongs to: its results are removed.
+    /// Overwrite a results folder of other histories: their results are removed.
     #[arg(long)]
     force: bool,
 }

@@ -222,7 +222,7 @@ impl Report {
         let (out, all) = (self.left_out.len(), self.left_out.len() + self.runs.len());
         let Some(first) = self.left_out.first() else { return Ok(()) };
         Err(PostError::Incomplete(format!(
-            "{out} of {all} runs are left out, as {}: {}; the results are those of the others",
+            "{out} of {all} runs are left out, such as {}: {}; the results are those of the others",
             first.run, first.why
         )))
     }
@@ -243,40 +243,43 @@ impl Report {
         let lined = self.samples.iter().filter(|sample| sample.line.is_some()).count();
         if self.values.len() == 1 {
             notes.push(format!(
-                "one value of {} only: no line, and whether the ratio is constant cannot be told",
+                "only one value of {}: no line can be fitted, and constancy of the ratio cannot be tested",
                 self.field
             ));
         } else if lined == 0 {
             notes.push(
-                "no sample was run at two values: lines of samples and constancy of ratios cannot be told".into(),
+                "no sample was run at two values: no lines of single samples, and constancy of ratios cannot be tested"
+                    .into(),
             );
         } else if self.line.is_some_and(|line| line.slope.standard_error.is_none()) {
-            notes.push("two points: any line goes through them, and its errors cannot be told".into());
+            notes.push("two points: the line is exact, and its errors are unknown".into());
         }
         if self.line.is_some_and(|line| line.r_squared.is_none()) {
-            notes.push("all strengths are equal: there is no variance for R² to be a share of".into());
+            notes.push("all strengths are equal: R² is undefined".into());
         }
         if self.samples.len() == 1 {
-            notes.push("one sample only: how strength scatters from sample to sample cannot be told".into());
+            notes.push("only one sample: the scatter of strength between samples is unknown".into());
         } else if lined == 1 {
-            notes.push(
-                "one sample only was run at two values: the scatter of slopes over samples cannot be told".into(),
-            );
+            notes
+                .push("only one sample was run at two values: the scatter of slopes between samples is unknown".into());
         }
         if self.values.iter().any(|at| at.value == 0.0) {
-            notes.push(format!("{} is zero in some runs: there is no ratio to it", self.field));
+            notes.push(format!("{} is zero in some runs: the ratio is undefined", self.field));
         }
         let other: Vec<&str> =
             self.samples.iter().filter(|sample| !sample.same_grains).map(|sample| sample.sample.as_str()).collect();
         if let Some(first) = other.first() {
             let count = other.len();
-            notes.push(format!("{count} of the samples are other grains at another value, as {first}: a line of such a sample is one through different samples"));
+            notes.push(format!(
+                "{count} of the samples have different grains at different values, such as {first}: the line of such a \
+                 sample mixes different samples"
+            ));
         }
         let early = self.runs.iter().filter(|run| run.early).count();
         if early > 0 {
             notes.push(format!(
-                "in {early} runs no bond had broken by the collapse: where bonds join all grains to one piece, the strain is the \
-                 solver's own"
+                "in {early} runs no bond had broken before the collapse: if bonds join all grains to one piece, the strain is \
+                 solver error"
             ));
         }
         notes

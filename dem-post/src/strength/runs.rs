@@ -14,18 +14,18 @@ use crate::collapse::{Bonding, Collapse, peak};
 use crate::output::{PostError, Result, quantity};
 use crate::stress_strain;
 
-/// What counts as the strength of a run: the load at …
+/// Definition of the strength of a run: the load at …
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Measure {
     /// The first break of a bond.
     FirstBreak,
-    /// The break by which 5 % of the bonds had broken.
+    /// The break with which 5 % of the bonds are broken.
     #[default]
     Broken,
     /// The last step before the strain of the sample exceeds 1e-4.
     Collapse,
-    /// The greatest load, where it falls by 5 % afterwards.
+    /// The greatest load, if the load falls by 5 % afterwards.
     Peak,
 }
 
@@ -91,7 +91,7 @@ pub fn histories(paths: &[PathBuf]) -> Result<(Vec<PathBuf>, Vec<LeftOut>)> {
         let Some(mut manifest) = store.manifest()? else {
             let shown = path.display();
             return Err(PostError::Usage(format!(
-                "{shown} holds no manifest.json: give the folder of a sweep, which dem-run sweep writes, or the histories"
+                "{shown} holds no manifest.json: give the folder of a `dem-run sweep`, or the histories"
             )));
         };
         store.gather(&mut manifest);
@@ -134,7 +134,7 @@ pub fn read(path: &Path, measure: Measure, wall: Option<&str>) -> Result<Found> 
     let course = Course::read(&history, wall)?;
     let scene = history.parameters()?.scene;
     if bonds.is_empty() && matches!(measure, Measure::FirstBreak | Measure::Broken) {
-        let what = "it has no bonds that could break: choose --measure collapse or peak".into();
+        let what = "it has no bonds: choose --measure collapse or peak".into();
         return Err(PostError::Lacking { path: path.into(), what });
     }
     let strength = if measure == Measure::Collapse {
@@ -235,9 +235,9 @@ impl Course {
             Measure::Broken => format!("{broken} of {bonds} bonds have broken by {greatest}, fewer than 5 %"),
             Measure::Collapse => {
                 let strain = self.strain.iter().map(|e| e.abs()).fold(0.0, f64::max);
-                format!("its strain comes to {} by {greatest}, not to 1e-4", quantity(Some(strain), ""))
+                format!("its strain reaches {} by {greatest}, less than 1e-4", quantity(Some(strain), ""))
             }
-            Measure::Peak => format!("its load never falls by 5 %; it comes to {greatest}"),
+            Measure::Peak => format!("its load never falls by 5 %; it reaches {greatest}"),
         }
     }
 }

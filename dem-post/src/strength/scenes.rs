@@ -71,11 +71,11 @@ pub fn design(runs: &[(String, String)], against: Option<&str>) -> Result<Design
     if !other.is_empty() {
         return Err(PostError::Usage(format!(
             "these are runs of different scenes: besides {field} and the sample they differ in {}; choose runs that have \
-             these in common, or vary another field by --against",
+             these in common, or another field with --against",
             list(&other)
         )));
     }
-    let labels: Vec<(Vec<Key>, String)> = scenes.iter().map(|scene| label(scene, &sample_fields, &field)).collect();
+    let labels: Vec<(Vec<SortKey>, String)> = scenes.iter().map(|scene| label(scene, &sample_fields, &field)).collect();
     let mut sorted = labels.clone();
     sorted.sort();
     sorted.dedup();
@@ -142,7 +142,7 @@ fn choose(scenes: &[Leaves], differing: &[String]) -> Result<String> {
         return match is_number(scenes, DEFAULT) {
             true => Ok(DEFAULT.into()),
             false => Err(PostError::Usage(
-                "no number differs between these runs but what makes the sample: name a field by --against".into(),
+                "these runs differ in no number except those of the sample: name a field with --against".into(),
             )),
         };
     };
@@ -150,7 +150,7 @@ fn choose(scenes: &[Leaves], differing: &[String]) -> Result<String> {
     match first.as_slice() {
         [field] => Ok(field.clone()),
         several => Err(PostError::Usage(format!(
-            "several fields differ between these runs: choose one by --against: {}",
+            "several fields differ between these runs: choose one with --against: {}",
             list(several)
         ))),
     }
@@ -182,10 +182,10 @@ fn follows(scenes: &[Leaves], values: &[f64], name: &str) -> bool {
 }
 
 /// Sort key of a sample: numbers before words.
-type Key = (u64, String);
+type SortKey = (u64, String);
 
 /// The name of a scene's sample, and its sort key; samples differ in `fields`, not in `varied`.
-fn label(scene: &Leaves, fields: &[String], varied: &str) -> (Vec<Key>, String) {
+fn label(scene: &Leaves, fields: &[String], varied: &str) -> (Vec<SortKey>, String) {
     let value = |name: &str| scene.get(name).cloned().unwrap_or_default();
     let text = |name: &str| match value(name) {
         Value::String(text) => text,

@@ -39,12 +39,12 @@ mod pictures;
 mod report;
 mod section;
 
-/// Force–displacement, stress–strain, the collapse load.
+/// Force–displacement and stress–strain curves, collapse load.
 #[derive(Debug, Args)]
 pub struct Command {
     #[command(flatten)]
     files: Files,
-    /// The load wall [default: that of the scene, else the only driven one].
+    /// Name of the load wall [default: that of the scene, else the only driven wall].
     #[arg(long, value_name = "NAME")]
     wall: Option<String>,
 }

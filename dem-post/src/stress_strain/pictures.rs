@@ -15,7 +15,7 @@ fn pairs(x: &[f64], x_scale: f64, y: &[f64], y_scale: f64) -> Vec<(f64, f64)> {
 /// Force over displacement of the wall.
 pub fn force_displacement(report: &Report) -> Chart {
     let mut chart = Chart::new("displacement of the wall (mm)", "force (N)");
-    chart.set_off = true;
+    chart.pad_x = true;
     if !report.reaction.is_empty() {
         let points = pairs(&report.displacement, 1e3, &report.reaction, 1.0);
         chart = chart.curve("reaction of the grains", colour::ORANGE, Style::Thin, points);
@@ -50,7 +50,7 @@ pub fn onset(report: &Report) -> Option<Chart> {
 /// Stress over strain.
 pub fn stress_strain(report: &Report) -> Chart {
     let mut chart = Chart::new("axial strain (%)", "axial stress (kPa)");
-    chart.set_off = true;
+    chart.pad_x = true;
     let wall_strain = 1e2 / report.summary.height;
     let wall_stress = report.summary.area.map(|area| 1e-3 / area);
     if let Some(wall_stress) = wall_stress.filter(|_| !report.reaction.is_empty()) {

@@ -236,7 +236,7 @@ fn driven(path: &Path, walls: &[Wall], scene: &str, asked: Option<&str>) -> Resu
         }
         None => chosen.ok_or_else(|| {
             let shown = path.display();
-            PostError::Usage(format!("{shown}: several walls are driven: choose one by --wall: {}", names()))
+            PostError::Usage(format!("{shown}: several walls are driven: choose one with --wall: {}", names()))
         })?,
     };
     Ok(walls.iter().position(|wall| wall.name == name).unwrap_or(0))

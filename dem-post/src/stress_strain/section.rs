@@ -45,9 +45,9 @@ impl OnPage for Report {
         facts.extend(s.splitting.as_ref().map(|splitting| ("Splitting strength", splitting.to_string())));
         Ok(Section {
             text:
-                "Of rigid grains that bonds join to one piece a strain before the first bond breaks is solver error: believe a \
-                   collapse load only where it lies above the load of the first break. A wall that moves at a prescribed \
-                   velocity loads the sample with the force that acted before any bond broke in the step."
+                "If rigid bonds join all grains to one piece, strain before the first break is solver error: a collapse load \
+                   is then meaningful only above the load of the first break. For a wall with prescribed velocity, the \
+                   load of a step is the force that acted before any bond broke in it."
                     .into(),
             facts: facts.into_iter().map(|(name, value)| (name.into(), value)).collect(),
             figures,

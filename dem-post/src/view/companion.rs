@@ -23,9 +23,9 @@ pub(super) struct Companion<'a> {
 /// One part of a virtual dataset: elements of a source and their destination, both in the order of
 /// their rows.
 pub(super) struct Piece {
-    /// A dataset of the history, or of the companion if `own`.
+    /// A dataset of the history, or of the companion if `in_companion`.
     pub place: &'static str,
-    pub own: bool,
+    pub in_companion: bool,
     pub from: Vec<SliceOrIndex>,
     pub to: Vec<SliceOrIndex>,
 }
@@ -87,7 +87,7 @@ impl<'a> Companion<'a> {
     pub fn map<T: H5Type>(&self, group: &Group, name: &str, shape: &[usize], pieces: &[Piece]) -> hdf5::Result<()> {
         let mut builder = group.new_dataset::<T>().shape(shape);
         for piece in pieces {
-            let (source, file) = if piece.own { (&self.file, ITSELF) } else { (self.history, &*self.link) };
+            let (source, file) = if piece.in_companion { (&self.file, ITSELF) } else { (self.history, &*self.link) };
             let extents = source.dataset(piece.place)?.shape();
             let [from, to] = [&piece.from, &piece.to].map(|slices| Hyperslab::from(slices.clone()));
             // HDF5 would replace %b in this name by a number
@@ -109,7 +109,7 @@ impl<'a> Companion<'a> {
     ) -> hdf5::Result<()> {
         let axes = if rows.width == 1 { 1 } else { 2 };
         let to = [span(0..rows.count), span(rows.filled.clone())][..axes].to_vec();
-        self.map::<T>(group, name, &[rows.count, rows.width][..axes], &[Piece { place, own: false, from, to }])
+        self.map::<T>(group, name, &[rows.count, rows.width][..axes], &[Piece { place, in_companion: false, from, to }])
     }
 
     /// Writes an array out.

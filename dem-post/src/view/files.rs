@@ -20,9 +20,12 @@ pub fn write(history: &History, report: &mut Report, folder: &mut Folder, quiet:
     let source = absolute(history.path())?;
     let home = absolute(folder.path())?;
     let link = relative(&home, &source);
-    let link = link.to_str().ok_or_else(|| failed(&source, &"its path is no Unicode text"))?;
+    let link = link.to_str().ok_or_else(|| failed(&source, &"its path is not Unicode text"))?;
     if NAMES.iter().any(|name| home.join(name) == source) {
-        return Err(PostError::Usage(format!("{} would be overwritten: choose another folder with -o", report.file)));
+        return Err(PostError::Usage(format!(
+            "{} would be overwritten: choose another folder with -o DIR",
+            report.file
+        )));
     }
     let file = hdf5::File::open(&source).map_err(|error| failed(&source, &error))?;
     for companion in &mut report.companions {

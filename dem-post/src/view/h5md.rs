@@ -48,7 +48,7 @@ fn element(companion: &Companion, grains: &Group, name: &str, place: &'static st
         &group,
         "value",
         &[t, n, 3],
-        &[Piece { place, own: false, from: vectors.clone(), to: vectors }],
+        &[Piece { place, in_companion: false, from: vectors.clone(), to: vectors }],
     )
 }
 

@@ -20,12 +20,12 @@ mod outline;
 pub mod report;
 mod vtk;
 
-/// Small files that show the history in ParaView, VTK and MDAnalysis, and copy almost nothing of
-/// it.
+/// Write small files through which ParaView, VTK and MDAnalysis read the history, almost without
+/// copies.
 ///
 /// Grains, contacts and bonds over time as grains.vtkhdf, contacts.vtkhdf and bonds.vtkhdf
-/// (ParaView 5.13, VTK or pyvista), positions as grains.h5md (MDAnalysis). They lead to the history
-/// by a path relative to themselves: move them together. docs/history.md shows how to use them.
+/// (ParaView 5.13, VTK or pyvista), positions as grains.h5md (MDAnalysis). They refer to the
+/// history by a relative path: move them together. docs/history.md shows how to use them.
 #[derive(Debug, Args)]
 pub struct Command {
     #[command(flatten)]

@@ -45,8 +45,8 @@ pub fn read(history: &History, quiet: bool) -> Result<Report> {
     let lacking = |what: &str| PostError::Lacking { path: history.path().into(), what: what.into() };
     if history.open_ended() {
         return Err(lacking(
-            "it was never closed, and viewers open closed files only: wait for the end of the run, or, if it was \
-             killed, `dem-run resume FILE` goes on with it, and `dem-post info --repair FILE` closes it",
+            "it is not closed, and viewers open only closed files: wait for the end of the run; if it was killed, \
+             `dem-run resume FILE` continues it, and `dem-post info --repair FILE` closes the file",
         ));
     }
     if history.frames() == 0 {
@@ -83,7 +83,7 @@ impl Report {
         let [small, large] = [sum, self.bytes].map(|bytes| bytes as f64 / 1e6);
         lines.push((
             "length",
-            format!("{small:.2} MB, beside {large:.2} MB of the history, which must stay where it is"),
+            format!("{small:.2} MB, in addition to the history of {large:.2} MB, which must stay in its place"),
         ));
         facts(&lines)
     }

@@ -257,9 +257,9 @@ fn lines(pairs: &[[i32; 2]], points: &[f64], o: &Outline) -> (Vec<i32>, Vec<f64>
 fn points(poly: &Poly, o: &Outline, room: usize) -> hdf5::Result<()> {
     let (t, n, d) = (o.frames, o.grains, o.dimension);
     let each = |start, block| vec![blocks(start, n + room, t, block), span(0..d)];
-    let mut pieces = vec![Piece { place: POSITION, own: false, from: first(&[t, n, d]), to: each(0, n) }];
+    let mut pieces = vec![Piece { place: POSITION, in_companion: false, from: first(&[t, n, d]), to: each(0, n) }];
     if room > 0 {
-        pieces.push(Piece { place: PLACES, own: true, from: first(&[t, room, d]), to: each(n, room) });
+        pieces.push(Piece { place: PLACES, in_companion: true, from: first(&[t, room, d]), to: each(n, room) });
     }
     poly.companion.map::<f64>(&poly.root, "Points", &[t * (n + room), 3], &pieces)
 }

@@ -1,5 +1,5 @@
-//! Histories spoilt by one value each, given to every analysis: nothing panics, nothing is drawn
-//! from them, and `info --check` names the place.
+//! Every analysis of histories with one corrupted value each: nothing panics, nothing is drawn, and
+//! `info --check` reports the place.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -16,14 +16,14 @@ member!(EventX, x, f64);
 member!(EventTwist, twist, f64);
 member!(EventOther, j, i32);
 
-/// A value that is put at an index of a dataset.
+/// Writes a wrong value at an index of a dataset.
 type Spoil = Box<dyn Fn(&File, &str, &[usize])>;
 
 fn spoil<T: H5Type + Copy>(value: T) -> Spoil {
     Box::new(move |file, place, index| put(file, place, index, value))
 }
 
-/// Values that no dataset of a type may hold, with the words for them.
+/// Values that are wrong in any dataset of a type, with their names.
 fn spoils(place: &str, kind: &TypeDescriptor) -> Vec<(String, Spoil)> {
     fn named<T: H5Type + Copy + std::fmt::Debug>(values: &[T]) -> Vec<(String, Spoil)> {
         values.iter().map(|value| (format!("{value:?}"), spoil(*value))).collect()
@@ -56,12 +56,12 @@ fn spoils(place: &str, kind: &TypeDescriptor) -> Vec<(String, Spoil)> {
     }
 }
 
-/// The datasets below a group that hold numbers, each under one of its names.
+/// The datasets below a group that hold numbers, each under one of its paths.
 fn datasets(group: &hdf5::Group, seen: &mut Vec<String>) -> Vec<String> {
     let mut found = vec![];
     for dataset in group.datasets().unwrap() {
         let token = format!("{:?}", dataset.loc_info().unwrap().token);
-        // slots of the state have a checksum; texts are no numbers
+        // checkpoint slots have a checksum; texts are not numbers
         let name = dataset.name().trim_start_matches('/').to_string();
         let text = matches!(dataset.dtype().unwrap().to_descriptor(), Ok(TypeDescriptor::VarLenUnicode));
         if !seen.contains(&token) && !text && !name.starts_with("checkpoint/") && dataset.size() > 0 {
@@ -81,7 +81,7 @@ fn command<'a>(name: &'static str, run: impl Fn(&History, &mut Folder) -> Result
     (name, Box::new(run))
 }
 
-/// What every command reads.
+/// The reading part of every command.
 fn reads(good: &Path) -> Vec<Command<'_>> {
     vec![
         command("info", |h, _| info::read(h).map(|report| drop(report.table()))),
@@ -102,7 +102,7 @@ fn reads(good: &Path) -> Vec<Command<'_>> {
     ]
 }
 
-/// What every command writes.
+/// The writing part of every command.
 fn writes(good: &Path) -> Vec<Command<'_>> {
     vec![
         command("cracks", |h, folder| cracks::write(h, &cracks::read(h, true)?, &[], folder)),
@@ -118,8 +118,8 @@ fn writes(good: &Path) -> Vec<Command<'_>> {
     ]
 }
 
-/// Gives a spoilt history to every command, and lets those draw that find nothing wrong, where none
-/// does; which of them refused it.
+/// Names of the commands that reject the history when they read it or, if none does, when they
+/// write their results.
 fn tried(path: &Path, good: &Path, what: &str) -> Vec<&'static str> {
     let output = tempfile::tempdir().unwrap();
     let mut refused = vec![];
@@ -129,7 +129,7 @@ fn tried(path: &Path, good: &Path, what: &str) -> Vec<&'static str> {
             let outcome = catch_unwind(AssertUnwindSafe(|| command(&History::open(path)?, &mut folder)));
             match outcome.unwrap_or_else(|_| panic!("{what}: {name} panics")) {
                 Ok(()) => {}
-                // runs that do not differ have no strength against anything
+                // runs without a difference have no varied field
                 Err(PostError::Usage(_) | PostError::Lacking { .. }) if name == "strength" => {}
                 Err(error) => {
                     let text = error.to_string();
@@ -148,7 +148,7 @@ fn tried(path: &Path, good: &Path, what: &str) -> Vec<&'static str> {
     if found.is_empty() { all(writes(good)) } else { found }
 }
 
-/// Datasets that no analysis reads, or that may hold any number; so may steps.
+/// Datasets that no analysis reads, or in which any number is valid; any step is valid too.
 const UNREAD: &[&str] = &[
     "particles/grains/id",
     "particles/grains/inertia",
@@ -174,8 +174,8 @@ fn no_spoilt_value_makes_an_analysis_panic_or_pass_unseen() {
         drop(file);
         for (place, kind, shape) in kinds {
             for (k, (value, spoil)) in spoils(place, &kind).into_iter().enumerate() {
-                // half of the values in 2D and the others in 3D, the last and the first number in
-                // turn
+                // half of the values in 2D, the others in 3D; the last and the first number
+                // alternate
                 if place != "events/rupture" && (k % 2 == 1) != space {
                     continue;
                 }
@@ -211,10 +211,10 @@ type Refused<'a> = (&'a str, &'a [&'a str], &'a dyn Fn(&File));
 #[test]
 fn a_command_names_file_dataset_and_row_of_what_is_wrong() {
     let spoilt: [Refused; 5] = [
-        ("cracks", &["/events/rupture", "row 1", "100000000 is none of 4 bonds"], &|file| {
+        ("cracks", &["/events/rupture", "row 1", "100000000 is not one of the 4 bonds"], &|file| {
             put(file, "events/rupture", &[1], EventBond { bond: 100_000_000 });
         }),
-        ("chains", &["/contacts/pair", "row 40", "9, 0 are not a grain and another, or a wall"], &|file| {
+        ("chains", &["/contacts/pair", "row 40", "9, 0 are not a pair of bodies"], &|file| {
             put(file, "contacts/pair", &[40, 0], 9i32);
         }),
         ("chains", &["/contacts/count", "row 10", "belong to the frame"], &|file| {

@@ -50,7 +50,7 @@ fn results_of_two_runs_do_not_mix() {
     assert!(
         content(&post).iter().filter(|(name, _)| !name.starts_with("stress") && !name.starts_with("force")).eq(&before)
     );
-    // the other one goes elsewhere
+    // the other run needs another folder
     succeeds(&run(here, &["stress-strain", "B/0001.h5", "-o", "other"]));
     assert!(post.join("cracks.csv").exists() && here.join("other/stress-strain.csv").exists());
 }
@@ -90,7 +90,7 @@ fn a_history_stays_the_same_while_it_grows_is_packed_or_moves() {
     let (here, paths) = two();
     let here = here.path();
     let mut longer = begun("2026-01-01T00:00:00Z");
-    // a run that goes on may have another end
+    // a resumed run may have a different end
     longer.parameters.scene = "{\"thickness\": 0.5, \"time\": {\"end\": 2}}".into();
     write_course(&here.join("longer.h5"), &longer, Course { steps: 120, ..COURSE });
     succeeds(&run(here, &["cracks", "A/0001.h5"]));

@@ -11,7 +11,7 @@ mod folders;
 mod solves;
 mod view;
 
-/// How long a run goes on, and when its bonds 0 and 1 break, in steps.
+/// Length of a run, and when its bonds 0 and 1 break, in steps.
 #[derive(Clone, Copy)]
 struct Course {
     steps: i64,
@@ -186,7 +186,7 @@ fn dem_post(history: &Path, arguments: &[&str]) -> Output {
     command.current_dir(folder).arg(arguments[0]).arg(name).args(&arguments[1..]).output().unwrap()
 }
 
-/// The names of the results in a folder, in order; the record of whose they are is none.
+/// The names of the results in a folder, in order, without the record of their sources.
 fn names(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).unwrap();
     let mut names: Vec<String> = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
@@ -310,7 +310,7 @@ fn a_wall_that_moves_loads_with_the_force_before_the_breaks_of_a_step() {
     l.observables.push(Observable::new("wall_force_at_limit", "N", &[2, 2]));
     let mut writer = Writer::create(&path, &l, false).unwrap();
     frame(&mut writer, &l, COURSE, 0, 4e-3);
-    // the bond breaks in step 3 at 30 N, of which 1 N is left
+    // the bond breaks in step 3 at 30 N, and 1 N remains
     for (step, acted, left, broken) in [(1, 10.0, 10.0, 0.0), (2, 20.0, 20.0, 0.0), (3, 30.0, 1.0, 1.0)] {
         let top = 4e-3 - 1e-6 * step as f64;
         let (zeros, still) = ([0.0; 4], [0.0, 0.0]);
@@ -323,7 +323,7 @@ fn a_wall_that_moves_loads_with_the_force_before_the_breaks_of_a_step() {
     let found = json(&dem_post(&path, &["stress-strain", "--json"]));
     assert_eq!((&found["first_break"], &found["load_at_5_percent_broken"]), (&30.0.into(), &30.0.into()));
     assert_eq!(found["greatest_load"], 30.0);
-    // the work is that of the force which the step ended with
+    // the work is that of the force at the end of the step
     assert!((found["work"].as_f64().unwrap() - 31e-6).abs() < 1e-12, "{}", found["work"]);
 }
 
@@ -384,7 +384,7 @@ fn what_a_scene_lacks_is_named() {
     let (folder, path) = sample(&free);
     refused(&dem_post(&path, &["stress-strain"]), 2, &["driven wall"]);
     refused(&dem_post(&path, &["chains", "--times", "0"]), 2, &["no contact carries a normal force"]);
-    // nothing was left behind
+    // no temporary files remain
     assert!(!folder.path().join("run-post").exists());
     let unobserved = Layout { observables: vec![], ..layout(2) };
     let (_folder, path) = sample(&unobserved);
@@ -479,7 +479,7 @@ fn frames_are_numbered_and_alike() {
         let sizes: Vec<_> = (0..4).map(|k| size(folder.join(format!("frame-{k:05}.png")))).collect();
         assert!(sizes.iter().all(|size| *size == sizes[0] && size[0] % 2 == 0 && size[1] % 2 == 0), "{sizes:?}");
     }
-    // a shorter series leaves no pictures of the longer one behind
+    // a shorter series removes the pictures of the longer one
     let pictures = || names(&path.with_file_name("speed")).len();
     assert_eq!(pictures(), 4);
     let shorter = dem_post(&path, &["frames", "--draw", "speed", "--times", "0.05", "-o", "speed", "--quiet"]);
@@ -563,7 +563,7 @@ fn a_report_needs_nothing_but_itself() {
         for section in sections {
             assert!(page.contains(&format!("<section id=\"{section}\">")), "{section}");
         }
-        // every address is one inside the page
+        // every address is inside the page
         let addresses = |attribute: &str| -> Vec<String> {
             let parts = page.split(attribute).skip(1);
             parts.map(|rest| rest.split('"').next().unwrap().chars().take(30).collect()).collect()

@@ -7,7 +7,7 @@ use dem_post::{check, report};
 use hdf5::H5Type;
 use hdf5::types::{EnumMember, EnumType, IntSize, TypeDescriptor};
 
-/// A code of a route, as the file holds it.
+/// A code of a route, as stored in the file.
 #[derive(Clone, Copy)]
 #[repr(transparent)]
 struct Route(u8);
@@ -70,7 +70,7 @@ fn a_report_tells_methods_load_errors_and_false_accelerations_apart() {
     assert!(!page.contains("false acceleration where none was reported"));
 }
 
-/// Histories of before version 4 have one observable that holds either.
+/// Histories older than version 4 have one observable for both.
 #[test]
 fn a_report_says_what_the_load_error_of_an_older_history_is() {
     let (_folder, path) = observed(vec![Observable::new(LOAD_ERROR, "", &[])], [&[0.5], &[1e-6], &[1e-6], &[1e-6]]);
@@ -85,7 +85,7 @@ fn a_check_knows_routes_and_load_errors() {
     let (_folder, path) = solved();
     assert_eq!(checked(&path)["violations"], serde_json::json!([]));
     for (place, row, words, value) in [
-        ("observables/solver_route/value", 2, "code 9 names nothing", None),
+        ("observables/solver_route/value", 2, "unknown code 9", None),
         ("observables/solver_load_error/value", 1, "inf", Some(f64::INFINITY)),
         ("observables/false_acceleration/value", 1, "NaN", Some(f64::NAN)),
     ] {

@@ -1,5 +1,5 @@
-//! Companions for viewers: what they map is what the history holds. That viewers read them, the
-//! Python tests see.
+//! Companions for viewers: their values are those of the history. The Python tests check that
+//! viewers read them.
 
 use hdf5::{File, H5Type};
 
@@ -26,7 +26,7 @@ fn view(path: &Path) -> (PathBuf, serde_json::Value) {
     (path.with_file_name("post").join("deep"), found)
 }
 
-/// Frame by frame: the points of `file`, from what VTK reads: how many, and where they begin.
+/// Number and start of the points of each frame of `file`, as VTK reads them.
 fn points(file: &File, frame: usize) -> Vec<[f64; 3]> {
     let at = |place: &str| numbers::<i64>(file, place)[frame] as usize;
     let start = at("VTKHDF/Steps/PointOffsets");
@@ -138,7 +138,7 @@ fn companions_map_the_history() {
 #[test]
 fn companions_move_with_their_history() {
     let (folder, path) = sample(&layout(2));
-    // HDF5 would take %b for a number to fill in
+    // HDF5 would replace %b by a number
     let odd = folder.path().join("50%b é.h5");
     std::fs::rename(&path, &odd).unwrap();
     view(&odd);
@@ -148,7 +148,7 @@ fn companions_move_with_their_history() {
     let h = History::open(&moved.join("50%b é.h5")).unwrap();
     check_grains(&moved.join("post/deep"), &h);
     check_contacts(&moved.join("post/deep"), &h);
-    // without the history the times are out of reach, and nothing reads as zeros
+    // without the history the times cannot be read, and nothing reads as zeros
     std::fs::remove_file(h.path()).unwrap();
     let file = File::open(moved.join("post/deep/grains.vtkhdf")).unwrap();
     assert!(file.dataset("VTKHDF/Steps/Values").is_err());
@@ -163,7 +163,7 @@ fn frames_with_the_same_pairs_share_their_lines() {
     assert_eq!(file.dataset("VTKHDF/Lines/Connectivity").unwrap().size(), 8);
 }
 
-/// A grain that falls and meets nothing.
+/// A falling grain without contacts.
 fn falling(path: &Path, frames: usize) -> Writer {
     let grains = Grains { id: vec![0], radius: vec![1.0], mass: vec![1.0], inertia: vec![1.0] };
     let l = Layout { dimension: 2, grains, ..Layout::default() };
@@ -189,7 +189,7 @@ fn what_is_not_there_is_not_mapped() {
         let line = table.lines().find(|found| found.starts_with(line)).unwrap();
         assert!(line.contains("not made: "), "{line}");
     }
-    // the companions of the history that stood there before are gone
+    // the companions of the earlier history are removed
     let folder = folder.path().join("post/deep");
     assert_eq!(names(&folder).len(), 2);
     check_grains(&folder, &History::open(&path).unwrap());
@@ -203,7 +203,7 @@ fn histories_that_viewers_cannot_open_are_refused() {
     refused(&dem_post(&path, &["view"]), 2, &["run.h5", "no frame"]);
     let open = folder.path().join("open.h5");
     let writer = falling(&open, 2);
-    refused(&dem_post(&open, &["view"]), 2, &["open.h5", "never closed", "info --repair"]);
+    refused(&dem_post(&open, &["view"]), 2, &["open.h5", "not closed", "info --repair"]);
     drop(writer);
     refused(&dem_post(&folder.path().join("none.h5"), &["view"]), 4, &["none.h5", "does not exist"]);
     let named = folder.path().join("grains.h5md");

@@ -150,9 +150,9 @@ pub struct Chart {
     pub log_y: bool,
     /// Whether the horizontal axis extends a little beyond the first and the last value, so that a
     /// steep rise there is visible.
-    pub set_off: bool,
+    pub pad_x: bool,
     /// Whether values on the vertical axis are counts.
-    pub counts: bool,
+    pub y_is_count: bool,
     /// The curves.
     pub curves: Vec<Curve>,
     /// Means with bars, over the curves.
@@ -263,13 +263,13 @@ impl Chart {
         let high = values().map(|p| p.0).fold(f64::NEG_INFINITY, f64::max);
         if self.log_x {
             layout = layout.with_log_x().with_x_tick_format(TickFormat::Custom(Arc::new(power_of_ten)));
-            if self.set_off && 0.0 < low && low < high {
+            if self.pad_x && 0.0 < low && low < high {
                 // the same share of the axis as in the linear case
                 let off = (high / low).powf(0.04);
                 layout = layout.with_x_axis_min(low / off).with_x_axis_max(high * off);
             }
         } else if low < high {
-            let off = if self.set_off { 0.03 * (high - low) } else { 0.0 };
+            let off = if self.pad_x { 0.03 * (high - low) } else { 0.0 };
             layout = layout.with_x_axis_min(low - off).with_x_axis_max(high + off);
             // with the plotting crate's three digits several ticks would have the same label
             if high - low < 0.05 * low.abs().max(high.abs()) {
@@ -295,7 +295,7 @@ impl Chart {
                 let (below, above) = ((0.8 * low).log10().floor(), (1.25 * high).log10().ceil());
                 layout = layout.with_y_axis_min(decade(below)).with_y_axis_max(decade(above));
             }
-        } else if self.counts {
+        } else if self.y_is_count {
             let whole = |value: f64| if value.fract() == 0.0 { format!("{value}") } else { String::new() };
             layout = layout.with_y_tick_format(TickFormat::Custom(Arc::new(whole)));
             let high = values().map(|p| p.1).fold(0.0, f64::max);

@@ -122,7 +122,7 @@ pub enum HistoryError {
     },
     /// The caller handed over arrays that do not fit the layout: an error in the program, not in
     /// the file.
-    #[error("history: {place} has {found} values where the layout asks for {expected}")]
+    #[error("history: {place} has {found} values where the layout requires {expected}")]
     Shape {
         /// The array.
         place: String,

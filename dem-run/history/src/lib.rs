@@ -90,7 +90,7 @@ pub use copy::{CopyAs, copy};
 pub use error::{HistoryError, Result, reason};
 pub use lock::refuse_busy;
 pub use model::{
-    Bonds, ContactRows, Frame, GrainState, Grains, Kept, Layout, Observable, Parameters, Rupture, ValueKind, Wall,
+    Bonds, ContactRows, Frame, GrainState, Grains, Layout, Observable, Parameters, RowCounts, Rupture, ValueKind, Wall,
     WallState,
 };
 pub use observed::Series;

@@ -277,7 +277,7 @@ pub struct Rupture {
 
 /// Complete rows of each kind of table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Kept {
+pub struct RowCounts {
     /// Frames.
     pub frames: usize,
     /// Contacts of all frames.

@@ -9,7 +9,7 @@ use hdf5::types::VarLenUnicode;
 use super::checkpoint::Checkpoint;
 use super::codes::{BondCode, BondStatus, ContactCode, WallDriveCode, WallKindCode};
 use super::error::{HistoryError, Result, refused, while_reading};
-use super::model::{Bonds, ContactRows, GrainState, Grains, Kept, Layout, Parameters, Rupture, Wall, WallState};
+use super::model::{Bonds, ContactRows, GrainState, Grains, Layout, Parameters, RowCounts, Rupture, Wall, WallState};
 use super::observed::{self, Series};
 use super::rupture::RuptureRow;
 use super::schema::path;
@@ -92,7 +92,7 @@ impl History {
     ///
     /// # Errors
     /// [`HistoryError::Damaged`].
-    pub fn complete(&self) -> Result<Kept> {
+    pub fn complete(&self) -> Result<RowCounts> {
         self.complete_at(self.frames())
     }
 
@@ -100,13 +100,13 @@ impl History {
     ///
     /// # Errors
     /// [`HistoryError::Damaged`].
-    pub fn complete_at(&self, frames: usize) -> Result<Kept> {
+    pub fn complete_at(&self, frames: usize) -> Result<RowCounts> {
         let rows = |place: &str| -> Result<usize> {
             let last = frames.saturating_sub(1)..frames;
             Ok(self.source.read::<u64>(place, last)?.1.first().map_or(0, |&rows| rows as usize))
         };
         let bonded = self.source.has(path::RUPTURE);
-        Ok(Kept {
+        Ok(RowCounts {
             frames,
             contacts: rows(path::COMMIT_CONTACTS)?,
             steps: rows(path::COMMIT_STEPS)?,
@@ -262,7 +262,7 @@ impl History {
         let place = |name: &str| format!("{}/{name}", path::WALLS);
         let names = self.source.texts(&place("name"))?;
         if names.len() != self.walls {
-            return Err(self.source.damaged(&place("name"), "it is no list of names"));
+            return Err(self.source.damaged(&place("name"), "it is not a list of names"));
         }
         let (w, d) = (self.walls, self.dimension);
         let kinds = self.source.coded(&place("kind"), self.source.whole::<WallKindCode>(&place("kind"), 1)?, w)?;
@@ -298,7 +298,12 @@ impl History {
         let pair = pairs(&self.source.whole::<i32>(&place("pair"), 2)?);
         let unknown = |pair: &[i32; 2]| pair.iter().any(|grain| !(0..self.grains as i32).contains(grain));
         if let Some(bond) = pair.iter().position(unknown) {
-            return Err(sound::row(&self.source.path, &place("pair"), bond, "a bond names a grain that is not there"));
+            return Err(sound::row(
+                &self.source.path,
+                &place("pair"),
+                bond,
+                "a bond refers to a grain that does not exist",
+            ));
         }
         let column = |name: &str| self.source.column(&place(name), pair.len());
         let bonds = Bonds {
@@ -377,7 +382,7 @@ impl History {
         let complete = self.source.read::<u64>(path::COMMIT_CONTACTS, frame.saturating_sub(1)..frame + 1)?.1;
         let (before, end) = (if frame == 0 { 0 } else { complete[0] }, complete[complete.len() - 1]);
         if start != before || start.checked_add(rows) != Some(end) {
-            let why = format!("{rows} rows from {start} on, where those from {before} to {end} belong to the frame");
+            let why = format!("{rows} rows from row {start}, but rows {before} to {end} belong to the frame");
             return Err(sound::row(&self.source.path, &count, frame, why));
         }
         Ok(start as usize..end as usize)
@@ -455,7 +460,7 @@ impl History {
         }
         let (_, events) = RuptureRow::read(&self.source, path::RUPTURE, 0..self.events)?;
         let event = |(k, row): (usize, &RuptureRow)| {
-            row.event().ok_or_else(|| sound::row(&self.source.path, path::RUPTURE, k, "a mode that is none"))
+            row.event().ok_or_else(|| sound::row(&self.source.path, path::RUPTURE, k, "an unknown mode"))
         };
         let known: Vec<Rupture> = events.iter().enumerate().map(event).collect::<Result<_>>()?;
         let (counts, last) = ([self.bonds()?.len(), self.grains], self.steps.last().copied().unwrap_or(i64::MAX));
@@ -510,7 +515,7 @@ impl History {
         let known = self.source.count(&format!("{}/pair", path::BONDS))? as i32;
         match bonds.iter().position(|bond| !(-1..known).contains(bond)) {
             Some(k) => {
-                let why = format!("{} is none of {known} bonds", bonds[k]);
+                let why = format!("{} is not one of the {known} bonds", bonds[k]);
                 Err(sound::row(&self.source.path, &place, range.start + k, why))
             }
             None => Ok(bonds),
@@ -526,7 +531,7 @@ impl History {
         }
         let (row, values) = self.source.read::<f64>(&place, range.clone())?;
         if !widths.contains(&row.iter().product()) {
-            return Err(self.source.damaged(&place, "its rows have another length"));
+            return Err(self.source.damaged(&place, "its rows have a different length"));
         }
         sound::reals(&self.source.path, &place, range.start, row.iter().product(), &values)?;
         Ok(values)
@@ -537,7 +542,7 @@ impl History {
         let place = format!("{}/pair", path::CONTACTS);
         let (row, flat) = self.source.read::<i32>(&place, range.clone())?;
         if row != [2] {
-            return Err(self.source.damaged(&place, "its rows have another length"));
+            return Err(self.source.damaged(&place, "its rows have a different length"));
         }
         let (grains, walls) = (self.grains as i32, self.walls as i32);
         let pairs = pairs(&flat);
@@ -545,8 +550,7 @@ impl History {
         match pairs.iter().position(|pair| !known(pair)) {
             Some(k) => {
                 let [i, j] = pairs[k];
-                let why =
-                    format!("{i}, {j} are not a grain and another, or a wall, of {grains} grains and {walls} walls");
+                let why = format!("{i}, {j} are not a pair of bodies: there are {grains} grains and {walls} walls");
                 Err(sound::row(&self.source.path, &place, range.start + k, why))
             }
             None => Ok(pairs),

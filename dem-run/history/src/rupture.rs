@@ -103,7 +103,7 @@ impl RuptureRow {
             return source.read(place, range);
         }
         if ![first, second].contains(&found) {
-            return Err(source.damaged(place, "its members are others"));
+            return Err(source.damaged(place, "its members differ from the layout"));
         }
         let (row, old) = source.read::<OldRuptureRow>(place, range)?;
         Ok((row, old.into_iter().map(Self::from).collect()))

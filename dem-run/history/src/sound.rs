@@ -89,7 +89,9 @@ pub(super) fn observed(path: &Path, name: &str, place: &str, first: usize, width
 /// Rejects the value with index `wrong`, if any.
 fn refused(path: &Path, place: &str, first: usize, width: usize, wrong: Option<usize>, values: &[f64]) -> Result<()> {
     match wrong {
-        Some(k) => Err(row(path, place, first + k / width.max(1), format!("{:e} is no plausible number", values[k]))),
+        Some(k) => {
+            Err(row(path, place, first + k / width.max(1), format!("{:e} is not a plausible number", values[k])))
+        }
         None => Ok(()),
     }
 }
@@ -107,9 +109,7 @@ pub(super) fn radii(path: &Path, place: &str, values: &[f64]) -> Result<()> {
     positive(path, place, values)?;
     let usual = median(values.to_vec());
     match values.iter().position(|radius| is_huge(*radius, usual)) {
-        Some(k) => {
-            Err(row(path, place, k, format!("{:e} m, where half the grains have at most {usual:e} m", values[k])))
-        }
+        Some(k) => Err(row(path, place, k, format!("{:e} m, but half the grains have at most {usual:e} m", values[k]))),
         None => Ok(()),
     }
 }
@@ -140,15 +140,15 @@ pub(super) fn ruptures(
         let numbers = [e.time, x, y, z, e.normal_force, e.tangential_force, e.moment, twist, e.energy];
         reals(path, place, k, numbers.len(), &numbers)?;
         let what = if !known(e.bond, bonds) {
-            format!("{} is none of {bonds} bonds", e.bond)
+            format!("{} is not one of the {bonds} bonds", e.bond)
         } else if !e.pair.iter().all(|grain| known(*grain, grains)) {
-            format!("{}, {} are not two of {grains} grains", e.pair[0], e.pair[1])
+            format!("{}, {} are not two different grains of {grains}", e.pair[0], e.pair[1])
         } else if e.step < last.0 || e.time < last.1 {
             format!("step {} at {} s does not come after step {} at {} s", e.step, e.time, last.0, last.1)
         } else if e.step > until {
             format!("step {} comes after the last frame, of step {until}", e.step)
         } else if e.round < 0 {
-            format!("{} is no round of a cascade", e.round)
+            format!("{} is not a round of a cascade", e.round)
         } else {
             last = (e.step, e.time);
             continue;

@@ -58,7 +58,7 @@ impl Source {
             return Err(self.damaged(place, "it is a single value"));
         };
         if count < range.end {
-            return Err(self.damaged(place, &format!("it has {count} rows, and {} are promised", range.end)));
+            return Err(self.damaged(place, &format!("it has {count} rows, but {} are required", range.end)));
         }
         // a forged shape must not allocate more memory than the file can fill
         let bytes = row.iter().fold(range.len() as u64, |b, &n| b.saturating_mul(n as u64));
@@ -75,7 +75,7 @@ impl Source {
     pub fn whole<T: H5Type>(&self, place: &str, width: usize) -> Result<Vec<T>> {
         let (row, values) = self.read(place, 0..self.count(place)?)?;
         if row.iter().product::<usize>() != width {
-            return Err(self.damaged(place, "its rows have another length"));
+            return Err(self.damaged(place, "its rows have a different length"));
         }
         Ok(values)
     }
@@ -96,7 +96,7 @@ impl Source {
         if let Some(offset) = dataset.offset() {
             let held = self.texts.hold(&self.path, offset, dataset.size().min(self.length as usize));
             if !held.map_err(|error| refused(&self.path)("read", error))? {
-                return Err(self.damaged(place, "it names a text that is not there"));
+                return Err(self.damaged(place, "it refers to a text that does not exist"));
             }
         }
         let texts = dataset.read_raw::<VarLenUnicode>().map_err(while_reading(&self.path, place))?;
@@ -125,8 +125,8 @@ impl Source {
         let known: Option<Vec<C>> = codes.into_iter().map(C::from_code).collect();
         match known {
             Some(values) if values.len() == expected => Ok(values),
-            Some(_) => Err(self.damaged(place, "it has another length")),
-            None => Err(self.damaged(place, "a value that names nothing")),
+            Some(_) => Err(self.damaged(place, "it has a different length")),
+            None => Err(self.damaged(place, "an unknown value")),
         }
     }
 
@@ -149,7 +149,7 @@ fn check_superblock(path: &Path) -> Result<(u64, bool)> {
         _ => io(error),
     })?;
     if metadata.is_dir() {
-        return Err(io(std::io::Error::new(std::io::ErrorKind::IsADirectory, "it is a folder, give the .h5 file")));
+        return Err(io(std::io::Error::new(std::io::ErrorKind::IsADirectory, "it is a folder: give the .h5 file")));
     }
     let mut head = Vec::new();
     fs::File::open(path).and_then(|file| file.take(48).read_to_end(&mut head)).map_err(io)?;

@@ -197,7 +197,7 @@ impl Store {
                 let manifest: Manifest = serde_json::from_slice(&bytes).map_err(|e| failed(e.to_string()))?;
                 match manifest.format {
                     FORMAT => Ok(Some(manifest)),
-                    other => Err(failed(format!("its format is {other}, and this program knows {FORMAT}"))),
+                    other => Err(failed(format!("its format is {other}, but this program reads {FORMAT}"))),
                 }
             }
             Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
@@ -289,10 +289,10 @@ impl Store {
     /// Creates the folder and its subfolder `runs`.
     ///
     /// # Errors
-    /// They cannot be made.
+    /// They cannot be created.
     pub fn create(&self) -> Result<()> {
         let runs = self.folder.join("runs");
-        fs::create_dir_all(&runs).map_err(|source| SweepError::File { path: runs, doing: "cannot be made", source })
+        fs::create_dir_all(&runs).map_err(|source| SweepError::File { path: runs, doing: "cannot be created", source })
     }
 
     /// Deletes all files of a run.

@@ -546,7 +546,7 @@ fn the_route_is_an_enumeration_and_read_as_its_codes() {
     values.write(&[0, 1, 7, 3].map(codes::RouteCode)).unwrap();
     drop((values, file));
     let error = History::open(&path).unwrap().observable(ROUTE).unwrap_err().to_string();
-    assert!(error.contains("solver_route") && error.contains("names nothing"), "{error}");
+    assert!(error.contains("solver_route") && error.contains("unknown value"), "{error}");
 }
 
 #[test]
@@ -571,7 +571,7 @@ fn only_a_load_error_may_be_no_number() {
         let read = History::open(&path).unwrap().observable(name);
         match name {
             LOAD_ERROR => assert!(read.unwrap().unwrap().value[0].is_nan()),
-            _ => assert!(read.unwrap_err().to_string().contains("no plausible number")),
+            _ => assert!(read.unwrap_err().to_string().contains("not a plausible number")),
         }
     }
 }

@@ -12,7 +12,7 @@ use super::codes::{BondCode, Coded};
 use super::create::{self, Column, Commit, ContactTables, Observables, check_length};
 use super::error::{HistoryError, Result, refused, while_writing};
 use super::lock;
-use super::model::{Frame, Kept, Layout, Rupture};
+use super::model::{Frame, Layout, RowCounts, Rupture};
 use super::reader::History;
 use super::rupture::RuptureRow;
 use super::schema::{chunk_cache, path};
@@ -87,7 +87,7 @@ impl Writer {
         path: &Path,
         layout: &Layout,
         history: &History,
-        kept: Kept,
+        kept: RowCounts,
         checkpoint: &Checkpoint,
         tell: &mut dyn FnMut(f64) -> bool,
     ) -> Result<Self> {
@@ -123,7 +123,7 @@ impl Writer {
     }
 
     /// Bytes of the rows `kept` of all tables.
-    pub(super) fn bytes(&mut self, kept: Kept) -> Result<u64> {
+    pub(super) fn bytes(&mut self, kept: RowCounts) -> Result<u64> {
         let mut bytes = Bytes::default();
         self.visit(kept, &mut bytes)?;
         Ok(bytes.0)
@@ -185,7 +185,7 @@ impl Writer {
     }
 
     /// Every table, with the number of its rows in `kept`.
-    pub(super) fn visit(&mut self, kept: Kept, visit: &mut impl Visit) -> Result<()> {
+    pub(super) fn visit(&mut self, kept: RowCounts, visit: &mut impl Visit) -> Result<()> {
         let frames = kept.frames;
         visit.table::<i64>(&mut self.step, frames)?;
         visit.table::<f64>(&mut self.time, frames)?;
@@ -198,7 +198,7 @@ impl Writer {
     }
 
     /// Copies the rows `kept` of `source` into the empty tables.
-    pub(super) fn take_over(&mut self, source: &Source, kept: Kept, share: &mut Share) -> Result<()> {
+    pub(super) fn take_over(&mut self, source: &Source, kept: RowCounts, share: &mut Share) -> Result<()> {
         let path = self.path.clone();
         self.visit(kept, &mut Copy { source, to: &path, share })?;
         self.commit.frames.write_scalar(&(kept.frames as u64)).map_err(while_writing(&path))

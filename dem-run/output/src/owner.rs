@@ -91,7 +91,9 @@ impl Owner {
         let _lock = owner.lock();
         let record = match Record::read(folder) {
             Err(_) if force => None,
-            read => read.map_err(|why| format!("{why}; give another folder by -o DIR, or --force to begin anew"))?,
+            read => {
+                read.map_err(|why| format!("{why}; choose another folder with -o DIR, or start anew with --force"))?
+            }
         };
         let mut record = record.unwrap_or_else(|| Record { sources: owner.sources.clone(), ..Record::default() });
         let same = record.sources.len() == owner.sources.len()
@@ -129,13 +131,13 @@ impl Owner {
         for name in names {
             let refuse = |why: &str| Err((Some(name.clone()), why.to_string()));
             if self.is_source(name) {
-                return refuse("it is what the results are made of: give another folder by -o DIR");
+                return refuse("it is an input of the results: choose another folder with -o DIR");
             }
             let listed = record.files.values().any(|files| files.contains(name));
             if !listed && !self.force && self.folder.join(name).exists() {
                 return refuse(
-                    "it exists, and the record of the folder does not list it: give another folder by -o DIR, or --force \
-                     to replace it",
+                    "it exists and is not listed in the record of the folder: choose another folder with -o DIR, or replace it \
+                     with --force",
                 );
             }
             news |= record.files.entry(self.command.clone()).or_default().insert(name.clone());
@@ -167,7 +169,7 @@ impl Owner {
     fn current(&self) -> Result<Record, String> {
         match Record::read(&self.folder)? {
             Some(record) if record.sources == self.sources => Ok(record),
-            _ => Err("another command has taken over the folder meanwhile".into()),
+            _ => Err("another command has taken over the folder in the meantime".into()),
         }
     }
 
@@ -195,13 +197,13 @@ fn refusal(before: &[Source], now: &[Source]) -> String {
     let same_place = paths(before) == paths(now);
     let name = |sources: &[Source]| {
         let name = |source: &Source| match &source.run {
-            Some(run) if same_place => format!("{} as of the run {run}", source.path.display()),
+            Some(run) if same_place => format!("{} of the run {run}", source.path.display()),
             _ => source.path.display().to_string(),
         };
         sources.iter().map(name).collect::<Vec<_>>().join(" and ")
     };
     format!(
-        "it holds results of {}, and these are of {}: give another folder by -o DIR, or --force to remove those",
+        "it holds results of {}, not of {}: choose another folder with -o DIR, or remove those results with --force",
         name(before),
         name(now)
     )

@@ -89,7 +89,7 @@ fn folder_of(path: &Path) -> &Path {
 /// The temporary name of a file: in the same folder, so that the move is atomic.
 fn partial(path: &Path) -> Result<PathBuf> {
     let Some(name) = path.file_name().filter(|_| !path.is_dir()) else {
-        return Err(Error::new(ErrorKind::IsADirectory, "it is a folder, give a file name"));
+        return Err(Error::new(ErrorKind::IsADirectory, "it is a folder: give a file name"));
     };
     Ok(path.with_file_name(format!(".{}.{}.part", name.to_string_lossy(), std::process::id())))
 }

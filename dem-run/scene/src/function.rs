@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A function of time. Its unit is that of what it drives: N, m/s, or none for a factor.
+/// A function of time. Its unit is that of the driven quantity: N, m/s, or none for a factor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Function {
@@ -11,8 +11,8 @@ pub enum Function {
     Constant(f64),
     /// Zero until `start`, then growing at a constant rate.
     Ramp(Ramp),
-    /// Pairs `[time, value]`, times in s and growing: linear in between, held before the first and
-    /// after the last.
+    /// Pairs `[time, value]` with increasing times (s): linear in between, constant before the
+    /// first and after the last.
     Table(Vec<[f64; 2]>),
 }
 
@@ -22,7 +22,7 @@ pub enum Function {
 pub struct Ramp {
     /// Growth per second (N/s for a force, m/s² for a velocity, 1/s for a factor).
     pub rate: f64,
-    /// When it starts to grow (s).
+    /// Start of the growth (s).
     #[serde(default)]
     pub start: f64,
 }

@@ -87,7 +87,7 @@ pub fn text(path: &Path) -> io::Result<String> {
     }
     if bytes.starts_with(b"\x89HDF\r\n\x1a\n") {
         return Err(io::Error::other(
-            "it is an HDF5 file: `dem-run resume` goes on with a history, `dem-post` reads it",
+            "it is an HDF5 file: `dem-run resume` resumes the run of a history, `dem-post` reads it",
         ));
     }
     String::from_utf8(bytes).map_err(|error| {
@@ -104,7 +104,7 @@ pub fn open_regular(path: &Path) -> io::Result<File> {
     match std::fs::metadata(path)?.file_type() {
         kind if kind.is_file() => File::open(path),
         kind if kind.is_dir() => Err(io::Error::other("it is a folder: name a file in it")),
-        _ => Err(io::Error::other("it is not a regular file: save what a pipe or a device gives as a file first")),
+        _ => Err(io::Error::other("it is not a regular file: save the output of a pipe or a device to a file first")),
     }
 }
 

@@ -15,10 +15,10 @@ use super::wall::{Drive, Wall};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
-    /// The JSON Schema that an editor checks the scene against, as `dem-run schema` prints it.
+    /// JSON Schema for editors, as printed by `dem-run schema`.
     #[serde(default, rename = "$schema", skip_serializing_if = "Option::is_none")]
     pub schema: Option<String>,
-    /// What the scene shows, in a line.
+    /// Title of the scene, one line.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub title: Option<String>,
     /// Dimension of space: 2 (disks) or 3 (spheres).
@@ -26,14 +26,14 @@ pub struct Scene {
     /// Seed of all random numbers of the preparation.
     #[serde(default = "default_seed")]
     pub seed: u64,
-    /// Thickness of the disks in 2D (m); 1 m where it is absent.
+    /// Thickness of the disks in 2D (m); default: 1 m.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub thickness: Option<f64>,
     /// The grains.
     pub sample: Sample,
     /// Density, friction and restitution.
     pub materials: Materials,
-    /// Cohesive bonds between grains; none where it is absent.
+    /// Cohesive bonds between grains; default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bonds: Option<Bonds>,
     /// Grains that are held fixed or loaded.
@@ -42,12 +42,12 @@ pub struct Scene {
     /// Walls, by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub walls: BTreeMap<String, Wall>,
-    /// Name of the driven wall whose force is the load of the sample: of the first break, of the
-    /// collapse, and the greatest. Where it is absent, the wall of `stop.wall_travel`, else the
-    /// only driven one.
+    /// Name of the driven wall whose force is the load of the sample, as reported at the first
+    /// break, at the collapse and at the peak. Default: the wall of `stop.wall_travel`, else the
+    /// only driven wall.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub load_wall: Option<String>,
-    /// Gravity: one number for each dimension (m/s²); none where it is absent.
+    /// Gravity: one number for each dimension (m/s²); default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gravity: Option<Vec<f64>>,
     /// Time step and end of the run.
@@ -60,7 +60,7 @@ pub struct Scene {
     pub rupture: Rupture,
     /// How often the history is written.
     pub output: Output,
-    /// What ends the run before `time.end`; nothing where it is absent.
+    /// Conditions that end the run before `time.end`; default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stop: Option<Stop>,
 }
@@ -73,7 +73,7 @@ pub struct Materials {
     pub density: f64,
     /// Coefficients of friction.
     pub friction: Friction,
-    /// Coefficients of restitution; zero where they are absent.
+    /// Coefficients of restitution; default: zero.
     #[serde(default)]
     pub restitution: Restitution,
 }
@@ -100,43 +100,42 @@ pub struct Restitution {
     pub threshold_speed: f64,
 }
 
-/// Cohesive bonds, formed once at the start between grains that are near enough.
+/// Cohesive bonds, formed once, at the start, between all grains closer than `gap_tolerance`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Bonds {
-    /// Tensile strength of every bond (N); zero means no bonds. Either this or `stress`.
+    /// Tensile strength of every bond (N); zero means no bonds. Give either this or `stress`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub strength: Option<f64>,
-    /// Tensile strength as a stress over the section of a bond (Pa); zero means no bonds. Either
-    /// this or `strength`.
+    /// Tensile strength as a stress over the section of a bond (Pa); zero means no bonds. Give
+    /// either this or `strength`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stress: Option<f64>,
     /// Two grains are bonded if their gap is at most this fraction of their mean diameter.
     pub gap_tolerance: f64,
-    /// Friction of intact bonds, for shear and rolling; that between grains where it is absent.
+    /// Friction of intact bonds, for shear and rolling; default: the friction between grains.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub friction: Option<f64>,
-    /// Coefficient of the shear limit: an intact bond bears tangential forces up to this times
-    /// (r_n + r_coh); `friction` where it is absent.
+    /// Coefficient of the shear limit: an intact bond bears tangential forces up to this times (r_n
+    /// + r_coh); default: `friction`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shear: Option<f64>,
     /// Coefficient of the rolling limit: an intact bond bears bending moments up to this times the
-    /// mean diameter times (r_n + r_coh); `friction` where it is absent.
+    /// mean diameter times (r_n + r_coh); default: `friction`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rolling: Option<f64>,
-    /// Coefficient of the twisting moment of bonds in 3D, which an intact bond bears up to this
-    /// times the mean diameter times (r_n + r_coh); where it is absent two grains are free to spin
-    /// about their normal.
+    /// Coefficient of the twist limit in 3D: an intact bond bears twisting moments up to this times
+    /// the mean diameter times (r_n + r_coh). Without it, bonds do not resist twist.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub twist: Option<f64>,
-    /// Scatter of the strengths from bond to bond, drawn with `seed`; without it all bonds of one
+    /// Scatter of the strengths from bond to bond, drawn with `seed`. Without it, all bonds of one
     /// size are equally strong.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scatter: Option<Scatter>,
     /// Flow of an intact bond at its limit.
     #[serde(default)]
     pub flow: Flow,
-    /// Stiffness of elastic bonds; bonds are rigid where it is absent.
+    /// Stiffness of elastic bonds. Without it, bonds are rigid.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<Stiffness>,
 }
@@ -148,7 +147,7 @@ pub enum Scatter {
     /// Weibull: a share exp(−(s/s₀)^m) of the bonds is stronger than s, with the given strength
     /// as s₀.
     Weibull {
-        /// Modulus m: the larger, the more alike the bonds are.
+        /// Modulus m: the larger it is, the smaller the scatter.
         modulus: f64,
     },
     /// Normal, with the given strength as mean and no strength below zero.
@@ -164,8 +163,8 @@ pub enum Scatter {
 pub enum Stiffness {
     /// The same springs in every bond.
     Springs(Springs),
-    /// Bars as long as they are wide, the mean diameter of the pair: of square section across the
-    /// plane's thickness in 2D, of round section in 3D.
+    /// Bars whose length and width are the mean diameter of the pair. In 2D their section is
+    /// rectangular, width times thickness; in 3D it is round.
     Young(Young),
 }
 
@@ -175,11 +174,11 @@ pub enum Stiffness {
 pub struct Springs {
     /// Along the normal (N/m).
     pub normal: f64,
-    /// Across it (N/m).
+    /// Across the normal (N/m).
     pub tangential: f64,
     /// In bending (N m/rad).
     pub rolling: f64,
-    /// In twist (N m/rad), of bonds that resist it.
+    /// In twist (N m/rad), for bonds that resist twist.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub twist: Option<f64>,
 }
@@ -198,10 +197,10 @@ pub struct Young {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Flow {
-    /// Without the shift μ‖u_t‖: a convex problem; the bond breaks at its limit anyway.
+    /// Without the shift μ‖u_t‖: a convex problem. The bond breaks at its limit in either case.
     #[default]
     Associated,
-    /// With the shift, as between dry grains.
+    /// With the shift μ‖u_t‖, as between dry grains.
     Bipotential,
 }
 
@@ -221,13 +220,13 @@ pub struct Grains {
 pub struct Load {
     /// Number of the grain.
     pub grain: usize,
-    /// Force: one number for each dimension (N); zero where it is absent.
+    /// Force: one number for each dimension (N); default: zero.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub force: Option<Vec<f64>>,
-    /// Torque: `[t]` in 2D, counter-clockwise, `[tx, ty, tz]` in 3D (N m); zero where it is absent.
+    /// Torque: `[t]` in 2D, counter-clockwise, `[tx, ty, tz]` in 3D (N m); default: zero.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub torque: Option<Vec<f64>>,
-    /// Factor on both, a function of time; 1 where it is absent.
+    /// Factor on force and torque, a function of time; default: 1.
     #[serde(default = "one")]
     pub time: Function,
 }
@@ -238,8 +237,7 @@ pub struct Load {
 pub struct Time {
     /// Time step (s).
     pub step: f64,
-    /// End of the run (s): no step ends after it. The last one ends before it where it is not a
-    /// multiple of the step.
+    /// End of the run (s). If it is not a multiple of `step`, the last step ends before it.
     pub end: f64,
 }
 
@@ -247,31 +245,31 @@ pub struct Time {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Rupture {
-    /// All bonds at their limit break and the same step is solved again, until none breaks.
+    /// All bonds at their limit break and the step is solved again, until no bond breaks.
     #[default]
     Cascade,
-    /// The same, but only the bond whose grains move apart fastest breaks each time.
+    /// As `cascade`, but in each round only the bond whose grains separate fastest breaks.
     CascadeWorst,
     /// Bonds at their limit break at the end of the step.
     EndOfStep,
 }
 
-/// What the history holds, and how often it is written: either every_steps or interval.
+/// What the history holds, and how often it is written; give either `every_steps` or `interval`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Output {
-    /// Number of steps from frame to frame.
+    /// Number of steps between frames.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every_steps: Option<u64>,
-    /// Time from frame to frame (s), rounded to whole steps.
+    /// Time between frames (s), rounded to whole steps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interval: Option<f64>,
     /// Whether frames hold the reactions and moments of the contacts.
     pub reactions: bool,
-    /// Precision of what frames hold. Observables and events are always double.
+    /// Precision of the numbers in frames. Observables and events are always double.
     pub precision: Precision,
-    /// Number of frames from checkpoint to checkpoint. A run that is killed goes on from its last
-    /// checkpoint; the last state of one that ends is always one.
+    /// Number of frames between checkpoints. A killed run resumes from its last checkpoint. The
+    /// last state of a run that ends is always a checkpoint.
     pub checkpoint_every: u64,
 }
 
@@ -292,33 +290,33 @@ pub enum Precision {
     Single,
 }
 
-/// What ends the run before its time.
+/// Conditions that end the run before `time.end`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Stop {
-    /// A wall has moved far enough.
+    /// Ends the run when a wall has travelled a given distance.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wall_travel: Option<WallTravel>,
-    /// This fraction of the bonds has broken (above 0, up to 1).
+    /// Ends the run when this fraction of the bonds has broken (above 0, at most 1).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub broken_fraction: Option<f64>,
 }
 
-/// A wall has moved far enough.
+/// A travel of a wall that ends the run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WallTravel {
-    /// Name of the wall, one that is driven.
+    /// Name of a driven wall.
     pub wall: String,
     /// Distance along the wall's direction, as a fraction of the sample's extent along it at the
     /// start.
     pub fraction_of_height: f64,
-    /// From when on the distance is counted.
+    /// Start of the measured travel.
     #[serde(default)]
     pub after: TravelFrom,
 }
 
-/// From when on the travel of a wall is counted.
+/// Start of the measured travel of a wall.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum TravelFrom {

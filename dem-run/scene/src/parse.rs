@@ -109,7 +109,7 @@ fn with_remedy(message: &str, rest: &str) -> String {
         (ParseErrorKind::TrailingCommasNotAllowed, "remove the comma before the closing bracket"),
         (ParseErrorKind::SingleQuotedStringsNotAllowed, "write \"double quotes\""),
         (ParseErrorKind::BareDecimalPointNumbersNotAllowed, "write 0.5 or 5.0"),
-        (ParseErrorKind::ExpectedStringObjectProperty, "names stand in \"double quotes\""),
+        (ParseErrorKind::ExpectedStringObjectProperty, "write names in \"double quotes\""),
     ];
     match remedies.iter().find(|(kind, _)| kind.to_string() == message) {
         Some((_, remedy)) => format!("{message}: {remedy}"),
@@ -441,7 +441,7 @@ fn explain(path: String, message: &str, kinds: &[String]) -> Problem {
             return Problem::new(path, found, allowed + &which);
         }
     }
-    Problem::new(path, "a value that does not fit", shorten(message))
+    Problem::new(path, "an invalid value", shorten(message))
 }
 
 /// The problem of a name that the model does not have; `expected` is serde's list of valid names.

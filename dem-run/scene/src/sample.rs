@@ -27,39 +27,40 @@ pub struct RandomSample {
     pub count: usize,
     /// Distribution of the diameters (m).
     pub diameter: Diameters,
-    /// Shape of the box seen from above, in 3D only.
+    /// Cross-section of the box seen from above, in 3D only.
     #[serde(default, skip_serializing_if = "Section::is_rectangle")]
     pub section: Section,
-    /// Width of the box, along x (m): the diameter of a circle.
+    /// Width of the box along x, or the diameter of a circular section (m).
     pub width: f64,
-    /// Depth of the box, along y (m), in 3D only and not of a circle.
+    /// Depth of the box along y (m), in 3D with a rectangular section only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth: Option<f64>,
-    /// How the packing is made.
+    /// Preparation of the packing.
     pub preparation: Preparation,
-    /// Shape that is cut out of the packing; all of it is kept where this is absent.
+    /// Shape that is cut out of the packing; default: the whole packing is kept.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cut: Option<Cut>,
 }
 
-/// A shape whose grains are kept of a packing.
+/// A shape cut out of a packing: only the grains inside it are kept.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Cut {
-    /// A circle of this diameter (m) around the middle of the packing, upright along x: a disk in
-    /// 2D, in 3D a cylinder along y. Grains that it would cut are left out. Higher than the
-    /// packing, it has flats where floor and lid were.
+    /// A circle of this diameter (m) around the centre of the packing, in the plane of x and the
+    /// vertical axis: a disk in 2D, a cylinder along y in 3D. Grains that cross it are left out. If
+    /// it is higher than the packing, the sample has flats where floor and lid were.
     Circle(f64),
 }
 
-/// The shape of a box seen from above.
+/// Cross-section of a box seen from above.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Section {
     /// `width` by `depth`.
     #[default]
     Rectangle,
-    /// A circle of diameter `width`: a cylinder, whose axis goes through x = y = `width` / 2.
+    /// A circle of diameter `width`: the box is a cylinder with its axis through x = y = `width` /
+    /// 2.
     Circle,
 }
 
@@ -77,7 +78,7 @@ pub enum Diameters {
     Constant(f64),
     /// Uniform between two diameters.
     Uniform(UniformRange),
-    /// Pairs `[diameter in m, weight]`: each grain has one of these diameters, with a chance
+    /// Pairs `[diameter in m, weight]`: each grain has one of these diameters, with a probability
     /// proportional to its weight.
     Table(Vec<[f64; 2]>),
 }
@@ -104,7 +105,7 @@ pub struct UniformRange {
     pub max: f64,
 }
 
-/// How a random packing is made. Both ways are frictionless, so that the packing is dense.
+/// Preparation of a random packing. Both ways are frictionless, so that the packing is dense.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Preparation {
@@ -118,7 +119,7 @@ pub enum Preparation {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Compaction {
-    /// Solid fraction to reach at least: volume of the grains over volume of the box (0 to 1).
+    /// Minimum solid fraction to reach: volume of the grains over volume of the box (0 to 1).
     pub solid_fraction: f64,
 }
 
@@ -126,7 +127,7 @@ pub struct Compaction {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Deposition {
-    /// Solid fraction to reach at least: volume of the grains over volume of the box (0 to 1).
+    /// Minimum solid fraction to reach: volume of the grains over volume of the box (0 to 1).
     pub solid_fraction: f64,
 }
 
@@ -134,8 +135,8 @@ pub struct Deposition {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Lattice {
-    /// Close packed: rows of `columns` and `columns` − 1 grains in turn, in 3D in layers, of which
-    /// every second begins with the shorter row.
+    /// Close packed: rows of `columns` and `columns` − 1 grains alternate; in 3D in layers, of
+    /// which every second begins with the shorter row.
     Hexagonal {
         /// Diameter of the grains (m).
         diameter: f64,
@@ -196,8 +197,8 @@ impl Lattice {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SampleFile {
-    /// CSV file with the header `x,y,radius` (2D) or `x,y,z,radius` (3D), all in m, sought beside
-    /// the scene. Lines that begin with `#` are comments.
+    /// CSV file with the header `x,y,radius` (2D) or `x,y,z,radius` (3D), all in m. A relative path
+    /// starts from the folder of the scene. Lines that begin with `#` are comments.
     pub path: PathBuf,
 }
 
@@ -209,11 +210,11 @@ pub struct GrainSpec {
     pub center: Vec<f64>,
     /// Radius (m).
     pub radius: f64,
-    /// Velocity at the start: one number for each dimension (m/s); zero where it is absent.
+    /// Initial velocity: one number for each dimension (m/s); default: zero.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub velocity: Option<Vec<f64>>,
-    /// Angular velocity at the start: `[w]` in 2D, counter-clockwise, `[wx, wy, wz]` in 3D (rad/s);
-    /// zero where it is absent.
+    /// Initial angular velocity: `[w]` in 2D, counter-clockwise, `[wx, wy, wz]` in 3D (rad/s);
+    /// default: zero.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spin: Option<Vec<f64>>,
     /// Density instead of the material's (kg/m³).

@@ -95,7 +95,7 @@ fn step(forms: &[Form], node: Option<&Value>, above: &str, key: &str) -> Result<
             && let Some(other) = other_kind(node, key)
         {
             let allowed =
-                format!("this path only where the scene has \"{key}\"; to change the kind, set {above} as a whole");
+                format!("this path only if the scene has \"{key}\"; to change the kind, set {above} as a whole");
             return Err(Problem::new(below, format!("\"{other}\" in {above}"), allowed));
         }
         return Ok(found);
@@ -132,7 +132,7 @@ fn other_kind(node: Option<&Value>, key: &str) -> Option<String> {
 fn unknown<'a>(above: &str, key: &str, names: impl Iterator<Item = &'a str>) -> Problem {
     let names: BTreeSet<&str> = names.collect();
     let allowed = match (names.is_empty(), above) {
-        (true, above) => format!("{above} is a single value, without names below"),
+        (true, above) => format!("{above} is a single value and has no fields"),
         (false, "") => format!("a path that starts with {}", list(&names)),
         (false, above) => format!("below {above}: {}", list(&names)),
     };

@@ -3,8 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Residual that is accepted where the scene does not say: bonds break for good, and want the
-/// better one.
+/// Default of the accepted residual: smaller with bonds, whose rupture is irreversible.
 #[must_use]
 pub(super) fn default_accept(tolerance: f64, bonds: bool) -> f64 {
     tolerance.max(if bonds { 1e-6 } else { 1e-4 })
@@ -16,13 +15,13 @@ pub(super) fn default_accept(tolerance: f64, bonds: bool) -> f64 {
 pub struct Solver {
     /// The solver.
     pub kind: SolverKind,
-    /// Relative residual that the solver aims at.
+    /// Relative residual at which the solver stops: the tolerance.
     pub tolerance: f64,
-    /// Largest relative residual of a solve that is accepted, at least the tolerance; where it is
-    /// absent 1e-6 with bonds and 1e-4 without, or the tolerance if that is larger.
+    /// Largest relative residual with which a solve is accepted, at least the tolerance. Default:
+    /// 1e-6 with bonds and 1e-4 without, or the tolerance if that is larger.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accept: Option<f64>,
-    /// How many times a step whose solve was not accepted is cut in half before the run stops.
+    /// Number of times that a step is halved when its solve is not accepted, before the run stops.
     pub max_step_halvings: u32,
 }
 
@@ -30,14 +29,15 @@ pub struct Solver {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SolverKind {
-    /// One method after the other, until one solves the problem: Gauss–Seidel where all contacts
-    /// are dry, Newton from the active set of the last step where there are bonds, the
-    /// interior-point method.
+    /// Methods in a fixed order until one solves the problem: Gauss–Seidel if all contacts are dry,
+    /// Newton from the active set of the last step if there are bonds, then the interior-point
+    /// method.
     Auto(Newton),
     /// Non-linear Gauss–Seidel: one contact after the other, until none changes.
     GaussSeidel(GaussSeidel),
-    /// Semismooth Newton on the augmented Lagrangian from the active set of the last step, with a
-    /// sparse factorisation: all contacts at once; the interior-point method where that fails.
+    /// Semismooth Newton on the augmented Lagrangian, for all contacts at once with a sparse
+    /// factorisation, warm-started from the active set of the last step. Where it fails, the
+    /// interior-point method.
     Newton(Newton),
     /// The interior-point method in every step.
     Interior(Newton),
@@ -49,43 +49,43 @@ pub enum SolverKind {
 pub struct GaussSeidel {
     /// How one contact is solved.
     pub local: LocalSolve,
-    /// Sweeps over all contacts after which a solve gives up.
+    /// Maximum number of sweeps over all contacts in a solve.
     pub max_sweeps: u64,
-    /// Steps that Anderson's acceleration remembers, 0 for plain sweeps; 8 takes some ten times
-    /// fewer sweeps where bonds abound.
+    /// Memory of Anderson's acceleration, in sweeps; 0 means plain sweeps. With many bonds, 8 needs
+    /// about a tenth of the sweeps.
     pub acceleration: usize,
 }
 
-/// Settings of the methods that solve for all contacts at once.
+/// Settings of Newton and of the interior-point method, which solve for all contacts at once.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Newton {
-    /// Load error that the solver aims at, how far the net force on the bodies still changed, over
-    /// itself; the velocity error likewise, how far contacts are from their laws, over the free
-    /// velocities.
+    /// Tolerance of the load error (estimated error of the net forces on the bodies, relative to
+    /// these forces) and of the velocity error (violation of the contact laws, relative to the free
+    /// velocities).
     pub load_tolerance: f64,
-    /// Where the reactions start from in every step.
+    /// Initial reactions of every step.
     pub start: Start,
-    /// Tangential stiffness over the normal one, in the metric of the stiff limit.
+    /// Ratio of tangential to normal stiffness in the stiff limit.
     pub tangential_stiffness: f64,
-    /// Bending stiffness over the normal one times the square of the mean diameter, in the metric
-    /// of the stiff limit.
+    /// Ratio of bending stiffness to normal stiffness times the square of the mean diameter, in the
+    /// stiff limit.
     pub rolling_stiffness: f64,
-    /// Iterations of one of these methods after which it gives up.
+    /// Maximum number of iterations of one of these methods in a solve.
     pub max_iterations: u64,
 }
 
-/// Where the reactions start from in every step.
+/// Initial reactions of every step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Start {
-    /// From zero: of all reactions that balance the load, those that stiff springs would give.
+    /// From zero: gives the minimum-energy reactions, those of springs in the stiff limit.
     StiffLimit,
-    /// From the last step: the reactions keep their history.
+    /// From the reactions of the last step: they depend on the history of the load.
     LastStep,
 }
 
-/// How one contact is solved, the others held.
+/// How one contact is solved while the others are fixed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum LocalSolve {

@@ -22,14 +22,14 @@ pub struct Wall {
     /// Drive: force along the direction, a function of time (N). The wall needs a mass.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub force: Option<Function>,
-    /// Drive: force along the direction that grows from zero at this rate (N/s). The wall needs a
+    /// Drive: force along the direction, growing from zero at this rate (N/s). The wall needs a
     /// mass.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub force_rate: Option<f64>,
     /// Mass of a wall that is driven by a force.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mass: Option<WallMass>,
-    /// Direction of the drive, of any length. A plane's is its normal where it is absent.
+    /// Direction of the drive, of any length. Default for a plane: its normal.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub direction: Option<Vec<f64>>,
 }
@@ -38,13 +38,13 @@ pub struct Wall {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Shape {
-    /// A plane (a line in 2D), without ends.
+    /// An infinite plane (a line in 2D).
     Plane(Plane),
-    /// 2D: a disk, or the outside of one.
+    /// 2D: a disk, or a ring around the grains.
     Circle(Circle),
-    /// 3D: a sphere, or the outside of one.
+    /// 3D: a sphere, or a hollow sphere around the grains.
     Sphere(Sphere),
-    /// 3D: a cylinder without ends, or the outside of one.
+    /// 3D: an infinite cylinder, or a hollow one around the grains.
     Cylinder(Cylinder),
 }
 
@@ -54,15 +54,15 @@ pub enum Shape {
 pub struct Plane {
     /// Normal, of any length, pointing to the side where the grains are.
     pub normal: Vec<f64>,
-    /// Where the plane stands.
+    /// Position of the plane.
     pub place: Place,
 }
 
-/// Where a plane stands.
+/// Position of a plane.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Place {
-    /// Against the sample: moved along its normal until it touches the first grain.
+    /// Seated against the sample: moved along its normal until it touches the first grain.
     Seated,
     /// Through this point: one number for each dimension (m).
     At(Vec<f64>),
@@ -76,11 +76,11 @@ pub struct Circle {
     pub center: Vec<f64>,
     /// Radius (m).
     pub radius: f64,
-    /// Whether the grains are inside it, as in a drum.
+    /// Whether the grains are inside the wall, as in a drum.
     #[serde(default)]
     pub inside: bool,
-    /// Against the sample: moved from the centre in this direction, of any length, until it touches
-    /// the first grain.
+    /// Seated against the sample: moved from `center` in this direction, of any length, until it
+    /// touches the first grain.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seated: Option<Vec<f64>>,
 }
@@ -93,26 +93,26 @@ pub struct Sphere {
     pub center: Vec<f64>,
     /// Radius (m).
     pub radius: f64,
-    /// Whether the grains are inside it.
+    /// Whether the grains are inside the sphere.
     #[serde(default)]
     pub inside: bool,
-    /// Against the sample: moved from the centre in this direction, of any length, until it touches
-    /// the first grain.
+    /// Seated against the sample: moved from `center` in this direction, of any length, until it
+    /// touches the first grain.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seated: Option<Vec<f64>>,
 }
 
-/// A cylindrical wall without ends (3D).
+/// An infinite cylindrical wall (3D).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Cylinder {
-    /// A point of the axis `[x, y, z]` (m).
+    /// A point on the axis, `[x, y, z]` (m).
     pub center: Vec<f64>,
     /// Direction of the axis, of any length.
     pub axis: Vec<f64>,
     /// Radius (m).
     pub radius: f64,
-    /// Whether the grains are inside it, as in a drum.
+    /// Whether the grains are inside the wall, as in a drum.
     #[serde(default)]
     pub inside: bool,
 }

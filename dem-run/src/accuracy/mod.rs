@@ -43,7 +43,7 @@ const MOST_PROBLEMS: usize = 50;
 pub fn accuracy(scene: &Scene, options: &AccuracyOptions) -> Result<(), RunError> {
     if let Some(names) = scene.load_unknown() {
         return Err(RunError::Usage(format!(
-            "several walls are driven, {names}: name the one that loads the sample as load_wall in the scene, or by \
+            "several walls are driven, {names}: name the one that loads the sample as load_wall in the scene, or with \
              --set load_wall=NAME"
         )));
     }
@@ -60,7 +60,7 @@ pub fn accuracy(scene: &Scene, options: &AccuracyOptions) -> Result<(), RunError
         let mut stderr = std::io::stderr();
         folder.written().iter().for_each(|path| drop(writeln!(stderr, "wrote {}", path.display())));
     }
-    if report.interrupted { Err(RunError::Interrupted("what was measured before is written")) } else { Ok(()) }
+    if report.interrupted { Err(RunError::Interrupted("the measurements so far are written")) } else { Ok(()) }
 }
 
 fn measure<D: Dim>(scene: &Scene, options: &AccuracyOptions, interrupt: &Interrupt) -> Result<Report, RunError> {
@@ -79,8 +79,8 @@ fn measure<D: Dim>(scene: &Scene, options: &AccuracyOptions, interrupt: &Interru
     let posed = measuring.runs(&mut report);
     if varied > 0 && !interrupt.requested() {
         let threads = rayon::ThreadPoolBuilder::new().num_threads(options.execution.threads.unwrap_or(0)).build();
-        let threads = threads
-            .map_err(|error| RunError::System { what: "threads cannot be started".into(), source: error.into() })?;
+        let threads =
+            threads.map_err(|error| RunError::System { what: "cannot start threads".into(), source: error.into() })?;
         report.indeterminacy = Some(threads.install(|| measuring.indeterminacy(&report.runs)));
     }
     if !interrupt.requested() {

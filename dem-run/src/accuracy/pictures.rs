@@ -23,8 +23,9 @@ pub fn draw(report: &Report, folder: &mut Folder) -> Result<()> {
 /// of the collapse load. For other samples, the residual.
 fn work_precision(report: &Report) -> Vec<Chart> {
     let strain = over_time(report, "strain before the first break, all false", &|row| row.outcome.false_strain);
-    let deviation =
-        over_time(report, "collapse load: error beside the reference", &|row| row.collapse_deviation[0].map(f64::abs));
+    let deviation = over_time(report, "collapse load: error relative to the reference", &|row| {
+        row.collapse_deviation[0].map(f64::abs)
+    });
     let residual = over_time(report, "worst residual", &|row| Some(row.outcome.worst_residual));
     let mut charts = vec![strain.or(residual)];
     charts.push(deviation.map(|mut chart| {

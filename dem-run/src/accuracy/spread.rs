@@ -15,11 +15,11 @@ pub struct Spread {
     /// Runs in which a step was not solved. They are excluded from all other numbers.
     pub failed: usize,
     /// Applied force at the first break (N).
-    pub first_break: Option<Range>,
+    pub first_break: Option<MinMeanMax>,
     /// Number of different bonds that broke first.
     pub first_bonds: usize,
     /// Collapse load (N) at each of [`crate::scene::failure::STRAINS`].
-    pub collapse: [Option<Range>; 2],
+    pub collapse: [Option<MinMeanMax>; 2],
     /// Mean Jaccard index over all pairs of sets of broken bonds (–); none for fewer than two runs.
     pub jaccard: Option<f64>,
 }
@@ -54,7 +54,7 @@ impl Varied {
 
 /// Least, mean and greatest value.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Range {
+pub struct MinMeanMax {
     /// Least.
     pub min: f64,
     /// Mean.
@@ -63,7 +63,7 @@ pub struct Range {
     pub max: f64,
 }
 
-impl Range {
+impl MinMeanMax {
     /// The range of the values; none if there are no values.
     #[must_use]
     pub fn of(values: &[f64]) -> Option<Self> {
@@ -81,7 +81,7 @@ impl Spread {
     pub fn of(solver: SolverName, varied: Varied, outcomes: &[&Outcome]) -> Self {
         let ended: Vec<&Outcome> = outcomes.iter().copied().filter(|o| o.error.is_none()).collect();
         let range = |value: &dyn Fn(&Outcome) -> Option<f64>| {
-            Range::of(&ended.iter().copied().filter_map(value).collect::<Vec<f64>>())
+            MinMeanMax::of(&ended.iter().copied().filter_map(value).collect::<Vec<f64>>())
         };
         let mut first: Vec<u32> = ended.iter().filter_map(|o| Some(o.first_break.as_ref()?.bond)).collect();
         first.sort_unstable();
@@ -98,7 +98,7 @@ impl Spread {
             first_break: range(&|o| o.first_break.as_ref()?.load),
             first_bonds: first.len(),
             collapse: [range(&|o| o.failure.collapse[0]), range(&|o| o.failure.collapse[1])],
-            jaccard: Range::of(&pairs).map(|range| range.mean),
+            jaccard: MinMeanMax::of(&pairs).map(|range| range.mean),
         }
     }
 }
@@ -129,7 +129,7 @@ mod tests {
 
     #[test]
     fn a_range_has_its_mean() {
-        assert_eq!(Range::of(&[3.0, 1.0, 5.0]), Some(Range { min: 1.0, mean: 3.0, max: 5.0 }));
-        assert_eq!(Range::of(&[]), None);
+        assert_eq!(MinMeanMax::of(&[3.0, 1.0, 5.0]), Some(MinMeanMax { min: 1.0, mean: 3.0, max: 5.0 }));
+        assert_eq!(MinMeanMax::of(&[]), None);
     }
 }

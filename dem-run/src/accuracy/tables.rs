@@ -1,7 +1,7 @@
 //! The report as tables: as text on stdout, and as CSV.
 
 use super::report::{Indeterminacy, Report, Row};
-use super::spread::Range;
+use super::spread::MinMeanMax;
 use super::trial::{End, Outcome};
 use crate::output::{Folder, Result, Text, cell, number, short};
 use crate::row;
@@ -9,10 +9,10 @@ use crate::row;
 /// All tables, as they are printed.
 pub fn text(report: &Report) -> String {
     let mut text = head(report);
-    text += "\nWork and precision: what each run cost, and how well it was solved\n\n";
+    text += "\nWork and precision: the cost and the accuracy of each run\n\n";
     text += &work(report);
     if report.bonds > 0 {
-        text += "\nWhat the runs say of the sample\n\n";
+        text += "\nResults of the runs for the sample\n\n";
         text += &failure(report);
     }
     text += &notes(report);
@@ -52,7 +52,7 @@ fn head(report: &Report) -> String {
                 .false_strain
                 .map_or("\n".into(), |e| format!("; strain before the first break {}\n", short(e)));
         }
-        None => text += "reference: none, no run came to its end\n",
+        None => text += "reference: none, as no run reached its end\n",
     }
     text
 }
@@ -160,17 +160,16 @@ fn collapse(outcome: &Outcome, k: usize) -> String {
 fn notes(report: &Report) -> String {
     let mut text = String::from("\n");
     if report.elastic {
-        text +=
-            "false acceleration is that before the first break, and means something only where the load grows slowly\n";
+        text += "false acceleration is that before the first break; it is meaningful only if the load grows slowly\n";
     } else if report.bonds > 0 {
         text += "false acceleration and strain are those before the first break, where a rigid sample is at rest and keeps its shape\n";
     } else {
-        text += "false acceleration means something only where the sample should be at rest\n";
+        text += "false acceleration is meaningful only for a sample that should be at rest\n";
     }
     if report.runs.iter().any(|row| row.outcome.failure.early.contains(&true)) {
         text += match (report.elastic, report.one_piece) {
-            (true, _) => "* before any bond broke: what the bonds yielded, and the solver\n",
-            (false, true) => "* before any bond broke: the solver's own strain, not the sample's\n",
+            (true, _) => "* before any bond broke: strain of the elastic bonds, and solver error\n",
+            (false, true) => "* before any bond broke: solver error, not strain of the sample\n",
             (false, false) => "* before any bond broke: not all grains are bonded to one piece\n",
         };
     }
@@ -181,14 +180,14 @@ fn notes(report: &Report) -> String {
         }
     }
     if report.interrupted {
-        text += "interrupted: what was not finished is missing\n";
+        text += "interrupted: unfinished runs are missing\n";
     }
     if text.len() == 1 { String::new() } else { text }
 }
 
 fn spreads(report: &Report, indeterminacy: &Indeterminacy) -> String {
     let mut text = format!(
-        "\nIndeterminacy: the same scene in other contact orders{}, tolerance {}, step {} s\n\n",
+        "\nIndeterminacy: the same scene with other contact orders{}, tolerance {}, step {} s\n\n",
         if report.elastic { "" } else { " and from other starting reactions" },
         tolerance(indeterminacy.tolerance),
         tolerance(indeterminacy.step_factor * report.step)
@@ -218,13 +217,13 @@ fn spreads(report: &Report, indeterminacy: &Indeterminacy) -> String {
         table.row(cells);
     }
     text += &table.lines();
-    text += "\n1st bonds: how many different bonds broke first; Jaccard: what two runs have in common of their broken bonds\n";
+    text += "\n1st bonds: number of different bonds that broke first; Jaccard: similarity of the broken bonds of two runs, 1 if equal\n";
     text
 }
 
-fn range(range: Option<Range>) -> Vec<String> {
+fn range(range: Option<MinMeanMax>) -> Vec<String> {
     match range {
-        Some(Range { min, mean, max }) => row![number(min), number(mean), number(max)],
+        Some(MinMeanMax { min, mean, max }) => row![number(min), number(mean), number(max)],
         None => row!["–", "–", "–"],
     }
 }

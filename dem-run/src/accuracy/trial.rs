@@ -25,7 +25,7 @@ const START_SHARE: f64 = 0.1;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum SolverName {
-    /// One method after the other, until one solves the problem.
+    /// Methods in a fixed order until one solves the problem.
     Auto,
     /// Non-linear Gauss–Seidel.
     #[value(alias = "gauss_seidel")]
@@ -360,7 +360,7 @@ impl<D: Dim> Trial<'_, D> {
             }
             if state.blown_up(&world) {
                 break End::Failed(format!(
-                    "the motion has far more energy than was put in at t = {:.6e} s: the solves that were accepted are wrong",
+                    "the energy of the motion far exceeds the energy supplied at t = {:.6e} s: solves were accepted that are wrong",
                     world.time
                 ));
             }

@@ -91,7 +91,7 @@ impl Reader {
         let dimension = self.source.integer(&spacedim)?;
         let rolling = self.source.has(&mu_r);
         if !rolling && (self.group == "fclib_global_rolling" || [5, 6].contains(&dimension)) {
-            return Err(self.source.wrong(&mu_r, format!("it is missing, and spacedim is {dimension}")));
+            return Err(self.source.wrong(&mu_r, format!("it is missing, but spacedim is {dimension}")));
         }
         match (dimension, rolling) {
             (2, false) => Ok(ContactRows { tangents: 1, moments: 0 }),
@@ -122,7 +122,7 @@ impl Reader {
         let unknowns = self.source.order(&m)?;
         let (rows, columns) = self.source.shape(&h)?;
         if rows != unknowns {
-            let why = format!("it is {rows}, and M has {unknowns} rows");
+            let why = format!("it is {rows}, but M has {unknowns} rows");
             return Err(self.source.wrong(&format!("{h}/m"), why));
         }
         let total = self.multiple(&format!("{h}/n"), columns, size)?;
@@ -160,7 +160,7 @@ impl Reader {
         if relative > MOST_ASYMMETRY {
             let why = format!(
                 "W is not symmetric: {:e} in row {row} and column {column}, {:e} in the place opposite; their mean differs by \
-                 {relative:.1e} of the largest entry, up to {MOST_ASYMMETRY:e} is made symmetric",
+                 {relative:.1e} of the largest entry; at most {MOST_ASYMMETRY:e} is corrected",
                 worst.entry, worst.mirrored
             );
             return Err(self.source.wrong(&self.at("W"), why));

@@ -27,7 +27,7 @@ impl Source {
         let io = |source| FclibError::Io { path: path.into(), doing: "read", source };
         let metadata = std::fs::metadata(path).map_err(io)?;
         if metadata.is_dir() {
-            return Err(io(std::io::Error::new(std::io::ErrorKind::IsADirectory, "it is a folder, give a file")));
+            return Err(io(std::io::Error::new(std::io::ErrorKind::IsADirectory, "it is a folder: give a file")));
         }
         std::fs::File::open(path).map_err(io)?;
         let unopened = |error| FclibError::NotHdf5 { path: path.into(), why: reason(&error) };
@@ -131,7 +131,7 @@ impl Source {
             true => Ok(m),
             false => {
                 let name = matrix.rsplit('/').next().unwrap_or(matrix);
-                Err(self.wrong(&format!("{matrix}/n"), format!("it is {n}, and m is {m}: {name} must be square")))
+                Err(self.wrong(&format!("{matrix}/n"), format!("it is {n}, but m is {m}: {name} must be square")))
             }
         }
     }
@@ -165,7 +165,7 @@ impl Source {
     fn leading<T: H5Type>(&self, place: &str, count: usize) -> Result<Vec<T>, FclibError> {
         let mut values = self.values(place)?;
         if values.len() < count {
-            return Err(self.wrong(place, format!("it has {} values, and {count} are promised", values.len())));
+            return Err(self.wrong(place, format!("it has {} values, but {count} are required", values.len())));
         }
         values.truncate(count);
         Ok(values)
@@ -175,7 +175,7 @@ impl Source {
     fn starts(&self, place: &str, lines: usize) -> Result<Vec<usize>, FclibError> {
         let starts = self.indices(place, lines + 1, usize::MAX)?;
         if starts[0] != 0 || starts.windows(2).any(|pair| pair[0] > pair[1]) {
-            return Err(self.wrong(place, "it must start at 0 and never fall"));
+            return Err(self.wrong(place, "it must start at 0 and never decrease"));
         }
         Ok(starts)
     }

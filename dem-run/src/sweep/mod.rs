@@ -123,7 +123,7 @@ fn all(store: &Store, plan: &Plan, mut manifest: Manifest, options: &SweepOption
     let printed = print_result(&standing, options.json);
     carried.and(written)?;
     if interrupt.requested() {
-        return Err(RunError::Interrupted("the runs that are done are kept, and the same command does the others"));
+        return Err(RunError::Interrupted("finished runs are kept; the same command does the others"));
     }
     printed?;
     failed
@@ -140,20 +140,19 @@ fn one(store: &Store, plan: &Plan, id: &str, options: &SweepOptions) -> Result<(
         return Err(RunError::Usage(format!("there is no run {id} in {folder}: the last is {last}")));
     };
     let Some(run) = plan.run(&entry.digest) else {
-        let what =
-            format!("run {} ({}) of {folder} is no longer what {sweep} gives", entry.id, describe(&entry.values));
+        let what = format!("run {} ({}) of {folder} is no longer in {sweep}", entry.id, describe(&entry.values));
         return Err(RunError::InputOutput(format!(
-            "{what}: the sweep or its scene has changed since --prepare; do that again"
+            "{what}: the sweep or its scene has changed since --prepare; repeat --prepare"
         )));
     };
     let interrupt = handle_signals()?;
     let job = Job { id: &entry.id, run };
     carry_out(store, &[job], 1, &interrupt, &mut options.execution.show(), &mut || Ok(()))?;
     if interrupt.requested() {
-        return Err(RunError::Interrupted("the run is left"));
+        return Err(RunError::Interrupted("the run is not done"));
     }
     match store.outcome(&entry.id).filter(|outcome| outcome.digest == entry.digest) {
-        None => Err(RunError::InputOutput(format!("run {} is being carried out by another process", entry.id))),
+        None => Err(RunError::InputOutput(format!("run {} is being run by another process", entry.id))),
         Some(outcome) if outcome.state == State::Failed => {
             let why = outcome.message.clone().unwrap_or_default();
             Err(RunError::Runs { code: exit_code(outcome.exit_code), message: format!("run {}: {why}", entry.id) })
@@ -177,8 +176,8 @@ fn prepare(store: &Store, manifest: Manifest, options: &SweepOptions) -> Result<
         return Ok(print_result(&standing, options.json)?);
     }
     Ok(print_line(&format!(
-        "{standing}\n\ncarry it out with one of\n  sbatch {folder}/slurm.sh\n  snakemake -s {folder}/Snakefile --cores 8 \
-         --keep-going\n  dem-run sweep {sweep} -o {folder}\nsee how it stands with\n  dem-run sweep {sweep} -o {folder} \
+        "{standing}\n\nrun it with one of\n  sbatch {folder}/slurm.sh\n  snakemake -s {folder}/Snakefile --cores 8 \
+         --keep-going\n  dem-run sweep {sweep} -o {folder}\nprint its status with\n  dem-run sweep {sweep} -o {folder} \
          --status"
     ))?)
 }
@@ -213,9 +212,9 @@ fn failures(store: &Store, manifest: &Manifest) -> Result<(), RunError> {
     let Some(code) = code else { return Ok(()) };
     let left = failed.iter().filter(|run| store.path(&run.id, ".failed.h5").is_file()).count();
     let left = match left {
-        0 => "none had begun its history, runs/NNNN.log says why".to_string(),
-        all if all == failed.len() => "what each had written is in runs/NNNN.failed.h5".to_string(),
-        some => format!("what {some} of them had written is in runs/NNNN.failed.h5"),
+        0 => "none had started its history; see runs/NNNN.log".to_string(),
+        all if all == failed.len() => "their histories up to the failure are runs/NNNN.failed.h5".to_string(),
+        some => format!("the histories of {some} of them up to the failure are runs/NNNN.failed.h5"),
     };
     let message = format!("{} of {} runs failed; {left}; --retry runs them again", failed.len(), manifest.runs.len());
     Err(RunError::Runs { code, message })
@@ -256,7 +255,7 @@ impl fmt::Display for Checked {
             ("runs", self.runs.len().to_string()),
             ("the first", run(self.runs.first())),
             ("the last", run(self.runs.last())),
-            ("steps", format!("{} in all, unless stop conditions end runs before", self.steps)),
+            ("steps", format!("{} in all, unless stop conditions end runs earlier", self.steps)),
             ("files", format!("about {} in all", size(self.file_bytes))),
             ("free disk", self.free_bytes.map_or("unknown".into(), size)),
         ]);

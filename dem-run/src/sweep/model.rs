@@ -15,19 +15,19 @@ use serde_json::Value;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Sweep {
-    /// The JSON Schema that an editor checks the sweep against, as `dem-run schema --sweep` prints
-    /// it.
+    /// JSON Schema for editors, as printed by `dem-run schema --sweep`.
     #[serde(default, rename = "$schema", skip_serializing_if = "Option::is_none")]
     pub schema: Option<String>,
-    /// What the sweep shows, in a line.
+    /// Title of the sweep, one line.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub title: Option<String>,
-    /// The scene that all runs start from: a file, sought beside the sweep.
+    /// File of the scene on which all runs are based. A relative path starts from the folder of the
+    /// sweep.
     pub scene: PathBuf,
-    /// Values that all runs have in place of the scene's.
+    /// Values that replace those of the scene in all runs.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub set: BTreeMap<String, Value>,
-    /// What is varied. The fields of one object vary together: the first run has the first value of
+    /// The varied fields. Fields of one object vary together: the first run has the first value of
     /// each, and so on. Several objects are combined, each with each; the last varies fastest.
     pub vary: Vec<BTreeMap<String, Values>>,
 }
@@ -36,37 +36,36 @@ pub struct Sweep {
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Values {
-    /// These, in this order; any that the field may have.
+    /// These values, in this order.
     List(Vec<Value>),
-    /// Numbers at equal distances.
+    /// Equally spaced numbers.
     Range(Range),
 }
 
-/// Numbers at equal distances, rounded to 12 digits; those that are whole are written as whole
-/// numbers.
+/// Equally spaced numbers, rounded to 12 digits; whole numbers are written without a decimal point.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Range {
     /// The first number.
     pub from: f64,
-    /// The last number; where it is absent, each number is the one before plus 1.
+    /// The last number; default: each number is its predecessor plus 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub to: Option<f64>,
     /// How many numbers.
     pub count: u64,
-    /// What is equal between neighbours.
+    /// Spacing of the numbers; default: `linear`.
     #[serde(default)]
     pub spacing: Spacing,
 }
 
-/// What is equal between neighbours of a range.
+/// Spacing of the numbers of a range.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Spacing {
-    /// Their difference.
+    /// Equal differences.
     #[default]
     Linear,
-    /// Their ratio.
+    /// Equal ratios.
     Geometric,
 }
 

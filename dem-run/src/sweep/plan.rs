@@ -114,8 +114,8 @@ fn validate(sweep: &Sweep) -> Vec<Problem> {
             let here = format!("{place}.{path}");
             problems.extend(wrong_values(&here, values));
             if let Some((other, there)) = given.iter().find(|(other, _)| overlap(other, path)) {
-                let found = format!("{other} has values at {there} as well");
-                problems.push(Problem::new(&here, found, "each field once, not the whole and a part of it"));
+                let found = format!("{other} also has values at {there}");
+                problems.push(Problem::new(&here, found, "each field once, and not both a field and a part of it"));
             }
             given.push((path, here));
         }
@@ -123,8 +123,8 @@ fn validate(sweep: &Sweep) -> Vec<Problem> {
         if lengths.iter().any(|(_, length)| *length != lengths[0].1) {
             let found: Vec<String> =
                 lengths.iter().map(|(path, length)| format!("{path} has {length} values")).collect();
-            let allowed = "as many values for each, since fields in one object vary together; an object for each field \
-                           combines each value with each";
+            let allowed = "the same number of values for each, since fields in one object vary together; one object per \
+                           field combines each value with each";
             problems.push(Problem::new(place, found.join(", "), allowed));
         }
         count = lengths.first().and_then(|(_, length)| count?.checked_mul(*length));
@@ -251,7 +251,7 @@ fn located(
         Some(Origin::Text { line, column }) => format!(", line {line}, column {column}"),
         _ => String::new(),
     };
-    let shown = format!("{path} in {}{line}: {found}, where {}", scene.display(), describe(values));
+    let shown = format!("{path} in {}{line}: {found}, with {}", scene.display(), describe(values));
     ([path, found, allowed.clone()], Problem::new("scene", shown, allowed).with_nearest(nearest))
 }
 
@@ -262,15 +262,14 @@ fn same_scene(runs: &[PlannedRun]) -> Option<Problem> {
         let earlier = first.insert(&run.digest, run)?;
         let (a, b) = (describe(&earlier.values), describe(&run.values));
         let found = if a == b { format!("{a} twice") } else { format!("the same scene for {a} and for {b}") };
-        Some(Problem::new("vary", found, "values that make every run another (a title does not)"))
+        Some(Problem::new("vary", found, "values that make every run different (a title does not)"))
     })
 }
 
 /// The error that a run has several driven walls and no load wall.
 fn load_unknown(runs: &[PlannedRun]) -> Option<Problem> {
     let (run, names) = runs.iter().find_map(|run| Some((run, run.scene.load_unknown()?)))?;
-    let found =
-        format!("several driven walls, {names}, and none named as the load wall, where {}", describe(&run.values));
+    let found = format!("several driven walls, {names}, but no load wall, with {}", describe(&run.values));
     let allowed = "one of them as load_wall, in the scene or in the sweep: \"set\": { \"load_wall\": … }";
     Some(Problem::new("scene", found, allowed))
 }
@@ -365,7 +364,10 @@ mod tests {
                 r#""vary": [{"seed": [1, 2], "bonds.strength": [1, 2, 3]}]"#,
                 &["vary.0", "bonds.strength has 3 values, seed has 2", "combines each value with each"],
             ),
-            (r#""vary": [{"seed": [1]}, {"seed": [2]}]"#, &["vary.1.seed", "vary.0.seed as well", "each field once"]),
+            (
+                r#""vary": [{"seed": [1]}, {"seed": [2]}]"#,
+                &["vary.1.seed", "also has values at vary.0.seed", "each field once"],
+            ),
             (r#""set": {"bonds": null}, "vary": [{"bonds.strength": [1]}]"#, &["vary.0.bonds.strength", "set.bonds"]),
             (r#""vary": [{"bonds.strenght": [1, 2]}]"#, &["vary.0.bonds.strenght", "nearest  bonds.strength"]),
             (r#""set": {"sed": 1}, "vary": [{"time.end": [1]}]"#, &["set.sed (line 1", "nearest  seed"]),

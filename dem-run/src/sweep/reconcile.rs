@@ -25,8 +25,8 @@ pub fn reconcile(store: &Store, plan: &Plan, give_up: bool) -> Result<Manifest, 
     let mut manifest = Manifest::new(&plan.sweep, &plan.scene, plan.fields.clone());
     let old = store.manifest()?;
     if old.is_none() && store.path("", "").exists() && !give_up {
-        let remedy = "-o DIR names another, --force puts this sweep's runs there".into();
-        let state = "holds runs and no manifest.json";
+        let remedy = "-o DIR names another folder, --force replaces its runs by those of this sweep".into();
+        let state = "holds runs but no manifest.json";
         return Err(RunError::Unfit { path: store.folder().into(), state, remedy });
     }
     let old = old.map(|manifest| manifest.runs).unwrap_or_default();
@@ -71,7 +71,7 @@ fn refusal(store: &Store, told: &[String]) -> RunError {
         shown.push(format!("  … and {} more", told.len() - MOST_TOLD));
     }
     RunError::InputOutput(format!(
-        "{} holds results of other scenes than the sweep gives now:\n{}\n--force runs the changed ones again and deletes \
+        "{} holds results of scenes that are no longer those of the sweep:\n{}\n--force runs the changed ones again and deletes \
          those that are no longer in the sweep; -o DIR names another folder",
         store.folder().display(),
         shown.join("\n")

@@ -231,7 +231,7 @@ fn outcome(store: &Store, job: &Job<'_>, status: ExitStatus, summary: &str, wall
     // exit code 0 without a summary counts as a failure
     let done = status.success() && summary.is_some();
     let why = match said.trim().trim_start_matches("error: ") {
-        "" => format!("the run ended with {status} and said nothing"),
+        "" => format!("the run ended with {status} and no message"),
         said if status.code().is_none() => format!("the run ended with {status}: {said}"),
         said => said.to_string(),
     };

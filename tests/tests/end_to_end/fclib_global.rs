@@ -294,7 +294,7 @@ fn wrong_global_problems_are_refused() {
             put(group, place, &[value]);
         }
     };
-    refused(same, again("H/m", 13), &["/fclib_global/H/m", "it is 13, and M has 12 rows"]);
+    refused(same, again("H/m", 13), &["/fclib_global/H/m", "it is 13, but M has 12 rows"]);
     refused(same, again("H/n", 10), &["/fclib_global/H/n", "multiple of 3"]);
     refused(same, again("M/n", 11), &["/fclib_global/M/n", "M must be square"]);
     refused(same, again("spacedim", 5), &["/fclib_global/vectors/mu_r", "missing"]);
@@ -330,5 +330,5 @@ fn a_nearly_symmetric_matrix_is_made_symmetric() {
     // what is written is symmetric
     assert_eq!(Problem::read(&here.path("c.hdf5")).expect("read").warnings, [""; 0]);
     change(2e-3);
-    here.dem_run(&["solve", "b.hdf5"]).fails(4, &["b.hdf5, /fclib_local/W", "not symmetric", "1.5e-3", "up to 1e-3"]);
+    here.dem_run(&["solve", "b.hdf5"]).fails(4, &["b.hdf5, /fclib_local/W", "not symmetric", "1.5e-3", "at most 1e-3"]);
 }

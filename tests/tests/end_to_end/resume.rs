@@ -333,7 +333,7 @@ fn a_run_that_was_killed_before_its_first_checkpoint_begins_anew() {
     drop(file);
     // of one that has gone on for long, nothing is thrown away
     let before = here.read("a.h5");
-    here.dem_run(&["resume", "a.h5", "--quiet"]).fails(4, &["no whole state", "damaged"]);
+    here.dem_run(&["resume", "a.h5", "--quiet"]).fails(4, &["no complete state", "damaged"]);
     assert_eq!(here.read("a.h5"), before);
     // a file each: HDF5's lock on one that was read here may live on in a program that another test
     // started meanwhile

@@ -257,7 +257,7 @@ fn tasks_of_a_scheduler_carry_out_one_run_each() {
     assert_eq!(states(&here, "a b"), ["left", "failed", "done"]);
 
     strengths(&here, &[1, 2]);
-    let parts = ["run 0001", "no longer what sweep.json gives", "--prepare"];
+    let parts = ["run 0001", "no longer in sweep.json", "--prepare"];
     here.dem_run(&["sweep", "sweep.json", "-o", "a b", "--run", "1"]).fails(4, &parts);
     here.dem_run(&["sweep", "sweep.json", "-o", "none", "--run", "1"]).fails(4, &["no manifest.json", "--prepare"]);
 }
@@ -275,7 +275,11 @@ fn wrong_sweeps_are_refused_before_anything_is_written() {
             &["vary.0.bonds.strenght", "nearest  bonds.strength"],
         ),
         (r#"{ "scene": "S", "vary": [{"bonds.strength": []}] }"#, 2, &["vary.0.bonds.strength", "at least one value"]),
-        (r#"{ "scene": "S", "vary": [{"bonds.strength": [1, 2], "seed": [1]}] }"#, 2, &["vary.0", "as many values"]),
+        (
+            r#"{ "scene": "S", "vary": [{"bonds.strength": [1, 2], "seed": [1]}] }"#,
+            2,
+            &["vary.0", "the same number of values"],
+        ),
         (
             r#"{ "scene": "S", "vary": [{"bonds.strength": [1, -1]}, {"time.step": [0, 1e-4]}] }"#,
             2,

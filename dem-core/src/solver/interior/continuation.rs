@@ -27,7 +27,7 @@ use crate::solver::tuning::continuation as tuning;
 
 /// A point next to the path, or a change of it.
 #[derive(Clone, Debug)]
-struct Iterate {
+struct PathPoint {
     /// Reactions without the shift, of all rows.
     r: Vec<f64>,
     /// x − z of all pairs.
@@ -47,8 +47,8 @@ enum Parameter {
 /// A step along the tangent at a point of the path.
 #[derive(Clone, Debug)]
 struct Predictor {
-    from: Iterate,
-    tangent: Iterate,
+    from: PathPoint,
+    tangent: PathPoint,
     /// Relative change of the barrier.
     length: f64,
 }
@@ -68,7 +68,7 @@ pub(super) enum Progress {
 /// The state of a continuation.
 #[derive(Debug)]
 pub(super) struct Continuation {
-    at: Iterate,
+    at: PathPoint,
     parameter: Parameter,
     predictor: Option<Predictor>,
     /// Newton steps since the predictor, and the relative length of the first.
@@ -81,10 +81,10 @@ pub(super) struct Continuation {
     straight: f64,
     /// Whether the start of the step along the tangent is corrected again, since the correction of
     /// its end failed.
-    again: bool,
+    correct_start: bool,
 }
 
-impl Iterate {
+impl PathPoint {
     fn advance(&mut self, length: f64, by: &Self) {
         self.r.iter_mut().zip(&by.r).for_each(|(r, d)| *r += length * d);
         self.w.iter_mut().zip(&by.w).for_each(|(w, d)| *w = moved(w, length, d));
@@ -112,7 +112,7 @@ impl Continuation {
     pub fn new(point: &State, gap: f64, raised: f64, straight: f64) -> Self {
         let w = point.x.iter().zip(&point.z).map(|(x, z)| moved(x, -1.0, z)).collect();
         Self {
-            at: Iterate { r: point.r.clone(), w, theta: (raised * gap).ln() },
+            at: PathPoint { r: point.r.clone(), w, theta: (raised * gap).ln() },
             parameter: Parameter::Barrier,
             predictor: None,
             corrections: 0,
@@ -120,7 +120,7 @@ impl Continuation {
             length: tuning::LONGEST,
             end: (0.5 * gap).ln(),
             straight,
-            again: false,
+            correct_start: false,
         }
     }
 
@@ -153,7 +153,7 @@ impl Continuation {
     /// A Newton step alone. Too many of them mean that the start of the step along the tangent is
     /// not on the path, or that this step is too long. The start is corrected again first; then the
     /// step is repeated, shorter.
-    fn correct(&mut self, error: f64, newton: &Iterate) -> Progress {
+    fn correct(&mut self, error: f64, newton: &PathPoint) -> Progress {
         self.corrections += 1;
         let most = if self.predictor.is_some() { tuning::CORRECTIONS } else { tuning::FIRST_CORRECTIONS };
         if self.corrections <= most && error.is_finite() {
@@ -165,8 +165,8 @@ impl Continuation {
         let Some(predictor) = self.predictor.as_mut().filter(|_| self.length >= tuning::SHORTEST) else {
             return Progress::Lost;
         };
-        self.again = !self.again;
-        if self.again {
+        self.correct_start = !self.correct_start;
+        if self.correct_start {
             self.at = predictor.from.clone();
             self.parameter = Parameter::Barrier;
         } else {
@@ -176,27 +176,32 @@ impl Continuation {
         Progress::Path
     }
 
-    /// A step along the tangent, `down` to a lower barrier or up to a higher one.
-    fn predict(&mut self, tangent: Iterate, down: bool) -> Progress {
+    /// A step along the tangent, `to_lower_barrier` or to a higher one.
+    fn predict(&mut self, tangent: PathPoint, to_lower_barrier: bool) -> Progress {
         // the error of a step grows with the square of its length
-        if !std::mem::take(&mut self.again) {
+        if !std::mem::take(&mut self.correct_start) {
             let factor = (tuning::AIM / self.first_error).sqrt().clamp(tuning::SHORTER, 2.0);
             self.length = (factor * self.length).min(tuning::LONGEST);
         }
         self.corrections = 0;
         let (fastest, size) = self.at.fastest(&tangent);
-        self.parameter = if down && size <= tuning::SLOW { Parameter::Barrier } else { fastest };
-        let length = if down { -(self.length / size).min(1.0 - tuning::STEEPEST) } else { self.length / size };
+        self.parameter = if to_lower_barrier && size <= tuning::SLOW { Parameter::Barrier } else { fastest };
+        let length =
+            if to_lower_barrier { -(self.length / size).min(1.0 - tuning::STEEPEST) } else { self.length / size };
         let predictor = Predictor { from: self.at.clone(), tangent, length };
         self.at = predictor.end();
         self.predictor = Some(predictor);
-        if down && size <= self.straight && self.at.theta < self.end { Progress::Straight } else { Progress::Path }
+        if to_lower_barrier && size <= self.straight && self.at.theta < self.end {
+            Progress::Straight
+        } else {
+            Progress::Path
+        }
     }
 }
 
 impl Predictor {
     /// The end of the step; w is nearly linear in τ.
-    fn end(&self) -> Iterate {
+    fn end(&self) -> PathPoint {
         let mut at = self.from.clone();
         at.advance(self.length, &self.tangent);
         at.theta = self.from.theta + self.length.ln_1p();
@@ -205,7 +210,7 @@ impl Predictor {
 }
 
 /// The Newton step at fixed barrier, and the tangent for dθ = 1.
-fn directions(system: &System, sites: &Sites, barrier: f64) -> (Iterate, Iterate) {
+fn directions(system: &System, sites: &Sites, barrier: f64) -> (PathPoint, PathPoint) {
     let at = system.at;
     let misfit = misfit(sites, at);
     let by: Vec<Point> = at.z.iter().zip(&misfit).map(|(z, p)| product(z, p)).collect();
@@ -214,7 +219,7 @@ fn directions(system: &System, sites: &Sites, barrier: f64) -> (Iterate, Iterate
     let w = |step: &State, c: usize| moved(&step.x[c], -1.0, &step.z[c]);
     let corrected = (0..misfit.len()).map(|c| moved(&w(&newton, c), -1.0, &misfit[c])).collect();
     let along = (0..misfit.len()).map(|c| w(&tangent, c)).collect();
-    (Iterate { r: newton.r, w: corrected, theta: 0.0 }, Iterate { r: tangent.r, w: along, theta: 1.0 })
+    (PathPoint { r: newton.r, w: corrected, theta: 0.0 }, PathPoint { r: tangent.r, w: along, theta: 1.0 })
 }
 
 /// x − G r̂ of all pairs.

@@ -21,7 +21,7 @@ pub(super) enum Coupling<'a> {
     /// W as a symmetric matrix over the contacts. The matrix of a step is 1 + W D⁻¹.
     Matrix {
         /// The upper triangle, block by block: an element of `tree` each.
-        blocks: Vec<Block>,
+        blocks: Vec<CouplingBlock>,
         /// Their values.
         values: Vec<f64>,
         tree: Tree,
@@ -30,7 +30,7 @@ pub(super) enum Coupling<'a> {
 
 /// A block of W in the units of [`Sites`]: the rows of the first contact, one after the other, over
 /// those of the second (the same contact for a diagonal block).
-pub(super) struct Block {
+pub(super) struct CouplingBlock {
     contacts: [usize; 2],
     /// Start of its values.
     start: usize,
@@ -63,7 +63,7 @@ impl<'a> Coupling<'a> {
         let (mut blocks, mut values) = (Vec::new(), Vec::new());
         for (c, site) in sites.list.iter().enumerate() {
             for (d, block) in matrix.row(c).filter(|(d, _)| *d >= c) {
-                blocks.push(Block { contacts: [c, d], start: values.len() });
+                blocks.push(CouplingBlock { contacts: [c, d], start: values.len() });
                 let other = &sites.list[d];
                 for row in &site.of[..site.rows] {
                     values.extend(other.of[..other.rows].iter().map(|k| scale * block[row * size + k]));
@@ -172,7 +172,7 @@ impl<'a> Coupling<'a> {
     }
 }
 
-impl Block {
+impl CouplingBlock {
     /// u += W r for this block and its transpose.
     fn multiply(&self, sites: &Sites, values: &[f64], r: &[f64], u: &mut [f64]) {
         let [site, other] = self.contacts.map(|c| &sites.list[c]);

@@ -22,7 +22,7 @@ pub(super) struct Follow {
     straight: f64,
     by_arc_length: Option<ByArcLength>,
     /// Whether round-off has ended the long steps.
-    to_the_end: bool,
+    round_off_reached: bool,
 }
 
 struct ByArcLength {
@@ -34,7 +34,7 @@ struct ByArcLength {
 impl Follow {
     /// Follow in long steps, from a point inside all cones.
     pub fn from(at: State) -> Self {
-        Self { at, stuck: 0, straight: tuning::STRAIGHT, by_arc_length: None, to_the_end: false }
+        Self { at, stuck: 0, straight: tuning::STRAIGHT, by_arc_length: None, round_off_reached: false }
     }
 
     /// The current point.
@@ -69,7 +69,7 @@ impl Follow {
             Progress::Straight => {
                 let x = sites.primal(&now.r);
                 let inside = State { x, ..now };
-                if !self.to_the_end && is_central(&inside) {
+                if !self.round_off_reached && is_central(&inside) {
                     (self.at, self.by_arc_length) = (inside, None);
                 }
             }
@@ -95,8 +95,8 @@ impl Follow {
         let left = gap(&next) / gap(system.at);
         self.stuck = if left <= 1.0 - tuning::PROGRESS { 0 } else { self.stuck + 1 };
         self.at = next;
-        self.to_the_end = left > 0.5 && is_rounded(&self.at);
-        if self.to_the_end {
+        self.round_off_reached = left > 0.5 && is_rounded(&self.at);
+        if self.round_off_reached {
             self.jam(1.0);
         } else if self.stuck == tuning::JAMMED {
             self.stuck = 0;

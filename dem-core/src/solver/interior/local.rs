@@ -9,7 +9,7 @@
 //! sticking rows, which are small beside slipping ones.
 
 use super::cones::{Point, Scaling, eigenvalues, product};
-use super::sites::{CONES, Cone, ROWS, Sites};
+use super::sites::{CONES, ROWS, SecondOrderCone, Sites};
 use super::state::State;
 
 /// Largest order of a local matrix.
@@ -52,10 +52,10 @@ pub(super) fn invert(sites: &Sites, pairs: &[Scaled], compliance: &[f64], invers
         }
         let mut first = site.rows;
         for c in site.cones.clone() {
-            let Cone { slope, rows, tangents, opens } = &sites.cones[c];
+            let SecondOrderCone { slope, rows, tangents, acts_on_normal } = &sites.cones[c];
             let Scaled { scaling, x, z } = &pairs[c];
             let scale = scale(x, z);
-            if *opens {
+            if *acts_on_normal {
                 a[first] = -slope;
             }
             for k in 0..=*tangents {

@@ -39,7 +39,7 @@ impl Metric {
             for (k, u) in (site.at..site.at + site.rows).zip(&mut u) {
                 *u = self.own[k] * (r[k] - self.anchor[k]);
             }
-            for cone in sites.cones[site.cones.clone()].iter().filter(|cone| !cone.opens) {
+            for cone in sites.cones[site.cones.clone()].iter().filter(|cone| !cone.acts_on_normal) {
                 let slip = cone.rows[..cone.tangents].iter().map(|row| u[*row] * u[*row]).sum::<f64>();
                 u[0] += cone.slope * slip.sqrt();
             }

@@ -29,14 +29,14 @@ pub(super) struct Limit {
 
 /// One cone of a contact.
 #[derive(Clone, Debug)]
-pub(super) struct Cone {
+pub(super) struct SecondOrderCone {
     /// Ratio of x₀ to the shifted normal reaction.
     pub slope: f64,
     /// The contact's rows for the components after x₀; `tangents` of them.
     pub rows: [usize; 2],
     pub tangents: usize,
     /// Whether z₀ acts on the normal row.
-    pub opens: bool,
+    pub acts_on_normal: bool,
 }
 
 /// One contact.
@@ -74,7 +74,7 @@ impl Site {
     }
 }
 
-impl Cone {
+impl SecondOrderCone {
     /// G r: the change of x with the reaction.
     #[inline]
     pub fn primal(&self, r: &[f64]) -> Point {
@@ -88,7 +88,7 @@ impl Cone {
     /// u += Bᵀ z.
     #[inline]
     pub fn add_velocity(&self, z: &Point, u: &mut [f64]) {
-        if self.opens {
+        if self.acts_on_normal {
             u[0] += self.slope * z[0];
         }
         for k in 0..self.tangents {
@@ -101,7 +101,7 @@ impl Cone {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sites {
     pub list: Vec<Site>,
-    pub cones: Vec<Cone>,
+    pub cones: Vec<SecondOrderCone>,
     /// Number of all rows.
     pub rows: usize,
     /// Unit of reactions (N s, over the unit of mass), and of velocities (m/s).
@@ -175,10 +175,10 @@ impl Sites {
         let groups = groups.into_iter().filter(|(_, (_, count))| *count > 0);
         let before = self.cones.len();
         for (slope, (rows, tangents)) in groups {
-            self.cones.push(Cone { slope, rows, tangents, opens: row.associated });
+            self.cones.push(SecondOrderCone { slope, rows, tangents, acts_on_normal: row.associated });
         }
         if !row.associated || self.cones.len() == before {
-            self.cones.push(Cone { slope: 1.0, rows: [0; 2], tangents: 0, opens: true });
+            self.cones.push(SecondOrderCone { slope: 1.0, rows: [0; 2], tangents: 0, acts_on_normal: true });
         }
         site.cones.end = self.cones.len();
         site.duals = self.cones[before..].iter().map(|cone| 1 + cone.tangents).sum();
@@ -266,7 +266,7 @@ impl Sites {
         let one = |(site, shift): (&Site, &f64)| {
             let mut own = [0.0; ROWS];
             own[..site.rows].copy_from_slice(site.part(&at.r));
-            if site.cones.clone().any(|c| self.cones[c].opens && limit(c, *shift).apex) {
+            if site.cones.clone().any(|c| self.cones[c].acts_on_normal && limit(c, *shift).apex) {
                 // at the apex: the shifted reaction is zero
                 own = [0.0; ROWS];
                 own[0] = -shift;

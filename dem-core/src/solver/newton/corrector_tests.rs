@@ -35,7 +35,7 @@ fn contact(rng: &mut Pcg64, tangents: usize, moments: usize, associated: bool, e
         rows,
         cone,
         associated,
-        breaks: moments > 0,
+        is_bond: moments > 0,
         shift,
         given: Padded::zero(),
         weights: weights(rng),

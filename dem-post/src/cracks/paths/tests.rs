@@ -224,7 +224,7 @@ fn cracks_that_meet_grow_by_each_other() {
 #[test]
 fn the_growth_ends_with_the_cracks_of_the_table() {
     let sample = hexagonal(12, 9);
-    // every third bond, in an order without sense
+    // every third bond, in an arbitrary order
     let count = sample.bonds.len();
     let bonds: Vec<usize> = (0..count / 3).map(|k| (k * 3 * 17) % count).collect();
     let mut seen = bonds.clone();
@@ -245,7 +245,7 @@ fn the_growth_ends_with_the_cracks_of_the_table() {
 
 #[test]
 fn the_path_of_a_crack_with_loops_is_the_longest_of_all_pairs() {
-    // five of six bonds, in two orders without sense: many loops
+    // five of six bonds, in two arbitrary orders: many loops
     for (lattice, factor) in [(hexagonal(14, 11), 17), (square(16, 13), 29)] {
         let count = lattice.bonds.len();
         let ruptures = one_a_step(&(0..5 * count / 6).map(|k| (k * factor) % count).collect::<Vec<_>>());

@@ -79,7 +79,7 @@ fn a_cut_through_a_cubic_lattice_is_one_flat_crack() {
     assert_eq!(cut.len(), 25);
     let (found, ruptures) = sample.broken(&cut);
     let [crack] = found.cracks.as_slice() else { panic!("{:?}", found.cracks) };
-    // of the square cell what lies within the polygon around the circle of half a diameter
+    // the part of the square cell within the polygon around the circle of half a diameter
     let polygon = SIDES as f64 * (std::f64::consts::PI / SIDES as f64).tan() * 0.25 * D * D;
     assert!(close(crack.area, 25.0 * polygon), "{}", crack.area / polygon);
     assert!(close(crack.flatness, 1.0) && close(crack.normal[2], 1.0), "{crack:?}");

@@ -69,7 +69,7 @@ fn bonds(report: &mut Report, bonds: &Bonds, dimension: u8) {
     match (bonds.strength, bonds.stress) {
         (Some(strength), Some(stress)) => {
             let found = format!("strength {strength:?} N and stress {stress:?} Pa");
-            report.wrong("bonds", found, "one of them; `--set bonds.stress=null` takes a value away");
+            report.wrong("bonds", found, "one of them; `--set bonds.stress=null` removes a value");
         }
         (None, None) => {
             report.wrong("bonds", "neither strength nor stress", "one of them: strength (N) or stress (Pa)")
@@ -90,7 +90,7 @@ fn bonds(report: &mut Report, bonds: &Bonds, dimension: u8) {
     match bonds.scatter {
         Some(Scatter::Weibull { modulus }) => report.positive("bonds.scatter.weibull.modulus", modulus, "no unit"),
         Some(Scatter::Normal { deviation }) => {
-            let allowed = "a number from 0 to 0.5: with more, strengths below zero would be left out often";
+            let allowed = "a number from 0 to 0.5: above, many drawn strengths would be negative";
             report.range(
                 "bonds.scatter.normal.deviation",
                 deviation,
@@ -101,9 +101,9 @@ fn bonds(report: &mut Report, bonds: &Bonds, dimension: u8) {
         None => {}
     }
     if let Some(twist) = bonds.twist {
-        report.positive("bonds.twist", twist, "no unit; without it bonds are free to spin about their normal");
+        report.positive("bonds.twist", twist, "no unit; without it bonds do not resist twist");
         if dimension == 2 {
-            report.wrong("bonds.twist", "a value in a scene of dimension 2", "left out: disks do not twist");
+            report.wrong("bonds.twist", "a value in a scene of dimension 2", "no value: disks do not twist");
         }
     }
     match &bonds.stiffness {
@@ -117,9 +117,11 @@ fn bonds(report: &mut Report, bonds: &Bonds, dimension: u8) {
                 (Some(_), None) => {
                     report.wrong(path("twist"), "nothing", "a stiffness (N m/rad), as bonds.twist is given")
                 }
-                (None, Some(_)) => {
-                    report.wrong(path("twist"), "a value", "left out, or bonds.twist given: bonds resist no twist")
-                }
+                (None, Some(_)) => report.wrong(
+                    path("twist"),
+                    "a value",
+                    "no value, or a value of bonds.twist: these bonds do not resist twist",
+                ),
                 (None, None) => {}
             }
         }

@@ -66,7 +66,7 @@ fn random_sample(report: &mut Report, random: &RandomSample) {
     if let Some(Cut::Circle(diameter)) = random.cut {
         report.positive("sample.random.cut.circle", diameter, "m");
         if random.section == Section::Circle {
-            report.wrong("sample.random.cut", "circle, beside section: circle", "a cut through a box, or none");
+            report.wrong("sample.random.cut", "circle, together with section: circle", "a cut through a box, or none");
         }
     }
 }
@@ -153,7 +153,7 @@ fn grain(report: &mut Report, index: usize, grain: &GrainSpec) {
         }
     }
     if let (Some(density), Some(mass)) = (grain.density, grain.mass) {
-        let found = format!("{density:?}, beside a mass of {mass:?} kg");
+        let found = format!("{density:?}, together with a mass of {mass:?} kg");
         report.wrong(format!("{path}.density"), found, "either density or mass");
     }
 }

@@ -53,7 +53,7 @@ fn mass_and_direction(report: &mut Report, path: &str, wall: &Wall) {
         }
         (Some(vector), _) => report.direction(&direction, vector),
         (None, Drive::Velocity(_) | Drive::Force(_)) if wall.drive_direction().is_none() => {
-            report.wrong(direction, "nothing", "a vector: only a plane has a direction of its own, its normal");
+            report.wrong(direction, "nothing", "a vector: only a plane has a default direction, its normal");
         }
         _ => {}
     }
