@@ -152,7 +152,8 @@ pub enum Shape<D: Dim> {
 
 impl<D: Dim> Shape<D> {
     /// Gap (m, negative for an overlap) and unit normal towards the grain, for a grain at `offset`
-    /// from the wall's position.
+    /// from the wall's position. Both are those of the point of the wall nearest to the centre of
+    /// the grain, also where that centre is beyond the wall.
     pub fn gap(&self, offset: D::Vector, radius: f64) -> (f64, D::Vector) {
         match *self {
             Self::Plane { normal } => (offset.dot(&normal) - radius, normal),
@@ -165,7 +166,8 @@ impl<D: Dim> Shape<D> {
         }
     }
 
-    /// The length (m) to which tolerances at this wall are relative; infinite for a plane.
+    /// The length (m) to which tolerances at this wall are relative: its smallest radius of
+    /// curvature, infinite for a plane.
     pub fn size(&self) -> f64 {
         match *self {
             Self::Plane { .. } => f64::INFINITY,
@@ -202,13 +204,15 @@ impl<D: Dim> Shape<D> {
     /// (m).
     pub(crate) fn smallest_gap(&self, offset: D::Vector, way: D::Vector, radius: f64) -> f64 {
         let end = self.gap(offset + way, radius).0.min(self.gap(offset, radius).0);
-        let Self::Round { inside: false, axis, .. } = *self else {
+        match *self {
             // along a line the gap to a plane or to an enclosing wall is smallest at an end
-            return end;
-        };
-        let (x, w) = (across::<D>(offset, axis), across::<D>(way, axis));
-        let nearest = -x.dot(&w) / w.dot(&w);
-        if 0.0 < nearest && nearest < 1.0 { self.gap(offset + way * nearest, radius).0 } else { end }
+            Self::Plane { .. } | Self::Round { inside: true, .. } => end,
+            Self::Round { inside: false, axis, .. } => {
+                let (x, w) = (across::<D>(offset, axis), across::<D>(way, axis));
+                let nearest = -x.dot(&w) / w.dot(&w);
+                if 0.0 < nearest && nearest < 1.0 { self.gap(offset + way * nearest, radius).0 } else { end }
+            }
+        }
     }
 }
 

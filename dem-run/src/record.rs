@@ -37,7 +37,8 @@ const GATHERED: usize = 256;
 impl<D: Dim> Recorder<D> {
     /// Create the history of a world at `path`.
     pub fn create(path: &Path, overwrite: bool, scene: &Scene, built: &Built<D>) -> history::Result<Self> {
-        let (layout, measures) = describe(scene, &built.world, parameters(scene, built.solid_fraction));
+        let observables = observables(&built.world);
+        let (layout, measures) = describe(scene, &built.world, observables, parameters(scene, built.solid_fraction));
         let writer = Writer::create(path, &layout, overwrite)?;
         Ok(Self::new(writer, &layout, measures, 0.0))
     }
@@ -55,9 +56,13 @@ impl<D: Dim> Recorder<D> {
         tell: &mut dyn FnMut(f64) -> bool,
     ) -> history::Result<Self> {
         let origin = Parameters { scene: scene.to_json().unwrap_or_default(), ..history.parameters()? };
-        let (layout, measures) = describe(scene, world, origin);
-        // the layout of a history does not change: without friction at the start, none later
-        let layout = Layout { friction: history.layout()?.friction, ..layout };
+        // the layout of a history does not change: without friction at the start, none later; no
+        // observable that the program which began it did not know
+        let before = history.layout()?;
+        let mut observables = observables(world);
+        observables.retain(|(observable, _)| before.observables.iter().any(|known| known.name == observable.name));
+        let (layout, measures) = describe(scene, world, observables, origin);
+        let layout = Layout { friction: before.friction, ..layout };
         let writer = Writer::go_on(history.path(), &layout, history, kept, checkpoint, tell)?;
         Ok(Self::new(writer, &layout, measures, cpu_before))
     }
@@ -172,12 +177,17 @@ impl<D: Dim> Recorder<D> {
 
 /// The layout of the history of a world, and the functions that measure its observables except the
 /// last, the processor time, which the recorder adds.
-fn describe<D: Dim>(scene: &Scene, world: &World<D>, parameters: Parameters) -> (Layout, Vec<Measure<D>>) {
+fn describe<D: Dim>(
+    scene: &Scene,
+    world: &World<D>,
+    observables: Vec<(Observable, Measure<D>)>,
+    parameters: Parameters,
+) -> (Layout, Vec<Measure<D>>) {
     let bonded = !world.bonds.is_empty();
     let friction = world.settings.friction > 0.0 || world.walls.iter().any(|w| w.friction > 0.0);
     // without friction, bonds and torques, grains keep their spin
     let turning = world.grains.spin.iter().any(|w| w.norm() > 0.0) || world.loads.iter().any(|l| l.torque.norm() > 0.0);
-    let (mut observables, measures): (Vec<_>, _) = observables(world).into_iter().unzip();
+    let (mut observables, measures): (Vec<_>, _) = observables.into_iter().unzip();
     observables.push(Observable::new("cpu_time", "s", &[]));
     let layout = Layout {
         dimension: D::N,

@@ -1,6 +1,6 @@
 //! Checks names, types, shapes and units against the layout.
 
-use dem_history::{BondStatus, ContactStatus, ROUTE, RuptureMode, SolverRoute, WallDrive, WallKind};
+use dem_history::{BondStatus, ContactStatus, ROUTE, RuptureMode, SolverRoute, WallColumn, WallDrive, WallKind};
 use hdf5::Attribute;
 use hdf5::types::{CompoundField, EnumMember, EnumType, FloatSize, IntSize, TypeDescriptor, VarLenUnicode};
 
@@ -235,9 +235,12 @@ fn walls(c: &mut Checker) {
     c.sound.remove("walls/name");
     c.table("walls/kind", &bytes(WallKind::ALL.iter().map(|kind| kind.label())), w, &[], "");
     c.table("walls/drive", &bytes(WallDrive::ALL.iter().map(|drive| drive.label())), w, &[], "");
-    c.table("walls/normal", &F64, w, &[d], "");
-    c.table("walls/direction", &F64, w, &[d], "");
-    c.table("walls/radius", &F64, w, &[], "m");
+    for column in WallColumn::ALL {
+        let place = format!("walls/{}", column.name);
+        if column.always || c.has(&place) {
+            c.table(&place, &F64, w, &column.row(d), column.unit);
+        }
+    }
     let reals = reals(c);
     for (name, unit) in [("position", "m"), ("velocity", "m s-1"), ("force", "N")] {
         c.element(&format!("walls/{name}"), &reals, &[w, d], unit);

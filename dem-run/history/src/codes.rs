@@ -5,7 +5,6 @@
 //! variants.
 
 use hdf5::H5Type;
-use hdf5::types::{EnumMember, EnumType, IntSize, TypeDescriptor};
 
 /// A Rust enum and its raw code in the file.
 pub(super) trait Coded: Copy {
@@ -40,17 +39,17 @@ macro_rules! codes {
         pub(super) struct $code(pub(super) $raw);
 
         // Sound: the type is transparent over the integer that is the enum's base type.
-        unsafe impl H5Type for $code {
-            fn type_descriptor() -> TypeDescriptor {
-                TypeDescriptor::Enum(EnumType {
-                    size: IntSize::$size,
+        unsafe impl hdf5::H5Type for $code {
+            fn type_descriptor() -> hdf5::types::TypeDescriptor {
+                hdf5::types::TypeDescriptor::Enum(hdf5::types::EnumType {
+                    size: hdf5::types::IntSize::$size,
                     signed: $signed,
-                    members: vec![$(EnumMember { name: $label.into(), value: $value }),+],
+                    members: vec![$(hdf5::types::EnumMember { name: $label.into(), value: $value }),+],
                 })
             }
         }
 
-        impl Coded for $name {
+        impl $crate::codes::Coded for $name {
             type Code = $code;
             fn code(self) -> $code {
                 match self { $(Self::$variant => $code($value)),+ }
@@ -61,6 +60,8 @@ macro_rules! codes {
         }
     };
 }
+
+pub(super) use codes;
 
 codes! {
     /// Status of a contact in the last solve.
@@ -101,41 +102,6 @@ codes! {
     Rolling = 3 "ROLLING",
     /// The twisting moment reached its limit.
     Twist = 4 "TWIST"
-}
-
-codes! {
-    /// The shape of a wall.
-    WallKind, WallKindCode(u8, U1, signed = false),
-    /// A half-space bounded by a plane (a line in 2D).
-    Plane = 0 "PLANE",
-    /// A circle in 2D.
-    Circle = 1 "CIRCLE",
-    /// An endless cylinder in 3D.
-    Cylinder = 2 "CYLINDER",
-    /// A sphere in 3D.
-    Sphere = 3 "SPHERE"
-}
-
-impl WallKind {
-    /// Whether `/walls/normal` has a unit vector for it: the normal of a plane, the axis of a
-    /// cylinder.
-    pub fn has_normal(self) -> bool {
-        match self {
-            Self::Plane | Self::Cylinder => true,
-            Self::Circle | Self::Sphere => false,
-        }
-    }
-}
-
-codes! {
-    /// What drives a wall.
-    WallDrive, WallDriveCode(u8, U1, signed = false),
-    /// Nothing: the wall is fixed.
-    Fixed = 0 "FIXED",
-    /// Its velocity is prescribed.
-    Velocity = 1 "VELOCITY",
-    /// The force along one direction is prescribed.
-    Force = 2 "FORCE"
 }
 
 codes! {

@@ -3,12 +3,14 @@
 use hdf5::types::VarLenUnicode;
 use hdf5::{Dataset, File, Group};
 
-use super::codes::{BondCode, Coded, ContactCode, RouteCode, SolverRoute, WallDriveCode, WallKindCode};
+use super::codes::{BondCode, Coded, ContactCode, RouteCode, SolverRoute};
 use super::error::{HistoryError, Result};
-use super::model::{Bonds, Frame, Layout, Observable, ValueKind, Wall};
-use super::schema::{CREATOR, FALSE_ACCELERATION, LOAD_ERROR, SCHEMA_VERSION, path};
+use super::model::{Bonds, Frame, Layout, Observable, ValueKind};
+use super::schema::{CREATOR, FALSE_ACCELERATION, LOAD_ERROR, path};
 use super::table::{Growth, Storage, Table, fixed, text, text_attribute};
 use super::visit::Visit;
+use super::wall::{WallColumn, WallDriveCode, WallKindCode};
+use crate::SCHEMA_VERSION;
 
 /// A table of doubles and where a frame keeps its values.
 pub(super) struct Column {
@@ -255,22 +257,20 @@ pub(super) fn grain_columns(
 }
 
 pub(super) fn wall_columns(file: &File, layout: &Layout, storage: Storage) -> hdf5::Result<Vec<Column>> {
-    let (walls, d) = (&layout.walls, layout.dimension);
-    let (w, group) = (walls.len(), file.create_group(path::WALLS)?);
-    let vectors = |take: fn(&Wall) -> &[f64; 3]| -> Vec<f64> {
-        walls.iter().flat_map(|wall| take(wall)[..d].iter().copied()).collect()
-    };
-    let names: Vec<VarLenUnicode> = walls.iter().map(|wall| text(&wall.name)).collect();
+    let (w, d, group) = (layout.walls.len(), layout.dimension, file.create_group(path::WALLS)?);
+    let names: Vec<VarLenUnicode> = layout.walls.iter().map(|wall| text(&wall.name)).collect();
     fixed(&group, "name", "", &[w], &names)?;
-    let kinds: Vec<WallKindCode> = walls.iter().map(|wall| wall.kind.code()).collect();
+    let kinds: Vec<WallKindCode> = layout.walls.iter().map(|wall| wall.kind.code()).collect();
     fixed(&group, "kind", "", &[w], &kinds)?;
-    let drives: Vec<WallDriveCode> = walls.iter().map(|wall| wall.drive.code()).collect();
+    let drives: Vec<WallDriveCode> = layout.walls.iter().map(|wall| wall.drive.code()).collect();
     fixed(&group, "drive", "", &[w], &drives)?;
-    fixed(&group, "normal", "", &[w, d], &vectors(|wall| &wall.normal))?;
-    fixed(&group, "direction", "", &[w, d], &vectors(|wall| &wall.direction))?;
-    let radii: Vec<f64> = walls.iter().map(|wall| wall.radius).collect();
-    fixed(&group, "radius", "m", &[w], &radii)?;
-
+    for constant in WallColumn::ALL {
+        let shape = [vec![w], constant.row(d)].concat();
+        let values = constant.values(&layout.walls, d);
+        if constant.always || values.iter().any(|value| *value != 0.0) {
+            fixed(&group, constant.name, constant.unit, &shape, &values)?;
+        }
+    }
     let column = |place, name, unit, take| -> hdf5::Result<Column> {
         let table = Table::reals(&element(&group, name)?, "value", unit, &[w, d], Growth::Frames, storage)?;
         Ok(Column { place, table, take })

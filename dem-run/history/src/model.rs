@@ -1,7 +1,8 @@
 //! What a history holds, as plain data.
 
-use super::codes::{BondStatus, ContactStatus, RuptureMode, WallDrive, WallKind};
+use super::codes::{BondStatus, ContactStatus, RuptureMode};
 use super::schema::ROUTE;
+use super::wall::Wall;
 
 /// The layout of a history: everything known before the first step. Each field states its length.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -41,23 +42,6 @@ pub struct Grains {
     pub mass: Vec<f64>,
     /// Moments of inertia about the centre, kg m².
     pub inertia: Vec<f64>,
-}
-
-/// The constant properties of a wall. In 2D the third components are zero.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Wall {
-    /// Its name in the scene.
-    pub name: String,
-    /// Its shape.
-    pub kind: WallKind,
-    /// Plane: unit normal towards the grains; cylinder: unit axis; else zero.
-    pub normal: [f64; 3],
-    /// Radius, m: 0 for a plane, negative where the grains are inside.
-    pub radius: f64,
-    /// Its drive.
-    pub drive: WallDrive,
-    /// Unit direction of the drive; zero for fixed walls.
-    pub direction: [f64; 3],
 }
 
 /// The bonds as they were formed; each array has B entries.

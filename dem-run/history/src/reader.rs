@@ -7,14 +7,15 @@ use std::path::Path;
 use hdf5::types::VarLenUnicode;
 
 use super::checkpoint::Checkpoint;
-use super::codes::{BondCode, BondStatus, ContactCode, WallDriveCode, WallKindCode};
+use super::codes::{BondCode, BondStatus, ContactCode};
 use super::error::{HistoryError, Result, refused, while_reading};
-use super::model::{Bonds, ContactRows, GrainState, Grains, Layout, Parameters, RowCounts, Rupture, Wall, WallState};
+use super::model::{Bonds, ContactRows, GrainState, Grains, Layout, Parameters, RowCounts, Rupture, WallState};
 use super::observed::{self, Series};
 use super::rupture::RuptureRow;
 use super::schema::path;
 use super::sound::{self, Surroundings};
 use super::source::Source;
+use super::wall::{Wall, WallColumn, WallDriveCode, WallKindCode};
 use super::{checkpoint, lock};
 
 /// An open history, read-only. Only complete frames are visible. The file of a running or killed
@@ -267,23 +268,14 @@ impl History {
         let (w, d) = (self.walls, self.dimension);
         let kinds = self.source.coded(&place("kind"), self.source.whole::<WallKindCode>(&place("kind"), 1)?, w)?;
         let drives = self.source.coded(&place("drive"), self.source.whole::<WallDriveCode>(&place("drive"), 1)?, w)?;
-        let normals = self.source.column(&place("normal"), w * d)?;
-        let directions = self.source.column(&place("direction"), w * d)?;
-        let radii = self.source.column(&place("radius"), w)?;
-        let vector = |values: &[f64], k: usize| {
-            let mut vector = [0.0; 3];
-            vector[..d].copy_from_slice(&values[k * d..(k + 1) * d]);
-            vector
-        };
-        let wall = |k: usize| Wall {
-            name: names[k].clone(),
-            kind: kinds[k],
-            normal: vector(&normals, k),
-            radius: radii[k],
-            drive: drives[k],
-            direction: vector(&directions, k),
-        };
-        Ok((0..w).map(wall).collect())
+        let wall = |((name, kind), drive)| Wall::unmeasured(name, kind, drive);
+        let mut walls: Vec<Wall> = names.into_iter().zip(kinds).zip(drives).map(wall).collect();
+        for column in WallColumn::ALL {
+            if column.always || self.source.has(&place(column.name)) {
+                column.set(&mut walls, d, &self.source.column(&place(column.name), w * column.width(d))?);
+            }
+        }
+        Ok(walls)
     }
 
     /// The bonds as they were formed; empty for a scene without any.

@@ -1,11 +1,4 @@
-//! Names, versions and chunk sizes of the layout; the layout itself is in the documentation of the
-//! crate.
-
-/// Version of the layout. It increases with every change that an older reader would misread. 2:
-/// bonds also break in twist. 3: a rupture stores its twisting moment apart from the bending
-/// moment. 4: the load error is that of the solver alone (NaN where no solve reports one), and the
-/// false acceleration is separate; observables may be enumerations.
-pub const SCHEMA_VERSION: u32 = 4;
+//! Names and chunk sizes of the layout; the layout itself and its version are in `lib.rs`.
 
 /// The program's name as `/h5md/creator` records it.
 pub(super) const CREATOR: &str = "dem-run";

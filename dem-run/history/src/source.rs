@@ -10,10 +10,11 @@ use hdf5::{Dataset, File, H5Type, OpenMode};
 
 use super::codes::Coded;
 use super::error::{HistoryError, Result, damaged, reason, refused, while_reading};
-use super::schema::{CREATOR, SCHEMA_VERSION, path};
+use super::schema::{CREATOR, path};
 use super::sound;
 use super::table::rows;
 use super::texts::Texts;
+use crate::SCHEMA_VERSION;
 
 /// Largest compression ratio of deflate: no dataset can be larger than this many file lengths.
 const GREATEST_COMPRESSION: u64 = 1032;

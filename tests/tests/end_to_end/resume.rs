@@ -186,6 +186,21 @@ fn a_finished_run_goes_on_to_a_later_end() {
 }
 
 #[test]
+fn a_run_goes_on_with_the_observables_that_its_history_has() {
+    let here = Folder::new();
+    run(&here, "a.h5", &["--set", "time.end=0.02", "--quiet"]);
+    // as a program wrote it that did not measure this yet
+    let file = hdf5::File::open_rw(here.path("a.h5")).expect("open");
+    file.unlink("observables/substeps").expect("unlink");
+    drop(file);
+    here.dem_run(&["resume", "a.h5", "--until", "0.03", "--quiet"]).succeeds();
+    let history = here.history("a.h5");
+    assert!(history.observable("substeps").expect("read").is_none());
+    let residual = history.observable("solver_residual").expect("read").expect("an observable");
+    assert_eq!(residual.value.len(), 300);
+}
+
+#[test]
 fn other_scenes_are_refused_with_what_differs() {
     let here = Folder::new();
     run(&here, "a.h5", &["--set", "time.end=0.02", "--quiet"]);
