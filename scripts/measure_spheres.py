@@ -50,7 +50,7 @@ def run(values, *options):
 def measured(values, history):
     """Median CPU time of a step (s), peak memory (bytes), worst residual, number of contacts."""
     last = FIRST + STEPS
-    memory = run([*values, "time.step=1e-4", f"time.end={last * 1e-4}", "output.every_steps=1000"], "-o", history)
+    memory = run([*values, "time.step=1e-4", f"time.end={last * 1e-4}", "output.every_steps=1000"], "-o", history, "--threads", "1")
     with h5py.File(history) as f:
         of = lambda name: f[f"observables/{name}/value"][:]
         times = np.diff(of("cpu_time"))[FIRST:]

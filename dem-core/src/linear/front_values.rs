@@ -59,10 +59,15 @@ impl FrontValues<'_> {
             for (left, up) in below {
                 let from = |place: usize| up.partition_point(|at| *at < place);
                 let (upper, lower) = (from(rows.start), from(rows.end));
+                let runs = runs(&up[upper..lower], rows.start);
                 for c in from(first)..from(last) {
                     let column = &mut values[(up[c] - first) * height..][..height];
-                    let left = &left[c * up.len()..][upper..lower];
-                    up[upper..lower].iter().zip(left).for_each(|(at, value)| column[at - rows.start] += value);
+                    let mut left = &left[c * up.len()..][upper..lower];
+                    for (start, length) in &runs {
+                        let (run, later) = left.split_at(*length);
+                        column[*start..][..*length].iter_mut().zip(run).for_each(|(x, value)| *x += value);
+                        left = later;
+                    }
                 }
             }
         };
@@ -157,6 +162,12 @@ fn factorise_panel(mut matrix: MatMut<'_, f64>) -> Option<(f64, Vec<usize>)> {
     let odd = info.transposition_count % 2 == 1;
     let sign = (0..width).fold(if odd { -1.0 } else { 1.0 }, |sign, d| matrix[(d, d)].signum() * sign);
     Some((sign, forward))
+}
+
+/// Runs of consecutive places in an ascending list, relative to `origin`: start and length.
+fn runs(places: &[usize], origin: usize) -> Vec<(usize, usize)> {
+    let consecutive = places.chunk_by(|a, b| a + 1 == *b);
+    consecutive.map(|run| (run[0] - origin, run.len())).collect()
 }
 
 /// In each column of n values: the values from `first` on in this order.

@@ -4,8 +4,8 @@
 //! its *nodes* (its bodies), on top of the identity. It is not symmetric if contacts slip, but its
 //! pattern is. The multifrontal method (Duff & Reid, ACM Trans. Math. Softw. 9, 1983) factorises it
 //! along the elimination tree of the graph of nodes, in dense fronts. [`Tree`] is the symbolic
-//! part, which depends on the graph alone, [`Lu`] the numeric part, which is shared among threads if
-//! the matrix is large.
+//! part, which depends on the graph alone, [`Lu`] the numeric part, shared among threads if the
+//! matrix is large.
 
 mod front_values;
 mod lu;
