@@ -1,5 +1,5 @@
-//! Analyses of histories: cracks and fragments, force chains, velocities, stress and strain;
-//! picture series, comparisons of two runs, strength over many, and reports; companions for
+//! Analyses of histories: cracks and fragments, single bonds, force chains, velocities, stress and
+//! strain; picture series, comparisons of two runs, strength over many, and reports; companions for
 //! viewers.
 //!
 //! Each analysis is a module with a [`analysis::Analysis`], and an entry of [`ANALYSES`]. Its
@@ -20,6 +20,7 @@ pub mod strength;
 pub mod stress_strain;
 pub mod velocities;
 pub mod view;
+pub mod why;
 
 // their common parts
 pub mod analysis;
@@ -37,6 +38,7 @@ pub mod section;
 pub const ANALYSES: &[Entry] = &[
     Entry::of::<info::Command>(),
     Entry::of::<cracks::Command>(),
+    Entry::of::<why::Command>(),
     Entry::of::<chains::Command>(),
     Entry::of::<velocities::Command>(),
     Entry::of::<frames::Command>(),

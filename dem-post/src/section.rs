@@ -88,25 +88,50 @@ impl Table {
 
 /// A chart as SVG.
 pub fn chart_figure(chart: Chart, alt: &str, caption: &str) -> Figure {
-    let svg = STANDARD.encode(Chart::draw_sized(vec![chart], CHART).svg());
-    let source = format!("data:image/svg+xml;base64,{svg}");
+    let source = address("svg+xml", Chart::draw_sized(vec![chart], CHART).svg().as_bytes());
     Figure { source, alt: alt.into(), caption: caption.into(), class: "chart" }
 }
 
-/// A map as PNG.
+/// A map as SVG or PNG, whichever is smaller.
 ///
 /// # Errors
 /// [`PostError::Usage`] with the plotting crate's message.
 pub fn map_figure(drawing: &Drawing, alt: &str, caption: &str) -> Result<Figure> {
-    let png = drawing.png_scaled(PIXELS).map_err(|why| PostError::Usage(format!("the map {caption}: {why}")))?;
     let (width, height) = drawing.size();
     let class = if width > 1.2 * height { "wide" } else { "map" };
-    let source = format!("data:image/png;base64,{}", STANDARD.encode(png));
+    let svg = drawing.svg();
+    let png = drawing.png_scaled(PIXELS).map_err(|why| PostError::Usage(format!("the map {caption}: {why}")))?;
+    let source = if svg.len() < png.len() { address("svg+xml", svg.as_bytes()) } else { address("png", &png) };
     Ok(Figure { source, alt: alt.into(), caption: caption.into(), class })
+}
+
+/// The `data:` address of a picture.
+fn address(kind: &str, picture: &[u8]) -> String {
+    format!("data:image/{kind};base64,{}", STANDARD.encode(picture))
 }
 
 /// A text with a capital first letter.
 pub fn capitalised(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().collect::<String>() + letters.as_str())
+}
+
+#[cfg(test)]
+mod tests {
+    use dem_drawing::Canvas;
+
+    use super::*;
+
+    #[test]
+    fn a_map_is_svg_or_png_whichever_is_smaller() {
+        let kind = |grains: usize| {
+            let mut canvas = Canvas::new(100.0, 100.0);
+            for k in 0..grains {
+                canvas.disk((k as f64 % 97.0, k as f64 % 89.0), 2.0, "#ffffff", "#404040", 0.5);
+            }
+            let source = map_figure(&canvas.finish(), "", "").unwrap().source;
+            source.split(';').next().unwrap().to_string()
+        };
+        assert_eq!((kind(10), kind(5000)), ("data:image/svg+xml".into(), "data:image/png".into()));
+    }
 }

@@ -1,9 +1,9 @@
 //! A run on one page: a self-contained HTML file with pictures, curves, tables, the solver's own
 //! measures of its accuracy, the energy balance and the scene.
 //!
-//! Curves are SVG, maps are PNG (smaller than SVG for thousands of grains), all of them inside the
-//! page as `data:` addresses. Long curves are thinned, as in all charts. A section without content
-//! gives the reason.
+//! Curves are SVG; maps are SVG or, of thousands of grains, PNG, whichever is smaller; all of them
+//! are inside the page as `data:` addresses. Long curves are thinned, as in all charts. A section
+//! without content gives the reason.
 
 use clap::Args;
 use dem_history::History;

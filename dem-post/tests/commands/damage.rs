@@ -4,7 +4,9 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use dem_post::output::{Folder, PostError, Result};
-use dem_post::{chains, check, compare, cracks, frames, info, pack, report, strength, stress_strain, velocities, view};
+use dem_post::{
+    chains, check, compare, cracks, frames, info, pack, report, strength, stress_strain, velocities, view, why,
+};
 use hdf5::types::{IntSize, TypeDescriptor};
 use hdf5::{File, H5Type};
 
@@ -86,6 +88,7 @@ fn reads(good: &Path) -> Vec<Command<'_>> {
     vec![
         command("info", |h, _| info::read(h).map(|report| drop(report.table()))),
         command("cracks", |h, _| cracks::read(h, true).map(|report| drop(report.table()))),
+        command("why", |h, _| why::read(h, why::Which::Number(0), None, true).map(|report| drop(report.table()))),
         command("chains", |h, _| chains::read(h, &[]).map(|report| drop(report.table()))),
         command("velocities", |h, _| velocities::read(h, &[]).map(|report| drop(report.table()))),
         command("report", |h, _| report::read(h, &[], None, true).map(|report| drop(report.table()))),
@@ -106,6 +109,7 @@ fn reads(good: &Path) -> Vec<Command<'_>> {
 fn writes(good: &Path) -> Vec<Command<'_>> {
     vec![
         command("cracks", |h, folder| cracks::write(h, &cracks::read(h, true)?, &[], folder)),
+        command("why", |h, folder| why::write(&why::read(h, why::Which::Number(0), None, true)?, folder)),
         command("chains", |h, folder| chains::write(h, &chains::read(h, &[])?, folder)),
         command("velocities", |h, folder| velocities::write(h, &velocities::read(h, &[])?, folder)),
         command("report", |h, folder| report::write(h, &report::read(h, &[], None, true)?, folder)),

@@ -10,6 +10,7 @@ mod damage;
 mod folders;
 mod solves;
 mod view;
+mod why;
 
 /// Length of a run, and when its bonds 0 and 1 break, in steps.
 #[derive(Clone, Copy)]

@@ -16,6 +16,10 @@ use kuva::render::layout::{Layout, TickFormat};
 use kuva::render::plots::Plot;
 use kuva::render::render::{PathData, Primitive, Scene, TextAnchor};
 
+use compact::compact;
+
+mod compact;
+
 /// Colours that colour-blind readers can distinguish, also in print (Okabe & Ito).
 pub mod colour {
     /// Black.
@@ -54,18 +58,26 @@ const FEW: f64 = 5.0;
 /// is lost.
 const CURVE_POINTS: usize = 4000;
 
+/// Fonts of the text of a map in SVG, those of charts.
+const FONTS: &str = "DejaVu Sans, Verdana, Liberation Sans, Arial, sans-serif";
+
 /// A finished drawing.
-pub struct Drawing(Scene);
+pub struct Drawing {
+    scene: Scene,
+    /// Whether lines of the SVG end in half disks, as all lines of a PNG do.
+    round_ends: bool,
+}
 
 impl Drawing {
     /// The drawing as SVG.
     pub fn svg(&self) -> String {
-        SvgBackend::new().render_scene(&self.0)
+        let svg = compact(&SvgBackend::new().render_scene(&self.scene));
+        if self.round_ends { svg.replacen("<svg ", r#"<svg stroke-linecap="round" "#, 1) } else { svg }
     }
 
     /// Width and height.
     pub fn size(&self) -> (f64, f64) {
-        (self.0.width, self.0.height)
+        (self.scene.width, self.scene.height)
     }
 
     /// The drawing as PNG.
@@ -81,7 +93,7 @@ impl Drawing {
     /// # Errors
     /// The plotting crate's message.
     pub fn png_scaled(&self, scale: f32) -> Result<Vec<u8>, String> {
-        PngBackend::new().with_scale(scale).render_scene(&self.0)
+        PngBackend::new().with_scale(scale).render_scene(&self.scene)
     }
 }
 
@@ -195,7 +207,8 @@ impl Chart {
             .with_spacing(SPACING)
             .with_padding(PADDING);
         let figure = if columns > 1 { figure.with_labels_lowercase() } else { figure };
-        let mut canvas = Canvas(figure.render());
+        // round ends would fill the gaps of dashed lines
+        let mut canvas = Canvas { scene: figure.render(), round_ends: false };
         for (k, legend) in legends.iter().enumerate() {
             let left = PADDING + k as f64 * (size.0 + SPACING);
             let rows = legend_rows(legend, size.0);
@@ -441,33 +454,38 @@ pub enum Anchor {
 }
 
 /// A sheet to draw on; lengths in units of the drawing, y downwards.
-pub struct Canvas(Scene);
+pub struct Canvas {
+    scene: Scene,
+    round_ends: bool,
+}
 
 impl Canvas {
     /// An empty white sheet.
     pub fn new(width: f64, height: f64) -> Self {
-        Self(Scene::new(width, height))
+        let mut scene = Scene::new(width, height);
+        scene.font_family = Some(FONTS.into());
+        Self { scene, round_ends: true }
     }
 
     /// Clips all drawing to a rectangle until [`Canvas::end_clip`].
     pub fn clip(&mut self, corner: (f64, f64), size: (f64, f64)) {
-        self.0.add(Primitive::ClipStart {
+        self.scene.add(Primitive::ClipStart {
             x: corner.0,
             y: corner.1,
             width: size.0,
             height: size.1,
-            id: format!("panel-{}", self.0.elements.len()),
+            id: format!("panel-{}", self.scene.elements.len()),
         });
     }
 
     /// Ends the clip of [`Canvas::clip`].
     pub fn end_clip(&mut self) {
-        self.0.add(Primitive::ClipEnd);
+        self.scene.add(Primitive::ClipEnd);
     }
 
     /// A disk with an outline.
     pub fn disk(&mut self, centre: (f64, f64), radius: f64, fill: &str, outline: &str, width: f64) {
-        self.0.add(Primitive::Circle {
+        self.scene.add(Primitive::Circle {
             cx: centre.0,
             cy: centre.1,
             r: radius,
@@ -480,7 +498,7 @@ impl Canvas {
 
     /// A straight line.
     pub fn line(&mut self, from: (f64, f64), to: (f64, f64), colour: &str, width: f64) {
-        self.0.add(Primitive::Line {
+        self.scene.add(Primitive::Line {
             x1: from.0,
             y1: from.1,
             x2: to.0,
@@ -497,7 +515,7 @@ impl Canvas {
         for (k, (x, y)) in corners.iter().enumerate() {
             d += &format!("{}{x:.2},{y:.2} ", if k == 0 { "M" } else { "L" });
         }
-        self.0.add(Primitive::Path(Box::new(PathData {
+        self.scene.add(Primitive::Path(Box::new(PathData {
             d: d + "Z",
             fill: Some(fill.into()),
             stroke: outline.into(),
@@ -509,7 +527,7 @@ impl Canvas {
 
     /// A filled rectangle.
     pub fn rectangle(&mut self, corner: (f64, f64), size: (f64, f64), fill: &str) {
-        self.0.add(Primitive::Rect {
+        self.scene.add(Primitive::Rect {
             x: corner.0,
             y: corner.1,
             width: size.0,
@@ -523,7 +541,7 @@ impl Canvas {
 
     /// A line of text; `at` is on its baseline.
     pub fn text(&mut self, at: (f64, f64), text: &str, size: u32, anchor: Anchor) {
-        self.0.add(Primitive::Text {
+        self.scene.add(Primitive::Text {
             x: at.0,
             y: at.1,
             content: text.into(),
@@ -541,7 +559,7 @@ impl Canvas {
 
     /// The drawing.
     pub fn finish(self) -> Drawing {
-        Drawing(self.0)
+        Drawing { scene: self.scene, round_ends: self.round_ends }
     }
 }
 

@@ -401,7 +401,14 @@ impl History {
     /// # Errors
     /// [`HistoryError::NoFrame`], [`HistoryError::Damaged`].
     pub fn contacts(&self, frame: usize) -> Result<ContactRows> {
-        let range = self.contact_rows(frame)?;
+        self.contacts_in(self.contact_rows(frame)?)
+    }
+
+    /// The contacts in the rows `range` of `/contacts`, a part of [`History::contact_rows`].
+    ///
+    /// # Errors
+    /// [`HistoryError::Damaged`].
+    pub fn contacts_in(&self, range: Range<usize>) -> Result<ContactRows> {
         let place = |name: &str| format!("{}/{name}", path::CONTACTS);
         let column = |name: &str, widths: &[usize]| self.reals_in(range.clone(), name, widths);
         let d = self.dimension;
