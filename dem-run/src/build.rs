@@ -50,9 +50,9 @@ pub struct Placed<D: Dim> {
 /// Maximum number of grain pairs that are reported individually.
 const MOST_TOLD: usize = 10;
 
-/// Prepares the sample of a scene and assembles its world. A random sample is packed, or taken from
-/// the folder `packings` and kept there ([`packings::obtain`]). `watch` receives the progress of the
-/// preparation.
+/// Prepares the sample of a scene and assembles its world. A random sample is packed, or shared
+/// with other runs by way of the folder `packings` ([`packings::obtain`]). `watch` receives the
+/// progress of the preparation.
 ///
 /// # Errors
 /// [`RunError`], with all errors of the sample.

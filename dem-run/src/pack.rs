@@ -48,8 +48,8 @@ struct Packed {
 /// Packs the random sample of a scene and writes it as `run --write-sample` does.
 ///
 /// # Errors
-/// [`RunError`]: no random sample, a sample that cannot be packed, a file that cannot be written, an
-/// interruption.
+/// [`RunError`]: no random sample, a sample that cannot be packed, a file that cannot be written,
+/// an interruption.
 pub fn pack(scene: &Scene, options: &PackOptions) -> Result<(), RunError> {
     let Sample::Random(random) = &scene.sample else {
         return Err(RunError::Usage(format!(

@@ -1,7 +1,7 @@
 //! Packings that runs share: a folder with one file for each packing.
 //!
-//! The name of a file is the digest of the values that determine its packing. The file is a table of
-//! grains as `sample.file` reads it, below four comments:
+//! The name of a file is the digest of the values that determine its packing. The file is a table
+//! of grains as `sample.file` reads it, below four comments:
 //!
 //! ```text
 //! # SHA-256 of the lines below: 9f86…
