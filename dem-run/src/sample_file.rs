@@ -201,7 +201,7 @@ pub fn write<D: Dim>(balls: impl IntoIterator<Item = Ball<D>>, path: &Path) -> R
         .map_err(|error| RunError::File { path: path.into(), doing: "cannot be written", source: error.into() })
 }
 
-/// As [`write`], to `out`.
+/// As [`write()`], to `out`.
 ///
 /// # Errors
 /// `out` cannot be written.
