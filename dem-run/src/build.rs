@@ -1,8 +1,9 @@
 //! From a scene to a world: sample, walls, loads, bonds, settings.
 
-use crate::error::{NoConvergence, RunError};
+use crate::error::RunError;
 use crate::output::number;
-use crate::prepare::{self, Ball, PrepareError, Watch};
+use crate::packings;
+use crate::prepare::{self, Ball, Watch};
 use crate::sample_file;
 use crate::scene::{self, Drive as SceneDrive, Place, Sample, Scene, SolverKind, WallMass};
 use crate::tolerances::{DEEPEST, ROUNDED, TOUCHING};
@@ -18,6 +19,7 @@ use dem_core::world::{Restitution, Settings, World};
 use rand::RngExt;
 use rand_pcg::Pcg64;
 use std::f64::consts::PI;
+use std::path::Path;
 use std::sync::Arc;
 
 /// Stream of the random generator from which strengths of bonds are drawn.
@@ -48,13 +50,14 @@ pub struct Placed<D: Dim> {
 /// Maximum number of grain pairs that are reported individually.
 const MOST_TOLD: usize = 10;
 
-/// Prepares the sample of a scene and assembles its world. `watch` receives the progress of the
-/// preparation.
+/// Prepares the sample of a scene and assembles its world. A random sample is packed, or shared
+/// with other runs by way of the folder `packings` ([`packings::obtain`]). `watch` receives the
+/// progress of the preparation.
 ///
 /// # Errors
 /// [`RunError`], with all errors of the sample.
-pub fn build<D: Dim>(scene: &Scene, watch: Watch) -> Result<Built<D>, RunError> {
-    let Placed { grains, walls, solid_fraction, warnings } = place::<D>(scene, watch)?;
+pub fn build<D: Dim>(scene: &Scene, packings: Option<&Path>, watch: Watch) -> Result<Built<D>, RunError> {
+    let Placed { grains, walls, solid_fraction, warnings } = place::<D>(scene, packings, watch)?;
     let mut world = World::new(grains, walls, loads(scene), settings(scene));
     if let Some(bonds) = &scene.bonds {
         let strength = |mean_diameter| bonds.cohesion(scene.dimension, mean_diameter, scene.thickness());
@@ -76,12 +79,12 @@ pub fn build<D: Dim>(scene: &Scene, watch: Watch) -> Result<Built<D>, RunError> 
     Ok(Built { world, solid_fraction, warnings })
 }
 
-/// Prepares the sample of a scene and positions its walls.
+/// Prepares the sample of a scene, as [`build`] does, and positions its walls.
 ///
 /// # Errors
 /// As [`build`].
-pub fn place<D: Dim>(scene: &Scene, watch: Watch) -> Result<Placed<D>, RunError> {
-    let Sampled { mut grains, solid_fraction, unsettled } = grains::<D>(scene, watch)?;
+pub fn place<D: Dim>(scene: &Scene, packings: Option<&Path>, watch: Watch) -> Result<Placed<D>, RunError> {
+    let Sampled { mut grains, solid_fraction, unsettled } = grains::<D>(scene, packings, watch)?;
     refuse_other_units(&grains)?;
     let mut wrong = hold_fixed(scene, &mut grains);
     let loads = scene.grains.iter().flat_map(|g| &g.loads);
@@ -123,14 +126,16 @@ struct Sampled<D: Dim> {
 }
 
 /// The sample of a scene.
-fn grains<D: Dim>(scene: &Scene, watch: Watch) -> Result<Sampled<D>, RunError> {
+fn grains<D: Dim>(scene: &Scene, packings: Option<&Path>, watch: Watch) -> Result<Sampled<D>, RunError> {
     let density = scene.materials.density * scene.thickness();
     let at_rest =
         |balls: Vec<Ball<D>>| balls.into_iter().map(|(x, r)| Grain::at_rest(x, r, density)).collect::<Grains<D>>();
     let grains = match &scene.sample {
         Sample::Random(random) => {
-            let packing = prepare::pack::<D>(random, scene.seed, watch).map_err(preparation_error)?;
-            let prepare::Packing { balls, solid_fraction, unsettled } = packing;
+            let prepare::Packing { balls, solid_fraction, unsettled } = match packings {
+                Some(folder) => packings::obtain::<D>(folder, random, scene.seed, watch)?,
+                None => prepare::pack::<D>(random, scene.seed, watch)?,
+            };
             return Ok(Sampled { grains: at_rest(balls), solid_fraction: Some(solid_fraction), unsettled });
         }
         Sample::Lattice(lattice) => at_rest(prepare::lattice::<D>(lattice)),
@@ -154,14 +159,6 @@ fn hold_fixed<D: Dim>(scene: &Scene, grains: &mut Grains<D>) -> Vec<String> {
         grains.spin[k] = D::Spin::zero();
     }
     wrong
-}
-
-fn preparation_error(error: PrepareError) -> RunError {
-    match error {
-        PrepareError::Interrupted => RunError::Interrupted("the sample was not packed"),
-        PrepareError::Step(step) => NoConvergence::Packing(step.to_string()).into(),
-        other => RunError::Sample(vec![other.to_string()]),
-    }
 }
 
 fn missing_grain(place: &str, grain: usize, count: usize) -> String {

@@ -199,7 +199,7 @@ fn look<D: Dim>(scene: &Scene, enough_memory: bool) -> Result<(Option<Sizes>, Ve
     let sizes = match &scene.sample {
         Sample::Random(random) if enough_memory => Some(random_sizes::<D>(scene, random)),
         _ if enough_memory => {
-            let Placed { grains, warnings, .. } = place::<D>(scene, &mut |_| true)?;
+            let Placed { grains, warnings, .. } = place::<D>(scene, None, &mut |_| true)?;
             let (low, high) = grains.bounds();
             let corners = [low, high].map(|x| x.as_slice().to_vec());
             return Ok((Some(Sizes::of(&grains.radius, corners, grains.mass.iter().sum())), warnings));

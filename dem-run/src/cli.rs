@@ -15,6 +15,7 @@ use crate::destination::{apart, folder_or_new, not_itself, unicode, writable};
 use crate::error::RunError;
 use crate::export::{self, ExportOptions};
 use crate::output::{default_folder, escaped, print_json, print_result};
+use crate::pack::{self, PackOptions};
 use crate::progress::ProgressMode;
 use crate::resume::{self, ResumeOptions};
 use crate::run::{self, Execution, RunOptions};
@@ -46,6 +47,9 @@ enum Command {
     /// end.
     #[command(after_help = RESUME_EXAMPLE)]
     Resume(ResumeArgs),
+    /// Pack the random sample of a scene and write it to a file, for many runs.
+    #[command(after_help = PACK_EXAMPLE)]
+    Pack(PackArgs),
     /// Check a scene without running it; print grains and their sizes, walls, steps, frames, memory
     /// and disk space.
     #[command(after_help = CHECK_EXAMPLE)]
@@ -89,6 +93,15 @@ except for fields that cannot change during a run.
 
 Example:
   dem-run resume compression.h5 --until 0.6";
+
+const PACK_EXAMPLE: &str = "\
+The sample is that of a run of the scene with the same seed, to the bit. A scene reads it as
+  \"sample\": { \"file\": { \"path\": \"compression-sample.csv\" } }
+A run with sample.random packs each time, a run with the file does not. The runs of a sweep share their packings and
+need no file.
+
+Example:
+  dem-run pack configs/compression.json --set seed=3 -o seed-3.csv";
 
 const CHECK_EXAMPLE: &str = "\
 Values out of range are reported all together, each with its place, the value found and the values allowed. Errors of
@@ -207,9 +220,26 @@ struct RunArgs {
     /// Run the scene even though it needs more memory than is free.
     #[arg(long)]
     ignore_memory: bool,
+    /// Take random packings from this folder, and keep new ones there.
+    #[arg(long, hide = true, value_name = "DIR")]
+    packings: Option<PathBuf>,
     /// End when the parent process ends, so that killing a sweep also ends its runs.
     #[arg(long, hide = true)]
     end_with_parent: bool,
+}
+
+#[derive(Debug, Args)]
+struct PackArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Sample to write [default: the scene's name with -sample.csv, in the current folder].
+    #[arg(short, long, value_name = "FILE.csv")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    manner: MannerArgs,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
 }
 
 #[derive(Debug, Args)]
@@ -391,6 +421,7 @@ pub fn main() -> ExitCode {
     let result = match arguments().command {
         Command::Run(args) => run(args),
         Command::Resume(args) => resume(args),
+        Command::Pack(args) => pack(args),
         Command::Check(args) => check(&args),
         Command::Export(args) => export(args),
         Command::Solve(args) => solve(args),
@@ -432,11 +463,12 @@ fn run(args: RunArgs) -> Result<(), RunError> {
     }
     let scene = args.scene.load()?;
     let options = RunOptions {
-        output: args.output.unwrap_or_else(|| default_output(&args.scene.scene)),
+        output: args.output.unwrap_or_else(|| default_output(&args.scene.scene, ".h5")),
         overwrite: args.manner.force,
         execution: args.manner.execution.into(),
         json: args.json,
         write_sample: args.write_sample,
+        packings: args.packings,
         ignore_memory: args.ignore_memory,
     };
     apart(&args.scene.scene, &scene, &options)?;
@@ -445,6 +477,15 @@ fn run(args: RunArgs) -> Result<(), RunError> {
         writable(sample, "--write-sample FILE.csv", options.overwrite)?;
     }
     run::run(&scene, &options)
+}
+
+fn pack(args: PackArgs) -> Result<(), RunError> {
+    let scene = args.scene.load()?;
+    let output = args.output.unwrap_or_else(|| default_output(&args.scene.scene, "-sample.csv"));
+    not_itself(&args.scene.scene, &output)?;
+    writable(&output, "-o FILE.csv", args.manner.force)?;
+    let execution = args.manner.execution.into();
+    pack::pack(&scene, &PackOptions { scene: args.scene.scene, output, execution, json: args.json })
 }
 
 fn resume(args: ResumeArgs) -> Result<(), RunError> {
@@ -559,10 +600,10 @@ fn sweep(args: SweepArgs) -> Result<(), RunError> {
     })
 }
 
-/// `<scene stem>.h5` in the current folder.
-fn default_output(scene: &Path) -> PathBuf {
+/// `<scene stem><ending>` in the current folder.
+fn default_output(scene: &Path, ending: &str) -> PathBuf {
     let mut name = scene.file_stem().unwrap_or_default().to_os_string();
-    name.push(".h5");
+    name.push(ending);
     name.into()
 }
 
@@ -578,7 +619,7 @@ mod tests {
 
     #[test]
     fn the_default_output_is_the_scene_s_name_in_the_current_folder() {
-        assert_eq!(default_output(Path::new("configs/compression.json")), Path::new("compression.h5"));
-        assert_eq!(default_output(Path::new("a.b.json")), Path::new("a.b.h5"));
+        assert_eq!(default_output(Path::new("configs/compression.json"), ".h5"), Path::new("compression.h5"));
+        assert_eq!(default_output(Path::new("a.b.json"), "-sample.csv"), Path::new("a.b-sample.csv"));
     }
 }

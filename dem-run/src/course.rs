@@ -281,7 +281,7 @@ mod tests {
     #[test]
     fn each_mode_of_rupture_is_counted_by_itself() {
         let scene = crate::scene::load(TWO_GRAINS.as_ref(), &[]).expect("scene");
-        let mut world = build::<D2>(&scene, &mut |_| true).expect("world").world;
+        let mut world = build::<D2>(&scene, None, &mut |_| true).expect("world").world;
         let mut course = Course::new(&scene, &world);
         let mut report = world.step().expect("a step");
         use BondStatus::{Intact, Rolling, Shear, Tension, Twist};
@@ -301,7 +301,7 @@ mod tests {
     #[test]
     fn a_step_that_misses_its_load_tolerance_alone_does_not_miss_the_tolerance() {
         let scene = crate::scene::load(TWO_GRAINS.as_ref(), &[]).expect("scene");
-        let mut world = build::<D2>(&scene, &mut |_| true).expect("world").world;
+        let mut world = build::<D2>(&scene, None, &mut |_| true).expect("world").world;
         let solver = world.settings.solver;
         let (tolerance, load_tolerance) =
             (solver.tolerance(), solver.load_tolerance().expect("it reports a load error"));

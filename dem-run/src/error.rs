@@ -4,6 +4,7 @@ use crate::fclib::FclibError;
 use crate::history::HistoryError;
 use crate::history::sweep::SweepError;
 use crate::output::{WriteError, size};
+use crate::prepare::PrepareError;
 use crate::scene::SceneError;
 use crate::signals::INTERRUPTED;
 use std::error::Error;
@@ -182,6 +183,16 @@ pub enum NoConvergence {
         /// The accuracy reached, and the proven verdict on the problem's feasibility.
         why: String,
     },
+}
+
+impl From<PrepareError> for RunError {
+    fn from(error: PrepareError) -> Self {
+        match error {
+            PrepareError::Interrupted => Self::Interrupted("the sample was not packed"),
+            PrepareError::Step(step) => NoConvergence::Packing(step.to_string()).into(),
+            other => Self::Sample(vec![other.to_string()]),
+        }
+    }
 }
 
 impl RunError {

@@ -60,7 +60,7 @@ pub fn export(options: &ExportOptions) -> Result<(), RunError> {
 
 fn export_in<D: Dim>(scene: &Scene, options: &ExportOptions, interrupt: &Interrupt) -> Result<(), RunError> {
     let mut progress = options.execution.show();
-    let mut world = build::<D>(scene, &mut |done| {
+    let mut world = build::<D>(scene, None, &mut |done| {
         progress.phase("packing the sample", done);
         !interrupt.requested()
     })?

@@ -13,6 +13,8 @@ pub mod error;
 pub mod export;
 pub mod fclib;
 pub mod memory;
+pub mod pack;
+pub mod packings;
 pub mod prepare;
 pub mod progress;
 pub mod record;

@@ -73,6 +73,9 @@ pub struct Packing<D: Dim> {
 /// Callback: receives the progress of the packing (0 to 1), returns false to stop the packing.
 pub type Watch<'a> = &'a mut dyn FnMut(f64) -> bool;
 
+/// Version of the packing method. It increases with every change that alters the bits of a packing,
+/// also one of the contact solver: packings kept by an earlier version are then not used.
+pub const METHOD: u32 = 1;
 /// Maximum number of steps of one packing.
 pub const MOST_STEPS: usize = 20_000;
 /// Maximum number of packings, each from other initial positions; the first dense enough is used.
@@ -406,8 +409,10 @@ fn settle<D: Dim>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Compaction;
+    use crate::output::hex;
+    use crate::scene::{Compaction, UniformRange};
     use dem_core::dim::{D2, D3};
+    use sha2::{Digest, Sha256};
 
     fn cylinder(count: usize, width: f64) -> RandomSample {
         RandomSample {
@@ -419,6 +424,29 @@ mod tests {
             preparation: Preparation::Compaction(Compaction { solid_fraction: 0.1 }),
             cut: None,
         }
+    }
+
+    /// Packings are kept by the version of the method, so bits may change only with it.
+    #[test]
+    fn a_packing_has_the_bits_of_its_method() {
+        if !cfg!(all(target_arch = "x86_64", target_os = "linux")) {
+            println!("skipped: the digest holds for x86_64 Linux");
+            return;
+        }
+        let diameter = Diameters::Uniform(UniformRange { min: 1e-3, max: 3e-3 });
+        let sample = RandomSample { diameter, section: Section::Rectangle, ..cylinder(60, 0.012) };
+        let mut digest = Sha256::new();
+        let mut add = |numbers: &[f64]| numbers.iter().for_each(|x| digest.update(x.to_bits().to_le_bytes()));
+        let disks = pack::<D2>(&sample, 3, &mut |_| true).expect("a packing").balls;
+        disks.iter().for_each(|(x, r)| add(&[x[0], x[1], *r]));
+        let spheres = pack::<D3>(&sample, 3, &mut |_| true).expect("a packing").balls;
+        spheres.iter().for_each(|(x, r)| add(&[x[0], x[1], x[2], *r]));
+        let bits = (METHOD, hex(&digest.finalize()));
+        assert_eq!(
+            bits,
+            (1, "b5081e8c6298d545a6e99d703f9e0dc01d3e90c56613cfac9cdb490b7f305ede".into()),
+            "other bits: increase METHOD"
+        );
     }
 
     #[test]

@@ -144,7 +144,14 @@ fn resume_in<D: Dim>(
         error => error.into(),
     })?;
     // idle walls are not reported: the earlier forces on the walls are unknown
-    let mut run = Run { scene, state, recorder, solid_fraction: history.parameters()?.solid_fraction, idle: vec![] };
+    let mut run = Run {
+        scene,
+        state,
+        recorder,
+        solid_fraction: history.parameters()?.solid_fraction,
+        preparation_time: None,
+        idle: vec![],
+    };
     let outcome = run.step_on(interrupt, &mut progress);
     run.conclude(path, outcome, options.json, progress)
 }
@@ -157,6 +164,7 @@ fn anew(options: &ResumeOptions) -> RunOptions {
         execution: options.execution,
         json: options.json,
         write_sample: None,
+        packings: None,
         ignore_memory: true,
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::build::{build, rebuild};
 use crate::check;
+use crate::clock::cpu_time;
 use crate::collapse::Failure;
 use crate::course::Course;
 use crate::error::{NoConvergence, RunError};
@@ -37,6 +38,8 @@ pub struct RunOptions {
     pub json: bool,
     /// CSV file to which the prepared sample is written, if any.
     pub write_sample: Option<PathBuf>,
+    /// Folder of packings that this run shares with others, if any.
+    pub packings: Option<PathBuf>,
     /// Whether a scene runs although it needs more memory than is free.
     pub ignore_memory: bool,
 }
@@ -87,7 +90,7 @@ pub(crate) fn run_in<D: Dim>(scene: &Scene, options: &RunOptions, interrupt: &In
         memory::refuse_too_large(scene, check::count(scene)?)?;
     }
     let mut progress = options.execution.show();
-    let built = build::<D>(scene, &mut |done| {
+    let built = build::<D>(scene, options.packings.as_deref(), &mut |done| {
         progress.phase("packing the sample", done);
         !interrupt.requested()
     })?;
@@ -95,17 +98,15 @@ pub(crate) fn run_in<D: Dim>(scene: &Scene, options: &RunOptions, interrupt: &In
         progress.note(&format!("warning: {warning}"));
     }
     if let Some(path) = &options.write_sample {
-        sample_file::write(&built.world.grains, path).map_err(|error| RunError::File {
-            path: path.clone(),
-            doing: "cannot be written",
-            source: error.into(),
-        })?;
+        let grains = &built.world.grains;
+        sample_file::write::<D>(grains.position.iter().copied().zip(grains.radius.iter().copied()), path)?;
     }
     let recorder = Recorder::create(&options.output, options.overwrite, scene, &built)?;
     let course = Course::new(scene, &built.world);
     let idle = may_be_idle(scene, &built.world);
     let state = RunState { world: built.world, course };
-    let mut run = Run { scene, state, recorder, solid_fraction: built.solid_fraction, idle };
+    let solid_fraction = built.solid_fraction;
+    let mut run = Run { scene, state, recorder, solid_fraction, preparation_time: Some(cpu_time()), idle };
     let outcome = run.begin().and_then(|()| run.step_on(interrupt, &mut progress));
     run.conclude(&options.output, outcome, options.json, progress)
 }
@@ -149,6 +150,8 @@ pub(crate) struct Run<'a, D: Dim> {
     pub recorder: Recorder<D>,
     /// Solid fraction that the sample was packed to (–).
     pub solid_fraction: Option<f64>,
+    /// Processor time until the first step (s); none after it was resumed.
+    pub preparation_time: Option<f64>,
     /// Driven walls on which no force has acted yet, by index.
     pub idle: Vec<usize>,
 }
@@ -302,7 +305,8 @@ impl<D: Dim> Run<'_, D> {
         self.record(!framed, !kept)?;
         let cpu_time = self.recorder.cpu_time();
         self.recorder.finish()?;
-        let summary = self.state.summary(self.scene, self.solid_fraction, path, ending, cpu_time);
+        let times = (cpu_time, self.preparation_time);
+        let summary = self.state.summary(self.scene, self.solid_fraction, path, ending, times);
         let printed = print_result(&summary, json);
         // an error of the run takes precedence over an error in printing the summary
         end.and(printed.map_err(RunError::from))
@@ -316,7 +320,7 @@ impl<D: Dim> RunState<D> {
         solid_fraction: Option<f64>,
         history: &Path,
         ending: Ending,
-        cpu_time: f64,
+        (cpu_time, preparation_time): (f64, Option<f64>),
     ) -> Summary {
         let (world, course) = (&self.world, &self.course);
         let elastic = world.bonds.iter().any(|b| b.stiffness.is_some());
@@ -367,6 +371,7 @@ impl<D: Dim> RunState<D> {
             energy_remainder: world.ledger.remainder,
             bond_remainder: world.ledger.bonds,
             cpu_time,
+            preparation_time,
         }
     }
 }

@@ -3,10 +3,9 @@
 use crate::error::RunError;
 use crate::prepare::Ball;
 use crate::scene::{LARGEST, MAX_GRAINS, open_regular, shorten};
-use dem_core::body::Grains;
 use dem_core::dim::{Dim, Vect};
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// Maximum number of wrong lines that are reported individually.
@@ -38,8 +37,19 @@ pub fn count(path: &Path) -> Result<usize, RunError> {
 /// [`RunError::SampleFile`] and [`RunError::File`] for a file that cannot be read,
 /// [`RunError::Sample`] with all wrong lines.
 pub fn read<D: Dim>(path: &Path) -> Result<Vec<Ball<D>>, RunError> {
-    let mut lines = Lines::open(path)?;
-    let mut wrong = Wrong { name: path.display().to_string(), told: vec![], count: 0 };
+    parse::<D, _>(Lines::open(path)?)
+}
+
+/// As [`read`], from text that was read from the file `path`.
+///
+/// # Errors
+/// [`RunError::Sample`] with all wrong lines.
+pub fn read_text<D: Dim>(path: &Path, text: &str) -> Result<Vec<Ball<D>>, RunError> {
+    parse::<D, _>(Lines::new(path, text.as_bytes()))
+}
+
+fn parse<D: Dim, R: BufRead>(mut lines: Lines<R>) -> Result<Vec<Ball<D>>, RunError> {
+    let mut wrong = Wrong { name: lines.path.display().to_string(), told: vec![], count: 0 };
     let header = header::<D>().join(",");
     lines.next()?;
     match lines.fields().map(|fields| fields.collect::<Vec<_>>().join(",")) {
@@ -95,18 +105,24 @@ fn ball<D: Dim>(fields: &[&str]) -> Result<Ball<D>, String> {
 }
 
 /// The lines of a table that are neither empty nor a comment.
-struct Lines {
+struct Lines<R> {
     path: PathBuf,
-    inner: BufReader<File>,
+    inner: R,
     line: Vec<u8>,
     /// Number of the current line, from 1.
     number: u64,
 }
 
-impl Lines {
+impl Lines<BufReader<File>> {
     fn open(path: &Path) -> Result<Self, RunError> {
         let file = open_regular(path).map_err(|source| RunError::SampleFile { path: path.into(), source })?;
-        Ok(Self { path: path.into(), inner: BufReader::new(file), line: vec![], number: 0 })
+        Ok(Self::new(path, BufReader::new(file)))
+    }
+}
+
+impl<R: BufRead> Lines<R> {
+    fn new(path: &Path, inner: R) -> Self {
+        Self { path: path.into(), inner, line: vec![], number: 0 }
     }
 
     /// Reads the next line; returns false at the end of the file.
@@ -174,15 +190,26 @@ impl Wrong {
     }
 }
 
-/// Writes the grains as a CSV file that [`read`] reads back bit for bit.
+/// Writes the grains to a CSV file that [`read`] reads back bit for bit.
 ///
 /// # Errors
-/// A file that cannot be written.
-pub fn write<D: Dim>(grains: &Grains<D>, path: &Path) -> Result<(), csv::Error> {
-    let mut writer = csv::Writer::from_path(path)?;
+/// [`RunError::File`]: a file that cannot be written.
+pub fn write<D: Dim>(balls: impl IntoIterator<Item = Ball<D>>, path: &Path) -> Result<(), RunError> {
+    File::create(path)
+        .map_err(csv::Error::from)
+        .and_then(|file| write_to::<D>(balls, file))
+        .map_err(|error| RunError::File { path: path.into(), doing: "cannot be written", source: error.into() })
+}
+
+/// As [`write()`], to `out`.
+///
+/// # Errors
+/// `out` cannot be written.
+pub fn write_to<D: Dim>(balls: impl IntoIterator<Item = Ball<D>>, out: impl Write) -> Result<(), csv::Error> {
+    let mut writer = csv::Writer::from_writer(out);
     writer.write_record(header::<D>())?;
-    for (x, r) in grains.position.iter().zip(&grains.radius) {
-        writer.write_record(x.as_slice().iter().chain([r]).map(f64::to_string))?;
+    for (x, r) in balls {
+        writer.write_record(x.as_slice().iter().chain([&r]).map(f64::to_string))?;
     }
     writer.flush()?;
     Ok(())

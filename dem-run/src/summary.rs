@@ -24,6 +24,9 @@ pub enum Ending {
     NoConvergence,
 }
 
+/// Shortest preparation that is printed (s).
+const SHORTEST_TOLD: f64 = 0.05;
+
 /// The result of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Summary {
@@ -104,6 +107,9 @@ pub struct Summary {
     pub bond_remainder: f64,
     /// Processor time of the whole program (s).
     pub cpu_time: f64,
+    /// Processor time until the first step (s): sample, walls and bonds. A packing that another run
+    /// made is not in it. None if the run was resumed.
+    pub preparation_time: Option<f64>,
 }
 
 /// The loads of a driven wall.
@@ -182,7 +188,9 @@ impl fmt::Display for Summary {
             self.write_loads(f)?;
             self.write_solves(f)?;
         }
-        writeln!(f, "CPU time         {:.1} s", self.cpu_time)?;
+        let told = self.preparation_time.filter(|time| *time >= SHORTEST_TOLD);
+        let preparation = told.map_or(String::new(), |time| format!(", {time:.1} s of it for the preparation"));
+        writeln!(f, "CPU time         {:.1} s{preparation}", self.cpu_time)?;
         writeln!(f, "history          {}\n\nlook at it with", self.history.display())?;
         let file = in_shell(&self.history);
         write!(f, "  dem-post info {file}")?;

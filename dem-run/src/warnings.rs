@@ -229,7 +229,7 @@ mod tests {
         );
         let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
         let scene = from_text("test", &text, &sets).unwrap_or_else(|error| panic!("{error}"));
-        place::<D2>(&scene, &mut |_| true).unwrap_or_else(|error| panic!("{error}")).warnings
+        place::<D2>(&scene, None, &mut |_| true).unwrap_or_else(|error| panic!("{error}")).warnings
     }
 
     fn lid(place: &str, drive: &str) -> String {

@@ -148,9 +148,9 @@ fn schema_prints_a_json_schema_of_sweeps() {
 
 #[test]
 fn every_command_shows_an_example() {
-    for args in [&["--help"][..], &["run", "--help"], &["check", "--help"], &["schema", "--help"], &["sweep", "--help"]]
-    {
-        let (code, stdout, _) = dem_run(folder().path(), args);
+    for command in ["run", "pack", "check", "schema", "sweep", ""] {
+        let args: Vec<&str> = [command, "--help"].into_iter().filter(|arg| !arg.is_empty()).collect();
+        let (code, stdout, _) = dem_run(folder().path(), &args);
         assert_eq!(code, Some(0));
         assert!(stdout.contains("Example"), "{args:?}");
     }

@@ -43,7 +43,7 @@ fn listed(steps: &str) -> Result<Vec<u64>, std::num::ParseIntError> {
 }
 
 fn problems<D: Dim>(scene: &Scene, folder: &Path, steps: &[u64]) -> Outcome {
-    let mut world = build::<D>(scene, &mut |_| true)?.world;
+    let mut world = build::<D>(scene, None, &mut |_| true)?.world;
     let SolverSettings::Staged(settings) = world.settings.solver else {
         return Err("the scene's solver has no metric".into());
     };

@@ -19,12 +19,19 @@ def check(h, report, told, text=None):
     expected = recomputed(h, told)
     for name, value in expected.items():
         compare(report, "summary", name, told.get(name), value)
-    unknown = sorted(set(told) - set(expected) - {"history", "cpu_time", "ending"})
+    unknown = sorted(set(told) - set(expected) - {"history", "cpu_time", "preparation_time", "ending"})
     report.require("summary", not unknown, f"keys that the checker does not know: {', '.join(unknown)}")
     check_ending(h, report, told)
     last = float(h.observed["cpu_time"][-1]) if h.S else 0.0
     report.require(
         "summary", told["cpu_time"] >= last, f"cpu_time {told['cpu_time']} is less than that of the last step, {last}"
+    )
+    began = told.get("preparation_time")
+    first = float(h.observed["cpu_time"][0]) if h.S else told["cpu_time"]
+    report.require(
+        "summary",
+        began is None or 0 <= began <= first,
+        f"preparation_time {began} is more than cpu_time of the first step, {first}",
     )
     if text is not None:
         check_text(h, report, told, text)

@@ -8,6 +8,7 @@
 //! runs/0001.part.h5    its history while it is written
 //! runs/0001.failed.h5  its history up to the failure
 //! runs/0001.state.json its outcome
+//! packings/            random samples, each packed once for all runs that have it
 //! ```
 //!
 //! The state files alone record outcomes. Each has one writer, the process that holds the lock of
@@ -183,6 +184,12 @@ impl Store {
     #[must_use]
     pub fn path(&self, id: &str, ending: &str) -> PathBuf {
         self.folder.join("runs").join(format!("{id}{ending}"))
+    }
+
+    /// The folder of the packings that the runs share; there only if a run has a random sample.
+    #[must_use]
+    pub fn packings(&self) -> PathBuf {
+        self.folder.join("packings")
     }
 
     /// The manifest, if there is one.

@@ -11,4 +11,4 @@ pub use error::{Result, WriteError};
 pub use folder::{Folder, Picture, default_folder};
 pub use owner::Source;
 pub use print::{escaped, in_shell, print, print_json, print_line, print_result};
-pub use text::{Text, cell, facts, number, quantity, short, size};
+pub use text::{Text, cell, facts, hex, number, quantity, short, size};

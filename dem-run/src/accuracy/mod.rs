@@ -65,7 +65,7 @@ pub fn accuracy(scene: &Scene, options: &AccuracyOptions) -> Result<(), RunError
 
 fn measure<D: Dim>(scene: &Scene, options: &AccuracyOptions, interrupt: &Interrupt) -> Result<Report, RunError> {
     let mut progress = options.execution.show();
-    let built = build::<D>(scene, &mut |done| {
+    let built = build::<D>(scene, None, &mut |done| {
         progress.phase("packing the sample", done);
         !interrupt.requested()
     })?;

@@ -478,7 +478,7 @@ mod tests {
 
     fn sample() -> (Scene, Sample<D2>) {
         let scene = from_text("scene", SCENE, &[]).expect("scene");
-        let built = build::<D2>(&scene, &mut |_| true).expect("world");
+        let built = build::<D2>(&scene, None, &mut |_| true).expect("world");
         (scene, Sample::of(built))
     }
 
@@ -528,7 +528,7 @@ mod tests {
         let settings = [&["walls.top.force_rate=2000"], settings].concat();
         let settings: Vec<String> = settings.into_iter().map(String::from).collect();
         let scene = crate::scene::load(path, &settings).expect("scene");
-        let sample = Sample::of(build::<D2>(&scene, &mut |_| true).expect("world"));
+        let sample = Sample::of(build::<D2>(&scene, None, &mut |_| true).expect("world"));
         let as_given = first_breaks(&scene, &sample, Variant::AsGiven, 20);
         for seed in 1..=10 {
             assert_eq!(first_breaks(&scene, &sample, variant(seed), 20), as_given, "{:?}", variant(seed));

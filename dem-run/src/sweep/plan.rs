@@ -1,7 +1,6 @@
 //! From a sweep file to the scenes of its runs. All scenes are checked before the first run.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
-use std::fmt::Write as _;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
@@ -10,6 +9,7 @@ use sha2::{Digest, Sha256};
 
 use super::model::{Range, Spacing, Sweep, Values};
 use crate::error::RunError;
+use crate::output::hex;
 use crate::scene::parse::{self, Document};
 use crate::scene::{self, Base, Change, Origin, Problem, Sample, Scene, SceneError, shorten};
 
@@ -301,11 +301,7 @@ fn digest(scene: &Scene, samples: &mut HashMap<PathBuf, Vec<u8>>) -> String {
         hash.update(samples.entry(path).or_insert_with_key(|path| content(path).unwrap_or_default()));
     }
     hash.update(plain.to_json().unwrap_or_default());
-    hash.finalize().iter().fold(String::new(), |mut text, byte| {
-        // writing to a string cannot fail
-        let _ = write!(text, "{byte:02x}");
-        text
-    })
+    hex(&hash.finalize())
 }
 
 #[cfg(test)]

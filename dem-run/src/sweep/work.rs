@@ -197,6 +197,7 @@ fn this_program() -> std::io::Result<PathBuf> {
 fn start(store: &Store, id: &str) -> std::io::Result<Child> {
     let mut command = Command::new(this_program()?);
     command.arg("run").arg(store.path(id, ".json")).arg("-o").arg(store.path(id, ".part.h5"));
+    command.arg("--packings").arg(store.packings());
     command.args(["--force", "--threads", "1", "--quiet", "--json", "--end-with-parent"]);
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(File::create(store.path(id, ".log"))?);
     #[cfg(unix)]

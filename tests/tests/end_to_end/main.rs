@@ -12,6 +12,7 @@ mod fclib_global;
 mod interrupt;
 mod loads;
 mod pack;
+mod packings;
 mod resume;
 mod solves;
 mod specimens;

@@ -99,6 +99,7 @@ fn every_run_of_a_sweep_is_the_run_of_its_scene() {
     assert_eq!(told["runs"][3]["values"], json!({ "bonds.strength": 10, "seed": 4, "time.end": 0.11 }));
     assert!(told["runs"][3]["cpu_time"].as_f64().is_some_and(|time| time > 0.0));
     assert_eq!(files(&here, "sweep-sweep", ".h5"), ["0001.h5", "0002.h5", "0003.h5", "0004.h5"]);
+    assert!(!here.path("sweep-sweep/packings").exists(), "no sample is random");
 
     here.run_config("two-grains.json", &["-o", "alone.h5", "--set", "bonds.strength=10", "--set", "time.end=0.11"]);
     let alone = content(&here.history("alone.h5"));
