@@ -79,8 +79,11 @@ impl FrontValues<'_> {
     /// Factorise the pivots and form the Schur complement. Returns the sign of their determinant
     /// and their rows; none if a pivot is zero or not finite.
     pub fn eliminate(&mut self) -> Option<(f64, Vec<usize>)> {
+        self.eliminate_in(Tiles::of(self.n))
+    }
+
+    fn eliminate_in(&mut self, tiles: Tiles) -> Option<(f64, Vec<usize>)> {
         let (n, p, b) = (self.n, self.p, self.n - self.p);
-        let tiles = Tiles::of(n);
         let (sign, rows) = tiles.factorise(self.columns, n, p, 0)?;
         if b > 0 {
             let (pivots, below) = MatRef::from_column_major_slice(self.columns, n, p).split_at_row(p);
@@ -187,5 +190,35 @@ pub(super) fn in_chunks(values: &mut [f64], size: usize, work: impl Fn(usize, &m
         0 => {}
         length if length <= size => work(0, values),
         _ => values.par_chunks_mut(size).enumerate().for_each(|(k, chunk)| work(k, chunk)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg64;
+
+    #[test]
+    fn tiles_have_the_factors_of_the_whole() {
+        let (n, p) = (LARGE + 90, LARGE + 10);
+        let b = n - p;
+        // pivots are exchanged in every column
+        let mut random = Pcg64::seed_from_u64(7);
+        let matrix: Vec<f64> = (0..n * n).map(|_| random.random_range(-1.0..1.0)).collect();
+        let eliminated = |tiles: Tiles| {
+            let (mut columns, mut across, rest) = (vec![0.0; n * p], vec![0.0; p * b], vec![0.0; b * b]);
+            let mut values = FrontValues { n, p, columns: &mut columns, across: &mut across, rest };
+            for (row, column) in (0..n).flat_map(|row| (0..n).map(move |column| (row, column))) {
+                *values.at(row, column) = matrix[row * n + column];
+            }
+            let (sign, rows) = values.eliminate_in(tiles).unwrap();
+            (sign, rows, values.rest, columns)
+        };
+        let (sign, rows, rest, columns) = eliminated(Tiles { panel: n, width: n });
+        let (same_sign, same_rows, same_rest, same_columns) = eliminated(Tiles::of(n));
+        assert_eq!((sign, rows), (same_sign, same_rows));
+        let close = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9);
+        assert!(close(&rest, &same_rest) && close(&columns, &same_columns));
     }
 }
