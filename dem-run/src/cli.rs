@@ -485,7 +485,8 @@ fn pack(args: PackArgs) -> Result<(), RunError> {
     not_itself(&args.scene.scene, &output)?;
     writable(&output, "-o FILE.csv", args.manner.force)?;
     let execution = args.manner.execution.into();
-    pack::pack(&scene, &PackOptions { scene: args.scene.scene, output, execution, json: args.json })
+    let SceneArgs { scene: file, set } = args.scene;
+    pack::pack(&scene, &PackOptions { scene: file, set, output, execution, json: args.json })
 }
 
 fn resume(args: ResumeArgs) -> Result<(), RunError> {

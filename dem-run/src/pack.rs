@@ -22,6 +22,8 @@ use crate::warnings;
 pub struct PackOptions {
     /// The file of the scene.
     pub scene: PathBuf,
+    /// Its changed fields, as given to `--set`.
+    pub set: Vec<String>,
     /// CSV file to which the sample is written.
     pub output: PathBuf,
     /// How the command is carried out.
@@ -35,6 +37,9 @@ pub struct PackOptions {
 struct Packed {
     #[serde(skip)]
     scene: PathBuf,
+    /// Its changed fields, apart from those of the sample.
+    #[serde(skip)]
+    set: Vec<String>,
     /// Number of grains, after a cut.
     grains: usize,
     /// Solid fraction in the box, before a cut (–).
@@ -80,7 +85,9 @@ fn pack_in<D: Dim>(
     }
     let (grains, scene, path) = (balls.len(), options.scene.clone(), &options.output);
     sample_file::write::<D>(balls, path)?;
-    let packed = Packed { scene, grains, solid_fraction, cpu_time: cpu_time(), sample: path.clone() };
+    let of_sample = |set: &String| set.starts_with("sample.") || set.starts_with("sample=");
+    let set = options.set.iter().filter(|set| !of_sample(set)).cloned().collect();
+    let packed = Packed { scene, set, grains, solid_fraction, cpu_time: cpu_time(), sample: path.clone() };
     Ok(print_result(&packed, options.json)?)
 }
 
@@ -94,7 +101,8 @@ impl fmt::Display for Packed {
         ]);
         // a relative path would start from the folder of the scene
         let path = std::path::absolute(&self.sample).unwrap_or_else(|_| self.sample.clone());
-        let set = format!("sample={}", serde_json::json!({ "file": { "path": path } }));
-        write!(f, "{text}\nuse it with\n  dem-run run {} --set {}", in_shell(&self.scene), in_shell(Path::new(&set)))
+        let sample = format!("sample={}", serde_json::json!({ "file": { "path": path.to_string_lossy() } }));
+        write!(f, "{text}\nuse it with\n  dem-run run {}", in_shell(&self.scene))?;
+        self.set.iter().chain([&sample]).try_for_each(|set| write!(f, " --set {}", in_shell(Path::new(set))))
     }
 }

@@ -1,6 +1,7 @@
 //! Samples as CSV tables: reads the grains of a scene, writes those of a run.
 
 use crate::error::RunError;
+use crate::output::replace;
 use crate::prepare::Ball;
 use crate::scene::{LARGEST, MAX_GRAINS, open_regular, shorten};
 use dem_core::dim::{Dim, Vect};
@@ -190,15 +191,20 @@ impl Wrong {
     }
 }
 
-/// Writes the grains to a CSV file that [`read`] reads back bit for bit.
+/// Writes the grains to a CSV file that [`read`] reads back bit for bit. An old file stays until the
+/// new one is complete.
 ///
 /// # Errors
 /// [`RunError::File`]: a file that cannot be written.
 pub fn write<D: Dim>(balls: impl IntoIterator<Item = Ball<D>>, path: &Path) -> Result<(), RunError> {
-    File::create(path)
-        .map_err(csv::Error::from)
-        .and_then(|file| write_to::<D>(balls, file))
-        .map_err(|error| RunError::File { path: path.into(), doing: "cannot be written", source: error.into() })
+    let mut content = Vec::new();
+    write_to::<D>(balls, &mut content)?;
+    // a device cannot be replaced
+    let written = match path.exists() && !path.is_file() {
+        true => std::fs::write(path, &content),
+        false => replace::write(path, &content),
+    };
+    written.map_err(|error| RunError::File { path: path.into(), doing: "cannot be written", source: error.into() })
 }
 
 /// As [`write()`], to `out`.

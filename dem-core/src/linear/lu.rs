@@ -149,14 +149,11 @@ fn eliminate(
     for (k, factors) in list {
         let front = &tree.fronts[k];
         let (n, p, b) = (front.unknowns.len(), front.pivots, front.border());
-        factors.columns.clear();
-        factors.columns.resize(n * p, 0.0);
-        factors.across.clear();
-        factors.across.resize(p * b, 0.0);
+        zeros(&mut factors.columns, n * p);
+        zeros(&mut factors.across, p * b);
         let (columns, across) = (&mut factors.columns, &mut factors.across);
         let mut rest = spare.pop().unwrap_or_default();
-        rest.clear();
-        rest.resize(b * b, 0.0);
+        zeros(&mut rest, b * b);
         let mut values = FrontValues { n, p, columns, across, rest };
         (0..p).for_each(|d| *values.at(d, d) = 1.0);
         for place in &front.elements {
@@ -183,6 +180,16 @@ fn eliminate(
         factors.rows = order;
     }
     Some(sign)
+}
+
+/// Makes a list one of zeros. Its memory is reused unless it is much more than needed: as the graph
+/// changes, the largest fronts get other numbers.
+fn zeros(list: &mut Vec<f64>, length: usize) {
+    if list.capacity() > 2 * length {
+        *list = Vec::with_capacity(length);
+    }
+    list.clear();
+    list.resize(length, 0.0);
 }
 
 impl Factors {

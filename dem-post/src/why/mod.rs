@@ -53,7 +53,9 @@ impl Analysis for Command {
     }
 
     fn folder(&self, history: &History) -> Result<Option<Folder>> {
-        self.files.folder(history, Self::NAME)
+        // the files of one bond do not replace those of another
+        let bond = self.bond.find(history, &history.bonds()?)?;
+        self.files.folder(history, &format!("{}-{bond}", Self::NAME))
     }
 
     fn write(&self, _: &History, report: &mut Report, folder: &mut Folder, _: bool) -> Result<()> {

@@ -4,7 +4,7 @@ use dem_history::{BondStatus, ContactRows, History, HistoryError};
 use serde::Serialize;
 
 use super::bond::Which;
-use super::rupture::Broken;
+use super::rupture::{Broken, wall_load};
 use super::utilisation::{Greatest, Limits, Load, Part, Twist, greatest};
 use crate::output::{PostError, Result, progress};
 
@@ -87,6 +87,10 @@ pub fn read(history: &History, which: Which, wall: Option<&str>, quiet: bool) ->
     let ruptures = history.ruptures()?;
     let broken = ruptures.iter().find(|rupture| rupture.bond == bond as i32);
     agree(history, bond, broken.is_some())?;
+    if broken.is_none() && wall.is_some() {
+        // the load of a bond that holds is not shown, but a wrong name is an error
+        wall_load(history, end.0, wall)?.ok();
+    }
     let until = broken.map_or(i64::MAX, |rupture| rupture.step);
     let frames = moments(history, bond, bonds.pair[bond], &limits, until, quiet)?;
     let (radius, position) = (history.grains()?.radius, history.grain_state(0)?.position);

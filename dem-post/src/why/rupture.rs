@@ -104,7 +104,11 @@ impl Broken {
 }
 
 /// The load in step `step`, or why it is not known.
-fn wall_load(history: &History, step: i64, wall: Option<&str>) -> Result<std::result::Result<WallLoad, String>> {
+pub(super) fn wall_load(
+    history: &History,
+    step: i64,
+    wall: Option<&str>,
+) -> Result<std::result::Result<WallLoad, String>> {
     let walls = history.walls()?;
     let scene = history.parameters()?.scene;
     if wall.is_none() && stress_strain::load_wall(&walls, &scene).0.is_empty() {

@@ -164,6 +164,9 @@ fn what_broke_before_and_the_load_are_those_of_the_run() {
     // no row of a contact names this bond
     assert!(found["frames_note"].as_str().unwrap().contains("no frame holds its forces"));
     assert_eq!(names(&path.with_file_name("here")), ["why-1.csv"]);
+    // another bond has files of its own
+    json(&dem_post(&path, &["why", "0", "--json", "-o", "here"]));
+    assert!(names(&path.with_file_name("here")).contains(&"why-1.csv".into()));
     refused(&dem_post(&path, &["why", "1", "--wall", "bottom"]), 2, &["--wall bottom", "top"]);
 }
 
