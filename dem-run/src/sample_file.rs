@@ -191,8 +191,8 @@ impl Wrong {
     }
 }
 
-/// Writes the grains to a CSV file that [`read`] reads back bit for bit. An old file stays until the
-/// new one is complete.
+/// Writes the grains to a CSV file that [`read`] reads back bit for bit. An old file stays until
+/// the new one is complete.
 ///
 /// # Errors
 /// [`RunError::File`]: a file that cannot be written.
