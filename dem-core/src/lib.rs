@@ -42,6 +42,7 @@ mod linear;
 pub mod problem;
 pub mod saved;
 pub mod solver;
+mod threads;
 pub mod world;
 
 /// The types needed to build a world and to step it.

@@ -143,9 +143,8 @@ impl Tiles {
         });
         let (of_right, order) = self.factorise(right, n, p, first + half)?;
         in_chunks(left, self.width * n, |_, tile| reorder(tile, n, first + half, &order));
-        let (_, later) = rows.split_at_mut(half);
-        let reordered: Vec<usize> = order.iter().map(|k| later[*k]).collect();
-        later.copy_from_slice(&reordered);
+        let pivots = rows.len();
+        reorder(&mut rows, pivots, half, &order);
         Some((of_left * of_right, rows))
     }
 }
@@ -174,7 +173,7 @@ fn runs(places: &[usize], origin: usize) -> Vec<(usize, usize)> {
 }
 
 /// In each column of n values: the values from `first` on in this order.
-fn reorder(columns: &mut [f64], n: usize, first: usize, order: &[usize]) {
+fn reorder<T: Copy>(columns: &mut [T], n: usize, first: usize, order: &[usize]) {
     let mut reordered = Vec::with_capacity(order.len());
     for column in columns.chunks_exact_mut(n) {
         let values = &mut column[first..first + order.len()];

@@ -7,6 +7,7 @@
 
 use super::front_values::{FrontValues, Tiles, in_chunks};
 use super::tree::{Front, Part, Tree};
+use crate::threads::among_threads;
 use rayon::prelude::*;
 
 /// Rows of a large front that one task of a triangular solve updates.
@@ -51,7 +52,7 @@ impl Lu {
     /// the unknowns of its first node and then its second. Returns the sign of the determinant;
     /// none if a pivot is zero or not finite.
     pub fn factorise(&mut self, tree: &Tree, element: impl Fn(usize, &mut [f64]) + Send + Sync) -> Option<f64> {
-        among_threads(tree, || self.factorise_parts(tree, element))
+        among_threads(tree.parts.len() > 1, || self.factorise_parts(tree, element))
     }
 
     fn factorise_parts(&mut self, tree: &Tree, element: impl Fn(usize, &mut [f64]) + Send + Sync) -> Option<f64> {
@@ -81,7 +82,7 @@ impl Lu {
 
     /// x ← (L U)⁻¹ x.
     pub fn solve(&self, tree: &Tree, x: &mut [f64]) {
-        among_threads(tree, || self.solve_parts(tree, x));
+        among_threads(tree.parts.len() > 1, || self.solve_parts(tree, x));
     }
 
     fn solve_parts(&self, tree: &Tree, x: &mut [f64]) {
@@ -119,12 +120,6 @@ impl Lu {
         let mut line = Vec::new();
         part.fronts.iter().rev().for_each(|k| self.fronts[*k].backward(&tree.fronts[*k], x, &mut line));
     }
-}
-
-/// Run `work`, for a tree of several parts inside the thread pool: the threads then need not be
-/// woken for each front.
-fn among_threads<R: Send>(tree: &Tree, work: impl FnOnce() -> R + Send) -> R {
-    if tree.parts.len() > 1 { rayon::scope(|_| work()) } else { work() }
 }
 
 /// `work` on each item, in parallel if there are several; results in the order of the items.

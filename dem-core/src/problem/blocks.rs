@@ -16,10 +16,9 @@ use rayon::prelude::*;
 /// Number of grains of a block: their velocities fit into a core's own cache.
 const BLOCK: usize = 4096;
 
-/// Run `work`, for a large problem inside the thread pool: the threads then need not be woken for
-/// each sweep.
-pub(crate) fn among_threads<R: Send>(grains: usize, work: impl FnOnce() -> R + Send) -> R {
-    if blocks(grains) > 1 { rayon::scope(|_| work()) } else { work() }
+/// Whether a problem of this many grains is swept by several threads.
+pub(crate) fn are_several(grains: usize) -> bool {
+    blocks(grains) > 1
 }
 
 /// Number of blocks of this many grains; 1 means that contacts are swept in the order of their

@@ -14,6 +14,7 @@ use crate::problem::residual::residual;
 use crate::problem::{ContactProblem, Group, GroupVisitorMut, Nodes, blocks};
 use crate::saved::{Mismatch, Reader, Saved};
 use crate::solver::tuning::{defaults, gauss_seidel as tuning};
+use crate::threads::among_threads;
 
 /// Settings of [`GaussSeidel`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -188,7 +189,7 @@ pub(super) fn iterate(problem: &mut impl Sweepable, settings: &GaussSeidelSettin
 impl<D: Dim> ContactSolver<D> for GaussSeidel {
     fn solve(&mut self, problem: &mut ContactProblem<D>) -> SolveReport {
         let settings = self.settings;
-        blocks::among_threads(problem.nodes.grains, || iterate(problem, &settings))
+        among_threads(blocks::are_several(problem.nodes.grains), || iterate(problem, &settings))
     }
 
     fn snapshot(&self) -> Box<dyn ContactSolver<D>> {

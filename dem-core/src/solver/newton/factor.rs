@@ -54,7 +54,6 @@ impl Factor {
 
     fn factorise(&mut self, mut factors: Factors) -> bool {
         let Factors { graph, elements, lu } = &mut factors;
-        // `Lu` requests each element once, in the order of the fronts
         let mut next = 0;
         let starts: Vec<usize> = (0..graph.contacts.len())
             .map(|e| {
