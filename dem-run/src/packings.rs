@@ -15,14 +15,14 @@
 //! used: the sample is packed again and the file replaced.
 
 use crate::error::RunError;
-use crate::output::{hex, replace};
+use crate::output::{hex, lock, replace};
 use crate::prepare::{METHOD, Packing, PrepareError, Watch, pack};
 use crate::sample_file;
 use crate::scene::{RandomSample, open_regular};
 use dem_core::dim::Dim;
 use sha2::{Digest, Sha256};
-use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{ErrorKind, Read};
+use std::fs::{self, File};
+use std::io::Read;
 use std::path::Path;
 use std::time::Duration;
 
@@ -97,17 +97,15 @@ fn write<D: Dim>(path: &Path, name: &str, packing: &Packing<D>) -> Result<(), Ru
 /// Waits for the lock of a packing. The lock is released when its process ends, also by a crash.
 fn claim(path: &Path, watch: Watch) -> Result<File, RunError> {
     let failed = |error| refused(path, "cannot be locked", error);
-    let file = OpenOptions::new().write(true).create(true).truncate(false).open(path).map_err(failed)?;
-    loop {
-        match file.try_lock() {
-            Ok(()) => return Ok(file),
-            // a file system without locks: each process packs, and the last file stays
-            Err(TryLockError::Error(error)) if error.kind() == ErrorKind::Unsupported => return Ok(file),
-            Err(TryLockError::Error(error)) => return Err(failed(error)),
-            Err(TryLockError::WouldBlock) if watch(0.0) => std::thread::sleep(PAUSE),
-            Err(TryLockError::WouldBlock) => return Err(PrepareError::Interrupted.into()),
+    let file = lock::open(path).map_err(failed)?;
+    // on a file system without locks each process packs, and the last file stays
+    while !lock::try_lock(&file).map_err(failed)? {
+        if !watch(0.0) {
+            return Err(PrepareError::Interrupted.into());
         }
+        std::thread::sleep(PAUSE);
     }
+    Ok(file)
 }
 
 fn refused(path: &Path, doing: &'static str, error: std::io::Error) -> RunError {

@@ -16,7 +16,7 @@
 //! never write the same file.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File, OpenOptions, TryLockError};
+use std::fs::{self, File, TryLockError};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -24,7 +24,7 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use dem_output::replace;
+use dem_output::{lock, replace};
 
 use crate::reader::History;
 
@@ -240,17 +240,14 @@ impl Store {
     pub fn claim(&self, id: &str) -> Result<Option<File>> {
         let path = self.path(id, ".json");
         let failed = |source| SweepError::File { path: path.clone(), doing: "cannot be locked", source };
-        let file = OpenOptions::new().write(true).create(true).truncate(false).open(&path).map_err(failed)?;
-        // `gather` takes a shared lock for a moment
+        let file = lock::open(&path).map_err(failed)?;
+        // `gather` takes a shared lock for a moment; on a file system without locks the scheduler
+        // must start each run only once
         for _ in 0..10 {
-            match file.try_lock() {
-                Ok(()) => return Ok(Some(file)),
-                Err(TryLockError::WouldBlock) => std::thread::sleep(Duration::from_millis(10)),
-                // a file system without locks, as on some clusters: here the scheduler must start
-                // each run only once
-                Err(TryLockError::Error(error)) if error.kind() == ErrorKind::Unsupported => return Ok(Some(file)),
-                Err(TryLockError::Error(error)) => return Err(failed(error)),
+            if lock::try_lock(&file).map_err(failed)? {
+                return Ok(Some(file));
             }
+            std::thread::sleep(Duration::from_millis(10));
         }
         Ok(None)
     }

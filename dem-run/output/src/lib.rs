@@ -2,6 +2,7 @@
 
 mod error;
 mod folder;
+pub mod lock;
 mod owner;
 mod print;
 pub mod replace;
