@@ -1,6 +1,7 @@
 //! Scenes, sample preparation, the run loop and the history.
 
 pub mod accuracy;
+mod arguments;
 pub mod build;
 pub mod check;
 pub mod cli;
