@@ -11,12 +11,12 @@ use serde::Serialize;
 use crate::analysis::Analysis;
 use crate::chains::pictures::{force_legend, links};
 use crate::chains::report::{normal_forces, require_reactions, statistics};
-use crate::map::{Colour, Key, Link, Panel, Ramp, Sample, Scale, View, draw_view};
+use crate::cracks::{Modes, mode_colour};
+use crate::map::{Key, Link, Panel, Ramp, Sample, Scale, View, draw_view};
+use crate::moments;
 use crate::options::Files;
 use crate::output::{Folder, PostError, Result, facts, number, progress, quantity, short};
 use crate::velocities::{speeds, usual_speed};
-use crate::{cracks, moments};
-use dem_drawing::colour;
 
 /// Pixels per unit of a drawing.
 const PIXELS: f32 = 2.0;
@@ -224,11 +224,11 @@ fn picture(history: &History, report: &Report, frame: usize) -> Result<(Panel, V
 /// A line for each bond, in the colour of its mode of rupture.
 fn bonds(history: &History, frame: usize, panel: &mut Panel) -> Result<Vec<Key>> {
     let (d, bonds, status) = (history.dimension(), history.bonds()?, history.bond_status(frame)?);
-    let mut modes = cracks::Modes::default();
+    let mut modes = Modes::default();
     let centre =
         |panel: &Panel, grain: i32| panel.grains.position[grain as usize * d..(grain as usize + 1) * d].to_vec();
     for (k, (pair, status)) in bonds.pair.iter().zip(&status).enumerate() {
-        let Some((colour, mode)) = broken(*status) else {
+        let Some(mode) = status.mode() else {
             continue;
         };
         modes.add(mode);
@@ -237,16 +237,17 @@ fn bonds(history: &History, frame: usize, panel: &mut Panel) -> Result<Vec<Key>>
         let distance = from.iter().zip(&to).map(|(a, b)| (b - a).powi(2)).sum::<f64>().sqrt();
         // no line across the sample between grains that have moved apart
         if distance < 1.5 * bonds.mean_diameter[k] {
-            panel.links.push(Link { from, to, width: CRACK, colour });
+            panel.links.push(Link { from, to, width: CRACK, colour: mode_colour(mode).into() });
         }
     }
+    let key = |mode: RuptureMode, text: &str| Key::Line(mode_colour(mode), CRACK, text.into());
     let mut keys = vec![
-        Key::Line(colour::BLUE, CRACK, "broken in tension".into()),
-        Key::Line(colour::VERMILLION, CRACK, "in shear".into()),
-        Key::Line(colour::GREEN, CRACK, "by rolling".into()),
+        key(RuptureMode::Tension, "broken in tension"),
+        key(RuptureMode::Shear, "in shear"),
+        key(RuptureMode::Rolling, "by rolling"),
     ];
     if modes.twist > 0 {
-        keys.push(Key::Line(colour::PURPLE, CRACK, "by twist".into()));
+        keys.push(key(RuptureMode::Twist, "by twist"));
     }
     // in 3D bonds would hide each other and lie behind grains
     if d == 2 {
@@ -262,14 +263,4 @@ fn bonds(history: &History, frame: usize, panel: &mut Panel) -> Result<Vec<Key>>
     }
     panel.caption.push(format!("{} of {} bonds broken", modes.total(), bonds.len()));
     Ok(keys)
-}
-
-fn broken(status: BondStatus) -> Option<(Colour, RuptureMode)> {
-    match status {
-        BondStatus::Intact => None,
-        BondStatus::Tension => Some((colour::BLUE.into(), RuptureMode::Tension)),
-        BondStatus::Shear => Some((colour::VERMILLION.into(), RuptureMode::Shear)),
-        BondStatus::Rolling => Some((colour::GREEN.into(), RuptureMode::Rolling)),
-        BondStatus::Twist => Some((colour::PURPLE.into(), RuptureMode::Twist)),
-    }
 }

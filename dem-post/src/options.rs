@@ -33,6 +33,21 @@ pub struct Moments {
     pub times: Vec<f64>,
 }
 
+/// The load wall.
+#[derive(Debug, Args)]
+pub struct LoadWall {
+    /// Name of the load wall [default: that of the scene, else the only driven wall].
+    #[arg(long, value_name = "NAME")]
+    wall: Option<String>,
+}
+
+impl LoadWall {
+    /// The requested wall.
+    pub fn name(&self) -> Option<&str> {
+        self.wall.as_deref()
+    }
+}
+
 impl Files {
     /// Opens the history.
     ///

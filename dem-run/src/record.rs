@@ -242,12 +242,7 @@ fn rupture<D: Dim>(failed: &Break<D>, step: i64, time: f64) -> Rupture {
         round: failed.round as i32,
         bond: failed.bond as i32,
         pair: failed.pair.map(|k| k as i32),
-        mode: match failed.mode {
-            bond::BondStatus::Shear => RuptureMode::Shear,
-            bond::BondStatus::Rolling => RuptureMode::Rolling,
-            bond::BondStatus::Twist => RuptureMode::Twist,
-            _ => RuptureMode::Tension,
-        },
+        mode: bond_status(failed.mode).mode().unwrap_or(RuptureMode::Tension),
     }
 }
 

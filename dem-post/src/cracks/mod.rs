@@ -11,7 +11,7 @@ use crate::analysis::Analysis;
 use crate::options::Moments;
 use crate::output::{Folder, Result};
 pub use files::write;
-pub use modes::Modes;
+pub use modes::{Modes, mode_colour, mode_name};
 pub use report::{Report, read};
 
 mod files;

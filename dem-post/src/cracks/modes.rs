@@ -1,7 +1,23 @@
-//! Broken bonds, counted by mode of rupture.
+//! Broken bonds, counted by mode of rupture; the colour of each mode.
 
+use dem_drawing::colour;
 use dem_history::RuptureMode;
 use serde::Serialize;
+
+/// The colour of a mode in all drawings.
+pub fn mode_colour(mode: RuptureMode) -> &'static str {
+    match mode {
+        RuptureMode::Tension => colour::BLUE,
+        RuptureMode::Shear => colour::VERMILLION,
+        RuptureMode::Rolling => colour::GREEN,
+        RuptureMode::Twist => colour::PURPLE,
+    }
+}
+
+/// The name of a mode in drawings.
+pub fn mode_name(mode: RuptureMode) -> String {
+    mode.label().to_lowercase()
+}
 
 /// A number for each mode of rupture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]

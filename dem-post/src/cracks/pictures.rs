@@ -1,8 +1,9 @@
 //! The drawings of cracks.
 
-use dem_history::{BondStatus, History};
+use dem_history::{BondStatus, History, RuptureMode};
 
 use super::front::Growth;
+use super::modes::{mode_colour, mode_name};
 use super::paths::Crack;
 use super::report::{Pieces, Report};
 use super::surfaces::Facet;
@@ -36,13 +37,13 @@ pub fn broken_chart(curve: &[(f64, [usize; 4])], end: f64) -> Chart {
         let inner = curve.iter().map(|(time, n)| (*time, count(n) as f64));
         std::iter::once((0.0, 0.0)).chain(inner).chain([(end, last as f64)]).collect()
     };
-    let mut chart = Chart::new("time (s)", "broken bonds")
-        .curve("all", colour::BLACK, Style::Steps, points(&|n| n.iter().sum()))
-        .curve("tension", colour::BLUE, Style::Steps, points(&|n| n[0]))
-        .curve("shear", colour::VERMILLION, Style::Steps, points(&|n| n[1]))
-        .curve("rolling", colour::GREEN, Style::Steps, points(&|n| n[2]));
-    if curve.last().is_some_and(|(_, n)| n[3] > 0) {
-        chart = chart.curve("twist", colour::PURPLE, Style::Steps, points(&|n| n[3]));
+    let mut chart = Chart::new("time (s)", "broken bonds");
+    chart = chart.curve("all", colour::BLACK, Style::Steps, points(&|n| n.iter().sum()));
+    for (k, mode) in RuptureMode::ALL.iter().enumerate() {
+        // few samples have bonds that resist twist
+        if *mode != RuptureMode::Twist || curve.last().is_some_and(|(_, n)| n[k] > 0) {
+            chart = chart.curve(&mode_name(*mode), mode_colour(*mode), Style::Steps, points(&|n| n[k]));
+        }
     }
     (chart.y_is_count, chart.pad_x) = (true, true);
     chart

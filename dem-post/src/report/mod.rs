@@ -10,7 +10,7 @@ use dem_history::History;
 use serde::Serialize;
 
 use crate::analysis::Analysis;
-use crate::options::Moments;
+use crate::options::{LoadWall, Moments};
 use crate::output::{Folder, PostError, Result, facts, number};
 use crate::section::{OnPage, Section};
 use crate::{chains, cracks, info, stress_strain, velocities};
@@ -27,9 +27,8 @@ use solver::Accuracy;
 pub struct Command {
     #[command(flatten)]
     moments: Moments,
-    /// Name of the load wall [default: that of the scene, else the only driven wall].
-    #[arg(long, value_name = "NAME")]
-    wall: Option<String>,
+    #[command(flatten)]
+    load_wall: LoadWall,
 }
 
 impl Analysis for Command {
@@ -42,7 +41,7 @@ impl Analysis for Command {
     }
 
     fn read(&self, history: &History, quiet: bool) -> Result<Report> {
-        read(history, &self.moments.times, self.wall.as_deref(), quiet)
+        read(history, &self.moments.times, self.load_wall.name(), quiet)
     }
 
     fn table(report: &Report) -> String {

@@ -20,6 +20,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::analysis::Analysis;
+use crate::options::LoadWall;
 use crate::output::{Folder, Result, Source, default_folder};
 pub use files::write;
 pub use report::{Options, Report, read};
@@ -46,9 +47,8 @@ pub struct Command {
     /// Definition of the strength: the load at …
     #[arg(long, value_enum, default_value_t)]
     measure: Measure,
-    /// Name of the load wall [default: that of the scene, else the only driven wall].
-    #[arg(long, value_name = "NAME")]
-    wall: Option<String>,
+    #[command(flatten)]
+    load_wall: LoadWall,
     /// Folder for the results, created if missing [default: RUNS-strength].
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
@@ -68,7 +68,11 @@ impl Analysis for Command {
     }
 
     fn read(&self, (): &(), _: bool) -> Result<Report> {
-        let options = Options { against: self.against.clone(), measure: self.measure, wall: self.wall.clone() };
+        let options = Options {
+            against: self.against.clone(),
+            measure: self.measure,
+            wall: self.load_wall.name().map(String::from),
+        };
         read(&self.runs, &options)
     }
 

@@ -28,11 +28,11 @@ use clap::Args;
 use dem_history::History;
 
 use crate::analysis::Analysis;
-use crate::options::Files;
+use crate::options::{Files, LoadWall};
 use crate::output::{Folder, Result};
 pub use files::write;
-pub(crate) use report::load_wall;
 pub use report::{Report, Summary, read};
+pub(crate) use report::{driven, load_wall};
 
 mod files;
 mod pictures;
@@ -44,9 +44,8 @@ mod section;
 pub struct Command {
     #[command(flatten)]
     files: Files,
-    /// Name of the load wall [default: that of the scene, else the only driven wall].
-    #[arg(long, value_name = "NAME")]
-    wall: Option<String>,
+    #[command(flatten)]
+    load_wall: LoadWall,
 }
 
 impl Analysis for Command {
@@ -59,7 +58,7 @@ impl Analysis for Command {
     }
 
     fn read(&self, history: &History, _: bool) -> Result<Report> {
-        read(history, self.wall.as_deref())
+        read(history, self.load_wall.name())
     }
 
     fn table(report: &Report) -> String {

@@ -221,7 +221,7 @@ pub(crate) fn load_wall<'a>(walls: &'a [Wall], scene: &str) -> (Vec<&'a str>, Op
 }
 
 /// The load wall: the requested one, or that of the scene.
-fn driven(path: &Path, walls: &[Wall], scene: &str, asked: Option<&str>) -> Result<usize> {
+pub(crate) fn driven(path: &Path, walls: &[Wall], scene: &str, asked: Option<&str>) -> Result<usize> {
     let (driven, chosen) = load_wall(walls, scene);
     let names = || driven.join(", ");
     let name = match asked {

@@ -1,16 +1,14 @@
 //! What `dem-post why` writes.
 
-use dem_drawing::{Chart, Style, colour};
+use dem_drawing::{Chart, Style};
 use dem_history::RuptureMode;
 use dem_output::row;
 
 use super::report::{Moment, Report};
-use super::utilisation::{Load, Part, greatest};
+use super::rupture::Broken;
+use super::utilisation::{Part, greatest};
+use crate::cracks::{mode_colour, mode_name};
 use crate::output::{Folder, Result, cell};
-
-/// Colours and names of the modes, in the order of [`RuptureMode::ALL`].
-const MODES: [(&str, &str); 4] =
-    [("tension", colour::BLUE), ("shear", colour::VERMILLION), ("rolling", colour::GREEN), ("twist", colour::PURPLE)];
 
 /// Writes `why-BOND.csv`: the load and the utilisation in each frame and, last, at rupture. Where
 /// they are known in at least two frames, also the drawing `why-BOND`.
@@ -36,15 +34,8 @@ pub fn write(report: &Report, folder: &mut Folder) -> Result<()> {
     ];
     let frames = report.frames.iter().map(|moment| line("frame", moment, moment.greatest.map_or("", |most| most.mode)));
     let own = report.broken.as_ref().map(|broken| {
-        let value = |mode: RuptureMode| of(&broken.parts, mode).and_then(|part| part.value);
-        let load = Load {
-            normal_force: value(RuptureMode::Tension).unwrap_or_default(),
-            tangential_force: value(RuptureMode::Shear).unwrap_or_default(),
-            moment: value(RuptureMode::Rolling),
-            twist: value(RuptureMode::Twist),
-        };
-        let greatest = greatest(&broken.parts);
-        let moment = Moment { step: broken.step, time: broken.time, load, parts: broken.parts.clone(), greatest };
+        let Broken { step, time, local, parts, .. } = broken.clone();
+        let moment = Moment { step, time, load: local, greatest: greatest(&parts), parts };
         line("rupture", &moment, broken.mode)
     });
     folder.table(&name, &head, frames.chain(own))?;
@@ -83,13 +74,13 @@ fn of(parts: &[Part], mode: RuptureMode) -> Option<&Part> {
 fn chart(report: &Report) -> Chart {
     let mut chart = Chart::new("time (s)", &format!("utilisation of bond {}", report.bond));
     chart.pad_x = true;
-    for ((name, colour), mode) in MODES.into_iter().zip(RuptureMode::ALL) {
-        let ratio = |parts: &[Part]| of(parts, *mode).and_then(|part| part.utilisation);
+    for &mode in RuptureMode::ALL {
+        let ratio = |parts: &[Part]| of(parts, mode).and_then(|part| part.utilisation);
         let frames = report.frames.iter().filter_map(|moment| Some((moment.time, ratio(&moment.parts)?)));
         let end = report.broken.as_ref().and_then(|broken| Some((broken.time, ratio(&broken.parts)?)));
         let points: Vec<(f64, f64)> = frames.chain(end).collect();
         if !points.is_empty() {
-            chart = chart.curve(name, colour, Style::Line, points);
+            chart = chart.curve(&mode_name(mode), mode_colour(mode), Style::Line, points);
         }
     }
     chart.levels.push((1.0, "it breaks".into()));

@@ -7,7 +7,7 @@ use clap::Args;
 use dem_history::History;
 
 use crate::analysis::Analysis;
-use crate::options::Files;
+use crate::options::{Files, LoadWall};
 use crate::output::{Folder, Result};
 pub use bond::Which;
 pub use files::write;
@@ -30,9 +30,8 @@ pub struct Command {
     /// `dem-post cracks` lists the bonds that broke in ruptures.csv.
     #[arg(value_name = "BOND")]
     bond: Which,
-    /// Name of the load wall [default: that of the scene, else the only driven wall].
-    #[arg(long, value_name = "NAME")]
-    wall: Option<String>,
+    #[command(flatten)]
+    load_wall: LoadWall,
 }
 
 impl Analysis for Command {
@@ -45,7 +44,7 @@ impl Analysis for Command {
     }
 
     fn read(&self, history: &History, quiet: bool) -> Result<Report> {
-        read(history, self.bond, self.wall.as_deref(), quiet)
+        read(history, self.bond, self.load_wall.name(), quiet)
     }
 
     fn table(report: &Report) -> String {

@@ -4,9 +4,10 @@ use dem_history::{BondStatus, ContactRows, History, HistoryError};
 use serde::Serialize;
 
 use super::bond::Which;
-use super::rupture::{Broken, wall_load};
+use super::rupture::Broken;
 use super::utilisation::{Greatest, Limits, Load, Part, Twist, greatest};
 use crate::output::{PostError, Result, progress};
+use crate::stress_strain::driven;
 
 /// Utilisations whose first frame is reported.
 pub(super) const LEVELS: [f64; 2] = [0.5, 0.9];
@@ -87,9 +88,12 @@ pub fn read(history: &History, which: Which, wall: Option<&str>, quiet: bool) ->
     let ruptures = history.ruptures()?;
     let broken = ruptures.iter().find(|rupture| rupture.bond == bond as i32);
     agree(history, bond, broken.is_some())?;
-    if broken.is_none() && wall.is_some() {
+    if wall.is_some()
+        && let Err(error @ PostError::Usage(_)) =
+            driven(history.path(), &history.walls()?, &history.parameters()?.scene, wall)
+    {
         // the load of a bond that holds is not shown, but a wrong name is an error
-        wall_load(history, end.0, wall)?.ok();
+        return Err(error);
     }
     let until = broken.map_or(i64::MAX, |rupture| rupture.step);
     let frames = moments(history, bond, bonds.pair[bond], &limits, until, quiet)?;

@@ -3,7 +3,7 @@
 use dem_history::{History, Rupture, WallDrive};
 use serde::Serialize;
 
-use super::utilisation::{Limits, Part};
+use super::utilisation::{Limits, Load, Part};
 use crate::output::{PostError, Result};
 use crate::stress_strain;
 
@@ -22,7 +22,10 @@ pub struct Broken {
     pub point: Vec<f64>,
     /// Elastic energy released, J; 0 for a rigid bond.
     pub energy: f64,
-    /// Its local load, mode by mode.
+    /// Its local load.
+    #[serde(skip)]
+    pub local: Load,
+    /// The same mode by mode.
     pub parts: Vec<Part>,
     /// The load of the sample in that step.
     pub load: Option<WallLoad>,
@@ -85,6 +88,7 @@ impl Broken {
             Err(why) => (None, why),
         };
         let [last_before, nearest_before] = neighbours(ruptures, own);
+        let local = limits.at(own);
         Ok(Self {
             step: own.step,
             time: own.time,
@@ -92,7 +96,8 @@ impl Broken {
             mode: own.mode.label(),
             point: own.point[..history.dimension()].to_vec(),
             energy: own.energy,
-            parts: limits.parts(&limits.at(own)),
+            local,
+            parts: limits.parts(&local),
             load,
             load_note,
             before: ruptures.iter().filter(|r| r.step < own.step).count(),
@@ -104,11 +109,7 @@ impl Broken {
 }
 
 /// The load in step `step`, or why it is not known.
-pub(super) fn wall_load(
-    history: &History,
-    step: i64,
-    wall: Option<&str>,
-) -> Result<std::result::Result<WallLoad, String>> {
+fn wall_load(history: &History, step: i64, wall: Option<&str>) -> Result<std::result::Result<WallLoad, String>> {
     let walls = history.walls()?;
     let scene = history.parameters()?.scene;
     if wall.is_none() && stress_strain::load_wall(&walls, &scene).0.is_empty() {

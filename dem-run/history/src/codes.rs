@@ -91,6 +91,19 @@ codes! {
     Twist = 4 "TWIST"
 }
 
+impl BondStatus {
+    /// How the bond broke; none if it holds.
+    pub fn mode(self) -> Option<RuptureMode> {
+        match self {
+            Self::Intact => None,
+            Self::Tension => Some(RuptureMode::Tension),
+            Self::Shear => Some(RuptureMode::Shear),
+            Self::Rolling => Some(RuptureMode::Rolling),
+            Self::Twist => Some(RuptureMode::Twist),
+        }
+    }
+}
+
 codes! {
     /// How a bond broke.
     RuptureMode, ModeCode(i32, U4, signed = true),
