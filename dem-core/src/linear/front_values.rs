@@ -56,21 +56,15 @@ impl FrontValues<'_> {
 
     /// Add an element, row by row; `places` are those of its rows here.
     pub fn add(&mut self, element: &[f64], places: &[usize]) {
-        let (n, p, b, width) = (self.n, self.p, self.n - self.p, places.len());
+        let (n, p, b) = (self.n, self.p, self.n - self.p);
         let all = self.kind == Kind::General;
-        for (c, column) in places.iter().copied().enumerate() {
-            let entries = places.iter().zip(element[c..].iter().step_by(width));
-            let entries = entries.filter(|(row, _)| all || **row >= column);
-            if column < p {
-                let values = &mut self.columns[column * n..][..n];
-                entries.for_each(|(row, entry)| values[*row] += entry);
-            } else {
-                for (row, entry) in entries {
-                    match row.checked_sub(p) {
-                        None => self.across[(column - p) * p + row] += entry,
-                        Some(row) => self.rest[(column - p) * b + row] += entry,
-                    }
-                }
+        for (row, line) in places.iter().zip(element.chunks_exact(places.len().max(1))) {
+            for (column, entry) in places.iter().zip(line).filter(|(column, _)| all || row >= column) {
+                *match (*row < p, *column < p) {
+                    (_, true) => &mut self.columns[column * n + row],
+                    (true, false) => &mut self.across[(column - p) * p + row],
+                    (false, false) => &mut self.rest[(column - p) * b + row - p],
+                } += entry;
             }
         }
     }
@@ -89,17 +83,19 @@ impl FrontValues<'_> {
             let last = first + values.len() / height;
             for (left, up) in below.iter() {
                 let from = |place: usize| up.partition_point(|at| *at < place);
-                let runs = runs(up, from(rows.start)..from(rows.end));
-                let mut above = 0;
+                let runs = runs(up, from(rows.start)..from(rows.end), rows.start);
+                let mut runs = runs.as_slice();
                 for c in from(first)..from(last) {
                     let column = &mut values[(up[c] - first) * height..][..height];
                     let left_column = &left.values[c * up.len()..][..up.len()];
                     let begin = if left.kind == Kind::Symmetric { c } else { 0 };
-                    above += runs[above..].iter().take_while(|run| run.end <= begin).count();
-                    for run in &runs[above..] {
-                        let part = run.start.max(begin)..run.end;
-                        let to = &mut column[up[part.start] - rows.start..][..part.len()];
-                        to.iter_mut().zip(&left_column[part]).for_each(|(x, value)| *x += value);
+                    while let Some((_, later)) = runs.split_first().filter(|(run, _)| run.from + run.length <= begin) {
+                        runs = later;
+                    }
+                    for run in runs {
+                        let above = begin.saturating_sub(run.from);
+                        let to = &mut column[run.to + above..run.to + run.length];
+                        to.iter_mut().zip(&left_column[run.from + above..]).for_each(|(x, value)| *x += value);
                     }
                 }
             }
@@ -142,15 +138,22 @@ impl FrontValues<'_> {
     }
 }
 
-/// Runs of consecutive places in a part of an ascending list, as ranges of the list.
-fn runs(places: &[usize], part: Range<usize>) -> Vec<Range<usize>> {
-    let mut start = part.start;
+/// Values that are consecutive both in a border and in the front above.
+struct Run {
+    from: usize,
+    to: usize,
+    length: usize,
+}
+
+/// Runs of consecutive places in a part of an ascending list; places are counted from `origin`.
+fn runs(places: &[usize], part: Range<usize>, origin: usize) -> Vec<Run> {
+    let mut from = part.start;
     let consecutive = places[part].chunk_by(|a, b| a + 1 == *b);
-    let ranges = consecutive.map(|run| {
-        start += run.len();
-        start - run.len()..start
+    let runs = consecutive.map(|run| {
+        from += run.len();
+        Run { from: from - run.len(), to: run[0] - origin, length: run.len() }
     });
-    ranges.collect()
+    runs.collect()
 }
 
 #[cfg(test)]
