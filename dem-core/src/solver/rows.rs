@@ -358,7 +358,8 @@ impl Rows {
             }
         }
         if symmetric {
-            for r in 0..width {
+            // in a damaged state a contact may have one body twice, and fewer rows
+            for r in 0..out.len() / width {
                 (0..r).for_each(|c| out[c * width + r] = out[r * width + c]);
             }
         }
