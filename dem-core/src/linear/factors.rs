@@ -39,7 +39,8 @@ impl Factors {
         .ok()
     }
 
-    /// Factorise each front as one of the kind `at_best`, if it is. The error is the kind of a front that failed.
+    /// Factorise each front as one of the kind `at_best`, if it is. The error is the kind of a
+    /// front that failed.
     fn factorise_as(
         &mut self,
         at_best: Kind,

@@ -336,8 +336,8 @@ impl Rows {
         most.into_iter().map(|most| if most > 0.0 { most } else { 1.0 }).collect()
     }
 
-    /// out ← out + H̃ A H̃ᵀ for some rows of one contact, row by row over the unknowns of its pair; `a`
-    /// gives the entries of A over those rows. If A is symmetric, so is the result, to the last
+    /// out ← out + H̃ A H̃ᵀ for some rows of one contact, row by row over the unknowns of its pair;
+    /// `a` gives the entries of A over those rows. If A is symmetric, so is the result, to the last
     /// bit; `out` must be symmetric then.
     pub fn add_element(&self, row: &Row, of: &[usize], a: impl Fn(usize, usize) -> f64, out: &mut [f64]) {
         let width = row.width();
