@@ -234,6 +234,7 @@ impl Report {
         let mut lines = self.facts();
         let hints = [
             ("cracks", self.bonds > 0),
+            ("emission", self.bonds > 0),
             ("chains", self.reactions),
             ("velocities", true),
             ("stress-strain", self.driven > 0),

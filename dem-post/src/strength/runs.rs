@@ -150,11 +150,13 @@ pub fn read(path: &Path, measure: Measure, wall: Option<&str>) -> Result<Found> 
 
 /// The curves of a run, one entry per observed step.
 #[derive(Debug, Default)]
-struct Course {
+pub(crate) struct Course {
+    /// Steps.
+    pub(crate) step: Vec<i64>,
     /// Times, s.
-    time: Vec<f64>,
+    pub(crate) time: Vec<f64>,
     /// The load, N, positive in its own sense.
-    load: Vec<f64>,
+    pub(crate) load: Vec<f64>,
     /// Axial strain fitted to the grains, along the load; empty if not recorded.
     strain: Vec<f64>,
     /// Bonds broken; empty if not recorded.
@@ -162,13 +164,25 @@ struct Course {
 }
 
 impl Course {
-    fn read(history: &History, wall: Option<&str>) -> Result<Self> {
+    /// Reads the load of the wall `wall`, of the load wall, or, without a driven wall, of the only
+    /// force on a grain.
+    ///
+    /// # Errors
+    /// [`PostError::Lacking`] for a run without a load; [`PostError::Usage`] for a wall that is not
+    /// driven; those of reading the history.
+    pub(crate) fn read(history: &History, wall: Option<&str>) -> Result<Self> {
         let driven = history.walls()?.iter().any(|wall| wall.drive != WallDrive::Fixed);
         match (driven, wall) {
             (false, None) => Self::of_grain(history),
             _ => {
                 let found = stress_strain::read(history, wall)?;
-                Ok(Self { time: found.time, load: found.load, strain: found.strain, broken: found.broken })
+                Ok(Self {
+                    step: found.step,
+                    time: found.time,
+                    load: found.load,
+                    strain: found.strain,
+                    broken: found.broken,
+                })
             }
         }
     }
@@ -201,7 +215,7 @@ impl Course {
             }
         }
         let load = steps.time.iter().map(|&t| size * load.time.at(t)).collect();
-        Ok(Self { time: steps.time, load, strain, broken: steps.value })
+        Ok(Self { step: steps.step, time: steps.time, load, strain, broken: steps.value })
     }
 
     /// The collapse load, or the reason why there is none.
@@ -256,6 +270,7 @@ mod tests {
 
     fn course() -> Course {
         Course {
+            step: (0..6).collect(),
             time: (0..6).map(f64::from).collect(),
             load: vec![0.0, 10.0, 20.0, 30.0, 40.0, 12.0],
             strain: vec![0.0, 0.0, 0.0, -5e-5, -2e-4, -2e-3],

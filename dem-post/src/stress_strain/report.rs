@@ -10,6 +10,7 @@ use serde_json::Value;
 
 use crate::chains::stress::thickness;
 use crate::collapse::{Bonding, Collapse, peak, work};
+use crate::extent::first_box;
 use crate::output::{PostError, Result, facts, quantity};
 
 /// Strains that define the collapse.
@@ -283,20 +284,9 @@ struct Size {
 /// The size of the sample, and whether the load pushes (1) or pulls (−1).
 fn sample_size(history: &History, wall: usize, axis: usize, drive: f64) -> Result<(Size, f64)> {
     let d = history.dimension();
-    let (radius, position) = (history.grains()?.radius, history.grain_state(0)?.position);
-    let mut extents = vec![];
-    let mut middle = 0.0;
-    for k in 0..d {
-        let edge = |sign: f64| {
-            let reach = radius.iter().zip(position.chunks(d)).map(|(r, x)| sign * x[k] + r);
-            sign * reach.fold(f64::NEG_INFINITY, f64::max)
-        };
-        let (low, high) = (edge(-1.0), edge(1.0));
-        extents.push(high - low);
-        if k == axis {
-            middle = 0.5 * (low + high);
-        }
-    }
+    let ends = first_box(history)?;
+    let extents: Vec<f64> = ends.iter().map(|[low, high]| high - low).collect();
+    let middle = 0.5 * (ends[axis][0] + ends[axis][1]);
     let place = history.wall_state(0)?.position.get(wall * d + axis).copied().unwrap_or(middle);
     let across: f64 = (0..d).filter(|&k| k != axis).map(|k| extents[k]).product();
     let area = if d == 2 { across * thickness(history)? } else { across };

@@ -5,7 +5,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use dem_post::output::{Folder, PostError, Result};
 use dem_post::{
-    chains, check, compare, cracks, frames, info, pack, report, strength, stress_strain, velocities, view, why,
+    chains, check, compare, cracks, emission, frames, info, pack, report, strength, stress_strain, velocities, view,
+    why,
 };
 use hdf5::types::{IntSize, TypeDescriptor};
 use hdf5::{File, H5Type};
@@ -88,6 +89,7 @@ fn reads(good: &Path) -> Vec<Command<'_>> {
     vec![
         command("info", |h, _| info::read(h).map(|report| drop(report.table()))),
         command("cracks", |h, _| cracks::read(h, true).map(|report| drop(report.table()))),
+        command("emission", |h, _| emission::read(h, &emission::Options::default()).map(|report| drop(report.table()))),
         command("why", |h, _| why::read(h, why::Which::Number(0), None, true).map(|report| drop(report.table()))),
         command("chains", |h, _| chains::read(h, &[]).map(|report| drop(report.table()))),
         command("velocities", |h, _| velocities::read(h, &[]).map(|report| drop(report.table()))),
@@ -109,6 +111,7 @@ fn reads(good: &Path) -> Vec<Command<'_>> {
 fn writes(good: &Path) -> Vec<Command<'_>> {
     vec![
         command("cracks", |h, folder| cracks::write(h, &cracks::read(h, true)?, &[], folder)),
+        command("emission", |h, folder| emission::write(&emission::read(h, &emission::Options::default())?, folder)),
         command("why", |h, folder| why::write(&why::read(h, why::Which::Number(0), None, true)?, folder)),
         command("chains", |h, folder| chains::write(h, &chains::read(h, &[])?, folder)),
         command("velocities", |h, folder| velocities::write(h, &velocities::read(h, &[])?, folder)),

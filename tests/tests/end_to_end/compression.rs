@@ -5,7 +5,7 @@ use dem_run::history::History;
 use serde_json::Value;
 
 /// The files of each view, without the folder.
-const VIEWS: [(&str, &[&str]); 5] = [
+const VIEWS: [(&str, &[&str]); 6] = [
     ("info", &[]),
     (
         "cracks",
@@ -30,6 +30,18 @@ const VIEWS: [(&str, &[&str]); 5] = [
             "crack-front.csv",
             "crack-front.svg",
             "crack-front.png",
+        ],
+    ),
+    (
+        "emission",
+        &[
+            "emission-events.csv",
+            "emission-magnitudes.csv",
+            "emission-b-values.csv",
+            "emission.svg",
+            "emission.png",
+            "emission-magnitudes.svg",
+            "emission-magnitudes.png",
         ],
     ),
     (
