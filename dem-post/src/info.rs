@@ -237,6 +237,7 @@ impl Report {
             ("emission", self.bonds > 0),
             ("chains", self.reactions),
             ("velocities", true),
+            ("fabric", true),
             ("stress-strain", self.driven > 0),
             ("frames", self.bonds > 0),
             ("report", true),

@@ -1,6 +1,6 @@
 //! Analyses of histories: cracks and fragments, acoustic emission, single bonds, force chains,
-//! velocities, fabric, stress and strain; picture series, comparisons of two runs, strength over
-//! many, and reports; companions for viewers.
+//! velocities, fabric, stress and strain; picture series, comparisons of two runs, strength and
+//! failure envelope of many, and reports; companions for viewers.
 //!
 //! Each analysis is a module with a [`analysis::Analysis`], and an entry of [`ANALYSES`]. Its
 //! functions read a [`dem_history::History`] into a report, and write the report as CSV, SVG and
@@ -13,6 +13,7 @@ pub mod chains;
 pub mod compare;
 pub mod cracks;
 pub mod emission;
+pub mod envelope;
 pub mod fabric;
 pub mod frames;
 pub mod info;
@@ -51,6 +52,7 @@ pub const ANALYSES: &[Entry] = &[
     Entry::of::<compare::Command>(),
     Entry::of::<report::Command>(),
     Entry::of::<strength::Command>(),
+    Entry::of::<envelope::Command>(),
     Entry::of::<view::Command>(),
     Entry::of::<pack::Command>(),
     Entry::of::<stress_strain::Command>(),

@@ -1,20 +1,21 @@
-//! Frequency and magnitude of events: the b-value, its error, and the magnitude from which it holds.
+//! Frequency and magnitude of events: the b-value, its error, and the magnitude from which it
+//! holds.
 //!
-//! The law of Gutenberg and Richter, N(≥ M) ∝ 10^(−b M), from the completeness magnitude Mc on. Both
-//! magnitudes here are discrete, and b is the estimate of greatest likelihood on their values:
+//! The law of Gutenberg and Richter, N(≥ M) ∝ 10^(−b M), from the completeness magnitude Mc on.
+//! Both magnitudes here are discrete, and b is the estimate of greatest likelihood on their values:
 //!
 //! * **energies** are rounded to bins of width ΔM. The number in the bin Mc + k ΔM falls as
 //!   10^(−b k ΔM), and b = log₁₀(1 + ΔM/(M̄ − Mc))/ΔM with the mean magnitude M̄ of the events from
 //!   Mc on (Tinti & Mulargia 1987). For ΔM → 0 it is Aki's estimate (1965), b = log₁₀e/(M̄ − Mc);
 //!   its expansion to first order in ΔM is Utsu's correction (1966), M̄ − Mc + ΔM/2;
-//! * **sizes** n, with M = log₁₀ n, are whole numbers. The number of events of size n falls as n^(−α)
-//!   with b = α − 1, and α solves Σₙ n^(−α) ln n / Σₙ n^(−α) = mean of ln n, over n ≥ nc (Clauset,
-//!   Shalizi & Newman 2009). Aki's estimate takes sizes for continuous numbers, and is wrong by tens
-//!   of per cent where most events are single bonds.
+//! * **sizes** n, with M = log₁₀ n, are whole numbers. The number of events of size n falls as
+//!   n^(−α) with b = α − 1, and α solves Σₙ n^(−α) ln n / Σₙ n^(−α) = mean of ln n, over n ≥ nc
+//!   (Clauset, Shalizi & Newman 2009). Aki's estimate takes sizes for continuous numbers, and is
+//!   wrong by tens of per cent where most events are single bonds.
 //!
-//! The **error** is that of Shi and Bolt (1982): the standard error s/√N of the mean magnitude, from
-//! the scatter s of the magnitudes, over the slope |dM̄/db| of the expected mean. For ΔM → 0 it is
-//! their 2.30 b² s/√N.
+//! The **error** is that of Shi and Bolt (1982): the standard error s/√N of the mean magnitude,
+//! from the scatter s of the magnitudes, over the slope |dM̄/db| of the expected mean. For ΔM → 0
+//! it is their 2.30 b² s/√N.
 //!
 //! **Completeness**: a run lists all of its ruptures, so Mc is not where events begin to be missed
 //! but where the law begins to hold. It is the magnitude with the most events, of several the least

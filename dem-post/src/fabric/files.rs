@@ -6,8 +6,8 @@ use super::pictures::{anisotropy, coordination, crack_density, dilation, porosit
 use super::report::Report;
 use crate::output::{Folder, Result, cell};
 
-/// Writes `fabric.csv` with a row for each frame, and as drawings `fabric`, coordination, anisotropy
-/// and crack density, and `fabric-stress`, p and q, dilation and porosity.
+/// Writes `fabric.csv` with a row for each frame, and as drawings `fabric`, coordination,
+/// anisotropy and crack density, and `fabric-stress`, p and q, dilation and porosity.
 ///
 /// # Errors
 /// [`crate::output::PostError::Write`].

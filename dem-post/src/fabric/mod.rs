@@ -8,8 +8,8 @@
 //! * **Porosity** is that of a disk (2D) or a sphere (3D) in the middle of the sample, fixed in
 //!   space: its diameter is 80 % of the least extent of the box around all grains at the first
 //!   frame. The box itself would count the voids beside the outermost grains.
-//! * **Contacts** are those between grains that carry a force or are bonded; the **coordination** is
-//!   2 Nc/N.
+//! * **Contacts** are those between grains that carry a force or are bonded; the **coordination**
+//!   is 2 Nc/N.
 //! * Tensors of [`tensors`]: fabric and crack density, the latter with the box of the stress as its
 //!   volume.
 

@@ -50,8 +50,8 @@ pub struct Row {
 pub struct Report {
     /// Dimension.
     pub dimension: usize,
-    /// Extents of the box around all grains at the first frame, m: of the volume of stress and crack
-    /// density.
+    /// Extents of the box around all grains at the first frame, m: of the volume of stress and
+    /// crack density.
     pub extents: Vec<f64>,
     /// The region of the porosity.
     pub region_centre: Vec<f64>,

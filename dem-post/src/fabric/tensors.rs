@@ -7,10 +7,10 @@
 //! where the density is 1 + a cos 2(θ − θ₁) (Rothenburg & Bathurst 1989), and √(3/2 a:a) in 3D (Guo
 //! & Zhao 2013).
 //!
-//! **Crack density**: C = (1/V) Σ A n ⊗ n over the broken bonds, with the section A of each (m²), its
-//! normal n, from grain to grain at the first frame, and the volume V of the sample (1/m). It is
-//! Oda's crack tensor (1984) without its factor of length. Its trace is the area of cracks in a unit
-//! of volume; a crack that is made of many broken bonds counts with their sum.
+//! **Crack density**: C = (1/V) Σ A n ⊗ n over the broken bonds, with the section A of each (m²),
+//! its normal n, from grain to grain at the first frame, and the volume V of the sample (1/m). It
+//! is Oda's crack tensor (1984) without its factor of length. Its trace is the area of cracks in a
+//! unit of volume; a crack that is made of many broken bonds counts with their sum.
 
 use crate::tensor::principal;
 
@@ -95,7 +95,8 @@ mod tests {
         let fabric = dyads.over(total);
         assert!((anisotropy(&fabric, 2) - a).abs() < 1e-12);
         assert!((direction(&fabric) - f64::to_degrees(major)).abs() < 1e-9);
-        // in 3D the density 1 + a₁ (3 z² − 1)/2 has a = diag(−a₁/2, −a₁/2, a₁) and the scalar 3/2 a₁
+        // in 3D the density 1 + a₁ (3 z² − 1)/2 has a = diag(−a₁/2, −a₁/2, a₁) and the scalar 3/2
+        // a₁
         let (mut dyads, mut total) = (Dyads::new(3), 0.0);
         let rings = 20_000;
         for k in 0..rings {

@@ -5,7 +5,7 @@ use dem_run::history::History;
 use serde_json::Value;
 
 /// The files of each view, without the folder.
-const VIEWS: [(&str, &[&str]); 6] = [
+const VIEWS: [(&str, &[&str]); 7] = [
     ("info", &[]),
     (
         "cracks",
@@ -61,6 +61,7 @@ const VIEWS: [(&str, &[&str]); 6] = [
             "force-chain-lengths.png",
         ],
     ),
+    ("fabric", &["fabric.csv", "fabric.svg", "fabric.png", "fabric-stress.svg", "fabric-stress.png"]),
     ("velocities", &["velocities.csv", "velocities.svg", "velocities.png"]),
     (
         "stress-strain",
