@@ -66,8 +66,8 @@ pub fn write(report: &Report, folder: &mut Folder) -> Result<()> {
         row![f.magnitude, f.events, f.cumulative, cell(expected)]
     });
     folder.table("emission-magnitudes", &["magnitude", "events", "cumulative", "expected_cumulative"], rows)?;
-    let rows = report.b_values.iter().map(|law| row![law.from, law.events, law.b, law.error]);
-    folder.table("emission-b-values", &["completeness", "events", "b_value", "standard_error"], rows)?;
+    let rows = report.b_values.iter().map(|law| row![law.from, law.events, law.b, law.error, u8::from(law.law_holds)]);
+    folder.table("emission-b-values", &["completeness", "events", "b_value", "standard_error", "law_holds"], rows)?;
     folder.draw("emission", &Chart::draw(vec![course(report), magnitudes(report)]))?;
     let mut charts = vec![frequencies(report)];
     charts.extend(b_values(report));

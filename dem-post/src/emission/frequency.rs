@@ -19,7 +19,8 @@
 //!
 //! **Completeness**: a run lists all of its ruptures, so Mc is not where events begin to be missed
 //! but where the law begins to hold. It is the magnitude with the most events, of several the least
-//! (maximum curvature, Wiemer & Wyss 2000), unless it is given.
+//! (maximum curvature, Wiemer & Wyss 2000), unless it is given. Whether the law holds from there on
+//! is tested by the greatest distance of the cumulative shares (Lilliefors 1969).
 
 use std::f64::consts::LN_10;
 
@@ -27,6 +28,9 @@ use serde::Serialize;
 
 /// Least number of events from which a b-value is estimated: its error is a third of it by then.
 pub const FEWEST: usize = 10;
+/// Limit of the distance of a law whose b is fitted, times √N, that one in twenty catalogues of the
+/// law exceeds (Lilliefors 1969, for exponential distributions; of discrete ones fewer do).
+const LILLIEFORS: f64 = 1.06;
 /// Terms of a sum over all sizes that are added one by one; the rest is integrated.
 const TERMS: u32 = 100;
 /// Halvings of an interval: its length is then below the round-off of its ends.
@@ -52,6 +56,10 @@ pub struct BValue {
     pub b: f64,
     /// Its standard error.
     pub error: f64,
+    /// Greatest distance of the share of events of a magnitude or more from that of the law.
+    pub distance: f64,
+    /// Whether the law may hold: whether that distance is below Lilliefors' limit.
+    pub law_holds: bool,
 }
 
 /// The events of one magnitude.
@@ -130,20 +138,45 @@ impl Values {
                 (exponent - 1.0, logarithms(exponent, first)[1])
             }
         };
-        Some(BValue { from: self.magnitude(first), events: found.len(), b, error: (variance / n).sqrt() / slope })
+        let from = self.magnitude(first);
+        let distance = self.distance(b, first, &found);
+        let law_holds = distance * n.sqrt() < LILLIEFORS;
+        Some(BValue { from, events: found.len(), b, error: (variance / n).sqrt() / slope, distance, law_holds })
+    }
+
+    /// Greatest distance of the share of the events `found` of an index or more from that of the law
+    /// with `b` from the index `first` on.
+    fn distance(self, b: f64, first: i64, found: &[i64]) -> f64 {
+        let mut sorted = found.to_vec();
+        sorted.sort_unstable();
+        let n = sorted.len() as f64;
+        let law = |index: i64| self.share(b, first, index);
+        let mut before = 0;
+        let mut greatest: f64 = 0.0;
+        // the share of the events falls after each index that occurs; that of the law everywhere
+        for same in sorted.chunk_by(|x, y| x == y) {
+            let after = before + same.len();
+            let at = |count: usize| 1.0 - count as f64 / n;
+            greatest = greatest.max((at(before) - law(same[0])).abs()).max((at(after) - law(same[0] + 1)).abs());
+            before = after;
+        }
+        greatest
+    }
+
+    /// Share of the events of index `first` and more that have index `index` or more, by the law.
+    fn share(self, b: f64, first: i64, index: i64) -> f64 {
+        match self {
+            Self::Bins(width) => 10f64.powf(-b * width * (index - first) as f64),
+            Self::Sizes => {
+                let ratio = index as f64 / first as f64;
+                sums(b + 1.0, index)[0] / sums(b + 1.0, first)[0] * ratio.powf(-b - 1.0)
+            }
+        }
     }
 
     /// Number of events of at least `magnitude` that the law expects.
     pub fn expected(self, law: &BValue, magnitude: f64) -> f64 {
-        let events = law.events as f64;
-        match self {
-            Self::Bins(_) => events * 10f64.powf(-law.b * (magnitude - law.from)),
-            Self::Sizes => {
-                let [first, index] = [law.from, magnitude].map(|m| self.index(m));
-                let sum = |from: i64| sums(law.b + 1.0, from)[0] * (from as f64).powf(-law.b - 1.0);
-                events * sum(index) / sum(first)
-            }
-        }
+        law.events as f64 * self.share(law.b, self.index(law.from), self.index(magnitude))
     }
 }
 

@@ -65,7 +65,8 @@ pub fn frequencies(report: &Report) -> Chart {
         let values = report.values();
         let shown = report.frequencies.iter().filter(|f| f.magnitude >= law.from);
         let points = shown.map(|f| (f.magnitude, values.expected(law, f.magnitude))).collect();
-        let name = format!("b = {:.2} ± {:.2}", law.b, law.error);
+        let caveat = if law.law_holds { "" } else { ", does not fit" };
+        let name = format!("b = {:.2} ± {:.2}{caveat}", law.b, law.error);
         chart = chart.curve(&name, colour::BLACK, Style::Line, points);
     }
     chart

@@ -251,5 +251,6 @@ impl Report {
 
 /// A b-value with its error.
 fn words(law: &BValue) -> String {
-    format!("{:.2} ± {:.2} (standard error), {} events", law.b, law.error, law.events)
+    let caveat = if law.law_holds { "" } else { "; but they do not follow the law: b has no meaning from there on" };
+    format!("{:.2} ± {:.2} (standard error), {} events{caveat}", law.b, law.error, law.events)
 }

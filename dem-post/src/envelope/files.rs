@@ -6,7 +6,7 @@ use dem_drawing::{Chart, Drawing, Style, colour};
 use dem_output::row;
 
 use super::report::Report;
-use crate::output::{Folder, Result, cell, number};
+use crate::output::{Folder, Result, cell, number, short};
 
 /// Points of a half circle.
 const ARC: usize = 60;
@@ -58,8 +58,7 @@ fn circles_drawing(report: &Report) -> Drawing {
         let zero = -1e-3 * line.cohesion.value / tan;
         let first = if tan > 0.0 { zero.max(low - 0.5 * (high - low)).min(high) } else { low };
         above = above.max(at(high).1);
-        let name =
-            format!("φ = {}°, c = {} kPa", number(line.friction_angle.value), number(1e-3 * line.cohesion.value));
+        let name = format!("φ = {}°, c = {} kPa", short(line.friction_angle.value), short(1e-3 * line.cohesion.value));
         chart = chart.curve(&name, colour::VERMILLION, Style::Line, vec![at(first), at(high)]);
     }
     let width = chart.curves.iter().flat_map(|curve| &curve.points).map(|p| p.0);

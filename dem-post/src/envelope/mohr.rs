@@ -21,9 +21,25 @@ pub struct Envelope {
     pub r_squared: Option<f64>,
 }
 
-/// The line that circles with these principal stresses (σ₃, σ₁) touch in the mean; `None` for fewer
-/// than two different σ₃, and where σ₁ does not grow with σ₃.
+/// Range of σ₃ over the greatest |σ₁| below which circles count as those of one confinement: the
+/// slope would be that of their scatter.
+const ONE_CONFINEMENT: f64 = 0.01;
+
+/// Whether all circles with these principal stresses (σ₃, σ₁) have one confinement.
+pub fn one_confinement(principal: &[(f64, f64)]) -> bool {
+    let range = |of: fn(&(f64, f64)) -> f64| {
+        principal.iter().map(of).fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
+    };
+    let ([low, high], [_, most]) = (range(|p| p.0), range(|p| p.1.abs()));
+    high - low <= ONE_CONFINEMENT * most
+}
+
+/// The line that circles with these principal stresses (σ₃, σ₁) touch in the mean; `None` for those
+/// of one confinement, and where σ₁ does not grow with σ₃.
 pub fn envelope(principal: &[(f64, f64)]) -> Option<Envelope> {
+    if one_confinement(principal) {
+        return None;
+    }
     let line = line(principal).filter(|line| line.slope.value > 0.0)?;
     let n = principal.len() as f64;
     let (slope, strength) = (line.slope.value, line.intercept.value);
@@ -130,6 +146,8 @@ mod tests {
     fn what_circles_do_not_tell_is_absent() {
         assert_eq!(envelope(&[]), None);
         assert_eq!(envelope(&[(1.0, 4.0), (1.0, 5.0)]), None);
+        // σ₃ of unconfined samples is no confinement
+        assert_eq!(envelope(&[(1e-9, 4.0), (-1e-9, 5.0), (3e-9, 4.5)]), None);
         // σ₁ falls with σ₃
         assert_eq!(envelope(&[(0.0, 5.0), (1.0, 4.0)]), None);
         let two = envelope(&[(0.0, 2.0), (1.0, 5.0)]).unwrap();

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use dem_history::History;
 use serde::Serialize;
 
-use super::mohr::{Envelope, envelope};
+use super::mohr::{Envelope, envelope, one_confinement};
 use crate::output::{PostError, Result, Text, facts, number, quantity};
 use crate::strength::fit::Estimate;
 use crate::strength::runs::{Course, Failure, LeftOut, Measure, histories, name};
@@ -74,11 +74,15 @@ pub fn read(paths: &[PathBuf], measure: Measure, wall: Option<&str>) -> Result<R
         let what = format!("no run has a {}", measure.title());
         return Err(PostError::Usage(format!("{what}; choose another --measure, or load further; {}", all.join("; "))));
     }
-    let principal: Vec<(f64, f64)> = circles.iter().map(|circle| (circle.minor, circle.major)).collect();
-    let mut report =
-        Report { measure, varied: varied(&scenes)?, envelope: envelope(&principal), circles, left_out, notes: vec![] };
+    let envelope = envelope(&principals(&circles));
+    let mut report = Report { measure, varied: varied(&scenes)?, envelope, circles, left_out, notes: vec![] };
     report.notes = report.remarks();
     Ok(report)
+}
+
+/// The least and the greatest principal stress of each circle.
+fn principals(circles: &[Circle]) -> Vec<(f64, f64)> {
+    circles.iter().map(|circle| (circle.minor, circle.major)).collect()
 }
 
 /// The circle of a run, or the state that it reached; and its scene.
@@ -130,8 +134,8 @@ impl Report {
     fn remarks(&self) -> Vec<String> {
         let mut notes = vec![];
         match &self.envelope {
-            None if self.circles.iter().all(|circle| circle.minor == self.circles[0].minor) => {
-                notes.push("only one confinement: no line can be fitted".into());
+            None if one_confinement(&principals(&self.circles)) => {
+                notes.push("one confinement: no line can be fitted".into());
             }
             None => notes.push("the greatest principal stress does not grow with the confinement: no line".into()),
             Some(line) if line.cohesion.standard_error.is_none() => {

@@ -368,7 +368,8 @@ impl Summary {
         let names = ["Young's modulus", "Poisson's ratio"];
         match &self.elastic {
             Some(found) => {
-                let over = format!("at {:.0} % to {:.0} % of the load at first break", 1e2 * RANGE[0], 1e2 * RANGE[1]);
+                let whole = if self.first_break.is_some() { "load at the first break" } else { "greatest load" };
+                let over = format!("at {:.0} % to {:.0} % of the {whole}", 1e2 * RANGE[0], 1e2 * RANGE[1]);
                 let modulus = format!("{} (standard error), {over}", words(&found.young_modulus, "Pa"));
                 Some([(names[0], modulus), (names[1], words(&found.poisson_ratio, ""))])
             }

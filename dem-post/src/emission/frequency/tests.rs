@@ -16,10 +16,10 @@ impl Uniform {
 }
 
 /// Shares of catalogues whose estimate is within one and two of its standard errors of b, and the
-/// mean of the estimates over b; `catalogue` draws one, Mc is given or that of maximum curvature.
-fn recovered(values: Values, b: f64, from: Option<f64>, catalogue: &mut dyn FnMut() -> Vec<f64>) -> [f64; 3] {
+/// mean of the estimates over b, and the share whose law is found to hold; `catalogue` draws one, Mc is given or that of maximum curvature.
+fn recovered(values: Values, b: f64, from: Option<f64>, catalogue: &mut dyn FnMut() -> Vec<f64>) -> [f64; 4] {
     const TRIALS: usize = 2000;
-    let mut found = [0.0; 3];
+    let mut found = [0.0; 4];
     for _ in 0..TRIALS {
         let magnitudes = catalogue();
         let from = from.unwrap_or_else(|| maximum_curvature(&values.frequencies(&magnitudes)).unwrap());
@@ -28,16 +28,19 @@ fn recovered(values: Values, b: f64, from: Option<f64>, catalogue: &mut dyn FnMu
         found[0] += f64::from(u8::from(off < 1.0));
         found[1] += f64::from(u8::from(off < 2.0));
         found[2] += law.b / b;
+        found[3] += f64::from(u8::from(law.law_holds));
     }
     found.map(|sum| sum / TRIALS as f64)
 }
 
 /// A share of 2000 trials scatters by 1.1 % (one error) and 0.5 % (two): four of these are allowed,
 /// and what a catalogue of 200 events lacks to the normal distribution.
-fn agrees([one, two, mean]: [f64; 3], bias: f64) {
+fn agrees([one, two, mean, hold]: [f64; 4], bias: f64) {
+    eprintln!("{one} {two} {mean} {hold}");
     assert!((one - 0.683).abs() < 0.045, "{one} of the catalogues are within one error");
     assert!((two - 0.954).abs() < 0.025, "{two} are within two");
     assert!((mean - 1.0).abs() < bias, "the mean estimate is {mean} of b");
+    assert!(hold > 0.93, "the law is found to hold in {hold}");
 }
 
 #[test]
@@ -142,9 +145,24 @@ fn what_events_do_not_tell_is_absent() {
 
 #[test]
 fn the_law_expects_its_own_numbers() {
-    let law = BValue { from: 0.0, events: 1000, b: 1.0, error: 0.03 };
+    let law = BValue { from: 0.0, events: 1000, b: 1.0, error: 0.03, distance: 0.0, law_holds: true };
     assert!((Values::Bins(0.1).expected(&law, 2.0) - 10.0).abs() < 1e-9);
     // Σ_{n ≥ 2} n⁻² over Σ_{n ≥ 1} n⁻²
     let zeta = std::f64::consts::PI.powi(2) / 6.0;
     assert!((Values::Sizes.expected(&law, 2f64.log10()) / (1000.0 * (zeta - 1.0) / zeta) - 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn magnitudes_of_another_law_are_noticed() {
+    let mut uniform = Uniform(4);
+    // evenly spread between two magnitudes, and around one
+    let even: Vec<f64> = (0..200).map(|_| uniform.next()).collect();
+    let narrow: Vec<f64> = (0..200).map(|_| (0..12).map(|_| uniform.next()).sum::<f64>()).collect();
+    for (magnitudes, from) in [(even, 0.0), (narrow, 4.5)] {
+        let law = Values::Bins(0.1).b_value(&magnitudes, from).unwrap();
+        assert!(!law.law_holds, "{law:?}");
+    }
+    // sizes that are all alike but for a few
+    let sizes: Vec<f64> = (0..100).map(|k| f64::from(20 + k % 3).log10()).collect();
+    assert!(!Values::Sizes.b_value(&sizes, 0.0).unwrap().law_holds);
 }
