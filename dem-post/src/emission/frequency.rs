@@ -144,8 +144,8 @@ impl Values {
         Some(BValue { from, events: found.len(), b, error: (variance / n).sqrt() / slope, distance, law_holds })
     }
 
-    /// Greatest distance of the share of the events `found` of an index or more from that of the law
-    /// with `b` from the index `first` on.
+    /// Greatest distance of the share of the events `found` of an index or more from that of the
+    /// law with `b` from the index `first` on.
     fn distance(self, b: f64, first: i64, found: &[i64]) -> f64 {
         let mut sorted = found.to_vec();
         sorted.sort_unstable();

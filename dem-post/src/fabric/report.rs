@@ -98,7 +98,7 @@ pub fn read(history: &History, times: &[f64], quiet: bool) -> Result<Report> {
             ..Row::default()
         };
         // the first frame is recorded before any contact is solved
-        if !history.contact_rows(frame)?.is_empty() {
+        if frame > 0 {
             row.add_contacts(&history.contacts(frame)?, d, radius.len());
         }
         rows.push(row);

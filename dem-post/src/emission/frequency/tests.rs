@@ -16,7 +16,8 @@ impl Uniform {
 }
 
 /// Shares of catalogues whose estimate is within one and two of its standard errors of b, and the
-/// mean of the estimates over b, and the share whose law is found to hold; `catalogue` draws one, Mc is given or that of maximum curvature.
+/// mean of the estimates over b, and the share whose law is found to hold; `catalogue` draws one,
+/// Mc is given or that of maximum curvature.
 fn recovered(values: Values, b: f64, from: Option<f64>, catalogue: &mut dyn FnMut() -> Vec<f64>) -> [f64; 4] {
     const TRIALS: usize = 2000;
     let mut found = [0.0; 4];
@@ -36,7 +37,6 @@ fn recovered(values: Values, b: f64, from: Option<f64>, catalogue: &mut dyn FnMu
 /// A share of 2000 trials scatters by 1.1 % (one error) and 0.5 % (two): four of these are allowed,
 /// and what a catalogue of 200 events lacks to the normal distribution.
 fn agrees([one, two, mean, hold]: [f64; 4], bias: f64) {
-    eprintln!("{one} {two} {mean} {hold}");
     assert!((one - 0.683).abs() < 0.045, "{one} of the catalogues are within one error");
     assert!((two - 0.954).abs() < 0.025, "{two} are within two");
     assert!((mean - 1.0).abs() < bias, "the mean estimate is {mean} of b");
