@@ -171,7 +171,7 @@ fn note(magnitudes: &[f64], completeness: Option<f64>) -> String {
     let Some(from) = completeness else { return "no event has a magnitude".into() };
     let count = magnitudes.iter().filter(|&&m| m >= from).count();
     if count < FEWEST {
-        format!("{count} events of magnitude {} or more, fewer than {FEWEST}", number(from))
+        format!("{} of magnitude {} or more, fewer than {FEWEST}", counted(count, "event"), number(from))
     } else {
         "all events have the same magnitude".into()
     }
@@ -205,7 +205,7 @@ impl Report {
             ("bonds", format!("{}, {} broken ({share:.1} %)", self.bonds, self.ruptures)),
             ("events", self.events.len().to_string()),
             ("  linked ruptures", format!("steps apart: at most {steps}; bonds between: at most {reach}")),
-            ("  largest", most.map_or_else(|| "–".into(), |most| format!("{most} bonds"))),
+            ("  largest", most.map_or_else(|| "–".into(), |most| counted(most, "bond"))),
             ("energy released", released),
             ("magnitude", self.axis().trim_start_matches("magnitude ").into()),
             ("  from", quantity(self.completeness, "")),
@@ -247,6 +247,10 @@ impl Report {
             if rest > 0 { format!("… and {rest} smaller ones in emission-events.csv\n") } else { String::new() };
         table.lines() + &more
     }
+}
+
+fn counted(number: usize, word: &str) -> String {
+    format!("{number} {word}{}", if number == 1 { "" } else { "s" })
 }
 
 /// A b-value with its error.
