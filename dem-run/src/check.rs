@@ -9,6 +9,7 @@ use dem_core::body::Grains;
 use dem_core::dim::{Dim, Vect};
 use serde::Serialize;
 
+use crate::bonds;
 use crate::build::{Placed, place, walls};
 use crate::error::RunError;
 use crate::in_dimension;
@@ -95,7 +96,7 @@ impl Check {
     ///
     /// # Errors
     /// For a sample that is not random, the errors of a run before its first step:
-    /// [`RunError::SampleFile`], [`RunError::File`], [`RunError::Sample`].
+    /// [`RunError::SceneFile`], [`RunError::File`], [`RunError::Sample`].
     pub fn new(scene: &Scene) -> Result<Self, RunError> {
         let grains = count(scene)?;
         let (memory_bytes, free_memory_bytes) = (memory::expected(scene, grains), memory::free());
@@ -116,7 +117,7 @@ impl Check {
             grains,
             sample: sample_name(&scene.sample),
             sizes,
-            bonds: has_bonds(scene),
+            bonds: scene.has_bonds(),
             walls: walls.collect(),
             steps: scene.time.steps(),
             step: scene.time.step,
@@ -185,7 +186,7 @@ impl fmt::Display for Check {
 /// Number of grains of a scene, before a cut.
 ///
 /// # Errors
-/// [`RunError::SampleFile`], [`RunError::File`]: a sample file that cannot be read.
+/// [`RunError::SceneFile`], [`RunError::File`]: a sample file that cannot be read.
 pub(crate) fn count(scene: &Scene) -> Result<usize, RunError> {
     match &scene.sample {
         Sample::File(file) => sample_file::count(&file.path),
@@ -200,6 +201,8 @@ fn look<D: Dim>(scene: &Scene, enough_memory: bool) -> Result<(Option<Sizes>, Ve
         Sample::Random(random) if enough_memory => Some(random_sizes::<D>(scene, random)),
         _ if enough_memory => {
             let Placed { grains, warnings, .. } = place::<D>(scene, None, &mut |_| true)?;
+            // its bonds are made only to find what is wrong with them
+            bonds::of_sample(scene, &grains)?;
             let (low, high) = grains.bounds();
             let corners = [low, high].map(|x| x.as_slice().to_vec());
             return Ok((Some(Sizes::of(&grains.radius, corners, grains.mass.iter().sum())), warnings));
@@ -256,9 +259,6 @@ fn sample_name(sample: &Sample) -> &'static str {
     }
 }
 
-fn has_bonds(scene: &Scene) -> bool {
-    scene.bonds.as_ref().is_some_and(|bonds| bonds.cohesion(scene.dimension, 1.0, 1.0) > 0.0)
-}
 
 /// Estimated size of the history of `grains` grains (bytes), from the rows of `dem_run::history`
 /// and a typical number of contacts. The error may be 50 %.
@@ -271,7 +271,7 @@ fn expected_bytes(scene: &Scene, grains: usize) -> u64 {
     let real = if scene.output.precision == Precision::Single { 4.0 } else { NUMBER };
     let (d, spins, angles, tangents) = if scene.dimension == 2 { (2.0, 1.0, 1.0, 0.0) } else { (3.0, 3.0, 4.0, 3.0) };
     let contacts = memory::contacts_per_grain(scene) * grains as f64;
-    let bonds = if has_bonds(scene) { contacts } else { 0.0 };
+    let bonds = if scene.has_bonds() { contacts } else { 0.0 };
     // position, velocity, angular velocity, angle
     let grain_rows = grains as f64 * real * (2.0 * d + spins + angles);
     // point, normal, tangent, reaction, moment, gap; the pair, the status and the bond

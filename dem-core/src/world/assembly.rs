@@ -231,7 +231,15 @@ impl<D: Dim> World<D> {
 
     /// Friction coefficient of a dry contact (–).
     fn friction_of(&self, pair: [u32; 2]) -> f64 {
-        match (pair[1] as usize).checked_sub(self.grains.len()) {
+        let wall = (pair[1] as usize).checked_sub(self.grains.len());
+        if let Some(table) = &self.settings.material_friction {
+            let material = |k: u32| self.grains.material_of(k as usize);
+            return match wall {
+                None => table.grain_grain[material(pair[0]) * table.count + material(pair[1])],
+                Some(wall) => table.grain_wall[material(pair[0]) * self.walls.len() + wall],
+            };
+        }
+        match wall {
             None => self.settings.friction,
             Some(wall) => self.walls[wall].friction,
         }
