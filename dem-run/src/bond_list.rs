@@ -149,7 +149,11 @@ fn grain<D: Dim>(column: usize, text: Option<&str>, grains: &Grains<D>) -> Resul
     let (name, text, count) = (COLUMNS[column], text.unwrap_or_default(), grains.len());
     let number = text.parse::<usize>().ok().filter(|k| *k < count);
     number.ok_or_else(|| {
-        format!("{name} is {:?}, it must be the number of a grain, from 0 to {}", shorten(text), count.saturating_sub(1))
+        format!(
+            "{name} is {:?}, it must be the number of a grain, from 0 to {}",
+            shorten(text),
+            count.saturating_sub(1)
+        )
     })
 }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::error::RunError;
 use crate::history::refuse_busy;
 use crate::run::RunOptions;
-use crate::scene::{Sample, Scene};
+use crate::scene::Scene;
 
 /// Rejects an output that is the input, with or without `--force`.
 pub(crate) fn not_itself(read: &Path, written: &Path) -> Result<(), RunError> {

@@ -11,11 +11,7 @@ use dem_core::world::MaterialFriction;
 ///
 /// # Errors
 /// Messages about regions and materials without a grain.
-pub fn assign<D: Dim>(
-    scene: &Scene,
-    sampled: Vec<u8>,
-    places: &[D::Vector],
-) -> Result<Vec<u8>, Vec<String>> {
+pub fn assign<D: Dim>(scene: &Scene, sampled: Vec<u8>, places: &[D::Vector]) -> Result<Vec<u8>, Vec<String>> {
     let named = &scene.materials.named;
     if named.is_empty() {
         return Ok(vec![]);
@@ -41,7 +37,10 @@ pub fn assign<D: Dim>(
             }
         }
     }
-    for (k, material) in named.iter().enumerate().filter(|_| wrong.is_empty()) {
+    if !wrong.is_empty() {
+        return Err(wrong);
+    }
+    for (k, material) in named.iter().enumerate() {
         if materials.iter().all(|own| usize::from(*own) != k + 1) {
             let remedy = match material.regions.is_empty() {
                 true => "give it a region, or name it in the sample",

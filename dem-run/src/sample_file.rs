@@ -61,7 +61,7 @@ pub fn read_text<D: Dim>(path: &Path, text: &str) -> Result<Vec<Ball<D>>, RunErr
 
 fn parse<D: Dim, R: BufRead>(mut lines: Lines<R>, materials: &[&str]) -> Result<Table<D>, RunError> {
     let mut wrong = Wrong::of(&lines.path);
-    let header = header::<D>().join(",");
+    let (columns, header) = (header::<D>().len(), header::<D>().join(","));
     lines.next()?;
     let mut with_material = false;
     match lines.fields().map(|fields| fields.collect::<Vec<_>>().join(",")) {
@@ -82,7 +82,7 @@ fn parse<D: Dim, R: BufRead>(mut lines: Lines<R>, materials: &[&str]) -> Result<
     while lines.next()? {
         let row = lines.fields().and_then(|fields| {
             let mut fields: Vec<&str> = fields.collect();
-            let expected = header::<D>().len() + usize::from(with_material);
+            let expected = columns + usize::from(with_material);
             if fields.len() != expected {
                 let values = if fields.len() == 1 { "value" } else { "values" };
                 return Err(format!("it has {} {values}, the header has {expected}", fields.len()));
@@ -115,7 +115,9 @@ fn parse<D: Dim, R: BufRead>(mut lines: Lines<R>, materials: &[&str]) -> Result<
 fn material(name: &str, materials: &[&str]) -> Result<u8, String> {
     let place = materials.iter().position(|known| *known == name).and_then(|place| u8::try_from(place).ok());
     let (shown, known) = (shorten(name), materials.join(", "));
-    place.ok_or_else(|| format!("material is {shown:?}, it must be one of: {known}; materials.named of the scene adds one"))
+    place.ok_or_else(|| {
+        format!("material is {shown:?}, it must be one of: {known}; materials.named of the scene adds one")
+    })
 }
 
 /// The grain of a line, or the error of the line.

@@ -453,13 +453,7 @@ impl Bonds {
 
     /// The same of a bond between two materials, whose properties `pair` may replace its own.
     #[must_use]
-    pub fn cohesion_of(
-        &self,
-        pair: Option<&PairBonds>,
-        dimension: u8,
-        mean_diameter: f64,
-        thickness: f64,
-    ) -> f64 {
+    pub fn cohesion_of(&self, pair: Option<&PairBonds>, dimension: u8, mean_diameter: f64, thickness: f64) -> f64 {
         let of_pair = pair.map(|pair| (pair.strength, pair.stress)).filter(|given| *given != (None, None));
         cohesion(of_pair.unwrap_or((self.strength, self.stress)), dimension, mean_diameter, thickness)
     }

@@ -11,7 +11,7 @@ use super::model::{Range, Spacing, Sweep, Values};
 use crate::error::RunError;
 use crate::output::hex;
 use crate::scene::parse::{self, Document};
-use crate::scene::{self, Base, Change, Origin, Problem, Sample, Scene, SceneError, shorten};
+use crate::scene::{self, Base, Change, Origin, Problem, Scene, SceneError, shorten};
 
 /// Maximum number of runs of a sweep: each run has its own files.
 const MOST_RUNS: u64 = 100_000;

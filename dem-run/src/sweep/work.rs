@@ -16,7 +16,6 @@ use crate::error::RunError;
 use crate::history::sweep::{Outcome, State, Store};
 use crate::output::replace::move_to;
 use crate::progress::{Progress, RunsProgress};
-use crate::scene::Sample;
 use crate::signals::Interrupt;
 
 /// Interval between two checks for ended processes.

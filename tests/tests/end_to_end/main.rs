@@ -11,6 +11,7 @@ mod fclib;
 mod fclib_global;
 mod interrupt;
 mod loads;
+mod materials;
 mod pack;
 mod packings;
 mod resume;

@@ -8,8 +8,8 @@ use crate::region::Region;
 use crate::sample::Sample;
 use crate::suggest::nearest;
 
-/// Maximum number of named materials: histories and worlds number them by one byte.
-const MOST: usize = 255;
+/// Maximum number of named materials: histories number all materials by one byte.
+const MOST: usize = 254;
 
 /// Checks `materials`, and the materials of listed grains.
 pub(super) fn materials(report: &mut Report, scene: &Scene) {
@@ -140,7 +140,11 @@ pub(super) fn region(report: &mut Report, path: &str, region: &Region) {
             report.vector(&format!("{path}.to"), &cuboid.to);
             for (axis, (from, to)) in cuboid.from.iter().zip(&cuboid.to).enumerate() {
                 if from > to {
-                    report.wrong(format!("{path}.to.{axis}"), Number(*to), format!("at least that of `from`, {from:?} m"));
+                    report.wrong(
+                        format!("{path}.to.{axis}"),
+                        Number(*to),
+                        format!("at least that of `from`, {from:?} m"),
+                    );
                 }
             }
         }
