@@ -18,7 +18,7 @@ const TOUCHING: f64 = 1e-9;
 
 /// The same for a contact with a reaction in the previous step. It was closed then, and only solver
 /// errors have opened it since; a stiff contact would lose its force to them at once.
-const CLOSED: f64 = 1e-6;
+pub(super) const CLOSED: f64 = 1e-6;
 
 /// Gap, over the radius of the grain, below which a pair is part of the problem even if it does not
 /// close.
@@ -30,7 +30,7 @@ const SPARE: f64 = 0.15;
 /// State of the bonds at the start of a step, by bond index.
 pub(super) struct Brought<D: Dim> {
     /// Reactions of elastic bonds (N, N m); empty if all bonds are rigid.
-    carried: Vec<Local<D::Tangent, D::Moment>>,
+    pub carried: Vec<Local<D::Tangent, D::Moment>>,
     /// Length corrections.
     pub turns: Vec<Turn>,
 }

@@ -5,6 +5,7 @@
 
 mod assembly;
 mod ledger;
+mod limit_load;
 mod limits;
 mod motion;
 mod observe;
