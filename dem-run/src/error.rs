@@ -177,6 +177,9 @@ pub enum NoConvergence {
         /// The step that was not solved.
         last: u64,
     },
+    /// Of a limit load.
+    #[error("the limit load was not found: the programme was not solved to an error of 1e-7")]
+    Limit,
     /// In a file.
     #[error("{}: {why}", .path.display())]
     Problem {

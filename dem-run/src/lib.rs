@@ -16,6 +16,7 @@ mod dimension;
 pub mod error;
 pub mod export;
 pub mod fclib;
+pub mod limit;
 pub mod materials;
 pub mod memory;
 pub mod pack;

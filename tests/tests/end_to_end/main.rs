@@ -10,6 +10,7 @@ mod elastic;
 mod fclib;
 mod fclib_global;
 mod interrupt;
+mod limit;
 mod loads;
 mod materials;
 mod pack;
