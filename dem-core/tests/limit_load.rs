@@ -198,8 +198,8 @@ fn cross(a: &[f64], b: &[f64]) -> Vec<f64> {
     }
 }
 
-/// The limit load by Clarabel, from positions, radii and bonds alone. The unknowns are for each bond
-/// the force on its first grain and the moment, along the axes of space, and last λ.
+/// The limit load by Clarabel, from positions, radii and bonds alone. The unknowns are for each
+/// bond the force on its first grain and the moment, along the axes of space, and last λ.
 fn by_clarabel<D: Dim>(world: &World<D>, twists: bool) -> f64 {
     let (d, spins) = (D::N, D::Spin::LEN);
     let (each, body, g) = (d + spins, d + spins, &world.grains);

@@ -40,8 +40,8 @@ pub enum Command {
     /// and disk space.
     #[command(after_help = CHECK_EXAMPLE)]
     Check(CheckArgs),
-    /// Compute the largest load that a sample can bear before a bond must break, without running the
-    /// scene.
+    /// Compute the largest load that a sample can bear before a bond must break, without running
+    /// the scene.
     #[command(after_help = LIMIT_EXAMPLE)]
     Limit(LimitArgs),
     /// Write the contact problem of one step of a history in FCLIB's format, which other programs

@@ -35,7 +35,8 @@ impl Listed {
     }
 }
 
-/// The bonds of a file, in its order. `gap_tolerance`: largest gap of a pair over its mean diameter.
+/// The bonds of a file, in its order. `gap_tolerance`: largest gap of a pair over its mean
+/// diameter.
 ///
 /// # Errors
 /// [`RunError::SceneFile`] and [`RunError::File`] for a file that cannot be read,

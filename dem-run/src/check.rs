@@ -73,7 +73,8 @@ pub struct Sizes {
     /// Highest corner of the box around the sample (m). For a random sample: at the requested solid
     /// fraction, before a cut.
     pub box_to: Vec<f64>,
-    /// Mass of all grains (kg); unknown for a random sample of several materials, which is not packed.
+    /// Mass of all grains (kg); unknown for a random sample of several materials, which is not
+    /// packed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mass: Option<f64>,
     /// Number of grains of each material, by name; empty if there is one material, or if the sample

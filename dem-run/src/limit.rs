@@ -47,8 +47,8 @@ pub enum Outcome {
 pub struct GrowingLoad {
     /// `walls.NAME` or `grains.loads.K`.
     pub load: String,
-    /// At the start and at the end of the run (N along the wall's direction; the factor of a load on a
-    /// grain). Of a wall driven by a velocity: 0 and 1 N, or −1 N if it moves backwards.
+    /// At the start and at the end of the run (N along the wall's direction; the factor of a load
+    /// on a grain). Of a wall driven by a velocity: 0 and 1 N, or −1 N if it moves backwards.
     pub from: f64,
     /// At the end of the run.
     pub to: f64,
@@ -65,8 +65,8 @@ pub struct Limit {
     /// Largest factor on the growth of the loads from t = 0 to the end of the run.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub factor: Option<f64>,
-    /// Difference between the factor that the reactions found bear and the one that a mechanism found
-    /// proves to be the largest.
+    /// Difference between the factor that the reactions found bear and the one that a mechanism
+    /// found proves to be the largest.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub factor_error: Option<f64>,
     /// Time at which the loads of a run reach the limit (s), if they grow at constant rates.

@@ -56,8 +56,8 @@ pub use wall::*;
 
 /// Reads the scene in the file `path`, applies the `--set` assignments and validates the result.
 ///
-/// The paths of a sample file and of a list of bonds are relative to the scene file; in the returned
-/// scene they are already joined to the scene's folder.
+/// The paths of a sample file and of a list of bonds are relative to the scene file; in the
+/// returned scene they are already joined to the scene's folder.
 ///
 /// # Errors
 /// [`SceneError`]: an unreadable file, wrong syntax, wrong structure, or all wrong values.

@@ -64,7 +64,8 @@ fn limits_of_shear_and_rolling_differ_by_pair() {
         {"center": [4e-3, 0], "radius": 2e-3, "material": "hard"}]}"#;
     let turned = r#"grains.loads.0={"grain": 1, "torque": [1e-3], "time": {"ramp": {"rate": 100}}}"#;
     let sideways = "grains.loads.0.force=[0, 1]";
-    // as for `bonds.shear` and `bonds.rolling` in `teaching`; the friction of the pair is their default
+    // as for `bonds.shear` and `bonds.rolling` in `teaching`; their default is the friction of the
+    // pair
     for (pair, load, mode, time) in [
         (r#""bonds": {"shear": 0.2, "rolling": 0.5}"#, sideways, RuptureMode::Shear, 0.02),
         (r#""bonds": {"shear": 0.2, "rolling": 0.25}"#, turned, RuptureMode::Rolling, 0.1),

@@ -3,8 +3,8 @@
 use super::programme::{Programme, sum};
 use crate::solver::interior::cones::{Point, moved};
 
-/// A point of the embedding, or a step: reactions r̂ and factor λ, velocities y of a mechanism, cone
-/// pairs s and z, and the scale τ with its dual κ.
+/// A point of the embedding, or a step: reactions r̂ and factor λ, velocities y of a mechanism,
+/// cone pairs s and z, and the scale τ with its dual κ.
 #[derive(Clone)]
 pub(super) struct Iterate {
     pub r: Vec<f64>,

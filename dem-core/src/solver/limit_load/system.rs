@@ -77,8 +77,8 @@ impl<'a> System<'a> {
         out
     }
 
-    /// The solution of Hᵀy − LᵀW⁻¹z = r, f₁·y = λ, H r + f₁ λ = y, −W⁻¹L r − z = z. The scaled z has
-    /// an error of rounding relative to itself, where W⁻²L r would lose all digits.
+    /// The solution of Hᵀy − LᵀW⁻¹z = r, f₁·y = λ, H r + f₁ λ = y, −W⁻¹L r − z = z. The scaled z
+    /// has an error of rounding relative to itself, where W⁻²L r would lose all digits.
     pub fn solve(&self, right: &Parts) -> Parts {
         let of = self.of;
         let mut found = self.once(right);
