@@ -4,8 +4,8 @@ use crate::common::{Folder, SMALL, config};
 use serde_json::Value;
 
 fn limit(scene: &str, sets: &[&str]) -> Value {
-    let sets = sets.iter().flat_map(|set| ["--set", set]);
     let path = config(scene);
+    let sets = sets.iter().flat_map(|set| ["--set", set]);
     Folder::new().dem_run(&["limit", &path, "--json"].into_iter().chain(sets).collect::<Vec<_>>()).json()
 }
 

@@ -13,6 +13,7 @@ mod interrupt;
 mod limit;
 mod loads;
 mod materials;
+mod next_event;
 mod pack;
 mod packings;
 mod resume;
