@@ -34,7 +34,8 @@ impl<D: Dim> World<D> {
         });
         let (carried, turns) = (vec![Local::zero(); self.bonds.len()], vec![Turn::default(); self.bonds.len()]);
         let motion = Motion { before: at_rest.before, free: start };
-        let (problem, _) = self.assemble(&mid, &touches, &motion, &Brought { carried, turns }, 0.0, 1.0);
+        let brought = Brought { carried, turns, strengthened: 1.0 };
+        let (problem, _) = self.assemble(&mid, &touches, &motion, &brought, 0.0, 1.0);
         limit_load(&problem, growth)
     }
 
