@@ -46,7 +46,7 @@ fn compression_breaks_first_below_its_limit_at_any_cohesion() {
         let load = found["loads"][0]["limit"].as_f64().expect("a load");
         let args: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).chain(["-o", "a.h5"]).collect();
         let first = Folder::new().run_config("compression.json", &args);
-        let first = first["first_break_load"].as_f64().unwrap_or_else(|| panic!("{first}"));
+        let first = first["failure"]["first_break"].as_f64().unwrap_or_else(|| panic!("{first}"));
         assert!(first <= load + 100.0 * 1e-4, "first break at {first} N, limit {load} N");
         per_cohesion.push(load);
     }
