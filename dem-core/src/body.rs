@@ -26,6 +26,9 @@ pub struct Grains<D: Dim> {
     pub inertia: Vec<f64>,
     /// Whether the grain is held fixed.
     pub fixed: Vec<bool>,
+    /// Material of the grain, a place in the lists of
+    /// [`MaterialFriction`](crate::world::MaterialFriction); empty if there is one material.
+    pub material: Vec<u8>,
 }
 
 /// One grain, as it is added to [`Grains`].
@@ -75,6 +78,7 @@ impl<D: Dim> FromIterator<Grain<D>> for Grains<D> {
             mass: Vec::new(),
             inertia: Vec::new(),
             fixed: Vec::new(),
+            material: Vec::new(),
         };
         list.into_iter().for_each(|grain| grains.push(grain));
         grains
@@ -102,6 +106,11 @@ impl<D: Dim> Grains<D> {
         self.mass.push(grain.mass);
         self.inertia.push(grain.inertia);
         self.fixed.push(grain.fixed);
+    }
+
+    /// Material of grain `k`: 0 if the materials are not listed.
+    pub fn material_of(&self, k: usize) -> usize {
+        self.material.get(k).copied().map_or(0, usize::from)
     }
 
     /// Inverse mass (1/kg) and inverse inertia (1/(kg m²)) of grain `k`, both zero for a fixed

@@ -52,5 +52,5 @@ pub mod prelude {
     pub use crate::contact::BondFlow;
     pub use crate::dim::{D2, D3, D3Twist, Dim, Vect};
     pub use crate::solver::{GaussSeidelSettings, SolverSettings, StagedSettings};
-    pub use crate::world::{Restitution, Settings, StepError, StepReport, World};
+    pub use crate::world::{MaterialFriction, Restitution, Settings, StepError, StepReport, World};
 }

@@ -39,7 +39,13 @@ impl Run {
         let layout = Layout {
             dimension: 2,
             friction: true,
-            grains: Grains { id: vec![0, 1], radius: vec![1e-3; 2], mass: vec![1.0; 2], inertia: vec![1.0; 2] },
+            grains: Grains {
+                id: vec![0, 1],
+                radius: vec![1e-3; 2],
+                mass: vec![1.0; 2],
+                inertia: vec![1.0; 2],
+                material: vec![],
+            },
             walls: vec![wall],
             bonds: Bonds {
                 pair: vec![[0, 1]],

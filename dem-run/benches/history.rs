@@ -22,6 +22,7 @@ fn layout(single: bool) -> Layout {
             radius: vec![1e-3; GRAINS],
             mass: vec![1.0; GRAINS],
             inertia: vec![1.0; GRAINS],
+            material: vec![],
         },
         bonds: Bonds {
             pair: (0..CONTACTS).map(|k| [(k % GRAINS) as i32, ((k + 1) % GRAINS) as i32]).collect(),

@@ -40,6 +40,10 @@ pub enum Command {
     /// and disk space.
     #[command(after_help = CHECK_EXAMPLE)]
     Check(CheckArgs),
+    /// Compute the largest load that a sample can bear before a bond must break, without running
+    /// the scene.
+    #[command(after_help = LIMIT_EXAMPLE)]
+    Limit(LimitArgs),
     /// Write the contact problem of one step of a history in FCLIB's format, which other programs
     /// can solve too.
     #[command(after_help = EXPORT_EXAMPLE)]
@@ -100,6 +104,18 @@ bytes.
 
 Example:
   dem-run check configs/compression.json --set time.step=5e-5";
+
+const LIMIT_EXAMPLE: &str = "\
+The largest factor on the growing loads for which some reactions balance all loads within the limits of all bonds and
+contacts, with the grains at their places. Loads that grow are forces of walls and loads on grains whose values differ
+between t = 0 and time.end: the factor multiplies that difference. Gravity, constant forces and the values at t = 0 are
+not multiplied. If nothing grows, the force of the load wall is taken, also of one that is driven by a velocity.
+
+A run breaks its first bond at or below this load, whatever its time step, solver, stiffnesses and order of contacts;
+often well below, since it does not choose the best reactions. docs/theory/limit-load.md.
+
+Example:
+  dem-run limit configs/bending.json";
 
 const ACCURACY_EXAMPLE: &str = "\
 Runs the scene with several solvers, tolerances and time steps, all from one sample, and compares each run with the
@@ -330,6 +346,17 @@ pub struct CheckArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
     /// Print JSON: the description of the run, or the problems of the scene.
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct LimitArgs {
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    #[command(flatten)]
+    pub execution: ExecutionArgs,
+    /// Print JSON.
     #[arg(long)]
     pub json: bool,
 }

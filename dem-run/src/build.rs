@@ -1,29 +1,25 @@
 //! From a scene to a world: sample, walls, loads, bonds, settings.
 
+use crate::bonds;
 use crate::error::RunError;
+use crate::materials;
 use crate::output::number;
 use crate::packings;
-use crate::prepare::{self, Ball, Watch};
-use crate::sample_file;
+use crate::prepare::{self, Watch};
+use crate::sample_file::{self, Table};
 use crate::scene::{self, Drive as SceneDrive, Place, Sample, Scene, SolverKind, WallMass};
 use crate::tolerances::{DEEPEST, ROUNDED, TOUCHING};
 use crate::warnings;
 use dem_core::body::{Drive, Grain, Grains, Load, Schedule, Shape, Wall};
-use dem_core::bond::{self, Bond, Rupture};
+use dem_core::bond::Rupture;
 use dem_core::contact::{BondFlow, LocalSolve};
 use dem_core::detection::pairs_within;
 use dem_core::dim::{Dim, Vect};
 use dem_core::saved::{Mismatch, Reader};
 use dem_core::solver::{GaussSeidelSettings, SolverSettings, StagedSettings, Stages, Start, StiffnessRatio};
 use dem_core::world::{Restitution, Settings, World};
-use rand::RngExt;
-use rand_pcg::Pcg64;
-use std::f64::consts::PI;
 use std::path::Path;
 use std::sync::Arc;
-
-/// Stream of the random generator from which strengths of bonds are drawn.
-const SCATTER_STREAM: u128 = 1;
 
 /// A world at time zero, the solid fraction of its sample, and warnings.
 pub struct Built<D: Dim> {
@@ -58,24 +54,9 @@ const MOST_TOLD: usize = 10;
 /// [`RunError`], with all errors of the sample.
 pub fn build<D: Dim>(scene: &Scene, packings: Option<&Path>, watch: Watch) -> Result<Built<D>, RunError> {
     let Placed { grains, walls, solid_fraction, warnings } = place::<D>(scene, packings, watch)?;
+    let bonds = bonds::of_sample(scene, &grains)?;
     let mut world = World::new(grains, walls, loads(scene), settings(scene));
-    if let Some(bonds) = &scene.bonds {
-        let strength = |mean_diameter| bonds.cohesion(scene.dimension, mean_diameter, scene.thickness());
-        let friction = bonds.friction.unwrap_or(scene.materials.friction.grain_grain);
-        world.form_bonds(bonds.gap_tolerance, strength, friction);
-        for bond in &mut world.bonds {
-            (bond.shear, bond.rolling) = (bonds.shear.unwrap_or(friction), bonds.rolling.unwrap_or(friction));
-        }
-        if let Some(scatter) = bonds.scatter {
-            scatter_strengths(&mut world.bonds, scatter, scene.seed);
-        }
-        if let Some(twist) = bonds.twist {
-            world.limit_twist(twist);
-        }
-        if let Some(stiffness) = bonds.stiffness {
-            world.make_bonds_elastic(|a| bond_stiffness::<D>(stiffness, a, scene.thickness()));
-        }
-    }
+    world.add_bonds(bonds);
     Ok(Built { world, solid_fraction, warnings })
 }
 
@@ -127,22 +108,40 @@ struct Sampled<D: Dim> {
 
 /// The sample of a scene.
 fn grains<D: Dim>(scene: &Scene, packings: Option<&Path>, watch: Watch) -> Result<Sampled<D>, RunError> {
-    let density = scene.materials.density * scene.thickness();
-    let at_rest =
-        |balls: Vec<Ball<D>>| balls.into_iter().map(|(x, r)| Grain::at_rest(x, r, density)).collect::<Grains<D>>();
-    let grains = match &scene.sample {
+    let names = scene.materials.names();
+    let (mut solid_fraction, mut unsettled) = (None, None);
+    let table = match &scene.sample {
         Sample::Random(random) => {
-            let prepare::Packing { balls, solid_fraction, unsettled } = match packings {
+            let packing = match packings {
                 Some(folder) => packings::obtain::<D>(folder, random, scene.seed, watch)?,
                 None => prepare::pack::<D>(random, scene.seed, watch)?,
             };
-            return Ok(Sampled { grains: at_rest(balls), solid_fraction: Some(solid_fraction), unsettled });
+            (solid_fraction, unsettled) = (Some(packing.solid_fraction), packing.unsettled);
+            Table { balls: packing.balls, material: vec![] }
         }
-        Sample::Lattice(lattice) => at_rest(prepare::lattice::<D>(lattice)),
-        Sample::File(file) => at_rest(sample_file::read::<D>(&file.path)?),
-        Sample::Grains(list) => list.iter().map(|spec| listed(spec, scene)).collect(),
+        Sample::Lattice(lattice) => Table { balls: prepare::lattice::<D>(lattice), material: vec![] },
+        Sample::File(file) => sample_file::read::<D>(&file.path, &names)?,
+        Sample::Grains(list) => {
+            // a name that is none was refused with the scene
+            let place = |name: &str| names.iter().position(|known| *known == name).unwrap_or_default() as u8;
+            Table {
+                balls: list.iter().map(|spec| (D::Vector::from_slice(&spec.center), spec.radius)).collect(),
+                material: list.iter().map(|spec| spec.material.as_deref().map_or(0, place)).collect(),
+            }
+        }
     };
-    Ok(Sampled { grains, solid_fraction: None, unsettled: None })
+    let places: Vec<D::Vector> = table.balls.iter().map(|(x, _)| *x).collect();
+    let material = materials::assign::<D>(scene, table.material, &places).map_err(RunError::Sample)?;
+    let density = |k: usize| scene.materials.density_of(material.get(k).copied().map_or(0, usize::from));
+    let mut grains: Grains<D> = match &scene.sample {
+        Sample::Grains(list) => list.iter().enumerate().map(|(k, spec)| listed(spec, density(k), scene)).collect(),
+        _ => {
+            let balls = table.balls.into_iter().enumerate();
+            balls.map(|(k, (x, r))| Grain::at_rest(x, r, density(k) * scene.thickness())).collect()
+        }
+    };
+    grains.material = material;
+    Ok(Sampled { grains, solid_fraction, unsettled })
 }
 
 /// Fixes the grains of `grains.fixed`; returns messages about numbers without a grain.
@@ -165,8 +164,9 @@ fn missing_grain(place: &str, grain: usize, count: usize) -> String {
     format!("{place}: there is no grain {grain}; the sample has {count}, counted from 0")
 }
 
-fn listed<D: Dim>(spec: &scene::GrainSpec, scene: &Scene) -> Grain<D> {
-    let density = spec.density.unwrap_or(scene.materials.density) * scene.thickness();
+/// A grain of a list, of a material of this density (kg/m³).
+fn listed<D: Dim>(spec: &scene::GrainSpec, density: f64, scene: &Scene) -> Grain<D> {
+    let density = spec.density.unwrap_or(density) * scene.thickness();
     let mut grain = Grain::<D>::at_rest(D::Vector::from_slice(&spec.center), spec.radius, density);
     if let Some(mass) = spec.mass {
         grain.mass = mass;
@@ -389,6 +389,7 @@ pub fn settings<D: Dim>(scene: &Scene) -> Settings<D> {
         step: scene.time.step,
         gravity: scene.gravity.as_deref().map(D::Vector::from_slice).filter(|g| g.norm() > 0.0),
         friction: scene.materials.friction.grain_grain,
+        material_friction: materials::friction(scene),
         restitution: bouncing.then_some(Restitution {
             grain_grain: restitution.grain_grain,
             grain_wall: restitution.grain_wall,
@@ -445,108 +446,10 @@ fn staged(newton: &scene::Newton, stages: Stages, tolerance: f64, accept: f64) -
     }
 }
 
-/// Multiplies the strength of each bond by a random factor, in the order of the bonds' pairs.
-fn scatter_strengths(bonds: &mut [Bond], scatter: scene::Scatter, seed: u64) {
-    // a separate stream: the packing uses the default stream of the seed
-    let mut rng = Pcg64::new(u128::from(seed), SCATTER_STREAM);
-    let mut share = || loop {
-        let share = rng.random::<f64>();
-        if share > 0.0 {
-            break share;
-        }
-    };
-    for bond in bonds {
-        bond.strength *= match scatter {
-            scene::Scatter::Weibull { modulus } => (-share().ln()).powf(1.0 / modulus),
-            scene::Scatter::Normal { deviation } => loop {
-                // Box & Muller 1958
-                let normal = (-2.0 * share().ln()).sqrt() * (2.0 * PI * share()).cos();
-                let factor = 1.0 + deviation * normal;
-                if factor > 0.0 {
-                    break factor;
-                }
-            },
-        };
-    }
-}
-
-/// Stiffness of a bond of mean diameter `a` (m). A bar of length a and width a, either round or of
-/// thickness t, has the axial stiffness E A/a, the shear stiffness G A/a and the bending stiffness
-/// E I/a; a round bar has the twist stiffness G 2I/a.
-fn bond_stiffness<D: Dim>(stiffness: scene::Stiffness, a: f64, thickness: f64) -> bond::Stiffness {
-    match stiffness {
-        scene::Stiffness::Springs(scene::Springs { normal, tangential, rolling, twist }) => {
-            bond::Stiffness { normal, tangential, rolling, twist: twist.unwrap_or_default() }
-        }
-        scene::Stiffness::Young(scene::Young { modulus, poisson_ratio }) => {
-            let (area, second_moment) = match D::N {
-                2 => (a * thickness, thickness * a.powi(3) / 12.0),
-                _ => (0.25 * PI * a * a, PI * a.powi(4) / 64.0),
-            };
-            let normal = modulus * area / a;
-            let tangential = normal / (2.0 * (1.0 + poisson_ratio));
-            let rolling = modulus * second_moment / a;
-            bond::Stiffness { normal, tangential, rolling, twist: rolling / (1.0 + poisson_ratio) }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dem_core::dim::{D2, D3Twist};
-
-    fn assert_near(found: bond::Stiffness, expected: [f64; 4]) {
-        for (found, expected) in [found.normal, found.tangential, found.rolling, found.twist].into_iter().zip(expected)
-        {
-            assert!((found / expected - 1.0).abs() < 1e-14, "{found} against {expected}");
-        }
-    }
-
-    fn scattered(scatter: scene::Scatter, count: u32, seed: u64) -> Vec<f64> {
-        let grains = (0..count + 1).map(|k| Grain::<D2>::at_rest([f64::from(k), 0.0].into(), 0.5, 1.0)).collect();
-        let mut world = World::new(grains, vec![], vec![], Settings::default());
-        world.form_bonds(1e-6, |_| 10.0, 0.3);
-        scatter_strengths(&mut world.bonds, scatter, seed);
-        world.bonds.iter().map(|bond| bond.strength).collect()
-    }
-
-    /// The largest distance of an empirical distribution from a given one (Kolmogorov & Smirnov).
-    fn distance(mut values: Vec<f64>, below: impl Fn(f64) -> f64) -> f64 {
-        values.sort_by(f64::total_cmp);
-        let count = values.len() as f64;
-        let apart = |(k, value): (usize, &f64)| {
-            let (low, high, exact) = (k as f64 / count, (k + 1) as f64 / count, below(*value));
-            (exact - low).abs().max((high - exact).abs())
-        };
-        values.iter().enumerate().map(apart).fold(0.0, f64::max)
-    }
-
-    #[test]
-    fn the_weakest_of_weibull_bonds_is_a_weibull_bond() {
-        // 1,000 chains of 20 bonds: weakest links of scale σ₀ N^(−1/m)
-        let (modulus, links, chains) = (5.0, 20, 1000);
-        let weakest = |seed: u64| {
-            let bonds = scattered(scene::Scatter::Weibull { modulus }, links, seed);
-            bonds.into_iter().fold(f64::INFINITY, f64::min)
-        };
-        let scale = 10.0 * f64::from(links).powf(-1.0 / modulus);
-        let off = distance((0..chains).map(weakest).collect(), |s| 1.0 - (-(s / scale).powf(modulus)).exp());
-        // a sample of the distribution exceeds this distance with probability 1/1000
-        assert!(off < 1.95 / (chains as f64).sqrt(), "{off}");
-    }
-
-    #[test]
-    fn normal_strengths_have_their_mean_and_deviation() {
-        let bonds = scattered(scene::Scatter::Normal { deviation: 0.2 }, 10_000, 3);
-        let mean = bonds.iter().sum::<f64>() / bonds.len() as f64;
-        let variance = bonds.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / bonds.len() as f64;
-        assert!((mean - 10.0).abs() < 0.08 && (variance.sqrt() - 2.0).abs() < 0.06, "{mean} {variance}");
-        assert!(bonds.iter().all(|s| *s > 0.0));
-        // the same seed gives the same bonds, another seed others
-        assert_eq!(bonds, scattered(scene::Scatter::Normal { deviation: 0.2 }, 10_000, 3));
-        assert_ne!(bonds, scattered(scene::Scatter::Normal { deviation: 0.2 }, 10_000, 4));
-    }
+    use dem_core::dim::D2;
 
     #[test]
     fn the_defaults_of_a_scene_are_those_of_the_library() {
@@ -556,23 +459,5 @@ mod tests {
         let gauss_seidel = SolverKind::GaussSeidel(scene::GaussSeidel::default());
         let expected = SolverSettings::GaussSeidel(GaussSeidelSettings::default());
         assert_eq!(solver(&scene::Solver { kind: gauss_seidel, ..scene }), expected);
-    }
-
-    #[test]
-    fn a_bond_is_as_stiff_as_a_bar_of_its_size() {
-        let (young, poisson, a, thickness) = (2e9, 0.25, 4e-3, 0.01);
-        let shear = young / (2.0 * (1.0 + poisson));
-        let bar = scene::Stiffness::Young(scene::Young { modulus: young, poisson_ratio: poisson });
-        // round: A = π a²/4, I = π a⁴/64 and the polar J = π a⁴/32
-        let round =
-            [young * PI * a / 4.0, shear * PI * a / 4.0, young * PI * a.powi(3) / 64.0, shear * PI * a.powi(3) / 32.0];
-        assert_near(bond_stiffness::<D3Twist>(bar, a, 1.0), round);
-        // a square plate: A = a t, I = t a³/12; no twist in 2D
-        let plate = bond_stiffness::<D2>(bar, a, thickness);
-        let expected = [young * thickness, shear * thickness, young * thickness * a * a / 12.0];
-        assert_near(bond::Stiffness { twist: 1.0, ..plate }, [expected[0], expected[1], expected[2], 1.0]);
-        // springs of the scene do not depend on the diameter
-        let springs = scene::Springs { normal: 1.0, tangential: 2.0, rolling: 3.0, twist: Some(4.0) };
-        assert_near(bond_stiffness::<D3Twist>(scene::Stiffness::Springs(springs), a, 1.0), [1.0, 2.0, 3.0, 4.0]);
     }
 }

@@ -9,6 +9,7 @@ use dem_core::body::Grains;
 use dem_core::dim::{Dim, Vect};
 use serde::Serialize;
 
+use crate::bonds;
 use crate::build::{Placed, place, walls};
 use crate::error::RunError;
 use crate::in_dimension;
@@ -72,8 +73,14 @@ pub struct Sizes {
     /// Highest corner of the box around the sample (m). For a random sample: at the requested solid
     /// fraction, before a cut.
     pub box_to: Vec<f64>,
-    /// Mass of all grains (kg).
-    pub mass: f64,
+    /// Mass of all grains (kg); unknown for a random sample of several materials, which is not
+    /// packed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mass: Option<f64>,
+    /// Number of grains of each material, by name; empty if there is one material, or if the sample
+    /// is not packed.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub materials: Vec<(String, usize)>,
 }
 
 /// A wall.
@@ -95,7 +102,7 @@ impl Check {
     ///
     /// # Errors
     /// For a sample that is not random, the errors of a run before its first step:
-    /// [`RunError::SampleFile`], [`RunError::File`], [`RunError::Sample`].
+    /// [`RunError::SceneFile`], [`RunError::File`], [`RunError::Sample`].
     pub fn new(scene: &Scene) -> Result<Self, RunError> {
         let grains = count(scene)?;
         let (memory_bytes, free_memory_bytes) = (memory::expected(scene, grains), memory::free());
@@ -116,7 +123,7 @@ impl Check {
             grains,
             sample: sample_name(&scene.sample),
             sizes,
-            bonds: has_bonds(scene),
+            bonds: scene.has_bonds(),
             walls: walls.collect(),
             steps: scene.time.steps(),
             step: scene.time.step,
@@ -153,12 +160,18 @@ impl fmt::Display for Check {
         }
         writeln!(f, "dimension  {}", self.dimension)?;
         writeln!(f, "grains     {} ({})", self.grains, self.sample)?;
-        if let Some(Sizes { diameters: [min, mean, max], box_from, box_to, mass }) = &self.sizes {
+        if let Some(Sizes { diameters: [min, mean, max], box_from, box_to, mass, materials }) = &self.sizes {
             writeln!(f, "diameters  {} to {} m, mean {} m", number(*min), number(*max), number(*mean))?;
             let sides: Vec<String> = box_from.iter().zip(box_to).map(|(from, to)| number(to - from)).collect();
             let corner: Vec<String> = box_from.iter().map(|x| number(*x)).collect();
             writeln!(f, "box        {} m, from ({}) m", sides.join(" × "), corner.join(", "))?;
-            writeln!(f, "mass       {} kg", number(*mass))?;
+            if let Some(mass) = mass {
+                writeln!(f, "mass       {} kg", number(*mass))?;
+            }
+            if !materials.is_empty() {
+                let shares: Vec<String> = materials.iter().map(|(name, count)| format!("{name} {count}")).collect();
+                writeln!(f, "materials  {} grains", shares.join(", "))?;
+            }
         }
         writeln!(f, "bonds      {}", if self.bonds { "yes" } else { "none" })?;
         let walls: Vec<String> =
@@ -185,7 +198,7 @@ impl fmt::Display for Check {
 /// Number of grains of a scene, before a cut.
 ///
 /// # Errors
-/// [`RunError::SampleFile`], [`RunError::File`]: a sample file that cannot be read.
+/// [`RunError::SceneFile`], [`RunError::File`]: a sample file that cannot be read.
 pub(crate) fn count(scene: &Scene) -> Result<usize, RunError> {
     match &scene.sample {
         Sample::File(file) => sample_file::count(&file.path),
@@ -200,9 +213,18 @@ fn look<D: Dim>(scene: &Scene, enough_memory: bool) -> Result<(Option<Sizes>, Ve
         Sample::Random(random) if enough_memory => Some(random_sizes::<D>(scene, random)),
         _ if enough_memory => {
             let Placed { grains, warnings, .. } = place::<D>(scene, None, &mut |_| true)?;
+            // its bonds are made only to find what is wrong with them
+            bonds::of_sample(scene, &grains)?;
             let (low, high) = grains.bounds();
             let corners = [low, high].map(|x| x.as_slice().to_vec());
-            return Ok((Some(Sizes::of(&grains.radius, corners, grains.mass.iter().sum())), warnings));
+            let count = |k: usize| (0..grains.len()).filter(|grain| grains.material_of(*grain) == k).count();
+            let names = scene.materials.names().into_iter().enumerate();
+            let materials = match grains.material.is_empty() {
+                true => vec![],
+                false => names.map(|(k, name)| (name.to_string(), count(k))).collect(),
+            };
+            let sizes = Sizes::of(&grains.radius, corners, Some(grains.mass.iter().sum()));
+            return Ok((Some(Sizes { materials, ..sizes }), warnings));
         }
         _ => None,
     };
@@ -216,14 +238,15 @@ fn random_sizes<D: Dim>(scene: &Scene, random: &RandomSample) -> Sizes {
     let radii = prepare::radii(random, scene.seed);
     let corners = [vec![0.0; D::N], prepare::sides::<D>(random, &radii)];
     let volume: f64 = radii.iter().map(|r| D::volume(*r)).sum();
-    Sizes::of(&radii, corners, volume * scene.materials.density * scene.thickness())
+    let mass = volume * scene.materials.density * scene.thickness();
+    Sizes::of(&radii, corners, scene.materials.named.is_empty().then_some(mass))
 }
 
 impl Sizes {
-    fn of(radii: &[f64], [box_from, box_to]: [Vec<f64>; 2], mass: f64) -> Self {
+    fn of(radii: &[f64], [box_from, box_to]: [Vec<f64>; 2], mass: Option<f64>) -> Self {
         let (low, high) = radii.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), r| (low.min(*r), high.max(*r)));
         let mean = radii.iter().sum::<f64>() / radii.len() as f64;
-        Self { diameters: [low, mean, high].map(|r| 2.0 * r), box_from, box_to, mass }
+        Self { diameters: [low, mean, high].map(|r| 2.0 * r), box_from, box_to, mass, materials: vec![] }
     }
 }
 
@@ -256,10 +279,6 @@ fn sample_name(sample: &Sample) -> &'static str {
     }
 }
 
-fn has_bonds(scene: &Scene) -> bool {
-    scene.bonds.as_ref().is_some_and(|bonds| bonds.cohesion(scene.dimension, 1.0, 1.0) > 0.0)
-}
-
 /// Estimated size of the history of `grains` grains (bytes), from the rows of `dem_run::history`
 /// and a typical number of contacts. The error may be 50 %.
 fn expected_bytes(scene: &Scene, grains: usize) -> u64 {
@@ -271,7 +290,7 @@ fn expected_bytes(scene: &Scene, grains: usize) -> u64 {
     let real = if scene.output.precision == Precision::Single { 4.0 } else { NUMBER };
     let (d, spins, angles, tangents) = if scene.dimension == 2 { (2.0, 1.0, 1.0, 0.0) } else { (3.0, 3.0, 4.0, 3.0) };
     let contacts = memory::contacts_per_grain(scene) * grains as f64;
-    let bonds = if has_bonds(scene) { contacts } else { 0.0 };
+    let bonds = if scene.has_bonds() { contacts } else { 0.0 };
     // position, velocity, angular velocity, angle
     let grain_rows = grains as f64 * real * (2.0 * d + spins + angles);
     // point, normal, tangent, reaction, moment, gap; the pair, the status and the bond

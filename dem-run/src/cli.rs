@@ -8,13 +8,14 @@ use std::process::ExitCode;
 
 use crate::accuracy::{self, AccuracyOptions};
 use crate::arguments::{
-    AccuracyArgs, CheckArgs, Command, ExecutionArgs, ExportArgs, PackArgs, ResumeArgs, RunArgs, SceneArgs, ShowArgs,
-    SolveArgs, SweepArgs, arguments,
+    AccuracyArgs, CheckArgs, Command, ExecutionArgs, ExportArgs, LimitArgs, PackArgs, ResumeArgs, RunArgs, SceneArgs,
+    ShowArgs, SolveArgs, SweepArgs, arguments,
 };
 use crate::check::Check;
 use crate::destination::{apart, folder_or_new, not_itself, unicode, writable};
 use crate::error::RunError;
 use crate::export::{self, ExportOptions};
+use crate::limit::{self, LimitOptions};
 use crate::output::{default_folder, escaped, print_json, print_result};
 use crate::pack::{self, PackOptions};
 use crate::resume::{self, ResumeOptions};
@@ -32,6 +33,7 @@ pub fn main() -> ExitCode {
         Command::Resume(args) => resume(args),
         Command::Pack(args) => pack(args),
         Command::Check(args) => check(&args),
+        Command::Limit(args) => limit(args),
         Command::Export(args) => export(args),
         Command::Solve(args) => solve(args),
         Command::Accuracy(args) => accuracy(args),
@@ -134,6 +136,11 @@ fn check(args: &CheckArgs) -> Result<(), RunError> {
         let _ = writeln!(std::io::stderr(), "warning: {warning}");
     }
     Ok(print_result(&check, args.json)?)
+}
+
+fn limit(args: LimitArgs) -> Result<(), RunError> {
+    let options = LimitOptions { execution: args.execution.into(), json: args.json };
+    limit::limit(&args.scene.load()?, &options)
 }
 
 fn export(args: ExportArgs) -> Result<(), RunError> {

@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::error::RunError;
 use crate::history::refuse_busy;
 use crate::run::RunOptions;
-use crate::scene::{Sample, Scene};
+use crate::scene::Scene;
 
 /// Rejects an output that is the input, with or without `--force`.
 pub(crate) fn not_itself(read: &Path, written: &Path) -> Result<(), RunError> {
@@ -22,9 +22,7 @@ fn same_file(a: &Path, b: &Path) -> bool {
 /// Rejects outputs that the run reads, and two outputs in one file, with or without `--force`.
 pub(crate) fn apart(path: &Path, scene: &Scene, options: &RunOptions) -> Result<(), RunError> {
     let mut read = vec![path];
-    if let Sample::File(file) = &scene.sample {
-        read.push(&file.path);
-    }
+    read.extend(scene.files().map(|(file, _)| file.as_path()));
     for (written, option) in [(Some(&options.output), "-o"), (options.write_sample.as_ref(), "--write-sample")] {
         let Some(written) = written else { continue };
         if read.iter().any(|read| same_file(read, written)) {

@@ -35,9 +35,11 @@ pub enum RunError {
         /// Why.
         source: Cause,
     },
-    /// The sample file that a scene names cannot be opened.
-    #[error("sample.file.path: {} cannot be read: {source}", .path.display())]
-    SampleFile {
+    /// A file that a scene names cannot be opened.
+    #[error("{field}: {} cannot be read: {source}", .path.display())]
+    SceneFile {
+        /// The field that names it.
+        field: &'static str,
         /// The file.
         path: PathBuf,
         /// Why.
@@ -175,6 +177,9 @@ pub enum NoConvergence {
         /// The step that was not solved.
         last: u64,
     },
+    /// Of a limit load.
+    #[error("the limit load was not found: the programme was not solved to an error of 1e-7")]
+    Limit,
     /// In a file.
     #[error("{}: {why}", .path.display())]
     Problem {
@@ -204,7 +209,7 @@ impl RunError {
             Self::Scene(SceneError::Read { .. }) => 4,
             Self::Scene(_) | Self::Sample(_) | Self::Usage(_) | Self::NotUnicode { .. } => 2,
             Self::NoConvergence(_) => 3,
-            Self::File { .. } | Self::SampleFile { .. } | Self::Content { .. } | Self::Unfit { .. } => 4,
+            Self::File { .. } | Self::SceneFile { .. } | Self::Content { .. } | Self::Unfit { .. } => 4,
             Self::Overwrites { .. } | Self::Memory { .. } | Self::Disk { .. } | Self::System { .. } => 4,
             Self::InputOutput(_) | Self::History(_) | Self::Problem(_) | Self::Write(_) => 4,
             Self::Json(_) | Self::Table(_) | Self::Sweep(_) => 4,

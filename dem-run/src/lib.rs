@@ -2,17 +2,22 @@
 
 pub mod accuracy;
 mod arguments;
+pub mod bond_list;
+pub mod bonds;
 pub mod build;
 pub mod check;
 pub mod cli;
 pub mod clock;
 pub mod collapse;
 pub mod course;
+mod csv_lines;
 mod destination;
 mod dimension;
 pub mod error;
 pub mod export;
 pub mod fclib;
+pub mod limit;
+pub mod materials;
 pub mod memory;
 pub mod pack;
 pub mod packings;

@@ -14,7 +14,7 @@ const GRAIN: f64 = 300.0;
 /// fill-in of Newton's factor per grain grows with the sample.
 #[must_use]
 pub fn expected(scene: &Scene, grains: usize) -> u64 {
-    let bonded = scene.bonds.as_ref().is_some_and(|bonds| bonds.bear());
+    let bonded = scene.has_bonds();
     let contacts = contacts_per_grain(scene) * grains as f64;
     let newton = match scene.solver.kind {
         SolverKind::Newton(_) | SolverKind::Interior(_) => true,

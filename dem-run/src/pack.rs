@@ -84,7 +84,7 @@ fn pack_in<D: Dim>(
         progress.note(&format!("warning: {}", warnings::of_packing(moved)));
     }
     let (grains, scene, path) = (balls.len(), options.scene.clone(), &options.output);
-    sample_file::write::<D>(balls, path)?;
+    sample_file::write::<D>(balls, (&[], &[]), path)?;
     let of_sample = |set: &String| set.starts_with("sample.") || set.starts_with("sample=");
     let set = options.set.iter().filter(|set| !of_sample(set)).cloned().collect();
     let packed = Packed { scene, set, grains, solid_fraction, cpu_time: cpu_time(), sample: path.clone() };

@@ -88,7 +88,7 @@ fn write<D: Dim>(path: &Path, name: &str, packing: &Packing<D>) -> Result<(), Ru
     let unsettled = packing.unsettled.map_or("none".into(), |moved| moved.to_string());
     let fraction = packing.solid_fraction;
     let mut content = format!("# packing {name}\n# solid fraction {fraction}\n# unsettled {unsettled}\n").into_bytes();
-    sample_file::write_to::<D>(packing.balls.iter().copied(), &mut content)?;
+    sample_file::write_to::<D>(packing.balls.iter().copied(), (&[], &[]), &mut content)?;
     let sum = format!("{SUM}{}\n", hex(&Sha256::digest(&content)));
     let file = [sum.into_bytes(), content].concat();
     replace::write(path, &file).map_err(|error| refused(path, "cannot be written", error))
@@ -157,7 +157,7 @@ mod tests {
         assert_eq!(obtained::<D>(&folder), (bits(&packed), true));
         assert_eq!(obtained::<D>(&folder), (bits(&packed), false));
         let [file] = &files(&folder)[..] else { panic!("one file: {:?}", files(&folder)) };
-        assert_eq!(sample_file::read::<D>(file).expect("a sample file"), packed.balls);
+        assert_eq!(sample_file::read::<D>(file, &[]).expect("a sample file").balls, packed.balls);
         // how far a packing still moved comes back too
         let moving = Packing { unsettled: Some(1.0 / 3.0), ..packed };
         write(file, "another", &moving).expect("written");

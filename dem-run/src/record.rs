@@ -184,7 +184,7 @@ fn describe<D: Dim>(
     parameters: Parameters,
 ) -> (Layout, Vec<Measure<D>>) {
     let bonded = !world.bonds.is_empty();
-    let friction = world.settings.friction > 0.0 || world.walls.iter().any(|w| w.friction > 0.0);
+    let friction = world.has_friction();
     // without friction, bonds and torques, grains keep their spin
     let turning = world.grains.spin.iter().any(|w| w.norm() > 0.0) || world.loads.iter().any(|l| l.torque.norm() > 0.0);
     let (mut observables, measures): (Vec<_>, _) = observables.into_iter().unzip();
@@ -201,9 +201,14 @@ fn describe<D: Dim>(
             radius: world.grains.radius.clone(),
             mass: world.grains.mass.clone(),
             inertia: world.grains.inertia.clone(),
+            material: world.grains.material.clone(),
         },
         walls: world.walls.iter().zip(scene.walls.keys()).map(|(wall, name)| describe_wall(wall, name)).collect(),
         bonds: describe_bonds(world),
+        materials: match world.grains.material.is_empty() {
+            true => vec![],
+            false => scene.materials.names().into_iter().map(String::from).collect(),
+        },
         observables,
         parameters,
     };

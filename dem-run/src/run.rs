@@ -99,7 +99,8 @@ pub(crate) fn run_in<D: Dim>(scene: &Scene, options: &RunOptions, interrupt: &In
     }
     if let Some(path) = &options.write_sample {
         let grains = &built.world.grains;
-        sample_file::write::<D>(grains.position.iter().copied().zip(grains.radius.iter().copied()), path)?;
+        let balls = grains.position.iter().copied().zip(grains.radius.iter().copied());
+        sample_file::write::<D>(balls, (&grains.material, &scene.materials.names()), path)?;
     }
     let recorder = Recorder::create(&options.output, options.overwrite, scene, &built)?;
     let course = Course::new(scene, &built.world);
@@ -346,7 +347,7 @@ impl<D: Dim> RunState<D> {
             grains: world.grains.len(),
             solid_fraction,
             bonds: world.bonds.len(),
-            gap_tolerance: scene.bonds.as_ref().filter(|bonds| bonds.bear()).map(|bonds| bonds.gap_tolerance),
+            gap_tolerance: scene.bonds.as_ref().filter(|_| scene.has_bonds()).map(|bonds| bonds.gap_tolerance),
             elastic,
             broken: course.broken,
             twists: scene.twists(),

@@ -1,18 +1,27 @@
 //! Samples as CSV tables: reads the grains of a scene, writes those of a run.
 
+use crate::csv_lines::{Lines, Wrong};
 use crate::error::RunError;
 use crate::output::replace;
 use crate::prepare::Ball;
-use crate::scene::{LARGEST, MAX_GRAINS, open_regular, shorten};
+use crate::scene::{BASE, LARGEST, MAX_GRAINS, shorten};
 use dem_core::dim::{Dim, Vect};
-use std::fs::File;
-use std::io::{BufRead, BufReader, Read, Write};
-use std::path::{Path, PathBuf};
+use std::io::{BufRead, Write};
+use std::path::Path;
 
-/// Maximum number of wrong lines that are reported individually.
-const MOST_TOLD: usize = 20;
-/// Maximum length of a line (bytes), so that a file without line breaks is not read into memory.
-const LONGEST_LINE: usize = 4096;
+/// The field of a scene that names a sample file.
+const FIELD: &str = "sample.file.path";
+/// The column of the names of materials, the last one, which may be absent.
+const MATERIAL: &str = "material";
+
+/// The grains of a table.
+#[derive(Debug)]
+pub struct Table<D: Dim> {
+    /// Centres and radii (m).
+    pub balls: Vec<Ball<D>>,
+    /// Material of each grain, a place in the list of names; empty without the column.
+    pub material: Vec<u8>,
+}
 
 fn header<D: Dim>() -> &'static [&'static str] {
     if D::N == 2 { &["x", "y", "radius"] } else { &["x", "y", "z", "radius"] }
@@ -22,9 +31,9 @@ fn header<D: Dim>() -> &'static [&'static str] {
 /// and comments.
 ///
 /// # Errors
-/// [`RunError::SampleFile`], [`RunError::File`], [`RunError::Sample`].
+/// [`RunError::SceneFile`], [`RunError::File`], [`RunError::Sample`].
 pub fn count(path: &Path) -> Result<usize, RunError> {
-    let mut lines = Lines::open(path)?;
+    let mut lines = Lines::open(path, FIELD)?;
     let mut count = 0_usize;
     while lines.next()? {
         count += 1;
@@ -32,29 +41,34 @@ pub fn count(path: &Path) -> Result<usize, RunError> {
     Ok(count.saturating_sub(1))
 }
 
-/// The grains of a CSV file with the header `x,y,radius` or `x,y,z,radius` (m).
+/// The grains of a CSV file with the header `x,y,radius` or `x,y,z,radius` (m), to which `material`
+/// may be added: one of `materials`.
 ///
 /// # Errors
-/// [`RunError::SampleFile`] and [`RunError::File`] for a file that cannot be read,
+/// [`RunError::SceneFile`] and [`RunError::File`] for a file that cannot be read,
 /// [`RunError::Sample`] with all wrong lines.
-pub fn read<D: Dim>(path: &Path) -> Result<Vec<Ball<D>>, RunError> {
-    parse::<D, _>(Lines::open(path)?)
+pub fn read<D: Dim>(path: &Path, materials: &[&str]) -> Result<Table<D>, RunError> {
+    parse::<D, _>(Lines::open(path, FIELD)?, materials)
 }
 
-/// As [`read`], from text that was read from the file `path`.
+/// As [`read`] without materials, from text that was read from the file `path`.
 ///
 /// # Errors
 /// [`RunError::Sample`] with all wrong lines.
 pub fn read_text<D: Dim>(path: &Path, text: &str) -> Result<Vec<Ball<D>>, RunError> {
-    parse::<D, _>(Lines::new(path, text.as_bytes()))
+    Ok(parse::<D, _>(Lines::new(path, text.as_bytes()), &[BASE])?.balls)
 }
 
-fn parse<D: Dim, R: BufRead>(mut lines: Lines<R>) -> Result<Vec<Ball<D>>, RunError> {
-    let mut wrong = Wrong { name: lines.path.display().to_string(), told: vec![], count: 0 };
-    let header = header::<D>().join(",");
+fn parse<D: Dim, R: BufRead>(mut lines: Lines<R>, materials: &[&str]) -> Result<Table<D>, RunError> {
+    let mut wrong = Wrong::of(&lines.path);
+    let (columns, header) = (header::<D>().len(), header::<D>().join(","));
     lines.next()?;
+    let mut with_material = false;
     match lines.fields().map(|fields| fields.collect::<Vec<_>>().join(",")) {
         Ok(found) if found == header => {}
+        Ok(found) if found.strip_prefix(&header).is_some_and(|rest| rest == format!(",{MATERIAL}")) => {
+            with_material = true;
+        }
         Ok(found) => {
             let commas = if found.contains([';', '\t']) { ", between commas" } else { "" };
             let found = shorten(&found);
@@ -64,32 +78,51 @@ fn parse<D: Dim, R: BufRead>(mut lines: Lines<R>) -> Result<Vec<Ball<D>>, RunErr
     }
     // below a wrong header, lines cannot be checked
     wrong.end()?;
-    let mut balls = Vec::new();
+    let mut table = Table { balls: vec![], material: vec![] };
     while lines.next()? {
-        match lines.fields().and_then(|fields| ball::<D>(&fields.collect::<Vec<_>>())) {
-            Ok(ball) => balls.push(ball),
+        let row = lines.fields().and_then(|fields| {
+            let mut fields: Vec<&str> = fields.collect();
+            let expected = columns + usize::from(with_material);
+            if fields.len() != expected {
+                let values = if fields.len() == 1 { "value" } else { "values" };
+                return Err(format!("it has {} {values}, the header has {expected}", fields.len()));
+            }
+            let material = if with_material { fields.pop() } else { None };
+            let material = material.map(|name| self::material(name, materials)).transpose();
+            Ok((ball::<D>(&fields)?, material?))
+        });
+        match row {
+            Ok((ball, material)) => {
+                table.balls.push(ball);
+                table.material.extend(material);
+            }
             Err(what) => wrong.tell(lines.number, what),
         }
-        if balls.len() > MAX_GRAINS {
+        if table.balls.len() > MAX_GRAINS {
             wrong.tell(lines.number, format!("there are more than {MAX_GRAINS} grains"));
             break;
         }
     }
     wrong.end()?;
-    if balls.is_empty() {
+    if table.balls.is_empty() {
         wrong.tell(lines.number, "there are no grains in the file".into());
     }
     wrong.end()?;
-    Ok(balls)
+    Ok(table)
+}
+
+/// The place of the material `name` in the list of names.
+fn material(name: &str, materials: &[&str]) -> Result<u8, String> {
+    let place = materials.iter().position(|known| *known == name).and_then(|place| u8::try_from(place).ok());
+    let (shown, known) = (shorten(name), materials.join(", "));
+    place.ok_or_else(|| {
+        format!("material is {shown:?}, it must be one of: {known}; materials.named of the scene adds one")
+    })
 }
 
 /// The grain of a line, or the error of the line.
 fn ball<D: Dim>(fields: &[&str]) -> Result<Ball<D>, String> {
     let header = header::<D>();
-    if fields.len() != header.len() {
-        let values = if fields.len() == 1 { "value" } else { "values" };
-        return Err(format!("it has {} {values}, the header has {}", fields.len(), header.len()));
-    }
     let mut numbers = [0.0; 4];
     let mut wrong = vec![];
     for (k, (field, name)) in fields.iter().zip(header).enumerate() {
@@ -105,100 +138,19 @@ fn ball<D: Dim>(fields: &[&str]) -> Result<Ball<D>, String> {
     if wrong.is_empty() { Ok((D::Vector::from_slice(&numbers[..D::N]), radius)) } else { Err(wrong.join("; ")) }
 }
 
-/// The lines of a table that are neither empty nor a comment.
-struct Lines<R> {
-    path: PathBuf,
-    inner: R,
-    line: Vec<u8>,
-    /// Number of the current line, from 1.
-    number: u64,
-}
-
-impl Lines<BufReader<File>> {
-    fn open(path: &Path) -> Result<Self, RunError> {
-        let file = open_regular(path).map_err(|source| RunError::SampleFile { path: path.into(), source })?;
-        Ok(Self::new(path, BufReader::new(file)))
-    }
-}
-
-impl<R: BufRead> Lines<R> {
-    fn new(path: &Path, inner: R) -> Self {
-        Self { path: path.into(), inner, line: vec![], number: 0 }
-    }
-
-    /// Reads the next line; returns false at the end of the file.
-    fn next(&mut self) -> Result<bool, RunError> {
-        loop {
-            self.line.clear();
-            let most = LONGEST_LINE as u64 + 1;
-            self.inner.by_ref().take(most).read_until(b'\n', &mut self.line).map_err(|error| RunError::File {
-                path: self.path.clone(),
-                doing: "cannot be read",
-                source: error.into(),
-            })?;
-            if self.line.is_empty() {
-                return Ok(false);
-            }
-            self.number += 1;
-            if self.line.len() > LONGEST_LINE {
-                let (name, number) = (self.path.display(), self.number);
-                return Err(RunError::Sample(vec![format!(
-                    "{name}, line {number}: it has more than {LONGEST_LINE} bytes: write one grain per line"
-                )]));
-            }
-            if self.number == 1 && self.line.starts_with("\u{feff}".as_bytes()) {
-                self.line.drain(..3);
-            }
-            let text = self.line.trim_ascii();
-            if !text.is_empty() && text[0] != b'#' {
-                return Ok(true);
-            }
-        }
-    }
-
-    /// The fields of the current line, without enclosing quotes.
-    fn fields(&self) -> Result<impl Iterator<Item = &str>, String> {
-        let text = std::str::from_utf8(&self.line).map_err(|_| "it is not UTF-8 text".to_string())?;
-        Ok(text.split(',').map(|field| field.trim().trim_matches('"')))
-    }
-}
-
-/// The errors of a file.
-struct Wrong {
-    name: String,
-    told: Vec<String>,
-    count: usize,
-}
-
-impl Wrong {
-    fn tell(&mut self, line: u64, what: String) {
-        self.count += 1;
-        if self.told.len() < MOST_TOLD {
-            self.told.push(format!("{}, line {line}: {what}", self.name));
-        }
-    }
-
-    /// Returns the errors found so far, if any.
-    fn end(&mut self) -> Result<(), RunError> {
-        if self.count == 0 {
-            return Ok(());
-        }
-        let more = self.count - self.told.len();
-        if more > 0 {
-            self.told.push(format!("{}: {more} more lines are wrong", self.name));
-        }
-        Err(RunError::Sample(std::mem::take(&mut self.told)))
-    }
-}
-
 /// Writes the grains to a CSV file that [`read`] reads back bit for bit. An old file stays until
-/// the new one is complete.
+/// the new one is complete. `materials`: the materials of the grains, places in the list of names;
+/// empty for a table without the column.
 ///
 /// # Errors
 /// [`RunError::File`]: a file that cannot be written.
-pub fn write<D: Dim>(balls: impl IntoIterator<Item = Ball<D>>, path: &Path) -> Result<(), RunError> {
+pub fn write<D: Dim>(
+    balls: impl IntoIterator<Item = Ball<D>>,
+    materials: (&[u8], &[&str]),
+    path: &Path,
+) -> Result<(), RunError> {
     let mut content = Vec::new();
-    write_to::<D>(balls, &mut content)?;
+    write_to::<D>(balls, materials, &mut content)?;
     // a device cannot be replaced
     let written = match path.exists() && !path.is_file() {
         true => std::fs::write(path, &content),
@@ -211,11 +163,17 @@ pub fn write<D: Dim>(balls: impl IntoIterator<Item = Ball<D>>, path: &Path) -> R
 ///
 /// # Errors
 /// `out` cannot be written.
-pub fn write_to<D: Dim>(balls: impl IntoIterator<Item = Ball<D>>, out: impl Write) -> Result<(), csv::Error> {
+pub fn write_to<D: Dim>(
+    balls: impl IntoIterator<Item = Ball<D>>,
+    (materials, names): (&[u8], &[&str]),
+    out: impl Write,
+) -> Result<(), csv::Error> {
     let mut writer = csv::Writer::from_writer(out);
-    writer.write_record(header::<D>())?;
-    for (x, r) in balls {
-        writer.write_record(x.as_slice().iter().chain([&r]).map(f64::to_string))?;
+    writer.write_record(header::<D>().iter().chain((!materials.is_empty()).then_some(&MATERIAL)))?;
+    for (k, (x, r)) in balls.into_iter().enumerate() {
+        let name = materials.get(k).and_then(|place| names.get(usize::from(*place)));
+        let numbers = x.as_slice().iter().chain([&r]).map(f64::to_string);
+        writer.write_record(numbers.chain(name.map(ToString::to_string)))?;
     }
     writer.flush()?;
     Ok(())
@@ -224,7 +182,9 @@ pub fn write_to<D: Dim>(balls: impl IntoIterator<Item = Ball<D>>, out: impl Writ
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::csv_lines::MOST_TOLD;
     use dem_core::dim::{D2, D3};
+    use std::path::PathBuf;
 
     fn file(text: &str) -> (tempfile::TempDir, PathBuf) {
         let folder = tempfile::tempdir().expect("folder");
@@ -235,7 +195,7 @@ mod tests {
 
     fn refused(text: &str) -> Vec<String> {
         let (_folder, path) = file(text);
-        let Err(RunError::Sample(told)) = read::<D2>(&path) else { panic!("not refused: {text}") };
+        let Err(RunError::Sample(told)) = read::<D2>(&path, &[BASE, "stone"]) else { panic!("not refused: {text}") };
         told
     }
 
@@ -261,13 +221,28 @@ mod tests {
     }
 
     #[test]
+    fn materials_are_a_column_that_is_written_as_it_is_read() {
+        let text = "x,y,radius,material\n0,0,1,base\n2,0,1,stone\n4,0,1,stone\n";
+        let (folder, path) = file(text);
+        let names = [BASE, "stone"];
+        let table = read::<D2>(&path, &names).expect("a sample with materials");
+        assert_eq!(table.material, [0, 1, 1]);
+        let again = folder.path().join("again.csv");
+        write::<D2>(table.balls, (&table.material, &names), &again).expect("write");
+        assert_eq!(std::fs::read_to_string(again).expect("read"), text);
+        let told = refused("x,y,radius,material\n0,0,1,stoen\n2,0,1\n4,0,1,base\n");
+        assert!(told[0].contains("line 2: material is \"stoen\", it must be one of: base, stone"), "{told:?}");
+        assert!(told[1].contains("line 3: it has 3 values, the header has 4") && told.len() == 2, "{told:?}");
+    }
+
+    #[test]
     fn lines_are_counted_as_they_are_read() {
         for text in [
             "x,y,z,radius\n# two grains\n0,0,0,1\n\n2,0,0,1",
             "\u{feff}\"x\", \"y\",\"z\",\"radius\"\r\n0, 0,0,1\r\n2,0,0,1\r\n",
         ] {
             let (_folder, path) = file(text);
-            assert_eq!((count(&path).expect("count"), read::<D3>(&path).expect("grains").len()), (2, 2));
+            assert_eq!((count(&path).expect("count"), read::<D3>(&path, &[BASE]).expect("grains").balls.len()), (2, 2));
         }
     }
 }

@@ -82,7 +82,11 @@ pub(crate) fn of_walls<D: Dim>(scene: &Scene, walls: &[Wall<D>], grains: Option<
         let Some(motion) = DriveMotion::of(wall, scene.time.end) else { continue };
         let alone = !others_push(scene) && !pushes.iter().enumerate().any(|(other, push)| *push && other != k);
         let word = match grains {
-            _ if motion.along_surface => along(wall.friction, alone),
+            _ if motion.along_surface => {
+                let own = scene.walls[name].friction;
+                let materials = 0..=scene.materials.named.len();
+                along(materials.map(|k| scene.materials.wall_friction_of(k, own)).fold(0.0, f64::max), alone)
+            }
             Some(grains) => {
                 pulled(wall, &motion, grains).or_else(|| alone.then(|| apart(wall, &motion, grains)).flatten())
             }

@@ -11,6 +11,7 @@ mod gauss_seidel;
 mod graph;
 mod history;
 mod interior;
+pub mod limit_load;
 mod newton;
 mod rows;
 mod solvable;

@@ -272,3 +272,23 @@ pub(super) mod certificate {
     /// round-off does not put it outside.
     pub const ROUNDING: f64 = 4.0 * f64::EPSILON;
 }
+
+/// The limit load, a conic programme.
+pub(super) mod limit_load {
+    /// Error of the balance, of the mechanism and of the load at which the programme is solved, and
+    /// the largest that is accepted. Double precision reaches some 1e-11 on samples of 430 disks.
+    pub const TOLERANCE: f64 = 1e-10;
+    pub const ACCEPT: f64 = 1e-7;
+    /// Largest net force, or work on a contact, of a certificate, relative to its load.
+    pub const CERTIFICATE: f64 = 1e-9;
+    /// Most iterations. Samples take 15 to 40.
+    pub const MOST: usize = 150;
+    /// Iterations without progress after which the best point is returned.
+    pub const PATIENCE: usize = 5;
+    /// Share of the way to the boundary of the cones.
+    pub const TO_THE_BOUNDARY: f64 = 0.99;
+    /// Regularisation of the balance equations, relative to their smallest diagonal entry, and the
+    /// number of refinements that remove it.
+    pub const RIDGE: f64 = 1e-10;
+    pub const REFINEMENTS: usize = 3;
+}

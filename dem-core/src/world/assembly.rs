@@ -18,7 +18,7 @@ const TOUCHING: f64 = 1e-9;
 
 /// The same for a contact with a reaction in the previous step. It was closed then, and only solver
 /// errors have opened it since; a stiff contact would lose its force to them at once.
-const CLOSED: f64 = 1e-6;
+pub(super) const CLOSED: f64 = 1e-6;
 
 /// Gap, over the radius of the grain, below which a pair is part of the problem even if it does not
 /// close.
@@ -30,7 +30,7 @@ const SPARE: f64 = 0.15;
 /// State of the bonds at the start of a step, by bond index.
 pub(super) struct Brought<D: Dim> {
     /// Reactions of elastic bonds (N, N m); empty if all bonds are rigid.
-    carried: Vec<Local<D::Tangent, D::Moment>>,
+    pub carried: Vec<Local<D::Tangent, D::Moment>>,
     /// Length corrections.
     pub turns: Vec<Turn>,
     /// Factor on the strengths (–): one, except in trials of next-event loading.
@@ -233,7 +233,15 @@ impl<D: Dim> World<D> {
 
     /// Friction coefficient of a dry contact (–).
     fn friction_of(&self, pair: [u32; 2]) -> f64 {
-        match (pair[1] as usize).checked_sub(self.grains.len()) {
+        let wall = (pair[1] as usize).checked_sub(self.grains.len());
+        if let Some(table) = &self.settings.material_friction {
+            let material = |k: u32| self.grains.material_of(k as usize);
+            return match wall {
+                None => table.grain_grain[material(pair[0]) * table.count + material(pair[1])],
+                Some(wall) => table.grain_wall[material(pair[0]) * self.walls.len() + wall],
+            };
+        }
+        match wall {
             None => self.settings.friction,
             Some(wall) => self.walls[wall].friction,
         }

@@ -6,6 +6,7 @@
 mod assembly;
 mod event;
 mod ledger;
+mod limit_load;
 mod limits;
 mod motion;
 mod observe;
@@ -41,6 +42,17 @@ pub struct Restitution {
     pub threshold_speed: f64,
 }
 
+/// Friction coefficients of several materials.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MaterialFriction {
+    /// Number of materials K.
+    pub count: usize,
+    /// Between grains of the materials a and b at a K + b (–), K × K and symmetric.
+    pub grain_grain: Vec<f64>,
+    /// Between a grain of material a and wall w of W at a W + w (–), K × W.
+    pub grain_wall: Vec<f64>,
+}
+
 /// Settings of a run.
 #[derive(Clone, Debug)]
 pub struct Settings<D: Dim> {
@@ -50,6 +62,9 @@ pub struct Settings<D: Dim> {
     pub gravity: Option<D::Vector>,
     /// Friction coefficient between grains (–).
     pub friction: f64,
+    /// Friction coefficients in place of `friction` and of those of the walls, if there are several
+    /// materials.
+    pub material_friction: Option<MaterialFriction>,
     /// Restitution, if there is any.
     pub restitution: Option<Restitution>,
     /// Flow rule of bonds at their limit.
@@ -127,6 +142,7 @@ impl<D: Dim> Default for Settings<D> {
             step: 1e-4,
             gravity: None,
             friction: 0.0,
+            material_friction: None,
             restitution: None,
             bond_flow: BondFlow::default(),
             rupture: Rupture::default(),
@@ -173,23 +189,7 @@ impl<D: Dim> World<D> {
     /// Pairs of two fixed grains get no bond, since nothing can strain it, nor do pairs that
     /// already have one, intact or broken.
     pub fn form_bonds(&mut self, gap_tolerance: f64, strength: impl Fn(f64) -> f64, friction: f64) {
-        // a superset of the pairs: the gap decides below
-        let skin: Vec<f64> = self.grains.radius.iter().map(|r| 2.0 * gap_tolerance * r).collect();
-        let mut bonds = Vec::new();
-        for pair in pairs_within(&self.grains, &self.grains.position, &skin) {
-            let [i, j] = pair.map(|k| k as usize);
-            let mean_diameter = self.grains.radius[i] + self.grains.radius[j];
-            let apart = separation::<D>(self.grains.position[i], self.grains.position[j]);
-            let rest_gap = apart.norm() - mean_diameter;
-            let strength = strength(mean_diameter);
-            let was_bonded = self.grains.fixed[i] && self.grains.fixed[j];
-            if rest_gap <= gap_tolerance * mean_diameter && strength > 0.0 && !was_bonded {
-                let status = BondStatus::Intact;
-                let (shear, rolling, twist, stiffness) = (friction, friction, 0.0, None);
-                bonds.push(Bond { pair, rest_gap, mean_diameter, strength, shear, rolling, twist, stiffness, status });
-            }
-        }
-        self.add_bonds(bonds);
+        self.add_bonds(close_pairs(&self.grains, gap_tolerance, |_, mean_diameter| strength(mean_diameter), friction));
     }
 
     /// Add bonds. A pair that already has a bond, intact or broken, keeps it.
@@ -264,6 +264,14 @@ impl<D: Dim> World<D> {
         self.time = snapshot.time;
     }
 
+    /// Whether some dry contact may have friction.
+    pub fn has_friction(&self) -> bool {
+        match &self.settings.material_friction {
+            Some(table) => table.grain_grain.iter().chain(&table.grain_wall).any(|mu| *mu > 0.0),
+            None => self.settings.friction > 0.0 || self.walls.iter().any(|wall| wall.friction > 0.0),
+        }
+    }
+
     /// Number of intact bonds.
     pub fn intact_bonds(&self) -> usize {
         self.bonds.iter().filter(|b| b.status == BondStatus::Intact).count()
@@ -289,4 +297,31 @@ impl<D: Dim> World<D> {
         self.walls.iter_mut().for_each(|w| w.velocity = D::Vector::zero());
         self.ledger.kinetic = 0.0;
     }
+}
+
+/// The bonds that [`World::form_bonds`] would add, but with a strength that may depend on the
+/// pair (the lower index first) and its mean diameter (m).
+pub fn close_pairs<D: Dim>(
+    grains: &Grains<D>,
+    gap_tolerance: f64,
+    strength: impl Fn([usize; 2], f64) -> f64,
+    friction: f64,
+) -> Vec<Bond> {
+    // a superset of the pairs: the gap decides below
+    let skin: Vec<f64> = grains.radius.iter().map(|r| 2.0 * gap_tolerance * r).collect();
+    let mut bonds = Vec::new();
+    for pair in pairs_within(grains, &grains.position, &skin) {
+        let [i, j] = pair.map(|k| k as usize);
+        let mean_diameter = grains.radius[i] + grains.radius[j];
+        let apart = separation::<D>(grains.position[i], grains.position[j]);
+        let rest_gap = apart.norm() - mean_diameter;
+        let strength = strength([i, j], mean_diameter);
+        let was_bonded = grains.fixed[i] && grains.fixed[j];
+        if rest_gap <= gap_tolerance * mean_diameter && strength > 0.0 && !was_bonded {
+            let status = BondStatus::Intact;
+            let (shear, rolling, twist, stiffness) = (friction, friction, 0.0, None);
+            bonds.push(Bond { pair, rest_gap, mean_diameter, strength, shear, rolling, twist, stiffness, status });
+        }
+    }
+    bonds
 }

@@ -58,6 +58,7 @@ impl<D: Dim> Grains<D> {
             mass: from.reals(n)?.to_vec(),
             inertia: from.reals(n)?.to_vec(),
             fixed: (0..n).map(|_| from.flag()).collect::<Result<_, _>>()?,
+            material: Vec::new(),
         })
     }
 }
@@ -66,6 +67,9 @@ impl<D: Dim> World<D> {
     /// Write everything that changes from step to step; the grains come first.
     pub fn save(&self, to: &mut Saved) {
         self.grains.save(to);
+        if self.settings.material_friction.is_some() {
+            (0..self.grains.len()).for_each(|k| to.count(self.grains.material_of(k)));
+        }
         to.count(self.steps as usize);
         to.real(self.time);
         to.real(self.load_time);
@@ -98,12 +102,19 @@ impl<D: Dim> World<D> {
     /// # Errors
     /// [`Mismatch`].
     pub fn restored(
-        grains: Grains<D>,
+        mut grains: Grains<D>,
         walls: Vec<Wall<D>>,
         loads: Vec<Load<D>>,
         settings: Settings<D>,
         from: &mut Reader,
     ) -> Result<Self, Mismatch> {
+        if let Some(table) = &settings.material_friction {
+            let material = |_| {
+                let place = from.count()?;
+                u8::try_from(place).ok().filter(|_| place < table.count).ok_or(Mismatch)
+            };
+            grains.material = (0..grains.len()).map(material).collect::<Result<_, _>>()?;
+        }
         let mut world = Self::new(grains, walls, loads, settings);
         let n = world.grains.len();
         world.steps = from.count()? as u64;

@@ -50,6 +50,7 @@ pub fn settings<D: Dim>(step: f64) -> Settings<D> {
         max_halvings: 0,
         thickness: 1.0,
         expel_overlaps: false,
+        ..Settings::default()
     }
 }
 

@@ -174,6 +174,7 @@ fn scene<D: Dim>(dice: &mut Dice, Size { grains: most, sweeps, solver, cylinders
         max_halvings: dice.pick(&[0, 4]),
         thickness: 1.0,
         expel_overlaps: false,
+        ..Settings::default()
     };
     if dice.one_in(3) {
         let (grain_grain, grain_wall) = (dice.unit(), dice.unit());

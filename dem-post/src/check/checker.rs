@@ -36,6 +36,8 @@ pub(super) struct Sizes {
     pub w: usize,
     pub b: usize,
     pub t: usize,
+    /// Materials, where there are several.
+    pub k: usize,
     /// Complete rows of contacts M, ruptures E and observed steps S.
     pub m: usize,
     pub e: usize,

@@ -62,6 +62,7 @@ pub(super) fn check(c: &mut Checker) {
     numbers(c);
     codes(c, "walls/kind", WallKind::ALL.len() as u8);
     codes(c, "walls/drive", WallDrive::ALL.len() as u8);
+    codes(c, "particles/grains/material", c.sizes.k.min(255) as u8);
     codes(c, ROUTE, SolverRoute::ALL.len() as u8);
     signs(c);
     places(c);
@@ -174,7 +175,7 @@ fn committed(c: &mut Checker) -> Vec<[u64; 2]> {
 /// Checks that every number of every dataset of floats is finite and of a plausible magnitude.
 fn numbers(c: &mut Checker) {
     let whole = |place: &str| {
-        ["step", "start", "count", "pair", "id", "bond"].contains(&place.rsplit('/').next().unwrap_or(""))
+        ["step", "start", "count", "pair", "id", "bond", "material"].contains(&place.rsplit('/').next().unwrap_or(""))
     };
     let places: Vec<String> = c.sound.keys().cloned().collect();
     for place in places {

@@ -12,6 +12,7 @@ const I32: TypeDescriptor = TypeDescriptor::Integer(IntSize::U4);
 const I64: TypeDescriptor = TypeDescriptor::Integer(IntSize::U8);
 const U32: TypeDescriptor = TypeDescriptor::Unsigned(IntSize::U4);
 const U64: TypeDescriptor = TypeDescriptor::Unsigned(IntSize::U8);
+const U8: TypeDescriptor = TypeDescriptor::Unsigned(IntSize::U1);
 const TEXT: TypeDescriptor = TypeDescriptor::VarLenUnicode;
 
 /// Members of a rupture: 64-bit integers and floats, then 32-bit integers. Layouts before version 3
@@ -207,6 +208,15 @@ fn grains(c: &mut Checker) {
     c.table("particles/grains/id", &I32, n, &[], "");
     for (name, unit) in [("radius", "m"), ("mass", "kg"), ("inertia", "kg m2")] {
         c.table(&format!("particles/grains/{name}"), &F64, n, &[], unit);
+    }
+    // both or neither
+    if c.has("particles/grains/material") || c.has("materials/name") {
+        let names = c.count("materials/name");
+        c.sizes.k = names;
+        c.table("materials/name", &TEXT, names, &[], "");
+        // texts contain no numbers to check
+        c.sound.remove("materials/name");
+        c.table("particles/grains/material", &U8, n, &[], "");
     }
     let real = reals(c);
     c.element("particles/grains/position", &real, &[n, d], "m");

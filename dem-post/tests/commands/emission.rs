@@ -15,6 +15,7 @@ fn chain(steps: &[i64], energy: f64) -> (tempfile::TempDir, PathBuf) {
         radius: vec![1e-3; count],
         mass: vec![1.0; count],
         inertia: vec![1.0; count],
+        material: vec![],
     };
     let bonds = steps.len();
     l.bonds = Bonds {

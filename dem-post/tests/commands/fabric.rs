@@ -26,6 +26,7 @@ fn lattice(dimension: usize, n: usize) -> (tempfile::TempDir, PathBuf) {
         radius: vec![1e-3; count],
         mass: vec![1.0; count],
         inertia: vec![1.0; count],
+        material: vec![],
     };
     let mut writer = Writer::create(&path, &l, false).unwrap();
     for step in 0..3 {

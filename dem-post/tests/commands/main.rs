@@ -39,7 +39,13 @@ fn layout(dimension: usize) -> Layout {
     Layout {
         dimension,
         friction: true,
-        grains: Grains { id: vec![0, 1, 2, 3], radius: vec![1e-3; 4], mass: vec![1.0; 4], inertia: vec![1.0; 4] },
+        grains: Grains {
+            id: vec![0, 1, 2, 3],
+            radius: vec![1e-3; 4],
+            mass: vec![1.0; 4],
+            inertia: vec![1.0; 4],
+            material: vec![],
+        },
         walls: vec![wall("bottom", 1.0, WallDrive::Fixed), wall("top", -1.0, WallDrive::Force)],
         bonds: Bonds {
             pair: vec![[0, 1], [1, 2], [2, 3], [3, 0]],

@@ -165,7 +165,7 @@ fn frames_with_the_same_pairs_share_their_lines() {
 
 /// A falling grain without contacts.
 fn falling(path: &Path, frames: usize) -> Writer {
-    let grains = Grains { id: vec![0], radius: vec![1.0], mass: vec![1.0], inertia: vec![1.0] };
+    let grains = Grains { id: vec![0], radius: vec![1.0], mass: vec![1.0], inertia: vec![1.0], material: vec![] };
     let l = Layout { dimension: 2, grains, ..Layout::default() };
     let mut writer = Writer::create(path, &l, false).unwrap();
     for k in 0..frames {

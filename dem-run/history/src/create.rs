@@ -211,6 +211,11 @@ pub(super) fn grains(file: &File, layout: &Layout) -> hdf5::Result<Group> {
     fixed(&group, "radius", "m", &n, &grains.radius)?;
     fixed(&group, "mass", "kg", &n, &grains.mass)?;
     fixed(&group, "inertia", "kg m2", &n, &grains.inertia)?;
+    if !grains.material.is_empty() {
+        fixed(&group, "material", "", &n, &grains.material)?;
+        let names: Vec<VarLenUnicode> = layout.materials.iter().map(|name| text(name)).collect();
+        fixed(&file.create_group("materials")?, "name", "", &[names.len()], &names)?;
+    }
     Ok(group)
 }
 

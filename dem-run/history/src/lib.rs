@@ -19,6 +19,8 @@
 //!     angle                {step, time, value[T,N]}: rad, 2D only, if rotation
 //!     orientation          {step, time, value[T,N,4]}: quaternions w x y z, 3D only, if rotation
 //!     id, radius, mass, inertia [N]
+//!     material u8[N]       place in /materials/name, if there are several materials
+//! /materials/name [K]      if there are several; `base` comes first
 //! /walls/                  name, kind [W]       enum PLANE, CIRCLE, CYLINDER, SPHERE
 //!     drive [W]            enum FIXED, VELOCITY, FORCE
 //!     normal [W,D]         plane: unit normal towards the grains; cylinder: unit axis; else 0

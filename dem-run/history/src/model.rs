@@ -25,13 +25,15 @@ pub struct Layout {
     pub walls: Vec<Wall>,
     /// The bonds, B; empty for a scene without any.
     pub bonds: Bonds,
+    /// Names of the materials; empty if there is one.
+    pub materials: Vec<String>,
     /// The observables recorded at every step.
     pub observables: Vec<Observable>,
     /// Provenance of the run.
     pub parameters: Parameters,
 }
 
-/// The constant properties of the grains; each array has N entries.
+/// The constant properties of the grains; each array has N entries, unless it says otherwise.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Grains {
     /// Names of the grains.
@@ -42,6 +44,8 @@ pub struct Grains {
     pub mass: Vec<f64>,
     /// Moments of inertia about the centre, kg m².
     pub inertia: Vec<f64>,
+    /// Materials, as places in the list of their names; empty if there is one material.
+    pub material: Vec<u8>,
 }
 
 /// The bonds as they were formed; each array has B entries.

@@ -160,6 +160,7 @@ impl History {
             grains: self.grains()?,
             walls: self.walls()?,
             bonds: self.bonds()?,
+            materials: self.materials()?,
             observables: observed::observables(&self.source)?,
             parameters: self.parameters()?,
         })
@@ -243,13 +244,43 @@ impl History {
         let id: Vec<i32> = self.source.whole(&format!("{}/id", path::GRAINS), 1)?;
         let place = |name: &str| format!("{}/{name}", path::GRAINS);
         let column = |name: &str| self.source.column(&place(name), self.grains);
-        let grains = Grains { radius: column("radius")?, mass: column("mass")?, inertia: column("inertia")?, id };
+        let grains = Grains {
+            radius: column("radius")?,
+            mass: column("mass")?,
+            inertia: column("inertia")?,
+            material: self.material(&place("material"))?,
+            id,
+        };
         if grains.id.is_empty() {
             return Err(self.source.damaged(&place("id"), "there is no grain"));
         }
         sound::radii(&self.source.path, &place("radius"), &grains.radius)?;
         sound::positive(&self.source.path, &place("mass"), &grains.mass)?;
         Ok(grains)
+    }
+
+    /// Materials of the grains, read from `place`; empty if there is one material.
+    fn material(&self, place: &str) -> Result<Vec<u8>> {
+        if !self.source.has(place) {
+            return Ok(vec![]);
+        }
+        let material: Vec<u8> = self.source.whole(place, 1)?;
+        let names = self.materials()?.len();
+        if material.len() != self.grains {
+            return Err(self.source.damaged(place, "it does not have one material for each grain"));
+        }
+        match material.iter().position(|own| usize::from(*own) >= names) {
+            None => Ok(material),
+            Some(grain) => Err(sound::row(&self.source.path, place, grain, "a material without a name")),
+        }
+    }
+
+    /// Names of the materials; empty if there is one.
+    ///
+    /// # Errors
+    /// [`HistoryError::Damaged`].
+    pub fn materials(&self) -> Result<Vec<String>> {
+        if self.source.has(path::MATERIALS) { self.source.texts(path::MATERIALS) } else { Ok(vec![]) }
     }
 
     /// The walls; empty for a scene without any.

@@ -18,6 +18,7 @@ pub(super) mod path {
     pub const COMMIT_EVENTS: &str = "commit_rows/events";
     pub const COMMIT_STEPS: &str = "commit_rows/steps";
     pub const GRAINS: &str = "particles/grains";
+    pub const MATERIALS: &str = "materials/name";
     pub const WALLS: &str = "walls";
     pub const CONTACTS: &str = "contacts";
     pub const BONDS: &str = "bonds";

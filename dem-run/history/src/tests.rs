@@ -27,6 +27,7 @@ fn full(dimension: usize) -> Layout {
             radius: vec![0.1, 0.2, 0.3],
             mass: vec![1.0, 2.0, 3.0],
             inertia: vec![0.5, 0.6, 0.7],
+            material: vec![0, 1, 1],
         },
         walls: vec![
             wall("sol", WallKind::Plane, WallDrive::Fixed, 0.0),
@@ -40,6 +41,7 @@ fn full(dimension: usize) -> Layout {
             rolling: vec![0.1, 0.25],
             mean_diameter: vec![0.3, 0.5],
         },
+        materials: vec!["base".into(), "pâte".into()],
         observables: vec![
             Observable::new("kinetic_energy", "J", &[]),
             Observable::new("stress", "Pa", &[dimension, dimension]),
@@ -62,7 +64,7 @@ fn full(dimension: usize) -> Layout {
 fn bare() -> Layout {
     Layout {
         dimension: 2,
-        grains: Grains { id: vec![0], radius: vec![1.0], mass: vec![1.0], inertia: vec![1.0] },
+        grains: Grains { id: vec![0], radius: vec![1.0], mass: vec![1.0], inertia: vec![1.0], material: vec![] },
         ..Layout::default()
     }
 }
@@ -157,7 +159,7 @@ fn check(path: &Path, l: &Layout, frames: usize) {
     let h = History::open(path).unwrap();
     assert_eq!((h.dimension(), h.frames()), (l.dimension, frames));
     assert_eq!(h.grains().unwrap(), l.grains);
-    assert_eq!(h.bonds().unwrap(), l.bonds);
+    assert_eq!((h.bonds().unwrap(), h.materials().unwrap()), (l.bonds.clone(), l.materials.clone()));
     assert_eq!(h.parameters().unwrap(), l.parameters);
     assert_eq!(h.walls().unwrap(), l.walls);
     for k in 0..frames {

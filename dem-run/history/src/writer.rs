@@ -381,6 +381,11 @@ fn check_layout(layout: &Layout) -> Result<()> {
     check_length("particles/grains/radius", grains.radius.len(), n)?;
     check_length("particles/grains/mass", grains.mass.len(), n)?;
     check_length("particles/grains/inertia", grains.inertia.len(), n)?;
+    if !grains.material.is_empty() || !layout.materials.is_empty() {
+        check_length("particles/grains/material", grains.material.len(), n)?;
+        let most = grains.material.iter().max().map_or(0, |most| usize::from(*most) + 1);
+        check_length("materials/name", layout.materials.len(), layout.materials.len().max(most))?;
+    }
     for (place, column) in [
         ("bonds/rest_gap", &bonds.rest_gap),
         ("bonds/strength", &bonds.strength),

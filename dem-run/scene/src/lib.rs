@@ -16,8 +16,10 @@ mod difference;
 mod error;
 pub mod failure;
 mod function;
+mod material;
 mod model;
 pub mod parse;
+mod region;
 mod sample;
 pub mod schema;
 mod set;
@@ -37,10 +39,12 @@ pub use difference::{Difference, differences};
 pub use error::shorten;
 pub use error::{Origin, Problem, SceneError};
 pub use function::{Function, Ramp};
+pub use material::{BASE, Friction, MaterialPair, Materials, NamedMaterial, PairBonds, Restitution};
 pub use model::{
-    Bonds, Flow, Friction, Grains, Load, Materials, Output, Precision, Restitution, Rupture, Scatter, Scene, Springs,
-    Stiffness, Stop, Time, TravelFrom, WallTravel, Young, choose_load_wall,
+    Bonds, Flow, Grains, Load, Output, Precision, Rupture, Scatter, Scene, Springs, Stiffness, Stop, Time, TravelFrom,
+    WallTravel, Young, choose_load_wall,
 };
+pub use region::Region;
 pub use sample::{
     Compaction, Cut, Deposition, Diameters, GrainSpec, Lattice, Preparation, RandomSample, Sample, SampleFile, Section,
     UniformRange,
@@ -52,8 +56,8 @@ pub use wall::*;
 
 /// Reads the scene in the file `path`, applies the `--set` assignments and validates the result.
 ///
-/// The path of a sample file is relative to the scene file; in the returned scene it is already
-/// joined to the scene's folder.
+/// The paths of a sample file and of a list of bonds are relative to the scene file; in the
+/// returned scene they are already joined to the scene's folder.
 ///
 /// # Errors
 /// [`SceneError`]: an unreadable file, wrong syntax, wrong structure, or all wrong values.
@@ -61,7 +65,7 @@ pub fn load(path: &Path, assignments: &[String]) -> Result<Scene, SceneError> {
     let mut document = parse::parse(&path.display().to_string(), &read(path)?)?;
     set::apply(&mut document, assignments).map_err(|problems| document.wrong(problems))?;
     let mut scene = finish(&mut document).map_err(|problems| document.wrong(problems))?;
-    join_sample(&mut scene, path);
+    join_files(&mut scene, path);
     Ok(scene)
 }
 
@@ -108,10 +112,10 @@ pub fn open_regular(path: &Path) -> io::Result<File> {
     }
 }
 
-/// Resolves the path of a sample file relative to the scene file.
-fn join_sample(scene: &mut Scene, path: &Path) {
-    if let (Sample::File(file), Some(folder)) = (&mut scene.sample, path.parent()) {
-        file.path = folder.join(&file.path);
+/// Resolves the paths of the files of a scene relative to the scene file.
+fn join_files(scene: &mut Scene, path: &Path) {
+    if let Some(folder) = path.parent() {
+        scene.files_mut().for_each(|file| *file = folder.join(&*file));
     }
 }
 
@@ -175,7 +179,7 @@ impl Base {
                 .map_err(|problem| vec![problem.with_origin(Origin::Sweep(place.as_str().into()))])?;
         }
         let mut scene = finish(&mut document).map_err(|problems| document.located(problems))?;
-        join_sample(&mut scene, &self.path);
+        join_files(&mut scene, &self.path);
         Ok(scene)
     }
 }

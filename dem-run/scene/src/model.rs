@@ -2,11 +2,14 @@
 //! files.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::function::Function;
+use super::material::{Materials, PairBonds};
+use super::region::Region;
 use super::sample::Sample;
 use super::solver::Solver;
 use super::wall::{Drive, Wall};
@@ -31,7 +34,7 @@ pub struct Scene {
     pub thickness: Option<f64>,
     /// The grains.
     pub sample: Sample,
-    /// Density, friction and restitution.
+    /// Density, friction and restitution, and further materials.
     pub materials: Materials,
     /// Cohesive bonds between grains; default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -63,41 +66,6 @@ pub struct Scene {
     /// Conditions that end the run before `time.end`; default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stop: Option<Stop>,
-}
-
-/// Density, friction and restitution.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Materials {
-    /// Density of the grains (kg/m³).
-    pub density: f64,
-    /// Coefficients of friction.
-    pub friction: Friction,
-    /// Coefficients of restitution; default: zero.
-    #[serde(default)]
-    pub restitution: Restitution,
-}
-
-/// Coefficients of friction, for each pair of kinds.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Friction {
-    /// Between grains.
-    pub grain_grain: f64,
-    /// Between grains and walls.
-    pub grain_wall: f64,
-}
-
-/// Coefficients of normal restitution, for each pair of kinds.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct Restitution {
-    /// Between grains (0 to 1).
-    pub grain_grain: f64,
-    /// Between grains and walls (0 to 1).
-    pub grain_wall: f64,
-    /// Approach speed below which restitution is zero (m/s).
-    pub threshold_speed: f64,
 }
 
 /// Cohesive bonds, formed once, at the start, between all grains closer than `gap_tolerance`.
@@ -138,6 +106,17 @@ pub struct Bonds {
     /// Stiffness of elastic bonds. Without it, bonds are rigid.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<Stiffness>,
+    /// Regions without bonds, as notches and joints: no bond forms between two grains if the line
+    /// between their centres meets one of them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub absent: Vec<Region>,
+    /// CSV file of the bonds, instead of one between all grains closer than `gap_tolerance`: a
+    /// header `i,j` (two grains, counted from 0), to which `strength` (N), `shear` and `rolling`
+    /// may be added, in any order; an empty cell leaves the value to the scene. `scatter` does not
+    /// change listed strengths. A listed pair with a larger gap than `gap_tolerance` is an error. A
+    /// relative path starts from the folder of the scene.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub list: Option<PathBuf>,
 }
 
 /// Distribution of the strengths of bonds, relative to `strength` or `stress`.
@@ -384,6 +363,36 @@ impl Scene {
         self.bonds.as_ref().is_some_and(|bonds| bonds.twist.is_some())
     }
 
+    /// Whether some bond can bear a load.
+    #[must_use]
+    pub fn has_bonds(&self) -> bool {
+        let bears = |limit: Option<f64>| limit.is_some_and(|limit| limit > 0.0);
+        let pairs = || self.materials.pairs.iter().filter_map(|pair| pair.bonds.as_ref());
+        self.bonds.as_ref().is_some_and(|bonds| {
+            let of_pairs = pairs().any(|pair| bears(pair.strength.or(pair.stress)));
+            bears(bonds.strength.or(bonds.stress)) || of_pairs || bonds.list.is_some()
+        })
+    }
+
+    /// Paths of the files that the scene reads.
+    pub fn files_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
+        let sample = match &mut self.sample {
+            Sample::File(file) => Some(&mut file.path),
+            _ => None,
+        };
+        sample.into_iter().chain(self.bonds.as_mut().and_then(|bonds| bonds.list.as_mut()))
+    }
+
+    /// The same, to be read, each with what it holds.
+    pub fn files(&self) -> impl Iterator<Item = (&PathBuf, &'static str)> {
+        let sample = match &self.sample {
+            Sample::File(file) => Some((&file.path, "the sample")),
+            _ => None,
+        };
+        let list = self.bonds.as_ref().and_then(|bonds| bonds.list.as_ref());
+        sample.into_iter().chain(list.map(|path| (path, "the list of bonds")))
+    }
+
     /// Number of components of a spin or a torque: 1 in 2D, 3 in 3D.
     #[must_use]
     pub fn spin_components(&self) -> usize {
@@ -439,22 +448,28 @@ impl Time {
 }
 
 impl Bonds {
-    /// Whether a bond bears anything.
-    #[must_use]
-    pub fn bear(&self) -> bool {
-        self.strength.or(self.stress).is_some_and(|limit| limit > 0.0)
-    }
-
     /// Tensile strength r_coh (N) of the bond between two grains of mean diameter `mean_diameter`
     /// (m): the force given, or σ·a·t in 2D, σ·π·a²/4 in 3D, t the `thickness` (m).
     #[must_use]
     pub fn cohesion(&self, dimension: u8, mean_diameter: f64, thickness: f64) -> f64 {
-        match (self.strength, self.stress) {
-            (Some(strength), _) => strength,
-            (None, Some(stress)) if dimension == 2 => stress * mean_diameter * thickness,
-            (None, Some(stress)) => stress * std::f64::consts::PI * mean_diameter * mean_diameter / 4.0,
-            (None, None) => 0.0,
-        }
+        cohesion((self.strength, self.stress), dimension, mean_diameter, thickness)
+    }
+
+    /// The same of a bond between two materials, whose properties `pair` may replace its own.
+    #[must_use]
+    pub fn cohesion_of(&self, pair: Option<&PairBonds>, dimension: u8, mean_diameter: f64, thickness: f64) -> f64 {
+        let of_pair = pair.map(|pair| (pair.strength, pair.stress)).filter(|given| *given != (None, None));
+        cohesion(of_pair.unwrap_or((self.strength, self.stress)), dimension, mean_diameter, thickness)
+    }
+}
+
+/// Tensile strength (N) of a bond from a strength or a stress.
+fn cohesion(limit: (Option<f64>, Option<f64>), dimension: u8, mean_diameter: f64, thickness: f64) -> f64 {
+    match limit {
+        (Some(strength), _) => strength,
+        (None, Some(stress)) if dimension == 2 => stress * mean_diameter * thickness,
+        (None, Some(stress)) => stress * std::f64::consts::PI * mean_diameter * mean_diameter / 4.0,
+        (None, None) => 0.0,
     }
 }
 
@@ -498,6 +513,8 @@ mod tests {
             twist: None,
             flow: Flow::Associated,
             stiffness: None,
+            absent: vec![],
+            list: None,
         };
         assert!((bonds.cohesion(2, 4e-3, 0.01) - 40.0).abs() < 1e-12);
         assert!((bonds.cohesion(3, 4e-3, 0.01) - 4.0 * std::f64::consts::PI).abs() < 1e-12);

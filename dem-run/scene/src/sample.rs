@@ -198,7 +198,8 @@ impl Lattice {
 #[serde(deny_unknown_fields)]
 pub struct SampleFile {
     /// CSV file with the header `x,y,radius` (2D) or `x,y,z,radius` (3D), all in m. A relative path
-    /// starts from the folder of the scene. Lines that begin with `#` are comments.
+    /// starts from the folder of the scene. Lines that begin with `#` are comments. A further
+    /// column `material` holds names of `materials.named`, or `base`.
     pub path: PathBuf,
 }
 
@@ -217,6 +218,9 @@ pub struct GrainSpec {
     /// default: zero.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spin: Option<Vec<f64>>,
+    /// Name of its material, one of `materials.named`; default: `base`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub material: Option<String>,
     /// Density instead of the material's (kg/m³).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub density: Option<f64>,

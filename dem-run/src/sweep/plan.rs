@@ -11,7 +11,7 @@ use super::model::{Range, Spacing, Sweep, Values};
 use crate::error::RunError;
 use crate::output::hex;
 use crate::scene::parse::{self, Document};
-use crate::scene::{self, Base, Change, Origin, Problem, Sample, Scene, SceneError, shorten};
+use crate::scene::{self, Base, Change, Origin, Problem, Scene, SceneError, shorten};
 
 /// Maximum number of runs of a sweep: each run has its own files.
 const MOST_RUNS: u64 = 100_000;
@@ -73,10 +73,8 @@ impl Plan {
         })?;
         let runs = runs(&sweep, &base, &scene).map_err(|problems| wrong(&document, problems))?;
         for run in &runs {
-            if let Sample::File(file) = &run.scene.sample
-                && let Err(error) = std::fs::metadata(&file.path)
-            {
-                return Err(unreadable(&file.path, "the sample", error));
+            for (path, what) in run.scene.files() {
+                std::fs::metadata(path).map_err(|error| unreadable(path, what, error))?;
             }
         }
         let fields = sweep.vary.iter().flat_map(BTreeMap::keys).cloned().collect();
@@ -291,14 +289,14 @@ fn content(path: &Path) -> std::io::Result<Vec<u8>> {
 }
 
 /// SHA-256 of all data that determine a scene's history: the scene without its title, and the
-/// content of its sample file instead of the file's name.
-fn digest(scene: &Scene, samples: &mut HashMap<PathBuf, Vec<u8>>) -> String {
+/// content of the files that it reads instead of their names.
+fn digest(scene: &Scene, files: &mut HashMap<PathBuf, Vec<u8>>) -> String {
     let mut plain = Scene { schema: None, title: None, ..scene.clone() };
     let mut hash = Sha256::new();
-    if let Sample::File(file) = &mut plain.sample {
-        let path = std::mem::take(&mut file.path);
-        // a sample file that cannot be read is reported after all other errors
-        hash.update(samples.entry(path).or_insert_with_key(|path| content(path).unwrap_or_default()));
+    for file in plain.files_mut() {
+        let path = std::mem::take(file);
+        // a file that cannot be read is reported after all other errors
+        hash.update(files.entry(path).or_insert_with_key(|path| content(path).unwrap_or_default()));
     }
     hash.update(plain.to_json().unwrap_or_default());
     hex(&hash.finalize())

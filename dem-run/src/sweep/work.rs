@@ -16,7 +16,6 @@ use crate::error::RunError;
 use crate::history::sweep::{Outcome, State, Store};
 use crate::output::replace::move_to;
 use crate::progress::{Progress, RunsProgress};
-use crate::scene::Sample;
 use crate::signals::Interrupt;
 
 /// Interval between two checks for ended processes.
@@ -177,9 +176,9 @@ impl Crew<'_> {
 /// Writes the scene of a run to the start of its file.
 fn write_scene(file: &mut File, run: &PlannedRun) -> std::io::Result<()> {
     let mut scene = run.scene.clone();
-    if let Sample::File(sample) = &mut scene.sample {
+    for path in scene.files_mut() {
         // the scene file is in another folder
-        sample.path = std::path::absolute(&sample.path)?;
+        *path = std::path::absolute(&*path)?;
     }
     file.set_len(0)?;
     file.write_all(scene.to_json()?.as_bytes())?;

@@ -8,35 +8,35 @@
 //! Optim. 8, 1998.
 
 /// A vector of the algebra.
-pub(super) type Point = [f64; 3];
+pub(in crate::solver) type Point = [f64; 3];
 
 /// The scalar product.
 #[inline]
-pub(super) fn dot(a: &Point, b: &Point) -> f64 {
+pub(in crate::solver) fn dot(a: &Point, b: &Point) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// The Jordan product.
 #[inline]
-pub(super) fn product(a: &Point, b: &Point) -> Point {
+pub(in crate::solver) fn product(a: &Point, b: &Point) -> Point {
     [dot(a, b), a[0] * b[1] + b[0] * a[1], a[0] * b[2] + b[0] * a[2]]
 }
 
 /// x + a d.
 #[inline]
-pub(super) fn moved(x: &Point, a: f64, d: &Point) -> Point {
+pub(in crate::solver) fn moved(x: &Point, a: f64, d: &Point) -> Point {
     [x[0] + a * d[0], x[1] + a * d[1], x[2] + a * d[2]]
 }
 
 /// ‖a, b‖; in 2D, where b is zero, without a root.
 #[inline]
-pub(super) fn norm(a: f64, b: f64) -> f64 {
+pub(in crate::solver) fn norm(a: f64, b: f64) -> f64 {
     if b == 0.0 { a.abs() } else { a.hypot(b) }
 }
 
 /// The two eigenvalues x₀ ± ‖x₁, x₂‖, the larger one first.
 #[inline]
-pub(super) fn eigenvalues(x: &Point) -> [f64; 2] {
+pub(in crate::solver) fn eigenvalues(x: &Point) -> [f64; 2] {
     let length = norm(x[1], x[2]);
     [x[0] + length, x[0] - length]
 }
@@ -49,7 +49,7 @@ fn determinant(x: &Point) -> f64 {
 }
 
 /// The smaller eigenvalue of the product of a pair in the scaling that makes it commute, P(√x) z.
-pub(super) fn least_product(x: &Point, z: &Point) -> f64 {
+pub(in crate::solver) fn least_product(x: &Point, z: &Point) -> f64 {
     let (half, whole) = (dot(x, z), determinant(x) * determinant(z));
     whole / (half + (half * half - whole).max(0.0).sqrt())
 }
@@ -57,7 +57,7 @@ pub(super) fn least_product(x: &Point, z: &Point) -> f64 {
 /// An automorphism of Q for x, and its transposed inverse for z: the boosts along −w and w, with
 /// w₀² − w₁² − w₂² = 1.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Scaling {
+pub(in crate::solver) struct Scaling {
     w: Point,
 }
 
@@ -95,7 +95,7 @@ fn boosted(w: &Point, p: &Point) -> Point {
 
 /// The change of x that brings its eigenvalues between `low` and `high`, downwards by no more than
 /// `high`.
-pub(super) fn correction(x: &Point, low: f64, high: f64) -> Point {
+pub(in crate::solver) fn correction(x: &Point, low: f64, high: f64) -> Point {
     let length = norm(x[1], x[2]);
     let change = |value: f64| (value.clamp(low, high) - value).max(-high);
     let (up, down) = (change(x[0] + length), change(x[0] - length));
@@ -105,7 +105,7 @@ pub(super) fn correction(x: &Point, low: f64, high: f64) -> Point {
 
 /// The longest step from x along d that stays inside Q, in units of d; infinite if there is no
 /// limit.
-pub(super) fn reach(x: &Point, d: &Point) -> f64 {
+pub(in crate::solver) fn reach(x: &Point, d: &Point) -> f64 {
     // the roots of det(x + τ d) = c + 2 b τ + a τ², and where x₀ + τ d₀ vanishes
     let (a, c) = (determinant(d), determinant(x).max(0.0));
     let b = x[0] * d[0] - x[1] * d[1] - x[2] * d[2];

@@ -16,7 +16,7 @@
 //! with friction Acary, Armand, Nguyen & Shpakovych, Optim. Methods Softw. 39, 2024.
 
 mod aims;
-mod cones;
+pub(super) mod cones;
 mod continuation;
 mod coupling;
 mod direction;

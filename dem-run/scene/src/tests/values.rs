@@ -46,6 +46,46 @@ const FLAT_CASES: &[(&str, &str)] = &[
     ("grains.loads.0.torque=[1, 2, 3]", "grains.loads.0.torque"),
     ("grains.loads.0.time={\"table\": []}", "grains.loads.0.time.table"),
     ("grains.loads.0.time={\"table\": [[0, 1], [0, 2]]}", "grains.loads.0.time.table.1.0"),
+    // materials and regions
+    ("materials.named=[{\"name\": \"base\"}]", "materials.named.0.name"),
+    ("materials.named=[{\"name\": \"a b\"}]", "materials.named.0.name"),
+    ("materials.named=[{\"name\": \"a\"}, {\"name\": \"a\"}]", "materials.named.1.name"),
+    ("materials.named=[{\"name\": \"a\", \"density\": 0}]", "materials.named.0.density"),
+    ("materials.named=[{\"name\": \"a\", \"wall_friction\": -1}]", "materials.named.0.wall_friction"),
+    (
+        "materials.named=[{\"name\": \"a\", \"regions\": [{\"ball\": {\"center\": [0, 0], \"radius\": 0}}]}]",
+        "materials.named.0.regions.0.ball.radius",
+    ),
+    (
+        "materials.named=[{\"name\": \"a\", \"regions\": [{\"box\": {\"from\": [0, 1], \"to\": [1, 0]}}]}]",
+        "materials.named.0.regions.0.box.to.1",
+    ),
+    (
+        "materials.named=[{\"name\": \"a\", \"regions\": [{\"half_space\": {\"point\": [0, 1], \"normal\": [0, 0]}}]}]",
+        "materials.named.0.regions.0.half_space.normal",
+    ),
+    ("materials.pairs=[{\"between\": [\"base\", \"stone\"], \"friction\": 0.1}]", "materials.pairs.0.between.1"),
+    ("materials.pairs=[{\"between\": [\"base\", \"base\"]}]", "materials.pairs.0"),
+    ("materials.pairs=[{\"between\": [\"base\", \"base\"], \"friction\": -0.1}]", "materials.pairs.0.friction"),
+    (
+        "materials.pairs=[{\"between\": [\"base\", \"base\"], \"bonds\": {\"shear\": -0.1}}]",
+        "materials.pairs.0.bonds.shear",
+    ),
+    (
+        "materials.pairs=[{\"between\": [\"base\", \"base\"], \"bonds\": {\"strength\": 1, \"stress\": 1}}]",
+        "materials.pairs.0.bonds",
+    ),
+    (
+        "materials.pairs=[{\"between\": [\"base\", \"base\"], \"bonds\": {\"stiffness_factor\": 2}}]",
+        "materials.pairs.0.bonds.stiffness_factor",
+    ),
+    (
+        "materials.pairs=[{\"between\": [\"base\", \"base\"], \"friction\": 0}, {\"between\": [\"base\", \"base\"], \"friction\": 0}]",
+        "materials.pairs.1.between",
+    ),
+    ("sample.grains.1.material=stone", "sample.grains.1.material"),
+    ("bonds.absent=[{\"ball\": {\"center\": [0], \"radius\": 1}}]", "bonds.absent.0.ball.center"),
+    ("bonds.list=\"\"", "bonds.list"),
     // walls
     ("walls.bottom.shape.plane.normal=[0, 0]", "walls.bottom.shape.plane.normal"),
     ("walls.bottom.shape.plane.normal=[0, 1, 0]", "walls.bottom.shape.plane.normal"),
@@ -113,6 +153,7 @@ const SOLID_CASES: &[(&str, &str)] = &[
     ),
     ("sample={\"lattice\": {\"square\": {\"diameter\": 1, \"rows\": 1, \"columns\": 1}}}", "sample.lattice.square"),
     ("sample.random.cut={\"circle\": 0}", "sample.random.cut.circle"),
+    ("materials.named=[{\"name\": \"a\"}]", "materials.named.0.regions"),
     ("sample={\"lattice\": {\"cubic\": {\"diameter\": -1, \"counts\": [1, 1, 1]}}}", "sample.lattice.cubic.diameter"),
     ("sample={\"lattice\": {\"cubic\": {\"diameter\": 1, \"counts\": [1, 0, 1]}}}", "sample.lattice.cubic.counts.1"),
     (

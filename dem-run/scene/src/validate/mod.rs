@@ -3,6 +3,7 @@
 //! Only the scene itself is checked here. Whether a wall overlaps the sample is checked once the
 //! sample exists.
 
+mod material;
 pub(crate) mod report;
 mod sample;
 mod wall;
@@ -35,7 +36,7 @@ pub fn validate(scene: &Scene) -> Vec<Problem> {
         (_, None) => {}
     }
     sample::sample(&mut report, scene);
-    materials(&mut report, scene);
+    material::materials(&mut report, scene);
     if let Some(bonds) = &scene.bonds {
         self::bonds(&mut report, bonds, scene.dimension);
     }
@@ -54,16 +55,6 @@ pub fn validate(scene: &Scene) -> Vec<Problem> {
     rupture(&mut report, scene);
     stop(&mut report, scene);
     report.problems
-}
-
-fn materials(report: &mut Report, scene: &Scene) {
-    let materials = &scene.materials;
-    report.positive("materials.density", materials.density, "kg/m³");
-    report.non_negative("materials.friction.grain_grain", materials.friction.grain_grain, "no unit");
-    report.non_negative("materials.friction.grain_wall", materials.friction.grain_wall, "no unit");
-    report.fraction("materials.restitution.grain_grain", materials.restitution.grain_grain);
-    report.fraction("materials.restitution.grain_wall", materials.restitution.grain_wall);
-    report.non_negative("materials.restitution.threshold_speed", materials.restitution.threshold_speed, "m/s");
 }
 
 fn bonds(report: &mut Report, bonds: &Bonds, dimension: u8) {
@@ -86,6 +77,18 @@ fn bonds(report: &mut Report, bonds: &Bonds, dimension: u8) {
     for (name, value) in [("friction", bonds.friction), ("shear", bonds.shear), ("rolling", bonds.rolling)] {
         if let Some(value) = value {
             report.non_negative(format!("bonds.{name}"), value, "no unit");
+        }
+    }
+    for (k, region) in bonds.absent.iter().enumerate() {
+        material::region(report, &format!("bonds.absent.{k}"), region);
+    }
+    if let Some(list) = &bonds.list {
+        if list.as_os_str().is_empty() {
+            report.wrong("bonds.list", "an empty path", "the path of a CSV file");
+        }
+        if !bonds.absent.is_empty() {
+            let allowed = "nothing: bonds.list names all bonds";
+            report.wrong("bonds.absent", format!("{} regions", bonds.absent.len()), allowed);
         }
     }
     match bonds.scatter {

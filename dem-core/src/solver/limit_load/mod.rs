@@ -1,0 +1,74 @@
+//! The limit load: the largest factor λ for which reactions inside all cones balance the constant
+//! loads f₀ and λ times the growing loads f₁,
+//!
+//! maximise λ subject to H r + f₀ + λ f₁ = 0, r + r_coh n ∈ K.
+//!
+//! It is the static theorem of limit analysis (Drucker, Prager & Greenberg 1952; for assemblies
+//! of rigid blocks Livesley 1978), a second-order cone programme. A bond that holds keeps its
+//! reaction inside the cone, so that a load beyond λ breaks a bond, whatever the stiffness, the
+//! time step and the solver.
+//!
+//! The method is the homogeneous self-dual embedding with the scaling of Nesterov & Todd and
+//! Mehrotra's predictor–corrector (Andersen, Roos & Terlaky, Math. Program. 95, 2003). Where there
+//! is no optimum it ends at a proof: reactions that balance f₁ alone inside the cones without
+//! cohesion (the load is not bounded), or a mechanism that the loads drive at every λ (they are
+//! balanced at none).
+//!
+//! With x = (r̂, λ), A = (H, f₁), s = L r̂ in a product of cones Q:
+//!
+//! minimise c·x subject to A x = b, s = L r̂ ∈ Q, b = −f₀ + H (r_coh n), c = (0, ∓1).
+//!
+//! Eliminating s and the dual z leaves S δr̂ + Hᵀδy = p with S = Lᵀ W⁻² L block by block, and with
+//! that (H S⁻¹ Hᵀ) δy on the graph of the bodies, bordered by f₁.
+
+mod iterate;
+mod path;
+mod programme;
+mod scaling;
+mod system;
+
+use super::rows::{Rows, StiffnessRatio};
+use super::tuning::limit_load as tuning;
+use crate::dim::{Dim, Vect};
+use crate::problem::ContactProblem;
+use programme::Programme;
+use std::sync::Arc;
+
+pub use programme::LimitLoad;
+
+/// The limit load of a problem over a step of 1 s. The free velocities of the problem are those
+/// that the constant loads give, M⁻¹ f₀; `growing` are those of the growing loads, M⁻¹ f₁. All its
+/// contacts take part; geometry, bias, compliance and flow do not matter.
+pub fn limit_load<D: Dim>(problem: &ContactProblem<D>, growing: Arc<[(D::Vector, D::Spin)]>) -> LimitLoad {
+    let constant = problem.free.iter().any(|(v, w)| v.norm() > 0.0 || w.norm() > 0.0);
+    let rows = |free: Arc<[(D::Vector, D::Spin)]>| {
+        let loaded = ContactProblem { free, ..problem.clone() };
+        Rows::of(&loaded, 1.0, StiffnessRatio::default())
+    };
+    let load = rows(growing).free;
+    let mut programme = match Programme::of(rows(Arc::clone(&problem.free)), load) {
+        Ok(programme) => programme,
+        Err(known) => return known,
+    };
+    if constant {
+        // whether they are balanced at λ = 0: the least λ
+        programme.sense = 1.0;
+        match programme.solve() {
+            LimitLoad::Unbounded => {}
+            LimitLoad::Factor { lower, upper } => {
+                let least = 0.5 * (lower + upper);
+                if lower > tuning::ACCEPT.max((upper - lower).abs()) {
+                    return LimitLoad::BrokenAtStart { least };
+                }
+            }
+            other => return other,
+        }
+        programme.sense = -1.0;
+    }
+    match programme.solve() {
+        LimitLoad::Factor { lower, upper } if upper < -tuning::ACCEPT.max((upper - lower).abs()) => {
+            LimitLoad::NeverBalanced
+        }
+        found => found,
+    }
+}

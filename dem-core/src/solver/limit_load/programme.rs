@@ -1,0 +1,188 @@
+//! The programme: unknowns, cones, right sides, and the maps between them.
+
+use crate::solver::graph::Graph;
+use crate::solver::interior::cones::Point;
+use crate::solver::rows::{Row, Rows, TWIST};
+use std::ops::Range;
+use std::sync::Arc;
+
+/// What the largest load factor is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LimitLoad {
+    /// The loads are balanced up to the factor `upper` at most (the dual value), and up to `lower`
+    /// (the primal value); both are the same to the accuracy of the solution.
+    Factor {
+        /// Value of the reactions found.
+        lower: f64,
+        /// Value of the mechanism found.
+        upper: f64,
+    },
+    /// No load is too large: reactions inside the cones without cohesion balance the growing loads
+    /// alone (checked).
+    Unbounded,
+    /// The loads are balanced at no factor, or only at negative ones: the constant loads drive some
+    /// mechanism.
+    NeverBalanced,
+    /// The constant loads alone are not balanced; they are from this factor on.
+    BrokenAtStart {
+        /// Least factor that is balanced.
+        least: f64,
+    },
+    /// The method has not come to an end.
+    Undecided,
+}
+
+/// A cone of a contact: s = (slope r_n, r_a, r_b).
+pub(super) struct Side {
+    pub slope: f64,
+    /// Places of the other components among the rows of the contact that take part.
+    pub others: [Option<usize>; 2],
+}
+
+/// The unknown reactions of a contact: the rows that take part.
+pub(super) struct Site {
+    /// Places among the rows of the contact; the first is the normal row.
+    pub of: Vec<usize>,
+    /// Start in a list of reactions.
+    pub at: usize,
+    /// Its cones in the list of all.
+    pub cones: Range<usize>,
+}
+
+pub(super) struct Programme {
+    pub rows: Rows,
+    pub graph: Arc<Graph>,
+    pub sites: Vec<Site>,
+    pub sides: Vec<Side>,
+    /// Number of reactions.
+    pub size: usize,
+    /// Right side of the balance, and the growing load.
+    pub b: Vec<f64>,
+    pub load: Vec<f64>,
+    /// −1 to maximise λ, 1 to minimise it.
+    pub sense: f64,
+    /// The factor that one unit of the unknown λ stands for.
+    pub unit: f64,
+}
+
+pub(super) fn most(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |most: f64, value| most.max(value.abs()))
+}
+
+pub(super) fn sum(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+impl Programme {
+    /// The programme of these rows and this growing load; or what is known without it.
+    pub fn of(mut rows: Rows, mut load: Vec<f64>) -> Result<Self, LimitLoad> {
+        let mut constant = std::mem::take(&mut rows.free);
+        rows.list.retain(|row| row.width() > 0);
+        // forces in place of scaled ones: the largest coefficient of each unknown becomes 1
+        let largest = rows.largest();
+        for row in &rows.list {
+            let scales: Vec<f64> = unknowns(row).map(|unknown| largest[unknown]).collect();
+            let own = &mut rows.coefficients[row.start..][..row.rows.len() * row.width()];
+            own.chunks_exact_mut(row.width()).for_each(|line| line.iter_mut().zip(&scales).for_each(|(h, l)| *h /= l));
+        }
+        constant.iter_mut().zip(&largest).for_each(|(f, l)| *f /= l);
+        load.iter_mut().zip(&largest).for_each(|(f, l)| *f /= l);
+        if most(&load) == 0.0 {
+            return Err(LimitLoad::Unbounded);
+        }
+        let shifts = rows.list.iter().map(|row| row.shift).fold(0.0, f64::max);
+        let force = match shifts.max(most(&constant)) {
+            0.0 => most(&load),
+            force => force,
+        };
+        let (mut sites, mut sides, mut size) = (Vec::new(), Vec::new(), 0);
+        for row in &rows.list {
+            let site = site(row, &mut sides, size);
+            size += site.of.len();
+            sites.push(site);
+        }
+        let mut b: Vec<f64> = constant.iter().map(|f| -f / force).collect();
+        for row in rows.list.iter().filter(|row| row.shift > 0.0) {
+            rows.push_by(row, 0, 1.0, row.shift / force, &mut b);
+        }
+        let unit = force / most(&load);
+        load.iter_mut().for_each(|f| *f *= unit / force);
+        let graph = Graph::of(&rows, &mut None).ok_or(LimitLoad::Undecided)?;
+        Ok(Self { rows, graph, sites, sides, size, b, load, sense: -1.0, unit })
+    }
+
+    /// H r.
+    pub fn pushed(&self, r: &[f64]) -> Vec<f64> {
+        let mut y = vec![0.0; self.rows.unknowns];
+        for (site, row) in self.sites.iter().zip(&self.rows.list) {
+            site.of.iter().zip(&r[site.at..]).for_each(|(k, r)| self.rows.push_by(row, *k, 1.0, *r, &mut y));
+        }
+        y
+    }
+
+    /// Hᵀ y.
+    pub fn pulled(&self, y: &[f64]) -> Vec<f64> {
+        let of_site = |(site, row)| {
+            let site: &Site = site;
+            site.of.iter().map(move |k| self.rows.pulled_by(row, *k, y))
+        };
+        self.sites.iter().zip(&self.rows.list).flat_map(of_site).collect()
+    }
+
+    /// L r.
+    pub fn in_cones(&self, r: &[f64]) -> Vec<Point> {
+        let mut s = Vec::with_capacity(self.sides.len());
+        for site in &self.sites {
+            let own = &r[site.at..];
+            for side in &self.sides[site.cones.clone()] {
+                let [a, b] = side.others.map(|place| place.map_or(0.0, |k| own[k]));
+                s.push([side.slope * own[0], a, b]);
+            }
+        }
+        s
+    }
+
+    /// Lᵀ z.
+    pub fn of_cones(&self, z: &[Point]) -> Vec<f64> {
+        let mut r = vec![0.0; self.size];
+        for site in &self.sites {
+            let own = &mut r[site.at..];
+            for (side, z) in self.sides[site.cones.clone()].iter().zip(&z[site.cones.clone()]) {
+                own[0] += side.slope * z[0];
+                for (place, z) in side.others.iter().zip(&z[1..]) {
+                    if let Some(k) = place {
+                        own[*k] += z;
+                    }
+                }
+            }
+        }
+        r
+    }
+}
+
+/// The unknowns of a contact's bodies, in the order of its coefficients.
+pub(super) fn unknowns(row: &Row) -> impl Iterator<Item = usize> {
+    (0..2).flat_map(|side| row.at[side]..row.at[side] + row.count[side])
+}
+
+/// The rows of a contact that take part, and its cones. Rows with a coefficient of zero are zero.
+pub(super) fn site(row: &Row, sides: &mut Vec<Side>, at: usize) -> Site {
+    let (first, mut of) = (sides.len(), vec![0]);
+    let groups: [(f64, &[usize]); 3] = [(row.cone.mu, &[1, 2]), (row.cone.nu, &[3, 4]), (row.cone.xi, &[TWIST])];
+    for (slope, places) in groups {
+        let mut others = [None; 2];
+        let mut count = 0;
+        for (k, _) in row.rows.iter().enumerate().filter(|(_, place)| slope > 0.0 && places.contains(place)) {
+            others[count] = Some(of.len());
+            count += 1;
+            of.push(k);
+        }
+        if count > 0 {
+            sides.push(Side { slope, others });
+        }
+    }
+    if sides.len() == first {
+        sides.push(Side { slope: 1.0, others: [None; 2] });
+    }
+    Site { of, at, cones: first..sides.len() }
+}

@@ -1,0 +1,110 @@
+//! The scaling of cone pairs, and what it makes of the equations of one contact.
+
+use super::programme::{Programme, Site, sum};
+use crate::contact::PADDED;
+use crate::solver::interior::cones::{Point, Scaling, eigenvalues};
+
+/// Rows of a local matrix.
+pub(super) type Local = [[f64; PADDED]; PADDED];
+
+/// The scaling of a pair: W = η B(w), W z = W⁻¹ s.
+#[derive(Clone, Copy)]
+pub(super) struct Metric {
+    pub scaling: Scaling,
+    pub eta: f64,
+}
+
+impl Metric {
+    pub fn of(s: &Point, z: &Point) -> Self {
+        let size = |x: &Point| {
+            let [high, low] = eigenvalues(x);
+            high * low
+        };
+        Self { scaling: Scaling::of(s, z), eta: (size(s) / size(z)).sqrt().sqrt() }
+    }
+
+    /// W x.
+    pub fn times(&self, x: &Point) -> Point {
+        self.scaling.z(x).map(|x| x * self.eta)
+    }
+
+    /// W⁻¹ x.
+    pub fn inverse(&self, x: &Point) -> Point {
+        self.scaling.x(x).map(|x| x / self.eta)
+    }
+}
+
+/// S⁻¹ of a contact, from S = RᵀR with R the triangular factor of W⁻¹L. Near the end of the path S
+/// has stiff and soft directions twenty orders of magnitude apart, of which W⁻¹L keeps both.
+#[derive(Clone, Copy)]
+pub(super) struct Soft {
+    /// R⁻¹, upper triangular.
+    pub root: Local,
+    pub inverse: Local,
+}
+
+impl Soft {
+    /// None if W⁻¹L is singular to rounding.
+    pub fn of(of: &Programme, site: &Site, metrics: &[Metric]) -> Option<Self> {
+        let n = site.of.len();
+        let mut lines: Vec<[f64; PADDED]> = Vec::new();
+        for (side, metric) in of.sides[site.cones.clone()].iter().zip(&metrics[site.cones.clone()]) {
+            let mut block = [[0.0; PADDED]; 3];
+            let parts = [(Some(0), side.slope), (side.others[0], 1.0), (side.others[1], 1.0)];
+            for (component, (place, factor)) in parts.iter().enumerate() {
+                let Some(place) = place else { continue };
+                let mut unit = [0.0; 3];
+                unit[component] = *factor;
+                block.iter_mut().zip(metric.inverse(&unit)).for_each(|(line, value)| line[*place] += value);
+            }
+            lines.extend(block);
+        }
+        let r = triangular(lines, n);
+        let mut root = [[0.0; PADDED]; PADDED];
+        for column in 0..n {
+            for i in (0..=column).rev() {
+                let unit = if i == column { 1.0 } else { 0.0 };
+                let left = unit - (i + 1..=column).map(|k| r[i][k] * root[k][column]).sum::<f64>();
+                root[i][column] = left / r[i][i];
+            }
+        }
+        let mut inverse = [[0.0; PADDED]; PADDED];
+        for i in 0..n {
+            for j in 0..n {
+                inverse[i][j] = (i.max(j)..n).map(|k| root[i][k] * root[j][k]).sum();
+            }
+        }
+        let sound = inverse.iter().flatten().all(|value| value.is_finite());
+        sound.then_some(Self { root, inverse })
+    }
+
+    /// S⁻¹ x for the `n` rows of the contact.
+    pub fn times(&self, x: &[f64], n: usize) -> impl Iterator<Item = f64> + use<> {
+        let mut half = [0.0; PADDED];
+        (0..n).for_each(|k| half[k] = (0..=k).map(|i| self.root[i][k] * x[i]).sum());
+        let root = self.root;
+        (0..n).map(move |i| (i..n).map(|k| root[i][k] * half[k]).sum())
+    }
+}
+
+/// The triangular factor of a matrix of `n` columns, by Householder's reflections.
+pub(super) fn triangular(mut lines: Vec<[f64; PADDED]>, n: usize) -> Local {
+    for column in 0..n {
+        let norm = lines[column..].iter().map(|line| line[column] * line[column]).sum::<f64>().sqrt();
+        let head = lines[column][column];
+        let end = if head > 0.0 { -norm } else { norm };
+        let mut mirror: Vec<f64> = lines[column..].iter().map(|line| line[column]).collect();
+        mirror[0] -= end;
+        let square = sum(&mirror, &mirror);
+        for other in column..n {
+            if square > 0.0 {
+                let along = lines[column..].iter().zip(&mirror).map(|(line, m)| line[other] * m).sum::<f64>();
+                let factor = 2.0 * along / square;
+                lines[column..].iter_mut().zip(&mirror).for_each(|(line, m)| line[other] -= factor * m);
+            }
+        }
+    }
+    let mut r = [[0.0; PADDED]; PADDED];
+    (0..n).for_each(|i| r[i][i..n].copy_from_slice(&lines[i][i..n]));
+    r
+}

@@ -1,0 +1,63 @@
+//! The limit load of a world where it stands.
+
+use super::World;
+use super::assembly::{Brought, CLOSED};
+use super::motion::{Midpoint, Motion, Turn};
+use crate::body::Drive;
+use crate::contact::Local;
+use crate::dim::{Dim, Vect};
+use crate::solver::limit_load::{LimitLoad, limit_load};
+use std::sync::Arc;
+
+/// Velocities (m/s, rad/s) of all bodies, grains first.
+type Velocities<D> = Arc<[(<D as Dim>::Vector, <D as Dim>::Spin)]>;
+
+impl<D: Dim> World<D> {
+    /// The largest factor λ for which reactions that no contact law excludes balance the loads of
+    /// the time `from` (s) and λ times what they grow by until the time `to` (s): weight, loads on
+    /// grains and forces on walls, with the bodies at their places. Walls without a force drive are
+    /// supports.
+    ///
+    /// All intact bonds take part, and all other pairs whose gap is at most 1e-6 of the smaller
+    /// radius. The world does not change.
+    pub fn limit_load(&mut self, from: f64, to: f64) -> LimitLoad {
+        let start = self.velocities_given(true, |value| value(from));
+        // without the weight, whose rounding would be a load
+        let growth = self.velocities_given(false, |value| value(to) - value(from));
+        let mid = Midpoint::of(&self.grains, &self.walls);
+        let still: Vec<_> = start.iter().map(|_| (D::Vector::zero(), D::Spin::zero())).collect();
+        let at_rest = Motion { before: still.clone(), free: still.into() };
+        let mut touches = self.detect(&mid, &at_rest, 1.0);
+        touches.retain(|stored| {
+            let gap = self.geometry(&mid, stored.pair).0;
+            stored.bond().is_some() || gap <= CLOSED * self.smaller(stored.pair)
+        });
+        let (carried, turns) = (vec![Local::zero(); self.bonds.len()], vec![Turn::default(); self.bonds.len()]);
+        let motion = Motion { before: at_rest.before, free: start };
+        let brought = Brought { carried, turns, strengthened: 1.0 };
+        let (problem, _) = self.assemble(&mid, &touches, &motion, &brought, 0.0, 1.0);
+        limit_load(&problem, growth)
+    }
+
+    /// The velocities that loads give to bodies at rest in a step of 1 s; `of` makes the factor of
+    /// a load from its function of time.
+    fn velocities_given(&self, weight: bool, of: impl Fn(&dyn Fn(f64) -> f64) -> f64) -> Velocities<D> {
+        let still = (D::Vector::zero(), D::Spin::zero());
+        let mut given = vec![still; self.grains.len()];
+        if let (Some(gravity), true) = (self.settings.gravity, weight) {
+            let free = given.iter_mut().zip(&self.grains.fixed).filter(|(_, fixed)| !**fixed);
+            free.for_each(|((v, _), _)| *v = gravity);
+        }
+        for load in &self.loads {
+            let (inverse_mass, inverse_inertia) = self.grains.inverse(load.grain);
+            let factor = of(&*load.factor);
+            given[load.grain].0 += load.force * (factor * inverse_mass);
+            given[load.grain].1 += load.torque * (factor * inverse_inertia);
+        }
+        given.extend(self.walls.iter().map(|wall| match &wall.drive {
+            Drive::Force { direction, mass, force } => (*direction * (of(&**force) / mass), D::Spin::zero()),
+            Drive::Fixed | Drive::Velocity { .. } => still,
+        }));
+        given.into()
+    }
+}

@@ -1,0 +1,236 @@
+//! `dem-run limit`: the largest load that the sample can bear before a bond must break.
+
+use std::fmt;
+use std::io::Write;
+use std::sync::Arc;
+
+use dem_core::body::Drive;
+use dem_core::dim::Dim;
+use dem_core::solver::limit_load::LimitLoad;
+use dem_core::world::World;
+use serde::Serialize;
+
+use crate::build::build;
+use crate::error::{NoConvergence, RunError};
+use crate::in_dimension;
+use crate::output::{facts, number, print_result};
+use crate::run::{Execution, handle_signals};
+use crate::scene::{self, Function, Scene};
+use crate::signals::Interrupt;
+
+/// Options of `dem-run limit`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LimitOptions {
+    /// How the command is carried out.
+    pub execution: Execution,
+    /// Whether the result on stdout is JSON.
+    pub json: bool,
+}
+
+/// What the largest load is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// There is one.
+    Limit,
+    /// Some reactions bear any load.
+    Unbounded,
+    /// The constant loads break a bond before any other load acts; together with the growing loads
+    /// they are borne from some factor on.
+    BrokenAtStart,
+    /// The same, whatever the factor.
+    NeverBorne,
+}
+
+/// A load that grows.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GrowingLoad {
+    /// `walls.NAME` or `grains.loads.K`.
+    pub load: String,
+    /// At the start and at the end of the run (N along the wall's direction; the factor of a load
+    /// on a grain). Of a wall driven by a velocity: 0 and 1 N, or −1 N if it moves backwards.
+    pub from: f64,
+    /// At the end of the run.
+    pub to: f64,
+    /// At the limit, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub limit: Option<f64>,
+}
+
+/// The limit load of a scene.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Limit {
+    /// What it is.
+    pub outcome: Outcome,
+    /// Largest factor on the growth of the loads from t = 0 to the end of the run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub factor: Option<f64>,
+    /// Difference between the factor that the reactions found bear and the one that a mechanism
+    /// found proves to be the largest.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub factor_error: Option<f64>,
+    /// Time at which the loads of a run reach the limit (s), if they grow at constant rates.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time: Option<f64>,
+    /// Least factor that is borne, if the constant loads alone are not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub least_factor: Option<f64>,
+    /// The loads that grow.
+    pub loads: Vec<GrowingLoad>,
+    /// Number of grains.
+    pub grains: usize,
+    /// Number of bonds.
+    pub bonds: usize,
+}
+
+/// Computes the limit load of a scene and prints it.
+///
+/// # Errors
+/// [`RunError`]: a sample that cannot be prepared, a scene without a load that grows, a programme
+/// that was not solved.
+pub fn limit(scene: &Scene, options: &LimitOptions) -> Result<(), RunError> {
+    let interrupt = handle_signals()?;
+    options.execution.start_threads()?;
+    in_dimension!(scene, D => limit_in::<D>(scene, options, &interrupt))
+}
+
+/// A load that grows: its name, values at the start and the end, and whether it grows at a constant
+/// rate.
+type Growth = (String, f64, f64, bool);
+
+fn limit_in<D: Dim>(scene: &Scene, options: &LimitOptions, interrupt: &Interrupt) -> Result<(), RunError> {
+    let mut growing = growing(scene);
+    let mut progress = options.execution.show();
+    let mut world = build::<D>(scene, None, &mut |done| {
+        progress.phase("packing the sample", done);
+        !interrupt.requested()
+    })?
+    .world;
+    progress.finish();
+    if growing.is_empty() {
+        growing.extend(pushed(scene, &mut world));
+    }
+    if growing.is_empty() {
+        return Err(RunError::Usage(
+            "no load of the scene grows between t = 0 and time.end: give a wall a force_rate or a load on a grain a ramp; \
+             of a wall that is driven by a velocity the force is taken, if it is the only driven wall or the load_wall"
+                .into(),
+        ));
+    }
+    let bent = growing.iter().find(|(_, _, _, straight)| !straight);
+    if let (Some((load, ..)), false) = (bent, options.execution.quiet) {
+        let text = "does not grow at a constant rate: the loads between its values at t = 0 and time.end are taken on a \
+                    straight line";
+        let _ = writeln!(std::io::stderr(), "warning: {load} {text}");
+    }
+    let found = world.limit_load(0.0, scene.time.end);
+    Ok(print_result(&describe(scene, &world, growing, found)?, options.json)?)
+}
+
+/// The loads of a scene that grow.
+fn growing(scene: &Scene) -> Vec<Growth> {
+    let end = scene.time.end;
+    let of = |name: String, function: &Function| (name, function.at(0.0), function.at(end), straight(function, end));
+    let walls = scene.walls.iter().filter_map(|(name, wall)| match wall.drive() {
+        scene::Drive::Force(force) => Some(of(format!("walls.{name}"), &force)),
+        scene::Drive::Fixed | scene::Drive::Velocity(_) => None,
+    });
+    let loads = scene.grains.iter().flat_map(|grains| &grains.loads).enumerate();
+    let loads = loads.map(|(k, load)| of(format!("grains.loads.{k}"), &load.time));
+    walls.chain(loads).filter(|(_, from, to, _)| from != to).collect()
+}
+
+/// Whether a function of time is linear from 0 to `end`.
+fn straight(function: &Function, end: f64) -> bool {
+    let times: Vec<f64> = match function {
+        Function::Constant(_) => vec![],
+        Function::Ramp(ramp) => vec![ramp.start],
+        Function::Table(rows) => rows.iter().map(|row| row[0]).collect(),
+    };
+    let (first, last) = (function.at(0.0), function.at(end));
+    let off = |t: f64| (function.at(t) - first - (last - first) * t / end).abs();
+    times.into_iter().filter(|t| (0.0..=end).contains(t)).all(|t| off(t) <= 1e-12 * (first.abs() + last.abs()))
+}
+
+/// Drives the load wall by a force instead of its velocity; returns that force as a load.
+fn pushed<D: Dim>(scene: &Scene, world: &mut World<D>) -> Option<Growth> {
+    let name = scene.load_wall()?;
+    let place = scene.walls.keys().position(|other| other == name)?;
+    let Drive::Velocity { direction, speed } = &world.walls[place].drive else { return None };
+    let (mass, end) = (world.grains.mass.iter().sum(), scene.time.end);
+    // the way that the wall moves
+    let sign = if speed(end) < 0.0 { -1.0 } else { 1.0 };
+    world.walls[place].drive = Drive::Force { direction: *direction, mass, force: Arc::new(move |t| sign * t / end) };
+    Some((format!("walls.{name}"), 0.0, sign, true))
+}
+
+fn describe<D: Dim>(
+    scene: &Scene,
+    world: &World<D>,
+    growing: Vec<Growth>,
+    found: LimitLoad,
+) -> Result<Limit, RunError> {
+    let (outcome, factor, factor_error, least_factor) = match found {
+        LimitLoad::Factor { lower, upper } => {
+            (Outcome::Limit, Some(0.5 * (lower + upper)), Some((upper - lower).abs()), None)
+        }
+        LimitLoad::Unbounded => (Outcome::Unbounded, None, None, None),
+        LimitLoad::NeverBalanced => (Outcome::NeverBorne, None, None, None),
+        LimitLoad::BrokenAtStart { least } => (Outcome::BrokenAtStart, None, None, Some(least)),
+        LimitLoad::Undecided => return Err(NoConvergence::Limit.into()),
+    };
+    let driven =
+        |name: &str| scene.walls.get(name).is_some_and(|wall| matches!(wall.drive(), scene::Drive::Velocity(_)));
+    let moved = growing.iter().any(|(load, ..)| load.strip_prefix("walls.").is_some_and(driven));
+    let steady = !moved && growing.iter().all(|(_, _, _, straight)| *straight);
+    let loads = growing.into_iter().map(|(load, from, to, _)| GrowingLoad {
+        load,
+        from,
+        to,
+        limit: factor.map(|factor| from + factor * (to - from)),
+    });
+    Ok(Limit {
+        outcome,
+        factor,
+        factor_error,
+        time: factor.filter(|_| steady).map(|factor| factor * scene.time.end),
+        least_factor,
+        loads: loads.collect(),
+        grains: world.grains.len(),
+        bonds: world.bonds.len(),
+    })
+}
+
+impl fmt::Display for Limit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let unit = |load: &GrowingLoad| if load.load.starts_with("walls.") { " N" } else { "" };
+        let mut lines = vec![("sample", format!("{} grains, {} bonds", self.grains, self.bonds))];
+        for load in &self.loads {
+            let unit = unit(load);
+            lines.push(("growing load", format!("{}, {} to {}{unit}", load.load, number(load.from), number(load.to))));
+        }
+        lines.push((
+            "limit",
+            match (self.outcome, self.factor, self.least_factor) {
+                (Outcome::Limit, Some(factor), _) => format!("{} of the growth", number(factor)),
+                (Outcome::BrokenAtStart, _, Some(least)) => format!(
+                    "the loads at t = 0 alone break a bond; with {} of the growth and more they are borne",
+                    number(least)
+                ),
+                (Outcome::Unbounded, ..) => "none: reactions within all limits bear any load".into(),
+                _ => {
+                    "the loads at t = 0 break a bond or move a body, whatever the growing load; is there a grain or a \
+                      wall without support?"
+                        .into()
+                }
+            },
+        ));
+        for load in &self.loads {
+            if let Some(limit) = load.limit {
+                lines.push(("limit load", format!("{}, {}{}", load.load, number(limit), unit(load))));
+            }
+        }
+        lines.extend(self.time.map(|time| ("reached at", format!("{} s", number(time)))));
+        write!(f, "{}", facts(&lines).trim_end())
+    }
+}

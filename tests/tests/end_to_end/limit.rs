@@ -1,0 +1,81 @@
+//! `dem-run limit`: the bound on the first break, and what it answers where there is none.
+
+use crate::common::{Folder, SMALL, config};
+use serde_json::Value;
+
+fn limit(scene: &str, sets: &[&str]) -> Value {
+    let path = config(scene);
+    let sets = sets.iter().flat_map(|set| ["--set", set]);
+    Folder::new().dem_run(&["limit", &path, "--json"].into_iter().chain(sets).collect::<Vec<_>>()).json()
+}
+
+fn close(value: &Value, expected: f64) {
+    let value = value.as_f64().expect("a number");
+    assert!((value / expected - 1.0).abs() < 1e-8, "{value} instead of {expected}");
+}
+
+#[test]
+fn two_grains_have_the_limits_that_they_break_at() {
+    // the load grows by 100 N/s for 0.15 s: limits of 10 N in tension, 3 N in shear
+    let pulled = limit("two-grains.json", &[]);
+    assert_eq!(pulled["outcome"], "limit");
+    close(&pulled["factor"], 10.0 / 15.0);
+    close(&pulled["loads"][0]["limit"], 10.0);
+    close(&pulled["time"], 0.1);
+    let shorn = limit("two-grains.json", &["grains.loads.0.force=[0, 1]"]);
+    close(&shorn["time"], 0.03);
+    let pressed = limit("two-grains.json", &["grains.loads.0.force=[-1, 0]"]);
+    assert_eq!((&pressed["outcome"], pressed["factor"].as_f64()), (&"unbounded".into(), None));
+    let heavy = limit("two-grains.json", &["gravity=[1e6, 0]"]);
+    assert_eq!(heavy["outcome"], "never_borne");
+    // its weight of 314 N pulls at the bond of 10 N, and the load pushes
+    let held = limit("two-grains.json", &["gravity=[1e6, 0]", "grains.loads.0.force=[-100, 0]"]);
+    assert_eq!(held["outcome"], "broken_at_start");
+    let weight = 1e6 * 2500.0 * 0.01 * std::f64::consts::PI * 4e-6;
+    close(&held["least_factor"], (weight - 10.0) / 1500.0);
+}
+
+#[test]
+fn compression_breaks_first_below_its_limit_at_any_cohesion() {
+    let small: Vec<&str> = SMALL.iter().copied().filter(|arg| *arg != "--set").collect();
+    let mut per_cohesion = vec![];
+    for strength in ["bonds.strength=10", "bonds.strength=20"] {
+        let sets = [&small[..], &[strength]].concat();
+        let found = limit("compression.json", &sets);
+        assert_eq!(found["outcome"], "limit", "{found}");
+        let load = found["loads"][0]["limit"].as_f64().expect("a load");
+        let args: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).chain(["-o", "a.h5"]).collect();
+        let first = Folder::new().run_config("compression.json", &args);
+        let first = first["failure"]["first_break"].as_f64().unwrap_or_else(|| panic!("{first}"));
+        assert!(first <= load + 100.0 * 1e-4, "first break at {first} N, limit {load} N");
+        per_cohesion.push(load);
+    }
+    assert!((per_cohesion[1] / per_cohesion[0] - 2.0).abs() < 1e-7, "{per_cohesion:?}");
+}
+
+#[test]
+fn a_wall_with_a_velocity_is_pressed_by_a_force_and_a_scene_without_loads_is_refused() {
+    // a row of 11 disks on two round supports, pressed in the middle: half the load bends the bonds
+    // beside the middle at an arm of 4.5 diameters; friction 0.3, no friction of the walls
+    let grains: Vec<String> =
+        (0..11).map(|k| format!(r#"{{"center": [{}, 0], "radius": 2e-3}}"#, 4e-3 * f64::from(k))).collect();
+    let sample = format!(r#"sample={{"grains": [{}]}}"#, grains.join(", "));
+    let circle =
+        |x: f64, y: f64| format!(r#""shape": {{"circle": {{"center": [{x}, {y}], "radius": 2e-3}}}}, "friction": 0"#);
+    let walls = format!(
+        r#"walls={{"left": {{{}}}, "right": {{{}}}, "press": {{{}, "velocity": {{"constant": -1}}, "direction": [0, 1]}}}}"#,
+        circle(0.0, -4e-3),
+        circle(0.04, -4e-3),
+        circle(0.02, 4e-3)
+    );
+    let bent = limit("two-grains.json", &[&sample, &walls, "grains=null"]);
+    assert_eq!((&bent["outcome"], &bent["loads"][0]["load"]), (&"limit".into(), &"walls.press".into()), "{bent}");
+    // the wall moves against its direction, and so does its force
+    let load = bent["loads"][0]["limit"].as_f64().expect("a load");
+    assert!((-load / (2.0 * 0.3 * 10.0 / 4.5) - 1.0).abs() < 1e-8, "{load}");
+
+    let here = Folder::new();
+    let still = here.dem_run(&["limit", &config("two-grains.json"), "--set", "grains.loads=[]"]);
+    still.fails(2, &["no load of the scene grows", "force_rate"]);
+    assert_eq!(here.names(), [""; 0]);
+}
