@@ -7,8 +7,9 @@ use crate::prepare::{self, Ball, Watch};
 use crate::sample_file;
 use crate::scene::{self, Drive as SceneDrive, Place, Sample, Scene, SolverKind, WallMass};
 use crate::tolerances::{DEEPEST, ROUNDED, TOUCHING};
+use crate::touching;
 use crate::warnings;
-use dem_core::body::{Drive, Grain, Grains, Load, Schedule, Shape, Wall};
+use dem_core::body::{Drive, Grain, Grains, Load, Schedule, Shape, Slide, Wall};
 use dem_core::bond::{self, Bond, Rupture};
 use dem_core::contact::{BondFlow, LocalSolve};
 use dem_core::detection::pairs_within;
@@ -95,6 +96,7 @@ pub fn place<D: Dim>(scene: &Scene, packings: Option<&Path>, watch: Watch) -> Re
     wrong.extend(unseated(scene, &grains));
     let walls = walls(scene, &grains);
     wrong.extend(buried(scene, &walls, &grains));
+    wrong.extend(touching::apart(scene, &walls, &grains));
     if !wrong.is_empty() {
         return Err(RunError::Sample(wrong));
     }
@@ -290,14 +292,24 @@ fn build_wall<D: Dim>(scene: &Scene, wall: &scene::Wall, grains: &Grains<D>) -> 
             built.velocity = direction * speed.at(0.0);
             Drive::Velocity { direction, speed: schedule(speed) }
         }
-        SceneDrive::Force(force) => {
+        SceneDrive::Force(force) | SceneDrive::Stress(force) => {
             let mass = match wall.mass {
                 Some(WallMass::Kg(mass)) => mass,
                 _ => grains.mass.iter().sum(),
             };
+            built.per_area = wall.stress.is_some();
             Drive::Force { direction, mass, force: schedule(force) }
         }
     };
+    built.grip = wall.grip;
+    if let Some(scene::Slide { direction: across, velocity }) = &wall.slide {
+        let across = unit::<D>(across);
+        // perpendicular to the last digit
+        let across = across - direction * direction.dot(&across);
+        let across = across * (1.0 / across.norm());
+        built.velocity += across * velocity.at(0.0);
+        built.slide = Some(Slide { direction: across, speed: schedule(velocity.clone()) });
+    }
     built
 }
 

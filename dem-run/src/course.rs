@@ -1,10 +1,11 @@
 //! The course of a run: its counters, updated at every step, and its stop conditions.
 
 use crate::collapse::{Collapse, LoadStep};
+use crate::load::{drive_direction, load};
+use crate::scene::Scene;
 use crate::scene::failure::in_one_piece;
-use crate::scene::{Scene, TravelFrom};
+use crate::stop::Stops;
 use crate::summary::Ending;
-use dem_core::body::{Drive, Wall};
 use dem_core::bond::BondStatus;
 use dem_core::dim::{Dim, Vect};
 use dem_core::saved::{Mismatch, Reader, Saved};
@@ -42,9 +43,7 @@ pub struct Course<D: Dim> {
     pub penetration: f64,
     /// Largest difference between the length of an intact bond and its length at rest (m).
     pub bond_elongation: f64,
-    stop: Option<TravelStop<D>>,
-    /// Share of broken bonds (–) that ends the run.
-    broken_limit: Option<f64>,
+    stops: Stops<D>,
 }
 
 /// A driven wall and its load.
@@ -55,14 +54,6 @@ pub struct Driven<D: Dim> {
     pub collapse: Collapse,
     /// Its initial position (m).
     start: D::Vector,
-}
-
-/// The travel of a wall that ends a run.
-struct TravelStop<D: Dim> {
-    wall: usize,
-    direction: D::Vector,
-    distance: f64,
-    from: Option<D::Vector>,
 }
 
 impl<D: Dim> Course<D> {
@@ -87,8 +78,7 @@ impl<D: Dim> Course<D> {
             rejected: 0,
             penetration: 0.0,
             bond_elongation: 0.0,
-            stop: travel_stop(scene, world),
-            broken_limit: scene.stop.as_ref().and_then(|s| s.broken_fraction),
+            stops: Stops::new(scene.stop.as_ref(), scene, world),
         }
     }
 
@@ -108,12 +98,7 @@ impl<D: Dim> Course<D> {
         let Work { sweeps, newton, factorisations } = self.work;
         to.counts.extend([sweeps, newton, factorisations, self.solved_steps]);
         to.counts.extend([self.missed_tolerance, self.missed_load_tolerance, self.rejected]);
-        to.flag(self.stop.is_some());
-        if let Some(stop) = &self.stop {
-            to.real(stop.distance);
-            to.flag(stop.from.is_some());
-            to.vector(&stop.from.unwrap_or(D::Vector::zero()));
-        }
+        self.stops.save(to);
     }
 
     /// The course saved by [`Course::save`], for a run of `scene` that is resumed with `world`.
@@ -140,13 +125,7 @@ impl<D: Dim> Course<D> {
         course.solved_steps = count()?;
         (course.missed_tolerance, course.missed_load_tolerance) = (count()?, count()?);
         course.rejected = count()?;
-        if from.flag()? {
-            let (distance, begun, place) = (from.real()?, from.flag()?, from.vector()?);
-            // a stop condition that the scene no longer has is dropped
-            if let Some(stop) = &mut course.stop {
-                (stop.distance, stop.from) = (distance, begun.then_some(place));
-            }
-        }
+        course.stops.restore(from)?;
         Ok(course)
     }
 
@@ -180,6 +159,7 @@ impl<D: Dim> Course<D> {
         self.count_solves(world, report);
         self.penetration = self.penetration.max(report.penetration);
         self.bond_elongation = self.bond_elongation.max(report.bond_elongation);
+        self.stops.count(world, self.broken());
         if self.driven.is_empty() {
             return;
         }
@@ -208,28 +188,7 @@ impl<D: Dim> Course<D> {
     /// The stop condition of the scene that ends the run after this step, if any.
     pub fn ending(&mut self, world: &World<D>) -> Option<Ending> {
         let broken = self.broken();
-        if let Some(stop) = &mut self.stop {
-            let position = world.walls[stop.wall].position;
-            if stop.from.is_none() && broken > 0 {
-                stop.from = Some(position);
-            }
-            if stop.from.is_some_and(|from| (position - from).dot(&stop.direction).abs() >= stop.distance) {
-                return Some(Ending::WallTravel);
-            }
-        }
-        let bonds = world.bonds.len() as f64;
-        let enough = |limit: f64| bonds > 0.0 && broken as f64 >= limit * bonds;
-        self.broken_limit.is_some_and(enough).then_some(Ending::BrokenFraction)
-    }
-}
-
-/// The load of a driven wall in the last step (N): the prescribed force, or for a prescribed
-/// velocity the force of the wall on the grains before any bond broke in that step.
-fn load<D: Dim>(wall: &Wall<D>) -> f64 {
-    match wall.drive {
-        Drive::Fixed => 0.0,
-        Drive::Velocity { direction, .. } => -direction.dot(&wall.reaction_at_limit),
-        Drive::Force { .. } => wall.applied,
+        self.stops.ending(world, broken)
     }
 }
 
@@ -242,29 +201,10 @@ fn extents<D: Dim>(world: &World<D>) -> Vec<f64> {
     (0..D::N).map(|axis| reach(axis, 1.0) + reach(axis, -1.0)).collect()
 }
 
-fn drive_direction<D: Dim>(wall: &Wall<D>) -> Option<D::Vector> {
-    match wall.drive {
-        Drive::Fixed => None,
-        Drive::Velocity { direction, .. } | Drive::Force { direction, .. } => Some(direction),
-    }
-}
-
 /// d·E d: the strain along a unit direction d.
 fn axial<V: Vect>(strain: &[f64], d: V) -> f64 {
     let row = |r: usize| (0..V::LEN).map(|c| strain[r * V::LEN + c] * d[c]).sum::<f64>();
     (0..V::LEN).map(|r| d[r] * row(r)).sum()
-}
-
-fn travel_stop<D: Dim>(scene: &Scene, world: &World<D>) -> Option<TravelStop<D>> {
-    let travel = scene.stop.as_ref()?.wall_travel.as_ref()?;
-    let wall = scene.walls.keys().position(|name| *name == travel.wall)?;
-    let direction = drive_direction(&world.walls[wall])?;
-    let along = |sign: f64| {
-        let reach = |(x, r): (&D::Vector, &f64)| sign * x.dot(&direction) + r;
-        world.grains.position.iter().zip(&world.grains.radius).map(reach).fold(f64::NEG_INFINITY, f64::max)
-    };
-    let from = (travel.after == TravelFrom::Start).then(|| world.walls[wall].position);
-    Some(TravelStop { wall, direction, distance: travel.fraction_of_height * (along(1.0) + along(-1.0)), from })
 }
 
 #[cfg(test)]

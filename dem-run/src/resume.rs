@@ -38,7 +38,7 @@ const FREE: [&str; 5] = ["title", "$schema", "time.end", "stop", "load_wall"];
 const OPEN: [&str; 7] =
     ["solver", "gravity", "rupture", "materials.friction", "materials.restitution", "grains.loads", "bonds.flow"];
 /// Fields of a wall that may change with `--force`.
-const OPEN_WALL: [&str; 4] = ["force", "force_rate", "velocity", "friction"];
+const OPEN_WALL: [&str; 6] = ["force", "force_rate", "velocity", "stress", "slide", "friction"];
 
 /// Resumes a run, writes its history and prints its summary.
 ///

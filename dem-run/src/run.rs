@@ -118,7 +118,7 @@ pub(crate) struct RunState<D: Dim> {
 }
 
 /// Version number of the data that [`RunState::save`] writes.
-const FORM: usize = 9;
+const FORM: usize = 10;
 
 impl<D: Dim> RunState<D> {
     /// The state as numbers, without the processor time: two runs of a scene write identical files.

@@ -18,6 +18,8 @@ pub enum Ending {
     WallTravel,
     /// Enough bonds have broken.
     BrokenFraction,
+    /// The load has dropped far enough below its peak.
+    LoadDrop,
     /// Ctrl-C or SIGTERM.
     Interrupted,
     /// A step was not solved.
@@ -167,6 +169,7 @@ impl fmt::Display for Summary {
             Ending::Time => "time.end was reached",
             Ending::WallTravel => "stop.wall_travel was reached",
             Ending::BrokenFraction => "stop.broken_fraction was reached",
+            Ending::LoadDrop => "stop.load_drop was reached",
             Ending::Interrupted => "interrupted",
             Ending::NoConvergence => "a step was not solved",
         };

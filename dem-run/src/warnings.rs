@@ -112,8 +112,10 @@ struct DriveMotion<D: Dim> {
     direction: D::Vector,
     /// Whether the direction is parallel to the surface.
     along_surface: bool,
-    /// Whether a force drives the wall.
+    /// Whether a force or a stress drives the wall.
     by_force: bool,
+    /// What drives it, and its unit.
+    drive: [&'static str; 2],
     /// Least and largest value of the drive (N or m/s).
     range: (f64, f64),
     /// Least and largest displacement along the direction until the end of the run (m).
@@ -138,7 +140,15 @@ impl<D: Dim> DriveMotion<D> {
             place += speed * step;
         }
         let along_surface = wall.shape.moves_across(direction) < PARALLEL;
-        (range != (0.0, 0.0)).then_some(Self { direction, along_surface, by_force: mass.is_some(), range, travel })
+        let drive = if wall.per_area { ["stress", "Pa"] } else { ["force", "N"] };
+        (range != (0.0, 0.0)).then_some(Self {
+            direction,
+            along_surface,
+            by_force: mass.is_some(),
+            drive,
+            range,
+            travel,
+        })
     }
 }
 
@@ -180,10 +190,11 @@ fn pulled<D: Dim>(wall: &Wall<D>, motion: &DriveMotion<D>, grains: &Grains<D>) -
     let (low, high) = motion.range;
     let away = motion.by_force && (if sign > 0.0 { high <= 0.0 } else { low >= 0.0 }) && sign != 0.0;
     let most = if sign > 0.0 { low } else { high };
+    let [drive, unit] = motion.drive;
     away.then(|| {
         format!(
-            "its force, {} N, pulls it away from the grains at all times, so it carries no load: change the sign of the force, \
-             or reverse the direction",
+            "its {drive}, {} {unit}, pulls it away from the grains at all times, so it carries no load: change the sign of \
+             the {drive}, or reverse the direction",
             number(most)
         )
     })

@@ -6,6 +6,7 @@
 mod assembly;
 mod ledger;
 mod limits;
+mod loads;
 mod motion;
 mod observe;
 mod report;
@@ -92,6 +93,8 @@ pub struct World<D: Dim> {
     last_part: f64,
     /// Length corrections of the bonds in it, by bond index; empty before the first.
     turns: Vec<Turn>,
+    /// The wall that holds each grain; empty if no wall holds one.
+    held: Vec<Option<u32>>,
     candidates: Candidates<D>,
     solver: Box<dyn ContactSolver<D>>,
     /// The settings that the solver was built from; `None` for a user-defined solver.
@@ -135,8 +138,9 @@ impl<D: Dim> Default for Settings<D> {
 }
 
 impl<D: Dim> World<D> {
-    /// A world at time zero, without bonds.
-    pub fn new(grains: Grains<D>, walls: Vec<Wall<D>>, loads: Vec<Load<D>>, settings: Settings<D>) -> Self {
+    /// A world at time zero, without bonds. Walls with a grip hold the grains near them.
+    pub fn new(mut grains: Grains<D>, walls: Vec<Wall<D>>, loads: Vec<Load<D>>, settings: Settings<D>) -> Self {
+        let held = loads::hold(&mut grains, &walls);
         let mut world = Self {
             reference: Vec::new(),
             reference_box: 0.0,
@@ -147,6 +151,7 @@ impl<D: Dim> World<D> {
             mid: Midpoint::of(&grains, &walls),
             last_part: 0.0,
             turns: Vec::new(),
+            held,
             bonds: Bonds::default(),
             ledger: Ledger::default(),
             time: 0.0,

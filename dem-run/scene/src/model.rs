@@ -300,6 +300,11 @@ pub struct Stop {
     /// Ends the run when this fraction of the bonds has broken (above 0, at most 1).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub broken_fraction: Option<f64>,
+    /// Ends the run when the load of the load wall has been below this share of its peak (above 0,
+    /// below 1) in ten consecutive steps. The peak is the greatest load since the first break of a
+    /// bond, that step included, so no load before a break counts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub load_drop: Option<f64>,
 }
 
 /// A travel of a wall that ends the run.

@@ -248,6 +248,7 @@ impl End {
             Self::Scene(Ending::Time) => "time",
             Self::Scene(Ending::WallTravel) => "wall travel",
             Self::Scene(Ending::BrokenFraction) => "broken fraction",
+            Self::Scene(Ending::LoadDrop) => "load drop",
             Self::Scene(Ending::Interrupted) => "interrupted",
             Self::Scene(Ending::NoConvergence) | Self::Failed(_) => "NO CONVERGENCE",
         }

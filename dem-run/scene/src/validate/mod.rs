@@ -266,4 +266,31 @@ fn stop(report: &mut Report, scene: &Scene) {
             report.wrong("stop.broken_fraction", Number(fraction), bonds_needed);
         }
     }
+    if let Some(share) = stop.load_drop {
+        load_drop(report, scene, share);
+    }
+}
+
+fn load_drop(report: &mut Report, scene: &Scene, share: f64) {
+    let path = "stop.load_drop";
+    report.range(path, share, share > 0.0 && share < 1.0, "a number above 0 and below 1");
+    if scene.bonds.is_none() {
+        report.wrong(
+            path,
+            Number(share),
+            "bonds in the scene: it has none, and the peak is sought after a first break",
+        );
+    }
+    let Some(name) = scene.load_wall() else {
+        let allowed = match scene.load_unknown() {
+            Some(names) => format!("a load_wall in the scene: one of {names}"),
+            None => "a wall with a velocity in the scene, whose load it is".to_string(),
+        };
+        report.wrong(path, Number(share), allowed);
+        return;
+    };
+    if scene.walls[name].velocity.is_none() {
+        let found = format!("{share:?}, and the load of walls.{name} is prescribed");
+        report.wrong(path, found, "a load wall that is driven by a velocity: a prescribed load does not drop");
+    }
 }
