@@ -90,7 +90,7 @@ fn a_stress_acts_on_the_extent_of_the_grains_or_on_a_cylinder_around_them() {
 /// of the contacts with the vertical: equilibrium of three disks without friction.
 #[test]
 fn stresses_hold_while_the_sample_swells() {
-    let (stress, thickness, h, half, speed) = (1e5, 0.02, 1e-2, 1.2 * R, 2e-4);
+    let (stress, thickness, h, half, speed) = (1e5, 0.02, 0.1, 1.2 * R, 2e-5);
     let height = |half: f64| 2.0 * R + (4.0 * R * R - half * half).sqrt();
     for settled in solvers() {
         let disks = [[-half, R], [half, R], [0.0, height(half) - R]];

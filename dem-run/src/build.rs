@@ -260,10 +260,10 @@ fn schedule(function: scene::Function) -> Schedule {
 }
 
 pub(crate) fn walls<D: Dim>(scene: &Scene, grains: &Grains<D>) -> Vec<Wall<D>> {
-    scene.walls.values().map(|wall| build_wall(scene, wall, grains)).collect()
+    scene.walls.iter().map(|(name, wall)| build_wall(scene, name, wall, grains)).collect()
 }
 
-fn build_wall<D: Dim>(scene: &Scene, wall: &scene::Wall, grains: &Grains<D>) -> Wall<D> {
+fn build_wall<D: Dim>(scene: &Scene, name: &str, wall: &scene::Wall, grains: &Grains<D>) -> Wall<D> {
     let round = |radius: f64, inside: bool, axis: Option<D::Vector>| Shape::Round { radius, inside, axis };
     let (shape, position) = match &wall.shape {
         scene::Shape::Plane(plane) => {
@@ -286,21 +286,10 @@ fn build_wall<D: Dim>(scene: &Scene, wall: &scene::Wall, grains: &Grains<D>) -> 
     let friction = wall.friction.unwrap_or(scene.materials.friction.grain_wall);
     let mut built = Wall::fixed(shape, position, friction);
     let direction = wall.drive_direction().map_or(D::Vector::zero(), unit::<D>);
-    built.drive = match wall.drive() {
-        SceneDrive::Fixed => Drive::Fixed,
-        SceneDrive::Velocity(speed) => {
-            built.velocity = direction * speed.at(0.0);
-            Drive::Velocity { direction, speed: schedule(speed) }
-        }
-        SceneDrive::Force(force) | SceneDrive::Stress(force) => {
-            let mass = match wall.mass {
-                Some(WallMass::Kg(mass)) => mass,
-                _ => grains.mass.iter().sum(),
-            };
-            built.per_area = wall.stress.is_some();
-            Drive::Force { direction, mass, force: schedule(force) }
-        }
-    };
+    drive(&mut built, wall, scene.first_drive(name, wall), direction, &grains.mass, 0.0);
+    if let Drive::Velocity { direction, speed } = &built.drive {
+        built.velocity = *direction * speed(0.0);
+    }
     built.grip = wall.grip;
     if let Some(scene::Slide { direction: across, velocity }) = &wall.slide {
         let across = unit::<D>(across);
@@ -311,6 +300,31 @@ fn build_wall<D: Dim>(scene: &Scene, wall: &scene::Wall, grains: &Grains<D>) -> 
         built.slide = Some(Slide { direction: across, speed: schedule(velocity.clone()) });
     }
     built
+}
+
+/// Gives a wall of the scene a drive along `direction`, whose times count from `start` (s). `masses`
+/// are those of the grains (kg).
+pub(crate) fn drive<D: Dim>(
+    built: &mut Wall<D>,
+    wall: &scene::Wall,
+    drive: SceneDrive,
+    direction: D::Vector,
+    masses: &[f64],
+    start: f64,
+) {
+    let schedule = |function: scene::Function| -> Schedule { Arc::new(move |t| function.at(t - start)) };
+    built.per_area = matches!(drive, SceneDrive::Stress(_));
+    built.drive = match drive {
+        SceneDrive::Fixed => Drive::Fixed,
+        SceneDrive::Velocity(speed) => Drive::Velocity { direction, speed: schedule(speed) },
+        SceneDrive::Force(force) | SceneDrive::Stress(force) => {
+            let mass = match wall.mass {
+                Some(WallMass::Kg(mass)) => mass,
+                _ => masses.iter().sum(),
+            };
+            Drive::Force { direction, mass, force: schedule(force) }
+        }
+    };
 }
 
 /// The centre of a round wall: the given one, or for a seated wall the one at its first contact

@@ -103,7 +103,7 @@ impl Check {
         let (sizes, warnings) = in_dimension!(scene, D => look::<D>(scene, enough)?);
         let end = scene.time.end;
         let walls = scene.walls.iter().map(|(name, wall)| {
-            let (drive, course) = match wall.drive() {
+            let (drive, course) = match scene.first_drive(name, wall) {
                 Drive::Fixed => ("fixed", None),
                 Drive::Velocity(velocity) => ("velocity", Some(over_time(&velocity, "m/s", end))),
                 Drive::Force(force) => ("force", Some(over_time(&force, "N", end))),

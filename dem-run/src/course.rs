@@ -4,6 +4,7 @@ use crate::collapse::{Collapse, LoadStep};
 use crate::load::{drive_direction, load};
 use crate::scene::Scene;
 use crate::scene::failure::in_one_piece;
+use crate::stages::Stages;
 use crate::stop::Stops;
 use crate::summary::Ending;
 use dem_core::bond::BondStatus;
@@ -44,6 +45,7 @@ pub struct Course<D: Dim> {
     /// Largest difference between the length of an intact bond and its length at rest (m).
     pub bond_elongation: f64,
     stops: Stops<D>,
+    stages: Stages<D>,
 }
 
 /// A driven wall and its load.
@@ -79,6 +81,7 @@ impl<D: Dim> Course<D> {
             penetration: 0.0,
             bond_elongation: 0.0,
             stops: Stops::new(scene.stop.as_ref(), scene, world),
+            stages: Stages::new(scene, world),
         }
     }
 
@@ -99,13 +102,15 @@ impl<D: Dim> Course<D> {
         to.counts.extend([sweeps, newton, factorisations, self.solved_steps]);
         to.counts.extend([self.missed_tolerance, self.missed_load_tolerance, self.rejected]);
         self.stops.save(to);
+        self.stages.save(to);
     }
 
-    /// The course saved by [`Course::save`], for a run of `scene` that is resumed with `world`.
+    /// The course saved by [`Course::save`], for a run of `scene` that is resumed with `world`; its
+    /// walls get the drives of the present stage.
     ///
     /// # Errors
     /// [`Mismatch`].
-    pub fn restored(scene: &Scene, world: &World<D>, from: &mut Reader) -> Result<Self, Mismatch> {
+    pub fn restored(scene: &Scene, world: &mut World<D>, from: &mut Reader) -> Result<Self, Mismatch> {
         let mut course = Self::new(scene, world);
         for _ in 0..from.count()? {
             let (wall, start, collapse) = (from.count()?, from.vector()?, Collapse::restored(from)?);
@@ -126,6 +131,7 @@ impl<D: Dim> Course<D> {
         (course.missed_tolerance, course.missed_load_tolerance) = (count()?, count()?);
         course.rejected = count()?;
         course.stops.restore(from)?;
+        course.stages = Stages::restored(scene, world, from)?;
         Ok(course)
     }
 
@@ -159,7 +165,9 @@ impl<D: Dim> Course<D> {
         self.count_solves(world, report);
         self.penetration = self.penetration.max(report.penetration);
         self.bond_elongation = self.bond_elongation.max(report.bond_elongation);
-        self.stops.count(world, self.broken());
+        let broken = self.broken();
+        self.stops.count(world, broken);
+        self.stages.count(world, broken);
         if self.driven.is_empty() {
             return;
         }
@@ -185,10 +193,11 @@ impl<D: Dim> Course<D> {
         self.rejected += u64::from(report.rejected);
     }
 
-    /// The stop condition of the scene that ends the run after this step, if any.
-    pub fn ending(&mut self, world: &World<D>) -> Option<Ending> {
+    /// What ends the run of `scene` after this step, if anything: a stop condition, or the end of the
+    /// last stage. At the end of another stage, the walls get the drives of the next.
+    pub fn ending(&mut self, scene: &Scene, world: &mut World<D>) -> Option<Ending> {
         let broken = self.broken();
-        self.stops.ending(world, broken)
+        self.stops.ending(world, broken).or_else(|| self.stages.advance(scene, world, broken))
     }
 }
 
@@ -262,7 +271,7 @@ mod tests {
         // a resumed run keeps the counts
         let mut saved = Saved::default();
         course.save(&mut saved);
-        let restored = Course::restored(&scene, &world, &mut Reader::new(&saved.reals, &saved.counts));
+        let restored = Course::restored(&scene, &mut world, &mut Reader::new(&saved.reals, &saved.counts));
         let restored = restored.expect("what was saved");
         assert_eq!((restored.missed_tolerance, restored.missed_load_tolerance), (1, 2));
         assert_eq!((restored.solved_steps, restored.worst_load_error), (4, course.worst_load_error));

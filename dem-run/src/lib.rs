@@ -26,6 +26,7 @@ pub mod run;
 pub mod sample_file;
 pub mod signals;
 pub mod solve;
+mod stages;
 mod stop;
 pub mod summary;
 pub mod sweep;

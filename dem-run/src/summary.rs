@@ -20,6 +20,8 @@ pub enum Ending {
     BrokenFraction,
     /// The load has dropped far enough below its peak.
     LoadDrop,
+    /// The last stage has ended.
+    Stages,
     /// Ctrl-C or SIGTERM.
     Interrupted,
     /// A step was not solved.
@@ -170,6 +172,7 @@ impl fmt::Display for Summary {
             Ending::WallTravel => "stop.wall_travel was reached",
             Ending::BrokenFraction => "stop.broken_fraction was reached",
             Ending::LoadDrop => "stop.load_drop was reached",
+            Ending::Stages => "the last of stages ended",
             Ending::Interrupted => "interrupted",
             Ending::NoConvergence => "a step was not solved",
         };

@@ -75,6 +75,10 @@ pub(crate) fn of_walls<D: Dim>(scene: &Scene, walls: &[Wall<D>], grains: Option<
         walls.iter().map(|wall| DriveMotion::of(wall, scene.time.end).is_some_and(|c| !c.along_surface)).collect();
     let mut told = vec![];
     for (k, (name, wall)) in scene.walls.keys().zip(walls).enumerate() {
+        // the drive of the first stage is not all that moves such a wall
+        if scene.stage_drives(name).next().is_some() {
+            continue;
+        }
         let Some(motion) = DriveMotion::of(wall, scene.time.end) else { continue };
         let alone = !others_push(scene) && !pushes.iter().enumerate().any(|(other, push)| *push && other != k);
         let word = match grains {

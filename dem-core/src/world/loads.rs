@@ -1,34 +1,15 @@
-//! Loads that depend on the state of the sample: stresses on its present section; walls that hold
+//! The section of the sample on which the stress of a wall acts, and the forces on walls that hold
 //! grains.
 
 use super::World;
 use super::motion::Midpoint;
-use crate::body::{Grains, Shape, Wall};
+use crate::body::Shape;
 use crate::dim::{Dim, Vect};
 
 /// The only axis along which a vector has a component, if any.
-pub(super) fn only_axis<V: Vect>(vector: V) -> Option<usize> {
+fn only_axis<V: Vect>(vector: V) -> Option<usize> {
     let axis = (0..V::LEN).find(|k| vector[*k] != 0.0)?;
     (axis + 1..V::LEN).all(|k| vector[k] == 0.0).then_some(axis)
-}
-
-/// The wall that holds each grain, if any; an empty list if no wall holds a grain. Grains that are
-/// held move with their wall: they count as fixed, at its velocity.
-pub(super) fn hold<D: Dim>(grains: &mut Grains<D>, walls: &[Wall<D>]) -> Vec<Option<u32>> {
-    let mut held = Vec::new();
-    for (w, wall) in walls.iter().enumerate() {
-        let Some(depth) = wall.grip else { continue };
-        held.resize(grains.len(), None);
-        for k in 0..grains.len() {
-            let gap = wall.shape.gap(grains.position[k] - wall.position, grains.radius[k]).0;
-            if gap <= depth && !grains.fixed[k] {
-                held[k] = Some(w as u32);
-                grains.fixed[k] = true;
-                (grains.velocity[k], grains.spin[k]) = (wall.velocity, D::Spin::zero());
-            }
-        }
-    }
-    held
 }
 
 impl<D: Dim> World<D> {

@@ -4,6 +4,7 @@
 //! detection, free velocity, contact problem with its rupture cascade, half a step.
 
 mod assembly;
+mod grip;
 mod ledger;
 mod limits;
 mod loads;
@@ -140,7 +141,7 @@ impl<D: Dim> Default for Settings<D> {
 impl<D: Dim> World<D> {
     /// A world at time zero, without bonds. Walls with a grip hold the grains near them.
     pub fn new(mut grains: Grains<D>, walls: Vec<Wall<D>>, loads: Vec<Load<D>>, settings: Settings<D>) -> Self {
-        let held = loads::hold(&mut grains, &walls);
+        let held = grip::hold(&mut grains, &walls);
         let mut world = Self {
             reference: Vec::new(),
             reference_box: 0.0,

@@ -22,6 +22,8 @@ mod sample;
 pub mod schema;
 mod set;
 mod solver;
+mod stage;
+mod stop;
 mod suggest;
 mod validate;
 mod wall;
@@ -39,13 +41,15 @@ pub use error::{Origin, Problem, SceneError};
 pub use function::{Function, Ramp};
 pub use model::{
     Bonds, Flow, Friction, Grains, Load, Materials, Output, Precision, Restitution, Rupture, Scatter, Scene, Springs,
-    Stiffness, Stop, Time, TravelFrom, WallTravel, Young, choose_load_wall,
+    Stiffness, Time, Young, choose_load_wall,
 };
 pub use sample::{
     Compaction, Cut, Deposition, Diameters, GrainSpec, Lattice, Preparation, RandomSample, Sample, SampleFile, Section,
     UniformRange,
 };
 pub use solver::{GaussSeidel, LocalSolve, Newton, Solver, SolverKind, Start};
+pub use stage::{Stage, StageDrive};
+pub use stop::{Stop, TravelFrom, WallTravel};
 pub use validate::validate;
 pub use validate::{LARGEST, MAX_GRAINS};
 pub use wall::*;

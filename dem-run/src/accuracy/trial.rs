@@ -249,6 +249,7 @@ impl End {
             Self::Scene(Ending::WallTravel) => "wall travel",
             Self::Scene(Ending::BrokenFraction) => "broken fraction",
             Self::Scene(Ending::LoadDrop) => "load drop",
+            Self::Scene(Ending::Stages) => "stages",
             Self::Scene(Ending::Interrupted) => "interrupted",
             Self::Scene(Ending::NoConvergence) | Self::Failed(_) => "NO CONVERGENCE",
         }
@@ -365,7 +366,7 @@ impl<D: Dim> Trial<'_, D> {
                     world.time
                 ));
             }
-            if let Some(ending) = state.course.ending(&world) {
+            if let Some(ending) = state.course.ending(self.scene, &mut world) {
                 break End::Scene(ending);
             }
             let failed = |loads: &Collapse| loads.passed[1] && loads.failure.broken_share.is_some();

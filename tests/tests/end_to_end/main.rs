@@ -10,6 +10,7 @@ mod elastic;
 mod fclib;
 mod fclib_global;
 mod interrupt;
+mod laboratory;
 mod loads;
 mod pack;
 mod packings;

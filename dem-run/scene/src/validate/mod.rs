@@ -5,13 +5,16 @@
 
 pub(crate) mod report;
 mod sample;
+mod stage;
 mod wall;
 
 use std::collections::HashMap;
 
 use super::error::Problem;
-use super::model::{Bonds, Load, Scatter, Scene, Stiffness, TravelFrom};
+use super::model::{Bonds, Load, Scatter, Scene, Stiffness};
 use super::solver::SolverKind;
+use super::stage::StageDrive;
+use super::stop::{Stop, TravelFrom};
 use super::suggest::nearest;
 use super::wall::Drive;
 pub use report::{LARGEST, MAX_GRAINS};
@@ -41,7 +44,7 @@ pub fn validate(scene: &Scene) -> Vec<Problem> {
     }
     grains(&mut report, scene);
     for (name, wall) in &scene.walls {
-        wall::wall(&mut report, name, wall);
+        wall::wall(&mut report, name, wall, &scene.stage_drives(name).map(StageDrive::drive).collect::<Vec<_>>());
     }
     if let Some(name) = &scene.load_wall {
         driven_wall(&mut report, scene, "load_wall", name);
@@ -51,7 +54,10 @@ pub fn validate(scene: &Scene) -> Vec<Problem> {
     }
     time_and_output(&mut report, scene);
     solver(&mut report, scene);
-    stop(&mut report, scene);
+    if let Some(stop) = &scene.stop {
+        self::stop(&mut report, scene, "stop", stop);
+    }
+    stage::check(&mut report, scene, stop);
     report.problems
 }
 
@@ -242,37 +248,36 @@ fn driven_wall(report: &mut Report, scene: &Scene, path: &str, name: &str) {
             let problem = Problem::new(path, format!("\"{name}\""), allowed);
             report.problems.push(problem.with_nearest(nearest(name, names)));
         }
-        Some(wall) if wall.drive() == Drive::Fixed => {
+        Some(wall) if scene.drives(name, wall).is_empty() => {
             report.wrong(path, format!("\"{name}\", which is fixed"), "a wall that is driven");
         }
         Some(_) => {}
     }
 }
 
-fn stop(report: &mut Report, scene: &Scene) {
-    let Some(stop) = &scene.stop else { return };
+/// Checks the stop conditions at `path`.
+fn stop(report: &mut Report, scene: &Scene, path: &str, stop: &Stop) {
     let bonds_needed = "bonds in the scene: it has none";
     if let Some(travel) = &stop.wall_travel {
-        driven_wall(report, scene, "stop.wall_travel.wall", &travel.wall);
-        report.positive("stop.wall_travel.fraction_of_height", travel.fraction_of_height, "no unit");
+        driven_wall(report, scene, &format!("{path}.wall_travel.wall"), &travel.wall);
+        report.positive(format!("{path}.wall_travel.fraction_of_height"), travel.fraction_of_height, "no unit");
         if travel.after == TravelFrom::FirstBreak && scene.bonds.is_none() {
-            report.wrong("stop.wall_travel.after", "first_break", bonds_needed);
+            report.wrong(format!("{path}.wall_travel.after"), "first_break", bonds_needed);
         }
     }
     if let Some(fraction) = stop.broken_fraction {
         let allowed = "a number above 0, at most 1";
-        report.range("stop.broken_fraction", fraction, fraction > 0.0 && fraction <= 1.0, allowed);
+        report.range(format!("{path}.broken_fraction"), fraction, fraction > 0.0 && fraction <= 1.0, allowed);
         if scene.bonds.is_none() {
-            report.wrong("stop.broken_fraction", Number(fraction), bonds_needed);
+            report.wrong(format!("{path}.broken_fraction"), Number(fraction), bonds_needed);
         }
     }
     if let Some(share) = stop.load_drop {
-        load_drop(report, scene, share);
+        load_drop(report, scene, &format!("{path}.load_drop"), share);
     }
 }
 
-fn load_drop(report: &mut Report, scene: &Scene, share: f64) {
-    let path = "stop.load_drop";
+fn load_drop(report: &mut Report, scene: &Scene, path: &str, share: f64) {
     report.range(path, share, share > 0.0 && share < 1.0, "a number above 0 and below 1");
     if scene.bonds.is_none() {
         report.wrong(
@@ -289,7 +294,7 @@ fn load_drop(report: &mut Report, scene: &Scene, share: f64) {
         report.wrong(path, Number(share), allowed);
         return;
     };
-    if scene.walls[name].velocity.is_none() {
+    if !scene.drives(name, &scene.walls[name]).iter().any(|drive| matches!(drive, Drive::Velocity(_))) {
         let found = format!("{share:?}, and the load of walls.{name} is prescribed");
         report.wrong(path, found, "a load wall that is driven by a velocity: a prescribed load does not drop");
     }

@@ -7,8 +7,8 @@ use crate::wall::{Drive, Shape, Slide, Wall, WallMass};
 /// directions are not exact.
 const PERPENDICULAR: f64 = 1e-6;
 
-/// Checks the wall `name`.
-pub(super) fn wall(report: &mut Report, name: &str, wall: &Wall) {
+/// Checks the wall `name`; `staged` are the drives that stages give it.
+pub(super) fn wall(report: &mut Report, name: &str, wall: &Wall, staged: &[Drive]) {
     let path = format!("walls.{name}");
     if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-') {
         report.wrong(&path, format!("the name \"{name}\""), "a name of letters, digits, _ and -");
@@ -35,8 +35,9 @@ pub(super) fn wall(report: &mut Report, name: &str, wall: &Wall) {
     if let Some(rate) = wall.force_rate {
         report.finite(format!("{path}.force_rate"), rate);
     }
-    mass_and_direction(report, &path, wall);
-    if given.len() == 1 && wall.stress.is_some() {
+    mass_and_direction(report, &path, wall, staged);
+    let stressed = staged.iter().any(|drive| matches!(drive, Drive::Stress(_)));
+    if given.len() < 2 && (wall.stress.is_some() || stressed) {
         stress(report, &path, wall);
     }
     if let Some(slide) = &wall.slide {
@@ -44,7 +45,7 @@ pub(super) fn wall(report: &mut Report, name: &str, wall: &Wall) {
     }
     if let Some(grip) = wall.grip {
         report.positive(format!("{path}.grip"), grip, "m");
-        if matches!(wall.drive(), Drive::Force(_) | Drive::Stress(_)) {
+        if staged.iter().chain([&wall.drive()]).any(pushed) {
             let allowed = "nothing for a wall that is driven by a force or a stress: drive it by a velocity, or fix it";
             report.wrong(format!("{path}.grip"), format!("{grip:?}"), allowed);
         }
@@ -73,7 +74,7 @@ fn slide(report: &mut Report, path: &str, wall: &Wall, slide: &Slide) {
     let place = format!("{path}.slide.direction");
     report.direction(&place, direction);
     report.function(&format!("{path}.slide.velocity"), velocity);
-    if !matches!(wall.drive(), Drive::Force(_) | Drive::Stress(_)) {
+    if !pushed(&wall.drive()) {
         let allowed = "a wall that is driven by force, force_rate or stress; another wall moves along its surface by \
                        velocity with a direction";
         report.wrong(format!("{path}.slide"), "a motion across no force", allowed);
@@ -87,32 +88,38 @@ fn slide(report: &mut Report, path: &str, wall: &Wall, slide: &Slide) {
     }
 }
 
-fn mass_and_direction(report: &mut Report, path: &str, wall: &Wall) {
-    let drive = wall.drive();
+/// Whether a wall is driven by a force or a stress.
+fn pushed(drive: &Drive) -> bool {
+    matches!(drive, Drive::Force(_) | Drive::Stress(_))
+}
+
+fn mass_and_direction(report: &mut Report, path: &str, wall: &Wall, staged: &[Drive]) {
+    let own = wall.drive();
+    let drives = || staged.iter().chain([&own]);
+    let (by_force, by_stress) = (drives().any(pushed), drives().any(|drive| matches!(drive, Drive::Stress(_))));
     let mass = format!("{path}.mass");
-    match (&wall.mass, &drive) {
-        (None, Drive::Force(_) | Drive::Stress(_)) => {
+    match &wall.mass {
+        None if by_force => {
             report.wrong(mass, "nothing", "\"sample\" or {\"kg\": …}, needed by a wall that is driven by a force");
         }
-        (Some(_), Drive::Fixed | Drive::Velocity(_)) => {
+        Some(_) if !by_force => {
             report.wrong(mass, "a mass", "nothing: only a wall that is driven by a force has a mass");
         }
-        (Some(WallMass::Kg(kg)), Drive::Force(_) | Drive::Stress(_)) => {
-            report.positive(format!("{mass}.kg"), *kg, "kg")
-        }
+        Some(WallMass::Kg(kg)) => report.positive(format!("{mass}.kg"), *kg, "kg"),
         _ => {}
     }
     let direction = format!("{path}.direction");
-    match (&wall.direction, &drive) {
-        (Some(vector), Drive::Fixed) => {
+    let driven = drives().any(|drive| *drive != Drive::Fixed);
+    match &wall.direction {
+        Some(vector) if !driven => {
             report.wrong(direction, format!("{vector:?}"), "nothing: a fixed wall has no direction");
         }
         // named by the check of the stress
-        (Some(_), Drive::Stress(_)) => {}
-        (Some(vector), _) => report.direction(&direction, vector),
-        (None, Drive::Velocity(_) | Drive::Force(_)) if wall.drive_direction().is_none() => {
+        Some(_) if by_stress => {}
+        Some(vector) => report.direction(&direction, vector),
+        None if driven && !by_stress && wall.drive_direction().is_none() => {
             report.wrong(direction, "nothing", "a vector: only a plane has a default direction, its normal");
         }
-        _ => {}
+        None => {}
     }
 }
