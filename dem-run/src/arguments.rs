@@ -26,7 +26,7 @@ Example:
 
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Write a shipped scene, with its comments, as the start of one's own; without NAME, list them.
+    /// Write a shipped scene, with its comments, as the start of one's own; without NAME, list all.
     #[command(after_help = NEW_EXAMPLE)]
     New(NewArgs),
     /// Run a scene and write its history.

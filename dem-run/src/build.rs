@@ -1,11 +1,12 @@
 //! From a scene to a world: sample, walls, loads, bonds, settings.
 
+use crate::drive::set_drive;
 use crate::error::RunError;
 use crate::output::number;
 use crate::packings;
 use crate::prepare::{self, Ball, Watch};
 use crate::sample_file;
-use crate::scene::{self, Drive as SceneDrive, Place, Sample, Scene, SolverKind, WallMass};
+use crate::scene::{self, Place, Sample, Scene, SolverKind, WallMass};
 use crate::tolerances::{DEEPEST, ROUNDED, TOUCHING};
 use crate::touching;
 use crate::warnings;
@@ -286,7 +287,7 @@ fn build_wall<D: Dim>(scene: &Scene, name: &str, wall: &scene::Wall, grains: &Gr
     let friction = wall.friction.unwrap_or(scene.materials.friction.grain_wall);
     let mut built = Wall::fixed(shape, position, friction);
     let direction = wall.drive_direction().map_or(D::Vector::zero(), unit::<D>);
-    drive(&mut built, wall, scene.first_drive(name, wall), direction, &grains.mass, 0.0);
+    set_drive(&mut built, wall, scene.first_drive(name, wall), direction, &grains.mass, 0.0);
     if let Drive::Velocity { direction, speed } = &built.drive {
         built.velocity = *direction * speed(0.0);
     }
@@ -300,31 +301,6 @@ fn build_wall<D: Dim>(scene: &Scene, name: &str, wall: &scene::Wall, grains: &Gr
         built.slide = Some(Slide { direction: across, speed: schedule(velocity.clone()) });
     }
     built
-}
-
-/// Gives a wall of the scene a drive along `direction`, whose times count from `start` (s). `masses`
-/// are those of the grains (kg).
-pub(crate) fn drive<D: Dim>(
-    built: &mut Wall<D>,
-    wall: &scene::Wall,
-    drive: SceneDrive,
-    direction: D::Vector,
-    masses: &[f64],
-    start: f64,
-) {
-    let schedule = |function: scene::Function| -> Schedule { Arc::new(move |t| function.at(t - start)) };
-    built.per_area = matches!(drive, SceneDrive::Stress(_));
-    built.drive = match drive {
-        SceneDrive::Fixed => Drive::Fixed,
-        SceneDrive::Velocity(speed) => Drive::Velocity { direction, speed: schedule(speed) },
-        SceneDrive::Force(force) | SceneDrive::Stress(force) => {
-            let mass = match wall.mass {
-                Some(WallMass::Kg(mass)) => mass,
-                _ => masses.iter().sum(),
-            };
-            Drive::Force { direction, mass, force: schedule(force) }
-        }
-    };
 }
 
 /// The centre of a round wall: the given one, or for a seated wall the one at its first contact

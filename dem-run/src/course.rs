@@ -193,8 +193,8 @@ impl<D: Dim> Course<D> {
         self.rejected += u64::from(report.rejected);
     }
 
-    /// What ends the run of `scene` after this step, if anything: a stop condition, or the end of the
-    /// last stage. At the end of another stage, the walls get the drives of the next.
+    /// What ends the run of `scene` after this step, if anything: a stop condition, or the end of
+    /// the last stage. At the end of another stage, the walls get the drives of the next.
     pub fn ending(&mut self, scene: &Scene, world: &mut World<D>) -> Option<Ending> {
         let broken = self.broken();
         self.stops.ending(world, broken).or_else(|| self.stages.advance(scene, world, broken))

@@ -10,6 +10,7 @@ pub mod collapse;
 pub mod course;
 mod destination;
 mod dimension;
+mod drive;
 pub mod error;
 pub mod export;
 pub mod fclib;

@@ -1,6 +1,6 @@
 //! The stages of loading of a run: when each ends, and the drives that the next one brings.
 
-use crate::build::drive;
+use crate::drive::set_drive;
 use crate::load::drive_direction;
 use crate::scene::Scene;
 use crate::stop::Stops;
@@ -48,7 +48,14 @@ impl<D: Dim> Stages<D> {
         }
         let Some(next) = scene.stages.get(self.began.len()) else { return Some(Ending::Stages) };
         self.began.push(world.steps);
+        let before = world.kinetic_energy();
         set_drives(scene, world, self.began.len() - 1, world.steps);
+        // a wall has kinetic energy only under a force: its new drive takes that energy, or gives it
+        let change = world.kinetic_energy() - before;
+        if change != 0.0 {
+            world.ledger.kinetic += change;
+            world.ledger.external_work += change;
+        }
         self.until = Stops::new(next.until.as_ref(), scene, world);
         None
     }
@@ -87,6 +94,6 @@ fn set_drives<D: Dim>(scene: &Scene, world: &mut World<D>, stage: usize, start: 
     for (name, change) in &scene.stages[stage].walls {
         let Some(index) = scene.walls.keys().position(|other| other == name) else { continue };
         let Some(direction) = drive_direction(&world.walls[index]) else { continue };
-        drive(&mut world.walls[index], &scene.walls[name], change.drive(), direction, &world.grains.mass, time);
+        set_drive(&mut world.walls[index], &scene.walls[name], change.drive(), direction, &world.grains.mass, time);
     }
 }

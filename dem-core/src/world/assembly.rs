@@ -237,8 +237,8 @@ impl<D: Dim> World<D> {
         }
     }
 
-    /// Velocities of the walls across their drives at the end of a step of length `h` (m/s); empty if
-    /// none is prescribed.
+    /// Velocities of the walls across their drives at the end of a step of length `h` (m/s); empty
+    /// if none is prescribed.
     fn slides(&self, h: f64) -> Vec<D::Vector> {
         if self.walls.iter().all(|wall| wall.slide.is_none()) {
             return Vec::new();

@@ -332,8 +332,8 @@ impl Scene {
         [wall.drive()].into_iter().chain(stages).filter(|drive| *drive != Drive::Fixed).collect()
     }
 
-    /// The drive of a wall at the start of the run: that of the first stage where it has one. A wall
-    /// that only later stages drive is held until then.
+    /// The drive of a wall at the start of the run: that of the first stage where it has one. A
+    /// wall that only later stages drive is held until then.
     #[must_use]
     pub fn first_drive(&self, name: &str, wall: &Wall) -> Drive {
         let first = self.stages.first().and_then(|stage| stage.walls.get(name));

@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use super::function::{Function, Ramp};
 use super::validate::report::Report;
 
-/// A rigid wall. It is fixed, or driven by one of `velocity`, `force`, `force_rate` and `stress` along
-/// one direction.
+/// A rigid wall. It is fixed, or driven by one of `velocity`, `force`, `force_rate` and `stress`
+/// along one direction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Wall {
@@ -26,17 +26,17 @@ pub struct Wall {
     /// mass.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub force_rate: Option<f64>,
-    /// Drive of a plane along its normal: stress, a function of time (Pa). The force in each step is
-    /// the stress times the present section of the sample across the wall. The wall needs a mass,
-    /// its normal is parallel to an axis, and it touches the sample at the start.
+    /// Drive of a plane along its normal: stress, a function of time (Pa). The force in each step
+    /// is the stress times the present section of the sample across the wall. The wall needs a
+    /// mass, its normal is parallel to an axis, and it touches the sample at the start.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stress: Option<Function>,
     /// Prescribed velocity across a drive by a force or a stress.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub slide: Option<Slide>,
-    /// Grains whose surface is within this distance of the wall at the start (m) move with the wall,
-    /// without turning, and the forces on them count as forces on the wall: a glued platen. Not for
-    /// a wall that is driven by a force or a stress.
+    /// Grains whose surface is within this distance of the wall at the start (m) move with the
+    /// wall, without turning, and the forces on them count as forces on the wall: a glued platen.
+    /// Not for a wall that is driven by a force or a stress.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grip: Option<f64>,
     /// Mass of a wall that is driven by a force.

@@ -95,8 +95,8 @@ fn a_block_under_a_lid_that_slides_is_held_back_by_the_friction_of_its_floor() {
     here.dem_post(&["info", "a.h5", "--check"]).succeeds();
 }
 
-/// The load of the platen is that of the specimen; its peak ends the run, and the run goes on to the
-/// bit from where it was stopped.
+/// The load of the platen is that of the specimen; its drop ends the run, and a run that was
+/// stopped goes on to the bit.
 #[test]
 fn a_specimen_between_glued_platens_is_torn_apart() {
     let here = Folder::new();

@@ -17,6 +17,7 @@ mod packings;
 mod resume;
 mod solves;
 mod specimens;
+mod stages;
 mod sweep;
 mod teaching;
 mod wrong_history;
