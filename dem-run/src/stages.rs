@@ -50,7 +50,7 @@ impl<D: Dim> Stages<D> {
         self.began.push(world.steps);
         let before = world.kinetic_energy();
         set_drives(scene, world, self.began.len() - 1, world.steps);
-        // a wall has kinetic energy only under a force: its new drive takes that energy, or gives it
+        // a wall has kinetic energy only under a force: its new drive takes it, or gives it
         let change = world.kinetic_energy() - before;
         if change != 0.0 {
             world.ledger.kinetic += change;
