@@ -6,7 +6,7 @@ use crate::output::number;
 use crate::packings;
 use crate::prepare::{self, Ball, Watch};
 use crate::sample_file;
-use crate::scene::{self, Place, Sample, Scene, SolverKind, WallMass};
+use crate::scene::{self, Place, Sample, Scene, SolverKind};
 use crate::tolerances::{DEEPEST, ROUNDED, TOUCHING};
 use crate::touching;
 use crate::warnings;

@@ -28,6 +28,14 @@ pub(crate) fn of_scene(scene: &Scene) -> Vec<String> {
             number(next)
         ));
     }
+    let longest: f64 = scene.stages.iter().filter_map(|stage| stage.duration).sum();
+    if scene.stages.iter().all(|stage| stage.until.is_none()) && longest > time.last() + 0.5 * time.step {
+        told.push(format!(
+            "time.end: the run ends at {} s, before its stages, which last {} s: a later time.end lets them end",
+            number(time.last()),
+            number(longest)
+        ));
+    }
     let Some(held) = &scene.grains else { return told };
     if let Sample::Grains(list) = &scene.sample {
         let moves = |values: &Option<Vec<f64>>| values.iter().flatten().any(|value| *value != 0.0);
