@@ -7,7 +7,7 @@ use crate::scene::failure::in_one_piece;
 use crate::stages::Stages;
 use crate::stop::Stops;
 use crate::summary::Ending;
-use dem_core::bond::BondStatus;
+use dem_core::bond::{BondStatus, Rupture};
 use dem_core::dim::{Dim, Vect};
 use dem_core::saved::{Mismatch, Reader, Saved};
 use dem_core::solver::{Route, Work};
@@ -197,6 +197,9 @@ impl<D: Dim> Course<D> {
     /// the last stage. At the end of another stage, the walls get the drives of the next.
     pub fn ending(&mut self, scene: &Scene, world: &mut World<D>) -> Option<Ending> {
         let broken = self.broken();
+        if matches!(world.settings.rupture, Rupture::NextEvent { until } if world.load_time >= until) {
+            return Some(Ending::NoBreak);
+        }
         self.stops.ending(world, broken).or_else(|| self.stages.advance(scene, world, broken))
     }
 }

@@ -12,6 +12,7 @@ mod fclib_global;
 mod interrupt;
 mod laboratory;
 mod loads;
+mod next_event;
 mod pack;
 mod packings;
 mod resume;

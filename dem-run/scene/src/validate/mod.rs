@@ -11,7 +11,7 @@ mod wall;
 use std::collections::HashMap;
 
 use super::error::Problem;
-use super::model::{Bonds, Load, Scatter, Scene, Stiffness};
+use super::model::{Bonds, Load, Rupture, Scatter, Scene, Stiffness};
 use super::solver::SolverKind;
 use super::stage::StageDrive;
 use super::stop::{Stop, TravelFrom};
@@ -54,6 +54,7 @@ pub fn validate(scene: &Scene) -> Vec<Problem> {
     }
     time_and_output(&mut report, scene);
     solver(&mut report, scene);
+    rupture(&mut report, scene);
     if let Some(stop) = &scene.stop {
         self::stop(&mut report, scene, "stop", stop);
     }
@@ -233,6 +234,34 @@ fn solver(report: &mut Report, scene: &Scene) {
     };
     if limit.1 == 0 {
         report.wrong(limit.0, 0, "a whole number, at least 1");
+    }
+}
+
+/// Loading to the next event follows prescribed loads of rigid bonds.
+fn rupture(report: &mut Report, scene: &Scene) {
+    if scene.rupture != Rupture::NextEvent {
+        return;
+    }
+    match &scene.bonds {
+        None => report.wrong("rupture", "next_event in a scene without bonds", "bonds in the scene, or another rule"),
+        Some(bonds) if bonds.stiffness.is_some() => {
+            report.wrong("bonds.stiffness", "a stiffness, with rupture next_event", "no value, or rupture cascade");
+        }
+        Some(_) => {}
+    }
+    for (name, _) in scene.walls.iter().filter(|(_, wall)| wall.velocity.is_some()) {
+        let found = "a velocity, with rupture next_event";
+        report.wrong(format!("walls.{name}.velocity"), found, "force or force_rate in its place, or rupture cascade");
+    }
+    for (name, _) in scene.walls.iter().filter(|(_, wall)| wall.slide.is_some()) {
+        let found = "a slide, with rupture next_event";
+        report.wrong(format!("walls.{name}.slide"), found, "no slide, or rupture cascade: nothing moves");
+    }
+    if !scene.stages.is_empty() {
+        report.wrong("stages", "stages, with rupture next_event", "one course of loads, or rupture cascade");
+    }
+    if matches!(scene.solver.kind, SolverKind::GaussSeidel(_)) {
+        report.wrong("solver.kind", "gauss_seidel, with rupture next_event", "auto, newton or interior");
     }
 }
 
