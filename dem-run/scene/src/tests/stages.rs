@@ -49,7 +49,7 @@ fn what_a_stage_asks_of_a_wall_is_checked_at_the_wall() {
 
 #[test]
 fn nothing_slides_and_no_stage_begins_from_break_to_break() {
-    let still = ["walls.roller=null", "rupture=next_event", "solver={}"];
+    let still = ["walls.roller.velocity=null", "walls.roller.direction=null", "rupture=next_event", "solver={}"];
     let slide = r#"walls.top.slide={"direction": [1, 0], "velocity": {"constant": 1}}"#;
     let stages = r#"stages=[{"name": "a", "duration": 0.1, "walls": {"top": {"force": {"constant": 1}}}}]"#;
     for (set, path) in [(slide, "walls.top.slide"), (stages, "stages")] {
