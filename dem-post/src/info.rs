@@ -234,8 +234,10 @@ impl Report {
         let mut lines = self.facts();
         let hints = [
             ("cracks", self.bonds > 0),
+            ("emission", self.bonds > 0),
             ("chains", self.reactions),
             ("velocities", true),
+            ("fabric", true),
             ("stress-strain", self.driven > 0),
             ("frames", self.bonds > 0),
             ("report", true),

@@ -1,6 +1,6 @@
-//! Analyses of histories: cracks and fragments, single bonds, force chains, velocities, stress and
-//! strain; picture series, comparisons of two runs, strength over many, and reports; companions for
-//! viewers.
+//! Analyses of histories: cracks and fragments, acoustic emission, single bonds, force chains,
+//! velocities, fabric, stress and strain; picture series, comparisons of two runs, strength and
+//! failure envelope of many, and reports; companions for viewers.
 //!
 //! Each analysis is a module with a [`analysis::Analysis`], and an entry of [`ANALYSES`]. Its
 //! functions read a [`dem_history::History`] into a report, and write the report as CSV, SVG and
@@ -12,6 +12,9 @@ use analysis::Entry;
 pub mod chains;
 pub mod compare;
 pub mod cracks;
+pub mod emission;
+pub mod envelope;
+pub mod fabric;
 pub mod frames;
 pub mod info;
 pub mod pack;
@@ -27,24 +30,29 @@ pub mod analysis;
 pub mod check;
 pub mod cli;
 pub mod collapse;
+pub mod extent;
 pub mod fragments;
 pub mod map;
 pub mod moments;
 pub mod options;
 pub mod output;
 pub mod section;
+pub mod tensor;
 
 /// All analyses, in the order in which `--help` lists their commands.
 pub const ANALYSES: &[Entry] = &[
     Entry::of::<info::Command>(),
     Entry::of::<cracks::Command>(),
     Entry::of::<why::Command>(),
+    Entry::of::<emission::Command>(),
     Entry::of::<chains::Command>(),
+    Entry::of::<fabric::Command>(),
     Entry::of::<velocities::Command>(),
     Entry::of::<frames::Command>(),
     Entry::of::<compare::Command>(),
     Entry::of::<report::Command>(),
     Entry::of::<strength::Command>(),
+    Entry::of::<envelope::Command>(),
     Entry::of::<view::Command>(),
     Entry::of::<pack::Command>(),
     Entry::of::<stress_strain::Command>(),

@@ -4,12 +4,14 @@
 //! its *nodes* (its bodies), on top of the identity. It is not symmetric if contacts slip, but its
 //! pattern is. The multifrontal method (Duff & Reid, ACM Trans. Math. Softw. 9, 1983) factorises it
 //! along the elimination tree of the graph of nodes, in dense fronts. [`Tree`] is the symbolic
-//! part, which depends on the graph alone, [`Lu`] the numeric part, shared among threads if the
-//! matrix is large.
+//! part, which depends on the graph alone, [`Factors`] the numeric part, shared among threads if
+//! the matrix is large.
 
+mod dense;
+mod factors;
+mod front_factors;
 mod front_values;
-mod lu;
 mod tree;
 
-pub(crate) use lu::Lu;
+pub(crate) use factors::Factors;
 pub(crate) use tree::Tree;

@@ -29,7 +29,7 @@ pub(super) struct Place {
 /// Unknowns that are eliminated together.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Front {
-    /// The part that it belongs to.
+    /// The part that it belongs to, counted from level to level.
     pub part: usize,
     /// The unknowns that are eliminated here, then those that they are coupled to, as places among
     /// the unknowns of the part.
@@ -71,8 +71,9 @@ pub(crate) struct Tree {
     /// Nodes of each element; an element of one node names it twice.
     elements: Vec<[usize; 2]>,
     pub(super) fronts: Vec<Front>,
-    /// Subtrees, which are independent of each other, and last the fronts above them.
-    pub(super) parts: Vec<Part>,
+    /// The parts of a level are independent of each other and need those below it: first subtrees,
+    /// then the fronts above them, each of them a part.
+    pub(super) levels: Vec<Vec<Part>>,
     unknowns: usize,
 }
 
@@ -81,7 +82,7 @@ impl Tree {
     /// between them; an element of one node names it twice. None if no order is found.
     pub fn new(sizes: Vec<usize>, elements: Vec<[usize; 2]>) -> Option<Self> {
         let unknowns = sizes.iter().sum();
-        let mut tree = Self { sizes, elements, fronts: Vec::new(), parts: Vec::new(), unknowns };
+        let mut tree = Self { sizes, elements, fronts: Vec::new(), levels: Vec::new(), unknowns };
         let adjacency = tree.adjacency();
         let order = ordered(&adjacency)?;
         tree.fronts = tree.joined(&order, &adjacency);
@@ -201,11 +202,12 @@ impl Tree {
         fronts
     }
 
-    /// Divide the fronts into parts: subtrees that are at most a share of the work, several of
-    /// them if they are small, and the fronts above them.
+    /// Divide the fronts into parts and levels: subtrees that are at most a share of the work,
+    /// several of them in a part if they are small, and the fronts above them.
     fn divide(&mut self) {
         let own = |front: &Front| work(front.pivots as f64, front.border() as f64);
         let mut subtree: Vec<f64> = self.fronts.iter().map(own).collect();
+        // the parents come after their children
         for (k, front) in self.fronts.iter().enumerate() {
             if let Some(parent) = front.parent {
                 subtree[parent] += subtree[k];
@@ -213,12 +215,8 @@ impl Tree {
         }
         let all: f64 = self.fronts.iter().map(own).sum();
         let most = (SHARE_OF_A_PART * all).max(WORK_OF_A_PART);
-        // the parents come after their children
-        let mut top = vec![false; self.fronts.len()];
-        if all > most {
-            (0..self.fronts.len()).for_each(|k| top[k] = subtree[k] > most);
-        }
-        let (mut parts, mut filled) = (vec![Part::default()], 0.0);
+        let top: Vec<bool> = subtree.iter().map(|work| *work > most).collect();
+        let (mut subtrees, mut filled) = (vec![Vec::new()], 0.0);
         let mut of_root = vec![0; self.fronts.len()];
         for k in (0..self.fronts.len()).rev().filter(|k| !top[*k]) {
             let inside = self.fronts[k].parent.filter(|parent| !top[*parent]);
@@ -226,40 +224,56 @@ impl Tree {
                 Some(parent) => of_root[parent],
                 None => {
                     if filled + subtree[k] > most && filled > 0.0 {
-                        parts.push(Part::default());
+                        subtrees.push(Vec::new());
                         filled = 0.0;
                     }
                     filled += subtree[k];
-                    parts.len() - 1
+                    subtrees.len() - 1
                 }
             };
         }
-        if all > most {
-            parts.push(Part::default());
-        }
-        let last = parts.len() - 1;
-        for (k, front) in self.fronts.iter_mut().enumerate() {
-            front.part = if top[k] { last } else { of_root[k] };
-            parts[front.part].fronts.push(k);
-        }
-        let mut at = vec![usize::MAX; self.unknowns];
-        for part in &mut parts {
-            let pivots = |k: &usize| self.fronts[*k].unknowns[..self.fronts[*k].pivots].iter().copied();
-            part.unknowns = part.fronts.iter().flat_map(pivots).collect();
-            part.pivots = part.unknowns.len();
-            part.unknowns.iter().enumerate().for_each(|(place, unknown)| at[*unknown] = place);
-            for k in &part.fronts {
-                for unknown in &mut self.fronts[*k].unknowns {
-                    if at[*unknown] == usize::MAX {
-                        at[*unknown] = part.unknowns.len();
-                        part.unknowns.push(*unknown);
-                    }
-                    *unknown = at[*unknown];
-                }
+        (0..self.fronts.len()).filter(|k| !top[*k]).for_each(|k| subtrees[of_root[k]].push(k));
+        let mut levels = vec![subtrees];
+        let mut above = vec![0; self.fronts.len()];
+        for (k, front) in self.fronts.iter().enumerate() {
+            let level = if top[k] { above[k].max(1) } else { 0 };
+            if top[k] {
+                levels.resize_with(levels.len().max(level + 1), Vec::new);
+                levels[level].push(vec![k]);
             }
-            part.unknowns.iter().for_each(|unknown| at[*unknown] = usize::MAX);
+            if let Some(parent) = front.parent {
+                above[parent] = above[parent].max(level + 1);
+            }
         }
-        self.parts = parts;
+        let (mut at, mut made) = (vec![usize::MAX; self.unknowns], 0);
+        for parts in levels {
+            let numbers = made..made + parts.len();
+            made = numbers.end;
+            let parts = parts.into_iter().zip(numbers).map(|(fronts, number)| self.part(fronts, number, &mut at));
+            let parts = parts.collect();
+            self.levels.push(parts);
+        }
+    }
+
+    /// The part of these fronts, with number `number`; `at` has no place for any unknown.
+    fn part(&mut self, fronts: Vec<usize>, number: usize, at: &mut [usize]) -> Part {
+        let pivots = |k: &usize| self.fronts[*k].unknowns[..self.fronts[*k].pivots].iter().copied();
+        let mut unknowns: Vec<usize> = fronts.iter().flat_map(pivots).collect();
+        let pivots = unknowns.len();
+        unknowns.iter().enumerate().for_each(|(place, unknown)| at[*unknown] = place);
+        for k in &fronts {
+            let front = &mut self.fronts[*k];
+            front.part = number;
+            for unknown in &mut front.unknowns {
+                if at[*unknown] == usize::MAX {
+                    at[*unknown] = unknowns.len();
+                    unknowns.push(*unknown);
+                }
+                *unknown = at[*unknown];
+            }
+        }
+        unknowns.iter().for_each(|unknown| at[*unknown] = usize::MAX);
+        Part { fronts, unknowns, pivots }
     }
 
     fn firsts(&self) -> Vec<usize> {

@@ -15,7 +15,7 @@
 use super::graph::Graph;
 use super::rows::{Row, Rows};
 use crate::contact::Padded;
-use crate::linear::Lu;
+use crate::linear::Factors;
 use crate::solver::tuning::history as tuning;
 use std::sync::Arc;
 
@@ -26,8 +26,8 @@ pub(super) fn history(rows: &Rows, graph: &mut Option<Arc<Graph>>) -> Vec<Padded
     let is_rigid_bond = |row: &Row| row.is_bond && row.compliance.n == 0.0;
     let Some(graph) = rows.list.iter().any(is_rigid_bond).then(|| Graph::of(rows, graph)).flatten() else { return all };
     let stiff = stiffness(rows);
-    let mut lu = Lu::default();
-    let made = lu.factorise(&graph.tree, |e, out| {
+    let mut factors = Factors::default();
+    let made = factors.factorise(&graph.tree, |e, out| {
         let row = &rows.list[graph.contacts[e]];
         if is_rigid_bond(row) {
             let every: Vec<usize> = (0..row.rows.len()).collect();
@@ -52,7 +52,7 @@ pub(super) fn history(rows: &Rows, graph: &mut Option<Arc<Graph>>) -> Vec<Padded
         for row in rows.list.iter().filter(|row| is_rigid_bond(row)) {
             rows.apply(row, &(stiffened(rows, row, stiff, &moved) * -1.0), &mut left);
         }
-        lu.solve(&graph.tree, &mut left);
+        factors.solve(&graph.tree, &mut left);
         moved.iter_mut().zip(&left).for_each(|(x, d)| *x += d);
     }
     let history = |(row, r): (&Row, Padded)| if is_rigid_bond(row) { stiffened(rows, row, stiff, &moved) } else { r };

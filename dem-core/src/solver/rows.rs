@@ -342,11 +342,13 @@ impl Rows {
         most.into_iter().map(|most| if most > 0.0 { most } else { 1.0 }).collect()
     }
 
-    /// out += H̃ A H̃ᵀ for some rows of one contact, row by row over the unknowns of its pair; `a`
-    /// gives the entries of A over those rows.
+    /// out ← out + H̃ A H̃ᵀ for some rows of one contact, row by row over the unknowns of its pair;
+    /// `a` gives the entries of A over those rows. If A is symmetric, so is the result, to the last
+    /// bit; `out` must be symmetric then.
     pub fn add_element(&self, row: &Row, of: &[usize], a: impl Fn(usize, usize) -> f64, out: &mut [f64]) {
         let width = row.width();
         let h = |k: usize| self.coefficients(row, of[k]);
+        let symmetric = (0..of.len()).all(|i| (0..i).all(|j| a(i, j) == a(j, i)));
         for i in 0..of.len() {
             // A H̃ᵀ
             let mut line = [0.0; PAIR];
@@ -356,8 +358,15 @@ impl Rows {
                     line.iter_mut().zip(h(j)).for_each(|(x, h)| *x += entry * h);
                 }
             }
-            for (out, h) in out.chunks_exact_mut(width).zip(h(i)) {
-                out.iter_mut().zip(&line).for_each(|(out, x)| *out += h * x);
+            for (r, (out, h)) in out.chunks_exact_mut(width).zip(h(i)).enumerate() {
+                let end = if symmetric { r + 1 } else { width };
+                out[..end].iter_mut().zip(&line).for_each(|(out, x)| *out += h * x);
+            }
+        }
+        if symmetric {
+            // in a damaged state a contact may have one body twice, and fewer rows
+            for r in 0..out.len() / width {
+                (0..r).for_each(|c| out[c * width + r] = out[r * width + c]);
             }
         }
     }

@@ -147,7 +147,8 @@ impl<D: Dim> World<D> {
     /// [`Equilibrium::excess`] of a solved problem.
     fn excess(&self, touches: &[StoredTouch<D>], problem: &ContactProblem<D>, places: &Places) -> f64 {
         let tolerance = self.settings.solver.load_tolerance().unwrap_or(self.settings.solver.tolerance());
-        if unbalanced_impulse(problem) > tolerance * self.scale_of(problem) {
+        // without loads nothing can move: contacts do no positive work on bodies at rest
+        if problem.applied > 0.0 && unbalanced_impulse(problem) > tolerance * self.scale_of(problem) {
             return f64::INFINITY;
         }
         let h = self.settings.step;

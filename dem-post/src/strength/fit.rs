@@ -99,7 +99,7 @@ pub fn spread(values: &[f64]) -> Option<Spread> {
 }
 
 /// The 95 % interval of a value from its standard error and its degrees of freedom, at least 1.
-fn around(value: f64, error: f64, freedom: usize) -> [f64; 2] {
+pub(crate) fn around(value: f64, error: f64, freedom: usize) -> [f64; 2] {
     let half = student(freedom) * error;
     [value - half, value + half]
 }

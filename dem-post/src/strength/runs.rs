@@ -130,31 +130,35 @@ pub fn name(path: &Path) -> String {
 /// those of reading it.
 pub fn read(path: &Path, measure: Measure, wall: Option<&str>) -> Result<Found> {
     let history = History::open(path)?;
-    let bonds = history.bonds()?;
     let course = Course::read(&history, wall)?;
-    let scene = history.parameters()?.scene;
-    if bonds.is_empty() && matches!(measure, Measure::FirstBreak | Measure::Broken) {
-        let what = "it has no bonds: choose --measure collapse or peak".into();
-        return Err(PostError::Lacking { path: path.into(), what });
-    }
-    let strength = if measure == Measure::Collapse {
-        course.collapse(path, Bonding::of(&history)?)?
-    } else {
-        match course.gives_way(path, measure, bonds.len())? {
-            Some(step) => Ok(Strength { load: course.load[step], time: course.time[step], early: false }),
-            None => Err(course.how_far(measure, bonds.len())),
-        }
-    };
-    Ok(Found { path: path.into(), scene, strength, grains: (history.grains()?.radius, bonds.pair) })
+    let failure = course.failure(&history, measure)?;
+    let at = |found: Failure| Strength { load: course.load[found.at], time: course.time[found.at], early: found.early };
+    Ok(Found {
+        path: path.into(),
+        scene: history.parameters()?.scene,
+        strength: failure.map(at),
+        grains: (history.grains()?.radius, history.bonds()?.pair),
+    })
+}
+
+/// The failure of a sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Failure {
+    /// Its row of the observed steps.
+    pub(crate) at: usize,
+    /// Whether all rigid bonds were intact when the strain exceeded the limit of collapse.
+    pub(crate) early: bool,
 }
 
 /// The curves of a run, one entry per observed step.
 #[derive(Debug, Default)]
-struct Course {
+pub(crate) struct Course {
+    /// Steps.
+    pub(crate) step: Vec<i64>,
     /// Times, s.
-    time: Vec<f64>,
+    pub(crate) time: Vec<f64>,
     /// The load, N, positive in its own sense.
-    load: Vec<f64>,
+    pub(crate) load: Vec<f64>,
     /// Axial strain fitted to the grains, along the load; empty if not recorded.
     strain: Vec<f64>,
     /// Bonds broken; empty if not recorded.
@@ -162,13 +166,25 @@ struct Course {
 }
 
 impl Course {
-    fn read(history: &History, wall: Option<&str>) -> Result<Self> {
+    /// Reads the load of the wall `wall`, of the load wall, or, without a driven wall, of the only
+    /// force on a grain.
+    ///
+    /// # Errors
+    /// [`PostError::Lacking`] for a run without a load; [`PostError::Usage`] for a wall that is not
+    /// driven; those of reading the history.
+    pub(crate) fn read(history: &History, wall: Option<&str>) -> Result<Self> {
         let driven = history.walls()?.iter().any(|wall| wall.drive != WallDrive::Fixed);
         match (driven, wall) {
             (false, None) => Self::of_grain(history),
             _ => {
                 let found = stress_strain::read(history, wall)?;
-                Ok(Self { time: found.time, load: found.load, strain: found.strain, broken: found.broken })
+                Ok(Self {
+                    step: found.step,
+                    time: found.time,
+                    load: found.load,
+                    strain: found.strain,
+                    broken: found.broken,
+                })
             }
         }
     }
@@ -201,15 +217,44 @@ impl Course {
             }
         }
         let load = steps.time.iter().map(|&t| size * load.time.at(t)).collect();
-        Ok(Self { time: steps.time, load, strain, broken: steps.value })
+        Ok(Self { step: steps.step, time: steps.time, load, strain, broken: steps.value })
     }
 
-    /// The collapse load, or the reason why there is none.
-    fn collapse(&self, path: &Path, bonds: Bonding) -> Result<std::result::Result<Strength, String>> {
+    /// The failure of the sample by a measure; for a run that did not fail, the state it reached.
+    ///
+    /// # Errors
+    /// [`PostError::Lacking`] for a run without the observables of the measure; those of reading
+    /// it.
+    pub(crate) fn failure(&self, history: &History, measure: Measure) -> Result<std::result::Result<Failure, String>> {
+        let (path, bonds) = (history.path(), history.bonds()?.len());
+        if bonds == 0 && matches!(measure, Measure::FirstBreak | Measure::Broken) {
+            let what = "it has no bonds: choose --measure collapse or peak".into();
+            return Err(PostError::Lacking { path: path.into(), what });
+        }
+        if measure == Measure::Collapse {
+            return self.collapse(path, Bonding::of(history)?);
+        }
+        let step = self.gives_way(path, measure, bonds)?;
+        Ok(step.map(|at| Failure { at, early: false }).ok_or_else(|| self.how_far(measure, bonds)))
+    }
+
+    /// The row whose end is the state that the sample still bore: that of the failure or, if bonds
+    /// broke in it, the one before; `None` if they did in the first.
+    pub(crate) fn borne(&self, failure: Failure) -> Option<usize> {
+        let broken = |row: usize| self.broken.get(row).copied().unwrap_or(0.0);
+        match failure.at.checked_sub(1) {
+            None => (broken(0) == 0.0).then_some(0),
+            Some(before) if broken(failure.at) > broken(before) => Some(before),
+            Some(_) => Some(failure.at),
+        }
+    }
+
+    /// The collapse, or the reason why there is none.
+    fn collapse(&self, path: &Path, bonds: Bonding) -> Result<std::result::Result<Failure, String>> {
         recorded(path, &self.strain, "strain")?;
         let found = Collapse::read(&self.load, &self.strain, &self.broken, STRAINS[0], bonds);
         Ok(match found.step {
-            Some(step) => Ok(Strength { load: self.load[step], time: self.time[step], early: found.early }),
+            Some(at) => Ok(Failure { at, early: found.early }),
             None if found.note.is_empty() => Err(self.how_far(Measure::Collapse, 0)),
             None => Err(format!("it has no collapse load: {}", found.note)),
         })
@@ -256,6 +301,7 @@ mod tests {
 
     fn course() -> Course {
         Course {
+            step: (0..6).collect(),
             time: (0..6).map(f64::from).collect(),
             load: vec![0.0, 10.0, 20.0, 30.0, 40.0, 12.0],
             strain: vec![0.0, 0.0, 0.0, -5e-5, -2e-4, -2e-3],
@@ -275,8 +321,18 @@ mod tests {
             (Some(4), Some(2), None)
         );
         let collapse = |bonds| course().collapse(Path::new("run.h5"), bonds).unwrap();
-        assert_eq!(collapse(Bonding::None), Ok(Strength { load: 30.0, time: 3.0, early: false }));
+        assert_eq!(collapse(Bonding::None), Ok(Failure { at: 3, early: false }));
         assert_eq!(step(Measure::Peak, 100), Some(4));
         assert!(Course::default().collapse(Path::new("a.h5"), Bonding::None).is_err());
+    }
+
+    #[test]
+    fn what_a_sample_bore_is_before_the_breaks_of_its_failure() {
+        // bonds break at rows 2, 4 and 5
+        let borne = |at: usize| course().borne(Failure { at, early: false });
+        assert_eq!([0, 1, 2, 3, 4, 5].map(borne), [Some(0), Some(1), Some(1), Some(3), Some(3), Some(4)]);
+        let at_once = Course { broken: vec![1.0, 2.0], ..course() };
+        assert_eq!(at_once.borne(Failure { at: 0, early: false }), None);
+        assert_eq!(Course { broken: vec![], ..course() }.borne(Failure { at: 4, early: false }), Some(4));
     }
 }

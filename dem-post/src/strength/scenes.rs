@@ -89,6 +89,17 @@ pub fn design(runs: &[(String, String)], against: Option<&str>) -> Result<Design
     Ok(Design { field, along, sample_fields, values, sample, samples: sorted.into_iter().map(|s| s.1).collect() })
 }
 
+/// The fields that differ between runs with these names and scenes (JSON), without those that make
+/// the sample.
+///
+/// # Errors
+/// [`PostError::Usage`] for a scene that cannot be read.
+pub fn varied(runs: &[(String, String)]) -> Result<Vec<String>> {
+    let mut names = differing(&runs.iter().map(leaves).collect::<Result<Vec<Leaves>>>()?);
+    names.retain(|name| !makes_sample(name));
+    Ok(names)
+}
+
 /// The leaves of a run's scene that are compared.
 fn leaves((name, scene): &(String, String)) -> Result<Leaves> {
     let tree: Value = serde_json::from_str(scene)

@@ -23,6 +23,8 @@
 //! load where no load acted in that step, or where elastic bonds reached that strain before any
 //! broke. If rigid bonds join all grains to one piece and none has broken by then, the strain is
 //! solver error and the load is meaningless: the tables note this, and the drawings omit the load.
+//!
+//! **Young's modulus and Poisson's ratio** of samples with elastic bonds: [`elastic`].
 
 use clap::Args;
 use dem_history::History;
@@ -34,6 +36,7 @@ pub use files::write;
 pub use report::{Report, Summary, read};
 pub(crate) use report::{driven, load_wall};
 
+pub mod elastic;
 mod files;
 mod pictures;
 mod report;

@@ -61,6 +61,11 @@ pub fn stress_strain(report: &Report) -> Chart {
     if !points.is_empty() {
         chart = chart.curve("from particles", colour::BLUE, Style::Thin, points);
     }
+    if let Some(elastic) = &report.summary.elastic {
+        let points = pairs(&elastic.strains, 1e2, &elastic.stresses, 1e-3);
+        let name = format!("E = {} GPa", short(1e-9 * elastic.young_modulus.value));
+        chart = chart.curve(&name, colour::BLACK, Style::Line, points);
+    }
     if let Some((load, wall_stress)) = report.summary.level().zip(wall_stress) {
         chart.levels.push((load * wall_stress, format!("at strain 10⁻⁴: {} kPa", short(load * wall_stress))));
     }

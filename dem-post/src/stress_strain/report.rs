@@ -8,9 +8,12 @@ use dem_scene::{Scene, choose_load_wall};
 use serde::Serialize;
 use serde_json::Value;
 
+use super::elastic::{Curves, Elastic, RANGE};
 use crate::chains::stress::thickness;
 use crate::collapse::{Bonding, Collapse, peak, work};
-use crate::output::{PostError, Result, facts, quantity};
+use crate::extent::first_box;
+use crate::output::{PostError, Result, facts, number, quantity};
+use crate::strength::fit::Estimate;
 
 /// Strains that define the collapse.
 pub(super) const COLLAPSE: [f64; 2] = [1e-4, 1e-3];
@@ -52,6 +55,11 @@ pub struct Summary {
     pub greatest_load: f64,
     /// The splitting strength of a disk between plates.
     pub splitting: Option<Splitting>,
+    /// Young's modulus and Poisson's ratio; `None` without elastic bonds, and where
+    /// `elastic_note` says why.
+    pub elastic: Option<Elastic>,
+    /// Why a sample with elastic bonds has no elastic constants; empty else.
+    pub elastic_note: &'static str,
     /// Displacement of the wall at the end, m.
     pub final_displacement: f64,
     /// Strain fitted to the grains at the end.
@@ -149,7 +157,46 @@ pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
     let disk = serde_json::from_str::<Scene>(&scene).ok().and_then(|scene| Disk::of(&scene, &s.wall, &size.extents));
     let collapse = s.collapse_load.filter(|_| !s.collapse_early[0]);
     s.splitting = disk.map(|disk| Splitting::of(disk, collapse, s.peak_load));
+    if bonds == Bonding::Elastic {
+        let found = if plate && disk.is_none() {
+            elastic(history, &report, axis, push)?
+        } else {
+            Err("only a sample that plates load along its axis has them")
+        };
+        match found {
+            Ok(found) => report.summary.elastic = Some(found),
+            Err(why) => report.summary.elastic_note = why,
+        }
+    }
     Ok(report)
+}
+
+/// The elastic constants, or why there are none; `push` as [`sample_size`] has it.
+fn elastic(
+    history: &History,
+    report: &Report,
+    axis: usize,
+    push: f64,
+) -> Result<std::result::Result<Elastic, &'static str>> {
+    // the mean over the other axes, positive along the load as the axial one
+    let lateral = |name: &str, sign: f64| -> Result<Vec<f64>> {
+        let axes: Vec<usize> = (0..history.dimension()).filter(|&k| k != axis).collect();
+        let mut sum = vec![0.0; report.load.len()];
+        let Some(series) = history.observable(name)? else { return Ok(vec![]) };
+        for &k in &axes {
+            let part = component(history, &series, &[k, k], name)?;
+            sum.iter_mut().zip(part).for_each(|(sum, x)| *sum += sign * x / axes.len() as f64);
+        }
+        Ok(sum)
+    };
+    Ok(Elastic::of(Curves {
+        load: &report.load,
+        broken: &report.broken,
+        strain: &report.strain,
+        stress: &report.stress,
+        lateral_strain: &lateral("strain", -push)?,
+        lateral_stress: &lateral("stress", push)?,
+    }))
 }
 
 /// Motion and forces of the driven wall along its direction, with the signs of that direction.
@@ -283,20 +330,9 @@ struct Size {
 /// The size of the sample, and whether the load pushes (1) or pulls (−1).
 fn sample_size(history: &History, wall: usize, axis: usize, drive: f64) -> Result<(Size, f64)> {
     let d = history.dimension();
-    let (radius, position) = (history.grains()?.radius, history.grain_state(0)?.position);
-    let mut extents = vec![];
-    let mut middle = 0.0;
-    for k in 0..d {
-        let edge = |sign: f64| {
-            let reach = radius.iter().zip(position.chunks(d)).map(|(r, x)| sign * x[k] + r);
-            sign * reach.fold(f64::NEG_INFINITY, f64::max)
-        };
-        let (low, high) = (edge(-1.0), edge(1.0));
-        extents.push(high - low);
-        if k == axis {
-            middle = 0.5 * (low + high);
-        }
-    }
+    let ends = first_box(history)?;
+    let extents: Vec<f64> = ends.iter().map(|[low, high]| high - low).collect();
+    let middle = 0.5 * (ends[axis][0] + ends[axis][1]);
     let place = history.wall_state(0)?.position.get(wall * d + axis).copied().unwrap_or(middle);
     let across: f64 = (0..d).filter(|&k| k != axis).map(|k| extents[k]).product();
     let area = if d == 2 { across * thickness(history)? } else { across };
@@ -321,6 +357,25 @@ impl Summary {
     pub fn sample(&self) -> String {
         let section = self.area.map_or_else(String::new, |area| format!(", section {}", quantity(Some(area), "m²")));
         format!("{} high{section}", quantity(Some(self.height), "m"))
+    }
+
+    /// Young's modulus and Poisson's ratio in words; `None` for samples without elastic bonds.
+    pub fn elastic(&self) -> Option<[(&'static str, String); 2]> {
+        let words = |found: &Estimate, unit: &str| {
+            let error = found.standard_error.map(|error| format!(" ± {}", number(error)));
+            format!("{}{} {unit}", number(found.value), error.unwrap_or_default()).trim_end().to_string()
+        };
+        let names = ["Young's modulus", "Poisson's ratio"];
+        match &self.elastic {
+            Some(found) => {
+                let whole = if self.first_break.is_some() { "load at the first break" } else { "greatest load" };
+                let over = format!("at {:.0} % to {:.0} % of the {whole}", 1e2 * RANGE[0], 1e2 * RANGE[1]);
+                let modulus = format!("{} (standard error), {over}", words(&found.young_modulus, "Pa"));
+                Some([(names[0], modulus), (names[1], words(&found.poisson_ratio, ""))])
+            }
+            None if self.elastic_note.is_empty() => None,
+            None => Some(names.map(|name| (name, format!("none: {}", self.elastic_note)))),
+        }
     }
 
     /// The peak in words.
@@ -400,8 +455,11 @@ impl Report {
             ("bonds broken", bonds),
             ("worst residual accepted", quantity(s.worst_residual, "")),
         ];
+        for (k, line) in s.elastic().into_iter().flatten().enumerate() {
+            lines.insert(2 + k, line);
+        }
         if let Some(splitting) = &s.splitting {
-            lines.insert(10, ("splitting strength", splitting.to_string()));
+            lines.insert(lines.len() - 6, ("splitting strength", splitting.to_string()));
         }
         facts(&lines)
     }

@@ -42,6 +42,7 @@ impl OnPage for Report {
             ("Greatest load", quantity(Some(s.greatest_load), "N")),
             ("Work of the wall", quantity(Some(s.work), "J")),
         ];
+        facts.extend(s.elastic().into_iter().flatten());
         facts.extend(s.splitting.as_ref().map(|splitting| ("Splitting strength", splitting.to_string())));
         Ok(Section {
             text:

@@ -5,7 +5,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use dem_post::output::{Folder, PostError, Result};
 use dem_post::{
-    chains, check, compare, cracks, frames, info, pack, report, strength, stress_strain, velocities, view, why,
+    chains, check, compare, cracks, emission, envelope, fabric, frames, info, pack, report, strength, stress_strain,
+    velocities, view, why,
 };
 use hdf5::types::{IntSize, TypeDescriptor};
 use hdf5::{File, H5Type};
@@ -88,9 +89,11 @@ fn reads(good: &Path) -> Vec<Command<'_>> {
     vec![
         command("info", |h, _| info::read(h).map(|report| drop(report.table()))),
         command("cracks", |h, _| cracks::read(h, true).map(|report| drop(report.table()))),
+        command("emission", |h, _| emission::read(h, &emission::Options::default()).map(|report| drop(report.table()))),
         command("why", |h, _| why::read(h, why::Which::Number(0), None, true).map(|report| drop(report.table()))),
         command("chains", |h, _| chains::read(h, &[]).map(|report| drop(report.table()))),
         command("velocities", |h, _| velocities::read(h, &[]).map(|report| drop(report.table()))),
+        command("fabric", |h, _| fabric::read(h, &[], true).map(|report| drop(report.table()))),
         command("report", |h, _| report::read(h, &[], None, true).map(|report| drop(report.table()))),
         command("stress-strain", |h, _| stress_strain::read(h, None).map(|report| drop(report.table()))),
         command("frames", |h, _| frames::read(h, frames::Subject::Forces, 1, &[]).map(drop)),
@@ -99,6 +102,10 @@ fn reads(good: &Path) -> Vec<Command<'_>> {
             let runs = [good.to_path_buf(), h.path().to_path_buf()];
             let options = strength::Options { against: None, measure: strength::Measure::Broken, wall: None };
             strength::read(&runs, &options).map(drop)
+        }),
+        command("envelope", |h, _| {
+            let runs = [good.to_path_buf(), h.path().to_path_buf()];
+            envelope::read(&runs, strength::Measure::Broken, None).map(|report| drop(report.table()))
         }),
         command("view", |h, _| view::read(h, true).map(|report| drop(report.table()))),
         command("pack", |h, folder| pack::write(h, &folder.path().join("packed.h5"), CopyAs::Packed, true).map(drop)),
@@ -109,15 +116,21 @@ fn reads(good: &Path) -> Vec<Command<'_>> {
 fn writes(good: &Path) -> Vec<Command<'_>> {
     vec![
         command("cracks", |h, folder| cracks::write(h, &cracks::read(h, true)?, &[], folder)),
+        command("emission", |h, folder| emission::write(&emission::read(h, &emission::Options::default())?, folder)),
         command("why", |h, folder| why::write(&why::read(h, why::Which::Number(0), None, true)?, folder)),
         command("chains", |h, folder| chains::write(h, &chains::read(h, &[])?, folder)),
         command("velocities", |h, folder| velocities::write(h, &velocities::read(h, &[])?, folder)),
+        command("fabric", |h, folder| fabric::write(&fabric::read(h, &[], true)?, folder)),
         command("report", |h, folder| report::write(h, &report::read(h, &[], None, true)?, folder)),
         command("stress-strain", |h, folder| stress_strain::write(&stress_strain::read(h, None)?, folder)),
         command("frames", |h, folder| {
             frames::write(h, &frames::read(h, frames::Subject::Bonds, 10, &[])?, folder, true)
         }),
         command("compare", |h, folder| compare::write(h, &compare::read(h, &History::open(good)?, 0.0)?, folder)),
+        command("envelope", |h, folder| {
+            let runs = [good.to_path_buf(), h.path().to_path_buf()];
+            envelope::write(&envelope::read(&runs, strength::Measure::Broken, None)?, folder)
+        }),
         command("view", |h, folder| view::write(h, &mut view::read(h, true)?, folder, true)),
     ]
 }

@@ -7,6 +7,10 @@ use dem_history::*;
 
 mod check;
 mod damage;
+mod elastic;
+mod emission;
+mod envelope;
+mod fabric;
 mod folders;
 mod solves;
 mod view;
@@ -216,8 +220,10 @@ fn every_command_writes_what_it_promises() {
         let (folder, path) = sample(&layout(dimension));
         for (command, files) in [
             ("cracks", &["ruptures.csv", "broken.csv", "fragments.csv", "broken", "fragments", "decohesion"][..]),
+            ("emission", &["emission-events.csv", "emission-magnitudes.csv", "emission", "emission-magnitudes"]),
             ("chains", &["forces.csv", "distribution.csv", "chains", "distribution", "force-chains"]),
             ("velocities", &["velocities.csv", "velocities"]),
+            ("fabric", &["fabric.csv", "fabric", "fabric-stress"]),
             ("stress-strain", &["stress-strain.csv", "force-displacement", "stress-strain"]),
         ] {
             let output = dem_post(&path, &[command]);
@@ -416,7 +422,9 @@ fn wrong_files_are_refused() {
     };
     let foreign = folder.path().join("foreign.h5");
     hdf5::File::create(&foreign).unwrap();
-    for command in ["info", "cracks", "chains", "velocities", "frames", "report", "stress-strain", "view"] {
+    for command in
+        ["info", "cracks", "emission", "chains", "velocities", "fabric", "frames", "report", "stress-strain", "view"]
+    {
         refused(&dem_post(&folder.path().join("none.h5"), &[command]), 4, &["none.h5", "does not exist"]);
         refused(&dem_post(&file("text.h5", b"x,y\n"), &[command]), 4, &["text.h5", "not an HDF5 file"]);
         refused(&dem_post(&file("cut.h5", &bytes[..bytes.len() / 2]), &[command]), 4, &["cut.h5", "truncated"]);

@@ -5,7 +5,7 @@ use dem_run::history::History;
 use serde_json::Value;
 
 /// The files of each view, without the folder.
-const VIEWS: [(&str, &[&str]); 5] = [
+const VIEWS: [(&str, &[&str]); 7] = [
     ("info", &[]),
     (
         "cracks",
@@ -33,6 +33,18 @@ const VIEWS: [(&str, &[&str]); 5] = [
         ],
     ),
     (
+        "emission",
+        &[
+            "emission-events.csv",
+            "emission-magnitudes.csv",
+            "emission-b-values.csv",
+            "emission.svg",
+            "emission.png",
+            "emission-magnitudes.svg",
+            "emission-magnitudes.png",
+        ],
+    ),
+    (
         "chains",
         &[
             "forces.csv",
@@ -49,6 +61,7 @@ const VIEWS: [(&str, &[&str]); 5] = [
             "force-chain-lengths.png",
         ],
     ),
+    ("fabric", &["fabric.csv", "fabric.svg", "fabric.png", "fabric-stress.svg", "fabric-stress.png"]),
     ("velocities", &["velocities.csv", "velocities.svg", "velocities.png"]),
     (
         "stress-strain",

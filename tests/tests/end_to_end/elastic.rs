@@ -90,3 +90,31 @@ fn accuracy_calls_no_strain_of_elastic_bonds_false() {
     assert!(told.contains("contact order") && !told.contains("starting reactions"), "{told}");
     assert!(!told.contains("keeps its shape") && !told.contains("solver error, not strain"), "{told}");
 }
+
+#[test]
+fn columns_of_springs_have_their_modulus() {
+    // two columns of 20 disks of diameter d and thickness t, each contact a spring k: the stress is
+    // F/(2 d t), the strain F/(2 k d), so that E = k/t; nothing moves sideways
+    let here = Folder::new();
+    let scene = r#"{
+        "dimension": 2, "thickness": 0.5,
+        "sample": { "lattice": { "square": { "diameter": 4e-3, "rows": 20, "columns": 2 } } },
+        "materials": { "density": 2500, "friction": { "grain_grain": 0.3, "grain_wall": 0 } },
+        "bonds": {
+            "strength": 10, "gap_tolerance": 1e-6,
+            "stiffness": { "springs": { "normal": 1e7, "tangential": 5e6, "rolling": 5 } }
+        },
+        "walls": {
+            "bottom": { "shape": { "plane": { "normal": [0, 1], "place": "seated" } } },
+            "top": { "shape": { "plane": { "normal": [0, -1], "place": "seated" } }, "mass": "sample", "force_rate": 20 }
+        },
+        "time": { "step": 1e-4, "end": 0.2 },
+        "output": { "every_steps": 100 }
+    }"#;
+    here.write("a.json", scene);
+    here.dem_run(&["run", "a.json"]).succeeds();
+    let found = here.dem_post(&["stress-strain", "a.h5", "--json"]).json();
+    let value = |name: &str| found["elastic"][name]["value"].as_f64().expect("a number");
+    assert!((value("young_modulus") / 2e7 - 1.0).abs() < 1e-3, "{found}");
+    assert!(value("poisson_ratio").abs() < 1e-6, "{found}");
+}

@@ -2,7 +2,7 @@
 //! it.
 
 use super::sites::{Site, Sites};
-use crate::linear::{Lu, Tree};
+use crate::linear::{Factors, Tree};
 use crate::problem::assembled::BlockMatrix;
 use crate::solver::graph::Graph;
 use crate::solver::rows::Rows;
@@ -140,9 +140,9 @@ impl<'a> Coupling<'a> {
 
     /// Factorise the matrix of a step; D⁻¹ is in the upper left corners of the inverses of the
     /// local matrices. Returns the sign of the determinant; none if the matrix is singular.
-    pub fn factorise(&self, sites: &Sites, inverses: &[f64], lu: &mut Lu) -> Option<f64> {
+    pub fn factorise(&self, sites: &Sites, inverses: &[f64], factors: &mut Factors) -> Option<f64> {
         match self {
-            Self::Bodies { rows, scale, graph } => lu.factorise(self.tree(), |e, out| {
+            Self::Bodies { rows, scale, graph } => factors.factorise(self.tree(), |e, out| {
                 let c = graph.contacts[e];
                 let (row, site) = (&rows.list[c], &sites.list[c]);
                 let (own, square) = (&inverses[site.matrix..], scale * scale);
@@ -150,22 +150,22 @@ impl<'a> Coupling<'a> {
                 rows.add_element(row, &site.of[..site.rows], entry, out);
             }),
             Self::Matrix { blocks, values, tree } => {
-                lu.factorise(tree, |e, out| blocks[e].add_element(sites, values, inverses, out))
+                factors.factorise(tree, |e, out| blocks[e].add_element(sites, values, inverses, out))
             }
         }
     }
 
     /// The contact velocities (1 + W D⁻¹)⁻¹ W r: reactions `r` with the response of the contacts.
-    pub fn yielded(&self, sites: &Sites, r: &[f64], lu: &Lu) -> Vec<f64> {
+    pub fn yielded(&self, sites: &Sites, r: &[f64], factors: &Factors) -> Vec<f64> {
         match self {
             Self::Bodies { .. } => {
                 let mut y = self.pushed(sites, r);
-                lu.solve(self.tree(), &mut y);
+                factors.solve(self.tree(), &mut y);
                 self.pulled(sites, &y)
             }
             Self::Matrix { .. } => {
                 let mut u = self.velocity(sites, r);
-                lu.solve(self.tree(), &mut u);
+                factors.solve(self.tree(), &mut u);
                 u
             }
         }

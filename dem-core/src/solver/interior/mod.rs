@@ -32,7 +32,7 @@ mod system;
 mod violation;
 
 use crate::contact::Padded;
-use crate::linear::Lu;
+use crate::linear::Factors;
 use crate::solver::graph::Graph;
 use crate::solver::rows::Rows;
 use crate::solver::solvable::Solvable;
@@ -53,7 +53,7 @@ pub(super) use violation::Least;
 /// The method, with buffers kept between solves.
 #[derive(Default)]
 pub(super) struct Interior {
-    lu: Lu,
+    factors: Factors,
     inverses: Vec<f64>,
     /// Factorisations so far.
     pub made: u64,
@@ -113,8 +113,19 @@ impl Interior {
         let pairs = scaled(at);
         let locally = invert(sites, &pairs, &metric.compliance, &mut self.inverses)?;
         self.made += 1;
-        let globally = coupling.factorise(sites, &self.inverses, &mut self.lu)?;
-        let (compliance, inverses, lu) = (&metric.compliance[..], &self.inverses[..], &self.lu);
-        Some(System { sites, coupling, at, velocity, right, pairs, compliance, inverses, lu, sign: locally * globally })
+        let globally = coupling.factorise(sites, &self.inverses, &mut self.factors)?;
+        let (compliance, inverses, factors) = (&metric.compliance[..], &self.inverses[..], &self.factors);
+        Some(System {
+            sites,
+            coupling,
+            at,
+            velocity,
+            right,
+            pairs,
+            compliance,
+            inverses,
+            factors,
+            sign: locally * globally,
+        })
     }
 }

@@ -5,7 +5,7 @@ use super::coupling::Coupling;
 use super::local::{Scaled, follow, opened, solve, yield_to};
 use super::sites::Sites;
 use super::state::State;
-use crate::linear::Lu;
+use crate::linear::Factors;
 
 /// One linear system and the point that it belongs to.
 pub(super) struct System<'a> {
@@ -21,7 +21,7 @@ pub(super) struct System<'a> {
     pub pairs: Vec<Scaled>,
     pub compliance: &'a [f64],
     pub inverses: &'a [f64],
-    pub lu: &'a Lu,
+    pub factors: &'a Factors,
     /// Sign of the determinant: it changes where the path folds.
     pub sign: f64,
 }
@@ -52,7 +52,7 @@ impl System<'_> {
 
     pub fn solved(&self, right: &[f64], by: &[Point]) -> State {
         let mut step = solve(self.sites, &self.pairs, self.inverses, right, by);
-        let yielded = self.coupling.yielded(self.sites, &step.r, self.lu);
+        let yielded = self.coupling.yielded(self.sites, &step.r, self.factors);
         yield_to(self.sites, self.inverses, &yielded, &mut step);
         follow(self.sites, &mut step);
         step

@@ -1,24 +1,24 @@
 //! The matrix I + Σ H̃ A H̃ᵀ of a Newton step and its factors, which are kept while refinement with
 //! them converges.
 
-use crate::linear::{Lu, Tree};
+use crate::linear::{Factors, Tree};
 use crate::saved::{Mismatch, Reader, Saved};
 use crate::solver::graph::Graph;
 use crate::solver::rows::{Operator, PAIR, Rows};
 use std::sync::Arc;
 
 /// Factors, and the matrices from which they were computed.
-struct Factors {
+struct Cached {
     graph: Arc<Graph>,
     /// The matrices of all elements, one after the other.
     elements: Vec<f64>,
-    lu: Lu,
+    factors: Factors,
 }
 
 /// The cached factors. A copy shares them until either copy renews its own.
 #[derive(Clone, Default)]
 pub(super) struct Factor {
-    factors: Option<Arc<Factors>>,
+    cached: Option<Arc<Cached>>,
     /// Whether the factors must be renewed.
     pub stale: bool,
     /// Factorisations so far.
@@ -28,16 +28,16 @@ pub(super) struct Factor {
 impl Factor {
     /// Whether the factors can be tried for this many unknowns.
     pub fn fits(&self, unknowns: usize) -> bool {
-        !self.stale && self.factors.as_ref().is_some_and(|factors| factors.graph.tree.unknowns() == unknowns)
+        !self.stale && self.cached.as_ref().is_some_and(|cached| cached.graph.tree.unknowns() == unknowns)
     }
 
     /// Factorise I + Σ H̃ A H̃ᵀ for these operators; false if the matrix is singular to round-off.
     pub fn renew(&mut self, rows: &Rows, operators: &[Option<Operator>], graph: Arc<Graph>) -> bool {
         self.made += 1;
         // reuse the memory of the old factors, unless a copy shares them
-        let (mut elements, lu) = match self.factors.take().and_then(Arc::into_inner) {
-            Some(old) => (old.elements, old.lu),
-            None => (Vec::new(), Lu::default()),
+        let (mut elements, factors) = match self.cached.take().and_then(Arc::into_inner) {
+            Some(old) => (old.elements, old.factors),
+            None => (Vec::new(), Factors::default()),
         };
         elements.clear();
         for c in &graph.contacts {
@@ -49,11 +49,11 @@ impl Factor {
                 rows.add_element(row, &all, entry, &mut elements[first..]);
             }
         }
-        self.factorise(Factors { graph, elements, lu })
+        self.factorise(Cached { graph, elements, factors })
     }
 
-    fn factorise(&mut self, mut factors: Factors) -> bool {
-        let Factors { graph, elements, lu } = &mut factors;
+    fn factorise(&mut self, mut cached: Cached) -> bool {
+        let Cached { graph, elements, factors } = &mut cached;
         let mut next = 0;
         let starts: Vec<usize> = (0..graph.contacts.len())
             .map(|e| {
@@ -62,27 +62,27 @@ impl Factor {
                 next - width * width
             })
             .collect();
-        let made = lu.factorise(&graph.tree, |e, out| {
+        let made = factors.factorise(&graph.tree, |e, out| {
             let n = out.len();
             out.copy_from_slice(&elements[starts[e]..][..n]);
         });
         self.stale = made.is_none();
-        self.factors = Some(Arc::new(factors));
+        self.cached = Some(Arc::new(cached));
         made.is_some()
     }
 
     /// x ← (I + Σ H̃ A H̃ᵀ)⁻¹ x, with the factors.
     pub fn solve(&self, x: &mut [f64]) {
-        if let Some(factors) = &self.factors {
-            factors.lu.solve(&factors.graph.tree, x);
+        if let Some(cached) = &self.cached {
+            cached.factors.solve(&cached.graph.tree, x);
         }
     }
 
     /// Write the matrices from which the factors were computed.
     pub fn save(&self, to: &mut Saved) {
-        let kept = self.factors.as_ref().filter(|_| !self.stale);
+        let kept = self.cached.as_ref().filter(|_| !self.stale);
         to.flag(kept.is_some());
-        let Some(Factors { graph, elements: values, .. }) = kept.map(AsRef::as_ref) else { return };
+        let Some(Cached { graph, elements: values, .. }) = kept.map(AsRef::as_ref) else { return };
         let (sizes, elements) = graph.tree.nodes_and_elements();
         to.count(sizes.len());
         sizes.iter().for_each(|size| to.count(*size));
@@ -115,7 +115,8 @@ impl Factor {
             return Err(Mismatch);
         }
         let elements = from.reals(values)?.to_vec();
-        let factors = Factors { graph: Arc::new(Graph { tree, contacts }), elements, lu: Lu::default() };
-        if factor.factorise(factors) { Ok(factor) } else { Err(Mismatch) }
+        let graph = Arc::new(Graph { tree, contacts });
+        let cached = Cached { graph, elements, factors: Factors::default() };
+        if factor.factorise(cached) { Ok(factor) } else { Err(Mismatch) }
     }
 }

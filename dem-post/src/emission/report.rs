@@ -1,0 +1,260 @@
+//! The events of a run: the report, and how it is computed from a history.
+
+use clap::ValueEnum;
+use dem_history::History;
+use serde::Serialize;
+
+use super::events::{Event, Rule, cluster};
+use super::frequency::{BValue, FEWEST, Frequency, Values, maximum_curvature};
+use crate::output::{PostError, Result, Text, facts, number, quantity};
+use crate::strength::runs::Course;
+
+/// Maximum number of events in the table on the terminal; the CSV has all.
+const SHOWN: usize = 12;
+
+/// The magnitude of an event.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Scale {
+    /// ⅔ log₁₀ of the elastic energy released, in J.
+    Energy,
+    /// log₁₀ of the number of bonds.
+    Size,
+}
+
+/// Options of the analysis.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Which ruptures are linked.
+    pub rule: Rule,
+    /// The magnitude; by default energy where bonds released some, else size.
+    pub scale: Option<Scale>,
+    /// Width of the bins of magnitudes of energy.
+    pub bin: f64,
+    /// Magnitude from which the b-value is estimated; by default that of the most events.
+    pub completeness: Option<f64>,
+    /// The load wall; by default that of the scene.
+    pub wall: Option<String>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { rule: Rule { steps: 1, reach: 1 }, scale: None, bin: 0.1, completeness: None, wall: None }
+    }
+}
+
+/// The load, and what had broken, over the steps.
+#[derive(Clone, Debug, Default)]
+pub struct Curves {
+    /// Time, s, and load, N; empty where the load is not known.
+    pub load: Vec<(f64, f64)>,
+    /// Time of each rupture, s, and its energy, J.
+    pub ruptures: Vec<(f64, f64)>,
+    /// End of the run, s.
+    pub end: f64,
+}
+
+/// The events of a run.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// Which ruptures are linked.
+    pub rule: Rule,
+    /// What the magnitude is.
+    pub magnitude: Scale,
+    /// Width of the bins of magnitudes; `None` for sizes.
+    pub bin: Option<f64>,
+    /// Bonds at the start.
+    pub bonds: usize,
+    /// Bonds that broke.
+    pub ruptures: usize,
+    /// Elastic energy that they released, J.
+    pub energy: f64,
+    /// Magnitude from which the b-value is estimated; `None` without events.
+    pub completeness: Option<f64>,
+    /// The b-value; `None` for too few events.
+    pub b_value: Option<BValue>,
+    /// Why there is none; empty where there is one.
+    pub b_note: String,
+    /// Why there is no load; empty where there is one.
+    pub load_note: String,
+    /// The events in the order of their first ruptures.
+    pub events: Vec<Event>,
+    /// Numbers of events by magnitude.
+    pub frequencies: Vec<Frequency>,
+    /// The b-value from each magnitude on that has enough events.
+    pub b_values: Vec<BValue>,
+    /// The load and the ruptures over time.
+    #[serde(skip)]
+    pub curves: Curves,
+}
+
+/// Reads the report.
+///
+/// # Errors
+/// [`PostError::Lacking`] for a scene without bonds, and for magnitudes of the energy of rigid
+/// bonds; [`PostError::Usage`] for wrong options and a wall that is not driven.
+pub fn read(history: &History, options: &Options) -> Result<Report> {
+    if !(options.bin > 0.0 && options.bin.is_finite()) {
+        return Err(PostError::Usage(format!("--bin {}: a width is a positive number, as in 0.1", options.bin)));
+    }
+    if let Some(wrong) = options.completeness.filter(|m| !m.is_finite()) {
+        return Err(PostError::Usage(format!("--completeness {wrong}: a magnitude is a finite number")));
+    }
+    let lacking = |what: &str| PostError::Lacking { path: history.path().into(), what: what.into() };
+    let bonds = history.bonds()?;
+    if bonds.is_empty() {
+        return Err(lacking(
+            "events need bonds, and none was formed: add `bonds` to the scene, or raise its bonds.gap_tolerance",
+        ));
+    }
+    let ruptures = history.ruptures()?;
+    let energy: f64 = ruptures.iter().map(|rupture| rupture.energy).sum();
+    let scale = options.scale.unwrap_or(if energy > 0.0 { Scale::Energy } else { Scale::Size });
+    if scale == Scale::Energy && energy <= 0.0 && !ruptures.is_empty() {
+        return Err(lacking(
+            "its bonds are rigid and release no energy: choose --magnitude size, or give the scene bonds.stiffness",
+        ));
+    }
+    let (course, load_note) = load(history, options.wall.as_deref())?;
+    let own = |event: &Vec<usize>| {
+        let mut event = Event::of(&event.iter().map(|&k| &ruptures[k]).collect::<Vec<_>>());
+        let at = course.as_ref().and_then(|course| Some((course, course.step.binary_search(&event.step).ok()?)));
+        event.load = at.and_then(|(course, k)| course.load.get(k).copied());
+        event.magnitude = match scale {
+            Scale::Energy => (event.energy > 0.0).then(|| event.energy.log10() / 1.5),
+            Scale::Size => Some((event.bonds as f64).log10()),
+        };
+        event
+    };
+    let grains = history.grains()?.radius.len();
+    let events: Vec<Event> = cluster(&ruptures, grains, &bonds, options.rule).iter().map(own).collect();
+    let values = if scale == Scale::Energy { Values::Bins(options.bin) } else { Values::Sizes };
+    let magnitudes: Vec<f64> = events.iter().filter_map(|event| event.magnitude).collect();
+    let frequencies = values.frequencies(&magnitudes);
+    let completeness = options.completeness.or_else(|| maximum_curvature(&frequencies));
+    let b_value = completeness.and_then(|from| values.b_value(&magnitudes, from));
+    let course = course.unwrap_or_default();
+    Ok(Report {
+        rule: options.rule,
+        magnitude: scale,
+        bin: (scale == Scale::Energy).then_some(options.bin),
+        bonds: bonds.len(),
+        ruptures: ruptures.len(),
+        energy,
+        completeness,
+        b_note: if b_value.is_some() { String::new() } else { note(&magnitudes, completeness) },
+        b_value,
+        load_note,
+        b_values: frequencies.iter().filter_map(|f| values.b_value(&magnitudes, f.magnitude)).collect(),
+        frequencies,
+        events,
+        curves: Curves {
+            load: course.time.iter().copied().zip(course.load).collect(),
+            ruptures: ruptures.iter().map(|rupture| (rupture.time, rupture.energy)).collect(),
+            end: history.times().last().copied().unwrap_or(0.0),
+        },
+    })
+}
+
+/// The load over the steps, or why it is not known.
+fn load(history: &History, wall: Option<&str>) -> Result<(Option<Course>, String)> {
+    match Course::read(history, wall) {
+        Ok(course) => Ok((Some(course), String::new())),
+        Err(PostError::Usage(why)) if wall.is_none() => Ok((None, why)),
+        Err(PostError::Lacking { what, .. }) if wall.is_none() => Ok((None, what)),
+        Err(error) => Err(error),
+    }
+}
+
+/// Why there is no b-value.
+fn note(magnitudes: &[f64], completeness: Option<f64>) -> String {
+    let Some(from) = completeness else { return "no event has a magnitude".into() };
+    let count = magnitudes.iter().filter(|&&m| m >= from).count();
+    if count < FEWEST {
+        format!("{} of magnitude {} or more, fewer than {FEWEST}", counted(count, "event"), number(from))
+    } else {
+        "all events have the same magnitude".into()
+    }
+}
+
+impl Report {
+    /// The values that magnitudes can have.
+    pub(super) fn values(&self) -> Values {
+        self.bin.map_or(Values::Sizes, Values::Bins)
+    }
+
+    /// The magnitude in words.
+    pub(super) fn axis(&self) -> &'static str {
+        match self.magnitude {
+            Scale::Energy => "magnitude ⅔ log₁₀(E / 1 J)",
+            Scale::Size => "magnitude log₁₀(bonds)",
+        }
+    }
+
+    /// The report as tables.
+    pub fn table(&self) -> String {
+        let Rule { steps, reach } = self.rule;
+        let share = 100.0 * self.ruptures as f64 / self.bonds as f64;
+        let most = self.events.iter().map(|event| event.bonds).max();
+        let released = match self.ruptures {
+            0 => "–".into(),
+            _ if self.energy > 0.0 => quantity(Some(self.energy), "J"),
+            _ => "none: rigid bonds".into(),
+        };
+        let mut lines = vec![
+            ("bonds", format!("{}, {} broken ({share:.1} %)", self.bonds, self.ruptures)),
+            ("events", self.events.len().to_string()),
+            ("  linked ruptures", format!("steps apart: at most {steps}; bonds between: at most {reach}")),
+            ("  largest", most.map_or_else(|| "–".into(), |most| counted(most, "bond"))),
+            ("energy released", released),
+            ("magnitude", self.axis().trim_start_matches("magnitude ").into()),
+            ("  from", quantity(self.completeness, "")),
+            ("b-value", self.b_value.map_or_else(|| format!("none: {}", self.b_note), |law| words(&law))),
+        ];
+        if !self.load_note.is_empty() {
+            lines.push(("load", format!("not known: {}", self.load_note)));
+        }
+        facts(&lines) + &if self.events.is_empty() { String::new() } else { format!("\n{}", self.event_table()) }
+    }
+
+    /// The largest events in order of time.
+    fn event_table(&self) -> String {
+        let mut largest: Vec<usize> = (0..self.events.len()).collect();
+        let size = |k: &usize| (self.events[*k].magnitude.unwrap_or(f64::NEG_INFINITY), self.events[*k].bonds);
+        largest.sort_by(|a, b| {
+            let ((ma, na), (mb, nb)) = (size(a), size(b));
+            mb.total_cmp(&ma).then(nb.cmp(&na)).then(a.cmp(b))
+        });
+        largest.truncate(SHOWN);
+        largest.sort_unstable();
+        let head = ["event", "time (s)", "load (N)", "bonds", "rounds", "duration (s)", "energy (J)", "magnitude"];
+        let mut table = Text::new(&head);
+        for k in largest {
+            let e = &self.events[k];
+            table.row(vec![
+                (k + 1).to_string(),
+                number(e.time),
+                quantity(e.load, ""),
+                e.bonds.to_string(),
+                e.rounds.to_string(),
+                number(e.duration),
+                number(e.energy),
+                quantity(e.magnitude, ""),
+            ]);
+        }
+        let rest = self.events.len().saturating_sub(SHOWN);
+        let more =
+            if rest > 0 { format!("… and {rest} smaller ones in emission-events.csv\n") } else { String::new() };
+        table.lines() + &more
+    }
+}
+
+fn counted(number: usize, word: &str) -> String {
+    format!("{number} {word}{}", if number == 1 { "" } else { "s" })
+}
+
+/// A b-value with its error.
+fn words(law: &BValue) -> String {
+    let caveat = if law.law_holds { "" } else { "; but they do not follow the law: b has no meaning from there on" };
+    format!("{:.2} ± {:.2} (standard error), {} events{caveat}", law.b, law.error, law.events)
+}

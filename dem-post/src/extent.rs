@@ -1,0 +1,22 @@
+//! The box around all grains.
+
+use dem_history::History;
+
+use crate::output::Result;
+
+/// The box around all grains at the first frame, m: its ends along each axis.
+///
+/// # Errors
+/// Those of reading the history; it must have a frame.
+pub fn first_box(history: &History) -> Result<Vec<[f64; 2]>> {
+    let (radius, position) = (history.grains()?.radius, history.grain_state(0)?.position);
+    let d = history.dimension();
+    let ends = |axis: usize| {
+        let reach = |sign: f64| {
+            let reach = radius.iter().zip(position.chunks(d)).map(|(r, x)| sign * x[axis] + r);
+            sign * reach.fold(f64::NEG_INFINITY, f64::max)
+        };
+        [reach(-1.0), reach(1.0)]
+    };
+    Ok((0..d).map(ends).collect())
+}
