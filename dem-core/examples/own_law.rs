@@ -64,7 +64,7 @@ fn main() {
     };
     let up = D3::frame([0.0, 0.0, 1.0].into());
     for (adhesion, falls) in [(3.5 * weight, 0), (2.5 * weight, 3)] {
-        let mut nodes = Nodes { all: (0..4).map(sphere).collect(), grains: 4, drives: vec![] };
+        let mut nodes = Nodes { all: (0..4).map(sphere).collect(), grains: 4, drives: vec![], slides: vec![] };
         let contact = |k: u32| {
             let link = Link::<D3>::new([k, k + 1], up);
             let law = Adhesive::new(nodes.block(&link, Default::default()), adhesion);

@@ -273,6 +273,15 @@ pub enum Drive<D: Dim> {
     },
 }
 
+/// A prescribed velocity of a wall across the direction of its drive.
+#[derive(Clone)]
+pub struct Slide<D: Dim> {
+    /// Unit direction, perpendicular to that of the drive.
+    pub direction: D::Vector,
+    /// Speed (m/s) over time (s).
+    pub speed: Schedule,
+}
+
 /// A rigid wall.
 #[derive(Clone)]
 pub struct Wall<D: Dim> {
@@ -284,6 +293,16 @@ pub struct Wall<D: Dim> {
     pub velocity: D::Vector,
     /// How it moves.
     pub drive: Drive<D>,
+    /// Whether the value of its force drive is a stress (Pa) on the present section of the sample.
+    /// The wall is then a plane whose normal is parallel to an axis.
+    pub per_area: bool,
+    /// That section in the last step (m²).
+    pub section: f64,
+    /// Motion of a force-driven wall across its drive, if prescribed.
+    pub slide: Option<Slide<D>>,
+    /// Grains within this distance of the surface at time zero (m) move with the wall, without
+    /// turning, and the forces on them act on the wall. A wall that a force drives holds no grains.
+    pub grip: Option<f64>,
     /// Friction coefficient with grains (–).
     pub friction: f64,
     /// Force of the grains on the wall at the end of the last step (N), after all ruptures in it.
@@ -304,6 +323,10 @@ impl<D: Dim> Wall<D> {
             position,
             velocity: zero,
             drive: Drive::Fixed,
+            per_area: false,
+            section: 0.0,
+            slide: None,
+            grip: None,
             friction,
             reaction: zero,
             reaction_at_limit: zero,
@@ -314,8 +337,23 @@ impl<D: Dim> Wall<D> {
     /// Prescribed force (N) at a time (s); zero for a wall without a force drive.
     pub fn applied_force(&self, time: f64) -> f64 {
         match &self.drive {
+            Drive::Force { force, .. } if self.per_area => force(time) * self.section,
             Drive::Force { force, .. } => force(time),
             Drive::Fixed | Drive::Velocity { .. } => 0.0,
+        }
+    }
+
+    /// Prescribed velocity (m/s) across the drive at a time (s).
+    pub fn slide_velocity(&self, time: f64) -> Option<D::Vector> {
+        self.slide.as_ref().map(|slide| slide.direction * (slide.speed)(time))
+    }
+
+    /// The part of a velocity of this wall (m/s) that is not prescribed: along the drive, where the
+    /// motion across it is prescribed, else all of it.
+    pub(crate) fn driven_part(&self, velocity: D::Vector) -> D::Vector {
+        match (&self.slide, self.free_direction()) {
+            (Some(_), Some((direction, _))) => direction * direction.dot(&velocity),
+            _ => velocity,
         }
     }
 

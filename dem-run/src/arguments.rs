@@ -26,6 +26,9 @@ Example:
 
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    /// Write a shipped scene, with its comments, as the start of one's own; without NAME, list all.
+    #[command(after_help = NEW_EXAMPLE)]
+    New(NewArgs),
     /// Run a scene and write its history.
     #[command(after_help = RUN_EXAMPLE)]
     Run(RunArgs),
@@ -65,6 +68,10 @@ pub enum Command {
         sweep: bool,
     },
 }
+
+const NEW_EXAMPLE: &str = "\
+Example:
+  dem-run new direct-tension -o mine.json";
 
 const RUN_EXAMPLE: &str = "\
 Ctrl-C ends the run after the current step, a second Ctrl-C immediately; `dem-run resume` continues it.
@@ -202,6 +209,18 @@ pub struct MannerArgs {
     pub force: bool,
     #[command(flatten)]
     pub execution: ExecutionArgs,
+}
+
+#[derive(Debug, Args)]
+pub struct NewArgs {
+    /// Name of the scene.
+    pub name: Option<String>,
+    /// File to write [default: the scene's name with .json, in the current folder].
+    #[arg(short, long, value_name = "FILE.json", requires = "name")]
+    pub output: Option<PathBuf>,
+    /// Overwrite a file that exists.
+    #[arg(long)]
+    pub force: bool,
 }
 
 #[derive(Debug, Args)]

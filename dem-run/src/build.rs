@@ -1,16 +1,18 @@
 //! From a scene to a world: sample, walls, loads, bonds, settings.
 
 use crate::bonds;
+use crate::drive::set_drive;
 use crate::error::RunError;
 use crate::materials;
 use crate::output::number;
 use crate::packings;
 use crate::prepare::{self, Watch};
 use crate::sample_file::{self, Table};
-use crate::scene::{self, Drive as SceneDrive, Place, Sample, Scene, SolverKind, WallMass};
+use crate::scene::{self, Place, Sample, Scene, SolverKind};
 use crate::tolerances::{DEEPEST, ROUNDED, TOUCHING};
+use crate::touching;
 use crate::warnings;
-use dem_core::body::{Drive, Grain, Grains, Load, Schedule, Shape, Wall};
+use dem_core::body::{Drive, Grain, Grains, Load, Schedule, Shape, Slide, Wall};
 use dem_core::bond::Rupture;
 use dem_core::contact::{BondFlow, LocalSolve};
 use dem_core::detection::pairs_within;
@@ -76,6 +78,7 @@ pub fn place<D: Dim>(scene: &Scene, packings: Option<&Path>, watch: Watch) -> Re
     wrong.extend(unseated(scene, &grains));
     let walls = walls(scene, &grains);
     wrong.extend(buried(scene, &walls, &grains));
+    wrong.extend(touching::apart(scene, &walls, &grains));
     if !wrong.is_empty() {
         return Err(RunError::Sample(wrong));
     }
@@ -258,10 +261,10 @@ fn schedule(function: scene::Function) -> Schedule {
 }
 
 pub(crate) fn walls<D: Dim>(scene: &Scene, grains: &Grains<D>) -> Vec<Wall<D>> {
-    scene.walls.values().map(|wall| build_wall(scene, wall, grains)).collect()
+    scene.walls.iter().map(|(name, wall)| build_wall(scene, name, wall, grains)).collect()
 }
 
-fn build_wall<D: Dim>(scene: &Scene, wall: &scene::Wall, grains: &Grains<D>) -> Wall<D> {
+fn build_wall<D: Dim>(scene: &Scene, name: &str, wall: &scene::Wall, grains: &Grains<D>) -> Wall<D> {
     let round = |radius: f64, inside: bool, axis: Option<D::Vector>| Shape::Round { radius, inside, axis };
     let (shape, position) = match &wall.shape {
         scene::Shape::Plane(plane) => {
@@ -284,20 +287,19 @@ fn build_wall<D: Dim>(scene: &Scene, wall: &scene::Wall, grains: &Grains<D>) -> 
     let friction = wall.friction.unwrap_or(scene.materials.friction.grain_wall);
     let mut built = Wall::fixed(shape, position, friction);
     let direction = wall.drive_direction().map_or(D::Vector::zero(), unit::<D>);
-    built.drive = match wall.drive() {
-        SceneDrive::Fixed => Drive::Fixed,
-        SceneDrive::Velocity(speed) => {
-            built.velocity = direction * speed.at(0.0);
-            Drive::Velocity { direction, speed: schedule(speed) }
-        }
-        SceneDrive::Force(force) => {
-            let mass = match wall.mass {
-                Some(WallMass::Kg(mass)) => mass,
-                _ => grains.mass.iter().sum(),
-            };
-            Drive::Force { direction, mass, force: schedule(force) }
-        }
-    };
+    set_drive(&mut built, wall, scene.first_drive(name, wall), direction, &grains.mass, 0.0);
+    if let Drive::Velocity { direction, speed } = &built.drive {
+        built.velocity = *direction * speed(0.0);
+    }
+    built.grip = wall.grip;
+    if let Some(scene::Slide { direction: across, velocity }) = &wall.slide {
+        let across = unit::<D>(across);
+        // perpendicular to the last digit
+        let across = across - direction * direction.dot(&across);
+        let across = across * (1.0 / across.norm());
+        built.velocity += across * velocity.at(0.0);
+        built.slide = Some(Slide { direction: across, speed: schedule(velocity.clone()) });
+    }
     built
 }
 

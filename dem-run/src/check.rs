@@ -92,7 +92,7 @@ pub struct CheckedWall {
     pub shape: &'static str,
     /// How it is driven.
     pub drive: &'static str,
-    /// Force or velocity over time, if the wall is driven.
+    /// Force, stress or velocity over time, if the wall is driven.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub course: Option<String>,
 }
@@ -110,10 +110,11 @@ impl Check {
         let (sizes, warnings) = in_dimension!(scene, D => look::<D>(scene, enough)?);
         let end = scene.time.end;
         let walls = scene.walls.iter().map(|(name, wall)| {
-            let (drive, course) = match wall.drive() {
+            let (drive, course) = match scene.first_drive(name, wall) {
                 Drive::Fixed => ("fixed", None),
                 Drive::Velocity(velocity) => ("velocity", Some(over_time(&velocity, "m/s", end))),
                 Drive::Force(force) => ("force", Some(over_time(&force, "N", end))),
+                Drive::Stress(stress) => ("stress", Some(over_time(&stress, "Pa", end))),
             };
             CheckedWall { name: name.clone(), shape: wall.shape.name(), drive, course }
         });

@@ -8,14 +8,15 @@ use std::process::ExitCode;
 
 use crate::accuracy::{self, AccuracyOptions};
 use crate::arguments::{
-    AccuracyArgs, CheckArgs, Command, ExecutionArgs, ExportArgs, LimitArgs, PackArgs, ResumeArgs, RunArgs, SceneArgs,
-    ShowArgs, SolveArgs, SweepArgs, arguments,
+    AccuracyArgs, CheckArgs, Command, ExecutionArgs, ExportArgs, LimitArgs, NewArgs, PackArgs, ResumeArgs, RunArgs,
+    SceneArgs, ShowArgs, SolveArgs, SweepArgs, arguments,
 };
 use crate::check::Check;
 use crate::destination::{apart, folder_or_new, not_itself, unicode, writable};
 use crate::error::RunError;
 use crate::export::{self, ExportOptions};
 use crate::limit::{self, LimitOptions};
+use crate::new::{self, NewOptions};
 use crate::output::{default_folder, escaped, print_json, print_result};
 use crate::pack::{self, PackOptions};
 use crate::resume::{self, ResumeOptions};
@@ -29,6 +30,7 @@ use crate::sweep::{self, Mode, SweepOptions};
 #[must_use]
 pub fn main() -> ExitCode {
     let result = match arguments().command {
+        Command::New(NewArgs { name, output, force: overwrite }) => new::new(&NewOptions { name, output, overwrite }),
         Command::Run(args) => run(args),
         Command::Resume(args) => resume(args),
         Command::Pack(args) => pack(args),

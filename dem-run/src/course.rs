@@ -1,10 +1,12 @@
 //! The course of a run: its counters, updated at every step, and its stop conditions.
 
 use crate::collapse::{Collapse, LoadStep};
+use crate::load::{drive_direction, load};
+use crate::scene::Scene;
 use crate::scene::failure::in_one_piece;
-use crate::scene::{Scene, TravelFrom};
+use crate::stages::Stages;
+use crate::stop::Stops;
 use crate::summary::Ending;
-use dem_core::body::{Drive, Wall};
 use dem_core::bond::{BondStatus, Rupture};
 use dem_core::dim::{Dim, Vect};
 use dem_core::saved::{Mismatch, Reader, Saved};
@@ -42,9 +44,8 @@ pub struct Course<D: Dim> {
     pub penetration: f64,
     /// Largest difference between the length of an intact bond and its length at rest (m).
     pub bond_elongation: f64,
-    stop: Option<TravelStop<D>>,
-    /// Share of broken bonds (–) that ends the run.
-    broken_limit: Option<f64>,
+    stops: Stops<D>,
+    stages: Stages<D>,
 }
 
 /// A driven wall and its load.
@@ -55,14 +56,6 @@ pub struct Driven<D: Dim> {
     pub collapse: Collapse,
     /// Its initial position (m).
     start: D::Vector,
-}
-
-/// The travel of a wall that ends a run.
-struct TravelStop<D: Dim> {
-    wall: usize,
-    direction: D::Vector,
-    distance: f64,
-    from: Option<D::Vector>,
 }
 
 impl<D: Dim> Course<D> {
@@ -87,8 +80,8 @@ impl<D: Dim> Course<D> {
             rejected: 0,
             penetration: 0.0,
             bond_elongation: 0.0,
-            stop: travel_stop(scene, world),
-            broken_limit: scene.stop.as_ref().and_then(|s| s.broken_fraction),
+            stops: Stops::new(scene.stop.as_ref(), scene, world),
+            stages: Stages::new(scene, world),
         }
     }
 
@@ -108,19 +101,16 @@ impl<D: Dim> Course<D> {
         let Work { sweeps, newton, factorisations } = self.work;
         to.counts.extend([sweeps, newton, factorisations, self.solved_steps]);
         to.counts.extend([self.missed_tolerance, self.missed_load_tolerance, self.rejected]);
-        to.flag(self.stop.is_some());
-        if let Some(stop) = &self.stop {
-            to.real(stop.distance);
-            to.flag(stop.from.is_some());
-            to.vector(&stop.from.unwrap_or(D::Vector::zero()));
-        }
+        self.stops.save(to);
+        self.stages.save(to);
     }
 
-    /// The course saved by [`Course::save`], for a run of `scene` that is resumed with `world`.
+    /// The course saved by [`Course::save`], for a run of `scene` that is resumed with `world`; its
+    /// walls get the drives of the present stage.
     ///
     /// # Errors
     /// [`Mismatch`].
-    pub fn restored(scene: &Scene, world: &World<D>, from: &mut Reader) -> Result<Self, Mismatch> {
+    pub fn restored(scene: &Scene, world: &mut World<D>, from: &mut Reader) -> Result<Self, Mismatch> {
         let mut course = Self::new(scene, world);
         for _ in 0..from.count()? {
             let (wall, start, collapse) = (from.count()?, from.vector()?, Collapse::restored(from)?);
@@ -140,13 +130,8 @@ impl<D: Dim> Course<D> {
         course.solved_steps = count()?;
         (course.missed_tolerance, course.missed_load_tolerance) = (count()?, count()?);
         course.rejected = count()?;
-        if from.flag()? {
-            let (distance, begun, place) = (from.real()?, from.flag()?, from.vector()?);
-            // a stop condition that the scene no longer has is dropped
-            if let Some(stop) = &mut course.stop {
-                (stop.distance, stop.from) = (distance, begun.then_some(place));
-            }
-        }
+        course.stops.restore(from)?;
+        course.stages = Stages::restored(scene, world, from)?;
         Ok(course)
     }
 
@@ -180,6 +165,9 @@ impl<D: Dim> Course<D> {
         self.count_solves(world, report);
         self.penetration = self.penetration.max(report.penetration);
         self.bond_elongation = self.bond_elongation.max(report.bond_elongation);
+        let broken = self.broken();
+        self.stops.count(world, broken);
+        self.stages.count(world, broken);
         if self.driven.is_empty() {
             return;
         }
@@ -205,34 +193,14 @@ impl<D: Dim> Course<D> {
         self.rejected += u64::from(report.rejected);
     }
 
-    /// The stop condition of the scene that ends the run after this step, if any.
-    pub fn ending(&mut self, world: &World<D>) -> Option<Ending> {
+    /// What ends the run of `scene` after this step, if anything: a stop condition, or the end of
+    /// the last stage. At the end of another stage, the walls get the drives of the next.
+    pub fn ending(&mut self, scene: &Scene, world: &mut World<D>) -> Option<Ending> {
         let broken = self.broken();
         if matches!(world.settings.rupture, Rupture::NextEvent { until } if world.load_time >= until) {
             return Some(Ending::NoBreak);
         }
-        if let Some(stop) = &mut self.stop {
-            let position = world.walls[stop.wall].position;
-            if stop.from.is_none() && broken > 0 {
-                stop.from = Some(position);
-            }
-            if stop.from.is_some_and(|from| (position - from).dot(&stop.direction).abs() >= stop.distance) {
-                return Some(Ending::WallTravel);
-            }
-        }
-        let bonds = world.bonds.len() as f64;
-        let enough = |limit: f64| bonds > 0.0 && broken as f64 >= limit * bonds;
-        self.broken_limit.is_some_and(enough).then_some(Ending::BrokenFraction)
-    }
-}
-
-/// The load of a driven wall in the last step (N): the prescribed force, or for a prescribed
-/// velocity the force of the wall on the grains before any bond broke in that step.
-fn load<D: Dim>(wall: &Wall<D>) -> f64 {
-    match wall.drive {
-        Drive::Fixed => 0.0,
-        Drive::Velocity { direction, .. } => -direction.dot(&wall.reaction_at_limit),
-        Drive::Force { .. } => wall.applied,
+        self.stops.ending(world, broken).or_else(|| self.stages.advance(scene, world, broken))
     }
 }
 
@@ -245,29 +213,10 @@ fn extents<D: Dim>(world: &World<D>) -> Vec<f64> {
     (0..D::N).map(|axis| reach(axis, 1.0) + reach(axis, -1.0)).collect()
 }
 
-fn drive_direction<D: Dim>(wall: &Wall<D>) -> Option<D::Vector> {
-    match wall.drive {
-        Drive::Fixed => None,
-        Drive::Velocity { direction, .. } | Drive::Force { direction, .. } => Some(direction),
-    }
-}
-
 /// d·E d: the strain along a unit direction d.
 fn axial<V: Vect>(strain: &[f64], d: V) -> f64 {
     let row = |r: usize| (0..V::LEN).map(|c| strain[r * V::LEN + c] * d[c]).sum::<f64>();
     (0..V::LEN).map(|r| d[r] * row(r)).sum()
-}
-
-fn travel_stop<D: Dim>(scene: &Scene, world: &World<D>) -> Option<TravelStop<D>> {
-    let travel = scene.stop.as_ref()?.wall_travel.as_ref()?;
-    let wall = scene.walls.keys().position(|name| *name == travel.wall)?;
-    let direction = drive_direction(&world.walls[wall])?;
-    let along = |sign: f64| {
-        let reach = |(x, r): (&D::Vector, &f64)| sign * x.dot(&direction) + r;
-        world.grains.position.iter().zip(&world.grains.radius).map(reach).fold(f64::NEG_INFINITY, f64::max)
-    };
-    let from = (travel.after == TravelFrom::Start).then(|| world.walls[wall].position);
-    Some(TravelStop { wall, direction, distance: travel.fraction_of_height * (along(1.0) + along(-1.0)), from })
 }
 
 #[cfg(test)]
@@ -325,7 +274,7 @@ mod tests {
         // a resumed run keeps the counts
         let mut saved = Saved::default();
         course.save(&mut saved);
-        let restored = Course::restored(&scene, &world, &mut Reader::new(&saved.reals, &saved.counts));
+        let restored = Course::restored(&scene, &mut world, &mut Reader::new(&saved.reals, &saved.counts));
         let restored = restored.expect("what was saved");
         assert_eq!((restored.missed_tolerance, restored.missed_load_tolerance), (1, 2));
         assert_eq!((restored.solved_steps, restored.worst_load_error), (4, course.worst_load_error));

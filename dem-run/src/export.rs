@@ -8,6 +8,7 @@ use dem_core::problem::assembled::Assembled;
 use dem_core::solver::SolveStatus;
 
 use crate::build::build;
+use crate::course::Course;
 use crate::error::{NoConvergence, RunError};
 use crate::fclib::Problem;
 use crate::history::History;
@@ -65,12 +66,16 @@ fn export_in<D: Dim>(scene: &Scene, options: &ExportOptions, interrupt: &Interru
         !interrupt.requested()
     })?
     .world;
+    let mut course = Course::new(scene, &world);
     while world.steps + 1 < options.step {
         let report = world.step().map_err(|error| NoConvergence::Export {
             error: error.to_string(),
             step: options.step,
             last: world.steps + 1,
         })?;
+        course.count(&world, &report);
+        // the walls may get the drives of the next stage
+        course.ending(scene, &mut world);
         progress.step(&StepProgress {
             step: world.steps,
             time: world.time,

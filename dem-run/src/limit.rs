@@ -99,6 +99,7 @@ pub fn limit(scene: &Scene, options: &LimitOptions) -> Result<(), RunError> {
 type Growth = (String, f64, f64, bool);
 
 fn limit_in<D: Dim>(scene: &Scene, options: &LimitOptions, interrupt: &Interrupt) -> Result<(), RunError> {
+    refuse_stages_and_growing_stresses(scene)?;
     let mut growing = growing(scene);
     let mut progress = options.execution.show();
     let mut world = build::<D>(scene, None, &mut |done| {
@@ -127,13 +128,31 @@ fn limit_in<D: Dim>(scene: &Scene, options: &LimitOptions, interrupt: &Interrupt
     Ok(print_result(&describe(scene, &world, growing, found)?, options.json)?)
 }
 
+/// A limit load is that of one course of forces; a stress may only confine.
+fn refuse_stages_and_growing_stresses(scene: &Scene) -> Result<(), RunError> {
+    if !scene.stages.is_empty() {
+        let text = "the scene has stages, and the limit load is that of one course of loads: `--set stages=[]`, with the \
+                    drives of one stage at its walls";
+        return Err(RunError::Usage(text.into()));
+    }
+    let end = scene.time.end;
+    let grows = scene.walls.iter().find(|(_, wall)| match wall.drive() {
+        scene::Drive::Stress(stress) => stress.at(0.0) != stress.at(end),
+        _ => false,
+    });
+    let refusal = |(name, _)| {
+        Err(RunError::Usage(format!("walls.{name}.stress grows: give a force in its place, or a constant stress")))
+    };
+    grows.map_or(Ok(()), refusal)
+}
+
 /// The loads of a scene that grow.
 fn growing(scene: &Scene) -> Vec<Growth> {
     let end = scene.time.end;
     let of = |name: String, function: &Function| (name, function.at(0.0), function.at(end), straight(function, end));
     let walls = scene.walls.iter().filter_map(|(name, wall)| match wall.drive() {
         scene::Drive::Force(force) => Some(of(format!("walls.{name}"), &force)),
-        scene::Drive::Fixed | scene::Drive::Velocity(_) => None,
+        scene::Drive::Fixed | scene::Drive::Velocity(_) | scene::Drive::Stress(_) => None,
     });
     let loads = scene.grains.iter().flat_map(|grains| &grains.loads).enumerate();
     let loads = loads.map(|(k, load)| of(format!("grains.loads.{k}"), &load.time));

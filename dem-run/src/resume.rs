@@ -38,7 +38,7 @@ const FREE: [&str; 5] = ["title", "$schema", "time.end", "stop", "load_wall"];
 const OPEN: [&str; 7] =
     ["solver", "gravity", "rupture", "materials.friction", "materials.restitution", "grains.loads", "bonds.flow"];
 /// Fields of a wall that may change with `--force`.
-const OPEN_WALL: [&str; 4] = ["force", "force_rate", "velocity", "friction"];
+const OPEN_WALL: [&str; 6] = ["force", "force_rate", "velocity", "stress", "slide", "friction"];
 
 /// Resumes a run, writes its history and prints its summary.
 ///
@@ -119,7 +119,7 @@ fn resume_in<D: Dim>(
     };
     let mut state = RunState::<D>::restored(scene, &checkpoint)
         .map_err(|mismatch| RunError::InputOutput(format!("{shown}: {mismatch}; run the scene again")))?;
-    if state.world.steps >= scene.time.steps() || state.course.ending(&state.world).is_some() {
+    if state.world.steps >= scene.time.steps() || state.course.ending(scene, &mut state.world).is_some() {
         let time = state.world.time;
         if options.json {
             return Ok(print_json(&serde_json::json!({ "history": path, "time": time, "steps_made": 0 }))?);

@@ -14,7 +14,7 @@ use crate::progress::{Progress, ProgressMode, StepProgress};
 use crate::record::Recorder;
 use crate::sample_file;
 use crate::scene::failure::{Disk, Splitting};
-use crate::scene::{Rupture, Scene, SolverKind};
+use crate::scene::{Drive as SceneDrive, Rupture, Scene, SolverKind};
 use crate::signals::{self, Interrupt};
 use crate::summary::{Ending, Summary, WallLoads};
 use crate::warnings;
@@ -119,7 +119,7 @@ pub(crate) struct RunState<D: Dim> {
 }
 
 /// Version number of the data that [`RunState::save`] writes.
-const FORM: usize = 10;
+const FORM: usize = 11;
 
 impl<D: Dim> RunState<D> {
     /// The state as numbers, without the processor time: two runs of a scene write identical files.
@@ -137,8 +137,8 @@ impl<D: Dim> RunState<D> {
         if from.count()? != FORM {
             return Err(Mismatch);
         }
-        let world = rebuild::<D>(scene, &mut from)?;
-        let course = Course::restored(scene, &world, &mut from)?;
+        let mut world = rebuild::<D>(scene, &mut from)?;
+        let course = Course::restored(scene, &mut world, &mut from)?;
         from.end()?;
         Ok(Self { world, course })
     }
@@ -161,8 +161,12 @@ pub(crate) struct Run<'a, D: Dim> {
 /// move away from the grains.
 fn may_be_idle<D: Dim>(scene: &Scene, world: &World<D>) -> Vec<usize> {
     let driven = |wall: &Wall<D>| !matches!(wall.drive, Drive::Fixed);
-    let walls = world.walls.iter().enumerate();
-    let told = walls.filter(|(_, wall)| driven(wall) && !warnings::leaves(wall, scene.time.end, &world.grains));
+    let walls = scene.walls.keys().zip(&world.walls).enumerate();
+    // a wall that stages drive may come back
+    let leaves = |name: &str, wall: &Wall<D>| {
+        scene.stage_drives(name).next().is_none() && warnings::leaves(wall, scene.time.end, &world.grains)
+    };
+    let told = walls.filter(|(_, (name, wall))| driven(wall) && !leaves(name, wall));
     told.map(|(k, _)| k).collect()
 }
 
@@ -195,7 +199,7 @@ impl<D: Dim> Run<'_, D> {
                 self.record(true, checkpoint)?;
             }
             let RunState { world, course, .. } = &mut self.state;
-            if let Some(ending) = course.ending(world) {
+            if let Some(ending) = course.ending(self.scene, world) {
                 return Ok(ending);
             }
             if interrupt.requested() {
@@ -331,8 +335,9 @@ impl<D: Dim> RunState<D> {
         let elastic = world.bonds.iter().any(|b| b.stiffness.is_some());
         let names: Vec<&String> = scene.walls.keys().collect();
         let loads = course.driven.iter().map(|driven| {
-            let may_fall =
-                matches!(world.walls[driven.wall].drive, Drive::Velocity { .. }) || scene.rupture == Rupture::NextEvent;
+            let drives = scene.drives(names[driven.wall], &scene.walls[names[driven.wall]]);
+            let moves = drives.iter().any(|drive| matches!(drive, SceneDrive::Velocity(_)));
+            let may_fall = moves || scene.rupture == Rupture::NextEvent;
             WallLoads::of(names[driven.wall], may_fall, elastic, &driven.collapse)
         });
         let driven_walls: Vec<WallLoads> = loads.collect();

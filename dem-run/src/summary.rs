@@ -18,6 +18,10 @@ pub enum Ending {
     WallTravel,
     /// Enough bonds have broken.
     BrokenFraction,
+    /// The load has dropped far enough below its peak.
+    LoadDrop,
+    /// The last stage has ended.
+    Stages,
     /// Loading to the next event: no bond breaks under the loads up to the end of the scene's time.
     NoBreak,
     /// Loading to the next event: without the bonds of the last one the sample bears no load.
@@ -173,6 +177,8 @@ impl fmt::Display for Summary {
             Ending::Time => "time.end was reached",
             Ending::WallTravel => "stop.wall_travel was reached",
             Ending::BrokenFraction => "stop.broken_fraction was reached",
+            Ending::LoadDrop => "stop.load_drop was reached",
+            Ending::Stages => "the last of stages ended",
             Ending::NoBreak => "the loads up to time.end break no further bond",
             Ending::NoEquilibrium => "no equilibrium without the bonds that broke last",
             Ending::Interrupted => "interrupted",

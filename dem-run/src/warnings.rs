@@ -28,6 +28,14 @@ pub(crate) fn of_scene(scene: &Scene) -> Vec<String> {
             number(next)
         ));
     }
+    let longest: f64 = scene.stages.iter().filter_map(|stage| stage.duration).sum();
+    if scene.stages.iter().all(|stage| stage.until.is_none()) && longest > time.last() + 0.5 * time.step {
+        told.push(format!(
+            "time.end: the run ends at {} s, before its stages, which last {} s: a later time.end lets them end",
+            number(time.last()),
+            number(longest)
+        ));
+    }
     let travels = scene.stop.as_ref().is_some_and(|stop| stop.wall_travel.is_some());
     if travels && scene.rupture == Rupture::NextEvent {
         told.push("stop.wall_travel: it has no effect with rupture next_event, where nothing moves".into());
@@ -79,6 +87,10 @@ pub(crate) fn of_walls<D: Dim>(scene: &Scene, walls: &[Wall<D>], grains: Option<
         walls.iter().map(|wall| DriveMotion::of(wall, scene.time.end).is_some_and(|c| !c.along_surface)).collect();
     let mut told = vec![];
     for (k, (name, wall)) in scene.walls.keys().zip(walls).enumerate() {
+        // the drive of the first stage is not all that moves such a wall
+        if scene.stage_drives(name).next().is_some() {
+            continue;
+        }
         let Some(motion) = DriveMotion::of(wall, scene.time.end) else { continue };
         let alone = !others_push(scene) && !pushes.iter().enumerate().any(|(other, push)| *push && other != k);
         let word = match grains {
@@ -120,8 +132,10 @@ struct DriveMotion<D: Dim> {
     direction: D::Vector,
     /// Whether the direction is parallel to the surface.
     along_surface: bool,
-    /// Whether a force drives the wall.
+    /// Whether a force or a stress drives the wall.
     by_force: bool,
+    /// What drives it, and its unit.
+    drive: [&'static str; 2],
     /// Least and largest value of the drive (N or m/s).
     range: (f64, f64),
     /// Least and largest displacement along the direction until the end of the run (m).
@@ -146,7 +160,15 @@ impl<D: Dim> DriveMotion<D> {
             place += speed * step;
         }
         let along_surface = wall.shape.moves_across(direction) < PARALLEL;
-        (range != (0.0, 0.0)).then_some(Self { direction, along_surface, by_force: mass.is_some(), range, travel })
+        let drive = if wall.per_area { ["stress", "Pa"] } else { ["force", "N"] };
+        (range != (0.0, 0.0)).then_some(Self {
+            direction,
+            along_surface,
+            by_force: mass.is_some(),
+            drive,
+            range,
+            travel,
+        })
     }
 }
 
@@ -188,10 +210,11 @@ fn pulled<D: Dim>(wall: &Wall<D>, motion: &DriveMotion<D>, grains: &Grains<D>) -
     let (low, high) = motion.range;
     let away = motion.by_force && (if sign > 0.0 { high <= 0.0 } else { low >= 0.0 }) && sign != 0.0;
     let most = if sign > 0.0 { low } else { high };
+    let [drive, unit] = motion.drive;
     away.then(|| {
         format!(
-            "its force, {} N, pulls it away from the grains at all times, so it carries no load: change the sign of the force, \
-             or reverse the direction",
+            "its {drive}, {} {unit}, pulls it away from the grains at all times, so it carries no load: change the sign of \
+             the {drive}, or reverse the direction",
             number(most)
         )
     })

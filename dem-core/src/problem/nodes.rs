@@ -26,6 +26,9 @@ pub struct Nodes<D: Dim> {
     pub grains: usize,
     /// Unit direction in which impulses move each wall; zero for a wall that they do not move.
     pub drives: Vec<D::Vector>,
+    /// Prescribed velocity of each wall across its drive (m/s), which no impulse changes; empty if
+    /// no wall has one.
+    pub slides: Vec<D::Vector>,
 }
 
 /// Consecutive nodes: a block of grains, or all grains and walls.

@@ -189,10 +189,13 @@ pub(super) fn margins(rows: &Rows, velocities: &[Padded], reactions: &[Padded]) 
 /// roots of the masses: the load error of a sample at rest (–).
 fn motion<D: Dim>(problem: &ContactProblem<D>) -> f64 {
     let (mut left, mut taken) = (0.0, 0.0);
-    for (node, (velocity, spin)) in problem.nodes.all.iter().zip(problem.free.iter()) {
+    let slides = |k: usize| problem.nodes.slides.get(k).copied().unwrap_or(D::Vector::zero());
+    for (k, (node, (velocity, spin))) in problem.nodes.all.iter().zip(problem.free.iter()).enumerate() {
         let over = |inverse: f64, x: f64| if inverse > 0.0 { x / inverse } else { 0.0 };
         let (m, i) = (node.inverse_mass, node.inverse_inertia);
-        left += over(m, node.velocity.dot(&node.velocity)) + over(i, node.spin.dot(&node.spin));
+        let given = k.checked_sub(problem.nodes.grains).map_or(D::Vector::zero(), slides);
+        let moving = node.velocity - given;
+        left += over(m, moving.dot(&moving)) + over(i, node.spin.dot(&node.spin));
         let (v, w) = (node.velocity - *velocity, node.spin - *spin);
         taken += over(m, v.dot(&v)) + over(i, w.dot(&w));
     }

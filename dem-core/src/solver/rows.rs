@@ -218,6 +218,12 @@ impl Rows {
             let moves = node.inverse_mass > 0.0;
             (node.velocity, node.spin) = if moves { (D::Vector::zero(), D::Spin::zero()) } else { *free };
         }
+        for (wall, slide) in problem.nodes.slides.iter().enumerate() {
+            // the unknown of such a wall is its velocity along the drive alone
+            if slide.norm() > 0.0 {
+                still.all[problem.nodes.grains + wall].velocity = *slide;
+            }
+        }
         let mut flatten = Flatten { rows, unknowns: &unknowns, ratio, normal: Vec::new(), problem, still };
         problem.visit(&mut flatten);
         let Flatten { mut rows, normal, .. } = flatten;

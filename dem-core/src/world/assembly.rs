@@ -4,7 +4,7 @@
 use super::World;
 use super::motion::{Midpoint, Motion, Turn};
 use super::touch::{StoredTouch, Touch, TouchStatus};
-use crate::body::{Grains, direction, separation};
+use crate::body::{Grains, Wall, direction, separation};
 use crate::bond::{Bond, BondStatus};
 use crate::contact::{Arms, Bonded, Coulomb, Elastic, Frictionless, Law, Local};
 use crate::dim::{Axes, Dim, Moments, Vect, in_frame, of_frame, resized};
@@ -247,8 +247,18 @@ impl<D: Dim> World<D> {
         }
     }
 
-    /// The nodes of the problem at their free velocities.
-    fn nodes(&self, motion: &Motion<D>) -> Nodes<D> {
+    /// Velocities of the walls across their drives at the end of a step of length `h` (m/s); empty
+    /// if none is prescribed.
+    fn slides(&self, h: f64) -> Vec<D::Vector> {
+        if self.walls.iter().all(|wall| wall.slide.is_none()) {
+            return Vec::new();
+        }
+        let slide = |wall: &Wall<D>| wall.slide_velocity(self.time + h).unwrap_or(D::Vector::zero());
+        self.walls.iter().map(slide).collect()
+    }
+
+    /// The nodes of a step of length `h` at their free velocities.
+    fn nodes(&self, motion: &Motion<D>, h: f64) -> Nodes<D> {
         let grains = self.grains.len();
         let node = |k: usize| {
             let (velocity, spin) = motion.free[k];
@@ -262,6 +272,7 @@ impl<D: Dim> World<D> {
             all: (0..grains + self.walls.len()).map(node).collect(),
             grains,
             drives: self.walls.iter().map(|w| w.free_direction().map_or(D::Vector::zero(), |(d, _)| d)).collect(),
+            slides: self.slides(h),
         }
     }
 
@@ -276,7 +287,7 @@ impl<D: Dim> World<D> {
         applied: f64,
         h: f64,
     ) -> (ContactProblem<D>, Places) {
-        let mut problem = ContactProblem::new(self.nodes(motion), motion.free.clone(), applied);
+        let mut problem = ContactProblem::new(self.nodes(motion, h), motion.free.clone(), applied);
         if D::N > 2 {
             problem.radii.clone_from(&self.grains.radius);
         }

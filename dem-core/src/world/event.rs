@@ -42,6 +42,7 @@ impl<D: Dim> World<D> {
     /// a load up to the time `until`, the loads of that time act and no bond breaks.
     pub(super) fn load_to_next_event(&mut self, until: f64) -> Result<StepReport<D>, StepError> {
         self.stop_motion();
+        self.measure_sections(&self.midpoint(self.settings.step));
         let mut done = Solves::default();
         let found = self.next_event(until, &mut done)?;
         if found.excess.is_infinite() {

@@ -21,10 +21,11 @@ impl<D: Dim> World<D> {
     /// All intact bonds take part, and all other pairs whose gap is at most 1e-6 of the smaller
     /// radius. The world does not change.
     pub fn limit_load(&mut self, from: f64, to: f64) -> LimitLoad {
+        let mid = Midpoint::of(&self.grains, &self.walls);
+        self.measure_sections(&mid);
         let start = self.velocities_given(true, |value| value(from));
         // without the weight, whose rounding would be a load
         let growth = self.velocities_given(false, |value| value(to) - value(from));
-        let mid = Midpoint::of(&self.grains, &self.walls);
         let still: Vec<_> = start.iter().map(|_| (D::Vector::zero(), D::Spin::zero())).collect();
         let at_rest = Motion { before: still.clone(), free: still.into() };
         let mut touches = self.detect(&mid, &at_rest, 1.0);
@@ -55,7 +56,10 @@ impl<D: Dim> World<D> {
             given[load.grain].1 += load.torque * (factor * inverse_inertia);
         }
         given.extend(self.walls.iter().map(|wall| match &wall.drive {
-            Drive::Force { direction, mass, force } => (*direction * (of(&**force) / mass), D::Spin::zero()),
+            Drive::Force { direction, mass, force } => {
+                let area = if wall.per_area { wall.section } else { 1.0 };
+                (*direction * (of(&**force) * area / mass), D::Spin::zero())
+            }
             Drive::Fixed | Drive::Velocity { .. } => still,
         }));
         given.into()

@@ -5,9 +5,11 @@
 
 mod assembly;
 mod event;
+mod grip;
 mod ledger;
 mod limit_load;
 mod limits;
+mod loads;
 mod motion;
 mod observe;
 mod report;
@@ -111,6 +113,8 @@ pub struct World<D: Dim> {
     last_part: f64,
     /// Length corrections of the bonds in it, by bond index; empty before the first.
     turns: Vec<Turn>,
+    /// The wall that holds each grain; empty if no wall holds one.
+    held: Vec<Option<u32>>,
     candidates: Candidates<D>,
     solver: Box<dyn ContactSolver<D>>,
     /// The settings that the solver was built from; `None` for a user-defined solver.
@@ -155,8 +159,9 @@ impl<D: Dim> Default for Settings<D> {
 }
 
 impl<D: Dim> World<D> {
-    /// A world at time zero, without bonds.
-    pub fn new(grains: Grains<D>, walls: Vec<Wall<D>>, loads: Vec<Load<D>>, settings: Settings<D>) -> Self {
+    /// A world at time zero, without bonds. Walls with a grip hold the grains near them.
+    pub fn new(mut grains: Grains<D>, walls: Vec<Wall<D>>, loads: Vec<Load<D>>, settings: Settings<D>) -> Self {
+        let held = grip::hold(&mut grains, &walls);
         let mut world = Self {
             reference: Vec::new(),
             reference_box: 0.0,
@@ -167,6 +172,7 @@ impl<D: Dim> World<D> {
             mid: Midpoint::of(&grains, &walls),
             last_part: 0.0,
             turns: Vec::new(),
+            held,
             bonds: Bonds::default(),
             ledger: Ledger::default(),
             time: 0.0,

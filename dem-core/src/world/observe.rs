@@ -13,7 +13,8 @@ impl<D: Dim> World<D> {
         }
         for wall in &self.walls {
             if let Some((_, mass)) = wall.free_direction() {
-                sum += mass * wall.velocity.dot(&wall.velocity);
+                let velocity = wall.driven_part(wall.velocity);
+                sum += mass * velocity.dot(&velocity);
             }
         }
         0.5 * sum

@@ -13,7 +13,7 @@ use crate::contact::Local;
 use crate::dim::Dim;
 use crate::saved::{Mismatch, Reader, Saved};
 
-/// Code of "no bond" in place of a bond index.
+/// Code of "none" in place of the index of a bond or a wall.
 const NONE: u64 = u64::MAX;
 
 const BONDS: [BondStatus; 5] =
@@ -80,6 +80,8 @@ impl<D: Dim> World<D> {
             to.vectors(&[wall.position, wall.velocity, wall.reaction, wall.reaction_at_limit]);
             to.real(wall.applied);
         }
+        to.count(self.held.len());
+        self.held.iter().for_each(|wall| to.counts.push(wall.map_or(NONE, u64::from)));
         to.count(self.bonds.len());
         self.bonds.iter().for_each(|bond| save_bond(bond, to));
         to.vectors(&self.mid.grains);
@@ -103,7 +105,7 @@ impl<D: Dim> World<D> {
     /// [`Mismatch`].
     pub fn restored(
         mut grains: Grains<D>,
-        walls: Vec<Wall<D>>,
+        mut walls: Vec<Wall<D>>,
         loads: Vec<Load<D>>,
         settings: Settings<D>,
         from: &mut Reader,
@@ -115,7 +117,10 @@ impl<D: Dim> World<D> {
             };
             grains.material = (0..grains.len()).map(material).collect::<Result<_, _>>()?;
         }
+        // the grains that walls hold are saved: others may be near them by now
+        let grips: Vec<Option<f64>> = walls.iter_mut().map(|wall| wall.grip.take()).collect();
         let mut world = Self::new(grains, walls, loads, settings);
+        world.walls.iter_mut().zip(grips).for_each(|(wall, grip)| wall.grip = grip);
         let n = world.grains.len();
         world.steps = from.count()? as u64;
         (world.time, world.load_time) = (from.real()?, from.real()?);
@@ -130,6 +135,8 @@ impl<D: Dim> World<D> {
             (wall.reaction, wall.reaction_at_limit) = (from.vector()?, from.vector()?);
             wall.applied = from.real()?;
         }
+        world.held =
+            (0..from.number_of()?).map(|_| restored_holder(world.walls.len(), from)).collect::<Result<_, _>>()?;
         let bonds: Vec<Bond> = (0..from.number_of()?).map(|_| restored_bond(n, from)).collect::<Result<_, _>>()?;
         world.bonds = bonds.into();
         let (bodies, bonds) = (n + world.walls.len(), world.bonds.len());
@@ -163,6 +170,14 @@ fn save_pair(pair: [u32; 2], to: &mut Saved) {
 fn restored_pair(bodies: usize, from: &mut Reader) -> Result<[u32; 2], Mismatch> {
     let pair = [from.count()?, from.count()?];
     if pair.iter().all(|k| *k < bodies) { Ok(pair.map(|k| k as u32)) } else { Err(Mismatch) }
+}
+
+fn restored_holder(walls: usize, from: &mut Reader) -> Result<Option<u32>, Mismatch> {
+    match from.count()? {
+        none if none as u64 == NONE => Ok(None),
+        wall if wall < walls => Ok(Some(wall as u32)),
+        _ => Err(Mismatch),
+    }
 }
 
 fn save_bond(bond: &Bond, to: &mut Saved) {

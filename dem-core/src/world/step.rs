@@ -94,6 +94,7 @@ impl<D: Dim> World<D> {
         watch: &mut dyn FnMut(usize),
     ) -> Result<StepReport<D>, StepError> {
         let mid = self.midpoint(h);
+        self.measure_sections(&mid);
         let loaded_at = self.time + 0.5 * h;
         let motion = self.free_motion(h, loaded_at);
         let applied = self.applied_impulse(h, loaded_at);
@@ -164,7 +165,9 @@ impl<D: Dim> World<D> {
     pub fn contact_problem(&mut self) -> ContactProblem<D> {
         let h = self.settings.step;
         let loaded_at = self.time + 0.5 * h;
-        let (mid, motion) = (self.midpoint(h), self.free_motion(h, loaded_at));
+        let mid = self.midpoint(h);
+        self.measure_sections(&mid);
+        let motion = self.free_motion(h, loaded_at);
         let touches = self.detect(&mid, &motion, h);
         let brought = self.brought(&mid, &touches, &motion, h);
         self.assemble(&mid, &touches, &motion, &brought, self.applied_impulse(h, loaded_at), h).0
@@ -211,9 +214,16 @@ impl<D: Dim> World<D> {
                 Drive::Fixed => (D::Vector::zero(), still),
                 Drive::Velocity { direction, speed } => (*direction * speed(self.time + h), still),
                 Drive::Force { direction, mass, .. } => {
-                    (wall.velocity + *direction * (h * wall.applied_force(at) / mass), still)
+                    let gain = *direction * (h * wall.applied_force(at) / mass);
+                    let free = wall.driven_part(wall.velocity) + gain;
+                    (wall.slide_velocity(self.time + h).map_or(free, |slide| free + slide), still)
                 }
             });
+        }
+        for (k, wall) in self.held.iter().enumerate() {
+            if let Some(wall) = wall {
+                free[k] = free[g.len() + *wall as usize];
+            }
         }
         Motion { before, free: free.into() }
     }
@@ -365,9 +375,17 @@ impl<D: Dim> World<D> {
     pub(super) fn wall_forces(&self, mid: &Midpoint<D>, touches: &[StoredTouch<D>]) -> Vec<D::Vector> {
         let mut forces = vec![D::Vector::zero(); self.walls.len()];
         for stored in touches {
-            if let Some(wall) = (stored.pair[1] as usize).checked_sub(self.grains.len()) {
-                let touch = self.touch(mid, stored);
-                forces[wall] -= D::compose(&touch.frame, touch.reaction.n, touch.reaction.t);
+            let [holder, wall] = stored.pair.map(|node| self.wall_of(node as usize));
+            if holder.is_none() && wall.is_none() {
+                continue;
+            }
+            let touch = self.touch(mid, stored);
+            let force = D::compose(&touch.frame, touch.reaction.n, touch.reaction.t);
+            if let Some(wall) = wall {
+                forces[wall] -= force;
+            }
+            if let Some(holder) = holder {
+                forces[holder] += force;
             }
         }
         forces
@@ -403,7 +421,8 @@ impl<D: Dim> World<D> {
             if node.inverse_mass > 0.0 {
                 let (mass, inertia) =
                     if k < n { (self.grains.mass[k], self.grains.inertia[k]) } else { (1.0 / node.inverse_mass, 0.0) };
-                sum += mass * node.velocity.dot(&node.velocity) + inertia * node.spin.dot(&node.spin);
+                let velocity = if k < n { node.velocity } else { self.walls[k - n].driven_part(node.velocity) };
+                sum += mass * velocity.dot(&velocity) + inertia * node.spin.dot(&node.spin);
             }
         }
         0.5 * sum
@@ -423,7 +442,7 @@ impl<D: Dim> World<D> {
             }
         }
         let n = self.grains.len();
-        let pushes = wall_impulses(problem, self.walls.len());
+        let pushes = self.wall_impulses(problem);
         for (w, wall) in self.walls.iter().enumerate() {
             work += match &wall.drive {
                 Drive::Fixed => 0.0,
@@ -432,8 +451,34 @@ impl<D: Dim> World<D> {
                     h * wall.applied_force(self.time + 0.5 * h) * direction.dot(&mean(n + w))
                 }
             };
+            if wall.slide.is_some() {
+                let across = mean(n + w) - wall.driven_part(mean(n + w));
+                work -= pushes[w].dot(&across);
+            }
         }
         work
+    }
+
+    /// Impulse of the grains on each wall, and on the grains that it holds (N s).
+    fn wall_impulses(&self, problem: &ContactProblem<D>) -> Vec<D::Vector> {
+        struct Pushes<'a, D: Dim> {
+            world: &'a World<D>,
+            pushes: Vec<D::Vector>,
+        }
+        impl<D: Dim> Visitor<D> for Pushes<'_, D> {
+            fn visit<L: Law>(&mut self, _: &Nodes<D>, c: &Contact<D, L>) {
+                let [holder, wall] = c.link.nodes.map(|node| self.world.wall_of(node as usize));
+                if let Some(wall) = wall {
+                    self.pushes[wall] -= c.link.impulse(&c.r);
+                }
+                if let Some(holder) = holder {
+                    self.pushes[holder] += c.link.impulse(&c.r);
+                }
+            }
+        }
+        let mut found = Pushes { world: self, pushes: vec![D::Vector::zero(); self.walls.len()] };
+        problem.visit(&mut found);
+        found.pushes
     }
 
     /// ‖M (v⁺ − v⁻)/h‖ over the grains that are free to move, over the norm of the forces on the
@@ -449,6 +494,9 @@ impl<D: Dim> World<D> {
         for wall in &self.walls {
             if let Drive::Velocity { direction, .. } = &wall.drive {
                 applied += (h * direction.dot(&wall.reaction)).powi(2);
+            }
+            if let Some(slide) = &wall.slide {
+                applied += (h * slide.direction.dot(&wall.reaction)).powi(2);
             }
         }
         if applied > 0.0 { change.sqrt() / applied.sqrt() } else { 0.0 }
@@ -490,21 +538,6 @@ impl<D: Dim> World<D> {
             substeps: 1,
         }
     }
-}
-
-/// Impulse of the grains on each wall (N s).
-fn wall_impulses<D: Dim>(problem: &ContactProblem<D>, walls: usize) -> Vec<D::Vector> {
-    struct Pushes<V>(Vec<V>);
-    impl<D: Dim> Visitor<D> for Pushes<D::Vector> {
-        fn visit<L: Law>(&mut self, nodes: &Nodes<D>, c: &Contact<D, L>) {
-            if let Some(wall) = (c.link.nodes[1] as usize).checked_sub(nodes.grains) {
-                self.0[wall] -= c.link.impulse(&c.r);
-            }
-        }
-    }
-    let mut pushes = Pushes(vec![D::Vector::zero(); walls]);
-    problem.visit(&mut pushes);
-    pushes.0
 }
 
 /// Turn the contacts of broken bonds into dry ones that start without reaction.

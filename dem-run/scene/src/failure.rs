@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use crate::model::Scene;
 use crate::sample::{Cut, Sample, Section};
-use crate::wall::{Drive, Shape};
+use crate::wall::Shape;
 
 /// Axial strains (–) at which the collapse load is reported.
 pub const STRAINS: [f64; 2] = [1e-4, 1e-3];
@@ -46,7 +46,7 @@ impl Disk {
             (None, Section::Circle, 3) => (random.width, Some(2)),
             _ => return None,
         };
-        let load = scene.walls.get(wall).filter(|wall| wall.drive() != Drive::Fixed)?;
+        let load = scene.walls.get(wall).filter(|found| !scene.drives(wall, found).is_empty())?;
         let (normal, across) = (normal(&load.shape)?, only_axis(load.drive_direction()?)?);
         let faces = |shape: &Shape| {
             self::normal(shape).is_some_and(|n| only_axis(n) == Some(across) && n[across] * normal[across] < 0.0)

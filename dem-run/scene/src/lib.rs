@@ -24,6 +24,8 @@ mod sample;
 pub mod schema;
 mod set;
 mod solver;
+mod stage;
+mod stop;
 mod suggest;
 mod validate;
 mod wall;
@@ -41,8 +43,8 @@ pub use error::{Origin, Problem, SceneError};
 pub use function::{Function, Ramp};
 pub use material::{BASE, Friction, MaterialPair, Materials, NamedMaterial, PairBonds, Restitution};
 pub use model::{
-    Bonds, Flow, Grains, Load, Output, Precision, Rupture, Scatter, Scene, Springs, Stiffness, Stop, Time, TravelFrom,
-    WallTravel, Young, choose_load_wall,
+    Bonds, Flow, Grains, Load, Output, Precision, Rupture, Scatter, Scene, Springs, Stiffness, Time, Young,
+    choose_load_wall,
 };
 pub use region::Region;
 pub use sample::{
@@ -50,6 +52,8 @@ pub use sample::{
     UniformRange,
 };
 pub use solver::{GaussSeidel, LocalSolve, Newton, Solver, SolverKind, Start};
+pub use stage::{Stage, StageDrive};
+pub use stop::{Stop, TravelFrom, WallTravel};
 pub use validate::validate;
 pub use validate::{LARGEST, MAX_GRAINS};
 pub use wall::*;

@@ -12,6 +12,8 @@ use super::material::{Materials, PairBonds};
 use super::region::Region;
 use super::sample::Sample;
 use super::solver::Solver;
+use super::stage::{Stage, StageDrive};
+use super::stop::Stop;
 use super::wall::{Drive, Wall};
 
 /// A scene: what is simulated, in SI units.
@@ -63,6 +65,9 @@ pub struct Scene {
     pub rupture: Rupture,
     /// How often the history is written.
     pub output: Output,
+    /// Stages of loading, one after the other; default: none. The run ends with the last.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub stages: Vec<Stage>,
     /// Conditions that end the run before `time.end`; default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stop: Option<Stop>,
@@ -273,43 +278,6 @@ pub enum Precision {
     Single,
 }
 
-/// Conditions that end the run before `time.end`.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct Stop {
-    /// Ends the run when a wall has travelled a given distance.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub wall_travel: Option<WallTravel>,
-    /// Ends the run when this fraction of the bonds has broken (above 0, at most 1).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub broken_fraction: Option<f64>,
-}
-
-/// A travel of a wall that ends the run.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct WallTravel {
-    /// Name of a driven wall.
-    pub wall: String,
-    /// Distance along the wall's direction, as a fraction of the sample's extent along it at the
-    /// start.
-    pub fraction_of_height: f64,
-    /// Start of the measured travel.
-    #[serde(default)]
-    pub after: TravelFrom,
-}
-
-/// Start of the measured travel of a wall.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum TravelFrom {
-    /// From the start of the run.
-    #[default]
-    Start,
-    /// From the first break of a bond.
-    FirstBreak,
-}
-
 fn default_seed() -> u64 {
     1
 }
@@ -331,8 +299,32 @@ impl Scene {
     /// Names of the driven walls, in order.
     #[must_use]
     pub fn driven_walls(&self) -> Vec<&str> {
-        let driven = self.walls.iter().filter(|(_, wall)| wall.drive() != Drive::Fixed);
+        let driven = self.walls.iter().filter(|(name, wall)| !self.drives(name, wall).is_empty());
         driven.map(|(name, _)| name.as_str()).collect()
+    }
+
+    /// The drives that the stages give a wall, in order.
+    pub fn stage_drives<'a>(&'a self, wall: &'a str) -> impl Iterator<Item = &'a StageDrive> {
+        self.stages.iter().filter_map(move |stage| stage.walls.get(wall))
+    }
+
+    /// All drives of a wall: its own and those of the stages.
+    #[must_use]
+    pub fn drives(&self, name: &str, wall: &Wall) -> Vec<Drive> {
+        let stages = self.stage_drives(name).map(StageDrive::drive);
+        [wall.drive()].into_iter().chain(stages).filter(|drive| *drive != Drive::Fixed).collect()
+    }
+
+    /// The drive of a wall at the start of the run: that of the first stage where it has one. A
+    /// wall that only later stages drive is held until then.
+    #[must_use]
+    pub fn first_drive(&self, name: &str, wall: &Wall) -> Drive {
+        let first = self.stages.first().and_then(|stage| stage.walls.get(name));
+        match (first, wall.drive()) {
+            (Some(first), _) => first.drive(),
+            (None, Drive::Fixed) if self.stage_drives(name).next().is_some() => StageDrive::default().drive(),
+            (None, own) => own,
+        }
     }
 
     /// The wall that loads the sample ([`choose_load_wall`]); none where no wall is driven, or

@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use super::function::{Function, Ramp};
 use super::validate::report::Report;
 
-/// A rigid wall. It is fixed, or driven by one of `velocity`, `force` and `force_rate` along one
-/// direction.
+/// A rigid wall. It is fixed, or driven by one of `velocity`, `force`, `force_rate` and `stress`
+/// along one direction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Wall {
@@ -26,12 +26,35 @@ pub struct Wall {
     /// mass.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub force_rate: Option<f64>,
+    /// Drive of a plane along its normal: stress, a function of time (Pa). The force in each step
+    /// is the stress times the present section of the sample across the wall. The wall needs a
+    /// mass, its normal is parallel to an axis, and it touches the sample at the start.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stress: Option<Function>,
+    /// Prescribed velocity across a drive by a force or a stress.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub slide: Option<Slide>,
+    /// Grains whose surface is within this distance of the wall at the start (m) move with the
+    /// wall, without turning, and the forces on them count as forces on the wall: a glued platen.
+    /// Not for a wall that is driven by a force or a stress.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub grip: Option<f64>,
     /// Mass of a wall that is driven by a force.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mass: Option<WallMass>,
     /// Direction of the drive, of any length. Default for a plane: its normal.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub direction: Option<Vec<f64>>,
+}
+
+/// Prescribed velocity of a wall across its drive.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Slide {
+    /// Direction, of any length, perpendicular to that of the drive.
+    pub direction: Vec<f64>,
+    /// Velocity along it, a function of time (m/s).
+    pub velocity: Function,
 }
 
 /// The shape of a wall.
@@ -136,6 +159,8 @@ pub enum Drive {
     Velocity(Function),
     /// Under this force along its direction (N).
     Force(Function),
+    /// Under this stress along its normal (Pa).
+    Stress(Function),
 }
 
 impl Shape {
@@ -216,11 +241,12 @@ impl Wall {
     /// How the wall moves: `force_rate` is a ramp from zero at t = 0.
     #[must_use]
     pub fn drive(&self) -> Drive {
-        match (&self.velocity, &self.force, self.force_rate) {
+        match (&self.velocity, &self.force, self.force_rate, &self.stress) {
             (Some(velocity), ..) => Drive::Velocity(velocity.clone()),
-            (None, Some(force), _) => Drive::Force(force.clone()),
-            (None, None, Some(rate)) => Drive::Force(Function::Ramp(Ramp { rate, start: 0.0 })),
-            (None, None, None) => Drive::Fixed,
+            (None, Some(force), ..) => Drive::Force(force.clone()),
+            (None, None, Some(rate), _) => Drive::Force(Function::Ramp(Ramp { rate, start: 0.0 })),
+            (None, None, None, Some(stress)) => Drive::Stress(stress.clone()),
+            (None, None, None, None) => Drive::Fixed,
         }
     }
 
@@ -246,6 +272,9 @@ mod tests {
             velocity: None,
             force: None,
             force_rate: None,
+            stress: None,
+            slide: None,
+            grip: None,
             mass: None,
             direction: None,
         }

@@ -248,6 +248,8 @@ impl End {
             Self::Scene(Ending::Time) => "time",
             Self::Scene(Ending::WallTravel) => "wall travel",
             Self::Scene(Ending::BrokenFraction) => "broken fraction",
+            Self::Scene(Ending::LoadDrop) => "load drop",
+            Self::Scene(Ending::Stages) => "stages",
             Self::Scene(Ending::NoBreak) => "no break",
             Self::Scene(Ending::NoEquilibrium) => "no equilibrium",
             Self::Scene(Ending::Interrupted) => "interrupted",
@@ -367,7 +369,7 @@ impl<D: Dim> Trial<'_, D> {
                     world.time
                 ));
             }
-            if let Some(ending) = state.course.ending(&world) {
+            if let Some(ending) = state.course.ending(self.scene, &mut world) {
                 break End::Scene(ending);
             }
             let failed = |loads: &Collapse| loads.passed[1] && loads.failure.broken_share.is_some();

@@ -102,6 +102,15 @@ const FLAT_CASES: &[(&str, &str)] = &[
     ("walls.top.mass=null", "walls.top.mass"),
     ("walls.top.mass={\"kg\": 0}", "walls.top.mass.kg"),
     ("walls.top.force={\"constant\": 1}", "walls.top"),
+    ("walls.top.stress={\"constant\": 1}", "walls.top"),
+    ("walls.top.grip=1e-3", "walls.top.grip"),
+    ("walls.bottom.grip=0", "walls.bottom.grip"),
+    ("walls.roller.stress={\"constant\": 1}", "walls.roller"),
+    (r#"walls.top.slide={"direction": [1, 1], "velocity": {"constant": 1}}"#, "walls.top.slide.direction"),
+    (r#"walls.top.slide={"direction": [0, 0], "velocity": {"constant": 1}}"#, "walls.top.slide.direction"),
+    (r#"walls.top.slide={"direction": [1, 0], "velocity": {"table": []}}"#, "walls.top.slide.velocity.table"),
+    (r#"walls.bottom.slide={"direction": [1, 0], "velocity": {"constant": 1}}"#, "walls.bottom.slide"),
+    (r#"walls.roller.slide={"direction": [1, 0], "velocity": {"constant": 1}}"#, "walls.roller.slide"),
     // time, output, solver
     ("time.step=0", "time.step"),
     ("time.step=-1e-4", "time.step"),
@@ -128,6 +137,9 @@ const FLAT_CASES: &[(&str, &str)] = &[
     ("stop.broken_fraction=0", "stop.broken_fraction"),
     ("stop.broken_fraction=1.5", "stop.broken_fraction"),
     ("bonds=null", "stop.wall_travel.after"),
+    // the load of `top` is prescribed, and a scene may not say which wall loads the sample
+    ("stop.load_drop=0.5", "stop.load_drop"),
+    ("stop={\"load_drop\": 0.5}", "stop.load_drop"),
 ];
 
 /// The same for [`SOLID`].
@@ -225,6 +237,48 @@ fn all_wrong_values_are_told_at_once_with_their_lines() {
     );
     assert_eq!(error.problems()[3].nearest.as_deref(), Some("top"));
     assert!(error.problems().iter().all(|problem| !problem.allowed.is_empty()));
+}
+
+#[test]
+fn a_drop_of_the_load_needs_bonds_a_share_and_a_load_that_can_drop() {
+    let rolls = "load_wall=roller";
+    read(FLAT, &[rolls, "stop={\"load_drop\": 0.5}"]).expect("a load wall with a velocity");
+    for share in ["0", "1", "-0.5"] {
+        let problem = only(read(FLAT, &[rolls, &format!("stop={{\"load_drop\": {share}}}")]));
+        assert_eq!(problem.path, "stop.load_drop", "{problem}");
+    }
+    let problem = only(read(FLAT, &["bonds=null", rolls, "stop={\"load_drop\": 0.5}"]));
+    assert!(problem.allowed.contains("bonds in the scene"), "{problem}");
+    let problem = only(read(FLAT, &["stop={\"load_drop\": 0.5}"]));
+    assert!(problem.allowed.contains("a load_wall in the scene: one of roller, top"), "{problem}");
+    let problem = only(read(FLAT, &["load_wall=top", "stop={\"load_drop\": 0.5}"]));
+    assert!(problem.found.contains("walls.top") && problem.allowed.contains("velocity"), "{problem}");
+}
+
+/// [`FLAT`] with a lid that is driven by a stress.
+fn stressed(sets: &[&str]) -> Result<Scene, SceneError> {
+    let lid = ["walls.top.force_rate=null", r#"walls.top.stress={"constant": 1e5}"#];
+    read(FLAT, &[&lid, sets].concat())
+}
+
+#[test]
+fn a_stress_needs_a_plane_along_an_axis_a_mass_and_no_other_direction() {
+    let scene =
+        stressed(&[r#"walls.top.slide={"direction": [-2, 0], "velocity": {"constant": 1}}"#, "walls.bottom.grip=1"]);
+    let Drive::Stress(stress) = scene.expect("right").walls["top"].drive() else { panic!("no stress") };
+    assert_eq!(stress.at(1.0), 1e5);
+    for (set, path) in [
+        ("walls.top.shape.plane.normal=[0.1, -1]", "walls.top.shape.plane.normal"),
+        ("walls.top.direction=[0, -1]", "walls.top.direction"),
+        ("walls.top.mass=null", "walls.top.mass"),
+        ("walls.top.mass={\"kg\": 0}", "walls.top.mass.kg"),
+        ("walls.top.grip=1e-3", "walls.top.grip"),
+        (r#"walls.top.shape={"circle": {"center": [0, 9], "radius": 1}}"#, "walls.top.stress"),
+    ] {
+        let error = stressed(&[set]).expect_err(set);
+        let paths: Vec<&str> = error.problems().iter().map(|problem| problem.path.as_str()).collect();
+        assert!(paths.contains(&path), "{set}: {error}");
+    }
 }
 
 #[test]

@@ -6,13 +6,16 @@
 mod material;
 pub(crate) mod report;
 mod sample;
+mod stage;
 mod wall;
 
 use std::collections::HashMap;
 
 use super::error::Problem;
-use super::model::{Bonds, Load, Rupture, Scatter, Scene, Stiffness, TravelFrom};
+use super::model::{Bonds, Load, Rupture, Scatter, Scene, Stiffness};
 use super::solver::SolverKind;
+use super::stage::StageDrive;
+use super::stop::{Stop, TravelFrom};
 use super::suggest::nearest;
 use super::wall::Drive;
 pub use report::{LARGEST, MAX_GRAINS};
@@ -42,7 +45,7 @@ pub fn validate(scene: &Scene) -> Vec<Problem> {
     }
     grains(&mut report, scene);
     for (name, wall) in &scene.walls {
-        wall::wall(&mut report, name, wall);
+        wall::wall(&mut report, name, wall, &scene.stage_drives(name).map(StageDrive::drive).collect::<Vec<_>>());
     }
     if let Some(name) = &scene.load_wall {
         driven_wall(&mut report, scene, "load_wall", name);
@@ -53,7 +56,10 @@ pub fn validate(scene: &Scene) -> Vec<Problem> {
     time_and_output(&mut report, scene);
     solver(&mut report, scene);
     rupture(&mut report, scene);
-    stop(&mut report, scene);
+    if let Some(stop) = &scene.stop {
+        self::stop(&mut report, scene, "stop", stop);
+    }
+    stage::check(&mut report, scene, stop);
     report.problems
 }
 
@@ -250,6 +256,13 @@ fn rupture(report: &mut Report, scene: &Scene) {
         let found = "a velocity, with rupture next_event";
         report.wrong(format!("walls.{name}.velocity"), found, "force or force_rate in its place, or rupture cascade");
     }
+    for (name, _) in scene.walls.iter().filter(|(_, wall)| wall.slide.is_some()) {
+        let found = "a slide, with rupture next_event";
+        report.wrong(format!("walls.{name}.slide"), found, "no slide, or rupture cascade: nothing moves");
+    }
+    if !scene.stages.is_empty() {
+        report.wrong("stages", "stages, with rupture next_event", "one course of loads, or rupture cascade");
+    }
     if matches!(scene.solver.kind, SolverKind::GaussSeidel(_)) {
         report.wrong("solver.kind", "gauss_seidel, with rupture next_event", "auto, newton or interior");
     }
@@ -267,28 +280,54 @@ fn driven_wall(report: &mut Report, scene: &Scene, path: &str, name: &str) {
             let problem = Problem::new(path, format!("\"{name}\""), allowed);
             report.problems.push(problem.with_nearest(nearest(name, names)));
         }
-        Some(wall) if wall.drive() == Drive::Fixed => {
+        Some(wall) if scene.drives(name, wall).is_empty() => {
             report.wrong(path, format!("\"{name}\", which is fixed"), "a wall that is driven");
         }
         Some(_) => {}
     }
 }
 
-fn stop(report: &mut Report, scene: &Scene) {
-    let Some(stop) = &scene.stop else { return };
+/// Checks the stop conditions at `path`.
+fn stop(report: &mut Report, scene: &Scene, path: &str, stop: &Stop) {
     let bonds_needed = "bonds in the scene: it has none";
     if let Some(travel) = &stop.wall_travel {
-        driven_wall(report, scene, "stop.wall_travel.wall", &travel.wall);
-        report.positive("stop.wall_travel.fraction_of_height", travel.fraction_of_height, "no unit");
+        driven_wall(report, scene, &format!("{path}.wall_travel.wall"), &travel.wall);
+        report.positive(format!("{path}.wall_travel.fraction_of_height"), travel.fraction_of_height, "no unit");
         if travel.after == TravelFrom::FirstBreak && scene.bonds.is_none() {
-            report.wrong("stop.wall_travel.after", "first_break", bonds_needed);
+            report.wrong(format!("{path}.wall_travel.after"), "first_break", bonds_needed);
         }
     }
     if let Some(fraction) = stop.broken_fraction {
         let allowed = "a number above 0, at most 1";
-        report.range("stop.broken_fraction", fraction, fraction > 0.0 && fraction <= 1.0, allowed);
+        report.range(format!("{path}.broken_fraction"), fraction, fraction > 0.0 && fraction <= 1.0, allowed);
         if scene.bonds.is_none() {
-            report.wrong("stop.broken_fraction", Number(fraction), bonds_needed);
+            report.wrong(format!("{path}.broken_fraction"), Number(fraction), bonds_needed);
         }
+    }
+    if let Some(share) = stop.load_drop {
+        load_drop(report, scene, &format!("{path}.load_drop"), share);
+    }
+}
+
+fn load_drop(report: &mut Report, scene: &Scene, path: &str, share: f64) {
+    report.range(path, share, share > 0.0 && share < 1.0, "a number above 0 and below 1");
+    if scene.bonds.is_none() {
+        report.wrong(
+            path,
+            Number(share),
+            "bonds in the scene: it has none, and the peak is sought after a first break",
+        );
+    }
+    let Some(name) = scene.load_wall() else {
+        let allowed = match scene.load_unknown() {
+            Some(names) => format!("a load_wall in the scene: one of {names}"),
+            None => "a wall with a velocity in the scene, whose load it is".to_string(),
+        };
+        report.wrong(path, Number(share), allowed);
+        return;
+    };
+    if !scene.drives(name, &scene.walls[name]).iter().any(|drive| matches!(drive, Drive::Velocity(_))) {
+        let found = format!("{share:?}, and the load of walls.{name} is prescribed");
+        report.wrong(path, found, "a load wall that is driven by a velocity: a prescribed load does not drop");
     }
 }

@@ -1,0 +1,58 @@
+//! Stages of loading.
+
+use super::*;
+
+/// [`FLAT`] with stages.
+fn staged(stages: &str, sets: &[&str]) -> Result<Scene, SceneError> {
+    let stages = format!("stages={stages}");
+    read(FLAT, &[&[stages.as_str()][..], sets].concat())
+}
+
+#[test]
+fn a_wall_has_the_drive_of_its_stage_and_is_held_before() {
+    let stages = r#"[{"name": "wait", "duration": 0.1}, {"name": "go", "until": {"broken_fraction": 0.5},
+        "walls": {"bottom": {"velocity": {"constant": 1}}, "top": {}}}]"#;
+    let scene = staged(stages, &[]).expect("right");
+    let held = Drive::Velocity(Function::Constant(0.0));
+    assert_eq!(scene.first_drive("bottom", &scene.walls["bottom"]), held);
+    assert_eq!(scene.drives("bottom", &scene.walls["bottom"]), [Drive::Velocity(Function::Constant(1.0))]);
+    assert_eq!(scene.drives("top", &scene.walls["top"])[1], held);
+    assert_eq!(scene.driven_walls(), ["bottom", "roller", "top"]);
+    // the load of `top` may drop, since it is held in a stage
+    staged(stages, &["stop={\"load_drop\": 0.5}", "load_wall=top"]).expect("a load that can drop");
+    assert_eq!(read(&scene.to_json().expect("json"), &[]).expect("the same scene"), scene);
+}
+
+#[test]
+fn what_a_stage_asks_of_a_wall_is_checked_at_the_wall() {
+    let stage = |walls: &str| format!(r#"[{{"name": "a", "duration": 0.1, "walls": {walls}}}]"#);
+    for (walls, sets, path) in [
+        (r#"{"bottom": {"force": {"constant": 1}}}"#, &[][..], "walls.bottom.mass"),
+        (r#"{"roller": {"stress": {"constant": 1}}}"#, &["walls.roller.mass=sample"], "walls.roller.stress"),
+        (
+            r#"{"roller": {"force": {"constant": 1}}}"#,
+            &["walls.roller.mass=sample", "walls.roller.grip=1"],
+            "walls.roller.grip",
+        ),
+        (r#"{"bottom": {"velocity": {"table": []}}}"#, &[], "stages.0.walls.bottom.velocity.table"),
+        (
+            r#"{"top": {}}"#,
+            &[r#"walls.top.slide={"direction": [1, 0], "velocity": {"constant": 1}}"#],
+            "stages.0.walls.top",
+        ),
+    ] {
+        let error = staged(&stage(walls), sets).expect_err(walls);
+        let paths: Vec<&str> = error.problems().iter().map(|problem| problem.path.as_str()).collect();
+        assert!(paths.contains(&path), "{walls}: {error}");
+    }
+}
+
+#[test]
+fn nothing_slides_and_no_stage_begins_from_break_to_break() {
+    let still = ["walls.roller.velocity=null", "walls.roller.direction=null", "rupture=next_event", "solver={}"];
+    let slide = r#"walls.top.slide={"direction": [1, 0], "velocity": {"constant": 1}}"#;
+    let stages = r#"stages=[{"name": "a", "duration": 0.1, "walls": {"top": {"force": {"constant": 1}}}}]"#;
+    for (set, path) in [(slide, "walls.top.slide"), (stages, "stages")] {
+        assert_eq!(only(read(FLAT, &[&still[..], &[set]].concat())).path, path);
+    }
+}

@@ -1,0 +1,62 @@
+//! Wrong values in the stages of loading.
+
+use super::report::Report;
+use crate::model::Scene;
+use crate::stage::StageDrive;
+use crate::stop::Stop;
+use crate::suggest::nearest;
+
+/// Reports wrong values of the stages.
+pub(super) fn check(report: &mut Report, scene: &Scene, stop: impl Fn(&mut Report, &Scene, &str, &Stop)) {
+    for (k, stage) in scene.stages.iter().enumerate() {
+        let path = format!("stages.{k}");
+        if scene.stages[..k].iter().any(|other| other.name == stage.name) {
+            report.wrong(format!("{path}.name"), format!("\"{}\" a second time", stage.name), "a name of its own");
+        }
+        match (stage.duration, &stage.until) {
+            (None, None) => {
+                let found = format!("stage \"{}\" without an end", stage.name);
+                report.wrong(&path, found, "a duration (s), or a condition: until");
+            }
+            (None, Some(until)) if *until == Stop::default() => {
+                report.wrong(format!("{path}.until"), "no condition", "a condition of stop, or a duration (s)");
+            }
+            _ => {}
+        }
+        if let Some(duration) = stage.duration {
+            let least = scene.time.step;
+            let allowed = format!("a finite number, at least the time step ({least:?} s)");
+            report.range(format!("{path}.duration"), duration, duration >= least, allowed);
+        }
+        if let Some(until) = &stage.until {
+            stop(report, scene, &format!("{path}.until"), until);
+        }
+        for (name, drive) in &stage.walls {
+            stage_drive(report, scene, &format!("{path}.walls.{name}"), name, drive);
+        }
+    }
+}
+
+fn stage_drive(report: &mut Report, scene: &Scene, path: &str, name: &str, drive: &StageDrive) {
+    let Some(wall) = scene.walls.get(name) else {
+        let names: Vec<&str> = scene.walls.keys().map(String::as_str).collect();
+        report.wrong(path, format!("\"{name}\""), format!("the name of a wall: {}", names.join(", ")));
+        if let Some(problem) = report.problems.pop() {
+            report.problems.push(problem.with_nearest(nearest(name, names)));
+        }
+        return;
+    };
+    let functions = [("velocity", &drive.velocity), ("force", &drive.force), ("stress", &drive.stress)];
+    let given: Vec<&str> = functions.iter().filter(|(_, f)| f.is_some()).map(|(name, _)| *name).collect();
+    if given.len() > 1 {
+        report.wrong(path, given.join(" and "), "one drive at most: velocity, force or stress");
+    }
+    for (name, function) in functions {
+        if let Some(function) = function {
+            report.function(&format!("{path}.{name}"), function);
+        }
+    }
+    if wall.slide.is_some() {
+        report.wrong(path, "a wall with a slide", "nothing: a wall that slides keeps its drive");
+    }
+}

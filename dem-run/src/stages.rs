@@ -1,0 +1,99 @@
+//! The stages of loading of a run: when each ends, and the drives that the next one brings.
+
+use crate::drive::set_drive;
+use crate::load::drive_direction;
+use crate::scene::Scene;
+use crate::stop::Stops;
+use crate::summary::Ending;
+use dem_core::dim::Dim;
+use dem_core::saved::{Mismatch, Reader, Saved};
+use dem_core::world::World;
+
+/// The stages of a run, in progress.
+pub struct Stages<D: Dim> {
+    /// The step after which each stage began, up to the present one; empty without stages.
+    began: Vec<u64>,
+    /// Conditions of the present stage.
+    until: Stops<D>,
+}
+
+impl<D: Dim> Stages<D> {
+    /// The stages of a run that begins with `world`, whose walls have the drives of the first.
+    pub fn new(scene: &Scene, world: &World<D>) -> Self {
+        let first = scene.stages.first();
+        Self {
+            began: first.map(|_| 0).into_iter().collect(),
+            until: Stops::new(first.and_then(|stage| stage.until.as_ref()), scene, world),
+        }
+    }
+
+    /// Counts a step; `world` is the state after it, `broken` the number of bonds broken so far.
+    pub fn count(&mut self, world: &World<D>, broken: usize) {
+        self.until.count(world, broken);
+    }
+
+    /// Ends the present stage if this step is its last, and begins the next one. Returns the end of
+    /// the run, if that was the last stage.
+    pub fn advance(&mut self, scene: &Scene, world: &mut World<D>, broken: usize) -> Option<Ending> {
+        let began = *self.began.last()?;
+        let stage = scene.stages.get(self.began.len() - 1)?;
+        // a stage has at least one step
+        if world.steps <= began {
+            return None;
+        }
+        let steps = stage.duration.map(|duration| (duration / scene.time.step).round().max(1.0) as u64);
+        let over = steps.is_some_and(|steps| world.steps - began >= steps);
+        if !over && self.until.ending(world, broken).is_none() {
+            return None;
+        }
+        let Some(next) = scene.stages.get(self.began.len()) else { return Some(Ending::Stages) };
+        self.began.push(world.steps);
+        let before = world.kinetic_energy();
+        set_drives(scene, world, self.began.len() - 1, world.steps);
+        // a wall has kinetic energy only under a force: its new drive takes it, or gives it
+        let change = world.kinetic_energy() - before;
+        if change != 0.0 {
+            world.ledger.kinetic += change;
+            world.ledger.external_work += change;
+        }
+        self.until = Stops::new(next.until.as_ref(), scene, world);
+        None
+    }
+
+    /// Saves what changes from step to step.
+    pub fn save(&self, to: &mut Saved) {
+        to.count(self.began.len());
+        to.counts.extend(&self.began);
+        self.until.save(to);
+    }
+
+    /// Restores what [`Stages::save`] wrote, with the drives of the present stage.
+    ///
+    /// # Errors
+    /// [`Mismatch`].
+    pub fn restored(scene: &Scene, world: &mut World<D>, from: &mut Reader) -> Result<Self, Mismatch> {
+        let begun = from.count()?;
+        let known = if scene.stages.is_empty() { begun == 0 } else { (1..=scene.stages.len()).contains(&begun) };
+        if !known {
+            return Err(Mismatch);
+        }
+        let began: Vec<u64> = (0..begun).map(|_| Ok(from.count()? as u64)).collect::<Result<_, Mismatch>>()?;
+        for (stage, start) in began.iter().enumerate().skip(1) {
+            set_drives(scene, world, stage, *start);
+        }
+        let until = begun.checked_sub(1).and_then(|last| scene.stages[last].until.as_ref());
+        let mut until = Stops::new(until, scene, world);
+        until.restore(from)?;
+        Ok(Self { began, until })
+    }
+}
+
+/// Gives the walls the drives of a stage that begins after the step `start`.
+fn set_drives<D: Dim>(scene: &Scene, world: &mut World<D>, stage: usize, start: u64) {
+    let time = start as f64 * scene.time.step;
+    for (name, change) in &scene.stages[stage].walls {
+        let Some(index) = scene.walls.keys().position(|other| other == name) else { continue };
+        let Some(direction) = drive_direction(&world.walls[index]) else { continue };
+        set_drive(&mut world.walls[index], &scene.walls[name], change.drive(), direction, &world.grains.mass, time);
+    }
+}

@@ -1,0 +1,161 @@
+//! The stop conditions of a scene, followed from step to step.
+
+use crate::load::{drive_direction, load};
+use crate::scene::{Scene, Stop, TravelFrom};
+use crate::summary::Ending;
+use dem_core::dim::{Dim, Vect};
+use dem_core::saved::{Mismatch, Reader, Saved};
+use dem_core::world::World;
+
+/// Number of consecutive steps whose load must be below the share of the peak. A grain that loses
+/// its contact with the wall for a step, or an impact that ends, is no drop of the load.
+pub const DROP_STEPS: usize = 10;
+
+/// The stop conditions of a run.
+pub struct Stops<D: Dim> {
+    travel: Option<TravelStop<D>>,
+    /// Share of broken bonds (–) that ends the run.
+    broken_limit: Option<f64>,
+    drop: Option<DropStop>,
+}
+
+/// The travel of a wall that ends a run.
+struct TravelStop<D: Dim> {
+    wall: usize,
+    direction: D::Vector,
+    distance: f64,
+    from: Option<D::Vector>,
+}
+
+/// The drop of the load that ends a run.
+struct DropStop {
+    /// Index of the load wall.
+    wall: usize,
+    /// Share of the peak (–).
+    share: f64,
+    /// Greatest magnitude of the load since the first break of a bond, that step included (N).
+    peak: f64,
+    /// Consecutive steps below the share, up to the last.
+    below: usize,
+}
+
+impl DropStop {
+    /// Counts a step with this load (N).
+    fn count(&mut self, load: f64, broken: usize) {
+        if broken == 0 {
+            return;
+        }
+        self.peak = self.peak.max(load.abs());
+        self.below = if load.abs() < self.share * self.peak { self.below + 1 } else { 0 };
+    }
+}
+
+impl<D: Dim> Stops<D> {
+    /// The conditions of `stop`, with the travel of a wall measured from `world`.
+    pub fn new(stop: Option<&Stop>, scene: &Scene, world: &World<D>) -> Self {
+        let wall = |name: &str| scene.walls.keys().position(|other| other == name);
+        let drop = stop.and_then(|stop| stop.load_drop).zip(scene.load_wall().and_then(wall));
+        Self {
+            travel: stop.and_then(|stop| travel_stop(stop, scene, world)),
+            broken_limit: stop.and_then(|stop| stop.broken_fraction),
+            drop: drop.map(|(share, wall)| DropStop { wall, share, peak: 0.0, below: 0 }),
+        }
+    }
+
+    /// Counts a step; `world` is the state after it, `broken` the number of bonds broken so far.
+    pub fn count(&mut self, world: &World<D>, broken: usize) {
+        if let Some(drop) = &mut self.drop {
+            drop.count(load(&world.walls[drop.wall]), broken);
+        }
+    }
+
+    /// The condition that ends the run after this step, if any.
+    pub fn ending(&mut self, world: &World<D>, broken: usize) -> Option<Ending> {
+        if let Some(stop) = &mut self.travel {
+            let position = world.walls[stop.wall].position;
+            if stop.from.is_none() && broken > 0 {
+                stop.from = Some(position);
+            }
+            if stop.from.is_some_and(|from| (position - from).dot(&stop.direction).abs() >= stop.distance) {
+                return Some(Ending::WallTravel);
+            }
+        }
+        let bonds = world.bonds.len() as f64;
+        if self.broken_limit.is_some_and(|limit| bonds > 0.0 && broken as f64 >= limit * bonds) {
+            return Some(Ending::BrokenFraction);
+        }
+        let dropped = self.drop.as_ref().is_some_and(|drop| drop.below >= DROP_STEPS);
+        dropped.then_some(Ending::LoadDrop)
+    }
+
+    /// Saves what changes from step to step.
+    pub fn save(&self, to: &mut Saved) {
+        to.flag(self.travel.is_some());
+        if let Some(stop) = &self.travel {
+            to.real(stop.distance);
+            to.flag(stop.from.is_some());
+            to.vector(&stop.from.unwrap_or(D::Vector::zero()));
+        }
+        to.flag(self.drop.is_some());
+        if let Some(drop) = &self.drop {
+            to.real(drop.peak);
+            to.count(drop.below);
+        }
+    }
+
+    /// Restores what [`Stops::save`] wrote. A condition that the scene no longer has is dropped.
+    ///
+    /// # Errors
+    /// [`Mismatch`].
+    pub fn restore(&mut self, from: &mut Reader) -> Result<(), Mismatch> {
+        if from.flag()? {
+            let (distance, begun, place) = (from.real()?, from.flag()?, from.vector()?);
+            if let Some(stop) = &mut self.travel {
+                (stop.distance, stop.from) = (distance, begun.then_some(place));
+            }
+        }
+        if from.flag()? {
+            let (peak, below) = (from.real()?, from.count()?);
+            if let Some(drop) = &mut self.drop {
+                (drop.peak, drop.below) = (peak, below);
+            }
+        }
+        Ok(())
+    }
+}
+
+fn travel_stop<D: Dim>(stop: &Stop, scene: &Scene, world: &World<D>) -> Option<TravelStop<D>> {
+    let travel = stop.wall_travel.as_ref()?;
+    let wall = scene.walls.keys().position(|name| *name == travel.wall)?;
+    let direction = drive_direction(&world.walls[wall])?;
+    let along = |sign: f64| {
+        let reach = |(x, r): (&D::Vector, &f64)| sign * x.dot(&direction) + r;
+        world.grains.position.iter().zip(&world.grains.radius).map(reach).fold(f64::NEG_INFINITY, f64::max)
+    };
+    let from = (travel.after == TravelFrom::Start).then(|| world.walls[wall].position);
+    Some(TravelStop { wall, direction, distance: travel.fraction_of_height * (along(1.0) + along(-1.0)), from })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_load_drops_below_its_share_of_the_peak_in_ten_consecutive_steps_after_a_break() {
+        let mut drop = DropStop { wall: 0, share: 0.5, peak: 0.0, below: 0 };
+        // an impact before the first break is no peak
+        drop.count(-500.0, 0);
+        drop.count(10.0, 0);
+        assert_eq!((drop.peak, drop.below), (0.0, 0));
+        // the load of the first break, of either sign, and a greater one
+        drop.count(-90.0, 1);
+        drop.count(-100.0, 1);
+        (1..DROP_STEPS).for_each(|_| drop.count(-49.0, 2));
+        assert_eq!((drop.peak, drop.below), (100.0, DROP_STEPS - 1));
+        // half the peak is not below it
+        drop.count(50.0, 2);
+        assert_eq!(drop.below, 0);
+        (0..DROP_STEPS).for_each(|_| drop.count(0.0, 2));
+        assert_eq!(drop.below, DROP_STEPS);
+    }
+}

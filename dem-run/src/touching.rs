@@ -1,0 +1,35 @@
+//! Walls that need grains at the start: those driven by a stress, and those that hold grains.
+
+use crate::output::number;
+use crate::scene::Scene;
+use crate::tolerances::ROUNDED;
+use dem_core::body::{Grains, Wall};
+use dem_core::dim::Dim;
+
+/// Messages about walls that need grains and have none.
+pub(crate) fn apart<D: Dim>(scene: &Scene, walls: &[Wall<D>], grains: &Grains<D>) -> Vec<String> {
+    let mut wrong = vec![];
+    for (name, wall) in scene.walls.keys().zip(walls) {
+        let gap = |(x, r): (&D::Vector, &f64)| (wall.shape.gap(*x - wall.position, *r).0, *r);
+        let Some((gap, radius)) =
+            grains.position.iter().zip(&grains.radius).map(gap).min_by(|a, b| a.0.total_cmp(&b.0))
+        else {
+            continue;
+        };
+        if wall.per_area && gap > ROUNDED * radius {
+            wrong.push(format!(
+                "walls.{name}.stress: the wall touches nothing at the start, so there is no section to load: its nearest \
+                 grain is {} m away; seat it (\"place\": \"seated\"), or turn its normal towards the sample",
+                number(gap)
+            ));
+        }
+        if let Some(grip) = wall.grip.filter(|grip| gap > *grip) {
+            wrong.push(format!(
+                "walls.{name}.grip: no grain is within {grip:?} m of the wall, the nearest is {} m away; seat the wall \
+                 (\"place\": \"seated\"), or enlarge the grip",
+                number(gap)
+            ));
+        }
+    }
+    wrong
+}
