@@ -57,12 +57,15 @@ pub enum Command {
     /// Run a scene with many values of its fields: a parameter study.
     #[command(after_help = SWEEP_EXAMPLE)]
     Sweep(SweepArgs),
-    /// Print the JSON Schema of scenes, for editors.
+    /// Print the JSON Schema of scenes, for editors, or a page of all their fields.
     #[command(after_help = SCHEMA_EXAMPLE)]
     Schema {
         /// Print the schema of sweeps instead.
         #[arg(long)]
         sweep: bool,
+        /// Print the fields of scenes as a page in Markdown instead, docs/scenes.md.
+        #[arg(long, conflicts_with = "sweep")]
+        markdown: bool,
     },
     Completions(Completions),
     Man(Man),

@@ -16,11 +16,11 @@ use crate::destination::{apart, folder_or_new, not_itself, unicode, writable};
 use crate::error::RunError;
 use crate::export::{self, ExportOptions};
 use crate::output::command_line::print_error;
-use crate::output::{default_folder, print_json, print_result};
+use crate::output::{default_folder, print, print_json, print_result};
 use crate::pack::{self, PackOptions};
 use crate::resume::{self, ResumeOptions};
 use crate::run::{self, Execution, RunOptions};
-use crate::scene::{self, Scene, SceneError, schema};
+use crate::scene::{self, Scene, SceneError, page, schema};
 use crate::signals;
 use crate::solve::{self, SolveOptions};
 use crate::sweep::{self, Mode, SweepOptions};
@@ -37,7 +37,8 @@ pub fn main() -> ExitCode {
         Command::Solve(args) => solve(args),
         Command::Accuracy(args) => accuracy(args),
         Command::Sweep(args) => sweep(args),
-        Command::Schema { sweep } => {
+        Command::Schema { markdown: true, .. } => print(&page::markdown()).map_err(RunError::from),
+        Command::Schema { sweep, .. } => {
             let schema = if sweep { sweep::model::json_schema() } else { schema::json_schema() };
             print_json(schema).map_err(RunError::from)
         }

@@ -10,6 +10,7 @@ use dem_core::dim::{Dim, Vect};
 use dem_core::saved::{Mismatch, Reader, Saved};
 use dem_core::solver::{Route, Work};
 use dem_core::world::{StepReport, World};
+use serde::Serialize;
 
 /// Counts of a run, and its stop conditions.
 pub struct Course<D: Dim> {
@@ -53,8 +54,19 @@ pub struct Driven<D: Dim> {
     pub wall: usize,
     /// Loads at failure, and peak load.
     pub collapse: Collapse,
+    /// Strain of the sample along its direction after the last step (–).
+    pub strain: f64,
     /// Its initial position (m).
     start: D::Vector,
+}
+
+/// How far the stop condition of a run is that is reached first, as it stands.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct StopProgress {
+    /// What ends the run: "travel" of a wall, or "broken" bonds.
+    pub condition: &'static str,
+    /// Fraction reached (0 to 1).
+    pub reached: f64,
 }
 
 /// The travel of a wall that ends a run.
@@ -65,12 +77,20 @@ struct TravelStop<D: Dim> {
     from: Option<D::Vector>,
 }
 
+impl<D: Dim> TravelStop<D> {
+    /// Distance of the wall along its direction from a place (m).
+    fn travelled(&self, world: &World<D>, from: D::Vector) -> f64 {
+        (world.walls[self.wall].position - from).dot(&self.direction).abs()
+    }
+}
+
 impl<D: Dim> Course<D> {
     /// The course of a run that begins with `world`.
     pub fn new(scene: &Scene, world: &World<D>) -> Self {
         let driven = world.walls.iter().enumerate().filter(|(_, w)| drive_direction(w).is_some());
-        let driven: Vec<Driven<D>> =
-            driven.map(|(wall, w)| Driven { wall, collapse: Collapse::default(), start: w.position }).collect();
+        let driven: Vec<Driven<D>> = driven
+            .map(|(wall, w)| Driven { wall, collapse: Collapse::default(), strain: 0.0, start: w.position })
+            .collect();
         let number = scene.load_wall().and_then(|name| scene.walls.keys().position(|other| other == name));
         Self {
             load_wall: driven.iter().position(|at| Some(at.wall) == number),
@@ -95,7 +115,7 @@ impl<D: Dim> Course<D> {
     /// Saves the course.
     pub fn save(&self, to: &mut Saved) {
         to.count(self.driven.len());
-        for Driven { wall, collapse, start } in &self.driven {
+        for Driven { wall, collapse, start, .. } in &self.driven {
             to.count(*wall);
             to.vector(start);
             collapse.save(to);
@@ -126,7 +146,7 @@ impl<D: Dim> Course<D> {
             let (wall, start, collapse) = (from.count()?, from.vector()?, Collapse::restored(from)?);
             // a wall that is no longer driven is dropped
             if let Some(driven) = course.driven.iter_mut().find(|driven| driven.wall == wall) {
-                *driven = Driven { wall, start, collapse };
+                *driven = Driven { wall, start, collapse, strain: 0.0 };
             }
         }
         course.extents = from.reals(D::N)?.to_vec();
@@ -165,6 +185,24 @@ impl<D: Dim> Course<D> {
         Some(load(&world.walls[self.driven[self.load_wall?].wall]))
     }
 
+    /// The strain of the sample along the direction of the load wall, if the scene has one (–).
+    pub fn strain(&self) -> Option<f64> {
+        Some(self.driven[self.load_wall?].strain)
+    }
+
+    /// How far the stop condition is, if the scene has one: the nearer of two.
+    pub fn stop_progress(&self, world: &World<D>) -> Option<StopProgress> {
+        let travel = self.stop.as_ref().map(|stop| {
+            let travelled = stop.from.map_or(0.0, |from| stop.travelled(world, from));
+            StopProgress { condition: "travel", reached: (travelled / stop.distance).min(1.0) }
+        });
+        let broken = self.broken_limit.map(|limit| {
+            let reached = self.broken() as f64 / (limit * world.bonds.len() as f64);
+            StopProgress { condition: "broken", reached: if reached.is_finite() { reached.min(1.0) } else { 0.0 } }
+        });
+        travel.into_iter().chain(broken).max_by(|a, b| a.reached.total_cmp(&b.reached))
+    }
+
     /// Counts a step; `world` is the state after the step.
     pub fn count(&mut self, world: &World<D>, report: &StepReport<D>) {
         for failed in &report.breaks {
@@ -184,11 +222,12 @@ impl<D: Dim> Course<D> {
             return;
         }
         let (strain, broken, bonds) = (world.strain(), self.broken(), world.bonds.len());
-        for Driven { wall, collapse, start } in &mut self.driven {
+        for Driven { wall, collapse, strain: along, start } in &mut self.driven {
             let wall = &world.walls[*wall];
             let direction = drive_direction(wall).unwrap_or(D::Vector::zero());
-            let (displacement, strain) = ((wall.position - *start).dot(&direction), axial(&strain, direction));
-            collapse.push(LoadStep { load: load(wall), displacement, strain, broken, bonds });
+            let displacement = (wall.position - *start).dot(&direction);
+            *along = axial(&strain, direction);
+            collapse.push(LoadStep { load: load(wall), displacement, strain: *along, broken, bonds });
         }
     }
 
@@ -209,11 +248,10 @@ impl<D: Dim> Course<D> {
     pub fn ending(&mut self, world: &World<D>) -> Option<Ending> {
         let broken = self.broken();
         if let Some(stop) = &mut self.stop {
-            let position = world.walls[stop.wall].position;
             if stop.from.is_none() && broken > 0 {
-                stop.from = Some(position);
+                stop.from = Some(world.walls[stop.wall].position);
             }
-            if stop.from.is_some_and(|from| (position - from).dot(&stop.direction).abs() >= stop.distance) {
+            if stop.from.is_some_and(|from| stop.travelled(world, from) >= stop.distance) {
                 return Some(Ending::WallTravel);
             }
         }

@@ -11,6 +11,7 @@ pub mod course;
 mod destination;
 mod dimension;
 pub mod error;
+pub mod estimate;
 pub mod export;
 pub mod fclib;
 pub mod memory;

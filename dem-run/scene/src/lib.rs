@@ -17,6 +17,7 @@ mod error;
 pub mod failure;
 mod function;
 mod model;
+pub mod page;
 pub mod parse;
 mod sample;
 pub mod schema;
