@@ -7,6 +7,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use dem_drawing::Drawing;
 use dem_history::{BondStatus, History, RuptureMode};
 use dem_output::command_line::{seconds, whole};
 use serde::Serialize;
@@ -171,13 +172,12 @@ impl Report {
 /// # Errors
 /// [`PostError::Write`], and those of reading the history.
 pub fn write(history: &History, report: &Report, folder: &mut Folder, quiet: bool) -> Result<()> {
-    let (sample, view) = shown(history, report)?;
+    let shown = shown(history, report)?;
     let bar = progress(report.frames.len() as u64, quiet, "{bar:24} {pos} of {len} pictures, {eta} left");
     let names: Vec<String> = (0..report.frames.len()).map(|k| format!("frame-{k:05}.png")).collect();
     folder.announce(&names)?;
     for (name, &frame) in names.iter().zip(&report.frames) {
-        let (panel, legend) = picture(history, report, frame)?;
-        let png = draw_view(&sample, view, &[panel], &legend).png_scaled(PIXELS);
+        let png = drawing(history, report, &shown, frame)?.png_scaled(PIXELS);
         folder.write(name, &png.map_err(|why| PostError::Usage(format!("{name}: {why}")))?)?;
         bar.inc(1);
     }
@@ -185,8 +185,19 @@ pub fn write(history: &History, report: &Report, folder: &mut Folder, quiet: boo
     Ok(())
 }
 
+/// The drawing of a frame.
+pub(crate) fn drawing(
+    history: &History,
+    report: &Report,
+    (sample, view): &(Sample, View),
+    frame: usize,
+) -> Result<Drawing> {
+    let (panel, legend) = picture(history, report, frame)?;
+    Ok(draw_view(sample, *view, &[panel], &legend))
+}
+
 /// The part of the plane that shows all frames.
-fn shown(history: &History, report: &Report) -> Result<(Sample, View)> {
+pub(crate) fn shown(history: &History, report: &Report) -> Result<(Sample, View)> {
     let sample = Sample::with_depth(history)?;
     let mut view = View::EMPTY;
     for &frame in &report.frames {

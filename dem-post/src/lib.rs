@@ -12,6 +12,7 @@ use analysis::Entry;
 pub mod chains;
 pub mod compare;
 pub mod cracks;
+pub mod film;
 pub mod frames;
 pub mod info;
 pub mod pack;
@@ -42,6 +43,7 @@ pub const ANALYSES: &[Entry] = &[
     Entry::of::<chains::Command>(),
     Entry::of::<velocities::Command>(),
     Entry::of::<frames::Command>(),
+    Entry::of::<film::Command>(),
     Entry::of::<compare::Command>(),
     Entry::of::<report::Command>(),
     Entry::of::<strength::Command>(),

@@ -36,8 +36,7 @@ class History:
 
     def __init__(self, path):
         self.path = os.fspath(path)
-        # also of a file that is being written, or that a kill left open
-        self._file = h5py.File(self.path, "r", swmr=True)
+        self._open()
         if "commit" not in self._file or "particles/grains" not in self._file:
             self._file.close()
             raise ValueError(f"{self.path} is not a history of dem-run: it has no /commit or no /particles/grains")
@@ -46,7 +45,7 @@ class History:
         self.parameters = {name: _plain(value) for name, value in parameters.attrs.items()}
         self.dimension = int(self.scene["dimension"])
         self.summary = None
-        self.refresh()
+        self.frames = int(self._file["commit"][()])
 
     def __enter__(self):
         return self
@@ -64,10 +63,21 @@ class History:
 
     def refresh(self):
         """Takes in what a running program has written since; returns the history."""
-        commit = self._file["commit"]
-        commit.refresh()
-        self.frames = int(commit[()])
+        # not dataset by dataset: where a closed file was opened with swmr, HDF5 2.0 reads wrong values
+        # after a refresh
+        self._file.close()
+        self._open()
+        self.frames = int(self._file["commit"][()])
         return self
+
+    def _open(self):
+        try:
+            self._file = h5py.File(self.path, "r")
+        except FileNotFoundError:
+            raise
+        except OSError:
+            # being written, or left open by a kill
+            self._file = h5py.File(self.path, "r", swmr=True)
 
     @property
     def times(self):
@@ -154,12 +164,9 @@ class History:
         positive) and the tangents.
         """
         group, frame = self._group("contacts"), self._number(frame)
-        for name in ("start", "count"):
-            group[name].refresh()
         start, count = int(group["start"][frame]), int(group["count"][frame])
 
         def rows(name):
-            group[name].refresh()
             return group[name][start : start + count]
 
         pair = rows("pair")
@@ -218,7 +225,6 @@ class History:
     def _read(self, place, frames=None):
         """Complete rows of a dataset with a row a frame."""
         data = self._file[place]
-        data.refresh()
         if isinstance(frames, (int, np.integer)):
             return data[self._number(frames)]
         if frames is None or isinstance(frames, slice):
@@ -232,7 +238,6 @@ class History:
 
     def _rows(self, data, counted):
         """Complete rows of a dataset whose rows are counted at each frame."""
-        data.refresh()
         counts = self._read(f"commit_rows/{counted}")
         return data[: int(counts[-1]) if len(counts) else 0]
 

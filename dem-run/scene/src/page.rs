@@ -10,9 +10,9 @@ use super::schema::json_schema;
 const HEAD: &str = "\
 # Scenes
 
-A scene is one JSON file with `//` and `/* */` comments. All numbers are in SI units. This page is made from the model of
-the program, by `dem-run schema --markdown`; editors read the same from [scene.schema.json](scene.schema.json). Complete
-scenes are in [the gallery](gallery.md), commands in [running scenes](running.md).
+A scene is one JSON file with `//` and `/* */` comments. All numbers are in SI units. This page is made from the model
+of the program, by `dem-run schema --markdown`; editors read the same from [scene.schema.json](scene.schema.json).
+Complete scenes are in [the gallery](gallery.md), commands in [running scenes](running.md).
 
 A run goes through these stages: the grains are packed, or placed as listed; walls that are `seated` move until they
 touch a grain; grains nearer than `bonds.gap_tolerance` are bonded; then the drives of the walls, gravity and the loads

@@ -3,7 +3,7 @@
 
 use crate::common::{Folder, SMALL};
 
-const VIEWS: [&str; 7] = ["info", "cracks", "chains", "velocities", "frames", "stress-strain", "report"];
+const VIEWS: [&str; 8] = ["info", "cracks", "chains", "velocities", "frames", "film", "stress-strain", "report"];
 
 /// Every view refuses the file `a.h5` in this folder.
 fn refused(here: &Folder, parts: &[&str]) {
