@@ -142,7 +142,7 @@ impl Bond {
 }
 
 /// Which bonds at their limit break after an accepted solve, and when.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Rupture {
     /// All break, and the same step is solved again, until none is at its limit.
     #[default]
@@ -152,6 +152,22 @@ pub enum Rupture {
     CascadeWorst,
     /// All break at the end of the step.
     EndOfStep,
+    /// Quasi-static: each step raises or lowers the load to the value at which the next bond
+    /// breaks ([`crate::world::World::load_time`]).
+    NextEvent {
+        /// Time of the last loads (s): the load functions are followed up to it.
+        until: f64,
+    },
+}
+
+/// The least strength (N) at which a bond with this cone bears the reaction `r`; negative for a
+/// reaction far inside the limits. It grows in proportion to the reaction.
+pub fn required_strength<T: Vect, B: Moments>(r: &Local<T, B>, cone: Cone) -> f64 {
+    let over = |size: f64, coefficient: f64| if coefficient > 0.0 { size / coefficient } else { 0.0 };
+    let shear = over(r.t.norm(), cone.mu);
+    let rolling = over(r.m.bending(), cone.nu);
+    let twist = over(r.m.twist(), cone.xi);
+    shear.max(rolling).max(twist) - r.n
 }
 
 /// Failure mode of a bond under the reaction `r`, with the shift s = r_coh in the unit of `r`;

@@ -402,6 +402,7 @@ pub fn settings<D: Dim>(scene: &Scene) -> Settings<D> {
             scene::Rupture::Cascade => Rupture::Cascade,
             scene::Rupture::CascadeWorst => Rupture::CascadeWorst,
             scene::Rupture::EndOfStep => Rupture::EndOfStep,
+            scene::Rupture::NextEvent => Rupture::NextEvent { until: scene.time.end },
         },
         solver: solver(&scene.solver),
         max_halvings: scene.solver.max_step_halvings,

@@ -5,7 +5,7 @@ use crate::scene::failure::in_one_piece;
 use crate::scene::{Scene, TravelFrom};
 use crate::summary::Ending;
 use dem_core::body::{Drive, Wall};
-use dem_core::bond::BondStatus;
+use dem_core::bond::{BondStatus, Rupture};
 use dem_core::dim::{Dim, Vect};
 use dem_core::saved::{Mismatch, Reader, Saved};
 use dem_core::solver::{Route, Work};
@@ -247,6 +247,9 @@ impl<D: Dim> Course<D> {
     /// The stop condition of the scene that ends the run after this step, if any.
     pub fn ending(&mut self, world: &World<D>) -> Option<Ending> {
         let broken = self.broken();
+        if matches!(world.settings.rupture, Rupture::NextEvent { until } if world.load_time >= until) {
+            return Some(Ending::NoBreak);
+        }
         if let Some(stop) = &mut self.stop {
             if stop.from.is_none() && broken > 0 {
                 stop.from = Some(world.walls[stop.wall].position);

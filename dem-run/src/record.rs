@@ -365,6 +365,9 @@ fn of_bonds_and_walls<D: Dim>(world: &World<D>) -> Vec<(Observable, Measure<D>)>
             add("bond_remainder", "J", scalar, |w, _, out| out.push(w.ledger.bonds));
         }
         add("bond_elongation", "m", scalar, |_, r, out| out.push(r.bond_elongation));
+        if matches!(world.settings.rupture, bond::Rupture::NextEvent { .. }) {
+            add("load_time", "s", scalar, |w, _, out| out.push(w.load_time));
+        }
         add("bonds_broken", "", scalar, |w, _, out| out.push((w.bonds.len() - w.intact_bonds()) as f64));
     }
     if walls > 0 {

@@ -14,7 +14,7 @@ use crate::progress::{Progress, ProgressMode, StepProgress};
 use crate::record::Recorder;
 use crate::sample_file;
 use crate::scene::failure::{Disk, Splitting};
-use crate::scene::{Scene, SolverKind};
+use crate::scene::{Rupture, Scene, SolverKind};
 use crate::signals::{self, Interrupt};
 use crate::summary::{Ending, Summary, WallLoads};
 use crate::warnings;
@@ -118,7 +118,7 @@ pub(crate) struct RunState<D: Dim> {
 }
 
 /// Version number of the data that [`RunState::save`] writes.
-const FORM: usize = 9;
+const FORM: usize = 10;
 
 impl<D: Dim> RunState<D> {
     /// The state as numbers, without the processor time: two runs of a scene write identical files.
@@ -178,6 +178,10 @@ impl<D: Dim> Run<'_, D> {
             let step = self.state.world.steps + 1;
             let report = match self.state.world.step_watched(&mut |broken| progress.cascade(step, broken)) {
                 Ok(report) => report,
+                Err(error @ StepError::Unbalanced { .. }) => {
+                    progress.note(&error.message(&|body| self.name(body)));
+                    return Ok(Ending::NoEquilibrium);
+                }
                 Err(error) => return self.failed(error),
             };
             let RunState { world, course, .. } = &mut self.state;
@@ -330,8 +334,9 @@ impl<D: Dim> RunState<D> {
         let elastic = world.bonds.iter().any(|b| b.stiffness.is_some());
         let names: Vec<&String> = scene.walls.keys().collect();
         let loads = course.driven.iter().map(|driven| {
-            let velocity = matches!(world.walls[driven.wall].drive, Drive::Velocity { .. });
-            WallLoads::of(names[driven.wall], velocity, elastic, &driven.collapse)
+            let may_fall =
+                matches!(world.walls[driven.wall].drive, Drive::Velocity { .. }) || scene.rupture == Rupture::NextEvent;
+            WallLoads::of(names[driven.wall], may_fall, elastic, &driven.collapse)
         });
         let driven_walls: Vec<WallLoads> = loads.collect();
         let chosen = course.load_wall.map(|at| &driven_walls[at]);

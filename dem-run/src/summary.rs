@@ -18,6 +18,10 @@ pub enum Ending {
     WallTravel,
     /// Enough bonds have broken.
     BrokenFraction,
+    /// Loading to the next event: no bond breaks under the loads up to the end of the scene's time.
+    NoBreak,
+    /// Loading to the next event: without the bonds of the last one the sample bears no load.
+    NoEquilibrium,
     /// Ctrl-C or SIGTERM.
     Interrupted,
     /// A step was not solved.
@@ -66,7 +70,8 @@ pub struct Summary {
     pub load_wall: Option<String>,
     /// Loads of this wall at which the sample failed (N).
     pub failure: Failure,
-    /// Peak load of this wall (N), if it is driven by a velocity or bonds are elastic.
+    /// Peak load of this wall (N), if it is driven by a velocity, bonds are elastic, or the load
+    /// follows events.
     pub peak_load: Option<f64>,
     /// Displacement of this wall along its direction at the end of the step of peak load (m).
     pub peak_displacement: Option<f64>,
@@ -121,7 +126,8 @@ pub struct WallLoads {
     /// step before the strain was exceeded, or if an elastic sample exceeded the strain before any
     /// bond broke.
     pub failure: Failure,
-    /// Peak load (N), if the wall is driven by a velocity or bonds are elastic.
+    /// Peak load (N), if the wall is driven by a velocity, bonds are elastic, or the load follows
+    /// events.
     pub peak_load: Option<f64>,
     /// Displacement along its direction at the end of the step of peak load (m).
     pub peak_displacement: Option<f64>,
@@ -134,15 +140,15 @@ pub struct WallLoads {
 }
 
 impl WallLoads {
-    /// The loads of the wall `wall`. `velocity`: the wall is driven by a velocity; `elastic`: bonds
-    /// are elastic.
+    /// The loads of the wall `wall`. `may_fall`: its load can decrease without a prescription, as
+    /// that of a velocity does; `elastic`: bonds are elastic.
     #[must_use]
-    pub fn of(wall: &str, velocity: bool, elastic: bool, found: &Collapse) -> Self {
+    pub fn of(wall: &str, may_fall: bool, elastic: bool, found: &Collapse) -> Self {
         let &Collapse { mut failure, passed, peak, rising, .. } = found;
         for (load, early) in failure.collapse.iter_mut().zip(failure.early) {
             *load = load.filter(|_| !(elastic && early));
         }
-        let peak = Some(peak).filter(|peak| (velocity || elastic) && peak.load != 0.0);
+        let peak = Some(peak).filter(|peak| (may_fall || elastic) && peak.load != 0.0);
         Self {
             wall: wall.into(),
             failure,
@@ -167,6 +173,8 @@ impl fmt::Display for Summary {
             Ending::Time => "time.end was reached",
             Ending::WallTravel => "stop.wall_travel was reached",
             Ending::BrokenFraction => "stop.broken_fraction was reached",
+            Ending::NoBreak => "the loads up to time.end break no further bond",
+            Ending::NoEquilibrium => "no equilibrium without the bonds that broke last",
             Ending::Interrupted => "interrupted",
             Ending::NoConvergence => "a step was not solved",
         };

@@ -3,7 +3,7 @@
 
 use crate::output::number;
 use crate::prepare::MOST_STEPS;
-use crate::scene::{Sample, Scene};
+use crate::scene::{Rupture, Sample, Scene};
 use crate::tolerances::{PARALLEL, TOUCHING};
 use dem_core::body::{Drive, Grains, Wall};
 use dem_core::dim::{Dim, Vect};
@@ -27,6 +27,10 @@ pub(crate) fn of_scene(scene: &Scene) -> Vec<String> {
             number(last),
             number(next)
         ));
+    }
+    let travels = scene.stop.as_ref().is_some_and(|stop| stop.wall_travel.is_some());
+    if travels && scene.rupture == Rupture::NextEvent {
+        told.push("stop.wall_travel: it has no effect with rupture next_event, where nothing moves".into());
     }
     let Some(held) = &scene.grains else { return told };
     if let Sample::Grains(list) = &scene.sample {

@@ -33,6 +33,8 @@ pub(super) struct Brought<D: Dim> {
     carried: Vec<Local<D::Tangent, D::Moment>>,
     /// Length corrections.
     pub turns: Vec<Turn>,
+    /// Factor on the strengths (–): one, except in trials of next-event loading.
+    pub strengthened: f64,
 }
 
 /// For each contact of the problem, by kind, its place among the contacts of the step.
@@ -146,7 +148,7 @@ impl<D: Dim> World<D> {
         motion: &Motion<D>,
         h: f64,
     ) -> Brought<D> {
-        Brought { carried: self.carried(touches), turns: self.turns(mid, touches, motion, h) }
+        Brought { carried: self.carried(touches), turns: self.turns(mid, touches, motion, h), strengthened: 1.0 }
     }
 
     /// Reactions (N, N m) of elastic bonds at the start of a step, by bond index; empty if all
@@ -296,7 +298,8 @@ impl<D: Dim> World<D> {
                     let arm = bond.mean_diameter;
                     let arms = Arms { lever, bending: arm };
                     let (block, r) = (problem.nodes.block(&link, arms), over_arm(start, arm));
-                    let (shift, cone, flow) = (h * bond.strength, bond.cone(), self.settings.bond_flow);
+                    let (shift, cone, flow) =
+                        (h * bond.strength * brought.strengthened, bond.cone(), self.settings.bond_flow);
                     if let Some(compliance) = bond.compliance(h) {
                         let carried = over_arm(brought.carried[number] * h, arm);
                         let law = Elastic::new(block, compliance, carried, arms, shift, cone, flow).with_bias(bias);
@@ -351,7 +354,7 @@ fn radius_of<D: Dim>(grains: &Grains<D>, body: usize) -> f64 {
 }
 
 /// A reaction with its moments divided by the mean diameter `arm`.
-fn over_arm<T: Vect, B: Moments>(r: Local<T, B>, arm: f64) -> Local<T, B> {
+pub(super) fn over_arm<T: Vect, B: Moments>(r: Local<T, B>, arm: f64) -> Local<T, B> {
     Local { m: r.m * (1.0 / arm), ..r }
 }
 

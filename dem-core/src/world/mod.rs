@@ -4,6 +4,7 @@
 //! detection, free velocity, contact problem with its rupture cascade, half a step.
 
 mod assembly;
+mod event;
 mod ledger;
 mod limits;
 mod motion;
@@ -82,6 +83,9 @@ pub struct World<D: Dim> {
     pub time: f64,
     /// Number of accepted steps.
     pub steps: u64,
+    /// With [`Rupture::NextEvent`], the time at which the load functions give the load of the last
+    /// event (s). It decreases where the load must be lowered.
+    pub load_time: f64,
     /// Energy balance since the start.
     pub ledger: Ledger,
     /// Contacts of the last accepted step, sorted by pair, with their reactions.
@@ -151,6 +155,7 @@ impl<D: Dim> World<D> {
             ledger: Ledger::default(),
             time: 0.0,
             steps: 0,
+            load_time: 0.0,
             grains,
             walls,
             loads,

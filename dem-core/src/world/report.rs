@@ -146,6 +146,16 @@ pub enum StepError {
         /// The pair and its displacement.
         violation: Violation,
     },
+    /// With [`crate::bond::Rupture::NextEvent`], the bodies do not stay at rest under the loads of
+    /// the last event.
+    Unbalanced {
+        /// Time of the last accepted state (s).
+        time: f64,
+        /// Time of the loads (s).
+        load_time: f64,
+        /// The body with the largest momentum (walls follow the grains).
+        body: u32,
+    },
     /// A velocity is not a finite number.
     NotFinite {
         /// The body (walls follow the grains).
@@ -179,7 +189,7 @@ impl StepError {
             Self::NotAccepted { verdict, .. } | Self::Yielded { violation: Violation { verdict, .. }, .. } => {
                 Some(verdict)
             }
-            Self::TooFast { .. } | Self::NotFinite { .. } => None,
+            Self::TooFast { .. } | Self::Unbalanced { .. } | Self::NotFinite { .. } => None,
         }
     }
 
@@ -210,6 +220,10 @@ impl StepError {
                 name(pair[1])
             ),
             Self::Yielded { time, violation } => violation.message(*time, name),
+            Self::Unbalanced { load_time, body, .. } => format!(
+                "no equilibrium under the loads of {load_time:.6e} s: {} moves, and others with it",
+                name(*body)
+            ),
             Self::NotFinite { time, body } => format!(
                 "the velocity of {} is not a finite number at t = {time:.6e} s: look for grains squeezed between bodies that \
                  cannot yield",

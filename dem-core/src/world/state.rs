@@ -68,6 +68,7 @@ impl<D: Dim> World<D> {
         self.grains.save(to);
         to.count(self.steps as usize);
         to.real(self.time);
+        to.real(self.load_time);
         to.real(self.reference_volume());
         to.vectors(&self.reference);
         to.count(self.walls.len());
@@ -106,7 +107,7 @@ impl<D: Dim> World<D> {
         let mut world = Self::new(grains, walls, loads, settings);
         let n = world.grains.len();
         world.steps = from.count()? as u64;
-        world.time = from.real()?;
+        (world.time, world.load_time) = (from.real()?, from.real()?);
         // the reference volume, which follows from the positions at time zero
         from.real()?;
         world.refer_to(from.vectors(n)?);

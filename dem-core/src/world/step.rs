@@ -27,7 +27,11 @@ impl<D: Dim> World<D> {
     pub fn step_watched(&mut self, watch: &mut dyn FnMut(usize)) -> Result<StepReport<D>, StepError> {
         self.follow_settings();
         let solver = self.solver.snapshot();
-        let mut report = match self.advance(self.settings.step, 0, 1, watch) {
+        let outcome = match self.settings.rupture {
+            Rupture::NextEvent { until } => self.load_to_next_event(until),
+            _ => self.advance(self.settings.step, 0, 1, watch),
+        };
+        let mut report = match outcome {
             Ok(report) => report,
             Err(error) => {
                 self.solver = solver;
@@ -90,8 +94,9 @@ impl<D: Dim> World<D> {
         watch: &mut dyn FnMut(usize),
     ) -> Result<StepReport<D>, StepError> {
         let mid = self.midpoint(h);
-        let motion = self.free_motion(h);
-        let applied = self.applied_impulse(h);
+        let loaded_at = self.time + 0.5 * h;
+        let motion = self.free_motion(h, loaded_at);
+        let applied = self.applied_impulse(h, loaded_at);
         let mut touches = self.detect(&mid, &motion, h);
         // sample preparation pushes grains apart at speeds without physical meaning
         let limits_apply = !self.settings.expel_overlaps;
@@ -158,14 +163,15 @@ impl<D: Dim> World<D> {
     /// world does not move.
     pub fn contact_problem(&mut self) -> ContactProblem<D> {
         let h = self.settings.step;
-        let (mid, motion) = (self.midpoint(h), self.free_motion(h));
+        let loaded_at = self.time + 0.5 * h;
+        let (mid, motion) = (self.midpoint(h), self.free_motion(h, loaded_at));
         let touches = self.detect(&mid, &motion, h);
         let brought = self.brought(&mid, &touches, &motion, h);
-        self.assemble(&mid, &touches, &motion, &brought, self.applied_impulse(h), h).0
+        self.assemble(&mid, &touches, &motion, &brought, self.applied_impulse(h, loaded_at), h).0
     }
 
     /// Half a step in position at the old velocities.
-    fn midpoint(&self, h: f64) -> Midpoint<D> {
+    pub(super) fn midpoint(&self, h: f64) -> Midpoint<D> {
         let drift = |x: &D::Vector, v: &D::Vector| *x + *v * (0.5 * h);
         Midpoint {
             grains: self.grains.position.iter().zip(&self.grains.velocity).map(|(x, v)| drift(x, v)).collect(),
@@ -173,26 +179,26 @@ impl<D: Dim> World<D> {
         }
     }
 
-    /// Prescribed force on each grain (N) at the middle of a step of length `h`, and torque (N m).
-    fn external_forces(&self, h: f64) -> Vec<(D::Vector, D::Spin)> {
+    /// Prescribed force on each grain (N), and torque (N m), at the time `at`.
+    fn external_forces(&self, at: f64) -> Vec<(D::Vector, D::Spin)> {
         let gravity = self.settings.gravity.unwrap_or(D::Vector::zero());
         let mut forces: Vec<_> = self.grains.mass.iter().map(|m| (gravity * *m, D::Spin::zero())).collect();
         for load in &self.loads {
-            let factor = (load.factor)(self.time + 0.5 * h);
+            let factor = (load.factor)(at);
             forces[load.grain].0 += load.force * factor;
             forces[load.grain].1 += load.torque * factor;
         }
         forces
     }
 
-    /// Velocities before the step and the free velocities v_f = v + h M⁻¹ F_ext; walls follow the
-    /// grains.
-    fn free_motion(&self, h: f64) -> Motion<D> {
+    /// Velocities before the step and the free velocities v_f = v + h M⁻¹ F_ext, with the loads of
+    /// the time `at`; walls follow the grains.
+    pub(super) fn free_motion(&self, h: f64, at: f64) -> Motion<D> {
         let g = &self.grains;
         let mut before: Vec<_> = g.velocity.iter().copied().zip(g.spin.iter().copied()).collect();
         let mut free = before.clone();
         if self.settings.gravity.is_some() || !self.loads.is_empty() {
-            for (k, (force, torque)) in self.external_forces(h).into_iter().enumerate() {
+            for (k, (force, torque)) in self.external_forces(at).into_iter().enumerate() {
                 let (inverse_mass, inverse_inertia) = g.inverse(k);
                 free[k].0 += force * (h * inverse_mass);
                 free[k].1 += torque * (h * inverse_inertia);
@@ -205,30 +211,30 @@ impl<D: Dim> World<D> {
                 Drive::Fixed => (D::Vector::zero(), still),
                 Drive::Velocity { direction, speed } => (*direction * speed(self.time + h), still),
                 Drive::Force { direction, mass, .. } => {
-                    (wall.velocity + *direction * (h * wall.applied_force(self.time + 0.5 * h) / mass), still)
+                    (wall.velocity + *direction * (h * wall.applied_force(at) / mass), still)
                 }
             });
         }
         Motion { before, free: free.into() }
     }
 
-    /// ‖h F_ext‖ over all bodies that can move (N s).
-    fn applied_impulse(&self, h: f64) -> f64 {
+    /// ‖h F_ext‖ over all bodies that can move (N s), with the loads of the time `at`.
+    pub(super) fn applied_impulse(&self, h: f64, at: f64) -> f64 {
         let mut sum = 0.0;
         if self.settings.gravity.is_some() || !self.loads.is_empty() {
-            for (k, (force, _)) in self.external_forces(h).into_iter().enumerate() {
+            for (k, (force, _)) in self.external_forces(at).into_iter().enumerate() {
                 if !self.grains.fixed[k] {
                     sum += force.dot(&force);
                 }
             }
         }
         for wall in &self.walls {
-            sum += wall.applied_force(self.time + 0.5 * h).powi(2);
+            sum += wall.applied_force(at).powi(2);
         }
         h * f64::sqrt(sum)
     }
 
-    fn refuse_unaccepted(
+    pub(super) fn refuse_unaccepted(
         &self,
         solve: SolveReport,
         problem: &ContactProblem<D>,
@@ -356,7 +362,7 @@ impl<D: Dim> World<D> {
     }
 
     /// Force of the grains on each wall (N).
-    fn wall_forces(&self, mid: &Midpoint<D>, touches: &[StoredTouch<D>]) -> Vec<D::Vector> {
+    pub(super) fn wall_forces(&self, mid: &Midpoint<D>, touches: &[StoredTouch<D>]) -> Vec<D::Vector> {
         let mut forces = vec![D::Vector::zero(); self.walls.len()];
         for stored in touches {
             if let Some(wall) = (stored.pair[1] as usize).checked_sub(self.grains.len()) {
@@ -409,7 +415,7 @@ impl<D: Dim> World<D> {
         let mean = |k: usize| (motion.before[k].0 + problem.nodes.all[k].velocity) * 0.5;
         let mut work = 0.0;
         if self.settings.gravity.is_some() || !self.loads.is_empty() {
-            for (k, (force, torque)) in self.external_forces(h).iter().enumerate() {
+            for (k, (force, torque)) in self.external_forces(self.time + 0.5 * h).iter().enumerate() {
                 if !self.grains.fixed[k] {
                     let spin = (motion.before[k].1 + problem.nodes.all[k].spin) * 0.5;
                     work += h * (force.dot(&mean(k)) + torque.dot(&spin));
@@ -449,7 +455,7 @@ impl<D: Dim> World<D> {
     }
 
     /// The report of a step of length `h` that has been committed.
-    fn report(
+    pub(super) fn report(
         &self,
         h: f64,
         motion: &Motion<D>,

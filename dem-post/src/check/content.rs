@@ -1,7 +1,7 @@
 //! Checks the content of the datasets: numbers, order, and agreement between datasets.
 
 use std::cmp::Ordering;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use dem_history::sound::{Surroundings, is_huge, is_plausible, may_be_observed, median};
 use dem_history::{BondStatus, RuptureMode, SolverRoute, WallDrive, WallKind};
@@ -68,7 +68,8 @@ pub(super) fn check(c: &mut Checker) {
     directions(c);
     let pairs = bond_pairs(c);
     let broken = states(c);
-    contacts(c, &rows, &pairs, &broken);
+    let late = broke_in_the_step_of_a_frame(c, &steps);
+    contacts(c, &rows, &pairs, &broken, &late);
     events(c, &steps, &pairs, &broken);
 }
 
@@ -322,9 +323,22 @@ fn states(c: &mut Checker) -> Broken {
     broken
 }
 
+/// Bonds that broke in the step of a frame. Where they break at the end of the step, its contacts
+/// are those that still had them.
+fn broke_in_the_step_of_a_frame(c: &mut Checker, steps: &[i64]) -> BTreeSet<usize> {
+    let mut late = BTreeSet::new();
+    if c.is_sound(&[RUPTURE]) {
+        c.blocks::<StoredRupture>(RUPTURE, |_, _, events| {
+            let of_a_frame = events.iter().filter(|event| steps.binary_search(&event.step).is_ok());
+            late.extend(of_a_frame.filter_map(|event| usize::try_from(event.bond).ok()));
+        });
+    }
+    late
+}
+
 /// Checks that contacts name existing bodies and bonds, and that a bonded contact has an intact
-/// bond between its grains.
-fn contacts(c: &mut Checker, rows: &[[u64; 2]], pairs: &[[i32; 2]], broken: &Broken) {
+/// bond between its grains, or one that broke in the same step.
+fn contacts(c: &mut Checker, rows: &[[u64; 2]], pairs: &[[i32; 2]], broken: &Broken, late: &BTreeSet<usize>) {
     let Sizes { n, w, .. } = c.sizes;
     for (frame, [start, count]) in rows.iter().enumerate() {
         let (start, end) = (*start as usize, (start + count) as usize);
@@ -347,7 +361,8 @@ fn contacts(c: &mut Checker, rows: &[[u64; 2]], pairs: &[[i32; 2]], broken: &Bro
                 }
                 None | Some((_, None)) => Some(format!("{bond} is not one of the {} bonds", pairs.len())),
                 Some((bond, Some(pair))) => {
-                    let gone = broken.get(&bond).is_some_and(|(at, _)| *at <= frame);
+                    let gone =
+                        broken.get(&bond).is_some_and(|(at, _)| *at < frame || *at == frame && !late.contains(&bond));
                     let same = bodies
                         .get(2 * k..2 * k + 2)
                         .is_none_or(|bodies| bodies == pair || bodies == [pair[1], pair[0]]);

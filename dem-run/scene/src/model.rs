@@ -252,6 +252,10 @@ pub enum Rupture {
     CascadeWorst,
     /// Bonds at their limit break at the end of the step.
     EndOfStep,
+    /// Quasi-static loading from break to break: each step raises or lowers the load to the value
+    /// at which the next bond breaks, in equilibrium. The load functions are followed up to
+    /// `time.end`.
+    NextEvent,
 }
 
 /// What the history holds, and how often it is written; give either `every_steps` or `interval`.

@@ -11,7 +11,7 @@ use dem_core::bond::{Bond, Bonds};
 use dem_core::contact::Local;
 use dem_core::dim::{Dim, Vect};
 use dem_core::problem::ContactProblem;
-use dem_core::world::{StepReport, World};
+use dem_core::world::{StepError, StepReport, World};
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -248,6 +248,8 @@ impl End {
             Self::Scene(Ending::Time) => "time",
             Self::Scene(Ending::WallTravel) => "wall travel",
             Self::Scene(Ending::BrokenFraction) => "broken fraction",
+            Self::Scene(Ending::NoBreak) => "no break",
+            Self::Scene(Ending::NoEquilibrium) => "no equilibrium",
             Self::Scene(Ending::Interrupted) => "interrupted",
             Self::Scene(Ending::NoConvergence) | Self::Failed(_) => "NO CONVERGENCE",
         }
@@ -356,6 +358,7 @@ impl<D: Dim> Trial<'_, D> {
             state.cpu_time += thread_time() - began;
             match step {
                 Ok(report) => state.follow(&world, &report),
+                Err(StepError::Unbalanced { .. }) => break End::Scene(Ending::NoEquilibrium),
                 Err(error) => break End::Failed(error.to_string()),
             }
             if state.blown_up(&world) {

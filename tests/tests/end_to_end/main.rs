@@ -11,6 +11,7 @@ mod fclib;
 mod fclib_global;
 mod interrupt;
 mod loads;
+mod next_event;
 mod pack;
 mod packings;
 mod resume;

@@ -217,3 +217,20 @@ fn nan_and_infinity_are_found_in_a_scene_that_was_made_in_code() {
         }
     }
 }
+
+#[test]
+fn loading_to_the_next_event_needs_loads_and_rigid_bonds() {
+    let next = |more: &[&str]| {
+        let sets: Vec<&str> = ["rupture=next_event", "bonds.strength=5"].iter().chain(more).copied().collect();
+        read(FLAT, &sets)
+    };
+    assert!(next(&["walls.roller.velocity=null", "walls.roller.direction=null"]).is_ok());
+    let path = |more: &[&str]| {
+        let all: Vec<&str> =
+            ["walls.roller.velocity=null", "walls.roller.direction=null"].iter().chain(more).copied().collect();
+        only(next(&all)).path
+    };
+    assert_eq!(path(&["walls.roller.velocity=1"]), "walls.roller.velocity");
+    assert_eq!(path(&["bonds.stiffness={young: {modulus: 1e9, poisson_ratio: 0.2}}"]), "bonds.stiffness");
+    assert_eq!(path(&["solver.kind.gauss_seidel.max_sweeps=7"]), "solver.kind");
+}

@@ -10,7 +10,7 @@ mod wall;
 use std::collections::HashMap;
 
 use super::error::Problem;
-use super::model::{Bonds, Load, Scatter, Scene, Stiffness, TravelFrom};
+use super::model::{Bonds, Load, Rupture, Scatter, Scene, Stiffness, TravelFrom};
 use super::solver::SolverKind;
 use super::suggest::nearest;
 use super::wall::Drive;
@@ -51,6 +51,7 @@ pub fn validate(scene: &Scene) -> Vec<Problem> {
     }
     time_and_output(&mut report, scene);
     solver(&mut report, scene);
+    rupture(&mut report, scene);
     stop(&mut report, scene);
     report.problems
 }
@@ -227,6 +228,27 @@ fn solver(report: &mut Report, scene: &Scene) {
     };
     if limit.1 == 0 {
         report.wrong(limit.0, 0, "a whole number, at least 1");
+    }
+}
+
+/// Loading to the next event follows prescribed loads of rigid bonds.
+fn rupture(report: &mut Report, scene: &Scene) {
+    if scene.rupture != Rupture::NextEvent {
+        return;
+    }
+    match &scene.bonds {
+        None => report.wrong("rupture", "next_event in a scene without bonds", "bonds in the scene, or another rule"),
+        Some(bonds) if bonds.stiffness.is_some() => {
+            report.wrong("bonds.stiffness", "a stiffness, with rupture next_event", "no value, or rupture cascade");
+        }
+        Some(_) => {}
+    }
+    for (name, _) in scene.walls.iter().filter(|(_, wall)| wall.velocity.is_some()) {
+        let found = "a velocity, with rupture next_event";
+        report.wrong(format!("walls.{name}.velocity"), found, "force or force_rate in its place, or rupture cascade");
+    }
+    if matches!(scene.solver.kind, SolverKind::GaussSeidel(_)) {
+        report.wrong("solver.kind", "gauss_seidel, with rupture next_event", "auto, newton or interior");
     }
 }
 

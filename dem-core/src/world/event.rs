@@ -1,0 +1,224 @@
+//! Loading to the next event: the load at which the next bond breaks, in equilibrium.
+//!
+//! The load functions give the loads as a path, with their time τ as parameter. A step starts from
+//! the reactions of the last event, without those of the bonds that broke in it, and finds the
+//! equilibrium r(τ) of the bodies at rest, with bonds that cannot break. At the τ of the last event
+//! the broken bonds have released their forces to the others. If no other bond exceeds its strength
+//! there, τ grows until the first one reaches it; else τ decreases until the last one meets it: the
+//! load of the next break. While no contact changes its status r(τ) is affine in the loads, and the
+//! secant through two equilibria finds that load with the third.
+
+use super::World;
+use super::assembly::{Places, over_arm, write_reactions};
+use super::motion::{Midpoint, Motion, Turn};
+use super::report::{Solves, StepError, StepReport};
+use super::touch::{Break, StoredTouch};
+use crate::bond::{BondStatus, LIMIT, failure, required_strength};
+use crate::dim::{Dim, Vect};
+use crate::problem::{ContactProblem, Kind, Nodes};
+
+/// The bodies at rest under the loads of one time, with bonds that cannot break.
+struct Equilibrium<D: Dim> {
+    /// Time of the loads (s).
+    at: f64,
+    mid: Midpoint<D>,
+    motion: Motion<D>,
+    turns: Vec<Turn>,
+    touches: Vec<StoredTouch<D>>,
+    problem: ContactProblem<D>,
+    /// The largest required strength of an intact bond over its strength, less one (–): zero if the
+    /// first bond is at its limit. Infinite if the bodies do not stay at rest.
+    excess: f64,
+}
+
+/// An interval of load times (s) in which the excess changes its sign, with its values there.
+struct Bracket {
+    low: (f64, f64),
+    high: (f64, f64),
+}
+
+impl<D: Dim> World<D> {
+    /// Raise or lower the load to that at which the next bonds break, and break them. Without such
+    /// a load up to the time `until`, the loads of that time act and no bond breaks.
+    pub(super) fn load_to_next_event(&mut self, until: f64) -> Result<StepReport<D>, StepError> {
+        self.stop_motion();
+        let mut done = Solves::default();
+        let found = self.next_event(until, &mut done)?;
+        if found.excess.is_infinite() {
+            return Err(self.unbalanced(&found));
+        }
+        let breaks = self.breaks_of(&found);
+        let Equilibrium { at, mid, motion, turns, touches, problem, .. } = found;
+        let forces = self.wall_forces(&mid, &touches);
+        for (wall, force) in self.walls.iter_mut().zip(forces) {
+            wall.applied = wall.applied_force(at);
+            (wall.reaction, wall.reaction_at_limit) = (force, force);
+        }
+        breaks.iter().for_each(|failed| self.bonds[failed.bond as usize].status = failed.mode);
+        (self.stored, self.mid, self.turns, self.last_part) = (touches, mid, turns, self.settings.step);
+        self.load_time = at;
+        Ok(self.report(self.settings.step, &motion, &problem, done, breaks))
+    }
+
+    /// The equilibrium in which the next bond is at its limit, or the last one on the way to it.
+    fn next_event(&mut self, until: f64, done: &mut Solves) -> Result<Equilibrium<D>, StepError> {
+        let held = self.equilibrium(self.load_time, done)?;
+        // no lower load balances bodies that this one moves, where all loads grow in proportion
+        if held.excess.abs() <= LIMIT || held.excess.is_infinite() {
+            return Ok(held);
+        }
+        let rises = held.excess < 0.0;
+        let end = if rises { until } else { 0.0 };
+        let mut last = (held.at, held.excess);
+        let mut step = if rises { self.settings.step } else { -self.settings.step };
+        let mut next = last.0 + step;
+        loop {
+            let beyond = if rises { next >= end } else { next <= end };
+            let trial = self.equilibrium(if beyond { end } else { next }, done)?;
+            let now = (trial.at, trial.excess);
+            if now.1.abs() <= LIMIT {
+                return Ok(trial);
+            }
+            if (now.1 < 0.0) != rises {
+                let [low, high] = if rises { [last, now] } else { [now, last] };
+                return self.bisect(Bracket { low, high }, trial, done);
+            }
+            if beyond {
+                return Ok(trial);
+            }
+            // no further than to where the secant meets the limit, else ever longer steps
+            step *= 2.0;
+            next = secant(last, now).filter(|at| (*at > now.0) == rises).unwrap_or(now.0 + step);
+            last = now;
+        }
+    }
+
+    /// The equilibrium in a bracket at which the first bond is at its limit; where the reactions
+    /// jump, the first one beyond the limit. `found` is the last trial.
+    fn bisect(
+        &mut self,
+        mut bracket: Bracket,
+        mut found: Equilibrium<D>,
+        done: &mut Solves,
+    ) -> Result<Equilibrium<D>, StepError> {
+        let mut halve = false;
+        loop {
+            let Bracket { low, high } = &mut bracket;
+            let (from, width) = (low.0, high.0 - low.0);
+            let middle = from + 0.5 * width;
+            let inside = |at: &f64| !halve && *at > from && *at < from + width;
+            let at = secant(*low, *high).filter(inside).unwrap_or(middle);
+            if at <= low.0 || at >= high.0 {
+                // no number between the two
+                return if found.at == high.0 { Ok(found) } else { self.equilibrium(high.0, done) };
+            }
+            found = self.equilibrium(at, done)?;
+            if found.excess.abs() <= LIMIT {
+                return Ok(found);
+            }
+            let side = if found.excess < 0.0 { low } else { high };
+            *side = (found.at, found.excess);
+            halve = bracket.high.0 - bracket.low.0 > 0.5 * width;
+        }
+    }
+
+    /// The equilibrium under the loads of the time `at`.
+    fn equilibrium(&mut self, at: f64, done: &mut Solves) -> Result<Equilibrium<D>, StepError> {
+        let h = self.settings.step;
+        let (mid, motion, applied) = (self.midpoint(h), self.free_motion(h, at), self.applied_impulse(h, at));
+        let mut touches = self.detect(&mid, &motion, h);
+        let mut brought = self.brought(&mid, &touches, &motion, h);
+        loop {
+            // bonds above their limit would yield, and the reactions would not be affine
+            brought.strengthened *= 2.0;
+            let (mut problem, places) = self.assemble(&mid, &touches, &motion, &brought, applied, h);
+            let solve = self.solver.solve(&mut problem);
+            done.add(solve);
+            self.refuse_unaccepted(solve, &problem, h, true)?;
+            let excess = self.excess(&touches, &problem, &places);
+            if 1.0 + excess < (1.0 - LIMIT) * brought.strengthened || excess.is_infinite() {
+                write_reactions(&mut touches, &problem, &places, h);
+                return Ok(Equilibrium { at, mid, motion, turns: brought.turns, touches, problem, excess });
+            }
+        }
+    }
+
+    /// [`Equilibrium::excess`] of a solved problem.
+    fn excess(&self, touches: &[StoredTouch<D>], problem: &ContactProblem<D>, places: &Places) -> f64 {
+        let tolerance = self.settings.solver.load_tolerance().unwrap_or(self.settings.solver.tolerance());
+        if unbalanced_impulse(problem) > tolerance * self.scale_of(problem) {
+            return f64::INFINITY;
+        }
+        let h = self.settings.step;
+        let bonds = problem.bonded.iter().zip(places.of(Kind::Bonded));
+        let shares = bonds.filter_map(|(contact, place)| {
+            let bond = &self.bonds[touches[*place as usize].bond()? as usize];
+            Some(required_strength(&contact.r, bond.cone()) / (h * bond.strength) - 1.0)
+        });
+        shares.fold(-1.0, f64::max)
+    }
+
+    /// The larger of the norms of the loads and of the reactions in the last event (N s): without
+    /// loads all reactions may vanish.
+    fn scale_of(&self, problem: &ContactProblem<D>) -> f64 {
+        let square = |touch: &StoredTouch<D>| touch.reaction.n.powi(2) + touch.reaction.t.dot(&touch.reaction.t);
+        let reactions = self.stored.iter().map(square).sum::<f64>().sqrt();
+        problem.applied.max(self.settings.step * reactions)
+    }
+
+    /// The bonds at their limit in an equilibrium: those that break.
+    fn breaks_of(&self, found: &Equilibrium<D>) -> Vec<Break<D>> {
+        if found.excess < -LIMIT {
+            return Vec::new();
+        }
+        let mut breaks = Vec::new();
+        for stored in &found.touches {
+            let Some(bond) = stored.bond() else { continue };
+            let properties = &self.bonds[bond as usize];
+            let reaction = over_arm(stored.reaction, properties.mean_diameter);
+            let required = required_strength(&reaction, properties.cone());
+            if required / properties.strength - 1.0 < found.excess - LIMIT {
+                continue;
+            }
+            let mode = failure(&reaction, required, properties.cone()).unwrap_or(BondStatus::Tension);
+            let touch = self.touch(&found.mid, stored);
+            let (pair, point, reaction) = (touch.pair, touch.point, touch.reaction);
+            breaks.push(Break { bond, pair, mode, round: 0, point, reaction, energy: 0.0 });
+        }
+        breaks
+    }
+
+    /// The error of bodies that do not stay at rest.
+    fn unbalanced(&self, found: &Equilibrium<D>) -> StepError {
+        let momentum = |k: &usize| node_impulse(&found.problem.nodes, *k);
+        let bodies = 0..found.problem.nodes.all.len();
+        let fastest = bodies.max_by(|a, b| momentum(a).total_cmp(&momentum(b)));
+        StepError::Unbalanced { time: self.time, load_time: found.at, body: fastest.unwrap_or(0) as u32 }
+    }
+}
+
+/// Norm of the impulses that contacts leave to the bodies of a problem (N s): zero if all stay at
+/// rest.
+fn unbalanced_impulse<D: Dim>(problem: &ContactProblem<D>) -> f64 {
+    (0..problem.nodes.all.len()).map(|k| node_impulse(&problem.nodes, k).powi(2)).sum::<f64>().sqrt()
+}
+
+/// Momentum of a body after the step (N s); its spin counts by the radius of gyration.
+fn node_impulse<D: Dim>(nodes: &Nodes<D>, k: usize) -> f64 {
+    let node = &nodes.all[k];
+    if node.inverse_mass == 0.0 {
+        return 0.0;
+    }
+    let spin = if node.inverse_inertia > 0.0 {
+        node.spin.norm() / (node.inverse_mass * node.inverse_inertia).sqrt()
+    } else {
+        0.0
+    };
+    (node.velocity.norm() / node.inverse_mass).hypot(spin)
+}
+
+/// Where the line through two points of time and excess meets zero.
+fn secant(a: (f64, f64), b: (f64, f64)) -> Option<f64> {
+    let at = b.0 - b.1 * (b.0 - a.0) / (b.1 - a.1);
+    at.is_finite().then_some(at)
+}

@@ -1,0 +1,101 @@
+//! `rupture: next_event`: loading from break to break.
+
+use crate::common::{Folder, SMALL, config};
+use serde_json::Value;
+use std::collections::BTreeSet;
+
+const NEXT: [&str; 6] = ["--set", "rupture=next_event", "--set", "stop=null", "--set", "output.every_steps=1"];
+
+/// The assignment of a sample that is read from a file.
+fn sample_of(here: &Folder, file: &str) -> String {
+    format!("sample={{\"file\": {{\"path\": {:?}}}}}", here.path(file))
+}
+
+/// Grains of a sample file, one a line, without its header.
+fn grains(here: &Folder, file: &str) -> (String, Vec<String>) {
+    let text = String::from_utf8(here.read(file)).expect("UTF-8");
+    let mut lines = text.lines().filter(|line| !line.starts_with('#')).map(str::to_string);
+    (lines.next().expect("a header"), lines.collect())
+}
+
+/// Each event of a history as the load of the top wall (N) and the pairs of the bonds that break,
+/// with the numbers that `name` gives to the grains.
+fn events(here: &Folder, file: &str, name: impl Fn(i32) -> usize) -> Vec<(f64, BTreeSet<[usize; 2]>)> {
+    let history = here.history(file);
+    let force = history.observable("applied_force").expect("read").expect("walls are driven");
+    let walls = force.value.len() / force.step.len();
+    let mut events: Vec<_> = force.value.chunks(walls).map(|walls| (walls[walls.len() - 1], BTreeSet::new())).collect();
+    for rupture in history.ruptures().expect("ruptures") {
+        let mut pair = rupture.pair.map(&name);
+        pair.sort_unstable();
+        events[rupture.step as usize - 1].1.insert(pair);
+    }
+    events
+}
+
+/// The whole branch, with loads that rise and fall, is the same for three orders of the grains, and
+/// its first break is in the step of a stepped run whose load is the first to reach it.
+#[test]
+fn the_branch_beyond_the_peak_does_not_depend_on_the_order_of_the_contacts() {
+    let here = Folder::new();
+    let scene = config("compression.json");
+    let pack = [&["pack", &scene, "-o", "sample.csv"][..], &SMALL].concat();
+    here.dem_run(&pack).succeeds();
+    let (header, lines) = grains(&here, "sample.csv");
+    let count = lines.len();
+    // a stride without a common factor visits every grain
+    let orders = [1, 7, 11].map(|stride| (0..count).map(|k| stride * k % count).collect::<Vec<_>>());
+    let branches = orders.map(|order| {
+        let rows: Vec<&str> = order.iter().map(|k| lines[*k].as_str()).collect();
+        here.write("order.csv", format!("{header}\n{}\n", rows.join("\n")));
+        let sample = sample_of(&here, "order.csv");
+        here.dem_run(&[&["run", &scene, "-o", "run.h5", "--force", "-q", "--set", &sample][..], &NEXT].concat())
+            .succeeds();
+        here.dem_post(&["info", "--check", "run.h5"]).succeeds();
+        events(&here, "run.h5", |grain| order[grain as usize])
+    });
+    let [first, others @ ..] = &branches;
+    let broken: usize = first.iter().map(|(_, pairs)| pairs.len()).sum();
+    assert!(broken >= 5, "{first:?}");
+    let loads: Vec<f64> = first.iter().map(|(load, _)| *load).collect();
+    assert!(loads.windows(2).any(|w| w[1] < w[0]) && loads.windows(2).any(|w| w[1] > w[0]), "{loads:?}");
+    for other in others {
+        assert_eq!(first.len(), other.len());
+        for (k, (a, b)) in first.iter().zip(other).enumerate() {
+            assert_eq!(a.1, b.1, "event {k}");
+            assert!((a.0 / b.0 - 1.0).abs() < 1e-4, "event {k}: {} N, {} N", a.0, b.0);
+        }
+    }
+
+    let sample = sample_of(&here, "sample.csv");
+    let rate = "walls.top.force_rate=100";
+    let stepped = ["run", &scene, "-o", "stepped.h5", "--json", "-q", "--set", &sample, "--set", rate];
+    let summary: Value = here.dem_run(&stepped).json();
+    let reached = summary["failure"]["first_break"].as_f64().expect("a load");
+    // a step of 1e-4 s adds 0.01 N
+    assert!(reached >= loads[0] * (1.0 - 1e-6) && reached <= loads[0] + 0.0101, "{reached} N, {} N", loads[0]);
+}
+
+#[test]
+fn a_resumed_run_goes_on_to_the_same_events() {
+    let here = Folder::new();
+    let scene = config("compression.json");
+    let stop = ["--set", "stop={\"broken_fraction\": 0.03}"];
+    let run = |file: &str, more: &[&str]| {
+        here.dem_run(&[&["run", &scene, "-o", file, "-q"][..], &SMALL, &NEXT, more].concat()).succeeds();
+    };
+    run("whole.h5", &[]);
+    run("parts.h5", &stop);
+    here.dem_run(&["resume", "parts.h5", "--set", "stop=null", "-q"]).succeeds();
+    let name = |grain: i32| grain as usize;
+    assert_eq!(events(&here, "whole.h5", name), events(&here, "parts.h5", name));
+}
+
+/// Where bonds break at the end of a step, its frame still has their contacts.
+#[test]
+fn a_history_in_which_bonds_break_at_the_end_of_a_step_is_sound() {
+    let here = Folder::new();
+    let sets = ["--set", "rupture=end_of_step", "--set", "output.every_steps=1"];
+    here.dem_run(&[&["run", &config("two-grains.json"), "-o", "run.h5", "-q"][..], &sets].concat()).succeeds();
+    here.dem_post(&["info", "--check", "run.h5"]).succeeds();
+}
