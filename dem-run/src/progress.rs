@@ -316,8 +316,8 @@ enum Event<'a> {
 fn bar() -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(BAR_LENGTH), ProgressDrawTarget::stderr());
     // if the template does not parse, the bar has no numbers; the run continues
-    // of 80 columns 64 are left for the message
-    if let Ok(style) = ProgressStyle::with_template("{bar:8} {percent:>3} %  {wide_msg}") {
+    // of 80 columns 68 are left for the message
+    if let Ok(style) = ProgressStyle::with_template("{bar:4} {percent:>3} %  {wide_msg}") {
         bar.set_style(style);
     }
     bar
@@ -435,7 +435,7 @@ mod tests {
             StepProgress { load: Some(-1.2345e9), strain: Some(-4.1e-12), broken: 54_321, bonds: 654_321, ..at(1) };
         let told = large.describe(Some(3599.0));
         let most = told.find(" left").expect("the time left") + " left".len();
-        assert!(most <= 64, "{most}: {told}");
+        assert!(most <= 68, "{most}: {told}");
     }
 
     #[test]
