@@ -1,13 +1,16 @@
 //! The command line: the options of all commands, and a command for each analysis.
 
 use clap::{ArgMatches, Args, Command, FromArgMatches};
+use dem_output::command_line::{Completions, Man, with_negative_numbers};
 
 use crate::ANALYSES;
-use crate::analysis::{Entry, Shown};
+use crate::analysis::Shown;
+use crate::output::Result;
 
 /// Analyses the histories that `dem-run run` writes.
 #[derive(Debug, Args)]
-#[command(version, propagate_version = true, subcommand_required = true, arg_required_else_help = true)]
+#[command(version = env!("DEM_VERSION"), propagate_version = true, subcommand_required = true)]
+#[command(arg_required_else_help = true, after_help = EXIT_CODES)]
 struct Cli {
     /// Print results as JSON.
     #[arg(long, global = true)]
@@ -17,22 +20,40 @@ struct Cli {
     quiet: bool,
 }
 
-/// The requested analysis, its options, and the format of its output. Wrong usage ends the process.
-pub fn parse() -> (&'static Entry, ArgMatches, Shown) {
+const EXIT_CODES: &str = "\
+Exit codes: 0 done, 1 some runs have no result, 2 wrong usage or nothing to analyse, 4 input/output.
+
+Examples:
+  dem-post report compression.h5
+  dem-post cracks compression.h5 --times 0.29,0.3";
+
+/// Runs the requested command. Wrong usage ends the process.
+///
+/// # Errors
+/// Those of the command.
+pub fn run() -> Result<()> {
     let mut matches = command().get_matches();
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
-    let asked = matches.remove_subcommand();
-    let found = asked.and_then(|(name, options)| Some((ANALYSES.iter().find(|one| one.name == name)?, options)));
     // clap rejects a command line without one of these commands
-    let (analysis, options) = found.unwrap_or_else(|| unreachable!("a command that is not listed"));
-    (analysis, options, Shown { json: cli.json, quiet: cli.quiet })
+    let (name, options) = matches.remove_subcommand().unwrap_or_else(|| unreachable!("no command"));
+    let shown = Shown { json: cli.json, quiet: cli.quiet };
+    match ANALYSES.iter().find(|one| one.name == name) {
+        Some(analysis) => (analysis.run)(&options, shown),
+        None if name == "man" => Ok(own::<Man>(&options).print(command())?),
+        None => Ok(own::<Completions>(&options).print(command())?),
+    }
+}
+
+fn own<A: FromArgMatches>(options: &ArgMatches) -> A {
+    A::from_arg_matches(options).unwrap_or_else(|error| error.exit())
 }
 
 /// `dem-post` with a command for each analysis.
 fn command() -> Command {
+    let own = [Completions::augment_args(Command::new("completions")), Man::augment_args(Command::new("man"))];
     // commands first: help lists options in the order of definition, and these come last
-    let commands = ANALYSES.iter().map(|analysis| (analysis.command)());
-    Cli::augment_args(Command::new("dem-post").subcommands(commands))
+    let commands = ANALYSES.iter().map(|analysis| (analysis.command)()).chain(own);
+    with_negative_numbers(Cli::augment_args(Command::new("dem-post").subcommands(commands)))
 }
 
 #[cfg(test)]
@@ -44,7 +65,8 @@ mod tests {
         let command = command();
         command.clone().debug_assert();
         let names: Vec<&str> = command.get_subcommands().map(Command::get_name).collect();
-        assert_eq!(names, ANALYSES.iter().map(|analysis| analysis.name).collect::<Vec<_>>());
+        let analyses = ANALYSES.iter().map(|analysis| analysis.name);
+        assert_eq!(names, analyses.chain(["completions", "man"]).collect::<Vec<_>>());
         assert!(command.get_subcommands().all(|command| command.get_about().is_some()));
     }
 }

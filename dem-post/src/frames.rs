@@ -4,8 +4,12 @@
 //! Colours and widths that represent a value have the same scale in all pictures. Frames are read,
 //! drawn and written one by one, so the memory does not grow with the length of the series.
 
+use std::path::{Path, PathBuf};
+
 use clap::{Args, ValueEnum};
+use dem_drawing::Drawing;
 use dem_history::{BondStatus, History, RuptureMode};
+use dem_output::command_line::{seconds, whole};
 use serde::Serialize;
 
 use crate::analysis::Analysis;
@@ -15,7 +19,7 @@ use crate::cracks::{Modes, mode_colour};
 use crate::map::{Key, Link, Panel, Ramp, Sample, Scale, View, draw_view};
 use crate::moments;
 use crate::options::Files;
-use crate::output::{Folder, PostError, Result, facts, number, progress, quantity, short};
+use crate::output::{Folder, PostError, Result, facts, in_shell, number, progress, quantity, short};
 use crate::velocities::{speeds, usual_speed};
 
 /// Pixels per unit of a drawing.
@@ -37,10 +41,10 @@ pub struct Command {
     #[arg(long, value_enum, default_value_t)]
     draw: Subject,
     /// Draw every N-th frame, and the last.
-    #[arg(long, value_name = "N", default_value_t = 1, conflicts_with = "times")]
+    #[arg(long, value_name = "N", default_value_t = 1, conflicts_with = "times", value_parser = whole::<usize>(1..=u64::MAX))]
     every: usize,
     /// Draw the frames nearest to these times (s).
-    #[arg(long, value_name = "T,…", value_delimiter = ',')]
+    #[arg(long, value_name = "T,…", value_delimiter = ',', value_parser = seconds)]
     times: Vec<f64>,
 }
 
@@ -66,6 +70,7 @@ impl Analysis for Command {
     }
 
     fn write(&self, history: &History, report: &mut Report, folder: &mut Folder, quiet: bool) -> Result<()> {
+        report.folder = Some(folder.path().into());
         write(history, report, folder, quiet)
     }
 }
@@ -92,6 +97,9 @@ pub struct Report {
     pub frames: Vec<usize>,
     /// Time of the first and of the last, s.
     pub span: [f64; 2],
+    /// The folder of the pictures, once they are written.
+    #[serde(skip)]
+    pub folder: Option<PathBuf>,
     /// Reference of the scale: the greatest mean force (N) or usual speed (m/s) of all frames.
     pub scale: Option<f64>,
 }
@@ -133,7 +141,7 @@ pub fn read(history: &History, subject: Subject, every: usize, times: &[f64]) ->
         return Err(lacking(&format!("{what} in these frames: choose others with --times, or another --draw")));
     }
     let time = |frame: Option<&usize>| frame.map_or(0.0, |&frame| history.times()[frame]);
-    Ok(Report { subject, span: [time(frames.first()), time(frames.last())], frames, scale })
+    Ok(Report { subject, span: [time(frames.first()), time(frames.last())], frames, folder: None, scale })
 }
 
 fn greatest(frames: &[usize], value: impl Fn(usize) -> Result<f64>) -> Result<f64> {
@@ -145,13 +153,16 @@ impl Report {
     pub fn table(&self) -> String {
         let subject = self.subject.to_possible_value().map_or_else(String::new, |value| value.get_name().to_string());
         let unit = if self.subject == Subject::Speed { "m/s" } else { "N" };
+        // to ffmpeg a percent sign begins a number
+        let folder = self.folder.as_deref().unwrap_or(Path::new("")).display().to_string().replace('%', "%%");
+        let pictures = in_shell(&Path::new(&folder).join("frame-%05d.png"));
         facts(&[
             ("pictures", self.frames.len().to_string()),
             ("of", subject),
             ("from", quantity(Some(self.span[0]), "s")),
             ("to", quantity(Some(self.span[1]), "s")),
             ("scale made for", quantity(self.scale, unit)),
-            ("a film", "ffmpeg -framerate 25 -i frame-%05d.png -pix_fmt yuv420p film.mp4".into()),
+            ("a film", format!("ffmpeg -framerate 25 -i {pictures} -pix_fmt yuv420p film.mp4")),
         ])
     }
 }
@@ -161,13 +172,12 @@ impl Report {
 /// # Errors
 /// [`PostError::Write`], and those of reading the history.
 pub fn write(history: &History, report: &Report, folder: &mut Folder, quiet: bool) -> Result<()> {
-    let (sample, view) = shown(history, report)?;
+    let shown = shown(history, report)?;
     let bar = progress(report.frames.len() as u64, quiet, "{bar:24} {pos} of {len} pictures, {eta} left");
     let names: Vec<String> = (0..report.frames.len()).map(|k| format!("frame-{k:05}.png")).collect();
     folder.announce(&names)?;
     for (name, &frame) in names.iter().zip(&report.frames) {
-        let (panel, legend) = picture(history, report, frame)?;
-        let png = draw_view(&sample, view, &[panel], &legend).png_scaled(PIXELS);
+        let png = drawing(history, report, &shown, frame)?.png_scaled(PIXELS);
         folder.write(name, &png.map_err(|why| PostError::Usage(format!("{name}: {why}")))?)?;
         bar.inc(1);
     }
@@ -175,8 +185,19 @@ pub fn write(history: &History, report: &Report, folder: &mut Folder, quiet: boo
     Ok(())
 }
 
+/// The drawing of a frame.
+pub(crate) fn drawing(
+    history: &History,
+    report: &Report,
+    (sample, view): &(Sample, View),
+    frame: usize,
+) -> Result<Drawing> {
+    let (panel, legend) = picture(history, report, frame)?;
+    Ok(draw_view(sample, *view, &[panel], &legend))
+}
+
 /// The part of the plane that shows all frames.
-fn shown(history: &History, report: &Report) -> Result<(Sample, View)> {
+pub(crate) fn shown(history: &History, report: &Report) -> Result<(Sample, View)> {
     let sample = Sample::with_depth(history)?;
     let mut view = View::EMPTY;
     for &frame in &report.frames {

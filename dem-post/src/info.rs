@@ -240,6 +240,7 @@ impl Report {
             ("fabric", true),
             ("stress-strain", self.driven > 0),
             ("frames", self.bonds > 0),
+            ("film", self.bonds > 0),
             ("report", true),
         ];
         let hints: Vec<&str> = hints.iter().filter(|(_, there)| *there).map(|(name, _)| *name).collect();

@@ -15,6 +15,7 @@ pub mod cracks;
 pub mod emission;
 pub mod envelope;
 pub mod fabric;
+pub mod film;
 pub mod frames;
 pub mod info;
 pub mod pack;
@@ -49,6 +50,7 @@ pub const ANALYSES: &[Entry] = &[
     Entry::of::<fabric::Command>(),
     Entry::of::<velocities::Command>(),
     Entry::of::<frames::Command>(),
+    Entry::of::<film::Command>(),
     Entry::of::<compare::Command>(),
     Entry::of::<report::Command>(),
     Entry::of::<strength::Command>(),

@@ -2,15 +2,13 @@
 
 use std::process::ExitCode;
 
-use dem_post::analysis::note;
-use dem_post::cli::parse;
+use dem_output::command_line::print_error;
 
 fn main() -> ExitCode {
-    let (analysis, options, shown) = parse();
-    match (analysis.run)(&options, shown) {
+    match dem_post::cli::run() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            note(&format!("dem-post: {error}"));
+            print_error(&error);
             ExitCode::from(error.exit_code())
         }
     }

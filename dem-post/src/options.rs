@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use dem_history::History;
+use dem_output::command_line::seconds;
 
 use crate::output::{Folder, Result, default_folder, source};
 
@@ -29,7 +30,7 @@ pub struct Moments {
     #[command(flatten)]
     pub files: Files,
     /// Times of the maps (s), as in 0.1,0.15 [default: first break, 5 % broken, end].
-    #[arg(long, value_name = "T,…", value_delimiter = ',')]
+    #[arg(long, value_name = "T,…", value_delimiter = ',', value_parser = seconds)]
     pub times: Vec<f64>,
 }
 

@@ -3,20 +3,24 @@
 use std::io::Write;
 use std::path::PathBuf;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::accuracy::trial::SolverName;
+use crate::output::command_line::{Completions, Man, seconds, whole, with_negative_numbers};
 use crate::output::escaped;
 use crate::progress::ProgressMode;
 use crate::solve::Solver;
 
 /// Simulates cemented grains by non-smooth contact dynamics.
 #[derive(Debug, Parser)]
-#[command(name = "dem-run", version, about, arg_required_else_help = true, after_help = EXIT_CODES)]
+#[command(name = "dem-run", version = VERSION, about, arg_required_else_help = true, after_help = EXIT_CODES)]
 pub struct Cli {
     #[command(subcommand)]
     pub command: Command,
 }
+
+/// Version number, and the revision of the source where it is known.
+pub const VERSION: &str = env!("DEM_VERSION");
 
 const EXIT_CODES: &str = "\
 Exit codes: 0 done, 2 wrong usage or scene, 3 no convergence, 4 input/output, 130 interrupted.
@@ -60,13 +64,18 @@ pub enum Command {
     /// Run a scene with many values of its fields: a parameter study.
     #[command(after_help = SWEEP_EXAMPLE)]
     Sweep(SweepArgs),
-    /// Print the JSON Schema of scenes, for editors.
+    /// Print the JSON Schema of scenes, for editors, or a page of all their fields.
     #[command(after_help = SCHEMA_EXAMPLE)]
     Schema {
         /// Print the schema of sweeps instead.
         #[arg(long)]
         sweep: bool,
+        /// Print the fields of scenes as a page in Markdown instead, docs/scenes.md.
+        #[arg(long, conflicts_with = "sweep")]
+        markdown: bool,
     },
+    Completions(Completions),
+    Man(Man),
 }
 
 const NEW_EXAMPLE: &str = "\
@@ -195,8 +204,8 @@ pub struct ShowArgs {
 #[derive(Debug, Args)]
 pub struct ExecutionArgs {
     /// Number of threads; results do not depend on it [default: all].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
-    pub threads: Option<u16>,
+    #[arg(long, value_name = "N", value_parser = whole::<usize>(1..=1024))]
+    pub threads: Option<usize>,
     #[command(flatten)]
     pub show: ShowArgs,
 }
@@ -269,7 +278,7 @@ pub struct ResumeArgs {
     #[arg(value_name = "FILE.h5")]
     pub history: PathBuf,
     /// New, later end of the run (s).
-    #[arg(long, value_name = "T", value_parser = positive)]
+    #[arg(long, value_name = "T", value_parser = later)]
     pub until: Option<f64>,
     /// Resume with this scene instead of the one in the history.
     #[arg(long, value_name = "SCENE")]
@@ -298,8 +307,8 @@ pub struct SweepArgs {
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
     /// Number of runs at a time, one thread each [default: the number of processors].
-    #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
-    pub jobs: Option<u16>,
+    #[arg(short, long, value_name = "N", value_parser = whole::<usize>(1..=1024))]
+    pub jobs: Option<usize>,
     /// Check every run; print their number, steps and disk space; write nothing.
     #[arg(long, group = "mode")]
     pub check: bool,
@@ -344,11 +353,11 @@ pub struct AccuracyArgs {
     #[arg(long, value_delimiter = ',', value_name = "FACTOR,…", default_value = "1,0.5", value_parser = positive)]
     pub steps: Vec<f64>,
     /// End of the runs (s), instead of the scene's time.end.
-    #[arg(long, value_name = "T", value_parser = positive)]
+    #[arg(long, value_name = "T", value_parser = later)]
     pub until: Option<f64>,
     /// Number of contact orders, and of starting reactions of rigid bonds, that each solver is run
     /// with; 0 for none.
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u64).range(..=10_000))]
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = whole::<u64>(0..=10_000))]
     pub orders: u64,
     /// Continue each run to the scene's end, beyond the collapse of the sample.
     #[arg(long)]
@@ -386,7 +395,7 @@ pub struct ExportArgs {
     #[arg(value_name = "FILE.h5")]
     pub history: PathBuf,
     /// Step whose problem is written, counted from 1.
-    #[arg(long, value_name = "K")]
+    #[arg(long, value_name = "K", value_parser = whole::<u64>(1..=u64::MAX))]
     pub step: u64,
     /// Problem to write.
     #[arg(short, long, value_name = "PROBLEM.hdf5")]
@@ -409,11 +418,11 @@ pub struct SolveArgs {
     pub tolerance: f64,
     /// Maximum number of iterations [default: 100000 sweeps of Gauss–Seidel, 300 iterations of the
     /// interior-point method].
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = whole::<u64>(0..=u64::MAX))]
     pub max_iterations: Option<u64>,
     /// Memory of Anderson's acceleration of Gauss–Seidel, in iterations; 8 is a good value, 0 means
     /// plain sweeps.
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = whole::<usize>(0..=10_000))]
     pub acceleration: usize,
     /// Write the problem with its solution if the tolerance is reached.
     #[arg(short, long, value_name = "SOLVED.hdf5")]
@@ -434,10 +443,24 @@ fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A time above zero (s).
+fn later(text: &str) -> Result<f64, String> {
+    match seconds(text)? {
+        time if time > 0.0 => Ok(time),
+        _ => Err("it must be a time above zero in s, as in 0.6".into()),
+    }
+}
+
+/// The program's command line.
+pub fn command() -> clap::Command {
+    with_negative_numbers(Cli::command())
+}
+
 /// The arguments. An error message about them is printed without the control characters that they
 /// may contain.
 pub fn arguments() -> Cli {
-    Cli::try_parse().unwrap_or_else(|error| {
+    let read = command().try_get_matches().and_then(|matches| Cli::from_arg_matches(&matches));
+    read.unwrap_or_else(|error| {
         let controls = |argument: std::ffi::OsString| argument.to_string_lossy().contains(char::is_control);
         if !error.use_stderr() || !std::env::args_os().any(controls) {
             error.exit()
@@ -453,7 +476,6 @@ mod tests {
 
     #[test]
     fn the_command_line_is_consistent() {
-        use clap::CommandFactory;
-        Cli::command().debug_assert();
+        command().debug_assert();
     }
 }

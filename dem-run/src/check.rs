@@ -20,6 +20,9 @@ use crate::sample_file;
 use crate::scene::{Drive, Function, Lattice, Precision, Ramp, RandomSample, Sample, Scene};
 use crate::warnings;
 
+/// Mean diameter (m) from which `check` asks whether millimetres were meant.
+const BOULDER: f64 = 0.5;
+
 /// Preview of a run of a scene.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Check {
@@ -138,6 +141,11 @@ impl Check {
             free_bytes: free_space(Path::new(".")),
             warnings,
         };
+        if let Some(mean) = check.sizes.as_ref().map(|sizes| sizes.diameters[1]).filter(|mean| *mean >= BOULDER) {
+            let told =
+                format!("the mean diameter of the grains is {} m: if you meant mm, write 1e-3 for each", number(mean));
+            check.warnings.push(format!("sample: {told}"));
+        }
         if !enough {
             check.warnings.push("the run needs more memory than is free: use fewer grains, or another machine".into());
         }
@@ -340,6 +348,16 @@ pub(crate) mod tests {
         for part in ["grains     430 (random packing)", "top (plane, force)", "5000 of 0.0001 s", "501, one every 10"] {
             assert!(text.contains(part), "{part} in\n{text}");
         }
+    }
+
+    #[test]
+    fn millimetres_given_as_metres_are_told() {
+        let size = "sample.random.diameter={\"uniform\": {\"min\": 1, \"max\": 4}}";
+        let check = Check::new(&config("compression.json", &[size, "sample.random.width=38"])).expect("check");
+        let told: Vec<_> = check.warnings.iter().filter(|word| word.contains("mm")).collect();
+        assert!(told.len() == 1 && told[0].contains("mean diameter of the grains is 2.5"), "{:?}", check.warnings);
+        let check = Check::new(&config("compression.json", &[])).expect("check");
+        assert!(check.warnings.is_empty(), "{:?}", check.warnings);
     }
 
     #[test]

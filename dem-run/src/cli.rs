@@ -2,14 +2,14 @@
 //!
 //! Exit codes: 0 done, 2 wrong usage or scene, 3 no convergence, 4 input/output, 130 interrupted.
 
-use std::io::Write;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use crate::accuracy::{self, AccuracyOptions};
 use crate::arguments::{
     AccuracyArgs, CheckArgs, Command, ExecutionArgs, ExportArgs, LimitArgs, NewArgs, PackArgs, ResumeArgs, RunArgs,
-    SceneArgs, ShowArgs, SolveArgs, SweepArgs, arguments,
+    SceneArgs, ShowArgs, SolveArgs, SweepArgs, arguments, command,
 };
 use crate::check::Check;
 use crate::destination::{apart, folder_or_new, not_itself, unicode, writable};
@@ -17,11 +17,12 @@ use crate::error::RunError;
 use crate::export::{self, ExportOptions};
 use crate::limit::{self, LimitOptions};
 use crate::new::{self, NewOptions};
-use crate::output::{default_folder, escaped, print_json, print_result};
+use crate::output::command_line::print_error;
+use crate::output::{default_folder, print, print_json, print_result};
 use crate::pack::{self, PackOptions};
 use crate::resume::{self, ResumeOptions};
 use crate::run::{self, Execution, RunOptions};
-use crate::scene::{self, Scene, SceneError, schema};
+use crate::scene::{self, Scene, SceneError, page, schema};
 use crate::signals;
 use crate::solve::{self, SolveOptions};
 use crate::sweep::{self, Mode, SweepOptions};
@@ -40,16 +41,18 @@ pub fn main() -> ExitCode {
         Command::Solve(args) => solve(args),
         Command::Accuracy(args) => accuracy(args),
         Command::Sweep(args) => sweep(args),
-        Command::Schema { sweep } => {
+        Command::Schema { markdown: true, .. } => print(&page::markdown()).map_err(RunError::from),
+        Command::Schema { sweep, .. } => {
             let schema = if sweep { sweep::model::json_schema() } else { schema::json_schema() };
             print_json(schema).map_err(RunError::from)
         }
+        Command::Completions(shell) => shell.print(command()).map_err(RunError::from),
+        Command::Man(pages) => pages.print(command()).map_err(RunError::from),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            // with stderr closed there is nobody to tell
-            let _ = writeln!(std::io::stderr(), "error: {}", escaped(&error.to_string()));
+            print_error(&error);
             ExitCode::from(error.exit_code())
         }
     }
@@ -57,7 +60,7 @@ pub fn main() -> ExitCode {
 
 impl From<ExecutionArgs> for Execution {
     fn from(args: ExecutionArgs) -> Self {
-        Self { threads: args.threads.map(usize::from), progress: args.show.progress, quiet: args.show.quiet }
+        Self { threads: args.threads, progress: args.show.progress, quiet: args.show.quiet }
     }
 }
 
@@ -211,7 +214,7 @@ fn sweep(args: SweepArgs) -> Result<(), RunError> {
         folder,
         sweep: args.sweep,
         mode,
-        jobs: args.jobs.map(usize::from),
+        jobs: args.jobs,
         retry: args.retry,
         overwrite: args.force,
         execution: Execution { threads: None, progress, quiet },

@@ -5,7 +5,7 @@ use crate::load::{drive_direction, load};
 use crate::scene::Scene;
 use crate::scene::failure::in_one_piece;
 use crate::stages::Stages;
-use crate::stop::Stops;
+use crate::stop::{StopProgress, Stops};
 use crate::summary::Ending;
 use dem_core::bond::{BondStatus, Rupture};
 use dem_core::dim::{Dim, Vect};
@@ -54,6 +54,8 @@ pub struct Driven<D: Dim> {
     pub wall: usize,
     /// Loads at failure, and peak load.
     pub collapse: Collapse,
+    /// Strain of the sample along its direction after the last step (–).
+    pub strain: f64,
     /// Its initial position (m).
     start: D::Vector,
 }
@@ -62,8 +64,9 @@ impl<D: Dim> Course<D> {
     /// The course of a run that begins with `world`.
     pub fn new(scene: &Scene, world: &World<D>) -> Self {
         let driven = world.walls.iter().enumerate().filter(|(_, w)| drive_direction(w).is_some());
-        let driven: Vec<Driven<D>> =
-            driven.map(|(wall, w)| Driven { wall, collapse: Collapse::default(), start: w.position }).collect();
+        let driven: Vec<Driven<D>> = driven
+            .map(|(wall, w)| Driven { wall, collapse: Collapse::default(), strain: 0.0, start: w.position })
+            .collect();
         let number = scene.load_wall().and_then(|name| scene.walls.keys().position(|other| other == name));
         Self {
             load_wall: driven.iter().position(|at| Some(at.wall) == number),
@@ -88,7 +91,7 @@ impl<D: Dim> Course<D> {
     /// Saves the course.
     pub fn save(&self, to: &mut Saved) {
         to.count(self.driven.len());
-        for Driven { wall, collapse, start } in &self.driven {
+        for Driven { wall, collapse, start, .. } in &self.driven {
             to.count(*wall);
             to.vector(start);
             collapse.save(to);
@@ -116,7 +119,7 @@ impl<D: Dim> Course<D> {
             let (wall, start, collapse) = (from.count()?, from.vector()?, Collapse::restored(from)?);
             // a wall that is no longer driven is dropped
             if let Some(driven) = course.driven.iter_mut().find(|driven| driven.wall == wall) {
-                *driven = Driven { wall, start, collapse };
+                *driven = Driven { wall, start, collapse, strain: 0.0 };
             }
         }
         course.extents = from.reals(D::N)?.to_vec();
@@ -150,6 +153,16 @@ impl<D: Dim> Course<D> {
         Some(load(&world.walls[self.driven[self.load_wall?].wall]))
     }
 
+    /// The strain of the sample along the direction of the load wall, if the scene has one (–).
+    pub fn strain(&self) -> Option<f64> {
+        Some(self.driven[self.load_wall?].strain)
+    }
+
+    /// How far the stop condition is, if the scene has one.
+    pub fn stop_progress(&self, world: &World<D>) -> Option<StopProgress> {
+        self.stops.progress(world, self.broken())
+    }
+
     /// Counts a step; `world` is the state after the step.
     pub fn count(&mut self, world: &World<D>, report: &StepReport<D>) {
         for failed in &report.breaks {
@@ -172,11 +185,12 @@ impl<D: Dim> Course<D> {
             return;
         }
         let (strain, broken, bonds) = (world.strain(), self.broken(), world.bonds.len());
-        for Driven { wall, collapse, start } in &mut self.driven {
+        for Driven { wall, collapse, strain: along, start } in &mut self.driven {
             let wall = &world.walls[*wall];
             let direction = drive_direction(wall).unwrap_or(D::Vector::zero());
-            let (displacement, strain) = ((wall.position - *start).dot(&direction), axial(&strain, direction));
-            collapse.push(LoadStep { load: load(wall), displacement, strain, broken, bonds });
+            let displacement = (wall.position - *start).dot(&direction);
+            *along = axial(&strain, direction);
+            collapse.push(LoadStep { load: load(wall), displacement, strain: *along, broken, bonds });
         }
     }
 

@@ -8,6 +8,7 @@ use crate::prepare::PrepareError;
 use crate::scene::SceneError;
 use crate::signals::INTERRUPTED;
 use std::error::Error;
+use std::io::ErrorKind;
 use std::path::PathBuf;
 
 /// The cause of a failure, from the operating system, a library or this program.
@@ -206,7 +207,7 @@ impl RunError {
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Scene(SceneError::Read { .. }) => 4,
+            Self::Scene(SceneError::Read { source, .. }) if source.kind() != ErrorKind::InvalidData => 4,
             Self::Scene(_) | Self::Sample(_) | Self::Usage(_) | Self::NotUnicode { .. } => 2,
             Self::NoConvergence(_) => 3,
             Self::File { .. } | Self::SceneFile { .. } | Self::Content { .. } | Self::Unfit { .. } => 4,

@@ -83,6 +83,10 @@ fn export_in<D: Dim>(scene: &Scene, options: &ExportOptions, interrupt: &Interru
             residual: report.residual,
             iterations: report.work.iterations(),
             broken: world.bonds.len() - world.intact_bonds(),
+            bonds: world.bonds.len(),
+            load: None,
+            strain: None,
+            stop: None,
         });
         if interrupt.requested() {
             return Err(RunError::Interrupted("nothing was written"));

@@ -15,6 +15,7 @@ mod destination;
 mod dimension;
 mod drive;
 pub mod error;
+pub mod estimate;
 pub mod export;
 pub mod fclib;
 pub mod limit;

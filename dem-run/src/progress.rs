@@ -6,7 +6,9 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 
-use crate::output::escaped;
+use crate::estimate::{Estimate, Sample};
+use crate::output::{escaped, short};
+use crate::stop::StopProgress;
 
 /// How progress is shown.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum)]
@@ -39,6 +41,14 @@ pub struct StepProgress {
     pub iterations: u64,
     /// Bonds broken since the start.
     pub broken: usize,
+    /// Bonds at the start.
+    pub bonds: usize,
+    /// Load of the load wall (N), if the scene has one.
+    pub load: Option<f64>,
+    /// Strain of the sample along its direction (–).
+    pub strain: Option<f64>,
+    /// How far the stop condition is, if the scene has one.
+    pub stop: Option<StopProgress>,
 }
 
 /// Progress of a family of runs.
@@ -60,8 +70,9 @@ pub struct Progress {
     began: Instant,
     shown: Option<Instant>,
     phase: String,
-    /// End of the first step, in real and in simulated time (s).
-    first: Option<(Instant, f64)>,
+    /// End of the first step.
+    first: Option<Instant>,
+    estimate: Estimate,
     /// A step that is not shown yet.
     pending: Option<StepProgress>,
     quiet: bool,
@@ -103,7 +114,17 @@ impl Progress {
 
     fn with_sink(sink: Sink, interval: Duration, quiet: bool) -> Self {
         let (began, phase) = (Instant::now(), String::new());
-        Self { sink, interval, began, shown: None, phase, first: None, pending: None, quiet }
+        Self {
+            sink,
+            interval,
+            began,
+            shown: None,
+            phase,
+            first: None,
+            estimate: Estimate::default(),
+            pending: None,
+            quiet,
+        }
     }
 
     /// Reports the progress of a phase of the preparation: its name, and the fraction done (0 to
@@ -132,9 +153,9 @@ impl Progress {
             return;
         }
         self.pending = Some(*step);
-        if self.first.is_none() {
-            self.first = Some((Instant::now(), step.time));
-        }
+        self.first.get_or_insert_with(Instant::now);
+        let sample = self.sample(step);
+        self.estimate.push(sample);
         if self.due() {
             self.show_step();
         }
@@ -205,7 +226,7 @@ impl Progress {
             return;
         };
         self.shown = Some(Instant::now());
-        let left = self.time_left(&step);
+        let left = self.estimate.left(self.sample(&step), step.end);
         match &mut self.sink {
             Sink::Bar(bar) => {
                 bar.set_position((step.fraction() * BAR_LENGTH as f64) as u64);
@@ -219,28 +240,35 @@ impl Progress {
         }
     }
 
-    /// Remaining time (s), extrapolated from the mean speed since the first step.
-    fn time_left(&self, step: &StepProgress) -> Option<f64> {
-        let (start, first) = self.first?;
-        let done = step.time - first;
-        (done > 0.0).then(|| start.elapsed().as_secs_f64() * ((step.end - step.time) / done).max(0.0))
+    /// Where the run stands now.
+    fn sample(&self, step: &StepProgress) -> Sample {
+        let elapsed = self.first.map_or(0.0, |first| first.elapsed().as_secs_f64());
+        Sample { elapsed, time: step.time, stop: step.stop.map(|stop| stop.reached) }
     }
 }
 
 impl StepProgress {
-    /// Completed fraction of the simulated time (0 to 1).
+    /// Completed fraction (0 to 1) of the simulated time, or of the stop condition where it is
+    /// nearer.
     fn fraction(&self) -> f64 {
-        if self.end > 0.0 { (self.time / self.end).clamp(0.0, 1.0) } else { 0.0 }
+        let time = if self.end > 0.0 { (self.time / self.end).clamp(0.0, 1.0) } else { 0.0 };
+        self.stop.map_or(time, |stop| stop.reached.max(time))
     }
 
+    /// The most important first: a terminal cuts the rest.
     fn describe(&self, left: Option<f64>) -> String {
-        let Self { step, time, end, residual, iterations, broken } = self;
-        let bonds = bonds(*broken);
+        let Self { step, time, end, residual, iterations, broken, bonds, load, strain, stop } = self;
         let left = left.map_or("?".to_string(), duration);
-        format!(
-            "t {time:.4} of {end} s  step {step}  residual {residual:.1e} ({iterations} iterations)  \
-             {broken} {bonds} broken  {left} left"
-        )
+        let parts = [
+            load.map(|load| format!("{} N", short(load))),
+            strain.map(|strain| format!("strain {strain:.1e}")),
+            (*bonds > 0).then(|| format!("{broken} of {bonds} broken")),
+            Some(format!("{left} left")),
+            stop.map(|stop| format!("stop: {} {:.0} %", stop.condition, 100.0 * stop.reached)),
+            Some(format!("t {time:.4} of {end} s")),
+            Some(format!("step {step}  residual {residual:.1e} ({iterations} iterations)")),
+        ];
+        parts.into_iter().flatten().collect::<Vec<_>>().join("  ")
     }
 }
 
@@ -288,7 +316,8 @@ enum Event<'a> {
 fn bar() -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(BAR_LENGTH), ProgressDrawTarget::stderr());
     // if the template does not parse, the bar has no numbers; the run continues
-    if let Ok(style) = ProgressStyle::with_template("{bar:24} {percent:>3} %  {wide_msg}") {
+    // of 80 columns 68 are left for the message
+    if let Ok(style) = ProgressStyle::with_template("{bar:4} {percent:>3} %  {wide_msg}") {
         bar.set_style(style);
     }
     bar
@@ -346,7 +375,19 @@ mod tests {
     }
 
     fn at(step: u64) -> StepProgress {
-        StepProgress { step, time: step as f64 * 0.1, end: 1.0, residual: 8.2e-5, iterations: 12, broken: 1 }
+        let stop = Some(StopProgress { condition: "travel", reached: 0.04 * step as f64 });
+        StepProgress {
+            step,
+            time: step as f64 * 0.1,
+            end: 1.0,
+            residual: 8.2e-5,
+            iterations: 12,
+            broken: 1,
+            bonds: 20,
+            load: Some(57.1923),
+            strain: Some(4.12e-4),
+            stop,
+        }
     }
 
     #[test]
@@ -360,12 +401,13 @@ mod tests {
             out.lines(),
             [
                 "compaction: 50 %",
-                " 10 %  t 0.1000 of 1 s  step 1  residual 8.2e-5 (12 iterations)  1 bond broken  ? left",
+                " 10 %  57.2 N  strain 4.1e-4  1 of 20 broken  ? left  stop: travel 4 %  t 0.1000 of 1 s  step 1  \
+                 residual 8.2e-5 (12 iterations)",
                 "a note",
             ]
         );
         progress.step(&at(2));
-        assert!(out.lines()[3].ends_with(" s left"), "{:?}", out.lines());
+        assert!(out.lines()[3].contains(" s left  stop: travel 8 %"), "{:?}", out.lines());
         progress.cascade(3, 187);
         assert_eq!(out.lines()[4], "       step 3 continues: 187 bonds broken in it so far");
     }
@@ -384,7 +426,25 @@ mod tests {
         progress.finish();
         progress.finish();
         assert_eq!(out.lines().len(), 3);
-        assert!(out.lines()[2].starts_with("100 %  t 1.0000"), "{:?}", out.lines());
+        assert!(out.lines()[2].contains(" t 1.0000"), "{:?}", out.lines());
+    }
+
+    #[test]
+    fn the_message_fits_a_terminal_of_80_columns_up_to_the_time_left() {
+        let large =
+            StepProgress { load: Some(-1.2345e9), strain: Some(-4.1e-12), broken: 54_321, bonds: 654_321, ..at(1) };
+        let told = large.describe(Some(3599.0));
+        let most = told.find(" left").expect("the time left") + " left".len();
+        assert!(most <= 68, "{most}: {told}");
+    }
+
+    #[test]
+    fn what_a_scene_lacks_is_not_told() {
+        let falling = StepProgress { bonds: 0, broken: 0, load: None, strain: None, stop: None, ..at(2) };
+        assert!(falling.describe(None).starts_with("? left  t 0.2000 of 1 s"), "{}", falling.describe(None));
+        // the stop condition counts where it is nearer than the end
+        let near = StopProgress { condition: "broken", reached: 0.9 };
+        assert_eq!((at(2).fraction(), StepProgress { stop: Some(near), ..at(2) }.fraction()), (0.2, 0.9));
     }
 
     #[test]

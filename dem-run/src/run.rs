@@ -280,6 +280,10 @@ impl<D: Dim> Run<'_, D> {
             residual: report.residual,
             iterations: report.work.iterations(),
             broken: self.state.course.broken(),
+            bonds: self.state.world.bonds.len(),
+            load: self.state.course.load(&self.state.world),
+            strain: self.state.course.strain(),
+            stop: self.state.course.stop_progress(&self.state.world),
         }
     }
 

@@ -6,6 +6,7 @@ use crate::summary::Ending;
 use dem_core::dim::{Dim, Vect};
 use dem_core::saved::{Mismatch, Reader, Saved};
 use dem_core::world::World;
+use serde::Serialize;
 
 /// Number of consecutive steps whose load must be below the share of the peak. A grain that loses
 /// its contact with the wall for a step, or an impact that ends, is no drop of the load.
@@ -19,12 +20,28 @@ pub struct Stops<D: Dim> {
     drop: Option<DropStop>,
 }
 
+/// How far the stop condition of a run is that is reached first, as it stands.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct StopProgress {
+    /// What ends the run: "travel" of a wall, or "broken" bonds.
+    pub condition: &'static str,
+    /// Fraction reached (0 to 1).
+    pub reached: f64,
+}
+
 /// The travel of a wall that ends a run.
 struct TravelStop<D: Dim> {
     wall: usize,
     direction: D::Vector,
     distance: f64,
     from: Option<D::Vector>,
+}
+
+impl<D: Dim> TravelStop<D> {
+    /// Distance of the wall along its direction from a place (m).
+    fn travelled(&self, world: &World<D>, from: D::Vector) -> f64 {
+        (world.walls[self.wall].position - from).dot(&self.direction).abs()
+    }
 }
 
 /// The drop of the load that ends a run.
@@ -69,14 +86,26 @@ impl<D: Dim> Stops<D> {
         }
     }
 
+    /// How far the nearest condition is. A drop of the load has no measure of that.
+    pub fn progress(&self, world: &World<D>, broken: usize) -> Option<StopProgress> {
+        let travel = self.travel.as_ref().map(|stop| {
+            let travelled = stop.from.map_or(0.0, |from| stop.travelled(world, from));
+            StopProgress { condition: "travel", reached: (travelled / stop.distance).min(1.0) }
+        });
+        let broken = self.broken_limit.map(|limit| {
+            let reached = broken as f64 / (limit * world.bonds.len() as f64);
+            StopProgress { condition: "broken", reached: if reached.is_finite() { reached.min(1.0) } else { 0.0 } }
+        });
+        travel.into_iter().chain(broken).max_by(|a, b| a.reached.total_cmp(&b.reached))
+    }
+
     /// The condition that ends the run after this step, if any.
     pub fn ending(&mut self, world: &World<D>, broken: usize) -> Option<Ending> {
         if let Some(stop) = &mut self.travel {
-            let position = world.walls[stop.wall].position;
             if stop.from.is_none() && broken > 0 {
-                stop.from = Some(position);
+                stop.from = Some(world.walls[stop.wall].position);
             }
-            if stop.from.is_some_and(|from| (position - from).dot(&stop.direction).abs() >= stop.distance) {
+            if stop.from.is_some_and(|from| stop.travelled(world, from) >= stop.distance) {
                 return Some(Ending::WallTravel);
             }
         }

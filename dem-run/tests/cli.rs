@@ -134,6 +134,11 @@ fn schema_prints_a_json_schema_of_scenes() {
     let copy = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/scene.schema.json");
     let copy = std::fs::read_to_string(copy).expect("docs/scene.schema.json");
     assert!(copy == stdout, "docs/scene.schema.json is old: dem-run schema > docs/scene.schema.json");
+    let (code, page, _) = dem_run(folder().path(), &["schema", "--markdown"]);
+    let copy = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/scenes.md");
+    assert!(code == Some(0) && copy.exists(), "docs/scenes.md");
+    let copy = std::fs::read_to_string(copy).expect("docs/scenes.md");
+    assert!(copy == page, "docs/scenes.md is old: dem-run schema --markdown > docs/scenes.md");
     assert!(schema["properties"]["thickness"]["description"].as_str().is_some_and(|text| text.contains("(m)")));
 }
 

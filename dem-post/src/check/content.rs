@@ -69,7 +69,7 @@ pub(super) fn check(c: &mut Checker) {
     directions(c);
     let pairs = bond_pairs(c);
     let broken = states(c);
-    let late = broke_in_the_step_of_a_frame(c, &steps);
+    let late = broke_at_the_end_of_a_frame(c, &steps);
     contacts(c, &rows, &pairs, &broken, &late);
     events(c, &steps, &pairs, &broken);
 }
@@ -324,11 +324,13 @@ fn states(c: &mut Checker) -> Broken {
     broken
 }
 
-/// Bonds that broke in the step of a frame. Where they break at the end of the step, its contacts
-/// are those that still had them.
-fn broke_in_the_step_of_a_frame(c: &mut Checker, steps: &[i64]) -> BTreeSet<usize> {
+/// Bonds that broke in the step of a frame, where the scene breaks bonds at the end of a step: the
+/// contacts of that frame still have them.
+fn broke_at_the_end_of_a_frame(c: &mut Checker, steps: &[i64]) -> BTreeSet<usize> {
     let mut late = BTreeSet::new();
-    if c.is_sound(&[RUPTURE]) {
+    let scene = schema::scene(c);
+    let rule = scene.as_ref().and_then(|scene| scene["rupture"].as_str());
+    if matches!(rule, Some("end_of_step" | "next_event")) && c.is_sound(&[RUPTURE]) {
         c.blocks::<StoredRupture>(RUPTURE, |_, _, events| {
             let of_a_frame = events.iter().filter(|event| steps.binary_search(&event.step).is_ok());
             late.extend(of_a_frame.filter_map(|event| usize::try_from(event.bond).ok()));

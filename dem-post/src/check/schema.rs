@@ -178,12 +178,16 @@ fn identity(c: &mut Checker) {
         c.wrong("parameters@seed", None, "is missing, or not a number");
     }
     if let Some(shape) = c.typed("parameters/scene", &TEXT) {
-        let scene = c.file.dataset("parameters/scene").and_then(|scene| scene.read_scalar::<VarLenUnicode>());
-        let valid = scene.is_ok_and(|scene| serde_json::from_str::<serde_json::Value>(&scene).is_ok());
-        if !shape.is_empty() || !valid {
+        if !shape.is_empty() || scene(c).is_none() {
             c.wrong("parameters/scene", None, "is not a JSON text");
         }
     }
+}
+
+/// The scene, if it is a JSON text.
+pub(super) fn scene(c: &Checker) -> Option<serde_json::Value> {
+    let text = c.file.dataset("parameters/scene").and_then(|scene| scene.read_scalar::<VarLenUnicode>());
+    serde_json::from_str(&text.ok()?).ok()
 }
 
 fn commit(c: &mut Checker) {

@@ -28,9 +28,9 @@ pub fn write(report: &Report, folder: &mut Folder) -> Result<()> {
     let rows = (0..report.step.len()).map(|k| {
         vec![
             report.step[k].to_string(),
-            report.time[k].to_string(),
-            report.displacement[k].to_string(),
-            report.load[k].to_string(),
+            cell(Some(report.time[k])),
+            cell(Some(report.displacement[k])),
+            cell(Some(report.load[k])),
             cell(at(&report.reaction, k)),
             cell(area.map(|_| report.displacement[k] / height)),
             cell(at(&report.reaction, k).zip(area).map(|(f, area)| f / area)),

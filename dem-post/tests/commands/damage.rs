@@ -5,8 +5,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use dem_post::output::{Folder, PostError, Result};
 use dem_post::{
-    chains, check, compare, cracks, emission, envelope, fabric, frames, info, pack, report, strength, stress_strain,
-    velocities, view, why,
+    chains, check, compare, cracks, emission, envelope, fabric, film, frames, info, pack, report, strength,
+    stress_strain, velocities, view, why,
 };
 use hdf5::types::{IntSize, TypeDescriptor};
 use hdf5::{File, H5Type};
@@ -97,6 +97,7 @@ fn reads(good: &Path) -> Vec<Command<'_>> {
         command("report", |h, _| report::read(h, &[], None, true).map(|report| drop(report.table()))),
         command("stress-strain", |h, _| stress_strain::read(h, None).map(|report| drop(report.table()))),
         command("frames", |h, _| frames::read(h, frames::Subject::Forces, 1, &[]).map(drop)),
+        command("film", |h, _| film::read(h, frames::Subject::Bonds, None, 1).map(drop)),
         command("compare", |h, _| compare::read(h, &History::open(good)?, 0.0).map(|report| drop(report.table()))),
         command("strength", |h, _| {
             let runs = [good.to_path_buf(), h.path().to_path_buf()];
@@ -126,6 +127,7 @@ fn writes(good: &Path) -> Vec<Command<'_>> {
         command("frames", |h, folder| {
             frames::write(h, &frames::read(h, frames::Subject::Bonds, 10, &[])?, folder, true)
         }),
+        command("film", |h, folder| film::write(h, &mut film::read(h, frames::Subject::Bonds, None, 1)?, folder, true)),
         command("compare", |h, folder| compare::write(h, &compare::read(h, &History::open(good)?, 0.0)?, folder)),
         command("envelope", |h, folder| {
             let runs = [good.to_path_buf(), h.path().to_path_buf()];

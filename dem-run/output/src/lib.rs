@@ -1,5 +1,6 @@
 //! Output of results: tables on stdout, files in one folder, each replaced atomically.
 
+pub mod command_line;
 mod error;
 mod folder;
 pub mod lock;
@@ -12,4 +13,4 @@ pub use error::{Result, WriteError};
 pub use folder::{Folder, Picture, default_folder};
 pub use owner::Source;
 pub use print::{escaped, in_shell, print, print_json, print_line, print_result};
-pub use text::{Text, cell, facts, hex, number, quantity, short, size};
+pub use text::{Cell, Text, cell, facts, hex, number, quantity, short, shortest, size};

@@ -1,11 +1,35 @@
 //! Readable tables and numbers, cells of CSV files.
 
+use std::borrow::Cow;
 use std::fmt::Display;
 
 /// A row of a CSV file from numbers and words.
 #[macro_export]
 macro_rules! row {
-    ($($cell:expr),* $(,)?) => { vec![$($cell.to_string()),*] };
+    ($($cell:expr),* $(,)?) => { vec![$($crate::Cell::text(&$cell)),*] };
+}
+
+/// A value as a cell of a CSV file.
+pub trait Cell {
+    /// Its text; for a number as [`shortest`].
+    fn text(&self) -> String;
+}
+
+impl Cell for f64 {
+    fn text(&self) -> String {
+        shortest(*self)
+    }
+}
+
+macro_rules! as_displayed {
+    ($($kind:ty),*) => { $(impl Cell for $kind { fn text(&self) -> String { self.to_string() } })* };
+}
+as_displayed!(bool, u8, u32, u64, usize, i32, i64, str, String, Cow<'_, str>);
+
+impl<T: Cell + ?Sized> Cell for &T {
+    fn text(&self) -> String {
+        T::text(self)
+    }
 }
 
 /// A table of text with right-aligned numbers.
@@ -89,9 +113,16 @@ fn with_unit(number: impl Display, unit: &str) -> String {
     if unit.is_empty() { number.to_string() } else { format!("{number} {unit}") }
 }
 
-/// An optional number as a cell of a CSV file; empty for none.
+/// An optional number as a cell of a CSV file, as [`shortest`]; empty for none.
 pub fn cell(value: Option<f64>) -> String {
-    value.map_or_else(String::new, |value| value.to_string())
+    value.map_or_else(String::new, shortest)
+}
+
+/// The fewest digits from which the same number is read, with a power of ten for very large or
+/// small values.
+pub fn shortest(value: f64) -> String {
+    let magnitude = value.abs();
+    if value == 0.0 || (1e-4..1e16).contains(&magnitude) { value.to_string() } else { format!("{value:e}") }
 }
 
 /// A readable file size.
@@ -121,6 +152,22 @@ mod tests {
         ] {
             assert_eq!(number(value), text);
         }
+    }
+
+    #[test]
+    fn cells_are_read_back_to_the_bit() {
+        for (value, text) in [
+            (0.1, "0.1"),
+            (-0.0, "-0"),
+            (23.369999999999997, "23.369999999999997"),
+            (0.00000000012533300262912866, "1.2533300262912866e-10"),
+            (1e16, "1e16"),
+            (-5e-324, "-5e-324"),
+        ] {
+            assert_eq!(shortest(value), text);
+            assert_eq!(text.parse::<f64>().map(f64::to_bits), Ok(value.to_bits()));
+        }
+        assert_eq!((cell(None), cell(Some(2.0))), (String::new(), "2".into()));
     }
 
     #[test]

@@ -18,6 +18,7 @@ pub mod failure;
 mod function;
 mod material;
 mod model;
+pub mod page;
 pub mod parse;
 mod region;
 mod sample;
@@ -66,7 +67,7 @@ pub use wall::*;
 /// # Errors
 /// [`SceneError`]: an unreadable file, wrong syntax, wrong structure, or all wrong values.
 pub fn load(path: &Path, assignments: &[String]) -> Result<Scene, SceneError> {
-    let mut document = parse::parse(&path.display().to_string(), &read(path)?)?;
+    let mut document = read_scene(path)?;
     set::apply(&mut document, assignments).map_err(|problems| document.wrong(problems))?;
     let mut scene = finish(&mut document).map_err(|problems| document.wrong(problems))?;
     join_files(&mut scene, path);
@@ -80,7 +81,18 @@ fn read(path: &Path) -> Result<String, SceneError> {
     text(path).map_err(|source| SceneError::Read { path: path.to_path_buf(), source })
 }
 
-/// The text of a scene or a sweep: a regular file of at most [`MAX_TEXT`].
+/// The tree of the scene in the file `path`; a sweep is refused.
+fn read_scene(path: &Path) -> Result<parse::Document, SceneError> {
+    let document = parse::parse(&path.display().to_string(), &read(path)?)?;
+    if document.has("vary") && !document.has("dimension") {
+        let found = "a sweep: the name of a scene, and fields to vary";
+        return Err(document.wrong(vec![Problem::new("", found, "a scene; run a sweep with `dem-run sweep`")]));
+    }
+    Ok(document)
+}
+
+/// The text of a scene or a sweep: a regular file of at most [`MAX_TEXT`]. A file with other
+/// content is an error of the kind [`io::ErrorKind::InvalidData`].
 pub fn text(path: &Path) -> io::Result<String> {
     let too_long = || io::Error::other(format!("it has more than {} MiB: {MANY_GRAINS}", MAX_TEXT >> 20));
     let file = open_regular(path)?;
@@ -94,14 +106,18 @@ pub fn text(path: &Path) -> io::Result<String> {
         return Err(too_long());
     }
     if bytes.starts_with(b"\x89HDF\r\n\x1a\n") {
-        return Err(io::Error::other(
+        return Err(io::Error::new(
+            io::ErrorKind::InvalidData,
             "it is an HDF5 file: `dem-run resume` resumes the run of a history, `dem-post` reads it",
         ));
     }
     String::from_utf8(bytes).map_err(|error| {
-        let before = &error.as_bytes()[..error.utf8_error().valid_up_to()];
-        let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
-        io::Error::new(io::ErrorKind::InvalidData, format!("line {line} is not UTF-8 text: save it as UTF-8"))
+        // valid up to here
+        let before = String::from_utf8_lossy(&error.as_bytes()[..error.utf8_error().valid_up_to()]);
+        let line = 1 + before.matches('\n').count();
+        let column = 1 + before.chars().rev().take_while(|c| *c != '\n').count();
+        let told = format!("line {line} is not UTF-8 text from column {column} on: save the file as UTF-8");
+        io::Error::new(io::ErrorKind::InvalidData, told)
     })
 }
 
@@ -139,12 +155,21 @@ pub fn from_text(name: &str, text: &str, assignments: &[String]) -> Result<Scene
 ///
 /// The tree is dropped: for millions of grains it is larger than all later data.
 fn finish(document: &mut parse::Document) -> Result<Scene, Vec<Problem>> {
-    let mut scene: Scene = document.decode().map_err(|problem| vec![problem])?;
+    let mut scene: Scene = document.decode().map_err(|problem| with_all_missing(problem, &document.root))?;
     document.root.take();
     let accept = solver::default_accept(scene.solver.tolerance, scene.bonds.is_some());
     scene.solver.accept.get_or_insert(accept);
     let problems = document.merge_non_finite(validate(&scene));
     if problems.is_empty() { Ok(scene) } else { Err(problems) }
+}
+
+/// The problem alone, or all required fields that `root` lacks if it is one of them.
+fn with_all_missing(problem: Problem, root: &serde_json::Value) -> Vec<Problem> {
+    if problem.allowed != parse::REQUIRED {
+        return vec![problem];
+    }
+    let missing = schema::missing(root);
+    if missing.iter().any(|other| other.path == problem.path) { missing } else { vec![problem] }
 }
 
 /// The base scene of a sweep, before its values are varied.
@@ -168,8 +193,7 @@ pub struct Change {
 impl Base {
     /// Reads the text; the scene may be invalid until the values are set.
     pub fn read(path: &Path) -> Result<Self, SceneError> {
-        let document = parse::parse(&path.display().to_string(), &read(path)?)?;
-        Ok(Self { path: path.to_path_buf(), document })
+        Ok(Self { path: path.to_path_buf(), document: read_scene(path)? })
     }
 
     /// The scene with these values.

@@ -312,6 +312,12 @@ pub fn join(path: &str, key: &str) -> String {
 }
 
 impl Document {
+    /// Whether the tree is an object with this name.
+    #[must_use]
+    pub fn has(&self, name: &str) -> bool {
+        self.root.get(name).is_some()
+    }
+
     /// Records that the value at `path` does not come from the text.
     pub(super) fn mark_set(&mut self, path: &str, origin: Origin) {
         let below = format!("{path}.");
@@ -418,6 +424,9 @@ fn segment(segment: &Segment) -> Option<String> {
     }
 }
 
+/// What is allowed where a required field is missing.
+pub(super) const REQUIRED: &str = "this field is required";
+
 /// Serde's message about the value at `path`, in the terms of a scene.
 fn explain(path: String, message: &str, kinds: &[String]) -> Problem {
     for start in ["unknown field ", "unknown variant "] {
@@ -426,7 +435,7 @@ fn explain(path: String, message: &str, kinds: &[String]) -> Problem {
         }
     }
     if let Some(field) = message.strip_prefix("missing field ") {
-        return Problem::new(join(&path, field.trim_matches('`')), "nothing", "this name is required");
+        return Problem::new(join(&path, field.trim_matches('`')), "nothing", REQUIRED);
     }
     for start in ["invalid type: ", "invalid value: ", "invalid length "] {
         if let Some((found, expected)) = message.strip_prefix(start).and_then(|rest| rest.rsplit_once(", expected ")) {

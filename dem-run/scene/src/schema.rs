@@ -4,7 +4,9 @@ use std::sync::LazyLock;
 
 use serde_json::Value;
 
+use super::error::Problem;
 use super::model::Scene;
+use super::parse::{REQUIRED, join};
 
 static SCHEMA: LazyLock<Value> = LazyLock::new(|| schemars::schema_for!(Scene).to_value());
 
@@ -56,6 +58,42 @@ impl Form {
         let mut forms = vec![];
         collect(self.schema.get("items")?, false, &mut forms);
         Some(forms)
+    }
+}
+
+/// The required fields that the scene `root` lacks.
+pub(super) fn missing(root: &Value) -> Vec<Problem> {
+    let mut found = vec![];
+    look_for_missing(&Form::root(), root, "", &mut found);
+    found
+}
+
+fn look_for_missing(forms: &[Form], node: &Value, path: &str, found: &mut Vec<Problem>) {
+    let given = |form: &&Form| !form.kind || form.names().any(|name| node.get(name).is_some());
+    for form in forms.iter().filter(given) {
+        match node {
+            Value::Object(map) => {
+                for name in form.schema.get("required").and_then(Value::as_array).into_iter().flatten() {
+                    let Some(name) = name.as_str().filter(|name| !map.contains_key(*name)) else { continue };
+                    let described = form.schema["properties"][name]["description"].as_str().unwrap_or_default();
+                    let meaning = described.split(". ").next().unwrap_or_default().trim_end_matches('.');
+                    let allowed =
+                        if meaning.is_empty() { REQUIRED.to_string() } else { format!("{REQUIRED}: {meaning}") };
+                    found.push(Problem::new(join(path, name), "nothing", allowed));
+                }
+                for (name, value) in map {
+                    let below = form.property(name).or_else(|| form.entries()).unwrap_or_default();
+                    look_for_missing(&below, value, &join(path, name), found);
+                }
+            }
+            Value::Array(items) => {
+                let below = form.items().unwrap_or_default();
+                for (k, item) in items.iter().enumerate() {
+                    look_for_missing(&below, item, &join(path, &k.to_string()), found);
+                }
+            }
+            _ => {}
+        }
     }
 }
 

@@ -2,7 +2,8 @@
 //! varies.
 //!
 //! A path must exist in the model ([`super::schema`]), whether or not the scene gives a value
-//! there; free names, as those of walls, must exist in the scene.
+//! there; free names, as those of walls, must exist in the scene, unless an object adds one as a
+//! whole.
 
 use std::collections::BTreeSet;
 
@@ -32,8 +33,9 @@ fn assign(document: &mut Document, assignment: &str) -> Result<(), Problem> {
         return Err(Problem::new("", quoted(assignment), "path=value, as in bonds.strength=5"));
     };
     let path = path.trim();
-    check_path(&document.root, path)?;
-    let (value, non_finite) = read_value(path, literal.trim())?;
+    let value = read_value(path, literal.trim());
+    check_path(&document.root, path, value.as_ref().is_ok_and(|(value, _)| value.is_object()))?;
+    let (value, non_finite) = value?;
     store(&mut document.root, path, value);
     document.mark_set(path, Origin::Set(assignment.to_string()));
     document.mark_non_finite(non_finite);
@@ -45,7 +47,7 @@ fn assign(document: &mut Document, assignment: &str) -> Result<(), Problem> {
 /// # Errors
 /// A path that does not exist.
 pub(super) fn put(document: &mut Document, path: &str, value: Value, place: &str) -> Result<(), Problem> {
-    check_path(&document.root, path)?;
+    check_path(&document.root, path, value.is_object())?;
     store(&mut document.root, path, value);
     document.mark_set(path, Origin::Sweep(place.into()));
     Ok(())
@@ -71,21 +73,24 @@ fn read_value(path: &str, literal: &str) -> Result<(Value, Overflows), Problem> 
     Err(Problem::new(path, quoted(literal), "a JSON value: a number, true, \"text\", [ … ] or { … }, or a bare word"))
 }
 
-/// Whether `path` exists in the model and, where names are free or counted, in the tree.
-fn check_path(root: &Value, path: &str) -> Result<(), Problem> {
+/// Whether `path` exists in the model and, where names are free or counted, in the tree. An
+/// `object` may get a new free name.
+fn check_path(root: &Value, path: &str, object: bool) -> Result<(), Problem> {
     let mut forms = Form::root();
     let mut node = Some(root);
     let mut above = String::new();
-    for key in path.split('.') {
-        forms = step(&forms, node, &above, key)?;
+    let mut keys = path.split('.').peekable();
+    while let Some(key) = keys.next() {
+        forms = step(&forms, node, &above, key, object && keys.peek().is_none())?;
         node = node.and_then(|node| child(node, key));
         above = join(&above, key);
     }
     Ok(())
 }
 
-/// The forms of the value under `key` in `node`, for which one of `forms` is expected.
-fn step(forms: &[Form], node: Option<&Value>, above: &str, key: &str) -> Result<Vec<Form>, Problem> {
+/// The forms of the value under `key` in `node`, for which one of `forms` is expected. With `add`,
+/// a free name may be new.
+fn step(forms: &[Form], node: Option<&Value>, above: &str, key: &str, add: bool) -> Result<Vec<Form>, Problem> {
     let below = join(above, key);
     let object = node.and_then(Value::as_object);
     if let Some((form, found)) = forms.iter().find_map(|form| Some((form, form.property(key)?))) {
@@ -101,10 +106,14 @@ fn step(forms: &[Form], node: Option<&Value>, above: &str, key: &str) -> Result<
         return Ok(found);
     }
     if let Some(found) = forms.iter().find_map(Form::entries) {
-        if object.is_some_and(|object| object.contains_key(key)) {
+        if add || object.is_some_and(|object| object.contains_key(key)) {
             return Ok(found);
         }
-        return Err(unknown(above, key, object.into_iter().flatten().map(|(name, _)| name.as_str())));
+        let names: BTreeSet<&str> = object.into_iter().flatten().map(|(name, _)| name.as_str()).collect();
+        let new = format!("a new name with an object: {}={{ … }}", join(above, &shorten(key)));
+        let mut problem = unknown(above, key, names.iter().copied());
+        problem.allowed = if names.is_empty() { new } else { format!("{}, or {new}", problem.allowed) };
+        return Err(problem);
     }
     if let Some(found) = forms.iter().find_map(Form::items) {
         let length = node.and_then(Value::as_array).map_or(0, Vec::len);

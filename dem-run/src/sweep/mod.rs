@@ -21,7 +21,7 @@ use crate::check::Check;
 use crate::destination::folder_or_new;
 use crate::error::RunError;
 use crate::history::sweep::{Manifest, State, Store};
-use crate::output::{facts, print_line, print_result, size};
+use crate::output::{facts, in_shell, print_line, print_result, size};
 use crate::run::{Execution, handle_signals};
 use plan::{Plan, describe};
 use reconcile::reconcile;
@@ -170,13 +170,14 @@ fn prepare(store: &Store, manifest: Manifest, options: &SweepOptions) -> Result<
     if left > 0 {
         cluster::write(store, &options.sweep, &manifest)?;
     }
-    let (folder, sweep) = (store.folder().display(), options.sweep.display());
+    let (folder, sweep) = (in_shell(store.folder()), in_shell(&options.sweep));
+    let [slurm, snakefile] = ["slurm.sh", "Snakefile"].map(|name| in_shell(&store.folder().join(name)));
     let standing = Standing { folder: options.folder.clone(), manifest };
     if options.json || left == 0 {
         return Ok(print_result(&standing, options.json)?);
     }
     Ok(print_line(&format!(
-        "{standing}\n\nrun it with one of\n  sbatch {folder}/slurm.sh\n  snakemake -s {folder}/Snakefile --cores 8 \
+        "{standing}\n\nrun it with one of\n  sbatch {slurm}\n  snakemake -s {snakefile} --cores 8 \
          --keep-going\n  dem-run sweep {sweep} -o {folder}\nprint its status with\n  dem-run sweep {sweep} -o {folder} \
          --status"
     ))?)

@@ -1,7 +1,7 @@
 //! From a sweep file to the scenes of its runs. All scenes are checked before the first run.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
-use std::io::Read as _;
+use std::io::{ErrorKind, Read as _};
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
@@ -58,8 +58,15 @@ impl Plan {
             let source = error.into();
             RunError::Content { path: path.into(), what, source }
         };
-        let text = scene::text(path).map_err(|error| unreadable(path, "the sweep", error))?;
+        let text = scene::text(path).map_err(|error| match error.kind() {
+            ErrorKind::InvalidData => RunError::Usage(format!("{}: the sweep cannot be read: {error}", path.display())),
+            _ => unreadable(path, "the sweep", error),
+        })?;
         let document = parse::parse(&path.display().to_string(), &text)?;
+        if document.has("dimension") && !document.has("vary") {
+            let allowed = "a sweep, { \"scene\": …, \"vary\": … }; run a scene with `dem-run run`";
+            return Err(wrong(&document, vec![Problem::new("", "a scene", allowed)]));
+        }
         let sweep: Sweep = document.decode().map_err(|problem| wrong(&document, vec![problem]))?;
         let problems = document.merge_non_finite(validate(&sweep));
         if !problems.is_empty() {

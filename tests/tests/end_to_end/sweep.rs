@@ -268,7 +268,8 @@ fn wrong_sweeps_are_refused_before_anything_is_written() {
     for (sweep, code, parts) in [
         ("{", 2, &["sweep.json, line 1"][..]),
         ("[]", 2, &["sweep.json is wrong at one place", "the sweep"]),
-        (r#"{ "scene": "S" }"#, 2, &["vary", "this name is required"]),
+        (r#"{ "scene": "S" }"#, 2, &["vary", "this field is required"]),
+        (r#"{ "dimension": 2, "sample": "S" }"#, 2, &["the sweep", "a scene", "`dem-run run`"]),
         (r#"{ "scene": "none.json", "vary": [{"seed": [1]}] }"#, 4, &["sweep.json names a scene", "none.json"]),
         (
             r#"{ "scene": "S", "vary": [{"bonds.strenght": [1]}] }"#,

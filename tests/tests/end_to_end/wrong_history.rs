@@ -3,8 +3,8 @@
 
 use crate::common::{Folder, SMALL};
 
-const VIEWS: [&str; 9] =
-    ["info", "cracks", "emission", "chains", "velocities", "fabric", "frames", "stress-strain", "report"];
+const VIEWS: [&str; 10] =
+    ["info", "cracks", "emission", "chains", "velocities", "fabric", "frames", "film", "stress-strain", "report"];
 
 /// Every view refuses the file `a.h5` in this folder.
 fn refused(here: &Folder, parts: &[&str]) {

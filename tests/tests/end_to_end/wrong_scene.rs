@@ -60,12 +60,13 @@ fn texts_that_are_no_scene_are_refused_at_their_line() {
         (b"{ \"dimension\": 2, \"dimension\": 2 }", 2, &["dimension", "a second time", "each name once"]),
         (b"{}", 2, &["dimension"]),
         (b"[]", 2, &["the scene"]),
+        (b"{ \"scene\": \"a.json\", \"vary\": [] }", 2, &["the scene", "a sweep", "`dem-run sweep`"]),
         // a history is not a scene
-        (b"\x89HDF\r\n\x1a\n\0\0", 4, &["scene.json", "cannot be read", "an HDF5 file", "dem-run resume"]),
+        (b"\x89HDF\r\n\x1a\n\0\0", 2, &["scene.json", "cannot be read", "an HDF5 file", "dem-run resume"]),
         (
             b"{ \"dimension\": 2,\n  \"title\": \"caf\xe9\" }",
-            4,
-            &["scene.json", "line 2 is not UTF-8", "save it as UTF-8"],
+            2,
+            &["scene.json", "line 2 is not UTF-8 text from column 16 on", "save the file as UTF-8"],
         ),
     ] {
         let here = Folder::new();

@@ -139,7 +139,15 @@ fn a_missing_file_and_one_that_is_not_text_are_told_apart() {
     assert!(missing.to_string().contains("scene.json"), "{missing}");
     std::fs::write(&path, [0xff, 0xfe, 0x00]).expect("write");
     let binary = load(&path, &[]).expect_err("not text");
-    assert!(binary.to_string().contains("line 1 is not UTF-8"), "{binary}");
+    assert!(binary.to_string().contains("line 1 is not UTF-8 text from column 1 on"), "{binary}");
+    std::fs::write(&path, b"{\n  \"title\": \"\xc2\xb5 caf\xe9\"").expect("write");
+    let latin = load(&path, &[]).expect_err("Latin-1");
+    assert!(latin.to_string().contains("line 2 is not UTF-8 text from column 18 on"), "{latin}");
+    // neither is a sweep a scene
+    std::fs::write(&path, r#"{ "scene": "a.json", "vary": [{ "seed": [1] }] }"#).expect("write");
+    let sweep = load(&path, &["seed=2".into()]).expect_err("a sweep");
+    assert_eq!((sweep.problems().len(), sweep.problems()[0].path.as_str()), (1, ""));
+    assert!(sweep.to_string().contains("`dem-run sweep`"), "{sweep}");
 }
 
 #[test]

@@ -125,7 +125,59 @@ fn what_is_missing_is_named() {
     ] {
         let problem = only(read(&FLAT.replacen(from, "", 1), &[]));
         assert_eq!((problem.path.as_str(), problem.found.as_str()), (path, "nothing"), "{problem}");
+        assert!(problem.allowed.starts_with("this field is required: "), "{problem}");
     }
+}
+
+#[test]
+fn all_that_is_missing_is_named_at_once() {
+    let missing = |text: &str| -> Vec<String> {
+        let error = read(text, &[]).expect_err("fields are missing");
+        assert!(error.problems().iter().all(|problem| problem.found == "nothing"), "{error}");
+        error.problems().iter().map(|problem| problem.path.clone()).collect()
+    };
+    assert_eq!(missing("{}"), ["dimension", "sample", "materials", "time", "output"]);
+    // in every part of a scene that is otherwise right
+    let text = FLAT
+        .replace("\"density\": 2500, ", "")
+        .replace(", \"gap_tolerance\": 1e-3", "")
+        .replace("\"center\": [2e-3, 0], ", "")
+        .replace(", \"place\": \"seated\"", "")
+        .replace("\"step\": 1e-4, ", "");
+    let mut paths = missing(&text);
+    paths.sort_unstable();
+    assert_eq!(
+        paths,
+        [
+            "bonds.gap_tolerance",
+            "materials.density",
+            "sample.grains.1.center",
+            "time.step",
+            "walls.top.shape.plane.place"
+        ]
+    );
+    let density = read(&text, &[]).expect_err("fields are missing").to_string();
+    assert!(density.contains("this field is required: Density of the grains (kg/m³)"), "{density}");
+}
+
+#[test]
+fn a_wall_is_added_as_a_whole() {
+    let wall = r#"walls.left={"shape": {"plane": {"normal": [1, 0], "place": {"at": [-1, 0]}}}}"#;
+    let scene = read(FLAT, &[wall, "walls.left.velocity={\"constant\": 1e-3}"]).expect("a wall more");
+    assert_eq!(scene.walls.keys().collect::<Vec<_>>(), ["bottom", "left", "roller", "top"]);
+    assert!(scene.walls["left"].velocity.is_some());
+    // the first wall of a scene
+    let rest = "\"time\": { \"step\": 1e-4, \"end\": 0.5 }, \"output\": { \"every_steps\": 10 }";
+    let text = FLAT[..FLAT.find("\"walls\"").expect("walls")].to_string() + rest + "}";
+    assert_eq!(read(&text, &[wall]).expect("a wall").walls.len(), 1);
+    for set in ["walls.left=1", "walls.left.force_rate=5"] {
+        let problem = only(read(&text, &[set]));
+        assert_eq!(problem.path, "walls.left");
+        assert_eq!(problem.allowed, "a new name with an object: walls.left={ … }");
+    }
+    let problem = only(read(FLAT, &["walls.left=1"]));
+    assert_eq!(problem.allowed, "below walls: bottom, roller, top, or a new name with an object: walls.left={ … }");
+    assert_eq!(only(read(FLAT, &["walls.left={}"])).path, "walls.left.shape");
 }
 
 #[test]
