@@ -308,8 +308,8 @@ fn the_unit_of_force_and_the_size_of_the_load_do_not_matter() {
     for factor in [1e-12, 1e9] {
         let mut other = block::<D2>(3, 5, true);
         other.loads.iter_mut().for_each(|load| {
-            load.force = load.force * factor;
-            load.torque = load.torque * factor;
+            load.force *= factor;
+            load.torque *= factor;
         });
         close(limit(&mut other), expected / factor);
         other.settings.gravity = down::<D2>(1e-6 * factor);
@@ -321,10 +321,10 @@ fn the_unit_of_force_and_the_size_of_the_load_do_not_matter() {
 /// A fixed row under random bonded grains, which a lid presses or loads pull.
 fn quasi_static(seed: u64) -> World<D2> {
     let mut rng = Pcg64::seed_from_u64(seed);
-    let mut world = block::<D2>(seed, rng.random_range(2..5), seed % 3 == 0);
+    let mut world = block::<D2>(seed, rng.random_range(2..5), seed.is_multiple_of(3));
     world.settings.solver = SolverSettings::default();
     world.settings.step = 1e-2;
-    if seed % 2 == 0 {
+    if seed.is_multiple_of(2) {
         let high = world.grains.position.iter().zip(&world.grains.radius).map(|(x, r)| x[1] + r).fold(0.0, f64::max);
         let direction: [f64; 2] = [0.0, -1.0];
         let mut lid = Wall::fixed(Shape::Plane { normal: direction.into() }, [0.0, high].into(), 0.2);

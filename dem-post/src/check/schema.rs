@@ -177,10 +177,10 @@ fn identity(c: &mut Checker) {
     if !number(c, "parameters", "seed").is_ok_and(|seed| seed.read_scalar::<u64>().is_ok()) {
         c.wrong("parameters@seed", None, "is missing, or not a number");
     }
-    if let Some(shape) = c.typed("parameters/scene", &TEXT) {
-        if !shape.is_empty() || scene(c).is_none() {
-            c.wrong("parameters/scene", None, "is not a JSON text");
-        }
+    if let Some(shape) = c.typed("parameters/scene", &TEXT)
+        && (!shape.is_empty() || scene(c).is_none())
+    {
+        c.wrong("parameters/scene", None, "is not a JSON text");
     }
 }
 

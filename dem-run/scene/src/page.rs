@@ -60,7 +60,7 @@ impl Page {
             let _ = write!(self.text, "\n## `{path}`\n");
         }
         if let Some(described) = schema["description"].as_str().filter(|_| !path.is_empty()) {
-            let _ = write!(self.text, "\n{}\n", one_line(described));
+            let _ = write!(self.text, "\n{}\n", wrapped(&one_line(described)));
         }
         match kinds(schema) {
             Some(kinds) => self.kinds(path, kinds),
@@ -171,6 +171,23 @@ fn without_unit(description: &str) -> (String, &'static str) {
         Some(unit) => (text.replacen(&format!(" ({unit})"), "", 1), unit),
         None => (text, ""),
     }
+}
+
+/// A text in lines of at most 120 characters.
+fn wrapped(text: &str) -> String {
+    let mut lines = String::new();
+    let mut length = 0;
+    for word in text.split(' ') {
+        let more = word.chars().count();
+        if length > 0 {
+            let breaks = length + 1 + more > 120;
+            lines.push(if breaks { '\n' } else { ' ' });
+            length = if breaks { 0 } else { length + 1 };
+        }
+        lines.push_str(word);
+        length += more;
+    }
+    lines
 }
 
 fn one_line(text: &str) -> String {
