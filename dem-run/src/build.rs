@@ -56,8 +56,9 @@ const MOST_TOLD: usize = 10;
 /// [`RunError`], with all errors of the sample.
 pub fn build<D: Dim>(scene: &Scene, packings: Option<&Path>, watch: Watch) -> Result<Built<D>, RunError> {
     let Placed { grains, walls, solid_fraction, warnings } = place::<D>(scene, packings, watch)?;
-    let bonds = bonds::of_sample(scene, &grains)?;
     let mut world = World::new(grains, walls, loads(scene), settings(scene));
+    // the world knows which grains its walls hold: those get no bonds among each other
+    let bonds = bonds::of_sample(scene, &world.grains)?;
     world.add_bonds(bonds);
     Ok(Built { world, solid_fraction, warnings })
 }

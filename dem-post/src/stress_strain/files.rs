@@ -2,11 +2,12 @@
 
 use dem_drawing::Chart;
 
-use super::pictures::{force_displacement, onset, stress_strain};
+use super::pictures::{force_displacement, load_breaks, onset, stress_strain};
 use super::report::Report;
 use crate::output::{Folder, Result, cell};
 
-/// Writes `stress-strain.csv`, and as drawings `force-displacement` and `stress-strain`.
+/// Writes `stress-strain.csv`, and as drawings `force-displacement` and `stress-strain`; where the
+/// load follows the breaks, `load-breaks` too.
 ///
 /// # Errors
 /// [`crate::output::PostError::Write`].
@@ -41,6 +42,9 @@ pub fn write(report: &Report, folder: &mut Folder) -> Result<()> {
     });
     folder.table("stress-strain", &head, rows)?;
     folder.draw("force-displacement", &Chart::draw(vec![force_displacement(report)]))?;
+    if let Some(chart) = load_breaks(report) {
+        folder.draw("load-breaks", &Chart::draw(vec![chart]))?;
+    }
     let mut charts = vec![stress_strain(report)];
     charts.extend(onset(report));
     Ok(folder.draw("stress-strain", &Chart::draw(charts))?)

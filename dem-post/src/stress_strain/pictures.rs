@@ -28,6 +28,16 @@ pub fn force_displacement(report: &Report) -> Chart {
     chart
 }
 
+/// The load of each break over the number of broken bonds, where the load follows the breaks.
+pub fn load_breaks(report: &Report) -> Option<Chart> {
+    if !report.follows_breaks {
+        return None;
+    }
+    let mut chart = Chart::new("broken bonds", "load of the break (N)");
+    chart.pad_x = true;
+    Some(chart.curve("applied force", colour::BLUE, Style::Line, pairs(&report.broken, 1.0, &report.load, 1.0)))
+}
+
 /// The load over the logarithm of the fitted strain: it shows the small strains before the
 /// collapse.
 pub fn onset(report: &Report) -> Option<Chart> {

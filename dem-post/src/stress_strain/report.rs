@@ -104,6 +104,9 @@ pub struct Report {
     /// Bonds broken; empty if not recorded.
     #[serde(skip)]
     pub broken: Vec<f64>,
+    /// Whether each step is the load at which the next bond breaks (`rupture: next_event`).
+    #[serde(skip)]
+    pub follows_breaks: bool,
     /// The summary.
     pub summary: Summary,
 }
@@ -139,6 +142,7 @@ pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
         reaction: motion.reaction.iter().map(|f| -motion.sense * f).collect(),
         strain: tensor("strain")?.iter().map(|e| -push * e).collect(),
         stress: tensor("stress")?.iter().map(|s| push * s).collect(),
+        follows_breaks: history.observable("load_time")?.is_some(),
         broken: history.observable("bonds_broken")?.map(|series| series.value).unwrap_or_default(),
         summary: Summary {
             wall: walls[k].name.clone(),

@@ -2,7 +2,7 @@
 
 use dem_history::History;
 
-use super::pictures::{force_displacement, onset, stress_strain};
+use super::pictures::{force_displacement, load_breaks, onset, stress_strain};
 use super::report::Report;
 use crate::output::{Result, quantity};
 use crate::section::{OnPage, Section, chart_figure};
@@ -12,7 +12,12 @@ impl OnPage for Report {
     const TITLE: &'static str = "Load and displacement";
 
     fn section(&self, _: &History, _: &[usize]) -> Result<Section> {
-        let mut figures = vec![
+        let breaks = load_breaks(self).map(|chart| {
+            let alt = "Load at which each bond breaks over the number of broken bonds.";
+            chart_figure(chart, alt, "The load of each break: it falls where the sample bears less.")
+        });
+        let mut figures: Vec<_> = breaks.into_iter().collect();
+        figures.extend([
             chart_figure(
                 force_displacement(self),
                 "Applied force and reaction of the grains over the displacement of the driven wall.",
@@ -23,7 +28,7 @@ impl OnPage for Report {
                 "Axial stress over axial strain, from the walls and from the particles.",
                 "Axial stress over strain.",
             ),
-        ];
+        ]);
         figures.extend(onset(self).map(|onset| {
             let alt =
                 "Applied force over the logarithm of the axial strain, with the strains that define the collapse.";

@@ -33,9 +33,10 @@ impl Texts {
         for start in (0..head.len()).step_by(8).filter(|start| head[*start..].starts_with(b"GCOL\x01\0\0\0")) {
             let end = number(start + 8).unwrap_or(0).saturating_add(start as u64);
             let mut at = start + 16;
-            while let Some(size) = number(at + 8).filter(|_| (at as u64) < end) {
+            // less than a header at the end of a heap is unused
+            while let Some(size) = number(at + 8).filter(|_| at as u64 + 16 <= end) {
                 let index = u32::from(u16::from_le_bytes([head[at], head[at + 1]]));
-                let room = if index == 0 { size } else { size.saturating_add(7) / 8 * 8 + 16 };
+                let room = if index == 0 { size } else { (size.saturating_add(7) / 8 * 8).saturating_add(16) };
                 if room == 0 || room > end - at as u64 {
                     return Ok(Err(format!("the text at byte {at} is longer than the room for texts")));
                 }
@@ -61,5 +62,33 @@ impl Texts {
             length == 0 || self.0.get(&place).is_some_and(|size| length <= *size)
         };
         Ok(named.as_chunks::<NAMED>().0.iter().all(is_held))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A heap of `room` bytes at the start of a file, with one text of 25 bytes, and what follows.
+    fn heap(room: u64) -> Vec<u8> {
+        let mut file = b"GCOL\x01\0\0\0".to_vec();
+        file.extend(room.to_le_bytes());
+        file.extend([1, 0, 0, 0, 0, 0, 0, 0]);
+        file.extend(25u64.to_le_bytes());
+        file.extend([b'x'; 32]);
+        file.extend([0xff; 64]);
+        file
+    }
+
+    /// Less than 16 bytes at the end of a heap hold no header, so what follows is not read as one.
+    #[test]
+    fn the_end_of_a_heap_may_be_too_short_for_a_header() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("heap");
+        for (room, sound) in [(64, true), (72, true), (80, false), (56, false)] {
+            std::fs::write(&path, heap(room)).expect("write");
+            let found = Texts::find(&path).expect("read");
+            assert_eq!(found.is_ok(), sound, "{room}");
+        }
     }
 }

@@ -46,13 +46,7 @@ struct Page {
 impl Page {
     /// The section of the object or the kinds at `path`, and those below it.
     fn section(&mut self, path: &str, schema: &'static Value) {
-        let (name, schema) = resolved(schema);
-        if let Some(name) = name {
-            if self.told.iter().any(|(other, _)| other == name) {
-                return;
-            }
-            self.told.push((name.to_string(), path.to_string()));
-        }
+        let (_, schema) = resolved(schema);
         if path.is_empty() {
             self.text.push_str("\n## The whole scene\n");
         } else {
@@ -113,20 +107,21 @@ impl Page {
     }
 
     /// The value that `schema` allows, in words; what needs a section is added to `below`.
-    fn value(&self, path: &str, schema: &'static Value, below: &mut Vec<(String, &'static Value)>) -> String {
+    fn value(&mut self, path: &str, schema: &'static Value, below: &mut Vec<(String, &'static Value)>) -> String {
         let (name, inner) = resolved(schema);
         let kind = match &inner["type"] {
             Value::Array(several) => several[0].as_str(),
             one => one.as_str(),
         };
         if kinds(inner).is_some() || inner["properties"].is_object() {
-            let told = |name: &str| self.told.iter().find(|(other, _)| other == name).map(|(_, path)| path.clone());
-            let waiting = |name: &str| {
-                below.iter().find(|(_, other)| resolved(other).0 == Some(name)).map(|(path, _)| path.clone())
-            };
-            let place = name.and_then(|name| told(name).or_else(|| waiting(name))).unwrap_or_else(|| path.to_string());
             let word = if kinds(inner).is_some() { "one of" } else { "object" };
-            below.push((path.to_string(), schema));
+            // a definition has one section, at the first place that refers to it
+            let told = self.told.iter().find(|(other, _)| Some(other.as_str()) == name);
+            let place = told.map(|(_, place)| place.clone()).unwrap_or_else(|| {
+                below.push((path.to_string(), schema));
+                self.told.extend(name.map(|name| (name.to_string(), path.to_string())));
+                path.to_string()
+            });
             return format!("[{word}](#{})", anchor(&place));
         }
         match kind {

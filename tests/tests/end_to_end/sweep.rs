@@ -239,7 +239,7 @@ fn tasks_of_a_scheduler_carry_out_one_run_each() {
     let here = Folder::new();
     failing(&here);
     let told = here.dem_run(&["sweep", "sweep.json", "-o", "a b", "--prepare"]).succeeds().stdout;
-    assert!(told.contains("sbatch a b/slurm.sh") && told.contains("left     3"), "{told}");
+    assert!(told.contains("sbatch 'a b/slurm.sh'") && told.contains("left     3"), "{told}");
     assert_eq!(files(&here, "a b", ""), [""; 0]);
     let slurm = String::from_utf8(here.read("a b/slurm.sh")).expect("UTF-8");
     assert!(slurm.contains("#SBATCH --array=1-3\n"), "{slurm}");
