@@ -148,6 +148,8 @@ def test_the_page_tells_every_dataset(folder, space, dimension):
         absent = {2: {"/particles/grains/orientation", "/contacts/tangent"}, 3: {"/particles/grains/angle"}}[dimension]
         # these scenes have one coefficient for shear and rolling
         absent |= {"/bonds/rolling"}
+        # and one material
+        absent |= {"/particles/grains/material", "/materials/name"}
         elastic = {"elastic_energy", "dissipation_damping", "fracture_energy"}
         places = {place for place in rows if place.startswith("/")}
         assert places - seen == absent

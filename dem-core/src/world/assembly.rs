@@ -1,9 +1,9 @@
 //! From bodies to the contact problem and back: detection with warm start, assembly, reading of the
 //! result.
 
-use super::World;
 use super::motion::{Midpoint, Motion, Turn};
 use super::touch::{StoredTouch, Touch, TouchStatus};
+use super::{MaterialFriction, World};
 use crate::body::{Grains, Wall, direction, separation};
 use crate::bond::{Bond, BondStatus};
 use crate::contact::{Arms, Bonded, Coulomb, Elastic, Frictionless, Law, Local};
@@ -232,18 +232,23 @@ impl<D: Dim> World<D> {
     }
 
     /// Friction coefficient of a dry contact (–).
+    #[inline]
     fn friction_of(&self, pair: [u32; 2]) -> f64 {
         let wall = (pair[1] as usize).checked_sub(self.grains.len());
-        if let Some(table) = &self.settings.material_friction {
-            let material = |k: u32| self.grains.material_of(k as usize);
-            return match wall {
-                None => table.grain_grain[material(pair[0]) * table.count + material(pair[1])],
-                Some(wall) => table.grain_wall[material(pair[0]) * self.walls.len() + wall],
-            };
+        match (&self.settings.material_friction, wall) {
+            (Some(table), wall) => self.friction_of_materials(table, pair, wall),
+            (None, None) => self.settings.friction,
+            (None, Some(wall)) => self.walls[wall].friction,
         }
+    }
+
+    /// The same where there are several materials; `wall` if the second body is one.
+    #[inline(never)]
+    fn friction_of_materials(&self, table: &MaterialFriction, pair: [u32; 2], wall: Option<usize>) -> f64 {
+        let material = |k: u32| self.grains.material_of(k as usize);
         match wall {
-            None => self.settings.friction,
-            Some(wall) => self.walls[wall].friction,
+            None => table.grain_grain[material(pair[0]) * table.count + material(pair[1])],
+            Some(wall) => table.grain_wall[material(pair[0]) * self.walls.len() + wall],
         }
     }
 
@@ -378,6 +383,7 @@ pub(super) fn over_arm<T: Vect, B: Moments>(r: Local<T, B>, arm: f64) -> Local<T
 }
 
 /// Write the impulses of a problem back to the contacts of the step, as forces.
+#[inline]
 pub(super) fn write_reactions<D: Dim>(
     touches: &mut [StoredTouch<D>],
     problem: &ContactProblem<D>,

@@ -21,6 +21,16 @@ impl<D: Dim> World<D> {
         }
     }
 
+    /// [`World::wall_of`] both nodes of a contact. Where no wall holds grains only the second node
+    /// can have one.
+    #[inline]
+    pub(super) fn walls_of(&self, nodes: [u32; 2]) -> [Option<usize>; 2] {
+        if self.held.is_empty() {
+            return [None, (nodes[1] as usize).checked_sub(self.grains.len())];
+        }
+        nodes.map(|node| self.wall_of(node as usize))
+    }
+
     /// Number of grains that a wall holds.
     pub fn grains_held_by(&self, wall: usize) -> usize {
         self.held.iter().filter(|held| **held == Some(wall as u32)).count()

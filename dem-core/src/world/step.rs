@@ -372,10 +372,11 @@ impl<D: Dim> World<D> {
     }
 
     /// Force of the grains on each wall (N).
+    #[inline]
     pub(super) fn wall_forces(&self, mid: &Midpoint<D>, touches: &[StoredTouch<D>]) -> Vec<D::Vector> {
         let mut forces = vec![D::Vector::zero(); self.walls.len()];
         for stored in touches {
-            let [holder, wall] = stored.pair.map(|node| self.wall_of(node as usize));
+            let [holder, wall] = self.walls_of(stored.pair);
             if holder.is_none() && wall.is_none() {
                 continue;
             }
@@ -467,7 +468,7 @@ impl<D: Dim> World<D> {
         }
         impl<D: Dim> Visitor<D> for Pushes<'_, D> {
             fn visit<L: Law>(&mut self, _: &Nodes<D>, c: &Contact<D, L>) {
-                let [holder, wall] = c.link.nodes.map(|node| self.world.wall_of(node as usize));
+                let [holder, wall] = self.world.walls_of(c.link.nodes);
                 if let Some(wall) = wall {
                     self.pushes[wall] -= c.link.impulse(&c.r);
                 }
@@ -503,6 +504,7 @@ impl<D: Dim> World<D> {
     }
 
     /// The report of a step of length `h` that has been committed.
+    #[inline]
     pub(super) fn report(
         &self,
         h: f64,
