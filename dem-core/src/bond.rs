@@ -163,11 +163,14 @@ pub enum Rupture {
 /// The least strength (N) at which a bond with this cone bears the reaction `r`; negative for a
 /// reaction far inside the limits. It grows in proportion to the reaction.
 pub fn required_strength<T: Vect, B: Moments>(r: &Local<T, B>, cone: Cone) -> f64 {
+    required_limits(r, cone).into_iter().fold(0.0, f64::max) - r.n
+}
+
+/// ‖t‖/μ, ‖m‖/ν and |τ|/ξ: the limit r_n + r_coh that shear, rolling and twist require; zero where
+/// the coefficient is zero.
+fn required_limits<T: Vect, B: Moments>(r: &Local<T, B>, cone: Cone) -> [f64; 3] {
     let over = |size: f64, coefficient: f64| if coefficient > 0.0 { size / coefficient } else { 0.0 };
-    let shear = over(r.t.norm(), cone.mu);
-    let rolling = over(r.m.bending(), cone.nu);
-    let twist = over(r.m.twist(), cone.xi);
-    shear.max(rolling).max(twist) - r.n
+    [over(r.t.norm(), cone.mu), over(r.m.bending(), cone.nu), over(r.m.twist(), cone.xi)]
 }
 
 /// Failure mode of a bond under the reaction `r`, with the shift s = r_coh in the unit of `r`;
@@ -182,10 +185,7 @@ pub fn failure<T: Vect, B: Moments>(r: &Local<T, B>, shift: f64, cone: Cone) -> 
     if limit <= LIMIT * shift {
         return Some(BondStatus::Tension);
     }
-    let over = |size: f64, coefficient: f64| if coefficient > 0.0 { size / coefficient } else { 0.0 };
-    let shear = over(r.t.norm(), cone.mu);
-    let rolling = over(r.m.bending(), cone.nu);
-    let twist = over(r.m.twist(), cone.xi);
+    let [shear, rolling, twist] = required_limits(r, cone);
     if shear.max(rolling).max(twist) < (1.0 - LIMIT) * limit {
         None
     } else if twist > shear.max(rolling) {

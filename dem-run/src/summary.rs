@@ -24,7 +24,7 @@ pub enum Ending {
     Stages,
     /// Loading to the next event: no bond breaks under the loads up to the end of the scene's time.
     NoBreak,
-    /// Loading to the next event: without the bonds of the last one the sample bears no load.
+    /// Loading to the next event: the bodies do not stay at rest under the load that comes next.
     NoEquilibrium,
     /// Ctrl-C or SIGTERM.
     Interrupted,
@@ -180,7 +180,7 @@ impl fmt::Display for Summary {
             Ending::LoadDrop => "stop.load_drop was reached",
             Ending::Stages => "the last of stages ended",
             Ending::NoBreak => "the loads up to time.end break no further bond",
-            Ending::NoEquilibrium => "no equilibrium without the bonds that broke last",
+            Ending::NoEquilibrium => "the sample bears no further load",
             Ending::Interrupted => "interrupted",
             Ending::NoConvergence => "a step was not solved",
         };

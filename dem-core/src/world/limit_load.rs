@@ -56,9 +56,8 @@ impl<D: Dim> World<D> {
             given[load.grain].1 += load.torque * (factor * inverse_inertia);
         }
         given.extend(self.walls.iter().map(|wall| match &wall.drive {
-            Drive::Force { direction, mass, force } => {
-                let area = if wall.per_area { wall.section } else { 1.0 };
-                (*direction * (of(&**force) * area / mass), D::Spin::zero())
+            Drive::Force { direction, mass, .. } => {
+                (*direction * (of(&|time| wall.applied_force(time)) / mass), D::Spin::zero())
             }
             Drive::Fixed | Drive::Velocity { .. } => still,
         }));

@@ -13,22 +13,17 @@ fn only_axis<V: Vect>(vector: V) -> Option<usize> {
 }
 
 impl<D: Dim> World<D> {
-    /// The wall on which the forces on a node act: the wall itself, or the wall that holds a grain.
-    pub(super) fn wall_of(&self, node: usize) -> Option<usize> {
-        match node.checked_sub(self.grains.len()) {
-            None => self.held.get(node).copied().flatten().map(|wall| wall as usize),
-            wall => wall,
-        }
-    }
-
-    /// [`World::wall_of`] both nodes of a contact. Where no wall holds grains only the second node
-    /// can have one.
+    /// For each of the two nodes of a contact, the wall on which the forces on it act: the wall
+    /// itself, or the wall that holds the grain.
     #[inline]
     pub(super) fn walls_of(&self, nodes: [u32; 2]) -> [Option<usize>; 2] {
+        let [first, second] = nodes.map(|node| node as usize);
+        let wall = second.checked_sub(self.grains.len());
         if self.held.is_empty() {
-            return [None, (nodes[1] as usize).checked_sub(self.grains.len())];
+            return [None, wall];
         }
-        nodes.map(|node| self.wall_of(node as usize))
+        let holder = |grain: usize| self.held[grain].map(|wall| wall as usize);
+        [holder(first), wall.or_else(|| holder(second))]
     }
 
     /// Number of grains that a wall holds.

@@ -162,6 +162,17 @@ impl<D: Dim> World<D> {
     /// A world at time zero, without bonds. Walls with a grip hold the grains near them.
     pub fn new(mut grains: Grains<D>, walls: Vec<Wall<D>>, loads: Vec<Load<D>>, settings: Settings<D>) -> Self {
         let held = grip::hold(&mut grains, &walls);
+        Self::holding(held, grains, walls, loads, settings)
+    }
+
+    /// A world at time zero, without bonds, in which these walls hold the grains.
+    fn holding(
+        held: Vec<Option<u32>>,
+        grains: Grains<D>,
+        walls: Vec<Wall<D>>,
+        loads: Vec<Load<D>>,
+        settings: Settings<D>,
+    ) -> Self {
         let mut world = Self {
             reference: Vec::new(),
             reference_box: 0.0,

@@ -105,7 +105,7 @@ impl<D: Dim> World<D> {
     /// [`Mismatch`].
     pub fn restored(
         mut grains: Grains<D>,
-        mut walls: Vec<Wall<D>>,
+        walls: Vec<Wall<D>>,
         loads: Vec<Load<D>>,
         settings: Settings<D>,
         from: &mut Reader,
@@ -118,9 +118,7 @@ impl<D: Dim> World<D> {
             grains.material = (0..grains.len()).map(material).collect::<Result<_, _>>()?;
         }
         // the grains that walls hold are saved: others may be near them by now
-        let grips: Vec<Option<f64>> = walls.iter_mut().map(|wall| wall.grip.take()).collect();
-        let mut world = Self::new(grains, walls, loads, settings);
-        world.walls.iter_mut().zip(grips).for_each(|(wall, grip)| wall.grip = grip);
+        let mut world = Self::holding(Vec::new(), grains, walls, loads, settings);
         let n = world.grains.len();
         world.steps = from.count()? as u64;
         (world.time, world.load_time) = (from.real()?, from.real()?);

@@ -1,8 +1,9 @@
 //! The scaling of cone pairs, and what it makes of the equations of one contact.
 
-use super::programme::{Programme, Site, sum};
+use super::programme::{Programme, Site};
 use crate::contact::PADDED;
 use crate::solver::interior::cones::{Point, Scaling, eigenvalues};
+use nalgebra::DMatrix;
 
 /// Rows of a local matrix.
 pub(super) type Local = [[f64; PADDED]; PADDED];
@@ -59,21 +60,14 @@ impl Soft {
             }
             lines.extend(block);
         }
-        let r = triangular(lines, n);
-        let mut root = [[0.0; PADDED]; PADDED];
-        for column in 0..n {
-            for i in (0..=column).rev() {
-                let unit = if i == column { 1.0 } else { 0.0 };
-                let left = unit - (i + 1..=column).map(|k| r[i][k] * root[k][column]).sum::<f64>();
-                root[i][column] = left / r[i][i];
-            }
-        }
-        let mut inverse = [[0.0; PADDED]; PADDED];
-        for i in 0..n {
-            for j in 0..n {
-                inverse[i][j] = (i.max(j)..n).map(|k| root[i][k] * root[j][k]).sum();
-            }
-        }
+        let r = DMatrix::from_fn(lines.len(), n, |i, j| lines[i][j]).qr().r();
+        let inverted = r.solve_upper_triangular(&DMatrix::identity(n, n))?;
+        let filled = |of: DMatrix<f64>| {
+            let mut local = [[0.0; PADDED]; PADDED];
+            (0..n).for_each(|i| (0..n).for_each(|j| local[i][j] = of[(i, j)]));
+            local
+        };
+        let (root, inverse) = (filled(inverted.clone()), filled(&inverted * inverted.transpose()));
         let sound = inverse.iter().flatten().all(|value| value.is_finite());
         sound.then_some(Self { root, inverse })
     }
@@ -85,26 +79,4 @@ impl Soft {
         let root = self.root;
         (0..n).map(move |i| (i..n).map(|k| root[i][k] * half[k]).sum())
     }
-}
-
-/// The triangular factor of a matrix of `n` columns, by Householder's reflections.
-pub(super) fn triangular(mut lines: Vec<[f64; PADDED]>, n: usize) -> Local {
-    for column in 0..n {
-        let norm = lines[column..].iter().map(|line| line[column] * line[column]).sum::<f64>().sqrt();
-        let head = lines[column][column];
-        let end = if head > 0.0 { -norm } else { norm };
-        let mut mirror: Vec<f64> = lines[column..].iter().map(|line| line[column]).collect();
-        mirror[0] -= end;
-        let square = sum(&mirror, &mirror);
-        for other in column..n {
-            if square > 0.0 {
-                let along = lines[column..].iter().zip(&mirror).map(|(line, m)| line[other] * m).sum::<f64>();
-                let factor = 2.0 * along / square;
-                lines[column..].iter_mut().zip(&mirror).for_each(|(line, m)| line[other] -= factor * m);
-            }
-        }
-    }
-    let mut r = [[0.0; PADDED]; PADDED];
-    (0..n).for_each(|i| r[i][i..n].copy_from_slice(&lines[i][i..n]));
-    r
 }
