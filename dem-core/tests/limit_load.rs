@@ -135,6 +135,28 @@ fn weight_is_borne_first() {
     assert_eq!(hanging(4.0 * weight, 1.0).limit_load(0.0, 1.0), LimitLoad::NeverBalanced);
 }
 
+/// A disk between two fixed walls bears any load along them, in both directions: self-stress and
+/// friction balance it. That says nothing of a second disk that falls.
+#[test]
+fn a_load_that_is_always_borne_does_not_hide_a_weight_that_is_not() {
+    let answer = |falls: bool, load: f64| {
+        let mut grains: Vec<Grain<D2>> = vec![grain(&[0.0, 1e-3], 1e-3)];
+        if falls {
+            grains.push(grain(&[1.0, 1e-3 + 1e-4], 1e-3));
+        }
+        let ceiling = Wall::fixed(Shape::Plane { normal: [0.0, -1.0].into() }, [0.0, 2e-3].into(), 0.3);
+        let mut set = settings(1e-4);
+        set.gravity = down::<D2>(9.81);
+        let mut world = world(grains, vec![floor::<D2>(0.3), ceiling], set);
+        world.loads.push(growing(0, &[load, 0.0], &[0.0]));
+        world.limit_load(0.0, 1.0)
+    };
+    for load in [1e-6, 1e-3, 1.0, 1e3, 1e6] {
+        assert_eq!(answer(false, load), LimitLoad::Unbounded, "{load} N");
+        assert_eq!(answer(true, load), LimitLoad::NeverBalanced, "{load} N");
+    }
+}
+
 #[test]
 fn dry_contacts_bear_what_friction_bears() {
     // two disks that a strong bond joins stand on a floor and are pushed along it: they slide at

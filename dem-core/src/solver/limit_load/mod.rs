@@ -50,6 +50,7 @@ pub fn limit_load<D: Dim>(problem: &ContactProblem<D>, growing: Arc<[(D::Vector,
         Ok(programme) => programme,
         Err(known) => return known,
     };
+    let mut borne = !constant;
     if constant {
         // whether they are balanced at λ = 0: the least λ
         programme.sense = 1.0;
@@ -60,6 +61,7 @@ pub fn limit_load<D: Dim>(problem: &ContactProblem<D>, growing: Arc<[(D::Vector,
                 if lower > tuning::ACCEPT.max((upper - lower).abs()) {
                     return LimitLoad::BrokenAtStart { least };
                 }
+                borne = true;
             }
             other => return other,
         }
@@ -68,6 +70,14 @@ pub fn limit_load<D: Dim>(problem: &ContactProblem<D>, growing: Arc<[(D::Vector,
     match programme.solve() {
         LimitLoad::Factor { lower, upper } if upper < -tuning::ACCEPT.max((upper - lower).abs()) => {
             LimitLoad::NeverBalanced
+        }
+        LimitLoad::Unbounded if !borne => {
+            // the growing loads are balanced in both directions; the constant ones may not be
+            programme.sense = 0.0;
+            match programme.solve() {
+                LimitLoad::Factor { .. } => LimitLoad::Unbounded,
+                other => other,
+            }
         }
         found => found,
     }

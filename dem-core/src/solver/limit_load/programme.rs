@@ -59,7 +59,7 @@ pub(super) struct Programme {
     /// Right side of the balance, and the growing load.
     pub b: Vec<f64>,
     pub load: Vec<f64>,
-    /// −1 to maximise λ, 1 to minimise it.
+    /// −1 to maximise λ, 1 to minimise it, 0 to balance the constant loads at any λ.
     pub sense: f64,
     /// The factor that one unit of the unknown λ stands for.
     pub unit: f64,
