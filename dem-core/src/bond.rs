@@ -160,8 +160,9 @@ pub enum Rupture {
     },
 }
 
-/// The least strength (N) at which a bond with this cone bears the reaction `r`; negative for a
-/// reaction far inside the limits. It grows in proportion to the reaction.
+/// The least strength at which a bond with this cone bears the reaction `r`, whose moments are
+/// divided by the mean diameter; in the unit of `r`. It is negative inside the cone without
+/// cohesion and positively homogeneous: a reaction twice as large needs twice the strength.
 pub fn required_strength<T: Vect, B: Moments>(r: &Local<T, B>, cone: Cone) -> f64 {
     required_limits(r, cone).into_iter().fold(0.0, f64::max) - r.n
 }

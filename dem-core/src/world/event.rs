@@ -5,8 +5,9 @@
 //! equilibrium r(τ) of the bodies at rest, with bonds that cannot break. At the τ of the last event
 //! the broken bonds have released their forces to the others. If no other bond exceeds its strength
 //! there, τ grows until the first one reaches it; else τ decreases until the last one meets it: the
-//! load of the next break. While no contact changes its status r(τ) is affine in the loads, and the
-//! secant through two equilibria finds that load with the third.
+//! load of the next break. While no contact changes its status r(τ) is affine in the loads; where
+//! the excess is affine, too (2D, one bond governs), a secant finds that load with the third
+//! equilibrium.
 
 use super::World;
 use super::assembly::{Places, over_arm, write_reactions};

@@ -1,4 +1,4 @@
-//! Points of the homogeneous embedding, and what is left of its equations there.
+//! Points of the homogeneous embedding, and the residuals there.
 
 use super::programme::{Programme, sum};
 use crate::solver::interior::cones::{Point, moved};
@@ -26,7 +26,7 @@ pub(super) struct Residual {
 }
 
 impl Programme {
-    /// What is left of the equations at a point.
+    /// The residuals at a point.
     pub fn residual(&self, at: &Iterate) -> Residual {
         let (pulled, of_cones) = (self.pulled(&at.y), self.of_cones(&at.z));
         let pushed = self.pushed(&at.r);

@@ -16,7 +16,9 @@
 //!
 //! With x = (r̂, λ), A = (H, f₁), s = L r̂ in a product of cones Q:
 //!
-//! minimise c·x subject to A x = b, s = L r̂ ∈ Q, b = −f₀ + H (r_coh n), c = (0, ∓1).
+//! minimise c·x subject to A x = b, s = L r̂ ∈ Q, b = −f₀ + H (r_coh n),
+//!
+//! with c = (0, −1) to maximise λ and c = (0, 1) to minimise it.
 //!
 //! Eliminating s and the dual z leaves S δr̂ + Hᵀδy = p with S = Lᵀ W⁻² L block by block, and with
 //! that (H S⁻¹ Hᵀ) δy on the graph of the bodies, bordered by f₁.

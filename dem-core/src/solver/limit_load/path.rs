@@ -1,4 +1,4 @@
-//! The way to the optimum, or to a proof that there is none.
+//! Iterations along the central path, to the optimum or to a proof that there is none.
 
 use super::iterate::{Iterate, Residual};
 use super::programme::{LimitLoad, Programme, most, sum};
