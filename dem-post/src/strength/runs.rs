@@ -159,6 +159,8 @@ pub(crate) struct Course {
     pub(crate) time: Vec<f64>,
     /// The load, N, positive in its own sense.
     pub(crate) load: Vec<f64>,
+    /// Why the load of a step is not that before anything broke in it; `None` where it is.
+    pub(crate) load_after_breaks: Option<String>,
     /// Axial strain fitted to the grains, along the load; empty if not recorded.
     strain: Vec<f64>,
     /// Bonds broken; empty if not recorded.
@@ -179,6 +181,7 @@ impl Course {
             _ => {
                 let found = stress_strain::read(history, wall)?;
                 Ok(Self {
+                    load_after_breaks: found.load_after_breaks(),
                     step: found.step,
                     time: found.time,
                     load: found.load,
@@ -198,8 +201,8 @@ impl Course {
         let lacking = |what: &str| PostError::Lacking { path: history.path().into(), what: what.into() };
         let [load] = pulling.as_slice() else {
             return Err(lacking(
-                "its strength needs a driven wall, or one force on a grain, and this scene has none: give one of its \
-                 walls a velocity or a force",
+                "its load is that of a driven wall or of one force on a grain, and this scene has neither: give one \
+                 of its walls a velocity or a force",
             ));
         };
         let steps = history.observable("bonds_broken")?.filter(|series| !series.step.is_empty());
@@ -217,7 +220,7 @@ impl Course {
             }
         }
         let load = steps.time.iter().map(|&t| size * load.time.at(t)).collect();
-        Ok(Self { step: steps.step, time: steps.time, load, strain, broken: steps.value })
+        Ok(Self { step: steps.step, time: steps.time, load, strain, broken: steps.value, load_after_breaks: None })
     }
 
     /// The failure of the sample by a measure; for a run that did not fail, the state it reached.
@@ -305,6 +308,7 @@ mod tests {
             time: (0..6).map(f64::from).collect(),
             load: vec![0.0, 10.0, 20.0, 30.0, 40.0, 12.0],
             strain: vec![0.0, 0.0, 0.0, -5e-5, -2e-4, -2e-3],
+            load_after_breaks: None,
             broken: vec![0.0, 0.0, 1.0, 1.0, 5.0, 9.0],
         }
     }

@@ -138,3 +138,15 @@ fn the_load_of_an_event_is_that_of_its_step() {
         "{text}"
     );
 }
+
+#[test]
+fn an_event_has_no_load_that_its_breaks_have_reduced() {
+    // a wall that is moved, without its force before the breaks of a step
+    let mut moved = layout(2);
+    moved.walls[1].drive = WallDrive::Velocity;
+    let (_folder, path) = sample(&moved);
+    let found = json(&dem_post(&path, &["emission", "--json"]));
+    assert_eq!(found["events"].as_array().unwrap().len(), 2);
+    assert!(found["events"].as_array().unwrap().iter().all(|event| event["load"].is_null()), "{found}");
+    assert!(found["load_note"].as_str().unwrap().contains("no wall_force_at_limit of wall top"), "{found}");
+}
