@@ -10,6 +10,7 @@ use dem_scene::failure::{BROKEN_SHARE, STRAINS};
 use serde::Serialize;
 use serde_json::Value;
 
+use super::left_out::LeftOut;
 use crate::collapse::{Bonding, Collapse, peak};
 use crate::output::{PostError, Result, quantity};
 use crate::stress_strain;
@@ -52,15 +53,6 @@ pub struct Found {
     pub strength: std::result::Result<Strength, String>,
     /// Radii of its grains and its bonds: equal in two runs of the same grains.
     pub grains: (Vec<f64>, Vec<[i32; 2]>),
-}
-
-/// A run without a strength.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct LeftOut {
-    /// Its file.
-    pub run: String,
-    /// The reason.
-    pub why: String,
 }
 
 /// The strength of a run, and when it was reached.
@@ -116,6 +108,12 @@ pub fn histories(paths: &[PathBuf]) -> Result<(Vec<PathBuf>, Vec<LeftOut>)> {
         return Err(PostError::Usage(format!("{what} histories, or the folder of a sweep that has been run")));
     }
     Ok((found, left_out))
+}
+
+/// The note on `count` runs whose failure is [`Failure::early`]; `None` without such runs.
+pub(crate) fn early(count: usize) -> Option<String> {
+    let why = "if bonds join all grains to one piece, the strain is solver error";
+    (count > 0).then(|| format!("in {count} runs no bond had broken before the collapse: {why}"))
 }
 
 /// The name of a run in tables.
