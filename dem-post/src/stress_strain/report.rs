@@ -180,7 +180,7 @@ pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
     Ok(report)
 }
 
-/// The elastic constants, or why there are none; `push` as [`sample_size`] has it.
+/// The elastic constants, or why there are none; `push` is that of [`sample_size`].
 fn elastic(
     history: &History,
     report: &Report,
@@ -455,9 +455,9 @@ impl Report {
     pub fn table(&self) -> String {
         let s = &self.summary;
         let bonds = s.bonds_broken.map_or_else(|| "–".into(), |n| format!("{n:.0}"));
-        let mut lines = vec![
-            ("driven wall", s.wall.clone()),
-            ("sample", s.sample()),
+        let mut lines = vec![("driven wall", s.wall.clone()), ("sample", s.sample())];
+        lines.extend(s.elastic().into_iter().flatten());
+        lines.extend([
             ("first break", quantity(s.first_break, "N")),
             ("collapse load (strain 1e-4)", s.collapse(0)),
             ("collapse load (strain 1e-3)", s.collapse(1)),
@@ -466,19 +466,16 @@ impl Report {
             ("collapse at", quantity(s.collapse_time, "s")),
             ("peak load", s.peak()),
             ("strain at the peak", quantity(s.peak_strain, "")),
+        ]);
+        lines.extend(s.splitting.as_ref().map(|splitting| ("splitting strength", splitting.to_string())));
+        lines.extend([
             ("greatest load", quantity(Some(s.greatest_load), "N")),
             ("displacement at the end", quantity(Some(s.final_displacement), "m")),
             ("strain at the end", quantity(s.final_strain, "")),
             ("work of the wall", quantity(Some(s.work), "J")),
             ("bonds broken", bonds),
             ("worst residual accepted", quantity(s.worst_residual, "")),
-        ];
-        for (k, line) in s.elastic().into_iter().flatten().enumerate() {
-            lines.insert(2 + k, line);
-        }
-        if let Some(splitting) = &s.splitting {
-            lines.insert(lines.len() - 6, ("splitting strength", splitting.to_string()));
-        }
+        ]);
         facts(&lines)
     }
 }
