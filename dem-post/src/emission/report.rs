@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::events::{Event, Rule, cluster};
 use super::frequency::{BValue, FEWEST, Frequency, Values, maximum_curvature};
-use crate::output::{PostError, Result, Text, facts, number, quantity};
+use crate::output::{PostError, Result, Text, counted, facts, number, quantity};
 use crate::strength::runs::Course;
 
 /// Maximum number of events in the table on the terminal; the CSV has all.
@@ -251,10 +251,6 @@ impl Report {
             if rest > 0 { format!("… and {rest} smaller ones in emission-events.csv\n") } else { String::new() };
         table.lines() + &more
     }
-}
-
-fn counted(number: usize, word: &str) -> String {
-    format!("{number} {word}{}", if number == 1 { "" } else { "s" })
 }
 
 /// A b-value with its error.

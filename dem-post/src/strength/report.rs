@@ -8,7 +8,8 @@ use super::fit::{Estimate, Line, Spread, line, spread};
 use super::left_out::{self, LeftOut};
 use super::runs::{self, Found, Measure, early, histories, name};
 use super::scenes::{design, unit};
-use crate::output::{Result, Text, facts, number, quantity};
+use crate::extent::range;
+use crate::output::{Result, Text, counted, facts, number, quantity};
 
 /// Threshold of round-off: of 1 − R², and of the ratio of an intercept to the greatest strength.
 const ROUNDING: f64 = 1e-12;
@@ -175,7 +176,7 @@ fn at_values(runs: &[Run]) -> Vec<AtValue> {
         let here: Vec<&Run> = runs.iter().filter(|run| run.value == value).collect();
         let strengths: Vec<f64> = here.iter().map(|run| run.strength).collect();
         let ratios: Vec<f64> = here.iter().filter_map(|run| run.ratio).collect();
-        let range = strengths.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], &s| [l.min(s), h.max(s)]);
+        let range = range(strengths.iter().copied());
         Some(AtValue { value, strength: spread(&strengths)?, range, ratio: spread(&ratios) })
     };
     values.into_iter().filter_map(at).collect()
@@ -275,8 +276,7 @@ impl Report {
     /// The report as tables.
     pub fn table(&self) -> String {
         let slope_unit = self.slope_unit();
-        let varied =
-            format!("{}, {} {}", axis(&self.field, &self.unit), self.values.len(), plural(self.values.len(), "value"));
+        let varied = format!("{}, {}", axis(&self.field, &self.unit), counted(self.values.len(), "value"));
         let by = if self.sample_fields.is_empty() {
             String::new()
         } else {
@@ -397,10 +397,6 @@ fn share(r: f64) -> String {
 /// A field or a load with its unit, as on an axis.
 pub(super) fn axis(name: &str, unit: &str) -> String {
     if unit.is_empty() { name.to_string() } else { format!("{name} ({unit})") }
-}
-
-fn plural(count: usize, word: &str) -> String {
-    if count == 1 { word.into() } else { format!("{word}s") }
 }
 
 /// A fitted number with its errors.

@@ -12,7 +12,7 @@ use serde_json::Value;
 
 use super::left_out::LeftOut;
 use crate::collapse::{Bonding, Collapse, peak};
-use crate::output::{PostError, Result, quantity};
+use crate::output::{PostError, Result, counted, quantity};
 use crate::stress_strain;
 
 /// Definition of the strength of a run: the load at …
@@ -113,7 +113,7 @@ pub fn histories(paths: &[PathBuf]) -> Result<(Vec<PathBuf>, Vec<LeftOut>)> {
 /// The note on `count` runs whose failure is [`Failure::early`]; `None` without such runs.
 pub(crate) fn early(count: usize) -> Option<String> {
     let why = "if bonds join all grains to one piece, the strain is solver error";
-    (count > 0).then(|| format!("in {count} runs no bond had broken before the collapse: {why}"))
+    (count > 0).then(|| format!("in {} no bond had broken before the collapse: {why}", counted(count, "run")))
 }
 
 /// The name of a run in tables.
