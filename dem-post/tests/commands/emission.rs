@@ -10,13 +10,7 @@ fn chain(steps: &[i64], energy: f64) -> (tempfile::TempDir, PathBuf) {
     let mut l = layout(2);
     l.observables.clear();
     l.walls.clear();
-    l.grains = Grains {
-        id: (0..count as i32).collect(),
-        radius: vec![1e-3; count],
-        mass: vec![1.0; count],
-        inertia: vec![1.0; count],
-        material: vec![],
-    };
+    l.grains = grains(count, 1e-3);
     let bonds = steps.len();
     l.bonds = Bonds {
         pair: (0..bonds as i32).map(|k| [k, k + 1]).collect(),
