@@ -68,7 +68,7 @@ pub fn read(paths: &[PathBuf], measure: Measure, wall: Option<&str>) -> Result<R
         }
     }
     if circles.is_empty() {
-        return Err(left_out::none_failed(&left_out, measure));
+        return Err(left_out::none_failed(&left_out, measure.title()));
     }
     let envelope = envelope(&principals(&circles));
     let mut report = Report { measure, varied: varied(&scenes)?, envelope, circles, left_out, notes: vec![] };

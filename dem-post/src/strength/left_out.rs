@@ -2,7 +2,6 @@
 
 use serde::Serialize;
 
-use super::runs::Measure;
 use crate::output::{PostError, Result};
 
 /// Maximum number of them that a table names.
@@ -25,11 +24,11 @@ impl LeftOut {
     }
 }
 
-/// The error where no run failed by `measure`.
-pub(crate) fn none_failed(left_out: &[LeftOut], measure: Measure) -> PostError {
+/// The error where no run has a `load`, the name of that at failure.
+pub(crate) fn none_failed(left_out: &[LeftOut], load: &str) -> PostError {
     let runs: Vec<String> = left_out.iter().take(IN_ERROR).map(LeftOut::line).collect();
-    let what = format!("no run has a {}", measure.title());
-    PostError::Usage(format!("{what}; choose another --measure, or load further; {}", runs.join("; ")))
+    let runs = runs.join("; ");
+    PostError::Usage(format!("no run has a {load}; choose another --measure, or load further; {runs}"))
 }
 
 /// Whether every run has a result, as `done` runs have.

@@ -142,7 +142,7 @@ pub fn read(paths: &[PathBuf], options: &Options) -> Result<Report> {
         }
     }
     if runs.is_empty() {
-        return Err(left_out::none_failed(&left_out, options.measure));
+        return Err(left_out::none_failed(&left_out, options.measure.title()));
     }
     let samples = samples(&design.samples, &runs, &grains);
     let mut report = Report {
