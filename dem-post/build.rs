@@ -19,8 +19,11 @@ fn main() {
         }
     }
     println!("cargo::rustc-env=DEM_VERSION={version}");
-    // a change makes the revision "dirty"
-    for source in ["build.rs", "src", "templates", "Cargo.toml", "../dem-run/drawing", "../dem-run/history"] {
+    // what the program is made of: a change makes the revision "dirty"
+    for source in ["build.rs", "src", "templates", "Cargo.toml", "../Cargo.lock"] {
         println!("cargo::rerun-if-changed={source}");
+    }
+    for part in ["drawing", "history", "output", "scene"] {
+        println!("cargo::rerun-if-changed=../dem-run/{part}");
     }
 }

@@ -1,8 +1,13 @@
-//! The box around all grains.
+//! Ranges of numbers, and the box around all grains.
 
 use dem_history::History;
 
 use crate::output::Result;
+
+/// The least and the greatest of some numbers; infinite, the least above the greatest, without any.
+pub fn range(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
+    values.into_iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
+}
 
 /// The box around all grains at the first frame, m: its ends along each axis.
 ///

@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use crate::analysis::Analysis;
 use crate::cracks::Modes;
+use crate::extent::range;
 use crate::output::{Result, facts, in_shell, number, quantity};
 use crate::section::{OnPage, Section};
 use crate::{check, pack, stress_strain};
@@ -147,9 +148,6 @@ pub struct Report {
 pub fn read(history: &History) -> Result<Report> {
     let (parameters, grains, bonds) = (history.parameters()?, history.grains()?, history.bonds()?);
     let revision = if parameters.git_revision.is_empty() { "unknown" } else { &parameters.git_revision };
-    let range = |values: &[f64]| {
-        values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &v| [low.min(v), high.max(v)])
-    };
     let mut broken = Modes::default();
     history.ruptures()?.iter().for_each(|rupture| broken.add(rupture.mode));
     let listed = history.walls()?;
@@ -167,13 +165,13 @@ pub fn read(history: &History) -> Result<Report> {
         dimension: history.dimension(),
         seed: parameters.seed,
         grains: grains.radius.len(),
-        diameters: range(&grains.radius).map(|r| 2.0 * r),
+        diameters: range(grains.radius.iter().copied()).map(|r| 2.0 * r),
         mass: grains.mass.iter().sum(),
         walls: walls(&listed),
         load_wall: load_wall.map(String::from),
         driven: driven.len(),
         bonds: bonds.len(),
-        cohesion: (!bonds.is_empty()).then(|| range(&bonds.strength)),
+        cohesion: (!bonds.is_empty()).then(|| range(bonds.strength.iter().copied())),
         broken,
         frames,
         first: (frames > 0).then(|| moment(0)),

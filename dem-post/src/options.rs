@@ -6,7 +6,7 @@ use clap::Args;
 use dem_history::History;
 use dem_output::command_line::seconds;
 
-use crate::output::{Folder, Result, default_folder, source};
+use crate::output::{Folder, Result, Source, default_folder, source};
 
 /// A history and the folder for what is made of it.
 #[derive(Debug, Args)]
@@ -19,6 +19,21 @@ pub struct Files {
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
     /// Overwrite a results folder of another history: its results are removed.
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// Several runs and the folder for what is made of them.
+#[derive(Debug, Args)]
+pub struct Runs {
+    /// Histories, or the folder of a sweep.
+    #[arg(value_name = "RUNS", required = true)]
+    pub runs: Vec<PathBuf>,
+    /// Folder for the results, created if missing [default: RUNS-strength, for `envelope`
+    /// RUNS-envelope, in the current folder].
+    #[arg(short, long, value_name = "DIR")]
+    pub output: Option<PathBuf>,
+    /// Overwrite a results folder of other histories: their results are removed.
     #[arg(long)]
     pub force: bool,
 }
@@ -46,6 +61,20 @@ impl LoadWall {
     /// The requested wall.
     pub fn name(&self) -> Option<&str> {
         self.wall.as_deref()
+    }
+}
+
+impl Runs {
+    /// The folder for the results of the command `command`: the requested one, or that named after
+    /// the first run and the command.
+    ///
+    /// # Errors
+    /// [`crate::output::PostError::Write`] for a folder that cannot be created, or that belongs to
+    /// other histories.
+    pub fn folder(&self, command: &str) -> Result<Option<Folder>> {
+        let path = self.output.clone().unwrap_or_else(|| default_folder(&self.runs[0], &format!("-{command}")));
+        let sources = self.runs.iter().map(|run| Source::new(run, None)).collect();
+        Ok(Some(Folder::of(path, command, sources, self.force)?))
     }
 }
 

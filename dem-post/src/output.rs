@@ -65,6 +65,11 @@ pub(crate) fn progress(length: u64, quiet: bool, template: &str) -> ProgressBar 
     bar
 }
 
+/// A number of things in words: `1 bond`, `2 bonds`.
+pub(crate) fn counted(number: usize, word: &str) -> String {
+    format!("{number} {word}{}", if number == 1 { "" } else { "s" })
+}
+
 /// A history as the source of results: its path, and the properties of its run that do not change
 /// while the run continues or when the history is packed.
 ///

@@ -12,6 +12,7 @@ use dem_history::{GrainState, History};
 use serde::Serialize;
 
 use crate::analysis::Analysis;
+use crate::extent::range;
 use crate::map::{Arrow, Key, Panel, Ramp, Sample, Scale, draw};
 use crate::moments;
 use crate::options::Moments;
@@ -248,15 +249,12 @@ impl OnPage for Report {
 /// Arrows of the mean velocities of disks in the squares of a grid; the longest is as long as a
 /// square is wide.
 fn arrows(state: &GrainState) -> Vec<Arrow> {
-    let range = [0, 1].map(|k| {
-        let values = || state.position.chunks(2).map(|x| x[k]);
-        (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max))
-    });
-    let side = range.iter().map(|(low, high)| high - low).fold(0.0, f64::max) / SQUARES;
+    let ends = [0, 1].map(|k| range(state.position.chunks(2).map(|x| x[k])));
+    let side = ends.iter().map(|[low, high]| high - low).fold(0.0, f64::max) / SQUARES;
     if side <= 0.0 || !side.is_finite() {
         return vec![];
     }
-    let square = |grain: &usize| [0, 1].map(|k| ((state.position[2 * grain + k] - range[k].0) / side) as i64);
+    let square = |grain: &usize| [0, 1].map(|k| ((state.position[2 * grain + k] - ends[k][0]) / side) as i64);
     let mut grains: Vec<usize> = (0..state.position.len() / 2).collect();
     grains.sort_by_key(square);
     let mean = |group: &[usize], all: &[f64]| {

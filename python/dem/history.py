@@ -103,9 +103,15 @@ class History:
         return int(np.abs(times - time).argmin())
 
     def grains(self, frames=None):
-        """Positions, velocities and turns of the grains: dimensions time, grain and axis."""
+        """Positions, velocities and turns of the grains: dimensions time, grain and axis.
+
+        Where there are several materials, `material` names that of each grain.
+        """
         group = self._file["particles/grains"]
         fixed = {name: (("grain",), group[name][:], _units(group[name])) for name in ("radius", "mass", "inertia")}
+        if "material" in group:
+            names = self._file["materials/name"].asstr()[:].astype(str)
+            fixed["material"] = (("grain",), names[group["material"][:]])
         trailing = {
             "position": ("grain", "axis"),
             "velocity": ("grain", "axis"),
@@ -272,7 +278,7 @@ def _named(data, values=None):
 
 
 def _units(data):
-    return {"units": _plain(data.attrs["unit"])} if "unit" in data.attrs else {}
+    return _unit_of("units", data)
 
 
 def _unit_of(column, data):

@@ -138,6 +138,30 @@ def test_in_3d_there_are_two_tangents(program):
         dem.run(scene)
 
 
+def test_grains_have_the_names_of_their_materials(program):
+    scene = {
+        "dimension": 2,
+        "sample": {"grains": [{"center": [x, 0], "radius": 1e-3} for x in (0, 4e-3, 8e-3)]},
+        "materials": {
+            "density": 2500,
+            "friction": {"grain_grain": 0.3, "grain_wall": 0.3},
+            "named": [
+                {"name": "steel", "density": 7800, "regions": [{"half_space": {"point": [6e-3, 0], "normal": [1, 0]}}]}
+            ],
+        },
+        "time": {"step": 1e-4, "end": 1e-3},
+        "output": {"every_steps": 5},
+    }
+    with dem.run(scene, "two.h5") as history:
+        grains = history.grains(-1)
+        assert grains["material"].dims == ("grain",)
+        assert grains["material"].values.tolist() == ["base", "base", "steel"]
+        assert float(grains["mass"][2] / grains["mass"][0]) == pytest.approx(7800 / 2500)
+    scene["materials"].pop("named")
+    with dem.run(scene, "one.h5") as history:
+        assert "material" not in history.grains(-1)
+
+
 def test_a_run_takes_values_of_fields(program, tmp_path):
     with dem.run(COLUMN, time__end=0.01, title=None, **{"materials.density": 1000}) as history:
         assert (tmp_path / "column.h5").exists()

@@ -9,7 +9,7 @@ use super::report::{Pieces, Report};
 use super::surfaces::Facet;
 use crate::fragments::{Fragment, Fragments};
 use crate::map::{Colour, Key, Link, Panel, Patch, Ramp, Sample, Scale, draw, draw_view};
-use crate::output::{Result, number};
+use crate::output::{Result, counted, number};
 use dem_drawing::{Chart, Drawing, Style, colour};
 
 /// Fill of grains that kept all their bonds.
@@ -169,11 +169,9 @@ impl<'a> When<'a> {
 
 /// The grains of the first frame, pale; the caption gives the numbers of cracks and broken bonds.
 fn pale_panel(history: &History, report: &Report, cracks: usize) -> Result<Panel> {
-    let plural = |count: usize| if count == 1 { "" } else { "s" };
-    let broken = report.broken.total();
     Ok(Panel {
         caption: vec![
-            format!("{cracks} crack{} of {broken} broken bond{}", plural(cracks), plural(broken)),
+            format!("{} of {}", counted(cracks, "crack"), counted(report.broken.total(), "broken bond")),
             "positions in the first frame".into(),
         ],
         grains: history.grain_state(0)?,

@@ -106,7 +106,7 @@ fn within(own: &[usize], around: &[Vec<usize>], reach: u32) -> Vec<usize> {
     let mut found = own.to_vec();
     let mut shell: Range<usize> = 0..found.len();
     for _ in 0..reach {
-        let mut next: Vec<usize> = found[shell.clone()].iter().flat_map(|&grain| around[grain].clone()).collect();
+        let mut next: Vec<usize> = found[shell.clone()].iter().flat_map(|&grain| &around[grain]).copied().collect();
         next.sort_unstable();
         next.dedup();
         next.retain(|grain| !found.contains(grain));
@@ -123,7 +123,7 @@ impl Event {
         let mut modes = Modes::default();
         own.iter().for_each(|rupture| modes.add(rupture.mode));
         let place = [0, 1, 2].map(|k| own.iter().map(|rupture| rupture.point[k]).sum::<f64>() / count);
-        let off = |rupture: &&&Rupture| (0..3).map(|k| (rupture.point[k] - place[k]).powi(2)).sum::<f64>();
+        let off = |rupture: &&Rupture| (0..3).map(|k| (rupture.point[k] - place[k]).powi(2)).sum::<f64>();
         let mut rounds: Vec<(i64, i32)> = own.iter().map(|rupture| (rupture.step, rupture.round)).collect();
         rounds.dedup();
         Self {
@@ -136,7 +136,7 @@ impl Event {
             bonds: own.len(),
             modes,
             place,
-            radius: (own.iter().map(|rupture| off(&rupture)).sum::<f64>() / count).sqrt(),
+            radius: (own.iter().map(off).sum::<f64>() / count).sqrt(),
             energy: own.iter().map(|rupture| rupture.energy).sum(),
             magnitude: None,
         }

@@ -32,16 +32,16 @@ pub struct Command {
     #[command(flatten)]
     files: Files,
     /// Ruptures at most this many steps apart can be linked to one event.
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = Options::default().rule.steps)]
     steps: u32,
     /// Ruptures at most this many bonds apart can be linked: 0 if they share a grain.
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = Options::default().rule.reach)]
     reach: u32,
     /// Magnitude of an event [default: energy, of rigid bonds size].
     #[arg(long, value_enum)]
     magnitude: Option<Scale>,
     /// Width of the bins of magnitudes of energy.
-    #[arg(long, value_name = "WIDTH", default_value_t = 0.1)]
+    #[arg(long, value_name = "WIDTH", default_value_t = Options::default().bin)]
     bin: f64,
     /// Magnitude from which the b-value is estimated [default: that of the most events].
     #[arg(long, value_name = "M", allow_negative_numbers = true)]

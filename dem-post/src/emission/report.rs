@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::events::{Event, Rule, cluster};
 use super::frequency::{BValue, FEWEST, Frequency, Values, maximum_curvature};
-use crate::output::{PostError, Result, Text, facts, number, quantity};
+use crate::output::{PostError, Result, Text, counted, facts, number, quantity};
 use crate::strength::runs::Course;
 
 /// Maximum number of events in the table on the terminal; the CSV has all.
@@ -46,7 +46,7 @@ impl Default for Options {
 /// The load, and what had broken, over the steps.
 #[derive(Clone, Debug, Default)]
 pub struct Curves {
-    /// Time, s, and load, N; empty where the load is not known.
+    /// Time, s, and load, N; empty for a run without a load.
     pub load: Vec<(f64, f64)>,
     /// Time of each rupture, s, and its energy, J.
     pub ruptures: Vec<(f64, f64)>,
@@ -75,7 +75,7 @@ pub struct Report {
     pub b_value: Option<BValue>,
     /// Why there is none; empty where there is one.
     pub b_note: String,
-    /// Why there is no load; empty where there is one.
+    /// Why the events have no load; empty where they have one.
     pub load_note: String,
     /// The events in the order of their first ruptures.
     pub events: Vec<Event>,
@@ -118,8 +118,10 @@ pub fn read(history: &History, options: &Options) -> Result<Report> {
     let (course, load_note) = load(history, options.wall.as_deref())?;
     let own = |event: &Vec<usize>| {
         let mut event = Event::of(&event.iter().map(|&k| &ruptures[k]).collect::<Vec<_>>());
-        let at = course.as_ref().and_then(|course| Some((course, course.step.binary_search(&event.step).ok()?)));
-        event.load = at.and_then(|(course, k)| course.load.get(k).copied());
+        if load_note.is_empty() {
+            let row = course.step.binary_search(&event.step).ok();
+            event.load = row.and_then(|row| course.load.get(row).copied());
+        }
         event.magnitude = match scale {
             Scale::Energy => (event.energy > 0.0).then(|| event.energy.log10() / 1.5),
             Scale::Size => Some((event.bonds as f64).log10()),
@@ -133,7 +135,6 @@ pub fn read(history: &History, options: &Options) -> Result<Report> {
     let frequencies = values.frequencies(&magnitudes);
     let completeness = options.completeness.or_else(|| maximum_curvature(&frequencies));
     let b_value = completeness.and_then(|from| values.b_value(&magnitudes, from));
-    let course = course.unwrap_or_default();
     Ok(Report {
         rule: options.rule,
         magnitude: scale,
@@ -156,12 +157,15 @@ pub fn read(history: &History, options: &Options) -> Result<Report> {
     })
 }
 
-/// The load over the steps, or why it is not known.
-fn load(history: &History, wall: Option<&str>) -> Result<(Option<Course>, String)> {
+/// The load over the steps, and why that of an event is not known; empty where it is.
+fn load(history: &History, wall: Option<&str>) -> Result<(Course, String)> {
     match Course::read(history, wall) {
-        Ok(course) => Ok((Some(course), String::new())),
-        Err(PostError::Usage(why)) if wall.is_none() => Ok((None, why)),
-        Err(PostError::Lacking { what, .. }) if wall.is_none() => Ok((None, what)),
+        Ok(mut course) => {
+            let why = course.load_after_breaks.take();
+            Ok((course, why.unwrap_or_default()))
+        }
+        Err(PostError::Usage(why)) if wall.is_none() => Ok((Course::default(), why)),
+        Err(PostError::Lacking { what, .. }) if wall.is_none() => Ok((Course::default(), what)),
         Err(error) => Err(error),
     }
 }
@@ -212,7 +216,7 @@ impl Report {
             ("b-value", self.b_value.map_or_else(|| format!("none: {}", self.b_note), |law| words(&law))),
         ];
         if !self.load_note.is_empty() {
-            lines.push(("load", format!("not known: {}", self.load_note)));
+            lines.push(("load of an event", format!("not known: {}", self.load_note)));
         }
         facts(&lines) + &if self.events.is_empty() { String::new() } else { format!("\n{}", self.event_table()) }
     }
@@ -247,10 +251,6 @@ impl Report {
             if rest > 0 { format!("… and {rest} smaller ones in emission-events.csv\n") } else { String::new() };
         table.lines() + &more
     }
-}
-
-fn counted(number: usize, word: &str) -> String {
-    format!("{number} {word}{}", if number == 1 { "" } else { "s" })
 }
 
 /// A b-value with its error.

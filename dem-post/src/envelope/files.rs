@@ -6,6 +6,7 @@ use dem_drawing::{Chart, Drawing, Style, colour};
 use dem_output::row;
 
 use super::report::Report;
+use crate::extent::range;
 use crate::output::{Folder, Result, cell, number, short};
 
 /// Points of a half circle.
@@ -45,10 +46,7 @@ fn circles_drawing(report: &Report) -> Drawing {
             points.push((1e-3 * (centre + radius * angle.cos()), 1e-3 * radius * angle.sin().max(0.0)));
         }
     }
-    let range = |of: fn(&(f64, f64)) -> f64| {
-        points.iter().map(of).fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
-    };
-    let ([low, high], [_, top]) = (range(|p| p.0), range(|p| p.1));
+    let ([low, high], [_, top]) = (range(points.iter().map(|p| p.0)), range(points.iter().map(|p| p.1)));
     chart = chart.curve("at failure", colour::BLUE, Style::Thin, points);
     let mut above = top;
     if let Some(line) = &report.envelope {
@@ -61,8 +59,7 @@ fn circles_drawing(report: &Report) -> Drawing {
         let name = format!("φ = {}°, c = {} kPa", short(line.friction_angle.value), short(1e-3 * line.cohesion.value));
         chart = chart.curve(&name, colour::VERMILLION, Style::Line, vec![at(first), at(high)]);
     }
-    let width = chart.curves.iter().flat_map(|curve| &curve.points).map(|p| p.0);
-    let [low, high] = width.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)]);
+    let [low, high] = range(chart.curves.iter().flat_map(|curve| &curve.points).map(|p| p.0));
     let height = if high > low { MARGINS + AXIS * above / (high - low) } else { HEIGHTS[0] };
     Chart::draw_sized(vec![chart], (WIDTH, height.clamp(HEIGHTS[0], HEIGHTS[1])))
 }
@@ -73,11 +70,9 @@ fn principal(report: &Report) -> Chart {
     let mut chart = Chart::new("least principal stress σ₃ (kPa)", "greatest principal stress σ₁ (kPa)");
     chart.pad_x = true;
     if let Some(line) = &report.envelope {
-        let ends = points.iter().map(|p| p.0);
-        let ends = [ends.clone().fold(f64::INFINITY, f64::min), ends.fold(f64::NEG_INFINITY, f64::max)];
         let (slope, strength) = (line.slope.value, 1e-3 * line.unconfined_strength.value);
         let name = format!("σ₁ = {} σ₃ + {} kPa", number(slope), number(strength));
-        let line = ends.map(|x| (x, slope * x + strength)).to_vec();
+        let line = range(points.iter().map(|p| p.0)).map(|x| (x, slope * x + strength)).to_vec();
         chart = chart.curve(&name, colour::VERMILLION, Style::Line, line);
     }
     chart.curve("runs", colour::BLUE, Style::Points, points)

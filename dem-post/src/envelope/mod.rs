@@ -21,13 +21,11 @@
 //! The errors of N and σ_c, and their covariance −σ̄₃ s_N², propagate to φ and c by these
 //! derivatives.
 
-use std::path::PathBuf;
-
 use clap::Args;
 
 use crate::analysis::Analysis;
-use crate::options::LoadWall;
-use crate::output::{Folder, Result, Source, default_folder};
+use crate::options::{LoadWall, Runs};
+use crate::output::{Folder, Result};
 use crate::strength::Measure;
 pub use files::write;
 pub use report::{Report, read};
@@ -42,20 +40,13 @@ pub mod report;
 /// The exit code is 1 if runs were left out because they did not fail or are not done.
 #[derive(Debug, Args)]
 pub struct Command {
-    /// Histories, or the folder of a sweep.
-    #[arg(value_name = "RUNS", required = true)]
-    runs: Vec<PathBuf>,
     /// Definition of failure.
     #[arg(long, value_enum, default_value_t)]
     measure: Measure,
     #[command(flatten)]
     load_wall: LoadWall,
-    /// Folder for the results, created if missing [default: RUNS-envelope].
-    #[arg(short, long, value_name = "DIR")]
-    output: Option<PathBuf>,
-    /// Overwrite a results folder of other histories: their results are removed.
-    #[arg(long)]
-    force: bool,
+    #[command(flatten)]
+    runs: Runs,
 }
 
 impl Analysis for Command {
@@ -69,7 +60,7 @@ impl Analysis for Command {
     }
 
     fn read(&self, (): &(), _: bool) -> Result<Report> {
-        read(&self.runs, self.measure, self.load_wall.name())
+        read(&self.runs.runs, self.measure, self.load_wall.name())
     }
 
     fn table(report: &Report) -> String {
@@ -77,9 +68,7 @@ impl Analysis for Command {
     }
 
     fn folder(&self, (): &()) -> Result<Option<Folder>> {
-        let path = self.output.clone().unwrap_or_else(|| default_folder(&self.runs[0], "-envelope"));
-        let sources = self.runs.iter().map(|run| Source::new(run, None)).collect();
-        Ok(Some(Folder::of(path, Self::NAME, sources, self.force)?))
+        self.runs.folder(Self::NAME)
     }
 
     fn write(&self, (): &(), report: &mut Report, folder: &mut Folder, _: bool) -> Result<()> {

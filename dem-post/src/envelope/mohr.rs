@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use crate::extent::range;
 use crate::strength::fit::{Estimate, around, line};
 
 /// τ = c + σ tan φ.
@@ -27,10 +28,8 @@ const ONE_CONFINEMENT: f64 = 0.01;
 
 /// Whether all circles with these principal stresses (σ₃, σ₁) have one confinement.
 pub fn one_confinement(principal: &[(f64, f64)]) -> bool {
-    let range = |of: fn(&(f64, f64)) -> f64| {
-        principal.iter().map(of).fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
-    };
-    let ([low, high], [_, most]) = (range(|p| p.0), range(|p| p.1.abs()));
+    let [low, high] = range(principal.iter().map(|p| p.0));
+    let [_, most] = range(principal.iter().map(|p| p.1.abs()));
     high - low <= ONE_CONFINEMENT * most
 }
 

@@ -7,13 +7,11 @@ use serde::Serialize;
 
 use super::mohr::{Envelope, envelope, one_confinement};
 use crate::output::{PostError, Result, Text, facts, number, quantity};
-use crate::strength::fit::Estimate;
-use crate::strength::runs::{Course, Failure, LeftOut, Measure, histories, name};
+use crate::strength::left_out::{self, LeftOut};
+use crate::strength::report::estimate;
+use crate::strength::runs::{Course, Failure, Measure, early, histories, name};
 use crate::strength::scenes::varied;
 use crate::tensor::principal;
-
-/// Maximum number of omitted runs named in the table.
-const NAMED: usize = 12;
 
 /// The stress of a run at failure.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -70,9 +68,7 @@ pub fn read(paths: &[PathBuf], measure: Measure, wall: Option<&str>) -> Result<R
         }
     }
     if circles.is_empty() {
-        let all: Vec<String> = left_out.iter().take(3).map(|out| format!("{}: {}", out.run, out.why)).collect();
-        let what = format!("no run has a {}", measure.title());
-        return Err(PostError::Usage(format!("{what}; choose another --measure, or load further; {}", all.join("; "))));
+        return Err(left_out::none_failed(&left_out, measure.title()));
     }
     let envelope = envelope(&principals(&circles));
     let mut report = Report { measure, varied: varied(&scenes)?, envelope, circles, left_out, notes: vec![] };
@@ -122,12 +118,7 @@ impl Report {
     /// # Errors
     /// [`PostError::Incomplete`] where runs were left out.
     pub fn complete(&self) -> Result<()> {
-        let (out, all) = (self.left_out.len(), self.left_out.len() + self.circles.len());
-        let Some(first) = self.left_out.first() else { return Ok(()) };
-        Err(PostError::Incomplete(format!(
-            "{out} of {all} runs are left out, such as {}: {}; the results are those of the others",
-            first.run, first.why
-        )))
+        left_out::complete(&self.left_out, self.circles.len())
     }
 
     /// Notes: what the runs do not show, and caveats.
@@ -146,23 +137,16 @@ impl Report {
             }
             Some(_) => {}
         }
-        let early = self.circles.iter().filter(|circle| circle.early).count();
-        if early > 0 {
-            notes.push(format!(
-                "in {early} runs no bond had broken before the collapse: if bonds join all grains to one piece, the \
-                 strain is solver error"
-            ));
-        }
+        notes.extend(early(self.circles.iter().filter(|circle| circle.early).count()));
         notes
     }
 
     /// The report as tables.
     pub fn table(&self) -> String {
-        let left = if self.left_out.is_empty() { String::new() } else { format!(", {} left out", self.left_out.len()) };
         let varied = if self.varied.is_empty() { "nothing but the sample".into() } else { self.varied.join(", ") };
         let mut lines = vec![
             ("failure", self.measure.title().to_string()),
-            ("runs", format!("{}{left}", self.circles.len())),
+            ("runs", left_out::counted(self.circles.len(), &self.left_out)),
             ("differ in", varied),
         ];
         if let Some(line) = &self.envelope {
@@ -179,26 +163,6 @@ impl Report {
             let middle = quantity(c.intermediate, "");
             table.row(vec![c.run.clone(), number(c.time), number(c.load), number(c.major), middle, number(c.minor)]);
         }
-        let mut out = facts(&lines) + "\n" + &table.lines();
-        let left_out = self.left_out.iter().take(NAMED).map(|out| format!("left out: {}: {}", out.run, out.why));
-        let more = self.left_out.len().saturating_sub(NAMED);
-        let more = (more > 0).then(|| format!("left out: … and {more} more in envelope.csv"));
-        let notes = self.notes.iter().map(|note| format!("note: {note}"));
-        let remarks: Vec<String> = left_out.chain(more).chain(notes).collect();
-        if !remarks.is_empty() {
-            out += &format!("\n{}\n", remarks.join("\n"));
-        }
-        out
-    }
-}
-
-/// A fitted number with its errors.
-fn estimate(found: &Estimate, unit: &str) -> String {
-    let value = quantity(Some(found.value), unit);
-    match found.standard_error.zip(found.interval) {
-        Some((error, [low, high])) => {
-            format!("{value}, standard error {}, 95 % {} to {}", number(error), number(low), number(high))
-        }
-        None => value,
+        facts(&lines) + "\n" + &table.lines() + &left_out::remarks(&self.left_out, "envelope.csv", &self.notes)
     }
 }

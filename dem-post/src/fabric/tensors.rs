@@ -19,7 +19,7 @@ use crate::tensor::principal;
 pub struct Dyads {
     dimension: usize,
     /// The sum, D × D.
-    pub sum: Vec<f64>,
+    sum: Vec<f64>,
 }
 
 impl Dyads {

@@ -122,9 +122,9 @@ impl Analysis for Command {
 /// Those of [`frames::read`], and [`PostError::Usage`] of [`stress_strain::read`].
 pub fn read(history: &History, subject: Subject, wall: Option<&str>, seconds: u16) -> Result<Report> {
     let frames = frames::read(history, subject, 1, &[])?;
-    let curves = Curves::read(history, wall)?;
     let times: Vec<f64> = frames.frames.iter().map(|&frame| history.times()[frame]).collect();
     let ruptures: Vec<f64> = history.ruptures()?.iter().map(|rupture| rupture.time).collect();
+    let curves = Curves::read(history, wall, &ruptures)?;
     let pictures = pace::pictures(&times, &ruptures, usize::from(RATE) * usize::from(seconds));
     let ticks: usize = pictures.iter().map(|shown| shown.ticks).sum();
     let length = ticks as f64 / f64::from(RATE) + f64::from(LAST);
@@ -193,7 +193,8 @@ fn webm(png: &Path, webm: &Path) -> std::result::Result<(), String> {
 }
 
 impl Curves {
-    fn read(history: &History, wall: Option<&str>) -> Result<Self> {
+    /// Reads the curves; `ruptures` are the times at which bonds broke (s), in order.
+    fn read(history: &History, wall: Option<&str>, ruptures: &[f64]) -> Result<Self> {
         let mut curves = Self::default();
         match stress_strain::read(history, wall) {
             Ok(load) => {
@@ -201,16 +202,15 @@ impl Curves {
                 curves.load = millimetres.zip(load.load.iter().copied()).collect();
                 curves.times = load.time;
             }
-            // a scene without a load, or without one that is chosen
+            // no wall is driven, or its force and position were not observed
             Err(PostError::Lacking { .. }) => {}
             Err(error) => return Err(error),
         }
         if !history.bonds()?.is_empty() {
-            let ruptures = history.ruptures()?;
             let ends = [history.times().first(), history.times().last()].map(|time| time.copied().unwrap_or(0.0));
-            let counted = ruptures.iter().enumerate().map(|(k, rupture)| (rupture.time, (k + 1) as f64));
+            let counts = ruptures.iter().enumerate().map(|(k, &time)| (time, (k + 1) as f64));
             curves.broken =
-                [(ends[0], 0.0)].into_iter().chain(counted).chain([(ends[1], ruptures.len() as f64)]).collect();
+                [(ends[0], 0.0)].into_iter().chain(counts).chain([(ends[1], ruptures.len() as f64)]).collect();
         } else if curves.load.is_empty()
             && let Some(energy) = history.observable("kinetic_energy")?
         {

@@ -5,6 +5,7 @@ use dem_history::{GrainState, Grains, History, Wall, WallState};
 use super::boxes::{Box2, EMPTY, EVERYWHERE, around, union};
 use super::eye::{Eye, Place};
 use super::wall;
+use crate::extent::range;
 use crate::output::Result;
 
 /// A part of the sample smaller than this share has a separate picture.
@@ -75,7 +76,8 @@ impl Sample {
         let mut sample = Self::read(history)?;
         let first = history.grain_state(0)?;
         let depths = || first.position.chunks(sample.dimension).map(|x| sample.eye.depth(x));
-        let middle = 0.5 * (depths().fold(f64::INFINITY, f64::min) + depths().fold(f64::NEG_INFINITY, f64::max));
+        let [low, high] = range(depths());
+        let middle = 0.5 * (low + high);
         let off = |depth: &f64| (depth - middle).abs();
         let cuts = depths().zip(&sample.radius).any(|(depth, radius)| off(&depth) < *radius);
         let nearest = depths().min_by(|a, b| off(a).total_cmp(&off(b)));

@@ -15,19 +15,18 @@
 //! also has its own line, and the intervals over the samples are those of the mean of their slopes
 //! and intercepts.
 
-use std::path::PathBuf;
-
 use clap::Args;
 
 use crate::analysis::Analysis;
-use crate::options::LoadWall;
-use crate::output::{Folder, Result, Source, default_folder};
+use crate::options::{LoadWall, Runs};
+use crate::output::{Folder, Result};
 pub use files::write;
 pub use report::{Options, Report, read};
 pub use runs::Measure;
 
 mod files;
 pub mod fit;
+pub mod left_out;
 pub mod report;
 pub mod runs;
 pub mod scenes;
@@ -38,9 +37,6 @@ pub mod scenes;
 /// The exit code is 1 if runs were left out because they did not fail or are not done.
 #[derive(Debug, Args)]
 pub struct Command {
-    /// Histories, or the folder of a sweep.
-    #[arg(value_name = "RUNS", required = true)]
-    runs: Vec<PathBuf>,
     /// The varied field, as --set names it [default: the one that differs].
     #[arg(long, value_name = "FIELD")]
     against: Option<String>,
@@ -49,12 +45,8 @@ pub struct Command {
     measure: Measure,
     #[command(flatten)]
     load_wall: LoadWall,
-    /// Folder for the results, created if missing [default: RUNS-strength].
-    #[arg(short, long, value_name = "DIR")]
-    output: Option<PathBuf>,
-    /// Overwrite a results folder of other histories: their results are removed.
-    #[arg(long)]
-    force: bool,
+    #[command(flatten)]
+    runs: Runs,
 }
 
 impl Analysis for Command {
@@ -73,7 +65,7 @@ impl Analysis for Command {
             measure: self.measure,
             wall: self.load_wall.name().map(String::from),
         };
-        read(&self.runs, &options)
+        read(&self.runs.runs, &options)
     }
 
     fn table(report: &Report) -> String {
@@ -81,9 +73,7 @@ impl Analysis for Command {
     }
 
     fn folder(&self, (): &()) -> Result<Option<Folder>> {
-        let path = self.output.clone().unwrap_or_else(|| default_folder(&self.runs[0], "-strength"));
-        let sources = self.runs.iter().map(|run| Source::new(run, None)).collect();
-        Ok(Some(Folder::of(path, Self::NAME, sources, self.force)?))
+        self.runs.folder(Self::NAME)
     }
 
     fn write(&self, (): &(), report: &mut Report, folder: &mut Folder, _: bool) -> Result<()> {

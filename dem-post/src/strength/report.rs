@@ -5,14 +5,14 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::fit::{Estimate, Line, Spread, line, spread};
-use super::runs::{self, Found, LeftOut, Measure, histories, name};
+use super::left_out::{self, LeftOut};
+use super::runs::{self, Found, Measure, early, histories, name};
 use super::scenes::{design, unit};
-use crate::output::{PostError, Result, Text, facts, number, quantity};
+use crate::extent::range;
+use crate::output::{Result, Text, counted, facts, number, quantity};
 
 /// Threshold of round-off: of 1 − R², and of the ratio of an intercept to the greatest strength.
 const ROUNDING: f64 = 1e-12;
-/// Maximum number of omitted runs named in the table.
-const NAMED: usize = 12;
 
 /// Options of the analysis.
 #[derive(Clone, Debug, Default)]
@@ -119,8 +119,9 @@ pub struct Report {
 /// Reads the runs that `paths` name: histories, and folders of sweeps.
 ///
 /// # Errors
-/// [`PostError::Usage`] for no runs, runs of different scenes, and where none failed;
-/// [`PostError::Lacking`] for a run without a load; those of reading histories and manifests.
+/// [`crate::output::PostError::Usage`] for no runs, runs of different scenes, and where none
+/// failed; [`crate::output::PostError::Lacking`] for a run without a load; those of reading
+/// histories and manifests.
 pub fn read(paths: &[PathBuf], options: &Options) -> Result<Report> {
     let (paths, mut left_out) = histories(paths)?;
     let wall = options.wall.as_deref();
@@ -141,9 +142,7 @@ pub fn read(paths: &[PathBuf], options: &Options) -> Result<Report> {
         }
     }
     if runs.is_empty() {
-        let all: Vec<String> = left_out.iter().take(3).map(|out| format!("{}: {}", out.run, out.why)).collect();
-        let what = format!("no run has a {}", options.measure.title());
-        return Err(PostError::Usage(format!("{what}; choose another --measure, or load further; {}", all.join("; "))));
+        return Err(left_out::none_failed(&left_out, options.measure.title()));
     }
     let samples = samples(&design.samples, &runs, &grains);
     let mut report = Report {
@@ -177,7 +176,7 @@ fn at_values(runs: &[Run]) -> Vec<AtValue> {
         let here: Vec<&Run> = runs.iter().filter(|run| run.value == value).collect();
         let strengths: Vec<f64> = here.iter().map(|run| run.strength).collect();
         let ratios: Vec<f64> = here.iter().filter_map(|run| run.ratio).collect();
-        let range = strengths.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], &s| [l.min(s), h.max(s)]);
+        let range = range(strengths.iter().copied());
         Some(AtValue { value, strength: spread(&strengths)?, range, ratio: spread(&ratios) })
     };
     values.into_iter().filter_map(at).collect()
@@ -217,14 +216,9 @@ impl Report {
     /// Whether every run has a strength.
     ///
     /// # Errors
-    /// [`PostError::Incomplete`] where runs were left out.
+    /// [`crate::output::PostError::Incomplete`] where runs were left out.
     pub fn complete(&self) -> Result<()> {
-        let (out, all) = (self.left_out.len(), self.left_out.len() + self.runs.len());
-        let Some(first) = self.left_out.first() else { return Ok(()) };
-        Err(PostError::Incomplete(format!(
-            "{out} of {all} runs are left out, such as {}: {}; the results are those of the others",
-            first.run, first.why
-        )))
+        left_out::complete(&self.left_out, self.runs.len())
     }
 
     /// The unit of strength over field, and of a slope.
@@ -275,34 +269,26 @@ impl Report {
                  sample mixes different samples"
             ));
         }
-        let early = self.runs.iter().filter(|run| run.early).count();
-        if early > 0 {
-            notes.push(format!(
-                "in {early} runs no bond had broken before the collapse: if bonds join all grains to one piece, the strain is \
-                 solver error"
-            ));
-        }
+        notes.extend(early(self.runs.iter().filter(|run| run.early).count()));
         notes
     }
 
     /// The report as tables.
     pub fn table(&self) -> String {
         let slope_unit = self.slope_unit();
-        let varied =
-            format!("{}, {} {}", axis(&self.field, &self.unit), self.values.len(), plural(self.values.len(), "value"));
+        let varied = format!("{}, {}", axis(&self.field, &self.unit), counted(self.values.len(), "value"));
         let by = if self.sample_fields.is_empty() {
             String::new()
         } else {
             format!(", by {}", self.sample_fields.join(", "))
         };
-        let left = if self.left_out.is_empty() { String::new() } else { format!(", {} left out", self.left_out.len()) };
         let mut lines = vec![("strength", self.measure.title().to_string()), ("against", varied)];
         if !self.along.is_empty() {
             lines.push(("moves with it", self.along.join(", ")));
         }
         lines.extend([
             ("samples", format!("{}{by}", self.samples.len())),
-            ("runs", format!("{}{left}", self.runs.len())),
+            ("runs", left_out::counted(self.runs.len(), &self.left_out)),
         ]);
         if let Some(line) = &self.line {
             lines.extend([
@@ -322,14 +308,7 @@ impl Report {
             lines.extend(found.map(|found| (name, spread_line(&found, unit))));
         }
         let mut out = facts(&lines) + "\n" + &self.value_table() + "\n" + &self.sample_table();
-        let left_out = self.left_out.iter().take(NAMED).map(|out| format!("left out: {}: {}", out.run, out.why));
-        let more = self.left_out.len().saturating_sub(NAMED);
-        let more = (more > 0).then(|| format!("left out: … and {more} more in strength.csv"));
-        let remarks: Vec<String> =
-            left_out.chain(more).chain(self.notes.iter().map(|note| format!("note: {note}"))).collect();
-        if !remarks.is_empty() {
-            out += &format!("\n{}\n", remarks.join("\n"));
-        }
+        out += &left_out::remarks(&self.left_out, "strength.csv", &self.notes);
         out
     }
 
@@ -420,11 +399,8 @@ pub(super) fn axis(name: &str, unit: &str) -> String {
     if unit.is_empty() { name.to_string() } else { format!("{name} ({unit})") }
 }
 
-fn plural(count: usize, word: &str) -> String {
-    if count == 1 { word.into() } else { format!("{word}s") }
-}
-
-fn estimate(found: &Estimate, unit: &str) -> String {
+/// A fitted number with its errors.
+pub(crate) fn estimate(found: &Estimate, unit: &str) -> String {
     let value = quantity(Some(found.value), unit);
     match found.standard_error {
         Some(error) => format!("{value}, standard error {}, 95 % {}", number(error), interval(found.interval)),

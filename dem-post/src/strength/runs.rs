@@ -10,8 +10,9 @@ use dem_scene::failure::{BROKEN_SHARE, STRAINS};
 use serde::Serialize;
 use serde_json::Value;
 
+use super::left_out::LeftOut;
 use crate::collapse::{Bonding, Collapse, peak};
-use crate::output::{PostError, Result, quantity};
+use crate::output::{PostError, Result, counted, quantity};
 use crate::stress_strain;
 
 /// Definition of the strength of a run: the load at …
@@ -52,15 +53,6 @@ pub struct Found {
     pub strength: std::result::Result<Strength, String>,
     /// Radii of its grains and its bonds: equal in two runs of the same grains.
     pub grains: (Vec<f64>, Vec<[i32; 2]>),
-}
-
-/// A run without a strength.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct LeftOut {
-    /// Its file.
-    pub run: String,
-    /// The reason.
-    pub why: String,
 }
 
 /// The strength of a run, and when it was reached.
@@ -118,6 +110,12 @@ pub fn histories(paths: &[PathBuf]) -> Result<(Vec<PathBuf>, Vec<LeftOut>)> {
     Ok((found, left_out))
 }
 
+/// The note on `count` runs whose failure is [`Failure::early`]; `None` without such runs.
+pub(crate) fn early(count: usize) -> Option<String> {
+    let why = "if bonds join all grains to one piece, the strain is solver error";
+    (count > 0).then(|| format!("in {} no bond had broken before the collapse: {why}", counted(count, "run")))
+}
+
 /// The name of a run in tables.
 pub fn name(path: &Path) -> String {
     path.display().to_string()
@@ -159,6 +157,8 @@ pub(crate) struct Course {
     pub(crate) time: Vec<f64>,
     /// The load, N, positive in its own sense.
     pub(crate) load: Vec<f64>,
+    /// Why the load of a step is not that before anything broke in it; `None` where it is.
+    pub(crate) load_after_breaks: Option<String>,
     /// Axial strain fitted to the grains, along the load; empty if not recorded.
     strain: Vec<f64>,
     /// Bonds broken; empty if not recorded.
@@ -179,6 +179,7 @@ impl Course {
             _ => {
                 let found = stress_strain::read(history, wall)?;
                 Ok(Self {
+                    load_after_breaks: found.load_after_breaks(),
                     step: found.step,
                     time: found.time,
                     load: found.load,
@@ -198,8 +199,8 @@ impl Course {
         let lacking = |what: &str| PostError::Lacking { path: history.path().into(), what: what.into() };
         let [load] = pulling.as_slice() else {
             return Err(lacking(
-                "its strength needs a driven wall, or one force on a grain, and this scene has none: give one of its \
-                 walls a velocity or a force",
+                "its load is that of a driven wall or of one force on a grain, and this scene has neither: give one \
+                 of its walls a velocity or a force",
             ));
         };
         let steps = history.observable("bonds_broken")?.filter(|series| !series.step.is_empty());
@@ -217,7 +218,7 @@ impl Course {
             }
         }
         let load = steps.time.iter().map(|&t| size * load.time.at(t)).collect();
-        Ok(Self { step: steps.step, time: steps.time, load, strain, broken: steps.value })
+        Ok(Self { step: steps.step, time: steps.time, load, strain, broken: steps.value, load_after_breaks: None })
     }
 
     /// The failure of the sample by a measure; for a run that did not fail, the state it reached.
@@ -305,6 +306,7 @@ mod tests {
             time: (0..6).map(f64::from).collect(),
             load: vec![0.0, 10.0, 20.0, 30.0, 40.0, 12.0],
             strain: vec![0.0, 0.0, 0.0, -5e-5, -2e-4, -2e-3],
+            load_after_breaks: None,
             broken: vec![0.0, 0.0, 1.0, 1.0, 5.0, 9.0],
         }
     }

@@ -6,8 +6,8 @@
 //! grains, the ratio that of the lateral strain over the axial one, with the opposite sign; in 3D
 //! the lateral strain is the mean of both. They are those of the sample where the lateral stress
 //! stays the same meanwhile, as without side walls or at constant confinement. In 2D they are those
-//! of a plate in plane stress. The standard errors are those of the lines: they tell how straight
-//! the curves are, not how far the ends of a sample hinder its lateral strain.
+//! of a plate in plane stress. The standard errors are those of the lines: they measure how far the
+//! curves are from straight, not how much the ends of a sample hinder its lateral strain.
 
 use serde::Serialize;
 

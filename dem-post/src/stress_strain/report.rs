@@ -92,6 +92,10 @@ pub struct Report {
     /// Load, N.
     #[serde(skip)]
     pub load: Vec<f64>,
+    /// Whether the load of a step is that before anything broke in it: a prescribed force, or a
+    /// recorded `wall_force_at_limit`. Else it is the force at the end of the step.
+    #[serde(skip)]
+    load_before_breaks: bool,
     /// Reaction of the grains on the wall, N; empty if not recorded.
     #[serde(skip)]
     pub reaction: Vec<f64>,
@@ -138,6 +142,7 @@ pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
     let mut report = Report {
         displacement: motion.way.iter().map(|x| motion.sense * x).collect(),
         load: motion.load.iter().map(|f| motion.sense * f).collect(),
+        load_before_breaks: motion.load_before_breaks,
         // the reaction of the grains has the opposite sign
         reaction: motion.reaction.iter().map(|f| -motion.sense * f).collect(),
         strain: tensor("strain")?.iter().map(|e| -push * e).collect(),
@@ -175,7 +180,7 @@ pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
     Ok(report)
 }
 
-/// The elastic constants, or why there are none; `push` as [`sample_size`] has it.
+/// The elastic constants, or why there are none; `push` is that of [`sample_size`].
 fn elastic(
     history: &History,
     report: &Report,
@@ -213,6 +218,8 @@ struct Motion {
     reaction: Vec<f64>,
     /// The load, N.
     load: Vec<f64>,
+    /// Whether it is that before anything broke in a step.
+    load_before_breaks: bool,
     /// The sign that makes the load positive.
     sense: f64,
 }
@@ -227,19 +234,19 @@ fn motion(history: &History, wall: &Wall, k: usize) -> Result<Motion> {
         None => vec![],
     };
     // the load is counted in the sense of the prescribed force, or of the prescribed motion
-    let load = match wall.drive {
-        WallDrive::Force => component(history, &required(history, "applied_force")?, &[k], "applied_force")?,
+    let (load, load_before_breaks) = match wall.drive {
+        WallDrive::Force => (component(history, &required(history, "applied_force")?, &[k], "applied_force")?, true),
         _ => {
             let at_limit = history.observable("wall_force_at_limit")?.filter(|series| !series.step.is_empty());
-            let (series, name) = match at_limit {
-                Some(series) => (series, "wall_force_at_limit"),
-                None => (required(history, "wall_force")?, "wall_force"),
+            let (series, name, before) = match at_limit {
+                Some(series) => (series, "wall_force_at_limit", true),
+                None => (required(history, "wall_force")?, "wall_force", false),
             };
-            along(history, &series, k, direction, name)?.iter().map(|f| -f).collect()
+            (along(history, &series, k, direction, name)?.iter().map(|f| -f).collect(), before)
         }
     };
     let sense = sense(if wall.drive == WallDrive::Force { &load } else { &way });
-    Ok(Motion { step: position.step, time: position.time, way, reaction, load, sense })
+    Ok(Motion { step: position.step, time: position.time, way, reaction, load, load_before_breaks, sense })
 }
 
 /// The sign of the value of greatest magnitude.
@@ -437,13 +444,20 @@ impl Report {
         self.summary = summary;
     }
 
+    /// Why the load of a step is not that before anything broke in it; `None` where it is.
+    pub(crate) fn load_after_breaks(&self) -> Option<String> {
+        let why = "its force before the breaks of a step";
+        (!self.load_before_breaks)
+            .then(|| format!("the history has no wall_force_at_limit of wall {}, {why}", self.summary.wall))
+    }
+
     /// The summary as a table.
     pub fn table(&self) -> String {
         let s = &self.summary;
         let bonds = s.bonds_broken.map_or_else(|| "–".into(), |n| format!("{n:.0}"));
-        let mut lines = vec![
-            ("driven wall", s.wall.clone()),
-            ("sample", s.sample()),
+        let mut lines = vec![("driven wall", s.wall.clone()), ("sample", s.sample())];
+        lines.extend(s.elastic().into_iter().flatten());
+        lines.extend([
             ("first break", quantity(s.first_break, "N")),
             ("collapse load (strain 1e-4)", s.collapse(0)),
             ("collapse load (strain 1e-3)", s.collapse(1)),
@@ -452,19 +466,16 @@ impl Report {
             ("collapse at", quantity(s.collapse_time, "s")),
             ("peak load", s.peak()),
             ("strain at the peak", quantity(s.peak_strain, "")),
+        ]);
+        lines.extend(s.splitting.as_ref().map(|splitting| ("splitting strength", splitting.to_string())));
+        lines.extend([
             ("greatest load", quantity(Some(s.greatest_load), "N")),
             ("displacement at the end", quantity(Some(s.final_displacement), "m")),
             ("strain at the end", quantity(s.final_strain, "")),
             ("work of the wall", quantity(Some(s.work), "J")),
             ("bonds broken", bonds),
             ("worst residual accepted", quantity(s.worst_residual, "")),
-        ];
-        for (k, line) in s.elastic().into_iter().flatten().enumerate() {
-            lines.insert(2 + k, line);
-        }
-        if let Some(splitting) = &s.splitting {
-            lines.insert(lines.len() - 6, ("splitting strength", splitting.to_string()));
-        }
+        ]);
         facts(&lines)
     }
 }

@@ -1,6 +1,6 @@
 //! How a bond broke, what had broken before it, and the load of the sample.
 
-use dem_history::{History, Rupture, WallDrive};
+use dem_history::{History, Rupture};
 use serde::Serialize;
 
 use super::utilisation::{Limits, Load, Part};
@@ -110,8 +110,7 @@ impl Broken {
 
 /// The load in step `step`, or why it is not known.
 fn wall_load(history: &History, step: i64, wall: Option<&str>) -> Result<std::result::Result<WallLoad, String>> {
-    let walls = history.walls()?;
-    let scene = history.parameters()?.scene;
+    let (walls, scene) = (history.walls()?, history.parameters()?.scene);
     if wall.is_none() && stress_strain::load_wall(&walls, &scene).0.is_empty() {
         return Ok(Err("no wall is driven".into()));
     }
@@ -121,16 +120,13 @@ fn wall_load(history: &History, step: i64, wall: Option<&str>) -> Result<std::re
         Err(PostError::Lacking { what, .. }) => return Ok(Err(what)),
         Err(error) => return Err(error),
     };
-    let name = report.summary.wall;
-    let prescribed = walls.iter().any(|wall| wall.name == name && wall.drive == WallDrive::Force);
-    let at_limit = history.observable("wall_force_at_limit")?.is_some_and(|series| !series.step.is_empty());
-    if !prescribed && !at_limit {
-        let why =
-            format!("the history has no wall_force_at_limit of wall {name}, its force before the breaks of a step");
+    if let Some(why) = report.load_after_breaks() {
         return Ok(Err(why));
     }
     let load = report.step.iter().position(|&s| s == step).and_then(|k| report.load.get(k).copied());
-    Ok(load.map(|load| WallLoad { wall: name, load }).ok_or_else(|| format!("step {step} was not observed")))
+    Ok(load
+        .map(|load| WallLoad { wall: report.summary.wall, load })
+        .ok_or_else(|| format!("step {step} was not observed")))
 }
 
 /// Others that broke in the step of `own`: in earlier rounds, in the same and in later ones.

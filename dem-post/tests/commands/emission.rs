@@ -10,13 +10,7 @@ fn chain(steps: &[i64], energy: f64) -> (tempfile::TempDir, PathBuf) {
     let mut l = layout(2);
     l.observables.clear();
     l.walls.clear();
-    l.grains = Grains {
-        id: (0..count as i32).collect(),
-        radius: vec![1e-3; count],
-        mass: vec![1.0; count],
-        inertia: vec![1.0; count],
-        material: vec![],
-    };
+    l.grains = grains(count, 1e-3);
     let bonds = steps.len();
     l.bonds = Bonds {
         pair: (0..bonds as i32).map(|k| [k, k + 1]).collect(),
@@ -137,4 +131,16 @@ fn the_load_of_an_event_is_that_of_its_step() {
         text.contains("steps apart: at most 1; bonds between: at most 1") && text.contains("rigid bonds"),
         "{text}"
     );
+}
+
+#[test]
+fn an_event_has_no_load_that_its_breaks_have_reduced() {
+    // a wall that is moved, without its force before the breaks of a step
+    let mut moved = layout(2);
+    moved.walls[1].drive = WallDrive::Velocity;
+    let (_folder, path) = sample(&moved);
+    let found = json(&dem_post(&path, &["emission", "--json"]));
+    assert_eq!(found["events"].as_array().unwrap().len(), 2);
+    assert!(found["events"].as_array().unwrap().iter().all(|event| event["load"].is_null()), "{found}");
+    assert!(found["load_note"].as_str().unwrap().contains("no wall_force_at_limit of wall top"), "{found}");
 }

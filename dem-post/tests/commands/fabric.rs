@@ -21,13 +21,7 @@ fn lattice(dimension: usize, n: usize) -> (tempfile::TempDir, PathBuf) {
     l.walls.clear();
     l.bonds = Bonds::default();
     l.observables = vec![Observable::new("strain", "", &[d, d]), Observable::new("stress", "Pa", &[d, d])];
-    l.grains = Grains {
-        id: (0..count as i32).collect(),
-        radius: vec![1e-3; count],
-        mass: vec![1.0; count],
-        inertia: vec![1.0; count],
-        material: vec![],
-    };
+    l.grains = grains(count, 1e-3);
     let mut writer = Writer::create(&path, &l, false).unwrap();
     for step in 0..3 {
         let mut contacts = ContactRows::default();

@@ -165,8 +165,7 @@ fn frames_with_the_same_pairs_share_their_lines() {
 
 /// A falling grain without contacts.
 fn falling(path: &Path, frames: usize) -> Writer {
-    let grains = Grains { id: vec![0], radius: vec![1.0], mass: vec![1.0], inertia: vec![1.0], material: vec![] };
-    let l = Layout { dimension: 2, grains, ..Layout::default() };
+    let l = Layout { dimension: 2, grains: grains(1, 1.0), ..Layout::default() };
     let mut writer = Writer::create(path, &l, false).unwrap();
     for k in 0..frames {
         let state = GrainState { position: vec![0.5, -(k as f64)], velocity: vec![0.0, -1.0], ..GrainState::default() };

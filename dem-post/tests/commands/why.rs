@@ -9,13 +9,7 @@ fn two_grains(dimension: usize) -> Layout {
         dimension,
         friction: true,
         twist: dimension == 3,
-        grains: Grains {
-            id: vec![0, 1],
-            radius: vec![2e-3; 2],
-            mass: vec![1.0; 2],
-            inertia: vec![1.0; 2],
-            material: vec![],
-        },
+        grains: grains(2, 2e-3),
         bonds: Bonds {
             pair: vec![[0, 1]],
             rest_gap: vec![0.0],
