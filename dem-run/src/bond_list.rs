@@ -108,7 +108,10 @@ fn row<D: Dim>(fields: &[&str], columns: &[usize], grains: &Grains<D>, gap_toler
         return Err(format!("i and j are both {i}; a bond joins two grains"));
     }
     if grains.fixed[i] && grains.fixed[j] {
-        return Err(format!("grains {i} and {j} are both fixed, so that nothing strains their bond; remove the line"));
+        return Err(format!(
+            "grains {i} and {j} are both fixed, or held by the grip of a wall, and form no bond with each other; remove \
+             the line"
+        ));
     }
     let mean_diameter = grains.radius[i] + grains.radius[j];
     let rest_gap = (grains.position[i] - grains.position[j]).norm() - mean_diameter;

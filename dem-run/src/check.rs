@@ -1,6 +1,5 @@
 //! Preview of a run: grains and their sizes, walls and their drives, steps, frames, the size of the
-//! history and the memory. The sample is placed by the code of a run; random samples are not
-//! packed.
+//! history and the memory. The world is built by the code of a run; random samples are not packed.
 
 use std::fmt;
 use std::path::Path;
@@ -9,8 +8,7 @@ use dem_core::body::Grains;
 use dem_core::dim::{Dim, Vect};
 use serde::Serialize;
 
-use crate::bonds;
-use crate::build::{Placed, place, walls};
+use crate::build::{Built, build, walls};
 use crate::error::RunError;
 use crate::in_dimension;
 use crate::memory;
@@ -221,9 +219,8 @@ fn look<D: Dim>(scene: &Scene, enough_memory: bool) -> Result<(Option<Sizes>, Ve
     let sizes = match &scene.sample {
         Sample::Random(random) if enough_memory => Some(random_sizes::<D>(scene, random)),
         _ if enough_memory => {
-            let Placed { grains, warnings, .. } = place::<D>(scene, None, &mut |_| true)?;
-            // its bonds are made only to find what is wrong with them
-            bonds::of_sample(scene, &grains)?;
+            let Built { world, warnings, .. } = build::<D>(scene, None, &mut |_| true)?;
+            let grains = &world.grains;
             let (low, high) = grains.bounds();
             let corners = [low, high].map(|x| x.as_slice().to_vec());
             let count = |k: usize| (0..grains.len()).filter(|grain| grains.material_of(*grain) == k).count();
@@ -327,6 +324,7 @@ pub(crate) fn free_space(_folder: &Path) -> Option<u64> {
 pub(crate) mod tests {
     use super::*;
     use crate::scene::load;
+    use dem_core::dim::D2;
 
     pub(crate) fn config(name: &str, sets: &[&str]) -> Scene {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs").join(name);
@@ -371,6 +369,19 @@ pub(crate) mod tests {
         let check = Check::new(&config("column.json", &[])).expect("check");
         assert!(!Check { free_bytes: None, ..check.clone() }.disk_is_too_small());
         assert!(Check { free_bytes: Some(10), ..check }.disk_is_too_small());
+    }
+
+    /// The floor holds both grains, so no bond joins them, whatever the gap.
+    #[test]
+    fn grains_that_a_wall_holds_have_no_bond_in_a_check_as_in_a_run() {
+        let floor = r#"walls={"floor": {"shape": {"plane": {"normal": [0, 1], "place": "seated"}}, "grip": 1e-3}}"#;
+        let absent = r#"bonds.absent=[{"ball": {"center": [2e-3, 0], "radius": 1e-3}}]"#;
+        Check::new(&config("two-grains.json", &[absent])).expect("a bond through the region");
+        let scene = config("two-grains.json", &[floor, absent]);
+        let told = Check::new(&scene).expect_err("no bond through the region").to_string();
+        assert!(told.contains("bonds.absent.0.ball: no bond would pass through it"), "{told}");
+        let Err(run) = build::<D2>(&scene, None, &mut |_| true) else { panic!("a run accepts it") };
+        assert_eq!(told, run.to_string());
     }
 
     fn with_sample(table: &str) -> Result<Check, RunError> {
