@@ -112,8 +112,7 @@ fn grains<D: Dim>(scene: &Scene, packings: Option<&Path>, watch: Watch) -> Resul
             }
         }
     };
-    let places: Vec<D::Vector> = table.balls.iter().map(|(x, _)| *x).collect();
-    let material = materials::assign::<D>(scene, table.material, &places).map_err(RunError::Sample)?;
+    let material = materials::assign::<D>(scene, table.material, &table.balls).map_err(RunError::Sample)?;
     let density = |k: usize| scene.materials.density_of(material.get(k).copied().map_or(0, usize::from));
     let mut grains: Grains<D> = match &scene.sample {
         Sample::Grains(list) => list.iter().enumerate().map(|(k, spec)| listed(spec, density(k), scene)).collect(),
@@ -316,12 +315,10 @@ fn unseated<D: Dim>(scene: &Scene, grains: &Grains<D>) -> Vec<String> {
         };
         if wall.shape.seat().is_some() && seat(&wall.shape, D::Vector::from_slice(center), grains).is_none() {
             let (low, high) = grains.bounds();
-            let corner = |x: D::Vector| x.as_slice().iter().map(|x| number(*x)).collect::<Vec<_>>().join(", ");
             wrong.push(format!(
                 "walls.{name}: the seated wall meets no grain along its direction; move its centre, or turn its direction: \
-                 the sample reaches from ({}) to ({}) m",
-                corner(low),
-                corner(high)
+                 the sample reaches {}",
+                materials::extent::<D>([low, high].iter())
             ));
         }
     }
