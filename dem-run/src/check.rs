@@ -15,7 +15,7 @@ use crate::memory;
 use crate::output::{number, size};
 use crate::prepare;
 use crate::sample_file;
-use crate::scene::{Drive, Function, Lattice, Precision, Ramp, RandomSample, Sample, Scene};
+use crate::scene::{Drive, Function, Lattice, Precision, Ramp, RandomSample, Sample, Scene, Wall};
 use crate::warnings;
 
 /// Mean diameter (m) from which `check` asks whether millimetres were meant.
@@ -91,9 +91,9 @@ pub struct CheckedWall {
     pub name: String,
     /// Its shape.
     pub shape: &'static str,
-    /// How it is driven.
+    /// How it is driven at the start.
     pub drive: &'static str,
-    /// Force, stress or velocity over time, if the wall is driven.
+    /// Force, stress or velocity over time, if the wall is driven, with the drives of later stages.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub course: Option<String>,
 }
@@ -111,12 +111,7 @@ impl Check {
         let (sizes, warnings) = in_dimension!(scene, D => look::<D>(scene, enough)?);
         let end = scene.time.end;
         let walls = scene.walls.iter().map(|(name, wall)| {
-            let (drive, course) = match scene.first_drive(name, wall) {
-                Drive::Fixed => ("fixed", None),
-                Drive::Velocity(velocity) => ("velocity", Some(over_time(&velocity, "m/s", end))),
-                Drive::Force(force) => ("force", Some(over_time(&force, "N", end))),
-                Drive::Stress(stress) => ("stress", Some(over_time(&stress, "Pa", end))),
-            };
+            let (drive, course) = course(scene, name, wall);
             CheckedWall { name: name.clone(), shape: wall.shape.name(), drive, course }
         });
         let mut check = Self {
@@ -256,19 +251,50 @@ impl Sizes {
     }
 }
 
+/// How a wall is driven at the start, and its drive over time in words, if it is driven. Where
+/// stages drive it, no time is told at which a drive ends: a condition may end its stage.
+fn course(scene: &Scene, name: &str, wall: &Wall) -> (&'static str, Option<String>) {
+    let first = scene.first_drive(name, wall);
+    let Some((drive, function, unit)) = parts(&first) else { return ("fixed", None) };
+    let begins = over_time(function, unit);
+    if scene.stage_drives(name).next().is_some() {
+        let staged =
+            scene.stages.iter().skip(1).filter_map(|stage| Some((&stage.name, stage.walls.get(name)?.drive())));
+        let later = staged.filter_map(|(stage, drive)| {
+            let (drive, function, unit) = parts(&drive)?;
+            Some(format!("; from stage {stage} on: {drive} {}", over_time(function, unit)))
+        });
+        return (drive, Some(begins + &later.collect::<String>()));
+    }
+    let course = match function {
+        Function::Constant(_) => format!("{begins} at all times"),
+        _ => format!("{begins}: {} {unit} at {} s", number(function.at(scene.time.end)), scene.time.end),
+    };
+    (drive, Some(course))
+}
+
+/// The name of a drive, its function of time and its unit; none for a fixed wall.
+fn parts(drive: &Drive) -> Option<(&'static str, &Function, &'static str)> {
+    match drive {
+        Drive::Fixed => None,
+        Drive::Velocity(velocity) => Some(("velocity", velocity, "m/s")),
+        Drive::Force(force) => Some(("force", force, "N")),
+        Drive::Stress(stress) => Some(("stress", stress, "Pa")),
+    }
+}
+
 /// A function of time in words.
-fn over_time(function: &Function, unit: &str, end: f64) -> String {
-    let last = || format!("{} {unit} at {end} s", number(function.at(end)));
+fn over_time(function: &Function, unit: &str) -> String {
     match function {
-        Function::Constant(value) => format!("{} {unit} at all times", number(*value)),
+        Function::Constant(value) => format!("{} {unit}", number(*value)),
         Function::Ramp(Ramp { rate, start }) => {
             let until = if *start > 0.0 { format!("until {start} s, then ") } else { String::new() };
-            format!("0 {unit} {until}growing by {} {unit} a second: {}", number(*rate), last())
+            format!("0 {unit} {until}growing by {} {unit} a second", number(*rate))
         }
         Function::Table(rows) => {
             let values = rows.iter().map(|row| row[1]);
             let (low, high) = values.fold((f64::MAX, f64::MIN), |(low, high), value| (low.min(value), high.max(value)));
-            format!("from {} to {} {unit}, by a table of {} rows: {}", number(low), number(high), rows.len(), last())
+            format!("from {} to {} {unit}, by a table of {} rows", number(low), number(high), rows.len())
         }
     }
 }
@@ -369,6 +395,20 @@ pub(crate) mod tests {
         let check = Check::new(&config("column.json", &[])).expect("check");
         assert!(!Check { free_bytes: None, ..check.clone() }.disk_is_too_small());
         assert!(Check { free_bytes: Some(10), ..check }.disk_is_too_small());
+    }
+
+    #[test]
+    fn a_wall_has_the_drives_of_its_stages_one_after_the_other() {
+        let stages = r#"stages=[
+            {"name": "rest", "duration": 0.1, "walls": {"top": {"force": {"constant": 5}}}},
+            {"name": "press", "until": {"broken_fraction": 0.5}, "walls": {"top": {"velocity": {"constant": 1e-3}}}},
+            {"name": "tilt", "duration": 0.1, "walls": {"bottom": {"velocity": {"ramp": {"rate": 2}}}}}]"#;
+        let check = Check::new(&config("compression.json", &[stages])).expect("check");
+        let courses: Vec<_> =
+            check.walls.iter().map(|wall| (wall.drive, wall.course.as_deref().unwrap_or(""))).collect();
+        let bottom = "0 m/s; from stage tilt on: velocity 0 m/s growing by 2 m/s a second";
+        let top = "5 N; from stage press on: velocity 0.001 m/s";
+        assert_eq!(courses, [("velocity", bottom), ("force", top)]);
     }
 
     /// The floor holds both grains, so no bond joins them, whatever the gap.
