@@ -63,7 +63,7 @@ fn parse<D: Dim, R: BufRead>(
     wrong.end()?;
     let (mut list, mut first) = (vec![], HashMap::new());
     while lines.next()? {
-        let row = lines.fields().and_then(|fields| row(&fields.collect::<Vec<_>>(), &columns, grains, gap_tolerance));
+        let row = lines.row(columns.len()).and_then(|fields| row(&fields, &columns, grains, gap_tolerance));
         let row = row.and_then(|listed| match first.insert(listed.bond.pair, lines.number) {
             None => Ok(listed),
             Some(line) => Err(format!("the pair of line {line} again; remove one of the two lines")),
@@ -97,10 +97,6 @@ fn columns(names: &[&str]) -> Result<Vec<usize>, String> {
 
 /// The bond of a line, or what is wrong with it.
 fn row<D: Dim>(fields: &[&str], columns: &[usize], grains: &Grains<D>, gap_tolerance: f64) -> Result<Listed, String> {
-    if fields.len() != columns.len() {
-        let values = if fields.len() == 1 { "value" } else { "values" };
-        return Err(format!("it has {} {values}, the header has {}", fields.len(), columns.len()));
-    }
     let cell = |column: usize| columns.iter().position(|k| *k == column).map(|place| fields[place]);
     let pair = [grain(0, cell(0), grains)?, grain(1, cell(1), grains)?];
     let [i, j] = pair;
@@ -108,7 +104,10 @@ fn row<D: Dim>(fields: &[&str], columns: &[usize], grains: &Grains<D>, gap_toler
         return Err(format!("i and j are both {i}; a bond joins two grains"));
     }
     if grains.fixed[i] && grains.fixed[j] {
-        return Err(format!("grains {i} and {j} are both fixed, so that nothing strains their bond; remove the line"));
+        return Err(format!(
+            "grains {i} and {j} are both fixed, or held by the grip of a wall, and form no bond with each other; remove \
+             the line"
+        ));
     }
     let mean_diameter = grains.radius[i] + grains.radius[j];
     let rest_gap = (grains.position[i] - grains.position[j]).norm() - mean_diameter;

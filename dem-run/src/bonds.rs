@@ -109,7 +109,7 @@ fn outside<D: Dim>(bonds: &scene::Bonds, grains: &Grains<D>, formed: Vec<Bond>) 
             wrong.push(format!(
                 "bonds.absent.{k}.{}: no bond would pass through it; move or enlarge it: the centres of the grains reach {}",
                 region.name(),
-                extent::<D>(&grains.position)
+                extent::<D>(grains.position.iter())
             ));
         }
     }

@@ -33,18 +33,6 @@ pub struct Built<D: Dim> {
     pub warnings: Vec<String>,
 }
 
-/// Grains and walls in their places.
-pub struct Placed<D: Dim> {
-    /// The grains.
-    pub grains: Grains<D>,
-    /// The walls, in the order of their names.
-    pub walls: Vec<Wall<D>>,
-    /// Solid fraction of a random sample in its box (–).
-    pub solid_fraction: Option<f64>,
-    /// Warnings about probable mistakes in the scene.
-    pub warnings: Vec<String>,
-}
-
 /// Maximum number of grain pairs that are reported individually.
 const MOST_TOLD: usize = 10;
 
@@ -55,24 +43,10 @@ const MOST_TOLD: usize = 10;
 /// # Errors
 /// [`RunError`], with all errors of the sample.
 pub fn build<D: Dim>(scene: &Scene, packings: Option<&Path>, watch: Watch) -> Result<Built<D>, RunError> {
-    let Placed { grains, walls, solid_fraction, warnings } = place::<D>(scene, packings, watch)?;
-    let mut world = World::new(grains, walls, loads(scene), settings(scene));
-    // the world knows which grains its walls hold: those get no bonds among each other
-    let bonds = bonds::of_sample(scene, &world.grains)?;
-    world.add_bonds(bonds);
-    Ok(Built { world, solid_fraction, warnings })
-}
-
-/// Prepares the sample of a scene, as [`build`] does, and positions its walls.
-///
-/// # Errors
-/// As [`build`].
-pub fn place<D: Dim>(scene: &Scene, packings: Option<&Path>, watch: Watch) -> Result<Placed<D>, RunError> {
     let Sampled { mut grains, solid_fraction, unsettled } = grains::<D>(scene, packings, watch)?;
     refuse_other_units(&grains)?;
     let mut wrong = hold_fixed(scene, &mut grains);
-    let loads = scene.grains.iter().flat_map(|g| &g.loads);
-    let lost = loads.filter(|load| load.grain >= grains.len());
+    let lost = scene.grains.iter().flat_map(|g| &g.loads).filter(|load| load.grain >= grains.len());
     wrong.extend(lost.map(|load| missing_grain("grains.loads", load.grain, grains.len())));
     let (deep, shallow) = overlapping(&grains);
     wrong.extend(deep);
@@ -87,7 +61,11 @@ pub fn place<D: Dim>(scene: &Scene, packings: Option<&Path>, watch: Watch) -> Re
     warnings.extend(unsettled.map(warnings::of_packing));
     warnings.extend(shallow);
     warnings.extend(warnings::of_walls(scene, &walls, Some(&grains)));
-    Ok(Placed { grains, walls, solid_fraction, warnings })
+    let mut world = World::new(grains, walls, loads(scene), settings(scene));
+    // the world knows which grains its walls hold: those get no bonds among each other
+    let bonds = bonds::of_sample(scene, &world.grains)?;
+    world.add_bonds(bonds);
+    Ok(Built { world, solid_fraction, warnings })
 }
 
 /// The world of a scene, restored from a saved state.
@@ -134,8 +112,7 @@ fn grains<D: Dim>(scene: &Scene, packings: Option<&Path>, watch: Watch) -> Resul
             }
         }
     };
-    let places: Vec<D::Vector> = table.balls.iter().map(|(x, _)| *x).collect();
-    let material = materials::assign::<D>(scene, table.material, &places).map_err(RunError::Sample)?;
+    let material = materials::assign::<D>(scene, table.material, &table.balls).map_err(RunError::Sample)?;
     let density = |k: usize| scene.materials.density_of(material.get(k).copied().map_or(0, usize::from));
     let mut grains: Grains<D> = match &scene.sample {
         Sample::Grains(list) => list.iter().enumerate().map(|(k, spec)| listed(spec, density(k), scene)).collect(),
@@ -338,12 +315,10 @@ fn unseated<D: Dim>(scene: &Scene, grains: &Grains<D>) -> Vec<String> {
         };
         if wall.shape.seat().is_some() && seat(&wall.shape, D::Vector::from_slice(center), grains).is_none() {
             let (low, high) = grains.bounds();
-            let corner = |x: D::Vector| x.as_slice().iter().map(|x| number(*x)).collect::<Vec<_>>().join(", ");
             wrong.push(format!(
                 "walls.{name}: the seated wall meets no grain along its direction; move its centre, or turn its direction: \
-                 the sample reaches from ({}) to ({}) m",
-                corner(low),
-                corner(high)
+                 the sample reaches {}",
+                materials::extent::<D>([low, high].iter())
             ));
         }
     }

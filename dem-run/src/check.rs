@@ -1,6 +1,5 @@
 //! Preview of a run: grains and their sizes, walls and their drives, steps, frames, the size of the
-//! history and the memory. The sample is placed by the code of a run; random samples are not
-//! packed.
+//! history and the memory. The world is built by the code of a run; random samples are not packed.
 
 use std::fmt;
 use std::path::Path;
@@ -9,15 +8,14 @@ use dem_core::body::Grains;
 use dem_core::dim::{Dim, Vect};
 use serde::Serialize;
 
-use crate::bonds;
-use crate::build::{Placed, place, walls};
+use crate::build::{Built, build, walls};
 use crate::error::RunError;
 use crate::in_dimension;
 use crate::memory;
 use crate::output::{number, size};
 use crate::prepare;
 use crate::sample_file;
-use crate::scene::{Drive, Function, Lattice, Precision, Ramp, RandomSample, Sample, Scene};
+use crate::scene::{Drive, Function, Lattice, Precision, Ramp, RandomSample, Sample, Scene, Wall};
 use crate::warnings;
 
 /// Mean diameter (m) from which `check` asks whether millimetres were meant.
@@ -93,9 +91,9 @@ pub struct CheckedWall {
     pub name: String,
     /// Its shape.
     pub shape: &'static str,
-    /// How it is driven.
+    /// How it is driven at the start.
     pub drive: &'static str,
-    /// Force, stress or velocity over time, if the wall is driven.
+    /// Force, stress or velocity over time, if the wall is driven, with the drives of later stages.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub course: Option<String>,
 }
@@ -113,12 +111,7 @@ impl Check {
         let (sizes, warnings) = in_dimension!(scene, D => look::<D>(scene, enough)?);
         let end = scene.time.end;
         let walls = scene.walls.iter().map(|(name, wall)| {
-            let (drive, course) = match scene.first_drive(name, wall) {
-                Drive::Fixed => ("fixed", None),
-                Drive::Velocity(velocity) => ("velocity", Some(over_time(&velocity, "m/s", end))),
-                Drive::Force(force) => ("force", Some(over_time(&force, "N", end))),
-                Drive::Stress(stress) => ("stress", Some(over_time(&stress, "Pa", end))),
-            };
+            let (drive, course) = course(scene, name, wall);
             CheckedWall { name: name.clone(), shape: wall.shape.name(), drive, course }
         });
         let mut check = Self {
@@ -221,9 +214,8 @@ fn look<D: Dim>(scene: &Scene, enough_memory: bool) -> Result<(Option<Sizes>, Ve
     let sizes = match &scene.sample {
         Sample::Random(random) if enough_memory => Some(random_sizes::<D>(scene, random)),
         _ if enough_memory => {
-            let Placed { grains, warnings, .. } = place::<D>(scene, None, &mut |_| true)?;
-            // its bonds are made only to find what is wrong with them
-            bonds::of_sample(scene, &grains)?;
+            let Built { world, warnings, .. } = build::<D>(scene, None, &mut |_| true)?;
+            let grains = &world.grains;
             let (low, high) = grains.bounds();
             let corners = [low, high].map(|x| x.as_slice().to_vec());
             let count = |k: usize| (0..grains.len()).filter(|grain| grains.material_of(*grain) == k).count();
@@ -259,19 +251,50 @@ impl Sizes {
     }
 }
 
+/// How a wall is driven at the start, and its drive over time in words, if it is driven. Where
+/// stages drive it, no time is told at which a drive ends: a condition may end its stage.
+fn course(scene: &Scene, name: &str, wall: &Wall) -> (&'static str, Option<String>) {
+    let first = scene.first_drive(name, wall);
+    let Some((drive, function, unit)) = parts(&first) else { return ("fixed", None) };
+    let begins = over_time(function, unit);
+    if scene.stage_drives(name).next().is_some() {
+        let staged =
+            scene.stages.iter().skip(1).filter_map(|stage| Some((&stage.name, stage.walls.get(name)?.drive())));
+        let later = staged.filter_map(|(stage, drive)| {
+            let (drive, function, unit) = parts(&drive)?;
+            Some(format!("; from stage {stage} on: {drive} {}", over_time(function, unit)))
+        });
+        return (drive, Some(begins + &later.collect::<String>()));
+    }
+    let course = match function {
+        Function::Constant(_) => format!("{begins} at all times"),
+        _ => format!("{begins}: {} {unit} at {} s", number(function.at(scene.time.end)), scene.time.end),
+    };
+    (drive, Some(course))
+}
+
+/// The name of a drive, its function of time and its unit; none for a fixed wall.
+fn parts(drive: &Drive) -> Option<(&'static str, &Function, &'static str)> {
+    match drive {
+        Drive::Fixed => None,
+        Drive::Velocity(velocity) => Some(("velocity", velocity, "m/s")),
+        Drive::Force(force) => Some(("force", force, "N")),
+        Drive::Stress(stress) => Some(("stress", stress, "Pa")),
+    }
+}
+
 /// A function of time in words.
-fn over_time(function: &Function, unit: &str, end: f64) -> String {
-    let last = || format!("{} {unit} at {end} s", number(function.at(end)));
+fn over_time(function: &Function, unit: &str) -> String {
     match function {
-        Function::Constant(value) => format!("{} {unit} at all times", number(*value)),
+        Function::Constant(value) => format!("{} {unit}", number(*value)),
         Function::Ramp(Ramp { rate, start }) => {
             let until = if *start > 0.0 { format!("until {start} s, then ") } else { String::new() };
-            format!("0 {unit} {until}growing by {} {unit} a second: {}", number(*rate), last())
+            format!("0 {unit} {until}growing by {} {unit} a second", number(*rate))
         }
         Function::Table(rows) => {
             let values = rows.iter().map(|row| row[1]);
             let (low, high) = values.fold((f64::MAX, f64::MIN), |(low, high), value| (low.min(value), high.max(value)));
-            format!("from {} to {} {unit}, by a table of {} rows: {}", number(low), number(high), rows.len(), last())
+            format!("from {} to {} {unit}, by a table of {} rows", number(low), number(high), rows.len())
         }
     }
 }
@@ -327,6 +350,7 @@ pub(crate) fn free_space(_folder: &Path) -> Option<u64> {
 pub(crate) mod tests {
     use super::*;
     use crate::scene::load;
+    use dem_core::dim::D2;
 
     pub(crate) fn config(name: &str, sets: &[&str]) -> Scene {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs").join(name);
@@ -371,6 +395,33 @@ pub(crate) mod tests {
         let check = Check::new(&config("column.json", &[])).expect("check");
         assert!(!Check { free_bytes: None, ..check.clone() }.disk_is_too_small());
         assert!(Check { free_bytes: Some(10), ..check }.disk_is_too_small());
+    }
+
+    #[test]
+    fn a_wall_has_the_drives_of_its_stages_one_after_the_other() {
+        let stages = r#"stages=[
+            {"name": "rest", "duration": 0.1, "walls": {"top": {"force": {"constant": 5}}}},
+            {"name": "press", "until": {"broken_fraction": 0.5}, "walls": {"top": {"velocity": {"constant": 1e-3}}}},
+            {"name": "tilt", "duration": 0.1, "walls": {"bottom": {"velocity": {"ramp": {"rate": 2}}}}}]"#;
+        let check = Check::new(&config("compression.json", &[stages])).expect("check");
+        let courses: Vec<_> =
+            check.walls.iter().map(|wall| (wall.drive, wall.course.as_deref().unwrap_or(""))).collect();
+        let bottom = "0 m/s; from stage tilt on: velocity 0 m/s growing by 2 m/s a second";
+        let top = "5 N; from stage press on: velocity 0.001 m/s";
+        assert_eq!(courses, [("velocity", bottom), ("force", top)]);
+    }
+
+    /// The floor holds both grains, so no bond joins them, whatever the gap.
+    #[test]
+    fn grains_that_a_wall_holds_have_no_bond_in_a_check_as_in_a_run() {
+        let floor = r#"walls={"floor": {"shape": {"plane": {"normal": [0, 1], "place": "seated"}}, "grip": 1e-3}}"#;
+        let absent = r#"bonds.absent=[{"ball": {"center": [2e-3, 0], "radius": 1e-3}}]"#;
+        Check::new(&config("two-grains.json", &[absent])).expect("a bond through the region");
+        let scene = config("two-grains.json", &[floor, absent]);
+        let told = Check::new(&scene).expect_err("no bond through the region").to_string();
+        assert!(told.contains("bonds.absent.0.ball: no bond would pass through it"), "{told}");
+        let Err(run) = build::<D2>(&scene, None, &mut |_| true) else { panic!("a run accepts it") };
+        assert_eq!(told, run.to_string());
     }
 
     fn with_sample(table: &str) -> Result<Check, RunError> {

@@ -67,7 +67,7 @@ impl<D: Dim> Course<D> {
         let driven: Vec<Driven<D>> = driven
             .map(|(wall, w)| Driven { wall, collapse: Collapse::default(), strain: 0.0, start: w.position })
             .collect();
-        let number = scene.load_wall().and_then(|name| scene.walls.keys().position(|other| other == name));
+        let number = scene.load_wall().and_then(|name| scene.wall_index(name));
         Self {
             load_wall: driven.iter().position(|at| Some(at.wall) == number),
             extents: extents(world),
@@ -207,9 +207,9 @@ impl<D: Dim> Course<D> {
         self.rejected += u64::from(report.rejected);
     }
 
-    /// What ends the run of `scene` after this step, if anything: a stop condition, or the end of
-    /// the last stage. At the end of another stage, the walls get the drives of the next.
-    pub fn ending(&mut self, scene: &Scene, world: &mut World<D>) -> Option<Ending> {
+    /// Begins the next stage if this step ends one: the walls get its drives. Returns what ends the
+    /// run of `scene` after this step, if anything: a stop condition, or the end of the last stage.
+    pub fn advance(&mut self, scene: &Scene, world: &mut World<D>) -> Option<Ending> {
         let broken = self.broken();
         if matches!(world.settings.rupture, Rupture::NextEvent { until } if world.load_time >= until) {
             return Some(Ending::NoBreak);

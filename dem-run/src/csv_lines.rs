@@ -80,6 +80,19 @@ impl<R: BufRead> Lines<R> {
         let text = std::str::from_utf8(&self.line).map_err(|_| "it is not UTF-8 text".to_string())?;
         Ok(text.split(',').map(|field| field.trim().trim_matches('"')))
     }
+
+    /// The fields of the current line, as many as the header has.
+    ///
+    /// # Errors
+    /// What is wrong with the line.
+    pub fn row(&self, columns: usize) -> Result<Vec<&str>, String> {
+        let fields: Vec<&str> = self.fields()?.collect();
+        if fields.len() != columns {
+            let values = if fields.len() == 1 { "value" } else { "values" };
+            return Err(format!("it has {} {values}, the header has {columns}", fields.len()));
+        }
+        Ok(fields)
+    }
 }
 
 /// The errors of a file.

@@ -8,7 +8,6 @@ use dem_core::problem::assembled::Assembled;
 use dem_core::solver::SolveStatus;
 
 use crate::build::build;
-use crate::course::Course;
 use crate::error::{NoConvergence, RunError};
 use crate::fclib::Problem;
 use crate::history::History;
@@ -18,6 +17,7 @@ use crate::progress::StepProgress;
 use crate::run::{Execution, handle_signals};
 use crate::scene::{self, Scene};
 use crate::signals::Interrupt;
+use crate::stages::Stages;
 
 /// Options of `dem-run export`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -66,23 +66,23 @@ fn export_in<D: Dim>(scene: &Scene, options: &ExportOptions, interrupt: &Interru
         !interrupt.requested()
     })?
     .world;
-    let mut course = Course::new(scene, &world);
+    let mut stages = Stages::new(scene, &world);
     while world.steps + 1 < options.step {
         let report = world.step().map_err(|error| NoConvergence::Export {
             error: error.to_string(),
             step: options.step,
             last: world.steps + 1,
         })?;
-        course.count(&world, &report);
-        // the walls may get the drives of the next stage
-        course.ending(scene, &mut world);
+        let broken = world.bonds.len() - world.intact_bonds();
+        stages.count(&world, broken);
+        stages.advance(scene, &mut world, broken);
         progress.step(&StepProgress {
             step: world.steps,
             time: world.time,
             end: (options.step - 1) as f64 * scene.time.step,
             residual: report.residual,
             iterations: report.work.iterations(),
-            broken: world.bonds.len() - world.intact_bonds(),
+            broken,
             bonds: world.bonds.len(),
             load: None,
             strain: None,

@@ -101,6 +101,9 @@ type Growth = (String, f64, f64, bool);
 fn limit_in<D: Dim>(scene: &Scene, options: &LimitOptions, interrupt: &Interrupt) -> Result<(), RunError> {
     refuse_stages_and_growing_stresses(scene)?;
     let mut growing = growing(scene);
+    let pushed = if growing.is_empty() { Some(pushed(scene)?) } else { None };
+    // in a run a velocity drives that wall: there is no time at which a force reaches the limit
+    let steady = pushed.is_none() && growing.iter().all(|(_, _, _, straight)| *straight);
     let mut progress = options.execution.show();
     let mut world = build::<D>(scene, None, &mut |done| {
         progress.phase("packing the sample", done);
@@ -108,16 +111,7 @@ fn limit_in<D: Dim>(scene: &Scene, options: &LimitOptions, interrupt: &Interrupt
     })?
     .world;
     progress.finish();
-    if growing.is_empty() {
-        growing.extend(pushed(scene, &mut world));
-    }
-    if growing.is_empty() {
-        return Err(RunError::Usage(
-            "no load of the scene grows between t = 0 and time.end: give a wall a force_rate or a load on a grain a ramp; \
-             of a wall that is driven by a velocity the force is taken, if it is the only driven wall or the load_wall"
-                .into(),
-        ));
-    }
+    growing.extend(pushed.and_then(|wall| push(scene, &mut world, wall)));
     let bent = growing.iter().find(|(_, _, _, straight)| !straight);
     if let (Some((load, ..)), false) = (bent, options.execution.quiet) {
         let text = "does not grow at a constant rate: the loads between its values at t = 0 and time.end are taken on a \
@@ -125,7 +119,7 @@ fn limit_in<D: Dim>(scene: &Scene, options: &LimitOptions, interrupt: &Interrupt
         let _ = writeln!(std::io::stderr(), "warning: {load} {text}");
     }
     let found = world.limit_load(0.0, scene.time.end);
-    Ok(print_result(&describe(scene, &world, growing, found)?, options.json)?)
+    Ok(print_result(&describe(scene, &world, (growing, steady), found)?, options.json)?)
 }
 
 /// A limit load is that of one course of forces; a stress may only confine.
@@ -171,10 +165,27 @@ fn straight(function: &Function, end: f64) -> bool {
     times.into_iter().filter(|t| (0.0..=end).contains(t)).all(|t| off(t) <= 1e-12 * (first.abs() + last.abs()))
 }
 
-/// Drives the load wall by a force instead of its velocity; returns that force as a load.
-fn pushed<D: Dim>(scene: &Scene, world: &mut World<D>) -> Option<Growth> {
-    let name = scene.load_wall()?;
-    let place = scene.walls.keys().position(|other| other == name)?;
+/// The wall whose force is taken where no load grows: the load wall, if a velocity drives it. Its
+/// index and its name.
+///
+/// # Errors
+/// [`RunError::Usage`]: there is none.
+fn pushed(scene: &Scene) -> Result<(usize, &str), RunError> {
+    let load_wall = scene.load_wall();
+    let moves = |wall: &scene::Wall| matches!(wall.drive(), scene::Drive::Velocity(_));
+    let mut walls = scene.walls.iter().enumerate();
+    let found = walls.find(|(_, (name, wall))| load_wall == Some(name.as_str()) && moves(wall));
+    found.map(|(place, (name, _))| (place, name.as_str())).ok_or_else(|| {
+        RunError::Usage(
+            "no load of the scene grows between t = 0 and time.end: give a wall a force_rate or a load on a grain a ramp; \
+             of a wall that is driven by a velocity the force is taken, if it is the only driven wall or the load_wall"
+                .into(),
+        )
+    })
+}
+
+/// Drives a wall by a force instead of its velocity; returns that force as a load.
+fn push<D: Dim>(scene: &Scene, world: &mut World<D>, (place, name): (usize, &str)) -> Option<Growth> {
     let Drive::Velocity { direction, speed } = &world.walls[place].drive else { return None };
     let (mass, end) = (world.grains.mass.iter().sum(), scene.time.end);
     // the way that the wall moves
@@ -183,10 +194,11 @@ fn pushed<D: Dim>(scene: &Scene, world: &mut World<D>) -> Option<Growth> {
     Some((format!("walls.{name}"), 0.0, sign, true))
 }
 
+/// The limit load found. `steady`: the loads of a run grow at constant rates.
 fn describe<D: Dim>(
     scene: &Scene,
     world: &World<D>,
-    growing: Vec<Growth>,
+    (growing, steady): (Vec<Growth>, bool),
     found: LimitLoad,
 ) -> Result<Limit, RunError> {
     let (outcome, factor, factor_error, least_factor) = match found {
@@ -198,10 +210,6 @@ fn describe<D: Dim>(
         LimitLoad::BrokenAtStart { least } => (Outcome::BrokenAtStart, None, None, Some(least)),
         LimitLoad::Undecided => return Err(NoConvergence::Limit.into()),
     };
-    let driven =
-        |name: &str| scene.walls.get(name).is_some_and(|wall| matches!(wall.drive(), scene::Drive::Velocity(_)));
-    let moved = growing.iter().any(|(load, ..)| load.strip_prefix("walls.").is_some_and(driven));
-    let steady = !moved && growing.iter().all(|(_, _, _, straight)| *straight);
     let loads = growing.into_iter().map(|(load, from, to, _)| GrowingLoad {
         load,
         from,

@@ -1,28 +1,29 @@
 //! Several materials: which grain is of which, and friction by pair.
 
 use crate::output::number;
+use crate::prepare::Ball;
 use crate::scene::Scene;
 use dem_core::dim::{Dim, Vect};
 use dem_core::world::MaterialFriction;
 
 /// The material of each grain, as its place in `Materials::names`; empty for a scene with one
 /// material. `sampled` are the materials that the sample gives the grains (empty: all `base`),
-/// `places` their centres (m), `radii` their radii (m).
+/// `balls` their centres and radii (m).
 ///
 /// # Errors
 /// Messages about regions and materials without a grain.
-pub fn assign<D: Dim>(scene: &Scene, sampled: Vec<u8>, places: &[D::Vector]) -> Result<Vec<u8>, Vec<String>> {
+pub fn assign<D: Dim>(scene: &Scene, sampled: Vec<u8>, balls: &[Ball<D>]) -> Result<Vec<u8>, Vec<String>> {
     let named = &scene.materials.named;
     if named.is_empty() {
         return Ok(vec![]);
     }
-    let mut materials = if sampled.is_empty() { vec![0; places.len()] } else { sampled };
+    let mut materials = if sampled.is_empty() { vec![0; balls.len()] } else { sampled };
     let mut wrong = vec![];
     for (k, material) in named.iter().enumerate() {
         for (r, region) in material.regions.iter().enumerate() {
             let mut count = 0;
-            for (own, place) in materials.iter_mut().zip(places) {
-                if region.holds(place.as_slice()) {
+            for (own, (centre, _)) in materials.iter_mut().zip(balls) {
+                if region.holds(centre.as_slice()) {
                     *own = (k + 1) as u8;
                     count += 1;
                 }
@@ -32,7 +33,7 @@ pub fn assign<D: Dim>(scene: &Scene, sampled: Vec<u8>, places: &[D::Vector]) -> 
                     "materials.named.{k}.regions.{r}.{}: it holds no centre of a grain; move or enlarge it: the centres \
                      reach {}",
                     region.name(),
-                    extent::<D>(places)
+                    extent::<D>(balls.iter().map(|(centre, _)| centre))
                 ));
             }
         }
@@ -53,9 +54,9 @@ pub fn assign<D: Dim>(scene: &Scene, sampled: Vec<u8>, places: &[D::Vector]) -> 
 }
 
 /// From where to where points reach, in words.
-pub fn extent<D: Dim>(places: &[D::Vector]) -> String {
+pub fn extent<'a, D: Dim>(points: impl Iterator<Item = &'a D::Vector> + Clone) -> String {
     let corner = |best: fn(f64, f64) -> f64, start: f64| {
-        let along = |axis: usize| number(places.iter().map(|x| x[axis]).fold(start, best));
+        let along = |axis: usize| number(points.clone().map(|x| x[axis]).fold(start, best));
         (0..D::N).map(along).collect::<Vec<_>>().join(", ")
     };
     format!("from ({}) to ({}) m", corner(f64::min, f64::INFINITY), corner(f64::max, f64::NEG_INFINITY))

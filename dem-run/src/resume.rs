@@ -119,7 +119,7 @@ fn resume_in<D: Dim>(
     };
     let mut state = RunState::<D>::restored(scene, &checkpoint)
         .map_err(|mismatch| RunError::InputOutput(format!("{shown}: {mismatch}; run the scene again")))?;
-    if state.world.steps >= scene.time.steps() || state.course.ending(scene, &mut state.world).is_some() {
+    if state.world.steps >= scene.time.steps() || state.course.advance(scene, &mut state.world).is_some() {
         let time = state.world.time;
         if options.json {
             return Ok(print_json(&serde_json::json!({ "history": path, "time": time, "steps_made": 0 }))?);

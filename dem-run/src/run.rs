@@ -199,7 +199,7 @@ impl<D: Dim> Run<'_, D> {
                 self.record(true, checkpoint)?;
             }
             let RunState { world, course, .. } = &mut self.state;
-            if let Some(ending) = course.ending(self.scene, world) {
+            if let Some(ending) = course.advance(self.scene, world) {
                 return Ok(ending);
             }
             if interrupt.requested() {

@@ -79,14 +79,9 @@ fn parse<D: Dim, R: BufRead>(mut lines: Lines<R>, materials: &[&str]) -> Result<
     // below a wrong header, lines cannot be checked
     wrong.end()?;
     let mut table = Table { balls: vec![], material: vec![] };
+    let columns = columns + usize::from(with_material);
     while lines.next()? {
-        let row = lines.fields().and_then(|fields| {
-            let mut fields: Vec<&str> = fields.collect();
-            let expected = columns + usize::from(with_material);
-            if fields.len() != expected {
-                let values = if fields.len() == 1 { "value" } else { "values" };
-                return Err(format!("it has {} {values}, the header has {expected}", fields.len()));
-            }
+        let row = lines.row(columns).and_then(|mut fields| {
             let material = if with_material { fields.pop() } else { None };
             let material = material.map(|name| self::material(name, materials)).transpose();
             Ok((ball::<D>(&fields)?, material?))

@@ -92,7 +92,7 @@ impl<D: Dim> Stages<D> {
 fn set_drives<D: Dim>(scene: &Scene, world: &mut World<D>, stage: usize, start: u64) {
     let time = start as f64 * scene.time.step;
     for (name, change) in &scene.stages[stage].walls {
-        let Some(index) = scene.walls.keys().position(|other| other == name) else { continue };
+        let Some(index) = scene.wall_index(name) else { continue };
         let Some(direction) = drive_direction(&world.walls[index]) else { continue };
         set_drive(&mut world.walls[index], &scene.walls[name], change.drive(), direction, &world.grains.mass, time);
     }

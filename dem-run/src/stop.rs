@@ -70,8 +70,8 @@ impl DropStop {
 impl<D: Dim> Stops<D> {
     /// The conditions of `stop`, with the travel of a wall measured from `world`.
     pub fn new(stop: Option<&Stop>, scene: &Scene, world: &World<D>) -> Self {
-        let wall = |name: &str| scene.walls.keys().position(|other| other == name);
-        let drop = stop.and_then(|stop| stop.load_drop).zip(scene.load_wall().and_then(wall));
+        let load_wall = scene.load_wall().and_then(|name| scene.wall_index(name));
+        let drop = stop.and_then(|stop| stop.load_drop).zip(load_wall);
         Self {
             travel: stop.and_then(|stop| travel_stop(stop, scene, world)),
             broken_limit: stop.and_then(|stop| stop.broken_fraction),
@@ -155,19 +155,50 @@ impl<D: Dim> Stops<D> {
 
 fn travel_stop<D: Dim>(stop: &Stop, scene: &Scene, world: &World<D>) -> Option<TravelStop<D>> {
     let travel = stop.wall_travel.as_ref()?;
-    let wall = scene.walls.keys().position(|name| *name == travel.wall)?;
+    let wall = scene.wall_index(&travel.wall)?;
     let direction = drive_direction(&world.walls[wall])?;
     let along = |sign: f64| {
         let reach = |(x, r): (&D::Vector, &f64)| sign * x.dot(&direction) + r;
         world.grains.position.iter().zip(&world.grains.radius).map(reach).fold(f64::NEG_INFINITY, f64::max)
     };
-    let from = (travel.after == TravelFrom::Start).then(|| world.walls[wall].position);
+    // the first break of the run may be in an earlier stage
+    let begun = travel.after == TravelFrom::Start || world.intact_bonds() < world.bonds.len();
+    let from = begun.then(|| world.walls[wall].position);
     Some(TravelStop { wall, direction, distance: travel.fraction_of_height * (along(1.0) + along(-1.0)), from })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::build::build;
+    use crate::scene::from_text;
+    use dem_core::bond::BondStatus;
+    use dem_core::dim::D2;
+
+    #[test]
+    fn a_travel_begins_with_its_conditions_if_bonds_broke_before() {
+        let text = r#"{ "dimension": 2,
+            "sample": { "grains": [{ "center": [0, 1], "radius": 1 }, { "center": [2, 1], "radius": 1 }] },
+            "materials": { "density": 1, "friction": { "grain_grain": 0.3, "grain_wall": 0.3 } },
+            "bonds": { "strength": 1, "gap_tolerance": 1e-3 },
+            "walls": { "lid": { "shape": { "plane": { "normal": [0, -1], "place": "seated" } },
+                "velocity": { "constant": 1 } } },
+            "stop": { "wall_travel": { "wall": "lid", "fraction_of_height": 0.5, "after": "first_break" } },
+            "time": { "step": 0.1, "end": 1 }, "output": { "every_steps": 1 } }"#;
+        let scene = from_text("test", text, &[]).expect("scene");
+        let mut world = build::<D2>(&scene, None, &mut |_| true).expect("world").world;
+        let from = |world: &World<D2>| {
+            let stops = Stops::new(scene.stop.as_ref(), &scene, world);
+            stops.travel.and_then(|travel| travel.from).map(|place| place[1])
+        };
+        assert_eq!(from(&world), None);
+        world.bonds.iter_mut().for_each(|bond| bond.status = BondStatus::Tension);
+        assert_eq!(from(&world), Some(2.0));
+        // two grains are two metres high: half of that, exactly
+        let mut stops = Stops::new(scene.stop.as_ref(), &scene, &world);
+        world.walls[0].position = [0.0, 1.0].into();
+        assert_eq!(stops.ending(&world, 1), Some(Ending::WallTravel));
+    }
 
     #[test]
     fn a_load_drops_below_its_share_of_the_peak_in_ten_consecutive_steps_after_a_break() {

@@ -9,7 +9,8 @@ use dem_core::dim::Dim;
 /// Messages about walls that need grains and have none.
 pub(crate) fn apart<D: Dim>(scene: &Scene, walls: &[Wall<D>], grains: &Grains<D>) -> Vec<String> {
     let mut wrong = vec![];
-    for (name, wall) in scene.walls.keys().zip(walls) {
+    let needy = |wall: &Wall<D>| wall.per_area || wall.grip.is_some();
+    for (name, wall) in scene.walls.keys().zip(walls).filter(|(_, wall)| needy(wall)) {
         let gap = |(x, r): (&D::Vector, &f64)| (wall.shape.gap(*x - wall.position, *r).0, *r);
         let Some((gap, radius)) =
             grains.position.iter().zip(&grains.radius).map(gap).min_by(|a, b| a.0.total_cmp(&b.0))

@@ -244,7 +244,7 @@ fn apart<D: Dim>(wall: &Wall<D>, motion: &DriveMotion<D>, grains: &Grains<D>) ->
 
 #[cfg(test)]
 mod tests {
-    use crate::build::place;
+    use crate::build::build;
     use crate::scene::from_text;
     use dem_core::dim::D2;
 
@@ -260,7 +260,7 @@ mod tests {
         );
         let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
         let scene = from_text("test", &text, &sets).unwrap_or_else(|error| panic!("{error}"));
-        place::<D2>(&scene, None, &mut |_| true).unwrap_or_else(|error| panic!("{error}")).warnings
+        build::<D2>(&scene, None, &mut |_| true).unwrap_or_else(|error| panic!("{error}")).warnings
     }
 
     fn lid(place: &str, drive: &str) -> String {

@@ -114,25 +114,28 @@ impl Materials {
         std::iter::once(BASE).chain(self.named.iter().map(|material| material.name.as_str())).collect()
     }
 
+    /// The named material at a place in the list of names; none for `base`.
+    fn named(&self, material: usize) -> Option<&NamedMaterial> {
+        self.named.get(material.checked_sub(1)?)
+    }
+
     /// Density of a material (kg/m³).
     #[must_use]
     pub fn density_of(&self, material: usize) -> f64 {
-        let named = material.checked_sub(1).and_then(|k| self.named.get(k));
-        named.and_then(|named| named.density).unwrap_or(self.density)
+        self.named(material).and_then(|named| named.density).unwrap_or(self.density)
     }
 
     /// Friction of a material with a wall whose own friction is `wall`.
     #[must_use]
     pub fn wall_friction_of(&self, material: usize, wall: Option<f64>) -> f64 {
-        let named = material.checked_sub(1).and_then(|k| self.named.get(k));
-        wall.or(named.and_then(|named| named.wall_friction)).unwrap_or(self.friction.grain_wall)
+        let own = || self.named(material).and_then(|named| named.wall_friction);
+        wall.or_else(own).unwrap_or(self.friction.grain_wall)
     }
 
     /// What is listed for two materials.
     #[must_use]
     pub fn pair(&self, a: usize, b: usize) -> Option<&MaterialPair> {
-        let names = self.names();
-        let (a, b) = (names.get(a)?, names.get(b)?);
+        let [a, b] = [a, b].map(|material| self.named(material).map_or(BASE, |named| named.name.as_str()));
         self.pairs.iter().find(|pair| {
             let [first, second] = &pair.between;
             (first == a && second == b) || (first == b && second == a)

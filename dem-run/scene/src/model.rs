@@ -296,6 +296,12 @@ pub fn choose_load_wall<'a>(named: [Option<&str>; 2], driven: &[&'a str]) -> Opt
 }
 
 impl Scene {
+    /// Index of a wall, by name.
+    #[must_use]
+    pub fn wall_index(&self, name: &str) -> Option<usize> {
+        self.walls.keys().position(|other| other == name)
+    }
+
     /// Names of the driven walls, in order.
     #[must_use]
     pub fn driven_walls(&self) -> Vec<&str> {

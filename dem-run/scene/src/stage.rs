@@ -20,7 +20,8 @@ pub struct Stage {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub duration: Option<f64>,
     /// Conditions that end the stage. The travel of a wall is measured from the beginning of the
-    /// stage, or from the first break of a bond in the run; a peak is sought in the stage.
+    /// stage, or, with `after`: `first_break`, from the first break of a bond in the run if that
+    /// comes later. The peak of the load is that of the stage.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub until: Option<Stop>,
     /// Drives of walls from the beginning of the stage on, by the name of the wall. A wall that is

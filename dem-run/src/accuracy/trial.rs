@@ -369,7 +369,7 @@ impl<D: Dim> Trial<'_, D> {
                     world.time
                 ));
             }
-            if let Some(ending) = state.course.ending(self.scene, &mut world) {
+            if let Some(ending) = state.course.advance(self.scene, &mut world) {
                 break End::Scene(ending);
             }
             let failed = |loads: &Collapse| loads.passed[1] && loads.failure.broken_share.is_some();

@@ -1,6 +1,6 @@
 //! `dem-run accuracy` on a small sample: its figures, its files, and what it refuses.
 
-use crate::common::{Folder, config, program};
+use crate::common::{Folder, config, number, program};
 use serde_json::Value;
 use std::process::{Command, Stdio};
 
@@ -32,10 +32,6 @@ fn without_clock(value: &Value) -> Value {
         Value::Array(list) => list.iter().map(without_clock).collect(),
         other => other.clone(),
     }
-}
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("no number: {value}"))
 }
 
 /// A CSV file as its head and its rows.

@@ -1,7 +1,7 @@
 //! The programs, a folder to run them in, and what they answered.
 
 use assert_cmd::Command;
-use dem_run::history::{History, Layout, Parameters};
+use dem_run::history::{History, Layout, Parameters, Series};
 use serde_json::Value;
 use std::collections::HashMap;
 use std::env;
@@ -130,6 +130,26 @@ impl Folder {
             stderr: text(output.stderr),
         }
     }
+}
+
+/// A number of a JSON answer.
+pub fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("no number: {value}"))
+}
+
+/// Runs the scene in the file `scene` into `a.h5`, and gives its summary.
+pub fn run(here: &Folder, scene: &str, args: &[&str]) -> Value {
+    here.dem_run(&[&["run", scene, "-o", "a.h5", "--force", "--quiet", "--json"], args].concat()).json()
+}
+
+/// An observable of a history.
+pub fn observable(history: &History, name: &str) -> Series {
+    history.observable(name).expect("read").unwrap_or_else(|| panic!("no observable {name}"))
+}
+
+/// One component of an observable, step by step.
+pub fn series(history: &History, name: &str, index: &[usize]) -> Vec<f64> {
+    observable(history, name).component(index).unwrap_or_else(|| panic!("{name} has no {index:?}"))
 }
 
 /// All that a history holds, part by part, but its parameters and the processor time.

@@ -1,13 +1,13 @@
 //! Bonds with a stiffness, from the scene to the history.
 
-use crate::common::{Folder, SMALL, config};
+use crate::common::{Folder, SMALL, config, observable};
 use dem_run::history::History;
 
 const SPRINGS: &str = r#"bonds.stiffness={"springs": {"normal": 1e7, "tangential": 5e6, "rolling": 5}}"#;
 const YOUNG: &str = r#"bonds.stiffness={"young": {"modulus": 1e9, "poisson_ratio": 0.2}}"#;
 
 fn values(history: &History, name: &str) -> Vec<f64> {
-    history.observable(name).expect("read").unwrap_or_else(|| panic!("no observable {name}")).value
+    observable(history, name).value
 }
 
 #[test]

@@ -1,27 +1,13 @@
 //! Loads of laboratory tests: walls by stress, shear under a normal load, glued platens, the end at
 //! a drop of the load; and the shipped scenes that use them.
 
-use crate::common::{Folder, config};
+use crate::common::{Folder, config, number, run, series};
 use dem_run::history::History;
-use serde_json::{Value, json};
-
-fn run(here: &Folder, scene: &str, args: &[&str]) -> Value {
-    here.dem_run(&[&["run", scene, "-o", "a.h5", "--force", "--quiet", "--json"], args].concat()).json()
-}
-
-/// One component of an observable, step by step.
-fn series(history: &History, name: &str, index: &[usize]) -> Vec<f64> {
-    let series = history.observable(name).expect("read").unwrap_or_else(|| panic!("no observable {name}"));
-    series.component(index).unwrap_or_else(|| panic!("{name} has no {index:?}"))
-}
+use serde_json::json;
 
 /// Index of a wall.
 fn wall(history: &History, name: &str) -> usize {
     history.walls().expect("walls").iter().position(|wall| wall.name == name).expect("the wall")
-}
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("no number: {value}"))
 }
 
 /// The side walls press with their stress on the present distance of lid and floor, at the middle
@@ -124,16 +110,10 @@ fn a_specimen_between_glued_platens_is_torn_apart() {
     assert!((last - 10..last).all(low) && !low(last - 11), "{:?}", &load[last - 12..]);
     here.dem_post(&["info", "a.h5", "--check"]).succeeds();
 
+    let whole = series(&history, "wall_force", &[top, 1]);
     run(&here, &config("direct-tension.json"), &["--set", "time.end=0.02"]);
     here.dem_run(&["resume", "a.h5", "--until", "0.4", "--quiet"]).succeeds();
-    let resumed = here.history("a.h5");
-    assert_eq!(series(&resumed, "wall_force", &[top, 1]), series_of(&here, top));
-}
-
-/// The force on a wall in a run of `direct-tension` in one piece.
-fn series_of(here: &Folder, top: usize) -> Vec<f64> {
-    here.dem_run(&["run", &config("direct-tension.json"), "-o", "b.h5", "--quiet"]).succeeds();
-    series(&here.history("b.h5"), "wall_force", &[top, 1])
+    assert_eq!(series(&here.history("a.h5"), "wall_force", &[top, 1]), whole);
 }
 
 #[test]

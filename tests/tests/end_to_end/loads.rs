@@ -1,7 +1,7 @@
 //! The load that a run reports: of the right wall, of the right moment, and in the terms of its
 //! test.
 
-use crate::common::{Folder, config};
+use crate::common::{Folder, config, number, run, series};
 use dem_run::history::History;
 use serde_json::{Value, json};
 
@@ -27,27 +27,13 @@ fn biaxial(here: &Folder, sides: [&str; 2]) {
     here.write("biaxial.json", scene.to_string());
 }
 
-fn run(here: &Folder, scene: &str, args: &[&str]) -> Value {
-    here.dem_run(&[&["run", scene, "-o", "a.h5", "--force", "--quiet", "--json"], args].concat()).json()
-}
-
 fn text(here: &Folder, scene: &str, args: &[&str]) -> String {
     here.dem_run(&[&["run", scene, "-o", "a.h5", "--force", "--quiet"], args].concat()).succeeds().stdout
-}
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("no number: {value}"))
 }
 
 /// A load as it is printed.
 fn newtons(load: f64) -> String {
     format!("{} N", dem_run::output::number(load))
-}
-
-/// One component of an observable, step by step.
-fn series(history: &History, name: &str, index: &[usize]) -> Vec<f64> {
-    let series = history.observable(name).expect("read").unwrap_or_else(|| panic!("no observable {name}"));
-    series.component(index).unwrap_or_else(|| panic!("{name} has no {index:?}"))
 }
 
 /// The loads of a wall that a force drives, read off its history.

@@ -1,12 +1,12 @@
 //! What a run says of its solves: method, residual, load error and cost, in its history and its
 //! summary.
 
-use crate::common::{Folder, SMALL, config};
+use crate::common::{Folder, SMALL, config, observable};
 use dem_run::history::{History, SolverRoute};
 use serde_json::Value;
 
 fn values(history: &History, name: &str) -> Vec<f64> {
-    history.observable(name).expect("read").unwrap_or_else(|| panic!("no observable {name}")).value
+    observable(history, name).value
 }
 
 fn count(values: &[f64], holds: impl Fn(f64) -> bool) -> u64 {

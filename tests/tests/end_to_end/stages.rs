@@ -1,6 +1,6 @@
 //! Staged loading: the same bits as one table, loops that close, stages that end by a condition.
 
-use crate::common::Folder;
+use crate::common::{self, Folder, series};
 use dem_run::history::History;
 use serde_json::{Value, json};
 
@@ -24,13 +24,7 @@ fn scene(top: Value, stages: Value) -> Value {
 
 fn run(here: &Folder, scene: &Value, args: &[&str]) -> (Value, History) {
     here.write("scene.json", scene.to_string());
-    let summary = here.dem_run(&[&["run", "scene.json", "-o", "a.h5", "--force", "--quiet", "--json"], args].concat());
-    (summary.json(), here.history("a.h5"))
-}
-
-fn series(history: &History, name: &str, index: &[usize]) -> Vec<f64> {
-    let series = history.observable(name).expect("read").unwrap_or_else(|| panic!("no observable {name}"));
-    series.component(index).unwrap_or_else(|| panic!("{name} has no {index:?}"))
+    (common::run(here, "scene.json", args), here.history("a.h5"))
 }
 
 /// Position, forces and stress, step by step. The lid is the second wall.

@@ -1,12 +1,8 @@
 //! The scenes for a first look: each does what its comments say, within two seconds.
 
-use crate::common::{Folder, config};
-use dem_run::history::{History, RuptureMode, Series};
+use crate::common::{Folder, config, observable};
+use dem_run::history::{History, RuptureMode};
 use std::f64::consts::PI;
-
-fn observable(history: &History, name: &str) -> Series {
-    history.observable(name).expect("read").unwrap_or_else(|| panic!("no observable {name}"))
-}
 
 fn close(value: f64, expected: f64, relative: f64) {
     let error = (value - expected).abs() / expected.abs();

@@ -1,12 +1,10 @@
 //! Wrong values in the materials, and in regions.
 
 use super::report::{Number, Report};
-use crate::error::Problem;
 use crate::material::{BASE, MaterialPair, PairBonds};
 use crate::model::Scene;
 use crate::region::Region;
 use crate::sample::Sample;
-use crate::suggest::nearest;
 
 /// Maximum number of named materials: histories number all materials by one byte.
 const MOST: usize = 254;
@@ -40,14 +38,14 @@ fn named(report: &mut Report, scene: &Scene) {
     }
     for (k, material) in named.iter().enumerate() {
         let path = format!("materials.named.{k}");
-        let name = &material.name;
-        let shown = format!("the name \"{name}\"");
-        if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-') {
-            report.wrong(format!("{path}.name"), shown, "a name of letters, digits, _ and -");
-        } else if name == BASE {
-            report.wrong(format!("{path}.name"), shown, "another name: base is the material of materials.density");
-        } else if named[..k].iter().any(|other| other.name == *name) {
-            report.wrong(format!("{path}.name"), format!("{shown} a second time"), "a name of its own");
+        let (name, place) = (&material.name, format!("{path}.name"));
+        if report.name(&place, name) {
+            let shown = format!("the name \"{name}\"");
+            if name == BASE {
+                report.wrong(place, shown, "another name: base is the material of materials.density");
+            } else if named[..k].iter().any(|other| other.name == *name) {
+                report.wrong(place, format!("{shown} a second time"), "a name of its own");
+            }
         }
         if let Some(density) = material.density {
             report.positive(format!("{path}.density"), density, "kg/m³");
@@ -69,9 +67,7 @@ fn named(report: &mut Report, scene: &Scene) {
 fn known(report: &mut Report, scene: &Scene, path: String, name: &str) {
     let names = scene.materials.names();
     if !names.contains(&name) {
-        let allowed = format!("the name of a material: {}", names.join(", "));
-        let problem = Problem::new(path, format!("\"{name}\""), allowed);
-        report.problems.push(problem.with_nearest(nearest(name, names)));
+        report.unknown(path, name, "a material", names);
     }
 }
 
@@ -108,16 +104,8 @@ fn pair_bonds(report: &mut Report, scene: &Scene, path: &str, bonds: &PairBonds)
     if let (Some(strength), Some(stress)) = (bonds.strength, bonds.stress) {
         report.wrong(path, format!("strength {strength:?} N and stress {stress:?} Pa"), "one of them");
     }
-    for (name, value, unit) in [("strength", bonds.strength, "N"), ("stress", bonds.stress, "Pa")] {
-        if let Some(value) = value {
-            report.non_negative(format!("{path}.{name}"), value, &format!("{unit}; 0 means no bonds"));
-        }
-    }
-    for (name, value) in [("shear", bonds.shear), ("rolling", bonds.rolling)] {
-        if let Some(value) = value {
-            report.non_negative(format!("{path}.{name}"), value, "no unit");
-        }
-    }
+    report.bond_strength(path, bonds.strength, bonds.stress);
+    report.bond_coefficients(path, &[("shear", bonds.shear), ("rolling", bonds.rolling)]);
     if let Some(factor) = bonds.stiffness_factor {
         let place = format!("{path}.stiffness_factor");
         match all.stiffness {

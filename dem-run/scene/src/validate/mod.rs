@@ -16,7 +16,6 @@ use super::model::{Bonds, Load, Rupture, Scatter, Scene, Stiffness};
 use super::solver::SolverKind;
 use super::stage::StageDrive;
 use super::stop::{Stop, TravelFrom};
-use super::suggest::nearest;
 use super::wall::Drive;
 pub use report::{LARGEST, MAX_GRAINS};
 use report::{Number, Report};
@@ -74,17 +73,10 @@ fn bonds(report: &mut Report, bonds: &Bonds, dimension: u8) {
         }
         _ => {}
     }
-    for (name, value, unit) in [("strength", bonds.strength, "N"), ("stress", bonds.stress, "Pa")] {
-        if let Some(value) = value {
-            report.non_negative(format!("bonds.{name}"), value, &format!("{unit}; 0 means no bonds"));
-        }
-    }
+    report.bond_strength("bonds", bonds.strength, bonds.stress);
     report.non_negative("bonds.gap_tolerance", bonds.gap_tolerance, "a fraction of the mean diameter");
-    for (name, value) in [("friction", bonds.friction), ("shear", bonds.shear), ("rolling", bonds.rolling)] {
-        if let Some(value) = value {
-            report.non_negative(format!("bonds.{name}"), value, "no unit");
-        }
-    }
+    let coefficients = [("friction", bonds.friction), ("shear", bonds.shear), ("rolling", bonds.rolling)];
+    report.bond_coefficients("bonds", &coefficients);
     for (k, region) in bonds.absent.iter().enumerate() {
         material::region(report, &format!("bonds.absent.{k}"), region);
     }
@@ -271,15 +263,7 @@ fn rupture(report: &mut Report, scene: &Scene) {
 /// Checks that `name`, found at `path`, is the name of a driven wall.
 fn driven_wall(report: &mut Report, scene: &Scene, path: &str, name: &str) {
     match scene.walls.get(name) {
-        None => {
-            let names: Vec<&str> = scene.walls.keys().map(String::as_str).collect();
-            let allowed = match names.is_empty() {
-                true => "a wall of the scene: it has none".to_string(),
-                false => format!("the name of a wall: {}", names.join(", ")),
-            };
-            let problem = Problem::new(path, format!("\"{name}\""), allowed);
-            report.problems.push(problem.with_nearest(nearest(name, names)));
-        }
+        None => report.unknown(path, name, "a wall", scene.walls.keys().map(String::as_str).collect()),
         Some(wall) if scene.drives(name, wall).is_empty() => {
             report.wrong(path, format!("\"{name}\", which is fixed"), "a wall that is driven");
         }

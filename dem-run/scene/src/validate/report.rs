@@ -4,6 +4,7 @@ use std::fmt;
 
 use crate::error::Problem;
 use crate::function::Function;
+use crate::suggest::nearest;
 
 /// Histories number grains and walls by the same 32-bit signed integers.
 pub const MAX_GRAINS: usize = 100_000_000;
@@ -35,6 +36,26 @@ impl Report {
         self.problems.push(Problem::new(path, found.to_string(), allowed));
     }
 
+    /// Reports the name of something that the scene lacks: `what`, as "a wall". `names` are those
+    /// that it has.
+    pub(crate) fn unknown(&mut self, path: impl Into<String>, name: &str, what: &str, names: Vec<&str>) {
+        let allowed = match names.is_empty() {
+            true => format!("{what} of the scene: it has none"),
+            false => format!("the name of {what}: {}", names.join(", ")),
+        };
+        let problem = Problem::new(path, format!("\"{name}\""), allowed);
+        self.problems.push(problem.with_nearest(nearest(name, names)));
+    }
+
+    /// Checks the characters of a name; returns whether they are allowed.
+    pub(crate) fn name(&mut self, path: impl Into<String>, name: &str) -> bool {
+        let allowed = !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-');
+        if !allowed {
+            self.wrong(path, format!("the name \"{name}\""), "a name of letters, digits, _ and -");
+        }
+        allowed
+    }
+
     /// Checks that a number is finite and `inside` holds; `allowed` describes the range.
     pub(crate) fn range(&mut self, path: impl Into<String>, value: f64, inside: bool, allowed: impl Into<String>) {
         if inside && value.abs() <= LARGEST {
@@ -57,6 +78,24 @@ impl Report {
 
     pub(crate) fn non_negative(&mut self, path: impl Into<String>, value: f64, unit: &str) {
         self.range(path, value, value >= 0.0, format!("a finite number ≥ 0 ({unit})"));
+    }
+
+    /// Checks the strength of bonds at `path`: a force, or a stress.
+    pub(crate) fn bond_strength(&mut self, path: &str, strength: Option<f64>, stress: Option<f64>) {
+        for (name, value, unit) in [("strength", strength, "N"), ("stress", stress, "Pa")] {
+            if let Some(value) = value {
+                self.non_negative(format!("{path}.{name}"), value, &format!("{unit}; 0 means no bonds"));
+            }
+        }
+    }
+
+    /// Checks coefficients of the limits of bonds at `path`, by name.
+    pub(crate) fn bond_coefficients(&mut self, path: &str, coefficients: &[(&str, Option<f64>)]) {
+        for (name, value) in coefficients {
+            if let Some(value) = value {
+                self.non_negative(format!("{path}.{name}"), *value, "no unit");
+            }
+        }
     }
 
     pub(crate) fn finite(&mut self, path: impl Into<String>, value: f64) {

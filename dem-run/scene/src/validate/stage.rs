@@ -4,7 +4,6 @@ use super::report::Report;
 use crate::model::Scene;
 use crate::stage::StageDrive;
 use crate::stop::Stop;
-use crate::suggest::nearest;
 
 /// Reports wrong values of the stages.
 pub(super) fn check(report: &mut Report, scene: &Scene, stop: impl Fn(&mut Report, &Scene, &str, &Stop)) {
@@ -39,11 +38,7 @@ pub(super) fn check(report: &mut Report, scene: &Scene, stop: impl Fn(&mut Repor
 
 fn stage_drive(report: &mut Report, scene: &Scene, path: &str, name: &str, drive: &StageDrive) {
     let Some(wall) = scene.walls.get(name) else {
-        let names: Vec<&str> = scene.walls.keys().map(String::as_str).collect();
-        report.wrong(path, format!("\"{name}\""), format!("the name of a wall: {}", names.join(", ")));
-        if let Some(problem) = report.problems.pop() {
-            report.problems.push(problem.with_nearest(nearest(name, names)));
-        }
+        report.unknown(path, name, "a wall", scene.walls.keys().map(String::as_str).collect());
         return;
     };
     let functions = [("velocity", &drive.velocity), ("force", &drive.force), ("stress", &drive.stress)];

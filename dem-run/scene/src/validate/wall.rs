@@ -10,9 +10,7 @@ const PERPENDICULAR: f64 = 1e-6;
 /// Checks the wall `name`; `staged` are the drives that stages give it.
 pub(super) fn wall(report: &mut Report, name: &str, wall: &Wall, staged: &[Drive]) {
     let path = format!("walls.{name}");
-    if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-') {
-        report.wrong(&path, format!("the name \"{name}\""), "a name of letters, digits, _ and -");
-    }
+    report.name(&path, name);
     wall.shape.check(report, &format!("{path}.shape"));
     if let Some(friction) = wall.friction {
         report.non_negative(format!("{path}.friction"), friction, "no unit");
