@@ -272,8 +272,10 @@ impl Chart {
     /// `lift`.
     fn scale_axes(&self, mut layout: Layout, lift: f64) -> Layout {
         let values = || self.curves.iter().flat_map(|curve| &curve.points);
-        let low = values().map(|p| p.0).fold(f64::INFINITY, f64::min);
-        let high = values().map(|p| p.0).fold(f64::NEG_INFINITY, f64::max);
+        let bars = self.bars.iter().flat_map(|bars| &bars.bars);
+        let places: Vec<f64> = values().map(|p| p.0).chain(bars.map(|bar| bar.0)).collect();
+        let low = places.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = places.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         if self.log_x {
             layout = layout.with_log_x().with_x_tick_format(TickFormat::Custom(Arc::new(power_of_ten)));
             if self.pad_x && 0.0 < low && low < high {
