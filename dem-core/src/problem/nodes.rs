@@ -56,6 +56,7 @@ impl<D: Dim> Nodes<D> {
     }
 
     /// Local Delassus block of a contact.
+    #[inline(always)]
     pub fn block(&self, link: &Link<D>, arms: Arms) -> Block {
         let [i, j] = link.nodes.map(|k| &self.all[k as usize]);
         let Arms { lever: [li, lj], bending: arm } = arms;

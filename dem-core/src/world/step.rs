@@ -375,7 +375,9 @@ impl<D: Dim> World<D> {
     #[inline]
     pub(super) fn wall_forces(&self, mid: &Midpoint<D>, touches: &[StoredTouch<D>]) -> Vec<D::Vector> {
         let mut forces = vec![D::Vector::zero(); self.walls.len()];
-        for stored in touches {
+        // most touches are between grains that no wall holds
+        let grains = if self.held.is_empty() { self.grains.len() as u32 } else { 0 };
+        for stored in touches.iter().filter(|touch| touch.pair[1] >= grains) {
             let [holder, wall] = self.walls_of(stored.pair);
             if holder.is_none() && wall.is_none() {
                 continue;
