@@ -108,7 +108,7 @@ fn reads(good: &Path) -> Vec<Command<'_>> {
             let runs = [good.to_path_buf(), h.path().to_path_buf()];
             envelope::read(&runs, strength::Measure::Broken, None).map(|report| drop(report.table()))
         }),
-        command("view", |h, _| view::read(h, true).map(|report| drop(report.table()))),
+        command("view", |h, _| view::read(h, view::Format::Vtkhdf, true).map(|report| drop(report.table()))),
         command("pack", |h, folder| pack::write(h, &folder.path().join("packed.h5"), CopyAs::Packed, true).map(drop)),
     ]
 }
@@ -133,7 +133,11 @@ fn writes(good: &Path) -> Vec<Command<'_>> {
             let runs = [good.to_path_buf(), h.path().to_path_buf()];
             envelope::write(&envelope::read(&runs, strength::Measure::Broken, None)?, folder)
         }),
-        command("view", |h, folder| view::write(h, &mut view::read(h, true)?, folder, true)),
+        command("view", |h, folder| view::write(h, &mut view::read(h, view::Format::Vtkhdf, true)?, folder, true)),
+        command("view vtp", |h, folder| view::write(h, &mut view::read(h, view::Format::Vtp, true)?, folder, true)),
+        command("view lammps", |h, folder| {
+            view::write(h, &mut view::read(h, view::Format::Lammps, true)?, folder, true)
+        }),
     ]
 }
 

@@ -11,7 +11,7 @@ use super::checkpoint::{Checkpoint, Slots};
 use super::codes::{BondCode, Coded};
 use super::create::{self, Column, Commit, ContactTables, Observables, check_length};
 use super::error::{HistoryError, Result, refused, while_writing};
-use super::lock;
+use super::{dimensions, lock};
 use super::model::{Frame, Layout, RowCounts, Rupture};
 use super::reader::History;
 use super::rupture::RuptureRow;
@@ -163,6 +163,7 @@ impl Writer {
         let observables = create::observables(&file, &layout.observables, storage)?;
         let commit = create::commit(&file, bonded, storage)?;
         let slots = Slots::create(&file, storage)?;
+        dimensions::label(&file)?;
         Ok(Self {
             path: path.into(),
             dimension: layout.dimension,
