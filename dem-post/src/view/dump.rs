@@ -56,9 +56,9 @@ fn head(history: &History, grains: &Grains, frame: usize, rows: usize, of: &str)
     );
     for axis in 0..3 {
         let centres = state.position.chunks_exact(d).map(|centre| centre.get(axis).copied().unwrap_or(0.0));
-        let ends = centres.zip(&grains.radius).fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], (x, r)| {
-            [low.min(x - r), high.max(x + r)]
-        });
+        let ends = centres
+            .zip(&grains.radius)
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], (x, r)| [low.min(x - r), high.max(x + r)]);
         text += &line(&ends);
     }
     Ok(text)

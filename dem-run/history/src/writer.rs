@@ -11,7 +11,6 @@ use super::checkpoint::{Checkpoint, Slots};
 use super::codes::{BondCode, Coded};
 use super::create::{self, Column, Commit, ContactTables, Observables, check_length};
 use super::error::{HistoryError, Result, refused, while_writing};
-use super::{dimensions, lock};
 use super::model::{Frame, Layout, RowCounts, Rupture};
 use super::reader::History;
 use super::rupture::RuptureRow;
@@ -19,6 +18,7 @@ use super::schema::{chunk_cache, path};
 use super::source::{Source, end_of_file};
 use super::table::{Growth, Storage, Table};
 use super::visit::{Bytes, Copy, Share, Visit};
+use super::{dimensions, lock};
 
 /// Steps of observables, and ruptures, that are held in memory before they are appended.
 const BLOCK: usize = 256;
