@@ -22,7 +22,7 @@ SCENES = {
             "sample.random.preparation.compaction.solid_fraction=0.79",
         ],
     ),
-    "space": ("tests/problems/scenes/cube.json", ['bonds={"strength": 0.01, "gap_tolerance": 1e-3, "twist": true}']),
+    "space": ("tests/problems/scenes/cube.json", ['bonds={"strength": 0.01, "gap_tolerance": 1e-3, "twist": 0.1}']),
     "loose": ("tests/problems/scenes/cube.json", []),
 }
 
