@@ -6,9 +6,13 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 os.environ["OVITO_GUI_MODE"] = "0"
 
 import numpy
-import pytest
 from ovito.io import import_file
 from ovito.modifiers import LoadTrajectoryModifier
+
+
+def same(found, expected):
+    """Up to the last digits, in which OVITO's reader of decimal numbers differs."""
+    return numpy.allclose(found, expected, rtol=2**-50, atol=0)
 
 
 def topology(pipeline, path, columns):
@@ -30,10 +34,10 @@ def test_grains(case):
         data = pipeline.compute(k)
         grains = data.particles
         assert data.attributes["Timestep"] == case.steps[k]
-        assert data.attributes["Time"] == case.times[k]
+        assert same(data.attributes["Time"], case.times[k])
         assert (grains.identifiers[...] == case.grains["id"][:]).all()
-        assert (grains.positions[...] == case.positions(k)).all()
-        assert (grains["Velocity"][...] == case.velocities(k)).all()
+        assert same(grains.positions[...], case.positions(k))
+        assert same(grains["Velocity"][...], case.velocities(k))
         assert numpy.allclose(grains["Radius"][...], case.radius, rtol=2**-23, atol=0)
         assert numpy.allclose(grains["Mass"][...], case.grains["mass"][:], rtol=2**-23, atol=0)
         if "orientation" in case.grains:
@@ -58,7 +62,7 @@ def test_bonds(case):
         data = pipeline.compute(k)
         holds = case["bonds/status/value"][k] == 0
         assert (pairs(data) == case["bonds/pair"][:][holds]).all()
-        assert (data.particles.bonds["Strength"][...] == case["bonds/strength"][:][holds]).all()
+        assert same(data.particles.bonds["Strength"][...], case["bonds/strength"][:][holds])
         numbers.add(data.particles.bonds.count)
     assert case.name != "flat" or len(numbers) > 1
 
@@ -78,6 +82,7 @@ def test_contacts(case):
         bonds = data.particles.bonds
         assert (pairs(data) == pair[between]).all()
         assert (bonds["Status"][...] == case["contacts/status"][rows][between]).all()
-        assert (bonds["Gap"][...] == case["contacts/gap"][rows][between]).all()
-        assert (bonds["Normal force"][...] == reaction[:, 0]).all()
-        assert bonds["Tangential force"][...] == pytest.approx(numpy.linalg.norm(reaction[:, 1:], axis=1), rel=1e-14)
+        assert same(bonds["Gap"][...], case["contacts/gap"][rows][between])
+        assert same(bonds["Normal force"][...], reaction[:, 0])
+        tangential = numpy.linalg.norm(reaction[:, 1:], axis=1)
+        assert numpy.allclose(bonds["Tangential force"][...], tangential, rtol=1e-14, atol=0)
