@@ -67,7 +67,9 @@ fn datasets(group: &hdf5::Group, seen: &mut Vec<String>) -> Vec<String> {
         // checkpoint slots have a checksum; texts are not numbers
         let name = dataset.name().trim_start_matches('/').to_string();
         let text = matches!(dataset.dtype().unwrap().to_descriptor(), Ok(TypeDescriptor::VarLenUnicode));
-        if !seen.contains(&token) && !text && !name.starts_with("checkpoint/") && dataset.size() > 0 {
+        // the names of axes have no values
+        let values = dataset.size() > 0 && dataset.storage_size() > 0;
+        if !seen.contains(&token) && !text && !name.starts_with("checkpoint/") && values {
             found.push(name);
         }
         seen.push(token);
