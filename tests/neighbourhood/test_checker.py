@@ -2,6 +2,7 @@
 must fail."""
 
 import copy
+import json
 import re
 import shutil
 
@@ -105,7 +106,111 @@ def bouncing():
     }
 
 
+def side(sign, **drive):
+    """A side wall."""
+    return {"shape": {"plane": {"normal": [sign, 0], "place": "seated"}}, "mass": "sample"} | drive
+
+
+def layered():
+    """`pressed` with two materials, a notch, bonds of scattered strength."""
+    scene = pressed()
+    scene["bonds"] |= {
+        "scatter": {"weibull": {"modulus": 8}},
+        "absent": [{"box": {"from": [0.004, -1], "to": [0.004, 0.008]}}],
+    }
+    upper = {
+        "name": "upper",
+        "density": 3000,
+        "wall_friction": 0.4,
+        "regions": [{"half_space": {"point": [0, 0.009], "normal": [0.2, 1]}}],
+    }
+    own = {"strength": 6, "shear": 0.2, "rolling": 0.1}
+    pairs = [{"between": ["upper", "base"], "friction": 0.1, "bonds": own}]
+    scene["materials"] = DRY | {"named": [upper], "pairs": pairs}
+    return scene
+
+
+def listed():
+    """Two rows of three disks under a plate, from files: materials of the grains, and their bonds."""
+    r = 1e-3
+    rows = [f"{2 * r * (k % 3)},{r + 2 * r * (k // 3)},{r},{'upper' if k > 2 else 'base'}" for k in range(6)]
+    bonds = ["0,1,4,,", "1,2,,,", "4,3,,0.2,", "4,5,,,0.1", "0,3,,,", "1,4,9,0.5,0.4", "2,5,,,"]
+    scene = pressed()
+    del scene["gravity"]
+    scene["sample"] = {"file": {"path": "grains.csv"}}
+    scene["bonds"] |= {"list": "bonds.csv", "scatter": {"normal": {"deviation": 0.2}}}
+    scene["materials"] = DRY | {
+        "named": [{"name": "upper"}],
+        "pairs": [{"between": ["upper", "upper"], "bonds": {"strength": 3}}],
+    }
+    # off the middle, so that the bonds of the rows are loaded
+    scene["walls"]["top"] |= {"shape": {"circle": {"center": [1.5 * r, 1], "radius": r, "seated": [0, -1]}}}
+    scene["walls"]["top"] |= {"direction": [0, -1]}
+    scene["time"]["end"] = 0.01
+    texts = {"grains.csv": ["x,y,radius,material", *rows], "bonds.csv": ["i,j,strength,shear,rolling", *bonds]}
+    return scene | {"files": {name: "\n".join(lines) + "\n" for name, lines in texts.items()}}
+
+
+def confined():
+    """`pressed` with elastic bonds between walls with a stress, under a lid that comes down until its
+    load drops."""
+    scene = pressed()
+    del scene["gravity"]
+    scene["bonds"] |= {"stiffness": {"young": {"modulus": 1e8, "poisson_ratio": 0.2}}, "gap_tolerance": 0.01}
+    stress = {"table": [[0, 0], [2e-3, 2e4]]}
+    scene["walls"] |= {"left": side(1, stress=stress), "right": side(-1, stress=stress)}
+    scene["walls"]["top"] = {"shape": scene["walls"]["top"]["shape"]}
+    scene["walls"]["top"] |= {"velocity": {"table": [[2e-3, 0], [4e-3, 0.05]]}}
+    scene["time"]["end"] = 0.03
+    return scene | {"load_wall": "top", "stop": {"load_drop": 0.6}}
+
+
+def sheared():
+    """Three rows of disks on a wall that holds the lowest one, under a lid with a stress that
+    slides."""
+    scene = beam()
+    scene["sample"]["lattice"]["hexagonal"] |= {"rows": 3, "columns": 6}
+    scene["bonds"] |= {"strength": 10, "stiffness": {"young": {"modulus": 1e7, "poisson_ratio": 0.2}}}
+    lid = {"friction": 3, "mass": "sample", "stress": {"table": [[0, 0], [2e-3, 1000]]}}
+    lid["slide"] = {"direction": [1, 0], "velocity": {"table": [[2e-3, 0], [4e-3, 0.02]]}}
+    scene["walls"] = {
+        "bottom": {"shape": {"plane": {"normal": [0, 1], "place": "seated"}}, "grip": 1e-3},
+        "lid": {"shape": {"plane": {"normal": [0, -1], "place": "seated"}}} | lid,
+    }
+    return scene
+
+
+def staged():
+    """`pressed` under a plate with stages: a force, a velocity until bonds break, at rest, a
+    stress."""
+    scene = pressed()
+    top = scene["walls"]["top"]
+    del top["force_rate"]
+    scene["stages"] = [
+        {"name": "seat", "duration": 2e-3, "walls": {"top": {"force": {"ramp": {"rate": 5000}}}}},
+        {"name": "press", "until": {"broken_fraction": 0.1}, "walls": {"top": {"velocity": {"constant": 0.02}}}},
+        {"name": "hold", "duration": 1e-3, "walls": {"top": {}}},
+        {"name": "load", "duration": 2e-3, "walls": {"top": {"stress": {"ramp": {"rate": 1e6}}}}},
+    ]
+    scene["time"]["end"] = 0.02
+    return scene
+
+
+def from_break_to_break():
+    """`pressed` without weight, from break to break."""
+    scene = pressed(rupture="next_event")
+    del scene["gravity"]
+    scene["time"]["end"] = 0.02
+    return scene
+
+
 SCENES = {
+    "layered": layered,
+    "listed": listed,
+    "confined": confined,
+    "sheared": sheared,
+    "staged": staged,
+    "events": from_break_to_break,
     "pressed": pressed,
     "late": lambda: pressed(rupture="end_of_step"),
     "beam": beam,
@@ -148,7 +253,10 @@ class Runs(dict):
         self.folder = folder
 
     def __missing__(self, name):
-        self[name] = Good(*programs.run(SCENES[name](), self.folder, name, text=True))
+        scene = SCENES[name]()
+        for file, text in scene.pop("files", {}).items():
+            (self.folder / file).write_text(text)
+        self[name] = Good(*programs.run(scene, self.folder, name, text=True))
         return self[name]
 
 
@@ -203,6 +311,28 @@ def observed(name, step=40, relative=1e-5, absolute=0.0):
     return spoil
 
 
+def told(*place, value):
+    """Alters a value of the scene in the history."""
+
+    def spoil(file, good):
+        scene = json.loads(file["parameters/scene"][()])
+        inner = scene
+        for key in place[:-1]:
+            inner = inner[key]
+        inner[place[-1]] = value(inner[place[-1]]) if callable(value) else value
+        text = json.dumps(scene)
+        del file["parameters/scene"]
+        file["parameters/scene"] = text
+
+    return spoil
+
+
+def strongest_of_event(good):
+    """The row of the largest force between grains in the last step."""
+    h = good.h
+    return good.row((h.row_step == h.S - 2) & ~h.on_wall)
+
+
 G = "particles/grains/"
 step_of = lambda pick: lambda good: int(good.h.row_step[pick(good)]) + 1
 grain_of = lambda pick: lambda good: (int(good.h.row_step[pick(good)]) + 1, int(good.h.i[pick(good)]))
@@ -216,6 +346,11 @@ def broken_late(good):
     """A row of a bond that broke at the end of that step."""
     h = good.h
     return good.row((h.bond >= 0) & (h.bond_status[h.row_step + 1, h.bond] != "INTACT"))
+
+
+def dry_grain(good):
+    """A grain of a dry contact under a force."""
+    return int(good.h.i[good.row(good.h.bond < 0)])
 
 
 def apart(good):
@@ -513,6 +648,52 @@ SPOILT = (
         ("beam", "elastic energy", observed("elastic_energy", 20), "elastic_energy"),
         ("beam", "damping", observed("dissipation_damping", -1), "dissipation_damping"),
         ("beam", "fracture energy", observed("fracture_energy", -1), "fracture_energy"),
+        # several materials and bonds by pair
+        ("layered", "a material", put(G + "material", lambda g: 3, lambda m: 1 - m), "materials"),
+        ("listed", "a material", put(G + "material", lambda g: 3, 0), "materials"),
+        ("pressed", "a mass", add(G + "mass", lambda g: 3), "masses"),
+        ("layered", "an inertia", add(G + "inertia", lambda g: int(np.argmax(g.h.material))), "masses"),
+        ("layered", "the density of a material", told("materials", "named", 0, "density", value=2999), "masses"),
+        ("layered", "the friction of a pair", told("materials", "pairs", 0, "friction", value=0.09), "cone_or_slip"),
+        ("layered", "a region", told("materials", "named", 0, "regions", value=lambda r: r[:0]), "materials"),
+        ("layered", "the strength of a pair", told("materials", "pairs", 0, "bonds", "strength", value=6.1), "bonds formed"),
+        ("layered", "a limit of a pair", told("materials", "pairs", 0, "bonds", "shear", value=0.21), "bonds formed"),
+        ("layered", "a notch", told("bonds", "absent", value=lambda r: r[:0]), "bonds formed"),
+        ("layered", "a scattered strength", add("bonds/strength", lambda g: 3), "bonds formed"),
+        ("layered", "a rolling limit", add("bonds/rolling", lambda g: 3), "bonds formed"),
+        ("layered", "the seed of the strengths", told("seed", value=4), "bonds formed"),
+        ("listed", "a listed strength", add("bonds/strength", lambda g: 0), "bonds formed"),
+        ("listed", "a listed limit", add("bonds/friction", lambda g: 4), "bonds formed"),
+        ("listed", "a bond of the list", put("bonds/pair", lambda g: (0, 1), 2), "bonds formed"),
+        # laboratory loads
+        ("confined", "a stress", told("walls", "left", "stress", "table", 1, 1, value=2e4 * (1 + 1e-6)), "applied_force"),
+        ("confined", "a wall that confines", add("walls/velocity/value", lambda g: (-1, 1, 0), 1e-6), "wall motion"),
+        ("sheared", "a slide", told("walls", "lid", "slide", "velocity", "table", 1, 1, value=0.0201), "wall motion"),
+        ("sheared", "a wall that slides", add("walls/velocity/value", lambda g: (-1, 1, 0), 1e-9), "wall motion"),
+        ("sheared", "a grain that is held", add(G + "velocity/value", lambda g: (20, 2, 0), 0, 1e-12), "held grains"),
+        ("sheared", "a place of one", add(G + "position/value", lambda g: (20, 2, 0), 0, 1e-12), "held grains"),
+        ("sheared", "a force on one", observed("wall_force", 20, 1e-9), "wall_force"),
+        ("sheared", "the work of a slide", observed("external_work", -1), "external_work"),
+        ("staged", "a duration", told("stages", 0, "duration", value=1.9e-3), "wall motion"),
+        ("staged", "a condition of a stage", told("stages", 1, "until", "broken_fraction", value=0.9), "wall motion"),
+        ("staged", "a velocity of a stage", told("stages", 1, "walls", "top", "velocity", "constant", value=0.021), "wall motion"),
+        ("staged", "a wall at rest", told("stages", 2, "walls", "top", value={"velocity": {"constant": 1e-9}}), "wall motion"),
+        ("staged", "a stress of a stage", told("stages", 3, "walls", "top", "stress", "ramp", "rate", value=1.001e6), "applied_force"),
+        ("staged", "the work at its beginning", observed("external_work", -1), "external_work"),
+        # loading from break to break
+        ("events", "a place", add(G + "position/value", lambda g: (5, 3, 1), 0, 1e-15), "rest"),
+        ("events", "a speed", add(G + "velocity/value", lambda g: (5, 3, 1), 0, 1e-15), "rest"),
+        ("events", "a kinetic energy", observed("kinetic_energy", 3, 0, 1e-15), "rest"),
+        ("events", "a load", observed("load_time", 3), "applied_force"),
+        ("events", "a load beyond the end", observed("load_time", 3, 0, 1.0), "load time"),
+        ("events", "a reaction", put("contacts/reaction", lambda g: (strongest_of_event(g), 0), lambda r: 1.001 * r), "equilibrium"),
+        ("events", "a moment", put("contacts/moment", lambda g: BONDED(g), lambda m: m + 1e-6), "equilibrium"),
+        ("events", "a bond that breaks early", put("contacts/reaction", lambda g: (broken_late(g), 0), lambda r: r + 1e-2), "breaks"),
+        ("events", "a bond that holds too much", put("contacts/reaction", lambda g: (BONDED(g), 1), lambda r: r + 50), "breaks"),
+        ("events", "a force without touch", add(G + "radius", dry_grain, -1e-3), "contacts that do not touch"),
+        ("events", "a rupture's force", event("rn", lambda n: n * (1 + 1e-9)), "ruptures"),
+        ("events", "a rupture's moment", event("m", lambda m: m * (1 + 1e-9) + 1e-12), "ruptures"),
+        ("events", "a rupture's mode", event("mode", other_mode), "mode of events"),
         ("pressed", "a number that is none", put(G + "velocity/value", lambda g: (40, 1, 0), np.nan), "finite numbers"),
     ]
 )
@@ -522,6 +703,7 @@ EITHER = {
     "wall_force_or_applied": {"applied_force"},
     "closing_or_signorini": {"Signorini"},
     "Signorini_or_complementarity": {"Signorini", "complementarity"},
+    "cone_or_slip": {"cone", "slip", "stick"},
     "rt_or_mode": {"events at their limit", "mode of events"},
 }
 
@@ -549,6 +731,8 @@ def test_a_good_history_is_right(good, name):
 def test_a_spoilt_number_is_found(good, tmp_path, scene, what, spoil, expected):
     path = tmp_path / "spoilt.h5"
     shutil.copy(good[scene].path, path)
+    for table in good[scene].path.parent.glob("*.csv"):
+        shutil.copy(table, tmp_path)
     with h5py.File(path, "r+") as file:
         spoil(file, good[scene])
     wrong = set(check(path).wrong)
