@@ -161,9 +161,9 @@ class History:
         self.quasi_static = scene.get("rupture") == "next_event"
         if self.quasi_static:
             self.load_times = self.observed["load_time"]
-        self.wall_direction = np.array(
-            [prescribed.direction(scene, name, w) for name, w in self.scene_walls]
-        ).reshape(W, self.D)
+        self.wall_direction = np.array([prescribed.direction(scene, name, w) for name, w in self.scene_walls]).reshape(
+            W, self.D
+        )
         self._holding()
         still = np.zeros((self.S + 1, W, self.Q))
         self.body_x, self.body_v = np.concatenate([self.x, self.X], 1), np.concatenate([self.v, self.V], 1)

@@ -111,7 +111,11 @@ class Bonds:
         self.a = h.radius[i] + h.radius[j]
         self.strength, self.factor = prescribed.strength(scene, self.a), np.ones(len(i))
         friction, _ = dry_friction(h)
-        mu = friction[h.material[i], h.material[j]] if bonds.get("friction") is None else np.full(len(i), bonds["friction"])
+        mu = (
+            friction[h.material[i], h.material[j]]
+            if bonds.get("friction") is None
+            else np.full(len(i), bonds["friction"])
+        )
         limit = lambda key: mu.copy() if bonds.get(key) is None else np.full(len(i), float(bonds[key]))
         self.shear, self.rolling = limit("shear"), limit("rolling")
         for a in range(len(names(scene))):

@@ -57,6 +57,14 @@ QUICK = [
     "elastic, turned by 90°",
     "elastic, end of step",
     "elastic, confined",
+    "elastic, lid slide",
+    "elastic, confined by stress",
+    "disks, list",
+    "disks, file with materials",
+    "disks, stages",
+    "spheres, inclusion",
+    "beam, next event",
+    "heap, gripped",
 ]
 
 
