@@ -188,7 +188,7 @@ def tension():
     scene["walls"]["bottom"]["grip"] = 3e-3
     pulled = {"grip": 3e-3, "direction": up(2), "velocity": {"table": [[0.0, 0.0], [0.01, 2e-3]]}}
     scene["walls"]["top"] = plane(up(2, -1.0)) | pulled
-    return scene | {"stop": {"load_drop": 0.2}}
+    return scene | {"load_wall": "top", "stop": {"load_drop": 0.2}}
 
 
 def box_of(scene):

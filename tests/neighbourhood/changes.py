@@ -109,6 +109,7 @@ def lid(drive):
 
 def layers(scene):
     """Two materials, the upper one denser; their interface is weak in shear and slips easily."""
+    needs("named" not in scene["materials"])
     low, high = box_of(scene)
     border = low + 0.55 * (high - low)
     halves = {"half_space": {"point": border.tolist(), "normal": up(scene["dimension"])}}
@@ -125,10 +126,11 @@ def layers(scene):
 
 def inclusion(scene):
     """A ball in a box of a third material; it is bonded weakly to the box, and not to the base."""
+    needs("named" not in scene["materials"])
     low, high = box_of(scene)
     middle, size = low + 0.45 * (high - low), 0.3 * float((high - low).min())
     box = {"box": {"from": (middle - size).tolist(), "to": (middle + size).tolist()}}
-    ball = {"ball": {"center": middle.tolist(), "radius": size}}
+    ball = {"ball": {"center": middle.tolist(), "radius": 0.8 * size}}
     named = [{"name": "shell", "regions": [box]}, {"name": "core", "density": 2 * DENSITY, "regions": [ball]}]
     pairs = [{"between": ["core", "shell"], "friction": 0.7}]
     if scene.get("bonds"):

@@ -137,6 +137,9 @@ def is_possible(scene):
     moves = any({"velocity", "slide"} & set(wall) for wall in walls) or "stages" in scene
     if scene.get("rupture") == "next_event" and (moves or "stiffness" in scene["bonds"]):
         return False
+    if "as list" in scene and any("grip" in wall for wall in walls):
+        # grains that are held form no bond with each other, and a list names them
+        return False
     aslant = way.get("turn") not in (None, 0.0, np.pi / 2)
     stages = [drive for stage in scene.get("stages", []) for drive in stage["walls"].values()]
     stressed = any("stress" in drive for drive in [*walls, *stages])
