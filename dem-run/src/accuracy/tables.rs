@@ -149,7 +149,7 @@ fn failure(report: &Report) -> String {
 fn limit(report: &Report) -> String {
     let words = match &report.limit {
         None => return String::new(),
-        Some(LimitLoad::Missing { reason }) => format!("none: {reason}"),
+        Some(LimitLoad::Missing { reason }) => return format!("\nno limit load: {reason}\n"),
         Some(LimitLoad::Found(found)) => {
             let own = |load: &&GrowingLoad| {
                 load.load.strip_prefix("walls.").is_some_and(|name| Some(name) == report.load_wall.as_deref())
