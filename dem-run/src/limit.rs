@@ -150,7 +150,7 @@ impl<'a> Loads<'a> {
     /// # Errors
     /// [`NoConvergence::Limit`].
     pub fn limit<D: Dim>(mut self, scene: &Scene, world: &mut World<D>) -> Result<Limit, RunError> {
-        // in a run a velocity drives a pushed wall: there is no time at which a force reaches the limit
+        // in a run a velocity drives a pushed wall: no force reaches the limit at some time
         let steady = self.pushed.is_none() && self.growing.iter().all(|(_, _, _, straight)| *straight);
         self.growing.extend(self.pushed.and_then(|wall| push(scene, world, wall)));
         let found = world.limit_load(0.0, scene.time.end);
