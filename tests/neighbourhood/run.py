@@ -64,6 +64,7 @@ QUICK = [
     "disks, stages",
     "spheres, inclusion",
     "beam, next event",
+    "events, bonds that roll",
     "heap, gripped",
 ]
 
