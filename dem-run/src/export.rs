@@ -8,10 +8,12 @@ use dem_core::problem::assembled::Assembled;
 use dem_core::solver::SolveStatus;
 
 use crate::build::build;
+use crate::check;
 use crate::error::{NoConvergence, RunError};
 use crate::fclib::Problem;
 use crate::history::History;
 use crate::in_dimension;
+use crate::memory;
 use crate::output::{escaped, print_line};
 use crate::progress::StepProgress;
 use crate::run::{Execution, handle_signals};
@@ -30,6 +32,8 @@ pub struct ExportOptions {
     pub output: PathBuf,
     /// How the command is carried out.
     pub execution: Execution,
+    /// Whether a scene is run although it needs more memory than is free.
+    pub ignore_memory: bool,
 }
 
 /// Reruns the scene of a history up to a step and writes the first problem of that step, before any
@@ -55,6 +59,9 @@ pub fn export(options: &ExportOptions) -> Result<(), RunError> {
     if !options.execution.quiet && (parameters.version != version || parameters.git_revision != revision) {
         let note = "it was written by another version of the program: the states of this run may differ from it";
         let _ = writeln!(std::io::stderr(), "{}", escaped(&format!("note: {shown}: {note}")));
+    }
+    if !options.ignore_memory {
+        memory::refuse_too_large(&scene, check::count(&scene)?)?;
     }
     in_dimension!(scene, D => export_in::<D>(&scene, options, &interrupt))
 }

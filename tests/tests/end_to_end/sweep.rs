@@ -300,6 +300,7 @@ fn wrong_sweeps_are_refused_before_anything_is_written() {
 fn the_sweeps_of_the_paper_s_questions_are_right() {
     let here = Folder::new();
     for (name, runs) in [
+        ("sweep-biaxial.json", 25),
         ("sweep-brazilian.json", 20),
         ("sweep-cohesion.json", 30),
         ("sweep-cohesion-fixed-ramp.json", 30),
