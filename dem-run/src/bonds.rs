@@ -212,8 +212,7 @@ mod tests {
     /// The load (N) at which a chain of bonds of these strengths breaks, from a run.
     fn pulled_apart(strengths: &[f64]) -> f64 {
         let count = strengths.len();
-        let mut grains: Grains<D2> =
-            (0..=count).map(|k| Grain::at_rest([k as f64, 0.0].into(), 0.5, 1.0)).collect();
+        let mut grains: Grains<D2> = (0..=count).map(|k| Grain::at_rest([k as f64, 0.0].into(), 0.5, 1.0)).collect();
         grains.fixed[0] = true;
         // 1 N/s on the last grain
         let pull = Load { grain: count, force: [1.0, 0.0].into(), torque: Vect::zero(), factor: Arc::new(|t| t) };

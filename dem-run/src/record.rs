@@ -48,8 +48,8 @@ impl<D: Dim> Recorder<D> {
 
     /// Continues `history` in a new file that replaces it and starts with the rows `kept` and
     /// `checkpoint`. The world comes with the step after which a stage cemented it, if one did.
-    /// `cpu_before` is the processor time of the run so far (s); `tell` receives the copied share of
-    /// the history (0 to 1).
+    /// `cpu_before` is the processor time of the run so far (s); `tell` receives the copied share
+    /// of the history (0 to 1).
     pub fn go_on(
         history: &History,
         kept: RowCounts,

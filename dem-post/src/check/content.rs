@@ -176,7 +176,8 @@ fn committed(c: &mut Checker) -> Vec<[u64; 2]> {
 /// Checks that every number of every dataset of floats is finite and of a plausible magnitude.
 fn numbers(c: &mut Checker) {
     let whole = |place: &str| {
-        ["step", "start", "count", "pair", "id", "bond", "material", "formed"].contains(&place.rsplit('/').next().unwrap_or(""))
+        ["step", "start", "count", "pair", "id", "bond", "material", "formed"]
+            .contains(&place.rsplit('/').next().unwrap_or(""))
     };
     let places: Vec<String> = c.sound.keys().cloned().collect();
     for place in places {
@@ -316,7 +317,11 @@ fn before_the_bonds(c: &mut Checker, rows: &[[u64; 2]], steps: &[i64]) {
         let (start, end) = (*start as usize, (start + count) as usize);
         let bonds = c.rows::<i32>("contacts/bond", start..end).unwrap_or_default();
         if let Some(k) = bonds.iter().position(|bond| *bond != -1) {
-            c.wrong("contacts/bond", Some(start + k), format!("{} before the bonds formed, at step {formed}", bonds[k]));
+            c.wrong(
+                "contacts/bond",
+                Some(start + k),
+                format!("{} before the bonds formed, at step {formed}", bonds[k]),
+            );
         }
     }
 }

@@ -1,19 +1,22 @@
 //! Stages that cement: bonds that form later than at the start.
 
-use crate::common::{Folder, content, number, run, series};
+use crate::common::{Folder, config, content, number, run, series};
 use dem_run::history::{BondStatus, History, NOT_FORMED};
 use serde_json::{Value, json};
 
-/// Diameter (m), and stiffness of a bond (N/m).
-const (A, K): (f64, f64) = (0.01, 1e6);
+/// Diameter (m).
+const A: f64 = 0.01;
+/// Stiffness of a bond (N/m).
+const K: f64 = 1e6;
 
-/// Two disks, 1 mm apart, the lower one fixed. A force on the upper one closes the gap, presses with
-/// 10 N and from t = 0.4 s on grows upwards by 40 N/s. Bonds form in the second stage, at t = 0.21 s, in the
-/// step of a checkpoint.
+/// Two disks, 1 mm apart, the lower one fixed. A force on the upper one closes the gap, presses
+/// with 10 N and from t = 0.4 s on grows upwards by 40 N/s. Bonds form in the second stage, at
+/// t = 0.21 s, in the step of a checkpoint.
 fn scene(bonds: Value) -> Value {
     let grain = |y: f64| json!({ "center": [0, y], "radius": 0.5 * A });
     let law = json!({ "strength": 5, "shear": 1, "gap_tolerance": 1e-6 });
-    let law: serde_json::Map<_, _> = [law, bonds].iter().flat_map(|part| part.as_object().expect("fields").clone()).collect();
+    let law: serde_json::Map<_, _> =
+        [law, bonds].iter().flat_map(|part| part.as_object().expect("fields").clone()).collect();
     json!({
         "dimension": 2, "thickness": 1,
         "sample": { "grains": [grain(0.0), grain(A + 1e-3)] },
@@ -111,4 +114,28 @@ fn a_stage_that_finds_nothing_to_cement_is_named_with_the_remedy() {
     let parts = ["stages.1.cement", "no two grains are near enough at t = 0.21 s", "gap_tolerance larger"];
     here.dem_run(&["run", "scene.json", "--set", "grains.loads.0.force.1=0"]).fails(2, &parts);
     here.dem_run(&["accuracy", "scene.json"]).fails(2, &["stages.1 cements", "stages.1.cement=false"]);
+}
+
+/// A whole test in one scene: cementing moves nothing, and the loop of unloading and reloading
+/// comes back to where it began.
+#[test]
+fn a_sample_is_consolidated_cemented_and_tested_in_stages() {
+    let here = Folder::new();
+    let summary = run(&here, &config("staged-biaxial.json"), &["--set", "stages.5.duration=0.0078"]);
+    assert_eq!((&summary["ending"], &summary["load_wall"]), (&json!("stages"), &json!("top")));
+    let history = here.history("a.h5");
+    assert_eq!(history.bonds().expect("bonds").formed, Some(200));
+    let top = history.walls().expect("walls").iter().position(|wall| wall.name == "top").expect("the lid");
+    let (load, height) =
+        (series(&history, "wall_force_at_limit", &[top, 1]), series(&history, "wall_position", &[top, 1]));
+    // 200 Pa on 20 mm by 1 m, before and after; the peak is 17 micrometres away
+    for k in 190..250 {
+        assert!((load[k] / 4.0 - 1.0).abs() < 1e-6, "step {}: {} N", k + 1, load[k]);
+        assert!((height[k] - height[190]).abs() < 1e-9, "step {}: {} m", k + 1, height[k]);
+    }
+    // loaded to step 500; reloaded to the same height, no bond broken since
+    let broken = series(&history, "bonds_broken", &[]);
+    let back = (640..height.len()).find(|k| height[*k] <= height[499]).expect("it comes back");
+    assert!(broken[499] > 0.0 && load[back] < load[499] && load[back] > 0.95 * load[499], "{} N", load[back]);
+    here.dem_post(&["info", "a.h5", "--check"]).succeeds();
 }

@@ -43,8 +43,8 @@ impl History {
         Ok(bonds)
     }
 
-    /// The step after which a stage formed the bonds, or [`NOT_FORMED`]; none if they are there from
-    /// the start.
+    /// The step after which a stage formed the bonds, or [`NOT_FORMED`]; none if they are there
+    /// from the start.
     fn bonds_formed(&self) -> Result<Option<i64>> {
         let place = format!("{}/formed", path::BONDS);
         if !self.source.has(&place) {
@@ -56,8 +56,8 @@ impl History {
         }
     }
 
-    /// The state of each bond at frame `frame`; empty for a scene without any, and for a frame before
-    /// a stage forms them.
+    /// The state of each bond at frame `frame`; empty for a scene without any, and for a frame
+    /// before a stage forms them.
     ///
     /// # Errors
     /// [`HistoryError::NoFrame`], [`HistoryError::Damaged`].

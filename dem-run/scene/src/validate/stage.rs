@@ -52,7 +52,10 @@ fn cement(report: &mut Report, scene: &Scene, stage: usize, path: &str) {
         refuse("a stage that cements, in a scene without bonds", "bonds with a strength: add `bonds`");
     }
     if scene.bonds.as_ref().is_some_and(|bonds| bonds.list.is_some()) {
-        refuse("a stage that cements, with bonds.list", "bonds by gap_tolerance: the places of grains change until then");
+        refuse(
+            "a stage that cements, with bonds.list",
+            "bonds by gap_tolerance: the places of grains change until then",
+        );
     }
 }
 
