@@ -87,7 +87,7 @@ fn a_bond_that_forms_under_pressure_bears_its_strength_in_tension() {
         let work = series(&history, "external_work", &[]).into_iter().map(f64::abs).fold(0.0, f64::max);
         assert!(left.iter().all(|left| left.abs() < 1e-9 * work), "{:?} J of {work}", left.last());
         here.dem_post(&["info", "a.h5", "--check"]).succeeds();
-        here.dem_post(&["pack", "a.h5", "-o", "packed.h5"]).succeeds();
+        here.dem_post(&["pack", "a.h5", "-o", "packed.h5", "--force"]).succeeds();
         assert_eq!(content(&here.history("packed.h5")), content(&history));
     }
 }
