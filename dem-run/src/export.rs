@@ -82,7 +82,7 @@ fn export_in<D: Dim>(scene: &Scene, options: &ExportOptions, interrupt: &Interru
         })?;
         let broken = world.bonds.len() - world.intact_bonds();
         stages.count(&world, broken);
-        stages.advance(scene, &mut world, broken);
+        stages.advance(scene, &mut world, broken)?;
         progress.step(&StepProgress {
             step: world.steps,
             time: world.time,

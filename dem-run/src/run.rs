@@ -199,7 +199,12 @@ impl<D: Dim> Run<'_, D> {
                 self.record(true, checkpoint)?;
             }
             let RunState { world, course, .. } = &mut self.state;
-            if let Some(ending) = course.advance(self.scene, world) {
+            let bonds = world.bonds.len();
+            let ending = course.advance(self.scene, world)?;
+            if world.bonds.len() > bonds {
+                self.recorder.bonds_formed(world)?;
+            }
+            if let Some(ending) = ending {
                 return Ok(ending);
             }
             if interrupt.requested() {

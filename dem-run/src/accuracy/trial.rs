@@ -369,8 +369,10 @@ impl<D: Dim> Trial<'_, D> {
                     world.time
                 ));
             }
-            if let Some(ending) = state.course.advance(self.scene, &mut world) {
-                break End::Scene(ending);
+            match state.course.advance(self.scene, &mut world) {
+                Ok(None) => {}
+                Ok(Some(ending)) => break End::Scene(ending),
+                Err(error) => break End::Failed(error.to_string()),
             }
             let failed = |loads: &Collapse| loads.passed[1] && loads.failure.broken_share.is_some();
             if !self.whole && state.course.loads().is_some_and(failed) {

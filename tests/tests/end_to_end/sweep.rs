@@ -307,6 +307,7 @@ fn the_sweeps_of_the_paper_s_questions_are_right() {
         ("sweep-rate.json", 12),
         ("sweep-size.json", 12),
         ("sweep-friction.json", 15),
+        ("sweep-scatter.json", 160),
     ] {
         let check = here.dem_run(&["sweep", &config(name), "--check", "--json"]).json();
         assert_eq!(check["runs"].as_array().map(Vec::len), Some(runs), "{name}");
