@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use super::boxes::{Box2, EMPTY, around, union};
+use super::outline::Perspective;
 use super::scale::{Colour, mixed};
 
 /// A projection of the sample.
@@ -48,6 +49,13 @@ impl Place {
         let ahead = Vector3::new(-ASIDE.sin() * ABOVE.cos(), ASIDE.cos() * ABOVE.cos(), -ABOVE.sin());
         let right = Vector3::new(ASIDE.cos(), ASIDE.sin(), 0.0);
         Self { focus: 0.5 * (low + high), half: 0.5 * (high - low), right, up: right.cross(&ahead), ahead }
+    }
+
+    /// The viewpoint as numbers.
+    pub fn as_seen(&self) -> Perspective {
+        let half = self.half.norm();
+        let [focus, right, up, ahead] = [self.focus, self.right, self.up, self.ahead].map(Into::into);
+        Perspective { focus, right, up, ahead, far: FAR * half, half }
     }
 
     fn depth(&self, point: &[f64]) -> f64 {

@@ -3,6 +3,7 @@
 
 pub use draw::{draw, draw_view};
 pub use legend::Key;
+pub use outline::Perspective;
 pub use panel::{Arrow, Link, Panel, Patch};
 pub use sample::{Sample, View};
 pub use scale::{Colour, Ramp, Scale};
@@ -13,6 +14,7 @@ mod draw;
 mod eye;
 mod frame;
 mod legend;
+mod outline;
 mod panel;
 mod sample;
 mod scale;
