@@ -189,12 +189,7 @@ pub fn write(history: &History, report: &Report, folder: &mut Folder, quiet: boo
 }
 
 /// The drawing of a frame.
-pub(crate) fn drawing(
-    history: &History,
-    report: &Report,
-    shown: &Shown,
-    frame: usize,
-) -> Result<Drawing> {
+pub(crate) fn drawing(history: &History, report: &Report, shown: &Shown, frame: usize) -> Result<Drawing> {
     let (mut panel, legend) = picture(history, report, frame)?;
     panel.caption.insert(0, shown.titles.of(history, frame));
     Ok(draw_view(&shown.sample, shown.view, &[panel], &legend))

@@ -127,7 +127,10 @@ impl Plot {
             y: axes.y,
             log: axes.log,
             whole,
-            time: [("time (s)", 1.0), ("time (ms)", 1e3)].iter().find(|(title, _)| *title == titles[0]).map_or(0.0, |unit| unit.1),
+            time: [("time (s)", 1.0), ("time (ms)", 1e3)]
+                .iter()
+                .find(|(title, _)| *title == titles[0])
+                .map_or(0.0, |unit| unit.1),
             titles,
             curves: curves.into_iter().map(|curve| PlotCurve::of(curve, axes)).collect(),
         }

@@ -17,8 +17,8 @@ use crate::map::{Arrow, Key, Panel, Ramp, Sample, Scale, draw};
 use crate::moments;
 use crate::options::Moments;
 use crate::output::{Folder, Result, Text, number, short};
-use crate::title::Titles;
 use crate::section::{OnPage, Section, map_figure};
+use crate::title::Titles;
 use dem_drawing::{Drawing, colour};
 use dem_output::row;
 
@@ -229,10 +229,7 @@ pub fn map(history: &History, report: &Report) -> Result<Drawing> {
             format!("v = {} m/s, mean {} m/s", short(usual.high), short(field.mean_speed))
         };
         panels.push(Panel {
-            caption: vec![
-                titles.of(history, field.frame),
-                told,
-            ],
+            caption: vec![titles.of(history, field.frame), told],
             grains: field.state.clone(),
             walls: history.wall_state(field.frame)?,
             fills: field.speed.iter().map(|&speed| if rests { RESTS.into() } else { usual.colour(speed) }).collect(),

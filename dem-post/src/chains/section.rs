@@ -20,7 +20,11 @@ impl OnPage for Report {
             let alt = format!(
                 "Contact forces as lines at t = {time} s: blue is compression, orange is tension, width is magnitude."
             );
-            figures.push(map_figure(&network_map(history, &one, mean)?, &alt, &format!("Force network at t = {time} s."))?);
+            figures.push(map_figure(
+                &network_map(history, &one, mean)?,
+                &alt,
+                &format!("Force network at t = {time} s."),
+            )?);
             let alt = format!("Grains in force chains at t = {time} s, blue in compression, orange in tension.");
             figures.push(map_figure(&chain_map(history, &one)?, &alt, &format!("Force chains at t = {time} s."))?);
         }

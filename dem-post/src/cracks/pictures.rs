@@ -9,8 +9,8 @@ use super::report::{Pieces, Report};
 use super::surfaces::Facet;
 use crate::fragments::{Fragment, Fragments};
 use crate::map::{Colour, Key, Link, Panel, Patch, Ramp, Sample, Scale, draw, draw_view};
-use crate::title::Titles;
 use crate::output::{Result, counted, number};
+use crate::title::Titles;
 use dem_drawing::{Chart, Drawing, Style, colour};
 
 /// Fill of grains that kept all their bonds.
@@ -228,13 +228,7 @@ pub fn crack_map(history: &History, report: &Report) -> Result<(Drawing, Option<
 }
 
 /// The grains at a frame in these colours; the caption is the title of the frame and `what`.
-fn filled_panel(
-    history: &History,
-    titles: &Titles,
-    frame: usize,
-    fills: Vec<Colour>,
-    what: String,
-) -> Result<Panel> {
+fn filled_panel(history: &History, titles: &Titles, frame: usize, fills: Vec<Colour>, what: String) -> Result<Panel> {
     Ok(Panel {
         caption: vec![titles.of(history, frame), what],
         grains: history.grain_state(frame)?,

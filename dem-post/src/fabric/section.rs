@@ -14,8 +14,7 @@ impl OnPage for Report {
 
     fn section(&self, _: &History, _: &[usize]) -> Result<Section> {
         let drawn = |chart: &Chart| chart.curves.iter().any(|curve| curve.points.len() > 1);
-        let mut charts =
-            vec![stress(self), dilation(self), porosity(self), coordination(self), anisotropy(self)];
+        let mut charts = vec![stress(self), dilation(self), porosity(self), coordination(self), anisotropy(self)];
         if self.rows.last().is_some_and(|row| row.broken > 0) {
             charts.push(crack_density(self));
         }

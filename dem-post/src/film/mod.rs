@@ -192,8 +192,10 @@ fn webm(png: &Path, webm: &Path) -> std::result::Result<(), NoWebm> {
     let failed = |why: String| NoWebm::Failed(WriteError { path: "film.webm".into(), why });
     let mut ffmpeg = Process::new("ffmpeg");
     ffmpeg.args(["-nostdin", "-loglevel", "error", "-y", "-f", "apng", "-i"]).arg(png);
-    // an even number of pixels, as the encoder wants
-    ffmpeg.args(["-vf", "crop=trunc(iw/2)*2:trunc(ih/2)*2:0:0", "-r", &RATE.to_string(), "-pix_fmt", "yuv420p"]);
+    // a constant rate, which keeps the last picture for its time, and an even number of pixels, as
+    // the encoder wants
+    let filter = format!("fps={RATE},crop=trunc(iw/2)*2:trunc(ih/2)*2:0:0");
+    ffmpeg.args(["-vf", &filter, "-pix_fmt", "yuv420p"]);
     ffmpeg.args(["-c:v", "libvpx-vp9", "-b:v", "0", "-crf", "33", "-f", "webm"]).arg(webm).stdin(Stdio::null());
     match ffmpeg.output() {
         Ok(done) if done.status.success() => Ok(()),

@@ -1,7 +1,7 @@
 //! Drawings side by side, and an animated PNG of them.
 //!
-//! Of each picture but the first, the pixels that changed are stored, in the smallest rectangle that
-//! contains them; the others are transparent. Colours are rounded to steps of 8 of 255, which
+//! Of each picture but the first, the pixels that changed are stored, in the smallest rectangle
+//! that contains them; the others are transparent. Colours are rounded to steps of 8 of 255, which
 //! nobody sees and which halves the file.
 
 use std::fs::File;

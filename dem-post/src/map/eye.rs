@@ -1,9 +1,9 @@
 //! The viewpoint: parallel to an axis, or in perspective from above and from the side.
 
 use nalgebra::Vector3;
+use serde::Serialize;
 
 use super::boxes::{Box2, EMPTY, around, union};
-use super::outline::Perspective;
 use super::scale::{Colour, mixed};
 
 /// A projection of the sample.
@@ -12,6 +12,23 @@ pub(super) enum Eye {
     Along([usize; 2]),
     /// Perspective from a viewpoint.
     At(Place),
+}
+
+/// A viewpoint as numbers; lengths in m.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Perspective {
+    /// The point at which the eye looks.
+    pub focus: [f64; 3],
+    /// Unit vectors to the right, up, and away from the eye.
+    pub right: [f64; 3],
+    /// See `right`.
+    pub up: [f64; 3],
+    /// See `right`.
+    pub ahead: [f64; 3],
+    /// Distance of the eye from the focus.
+    pub far: f64,
+    /// Half the diagonal of the sample.
+    pub half: f64,
 }
 
 /// A viewpoint from which spheres are seen in perspective.

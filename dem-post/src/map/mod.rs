@@ -2,8 +2,8 @@
 //! scale.
 
 pub use draw::{draw, draw_view};
+pub use eye::Perspective;
 pub use legend::Key;
-pub use outline::Perspective;
 pub use panel::{Arrow, Link, Panel, Patch};
 pub use sample::{Sample, View};
 pub use scale::{Colour, Ramp, Scale};

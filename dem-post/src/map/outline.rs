@@ -1,26 +1,9 @@
 //! Viewpoint and outlines of walls for other drawers than the canvas.
 
 use dem_history::{Wall, WallKind};
-use serde::Serialize;
 
+use super::eye::Perspective;
 use super::sample::{Sample, View};
-
-/// A viewpoint from which spheres are seen in perspective; lengths in m.
-#[derive(Clone, Copy, Debug, Serialize)]
-pub struct Perspective {
-    /// The point at which the eye looks.
-    pub focus: [f64; 3],
-    /// Unit vectors to the right, up, and away from the eye.
-    pub right: [f64; 3],
-    /// See `right`.
-    pub up: [f64; 3],
-    /// See `right`.
-    pub ahead: [f64; 3],
-    /// Distance of the eye from the focus.
-    pub far: f64,
-    /// Half the diagonal of the sample.
-    pub half: f64,
-}
 
 impl View {
     /// Left, lower, right and upper edge, m.

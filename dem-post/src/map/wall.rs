@@ -37,8 +37,8 @@ pub(super) fn draw_in_front(canvas: &mut Canvas, eye: &Eye, wall: &Wall, positio
     }
 }
 
-/// An arrow of the load at a driven plane in 2D, at the middle of the panel: towards the grains where
-/// the wall pushes. None where no grain acts on the wall.
+/// An arrow of the load at a driven plane in 2D, at the middle of the panel: towards the grains
+/// where the wall pushes. None where no grain acts on the wall.
 pub(super) fn draw_load(canvas: &mut Canvas, wall: &Wall, position: &[f64], force: &[f64], frame: &Frame) {
     if !bears_arrow(wall) || position.len() != 2 || force.len() != 2 {
         return;

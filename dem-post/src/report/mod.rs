@@ -1,6 +1,6 @@
 //! A run on one page: a self-contained HTML file that begins with the result in a sentence, three
-//! moments and a slider over the run; then pictures, curves, tables, the energy balance, the solver's
-//! own measures of its accuracy, and the scene.
+//! moments and a slider over the run; then pictures, curves, tables, the energy balance, the
+//! solver's own measures of its accuracy, and the scene.
 //!
 //! Without scripts the page shows all but the slider and the values of the curves.
 //!
@@ -155,8 +155,14 @@ impl Report {
     /// The sections of the page, in order.
     fn sections(&self, history: &History) -> Result<Vec<Section>> {
         let frames: Vec<usize> = self.velocities.fields.iter().map(|field| field.frame).collect();
+        let parts = result::Parts {
+            info: &self.info,
+            load: self.stress_strain.as_ref(),
+            cracks: self.cracks.as_ref(),
+            times: &self.times,
+        };
         let mut sections = vec![
-            result::section(history, self, &self.times)?,
+            result::section(history, &parts)?,
             self.section_of(self.stress_strain.as_ref(), history, &frames)?,
             self.section_of(self.cracks.as_ref(), history, &frames)?,
         ];

@@ -3,13 +3,13 @@
 use dem_drawing::{Chart, Style, colour};
 use dem_history::{History, Rupture};
 
-use super::{Report, player};
+use super::player;
 use crate::collapse::peak;
 use crate::extent::first_box;
 use crate::frames::{self, Subject};
 use crate::output::{PostError, Result, counted, number, quantity, short};
 use crate::section::{Figure, Section, capitalised, chart_figure, map_figure};
-use crate::{cracks, moments, stress_strain};
+use crate::{cracks, info, moments, stress_strain};
 
 /// A moment of which the page shows a picture.
 struct Moment {
@@ -17,19 +17,30 @@ struct Moment {
     frame: usize,
 }
 
+/// The analyses of which the section tells.
+pub struct Parts<'a> {
+    /// What the history holds.
+    pub info: &'a info::Report,
+    /// The load, if a wall is driven.
+    pub load: Option<&'a stress_strain::Report>,
+    /// The breaks, if there are bonds.
+    pub cracks: Option<&'a cracks::Report>,
+    /// Times of the pictures that were asked for (s).
+    pub times: &'a [f64],
+}
+
 /// The section.
 ///
 /// # Errors
 /// Those of reading the history and of drawing.
-pub fn section(history: &History, report: &Report, times: &[f64]) -> Result<Section> {
-    let ruptures = history.ruptures()?;
-    let load = report.stress_strain.as_ref();
-    let shown = shown(history, &ruptures, load, times)?;
+pub fn section(history: &History, parts: &Parts) -> Result<Section> {
+    let (ruptures, load) = (history.ruptures()?, parts.load);
+    let shown = shown(history, &ruptures, load, parts.times)?;
     let pictured: Vec<usize> = shown.iter().map(|moment| moment.frame).collect();
     let figures = pictures(history, &shown, load)?;
     let mut player = player::read(history, &pictured, load)?;
     let charts = charts(history, &ruptures, load);
-    let text = sentences(history, report, &ruptures)?;
+    let text = sentences(history, parts, &ruptures)?;
     let mut section = Section { id: "result", title: "Result", text, figures, ..Section::default() };
     match &mut player {
         Some(player) => player.charts = charts,
@@ -115,7 +126,8 @@ fn charts(history: &History, ruptures: &[Rupture], load: Option<&stress_strain::
         let ends = [history.times().first(), history.times().last()].map(|time| time.copied().unwrap_or(0.0));
         let counts = ruptures.iter().enumerate().map(|(k, rupture)| (rupture.time, (k + 1) as f64));
         let points = [(ends[0], 0.0)].into_iter().chain(counts).chain([(ends[1], ruptures.len() as f64)]).collect();
-        let mut chart = Chart::new("time (s)", "broken bonds").curve("broken bonds", colour::BLUE, Style::Steps, points);
+        let mut chart =
+            Chart::new("time (s)", "broken bonds").curve("broken bonds", colour::BLUE, Style::Steps, points);
         chart.y_is_count = true;
         figures.push(chart_figure(chart, "Number of broken bonds over time.", "Broken bonds over time."));
     }
@@ -123,21 +135,23 @@ fn charts(history: &History, ruptures: &[Rupture], load: Option<&stress_strain::
 }
 
 /// The result in words.
-fn sentences(history: &History, report: &Report, ruptures: &[Rupture]) -> Result<String> {
-    let load = report.stress_strain.as_ref();
+fn sentences(history: &History, parts: &Parts, ruptures: &[Rupture]) -> Result<String> {
     let mut said = vec![];
-    said.extend(load.map(|load| load_sentence(load, ruptures)));
-    match &report.cracks {
+    said.extend(parts.load.map(|load| load_sentence(load, ruptures)));
+    match parts.cracks {
         Some(cracks) => said.push(break_sentence(history, cracks, ruptures)?),
         None => {
-            let n = report.info.grains;
+            let n = parts.info.grains;
             let last = history.times().last().copied().unwrap_or(0.0);
-            let energy = report.info.kinetic_energy.map(|energy| format!(", with a kinetic energy of {} J at the end", number(energy)));
+            let energy = parts
+                .info
+                .kinetic_energy
+                .map(|energy| format!(", with a kinetic energy of {} J at the end", number(energy)));
             let energy = energy.unwrap_or_default();
             said.push(format!("{} without bonds, until t = {} s{energy}.", counted(n, "grain"), number(last)));
         }
     }
-    if report.info.open_ended {
+    if parts.info.open_ended {
         said.push("The run was not closed: it is in progress or was stopped.".into());
     }
     Ok(said.join(" "))
@@ -157,7 +171,9 @@ fn load_sentence(load: &stress_strain::Report, ruptures: &[Rupture]) -> String {
     }
     match s.peak_load {
         Some(peak) => parts.push(format!("the load peaked at {}", newton(peak))),
-        None if parts.len() < 2 => parts.push(format!("the load reached {} without falling by 5 %", newton(s.greatest_load))),
+        None if parts.len() < 2 => {
+            parts.push(format!("the load reached {} without falling by 5 %", newton(s.greatest_load)))
+        }
         None => {}
     }
     format!("Under wall {}, {}.", s.wall, joined(&parts))

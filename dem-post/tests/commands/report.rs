@@ -74,7 +74,9 @@ fn the_page_begins_with_the_result() {
     // times that were asked for take the place of the chosen ones
     let (_folder, path) = sample(&layout(2));
     let asked = self::page(&path, &["--times", "0.02,0.07"]);
-    assert!(asked.contains("<figcaption>t = 0.02 s, load 20 N.") && asked.contains("<figcaption>t = 0.07 s, load 70 N."));
+    assert!(
+        asked.contains("<figcaption>t = 0.02 s, load 20 N.") && asked.contains("<figcaption>t = 0.07 s, load 70 N.")
+    );
     // what did not happen is not told
     let unbonded = Layout { bonds: Bonds::default(), ..layout(2) };
     let (_folder, path) = sample(&unbonded);
@@ -154,7 +156,22 @@ fn a_report_needs_nothing_but_itself() {
     let unbonded = Layout { bonds: Bonds::default(), ..layout(2) };
     let bare = Layout { walls: vec![], observables: vec![], ..layout(2) };
     for (l, sections) in [
-        (&named, &["result", "load", "cracks", "emission", "chains", "velocities", "fabric", "energy", "accuracy", "run", "scene"][..]),
+        (
+            &named,
+            &[
+                "result",
+                "load",
+                "cracks",
+                "emission",
+                "chains",
+                "velocities",
+                "fabric",
+                "energy",
+                "accuracy",
+                "run",
+                "scene",
+            ][..],
+        ),
         (&unbonded, &["run", "load", "chains", "scene"]),
         (&bare, &["run", "cracks", "velocities", "scene"]),
         (&layout(3), &["run", "cracks", "chains", "velocities", "scene"]),

@@ -13,8 +13,8 @@ use crate::{Anchor, Canvas, Drawing, colour};
 /// Width and height of one chart, in units of a drawing.
 const CHART: (f64, f64) = (640.0, 460.0);
 /// Margin around the cells of a figure, and between them.
-const PADDING: f64 = 6.0;
-const SPACING: f64 = 20.0;
+pub(crate) const PADDING: f64 = 6.0;
+pub(crate) const SPACING: f64 = 20.0;
 /// Margins above the axes, for the legend, and below.
 const ABOVE: f64 = 44.0;
 const BELOW: f64 = 62.0;
@@ -524,15 +524,17 @@ mod tests {
             let of = |tag: &str, name: &str| -> f64 {
                 tag.split(&format!(" {name}=\"")).nth(1).unwrap().split('"').next().unwrap().parse().unwrap()
             };
-            let dots: Vec<[f64; 2]> =
-                svg.split("<circle").skip(1).map(|tag| [of(tag, "cx"), of(tag, "cy")]).collect();
+            let dots: Vec<[f64; 2]> = svg.split("<circle").skip(1).map(|tag| [of(tag, "cx"), of(tag, "cy")]).collect();
             assert_eq!(dots.len(), 6);
             for (chart, axes) in axes.iter().enumerate() {
                 let [left, top, right, bottom] = axes.area;
                 for (point, dot) in points.iter().zip(&dots[3 * chart..]) {
                     let [x, y] = axes.share(*point);
                     let corner = [PADDING + chart as f64 * (500.0 + SPACING), PADDING];
-                    let off = [left + x * (right - left) - corner[0] - dot[0], bottom + y * (top - bottom) - corner[1] - dot[1]];
+                    let off = [
+                        left + x * (right - left) - corner[0] - dot[0],
+                        bottom + y * (top - bottom) - corner[1] - dot[1],
+                    ];
                     assert!(off.iter().all(|off| off.abs() < 0.02), "{point:?}: {off:?}");
                 }
             }

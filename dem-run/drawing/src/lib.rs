@@ -4,7 +4,6 @@
 //! SVG and PNG of a drawing are made from the same scene. The PNG uses a font embedded in the
 //! crate, so that it is the same on every machine.
 
-use dem_output::{Picture, Print, Printed};
 use kuva::backend::svg::SvgBackend;
 use kuva::render::render::Scene;
 
@@ -90,17 +89,3 @@ impl Drawing {
 
 /// Units of a drawing in a metre: those of CSS, 96 in an inch.
 const UNITS: f64 = 96.0 / 0.0254;
-
-impl Picture for Drawing {
-    fn svg(&self) -> String {
-        self.svg()
-    }
-
-    fn png(&self) -> Result<Vec<u8>, String> {
-        self.png()
-    }
-
-    fn printed(&self, print: Print) -> Result<Printed, String> {
-        print::printed(self, print)
-    }
-}

@@ -1,8 +1,9 @@
 //! Drawings of a given width on paper.
 
-use dem_output::{Print, Printed};
+use dem_output::{Picture, Print, Printed};
 use kuva::render::render::Primitive;
 
+use crate::chart::{PADDING, SPACING};
 use crate::{Chart, Drawing, Raster};
 
 /// A point, the unit of letters, in metres.
@@ -13,20 +14,32 @@ const SMALLEST: f64 = 13.0;
 /// its width.
 const LEAST: f64 = 300.0;
 const HEIGHT: f64 = 0.72;
-/// Around and between charts, in units of a drawing.
-const MARGIN: f64 = 20.0;
+impl Picture for Drawing {
+    fn svg(&self) -> String {
+        self.svg()
+    }
+
+    fn png(&self) -> Result<Vec<u8>, String> {
+        self.png()
+    }
+
+    fn printed(&self, print: Print) -> Result<Printed, String> {
+        printed(self, print)
+    }
+}
 
 /// A drawing as wide as asked for. Charts are laid out anew, with letters of [`Print::LETTERS`] and
 /// as many beside each other as fit; maps are scaled.
-pub fn printed(drawing: &Drawing, print: Print) -> Result<Printed, String> {
+fn printed(drawing: &Drawing, print: Print) -> Result<Printed, String> {
     if drawing.charts.is_empty() {
         return finished(drawing, print);
     }
-    let width = print.width * SMALLEST / (Print::LETTERS * POINT);
-    let fit = ((width + MARGIN) / (LEAST + MARGIN)) as usize;
+    let width = print.width * SMALLEST / (Print::LETTERS * POINT) - 2.0 * PADDING;
+    let fit = ((width + SPACING) / (LEAST + SPACING)) as usize;
     let columns = fit.clamp(1, drawing.charts.len());
-    let cell = (width - columns as f64 * MARGIN) / columns as f64;
-    let (laid_out, _) = Chart::draw_in_columns(drawing.charts.clone(), (cell, HEIGHT * cell), columns);
+    // whole numbers, as SVG states sizes
+    let cell = ((width + SPACING) / columns as f64 - SPACING).floor();
+    let (laid_out, _) = Chart::draw_in_columns(drawing.charts.clone(), (cell, (HEIGHT * cell).floor()), columns);
     finished(&laid_out, print)
 }
 

@@ -34,7 +34,8 @@ impl Raster {
         if labels.is_empty() {
             return render(scene);
         }
-        let turned = |element: &&Primitive| matches!(element, Primitive::Text { rotate: Some(angle), .. } if is_left(*angle));
+        let turned =
+            |element: &&Primitive| matches!(element, Primitive::Text { rotate: Some(angle), .. } if is_left(*angle));
         let mut rest = Scene::new(scene.width, scene.height);
         rest.background_color.clone_from(&scene.background_color);
         rest.text_color.clone_from(&scene.text_color);

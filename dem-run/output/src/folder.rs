@@ -161,8 +161,8 @@ impl Folder {
         self.print = Some(print);
     }
 
-    /// Pictures whose letters are smaller than [`Print::LETTERS`] at the size on paper, and the size
-    /// of the letters in points.
+    /// Pictures whose letters are smaller than [`Print::LETTERS`] at the size on paper, and the
+    /// size of the letters in points.
     pub fn small(&self) -> &[(String, f64)] {
         &self.small
     }
