@@ -226,7 +226,7 @@ pub fn map(history: &History, report: &Report) -> Result<Drawing> {
         let told = if rests {
             "at rest".into()
         } else {
-            format!("v = {} m/s, mean {} m/s", short(usual.high), short(field.mean_speed))
+            format!("v₉₉ = {} m/s, mean {} m/s", short(usual.high), short(field.mean_speed))
         };
         panels.push(Panel {
             caption: vec![titles.of(history, field.frame), told],
@@ -238,7 +238,7 @@ pub fn map(history: &History, report: &Report) -> Result<Drawing> {
             ..Panel::default()
         });
     }
-    let mut legend = if moving { vec![Key::Bar(scale("speed over v (99 % are slower)", 1.0))] } else { vec![] };
+    let mut legend = if moving { vec![Key::Bar(scale("speed over v₉₉", 1.0))] } else { vec![] };
     if flat && moving {
         legend.push(Key::Arrow("mean velocity in a square".into()));
     }

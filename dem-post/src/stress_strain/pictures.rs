@@ -34,7 +34,7 @@ pub fn load_breaks(report: &Report) -> Option<Chart> {
         return None;
     }
     let mut chart = Chart::new("broken bonds", "load of the break (N)");
-    chart.pad_x = true;
+    (chart.pad_x, chart.x_is_count) = (true, true);
     Some(chart.curve("applied force", colour::BLUE, Style::Line, pairs(&report.broken, 1.0, &report.load, 1.0)))
 }
 

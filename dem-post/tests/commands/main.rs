@@ -525,3 +525,27 @@ fn frames_are_numbered_and_alike() {
     let (_folder, path) = sample(&loose);
     refused(&dem_post(&path, &["frames"]), 2, &["no bonds", "--draw forces"]);
 }
+
+#[test]
+fn figures_have_the_width_that_was_asked_for() {
+    let (folder, path) = sample(&layout(2));
+    let read = |file: &str| std::fs::read(folder.path().join("run-post").join(file)).unwrap();
+    let output = dem_post(&path, &["stress-strain", "--width", "85mm", "--dpi", "300"]);
+    assert!(output.status.success() && !String::from_utf8_lossy(&output.stderr).contains("letters"));
+    for file in ["force-displacement", "stress-strain"] {
+        let svg = String::from_utf8(read(&format!("{file}.svg"))).unwrap();
+        assert!(svg.contains("width=\"85.000mm\""), "{}", &svg[..200]);
+        let png = read(&format!("{file}.png"));
+        let pixels = u32::from_be_bytes(png[16..20].try_into().unwrap());
+        assert!(pixels.abs_diff(1004) <= 2, "{pixels} pixels are not 85 mm at 300 dpi");
+    }
+    // three panels beside each other: smaller letters are told, in one panel they are large enough
+    let told = |options: &[&str]| {
+        let output = dem_post(&path, &[&["velocities", "--width", "85mm"], options].concat());
+        assert!(output.status.success());
+        String::from_utf8_lossy(&output.stderr).contains("warning: velocities: letters of ")
+    };
+    assert!(told(&[]) && !told(&["--times", "0.05"]));
+    refused(&dem_post(&path, &["chains", "--width", "5cm"]), 2, &["--width", "85mm"]);
+    refused(&dem_post(&path, &["chains", "--width", "3mm"]), 2, &["40mm to 2000mm"]);
+}
