@@ -192,7 +192,7 @@ fn break_sentence(history: &History, cracks: &cracks::Report, ruptures: &[Ruptur
         (broken.twist, "by twist"),
     ];
     let mut modes: Vec<_> = modes.into_iter().filter(|(count, _)| *count > 0).collect();
-    modes.sort_by(|a, b| b.0.cmp(&a.0));
+    modes.sort_by_key(|(count, _)| std::cmp::Reverse(*count));
     let how = match &modes[..] {
         [(1, how)] => format!(", {how}"),
         [(_, how)] => format!(", all {how}"),
