@@ -25,6 +25,7 @@ mod files;
 pub mod frequency;
 mod pictures;
 pub mod report;
+mod section;
 
 /// Acoustic emission: broken bonds clustered to events, their magnitudes, b-value.
 #[derive(Debug, Args)]

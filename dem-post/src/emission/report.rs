@@ -211,6 +211,11 @@ impl Report {
 
     /// The report as tables.
     pub fn table(&self) -> String {
+        facts(&self.lines()) + &if self.events.is_empty() { String::new() } else { format!("\n{}", self.event_table()) }
+    }
+
+    /// Names and values, in order.
+    pub(super) fn lines(&self) -> Vec<(&'static str, String)> {
         let Rule { steps, reach } = self.rule;
         let when = steps.map_or("a load that no longer grows".into(), |steps| format!("steps apart: at most {steps}"));
         let share = 100.0 * self.ruptures as f64 / self.bonds as f64;
@@ -233,7 +238,7 @@ impl Report {
         if !self.load_note.is_empty() {
             lines.push(("load of an event", format!("not known: {}", self.load_note)));
         }
-        facts(&lines) + &if self.events.is_empty() { String::new() } else { format!("\n{}", self.event_table()) }
+        lines
     }
 
     /// The largest events in order of time.
