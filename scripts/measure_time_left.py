@@ -5,7 +5,7 @@
 
 Runs each scene with `--progress json` and keeps its lines, so that a second call measures what is missing. Prints a
 table in Markdown: what the last line until then says was left, and in parentheses what was left, from the same run. A
-figure is right if it is within a factor of 2; ≤ is right if no more was left; `if no break` is a condition, so it is
+figure is right if it is within a factor of 2; ≤ is right if no more was left; `if it holds` is a condition, so it is
 neither.
 """
 
@@ -32,12 +32,18 @@ def lines_of(scene, programs, folder):
     return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
 
 
+def steps_of(lines):
+    """When the steps began and ended (s), and the lines between."""
+    began = max((line["elapsed_s"] for line in lines if line["event"] == "phase"), default=0.0)
+    timed = [line for line in lines if line["event"] in ("step", "cascade")]
+    return began, timed[-1]["elapsed_s"], timed
+
+
 def told(lines, moment):
-    """The last line until this share of the run, and the time that was left after it (s)."""
-    timed = [line for line in lines if "elapsed_s" in line]
-    total = timed[-1]["elapsed_s"]
-    before = [line for line in timed[:-1] if line["elapsed_s"] <= moment * total]
-    return (before[-1], total - before[-1]["elapsed_s"]) if before else None
+    """The last line until this share of the steps' time, and the time that was left after it (s)."""
+    began, end, timed = steps_of(lines)
+    before = [line for line in timed[:-1] if line["elapsed_s"] <= began + moment * (end - began)]
+    return (before[-1], end - before[-1]["elapsed_s"]) if before else None
 
 
 def cell(found):
@@ -50,8 +56,8 @@ def cell(found):
     figure, kind = line["left_s"], line["left_is"]
     if figure is None:
         return f"? ({left:.0f})", None
-    if kind == "if_no_break":
-        return f"{figure:.0f} if no break ({left:.0f})", None
+    if kind == "if_it_holds":
+        return f"{figure:.0f} if it holds ({left:.0f})", None
     if kind == "at_most":
         return f"≤ {figure:.0f} ({left:.0f})", left <= figure
     return f"{figure:.0f} ({left:.0f})", 0.5 <= figure / left <= 2
@@ -66,10 +72,10 @@ def main():
     options.folder.mkdir(parents=True, exist_ok=True)
     shipped = sorted(path.stem for path in (ROOT / "configs").glob("*.json") if not path.stem.startswith("sweep-"))
     counts, told_at_all, wrong = {True: 0, False: 0, None: 0}, 0, []
-    print("| scene | run (s) | at 25 % | at 50 % | at 75 % |\n|---|---|---|---|---|")
+    print("| scene | steps took (s) | at 25 % | at 50 % | at 75 % |\n|---|---|---|---|---|")
     for scene in options.scenes or shipped:
         lines = lines_of(scene, options.programs, options.folder)
-        timed = [line["elapsed_s"] for line in lines if "elapsed_s" in line]
+        began, end, _ = steps_of(lines)
         cells = [cell(told(lines, moment)) for moment in MOMENTS]
         for text, right in cells:
             counts[right] += 1
@@ -78,7 +84,7 @@ def main():
             if any(right is False for _, right in cells):
                 wrong.append(scene)
         marked = [text + {True: "", False: " **wrong**", None: ""}[right] for text, right in cells]
-        print(f"| `{scene}` | {timed[-1]:.1f} | {' | '.join(marked)} |", flush=True)
+        print(f"| `{scene}` | {end - began:.1f} | {' | '.join(marked)} |", flush=True)
     print(f"\n{counts[True]} right, {counts[False]} wrong, {counts[None]} without a figure;", end=" ")
     print(f"{told_at_all - len(wrong)} of {told_at_all} scenes with figures have right ones only")
     return 0

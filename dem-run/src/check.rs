@@ -388,7 +388,7 @@ pub(crate) mod tests {
             "top (plane, force)",
             "5000 of 0.0001 s",
             "501, one every 10",
-            "time       1.4 to 24 s of CPU for all steps if nothing breaks; a collapse and the packing come on top",
+            "time       1.4 s to 24 s of CPU for all steps if nothing breaks; a collapse and the packing come on top",
         ] {
             assert!(text.contains(part), "{part} in\n{text}");
         }

@@ -22,9 +22,9 @@ const SPREAD: f64 = 2.0;
 pub enum Left {
     /// Time at the speed of the window: its steps cost the same.
     Even(f64),
-    /// Time to the end if nothing breaks. Before the first break, neither the cost of a collapse
-    /// nor the time at which it ends the run is known.
-    IfNoBreak(f64),
+    /// Time to the end if the sample does not fail. Before that, neither the cost of a collapse nor
+    /// the time at which it ends the run is known.
+    IfHolds(f64),
     /// Expected time, where costs vary. It is told as a range.
     About(f64),
     /// Time to the end, where a condition without a measure may end the run earlier.
@@ -35,7 +35,7 @@ impl Left {
     /// The time (s) that is told; the centre of a range.
     #[must_use]
     pub fn seconds(self) -> f64 {
-        let (Self::Even(seconds) | Self::IfNoBreak(seconds) | Self::About(seconds) | Self::AtMost(seconds)) = self;
+        let (Self::Even(seconds) | Self::IfHolds(seconds) | Self::About(seconds) | Self::AtMost(seconds)) = self;
         seconds
     }
 
@@ -44,7 +44,7 @@ impl Left {
     pub fn name(self) -> &'static str {
         match self {
             Self::Even(_) => "even",
-            Self::IfNoBreak(_) => "if_no_break",
+            Self::IfHolds(_) => "if_it_holds",
             Self::About(_) => "about",
             Self::AtMost(_) => "at_most",
         }
@@ -55,7 +55,7 @@ impl fmt::Display for Left {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             Self::Even(seconds) => write!(f, "{} left", duration(seconds)),
-            Self::IfNoBreak(seconds) => write!(f, "{} left if no break", duration(seconds)),
+            Self::IfHolds(seconds) => write!(f, "{} left if it holds", duration(seconds)),
             Self::AtMost(seconds) => write!(f, "≤ {} left", duration(seconds)),
             Self::About(seconds) => {
                 let (low, high) = (seconds / SPREAD, seconds * SPREAD);
@@ -93,8 +93,8 @@ pub struct Outlook {
     pub end: f64,
     /// Whether the sample has bonds.
     pub bonded: bool,
-    /// Whether a bond has broken.
-    pub broken: bool,
+    /// Whether the sample has failed, by its strain or its broken bonds.
+    pub failed: bool,
     /// Whether a condition without a measure may end the run: a drop of the load, a share of broken
     /// bonds, or the end of a stage.
     pub open: bool,
@@ -139,9 +139,9 @@ impl Estimate {
         let to_end = (outlook.end - now.time).max(0.0);
         let seconds = self.to_stop(first, now).map_or(to_end, |to_stop| to_stop.min(to_end)) / speed;
         Some(match outlook {
-            Outlook { bonded: true, broken: false, .. } => Left::IfNoBreak(seconds),
+            Outlook { bonded: true, failed: false, .. } => Left::IfHolds(seconds),
             Outlook { open: true, .. } => Left::AtMost(seconds),
-            Outlook { broken: false, .. } if self.is_even(first, now) => Left::Even(seconds),
+            Outlook { failed: false, .. } if self.is_even(first, now) => Left::Even(seconds),
             _ => Left::About(SLOWING * seconds),
         })
     }
@@ -157,16 +157,24 @@ impl Estimate {
 
     /// Simulated time to the stop condition (s), if it comes nearer. A wall that a growing force
     /// pushes moves ever faster: its travel is extrapolated with the acceleration between the two
-    /// halves of the window.
+    /// halves of the window; of a window without a sample in between, with that of a start from
+    /// rest.
     fn to_stop(&self, first: &Sample, now: Sample) -> Option<f64> {
-        let middle = self.samples.iter().find(|sample| sample.time >= 0.5 * (first.time + now.time))?;
-        let rate = |from: &Sample, to: &Sample| {
-            let span = to.time - from.time;
-            Some((to.stop? - from.stop?) / span).filter(|_| span > 0.0)
+        let half = 0.5 * (first.time + now.time);
+        let between = self.samples.iter().filter(|sample| first.time < sample.time && sample.time < now.time);
+        let middle = between.min_by(|a, b| (a.time - half).abs().total_cmp(&(b.time - half).abs()));
+        let rate = |from: &Sample, to: &Sample| Some((to.stop? - from.stop?) / (to.time - from.time));
+        let (after, acceleration, since) = match middle {
+            Some(middle) => {
+                let (before, after) = (rate(first, middle)?, rate(middle, &now)?);
+                (after, 2.0 * (after - before) / (now.time - first.time), now.time - middle.time)
+            }
+            None => {
+                let mean = rate(first, &now)?;
+                (mean, 2.0 * mean / (now.time - first.time), now.time - first.time)
+            }
         };
-        let (before, after) = (rate(first, middle)?, rate(middle, &now)?);
-        let acceleration = 2.0 * (after - before) / (now.time - first.time);
-        let speed = after + 0.5 * acceleration * (now.time - middle.time);
+        let speed = after + 0.5 * acceleration * since;
         let missing = (1.0 - now.stop?).max(0.0);
         if acceleration > 0.0 && speed >= 0.0 {
             return Some(((speed * speed + 2.0 * acceleration * missing).sqrt() - speed) / acceleration);
@@ -223,6 +231,12 @@ mod tests {
         near(estimate(10.0, 1.0, |elapsed| (0.01 * elapsed, Some(0.04 * elapsed))), 15.0);
         // at constant acceleration, from the first step on: stop = (elapsed / 20)²
         near(estimate(10.0, 1.0, |elapsed| (0.01 * elapsed, Some((elapsed / 20.0).powi(2)))), 10.0);
+        // of two samples, from rest: stop = 0.25 elapsed² s⁻², so the second left has two halves
+        let two = [(0.0, 0.0), (1.0, 0.25)].map(|(elapsed, stop)| Sample { elapsed, time: elapsed, stop: Some(stop) });
+        let mut estimate = Estimate::default();
+        two.into_iter().for_each(|sample| estimate.push(sample));
+        let left = estimate.left(two[1], Outlook { end: 100.0, ..Outlook::default() });
+        assert_eq!(left, Some(Left::About(SLOWING)));
         // it stands still, or goes back
         near(estimate(10.0, 1.0, |elapsed| (0.01 * elapsed, Some(0.0))), 90.0);
         near(estimate(10.0, 1.0, |elapsed| (0.01 * elapsed, Some(0.5 - 0.01 * elapsed))), 90.0);
@@ -234,11 +248,11 @@ mod tests {
     fn what_is_not_known_is_not_told_as_a_figure() {
         let even = |elapsed: f64| (0.02 * elapsed, None);
         let slower = |elapsed: f64| (if elapsed < 7.0 { 0.1 * elapsed } else { 0.63 + 0.01 * elapsed }, None);
-        let outlook = |bonded, broken, open| Outlook { end: 1.0, bonded, broken, open };
+        let outlook = |bonded, failed, open| Outlook { end: 1.0, bonded, failed, open };
         let name = |outlook, stands: &dyn Fn(f64) -> (f64, Option<f64>)| told(10.0, outlook, stands).map(Left::name);
         assert_eq!(name(outlook(false, false, false), &even), Some("even"));
         assert_eq!(name(outlook(false, false, false), &slower), Some("about"));
-        assert_eq!(name(outlook(true, false, true), &even), Some("if_no_break"));
+        assert_eq!(name(outlook(true, false, true), &even), Some("if_it_holds"));
         assert_eq!(name(outlook(true, true, false), &even), Some("about"));
         assert_eq!(name(outlook(true, true, true), &even), Some("at_most"));
         // a broken sample slows down: 40 s at the present speed
@@ -251,7 +265,7 @@ mod tests {
             (Left::Even(0.0), "0 s left"),
             (Left::Even(1.26), "1.3 s left"),
             (Left::Even(59.6), "60 s left"),
-            (Left::IfNoBreak(130.0), "2.2 min left if no break"),
+            (Left::IfHolds(130.0), "2.2 min left if it holds"),
             (Left::AtMost(3599.0), "≤ 60 min left"),
             (Left::AtMost(7.3 * 3600.0), "≤ 7.3 h left"),
             (Left::About(12.0), "6.0–24 s left"),

@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use crate::estimate::{Estimate, Left, Outlook, Sample, duration};
 use crate::output::{escaped, short};
+use crate::scene::failure::{BROKEN_SHARE, STRAINS};
 use crate::stop::{StopProgress, TRAVEL};
 
 /// How progress is shown.
@@ -145,7 +146,10 @@ impl Progress {
                 bar.set_message(message.to_string());
             }
             Sink::Plain(out) => line(out, &format!("{message}: {:.0} %", 100.0 * fraction)),
-            Sink::Json(out) => json_line(out, &Event::Phase { message, fraction }),
+            Sink::Json(out) => {
+                let elapsed = self.began.elapsed().as_secs_f64();
+                json_line(out, &Event::Phase { message, fraction, elapsed });
+            }
             Sink::None => {}
         }
     }
@@ -266,8 +270,9 @@ impl StepProgress {
     /// What determines the time left. Bonds break in avalanches, so their share is not extrapolated.
     fn outlook(&self) -> Outlook {
         let by_bonds = self.stop.is_some_and(|stop| stop.condition != TRAVEL);
-        let (bonded, broken) = (self.bonds > 0, self.broken > 0);
-        Outlook { end: self.end, bonded, broken, open: self.may_end_early || by_bonds }
+        let strained = self.strain.is_some_and(|strain| strain.abs() > STRAINS[0]);
+        let failed = self.broken > 0 && (strained || self.broken as f64 >= BROKEN_SHARE * self.bonds as f64);
+        Outlook { end: self.end, bonded: self.bonds > 0, failed, open: self.may_end_early || by_bonds }
     }
 
     /// The most important first: a terminal cuts the rest.
@@ -305,6 +310,8 @@ enum Event<'a> {
     Phase {
         message: &'a str,
         fraction: f64,
+        #[serde(rename = "elapsed_s")]
+        elapsed: f64,
     },
     Step {
         #[serde(flatten)]
@@ -450,13 +457,20 @@ mod tests {
             (large, Left::About(2900.0)),
             (large, Left::AtMost(3599.0)),
             (large, Left::Even(3599.0)),
-            (unbroken, Left::IfNoBreak(3599.0)),
+            (unbroken, Left::IfHolds(3599.0)),
         ] {
             let (told, left) = (step.describe(Some(left)), left.to_string());
             let end = told.find(&left).expect("the time left") + left.len();
             let most = told[..end].chars().count();
             assert!(most <= 68, "{most}: {told}");
         }
+    }
+
+    #[test]
+    fn a_sample_has_failed_by_its_strain_or_its_broken_bonds() {
+        let failed = |broken, strain| StepProgress { broken, strain, bonds: 1000, ..at(1) }.outlook().failed;
+        assert_eq!([failed(0, Some(1e-2)), failed(49, Some(-1e-5)), failed(49, None)], [false; 3]);
+        assert_eq!([failed(1, Some(-2e-4)), failed(50, Some(0.0)), failed(50, None)], [true; 3]);
     }
 
     #[test]
@@ -478,7 +492,9 @@ mod tests {
         progress.cascade(2, 1);
         let events: Vec<serde_json::Value> =
             out.lines().iter().map(|line| serde_json::from_str(line).expect("JSON")).collect();
-        assert_eq!(events[0], serde_json::json!({"event": "phase", "message": "compaction", "fraction": 1.0}));
+        let phase = serde_json::json!({"event": "phase", "message": "compaction", "fraction": 1.0});
+        assert!(phase.as_object().is_some_and(|phase| phase.iter().all(|(name, value)| events[0][name] == *value)));
+        assert!(events[0]["elapsed_s"].is_number());
         assert_eq!((&events[1]["event"], &events[1]["step"]), (&"step".into(), &1.into()));
         assert!(events[1]["residual"].is_null() && events[1]["elapsed_s"].is_number());
         assert_eq!(events[2], serde_json::json!({"event": "note", "message": "a \"note\""}));
