@@ -17,6 +17,8 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 MOMENTS = (0.25, 0.5, 0.75)
+# share of the steps' time from which on a step is long
+LONG = 0.05
 
 
 def lines_of(scene, programs, folder):
@@ -42,8 +44,12 @@ def steps_of(lines):
 def told(lines, moment):
     """The last line until this share of the steps' time, and the time that was left after it (s)."""
     began, end, timed = steps_of(lines)
-    before = [line for line in timed[:-1] if line["elapsed_s"] <= began + moment * (end - began)]
-    return (before[-1], end - before[-1]["elapsed_s"]) if before else None
+    now = began + moment * (end - began)
+    before = [line for line in timed[:-1] if line["elapsed_s"] <= now]
+    # a figure stands while the next step breaks bonds, unless that takes long
+    recent = [line for line in before if line["event"] == "step" and line["elapsed_s"] > now - LONG * (end - began)]
+    line = (recent or before or [None])[-1]
+    return line and (line, end - line["elapsed_s"])
 
 
 def cell(found):

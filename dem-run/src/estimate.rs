@@ -27,7 +27,7 @@ pub enum Left {
     IfHolds(f64),
     /// Expected time, where costs vary. It is told as a range.
     About(f64),
-    /// Time to the end, where a condition without a measure may end the run earlier.
+    /// Upper end of the range, where a condition without a measure may end the run earlier.
     AtMost(f64),
 }
 
@@ -140,7 +140,7 @@ impl Estimate {
         let seconds = self.to_stop(first, now).map_or(to_end, |to_stop| to_stop.min(to_end)) / speed;
         Some(match outlook {
             Outlook { bonded: true, failed: false, .. } => Left::IfHolds(seconds),
-            Outlook { open: true, .. } => Left::AtMost(seconds),
+            Outlook { open: true, .. } => Left::AtMost(SPREAD * SLOWING * seconds),
             Outlook { failed: false, .. } if self.is_even(first, now) => Left::Even(seconds),
             _ => Left::About(SLOWING * seconds),
         })
@@ -257,6 +257,7 @@ mod tests {
         assert_eq!(name(outlook(true, true, true), &even), Some("at_most"));
         // a broken sample slows down: 40 s at the present speed
         near(told(10.0, outlook(true, true, false), even).map(Left::seconds), 24.0);
+        near(told(10.0, outlook(true, true, true), even).map(Left::seconds), 48.0);
     }
 
     #[test]
