@@ -54,8 +54,8 @@ pub struct Check {
     pub frames: u64,
     /// Number of steps from frame to frame.
     pub steps_per_frame: u64,
-    /// Least and greatest processor time of all steps (s) if nothing breaks, without the preparation:
-    /// in a collapse steps take longer.
+    /// Least and greatest processor time of all steps (s) if nothing breaks, without the
+    /// preparation: in a collapse steps take longer.
     pub unbroken_cpu_time: [f64; 2],
     /// Memory that a run takes, roughly (bytes).
     pub memory_bytes: u64,

@@ -1,4 +1,4 @@
-//! The time that a run will still take: a figure where steps cost the same, else what is known of it.
+//! The time that a run will still take: a figure where steps cost the same, else what is known.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -233,9 +233,9 @@ mod tests {
         near(estimate(10.0, 1.0, |elapsed| (0.01 * elapsed, Some((elapsed / 20.0).powi(2)))), 10.0);
         // of two samples, from rest: stop = 0.25 elapsed² s⁻², so the second left has two halves
         let two = [(0.0, 0.0), (1.0, 0.25)].map(|(elapsed, stop)| Sample { elapsed, time: elapsed, stop: Some(stop) });
-        let mut estimate = Estimate::default();
-        two.into_iter().for_each(|sample| estimate.push(sample));
-        let left = estimate.left(two[1], Outlook { end: 100.0, ..Outlook::default() });
+        let mut short = Estimate::default();
+        two.into_iter().for_each(|sample| short.push(sample));
+        let left = short.left(two[1], Outlook { end: 100.0, ..Outlook::default() });
         assert_eq!(left, Some(Left::About(SLOWING)));
         // it stands still, or goes back
         near(estimate(10.0, 1.0, |elapsed| (0.01 * elapsed, Some(0.0))), 90.0);

@@ -267,7 +267,7 @@ impl StepProgress {
         self.stop.map_or(time, |stop| stop.reached.max(time))
     }
 
-    /// What determines the time left. Bonds break in avalanches, so their share is not extrapolated.
+    /// What determines the time left. Bonds break in avalanches: their share is not extrapolated.
     fn outlook(&self) -> Outlook {
         let by_bonds = self.stop.is_some_and(|stop| stop.condition != TRAVEL);
         let strained = self.strain.is_some_and(|strain| strain.abs() > STRAINS[0]);

@@ -192,8 +192,8 @@ fn along(friction: f64, alone: bool) -> Option<String> {
     })
 }
 
-/// Unit vector from a wall to its nearest grain, of a plane also without grains; none inside a round
-/// wall.
+/// Unit vector from a wall to its nearest grain, of a plane also without grains; none inside a
+/// round wall.
 fn towards<D: Dim>(wall: &Wall<D>, grains: &Grains<D>) -> Option<D::Vector> {
     if wall.shape.encloses() {
         return None;
