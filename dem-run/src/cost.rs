@@ -60,7 +60,7 @@ mod tests {
             let scene = config(&format!("{name}.json"), &[]);
             let grains = grains.unwrap_or_else(|| count(&scene).expect("a number of grains"));
             let [low, high] = unbroken(&scene, grains).map(|time| time / scene.time.steps() as f64);
-            assert!(low <= measured && measured <= high, "{name}: {measured} is not in {low} to {high}");
+            assert!((low..=high).contains(&measured), "{name}: {measured} is not in {low} to {high}");
             // and it says something: of the solvers, less than two orders
             let sweeps = matches!(scene.solver.kind, SolverKind::GaussSeidel(_));
             assert!(sweeps || grains < 100 || high < 100.0 * low, "{name}: {low} to {high}");

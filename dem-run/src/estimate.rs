@@ -83,7 +83,7 @@ fn unit(seconds: f64) -> (f64, &'static str) {
 
 /// A count of units: with one decimal below 10, seconds too.
 fn digits(count: f64) -> String {
-    if count < 9.95 && count >= 0.05 { format!("{count:.1}") } else { format!("{count:.0}") }
+    if (0.05..9.95).contains(&count) { format!("{count:.1}") } else { format!("{count:.0}") }
 }
 
 /// What, beside the speed, determines how long a run takes.
