@@ -94,6 +94,7 @@ fn export_in<D: Dim>(scene: &Scene, options: &ExportOptions, interrupt: &Interru
             load: None,
             strain: None,
             stop: None,
+            may_end_early: false,
         });
         if interrupt.requested() {
             return Err(RunError::Interrupted("nothing was written"));
