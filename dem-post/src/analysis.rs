@@ -5,6 +5,7 @@
 use std::io::Write;
 
 use clap::{ArgMatches, Args};
+use dem_output::Print;
 use serde::Serialize;
 
 use crate::output::{Folder, PostError, Result, escaped, print};
@@ -80,6 +81,8 @@ pub struct Shown {
     pub json: bool,
     /// Without anything on stderr but errors.
     pub quiet: bool,
+    /// Size of the figures on paper.
+    pub print: Option<Print>,
 }
 
 impl Entry {
@@ -95,6 +98,7 @@ fn run<A: Analysis>(options: &ArgMatches, shown: Shown) -> Result<()> {
     let mut report = options.read(&input, shown.quiet)?;
     let mut folder = options.folder(&input)?;
     if let Some(folder) = &mut folder {
+        shown.print.into_iter().for_each(|print| folder.print_at(print));
         options.write(&input, &mut report, folder, shown.quiet)?;
         folder.finish()?;
     }
@@ -114,6 +118,11 @@ fn run<A: Analysis>(options: &ArgMatches, shown: Shown) -> Result<()> {
 fn name_files(folder: &Folder) {
     if folder.removed() > 0 {
         note(&format!("removed {} files of the history to which the folder belonged", folder.removed()));
+    }
+    for (name, points) in folder.small() {
+        note(&format!(
+            "warning: {name}: letters of {points:.1} pt: choose fewer moments with --times, or a larger --width"
+        ));
     }
     // for a long series stderr names only the first and the last file
     let written = folder.written();

@@ -1,11 +1,11 @@
 //! The command line: the options of all commands, and a command for each analysis.
 
 use clap::{ArgMatches, Args, Command, FromArgMatches};
-use dem_output::command_line::{Completions, Man, with_negative_numbers};
+use dem_output::Print;
+use dem_output::command_line::{Completions, Man, whole, with_negative_numbers};
 
 use crate::ANALYSES;
 use crate::analysis::Shown;
-use crate::output::Result;
 
 /// Analyses the histories that `dem-run run` writes.
 #[derive(Debug, Args)]
@@ -18,6 +18,20 @@ struct Cli {
     /// Print only errors on standard error.
     #[arg(long, short, global = true)]
     quiet: bool,
+    /// Width of the figures on paper, as in 85mm: charts are laid out for letters of 7 pt.
+    #[arg(long, global = true, value_name = "85mm", value_parser = millimetres)]
+    width: Option<f64>,
+    /// Pixels of the PNG figures in an inch.
+    #[arg(long, global = true, value_name = "N", default_value_t = 600, value_parser = whole::<u32>(30..=2400))]
+    dpi: u32,
+}
+
+/// A width in millimetres, as in `85mm` or `85`.
+fn millimetres(text: &str) -> Result<f64, String> {
+    let number = text.strip_suffix("mm").unwrap_or(text).trim_end().parse::<f64>();
+    let width = number.map_err(|_| "found no width in millimetres, as in 85mm".to_string())?;
+    // a chart has no room for its ticks on less
+    if (40.0..=2000.0).contains(&width) { Ok(width) } else { Err("allowed 40mm to 2000mm".into()) }
 }
 
 const EXIT_CODES: &str = "\
@@ -31,12 +45,16 @@ Examples:
 ///
 /// # Errors
 /// Those of the command.
-pub fn run() -> Result<()> {
+pub fn run() -> crate::output::Result<()> {
     let mut matches = command().get_matches();
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     // clap rejects a command line without one of these commands
     let (name, options) = matches.remove_subcommand().unwrap_or_else(|| unreachable!("no command"));
-    let shown = Shown { json: cli.json, quiet: cli.quiet };
+    let shown = Shown {
+        json: cli.json,
+        quiet: cli.quiet,
+        print: cli.width.map(|width| Print { width: 1e-3 * width, dots: f64::from(cli.dpi) / 0.0254 }),
+    };
     match ANALYSES.iter().find(|one| one.name == name) {
         Some(analysis) => (analysis.run)(&options, shown),
         None if name == "man" => Ok(own::<Man>(&options).print(command())?),
@@ -59,6 +77,14 @@ fn command() -> Command {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_width_is_in_millimetres() {
+        assert_eq!(["85mm", "170 mm", "60.5"].map(millimetres), [Ok(85.0), Ok(170.0), Ok(60.5)]);
+        for wrong in ["85cm", "", "mm", "-85mm", "NaN", "1mm", "1e9mm"] {
+            assert!(millimetres(wrong).is_err(), "{wrong}");
+        }
+    }
 
     #[test]
     fn every_analysis_has_a_command_of_its_own_with_help() {

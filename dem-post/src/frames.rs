@@ -19,7 +19,8 @@ use crate::cracks::{Modes, mode_colour};
 use crate::map::{Key, Link, Panel, Ramp, Sample, Scale, View, draw_view};
 use crate::moments;
 use crate::options::Files;
-use crate::output::{Folder, PostError, Result, facts, in_shell, number, progress, quantity, short};
+use crate::output::{Folder, PostError, Result, facts, in_shell, progress, quantity, short};
+use crate::title::Titles;
 use crate::velocities::{speeds, usual_speed};
 
 /// Pixels per unit of a drawing.
@@ -30,6 +31,8 @@ const GRAIN: [&str; 2] = ["#f0f0f0", "#bdbdbd"];
 const RELEASED: &str = "#ffffff";
 /// Width of the lines of bonds and of cracks.
 const BOND: f64 = 1.6;
+/// Colour of bonds that hold.
+const HELD: &str = "#9a9a9a";
 const CRACK: f64 = 2.8;
 
 /// Series of numbered pictures, for a viewer or a film.
@@ -186,32 +189,34 @@ pub fn write(history: &History, report: &Report, folder: &mut Folder, quiet: boo
 }
 
 /// The drawing of a frame.
-pub(crate) fn drawing(
-    history: &History,
-    report: &Report,
-    (sample, view): &(Sample, View),
-    frame: usize,
-) -> Result<Drawing> {
-    let (panel, legend) = picture(history, report, frame)?;
-    Ok(draw_view(sample, *view, &[panel], &legend))
+pub(crate) fn drawing(history: &History, report: &Report, shown: &Shown, frame: usize) -> Result<Drawing> {
+    let (mut panel, legend) = picture(history, report, frame)?;
+    panel.caption.insert(0, shown.titles.of(history, frame));
+    Ok(draw_view(&shown.sample, shown.view, &[panel], &legend))
+}
+
+/// What all pictures of a series share.
+pub(crate) struct Shown {
+    sample: Sample,
+    view: View,
+    titles: Titles,
 }
 
 /// The part of the plane that shows all frames.
-pub(crate) fn shown(history: &History, report: &Report) -> Result<(Sample, View)> {
+pub(crate) fn shown(history: &History, report: &Report) -> Result<Shown> {
     let sample = Sample::with_depth(history)?;
     let mut view = View::EMPTY;
     for &frame in &report.frames {
         let (grains, walls) = (history.grain_state(frame)?, history.wall_state(frame)?);
         view = view.join(sample.view(std::iter::once((&grains, &walls))));
     }
-    Ok((sample, view))
+    Ok(Shown { sample, view, titles: Titles::read(history)? })
 }
 
 fn picture(history: &History, report: &Report, frame: usize) -> Result<(Panel, Vec<Key>)> {
     let grains = history.grain_state(frame)?;
     let number_of_grains = history.grains()?.radius.len();
     let mut panel = Panel {
-        caption: vec![format!("t = {} s", number(history.times()[frame]))],
         walls: history.wall_state(frame)?,
         fills: vec![GRAIN[0].into(); number_of_grains],
         outline: GRAIN[1],
@@ -242,6 +247,21 @@ fn picture(history: &History, report: &Report, frame: usize) -> Result<(Panel, V
     Ok((panel, legend))
 }
 
+/// Colours and names of bonds by their state; in 3D those that hold are not drawn.
+pub(crate) fn bond_legend(dimension: usize, twist: bool) -> Vec<(&'static str, String)> {
+    let mut keys = vec![];
+    if dimension == 2 {
+        keys.push((HELD, "bond".into()));
+    }
+    keys.push((mode_colour(RuptureMode::Tension), "broken in tension".into()));
+    keys.push((mode_colour(RuptureMode::Shear), "in shear".into()));
+    keys.push((mode_colour(RuptureMode::Rolling), "by rolling".into()));
+    if twist {
+        keys.push((mode_colour(RuptureMode::Twist), "by twist".into()));
+    }
+    keys
+}
+
 /// A line for each bond, in the colour of its mode of rupture.
 fn bonds(history: &History, frame: usize, panel: &mut Panel) -> Result<Vec<Key>> {
     let (d, bonds, status) = (history.dimension(), history.bonds()?, history.bond_status(frame)?);
@@ -261,26 +281,19 @@ fn bonds(history: &History, frame: usize, panel: &mut Panel) -> Result<Vec<Key>>
             panel.links.push(Link { from, to, width: CRACK, colour: mode_colour(mode).into() });
         }
     }
-    let key = |mode: RuptureMode, text: &str| Key::Line(mode_colour(mode), CRACK, text.into());
-    let mut keys = vec![
-        key(RuptureMode::Tension, "broken in tension"),
-        key(RuptureMode::Shear, "in shear"),
-        key(RuptureMode::Rolling, "by rolling"),
-    ];
-    if modes.twist > 0 {
-        keys.push(key(RuptureMode::Twist, "by twist"));
-    }
+    let width = |colour: &str| if colour == HELD { BOND } else { CRACK };
+    let keys = bond_legend(d, modes.twist > 0).into_iter();
+    let keys = keys.map(|(colour, text)| Key::Line(colour, width(colour), text)).collect();
     // in 3D bonds would hide each other and lie behind grains
     if d == 2 {
         let holding = |&(_, status): &(&[i32; 2], &BondStatus)| *status == BondStatus::Intact;
-        let (width, colour) = (BOND, "#9a9a9a");
+        let (width, colour) = (BOND, HELD);
         let line = |(pair, _): (&[i32; 2], &BondStatus)| {
             let [from, to] = pair.map(|grain| centre(panel, grain));
             Link { from, to, width, colour: colour.into() }
         };
         let intact: Vec<Link> = bonds.pair.iter().zip(&status).filter(holding).map(line).collect();
         panel.links.splice(0..0, intact);
-        keys.insert(0, Key::Line(colour, width, "bond".into()));
     }
     panel.caption.push(format!("{} of {} bonds broken", modes.total(), bonds.len()));
     Ok(keys)

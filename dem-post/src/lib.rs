@@ -39,6 +39,7 @@ pub mod options;
 pub mod output;
 pub mod section;
 pub mod tensor;
+pub mod title;
 
 /// All analyses, in the order in which `--help` lists their commands.
 pub const ANALYSES: &[Entry] = &[

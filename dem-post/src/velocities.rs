@@ -18,6 +18,7 @@ use crate::moments;
 use crate::options::Moments;
 use crate::output::{Folder, Result, Text, number, short};
 use crate::section::{OnPage, Section, map_figure};
+use crate::title::Titles;
 use dem_drawing::{Drawing, colour};
 use dem_output::row;
 
@@ -26,6 +27,11 @@ const SQUARES: f64 = 18.0;
 /// Share of the speeds that the colour scale covers, so that one ejected grain does not set the
 /// scale.
 const COVERED: f64 = 0.99;
+/// A sample is at rest if its grains, at their speed, would move by less than this share of their
+/// diameter in the whole run: the rest is round-off.
+const AT_REST: f64 = 1e-8;
+/// Fill of grains at rest.
+const RESTS: &str = "#f0f0f0";
 
 /// Velocities of the grains as maps and a table.
 #[derive(Debug, Args)]
@@ -207,24 +213,33 @@ pub fn map(history: &History, report: &Report) -> Result<Drawing> {
     let scale = |title: &str, high: f64| Scale { title: title.into(), low: 0.0, high, ramp: Ramp::Areas };
     // in 3D the arrow of a square would be a mean over all depths
     let flat = history.dimension() == 2;
+    let titles = Titles::read(history)?;
+    let radius = history.grains()?.radius;
+    let diameter = 2.0 * radius.iter().sum::<f64>() / radius.len() as f64;
+    let duration = history.times().last().zip(history.times().first()).map_or(0.0, |(last, first)| last - first);
+    let mut moving = false;
     let mut panels = vec![];
     for field in &report.fields {
         let usual = scale("", usual_speed(field.speed.clone()));
+        let rests = usual.high * duration < AT_REST * diameter;
+        moving |= !rests;
+        let told = if rests {
+            "at rest".into()
+        } else {
+            format!("v₉₉ = {} m/s, mean {} m/s", short(usual.high), short(field.mean_speed))
+        };
         panels.push(Panel {
-            caption: vec![
-                format!("t = {} s", number(field.time)),
-                format!("v = {} m/s, mean {} m/s", short(usual.high), short(field.mean_speed)),
-            ],
+            caption: vec![titles.of(history, field.frame), told],
             grains: field.state.clone(),
             walls: history.wall_state(field.frame)?,
-            fills: field.speed.iter().map(|&speed| usual.colour(speed)).collect(),
+            fills: field.speed.iter().map(|&speed| if rests { RESTS.into() } else { usual.colour(speed) }).collect(),
             outline: colour::GREY,
-            arrows: if flat { arrows(&field.state) } else { vec![] },
+            arrows: if flat && !rests { arrows(&field.state) } else { vec![] },
             ..Panel::default()
         });
     }
-    let mut legend = vec![Key::Bar(scale("speed over v", 1.0))];
-    if flat {
+    let mut legend = if moving { vec![Key::Bar(scale("speed over v₉₉", 1.0))] } else { vec![] };
+    if flat && moving {
         legend.push(Key::Arrow("mean velocity in a square".into()));
     }
     Ok(draw(&Sample::with_depth(history)?, &panels, &legend))

@@ -41,7 +41,7 @@ pub fn write(history: &History, report: &Report, folder: &mut Folder) -> Result<
         network.distribution.iter().map(|(ratio, density)| row![network.step, network.time, ratio, density])
     });
     folder.table("distribution", &["step", "time_s", "ratio_to_mean", "density"], rows)?;
-    folder.draw("chains", &network_map(history, report)?)?;
+    folder.draw("chains", &network_map(history, report, report.greatest_mean())?)?;
     folder.draw("distribution", &Chart::draw(vec![distribution_chart(report)]))?;
     write_chains(report, folder)?;
     folder.draw("force-chains", &chain_map(history, report)?)?;

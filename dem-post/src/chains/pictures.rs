@@ -5,6 +5,7 @@ use dem_history::{ContactRows, History};
 use super::report::{CARRIES, Report};
 use crate::map::{Colour, Key, Link, Panel, Sample, draw};
 use crate::output::{Result, number, short};
+use crate::title::Titles;
 use dem_drawing::{Chart, Drawing, Style, colour};
 
 /// Width of a line that carries ⟨f⟩, and the greatest width, units of the drawing: of disks, and of
@@ -42,7 +43,7 @@ pub fn length_charts(report: &Report) -> Vec<Chart> {
     let mut charts = vec![];
     for (kind, label) in [(0, "chains in compression"), (1, "chains in tension")] {
         let mut chart = Chart::new("grains, at least", label);
-        (chart.pad_x, chart.log_y) = (true, true);
+        (chart.pad_x, chart.log_y, chart.x_is_count) = (true, true, true);
         for (k, network) in report.networks.iter().enumerate() {
             let Some(figures) = network.chain_figures.get(kind).filter(|figures| figures.count > 0) else {
                 continue;
@@ -71,6 +72,7 @@ pub fn length_charts(report: &Report) -> Vec<Chart> {
 pub fn chain_map(history: &History, report: &Report) -> Result<Drawing> {
     let d = history.dimension();
     let grains = history.grains()?.radius.len();
+    let titles = Titles::read(history)?;
     let mut panels = vec![];
     for network in &report.networks {
         let state = history.grain_state(network.frame)?;
@@ -95,7 +97,7 @@ pub fn chain_map(history: &History, report: &Report) -> Result<Drawing> {
         let number_of = |k: usize| network.chain_figures[k].count;
         panels.push(Panel {
             caption: vec![
-                format!("t = {} s", number(network.time)),
+                titles.of(history, network.frame),
                 format!("chains: {} in compression, {} in tension", number_of(0), number_of(1)),
             ],
             walls: history.wall_state(network.frame)?,
@@ -126,20 +128,22 @@ pub fn distribution_chart(report: &Report) -> Chart {
 }
 
 /// The map of the network: a line for each contact between the centres, or from a centre to the
-/// point on a wall.
+/// point on a wall. Widths are of forces over `mean` (N) in all panels.
 ///
 /// # Errors
 /// Those of reading the history.
-pub fn network_map(history: &History, report: &Report) -> Result<Drawing> {
+pub fn network_map(history: &History, report: &Report, mean: f64) -> Result<Drawing> {
     let (sample, d) = (Sample::with_depth(history)?, history.dimension());
     let grains = history.grains()?.radius.len();
     let mut panels = vec![];
+    let titles = Titles::read(history)?;
     for network in &report.networks {
         let state = history.grain_state(network.frame)?;
-        let s = network.statistics;
+        let own = network.statistics.mean;
+        let scale = if own == mean { String::new() } else { format!("mean force {} N, ", short(own)) };
         panels.push(Panel {
-            caption: vec![format!("t = {} s", number(network.time)), format!("⟨f⟩ = {} N", short(s.mean))],
-            links: links(&network.contacts, &state.position, s.mean, d),
+            caption: vec![titles.of(history, network.frame), format!("{scale}⟨f⟩ = {} N", short(mean))],
+            links: links(&network.contacts, &state.position, mean, d),
             grains: state,
             walls: history.wall_state(network.frame)?,
             fills: behind_lines(grains, d),

@@ -244,6 +244,11 @@ pub fn distribution(forces: &[f64], mean: f64) -> Vec<(f64, f64)> {
 }
 
 impl Report {
+    /// The greatest mean force of the networks, N.
+    pub fn greatest_mean(&self) -> f64 {
+        self.networks.iter().map(|network| network.statistics.mean).fold(0.0, f64::max)
+    }
+
     /// The report as a table.
     pub fn table(&self) -> String {
         let mut table = Text::new(&[

@@ -13,13 +13,18 @@ impl OnPage for Report {
 
     fn section(&self, history: &History, _: &[usize]) -> Result<Section> {
         let mut figures: Vec<Figure> = vec![];
+        let mean = self.greatest_mean();
         for network in &self.networks {
             let one = Self { networks: vec![network.clone()] };
             let time = number(network.time);
             let alt = format!(
                 "Contact forces as lines at t = {time} s: blue is compression, orange is tension, width is magnitude."
             );
-            figures.push(map_figure(&network_map(history, &one)?, &alt, &format!("Force network at t = {time} s."))?);
+            figures.push(map_figure(
+                &network_map(history, &one, mean)?,
+                &alt,
+                &format!("Force network at t = {time} s."),
+            )?);
             let alt = format!("Grains in force chains at t = {time} s, blue in compression, orange in tension.");
             figures.push(map_figure(&chain_map(history, &one)?, &alt, &format!("Force chains at t = {time} s."))?);
         }

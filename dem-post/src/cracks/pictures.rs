@@ -10,6 +10,7 @@ use super::surfaces::Facet;
 use crate::fragments::{Fragment, Fragments};
 use crate::map::{Colour, Key, Link, Panel, Patch, Ramp, Sample, Scale, draw, draw_view};
 use crate::output::{Result, counted, number};
+use crate::title::Titles;
 use dem_drawing::{Chart, Drawing, Style, colour};
 
 /// Fill of grains that kept all their bonds.
@@ -121,7 +122,7 @@ fn cascade_chart(report: &Report) -> Option<Chart> {
     let mut chart = Chart::new(&format!("round of the cascade in step {}", rounds[0].step), label)
         .curve("all", colour::BLACK, Style::Marked, points(|row| row.size))
         .curve(largest(report), colour::BLUE, Style::Marked, points(|row| row.largest));
-    chart.pad_x = true;
+    (chart.pad_x, chart.x_is_count) = (true, true);
     Some(chart)
 }
 
@@ -226,10 +227,10 @@ pub fn crack_map(history: &History, report: &Report) -> Result<(Drawing, Option<
     Ok((draw_view(&sample, all, &panels, &legend), near))
 }
 
-/// The grains at a frame in these colours; the caption is the time and `what`.
-fn filled_panel(history: &History, frame: usize, fills: Vec<Colour>, what: String) -> Result<Panel> {
+/// The grains at a frame in these colours; the caption is the title of the frame and `what`.
+fn filled_panel(history: &History, titles: &Titles, frame: usize, fills: Vec<Colour>, what: String) -> Result<Panel> {
     Ok(Panel {
-        caption: vec![format!("t = {} s", number(history.times()[frame])), what],
+        caption: vec![titles.of(history, frame), what],
         grains: history.grain_state(frame)?,
         walls: history.wall_state(frame)?,
         fills,
@@ -245,6 +246,7 @@ fn filled_panel(history: &History, frame: usize, fills: Vec<Colour>, what: Strin
 /// Those of reading the history.
 pub fn fragment_map(history: &History, sample: &Sample, frames: &[usize], lists: &[Vec<Fragment>]) -> Result<Drawing> {
     let grains = history.grains()?.radius.len();
+    let titles = Titles::read(history)?;
     let (mut panels, mut shown) = (vec![], 0);
     for (&frame, list) in frames.iter().zip(lists) {
         let mut fills = vec![Colour::from(PALE[0]); grains];
@@ -256,7 +258,7 @@ pub fn fragment_map(history: &History, sample: &Sample, frames: &[usize], lists:
         let heaviest = 100.0 * list.first().map_or(0.0, |f| f.mass_fraction);
         let plural = if list.len() == 1 { "" } else { "s" };
         let what = format!("{} fragment{plural}, the heaviest {heaviest:.1} %", list.len());
-        panels.push(filled_panel(history, frame, fills, what)?);
+        panels.push(filled_panel(history, &titles, frame, fills, what)?);
     }
     let names = ["heaviest", "second", "third", "fourth", "fifth", "sixth"];
     let coloured = FRAGMENTS.iter().zip(names).take(shown);
@@ -271,6 +273,7 @@ pub fn fragment_map(history: &History, sample: &Sample, frames: &[usize], lists:
 /// Those of reading the history.
 pub fn decohesion(history: &History, sample: &Sample, frames: &[usize]) -> Result<Drawing> {
     let bonds = history.bonds()?;
+    let titles = Titles::read(history)?;
     let mut panels = vec![];
     for &frame in frames {
         let status = history.bond_status(frame)?;
@@ -281,7 +284,7 @@ pub fn decohesion(history: &History, sample: &Sample, frames: &[usize]) -> Resul
             broken += 1;
         }
         let what = format!("{broken} of {} bonds broken", bonds.len());
-        panels.push(filled_panel(history, frame, fills, what)?);
+        panels.push(filled_panel(history, &titles, frame, fills, what)?);
     }
     let legend = [
         Key::Disk(BONDED, OUTLINE, "lost no bond".into()),

@@ -26,6 +26,7 @@ mod files;
 mod pictures;
 pub mod region;
 pub mod report;
+mod section;
 pub mod tensors;
 
 /// Stress tensor, p and q, volumetric strain, porosity, coordination, fabric and crack density over

@@ -190,6 +190,11 @@ impl Row {
 }
 
 impl Report {
+    /// Whether grains were ever in contact.
+    pub fn touched(&self) -> bool {
+        self.rows.iter().any(|row| row.contacts.is_some_and(|count| count > 0))
+    }
+
     /// The report as a table of the shown frames.
     pub fn table(&self) -> String {
         let mut table = Text::new(&[

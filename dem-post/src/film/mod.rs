@@ -23,7 +23,7 @@ use crate::stress_strain;
 use pace::Shown;
 use picture::{Animation, Picture};
 
-mod pace;
+pub(crate) mod pace;
 mod picture;
 
 /// Pictures a second, at most.
@@ -139,16 +139,28 @@ pub fn read(history: &History, subject: Subject, wall: Option<&str>, seconds: u1
 pub fn write(history: &History, report: &mut Report, folder: &mut Folder, quiet: bool) -> Result<()> {
     folder.make("film.png", |path| animate(history, report, path, quiet))?;
     let png = folder.path().join("film.png");
-    let made =
-        folder.make("film.webm", |path| webm(&png, path).map_err(|why| WriteError { path: "film.webm".into(), why }));
+    let made = folder.make("film.webm", |path| webm(&png, path));
     report.webm = made.is_ok();
-    if let Err(error) = made
-        && error.why != NO_FFMPEG
+    if let Err(NoWebm::Failed(error)) = made
         && !quiet
     {
         note(&format!("warning: film.webm was not made: {}", error.why));
     }
     Ok(())
+}
+
+/// Why there is no WebM.
+enum NoWebm {
+    /// There is no ffmpeg.
+    NoProgram,
+    /// ffmpeg failed, or the file cannot be written.
+    Failed(WriteError),
+}
+
+impl From<WriteError> for NoWebm {
+    fn from(error: WriteError) -> Self {
+        Self::Failed(error)
+    }
 }
 
 /// Draws and writes the animated PNG.
@@ -175,20 +187,21 @@ fn animate(history: &History, report: &Report, path: &Path, quiet: bool) -> Resu
     animation.map_or(Ok(()), Animation::finish).map_err(failed)
 }
 
-const NO_FFMPEG: &str = "there is no ffmpeg";
-
 /// Makes a WebM of an animated PNG with ffmpeg.
-fn webm(png: &Path, webm: &Path) -> std::result::Result<(), String> {
+fn webm(png: &Path, webm: &Path) -> std::result::Result<(), NoWebm> {
+    let failed = |why: String| NoWebm::Failed(WriteError { path: "film.webm".into(), why });
     let mut ffmpeg = Process::new("ffmpeg");
     ffmpeg.args(["-nostdin", "-loglevel", "error", "-y", "-f", "apng", "-i"]).arg(png);
-    // an even number of pixels, as the encoder wants
-    ffmpeg.args(["-vf", "crop=trunc(iw/2)*2:trunc(ih/2)*2:0:0", "-r", &RATE.to_string(), "-pix_fmt", "yuv420p"]);
+    // a constant rate, which keeps the last picture for its time, and an even number of pixels, as
+    // the encoder wants
+    let filter = format!("fps={RATE},crop=trunc(iw/2)*2:trunc(ih/2)*2:0:0");
+    ffmpeg.args(["-vf", &filter, "-pix_fmt", "yuv420p"]);
     ffmpeg.args(["-c:v", "libvpx-vp9", "-b:v", "0", "-crf", "33", "-f", "webm"]).arg(webm).stdin(Stdio::null());
     match ffmpeg.output() {
         Ok(done) if done.status.success() => Ok(()),
-        Ok(done) => Err(format!("ffmpeg: {}", String::from_utf8_lossy(&done.stderr).trim())),
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Err(NO_FFMPEG.into()),
-        Err(error) => Err(format!("ffmpeg: {error}")),
+        Ok(done) => Err(failed(format!("ffmpeg: {}", String::from_utf8_lossy(&done.stderr).trim()))),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Err(NoWebm::NoProgram),
+        Err(error) => Err(failed(format!("ffmpeg: {error}"))),
     }
 }
 

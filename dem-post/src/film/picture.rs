@@ -1,82 +1,63 @@
-//! Pictures of pixels: drawings side by side, and an animated PNG of them.
+//! Drawings side by side, and an animated PNG of them.
+//!
+//! Of each picture but the first, the pixels that changed are stored, in the smallest rectangle
+//! that contains them; the others are transparent. Colours are rounded to steps of 8 of 255, which
+//! nobody sees and which halves the file.
 
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
 
-use dem_drawing::Drawing;
+use dem_drawing::{Drawing, RGB, Raster};
 
-/// Bytes of a pixel.
-const RGB: usize = 3;
+/// Bytes of a stored pixel: red, green, blue, opacity.
+const RGBA: usize = 4;
+/// Colours are multiples of this, and white.
+const STEP: u8 = 8;
 
-/// Pixels in rows from the top, as red, green and blue.
+/// Pixels of a picture of the film.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Picture {
-    width: usize,
-    height: usize,
-    pixels: Vec<u8>,
-}
+pub struct Picture(Raster);
 
 impl Picture {
-    fn white(width: usize, height: usize) -> Self {
-        Self { width, height, pixels: vec![255; RGB * width * height] }
-    }
-
-    /// The pixels of a PNG, on white.
-    fn decode(png: &[u8]) -> Result<Self, String> {
-        let mut decoder = png::Decoder::new(std::io::Cursor::new(png));
-        decoder.set_transformations(png::Transformations::normalize_to_color8() | png::Transformations::ALPHA);
-        let mut reader = decoder.read_info().map_err(|error| error.to_string())?;
-        let mut buffer = vec![0; reader.output_buffer_size().ok_or("the picture is too large")?];
-        let info = reader.next_frame(&mut buffer).map_err(|error| error.to_string())?;
-        if info.color_type != png::ColorType::Rgba {
-            return Err(format!("a picture in {:?}", info.color_type));
-        }
-        let over_white = |channel: u8, alpha: u8| {
-            let (channel, alpha) = (u32::from(channel), u32::from(alpha));
-            ((channel * alpha + 255 * (255 - alpha) + 127) / 255) as u8
-        };
-        let pixels = buffer[..info.buffer_size()].chunks_exact(4).flat_map(|pixel| {
-            let [red, green, blue, alpha] = [pixel[0], pixel[1], pixel[2], pixel[3]];
-            [red, green, blue].map(|channel| over_white(channel, alpha))
-        });
-        Ok(Self { width: info.width as usize, height: info.height as usize, pixels: pixels.collect() })
-    }
-
     /// A drawing with charts beside it, one below the other.
     pub fn beside(drawing: &Drawing, charts: &[Drawing], scale: f32) -> Result<Self, String> {
-        let left = Self::decode(&drawing.png_scaled(scale)?)?;
-        let charts: Vec<Self> =
-            charts.iter().map(|chart| Self::decode(&chart.png_scaled(scale)?)).collect::<Result<_, String>>()?;
-        let right = charts.iter().map(|chart| chart.width).max().unwrap_or(0);
-        let below: usize = charts.iter().map(|chart| chart.height).sum();
-        let mut whole = Self::white(left.width + right, left.height.max(below));
-        whole.put(&left, (0, (whole.height - left.height) / 2));
-        let mut top = (whole.height - below) / 2;
+        let left = drawing.pixels(scale)?;
+        let charts: Vec<Raster> = charts.iter().map(|chart| chart.pixels(scale)).collect::<Result<_, String>>()?;
+        let right = charts.iter().map(|chart| chart.size[0]).max().unwrap_or(0);
+        let below: usize = charts.iter().map(|chart| chart.size[1]).sum();
+        let height = left.size[1].max(below);
+        let mut whole = Self(Raster::white(left.size[0] + right, height));
+        whole.put(&left, (0, (height - left.size[1]) / 2));
+        let mut top = (height - below) / 2;
         for chart in &charts {
-            whole.put(chart, (left.width, top));
-            top += chart.height;
+            whole.put(chart, (left.size[0], top));
+            top += chart.size[1];
         }
+        let rounded = |channel: &mut u8| *channel = channel.saturating_add(STEP / 2) / STEP * STEP;
+        whole.0.pixels.iter_mut().filter(|channel| **channel < 255 - STEP / 2).for_each(rounded);
+        whole.0.pixels.iter_mut().filter(|channel| **channel >= 255 - STEP / 2).for_each(|channel| *channel = 255);
         Ok(whole)
     }
 
-    fn put(&mut self, other: &Self, (x, y): (usize, usize)) {
-        for (row, pixels) in other.pixels.chunks_exact(RGB * other.width.max(1)).enumerate() {
-            let start = RGB * ((y + row) * self.width + x);
-            self.pixels[start..start + pixels.len()].copy_from_slice(pixels);
+    fn put(&mut self, other: &Raster, (x, y): (usize, usize)) {
+        for (row, pixels) in other.pixels.chunks_exact(RGB * other.size[0].max(1)).enumerate() {
+            let start = RGB * ((y + row) * self.0.size[0] + x);
+            self.0.pixels[start..start + pixels.len()].copy_from_slice(pixels);
         }
     }
 
     /// The smallest rectangle outside which two pictures of one size agree: its corner and its size
     /// in pixels, at least one.
     fn changed(&self, before: &Self) -> [usize; 4] {
-        let row = |picture: &Self, y: usize| y * RGB * picture.width..(y + 1) * RGB * picture.width;
-        let differs = |y: &usize| self.pixels[row(self, *y)] != before.pixels[row(before, *y)];
-        let Some(top) = (0..self.height).find(differs) else { return [0, 0, 1, 1] };
-        let bottom = (0..self.height).rev().find(differs).unwrap_or(top);
-        let (mut left, mut right) = (self.width - 1, 0);
+        let [width, height] = self.0.size;
+        let row = |y: usize| y * RGB * width..(y + 1) * RGB * width;
+        let differs = |y: &usize| self.0.pixels[row(*y)] != before.0.pixels[row(*y)];
+        let Some(top) = (0..height).find(differs) else { return [0, 0, 1, 1] };
+        let bottom = (0..height).rev().find(differs).unwrap_or(top);
+        let (mut left, mut right) = (width - 1, 0);
         for y in top..=bottom {
-            let rows = self.pixels[row(self, y)].chunks_exact(RGB).zip(before.pixels[row(before, y)].chunks_exact(RGB));
+            let rows = self.0.pixels[row(y)].chunks_exact(RGB).zip(before.0.pixels[row(y)].chunks_exact(RGB));
             for (x, _) in rows.enumerate().filter(|(_, (now, then))| now != then) {
                 (left, right) = (left.min(x), right.max(x));
             }
@@ -84,16 +65,23 @@ impl Picture {
         [left, top, right - left + 1, bottom - top + 1]
     }
 
-    fn part(&self, [left, top, width, height]: [usize; 4]) -> Vec<u8> {
-        (top..top + height)
-            .flat_map(|y| &self.pixels[RGB * (y * self.width + left)..RGB * (y * self.width + left + width)])
-            .copied()
-            .collect()
+    /// A part, with pixels that are the same as before transparent.
+    fn part(&self, [left, top, width, height]: [usize; 4], before: Option<&Self>) -> Vec<u8> {
+        let mut part = Vec::with_capacity(RGBA * width * height);
+        for y in top..top + height {
+            let row = RGB * (y * self.0.size[0] + left)..RGB * (y * self.0.size[0] + left + width);
+            let then = before.map(|before| &before.0.pixels[row.clone()]);
+            for (k, pixel) in self.0.pixels[row].chunks_exact(RGB).enumerate() {
+                let same = then.is_some_and(|then| then[RGB * k..RGB * (k + 1)] == *pixel);
+                part.extend_from_slice(if same { &[0; RGB] } else { pixel });
+                part.push(if same { 0 } else { 255 });
+            }
+        }
+        part
     }
 }
 
-/// An animated PNG that is being written. Of each picture but the first, the part that changed is
-/// stored.
+/// An animated PNG that is being written.
 pub struct Animation {
     writer: png::Writer<BufWriter<File>>,
     before: Option<Picture>,
@@ -105,10 +93,12 @@ impl Animation {
     pub fn create(path: &Path, first: &Picture, count: usize) -> Result<Self, String> {
         let told = |error: png::EncodingError| error.to_string();
         let file = File::create(path).map_err(|error| error.to_string())?;
-        let mut encoder = png::Encoder::new(BufWriter::new(file), first.width as u32, first.height as u32);
-        encoder.set_color(png::ColorType::Rgb);
+        let mut encoder = png::Encoder::new(BufWriter::new(file), first.0.size[0] as u32, first.0.size[1] as u32);
+        encoder.set_color(png::ColorType::Rgba);
         encoder.set_depth(png::BitDepth::Eight);
-        encoder.set_compression(png::Compression::Balanced);
+        encoder.set_compression(png::Compression::High);
+        // most pixels are those of before: differences to neighbours would only hide that
+        encoder.set_filter(png::Filter::NoFilter);
         encoder.set_animated(count as u32, 0).map_err(told)?;
         Ok(Self { writer: encoder.write_header().map_err(told)?, before: None })
     }
@@ -116,11 +106,11 @@ impl Animation {
     /// Adds a picture that stays for `ticks / rate` seconds.
     pub fn add(&mut self, picture: Picture, (ticks, rate): (u16, u16)) -> Result<(), String> {
         let place = match &self.before {
-            Some(before) if (before.width, before.height) != (picture.width, picture.height) => {
+            Some(before) if before.0.size != picture.0.size => {
                 return Err("the pictures differ in size".into());
             }
             Some(before) => picture.changed(before),
-            None => [0, 0, picture.width, picture.height],
+            None => [0, 0, picture.0.size[0], picture.0.size[1]],
         };
         let [left, top, width, height] = place.map(|length| length as u32);
         let mut write = || {
@@ -129,7 +119,8 @@ impl Animation {
             self.writer.reset_frame_position()?;
             self.writer.set_frame_dimension(width, height)?;
             self.writer.set_frame_position(left, top)?;
-            self.writer.write_image_data(&picture.part(place))
+            self.writer.set_blend_op(png::BlendOp::Over)?;
+            self.writer.write_image_data(&picture.part(place, self.before.as_ref()))
         };
         write().map_err(|error| error.to_string())?;
         self.before = Some(picture);
@@ -147,9 +138,9 @@ mod tests {
     use super::*;
 
     fn with(pixels: &[(usize, usize)]) -> Picture {
-        let mut picture = Picture::white(7, 5);
+        let mut picture = Picture(Raster::white(7, 5));
         for (x, y) in pixels {
-            picture.pixels[RGB * (7 * y + x)..][..RGB].copy_from_slice(&[10, 20, 30]);
+            picture.0.pixels[RGB * (7 * y + x)..][..RGB].copy_from_slice(&[10, 20, 30]);
         }
         picture
     }
@@ -174,19 +165,21 @@ mod tests {
         let file = std::io::BufReader::new(File::open(&path).expect("the file"));
         let mut reader = png::Decoder::new(file).read_info().expect("a PNG");
         assert_eq!(reader.info().animation_control.map(|control| control.num_frames), Some(4));
-        // what a viewer does: each part is put over the picture before
-        let mut seen = Picture::white(7, 5);
+        // what a viewer does: opaque pixels of each part cover those before
+        let mut seen = Picture(Raster::white(7, 5));
         for (k, expected) in pictures.iter().enumerate() {
             let mut buffer = vec![0; reader.output_buffer_size().expect("a size")];
             let info = reader.next_frame(&mut buffer).expect("a frame");
             let control = *reader.info().frame_control().expect("its place");
             assert_eq!((control.delay_num, control.delay_den), (k as u16 + 1, 15));
-            let part = Picture {
-                width: info.width as usize,
-                height: info.height as usize,
-                pixels: buffer[..info.buffer_size()].to_vec(),
-            };
-            seen.put(&part, (control.x_offset as usize, control.y_offset as usize));
+            assert_eq!(control.blend_op, png::BlendOp::Over);
+            for (at, pixel) in buffer[..info.buffer_size()].chunks_exact(RGBA).enumerate() {
+                let (x, y) = (at % info.width as usize, at / info.width as usize);
+                let to = RGB * (7 * (y + control.y_offset as usize) + x + control.x_offset as usize);
+                if pixel[RGB] == 255 {
+                    seen.0.pixels[to..to + RGB].copy_from_slice(&pixel[..RGB]);
+                }
+            }
             assert_eq!(seen, *expected, "{k}");
         }
     }

@@ -3,7 +3,7 @@
 use dem_drawing::{Anchor, Canvas, Drawing};
 
 use super::arrow::draw_arrow;
-use super::frame::{Frame, HATCH};
+use super::frame::{ARROW, Frame, HATCH};
 use super::legend::{Key, draw_legend, legend_rows, scale_bar};
 use super::panel::{Link, Panel, Patch};
 use super::sample::{Sample, View};
@@ -36,10 +36,12 @@ pub fn draw_view(sample: &Sample, View([low, high]): View, panels: &[Panel], leg
     let extent = [high[0] - low[0], high[1] - low[1]];
     let stacked = extent[0] > STACKED * extent[1];
     let widest = if stacked { WIDE } else { PANEL.0 };
-    // room for the hatching of walls
-    let scale = ((widest - 4.0 * HATCH) / extent[0]).min((PANEL.1 - 4.0 * HATCH) / extent[1]);
-    let low = low.map(|x| x - 2.0 * HATCH / scale);
-    let size = (extent[0] * scale + 4.0 * HATCH, extent[1] * scale + 4.0 * HATCH);
+    // room for the hatching of walls, or for arrows
+    let loaded = sample.dimension == 2 && sample.walls.iter().any(wall::bears_arrow);
+    let room = if loaded { ARROW + 4.0 } else { 2.0 * HATCH };
+    let scale = ((widest - 2.0 * room) / extent[0]).min((PANEL.1 - 2.0 * room) / extent[1]);
+    let low = low.map(|x| x - room / scale);
+    let size = (extent[0] * scale + 2.0 * room, extent[1] * scale + 2.0 * room);
     let (columns, lines) = if stacked { (1, panels.len()) } else { (panels.len(), 1) };
     let even = |length: f64| (length / EVEN).ceil() * EVEN;
     let width = even((columns as f64 * (size.0 + MARGIN) + MARGIN).max(420.0));
@@ -79,6 +81,12 @@ fn draw_panel(canvas: &mut Canvas, sample: &Sample, panel: &Panel, frame: &Frame
     }
     for (wall, position) in sample.walls.iter().zip(panel.walls.position.chunks(sample.dimension)) {
         wall::draw_in_front(canvas, &sample.eye, wall, position, frame);
+    }
+    for (k, wall) in sample.walls.iter().enumerate() {
+        let own = k * sample.dimension..(k + 1) * sample.dimension;
+        if let (Some(position), Some(force)) = (panel.walls.position.get(own.clone()), panel.walls.force.get(own)) {
+            wall::draw_load(canvas, wall, position, force, frame);
+        }
     }
     // lines between tiny grains must not merge
     let diameter = 2.0 * frame.scale * sample.radius.iter().sum::<f64>() / sample.radius.len() as f64;

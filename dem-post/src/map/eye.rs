@@ -1,6 +1,7 @@
 //! The viewpoint: parallel to an axis, or in perspective from above and from the side.
 
 use nalgebra::Vector3;
+use serde::Serialize;
 
 use super::boxes::{Box2, EMPTY, around, union};
 use super::scale::{Colour, mixed};
@@ -11,6 +12,23 @@ pub(super) enum Eye {
     Along([usize; 2]),
     /// Perspective from a viewpoint.
     At(Place),
+}
+
+/// A viewpoint as numbers; lengths in m.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Perspective {
+    /// The point at which the eye looks.
+    pub focus: [f64; 3],
+    /// Unit vectors to the right, up, and away from the eye.
+    pub right: [f64; 3],
+    /// See `right`.
+    pub up: [f64; 3],
+    /// See `right`.
+    pub ahead: [f64; 3],
+    /// Distance of the eye from the focus.
+    pub far: f64,
+    /// Half the diagonal of the sample.
+    pub half: f64,
 }
 
 /// A viewpoint from which spheres are seen in perspective.
@@ -48,6 +66,13 @@ impl Place {
         let ahead = Vector3::new(-ASIDE.sin() * ABOVE.cos(), ASIDE.cos() * ABOVE.cos(), -ABOVE.sin());
         let right = Vector3::new(ASIDE.cos(), ASIDE.sin(), 0.0);
         Self { focus: 0.5 * (low + high), half: 0.5 * (high - low), right, up: right.cross(&ahead), ahead }
+    }
+
+    /// The viewpoint as numbers.
+    pub fn as_seen(&self) -> Perspective {
+        let half = self.half.norm();
+        let [focus, right, up, ahead] = [self.focus, self.right, self.up, self.ahead].map(Into::into);
+        Perspective { focus, right, up, ahead, far: FAR * half, half }
     }
 
     fn depth(&self, point: &[f64]) -> f64 {

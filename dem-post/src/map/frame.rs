@@ -3,6 +3,8 @@
 /// Lines of a wall's hatching: their distance and length. Panels have room for it around the
 /// sample.
 pub(super) const HATCH: f64 = 7.0;
+/// Length of the arrow at a driven wall; panels with one have room for it.
+pub(super) const ARROW: f64 = 26.0;
 
 /// From metres to units of the drawing, for one panel.
 pub(super) struct Frame {

@@ -2,6 +2,7 @@
 //! scale.
 
 pub use draw::{draw, draw_view};
+pub use eye::Perspective;
 pub use legend::Key;
 pub use panel::{Arrow, Link, Panel, Patch};
 pub use sample::{Sample, View};
@@ -13,6 +14,7 @@ mod draw;
 mod eye;
 mod frame;
 mod legend;
+mod outline;
 mod panel;
 mod sample;
 mod scale;

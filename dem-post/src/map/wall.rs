@@ -1,11 +1,12 @@
 //! Drawing of each kind of wall, and its extent in the drawing.
 
 use dem_drawing::{Canvas, colour};
-use dem_history::{Wall, WallKind};
+use dem_history::{Wall, WallDrive, WallKind};
 
+use super::arrow::draw_arrow;
 use super::boxes::{Box2, around};
 use super::eye::{Eye, Place};
-use super::frame::{Frame, HATCH};
+use super::frame::{ARROW, Frame, HATCH};
 
 /// Draws a wall behind the grains.
 pub(super) fn draw(canvas: &mut Canvas, eye: &Eye, wall: &Wall, position: &[f64], frame: &Frame) {
@@ -34,6 +35,36 @@ pub(super) fn draw_in_front(canvas: &mut Canvas, eye: &Eye, wall: &Wall, positio
     if let (WallKind::Plane, Some(place)) = (wall.kind, eye.place()) {
         draw_plate(canvas, place, wall, position, frame, false);
     }
+}
+
+/// An arrow of the load at a driven plane in 2D, at the middle of the panel: towards the grains
+/// where the wall pushes. None where no grain acts on the wall.
+pub(super) fn draw_load(canvas: &mut Canvas, wall: &Wall, position: &[f64], force: &[f64], frame: &Frame) {
+    if !bears_arrow(wall) || position.len() != 2 || force.len() != 2 {
+        return;
+    }
+    // the load is opposite to the force of the grains
+    let along = -(force[0] * wall.direction[0] + force[1] * wall.direction[1]);
+    if along == 0.0 {
+        return;
+    }
+    let sign = along.signum();
+    // on the sheet y points down
+    let load = (sign * wall.direction[0], -sign * wall.direction[1]);
+    let normal = (wall.normal[0], -wall.normal[1]);
+    let from = frame.at([position[0], position[1]]);
+    let middle = (frame.corner.0 + 0.5 * frame.size.0, frame.corner.1 + 0.5 * frame.size.1);
+    let off = (middle.0 - from.0) * -normal.1 + (middle.1 - from.1) * normal.0;
+    let foot = (from.0 - normal.1 * off, from.1 + normal.0 * off);
+    let at = |s: f64| (foot.0 + s * load.0, foot.1 + s * load.1);
+    let pushes = load.0 * normal.0 + load.1 * normal.1 > 0.0;
+    let (tail, head) = if pushes { (-ARROW, -2.0) } else { (2.0, ARROW) };
+    draw_arrow(canvas, at(tail), at(head));
+}
+
+/// Whether a wall has an arrow of its load: a driven plane.
+pub(super) fn bears_arrow(wall: &Wall) -> bool {
+    wall.kind == WallKind::Plane && wall.drive != WallDrive::Fixed
 }
 
 /// The box around a wall in the drawing, of a round wall its part within `limits`; `None` for an

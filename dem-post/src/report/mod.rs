@@ -1,5 +1,8 @@
-//! A run on one page: a self-contained HTML file with pictures, curves, tables, the solver's own
-//! measures of its accuracy, the energy balance and the scene.
+//! A run on one page: a self-contained HTML file that begins with the result in a sentence, three
+//! moments and a slider over the run; then pictures, curves, tables, the energy balance, the
+//! solver's own measures of its accuracy, and the scene.
+//!
+//! Without scripts the page shows all but the slider and the values of the curves.
 //!
 //! Curves are SVG; maps are SVG or, of thousands of grains, PNG, whichever is smaller; all of them
 //! are inside the page as `data:` addresses. Long curves are thinned, as in all charts. A section
@@ -13,9 +16,11 @@ use crate::analysis::Analysis;
 use crate::options::{LoadWall, Moments};
 use crate::output::{Folder, PostError, Result, facts, number};
 use crate::section::{OnPage, Section};
-use crate::{chains, cracks, info, stress_strain, velocities};
+use crate::{chains, cracks, emission, fabric, info, stress_strain, velocities};
 
 mod page;
+mod player;
+mod result;
 mod sections;
 pub mod solver;
 
@@ -70,6 +75,15 @@ pub struct Report {
     pub chains: Option<chains::Report>,
     /// The velocities.
     pub velocities: velocities::Report,
+    /// Acoustic emission; `None` where no bond broke.
+    #[serde(skip)]
+    pub emission: Option<emission::Report>,
+    /// The sample as a continuum; `None` where grains never touched.
+    #[serde(skip)]
+    pub fabric: Option<fabric::Report>,
+    /// Times of the maps asked for (s); none where they are chosen.
+    #[serde(skip)]
+    times: Vec<f64>,
     /// Force and displacement of the load wall; `None` without a driven wall that was observed.
     #[serde(skip)]
     pub stress_strain: Option<stress_strain::Report>,
@@ -105,8 +119,24 @@ pub fn read(history: &History, times: &[f64], wall: Option<&str>, quiet: bool) -
         stress_strain: if_there(stress_strain::read(history, wall), &mut left_out)?,
         cracks: if_there(cracks::read(history, quiet), &mut left_out)?,
         chains: if_there(chains::read(history, times), &mut left_out)?,
+        emission: emission(history, wall)?,
+        fabric: Some(fabric::read(history, times, quiet)?).filter(|fabric| fabric.touched()),
+        times: times.to_vec(),
         left_out,
     })
+}
+
+/// The events, where a bond broke.
+fn emission(history: &History, wall: Option<&str>) -> Result<Option<emission::Report>> {
+    if history.ruptures()?.is_empty() {
+        return Ok(None);
+    }
+    let options = emission::Options { wall: wall.map(String::from), ..emission::Options::default() };
+    match emission::read(history, &options) {
+        // no load of the wall asked for; the section on the load gives the reason
+        Err(PostError::Lacking { .. }) => Ok(None),
+        found => found.map(Some),
+    }
 }
 
 /// `None` for an analysis whose data the scene lacks; the reason is added to `left_out`.
@@ -125,15 +155,29 @@ impl Report {
     /// The sections of the page, in order.
     fn sections(&self, history: &History) -> Result<Vec<Section>> {
         let frames: Vec<usize> = self.velocities.fields.iter().map(|field| field.frame).collect();
-        Ok(vec![
-            self.info.section(history, &frames)?,
-            self.accuracy.section(history, &frames)?,
+        let parts = result::Parts {
+            info: &self.info,
+            load: self.stress_strain.as_ref(),
+            cracks: self.cracks.as_ref(),
+            times: &self.times,
+        };
+        let mut sections = vec![
+            result::section(history, &parts)?,
             self.section_of(self.stress_strain.as_ref(), history, &frames)?,
             self.section_of(self.cracks.as_ref(), history, &frames)?,
-            self.section_of(self.chains.as_ref(), history, &frames)?,
-            self.velocities.section(history, &frames)?,
-            sections::energy(history)?,
-        ])
+        ];
+        if let Some(emission) = &self.emission {
+            sections.push(emission.section(history, &frames)?);
+        }
+        sections.push(self.section_of(self.chains.as_ref(), history, &frames)?);
+        sections.push(self.velocities.section(history, &frames)?);
+        if let Some(fabric) = &self.fabric {
+            sections.push(fabric.section(history, &frames)?);
+        }
+        sections.push(sections::energy(history)?);
+        sections.push(self.accuracy.section(history, &frames)?);
+        sections.push(self.info.section(history, &frames)?);
+        Ok(sections)
     }
 
     /// The section of an analysis, or the reason why it has none.

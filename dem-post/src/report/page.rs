@@ -13,7 +13,12 @@ struct Page {
     title: String,
     sections: Vec<Section>,
     scene: String,
+    style: &'static str,
+    script: &'static str,
 }
+
+const STYLE: &str = include_str!("../../templates/report.css");
+const SCRIPT: &str = include_str!("../../templates/report.js");
 
 /// The whole page: its sections, and after them the scene.
 ///
@@ -29,6 +34,6 @@ pub fn render(history: &History, sections: Vec<Section>) -> Result<String> {
         .map_or_else(|| name.clone(), |title| format!("{name}: {title}"));
     // a scene that is not JSON is printed unchanged
     let scene = if tree.is_null() { scene } else { serde_json::to_string_pretty(&tree).unwrap_or(scene) };
-    let page = Page { title, sections, scene };
+    let page = Page { title, sections, scene, style: STYLE, script: SCRIPT };
     page.render().map_err(|error| PostError::Usage(format!("the page: {error}")))
 }

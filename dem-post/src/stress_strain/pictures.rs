@@ -21,7 +21,7 @@ pub fn force_displacement(report: &Report) -> Chart {
         chart = chart.curve("reaction of the grains", colour::ORANGE, Style::Thin, points);
     }
     let points = pairs(&report.displacement, 1e3, &report.load, 1.0);
-    chart = chart.curve("applied force", colour::BLUE, Style::Line, points);
+    chart = chart.curve("applied force", colour::BLUE, Style::Line, points).timed(&report.time);
     if let Some(load) = report.summary.level() {
         chart.levels.push((load, format!("at strain 10⁻⁴: {} N", short(load))));
     }
@@ -34,7 +34,7 @@ pub fn load_breaks(report: &Report) -> Option<Chart> {
         return None;
     }
     let mut chart = Chart::new("broken bonds", "load of the break (N)");
-    chart.pad_x = true;
+    (chart.pad_x, chart.x_is_count) = (true, true);
     Some(chart.curve("applied force", colour::BLUE, Style::Line, pairs(&report.broken, 1.0, &report.load, 1.0)))
 }
 
@@ -47,7 +47,7 @@ pub fn onset(report: &Report) -> Option<Chart> {
     if points.len() < 2 {
         return None;
     }
-    let mut chart = Chart::new("magnitude of the axial strain, from the particles", "applied force (N)");
+    let mut chart = Chart::new("magnitude of the axial strain, from the grains", "applied force (N)");
     chart = chart.curve("applied force", colour::BLUE, Style::Line, points);
     chart.log_x = true;
     chart.moments = COLLAPSE.to_vec();
@@ -69,7 +69,7 @@ pub fn stress_strain(report: &Report) -> Chart {
     }
     let points = pairs(&report.strain, 1e2, &report.stress, 1e-3);
     if !points.is_empty() {
-        chart = chart.curve("from particles", colour::BLUE, Style::Thin, points);
+        chart = chart.curve("from grains", colour::BLUE, Style::Thin, points).timed(&report.time);
     }
     if let Some(elastic) = &report.summary.elastic {
         let points = pairs(&elastic.strains, 1e2, &elastic.stresses, 1e-3);

@@ -444,6 +444,11 @@ impl Report {
         self.summary = summary;
     }
 
+    /// The load at a step (N); `None` where it was not observed.
+    pub fn load_at(&self, step: i64) -> Option<f64> {
+        self.step.binary_search(&step).ok().and_then(|row| self.load.get(row).copied())
+    }
+
     /// Why the load of a step is not that before anything broke in it; `None` where it is.
     pub(crate) fn load_after_breaks(&self) -> Option<String> {
         let why = "its force before the breaks of a step";

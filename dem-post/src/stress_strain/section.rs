@@ -25,7 +25,7 @@ impl OnPage for Report {
             ),
             chart_figure(
                 stress_strain(self),
-                "Axial stress over axial strain, from the walls and from the particles.",
+                "Axial stress over axial strain, from the walls and from the grains.",
                 "Axial stress over strain.",
             ),
         ]);

@@ -102,8 +102,9 @@ fn grains_of(history: &History, grains: &Grains, frame: usize) -> Result<String>
 
 /// The bonds that hold.
 fn bonds_of(history: &History, grains: &Grains, bonds: &Bonds, frame: usize) -> Result<String> {
+    // before a stage forms the bonds there is no status
     let status = history.bond_status(frame)?;
-    let intact: Vec<usize> = (0..bonds.len()).filter(|&bond| status[bond] == BondStatus::Intact).collect();
+    let intact: Vec<usize> = (0..status.len()).filter(|&bond| status[bond] == BondStatus::Intact).collect();
     let mut text = head(history, grains, frame, intact.len(), "ENTRIES")?;
     text += "ITEM: ENTRIES index batom1 batom2 strength\n";
     for bond in intact {

@@ -103,18 +103,20 @@ fn grains(history: &History, constant: &Constant, frame: usize) -> Result<Poly> 
 
 fn bonds(history: &History, constant: &Constant, frame: usize) -> Result<Poly> {
     let (state, bonds) = (history.grain_state(frame)?, &constant.bonds);
-    let lines = bonds.pair.as_flattened().iter().map(|&grain| grain.into()).collect();
+    let status = history.bond_status(frame)?;
+    // none before a stage forms them
+    let count = status.len();
+    let lines = bonds.pair[..count].as_flattened().iter().map(|&grain| grain.into()).collect();
     let mut poly = Poly::new(&padded(&state.position, history.dimension()), lines, 2);
     let data = &mut poly.cell_data;
-    let code = |status: &BondStatus| *status as i32;
-    integers(data, "status", &history.bond_status(frame)?.iter().map(code).collect::<Vec<_>>());
+    integers(data, "status", &status.iter().map(|status| *status as i32).collect::<Vec<_>>());
     for (name, values) in [
         ("strength", &bonds.strength),
         ("friction", &bonds.friction),
         ("rest_gap", &bonds.rest_gap),
         ("mean_diameter", &bonds.mean_diameter),
     ] {
-        reals(data, name, 1, values);
+        reals(data, name, 1, &values[..count]);
     }
     Ok(poly)
 }

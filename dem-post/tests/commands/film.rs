@@ -36,7 +36,7 @@ fn a_film_is_one_animated_picture_and_a_webm_where_there_is_ffmpeg() {
         std::fs::set_permissions(&ffmpeg, std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
         assert_eq!(json(&film(&[]))["webm"], true);
         let told = std::fs::read_to_string(folder.path().join("run-post/film.webm")).unwrap();
-        assert!(told.contains("-f apng -i run-post/film.png"), "{told}");
+        assert!(told.contains("-f apng -i run-post/film.png -vf fps=15,"), "{told}");
         // one that fails leaves the picture and says why
         std::fs::write(&ffmpeg, "#!/bin/sh\necho no encoder >&2\nexit 1\n").unwrap();
         let failed = film(&[]);

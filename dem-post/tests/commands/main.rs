@@ -14,6 +14,7 @@ mod envelope;
 mod fabric;
 mod film;
 mod folders;
+mod report;
 mod solves;
 mod view;
 mod why;
@@ -61,6 +62,7 @@ fn layout(dimension: usize) -> Layout {
             friction: vec![0.3; 4],
             rolling: vec![],
             mean_diameter: vec![2e-3; 4],
+            formed: None,
         },
         observables: vec![
             Observable::new("wall_position", "m", &[2, d]),
@@ -526,46 +528,25 @@ fn frames_are_numbered_and_alike() {
 }
 
 #[test]
-fn a_report_needs_nothing_but_itself() {
-    let mut named = layout(2);
-    named.parameters.scene = "{\"title\": \"<b>Press & \\\"pull\\\"\", \"thickness\": 0.5}".into();
-    let unbonded = Layout { bonds: Bonds::default(), ..layout(2) };
-    let bare = Layout { walls: vec![], observables: vec![], ..layout(2) };
-    for (l, sections) in [
-        (&named, &["run", "accuracy", "load", "cracks", "chains", "velocities", "energy", "scene"][..]),
-        (&unbonded, &["run", "load", "chains", "scene"]),
-        (&bare, &["run", "cracks", "velocities", "scene"]),
-        (&layout(3), &["run", "cracks", "chains", "velocities", "scene"]),
-    ] {
-        let (_folder, path) = sample(l);
-        let output = dem_post(&path, &["report"]);
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        let page = std::fs::read_to_string(path.with_file_name("run-post").join("report.html")).unwrap();
-        for section in sections {
-            assert!(page.contains(&format!("<section id=\"{section}\">")), "{section}");
-        }
-        // every address is inside the page
-        let addresses = |attribute: &str| -> Vec<String> {
-            let parts = page.split(attribute).skip(1);
-            parts.map(|rest| rest.split('"').next().unwrap().chars().take(30).collect()).collect()
-        };
-        let pictures = addresses(" src=\"");
-        assert!(
-            !pictures.is_empty() && pictures.iter().all(|address| address.starts_with("data:image/")),
-            "{pictures:?}"
-        );
-        assert!(addresses(" href=\"").iter().all(|address| address.starts_with('#')));
-        for outside in ["http:", "https:", "url(", "@import", "<script", "<link", "<iframe"] {
-            assert!(!page.contains(outside), "{outside}");
-        }
-        // a picture has a description, and the title of a scene is text
-        assert_eq!(addresses(" alt=\"").iter().filter(|alt| !alt.is_empty()).count(), pictures.len());
-        assert!(!page.contains("<b>Press"));
+fn figures_have_the_width_that_was_asked_for() {
+    let (folder, path) = sample(&layout(2));
+    let read = |file: &str| std::fs::read(folder.path().join("run-post").join(file)).unwrap();
+    let output = dem_post(&path, &["stress-strain", "--width", "85mm", "--dpi", "300"]);
+    assert!(output.status.success() && !String::from_utf8_lossy(&output.stderr).contains("letters"));
+    for file in ["force-displacement", "stress-strain"] {
+        let svg = String::from_utf8(read(&format!("{file}.svg"))).unwrap();
+        assert!(svg.contains("width=\"85.000mm\""), "{}", &svg[..200]);
+        let png = read(&format!("{file}.png"));
+        let pixels = u32::from_be_bytes(png[16..20].try_into().unwrap());
+        assert!(pixels.abs_diff(1004) <= 2, "{pixels} pixels are not 85 mm at 300 dpi");
     }
-    let (_folder, path) = sample(&unbonded);
-    assert!(dem_post(&path, &["report"]).status.success());
-    let page = std::fs::read_to_string(path.with_file_name("run-post").join("report.html")).unwrap();
-    // an empty section gives the reason
-    let section = page.split("<section id=\"cracks\">").nth(1).unwrap().split("</section>").next().unwrap();
-    assert!(section.contains("None: ") && section.contains("bonds"), "{section}");
+    // three panels beside each other: smaller letters are told, in one panel they are large enough
+    let told = |options: &[&str]| {
+        let output = dem_post(&path, &[&["velocities", "--width", "85mm"], options].concat());
+        assert!(output.status.success());
+        String::from_utf8_lossy(&output.stderr).contains("warning: velocities: letters of ")
+    };
+    assert!(told(&[]) && !told(&["--times", "0.05"]));
+    refused(&dem_post(&path, &["chains", "--width", "5cm"]), 2, &["--width", "85mm"]);
+    refused(&dem_post(&path, &["chains", "--width", "3mm"]), 2, &["40mm to 2000mm"]);
 }

@@ -19,8 +19,6 @@ use super::wall::WallColumn;
 /// The scales of frames and of observed steps.
 const FRAMES: &str = "particles/grains/position/time";
 const STEPS: &str = "observables/time";
-/// The axis along which contacts are appended: its scale has no fixed length.
-const CONTACT: &str = "contact";
 /// The NAME of a scale that is no variable, as netCDF has it, without the length that follows.
 const NO_VARIABLE: &str = "This is a netCDF dimension but not a netCDF variable.";
 
@@ -46,15 +44,15 @@ const AXES: &[(&str, &[&str])] = &[
     ("walls/force/value", &[FRAMES, "wall", "axis"]),
     ("contacts/start", &[FRAMES]),
     ("contacts/count", &[FRAMES]),
-    ("contacts/pair", &[CONTACT, "body"]),
-    ("contacts/point", &[CONTACT, "axis"]),
-    ("contacts/normal", &[CONTACT, "axis"]),
-    ("contacts/tangent", &[CONTACT, "axis"]),
-    ("contacts/reaction", &[CONTACT, "force_component"]),
-    ("contacts/moment", &[CONTACT, "moment_component"]),
-    ("contacts/gap", &[CONTACT]),
-    ("contacts/status", &[CONTACT]),
-    ("contacts/bond", &[CONTACT]),
+    ("contacts/pair", &["contact", "body"]),
+    ("contacts/point", &["contact", "axis"]),
+    ("contacts/normal", &["contact", "axis"]),
+    ("contacts/tangent", &["contact", "axis"]),
+    ("contacts/reaction", &["contact", "force_component"]),
+    ("contacts/moment", &["contact", "moment_component"]),
+    ("contacts/gap", &["contact"]),
+    ("contacts/status", &["contact"]),
+    ("contacts/bond", &["contact"]),
     ("bonds/pair", &["bond", "body"]),
     ("bonds/rest_gap", &["bond"]),
     ("bonds/strength", &["bond"]),
@@ -62,6 +60,7 @@ const AXES: &[(&str, &[&str])] = &[
     ("bonds/rolling", &["bond"]),
     ("bonds/mean_diameter", &["bond"]),
     ("bonds/status/value", &[FRAMES, "bond"]),
+    ("bonds/formed", &["stage"]),
     ("observables/step", &[STEPS]),
 ];
 
@@ -148,7 +147,8 @@ fn attach(
 /// Makes a scale without values. It takes no room: HDF5 stores values when they are written.
 fn create(file: &File, name: &str, length: usize) -> hdf5::Result<()> {
     let builder = file.new_dataset::<u8>();
-    if name == CONTACT {
+    if length == 0 {
+        // an axis that grows, as that of the contacts: readers take its length from the datasets
         let extent = SimpleExtents::from(vec![Extent::resizable(0)]);
         builder.shape(extent).chunk(4096).obj_track_times(false).create(name)?;
     } else {

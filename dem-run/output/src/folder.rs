@@ -17,6 +17,38 @@ pub trait Picture {
     /// # Errors
     /// A message, where the picture cannot be drawn.
     fn png(&self) -> std::result::Result<Vec<u8>, String>;
+
+    /// The picture at a size on paper.
+    ///
+    /// # Errors
+    /// A message, where the picture cannot be drawn.
+    fn printed(&self, print: Print) -> std::result::Result<Printed, String>;
+}
+
+/// A size on paper.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Print {
+    /// Width, m.
+    pub width: f64,
+    /// Pixels of a PNG in a metre.
+    pub dots: f64,
+}
+
+impl Print {
+    /// Size of the smallest letters that are read without effort, and that journals ask for, in
+    /// points.
+    pub const LETTERS: f64 = 7.0;
+}
+
+/// A picture at a size on paper.
+#[derive(Clone, Debug)]
+pub struct Printed {
+    /// As SVG.
+    pub svg: String,
+    /// As PNG.
+    pub png: Vec<u8>,
+    /// Size of its smallest letters, in points.
+    pub letters: f64,
 }
 
 /// The results folder of a command, and the files written to it. Every file is replaced atomically.
@@ -24,6 +56,8 @@ pub struct Folder {
     path: PathBuf,
     written: Vec<PathBuf>,
     owner: Option<Owner>,
+    print: Option<Print>,
+    small: Vec<(String, f64)>,
 }
 
 impl Folder {
@@ -34,7 +68,7 @@ impl Folder {
     pub fn create(path: PathBuf) -> Result<Self> {
         fs::create_dir_all(&path).map_err(|error| WriteError { path: path.clone(), why: error.to_string() })?;
         remove_orphans(&path, None);
-        Ok(Self { path, written: vec![], owner: None })
+        Ok(Self { path, written: vec![], owner: None, print: None, small: vec![] })
     }
 
     /// As [`Folder::create`], for the results that `command` makes of `sources`. A folder with
@@ -122,14 +156,36 @@ impl Folder {
         Ok(self.path.join(name))
     }
 
+    /// Sets the size of the pictures on paper.
+    pub fn print_at(&mut self, print: Print) {
+        self.print = Some(print);
+    }
+
+    /// Pictures whose letters are smaller than [`Print::LETTERS`] at the size on paper, and the
+    /// size of the letters in points.
+    pub fn small(&self) -> &[(String, f64)] {
+        &self.small
+    }
+
     /// Writes `NAME.svg` and `NAME.png`.
     ///
     /// # Errors
     /// [`WriteError`].
     pub fn draw(&mut self, name: &str, picture: &impl Picture) -> Result<()> {
-        self.write(&format!("{name}.svg"), picture.svg().as_bytes())?;
         let file = format!("{name}.png");
-        let png = picture.png().map_err(|why| WriteError { path: self.path.join(&file), why })?;
+        let failed = |why| WriteError { path: self.path.join(&file), why };
+        let (svg, png) = match self.print {
+            Some(print) => {
+                let printed = picture.printed(print).map_err(failed)?;
+                // to the digits that are told
+                if printed.letters < Print::LETTERS - 0.05 {
+                    self.small.push((name.into(), printed.letters));
+                }
+                (printed.svg, printed.png)
+            }
+            None => (picture.svg(), picture.png().map_err(failed)?),
+        };
+        self.write(&format!("{name}.svg"), svg.as_bytes())?;
         self.write(&file, &png)
     }
 

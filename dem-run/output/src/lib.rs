@@ -10,7 +10,7 @@ pub mod replace;
 mod text;
 
 pub use error::{Result, WriteError};
-pub use folder::{Folder, Picture, default_folder};
+pub use folder::{Folder, Picture, Print, Printed, default_folder};
 pub use owner::Source;
 pub use print::{escaped, in_shell, print, print_json, print_line, print_result};
 pub use text::{Cell, Text, cell, facts, hex, number, quantity, short, shortest, size};

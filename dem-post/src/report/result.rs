@@ -1,0 +1,250 @@
+//! The beginning of the page: the result in a sentence, three moments as pictures, and the slider.
+
+use dem_drawing::{Chart, Style, colour};
+use dem_history::{History, Rupture};
+
+use super::player;
+use crate::collapse::peak;
+use crate::extent::first_box;
+use crate::frames::{self, Subject};
+use crate::output::{PostError, Result, counted, number, quantity, short};
+use crate::section::{Figure, Section, capitalised, chart_figure, map_figure};
+use crate::{cracks, info, moments, stress_strain};
+
+/// A moment of which the page shows a picture.
+struct Moment {
+    name: &'static str,
+    frame: usize,
+}
+
+/// The analyses of which the section tells.
+pub struct Parts<'a> {
+    /// What the history holds.
+    pub info: &'a info::Report,
+    /// The load, if a wall is driven.
+    pub load: Option<&'a stress_strain::Report>,
+    /// The breaks, if there are bonds.
+    pub cracks: Option<&'a cracks::Report>,
+    /// Times of the pictures that were asked for (s).
+    pub times: &'a [f64],
+}
+
+/// The section.
+///
+/// # Errors
+/// Those of reading the history and of drawing.
+pub fn section(history: &History, parts: &Parts) -> Result<Section> {
+    let (ruptures, load) = (history.ruptures()?, parts.load);
+    let shown = shown(history, &ruptures, load, parts.times)?;
+    let pictured: Vec<usize> = shown.iter().map(|moment| moment.frame).collect();
+    let figures = pictures(history, &shown, load)?;
+    let mut player = player::read(history, &pictured, load)?;
+    let charts = charts(history, &ruptures, load);
+    let text = sentences(history, parts, &ruptures)?;
+    let mut section = Section { id: "result", title: "Result", text, figures, ..Section::default() };
+    match &mut player {
+        Some(player) => player.charts = charts,
+        None => section.figures.extend(charts),
+    }
+    Ok(Section { player, ..section })
+}
+
+/// First break, collapse or peak, and end; the frames nearest to `times` (s), if there are any.
+fn shown(
+    history: &History,
+    ruptures: &[Rupture],
+    load: Option<&stress_strain::Report>,
+    times: &[f64],
+) -> Result<Vec<Moment>> {
+    if !times.is_empty() {
+        return Ok(moments::chosen(history, times)?.into_iter().map(|frame| Moment { name: "", frame }).collect());
+    }
+    let mut found = vec![];
+    let after = |time: f64| history.times().iter().position(|other| *other >= time);
+    if let Some(frame) = ruptures.first().and_then(|rupture| after(rupture.time)) {
+        found.push(Moment { name: "first break", frame });
+    }
+    if let Some(load) = load {
+        let s = &load.summary;
+        let collapse = s.collapse_time.filter(|_| !s.collapse_early[0]).map(|time| ("collapse", time));
+        let peak = || peak(&load.load).and_then(|row| load.time.get(row)).map(|time| ("peak load", *time));
+        let moment = collapse.or_else(peak).and_then(|(name, time)| Some((name, history.frame_at(time)?)));
+        found.extend(moment.map(|(name, frame)| Moment { name, frame }));
+    }
+    let last = history.frames() - 1;
+    if found.len() < 2 && last > 0 {
+        found.insert(0, Moment { name: "start", frame: 0 });
+    }
+    found.push(Moment { name: "end", frame: last });
+    found.sort_by_key(|moment| moment.frame);
+    found.dedup_by_key(|moment| moment.frame);
+    Ok(found)
+}
+
+/// A picture of each moment, all on one scale.
+fn pictures(history: &History, shown: &[Moment], load: Option<&stress_strain::Report>) -> Result<Vec<Figure>> {
+    let times: Vec<f64> = shown.iter().map(|moment| history.times()[moment.frame]).collect();
+    let bonded = !history.bonds()?.is_empty();
+    // what the sample has: bonds, else forces, else speeds
+    let mut chosen = None;
+    for subject in [Subject::Bonds, Subject::Forces, Subject::Speed] {
+        match frames::read(history, subject, 1, &times) {
+            Ok(found) => {
+                chosen = Some(found);
+                break;
+            }
+            Err(PostError::Lacking { .. }) => {}
+            Err(error) => return Err(error),
+        }
+    }
+    let Some(chosen) = chosen else { return Ok(vec![]) };
+    let view = frames::shown(history, &chosen)?;
+    let mut figures = vec![];
+    for Moment { name, frame } in shown {
+        let time = number(history.times()[*frame]);
+        let load = load.and_then(|load| load.load_at(history.steps()[*frame]));
+        let load = load.map_or_else(String::new, |load| format!(", load {} N", short(load)));
+        let named = if name.is_empty() { String::new() } else { format!("{}: ", capitalised(name)) };
+        let caption = format!("{named}t = {time} s{load}.");
+        let what = if bonded { "with its bonds and those that broke" } else { "and its forces or speeds" };
+        let alt = format!("The sample {what} at t = {time} s.");
+        figures.push(map_figure(&frames::drawing(history, &chosen, &view, *frame)?, &alt, &caption)?);
+    }
+    Ok(figures)
+}
+
+/// Load and broken bonds over time.
+fn charts(history: &History, ruptures: &[Rupture], load: Option<&stress_strain::Report>) -> Vec<Figure> {
+    let mut figures = vec![];
+    if let Some(load) = load {
+        let points = load.time.iter().copied().zip(load.load.iter().copied()).collect();
+        let chart = Chart::new("time (s)", "load (N)").curve("load", colour::BLUE, Style::Line, points);
+        let text = format!("Load of wall {} over time.", load.summary.wall);
+        figures.push(chart_figure(chart, &text, &text));
+    }
+    if !ruptures.is_empty() {
+        let ends = [history.times().first(), history.times().last()].map(|time| time.copied().unwrap_or(0.0));
+        let counts = ruptures.iter().enumerate().map(|(k, rupture)| (rupture.time, (k + 1) as f64));
+        let points = [(ends[0], 0.0)].into_iter().chain(counts).chain([(ends[1], ruptures.len() as f64)]).collect();
+        let mut chart =
+            Chart::new("time (s)", "broken bonds").curve("broken bonds", colour::BLUE, Style::Steps, points);
+        chart.y_is_count = true;
+        figures.push(chart_figure(chart, "Number of broken bonds over time.", "Broken bonds over time."));
+    }
+    figures
+}
+
+/// The result in words.
+fn sentences(history: &History, parts: &Parts, ruptures: &[Rupture]) -> Result<String> {
+    let mut said = vec![];
+    said.extend(parts.load.map(|load| load_sentence(load, ruptures)));
+    match parts.cracks {
+        Some(cracks) => said.push(break_sentence(history, cracks, ruptures)?),
+        None => {
+            let n = parts.info.grains;
+            let last = history.times().last().copied().unwrap_or(0.0);
+            let energy = parts
+                .info
+                .kinetic_energy
+                .map(|energy| format!(", with a kinetic energy of {} J at the end", number(energy)));
+            let energy = energy.unwrap_or_default();
+            said.push(format!("{} without bonds, until t = {} s{energy}.", counted(n, "grain"), number(last)));
+        }
+    }
+    if parts.info.open_ended {
+        said.push("The run was not closed: it is in progress or was stopped.".into());
+    }
+    Ok(said.join(" "))
+}
+
+/// First break, collapse and peak of the load.
+fn load_sentence(load: &stress_strain::Report, ruptures: &[Rupture]) -> String {
+    let s = &load.summary;
+    let newton = |load: f64| quantity(Some(load), "N");
+    let mut parts = vec![];
+    if let (Some(first), Some(rupture)) = (s.first_break, ruptures.first()) {
+        let mode = rupture.mode.label().to_lowercase();
+        parts.push(format!("the first bond broke at {} (t = {} s, in {mode})", newton(first), number(rupture.time)));
+    }
+    if let Some(collapse) = s.collapse_load.filter(|_| !s.collapse_early[0]) {
+        parts.push(format!("the sample collapsed at {} (strain 10⁻⁴)", newton(collapse)));
+    }
+    match s.peak_load {
+        Some(peak) => parts.push(format!("the load peaked at {}", newton(peak))),
+        None if parts.len() < 2 => {
+            parts.push(format!("the load reached {} without falling by 5 %", newton(s.greatest_load)))
+        }
+        None => {}
+    }
+    format!("Under wall {}, {}.", s.wall, joined(&parts))
+}
+
+/// How many bonds broke, in which modes, where the first, and what is left.
+fn break_sentence(history: &History, cracks: &cracks::Report, ruptures: &[Rupture]) -> Result<String> {
+    let Some(first) = ruptures.first() else {
+        return Ok(format!("None of the {} broke.", counted(cracks.bonds, "bond")));
+    };
+    let broken = cracks.broken;
+    let modes = [
+        (broken.tension, "in tension"),
+        (broken.shear, "in shear"),
+        (broken.rolling, "by rolling"),
+        (broken.twist, "by twist"),
+    ];
+    let mut modes: Vec<_> = modes.into_iter().filter(|(count, _)| *count > 0).collect();
+    modes.sort_by_key(|(count, _)| std::cmp::Reverse(*count));
+    let how = match &modes[..] {
+        [(1, how)] => format!(", {how}"),
+        [(_, how)] => format!(", all {how}"),
+        _ => {
+            let each: Vec<String> = modes.iter().map(|(count, how)| format!("{count} {how}")).collect();
+            format!(": {}", joined(&each))
+        }
+    };
+    let mut text = format!("{} of {} broke{how}", broken.total(), counted(cracks.bonds, "bond"));
+    text += &format!("; the first {}.", place(history, first)?);
+    if let Some(last) = cracks.fragments.last() {
+        let f = last.fragments;
+        let whole = cracks.fragments.first().map_or(1, |pieces| pieces.fragments.count);
+        let before = if whole > 1 { format!(" ({whole} at the start)") } else { String::new() };
+        let single = if f.singles > 0 { format!(", {} of them single grains", f.singles) } else { String::new() };
+        text += &format!(
+            " {}{before} at the end{single}; the heaviest has {:.1} % of the mass.",
+            counted(f.count, "fragment"),
+            100.0 * f.largest_mass_fraction
+        );
+    }
+    Ok(text)
+}
+
+/// Where a bond broke, as shares of the sample's box at the first frame.
+fn place(history: &History, rupture: &Rupture) -> Result<String> {
+    let ends = first_box(history)?;
+    let names = if ends.len() == 2 { &["width", "height"][..] } else { &["width", "depth", "height"] };
+    let share = |(k, [low, high]): (usize, &[f64; 2])| {
+        let share = 100.0 * (rupture.point[k] - low) / (high - low);
+        format!("{share:.0} % of the {}", names[k])
+    };
+    let shares: Vec<String> = ends.iter().enumerate().map(share).collect();
+    Ok(format!("at {}, between grains {} and {}", joined(&shares), rupture.pair[0], rupture.pair[1]))
+}
+
+/// `a, b and c`.
+fn joined(parts: &[String]) -> String {
+    match parts {
+        [] => String::new(),
+        [one] => one.clone(),
+        [head @ .., last] => format!("{} and {last}", head.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_are_joined_as_in_prose() {
+        let of = |n: usize| joined(&["a", "b", "c"][..n].iter().map(ToString::to_string).collect::<Vec<_>>());
+        assert_eq!([0, 1, 2, 3].map(of), ["", "a", "a and b", "a, b and c"]);
+    }
+}

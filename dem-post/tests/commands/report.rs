@@ -1,0 +1,208 @@
+//! The page of `dem-post report`.
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use serde_json::Value;
+
+use super::*;
+
+/// Reads the page of a history.
+fn page(path: &Path, options: &[&str]) -> String {
+    let output = dem_post(path, &[&["report"], options].concat());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let folder = format!("{}-post", path.file_stem().unwrap().to_str().unwrap());
+    std::fs::read_to_string(path.with_file_name(folder).join("report.html")).unwrap()
+}
+
+/// Checks that every element is closed, in order, and that no attribute is open.
+fn well_formed(page: &str) {
+    let mut open: Vec<&str> = vec![];
+    let mut rest = page.strip_prefix("<!doctype html>").expect("a document type");
+    while let Some((_, tail)) = rest.split_once('<') {
+        let mut quoted = false;
+        let end = tail.char_indices().find(|(_, letter)| {
+            quoted ^= *letter == '"';
+            *letter == '>' && !quoted
+        });
+        let (tag, after) = tail.split_at(end.expect("the end of a tag").0);
+        rest = &after[1..];
+        let name = tag.split([' ', '\n']).next().unwrap();
+        if let Some(name) = name.strip_prefix('/') {
+            assert_eq!(open.pop(), Some(name), "…{}", &rest[..rest.len().min(80)]);
+        } else if !["meta", "img", "input", "br", "link"].contains(&name) {
+            assert!(name.chars().all(|letter| letter.is_ascii_alphanumeric()) && !name.is_empty(), "<{tag}>");
+            open.push(name);
+            // the content of these is no markup
+            if ["script", "style"].contains(&name) {
+                rest = &rest[rest.find(&format!("</{name}")).expect("its end")..];
+            }
+        }
+    }
+    assert!(open.is_empty(), "{open:?}");
+}
+
+/// The JSON of the first script with this beginning.
+fn data(page: &str, tag: &str) -> Value {
+    let script = page.split(tag).nth(1).expect(tag).split("</script>").next().unwrap();
+    serde_json::from_str(script).unwrap()
+}
+
+fn bytes(value: &Value) -> Vec<u8> {
+    STANDARD.decode(value.as_str().unwrap()).unwrap()
+}
+
+fn floats(value: &Value) -> Vec<f64> {
+    value.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()
+}
+
+#[test]
+fn the_page_begins_with_the_result() {
+    let (_folder, path) = sample(&layout(2));
+    let page = page(&path, &[]);
+    let result = page.split("<section id=\"result\">").nth(1).unwrap().split("</section>").next().unwrap();
+    assert!(page.find("id=\"result\"") < page.find("id=\"load\""));
+    for said in [
+        "Under wall top, the first bond broke at 30 N (t = 0.03 s, in shear) and the sample collapsed at 40 N (strain 10⁻⁴).",
+        "2 of 4 bonds broke: 1 in tension and 1 in shear;",
+        "between grains 0 and 1. 2 fragments at the end, 1 of them single grains; the heaviest has 75.0 % of the mass.",
+        "First break: t = 0.03 s, load 30 N.",
+        "Collapse: t = 0.04 s, load 40 N.",
+        "End: t = 0.1 s, load 100 N.",
+    ] {
+        assert!(result.contains(said), "{said}");
+    }
+    // times that were asked for take the place of the chosen ones
+    let (_folder, path) = sample(&layout(2));
+    let asked = self::page(&path, &["--times", "0.02,0.07"]);
+    assert!(
+        asked.contains("<figcaption>t = 0.02 s, load 20 N.") && asked.contains("<figcaption>t = 0.07 s, load 70 N.")
+    );
+    // what did not happen is not told
+    let unbonded = Layout { bonds: Bonds::default(), ..layout(2) };
+    let (_folder, path) = sample(&unbonded);
+    let page = self::page(&path, &[]);
+    assert!(page.contains("Under wall top, the sample collapsed at 40 N") && page.contains("4 grains without bonds"));
+    assert!(!page.contains("broke at") && !page.contains("<section id=\"emission\">"));
+}
+
+#[test]
+fn the_slider_has_the_positions_of_the_history() {
+    for d in [2, 3] {
+        let l = layout(d);
+        let (_folder, path) = sample(&l);
+        let page = page(&path, &[]);
+        let found = data(&page, "<script type=\"application/json\" id=\"moments\">");
+        let history = History::open(&path).unwrap();
+        let steps: Vec<i64> = found["step"].as_array().unwrap().iter().map(|step| step.as_i64().unwrap()).collect();
+        // all eleven frames fit
+        assert_eq!(steps, history.steps());
+        assert_eq!(floats(&found["time"]), history.times());
+        assert_eq!(page.split("type=\"range\" min=\"0\" max=\"").nth(1).unwrap().split('"').next(), Some("10"));
+        let (low, high) = (floats(&found["low"]), floats(&found["high"]));
+        let places: Vec<f64> = bytes(&found["position"])
+            .chunks(2)
+            .map(|pair| f64::from(u16::from_le_bytes([pair[0], pair[1]])) / 65535.0)
+            .collect();
+        assert_eq!(places.len(), 11 * 4 * d);
+        for (frame, places) in places.chunks(4 * d).enumerate() {
+            let position = history.grain_state(frame).unwrap().position;
+            for (k, (share, x)) in places.iter().zip(position).enumerate() {
+                let (low, high) = (low[k % d], high[k % d]);
+                let off = low + share * (high - low) - x;
+                assert!(off.abs() <= 0.501 * (high - low) / 65535.0, "frame {frame}, number {k}: {off:e}");
+                // a range that is fine enough for grains of 1 mm
+                assert!((high - low) / 65535.0 < 1e-6 && *share > 0.0 && *share < 1.0);
+            }
+        }
+        let wide = |name: &str| -> Vec<u32> {
+            let numbers = bytes(&found[name]);
+            numbers.chunks(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
+        };
+        assert_eq!(wide("pair"), l.bonds.pair.iter().flatten().map(|grain| *grain as u32).collect::<Vec<_>>());
+        // bonds 0 and 1 are broken from the frames of steps 30 and 60 on, in shear and in tension
+        assert_eq!((bytes(&found["broke"]), bytes(&found["mode"])[..2].to_vec()), (vec![3, 6, 255, 255], vec![1, 0]));
+        assert_eq!(floats(&found["broken"]), [0, 0, 0, 1, 1, 1, 2, 2, 2, 2, 2].map(f64::from));
+        assert_eq!(floats(&found["load"]), steps.iter().map(|step| *step as f64).collect::<Vec<_>>());
+        // the walls: two ends in 2D, four corners in 3D; the upper one moves down
+        let walls = found["walls"].as_array().unwrap();
+        assert_eq!((walls[0]["driven"].as_bool(), walls[1]["driven"].as_bool()), (Some(false), Some(true)));
+        let points = floats(&walls[1]["points"]);
+        let heights: Vec<f64> = points.chunks(d).map(|point| point[1]).collect();
+        let corners = if d == 2 { 2 } else { 4 };
+        for (frame, heights) in heights.chunks(corners).enumerate() {
+            let top = history.wall_state(frame).unwrap().position[d + 1];
+            assert!(heights.iter().all(|y| (y - top).abs() < 1e-8), "{heights:?}, {top}");
+        }
+        assert_eq!(found["eye"].is_null(), d == 2);
+    }
+}
+
+#[test]
+fn a_history_of_one_frame_has_a_page_without_a_slider() {
+    let l = layout(2);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.h5");
+    write_course(&path, &l, Course { steps: 5, breaks: [30, 60] });
+    let page = page(&path, &[]);
+    assert!(!page.contains("id=\"moments\"") && page.contains("None of the 4 bonds broke."));
+    well_formed(&page);
+}
+
+#[test]
+fn a_report_needs_nothing_but_itself() {
+    let mut named = layout(2);
+    named.walls[1].name = "top</script><b>".into();
+    named.parameters.scene = "{\"title\": \"<b>Press & \\\"pull\\\"\", \"thickness\": 0.5}".into();
+    let unbonded = Layout { bonds: Bonds::default(), ..layout(2) };
+    let bare = Layout { walls: vec![], observables: vec![], ..layout(2) };
+    for (l, sections) in [
+        (
+            &named,
+            &[
+                "result",
+                "load",
+                "cracks",
+                "emission",
+                "chains",
+                "velocities",
+                "fabric",
+                "energy",
+                "accuracy",
+                "run",
+                "scene",
+            ][..],
+        ),
+        (&unbonded, &["run", "load", "chains", "scene"]),
+        (&bare, &["run", "cracks", "velocities", "scene"]),
+        (&layout(3), &["run", "cracks", "chains", "velocities", "scene"]),
+    ] {
+        let (_folder, path) = sample(l);
+        let page = page(&path, &[]);
+        for section in sections {
+            assert!(page.contains(&format!("<section id=\"{section}\">")), "{section}");
+        }
+        // every address is inside the page
+        let addresses = |attribute: &str| -> Vec<String> {
+            let parts = page.split(attribute).skip(1);
+            parts.map(|rest| rest.split('"').next().unwrap().chars().take(30).collect()).collect()
+        };
+        let pictures = addresses(" src=\"");
+        assert!(
+            !pictures.is_empty() && pictures.iter().all(|address| address.starts_with("data:image/")),
+            "{pictures:?}"
+        );
+        assert!(addresses(" href=\"").iter().all(|address| address.starts_with('#')));
+        for outside in ["http:", "https:", "url(", "@import", "<script src", "<link", "<iframe"] {
+            assert!(!page.contains(outside), "{outside}");
+        }
+        // a picture has a description, and the title of a scene is text
+        assert_eq!(addresses(" alt=\"").iter().filter(|alt| !alt.is_empty()).count(), pictures.len());
+        assert!(!page.contains("<b>"));
+        well_formed(&page);
+    }
+    let (_folder, path) = sample(&unbonded);
+    let page = page(&path, &[]);
+    // an empty section gives the reason
+    let section = page.split("<section id=\"cracks\">").nth(1).unwrap().split("</section>").next().unwrap();
+    assert!(section.contains("None: ") && section.contains("bonds"), "{section}");
+}

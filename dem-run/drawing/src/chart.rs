@@ -1,0 +1,543 @@
+//! Charts of curves.
+
+use std::sync::Arc;
+
+use kuva::plot::{LinePlot, ScatterPlot};
+use kuva::render::annotations::ReferenceLine;
+use kuva::render::figure::Figure;
+use kuva::render::layout::{ComputedLayout, Layout, TickFormat};
+use kuva::render::plots::Plot;
+
+use crate::{Anchor, Canvas, Drawing, colour};
+
+/// Width and height of one chart, in units of a drawing.
+const CHART: (f64, f64) = (640.0, 460.0);
+/// Margin around the cells of a figure, and between them.
+pub(crate) const PADDING: f64 = 6.0;
+pub(crate) const SPACING: f64 = 20.0;
+/// Margins above the axes, for the legend, and below.
+const ABOVE: f64 = 44.0;
+const BELOW: f64 = 62.0;
+/// Distance between the rows of a legend.
+const LEGEND_ROW: f64 = 19.0;
+/// The axis of smaller counts ends at this value.
+const FEW: f64 = 5.0;
+/// Title of an axis of time, and the time below which it is in milliseconds (s).
+const TIME: &str = "time (s)";
+const SHORT: f64 = 0.05;
+/// Maximum number of points of a curve: more than the pixels of its width, so that no visible point
+/// is lost.
+const CURVE_POINTS: usize = 4000;
+
+/// Style of a curve.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Style {
+    /// Joined points.
+    Line,
+    /// Points joined by a thin line, for scattered values.
+    Thin,
+    /// A value that holds until the next point.
+    Steps,
+    /// Joined points, each with a dot.
+    Marked,
+    /// Dots alone.
+    Points,
+    /// Error bars around a mean; see [`Bars`].
+    Bars,
+    /// A dashed level in the legend.
+    Level,
+}
+
+/// A named curve.
+#[derive(Clone)]
+pub struct Curve {
+    /// Its name in the legend.
+    pub label: String,
+    /// Points (x, y). Points that are not finite, or not positive on a logarithmic axis, are
+    /// omitted.
+    pub points: Vec<(f64, f64)>,
+    /// Its style.
+    pub style: Style,
+    /// Its colour.
+    pub colour: &'static str,
+    /// Time of each point (s); empty if the points are at no times of the run.
+    pub times: Vec<f64>,
+}
+
+/// Means with error bars.
+#[derive(Clone)]
+pub struct Bars {
+    /// Their name in the legend.
+    pub label: String,
+    /// Their colour.
+    pub colour: &'static str,
+    /// Position x, mean y, and half-length of the bar.
+    pub bars: Vec<(f64, f64, f64)>,
+}
+
+/// A chart of curves.
+#[derive(Clone, Default)]
+pub struct Chart {
+    /// Title of the horizontal axis, with its unit.
+    pub x: String,
+    /// Title of the vertical axis, with its unit.
+    pub y: String,
+    /// Whether the horizontal axis is logarithmic.
+    pub log_x: bool,
+    /// Whether the vertical axis is logarithmic.
+    pub log_y: bool,
+    /// Whether the horizontal axis extends a little beyond the first and the last value, so that a
+    /// steep rise there is visible.
+    pub pad_x: bool,
+    /// Whether values on the vertical axis are counts.
+    pub y_is_count: bool,
+    /// Whether values on the horizontal axis are counts.
+    pub x_is_count: bool,
+    /// The curves.
+    pub curves: Vec<Curve>,
+    /// Means with bars, over the curves.
+    pub bars: Option<Bars>,
+    /// Marked values of y, with their names in the legend.
+    pub levels: Vec<(f64, String)>,
+    /// Marked values of x.
+    pub moments: Vec<f64>,
+}
+
+/// The axes of a chart in its drawing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Axes {
+    /// Left, upper, right and lower edge of the area of the curves, in units of the drawing.
+    pub area: [f64; 4],
+    /// Values at the left and at the right edge.
+    pub x: [f64; 2],
+    /// Values at the lower and at the upper edge.
+    pub y: [f64; 2],
+    /// Whether each axis is logarithmic.
+    pub log: [bool; 2],
+}
+
+impl Axes {
+    /// The axes of a layout whose cell begins at `corner`; values of y are multiplied by `lift`.
+    fn of(layout: &ComputedLayout, corner: (f64, f64), lift: f64) -> Self {
+        let (left, top) = (corner.0 + layout.margin_left, corner.1 + layout.margin_top);
+        Self {
+            area: [left, top, left + layout.plot_width(), top + layout.plot_height()],
+            x: layout.x_range.into(),
+            y: [layout.y_range.0 / lift, layout.y_range.1 / lift],
+            log: [layout.log_x, layout.log_y],
+        }
+    }
+
+    /// The place of a point in the area: its share of the width from the left and of the height
+    /// from below.
+    pub fn share(&self, point: (f64, f64)) -> [f64; 2] {
+        let part = |value: f64, [low, high]: [f64; 2], log: bool| {
+            let of = |x: f64| if log { x.log10() } else { x };
+            (of(value) - of(low)) / (of(high) - of(low))
+        };
+        [part(point.0, self.x, self.log[0]), part(point.1, self.y, self.log[1])]
+    }
+}
+
+impl Chart {
+    /// A chart with titles of its axes.
+    pub fn new(x: &str, y: &str) -> Self {
+        Self { x: x.into(), y: y.into(), ..Self::default() }
+    }
+
+    /// Adds a curve.
+    pub fn curve(mut self, label: &str, colour: &'static str, style: Style, points: Vec<(f64, f64)>) -> Self {
+        self.curves.push(Curve { label: label.into(), points, style, colour, times: vec![] });
+        self
+    }
+
+    /// States the time of each point of the last curve (s).
+    pub fn timed(mut self, times: &[f64]) -> Self {
+        if let Some(curve) = self.curves.last_mut() {
+            curve.times = times.to_vec();
+        }
+        self
+    }
+
+    /// With a short time in milliseconds.
+    pub fn readable(mut self) -> Self {
+        let times = || self.curves.iter().flat_map(|curve| &curve.points).map(|p| p.0.abs());
+        let last = times().filter(|time| time.is_finite()).fold(0.0, f64::max);
+        if self.x == TIME && !self.log_x && last > 0.0 && last < SHORT {
+            self.x = "time (ms)".into();
+            self.curves.iter_mut().flat_map(|curve| &mut curve.points).for_each(|point| point.0 *= 1e3);
+            self.bars.iter_mut().flat_map(|bars| &mut bars.bars).for_each(|bar| bar.0 *= 1e3);
+            self.moments.iter_mut().for_each(|moment| *moment *= 1e3);
+        }
+        self
+    }
+
+    /// Draws the charts side by side, each with its legend above it.
+    pub fn draw(charts: Vec<Self>) -> Drawing {
+        Self::draw_sized(charts, CHART)
+    }
+
+    /// As [`Chart::draw`], each chart of a given width and height in units of the drawing.
+    pub fn draw_sized(charts: Vec<Self>, size: (f64, f64)) -> Drawing {
+        Self::draw_located(charts, size).0
+    }
+
+    /// As [`Chart::draw_sized`], with the axes of each chart.
+    pub fn draw_located(charts: Vec<Self>, size: (f64, f64)) -> (Drawing, Vec<Axes>) {
+        let columns = charts.len();
+        Self::draw_in_columns(charts, size, columns)
+    }
+
+    /// As [`Chart::draw_located`], in so many columns.
+    pub(crate) fn draw_in_columns(charts: Vec<Self>, size: (f64, f64), columns: usize) -> (Drawing, Vec<Axes>) {
+        let (columns, count) = (columns.max(1), charts.len());
+        let kept = charts.clone();
+        let corner = |k: usize| {
+            let place = |k: usize, length: f64| PADDING + k as f64 * (length + SPACING);
+            (place(k % columns, size.0), place(k / columns, size.1))
+        };
+        let legends: Vec<Vec<Named>> = charts.iter().map(Self::legend).collect();
+        // all begin at one height
+        let most = legends.iter().map(|legend| legend_rows(legend, size.0).len()).max().unwrap_or(0);
+        let above = ABOVE.max(LEGEND_ROW * most as f64 + 6.0);
+        let mut axes: Vec<Axes> = vec![];
+        let (plots, layouts) = charts
+            .into_iter()
+            .map(|chart| {
+                let (plots, layout, lift) = chart.readable().build(above, size);
+                axes.push(Axes::of(&ComputedLayout::from_layout(&layout), corner(axes.len()), lift));
+                (plots, layout)
+            })
+            .unzip();
+        let figure = Figure::new(count.div_ceil(columns).max(1), columns)
+            .with_plots(plots)
+            .with_layouts(layouts)
+            .with_cell_size(size.0, size.1)
+            .with_spacing(SPACING)
+            .with_padding(PADDING);
+        let figure = if count > 1 { figure.with_labels_lowercase() } else { figure };
+        // round ends would fill the gaps of dashed lines
+        let mut canvas = Canvas { scene: figure.render(), round_ends: false };
+        for (k, legend) in legends.iter().enumerate() {
+            let (left, top) = corner(k);
+            let rows = legend_rows(legend, size.0);
+            for (r, row) in rows.iter().enumerate() {
+                let y = top + 0.5 * above + LEGEND_ROW * (r as f64 - 0.5 * (rows.len() - 1) as f64);
+                draw_legend(&mut canvas, row, (left + 0.55 * size.0, y));
+            }
+        }
+        (Drawing { charts: kept, ..canvas.finish() }, axes)
+    }
+
+    /// Name, colour and style of each curve and each marked level; a single entry needs no name.
+    fn legend(&self) -> Vec<Named> {
+        let curves = self.curves.iter().map(|curve| (curve.label.clone(), curve.colour, curve.style));
+        let bars = self.bars.iter().map(|bars| (bars.label.clone(), bars.colour, Style::Bars));
+        let levels = self.levels.iter().map(|(_, label)| (label.clone(), colour::GREY, Style::Level));
+        let entries: Vec<_> = curves.chain(bars).chain(levels).collect();
+        if entries.len() < 2 { vec![] } else { entries }
+    }
+
+    /// Plots, layout, and the factor of [`Chart::lift`].
+    fn build(mut self, above: f64, size: (f64, f64)) -> (Vec<Plot>, Layout, f64) {
+        let lift = self.lift();
+        for curve in &mut self.curves {
+            let visible = |&(x, y): &(f64, f64)| {
+                x.is_finite() && y.is_finite() && (!self.log_x || x > 0.0) && (!self.log_y || y > 0.0)
+            };
+            curve.points.retain(visible);
+            thin(&mut curve.points);
+            curve.points.iter_mut().for_each(|point| point.1 *= lift);
+        }
+        let mut plots: Vec<Plot> = self.curves.iter().flat_map(Curve::plots).collect();
+        plots.extend(self.bars.as_ref().map(|bars| bars.plot(lift, self.log_y)));
+        let mut layout = Layout::auto_from_plots(&plots)
+            .with_x_label(&self.x)
+            .with_y_label(&self.y)
+            .with_label_size(15)
+            .with_tick_size(13)
+            .with_body_size(13)
+            .with_force_margins_y(above, BELOW)
+            .with_width(size.0)
+            .with_height(size.1)
+            .with_box_axes();
+        layout.show_legend = false;
+        layout = self.scale_axes(layout, lift);
+        for (value, _) in self.levels {
+            layout = layout.with_reference_line(ReferenceLine::horizontal(value * lift).with_color(colour::GREY));
+        }
+        for value in self.moments {
+            layout = layout.with_reference_line(ReferenceLine::vertical(value).with_color(colour::GREY));
+        }
+        (plots, layout, lift)
+    }
+
+    /// Factor, a power of ten, of the values on a logarithmic vertical axis: the plotting crate
+    /// misplaces values below 1e-10.
+    fn lift(&self) -> f64 {
+        let values = self.curves.iter().flat_map(|curve| &curve.points).map(|p| p.1);
+        let low = values.filter(|y| self.log_y && *y > 0.0).fold(1.0, f64::min);
+        if low < 1e-9 { 10f64.powi(-low.log10().floor() as i32) } else { 1.0 }
+    }
+
+    /// Axes limited to the range of the values, with matching ticks. Values of y are multiplied by
+    /// `lift`.
+    fn scale_axes(&self, mut layout: Layout, lift: f64) -> Layout {
+        let values = || self.curves.iter().flat_map(|curve| &curve.points);
+        let bars = self.bars.iter().flat_map(|bars| &bars.bars);
+        let places: Vec<f64> = values().map(|p| p.0).chain(bars.map(|bar| bar.0)).collect();
+        let low = places.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = places.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        if self.log_x {
+            layout = layout.with_log_x().with_x_tick_format(TickFormat::Custom(Arc::new(power_of_ten)));
+            if self.pad_x && 0.0 < low && low < high {
+                // the same share of the axis as in the linear case
+                let off = (high / low).powf(0.04);
+                layout = layout.with_x_axis_min(low / off).with_x_axis_max(high * off);
+            }
+        } else if low < high {
+            let off = if self.pad_x { 0.03 * (high - low) } else { 0.0 };
+            layout = layout.with_x_axis_min(low - off).with_x_axis_max(high + off);
+            // with the plotting crate's three digits several ticks would have the same label
+            if high - low < 0.05 * low.abs().max(high.abs()) {
+                let decimals = (10.0 / (high - low)).log10().ceil().max(0.0) as usize;
+                let tick = move |value: f64| format!("{value:.decimals$}");
+                layout = layout.with_x_tick_format(TickFormat::Custom(Arc::new(tick)));
+            }
+        }
+        if self.x_is_count && !self.log_x {
+            layout = layout.with_x_tick_format(TickFormat::Custom(Arc::new(whole)));
+            if high - low < FEW {
+                layout = layout.with_x_axis_min(low).with_x_axis_max(low + FEW);
+            }
+        }
+        if self.log_y {
+            // the axis includes the marked levels, so that they are visible
+            let levels = self.levels.iter().map(|(value, _)| value * lift).filter(|value| *value > 0.0);
+            let shown: Vec<f64> = values().map(|p| p.1).chain(levels).collect();
+            let low = shown.iter().copied().fold(f64::INFINITY, f64::min);
+            let high = shown.iter().copied().fold(0.0, f64::max);
+            let tick = move |value: f64| power_of_ten(value / lift);
+            layout = layout.with_log_y().with_y_tick_format(TickFormat::Custom(Arc::new(tick)));
+            if high > 10.0 * low {
+                layout = layout.with_y_axis_min(0.6 * low).with_y_axis_max(1.6 * high);
+            } else if low <= high {
+                // within a decade there may be no tick at all: show the whole decade
+                let decade = |x: f64| 10f64.powf(x);
+                // a point on the edge would be clipped
+                let (below, above) = ((0.8 * low).log10().floor(), (1.25 * high).log10().ceil());
+                layout = layout.with_y_axis_min(decade(below)).with_y_axis_max(decade(above));
+            }
+        } else if self.y_is_count {
+            layout = layout.with_y_tick_format(TickFormat::Custom(Arc::new(whole)));
+            let high = values().map(|p| p.1).fold(0.0, f64::max);
+            // on a shorter axis ticks would stand between whole numbers
+            if high < FEW {
+                layout = layout.with_y_axis_min(0.0).with_y_axis_max(FEW);
+            }
+        }
+        layout
+    }
+}
+
+/// A tick of an axis of counts: none between whole numbers.
+fn whole(value: f64) -> String {
+    if value.fract() == 0.0 { format!("{value}") } else { String::new() }
+}
+
+/// A tick of a logarithmic axis: powers of ten as such, others as numbers.
+fn power_of_ten(value: f64) -> String {
+    let exponent = value.log10();
+    let whole = (exponent - exponent.round()).abs() < 1e-6;
+    if (!whole && exponent > -3.0) || (-0.5..1.5).contains(&exponent) {
+        // round-off: 4.9999999e-6 is 5e-6
+        let rounded = format!("{value:.3e}").parse().unwrap_or(value);
+        return format!("{rounded}");
+    }
+    let power = if whole { exponent.round() } else { exponent.floor() };
+    let factor = if whole { String::new() } else { format!("{:.0}·", value / 10f64.powf(power)) };
+    let raise = |digit: char| match digit {
+        '-' => '⁻',
+        '1' => '¹',
+        '2' => '²',
+        '3' => '³',
+        digit => char::from_u32(0x2070 + digit.to_digit(10).unwrap_or(0)).unwrap_or(digit),
+    };
+    format!("{factor}10{}", format!("{power:.0}").chars().map(raise).collect::<String>())
+}
+
+/// A name of a legend, its colour and style.
+type Named = (String, &'static str, Style);
+
+fn legend_width(legend: &[Named]) -> f64 {
+    legend.iter().map(|(text, ..)| 50.0 + 7.8 * text.chars().count() as f64).sum()
+}
+
+/// A legend beside the letter of a chart of width `width`, in as many rows as necessary.
+fn legend_rows(legend: &[Named], width: f64) -> Vec<&[Named]> {
+    let mut rows = vec![];
+    let mut rest = legend;
+    while !rest.is_empty() {
+        let fits = (1..=rest.len()).take_while(|n| legend_width(&rest[..*n]) <= 0.86 * width).last().unwrap_or(1);
+        let (row, left) = rest.split_at(fits);
+        rows.push(row);
+        rest = left;
+    }
+    rows
+}
+
+/// The names of the curves in one row around `middle`.
+fn draw_legend(canvas: &mut Canvas, legend: &[Named], middle: (f64, f64)) {
+    let (mut x, y) = (middle.0 - 0.5 * legend_width(legend), middle.1);
+    for entry in legend {
+        let (text, colour, style) = entry;
+        match style {
+            Style::Level => {
+                for dash in [0.0, 7.0, 14.0, 21.0] {
+                    canvas.line((x + dash, y), (x + dash + 4.0, y), colour, 1.4);
+                }
+            }
+            Style::Points => {}
+            Style::Bars => {
+                canvas.line((x + 13.0, y - 6.5), (x + 13.0, y + 6.5), colour, 1.4);
+                for end in [-6.5, 6.5] {
+                    canvas.line((x + 9.0, y + end), (x + 17.0, y + end), colour, 1.4);
+                }
+            }
+            _ => canvas.line((x, y), (x + 26.0, y), colour, 2.2),
+        }
+        if matches!(style, Style::Marked | Style::Points | Style::Bars) {
+            canvas.disk((x + 13.0, y), 3.5, colour, colour, 0.5);
+        }
+        canvas.text((x + 33.0, y + 5.0), text, 14, Anchor::Start);
+        x += legend_width(std::slice::from_ref(entry));
+    }
+}
+
+impl Curve {
+    fn plots(&self) -> Vec<Plot> {
+        let points = || self.points.iter().copied();
+        let line = LinePlot::new().with_data(points()).with_color(self.colour).with_stroke_width(1.8);
+        match self.style {
+            Style::Line | Style::Level | Style::Bars => vec![line.into()],
+            Style::Thin => vec![line.with_stroke_width(1.0).into()],
+            Style::Steps => vec![line.with_step().into()],
+            Style::Marked => {
+                let dots = ScatterPlot::new().with_data(points()).with_color(self.colour).with_size(3.5);
+                vec![line.with_stroke_width(1.2).into(), dots.into()]
+            }
+            Style::Points => {
+                vec![ScatterPlot::new().with_data(points()).with_color(self.colour).with_size(4.0).into()]
+            }
+        }
+    }
+}
+
+impl Bars {
+    fn plot(&self, lift: f64, log_y: bool) -> Plot {
+        // a bar below zero has no end on a logarithmic axis: it is cut at a hundredth of the mean
+        let down = |mean: f64, half: f64| if log_y { half.min(0.99 * mean) } else { half };
+        let errors = self.bars.iter().map(|&(_, mean, half)| (lift * down(mean, half), lift * half));
+        ScatterPlot::new()
+            .with_data(self.bars.iter().map(|&(x, mean, _)| (x, lift * mean)))
+            .with_y_err_asymmetric(errors)
+            .with_color(self.colour)
+            .with_size(3.5)
+            .into()
+    }
+}
+
+/// Thins a long curve to the points of [`thinned`].
+fn thin(points: &mut Vec<(f64, f64)>) {
+    if points.len() > CURVE_POINTS {
+        *points = thinned(points, CURVE_POINTS).into_iter().map(|k| points[k]).collect();
+    }
+}
+
+/// The places of at most `most` points of a curve, in order: the first, lowest, highest and last
+/// point of each interval, so that no peak is lost.
+pub fn thinned(points: &[(f64, f64)], most: usize) -> Vec<usize> {
+    if points.len() <= most {
+        return (0..points.len()).collect();
+    }
+    let stretch = points.len().div_ceil((most / 4).max(1));
+    let mut kept = Vec::with_capacity(most);
+    for start in (0..points.len()).step_by(stretch) {
+        let part = start..(start + stretch).min(points.len());
+        let by = |a: &usize, b: &usize| points[*a].1.total_cmp(&points[*b].1);
+        let low = part.clone().min_by(by).unwrap_or(start);
+        let high = part.clone().max_by(by).unwrap_or(start);
+        let mut picks = [start, low, high, part.end - 1];
+        picks.sort_unstable();
+        kept.extend(picks.iter().enumerate().filter(|&(n, k)| n == 0 || picks[n - 1] != *k).map(|(_, &k)| k));
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use kuva::backend::svg::SvgBackend;
+
+    use super::*;
+
+    #[test]
+    fn ticks_are_powers_of_ten() {
+        for (value, text) in [
+            (1e-4, "10⁻⁴"),
+            (1e3, "10³"),
+            (0.1, "10⁻¹"),
+            (1.0, "1"),
+            (2e-5, "2·10⁻⁵"),
+            (5e-3, "0.005"),
+            (0.02, "0.02"),
+            (4.99999996e-6, "5·10⁻⁶"),
+            (2e-13, "2·10⁻¹³"),
+        ] {
+            assert_eq!(power_of_ten(value), text);
+        }
+    }
+
+    #[test]
+    fn a_thinned_curve_keeps_its_peak_and_its_ends() {
+        let mut points: Vec<(f64, f64)> = (0..100_000).map(|k| (f64::from(k), 0.0)).collect();
+        points[54_321].1 = 7.0;
+        thin(&mut points);
+        assert!(points.len() <= CURVE_POINTS);
+        assert!(points.contains(&(54_321.0, 7.0)));
+        assert_eq!((points[0].0, points[points.len() - 1].0), (0.0, 99_999.0));
+    }
+
+    #[test]
+    fn axes_are_where_points_are_drawn() {
+        for (log_x, log_y, points) in [
+            (false, false, vec![(0.0, 3.0), (2.0, 11.0), (7.5, -4.0)]),
+            (true, true, vec![(1e-6, 3e-13), (2e-3, 4e-9), (0.3, 5e-2)]),
+        ] {
+            let charts = ["first", "second"].map(|title| {
+                let mut chart = Chart::new("x", title).curve("", colour::BLUE, Style::Points, points.clone());
+                (chart.log_x, chart.log_y) = (log_x, log_y);
+                chart
+            });
+            let (drawing, axes) = Chart::draw_located(charts.into(), (500.0, 400.0));
+            let svg = SvgBackend::new().render_scene(&drawing.scene);
+            // centres of the dots within the cells, which are moved to their places
+            let of = |tag: &str, name: &str| -> f64 {
+                tag.split(&format!(" {name}=\"")).nth(1).unwrap().split('"').next().unwrap().parse().unwrap()
+            };
+            let dots: Vec<[f64; 2]> = svg.split("<circle").skip(1).map(|tag| [of(tag, "cx"), of(tag, "cy")]).collect();
+            assert_eq!(dots.len(), 6);
+            for (chart, axes) in axes.iter().enumerate() {
+                let [left, top, right, bottom] = axes.area;
+                for (point, dot) in points.iter().zip(&dots[3 * chart..]) {
+                    let [x, y] = axes.share(*point);
+                    let corner = [PADDING + chart as f64 * (500.0 + SPACING), PADDING];
+                    let off = [
+                        left + x * (right - left) - corner[0] - dot[0],
+                        bottom + y * (top - bottom) - corner[1] - dot[1],
+                    ];
+                    assert!(off.iter().all(|off| off.abs() < 0.02), "{point:?}: {off:?}");
+                }
+            }
+        }
+    }
+}
