@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use dem_history::{BondStatus, Bonds, ContactRows, Grains, History};
+use dem_history::{Bonds, ContactRows, Grains, History};
 
 use super::outline::Outline;
 use super::report::Report;
