@@ -54,6 +54,7 @@ impl Run {
                 friction: vec![0.3],
                 rolling: vec![],
                 mean_diameter: vec![2e-3],
+                formed: None,
             },
             observables: vec![
                 Observable::new("wall_position", "m", &[1, 2]),

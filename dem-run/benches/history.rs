@@ -31,6 +31,7 @@ fn layout(single: bool) -> Layout {
             friction: vec![0.3; CONTACTS],
             rolling: vec![],
             mean_diameter: vec![2e-3; CONTACTS],
+            formed: None,
         },
         ..Layout::default()
     }

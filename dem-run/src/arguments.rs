@@ -210,6 +210,14 @@ pub struct ExecutionArgs {
     pub show: ShowArgs,
 }
 
+/// What the commands that hold the contacts of a scene have in common.
+#[derive(Debug, Args)]
+pub struct MemoryArgs {
+    /// Run the scene even though it needs more memory than is free.
+    #[arg(long)]
+    pub ignore_memory: bool,
+}
+
 /// What the commands that run a scene from its start have in common.
 #[derive(Debug, Args)]
 pub struct MannerArgs {
@@ -247,9 +255,8 @@ pub struct RunArgs {
     /// Write the prepared sample; scenes can read it as sample.file.
     #[arg(long, value_name = "FILE.csv")]
     pub write_sample: Option<PathBuf>,
-    /// Run the scene even though it needs more memory than is free.
-    #[arg(long)]
-    pub ignore_memory: bool,
+    #[command(flatten)]
+    pub memory: MemoryArgs,
     /// Take random packings from this folder, and keep new ones there.
     #[arg(long, hide = true, value_name = "DIR")]
     pub packings: Option<PathBuf>,
@@ -363,6 +370,8 @@ pub struct AccuracyArgs {
     #[arg(long)]
     pub whole: bool,
     #[command(flatten)]
+    pub memory: MemoryArgs,
+    #[command(flatten)]
     pub manner: MannerArgs,
     /// Print all measurements as JSON instead of the tables.
     #[arg(long)]
@@ -383,6 +392,8 @@ pub struct LimitArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
     #[command(flatten)]
+    pub memory: MemoryArgs,
+    #[command(flatten)]
     pub execution: ExecutionArgs,
     /// Print JSON.
     #[arg(long)]
@@ -400,6 +411,8 @@ pub struct ExportArgs {
     /// Problem to write.
     #[arg(short, long, value_name = "PROBLEM.hdf5")]
     pub output: PathBuf,
+    #[command(flatten)]
+    pub memory: MemoryArgs,
     #[command(flatten)]
     pub manner: MannerArgs,
 }

@@ -177,9 +177,11 @@ fn bond_stiffness<D: Dim>(stiffness: scene::Stiffness, a: f64, thickness: f64) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dem_core::body::Grain;
+    use dem_core::body::{Grain, Load};
+    use dem_core::bond::Rupture;
     use dem_core::dim::{D2, D3Twist};
     use dem_core::world::{Settings, World};
+    use std::sync::Arc;
 
     fn assert_near(found: bond::Stiffness, expected: [f64; 4]) {
         for (found, expected) in [found.normal, found.tangential, found.rolling, found.twist].into_iter().zip(expected)
@@ -207,16 +209,34 @@ mod tests {
         values.iter().enumerate().map(apart).fold(0.0, f64::max)
     }
 
+    /// The load (N) at which a chain of bonds of these strengths breaks, from a run.
+    fn pulled_apart(strengths: &[f64]) -> f64 {
+        let count = strengths.len();
+        let mut grains: Grains<D2> = (0..=count).map(|k| Grain::at_rest([k as f64, 0.0].into(), 0.5, 1.0)).collect();
+        grains.fixed[0] = true;
+        // 1 N/s on the last grain
+        let pull = Load { grain: count, force: [1.0, 0.0].into(), torque: Vect::zero(), factor: Arc::new(|t| t) };
+        let settings = Settings { rupture: Rupture::NextEvent { until: 1e3 }, ..Settings::default() };
+        let mut world = World::new(grains, vec![], vec![pull], settings);
+        world.form_bonds(1e-6, |_| 1.0, 0.3);
+        world.bonds.iter_mut().zip(strengths).for_each(|(bond, strength)| bond.strength = *strength);
+        let report = world.step().expect("a step");
+        assert_eq!(report.breaks.len(), 1);
+        world.load_time
+    }
+
     #[test]
-    fn the_weakest_of_weibull_bonds_is_a_weibull_bond() {
+    fn weibull_chains_break_as_their_weakest_bonds_which_have_a_weibull_distribution_too() {
         // 1,000 chains of 20 bonds: weakest links of scale σ₀ N^(−1/m)
         let (modulus, links, chains) = (5.0, 20, 1000);
-        let weakest = |seed: u64| {
+        let strength = |seed: u64| {
             let bonds = scattered(scene::Scatter::Weibull { modulus }, links, seed);
-            bonds.into_iter().fold(f64::INFINITY, f64::min)
+            let (load, weakest) = (pulled_apart(&bonds), bonds.into_iter().fold(f64::INFINITY, f64::min));
+            assert!((load / weakest - 1.0).abs() < 1e-6, "{load} N, the weakest bond bears {weakest} N");
+            load
         };
         let scale = 10.0 * f64::from(links).powf(-1.0 / modulus);
-        let off = distance((0..chains).map(weakest).collect(), |s| 1.0 - (-(s / scale).powf(modulus)).exp());
+        let off = distance((0..chains).map(strength).collect(), |s| 1.0 - (-(s / scale).powf(modulus)).exp());
         // a sample of the distribution exceeds this distance with probability 1/1000
         assert!(off < 1.95 / (chains as f64).sqrt(), "{off}");
     }

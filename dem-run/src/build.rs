@@ -63,8 +63,9 @@ pub fn build<D: Dim>(scene: &Scene, packings: Option<&Path>, watch: Watch) -> Re
     warnings.extend(warnings::of_walls(scene, &walls, Some(&grains)));
     let mut world = World::new(grains, walls, loads(scene), settings(scene));
     // the world knows which grains its walls hold: those get no bonds among each other
-    let bonds = bonds::of_sample(scene, &world.grains)?;
-    world.add_bonds(bonds);
+    if scene.cement_stage().is_none() {
+        world.add_bonds(bonds::of_sample(scene, &world.grains)?);
+    }
     Ok(Built { world, solid_fraction, warnings })
 }
 

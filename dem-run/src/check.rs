@@ -9,7 +9,9 @@ use dem_core::dim::{Dim, Vect};
 use serde::Serialize;
 
 use crate::build::{Built, build, walls};
+use crate::cost;
 use crate::error::RunError;
+use crate::estimate::duration;
 use crate::in_dimension;
 use crate::memory;
 use crate::output::{number, size};
@@ -52,6 +54,9 @@ pub struct Check {
     pub frames: u64,
     /// Number of steps from frame to frame.
     pub steps_per_frame: u64,
+    /// Least and greatest processor time of all steps (s) if nothing breaks, without the
+    /// preparation: in a collapse steps take longer.
+    pub unbroken_cpu_time: [f64; 2],
     /// Memory that a run takes, roughly (bytes).
     pub memory_bytes: u64,
     /// Memory that is free (bytes), if known.
@@ -128,6 +133,7 @@ impl Check {
             last_step_ends: scene.time.last(),
             frames: scene.frames(),
             steps_per_frame: scene.steps_per_frame(),
+            unbroken_cpu_time: cost::unbroken(scene, grains),
             memory_bytes,
             free_memory_bytes,
             file_bytes: expected_bytes(scene, grains),
@@ -190,6 +196,14 @@ impl fmt::Display for Check {
         };
         writeln!(f, "steps      {} of {step} s, to {end} s{early}", self.steps)?;
         writeln!(f, "frames     {}, one every {} steps", self.frames, self.steps_per_frame)?;
+        let [low, high] = self.unbroken_cpu_time.map(duration);
+        let beyond = match (self.bonds, self.sample.starts_with("random")) {
+            (true, true) => " if nothing breaks; a collapse and the packing come on top",
+            (true, false) => " if nothing breaks; a collapse comes on top",
+            (false, true) => "; the packing comes on top",
+            (false, false) => "",
+        };
+        writeln!(f, "time       {low} to {high} of CPU for all steps{beyond}")?;
         let known = |free: Option<u64>| free.map_or("unknown".to_string(), size);
         writeln!(f, "memory     about {}; free {}", size(self.memory_bytes), known(self.free_memory_bytes))?;
         writeln!(f, "file       about {}", size(self.file_bytes))?;
@@ -369,7 +383,13 @@ pub(crate) mod tests {
         assert!((30e6..90e6).contains(&(check.file_bytes as f64)), "{}", check.file_bytes);
         assert!(check.free_bytes.is_some_and(|free| free > 0));
         let text = check.to_string();
-        for part in ["grains     430 (random packing)", "top (plane, force)", "5000 of 0.0001 s", "501, one every 10"] {
+        for part in [
+            "grains     430 (random packing)",
+            "top (plane, force)",
+            "5000 of 0.0001 s",
+            "501, one every 10",
+            "time       1.4 s to 24 s of CPU for all steps if nothing breaks; a collapse and the packing come on top",
+        ] {
             assert!(text.contains(part), "{part} in\n{text}");
         }
     }
@@ -382,6 +402,16 @@ pub(crate) mod tests {
         assert!(told.len() == 1 && told[0].contains("mean diameter of the grains is 2.5"), "{:?}", check.warnings);
         let check = Check::new(&config("compression.json", &[])).expect("check");
         assert!(check.warnings.is_empty(), "{:?}", check.warnings);
+    }
+
+    /// The normal of a plane says where the grains are, so the sample need not be packed.
+    #[test]
+    fn a_confinement_that_pulls_is_told_before_the_sample_is_packed() {
+        let pull = "walls.left.stress={\"table\": [[0, 0], [0.01, -500]]}";
+        let check = Check::new(&config("biaxial.json", &[pull])).expect("check");
+        let told: Vec<_> = check.warnings.iter().filter(|word| word.contains("pulls it away")).collect();
+        assert!(told.len() == 1 && told[0].starts_with("walls.left: its stress, -500 Pa"), "{:?}", check.warnings);
+        assert_eq!(Check::new(&config("biaxial.json", &[])).expect("check").warnings, Vec::<String>::new());
     }
 
     #[test]

@@ -85,7 +85,7 @@ fn run(args: RunArgs) -> Result<(), RunError> {
         json: args.json,
         write_sample: args.write_sample,
         packings: args.packings,
-        ignore_memory: args.ignore_memory,
+        ignore_memory: args.memory.ignore_memory,
     };
     apart(&args.scene.scene, &scene, &options)?;
     writable(&options.output, "-o FILE.h5", options.overwrite)?;
@@ -144,7 +144,8 @@ fn check(args: &CheckArgs) -> Result<(), RunError> {
 }
 
 fn limit(args: LimitArgs) -> Result<(), RunError> {
-    let options = LimitOptions { execution: args.execution.into(), json: args.json };
+    let ignore_memory = args.memory.ignore_memory;
+    let options = LimitOptions { execution: args.execution.into(), json: args.json, ignore_memory };
     limit::limit(&args.scene.load()?, &options)
 }
 
@@ -156,6 +157,7 @@ fn export(args: ExportArgs) -> Result<(), RunError> {
         step: args.step,
         output: args.output,
         execution: args.manner.execution.into(),
+        ignore_memory: args.memory.ignore_memory,
     })
 }
 
@@ -195,6 +197,7 @@ fn accuracy(args: AccuracyArgs) -> Result<(), RunError> {
         whole: args.whole,
         execution: args.manner.execution.into(),
         json: args.json,
+        ignore_memory: args.memory.ignore_memory,
     };
     accuracy::accuracy(&scene, &options)
 }

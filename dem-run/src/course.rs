@@ -1,6 +1,7 @@
 //! The course of a run: its counters, updated at every step, and its stop conditions.
 
 use crate::collapse::{Collapse, LoadStep};
+use crate::error::RunError;
 use crate::load::{drive_direction, load};
 use crate::scene::Scene;
 use crate::scene::failure::in_one_piece;
@@ -22,7 +23,7 @@ pub struct Course<D: Dim> {
     pub load_wall: Option<usize>,
     /// Lengths of the box around all grains at the start (m), one for each axis.
     pub extents: Vec<f64>,
-    /// Whether all grains were bonded into one piece at the start.
+    /// Whether all grains were bonded into one piece when the bonds formed.
     pub one_piece: bool,
     /// Bonds broken in tension, shear, rolling and twist.
     pub broken: [usize; 4],
@@ -71,7 +72,7 @@ impl<D: Dim> Course<D> {
         Self {
             load_wall: driven.iter().position(|at| Some(at.wall) == number),
             extents: extents(world),
-            one_piece: in_one_piece(world.grains.len(), world.bonds.iter().map(|bond| bond.pair)),
+            one_piece: one_piece(world),
             driven,
             broken: [0; 4],
             worst_residual: 0.0,
@@ -207,15 +208,37 @@ impl<D: Dim> Course<D> {
         self.rejected += u64::from(report.rejected);
     }
 
-    /// Begins the next stage if this step ends one: the walls get its drives. Returns what ends the
-    /// run of `scene` after this step, if anything: a stop condition, or the end of the last stage.
-    pub fn advance(&mut self, scene: &Scene, world: &mut World<D>) -> Option<Ending> {
+    /// The step after which the bonds formed, if a stage that cements has begun.
+    pub fn cemented(&self, scene: &Scene) -> Option<u64> {
+        self.stages.cemented(scene)
+    }
+
+    /// Begins the next stage if this step ends one: the walls get its drives, and bonds form if it
+    /// cements. Returns what ends the run of `scene` after this step, if anything: a stop
+    /// condition, or the end of the last stage.
+    ///
+    /// # Errors
+    /// [`RunError`] if the bonds of the next stage cannot form.
+    pub fn advance(&mut self, scene: &Scene, world: &mut World<D>) -> Result<Option<Ending>, RunError> {
         let broken = self.broken();
         if matches!(world.settings.rupture, Rupture::NextEvent { until } if world.load_time >= until) {
-            return Some(Ending::NoBreak);
+            return Ok(Some(Ending::NoBreak));
         }
-        self.stops.ending(world, broken).or_else(|| self.stages.advance(scene, world, broken))
+        if let Some(ending) = self.stops.ending(world, broken) {
+            return Ok(Some(ending));
+        }
+        let bonds = world.bonds.len();
+        let ending = self.stages.advance(scene, world, broken)?;
+        if world.bonds.len() > bonds {
+            self.one_piece = one_piece(world);
+        }
+        Ok(ending)
     }
+}
+
+/// Whether the bonds of a world join all its grains.
+fn one_piece<D: Dim>(world: &World<D>) -> bool {
+    in_one_piece(world.grains.len(), world.bonds.iter().map(|bond| bond.pair))
 }
 
 /// Lengths of the box around all grains (m), one for each axis.

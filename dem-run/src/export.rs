@@ -8,10 +8,12 @@ use dem_core::problem::assembled::Assembled;
 use dem_core::solver::SolveStatus;
 
 use crate::build::build;
+use crate::check;
 use crate::error::{NoConvergence, RunError};
 use crate::fclib::Problem;
 use crate::history::History;
 use crate::in_dimension;
+use crate::memory;
 use crate::output::{escaped, print_line};
 use crate::progress::StepProgress;
 use crate::run::{Execution, handle_signals};
@@ -30,6 +32,8 @@ pub struct ExportOptions {
     pub output: PathBuf,
     /// How the command is carried out.
     pub execution: Execution,
+    /// Whether a scene is run although it needs more memory than is free.
+    pub ignore_memory: bool,
 }
 
 /// Reruns the scene of a history up to a step and writes the first problem of that step, before any
@@ -56,6 +60,9 @@ pub fn export(options: &ExportOptions) -> Result<(), RunError> {
         let note = "it was written by another version of the program: the states of this run may differ from it";
         let _ = writeln!(std::io::stderr(), "{}", escaped(&format!("note: {shown}: {note}")));
     }
+    if !options.ignore_memory {
+        memory::refuse_too_large(&scene, check::count(&scene)?)?;
+    }
     in_dimension!(scene, D => export_in::<D>(&scene, options, &interrupt))
 }
 
@@ -75,7 +82,7 @@ fn export_in<D: Dim>(scene: &Scene, options: &ExportOptions, interrupt: &Interru
         })?;
         let broken = world.bonds.len() - world.intact_bonds();
         stages.count(&world, broken);
-        stages.advance(scene, &mut world, broken);
+        stages.advance(scene, &mut world, broken)?;
         progress.step(&StepProgress {
             step: world.steps,
             time: world.time,
@@ -87,6 +94,7 @@ fn export_in<D: Dim>(scene: &Scene, options: &ExportOptions, interrupt: &Interru
             load: None,
             strain: None,
             stop: None,
+            may_end_early: false,
         });
         if interrupt.requested() {
             return Err(RunError::Interrupted("nothing was written"));

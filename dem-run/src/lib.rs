@@ -9,6 +9,7 @@ pub mod check;
 pub mod cli;
 pub mod clock;
 pub mod collapse;
+pub mod cost;
 pub mod course;
 mod csv_lines;
 mod destination;

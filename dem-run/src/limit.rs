@@ -11,11 +11,13 @@ use dem_core::world::World;
 use serde::Serialize;
 
 use crate::build::build;
+use crate::check;
 use crate::error::{NoConvergence, RunError};
 use crate::in_dimension;
+use crate::memory;
 use crate::output::{facts, number, print_result};
 use crate::run::{Execution, handle_signals};
-use crate::scene::{self, Function, Scene};
+use crate::scene::{self, Function, Scene, SolverKind};
 use crate::signals::Interrupt;
 
 /// Options of `dem-run limit`.
@@ -25,6 +27,8 @@ pub struct LimitOptions {
     pub execution: Execution,
     /// Whether the result on stdout is JSON.
     pub json: bool,
+    /// Whether a scene is run although it needs more memory than is free.
+    pub ignore_memory: bool,
 }
 
 /// What the largest load is.
@@ -99,11 +103,13 @@ pub fn limit(scene: &Scene, options: &LimitOptions) -> Result<(), RunError> {
 type Growth = (String, f64, f64, bool);
 
 fn limit_in<D: Dim>(scene: &Scene, options: &LimitOptions, interrupt: &Interrupt) -> Result<(), RunError> {
-    refuse_stages_and_growing_stresses(scene)?;
-    let mut growing = growing(scene);
-    let pushed = if growing.is_empty() { Some(pushed(scene)?) } else { None };
-    // in a run a velocity drives that wall: there is no time at which a force reaches the limit
-    let steady = pushed.is_none() && growing.iter().all(|(_, _, _, straight)| *straight);
+    let loads = Loads::of(scene)?;
+    if !options.ignore_memory {
+        // the programme factorises a matrix over all bodies, whatever the solver of the scene
+        let mut factorised = scene.clone();
+        factorised.solver.kind = SolverKind::Interior(Default::default());
+        memory::refuse_too_large(&factorised, check::count(scene)?)?;
+    }
     let mut progress = options.execution.show();
     let mut world = build::<D>(scene, None, &mut |done| {
         progress.phase("packing the sample", done);
@@ -111,15 +117,45 @@ fn limit_in<D: Dim>(scene: &Scene, options: &LimitOptions, interrupt: &Interrupt
     })?
     .world;
     progress.finish();
-    growing.extend(pushed.and_then(|wall| push(scene, &mut world, wall)));
-    let bent = growing.iter().find(|(_, _, _, straight)| !straight);
+    let bent = loads.growing.iter().find(|(_, _, _, straight)| !straight);
     if let (Some((load, ..)), false) = (bent, options.execution.quiet) {
         let text = "does not grow at a constant rate: the loads between its values at t = 0 and time.end are taken on a \
                     straight line";
         let _ = writeln!(std::io::stderr(), "warning: {load} {text}");
     }
-    let found = world.limit_load(0.0, scene.time.end);
-    Ok(print_result(&describe(scene, &world, (growing, steady), found)?, options.json)?)
+    Ok(print_result(&loads.limit(scene, &mut world)?, options.json)?)
+}
+
+/// The loads of a scene that grow.
+pub(crate) struct Loads<'a> {
+    growing: Vec<Growth>,
+    /// The wall whose force is taken if no load grows: its index and its name.
+    pushed: Option<(usize, &'a str)>,
+}
+
+impl<'a> Loads<'a> {
+    /// The loads of a scene that grow.
+    ///
+    /// # Errors
+    /// [`RunError::Usage`]: the scene has stages, a stress that grows, or no load.
+    pub fn of(scene: &'a Scene) -> Result<Self, RunError> {
+        refuse_stages_and_growing_stresses(scene)?;
+        let growing = growing(scene);
+        let pushed = if growing.is_empty() { Some(pushed(scene)?) } else { None };
+        Ok(Self { growing, pushed })
+    }
+
+    /// The limit load of the world of that scene. A wall that is pushed has a force from then on.
+    ///
+    /// # Errors
+    /// [`NoConvergence::Limit`].
+    pub fn limit<D: Dim>(mut self, scene: &Scene, world: &mut World<D>) -> Result<Limit, RunError> {
+        // in a run a velocity drives a pushed wall: no force reaches the limit at some time
+        let steady = self.pushed.is_none() && self.growing.iter().all(|(_, _, _, straight)| *straight);
+        self.growing.extend(self.pushed.and_then(|wall| push(scene, world, wall)));
+        let found = world.limit_load(0.0, scene.time.end);
+        describe(scene, world, (self.growing, steady), found)
+    }
 }
 
 /// A limit load is that of one course of forces; a stress may only confine.
@@ -228,6 +264,25 @@ fn describe<D: Dim>(
     })
 }
 
+impl Limit {
+    /// The outcome in words.
+    pub(crate) fn in_words(&self) -> String {
+        match (self.outcome, self.factor, self.least_factor) {
+            (Outcome::Limit, Some(factor), _) => format!("{} of the growth", number(factor)),
+            (Outcome::BrokenAtStart, _, Some(least)) => format!(
+                "the loads at t = 0 alone break a bond; with {} of the growth and more they are borne",
+                number(least)
+            ),
+            (Outcome::Unbounded, ..) => "none: reactions within all limits bear any load".into(),
+            _ => {
+                "the loads at t = 0 break a bond or move a body, whatever the growing load; is there a grain or a wall \
+                  without support?"
+                    .into()
+            }
+        }
+    }
+}
+
 impl fmt::Display for Limit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let unit = |load: &GrowingLoad| if load.load.starts_with("walls.") { " N" } else { "" };
@@ -236,22 +291,7 @@ impl fmt::Display for Limit {
             let unit = unit(load);
             lines.push(("growing load", format!("{}, {} to {}{unit}", load.load, number(load.from), number(load.to))));
         }
-        lines.push((
-            "limit",
-            match (self.outcome, self.factor, self.least_factor) {
-                (Outcome::Limit, Some(factor), _) => format!("{} of the growth", number(factor)),
-                (Outcome::BrokenAtStart, _, Some(least)) => format!(
-                    "the loads at t = 0 alone break a bond; with {} of the growth and more they are borne",
-                    number(least)
-                ),
-                (Outcome::Unbounded, ..) => "none: reactions within all limits bear any load".into(),
-                _ => {
-                    "the loads at t = 0 break a bond or move a body, whatever the growing load; is there a grain or a \
-                      wall without support?"
-                        .into()
-                }
-            },
-        ));
+        lines.push(("limit", self.in_words()));
         for load in &self.loads {
             if let Some(limit) = load.limit {
                 lines.push(("limit load", format!("{}, {}{}", load.load, number(limit), unit(load))));

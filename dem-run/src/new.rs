@@ -30,8 +30,13 @@ pub const SCENES: &[(&str, &str)] = scenes![
     "cylinder-compression",
     "direct-tension",
     "incline",
+    "notched-beam",
+    "pull-off",
     "shear-box",
+    "staged-biaxial",
+    "triaxial",
     "two-grains",
+    "uniaxial-scatter",
 ];
 
 /// Options of `dem-run new`.

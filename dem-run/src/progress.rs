@@ -6,9 +6,10 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 
-use crate::estimate::{Estimate, Sample};
+use crate::estimate::{Estimate, Left, Outlook, Sample, duration};
 use crate::output::{escaped, short};
-use crate::stop::StopProgress;
+use crate::scene::failure::{BROKEN_SHARE, STRAINS};
+use crate::stop::{StopProgress, TRAVEL};
 
 /// How progress is shown.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum)]
@@ -49,6 +50,9 @@ pub struct StepProgress {
     pub strain: Option<f64>,
     /// How far the stop condition is, if the scene has one.
     pub stop: Option<StopProgress>,
+    /// Whether a condition of which [`Self::stop`] says nothing may end the run before its end.
+    #[serde(skip)]
+    pub may_end_early: bool,
 }
 
 /// Progress of a family of runs.
@@ -142,7 +146,10 @@ impl Progress {
                 bar.set_message(message.to_string());
             }
             Sink::Plain(out) => line(out, &format!("{message}: {:.0} %", 100.0 * fraction)),
-            Sink::Json(out) => json_line(out, &Event::Phase { message, fraction }),
+            Sink::Json(out) => {
+                let elapsed = self.began.elapsed().as_secs_f64();
+                json_line(out, &Event::Phase { message, fraction, elapsed });
+            }
             Sink::None => {}
         }
     }
@@ -172,7 +179,10 @@ impl Progress {
         match &mut self.sink {
             Sink::Bar(bar) => bar.set_message(text),
             Sink::Plain(out) => line(out, &format!("       {text}")),
-            Sink::Json(out) => json_line(out, &Event::Cascade { step, broken_in_step: broken }),
+            Sink::Json(out) => {
+                let elapsed = self.began.elapsed().as_secs_f64();
+                json_line(out, &Event::Cascade { step, broken_in_step: broken, elapsed });
+            }
             Sink::None => {}
         }
     }
@@ -226,7 +236,7 @@ impl Progress {
             return;
         };
         self.shown = Some(Instant::now());
-        let left = self.estimate.left(self.sample(&step), step.end);
+        let left = self.estimate.left(self.sample(&step), step.outlook());
         match &mut self.sink {
             Sink::Bar(bar) => {
                 bar.set_position((step.fraction() * BAR_LENGTH as f64) as u64);
@@ -234,7 +244,8 @@ impl Progress {
             }
             Sink::Plain(out) => line(out, &format!("{:3.0} %  {}", 100.0 * step.fraction(), step.describe(left))),
             Sink::Json(out) => {
-                json_line(out, &Event::Step { step: &step, elapsed: self.began.elapsed().as_secs_f64(), left });
+                let (elapsed, seconds) = (self.began.elapsed().as_secs_f64(), left.map(Left::seconds));
+                json_line(out, &Event::Step { step: &step, elapsed, left: seconds, left_is: left.map(Left::name) });
             }
             Sink::None => {}
         }
@@ -243,7 +254,8 @@ impl Progress {
     /// Where the run stands now.
     fn sample(&self, step: &StepProgress) -> Sample {
         let elapsed = self.first.map_or(0.0, |first| first.elapsed().as_secs_f64());
-        Sample { elapsed, time: step.time, stop: step.stop.map(|stop| stop.reached) }
+        let travel = step.stop.filter(|stop| stop.condition == TRAVEL);
+        Sample { elapsed, time: step.time, stop: travel.map(|stop| stop.reached) }
     }
 }
 
@@ -255,15 +267,26 @@ impl StepProgress {
         self.stop.map_or(time, |stop| stop.reached.max(time))
     }
 
+    /// What determines the time left. Bonds break in avalanches: their share is not extrapolated.
+    fn outlook(&self) -> Outlook {
+        let by_bonds = self.stop.is_some_and(|stop| stop.condition != TRAVEL);
+        let strained = self.strain.is_some_and(|strain| strain.abs() > STRAINS[0]);
+        let failed = self.broken > 0 && (strained || self.broken as f64 >= BROKEN_SHARE * self.bonds as f64);
+        Outlook { end: self.end, bonded: self.bonds > 0, failed, open: self.may_end_early || by_bonds }
+    }
+
     /// The most important first: a terminal cuts the rest.
-    fn describe(&self, left: Option<f64>) -> String {
-        let Self { step, time, end, residual, iterations, broken, bonds, load, strain, stop } = self;
-        let left = left.map_or("?".to_string(), duration);
+    fn describe(&self, left: Option<Left>) -> String {
+        let Self { step, time, end, residual, iterations, broken, bonds, load, strain, stop, .. } = self;
         let parts = [
             load.map(|load| format!("{} N", short(load))),
             strain.map(|strain| format!("strain {strain:.1e}")),
-            (*bonds > 0).then(|| format!("{broken} of {bonds} broken")),
-            Some(format!("{left} left")),
+            match (*bonds, *broken) {
+                (0, _) => None,
+                (bonds, 0) => Some(format!("{bonds} bonds")),
+                (bonds, broken) => Some(format!("{broken} of {bonds} broken")),
+            },
+            Some(left.map_or("? left".to_string(), |left| left.to_string())),
             stop.map(|stop| format!("stop: {} {:.0} %", stop.condition, 100.0 * stop.reached)),
             Some(format!("t {time:.4} of {end} s")),
             Some(format!("step {step}  residual {residual:.1e} ({iterations} iterations)")),
@@ -287,6 +310,8 @@ enum Event<'a> {
     Phase {
         message: &'a str,
         fraction: f64,
+        #[serde(rename = "elapsed_s")]
+        elapsed: f64,
     },
     Step {
         #[serde(flatten)]
@@ -295,10 +320,13 @@ enum Event<'a> {
         elapsed: f64,
         #[serde(rename = "left_s")]
         left: Option<f64>,
+        left_is: Option<&'static str>,
     },
     Cascade {
         step: u64,
         broken_in_step: usize,
+        #[serde(rename = "elapsed_s")]
+        elapsed: f64,
     },
     Runs {
         #[serde(flatten)]
@@ -336,16 +364,6 @@ fn json_line(out: &mut dyn Write, event: &Event<'_>) {
 
 fn bonds(count: usize) -> &'static str {
     if count == 1 { "bond" } else { "bonds" }
-}
-
-/// A duration (s) in readable units.
-fn duration(seconds: f64) -> String {
-    let whole = seconds.round() as u64;
-    match (whole / 3600, whole / 60 % 60, whole % 60) {
-        (0, 0, seconds) => format!("{seconds} s"),
-        (0, minutes, seconds) => format!("{minutes} min {seconds:02} s"),
-        (hours, minutes, _) => format!("{hours} h {minutes:02} min"),
-    }
 }
 
 #[cfg(test)]
@@ -387,6 +405,7 @@ mod tests {
             load: Some(57.1923),
             strain: Some(4.12e-4),
             stop,
+            may_end_early: false,
         }
     }
 
@@ -433,9 +452,25 @@ mod tests {
     fn the_message_fits_a_terminal_of_80_columns_up_to_the_time_left() {
         let large =
             StepProgress { load: Some(-1.2345e9), strain: Some(-4.1e-12), broken: 54_321, bonds: 654_321, ..at(1) };
-        let told = large.describe(Some(3599.0));
-        let most = told.find(" left").expect("the time left") + " left".len();
-        assert!(most <= 68, "{most}: {told}");
+        let unbroken = StepProgress { broken: 0, ..large };
+        for (step, left) in [
+            (large, Left::About(2900.0)),
+            (large, Left::AtMost(3599.0)),
+            (large, Left::Even(3599.0)),
+            (unbroken, Left::IfHolds(3599.0)),
+        ] {
+            let (told, left) = (step.describe(Some(left)), left.to_string());
+            let end = told.find(&left).expect("the time left") + left.len();
+            let most = told[..end].chars().count();
+            assert!(most <= 68, "{most}: {told}");
+        }
+    }
+
+    #[test]
+    fn a_sample_has_failed_by_its_strain_or_its_broken_bonds() {
+        let failed = |broken, strain| StepProgress { broken, strain, bonds: 1000, ..at(1) }.outlook().failed;
+        assert_eq!([failed(0, Some(1e-2)), failed(49, Some(-1e-5)), failed(49, None)], [false; 3]);
+        assert_eq!([failed(1, Some(-2e-4)), failed(50, Some(0.0)), failed(50, None)], [true; 3]);
     }
 
     #[test]
@@ -457,11 +492,14 @@ mod tests {
         progress.cascade(2, 1);
         let events: Vec<serde_json::Value> =
             out.lines().iter().map(|line| serde_json::from_str(line).expect("JSON")).collect();
-        assert_eq!(events[0], serde_json::json!({"event": "phase", "message": "compaction", "fraction": 1.0}));
+        let phase = serde_json::json!({"event": "phase", "message": "compaction", "fraction": 1.0});
+        assert!(phase.as_object().is_some_and(|phase| phase.iter().all(|(name, value)| events[0][name] == *value)));
+        assert!(events[0]["elapsed_s"].is_number());
         assert_eq!((&events[1]["event"], &events[1]["step"]), (&"step".into(), &1.into()));
         assert!(events[1]["residual"].is_null() && events[1]["elapsed_s"].is_number());
         assert_eq!(events[2], serde_json::json!({"event": "note", "message": "a \"note\""}));
-        assert_eq!(events[3], serde_json::json!({"event": "cascade", "step": 2, "broken_in_step": 1}));
+        assert_eq!((&events[3]["event"], &events[3]["broken_in_step"]), (&"cascade".into(), &1.into()));
+        assert!(events[3]["elapsed_s"].is_number() && events[1]["left_is"].is_null());
     }
 
     #[test]
@@ -479,14 +517,5 @@ mod tests {
         let progress = Progress::new(ProgressMode::Json, true);
         assert!(matches!(progress.sink, Sink::None));
         assert!(progress.quiet);
-    }
-
-    #[test]
-    fn durations_are_short() {
-        assert_eq!(duration(0.4), "0 s");
-        assert_eq!(duration(125.0), "2 min 05 s");
-        assert_eq!(duration(7265.0), "2 h 01 min");
-        assert!(duration(f64::INFINITY).ends_with("min"));
-        assert_eq!(duration(f64::NAN), "0 s");
     }
 }

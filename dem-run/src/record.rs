@@ -24,6 +24,7 @@ pub struct Recorder<D: Dim> {
     measures: Vec<Measure<D>>,
     rotation: bool,
     tangents: bool,
+    bonded: bool,
     reactions: bool,
     /// Processor time of the run before it was resumed (s).
     cpu_before: f64,
@@ -37,21 +38,24 @@ const GATHERED: usize = 256;
 impl<D: Dim> Recorder<D> {
     /// Create the history of a world at `path`.
     pub fn create(path: &Path, overwrite: bool, scene: &Scene, built: &Built<D>) -> history::Result<Self> {
-        let observables = observables(&built.world);
-        let (layout, measures) = describe(scene, &built.world, observables, parameters(scene, built.solid_fraction));
+        let observables = observables(scene, &built.world);
+        let bonds = describe_bonds(&built.world, scene.cement_stage().map(|_| history::NOT_FORMED));
+        let parameters = parameters(scene, built.solid_fraction);
+        let (layout, measures) = describe(scene, &built.world, bonds, observables, parameters);
         let writer = Writer::create(path, &layout, overwrite)?;
         Ok(Self::new(writer, &layout, measures, 0.0))
     }
 
     /// Continues `history` in a new file that replaces it and starts with the rows `kept` and
-    /// `checkpoint`. `cpu_before` is the processor time of the run so far (s); `tell` receives the
-    /// copied share of the history (0 to 1).
+    /// `checkpoint`. The world comes with the step after which a stage cemented it, if one did.
+    /// `cpu_before` is the processor time of the run so far (s); `tell` receives the copied share
+    /// of the history (0 to 1).
     pub fn go_on(
         history: &History,
         kept: RowCounts,
         checkpoint: &Checkpoint,
         scene: &Scene,
-        world: &World<D>,
+        (world, cemented): (&World<D>, Option<u64>),
         cpu_before: f64,
         tell: &mut dyn FnMut(f64) -> bool,
     ) -> history::Result<Self> {
@@ -59,12 +63,21 @@ impl<D: Dim> Recorder<D> {
         // the layout of a history does not change: without friction at the start, none later; no
         // observable that the program which began it did not know
         let before = history.layout()?;
-        let mut observables = observables(world);
+        let mut observables = observables(scene, world);
         observables.retain(|(observable, _)| before.observables.iter().any(|known| known.name == observable.name));
-        let (layout, measures) = describe(scene, world, observables, origin);
+        let formed = match before.bonds.formed {
+            // the rows of its frames have no bonds yet, or those after the checkpoint are dropped
+            Some(formed) if formed == history::NOT_FORMED || cemented.is_none() => Some(history::NOT_FORMED),
+            formed => formed,
+        };
+        let (layout, measures) = describe(scene, world, describe_bonds(world, formed), observables, origin);
         let layout = Layout { friction: before.friction, ..layout };
         let writer = Writer::go_on(history.path(), &layout, history, kept, checkpoint, tell)?;
-        Ok(Self::new(writer, &layout, measures, cpu_before))
+        let mut recorder = Self::new(writer, &layout, measures, cpu_before);
+        if cemented.is_some() && formed == Some(history::NOT_FORMED) {
+            recorder.bonds_formed(world)?;
+        }
+        Ok(recorder)
     }
 
     fn new(writer: Writer, layout: &Layout, measures: Vec<Measure<D>>, cpu_before: f64) -> Self {
@@ -72,7 +85,8 @@ impl<D: Dim> Recorder<D> {
             writer: Background::start(writer),
             measures,
             rotation: layout.rotation,
-            tangents: layout.friction || !layout.bonds.is_empty(),
+            tangents: layout.friction || layout.bonded(),
+            bonded: layout.bonded(),
             reactions: !layout.without_reactions,
             cpu_before,
             batch: Batch::default(),
@@ -95,6 +109,13 @@ impl<D: Dim> Recorder<D> {
         self.batch.observations.push((step, report.time, row));
         self.batch.ruptures.extend(report.breaks.iter().map(|failed| rupture(failed, step, report.time)));
         if self.batch.observations.len() < GATHERED { Ok(()) } else { self.hand_over() }
+    }
+
+    /// Records the bonds that a stage formed after the present step.
+    pub fn bonds_formed(&mut self, world: &World<D>) -> history::Result<()> {
+        self.hand_over()?;
+        self.batch.bonds = Some(describe_bonds(world, Some(world.steps as i64)));
+        self.hand_over()
     }
 
     /// Records the state as a frame, as a checkpoint to resume from, or as both.
@@ -139,7 +160,7 @@ impl<D: Dim> Recorder<D> {
     fn contacts(&self, world: &World<D>) -> ContactRows {
         let mut rows = ContactRows::default();
         let grains = world.grains.len() as i32;
-        let bonded = !world.bonds.is_empty();
+        let bonded = self.bonded;
         for touch in world.touches() {
             let [i, j] = touch.pair.map(|k| k as i32);
             rows.pair.push([i, if j < grains { j } else { grains - 1 - j }]);
@@ -180,10 +201,11 @@ impl<D: Dim> Recorder<D> {
 fn describe<D: Dim>(
     scene: &Scene,
     world: &World<D>,
+    bonds: history::Bonds,
     observables: Vec<(Observable, Measure<D>)>,
     parameters: Parameters,
 ) -> (Layout, Vec<Measure<D>>) {
-    let bonded = !world.bonds.is_empty();
+    let bonded = bonds.formed.is_some() || !bonds.is_empty();
     let friction = world.has_friction();
     // without friction, bonds and torques, grains keep their spin
     let turning = world.grains.spin.iter().any(|w| w.norm() > 0.0) || world.loads.iter().any(|l| l.torque.norm() > 0.0);
@@ -204,7 +226,7 @@ fn describe<D: Dim>(
             material: world.grains.material.clone(),
         },
         walls: world.walls.iter().zip(scene.walls.keys()).map(|(wall, name)| describe_wall(wall, name)).collect(),
-        bonds: describe_bonds(world),
+        bonds,
         materials: match world.grains.material.is_empty() {
             true => vec![],
             false => scene.materials.names().into_iter().map(String::from).collect(),
@@ -285,17 +307,21 @@ fn describe_wall<D: Dim>(wall: &Wall<D>, name: &str) -> history::Wall {
     }
 }
 
-fn describe_bonds<D: Dim>(world: &World<D>) -> history::Bonds {
-    let bonds = &world.bonds;
+/// The bonds of a world. `formed` is the step after which a stage formed them, or that none has;
+/// nothing if they are there from the start.
+fn describe_bonds<D: Dim>(world: &World<D>, formed: Option<i64>) -> history::Bonds {
+    let bonds: &[bond::Bond] = if formed == Some(history::NOT_FORMED) { &[] } else { &world.bonds };
     history::Bonds {
         pair: bonds.iter().map(|b| b.pair.map(|k| k as i32)).collect(),
         rest_gap: bonds.iter().map(|b| b.rest_gap).collect(),
         strength: bonds.iter().map(|b| b.strength).collect(),
         friction: bonds.iter().map(|b| b.shear).collect(),
-        rolling: match bonds.iter().all(|b| b.rolling == b.shear) {
+        // until bonds form it is not known whether the two differ
+        rolling: match formed.is_none() && bonds.iter().all(|b| b.rolling == b.shear) {
             true => Vec::new(),
             false => bonds.iter().map(|b| b.rolling).collect(),
         },
+        formed,
         mean_diameter: bonds.iter().map(|b| b.mean_diameter).collect(),
     }
 }
@@ -324,7 +350,7 @@ fn applied_force<D: Dim>(wall: &Wall<D>) -> f64 {
 }
 
 /// The observables of every step, in order. Observables of absent features are omitted.
-fn observables<D: Dim>(world: &World<D>) -> Vec<(Observable, Measure<D>)> {
+fn observables<D: Dim>(scene: &Scene, world: &World<D>) -> Vec<(Observable, Measure<D>)> {
     let (d, spins) = (D::N, D::Spin::LEN);
     let scalar: &[usize] = &[];
     let mut list: Vec<(Observable, Measure<D>)> = Vec::new();
@@ -350,19 +376,19 @@ fn observables<D: Dim>(world: &World<D>) -> Vec<(Observable, Measure<D>)> {
     add("stress", "Pa", &[d, d], |w, _, out| out.extend(w.stress()));
     add("strain", "", &[d, d], |w, _, out| out.extend(w.strain()));
     list.push((Observable::route(), |_, r, out| out.push(solver_route(r.route).number())));
-    list.extend(of_bonds_and_walls(world));
+    list.extend(of_bonds_and_walls(scene, world));
     list
 }
 
 /// The observables of bonds and walls.
-fn of_bonds_and_walls<D: Dim>(world: &World<D>) -> Vec<(Observable, Measure<D>)> {
+fn of_bonds_and_walls<D: Dim>(scene: &Scene, world: &World<D>) -> Vec<(Observable, Measure<D>)> {
     let (d, walls, scalar) = (D::N, world.walls.len(), &[][..]);
     let mut list: Vec<(Observable, Measure<D>)> = Vec::new();
     let mut add = |name: &str, unit: &str, shape: &[usize], measure: Measure<D>| {
         list.push((Observable::new(name, unit, shape), measure));
     };
-    if !world.bonds.is_empty() {
-        if world.bonds.iter().any(|b| b.stiffness.is_some()) {
+    if !world.bonds.is_empty() || scene.cement_stage().is_some() {
+        if scene.bonds.as_ref().is_some_and(|bonds| bonds.stiffness.is_some()) {
             add("elastic_energy", "J", scalar, |w, _, out| out.push(w.ledger.elastic));
             add("dissipation_damping", "J", scalar, |w, _, out| out.push(w.ledger.damping));
             add("fracture_energy", "J", scalar, |w, _, out| out.push(w.ledger.fracture));

@@ -119,7 +119,7 @@ fn resume_in<D: Dim>(
     };
     let mut state = RunState::<D>::restored(scene, &checkpoint)
         .map_err(|mismatch| RunError::InputOutput(format!("{shown}: {mismatch}; run the scene again")))?;
-    if state.world.steps >= scene.time.steps() || state.course.advance(scene, &mut state.world).is_some() {
+    if state.world.steps >= scene.time.steps() || state.course.advance(scene, &mut state.world)?.is_some() {
         let time = state.world.time;
         if options.json {
             return Ok(print_json(&serde_json::json!({ "history": path, "time": time, "steps_made": 0 }))?);
@@ -138,7 +138,9 @@ fn resume_in<D: Dim>(
         progress.phase("copying the history", done);
         !interrupt.requested()
     };
-    let recorder = Recorder::go_on(history, kept, &checkpoint, scene, &state.world, cpu_before, &mut tell);
+    let cemented = state.course.cemented(scene);
+    let state_of = (&state.world, cemented);
+    let recorder = Recorder::go_on(history, kept, &checkpoint, scene, state_of, cpu_before, &mut tell);
     let recorder = recorder.map_err(|error| match error {
         HistoryError::Interrupted => RunError::Interrupted("the history is unchanged"),
         error => error.into(),

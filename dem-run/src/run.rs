@@ -199,7 +199,12 @@ impl<D: Dim> Run<'_, D> {
                 self.record(true, checkpoint)?;
             }
             let RunState { world, course, .. } = &mut self.state;
-            if let Some(ending) = course.advance(self.scene, world) {
+            let bonds = world.bonds.len();
+            let ending = course.advance(self.scene, world)?;
+            if world.bonds.len() > bonds {
+                self.recorder.bonds_formed(world)?;
+            }
+            if let Some(ending) = ending {
                 return Ok(ending);
             }
             if interrupt.requested() {
@@ -284,6 +289,9 @@ impl<D: Dim> Run<'_, D> {
             load: self.state.course.load(&self.state.world),
             strain: self.state.course.strain(),
             stop: self.state.course.stop_progress(&self.state.world),
+            may_end_early: self.scene.stop.as_ref().is_some_and(|stop| stop.load_drop.is_some())
+                || self.scene.stages.iter().any(|stage| stage.until.is_some())
+                || self.scene.rupture == Rupture::NextEvent,
         }
     }
 

@@ -1,7 +1,10 @@
 //! The stages of loading of a run: when each ends, and the drives that the next one brings.
 
+use crate::bonds;
 use crate::drive::set_drive;
+use crate::error::RunError;
 use crate::load::drive_direction;
+use crate::output::number;
 use crate::scene::Scene;
 use crate::stop::Stops;
 use crate::summary::Ending;
@@ -32,21 +35,32 @@ impl<D: Dim> Stages<D> {
         self.until.count(world, broken);
     }
 
+    /// The step after which the bonds formed, if a stage that cements has begun.
+    pub fn cemented(&self, scene: &Scene) -> Option<u64> {
+        self.began.get(scene.cement_stage()?).copied()
+    }
+
     /// Ends the present stage if this step is its last, and begins the next one. Returns the end of
     /// the run, if that was the last stage.
-    pub fn advance(&mut self, scene: &Scene, world: &mut World<D>, broken: usize) -> Option<Ending> {
-        let began = *self.began.last()?;
-        let stage = scene.stages.get(self.began.len() - 1)?;
+    ///
+    /// # Errors
+    /// Those of [`bonds::of_sample`] where the next stage cements, and no grains that it bonds.
+    pub fn advance(&mut self, scene: &Scene, world: &mut World<D>, broken: usize) -> Result<Option<Ending>, RunError> {
+        let present = self.began.last().zip(scene.stages.get(self.began.len().saturating_sub(1)));
+        let Some((&began, stage)) = present else { return Ok(None) };
         // a stage has at least one step
         if world.steps <= began {
-            return None;
+            return Ok(None);
         }
         let steps = stage.duration.map(|duration| (duration / scene.time.step).round().max(1.0) as u64);
         let over = steps.is_some_and(|steps| world.steps - began >= steps);
         if !over && self.until.ending(world, broken).is_none() {
-            return None;
+            return Ok(None);
         }
-        let Some(next) = scene.stages.get(self.began.len()) else { return Some(Ending::Stages) };
+        let Some(next) = scene.stages.get(self.began.len()) else { return Ok(Some(Ending::Stages)) };
+        if next.cement {
+            cement(scene, world, self.began.len())?;
+        }
         self.began.push(world.steps);
         let before = world.kinetic_energy();
         set_drives(scene, world, self.began.len() - 1, world.steps);
@@ -57,7 +71,7 @@ impl<D: Dim> Stages<D> {
             world.ledger.external_work += change;
         }
         self.until = Stops::new(next.until.as_ref(), scene, world);
-        None
+        Ok(None)
     }
 
     /// Saves what changes from step to step.
@@ -86,6 +100,20 @@ impl<D: Dim> Stages<D> {
         until.restore(from)?;
         Ok(Self { began, until })
     }
+}
+
+/// Bonds the grains that are near each other now.
+fn cement<D: Dim>(scene: &Scene, world: &mut World<D>, stage: usize) -> Result<(), RunError> {
+    let formed = bonds::of_sample(scene, &world.grains)?;
+    if formed.is_empty() {
+        return Err(RunError::Sample(vec![format!(
+            "stages.{stage}.cement: no two grains are near enough at t = {} s; make the stages before it press them \
+             together, or bonds.gap_tolerance larger",
+            number(world.time)
+        )]));
+    }
+    world.add_bonds(formed);
+    Ok(())
 }
 
 /// Gives the walls the drives of a stage that begins after the step `start`.

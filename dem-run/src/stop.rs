@@ -12,6 +12,9 @@ use serde::Serialize;
 /// its contact with the wall for a step, or an impact that ends, is no drop of the load.
 pub const DROP_STEPS: usize = 10;
 
+/// Name of the travel of a wall as a stop condition.
+pub const TRAVEL: &str = "travel";
+
 /// The stop conditions of a run.
 pub struct Stops<D: Dim> {
     travel: Option<TravelStop<D>>,
@@ -90,7 +93,7 @@ impl<D: Dim> Stops<D> {
     pub fn progress(&self, world: &World<D>, broken: usize) -> Option<StopProgress> {
         let travel = self.travel.as_ref().map(|stop| {
             let travelled = stop.from.map_or(0.0, |from| stop.travelled(world, from));
-            StopProgress { condition: "travel", reached: (travelled / stop.distance).min(1.0) }
+            StopProgress { condition: TRAVEL, reached: (travelled / stop.distance).min(1.0) }
         });
         let broken = self.broken_limit.map(|limit| {
             let reached = broken as f64 / (limit * world.bonds.len() as f64);

@@ -192,9 +192,13 @@ fn along(friction: f64, alone: bool) -> Option<String> {
     })
 }
 
-/// Unit vector from a wall to its nearest grain; none inside a round wall.
+/// Unit vector from a wall to its nearest grain, of a plane also without grains; none inside a
+/// round wall.
 fn towards<D: Dim>(wall: &Wall<D>, grains: &Grains<D>) -> Option<D::Vector> {
-    if wall.shape.encloses() { None } else { nearest(wall, grains).map(|(_, normal)| normal) }
+    if wall.shape.encloses() {
+        return None;
+    }
+    wall.shape.flat_normal().or_else(|| nearest(wall, grains).map(|(_, normal)| normal))
 }
 
 /// Gap (m) of the grain nearest to a wall, and the unit normal towards it.

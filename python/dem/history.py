@@ -148,7 +148,10 @@ class History:
         return _frame(columns, units, index="bond")
 
     def bond_status(self, frames=None):
-        """INTACT, or the mode in which a bond broke: dimensions time and bond."""
+        """INTACT, or the mode in which a bond broke: dimensions time and bond.
+
+        If a stage forms the bonds, INTACT has no meaning up to the step in `/bonds/formed`.
+        """
         self._group("bonds")
         return self._over_frames("bonds", {"status": ("bond",)}, {}, {}, frames)["status"]
 

@@ -5,7 +5,7 @@ import numpy as np
 
 import prescribed
 import tolerances
-from history import cross, norm, sums
+from arrays import cross, norm, sums
 from rupture import energy_of_rows
 
 
@@ -33,8 +33,21 @@ def kinetic(h):
     frame."""
     free = ~h.fixed
     grains = 0.5 * (h.mass * (h.v**2).sum(2) + h.inertia * (h.w**2).sum(2))[:, free].sum(1)
-    mass = np.where(np.isfinite(h.wall_mass), h.wall_mass, 0.0)
-    return grains + 0.5 * ((h.V**2).sum(2) * mass).sum(1)
+    # a frame counts the walls of the step that led to it
+    mass = moving_mass(h)
+    return grains + 0.5 * (free_square(h) * np.concatenate([mass[:1], mass])).sum(1)
+
+
+def moving_mass(h):
+    """Masses (kg) of the walls that a force drives [S,W]; 0 for the others."""
+    mass = h.driving.mass
+    return np.where(np.isfinite(mass), mass, 0.0)
+
+
+def free_square(h):
+    """Squared velocities of the walls [S+1,W]; of one that slides that along its drive."""
+    along = np.einsum("swd,wd->sw", h.V, h.wall_direction)
+    return np.where(h.driving.slides, along**2, (h.V**2).sum(2))
 
 
 def check_kinetic(h, report):
@@ -71,14 +84,20 @@ def works(h, c, p):
     v, w = 0.5 * (h.v[1:] + h.v[:-1]), 0.5 * (h.w[1:] + h.w[:-1])
     total["external"] = h.h * ((outer * v).sum(2) + (torque * w).sum(2))[:, free].sum(1)
     sizes = sizes + h.h * (norm(outer) * norm(v))[:, free].sum(1)
-    middle = 0.5 * (h.V[1:] + h.V[:-1])
-    drive, against = h.wall_drive_force(), wall_forces(h)[0]
-    for k, (kind, _) in enumerate(h.drives):
-        if kind == "force":
-            total["external"] = total["external"] + h.h * drive[:, k] * (middle[:, k] @ h.wall_direction[k])
-            sizes = sizes + h.h * np.abs(drive[:, k]) * norm(middle[:, k])
-        elif kind == "velocity":
-            total["external"] = total["external"] - h.h * (against[:, k] * middle[:, k]).sum(1)
+    given, middle, against = h.driving, 0.5 * (h.V[1:] + h.V[:-1]), wall_forces(h)[0]
+    along = np.einsum("swd,wd->sw", middle, h.wall_direction)
+    moved = np.where(given.kind == "velocity", -(against * middle).sum(2), 0.0)
+    pushed = given.force * along
+    across = middle - along[:, :, None] * h.wall_direction
+    slid = np.where(given.slides, -(against * across).sum(2), 0.0)
+    total["external"] = total["external"] + h.h * (moved + pushed + slid).sum(1)
+    sizes = sizes + h.h * (np.where(given.kind == "force", given.error, 0.0) * norm(middle)).sum(1)
+    # a wall has kinetic energy only under a force: its new drive takes it, or gives it
+    mass = moving_mass(h)
+    change = np.zeros(h.S)
+    change[1:] = 0.5 * ((mass[1:] - mass[:-1]) * free_square(h)[1:-1]).sum(1)
+    total["external"] = total["external"] + change
+    sizes = sizes + np.abs(change)
     return total, sizes
 
 
@@ -158,7 +177,8 @@ def kicks(h):
     )
     outer, _ = h.external()
     total = h.h * (total + np.concatenate([norm(outer), np.abs(h.wall_drive_force())], 1))
-    inverse = np.concatenate([h.inverse_mass[: h.N], np.where(np.isfinite(h.wall_mass), 1 / h.wall_mass, 0.0)])
+    grains = np.broadcast_to(h.inverse_mass[: h.N], (h.S, h.N))
+    inverse = np.concatenate([grains, 1 / h.driving.mass], 1)
     return (total**2 * inverse).sum(1)
 
 
@@ -181,12 +201,18 @@ def check_momentum(h, report):
 
 
 def wall_forces(h):
-    """Forces of the grains on the walls (N) [S,W,D] by contacts, and the sums of their sizes
-    [S,W]."""
-    rows = np.flatnonzero(h.on_wall)
-    index = h.row_step[rows] * h.W + h.j[rows] - h.N
-    force = -sums(index, h.force[rows], h.S * h.W).reshape(h.S, h.W, h.D)
-    return force, sums(index, norm(h.force[rows]), h.S * h.W).reshape(h.S, h.W)
+    """Forces of the grains on the walls (N) [S,W,D] by contacts, and on the grains that
+    they hold, and the sums of the sizes [S,W]."""
+    force, size = np.zeros((h.S * h.W, h.D)), np.zeros(h.S * h.W)
+    holder = np.append(h.holder, np.full(h.W, -1))
+    # the wall of a contact, and those that hold its grains
+    second = np.where(h.on_wall, h.j - h.N, holder[h.j]) if h.M else h.j
+    for wall, sign in ((holder[h.i], 1.0), (second, -1.0)):
+        rows = np.flatnonzero(wall >= 0)
+        index = h.row_step[rows] * h.W + wall[rows]
+        force += sums(index, sign * h.force[rows], h.S * h.W)
+        size += sums(index, norm(h.force[rows]), h.S * h.W)
+    return force.reshape(h.S, h.W, h.D), size.reshape(h.S, h.W)
 
 
 def check_walls(h, report):
@@ -294,9 +320,10 @@ def check_false_acceleration(h, report):
     free = ~h.fixed
     inertial = (h.mass[None, :, None] * np.diff(h.v, axis=0) / h.h)[:, free]
     applied = (h.external()[0][:, free] ** 2).sum((1, 2)) + (h.wall_drive_force() ** 2).sum(1)
-    for k, (kind, _) in enumerate(h.drives):
-        if kind == "velocity":
-            applied = applied + (h.observed["wall_force"][:, k] @ h.wall_direction[k]) ** 2
+    if h.W:
+        seen = h.observed["wall_force"]
+        kept = np.where(h.driving.kind == "velocity", (seen * h.wall_direction).sum(2), 0.0)
+        applied = applied + (kept**2).sum(1) + ((seen * h.driving.across).sum(2) ** 2).sum(1)
     ratio = np.sqrt((inertial**2).sum((1, 2))) / np.sqrt(np.where(applied > 0, applied, 1.0))
     expected = np.where(applied > 0, ratio, 0.0)
     off = np.where(h.single, np.abs(h.observed["false_acceleration"] - expected), 0.0)

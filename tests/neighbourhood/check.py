@@ -18,7 +18,9 @@ import numpy as np
 import balance
 import geometry
 import laws
+import materials
 import motion
+import next_event
 import rupture
 import summary
 import tolerances
@@ -41,6 +43,12 @@ def check(path, told=None, text=None):
     report.figures["steps that missed the tolerance"] = int((residual > h.scene["solver"]["tolerance"]).sum())
     contacts = geometry.Contacts(h)
     solved = laws.Solved(h, contacts)
+    materials.check(h, report)
+    if h.quasi_static:
+        next_event.check(h, contacts, solved, report)
+        if told is not None:
+            summary.check(h, report, told, text)
+        return report
     motion.check(h, report)
     geometry.check(h, contacts, report)
     geometry.check_left_out(h, contacts, report)

@@ -4,7 +4,7 @@ and the checks of it."""
 import numpy as np
 
 import tolerances
-from history import norm, turning_velocity
+from arrays import norm, turning_velocity
 
 
 def gap_and_normal(h, i, j, xi, xj):

@@ -5,11 +5,15 @@ concatenated, and `row_step` is the step of each. SI units throughout.
 """
 
 import json
+from pathlib import Path
 
 import h5py
 import numpy as np
 
+import materials
 import prescribed
+from drives import Driving
+from geometry import gap_and_normal
 
 
 class Unfit(Exception):
@@ -24,6 +28,7 @@ class History:
     """
 
     def __init__(self, path):
+        self.folder = Path(path).parent
         with h5py.File(path, "r") as file:
             self.version = int(file["parameters"].attrs["schema_version"])
             self.packed = file["parameters"].attrs.get("solid_fraction")
@@ -63,6 +68,7 @@ class History:
         self.turned = None
         if self.turns:
             self.turned = group["angle/value"][:frames] if self.D == 2 else group["orientation/value"][:frames]
+        self.material = group["material"][:].astype(int) if "material" in group else np.zeros(self.N, int)
         self.fixed = np.zeros(self.N, bool)
         self.fixed[(self.scene.get("grains") or {}).get("fixed", [])] = True
 
@@ -135,8 +141,12 @@ class History:
         self.bond_rolling = group["rolling"][:] if "rolling" in group else self.bond_friction
         self.K = len(self.strength)
         self.bond_status = np.array(enum_names(group["status/value"], self.S + 1)).reshape(self.S + 1, self.K)
-        self.xi = float(self.scene["bonds"].get("twist") or 0.0)
+        twist = float(self.scene["bonds"].get("twist") or 0.0)
+        self.bond_twist = group["twist"][:] if "twist" in group else np.full(self.K, twist)
         self.stiffness = prescribed.stiffness(self.scene, self.mean_diameter)
+        if self.stiffness is not None:
+            factor = materials.Bonds(self, *self.bond_pair.T).factor
+            self.stiffness = [factor * spring for spring in self.stiffness]
         kept = int(file["commit_rows/events"][self.S]) if "commit_rows/events" in file else None
         self.events = file["events/rupture"][:kept]
         modes = h5py.check_enum_dtype(file["events/rupture"].dtype["mode"])
@@ -145,12 +155,16 @@ class History:
 
     def _bodies(self):
         scene, W = self.scene, self.W
-        self.drives = [prescribed.drive(wall) for _, wall in self.scene_walls]
-        self.wall_direction = np.array([prescribed.direction(w, self.D) for _, w in self.scene_walls]).reshape(
+        self.times = self.h * np.arange(self.S + 1)
+        # the time at which the load functions give the loads of a step, and at which velocities are prescribed
+        self.load_times = self.times[:-1] + 0.5 * self.h
+        self.quasi_static = scene.get("rupture") == "next_event"
+        if self.quasi_static:
+            self.load_times = self.observed["load_time"]
+        self.wall_direction = np.array([prescribed.direction(scene, name, w) for name, w in self.scene_walls]).reshape(
             W, self.D
         )
-        self.wall_mass = np.array([prescribed.wall_mass(w, self.mass) for _, w in self.scene_walls])
-        self.wall_friction = prescribed.wall_friction(scene)
+        self._holding()
         still = np.zeros((self.S + 1, W, self.Q))
         self.body_x, self.body_v = np.concatenate([self.x, self.X], 1), np.concatenate([self.v, self.V], 1)
         self.body_w = np.concatenate([self.w, still], 1)
@@ -159,11 +173,24 @@ class History:
         self.inverse_mass = np.concatenate([np.where(self.fixed, 0.0, 1 / self.mass), np.zeros(W)])
         self.inverse_inertia = np.concatenate([np.where(self.fixed, 0.0, 1 / self.inertia), np.zeros(W)])
         self.body_radius = np.concatenate([self.radius, np.zeros(W)])
-        # bodies that no contact moves
-        self.immovable = np.concatenate([self.fixed, ~np.isfinite(self.wall_mass)])
-        self.times = self.h * np.arange(self.S + 1)
         self.gravity = np.asarray(scene.get("gravity") or np.zeros(self.D), float)
         self._parts()
+        self.driving = Driving(self)
+        # bodies that no contact moves
+        self.immovable = np.concatenate([self.fixed, ~np.isfinite(self.driving.mass).any(0)])
+
+    def _holding(self):
+        """The wall that holds each grain [N], −1 for none: the first one within its grip at time
+        zero."""
+        self.holder = np.full(self.N, -1)
+        for k, (_, wall) in enumerate(self.scene_walls):
+            if wall.get("grip") is None:
+                continue
+            all_grains = np.arange(self.N)
+            place = np.broadcast_to(self.X[0, k], (self.N, self.D))
+            gap, _ = gap_and_normal(self, all_grains, np.full(self.N, self.N + k), self.x[0], place)
+            taken = (gap <= wall["grip"]) & ~self.fixed
+            self.holder[taken], self.fixed = k, self.fixed | taken
 
     def _parts(self):
         """Steps made whole, not in parts: only for them do the frames before and after determine
@@ -182,7 +209,7 @@ class History:
         force = np.broadcast_to(self.mass[:, None] * self.gravity, (self.S, self.N, self.D)).copy()
         torque = np.zeros((self.S, self.N, self.Q))
         for load in (self.scene.get("grains") or {}).get("loads", []):
-            factor = prescribed.at(load.get("time") or {"constant": 1.0}, self.times[:-1] + 0.5 * self.h)[:, None]
+            factor = prescribed.at(load.get("time") or {"constant": 1.0}, self.load_times)[:, None]
             force[:, load["grain"]] += factor * np.asarray(load.get("force") or np.zeros(self.D), float)
             torque[:, load["grain"]] += factor * np.asarray(load.get("torque") or np.zeros(self.Q), float)
         return force, torque
@@ -190,9 +217,7 @@ class History:
     def wall_drive_force(self):
         """Prescribed forces (N) [S,W] on the walls that a force drives, at the middle of each step;
         0 for the others."""
-        middle = self.times[:-1] + 0.5 * self.h
-        columns = [prescribed.at(f, middle) if kind == "force" else np.zeros(self.S) for kind, f in self.drives]
-        return np.stack(columns, 1) if columns else np.zeros((self.S, 0))
+        return self.driving.force
 
 
 def enum_names(dataset, count=None):
@@ -202,32 +227,3 @@ def enum_names(dataset, count=None):
     values = dataset[:] if count is None else dataset[:count]
     table = np.array([names.get(k, f"unknown {k}") for k in range(256)], dtype=object)
     return table[values]
-
-
-def sums(index, values, count):
-    """Sums of the rows of `values` [M,…] that have the same `index`, [count,…]."""
-    values = np.asarray(values, float)
-    out = np.zeros((count,) + values.shape[1:])
-    if out.size and len(values):
-        columns = [np.bincount(index, column, minlength=count) for column in values.reshape(len(values), -1).T]
-        out = np.stack(columns, 1).reshape(out.shape)
-    return out
-
-
-def cross(a, b):
-    """a × b: [M,1] in 2D, [M,3] in 3D."""
-    if a.shape[-1] == 2:
-        return (a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])[..., None]
-    return np.cross(a, b)
-
-
-def turning_velocity(spin, lever):
-    """ω × x, the velocity of a point at x of a body that turns."""
-    if lever.shape[-1] == 2:
-        return spin * np.stack([-lever[..., 1], lever[..., 0]], -1)
-    return np.cross(spin, lever)
-
-
-def norm(a):
-    """Norm along the last axis."""
-    return np.sqrt((a * a).sum(-1))

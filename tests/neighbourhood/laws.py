@@ -17,9 +17,10 @@ import itertools
 
 import numpy as np
 
+import materials
 import tolerances
+from arrays import norm
 from geometry import restitution_of, where
-from history import norm
 
 
 def project(x, mu, nu, xi, d):
@@ -67,29 +68,30 @@ class Solved:
         return np.concatenate([n[:, None], t, b] + ([w[:, None]] if self.twists else []), 1)
 
     def _coefficients(self, h):
-        dry = np.where(
-            h.on_wall,
-            np.append(h.wall_friction, 0)[np.where(h.on_wall, h.j - h.N, -1)],
-            h.scene["materials"]["friction"]["grain_grain"],
-        )
+        pairs, walls = materials.dry_friction(h)
+        other = np.where(h.on_wall, 0, h.j)
+        dry = pairs[h.material[h.i], h.material[other]]
+        if h.W:
+            dry = np.where(h.on_wall, walls[h.material[h.i], np.where(h.on_wall, h.j - h.N, 0)], dry)
         bond = h.bond_friction[h.bond] if h.K else np.zeros(h.M)
         self.mu = np.where(self.bonds, bond, dry)
         self.nu = np.where(self.bonds, h.bond_rolling[h.bond], 0.0) if h.K else np.zeros(h.M)
-        self.xi = np.where(self.bonds, h.xi, 0.0) if h.K else np.zeros(h.M)
+        self.xi = np.where(self.bonds, h.bond_twist[h.bond], 0.0) if h.K else np.zeros(h.M)
 
     def _blocks(self, h, c, smooth):
         """D: the largest diagonal entry of each Delassus block (1/kg),
         docs/theory/gauss-seidel.md."""
         mi, mj, qi, qj = h.inverse_mass[h.i], h.inverse_mass[h.j], h.inverse_inertia[h.i], h.inverse_inertia[h.j]
         n, t = mi + mj, mi + mj + c.lever_i**2 * qi + c.lever_j**2 * qj
-        for k in np.flatnonzero(np.isfinite(h.wall_mass)):
-            rows = h.j == h.N + k
+        for k in range(h.W):
+            mass = h.driving.mass[h.row_step, k]
+            rows = (h.j == h.N + k) & np.isfinite(mass)
             d = h.wall_direction[k]
             along = c.n[rows] @ d
             beta = norm(d - along[:, None] * c.n[rows])
             coupling = np.abs(along * beta)
-            n[rows] += (along**2 + coupling) / h.wall_mass[k]
-            t[rows] += (beta**2 + coupling) / h.wall_mass[k]
+            n[rows] += (along**2 + coupling) / mass[rows]
+            t[rows] += (beta**2 + coupling) / mass[rows]
         some = np.maximum(n, t)
         n, t = np.where(n == 0, some, n), np.where(t == 0, some, t)
         bend = np.where(self.bonds, self.a**2 * (qi + qj), 0.0)

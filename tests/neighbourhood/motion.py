@@ -3,9 +3,8 @@ motion, time."""
 
 import numpy as np
 
-import prescribed
 import tolerances
-from history import cross, norm, sums
+from arrays import cross, norm, sums
 
 
 def check(h, report):
@@ -15,6 +14,7 @@ def check(h, report):
     check_orientations(h, report)
     forces, torques = contact_sums(h)
     check_grains(h, report, forces, torques)
+    check_held(h, report)
     check_walls(h, report, forces)
 
 
@@ -119,50 +119,61 @@ def check_grains(h, report, forces, torques):
     off = np.where(single & free, off, 0) if h.turns else np.zeros((h.S, h.N))
     report.expect("law of spins", off, tolerances.rounding(scale), of_grain("I Δω − h Σ(torques) (N m s)"))
     still = norm(h.v) + norm(h.w) + norm(h.x - h.x[0])
-    report.expect("fixed grains", np.where(h.fixed, still, 0.0), 0.0, lambda s, k: f"step {s}, fixed grain {k} moves")
+    fixed = h.fixed & (h.holder < 0)
+    report.expect("fixed grains", np.where(fixed, still, 0.0), 0.0, lambda s, k: f"step {s}, fixed grain {k} moves")
+
+
+def check_held(h, report):
+    """Grains that a wall holds move with it and do not turn."""
+    grains = np.flatnonzero(h.holder >= 0)
+    wall = h.holder[grains]
+    off = norm(h.v[:, grains] - h.V[:, wall]) + norm(h.w[:, grains])
+    report.expect("held grains", off, 0.0, lambda s, k: f"step {s}, grain {grains[k]}: velocity beside its wall")
+    off = norm(h.x[:, grains] - h.x[0, grains] - (h.X[:, wall] - h.X[0, wall]))
+    way = np.cumsum(np.abs(np.diff(h.x[:, grains], axis=0, prepend=h.x[:1, grains])), 0).sum(2)
+    scale = np.maximum.accumulate(norm(h.x[:, grains]) + norm(h.X[:, wall])) + way
+    # each step rounds both places
+    scale = scale * (1 + np.arange(h.S + 1))[:, None]
+    report.expect("held grains", off, tolerances.rounding(scale), lambda s, k: f"step {s}, grain {grains[k]}: place")
 
 
 def check_walls(h, report, forces):
-    """Walls: a force drives m Δv·d = h (F + ΣR·d); a velocity is that of the step's end; a fixed
-    one does not move."""
-    drive = h.wall_drive_force()
+    """Walls: a force drives m Δv·d = h (F + ΣR·d); a velocity is that of the step's end; a slide is
+    prescribed across a drive; a fixed wall does not move."""
+    given, d = h.driving, h.wall_direction
     force, size = (part[:, h.N :] for part in forces)
-    for k, (kind, function) in enumerate(h.drives):
-        d, v = h.wall_direction[k], h.V[:, k]
-        along, across = v @ d, norm(v - (v @ d)[:, None] * d)
-
-        def describe(s, k=k):
-            return f"step {s + 1}, wall {h.wall_names[k]}"
-
-        if kind == "fixed":
-            moved = norm(v) + norm(h.X[:, k] - h.X[0, k])
-            report.expect("fixed walls", moved, 0.0, describe)
-            continue
-        # the net force on a wall is a difference of forces
-        given = np.append(0.0, np.abs(drive[:, k]) + size[:, k]) * (h.h / h.wall_mass[k])
-        report.expect("wall motion", across, tolerances.rounding(norm(v) + np.cumsum(given)), describe)
-        if kind == "velocity":
-            told = prescribed.at(function, h.times)
-            report.expect(
-                "wall motion", np.abs(along - told), tolerances.rounding(np.abs(told) + slope(function, h)), describe
-            )
-            continue
-        off = h.wall_mass[k] * np.diff(along) - h.h * (drive[:, k] + force[:, k] @ d)
-        scale = h.wall_mass[k] * (np.abs(along[1:]) + np.abs(along[:-1])) + h.h * (np.abs(drive[:, k]) + size[:, k])
-        report.expect("wall motion", np.where(h.single, np.abs(off), 0.0), tolerances.rounding(scale), describe)
-    applied = h.observed.get("applied_force")
-    if applied is not None:
-        against = -(h.observed["wall_force"] * h.wall_direction).sum(2)
-        kinds = np.array([kind for kind, _ in h.drives])
-        told = np.where(kinds == "force", drive, np.where(kinds == "velocity", against, 0.0))
-        scale = np.abs(told) + norm(h.observed["wall_force"])
-        # a step in parts has the force of its last part
-        off = np.where(h.single[:, None] | (kinds != "force"), np.abs(applied - told), 0.0)
-        report.expect("applied_force", off, tolerances.rounding(scale), of_wall(h, "applied_force (N)"))
+    fixed = norm(h.V) + norm(h.X - h.X[0])
+    report.expect("fixed walls", np.where(given.driven, 0.0, fixed), 0.0, of_wall(h, "it moves"))
+    along = np.einsum("swd,wd->sw", h.V, d)
+    slide = given.speed[:, :, None] * given.across
+    # the net force on a wall is a difference of forces
+    kicks = np.cumsum((given.error + size) * (h.h / given.mass), 0)
+    scale = norm(h.V) + np.concatenate([np.zeros((1, h.W)), kicks]) + given.speed_error * (h.times + h.h)[:, None]
+    across = norm(h.V - along[:, :, None] * d - slide)
+    where = of_wall(h, "velocity across its drive (m/s)")
+    report.expect("wall motion", np.where(given.driven, across, 0.0), tolerances.rounding(scale), where)
+    moves = given.kind == "velocity"
+    off = np.where(moves, np.abs(along[1:] - given.value), 0.0)
+    report.expect("wall motion", off, tolerances.rounding(given.error), of_wall(h, "velocity (m/s)"))
+    first = np.abs(along[0] - given.start)
+    report.expect("wall motion", first, tolerances.rounding(np.abs(given.start)), lambda k: f"wall {h.wall_names[k]}")
+    pushed = given.kind == "force"
+    mass = np.where(pushed, given.mass, 0.0)
+    off = mass * np.diff(along, axis=0) - h.h * (given.value + np.einsum("swd,wd->sw", force, d))
+    scale = mass * (np.abs(along[1:]) + np.abs(along[:-1])) + h.h * (given.error + size)
+    off = np.where(h.single[:, None] & pushed, np.abs(off), 0.0)
+    report.expect("wall motion", off, tolerances.rounding(scale), of_wall(h, "m Δv − h ΣF (N s)"))
+    check_applied(h, report)
 
 
-def slope(function, h):
-    """Change of a function of time due to the round-off of time, over that round-off."""
-    if "ramp" in function:
-        return np.abs(function["ramp"]["rate"]) * (h.times + abs(function["ramp"].get("start", 0.0)))
-    return 0.0
+def check_applied(h, report):
+    """The observable `applied_force`: the prescribed force, or that which keeps a velocity."""
+    applied, given = h.observed.get("applied_force"), h.driving
+    if applied is None:
+        return
+    against = -(h.observed["wall_force"] * h.wall_direction).sum(2)
+    told = np.where(given.kind == "force", given.value, np.where(given.kind == "velocity", against, 0.0))
+    scale = np.abs(told) + norm(h.observed["wall_force"]) + np.where(given.kind == "force", given.error, 0.0)
+    # a step in parts has the force of its last part
+    off = np.where(h.single[:, None] | (given.kind != "force"), np.abs(applied - told), 0.0)
+    report.expect("applied_force", off, tolerances.rounding(scale), of_wall(h, "applied_force (N)"))

@@ -16,38 +16,79 @@ def at(function, times):
     return np.interp(times, knots[:, 0], knots[:, 1])
 
 
+def steepness(function):
+    """Largest slope of a function of time (1/s)."""
+    if "constant" in function:
+        return 0.0
+    if "ramp" in function:
+        return abs(function["ramp"]["rate"])
+    knots = np.asarray(function["table"], float)
+    return float(np.abs(np.diff(knots[:, 1]) / np.diff(knots[:, 0])).max(initial=0.0))
+
+
 def drive(wall):
-    """Kind of drive of a wall of the scene and its function of time: ("force", f), ("velocity", f)
-    or ("fixed", None)."""
+    """Kind of drive of a wall of the scene and its function of time: ("force", f), ("stress", f),
+    ("velocity", f) or ("fixed", None)."""
     if wall.get("force_rate") is not None:
         return "force", {"ramp": {"rate": wall["force_rate"]}}
-    for kind in ("force", "velocity"):
+    for kind in ("force", "velocity", "stress"):
         if wall.get(kind) is not None:
             return kind, wall[kind]
     return "fixed", None
 
 
-def direction(wall, dimension):
+def stage_drive(given):
+    """The same of the drive that a stage gives; nothing holds the wall."""
+    kind, function = drive(given)
+    return ("velocity", {"constant": 0.0}) if kind == "fixed" else (kind, function)
+
+
+def first_drives(scene):
+    """The drives at time zero, in the order of the walls. A wall that only later stages drive is
+    held until then."""
+    stages = scene.get("stages") or []
+    out = []
+    for name, wall in walls(scene):
+        given = [stage["walls"][name] for stage in stages if name in (stage.get("walls") or {})]
+        kind, function = drive(wall)
+        if stages and name in (stages[0].get("walls") or {}):
+            kind, function = stage_drive(given[0])
+        elif kind == "fixed" and given:
+            kind, function = stage_drive({})
+        out.append((kind, function))
+    return out
+
+
+def is_driven(scene, name, wall):
+    """Whether the wall, or a stage of the scene, has a drive for it."""
+    staged = any(name in (stage.get("walls") or {}) for stage in scene.get("stages") or [])
+    return staged or drive(wall)[0] != "fixed"
+
+
+def direction(scene, name, wall):
     """Unit direction of the drive of a wall of the scene; zero where it is fixed."""
-    if drive(wall)[0] == "fixed":
-        return np.zeros(dimension)
+    if not is_driven(scene, name, wall):
+        return np.zeros(scene["dimension"])
     along = wall.get("direction") or wall["shape"]["plane"]["normal"]
     return np.asarray(along, float) / np.linalg.norm(along)
 
 
+def slide(wall, along):
+    """Unit direction of the slide of a wall, perpendicular to its drive `along`, and its velocity,
+    a function of time; none for a wall without one."""
+    given = wall.get("slide")
+    if given is None:
+        return None
+    across = np.asarray(given["direction"], float)
+    across = across / np.linalg.norm(across)
+    across = across - along * (across @ along)
+    return across / np.linalg.norm(across), given["velocity"]
+
+
 def wall_mass(wall, grains):
-    """Mass (kg) of a wall that is driven by a force; infinite for another."""
-    if drive(wall)[0] != "force":
-        return np.inf
-    mass = wall.get("mass", "sample")
+    """Mass (kg) that a wall has while a force drives it."""
+    mass = wall.get("mass") or "sample"
     return float(mass["kg"]) if isinstance(mass, dict) else float(np.sum(grains))
-
-
-def wall_friction(scene):
-    """Coefficients of friction of the walls, in the order of their names."""
-    common = scene["materials"]["friction"]["grain_wall"]
-    given = [wall.get("friction") for _, wall in walls(scene)]
-    return np.array([common if mu is None else mu for mu in given], float)
 
 
 def walls(scene):
@@ -55,9 +96,11 @@ def walls(scene):
     return sorted((scene.get("walls") or {}).items())
 
 
-def strength(scene, mean_diameter):
-    """Tensile strength (N) of bonds of these mean diameters (m)."""
-    bonds = scene["bonds"]
+def strength(scene, mean_diameter, given=None):
+    """Tensile strength (N) of bonds of these mean diameters (m); `given` are the values of their
+    pair of materials."""
+    given = given or {}
+    bonds = given if {"strength", "stress"} & {key for key in given if given[key] is not None} else scene["bonds"]
     if bonds.get("strength") is not None:
         return np.full(mean_diameter.shape, float(bonds["strength"]))
     section = mean_diameter * thickness(scene) if scene["dimension"] == 2 else np.pi * mean_diameter**2 / 4

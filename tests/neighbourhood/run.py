@@ -57,6 +57,15 @@ QUICK = [
     "elastic, turned by 90°",
     "elastic, end of step",
     "elastic, confined",
+    "elastic, lid slide",
+    "elastic, confined by stress",
+    "disks, list",
+    "disks, file with materials",
+    "disks, stages",
+    "spheres, inclusion",
+    "beam, next event",
+    "events, bonds that roll",
+    "heap, gripped",
 ]
 
 
@@ -85,7 +94,9 @@ def sample_of(base, folder, program):
     path = folder / f"sample-{key}.csv"
     if not path.exists():
         plain |= {"walls": {}, "time": {"step": 1e-9, "end": 1e-9}}
-        plain.pop("stop", None)
+        for name in ("stop", "stages", "load_wall", "rupture", "bonds"):
+            plain.pop(name, None)
+        plain["materials"] = scenes.materials()
         (folder / f"sample-{key}.json").write_text(json.dumps(plain))
         command = [
             program,
@@ -102,20 +113,47 @@ def sample_of(base, folder, program):
     return np.loadtxt(path, delimiter=",", skiprows=1)
 
 
-def write_sample(scene, points, path):
-    """Writes grains (rows of centre and radius) to a file, from which the scene then takes them."""
+def write_sample(scene, points, path, materials=None):
+    """Writes grains (rows of centre and radius) to a file, from which the scene then takes them;
+    `materials` are given to them in turns."""
     header = ",".join(("x", "y", "z")[: scene["dimension"]] + ("radius",))
-    rows = "\n".join(",".join(map(repr, map(float, row))) for row in points)
-    path.write_text(f"{header}\n{rows}\n")
+    rows = [",".join(map(repr, map(float, row))) for row in points]
+    if materials:
+        header += ",material"
+        rows = [f"{row},{materials[k % len(materials)]}" for k, row in enumerate(rows)]
+    path.write_text("\n".join([header, *rows]) + "\n")
     scene["sample"] = {"file": {"path": path.name}}
 
 
+def write_bonds(scene, points, path):
+    """Writes the bonds of grains (rows of centre and radius) to a list: all pairs within half the gap
+    tolerance, some of them with limits of their own."""
+    centre, radius = points[:, :-1], points[:, -1]
+    i, j = np.triu_indices(len(points), 1)
+    gap = np.linalg.norm(centre[i] - centre[j], axis=1) - radius[i] - radius[j]
+    near = gap <= 0.5 * scene["bonds"]["gap_tolerance"] * (radius[i] + radius[j])
+    strength = scene["bonds"].get("strength")
+    own = lambda k, period, value: repr(value) if value is not None and k % period == 0 else ""
+    rows = [
+        f"{a},{b},{own(k, 3, strength and 1.4 * strength)},{own(k, 4, 0.2)},{own(k, 5, 0.1)}"
+        for k, (a, b) in enumerate(zip(i[near], j[near]))
+    ]
+    path.write_text("\n".join(["i,j,strength,shear,rolling", *rows]) + "\n")
+    scene["bonds"]["list"] = path.name
+
+
 def written(scene, base, folder, key, program):
-    """Writes the scene, and its sample where it comes from a file."""
-    if "as file" in scene:
+    """Writes the scene, and its sample and bonds where they come from files."""
+    way, listed = dict(scene.get("as file") or {}), scene.get("as list")
+    scene = {name: value for name, value in scene.items() if not name.startswith("as ")}
+    if way or listed:
         points = sample_of(scenes.BASES[base], folder, program)
-        scene, points, _ = scenes.transformed(scene, points, **scene["as file"])
-        write_sample(scene, points, folder / f"{key}.csv")
+    if way:
+        materials = way.pop("materials", None)
+        scene, points, _ = scenes.transformed(scene, points, **way)
+        write_sample(scene, points, folder / f"{key}.csv", materials)
+    if listed:
+        write_bonds(scene, points, folder / f"{key}.bonds.csv")
     (folder / f"{key}.json").write_text(json.dumps(scene, indent=1))
 
 
@@ -191,7 +229,7 @@ def judged(name, scene, folder, key, program, limit):
         known["broken"] = sum(told["broken"])
     known["figures"] = {k: v for k, v in figures.items() if isinstance(v, float)}
     if not known["wrong"]:
-        for suffix in ("h5", "out", "err", "csv", "json"):
+        for suffix in ("h5", "out", "err", "csv", "bonds.csv", "json"):
             (folder / f"{key}.{suffix}").unlink(missing_ok=True)
     return known
 

@@ -3,55 +3,23 @@ else."""
 
 import numpy as np
 
-import prescribed
+import materials
 import tolerances
+from arrays import norm
 from geometry import gap_and_normal, where
-from history import norm
 
 
 def check(h, c, p, report):
     """All checks of this module; nothing without bonds."""
     if not h.K:
         return
-    check_formed(h, report)
+    materials.check_bonds(h, report)
     check_lengths(h, p, report)
     check_intact(h, p, report)
     check_statuses(h, report)
     check_events(h, c, p, report)
     check_limits_of_events(h, report)
     check_order_of_events(h, report)
-
-
-def check_formed(h, report):
-    """Bonds join exactly the pairs given by the scene, with its strength."""
-    i, j = np.triu_indices(h.N, 1)
-    gap, _ = gap_and_normal(h, i, j, h.x[0, i], h.x[0, j])
-    a = h.radius[i] + h.radius[j]
-    tolerance = h.scene["bonds"]["gap_tolerance"] * a
-    slack = tolerances.rounding(norm(h.x[0, i]) + norm(h.x[0, j]) + a)
-    bonded = np.isin(i * h.N + j, h.bond_pair[:, 0] * h.N + h.bond_pair[:, 1])
-    held = h.fixed[i] & h.fixed[j]
-    off = np.where(bonded, gap - tolerance, np.where(held, -np.inf, tolerance - gap))
-    report.expect("bonds formed", off, slack, lambda m: f"pair {i[m]}-{j[m]}, bonded: {bool(bonded[m])}")
-    bi, bj = h.bond_pair.T
-    rest, _ = gap_and_normal(h, bi, bj, h.x[0, bi], h.x[0, bj])
-    a = h.radius[bi] + h.radius[bj]
-    mu = h.scene["bonds"].get("friction")
-    mu = h.scene["materials"]["friction"]["grain_grain"] if mu is None else mu
-    told = {
-        "rest_gap": (h.rest_gap, rest, norm(h.x[0, bi]) + norm(h.x[0, bj]) + a),
-        "mean_diameter": (h.mean_diameter, a, a),
-    }
-    if h.scene["bonds"].get("scatter") is None:
-        told["strength"] = (h.strength, prescribed.strength(h.scene, a), np.abs(h.strength))
-    for name, found in (("shear", h.bond_friction), ("rolling", h.bond_rolling)):
-        given = h.scene["bonds"].get(name)
-        expected = np.full(h.K, mu if given is None else given)
-        told[name] = (found, expected, expected)
-    for name, (found, expected, scale) in told.items():
-        off = np.abs(found - expected)
-        report.expect("bonds formed", off, tolerances.rounding(scale), lambda k, name=name: f"bond {k}: {name}")
-    report.require("bonds formed", bool((h.bond_status[0] == "INTACT").all()), "a bond is broken at time zero")
 
 
 def check_lengths(h, p, report):
@@ -132,7 +100,7 @@ def check_intact(h, p, report):
         h.bond_friction[b],
         h.bond_rolling[b],
         h.mean_diameter[b],
-        np.full(len(b), h.xi),
+        h.bond_twist[b],
     )
     eps = tolerances.value("limit")
     slack = tolerances.rounding(np.abs(h.rn[rows]) + h.strength[b] + ratio)
@@ -173,7 +141,7 @@ def check_statuses(h, report):
     count = (np.arange(1, h.S + 1)[:, None] >= broke_at).sum(1)
     report.expect("bonds_broken", np.abs(broken - count), 0.0, lambda s: f"step {s + 1}: bonds_broken")
     # one row for each intact bond, and for each bond that breaks at the end of the step
-    late = 1 if h.scene.get("rupture") == "end_of_step" else 0
+    late = 1 if h.scene.get("rupture") in ("end_of_step", "next_event") else 0
     rows = np.flatnonzero(h.bond >= 0)
     held = np.arange(1, h.S + 1)[:, None] < broke_at + late
     seen = np.zeros((h.S, h.K), int)
@@ -260,7 +228,7 @@ def check_limits_of_events(h, report):
     twist = np.abs(e["twist"]) if two_columns else np.zeros(len(e))
     # before version 3 `m` is the norm of bending and twist together: weaker bounds on both
     mixed = h.moment.shape[1] > 2 and not two_columns
-    mu, nu, xi = h.bond_friction[b], h.bond_rolling[b], np.full(len(b), h.xi)
+    mu, nu, xi = h.bond_friction[b], h.bond_rolling[b], h.bond_twist[b]
     n, ratio, mode, ratios = failure(e["rn"], e["rt"], e["m"], twist, strength, mu, nu, h.mean_diameter[b], xi)
     slack = tolerances.rounding(np.abs(e["rn"]) + strength + ratio)
     describe = lambda k: f"event {k} ({h.event_mode[k]}) at step {e['step'][k]}, bond {e['bond'][k]}"
@@ -268,7 +236,7 @@ def check_limits_of_events(h, report):
     if mixed:
         # ‖(m, τ)‖ is between the smaller limit and the root of the sum of both squares
         moments = ~np.isin(h.event_mode, ["SHEAR", "TENSION"])
-        least, most = sorted((h.bond_friction[b].min(), h.xi))[0], np.hypot(h.bond_friction[b], h.xi)
+        least, most = min(h.bond_friction[b].min(), xi.min()), np.hypot(h.bond_friction[b], xi)
         of_moment = e["m"] / h.mean_diameter[b]
         report.expect("events in their cone", np.where(moments, of_moment - most * n, 0.0), slack, describe)
         ratio, mode = np.where(moments, of_moment / least, ratios[0]), h.event_mode

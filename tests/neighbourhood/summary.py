@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 
+import drives
 import prescribed
 import tolerances
 from balance import fitted_strain
@@ -126,17 +127,13 @@ def of_solves(o, route, newton):
 
 def loads(h, told):
     """The loads of driven walls in the form of the summary."""
-    driven = [k for k, (kind, _) in enumerate(h.drives) if kind != "fixed"]
+    driven = np.flatnonzero(h.driving.driven)
     walls = {h.wall_names[k]: wall_loads(h, k, "driven_walls" in told) for k in driven}
     none = {"first_break": None, "collapse": [None, None], "early": [False, False], "broken_share": None}
     if "driven_walls" not in told:
         first = next(iter(walls.values()), {"failure": none})
         return {"failure": first["failure"]}
-    chosen = h.scene.get("load_wall")
-    if chosen is None and ((h.scene.get("stop") or {}).get("wall_travel")):
-        chosen = h.scene["stop"]["wall_travel"]["wall"]
-    if chosen is None and len(walls) == 1:
-        chosen = next(iter(walls))
+    chosen = drives.load_wall(h.scene)
     of_chosen = walls.get(chosen, {"failure": none, "peak_load": None, "peak_displacement": None})
     return {
         "load_wall": chosen if chosen in walls else None,
@@ -148,23 +145,9 @@ def loads(h, told):
     }
 
 
-def load_of(h, k):
-    """Load (N) of the driven wall `k` in every step: the prescribed force, or its force on the
-    grains before a bond broke."""
-    kind, function = h.drives[k]
-    if kind == "force":
-        parts = h.observed.get("substeps")
-        middle = h.times[1:] - 0.5 * h.h
-        load = prescribed.at(function, middle)
-        # a step in parts has the load of its last part
-        return load if parts is None else np.where(parts > 1, h.observed["applied_force"][:, k], load)
-    at_limit = h.observed.get("wall_force_at_limit", h.observed["wall_force"])
-    return -at_limit[:, k] @ h.wall_direction[k]
-
-
 def wall_loads(h, k, new):
     """First break, collapse, 5 % broken and peak of one wall."""
-    load, d = load_of(h, k), h.wall_direction[k]
+    load, d = h.driving.load(h, k), h.wall_direction[k]
     strain = np.abs(np.einsum("a,sab,b->s", d, fitted_strain(h)[0], d)) if h.S else np.zeros(0)
     broken = h.observed["bonds_broken"] if h.K else np.zeros(h.S)
     first = lambda holds: int(np.argmax(holds)) if holds.any() else None
@@ -188,44 +171,47 @@ def wall_loads(h, k, new):
     out = {"failure": failure}
     if new:
         peak = int(np.argmax(np.abs(load))) if h.S else None
-        told = peak is not None and (h.drives[k][0] == "velocity" or elastic) and load[peak] != 0
+        told = peak is not None and (may_fall(h, k) or elastic) and load[peak] != 0
         out["peak_load"] = float(load[peak]) if told else None
         out["peak_displacement"] = float((h.X[peak + 1, k] - h.X[0, k]) @ d) if told else None
     return out
 
 
+def may_fall(h, k):
+    """Whether the load of a wall may fall by itself: a velocity drives it, at any time, or the load
+    follows events."""
+    stages = h.scene.get("stages") or []
+    name, wall = h.scene_walls[k]
+    given = [prescribed.stage_drive(s["walls"][name]) for s in stages if name in (s.get("walls") or {})]
+    kinds = {kind for kind, _ in given + [prescribed.drive(wall)]}
+    return "velocity" in kinds or h.quasi_static
+
+
 def check_ending(h, report, told):
-    """Why the run ended: at its time, or at the first step in which a condition of the scene
-    holds."""
-    stop, ending = h.scene.get("stop") or {}, told["ending"]
-    holds = {}
-    broken = h.observed["bonds_broken"] if h.K else np.zeros(h.S)
-    if stop.get("broken_fraction") is not None and h.K:
-        holds["broken_fraction"] = broken >= stop["broken_fraction"] * h.K
-    travel = stop.get("wall_travel")
-    if travel:
-        k = h.wall_names.index(travel["wall"])
-        d = h.wall_direction[k]
-        reach = lambda sign: (sign * (h.x[0] @ d) + h.radius).max()
-        distance = travel["fraction_of_height"] * (reach(1) + reach(-1))
-        begin = (
-            0
-            if travel.get("after", "start") == "start"
-            else (int(np.argmax(broken > 0)) + 1 if (broken > 0).any() else h.S)
-        )
-        way = np.abs((h.X[1:, k] - h.X[begin, k]) @ d)
-        holds["wall_travel"] = (way >= distance * (1 - 1e-12)) & (np.arange(h.S) >= begin)
+    """Why the run ended: at its time, with its last stage, or at the first step in which a condition
+    of the scene holds."""
+    ending = told["ending"]
+    holds = drives.conditions(h, h.scene.get("stop") or {}, 0, h.driving.load)
     for name, held in holds.items():
         report.require("ending", not held[:-1].any(), f"{name} held before the last step, and the run went on")
-    if ending in ("broken_fraction", "wall_travel"):
+    if ending in ("broken_fraction", "wall_travel", "load_drop"):
         report.require(
             "ending",
             ending in holds and h.S > 0 and bool(holds[ending][-1]),
             f"{ending} does not hold in the last step",
         )
+    ended = h.driving.ended
+    report.require("ending", ended is None or ended == h.S, f"the last stage ended after step {ended}")
+    if ending == "stages":
+        report.require("ending", ended == h.S, "the last stage did not end with the run")
+    end = h.scene["time"]["end"]
     if ending == "time":
-        end = h.scene["time"]["end"]
         report.require("ending", abs(h.frame_time[-1] - end) < h.h, f"ended at {h.frame_time[-1]} s, not {end} s")
+    if ending == "no_break":
+        last = float(h.load_times[-1]) if h.S else 0.0
+        report.require("ending", h.quasi_static and last >= end, f"ended at the loads of {last} s, not {end} s")
+    if ending == "no_equilibrium":
+        report.require("ending", h.quasi_static, "the bodies move, and the run ended for want of an equilibrium")
 
 
 def text_lines(h, told):
@@ -267,7 +253,7 @@ def load_lines(h, told, failure):
     if "driven_walls" in told and told["load_wall"] is None and told["driven_walls"]:
         lines = [(f"wall {wall['wall']}"[:16], line_of_wall(told, wall)) for wall in told["driven_walls"]]
         return [line for line in lines if line[1]]
-    if told["bonds"] and h.drives and any(kind != "fixed" for kind, _ in h.drives):
+    if told["bonds"] and h.driving.driven.any():
         lines.append(("first break", [failure["first_break"]]))
         lines += [
             ("collapse load", [load, strain]) for load, strain in zip(failure["collapse"], STRAINS) if load is not None

@@ -127,7 +127,8 @@ impl<D: Dim> World<D> {
             while old.next_if(|o| o.pair < touch.pair).is_some() {}
             let last = old.peek().filter(|o| o.pair == touch.pair);
             touch.closed = last.is_some_and(|o| o.reaction.n > 0.0);
-            let same = last.filter(|o| o.bond() == touch.bond());
+            // a bond that formed since then takes over the reaction of the dry contact
+            let same = last.filter(|o| o.bond() == touch.bond() || o.bond().is_none());
             if D::Tangents::LEN > 0 {
                 let (_, normal, _) = self.geometry(mid, touch.pair);
                 let frame = same.map_or_else(|| D::frame(normal), |o| D::transported(&o.tangents, normal));

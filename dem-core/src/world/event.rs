@@ -32,10 +32,11 @@ struct Equilibrium<D: Dim> {
     excess: f64,
 }
 
-/// An interval of load times (s) in which the excess changes its sign, with its values there.
-struct Bracket {
-    low: (f64, f64),
-    high: (f64, f64),
+impl<D: Dim> Equilibrium<D> {
+    /// Time of the loads (s), and the excess.
+    fn place(&self) -> (f64, f64) {
+        (self.at, self.excess)
+    }
 }
 
 impl<D: Dim> World<D> {
@@ -71,56 +72,59 @@ impl<D: Dim> World<D> {
         }
         let rises = held.excess < 0.0;
         let end = if rises { until } else { 0.0 };
-        let mut last = (held.at, held.excess);
+        let mut last = held;
         let mut step = if rises { self.settings.step } else { -self.settings.step };
-        let mut next = last.0 + step;
+        let mut next = last.at + step;
         loop {
             let beyond = if rises { next >= end } else { next <= end };
             let trial = self.equilibrium(if beyond { end } else { next }, done)?;
-            let now = (trial.at, trial.excess);
-            if now.1.abs() <= LIMIT {
+            if trial.excess.abs() <= LIMIT {
                 return Ok(trial);
             }
-            if (now.1 < 0.0) != rises {
-                let [low, high] = if rises { [last, now] } else { [now, last] };
-                return self.bisect(Bracket { low, high }, trial, done);
+            if (trial.excess < 0.0) != rises {
+                let [low, above] = if rises { [last, trial] } else { [trial, last] };
+                return self.bisect(low.place(), above, done);
             }
             if beyond {
                 return Ok(trial);
             }
             // no further than to where the secant meets the limit, else ever longer steps
             step *= 2.0;
-            next = secant(last, now).filter(|at| (*at > now.0) == rises).unwrap_or(now.0 + step);
-            last = now;
+            let meets = secant(last.place(), trial.place()).filter(|at| (*at > trial.at) == rises);
+            next = meets.unwrap_or(trial.at + step);
+            last = trial;
         }
     }
 
-    /// The equilibrium in a bracket at which the first bond is at its limit; where the reactions
-    /// jump, the first one beyond the limit. `found` is the last trial.
+    /// The equilibrium between the time and the excess `low` and the equilibrium `above` at which the
+    /// first bond is at its limit; where the reactions jump, the first one beyond the limit.
     fn bisect(
         &mut self,
-        mut bracket: Bracket,
-        mut found: Equilibrium<D>,
+        mut low: (f64, f64),
+        mut above: Equilibrium<D>,
         done: &mut Solves,
     ) -> Result<Equilibrium<D>, StepError> {
         let mut halve = false;
         loop {
-            let Bracket { low, high } = &mut bracket;
-            let (from, width) = (low.0, high.0 - low.0);
-            let middle = from + 0.5 * width;
-            let inside = |at: &f64| !halve && *at > from && *at < from + width;
-            let at = secant(*low, *high).filter(inside).unwrap_or(middle);
+            let high = above.place();
+            let width = high.0 - low.0;
+            let inside = |at: &f64| !halve && *at > low.0 && *at < low.0 + width;
+            let at = secant(low, high).filter(inside).unwrap_or(low.0 + 0.5 * width);
             if at <= low.0 || at >= high.0 {
-                // no number between the two
-                return if found.at == high.0 { Ok(found) } else { self.equilibrium(high.0, done) };
+                // no number between the two. Another solve at the same time may select other
+                // reactions, so the equilibrium is kept
+                return Ok(above);
             }
-            found = self.equilibrium(at, done)?;
+            let found = self.equilibrium(at, done)?;
             if found.excess.abs() <= LIMIT {
                 return Ok(found);
             }
-            let side = if found.excess < 0.0 { low } else { high };
-            *side = (found.at, found.excess);
-            halve = bracket.high.0 - bracket.low.0 > 0.5 * width;
+            if found.excess < 0.0 {
+                low = found.place();
+            } else {
+                above = found;
+            }
+            halve = above.at - low.0 > 0.5 * width;
         }
     }
 

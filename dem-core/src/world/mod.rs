@@ -209,9 +209,14 @@ impl<D: Dim> World<D> {
         self.add_bonds(close_pairs(&self.grains, gap_tolerance, |_, mean_diameter| strength(mean_diameter), friction));
     }
 
-    /// Add bonds. A pair that already has a bond, intact or broken, keeps it.
+    /// Add bonds. A pair that already has a bond, intact or broken, keeps it. A bond between grains
+    /// that press on each other takes over the reaction of their contact; if it is elastic, the
+    /// energy that its springs have under this reaction counts as external work.
     pub fn add_bonds(&mut self, bonds: Vec<Bond>) {
         let numbers = self.bonds.merge(bonds);
+        let brought: f64 = self.stored.iter().filter_map(|stored| self.brought_into_bond(stored)).sum();
+        self.ledger.elastic += brought;
+        self.ledger.external_work += brought;
         if !self.turns.is_empty() {
             let mut turns = vec![Turn::default(); self.bonds.len()];
             self.turns.iter().zip(&numbers).for_each(|(turn, number)| turns[*number as usize] = *turn);
@@ -221,6 +226,17 @@ impl<D: Dim> World<D> {
             let number = stored.bond().map(|bond| numbers[bond as usize]);
             stored.tie(number);
         }
+    }
+
+    /// Elastic energy (J) that a new bond has under the reaction of a dry contact, ½ f²/k.
+    fn brought_into_bond(&self, stored: &StoredTouch<D>) -> Option<f64> {
+        if stored.bond().is_some() {
+            return None;
+        }
+        let number = self.bonds.binary_search_by_key(&stored.pair, |bond| bond.pair).ok()?;
+        let stiffness = self.bonds[number].stiffness.filter(|_| self.bonds[number].status == BondStatus::Intact)?;
+        let (n, t) = (stored.reaction.n, &stored.reaction.t);
+        Some(0.5 * (n * n / stiffness.normal + t.dot(t) / stiffness.tangential))
     }
 
     /// Give the twisting moment of every bond the limit ξ a (r_n + r_coh) with this ξ (–), in 3D

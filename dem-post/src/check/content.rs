@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 
 use dem_history::sound::{Surroundings, is_huge, is_plausible, may_be_observed, median};
-use dem_history::{BondStatus, RuptureMode, SolverRoute, WallDrive, WallKind};
+use dem_history::{BondStatus, NOT_FORMED, RuptureMode, SolverRoute, WallDrive, WallKind};
 use hdf5::H5Type;
 
 use super::checker::{Checker, Sizes};
@@ -68,6 +68,7 @@ pub(super) fn check(c: &mut Checker) {
     places(c);
     directions(c);
     let pairs = bond_pairs(c);
+    before_the_bonds(c, &rows, &steps);
     let broken = states(c);
     let late = broke_at_the_end_of_a_frame(c, &steps);
     contacts(c, &rows, &pairs, &broken, &late);
@@ -175,7 +176,8 @@ fn committed(c: &mut Checker) -> Vec<[u64; 2]> {
 /// Checks that every number of every dataset of floats is finite and of a plausible magnitude.
 fn numbers(c: &mut Checker) {
     let whole = |place: &str| {
-        ["step", "start", "count", "pair", "id", "bond", "material"].contains(&place.rsplit('/').next().unwrap_or(""))
+        ["step", "start", "count", "pair", "id", "bond", "material", "formed"]
+            .contains(&place.rsplit('/').next().unwrap_or(""))
     };
     let places: Vec<String> = c.sound.keys().cloned().collect();
     for place in places {
@@ -300,10 +302,37 @@ fn bond_pairs(c: &mut Checker) -> Vec<[i32; 2]> {
     pairs
 }
 
+/// Checks the step after which a stage formed the bonds: there are bonds if it has come, and no
+/// contact of an earlier frame has one.
+fn before_the_bonds(c: &mut Checker, rows: &[[u64; 2]], steps: &[i64]) {
+    const FORMED: &str = "bonds/formed";
+    if !c.is_sound(&[FORMED]) {
+        return;
+    }
+    let formed = c.rows::<i64>(FORMED, 0..1).and_then(|rows| rows.first().copied()).unwrap_or(NOT_FORMED);
+    if formed < NOT_FORMED || (formed == NOT_FORMED) != (c.sizes.b == 0) {
+        c.wrong(FORMED, None, format!("{formed}, with {} bonds", c.sizes.b));
+    }
+    for ([start, count], _) in rows.iter().zip(steps).filter(|(_, step)| **step < formed) {
+        let (start, end) = (*start as usize, (start + count) as usize);
+        let bonds = c.rows::<i32>("contacts/bond", start..end).unwrap_or_default();
+        if let Some(k) = bonds.iter().position(|bond| *bond != -1) {
+            c.wrong(
+                "contacts/bond",
+                Some(start + k),
+                format!("{} before the bonds formed, at step {formed}", bonds[k]),
+            );
+        }
+    }
+}
+
 /// Checks that a bond changes at most once, from intact to one mode of rupture.
 fn states(c: &mut Checker) -> Broken {
     let b = c.sizes.b;
     let (mut last, mut broken) = (vec![INTACT; b], Broken::new());
+    if b == 0 {
+        return broken;
+    }
     c.blocks::<u8>(STATUS, |c, start, values| {
         for (k, row) in values.chunks_exact(b.max(1)).enumerate() {
             for (bond, (&now, before)) in

@@ -271,6 +271,9 @@ fn bonds(c: &mut Checker) {
     if c.has("bonds/rolling") {
         c.table("bonds/rolling", &F64, b, &[], "");
     }
+    if c.has("bonds/formed") {
+        c.table("bonds/formed", &I64, 1, &[], "");
+    }
     c.element("bonds/status", &bytes(BondStatus::ALL.iter().map(|status| status.label())), &[b], "");
     events(c);
 }

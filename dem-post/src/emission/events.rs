@@ -2,7 +2,8 @@
 //!
 //! Two ruptures are **linked** if
 //!
-//! * their steps differ by at most [`Rule::steps`], and
+//! * their steps differ by at most [`Rule::steps`], or, where the load follows the breaks
+//!   (`rupture: next_event`), if they are of one [burst](bursts), and
 //! * a grain of one bond is a grain of the other, or at most [`Rule::reach`] bonds of the intact
 //!   sample lead from a grain of one to a grain of the other.
 //!
@@ -23,8 +24,8 @@ use crate::cracks::modes::Modes;
 /// Which ruptures are linked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Rule {
-    /// Greatest difference of their steps.
-    pub steps: u32,
+    /// Greatest difference of their steps; `None`: those of one [burst](bursts).
+    pub steps: Option<u32>,
     /// Greatest number of bonds between them.
     pub reach: u32,
 }
@@ -59,9 +60,28 @@ pub struct Event {
     pub magnitude: Option<f64>,
 }
 
+/// The number of the burst of each step, from the loads under which bonds break in it.
+///
+/// A burst is what breaks under a load that no longer grows: its first step has a greater load than
+/// all before, the others none greater than the first. Under a load that only grows these bonds
+/// break at once (Hemmer & Hansen, J. Appl. Mech. 59, 1992).
+pub fn bursts(loads: &[f64]) -> Vec<i64> {
+    let (mut greatest, mut burst) = (f64::NEG_INFINITY, 0);
+    let mut of_step = |load: &f64| {
+        if *load > greatest {
+            greatest = *load;
+            burst += 1;
+        }
+        burst
+    };
+    loads.iter().map(&mut of_step).collect()
+}
+
 /// The events of `ruptures`, which are in order, in a sample of `grains` grains; for each event the
-/// indices of its ruptures. Events are in the order of their first ruptures.
-pub fn cluster(ruptures: &[Rupture], grains: usize, bonds: &Bonds, rule: Rule) -> Vec<Vec<usize>> {
+/// indices of its ruptures. Events are in the order of their first ruptures. `place` is the step of
+/// each rupture, or its burst.
+pub fn cluster(ruptures: &[Rupture], place: &[i64], grains: usize, bonds: &Bonds, rule: Rule) -> Vec<Vec<usize>> {
+    let window = i64::from(rule.steps.unwrap_or(0));
     let around = neighbours(grains, bonds);
     let mut joined = UnionFind::<usize>::new(ruptures.len());
     // the last rupture at each grain. Earlier ones need no look: within the same time they are
@@ -71,7 +91,7 @@ pub fn cluster(ruptures: &[Rupture], grains: usize, bonds: &Bonds, rule: Rule) -
         let own = rupture.pair.map(|grain| grain as usize);
         for grain in within(&own, &around, rule.reach) {
             let Some(other) = last[grain] else { continue };
-            if rupture.step - ruptures[other].step <= i64::from(rule.steps) {
+            if place[k] - place[other] <= window {
                 joined.union(k, other);
             }
         }
@@ -172,7 +192,18 @@ mod tests {
     }
 
     fn events(ruptures: &[Rupture], steps: u32, reach: u32) -> Vec<Vec<usize>> {
-        cluster(ruptures, 10, &chain(), Rule { steps, reach })
+        let place: Vec<i64> = ruptures.iter().map(|rupture| rupture.step).collect();
+        cluster(ruptures, &place, 10, &chain(), Rule { steps: Some(steps), reach })
+    }
+
+    #[test]
+    fn a_burst_is_what_breaks_under_a_load_that_no_longer_grows() {
+        assert_eq!(bursts(&[1.0, 0.5, 0.9, 1.0, 1.2, 1.1, 1.3, 2.0]), [1, 1, 1, 1, 2, 2, 3, 4]);
+        // ruptures of one burst are linked however many steps apart they are, those of two are not
+        let list = [rupture(1, 0, 0), rupture(9, 0, 1), rupture(10, 0, 2)];
+        let joined = |place: [i64; 3]| cluster(&list, &place, 10, &chain(), Rule { steps: None, reach: 0 });
+        assert_eq!(joined([1, 1, 2]), [vec![0, 1], vec![2]]);
+        assert_eq!(joined([1, 2, 2]), [vec![0], vec![1, 2]]);
     }
 
     #[test]

@@ -32,9 +32,10 @@ mod section;
 pub struct Command {
     #[command(flatten)]
     files: Files,
-    /// Ruptures at most this many steps apart can be linked to one event.
-    #[arg(long, value_name = "N", default_value_t = Options::default().rule.steps)]
-    steps: u32,
+    /// Ruptures at most this many steps apart can be linked to one event [default: 1; of
+    /// `rupture: next_event` those that break under a load that no longer grows].
+    #[arg(long, value_name = "N")]
+    steps: Option<u32>,
     /// Ruptures at most this many bonds apart can be linked: 0 if they share a grain.
     #[arg(long, value_name = "N", default_value_t = Options::default().rule.reach)]
     reach: u32,

@@ -1,10 +1,10 @@
 //! The events of a run: the report, and how it is computed from a history.
 
 use clap::ValueEnum;
-use dem_history::History;
+use dem_history::{History, Rupture};
 use serde::Serialize;
 
-use super::events::{Event, Rule, cluster};
+use super::events::{Event, Rule, bursts, cluster};
 use super::frequency::{BValue, FEWEST, Frequency, Values, maximum_curvature};
 use crate::output::{PostError, Result, Text, counted, facts, number, quantity};
 use crate::strength::runs::Course;
@@ -25,7 +25,8 @@ pub enum Scale {
 /// Options of the analysis.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Which ruptures are linked.
+    /// Which ruptures are linked. Without steps, those at most one step apart, or of one burst
+    /// where the load follows the breaks.
     pub rule: Rule,
     /// The magnitude; by default energy where bonds released some, else size.
     pub scale: Option<Scale>,
@@ -39,7 +40,7 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { rule: Rule { steps: 1, reach: 1 }, scale: None, bin: 0.1, completeness: None, wall: None }
+        Self { rule: Rule { steps: None, reach: 1 }, scale: None, bin: 0.1, completeness: None, wall: None }
     }
 }
 
@@ -129,14 +130,15 @@ pub fn read(history: &History, options: &Options) -> Result<Report> {
         event
     };
     let grains = history.grains()?.radius.len();
-    let events: Vec<Event> = cluster(&ruptures, grains, &bonds, options.rule).iter().map(own).collect();
+    let (rule, place) = rule_of(history, options.rule, &ruptures)?;
+    let events: Vec<Event> = cluster(&ruptures, &place, grains, &bonds, rule).iter().map(own).collect();
     let values = if scale == Scale::Energy { Values::Bins(options.bin) } else { Values::Sizes };
     let magnitudes: Vec<f64> = events.iter().filter_map(|event| event.magnitude).collect();
     let frequencies = values.frequencies(&magnitudes);
     let completeness = options.completeness.or_else(|| maximum_curvature(&frequencies));
     let b_value = completeness.and_then(|from| values.b_value(&magnitudes, from));
     Ok(Report {
-        rule: options.rule,
+        rule,
         magnitude: scale,
         bin: (scale == Scale::Energy).then_some(options.bin),
         bonds: bonds.len(),
@@ -155,6 +157,18 @@ pub fn read(history: &History, options: &Options) -> Result<Report> {
             end: history.times().last().copied().unwrap_or(0.0),
         },
     })
+}
+
+/// The rule by which ruptures are linked, and the step of each rupture, or its burst.
+fn rule_of(history: &History, asked: Rule, ruptures: &[Rupture]) -> Result<(Rule, Vec<i64>)> {
+    let steps: Vec<i64> = ruptures.iter().map(|rupture| rupture.step).collect();
+    let loads = if asked.steps.is_none() { history.observable("load_time")? } else { None };
+    let Some(loads) = loads else {
+        return Ok((Rule { steps: asked.steps.or(Some(1)), ..asked }, steps));
+    };
+    let burst = bursts(&loads.value);
+    let of = |step: &i64| loads.step.binary_search(step).ok().and_then(|row| burst.get(row)).copied();
+    Ok((asked, steps.iter().map(|step| of(step).unwrap_or(0)).collect()))
 }
 
 /// The load over the steps, and why that of an event is not known; empty where it is.
@@ -203,6 +217,7 @@ impl Report {
     /// Names and values, in order.
     pub(super) fn lines(&self) -> Vec<(&'static str, String)> {
         let Rule { steps, reach } = self.rule;
+        let when = steps.map_or("a load that no longer grows".into(), |steps| format!("steps apart: at most {steps}"));
         let share = 100.0 * self.ruptures as f64 / self.bonds as f64;
         let most = self.events.iter().map(|event| event.bonds).max();
         let released = match self.ruptures {
@@ -213,7 +228,7 @@ impl Report {
         let mut lines = vec![
             ("bonds", format!("{}, {} broken ({share:.1} %)", self.bonds, self.ruptures)),
             ("events", self.events.len().to_string()),
-            ("  linked ruptures", format!("steps apart: at most {steps}; bonds between: at most {reach}")),
+            ("  linked ruptures", format!("{when}; bonds between: at most {reach}")),
             ("  largest", most.map_or_else(|| "–".into(), |most| counted(most, "bond"))),
             ("energy released", released),
             ("magnitude", self.axis().trim_start_matches("magnitude ").into()),

@@ -122,7 +122,8 @@ pub fn read(history: &History, which: Which, wall: Option<&str>, quiet: bool) ->
 
 /// The list of ruptures and the last frame must agree on whether the bond holds.
 fn agree(history: &History, bond: usize, broken: bool) -> Result<()> {
-    let status = history.bond_status(history.frames() - 1)?[bond];
+    // a frame of the step after which bonds form has none
+    let status = history.bond_status(history.frames() - 1)?.get(bond).copied().unwrap_or(BondStatus::Intact);
     if broken == (status != BondStatus::Intact) {
         return Ok(());
     }

@@ -19,6 +19,7 @@ fn chain(steps: &[i64], energy: f64) -> (tempfile::TempDir, PathBuf) {
         friction: vec![0.3; bonds],
         rolling: vec![],
         mean_diameter: vec![2e-3; bonds],
+        formed: None,
     };
     let mut writer = Writer::create(&path, &l, false).unwrap();
     let frame = |step: i64| Frame {

@@ -62,6 +62,7 @@ fn layout(dimension: usize) -> Layout {
             friction: vec![0.3; 4],
             rolling: vec![],
             mean_diameter: vec![2e-3; 4],
+            formed: None,
         },
         observables: vec![
             Observable::new("wall_position", "m", &[2, d]),

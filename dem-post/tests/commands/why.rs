@@ -17,6 +17,7 @@ fn two_grains(dimension: usize) -> Layout {
             friction: vec![0.3],
             rolling: vec![0.2],
             mean_diameter: vec![4e-3],
+            formed: None,
         },
         parameters: Parameters { scene: scene.into(), ..Parameters::default() },
         ..Layout::default()

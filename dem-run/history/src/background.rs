@@ -5,7 +5,7 @@ use std::thread::JoinHandle;
 
 use super::checkpoint::Checkpoint;
 use super::error::Result;
-use super::model::{Frame, Rupture};
+use super::model::{Bonds, Frame, Rupture};
 use super::writer::Writer;
 
 /// Maximum number of batches in the queue.
@@ -16,6 +16,8 @@ const WAITING: usize = 4;
 pub struct Batch {
     /// Steps, times and observables, one row each.
     pub observations: Vec<(i64, f64, Vec<f64>)>,
+    /// Bonds that a stage formed since the last batch, before all others of this one.
+    pub bonds: Option<Bonds>,
     /// Bonds that broke.
     pub ruptures: Vec<Rupture>,
     /// The frame that makes them visible.
@@ -86,6 +88,9 @@ fn write_all(mut writer: Writer, batches: &Receiver<Batch>) -> Result<()> {
 }
 
 fn write(writer: &mut Writer, batch: &Batch) -> Result<()> {
+    if let Some(bonds) = &batch.bonds {
+        writer.bonds_formed(bonds)?;
+    }
     for (step, time, values) in &batch.observations {
         writer.observe(*step, *time, values)?;
     }

@@ -287,21 +287,76 @@ pub(super) fn wall_columns(file: &File, layout: &Layout, storage: Storage) -> hd
     ])
 }
 
-pub(super) fn bonds(file: &File, bonds: &Bonds, storage: Storage) -> hdf5::Result<Table> {
-    let (b, group) = (bonds.len(), file.create_group(path::BONDS)?);
-    fixed(&group, "pair", "", &[b, 2], bonds.pair.as_flattened())?;
-    fixed(&group, "rest_gap", "m", &[b], &bonds.rest_gap)?;
-    fixed(&group, "strength", "N", &[b], &bonds.strength)?;
-    fixed(&group, "friction", "", &[b], &bonds.friction)?;
-    if !bonds.rolling.is_empty() {
-        fixed(&group, "rolling", "", &[b], &bonds.rolling)?;
+/// What a history holds of its bonds.
+pub(super) struct BondTables {
+    /// The state of each bond, frame by frame.
+    pub status: Table,
+    /// Properties of bonds that a stage forms.
+    later: Option<LaterBonds>,
+}
+
+/// The properties of bonds that a stage forms: empty until then.
+struct LaterBonds {
+    pair: Table,
+    /// In the order of [`columns`].
+    columns: [Table; 5],
+    formed: Table,
+}
+
+/// Columns of the properties of bonds: name, unit, values.
+fn columns(bonds: &Bonds) -> [(&'static str, &'static str, &[f64]); 5] {
+    [
+        ("rest_gap", "m", &bonds.rest_gap),
+        ("strength", "N", &bonds.strength),
+        ("friction", "", &bonds.friction),
+        ("rolling", "", &bonds.rolling),
+        ("mean_diameter", "m", &bonds.mean_diameter),
+    ]
+}
+
+impl BondTables {
+    pub fn create(file: &File, bonds: &Bonds, storage: Storage) -> hdf5::Result<Self> {
+        let (b, group) = (bonds.len(), file.create_group(path::BONDS)?);
+        if let Some(formed) = bonds.formed {
+            let status = Table::of_bonds::<BondCode>(&element(&group, "status")?, "value", b, storage)?;
+            let growth = Growth::Rows(512);
+            let column = |name, unit| Table::create::<f64>(&group, name, unit, &[], growth, storage);
+            let [a, b, c, d, e] = columns(bonds).map(|(name, unit, _)| column(name, unit));
+            let later = LaterBonds {
+                pair: Table::create::<i32>(&group, "pair", "", &[2], growth, storage)?,
+                columns: [a?, b?, c?, d?, e?],
+                formed: Table::create::<i64>(&group, "formed", "", &[], Growth::Rows(1), storage)?,
+            };
+            let mut tables = Self { status, later: Some(later) };
+            tables.fill(bonds, formed)?;
+            return Ok(tables);
+        }
+        fixed(&group, "pair", "", &[b, 2], bonds.pair.as_flattened())?;
+        for (name, unit, values) in columns(bonds) {
+            // without it, the two limits of each bond have one coefficient
+            if name != "rolling" || !values.is_empty() {
+                fixed(&group, name, unit, &[b], values)?;
+            }
+        }
+        let status =
+            Table::create::<BondCode>(&element(&group, "status")?, "value", "", &[b], Growth::Frames, storage)?;
+        Ok(Self { status, later: None })
     }
-    fixed(&group, "mean_diameter", "m", &[b], &bonds.mean_diameter)?;
-    Table::create::<BondCode>(&element(&group, "status")?, "value", "", &[b], Growth::Frames, storage)
+
+    /// Writes the bonds that formed after the step `formed`.
+    pub fn fill(&mut self, bonds: &Bonds, formed: i64) -> hdf5::Result<()> {
+        let Some(later) = &mut self.later else { return Err("bonds that form later have no place".into()) };
+        later.pair.append(bonds.pair.as_flattened())?;
+        for (table, (_, _, values)) in later.columns.iter_mut().zip(columns(bonds)) {
+            table.append(values)?;
+        }
+        self.status.widen(bonds.len())?;
+        later.formed.overwrite(&[formed])
+    }
 }
 
 pub(super) fn contacts(file: &File, layout: &Layout, storage: Storage) -> hdf5::Result<ContactTables> {
-    let (d, bonded) = (layout.dimension, !layout.bonds.is_empty());
+    let (d, bonded) = (layout.dimension, layout.bonded());
     let group = file.create_group(path::CONTACTS)?;
     link_times(&group)?;
     // a dense packing has two to three contacts a grain

@@ -40,6 +40,9 @@
 //! /bonds/                  pair i32[B,2]; rest_gap (m), strength (N), friction,
 //!                          mean_diameter (m) [B]; rolling [B] if it differs from friction
 //!     status               {step, time, value[T,B]}: enum INTACT, TENSION, SHEAR, ROLLING, TWIST
+//!     formed i64[1]        if a stage forms the bonds: the step after which, −1 until then. B is 0
+//!                          until then; in frames up to this step there are no bonds, and `status`
+//!                          is INTACT
 //! /events/rupture          compound [E]: step i64; time, x, y, z, rn, rt, m, twist, energy f64;
 //!                          round, bond, i, j i32; mode i32 enum TENSION, SHEAR, ROLLING, TWIST;
 //!                          pad i32 (0)
@@ -93,8 +96,8 @@ pub use copy::{CopyAs, copy};
 pub use error::{HistoryError, Result, reason};
 pub use lock::refuse_busy;
 pub use model::{
-    Bonds, ContactRows, Frame, GrainState, Grains, Layout, Observable, Parameters, RowCounts, Rupture, ValueKind,
-    WallState,
+    Bonds, ContactRows, Frame, GrainState, Grains, Layout, NOT_FORMED, Observable, Parameters, RowCounts, Rupture,
+    ValueKind, WallState,
 };
 pub use observed::Series;
 pub use reader::History;

@@ -33,6 +33,13 @@ pub struct Layout {
     pub parameters: Parameters,
 }
 
+impl Layout {
+    /// Whether there are bonds, now or after a stage that forms them.
+    pub fn bonded(&self) -> bool {
+        self.bonds.formed.is_some() || !self.bonds.is_empty()
+    }
+}
+
 /// The constant properties of the grains; each array has N entries, unless it says otherwise.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Grains {
@@ -63,7 +70,13 @@ pub struct Bonds {
     pub rolling: Vec<f64>,
     /// Mean diameter a_moy, m.
     pub mean_diameter: Vec<f64>,
+    /// The step after which a stage formed them, or [`NOT_FORMED`]; none if they are there from the
+    /// start.
+    pub formed: Option<i64>,
 }
+
+/// In place of a step: no stage has formed the bonds yet.
+pub const NOT_FORMED: i64 = -1;
 
 impl Bonds {
     /// The number of bonds B.

@@ -7,9 +7,9 @@ use std::path::Path;
 use hdf5::types::VarLenUnicode;
 
 use super::checkpoint::Checkpoint;
-use super::codes::{BondCode, BondStatus, ContactCode};
+use super::codes::ContactCode;
 use super::error::{HistoryError, Result, refused, while_reading};
-use super::model::{Bonds, ContactRows, GrainState, Grains, Layout, Parameters, RowCounts, Rupture, WallState};
+use super::model::{ContactRows, GrainState, Grains, Layout, Parameters, RowCounts, Rupture, WallState};
 use super::observed::{self, Series};
 use super::rupture::RuptureRow;
 use super::schema::path;
@@ -17,6 +17,8 @@ use super::sound::{self, Surroundings};
 use super::source::Source;
 use super::wall::{Wall, WallColumn, WallDriveCode, WallKindCode};
 use super::{checkpoint, lock};
+
+mod bonds;
 
 /// An open history, read-only. Only complete frames are visible. The file of a running or killed
 /// run opens as well and shows the frames that were complete at opening.
@@ -309,38 +311,6 @@ impl History {
         Ok(walls)
     }
 
-    /// The bonds as they were formed; empty for a scene without any.
-    ///
-    /// # Errors
-    /// [`HistoryError::Damaged`].
-    pub fn bonds(&self) -> Result<Bonds> {
-        if !self.source.has(path::BONDS) {
-            return Ok(Bonds::default());
-        }
-        let place = |name: &str| format!("{}/{name}", path::BONDS);
-        let pair = pairs(&self.source.whole::<i32>(&place("pair"), 2)?);
-        let unknown = |pair: &[i32; 2]| pair.iter().any(|grain| !(0..self.grains as i32).contains(grain));
-        if let Some(bond) = pair.iter().position(unknown) {
-            return Err(sound::row(
-                &self.source.path,
-                &place("pair"),
-                bond,
-                "a bond refers to a grain that does not exist",
-            ));
-        }
-        let column = |name: &str| self.source.column(&place(name), pair.len());
-        let bonds = Bonds {
-            rest_gap: column("rest_gap")?,
-            strength: column("strength")?,
-            friction: column("friction")?,
-            rolling: if self.source.has(&place("rolling")) { column("rolling")? } else { Vec::new() },
-            mean_diameter: column("mean_diameter")?,
-            pair,
-        };
-        sound::positive(&self.source.path, &place("mean_diameter"), &bonds.mean_diameter)?;
-        Ok(bonds)
-    }
-
     /// The grains at frame `frame`.
     ///
     /// # Errors
@@ -372,21 +342,6 @@ impl History {
         let column =
             |name: &str| self.frame_values(frame, &format!("{}/{name}", path::WALLS), self.walls * self.dimension);
         Ok(WallState { position: column("position")?, velocity: column("velocity")?, force: column("force")? })
-    }
-
-    /// The state of each bond at frame `frame`; empty for a scene without any.
-    ///
-    /// # Errors
-    /// [`HistoryError::NoFrame`], [`HistoryError::Damaged`].
-    pub fn bond_status(&self, frame: usize) -> Result<Vec<BondStatus>> {
-        self.check_frame(frame)?;
-        let place = format!("{}/status/value", path::BONDS);
-        if !self.source.has(path::BONDS) {
-            return Ok(vec![]);
-        }
-        let (_, codes) = self.source.read::<BondCode>(&place, frame..frame + 1)?;
-        let bonds = self.source.count(&format!("{}/pair", path::BONDS))?;
-        self.source.coded(&place, codes, bonds)
     }
 
     /// The rows of `/contacts` that belong to frame `frame`.
@@ -533,23 +488,6 @@ impl History {
         }
         sound::reals(&self.source.path, &place, frame, expected, &values)?;
         Ok(values)
-    }
-
-    /// The bond of each contact; empty without bonds.
-    fn bonds_in(&self, range: Range<usize>) -> Result<Vec<i32>> {
-        let place = format!("{}/bond", path::CONTACTS);
-        if !self.source.has(&place) {
-            return Ok(vec![]);
-        }
-        let bonds: Vec<i32> = self.source.read(&place, range.clone())?.1;
-        let known = self.source.count(&format!("{}/pair", path::BONDS))? as i32;
-        match bonds.iter().position(|bond| !(-1..known).contains(bond)) {
-            Some(k) => {
-                let why = format!("{} is not one of the {known} bonds", bonds[k]);
-                Err(sound::row(&self.source.path, &place, range.start + k, why))
-            }
-            None => Ok(bonds),
-        }
     }
 
     /// A column of the contacts; the length of a row is one of `widths`. Empty if the scene has no

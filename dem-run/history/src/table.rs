@@ -58,6 +58,27 @@ impl Table {
         Ok(Self { dataset, rows: 0, row: row.to_vec() })
     }
 
+    /// Creates an empty table of one value per bond and frame, whose rows may become longer.
+    pub fn of_bonds<T: H5Type>(group: &Group, name: &str, bonds: usize, storage: Storage) -> hdf5::Result<Self> {
+        let extents = SimpleExtents::from(vec![Extent::resizable(0), Extent::resizable(bonds)]);
+        let builder = group.new_dataset::<T>();
+        let builder = if storage.packed { builder.shuffle().deflate(DEFLATE).fletcher32() } else { builder };
+        let dataset = builder.shape(extents).chunk(vec![16, 512]).obj_track_times(false).create(name)?;
+        Ok(Self { dataset, rows: 0, row: vec![bonds] })
+    }
+
+    /// Makes the rows of a table of bonds `width` long; the new values of earlier rows are zero.
+    pub fn widen(&mut self, width: usize) -> hdf5::Result<()> {
+        self.row = vec![width];
+        self.dataset.resize(self.shape(self.rows))
+    }
+
+    /// Appends rows without values, of a table of bonds that have not formed.
+    pub fn append_empty(&mut self, count: usize) -> hdf5::Result<()> {
+        self.rows += count;
+        self.dataset.resize(self.shape(self.rows))
+    }
+
     /// A table of reals, in the precision of frames.
     pub fn reals(
         group: &Group,

@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 
 use super::*;
 
+mod cement;
+
 /// Three grains, two walls, two bonds, in `dimension` dimensions.
 fn full(dimension: usize) -> Layout {
     let wall = |name: &str, kind, drive, radius| Wall {
@@ -40,6 +42,7 @@ fn full(dimension: usize) -> Layout {
             friction: vec![0.3, 0.2],
             rolling: vec![0.1, 0.25],
             mean_diameter: vec![0.3, 0.5],
+            formed: None,
         },
         materials: vec!["base".into(), "pâte".into()],
         observables: vec![

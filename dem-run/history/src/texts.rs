@@ -30,7 +30,9 @@ impl Texts {
         File::open(path)?.take(HEAD).read_to_end(&mut head)?;
         let number = |at: usize| Some(u64::from_le_bytes(head.get(at..at + 8)?.try_into().ok()?));
         let mut texts = HashMap::new();
-        for start in (0..head.len()).step_by(8).filter(|start| head[*start..].starts_with(b"GCOL\x01\0\0\0")) {
+        // HDF5 aligns heaps to nothing
+        let heaps = head.windows(8).enumerate().filter(|(_, bytes)| *bytes == b"GCOL\x01\0\0\0");
+        for (start, _) in heaps {
             let end = number(start + 8).unwrap_or(0).saturating_add(start as u64);
             let mut at = start + 16;
             // less than a header at the end of a heap is unused
@@ -78,6 +80,24 @@ mod tests {
         file.extend([b'x'; 32]);
         file.extend([0xff; 64]);
         file
+    }
+
+    #[test]
+    fn a_heap_may_begin_at_any_byte() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("heap");
+        for start in 0..9u64 {
+            let mut file = vec![0; start as usize];
+            file.extend(heap(64));
+            // a reference: length, address, index
+            let reference = file.len() as u64;
+            file.extend(25u32.to_le_bytes());
+            file.extend(start.to_le_bytes());
+            file.extend(1u32.to_le_bytes());
+            std::fs::write(&path, file).expect("write");
+            let texts = Texts::find(&path).expect("read").expect("sound");
+            assert!(texts.hold(&path, reference, 1).expect("read"), "at byte {start}");
+        }
     }
 
     /// Less than 16 bytes at the end of a heap hold no header, so what follows is not read as one.

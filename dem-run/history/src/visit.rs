@@ -78,7 +78,9 @@ impl Extract {
 
     /// Ranges of rows, read in turn.
     pub fn ranges(&self) -> impl Iterator<Item = Range<usize>> + use<> {
-        let (rows, step) = (self.rows, (BLOCK / self.row_bytes.max(1)).max(1));
+        // rows without values: the bonds have not formed
+        let rows = if self.row_bytes == 0 { 0 } else { self.rows };
+        let step = (BLOCK / self.row_bytes.max(1)).max(1);
         (0..rows).step_by(step).map(move |start| start..rows.min(start + step))
     }
 
@@ -120,6 +122,9 @@ pub(super) struct Copy<'a, 'b> {
 
 impl Visit for Copy<'_, '_> {
     fn table<T: Stored>(&mut self, table: &mut Table, rows: usize) -> Result<()> {
+        if table.width() == 0 {
+            return table.append_empty(rows).map_err(while_writing(self.to));
+        }
         let extract = Extract::of(table, rows);
         for range in extract.ranges() {
             let bytes = range.len() * extract.row_bytes;

@@ -9,10 +9,10 @@ use dem_output::replace::{replace_synced, sync};
 
 use super::checkpoint::{Checkpoint, Slots};
 use super::codes::{BondCode, Coded};
-use super::create::{self, Column, Commit, ContactTables, Observables, check_length};
+use super::create::{self, BondTables, Column, Commit, ContactTables, Observables, check_length};
 use super::error::{HistoryError, Result, refused, while_writing};
 use super::lock;
-use super::model::{Frame, Layout, RowCounts, Rupture};
+use super::model::{Bonds, Frame, Layout, RowCounts, Rupture};
 use super::reader::History;
 use super::rupture::RuptureRow;
 use super::schema::{chunk_cache, path};
@@ -42,7 +42,7 @@ pub struct Writer {
     step: Table,
     time: Table,
     frame_columns: Vec<Column>,
-    bond_status: Option<Table>,
+    bond_tables: Option<BondTables>,
     contacts: ContactTables,
     ruptures: Option<Table>,
     rupture_block: Vec<RuptureRow>,
@@ -151,8 +151,8 @@ impl Writer {
         if !layout.walls.is_empty() {
             frame_columns.extend(create::wall_columns(&file, layout, storage)?);
         }
-        let bonded = !layout.bonds.is_empty();
-        let bond_status = if bonded { Some(create::bonds(&file, &layout.bonds, storage)?) } else { None };
+        let bonded = layout.bonded();
+        let bond_tables = if bonded { Some(BondTables::create(&file, &layout.bonds, storage)?) } else { None };
         let contacts = create::contacts(&file, layout, storage)?;
         let ruptures = if bonded {
             let events = file.create_group("events")?;
@@ -170,7 +170,7 @@ impl Writer {
             step,
             time,
             frame_columns,
-            bond_status,
+            bond_tables,
             contacts,
             ruptures,
             rupture_block: Vec::with_capacity(BLOCK),
@@ -190,7 +190,7 @@ impl Writer {
         visit.table::<i64>(&mut self.step, frames)?;
         visit.table::<f64>(&mut self.time, frames)?;
         self.frame_columns.iter_mut().try_for_each(|column| column.visit(frames, visit))?;
-        self.bond_status.iter_mut().try_for_each(|table| visit.table::<BondCode>(table, frames))?;
+        self.bond_tables.iter_mut().try_for_each(|bonds| visit.table::<BondCode>(&mut bonds.status, frames))?;
         self.contacts.visit(frames, kept.contacts, visit)?;
         self.ruptures.iter_mut().try_for_each(|table| visit.table::<RuptureRow>(table, kept.events))?;
         self.observables.visit(kept.steps, visit)?;
@@ -241,6 +241,23 @@ impl Writer {
         }
         self.write_frame(frame).map_err(while_writing(&self.path))?;
         self.keep_head().map_err(|error| refused(&self.path)("read", error))
+    }
+
+    /// Records the bonds that a stage formed after the step `bonds.formed`; later frames have them.
+    ///
+    /// # Errors
+    /// [`HistoryError::Shape`] where the layout has no place for them, or has bonds already, or
+    /// where the arrays differ in length; [`HistoryError::Write`] where the disk refuses.
+    pub fn bonds_formed(&mut self, bonds: &Bonds) -> Result<()> {
+        check_bonds(bonds)?;
+        check_length(path::BONDS, self.bonds, 0)?;
+        check_length("bonds/rolling", bonds.rolling.len(), bonds.len())?;
+        let (Some(tables), Some(formed)) = (&mut self.bond_tables, bonds.formed) else {
+            return Err(HistoryError::Shape { place: path::BONDS.into(), found: bonds.len(), expected: 0 });
+        };
+        self.bonds = bonds.len();
+        let written = tables.fill(bonds, formed).and_then(|()| self.file.flush());
+        written.map_err(while_writing(&self.path))
     }
 
     /// Records a bond that broke; visible with the next frame.
@@ -329,9 +346,13 @@ impl Writer {
         for column in &mut self.frame_columns {
             column.append(frame)?;
         }
-        if let Some(status) = &mut self.bond_status {
-            let codes: Vec<BondCode> = frame.bonds.iter().map(|bond| bond.code()).collect();
-            status.append(&codes)?;
+        match &mut self.bond_tables {
+            Some(bonds) if self.bonds == 0 => bonds.status.append_empty(1)?,
+            Some(bonds) => {
+                let codes: Vec<BondCode> = frame.bonds.iter().map(|bond| bond.code()).collect();
+                bonds.status.append(&codes)?;
+            }
+            None => {}
         }
         self.contacts.append(frame)?;
         self.observables.append()?;
@@ -374,7 +395,7 @@ impl Head {
 }
 
 fn check_layout(layout: &Layout) -> Result<()> {
-    let (grains, bonds) = (&layout.grains, &layout.bonds);
+    let grains = &layout.grains;
     let n = grains.id.len();
     check_length("dimension", layout.dimension, layout.dimension.clamp(2, 3))?;
     check_length("particles/grains/id", n, n.max(1))?;
@@ -386,6 +407,14 @@ fn check_layout(layout: &Layout) -> Result<()> {
         let most = grains.material.iter().max().map_or(0, |most| usize::from(*most) + 1);
         check_length("materials/name", layout.materials.len(), layout.materials.len().max(most))?;
     }
+    check_bonds(&layout.bonds)?;
+    for observable in &layout.observables {
+        check_length(&format!("observables/{}", observable.name), observable.width(), observable.width().max(1))?;
+    }
+    Ok(())
+}
+
+fn check_bonds(bonds: &Bonds) -> Result<()> {
     for (place, column) in [
         ("bonds/rest_gap", &bonds.rest_gap),
         ("bonds/strength", &bonds.strength),
@@ -396,9 +425,6 @@ fn check_layout(layout: &Layout) -> Result<()> {
     }
     if !bonds.rolling.is_empty() {
         check_length("bonds/rolling", bonds.rolling.len(), bonds.len())?;
-    }
-    for observable in &layout.observables {
-        check_length(&format!("observables/{}", observable.name), observable.width(), observable.width().max(1))?;
     }
     Ok(())
 }

@@ -73,7 +73,8 @@ pub struct Scene {
     pub stop: Option<Stop>,
 }
 
-/// Cohesive bonds, formed once, at the start, between all grains closer than `gap_tolerance`.
+/// Cohesive bonds, formed once, at the start or by a stage with `cement`, between all grains closer
+/// than `gap_tolerance`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Bonds {
@@ -307,6 +308,12 @@ impl Scene {
     pub fn driven_walls(&self) -> Vec<&str> {
         let driven = self.walls.iter().filter(|(name, wall)| !self.drives(name, wall).is_empty());
         driven.map(|(name, _)| name.as_str()).collect()
+    }
+
+    /// The stage at whose beginning the bonds form; none if they form at the start of the run.
+    #[must_use]
+    pub fn cement_stage(&self) -> Option<usize> {
+        self.stages.iter().position(|stage| stage.cement)
     }
 
     /// The drives that the stages give a wall, in order.

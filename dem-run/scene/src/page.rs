@@ -15,8 +15,16 @@ of the program, by `dem-run schema --markdown`; editors read the same from [scen
 Complete scenes are in [the gallery](gallery.md), commands in [running scenes](running.md).
 
 A run goes through these stages: the grains are packed, or placed as listed; walls that are `seated` move until they
-touch a grain; grains nearer than `bonds.gap_tolerance` are bonded; then the drives of the walls, gravity and the loads
-on grains act, from t = 0 on, until `time.end` or a condition of `stop`.
+touch a grain; grains nearer than `bonds.gap_tolerance` are bonded, unless a stage of loading has `cement`; then the
+drives of the walls, gravity and the loads on grains act, from t = 0 on, until `time.end` or a condition of `stop`.
+
+![A plane with its normal; a circle, sphere or cylinder outside the grains, seated; and one around
+them.](images/walls.svg)
+
+![The drives of a wall: velocity; force with a mass; stress on the section of the sample; a biaxial test; a slide across
+a stress; a grip.](images/drives.svg)
+
+*Walls and what drives them; [more in words](running.md#how-walls-load-a-sample). `scripts/draw_walls.py` draws both.*
 
 *One of* means one of the kinds listed: by its name alone where it stands in quotes, else as an object with that one
 name. `--set` names a field by its path, as in `--set bonds.strength=5` or `--set walls.top.force_rate=100`.

@@ -390,8 +390,8 @@ impl Document {
             match self.non_finite.get(&path) {
                 Some(literal) => overflow(&path, literal),
                 None => {
-                    let kinds = self.kinds::<T>(&path);
-                    explain(path, &error.into_inner().to_string(), &kinds)
+                    let (kinds, field) = (self.kinds::<T>(&path), self.first_field::<T>(&path));
+                    explain(path, &error.into_inner().to_string(), &kinds, field)
                 }
             }
         })
@@ -400,14 +400,25 @@ impl Document {
     /// The kinds allowed at `path`, from the message about an unknown kind; none where the path has
     /// no kind.
     fn kinds<T: DeserializeOwned>(&self, path: &str) -> Vec<String> {
-        let mut root = self.root.clone();
-        let Some(place) = root.pointer_mut(&format!("/{}", path.replace('.', "/"))) else { return Vec::new() };
-        *place = Value::String("?".into());
-        let told = T::deserialize(root).err().map_or(String::new(), |error| error.to_string());
+        let told = self.told_of::<T>(path, Value::String("?".into()));
         match told.strip_prefix("unknown variant `?`, ") {
             Some(expected) => quoted(expected).map(String::from).collect(),
             None => Vec::new(),
         }
+    }
+
+    /// The first required field of the object at `path`, from the message about an empty object.
+    fn first_field<T: DeserializeOwned>(&self, path: &str) -> Option<String> {
+        let told = self.told_of::<T>(path, Value::Object(Map::new()));
+        told.strip_prefix("missing field ").map(|field| field.trim_matches('`').to_string())
+    }
+
+    /// Serde's message if `value` stood at `path`; empty if it accepts it.
+    fn told_of<T: DeserializeOwned>(&self, path: &str, value: Value) -> String {
+        let mut root = self.root.clone();
+        let Some(place) = root.pointer_mut(&format!("/{}", path.replace('.', "/"))) else { return String::new() };
+        *place = value;
+        T::deserialize(root).err().map_or(String::new(), |error| error.to_string())
     }
 }
 
@@ -428,7 +439,7 @@ fn segment(segment: &Segment) -> Option<String> {
 pub(super) const REQUIRED: &str = "this field is required";
 
 /// Serde's message about the value at `path`, in the terms of a scene.
-fn explain(path: String, message: &str, kinds: &[String]) -> Problem {
+fn explain(path: String, message: &str, kinds: &[String], field: Option<String>) -> Problem {
     for start in ["unknown field ", "unknown variant "] {
         if let Some((wrong, expected)) = message.strip_prefix(start).and_then(|rest| rest.split_once(", ")) {
             return unknown_name(path, wrong.trim_matches('`'), expected);
@@ -444,7 +455,10 @@ fn explain(path: String, message: &str, kinds: &[String]) -> Problem {
                 Some(kind) if expected == "newtype variant" => {
                     format!("an object with its settings: {{ \"{kind}\": {{ … }} }}")
                 }
-                _ => plain_type(expected),
+                _ => match field.filter(|_| expected.contains("struct")) {
+                    Some(field) => format!("an object {{ \"{field}\": … }}"),
+                    None => plain_type(expected),
+                },
             };
             let which = if kinds.is_empty() { String::new() } else { format!("; the kinds are {}", kinds.join(", ")) };
             return Problem::new(path, found, allowed + &which);

@@ -24,6 +24,11 @@ pub struct Stage {
     /// comes later. The peak of the load is that of the stage.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub until: Option<Stop>,
+    /// Whether the bonds of `bonds` form at the beginning of this stage, between the grains that
+    /// are near enough then, instead of at the start of the run. A bond takes over the force of
+    /// its contact.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub cement: bool,
     /// Drives of walls from the beginning of the stage on, by the name of the wall. A wall that is
     /// not named keeps its drive.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]

@@ -16,8 +16,11 @@ pub mod trial;
 pub use options::AccuracyOptions;
 
 use crate::build::build;
+use crate::check;
 use crate::error::RunError;
 use crate::in_dimension;
+use crate::limit::{Limit, Loads};
+use crate::memory;
 use crate::output::Folder;
 use crate::progress::Progress;
 use crate::run::handle_signals;
@@ -33,6 +36,8 @@ use trial::{Outcome, Posed, Sample, SolverName, Trial, Variant, Way};
 
 /// Maximum number of contact problems sampled from a run for the profile.
 const MOST_PROBLEMS: usize = 50;
+/// Maximum number of grains of a sample whose limit load is computed.
+const MOST_LIMITED: usize = 5000;
 
 /// Measures the accuracy of a scene, prints the tables, and writes tables and pictures.
 ///
@@ -46,6 +51,9 @@ pub fn accuracy(scene: &Scene, options: &AccuracyOptions) -> Result<(), RunError
             "several walls are driven, {names}: name the one that loads the sample as load_wall in the scene, or with \
              --set load_wall=NAME"
         )));
+    }
+    if !options.ignore_memory {
+        memory::refuse_too_large(scene, check::count(scene)?)?;
     }
     let interrupt = handle_signals()?;
     let mut folder = Folder::create(options.folder.clone())?;
@@ -64,6 +72,12 @@ pub fn accuracy(scene: &Scene, options: &AccuracyOptions) -> Result<(), RunError
 }
 
 fn measure<D: Dim>(scene: &Scene, options: &AccuracyOptions, interrupt: &Interrupt) -> Result<Report, RunError> {
+    if let Some(stage) = scene.cement_stage() {
+        return Err(RunError::Usage(format!(
+            "stages.{stage} cements, and accuracy compares runs whose bonds form at the start: `--set \
+             stages.{stage}.cement=false`"
+        )));
+    }
     let mut progress = options.execution.show();
     let built = build::<D>(scene, None, &mut |done| {
         progress.phase("packing the sample", done);
@@ -76,6 +90,10 @@ fn measure<D: Dim>(scene: &Scene, options: &AccuracyOptions, interrupt: &Interru
     let meter = Meter::new(progress, interrupt, asked.ways().len() + varied + 1);
     let measuring = Measuring { scene, sample: &sample, asked: &asked, meter: &meter };
     let mut report = Report::new(scene, &asked, &sample);
+    if !sample.bonds.is_empty() && !interrupt.requested() {
+        meter.tell(0, "limit load", 0.0);
+        report.limit = Some(limit_of(scene, &sample).into());
+    }
     let posed = measuring.runs(&mut report);
     if varied > 0 && !interrupt.requested() {
         let threads = rayon::ThreadPoolBuilder::new().num_threads(options.execution.threads.unwrap_or(0)).build();
@@ -89,6 +107,17 @@ fn measure<D: Dim>(scene: &Scene, options: &AccuracyOptions, interrupt: &Interru
     report.interrupted = interrupt.requested();
     meter.finish();
     Ok(report)
+}
+
+/// The limit load of the sample, or why there is none.
+fn limit_of<D: Dim>(scene: &Scene, sample: &Sample<D>) -> Result<Limit, String> {
+    let grains = sample.grains.len();
+    if grains > MOST_LIMITED {
+        return Err(format!("not computed for more than {MOST_LIMITED} grains, here {grains}: see dem-run limit"));
+    }
+    let loads = Loads::of(scene).map_err(|error| error.to_string())?;
+    let (mut world, _) = sample.world(scene, Variant::AsGiven);
+    loads.limit(scene, &mut world).map_err(|error| error.to_string())
 }
 
 /// One progress bar over all runs, and the check for an interruption.

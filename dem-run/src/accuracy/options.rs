@@ -24,4 +24,6 @@ pub struct AccuracyOptions {
     pub execution: Execution,
     /// Whether stdout is JSON.
     pub json: bool,
+    /// Whether a scene is run although it needs more memory than is free.
+    pub ignore_memory: bool,
 }

@@ -4,6 +4,7 @@ use super::options::AccuracyOptions;
 use super::profile::Profile;
 use super::spread::{Spread, Varied, jaccard};
 use super::trial::{Outcome, Sample, SolverName, Way};
+use crate::limit::Limit;
 use crate::scene::Scene;
 use crate::scene::failure::in_one_piece;
 use dem_core::dim::Dim;
@@ -141,6 +142,25 @@ pub struct VariedRun {
     pub outcome: Outcome,
 }
 
+/// The limit load of the sample, or why there is none.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum LimitLoad {
+    /// What was found.
+    Found(Limit),
+    /// Why it is not known.
+    Missing {
+        /// The reason.
+        reason: String,
+    },
+}
+
+impl From<Result<Limit, String>> for LimitLoad {
+    fn from(found: Result<Limit, String>) -> Self {
+        found.map_or_else(|reason| Self::Missing { reason }, Self::Found)
+    }
+}
+
 /// Everything that was measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
@@ -168,6 +188,8 @@ pub struct Report {
     pub interrupted: bool,
     /// Index of the reference run; none if no run was completed.
     pub reference: Option<usize>,
+    /// The limit load; none for a sample without bonds.
+    pub limit: Option<LimitLoad>,
     /// The work–precision table.
     pub runs: Vec<Row>,
     /// The indeterminacy, if measured.
@@ -195,6 +217,7 @@ impl Report {
             asked: asked.clone(),
             interrupted: false,
             reference: None,
+            limit: None,
             runs: vec![],
             indeterminacy: None,
             profile: None,

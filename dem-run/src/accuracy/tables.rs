@@ -1,8 +1,9 @@
 //! The report as tables: as text on stdout, and as CSV.
 
-use super::report::{Indeterminacy, Report, Row};
+use super::report::{Indeterminacy, LimitLoad, Report, Row};
 use super::spread::MinMeanMax;
 use super::trial::{End, Outcome};
+use crate::limit::GrowingLoad;
 use crate::output::{Folder, Result, Text, cell, number, short};
 use crate::row;
 
@@ -14,6 +15,7 @@ pub fn text(report: &Report) -> String {
     if report.bonds > 0 {
         text += "\nResults of the runs for the sample\n\n";
         text += &failure(report);
+        text += &limit(report);
     }
     text += &notes(report);
     if let Some(indeterminacy) = &report.indeterminacy {
@@ -141,6 +143,30 @@ fn failure(report: &Report) -> String {
         table.row(cells);
     }
     table.lines()
+}
+
+/// The limit load in words, beside the first break of the reference.
+fn limit(report: &Report) -> String {
+    let words = match &report.limit {
+        None => return String::new(),
+        Some(LimitLoad::Missing { reason }) => return format!("\nno limit load: {reason}\n"),
+        Some(LimitLoad::Found(found)) => {
+            let own = |load: &&GrowingLoad| {
+                load.load.strip_prefix("walls.").is_some_and(|name| Some(name) == report.load_wall.as_deref())
+            };
+            let limit = found.loads.iter().find(own).and_then(|load| load.limit);
+            let first = report.reference.and_then(|k| report.runs[k].first_break());
+            match (limit, first) {
+                (Some(limit), Some(first)) => format!(
+                    "{} N, whatever solver, step and order; the first break of the reference is at {:.2} of it",
+                    number(limit),
+                    first / limit
+                ),
+                _ => found.in_words(),
+            }
+        }
+    };
+    format!("\nlimit load, at or below which the first bond breaks: {words}\n")
 }
 
 fn place_width(report: &Report) -> usize {

@@ -127,7 +127,7 @@ impl<D: Dim> Sample<D> {
     }
 
     /// A world at time zero, and for each of its bonds the number of that bond in the sample.
-    fn world(&self, scene: &Scene, variant: Variant) -> (World<D>, Vec<u32>) {
+    pub(super) fn world(&self, scene: &Scene, variant: Variant) -> (World<D>, Vec<u32>) {
         let mut world = World::new(self.grains.clone(), self.walls.clone(), self.loads.clone(), settings(scene));
         let mut numbers: Vec<u32> = (0..self.bonds.len() as u32).collect();
         world.bonds.clone_from(&self.bonds);
@@ -369,8 +369,10 @@ impl<D: Dim> Trial<'_, D> {
                     world.time
                 ));
             }
-            if let Some(ending) = state.course.advance(self.scene, &mut world) {
-                break End::Scene(ending);
+            match state.course.advance(self.scene, &mut world) {
+                Ok(None) => {}
+                Ok(Some(ending)) => break End::Scene(ending),
+                Err(error) => break End::Failed(error.to_string()),
             }
             let failed = |loads: &Collapse| loads.passed[1] && loads.failure.broken_share.is_some();
             if !self.whole && state.course.loads().is_some_and(failed) {

@@ -65,6 +65,16 @@ fn a_scene_s_accuracy_is_measured_twice_alike() {
     // the sample is rigid: Newton strains it by next to nothing
     assert!(of(3, "false_strain") < 1e-3 * of(1, "false_strain"));
 
+    // the limit load of the sample is that of `dem-run limit`, and no run breaks a bond above it
+    let scene = config("compression.json");
+    let limit = here.dem_run(&[&["limit", &scene, "--json", "--quiet"][..], &TINY].concat()).json();
+    assert_eq!(report["limit"], limit);
+    let load = number(&limit["loads"][0]["limit"]);
+    for run in runs {
+        // a step of 1e-4 s adds 0.02 N
+        assert!(number(&run["first_break"]["load"]) <= load + 0.02, "{load} N, {run}");
+    }
+
     let reference = report["reference"].as_u64().expect("a reference") as usize;
     assert_eq!(reference, 3, "the lowest tolerance and the lowest median residual");
     assert_eq!(of(reference, "jaccard"), 1.0);

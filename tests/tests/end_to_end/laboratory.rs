@@ -130,6 +130,109 @@ fn a_cemented_layer_in_a_shear_box_has_a_peak_and_a_residual_strength() {
     assert!(residual > 0.0 && residual < 0.7 * peak, "peak {peak} N, residual {residual} N");
 }
 
+/// The four side plates of a triaxial cell press with their stress on the section at the middle of
+/// each step: what the other walls leave free.
+#[test]
+fn the_side_plates_of_a_triaxial_test_hold_their_stress() {
+    let here = Folder::new();
+    let small = [
+        "sample.random.count=80",
+        "sample.random.width=0.009",
+        "sample.random.depth=0.009",
+        "sample.random.preparation.compaction.solid_fraction=0.45",
+        "time.end=0.02",
+    ];
+    let sets: Vec<&str> = small.iter().flat_map(|set| ["--set", set]).collect();
+    let summary = run(&here, &config("triaxial.json"), &sets);
+    assert_eq!((number(&summary["grains"]), &summary["load_wall"]), (80.0, &json!("top")));
+    let history = here.history("a.h5");
+    let h = 1e-4;
+    // positions at mid-step, from those of the steps: x + v h/2, before and after
+    let middle = |name: &str, axis: usize| {
+        let index = wall(&history, name);
+        let (mut at, mut speed) = (history.wall_state(0).expect("walls").position[3 * index + axis], 0.0);
+        let half = |place: &f64| {
+            let middle = at + 0.5 * h * speed;
+            speed = 2.0 * (place - middle) / h;
+            at = *place;
+            middle
+        };
+        series(&history, "wall_position", &[index, axis]).iter().map(half).collect::<Vec<f64>>()
+    };
+    let gap = |walls: [&str; 2], axis: usize| -> Vec<f64> {
+        middle(walls[0], axis).iter().zip(middle(walls[1], axis)).map(|(high, low)| high - low).collect()
+    };
+    let (wide, deep, high) = (gap(["right", "left"], 0), gap(["back", "front"], 1), gap(["top", "bottom"], 2));
+    for (name, across) in [("left", &deep), ("right", &deep), ("front", &wide), ("back", &wide)] {
+        let force = series(&history, "applied_force", &[wall(&history, name)]);
+        for k in 100..force.len() {
+            let expected = 50e3 * across[k] * high[k];
+            assert!((force[k] / expected - 1.0).abs() < 1e-6, "{name}, step {k}: {} N, not {expected} N", force[k]);
+        }
+    }
+    let (first, last) = (wide[100] * deep[100], wide[199] * deep[199]);
+    assert!(high[199] < high[100] && last != first, "the block has the section that it had");
+    here.dem_post(&["info", "a.h5", "--check"]).succeeds();
+}
+
+#[test]
+fn the_crack_of_a_notched_beam_starts_at_its_notch_and_a_deeper_notch_weakens_it() {
+    let here = Folder::new();
+    let mut peaks = vec![];
+    for depth in [3e-3, 6e-3, 9e-3] {
+        let set = format!("bonds.absent.0.box.to=[0.04, {depth}]");
+        let summary = run(&here, &config("notched-beam.json"), &["--set", &set]);
+        assert_eq!(summary["ending"], "load_drop");
+        peaks.push(number(&summary["peak_load"]));
+        // within two diameters of the tip, in a beam forty long
+        let first = &here.history("a.h5").ruptures().expect("ruptures")[0];
+        let [x, y, _] = first.point;
+        assert!((x - 0.04).abs() < 4e-3 && (y - depth).abs() < 4e-3, "{depth} m: first break at {x}, {y} m");
+    }
+    assert!(peaks[0] > peaks[1] && peaks[1] > peaks[2], "{peaks:?} N");
+}
+
+#[test]
+fn a_layer_is_pulled_off_at_a_weak_interface_and_breaks_itself_at_a_strong_one() {
+    let here = Folder::new();
+    // shares of the broken bonds that lie between the two materials
+    let [weak, strong] = [2.5e3, 2e4].map(|stress| {
+        let set = format!("materials.pairs.1.bonds.stress={stress}");
+        run(&here, &config("pull-off.json"), &["--set", &set]);
+        let history = here.history("a.h5");
+        assert_eq!(history.materials().expect("materials"), ["base", "mortar"]);
+        let material = history.grains().expect("grains").material;
+        let broken = history.ruptures().expect("ruptures");
+        let across = broken.iter().filter(|event| {
+            let [i, j] = event.pair.map(|grain| material[grain as usize]);
+            i != j
+        });
+        (across.count(), broken.len())
+    });
+    assert!(weak.0 == weak.1 && weak.1 > 10, "weak: {weak:?}");
+    assert!(2 * strong.0 < strong.1, "strong: {strong:?}");
+}
+
+#[test]
+fn scattered_strengths_lower_the_load_of_the_first_break_and_it_is_proportional_to_them() {
+    let here = Folder::new();
+    let small = [
+        "--set",
+        "sample.random.count=60",
+        "--set",
+        "sample.random.width=0.011",
+        "--set",
+        "sample.random.preparation.compaction.solid_fraction=0.7",
+    ];
+    let first = |set: &str| {
+        let summary = run(&here, &config("uniaxial-scatter.json"), &[&small[..], &["--set", set]].concat());
+        number(&summary["failure"]["first_break"])
+    };
+    let (whole, scattered, doubled) = (first("bonds.scatter=null"), first("seed=1"), first("bonds.strength=20"));
+    assert!(scattered < 0.9 * whole, "{scattered} N with scatter, {whole} N without");
+    assert!((doubled / scattered - 2.0).abs() < 1e-4, "{doubled} N against {scattered} N");
+}
+
 #[test]
 fn walls_that_need_grains_and_have_none_are_named_with_the_remedy() {
     let here = Folder::new();

@@ -3,6 +3,7 @@
 
 mod accuracy;
 mod bending;
+mod cement;
 mod collapse;
 mod common;
 mod compression;

@@ -1,7 +1,8 @@
 //! `rupture: next_event`: loading from break to break.
 
 use crate::common::{Folder, SMALL, config};
-use serde_json::Value;
+use dem_run::history::RuptureMode;
+use serde_json::{Value, json};
 use std::collections::BTreeSet;
 
 const NEXT: [&str; 6] = ["--set", "rupture=next_event", "--set", "stop=null", "--set", "output.every_steps=1"];
@@ -98,4 +99,46 @@ fn a_history_in_which_bonds_break_at_the_end_of_a_step_is_sound() {
     let sets = ["--set", "rupture=end_of_step", "--set", "output.every_steps=1"];
     here.dem_run(&[&["run", &config("two-grains.json"), "-o", "run.h5", "-q"][..], &sets].concat()).succeeds();
     here.dem_post(&["info", "--check", "run.h5"]).succeeds();
+}
+
+/// A row of touching grains of radius 2 mm along x, the first one fixed, the last one pressed with
+/// a constant force (N) and pushed sideways ever harder, without a moment on its bond.
+fn row(grains: usize, press: f64) -> Value {
+    let last = grains - 1;
+    let centers: Vec<Value> = (0..grains).map(|k| json!({ "center": [4e-3 * k as f64, 0.0], "radius": 2e-3 })).collect();
+    json!({
+        "dimension": 2,
+        "thickness": 0.01,
+        "sample": { "grains": centers },
+        "materials": { "density": 2500, "friction": { "grain_grain": 0.3, "grain_wall": 0.2 } },
+        "bonds": { "strength": 10, "gap_tolerance": 1e-3 },
+        "grains": { "fixed": [0], "loads": [
+            { "grain": last, "force": [-press, 0] },
+            { "grain": last, "force": [0, 1], "torque": [-2e-3], "time": { "ramp": { "rate": 100 } } },
+        ] },
+        "rupture": "next_event",
+        "time": { "step": 1e-3, "end": 1 },
+        "output": { "every_steps": 1 },
+        "stop": { "broken_fraction": 1.0 / last as f64 },
+    })
+}
+
+/// Under five normal forces, one of them a pull, a bond breaks on its cone: in shear at T = μ (N +
+/// r_coh). In a row of five grains the bond at the fixed end has an arm of three diameters: it
+/// breaks by rolling at 3 a T = ν a (N + r_coh).
+#[test]
+fn the_failure_envelope_of_a_bond_is_its_cone() {
+    let here = Folder::new();
+    for (grains, slope, mode) in [(2, 0.3, RuptureMode::Shear), (5, 0.1, RuptureMode::Rolling)] {
+        for press in [-8.0, 0.0, 5.0, 20.0, 50.0] {
+            here.write("row.json", row(grains, press).to_string());
+            here.dem_run(&["run", "row.json", "-o", "row.h5", "--force", "--quiet"]).succeeds();
+            let ruptures = here.history("row.h5").ruptures().expect("ruptures");
+            let [first] = &ruptures[..] else { panic!("{ruptures:?}") };
+            assert_eq!((first.mode, first.bond), (mode, 0));
+            assert!((first.normal_force - press).abs() < 1e-6, "{first:?}");
+            let expected = slope * (press + 10.0);
+            assert!((first.tangential_force.abs() / expected - 1.0).abs() < 1e-6, "{expected} N, {first:?}");
+        }
+    }
 }

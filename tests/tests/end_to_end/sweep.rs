@@ -300,12 +300,14 @@ fn wrong_sweeps_are_refused_before_anything_is_written() {
 fn the_sweeps_of_the_paper_s_questions_are_right() {
     let here = Folder::new();
     for (name, runs) in [
+        ("sweep-biaxial.json", 25),
         ("sweep-brazilian.json", 20),
         ("sweep-cohesion.json", 30),
         ("sweep-cohesion-fixed-ramp.json", 30),
         ("sweep-rate.json", 12),
         ("sweep-size.json", 12),
         ("sweep-friction.json", 15),
+        ("sweep-scatter.json", 160),
     ] {
         let check = here.dem_run(&["sweep", &config(name), "--check", "--json"]).json();
         assert_eq!(check["runs"].as_array().map(Vec::len), Some(runs), "{name}");

@@ -274,12 +274,18 @@ fn a_scene_has_an_end() {
 fn a_scene_too_large_for_the_memory_is_refused() {
     let here = Folder::new();
     let sets = r#"--set 'sample={"lattice": {"square": {"diameter": 1e-3, "rows": 3000, "columns": 3000}}}'"#;
-    let within = |command: &str| {
-        let line =
-            format!("ulimit -v 1000000; exec {:?} {command} {:?} {sets}", program("dem-run"), config("column.json"));
+    let within_of = |command: &str, scene: &str| {
+        let line = format!("ulimit -v 1000000; exec {:?} {command} {:?} {sets}", program("dem-run"), config(scene));
         Command::new("sh").args(["-c", &line]).current_dir(here.path("")).output().expect("sh")
     };
+    let within = |command: &str| within_of(command, "column.json");
     let told = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
+    for (command, scene) in [("limit", "compression.json"), ("accuracy", "column.json")] {
+        let refused = within_of(command, scene);
+        assert_eq!(refused.status.code(), Some(4), "{command}");
+        let error = told(refused.stderr);
+        assert!(error.contains("9000000 grains need about") && error.contains("--ignore-memory"), "{command}: {error}");
+    }
     let run = within("run");
     assert_eq!(run.status.code(), Some(4));
     let error = told(run.stderr);

@@ -48,6 +48,29 @@ fn what_a_stage_asks_of_a_wall_is_checked_at_the_wall() {
 }
 
 #[test]
+fn bonds_form_once_at_the_start_or_in_one_later_stage() {
+    let stages = |cement: [bool; 3]| {
+        let stage = |(k, cement): (usize, &bool)| format!(r#"{{"name": "{k}", "duration": 0.1, "cement": {cement}}}"#);
+        format!("[{}]", cement.iter().enumerate().map(stage).collect::<Vec<_>>().join(", "))
+    };
+    let scene = staged(&stages([false, true, false]), &[]).expect("right");
+    assert_eq!(scene.cement_stage(), Some(1));
+    assert_eq!(read(&scene.to_json().expect("json"), &[]).expect("the same scene"), scene);
+    assert_eq!(staged(&stages([false; 3]), &[]).expect("right").cement_stage(), None);
+    for (cement, sets, path, remedy) in [
+        ([true, false, false], &[][..], "stages.0.cement", "bonds form at the start of the run"),
+        ([false, true, true], &[], "stages.2.cement", "one stage that cements, now 1"),
+        ([false, true, false], &["bonds.strength=0"], "stages.1.cement", "add `bonds`"),
+        ([false, true, false], &["bonds=null"], "stages.1.cement", "add `bonds`"),
+        ([false, true, false], &["bonds.list=a.csv"], "stages.1.cement", "bonds by gap_tolerance"),
+    ] {
+        let problem = only(staged(&stages(cement), sets));
+        assert_eq!(problem.path, path);
+        assert!(problem.allowed.contains(remedy), "{}", problem.allowed);
+    }
+}
+
+#[test]
 fn nothing_slides_and_no_stage_begins_from_break_to_break() {
     let still = ["walls.roller.velocity=null", "walls.roller.direction=null", "rupture=next_event", "solver={}"];
     let slide = r#"walls.top.slide={"direction": [1, 0], "velocity": {"constant": 1}}"#;

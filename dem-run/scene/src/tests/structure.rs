@@ -113,6 +113,8 @@ fn a_wrong_type_says_what_stood_there_and_what_is_allowed() {
     }
     assert_eq!(only(read("[]", &[])).path, "");
     assert_eq!(only(read("2", &[])).allowed, "an object { … }");
+    let file = only(read(FLAT, &["sample={\"file\": \"beam.csv\"}"]));
+    assert_eq!((&*file.path, &*file.allowed), ("sample.file", "an object { \"path\": … }"));
 }
 
 #[test]

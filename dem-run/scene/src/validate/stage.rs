@@ -30,9 +30,32 @@ pub(super) fn check(report: &mut Report, scene: &Scene, stop: impl Fn(&mut Repor
         if let Some(until) = &stage.until {
             stop(report, scene, &format!("{path}.until"), until);
         }
+        if stage.cement {
+            cement(report, scene, k, &format!("{path}.cement"));
+        }
         for (name, drive) in &stage.walls {
             stage_drive(report, scene, &format!("{path}.walls.{name}"), name, drive);
         }
+    }
+}
+
+/// Bonds form once, in a stage as at the start.
+fn cement(report: &mut Report, scene: &Scene, stage: usize, path: &str) {
+    let mut refuse = |found: &str, allowed: &str| report.wrong(path, found, allowed);
+    if stage == 0 {
+        refuse("the first stage cements", "nothing: bonds form at the start of the run");
+    } else if let Some(first) = scene.stages[..stage].iter().position(|other| other.cement) {
+        let allowed = format!("one stage that cements, now {first}: bonds form once");
+        refuse("a second stage that cements", &allowed);
+    }
+    if !scene.has_bonds() {
+        refuse("a stage that cements, in a scene without bonds", "bonds with a strength: add `bonds`");
+    }
+    if scene.bonds.as_ref().is_some_and(|bonds| bonds.list.is_some()) {
+        refuse(
+            "a stage that cements, with bonds.list",
+            "bonds by gap_tolerance: the places of grains change until then",
+        );
     }
 }
 
