@@ -1,4 +1,6 @@
-//! Ranges of numbers, and the box around all grains.
+//! Ranges of numbers, volumes of grains, and the box around all grains.
+
+use std::f64::consts::PI;
 
 use dem_history::History;
 
@@ -7,6 +9,11 @@ use crate::output::Result;
 /// The least and the greatest of some numbers; infinite, the least above the greatest, without any.
 pub fn range(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
     values.into_iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
+}
+
+/// Area of a disk (m², 2D) or volume of a sphere (m³, 3D) of this radius (m).
+pub fn volume(dimension: usize, radius: f64) -> f64 {
+    if dimension == 2 { PI * radius * radius } else { 4.0 / 3.0 * PI * radius.powi(3) }
 }
 
 /// The box around all grains at the first frame, m: its ends along each axis.

@@ -1,10 +1,10 @@
 //! Fragments: the pieces of a sample joined by intact bonds.
 
-use std::f64::consts::PI;
-
 use dem_history::{BondStatus, Bonds, Grains};
 use petgraph::unionfind::UnionFind;
 use serde::Serialize;
+
+use crate::extent::volume;
 
 /// The pieces at one moment. A grain without an intact bond is a piece of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -72,7 +72,7 @@ pub fn fragment_list(sample: &Grains, position: &[f64], bonds: &Bonds, status: &
         let (mass, radius) = (sample.mass[grain], sample.radius[grain]);
         fragment.grains.push(grain);
         fragment.mass += mass;
-        fragment.filled += if dimension == 2 { PI * radius.powi(2) } else { 4.0 / 3.0 * PI * radius.powi(3) };
+        fragment.filled += volume(dimension, radius);
         for (sum, x) in fragment.centre.iter_mut().zip(&position[grain * dimension..]) {
             *sum += mass * x;
         }
@@ -126,6 +126,6 @@ mod tests {
         assert_eq!(grains, [&[4, 5][..], &[0, 1, 2, 3], &[6]]);
         assert_eq!((list[0].mass, list[0].centre.clone()), (40.0, vec![0.0, 0.0, 3.0]));
         assert_eq!(list[1].centre, [1.5, 0.0, 0.0]);
-        assert!((list[1].filled / (4.0 * 4.0 / 3.0 * PI * 8.0) - 1.0).abs() < 1e-12);
+        assert!((list[1].filled / (4.0 * 4.0 / 3.0 * std::f64::consts::PI * 8.0) - 1.0).abs() < 1e-12);
     }
 }

@@ -96,8 +96,8 @@ impl<D: Dim> World<D> {
         }
     }
 
-    /// The equilibrium between the time and the excess `low` and the equilibrium `above` at which the
-    /// first bond is at its limit; where the reactions jump, the first one beyond the limit.
+    /// The equilibrium at which the first bond is at its limit, between the time and the excess
+    /// `low` and the equilibrium `above`; where the reactions jump, the first one beyond the limit.
     fn bisect(
         &mut self,
         mut low: (f64, f64),

@@ -2,6 +2,7 @@
 
 use dem_history::{ContactRows, History};
 
+use crate::extent::volume;
 use crate::output::Result;
 
 /// A symmetric 2 × 2 or 3 × 3 tensor, by rows; in 2D the third row and column are zero.
@@ -33,9 +34,7 @@ pub fn grain_stress(
                 continue;
             };
             let arm = |k: usize| if k < d { point[k] - position[grain * d + k] } else { 0.0 };
-            let r = radius[grain];
-            let pi = std::f64::consts::PI;
-            let volume = if d == 2 { pi * r * r * thickness } else { 4.0 / 3.0 * pi * r.powi(3) };
+            let volume = volume(d, radius[grain]) * if d == 2 { thickness } else { 1.0 };
             for (a, row) in stress[grain].iter_mut().enumerate() {
                 for (b, entry) in row.iter_mut().enumerate() {
                     *entry -= sign * 0.5 * (force[a] * arm(b) + force[b] * arm(a)) / volume;

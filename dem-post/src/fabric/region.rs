@@ -2,6 +2,8 @@
 
 use std::f64::consts::PI;
 
+use crate::extent::volume;
+
 /// Diameter of the region over the least extent of the sample: walls may move by a tenth of it on
 /// each side before they enter the region.
 const SHARE: f64 = 0.8;
@@ -31,8 +33,7 @@ impl Region {
             common(d, distance, self.radius, *r)
         };
         let filled: f64 = position.chunks(d).zip(radius).map(common).sum();
-        let whole = if d == 2 { PI * self.radius.powi(2) } else { 4.0 / 3.0 * PI * self.radius.powi(3) };
-        1.0 - filled / whole
+        1.0 - filled / volume(d, self.radius)
     }
 }
 
@@ -43,7 +44,7 @@ fn common(dimension: usize, distance: f64, a: f64, b: f64) -> f64 {
     }
     let small = a.min(b);
     if distance <= (a - b).abs() {
-        return if dimension == 2 { PI * small * small } else { 4.0 / 3.0 * PI * small.powi(3) };
+        return volume(dimension, small);
     }
     // distance of the common chord, or plane, from each centre
     let of_a = (distance * distance + a * a - b * b) / (2.0 * distance);

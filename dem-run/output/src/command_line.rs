@@ -36,7 +36,7 @@ pub struct Man {
 }
 
 const MAN_EXAMPLE: &str = "\
-Examples:
+For dem-run (dem-post alike):
   dem-run man | man -l -
   dem-run man ~/.local/share/man/man1 && man dem-run-run";
 

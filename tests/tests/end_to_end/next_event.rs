@@ -105,7 +105,8 @@ fn a_history_in_which_bonds_break_at_the_end_of_a_step_is_sound() {
 /// a constant force (N) and pushed sideways ever harder, without a moment on its bond.
 fn row(grains: usize, press: f64) -> Value {
     let last = grains - 1;
-    let centers: Vec<Value> = (0..grains).map(|k| json!({ "center": [4e-3 * k as f64, 0.0], "radius": 2e-3 })).collect();
+    let centers: Vec<Value> =
+        (0..grains).map(|k| json!({ "center": [4e-3 * k as f64, 0.0], "radius": 2e-3 })).collect();
     json!({
         "dimension": 2,
         "thickness": 0.01,

@@ -301,6 +301,7 @@ fn the_sweeps_of_the_paper_s_questions_are_right() {
     let here = Folder::new();
     for (name, runs) in [
         ("sweep-biaxial.json", 25),
+        ("sweep-triaxial.json", 9),
         ("sweep-brazilian.json", 20),
         ("sweep-cohesion.json", 30),
         ("sweep-cohesion-fixed-ramp.json", 30),

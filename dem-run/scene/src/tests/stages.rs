@@ -60,8 +60,8 @@ fn bonds_form_once_at_the_start_or_in_one_later_stage() {
     for (cement, sets, path, remedy) in [
         ([true, false, false], &[][..], "stages.0.cement", "bonds form at the start of the run"),
         ([false, true, true], &[], "stages.2.cement", "one stage that cements, now 1"),
-        ([false, true, false], &["bonds.strength=0"], "stages.1.cement", "add `bonds`"),
-        ([false, true, false], &["bonds=null"], "stages.1.cement", "add `bonds`"),
+        ([false, true, false], &["bonds.strength=0", "stop=null"], "stages.1.cement", "add `bonds`"),
+        ([false, true, false], &["bonds=null", "stop=null"], "stages.1.cement", "add `bonds`"),
         ([false, true, false], &["bonds.list=a.csv"], "stages.1.cement", "bonds by gap_tolerance"),
     ] {
         let problem = only(staged(&stages(cement), sets));
