@@ -94,7 +94,12 @@ impl Files {
     /// [`crate::output::PostError::Write`] for a folder that cannot be created, or that belongs to
     /// another history.
     pub fn folder(&self, history: &History, command: &str) -> Result<Option<Folder>> {
-        let suffix = if command == "frames" { "-frames" } else { "-post" };
+        // commands that write a file a frame have a folder of their own
+        let suffix = match command {
+            "frames" => "-frames",
+            "view vtp" => "-vtp",
+            _ => "-post",
+        };
         let path = self.output.clone().unwrap_or_else(|| default_folder(&self.history, suffix));
         Ok(Some(Folder::of(path, command, vec![source(history)?], self.force)?))
     }

@@ -145,11 +145,14 @@ def test_the_page_tells_every_dataset(folder, space, dimension):
         # hard links are visited once
         for name in history["contacts"]:
             seen.add(f"/contacts/{name}")
-        absent = {2: {"/particles/grains/orientation", "/contacts/tangent"}, 3: {"/particles/grains/angle"}}[dimension]
+        flat = {"/particles/grains/orientation", "/contacts/tangent", "/quaternion", "/moment_component"}
+        absent = {2: flat, 3: {"/particles/grains/angle"}}[dimension]
         # these scenes have one coefficient for shear and rolling
         absent |= {"/bonds/rolling"}
         # and one material
-        absent |= {"/particles/grains/material", "/materials/name"}
+        absent |= {"/particles/grains/material", "/materials/name", "/material"}
+        # and bonds from the start
+        absent |= {"/bonds/formed", "/stage"}
         elastic = {"elastic_energy", "dissipation_damping", "fracture_energy"}
         places = {place for place in rows if place.startswith("/")}
         assert places - seen == absent

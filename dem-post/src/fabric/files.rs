@@ -26,7 +26,7 @@ pub fn write(report: &Report, folder: &mut Folder) -> Result<()> {
     head.push("crack_area_per_m".into());
     let rows = report.rows.iter().map(|row| {
         let of = |tensor: &Option<Vec<f64>>, k: usize| cell(tensor.as_ref().map(|tensor| tensor[k]));
-        let mut cells = vec![row.step.to_string(), row.time.to_string()];
+        let mut cells = vec![row.step.to_string(), cell(Some(row.time))];
         cells.extend(entries.iter().map(|(k, _)| of(&row.stress, *k)));
         cells.extend([row.p, row.q, row.volumetric_strain, Some(row.porosity)].map(cell));
         cells.extend([row.contacts.map_or_else(String::new, |n| n.to_string()), cell(row.coordination)]);

@@ -7,15 +7,23 @@ use dem_history::History;
 use super::companion::{Companion, Fault, relative};
 use super::outline::Outline;
 use super::report::{NAMES, Report};
-use super::{h5md, vtk};
+use super::{Format, dump, h5md, vtk, vtp};
 use crate::output::{Folder, PostError, Result, WriteError, progress};
 
-/// Writes the companions into `folder`, and their lengths into the report.
+/// Writes the files into `folder`, and their lengths into the report.
 ///
 /// # Errors
 /// [`PostError::Write`], [`PostError::Usage`] for a history that has the name of a companion, and
 /// those of reading it.
 pub fn write(history: &History, report: &mut Report, folder: &mut Folder, quiet: bool) -> Result<()> {
+    match report.format {
+        Format::Vtkhdf => companions(history, report, folder, quiet),
+        Format::Vtp => vtp::write(history, report, folder, quiet),
+        Format::Lammps => dump::write(history, report, folder, quiet),
+    }
+}
+
+fn companions(history: &History, report: &mut Report, folder: &mut Folder, quiet: bool) -> Result<()> {
     let absolute = |path: &Path| path.canonicalize().map_err(|error| failed(path, &error));
     let source = absolute(history.path())?;
     let home = absolute(folder.path())?;

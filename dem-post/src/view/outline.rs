@@ -18,6 +18,11 @@ pub(super) struct Outline {
     pub starts: Vec<i64>,
     pub counts: Vec<i64>,
     pub at_walls: Vec<i64>,
+    /// Rows of a reaction and of a moment; 0 where the history has none.
+    pub reaction_rows: usize,
+    pub moment_rows: usize,
+    /// Whether contacts have a tangent of their own.
+    pub tangents: bool,
 }
 
 impl Outline {
@@ -40,6 +45,16 @@ impl Outline {
             outline.rows = outline.rows.max(rows.end);
         }
         bar.finish_and_clear();
+        let (layout, d) = (history.layout()?, outline.dimension);
+        if !layout.without_reactions {
+            outline.reaction_rows = if layout.friction { d } else { 1 };
+            outline.moment_rows = match (outline.bonds, d) {
+                (0, _) => 0,
+                (_, 2) => 1,
+                _ => 2 + usize::from(layout.twist),
+            };
+            outline.tangents = d == 3 && layout.friction;
+        }
         Ok(outline)
     }
 

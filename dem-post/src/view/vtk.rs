@@ -137,6 +137,7 @@ pub(super) fn grains(companion: &Companion, o: &Outline) -> hdf5::Result<()> {
     for (name, place) in [("id", "particles/grains/id"), ("radius", RADIUS), ("mass", "particles/grains/mass")] {
         data.still(name, place)?;
     }
+    data.still("material", "particles/grains/material")?;
     data.moving::<f64>("velocity", VELOCITY, first(&[t, n, d]), &Rows::vectors(t * n, d))?;
     // in 2D a grain turns about z
     let (spin, axes) = if d == 2 { (first(&[t, n]), 2..3) } else { (first(&[t, n, 3]), 0..3) };

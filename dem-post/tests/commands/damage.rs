@@ -67,7 +67,9 @@ fn datasets(group: &hdf5::Group, seen: &mut Vec<String>) -> Vec<String> {
         // checkpoint slots have a checksum; texts are not numbers
         let name = dataset.name().trim_start_matches('/').to_string();
         let text = matches!(dataset.dtype().unwrap().to_descriptor(), Ok(TypeDescriptor::VarLenUnicode));
-        if !seen.contains(&token) && !text && !name.starts_with("checkpoint/") && dataset.size() > 0 {
+        // the names of axes have no values
+        let values = dataset.size() > 0 && dataset.storage_size() > 0;
+        if !seen.contains(&token) && !text && !name.starts_with("checkpoint/") && values {
             found.push(name);
         }
         seen.push(token);
@@ -108,7 +110,7 @@ fn reads(good: &Path) -> Vec<Command<'_>> {
             let runs = [good.to_path_buf(), h.path().to_path_buf()];
             envelope::read(&runs, strength::Measure::Broken, None).map(|report| drop(report.table()))
         }),
-        command("view", |h, _| view::read(h, true).map(|report| drop(report.table()))),
+        command("view", |h, _| view::read(h, view::Format::Vtkhdf, true).map(|report| drop(report.table()))),
         command("pack", |h, folder| pack::write(h, &folder.path().join("packed.h5"), CopyAs::Packed, true).map(drop)),
     ]
 }
@@ -133,7 +135,11 @@ fn writes(good: &Path) -> Vec<Command<'_>> {
             let runs = [good.to_path_buf(), h.path().to_path_buf()];
             envelope::write(&envelope::read(&runs, strength::Measure::Broken, None)?, folder)
         }),
-        command("view", |h, folder| view::write(h, &mut view::read(h, true)?, folder, true)),
+        command("view", |h, folder| view::write(h, &mut view::read(h, view::Format::Vtkhdf, true)?, folder, true)),
+        command("view vtp", |h, folder| view::write(h, &mut view::read(h, view::Format::Vtp, true)?, folder, true)),
+        command("view lammps", |h, folder| {
+            view::write(h, &mut view::read(h, view::Format::Lammps, true)?, folder, true)
+        }),
     ]
 }
 

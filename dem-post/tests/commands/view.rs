@@ -212,3 +212,29 @@ fn histories_that_viewers_cannot_open_are_refused() {
     assert_eq!(std::fs::read(&named).unwrap(), before);
     refused(&dem_post(&named, &["view", "-o", "run.h5"]), 4, &["run.h5"]);
 }
+
+#[test]
+fn copies_need_no_closed_file_and_keep_the_files_of_other_formats() {
+    let folder = tempfile::tempdir().unwrap();
+    let open = folder.path().join("open.h5");
+    let _writer = falling(&open, 2);
+    for (format, files) in [("vtp", 3), ("lammps", 1)] {
+        let output = dem_post(&open, &["view", "--format", format, "-o", "post", "--json"]);
+        let found = json(&output);
+        let written = found["companions"].as_array().unwrap();
+        assert_eq!(written.len(), 1, "{found}");
+        let bytes: u64 = names(&folder.path().join("post"))
+            .iter()
+            .filter(|name| name.ends_with("dump") == (format == "lammps"))
+            .map(|name| std::fs::metadata(folder.path().join("post").join(name)).unwrap().len())
+            .sum();
+        assert_eq!(written[0]["bytes"], bytes);
+        assert_eq!(names(&folder.path().join("post")).len(), if format == "vtp" { files } else { files + 3 });
+    }
+    // the default folders
+    dem_post(&open, &["view", "--format", "vtp"]);
+    dem_post(&open, &["view", "--format", "lammps"]);
+    assert!(folder.path().join("open-vtp/grains.pvd").exists() && folder.path().join("open-post/grains.dump").exists());
+    let output = dem_post(&open, &["view", "--format", "xyz"]);
+    refused(&output, 2, &["xyz", "vtkhdf, vtp, lammps"]);
+}

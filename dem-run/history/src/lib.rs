@@ -51,6 +51,7 @@
 //!     solver_route         the same, enum EXTRAPOLATION, ACTIVE_SET, INTERIOR_POINT, SWEEPS
 //! /parameters/             scene (the JSON as run); attributes schema_version, seed, version,
 //!                          git_revision, build, host, start; solid_fraction, if packed
+//! /grain, axis, wall, …    names of the axes of datasets, without values (`dimensions.rs`)
 //! ```
 //!
 //! **Writing.** All objects are created first; then the file switches to HDF5's single-writer mode.
@@ -71,6 +72,7 @@ mod checkpoint;
 mod codes;
 mod copy;
 mod create;
+mod dimensions;
 mod error;
 mod lock;
 mod model;

@@ -11,7 +11,6 @@ use super::checkpoint::{Checkpoint, Slots};
 use super::codes::{BondCode, Coded};
 use super::create::{self, BondTables, Column, Commit, ContactTables, Observables, check_length};
 use super::error::{HistoryError, Result, refused, while_writing};
-use super::lock;
 use super::model::{Bonds, Frame, Layout, RowCounts, Rupture};
 use super::reader::History;
 use super::rupture::RuptureRow;
@@ -19,6 +18,7 @@ use super::schema::{chunk_cache, path};
 use super::source::{Source, end_of_file};
 use super::table::{Growth, Storage, Table};
 use super::visit::{Bytes, Copy, Share, Visit};
+use super::{dimensions, lock};
 
 /// Steps of observables, and ruptures, that are held in memory before they are appended.
 const BLOCK: usize = 256;
@@ -163,6 +163,7 @@ impl Writer {
         let observables = create::observables(&file, &layout.observables, storage)?;
         let commit = create::commit(&file, bonded, storage)?;
         let slots = Slots::create(&file, storage)?;
+        dimensions::label(&file)?;
         Ok(Self {
             path: path.into(),
             dimension: layout.dimension,
