@@ -130,6 +130,8 @@ fn resume_in<D: Dim>(
         ))?);
     }
     let kept = kept(history, scene, &checkpoint)?;
+    // read before the new history takes the place of the old one
+    let solid_fraction = history.parameters()?.solid_fraction;
     let cpu_time = history.observable("cpu_time")?.map_or(vec![], |series| series.value);
     let cpu_before = kept.steps.checked_sub(1).and_then(|last| cpu_time.get(last)).copied().unwrap_or(0.0);
     refuse_full_disk(history)?;
@@ -146,14 +148,7 @@ fn resume_in<D: Dim>(
         error => error.into(),
     })?;
     // idle walls are not reported: the earlier forces on the walls are unknown
-    let mut run = Run {
-        scene,
-        state,
-        recorder,
-        solid_fraction: history.parameters()?.solid_fraction,
-        preparation_time: None,
-        idle: vec![],
-    };
+    let mut run = Run { scene, state, recorder, solid_fraction, preparation_time: None, idle: vec![] };
     let outcome = run.step_on(interrupt, &mut progress);
     run.conclude(path, outcome, options.json, progress)
 }

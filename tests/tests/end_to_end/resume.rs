@@ -185,6 +185,16 @@ fn a_finished_run_goes_on_to_a_later_end() {
     assert!(summary["solid_fraction"].as_f64().expect("a fraction") > 0.5);
 }
 
+/// The new history replaces the old one, in which texts have other places.
+#[test]
+fn the_text_of_the_scene_may_become_longer() {
+    let here = Folder::new();
+    run(&here, "long.h5", &["--set", "time.end=0.0205", "--quiet"]);
+    run(&here, "short.h5", &["--set", "time.end=0.02", "--quiet"]);
+    here.dem_run(&["resume", "short.h5", "--until", "0.0205", "--quiet"]).succeeds();
+    same(&here.history("long.h5"), &here.history("short.h5"));
+}
+
 #[test]
 fn a_run_goes_on_with_the_observables_that_its_history_has() {
     let here = Folder::new();

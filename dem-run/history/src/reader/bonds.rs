@@ -13,7 +13,7 @@ impl History {
     /// The bonds as they were formed; empty for a scene without any.
     ///
     /// # Errors
-    /// [`HistoryError::Damaged`].
+    /// [`HistoryError::Damaged`](crate::HistoryError::Damaged).
     pub fn bonds(&self) -> Result<Bonds> {
         if !self.source.has(path::BONDS) {
             return Ok(Bonds::default());
@@ -60,7 +60,8 @@ impl History {
     /// before a stage forms them.
     ///
     /// # Errors
-    /// [`HistoryError::NoFrame`], [`HistoryError::Damaged`].
+    /// [`HistoryError::NoFrame`](crate::HistoryError::NoFrame),
+    /// [`HistoryError::Damaged`](crate::HistoryError::Damaged).
     pub fn bond_status(&self, frame: usize) -> Result<Vec<BondStatus>> {
         self.check_frame(frame)?;
         let place = format!("{}/status/value", path::BONDS);
