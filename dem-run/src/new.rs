@@ -70,9 +70,11 @@ pub fn new(options: &NewOptions) -> Result<(), RunError> {
     Ok(print_line(&format!("{} written\nrun it with\n  dem-run run {}", path.display(), in_shell(&path)))?)
 }
 
-/// The text of a scene outside `configs/`: without the path of the schema, which leads from there.
+/// The text of a scene outside `configs/`: without the path of the schema, which leads from there,
+/// and with commands for the folder of the file.
 fn start(text: &str) -> String {
-    text.split_inclusive('\n').filter(|line| !line.trim_start().starts_with("\"$schema\"")).collect()
+    let lines = text.split_inclusive('\n').filter(|line| !line.trim_start().starts_with("\"$schema\""));
+    lines.collect::<String>().replace("configs/", "")
 }
 
 /// Names and titles of all scenes.
@@ -109,6 +111,7 @@ mod tests {
             assert!(shipped.schema.take().is_some() && own.schema.is_none(), "{name}");
             assert_eq!(shipped, own);
             assert!(own.title.is_some(), "{name} has no title to list");
+            assert!(!start(text).contains("configs/"), "{name}");
         }
     }
 }

@@ -6,7 +6,7 @@ use dem_history::{History, Rupture};
 use dem_scene::{Difference, differences};
 use serde::Serialize;
 
-use crate::output::{PostError, Result, Text, facts, number, quantity};
+use crate::output::{PostError, Result, Text, counted, facts, number, quantity};
 use crate::stress_strain;
 
 /// Times closer than this share of the later one are equal: the clocks of two time steps round
@@ -237,7 +237,7 @@ impl Report {
         let mut out = facts(&[
             ("A", self.files[0].clone()),
             ("B", self.files[1].clone()),
-            ("scenes", format!("differ in {} places", self.scene.len())),
+            ("scenes", format!("differ in {}", counted(self.scene.len(), "place"))),
             ("sample", if self.same_sample { "the same radii and bonds" } else { "other radii or other bonds" }.into()),
             ("common times", self.gaps.len().to_string()),
             ("compared until", self.until()),
