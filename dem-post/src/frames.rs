@@ -229,12 +229,11 @@ fn picture(history: &History, report: &Report, frame: usize) -> Result<(Panel, V
         Subject::Forces => {
             let contacts = history.contacts(frame)?;
             panel.links = links(&contacts, &panel.grains.position, scale, history.dimension());
-            panel.caption.push(format!("⟨f⟩ = {} N, the greatest mean of the series", short(scale)));
             if history.dimension() == 3 {
                 // in 3D grains would hide the lines
                 panel.fills.clear();
             }
-            force_legend(history.dimension())
+            force_legend(history.dimension(), scale)
         }
         Subject::Speed => {
             let scale = Scale { title: "speed (m/s)".into(), low: 0.0, high: scale, ramp: Ramp::Areas };

@@ -8,8 +8,8 @@ use crate::output::{Result, number, short};
 use crate::title::Titles;
 use dem_drawing::{Chart, Drawing, Style, colour};
 
-/// Width of a line that carries ⟨f⟩, and the greatest width, units of the drawing: of disks, and of
-/// spheres.
+/// Width of a line that carries the force of the scale, and the greatest width, units of the
+/// drawing: of disks, and of spheres.
 const WIDTH: [(f64, f64); 2] = [(1.3, 8.0), (0.6, 4.0)];
 /// Colours of the weak network, compression and tension; also of grains in chains.
 const PALE: [&str; 2] = ["#9cc9e3", "#f0b27a"];
@@ -18,16 +18,19 @@ const GRAIN: [&str; 2] = ["#f4f4f4", "#c4c4c4"];
 /// Width of the line of a chain: of disks, and of spheres.
 const CHAIN: [f64; 2] = [3.0, 2.4];
 
-/// The lines that a map of forces needs in its legend.
-pub fn force_legend(d: usize) -> Vec<Key> {
+/// The lines that a map of forces needs in its legend; `scale` is the force (N) up to which lines
+/// are pale.
+pub fn force_legend(d: usize, scale: f64) -> Vec<Key> {
     let width = WIDTH[d - 2].0;
+    let strong = |what: &str| format!("{what}, {} N", short(3.0 * scale));
     let mut legend = vec![
-        Key::Line(colour::BLUE, 3.0 * width, "compression, 3⟨f⟩".into()),
-        Key::Line(colour::VERMILLION, 3.0 * width, "tension, 3⟨f⟩".into()),
+        Key::Line(colour::BLUE, 3.0 * width, strong("compression")),
+        Key::Line(colour::VERMILLION, 3.0 * width, strong("tension")),
     ];
     if d == 2 {
-        legend.push(Key::Line(PALE[0], 0.7 * width, "weak compression".into()));
-        legend.push(Key::Line(PALE[1], 0.7 * width, "weak tension".into()));
+        let weak = |what: &str| format!("{what} below {} N", short(scale));
+        legend.push(Key::Line(PALE[0], 0.7 * width, weak("compression")));
+        legend.push(Key::Line(PALE[1], 0.7 * width, weak("tension")));
     }
     legend
 }
@@ -139,10 +142,9 @@ pub fn network_map(history: &History, report: &Report, mean: f64) -> Result<Draw
     let titles = Titles::read(history)?;
     for network in &report.networks {
         let state = history.grain_state(network.frame)?;
-        let own = network.statistics.mean;
-        let scale = if own == mean { String::new() } else { format!("mean force {} N, ", short(own)) };
+        let caption = format!("⟨f⟩ = {} N", short(network.statistics.mean));
         panels.push(Panel {
-            caption: vec![titles.of(history, network.frame), format!("{scale}⟨f⟩ = {} N", short(mean))],
+            caption: vec![titles.of(history, network.frame), caption],
             links: links(&network.contacts, &state.position, mean, d),
             grains: state,
             walls: history.wall_state(network.frame)?,
@@ -151,7 +153,7 @@ pub fn network_map(history: &History, report: &Report, mean: f64) -> Result<Draw
             ..Panel::default()
         });
     }
-    Ok(draw(&sample, &panels, &force_legend(d)))
+    Ok(draw(&sample, &panels, &force_legend(d, mean)))
 }
 
 /// The lines of a network, the strongest last, so that they lie on top. For spheres only the lines
