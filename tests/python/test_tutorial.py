@@ -3,7 +3,6 @@ what they print, and the files that it names are there. It takes about a minute 
 
 import os
 import re
-import resource
 import subprocess
 
 import pytest
@@ -47,11 +46,6 @@ def test_the_files_that_it_names_are_there(done):
     folder, _ = done
     assert len(FILES) > 5
     assert [file for file in FILES if not (folder / file).exists()] == []
-
-
-def test_it_takes_at_most_three_minutes(done):
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    assert used.ru_utime + used.ru_stime < 180
 
 
 def test_seven_grains_break_where_the_pencil_says(done):
