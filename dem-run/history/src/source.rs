@@ -95,7 +95,7 @@ impl Source {
     pub fn texts(&self, place: &str) -> Result<Vec<String>> {
         let dataset = self.dataset(place)?;
         if let Some(offset) = dataset.offset() {
-            let held = self.texts.hold(&self.path, offset, dataset.size().min(self.length as usize));
+            let held = self.texts.hold(offset, dataset.size().min(self.length as usize));
             if !held.map_err(|error| refused(&self.path)("read", error))? {
                 return Err(self.damaged(place, "it refers to a text that does not exist"));
             }

@@ -17,8 +17,12 @@ const HEAD: u64 = 1 << 20;
 /// Bytes of a reference to a text in a dataset.
 const NAMED: usize = 16;
 
-/// Sizes of the texts, bytes, by the address of their heap and their index there.
-pub(super) struct Texts(HashMap<(u64, u32), u64>);
+/// The texts of a file, which stays open: another file may take its path.
+pub(super) struct Texts {
+    file: File,
+    /// Sizes of the texts, bytes, by the address of their heap and their index there.
+    sizes: HashMap<(u64, u32), u64>,
+}
 
 impl Texts {
     /// Finds the texts of a file.
@@ -26,11 +30,11 @@ impl Texts {
     /// # Errors
     /// Those of the operating system; for a text longer than its heap, a message with its place.
     pub fn find(path: &Path) -> io::Result<Result<Self, String>> {
-        let mut head = vec![];
-        File::open(path)?.take(HEAD).read_to_end(&mut head)?;
+        let (file, mut head) = (File::open(path)?, vec![]);
+        (&file).take(HEAD).read_to_end(&mut head)?;
         let number = |at: usize| Some(u64::from_le_bytes(head.get(at..at + 8)?.try_into().ok()?));
-        let mut texts = HashMap::new();
-        // HDF5 aligns heaps to nothing
+        let mut sizes = HashMap::new();
+        // HDF5 does not align heaps
         let heaps = head.windows(8).enumerate().filter(|(_, bytes)| *bytes == b"GCOL\x01\0\0\0");
         for (start, _) in heaps {
             let end = number(start + 8).unwrap_or(0).saturating_add(start as u64);
@@ -42,26 +46,26 @@ impl Texts {
                 if room == 0 || room > end - at as u64 {
                     return Ok(Err(format!("the text at byte {at} is longer than the room for texts")));
                 }
-                texts.insert((start as u64, index), size);
+                sizes.insert((start as u64, index), size);
                 at += room as usize;
             }
         }
-        Ok(Ok(Self(texts)))
+        Ok(Ok(Self { file, sizes }))
     }
 
     /// Whether the `count` references from byte `offset` of the file name texts in this list.
     ///
     /// # Errors
     /// Those of the operating system.
-    pub fn hold(&self, path: &Path, offset: u64, count: usize) -> io::Result<bool> {
+    pub fn hold(&self, offset: u64, count: usize) -> io::Result<bool> {
         let mut named = vec![0; NAMED * count];
-        File::open(path)?.read_exact_at(&mut named, offset)?;
+        self.file.read_exact_at(&mut named, offset)?;
         let is_held = |text: &[u8; NAMED]| {
             let [a, b, c, d, heap @ .., e, f, g, h] = *text;
             let length = u64::from(u32::from_le_bytes([a, b, c, d]));
             let place = (u64::from_le_bytes(heap), u32::from_le_bytes([e, f, g, h]));
             // a text that was never written has no address
-            length == 0 || self.0.get(&place).is_some_and(|size| length <= *size)
+            length == 0 || self.sizes.get(&place).is_some_and(|size| length <= *size)
         };
         Ok(named.as_chunks::<NAMED>().0.iter().all(is_held))
     }
@@ -82,22 +86,42 @@ mod tests {
         file
     }
 
+    /// A file with a heap at byte `start`, and the place of a reference to its text.
+    fn referring(start: u64) -> (Vec<u8>, u64) {
+        let mut file = vec![0; start as usize];
+        file.extend(heap(64));
+        let reference = file.len() as u64;
+        // length, address, index
+        file.extend(25u32.to_le_bytes());
+        file.extend(start.to_le_bytes());
+        file.extend(1u32.to_le_bytes());
+        (file, reference)
+    }
+
     #[test]
     fn a_heap_may_begin_at_any_byte() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("heap");
         for start in 0..9u64 {
-            let mut file = vec![0; start as usize];
-            file.extend(heap(64));
-            // a reference: length, address, index
-            let reference = file.len() as u64;
-            file.extend(25u32.to_le_bytes());
-            file.extend(start.to_le_bytes());
-            file.extend(1u32.to_le_bytes());
+            let (file, reference) = referring(start);
             std::fs::write(&path, file).expect("write");
             let texts = Texts::find(&path).expect("read").expect("sound");
-            assert!(texts.hold(&path, reference, 1).expect("read"), "at byte {start}");
+            assert!(texts.hold(reference, 1).expect("read"), "at byte {start}");
         }
+    }
+
+    #[test]
+    fn another_file_at_the_path_changes_nothing() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (path, new) = (folder.path().join("heap"), folder.path().join("new"));
+        let (file, reference) = referring(0);
+        std::fs::write(&path, file).expect("write");
+        let texts = Texts::find(&path).expect("read").expect("sound");
+        std::fs::write(&new, referring(8).0).expect("write");
+        std::fs::rename(&new, &path).expect("replace");
+        assert!(texts.hold(reference, 1).expect("read"));
+        let replaced = Texts::find(&path).expect("read").expect("sound");
+        assert!(!replaced.hold(reference, 1).expect("read"), "the reference lies elsewhere");
     }
 
     /// Less than 16 bytes at the end of a heap hold no header, so what follows is not read as one.
