@@ -299,7 +299,7 @@ pub(super) struct BondTables {
 struct LaterBonds {
     pair: Table,
     /// In the order of [`columns`].
-    columns: [Table; 5],
+    columns: Vec<Table>,
     formed: Table,
 }
 
@@ -317,30 +317,30 @@ fn columns(bonds: &Bonds) -> [(&'static str, &'static str, &[f64]); 5] {
 impl BondTables {
     pub fn create(file: &File, bonds: &Bonds, storage: Storage) -> hdf5::Result<Self> {
         let (b, group) = (bonds.len(), file.create_group(path::BONDS)?);
-        if let Some(formed) = bonds.formed {
-            let status = Table::of_bonds::<BondCode>(&element(&group, "status")?, "value", b, storage)?;
+        let mut later = None;
+        if bonds.formed.is_some() {
             let growth = Growth::Rows(512);
-            let column = |name, unit| Table::create::<f64>(&group, name, unit, &[], growth, storage);
-            let [a, b, c, d, e] = columns(bonds).map(|(name, unit, _)| column(name, unit));
-            let later = LaterBonds {
-                pair: Table::create::<i32>(&group, "pair", "", &[2], growth, storage)?,
-                columns: [a?, b?, c?, d?, e?],
-                formed: Table::create::<i64>(&group, "formed", "", &[], Growth::Rows(1), storage)?,
-            };
-            let mut tables = Self { status, later: Some(later) };
-            tables.fill(bonds, formed)?;
-            return Ok(tables);
-        }
-        fixed(&group, "pair", "", &[b, 2], bonds.pair.as_flattened())?;
-        for (name, unit, values) in columns(bonds) {
-            // without it, the two limits of each bond have one coefficient
-            if name != "rolling" || !values.is_empty() {
-                fixed(&group, name, unit, &[b], values)?;
+            let pair = Table::create::<i32>(&group, "pair", "", &[2], growth, storage)?;
+            let column = |(name, unit, _)| Table::create::<f64>(&group, name, unit, &[], growth, storage);
+            let columns = columns(bonds).into_iter().map(column).collect::<hdf5::Result<_>>()?;
+            let formed = Table::create::<i64>(&group, "formed", "", &[], Growth::Rows(1), storage)?;
+            later = Some(LaterBonds { pair, columns, formed });
+        } else {
+            fixed(&group, "pair", "", &[b, 2], bonds.pair.as_flattened())?;
+            for (name, unit, values) in columns(bonds) {
+                // without it, the two limits of each bond have one coefficient
+                if name != "rolling" || !values.is_empty() {
+                    fixed(&group, name, unit, &[b], values)?;
+                }
             }
         }
-        let status =
-            Table::create::<BondCode>(&element(&group, "status")?, "value", "", &[b], Growth::Frames, storage)?;
-        Ok(Self { status, later: None })
+        let growth = if later.is_some() { Growth::Bonds } else { Growth::Frames };
+        let status = Table::create::<BondCode>(&element(&group, "status")?, "value", "", &[b], growth, storage)?;
+        let mut tables = Self { status, later };
+        if let Some(formed) = bonds.formed {
+            tables.fill(bonds, formed)?;
+        }
+        Ok(tables)
     }
 
     /// Writes the bonds that formed after the step `formed`.

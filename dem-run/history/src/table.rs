@@ -11,6 +11,8 @@ use super::schema::{frame_chunk, row_chunk};
 pub(super) enum Growth {
     /// One row per frame.
     Frames,
+    /// One row per frame, of one value for each bond: longer once a stage forms the bonds.
+    Bonds,
     /// Many rows per frame; this many in a chunk.
     Rows(usize),
 }
@@ -47,24 +49,18 @@ impl Table {
         let item = size_of::<T>();
         let chunk = match growth {
             Growth::Frames => frame_chunk(item, row),
+            // their number is not known yet
+            Growth::Bonds => vec![16, 512],
             Growth::Rows(rows) => row_chunk(rows, item, row),
         };
         let mut extents = vec![Extent::resizable(0)];
-        extents.extend(row.iter().map(|&n| Extent::fixed(n)));
+        let extent = if matches!(growth, Growth::Bonds) { Extent::resizable } else { Extent::fixed };
+        extents.extend(row.iter().map(|&n| extent(n)));
         let builder = group.new_dataset::<T>();
         let builder = if storage.packed { builder.shuffle().deflate(DEFLATE).fletcher32() } else { builder };
         let dataset = builder.shape(SimpleExtents::from(extents)).chunk(chunk).obj_track_times(false).create(name)?;
         set_unit(&dataset, unit)?;
         Ok(Self { dataset, rows: 0, row: row.to_vec() })
-    }
-
-    /// Creates an empty table of one value per bond and frame, whose rows may become longer.
-    pub fn of_bonds<T: H5Type>(group: &Group, name: &str, bonds: usize, storage: Storage) -> hdf5::Result<Self> {
-        let extents = SimpleExtents::from(vec![Extent::resizable(0), Extent::resizable(bonds)]);
-        let builder = group.new_dataset::<T>();
-        let builder = if storage.packed { builder.shuffle().deflate(DEFLATE).fletcher32() } else { builder };
-        let dataset = builder.shape(extents).chunk(vec![16, 512]).obj_track_times(false).create(name)?;
-        Ok(Self { dataset, rows: 0, row: vec![bonds] })
     }
 
     /// Makes the rows of a table of bonds `width` long; the new values of earlier rows are zero.
