@@ -88,8 +88,7 @@ struct Labelled {
 pub(super) fn label(file: &File) -> hdf5::Result<()> {
     let mut scales = BTreeMap::new();
     for (place, axes) in AXES {
-        // HDF5 needs every group of the path to exist
-        if place.match_indices('/').all(|(end, _)| file.link_exists(&place[..end])) && file.link_exists(place) {
+        if file.link_exists(place) {
             attach(file, &mut scales, place, axes)?;
         }
     }

@@ -65,8 +65,9 @@ impl History {
     pub fn bond_status(&self, frame: usize) -> Result<Vec<BondStatus>> {
         self.check_frame(frame)?;
         let place = format!("{}/status/value", path::BONDS);
-        let not_yet = self.bonds_formed()?.is_some_and(|step| step == NOT_FORMED || self.steps[frame] <= step);
-        if !self.source.has(path::BONDS) || not_yet {
+        if !self.source.has(path::BONDS)
+            || self.bonds_formed()?.is_some_and(|step| step == NOT_FORMED || self.steps[frame] <= step)
+        {
             return Ok(vec![]);
         }
         let (_, codes) = self.source.read::<BondCode>(&place, frame..frame + 1)?;
