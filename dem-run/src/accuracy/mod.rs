@@ -52,6 +52,12 @@ pub fn accuracy(scene: &Scene, options: &AccuracyOptions) -> Result<(), RunError
              --set load_wall=NAME"
         )));
     }
+    if let Some(stage) = scene.cement_stage() {
+        return Err(RunError::Usage(format!(
+            "stages.{stage} cements, and accuracy compares runs whose bonds form at the start: `--set \
+             stages.{stage}.cement=false`"
+        )));
+    }
     if !options.ignore_memory {
         memory::refuse_too_large(scene, check::count(scene)?)?;
     }
@@ -72,12 +78,6 @@ pub fn accuracy(scene: &Scene, options: &AccuracyOptions) -> Result<(), RunError
 }
 
 fn measure<D: Dim>(scene: &Scene, options: &AccuracyOptions, interrupt: &Interrupt) -> Result<Report, RunError> {
-    if let Some(stage) = scene.cement_stage() {
-        return Err(RunError::Usage(format!(
-            "stages.{stage} cements, and accuracy compares runs whose bonds form at the start: `--set \
-             stages.{stage}.cement=false`"
-        )));
-    }
     let mut progress = options.execution.show();
     let built = build::<D>(scene, None, &mut |done| {
         progress.phase("packing the sample", done);
