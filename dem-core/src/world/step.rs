@@ -375,9 +375,9 @@ impl<D: Dim> World<D> {
     #[inline]
     pub(super) fn wall_forces(&self, mid: &Midpoint<D>, touches: &[StoredTouch<D>]) -> Vec<D::Vector> {
         let mut forces = vec![D::Vector::zero(); self.walls.len()];
-        // most touches are between grains that no wall holds
-        let grains = if self.held.is_empty() { self.grains.len() as u32 } else { 0 };
-        for stored in touches.iter().filter(|touch| touch.pair[1] >= grains) {
+        // where no wall holds grains only touches with a wall count, and most are between grains
+        let first = if self.held.is_empty() { self.grains.len() as u32 } else { 0 };
+        for stored in touches.iter().filter(|touch| touch.pair[1] >= first) {
             let [holder, wall] = self.walls_of(stored.pair);
             if holder.is_none() && wall.is_none() {
                 continue;

@@ -62,12 +62,12 @@ impl Soft {
         }
         let r = DMatrix::from_fn(lines.len(), n, |i, j| lines[i][j]).qr().r();
         let inverted = r.solve_upper_triangular(&DMatrix::identity(n, n))?;
-        let filled = |of: DMatrix<f64>| {
+        let filled = |of: &DMatrix<f64>| {
             let mut local = [[0.0; PADDED]; PADDED];
             (0..n).for_each(|i| (0..n).for_each(|j| local[i][j] = of[(i, j)]));
             local
         };
-        let (root, inverse) = (filled(inverted.clone()), filled(&inverted * inverted.transpose()));
+        let (root, inverse) = (filled(&inverted), filled(&(&inverted * inverted.transpose())));
         let sound = inverse.iter().flatten().all(|value| value.is_finite());
         sound.then_some(Self { root, inverse })
     }
