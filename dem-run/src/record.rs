@@ -47,16 +47,15 @@ impl<D: Dim> Recorder<D> {
     }
 
     /// Continues `history` in a new file that replaces it and starts with the rows `kept` and
-    /// `checkpoint`. The world comes with the step after which a stage cemented it, if one did.
-    /// `cpu_before` is the processor time of the run so far (s); `tell` receives the copied share
-    /// of the history (0 to 1).
+    /// `checkpoint`. `cemented` is the step after which a stage formed the bonds of the world, if
+    /// one did; `tell` receives the copied share of the history (0 to 1).
     pub fn go_on(
         history: &History,
         kept: RowCounts,
         checkpoint: &Checkpoint,
         scene: &Scene,
-        (world, cemented): (&World<D>, Option<u64>),
-        cpu_before: f64,
+        world: &World<D>,
+        cemented: Option<u64>,
         tell: &mut dyn FnMut(f64) -> bool,
     ) -> history::Result<Self> {
         let origin = Parameters { scene: scene.to_json().unwrap_or_default(), ..history.parameters()? };
@@ -72,6 +71,8 @@ impl<D: Dim> Recorder<D> {
         };
         let (layout, measures) = describe(scene, world, describe_bonds(world, formed), observables, origin);
         let layout = Layout { friction: before.friction, ..layout };
+        let cpu_time = history.observable("cpu_time")?.map_or(vec![], |series| series.value);
+        let cpu_before = kept.steps.checked_sub(1).and_then(|last| cpu_time.get(last)).copied().unwrap_or(0.0);
         let writer = Writer::go_on(history.path(), &layout, history, kept, checkpoint, tell)?;
         let mut recorder = Self::new(writer, &layout, measures, cpu_before);
         if cemented.is_some() && formed == Some(history::NOT_FORMED) {
@@ -205,15 +206,14 @@ fn describe<D: Dim>(
     observables: Vec<(Observable, Measure<D>)>,
     parameters: Parameters,
 ) -> (Layout, Vec<Measure<D>>) {
-    let bonded = bonds.formed.is_some() || !bonds.is_empty();
     let friction = world.has_friction();
     // without friction, bonds and torques, grains keep their spin
     let turning = world.grains.spin.iter().any(|w| w.norm() > 0.0) || world.loads.iter().any(|l| l.torque.norm() > 0.0);
     let (mut observables, measures): (Vec<_>, _) = observables.into_iter().unzip();
     observables.push(Observable::new("cpu_time", "s", &[]));
-    let layout = Layout {
+    let mut layout = Layout {
         dimension: D::N,
-        rotation: friction || bonded || turning,
+        rotation: friction || turning,
         friction,
         twist: scene.twists(),
         without_reactions: !scene.output.reactions,
@@ -234,6 +234,7 @@ fn describe<D: Dim>(
         observables,
         parameters,
     };
+    layout.rotation |= layout.bonded();
     (layout, measures)
 }
 

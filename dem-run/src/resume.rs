@@ -130,10 +130,7 @@ fn resume_in<D: Dim>(
         ))?);
     }
     let kept = kept(history, scene, &checkpoint)?;
-    // read before the new history takes the place of the old one
     let solid_fraction = history.parameters()?.solid_fraction;
-    let cpu_time = history.observable("cpu_time")?.map_or(vec![], |series| series.value);
-    let cpu_before = kept.steps.checked_sub(1).and_then(|last| cpu_time.get(last)).copied().unwrap_or(0.0);
     refuse_full_disk(history)?;
     let mut progress = options.execution.show();
     let mut tell = |done| {
@@ -141,8 +138,7 @@ fn resume_in<D: Dim>(
         !interrupt.requested()
     };
     let cemented = state.course.cemented(scene);
-    let state_of = (&state.world, cemented);
-    let recorder = Recorder::go_on(history, kept, &checkpoint, scene, state_of, cpu_before, &mut tell);
+    let recorder = Recorder::go_on(history, kept, &checkpoint, scene, &state.world, cemented, &mut tell);
     let recorder = recorder.map_err(|error| match error {
         HistoryError::Interrupted => RunError::Interrupted("the history is unchanged"),
         error => error.into(),
