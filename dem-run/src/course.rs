@@ -227,9 +227,8 @@ impl<D: Dim> Course<D> {
         if let Some(ending) = self.stops.ending(world, broken) {
             return Ok(Some(ending));
         }
-        let bonds = world.bonds.len();
         let ending = self.stages.advance(scene, world, broken)?;
-        if world.bonds.len() > bonds {
+        if self.cemented(scene) == Some(world.steps) {
             self.one_piece = one_piece(world);
         }
         Ok(ending)

@@ -114,7 +114,7 @@ pub struct Sample {
     pub elapsed: f64,
     /// Simulated time (s).
     pub time: f64,
-    /// Fraction of the stop condition reached (0 to 1), if the run has one.
+    /// Fraction of the travel reached (0 to 1), if the travel of a wall ends the run.
     pub stop: Option<f64>,
 }
 

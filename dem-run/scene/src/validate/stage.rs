@@ -44,7 +44,7 @@ fn cement(report: &mut Report, scene: &Scene, stage: usize, path: &str) {
     let mut refuse = |found: &str, allowed: &str| report.wrong(path, found, allowed);
     if stage == 0 {
         refuse("the first stage cements", "nothing: bonds form at the start of the run");
-    } else if let Some(first) = scene.stages[..stage].iter().position(|other| other.cement) {
+    } else if let Some(first) = scene.cement_stage().filter(|first| *first < stage) {
         let allowed = format!("one stage that cements, now {first}: bonds form once");
         refuse("a second stage that cements", &allowed);
     }
