@@ -127,10 +127,10 @@ impl Check {
             sizes,
             bonds: scene.has_bonds(),
             walls: walls.collect(),
-            steps: scene.time.steps(),
+            steps: scene.steps(),
             step: scene.time.step,
             end,
-            last_step_ends: scene.time.last(),
+            last_step_ends: scene.steps() as f64 * scene.time.step,
             frames: scene.frames(),
             steps_per_frame: scene.steps_per_frame(),
             unbroken_cpu_time: cost::unbroken(scene, grains),
@@ -266,7 +266,7 @@ impl Sizes {
 }
 
 /// How a wall is driven at the start, and its drive over time in words, if it is driven. Where
-/// stages drive it, no time is told at which a drive ends: a condition may end its stage.
+/// stages drive it, no time is printed at which a drive ends: a condition may end its stage.
 fn course(scene: &Scene, name: &str, wall: &Wall) -> (&'static str, Option<String>) {
     let first = scene.first_drive(name, wall);
     let Some((drive, function, unit)) = parts(&first) else { return ("fixed", None) };
@@ -345,7 +345,7 @@ fn expected_bytes(scene: &Scene, grains: usize) -> u64 {
     let contact_rows = contacts * (real * (2.0 * d + forces + 1.0) + 2.0 * 4.0 + 1.0 + 4.0);
     let wall_rows = scene.walls.len() as f64 * real * 3.0 * d;
     let frames = scene.frames() as f64 * (grain_rows + contact_rows + wall_rows + bonds);
-    (FIXED + frames + scene.time.steps() as f64 * PER_STEP) as u64
+    (FIXED + frames + scene.steps() as f64 * PER_STEP) as u64
 }
 
 /// Free space for the user on the disk of `folder` (bytes), if the system reports it.
@@ -439,6 +439,14 @@ pub(crate) mod tests {
         let bottom = "0 m/s; from stage tilt on: velocity 0 m/s growing by 2 m/s a second";
         let top = "5 N; from stage press on: velocity 0.001 m/s";
         assert_eq!(courses, [("velocity", bottom), ("force", top)]);
+    }
+
+    #[test]
+    fn the_last_stage_ends_a_run_before_its_time() {
+        let check = Check::new(&config("staged-biaxial.json", &[])).expect("check");
+        assert_eq!((check.steps, check.frames), (750, 76));
+        let text = check.to_string();
+        assert!(text.contains("steps      750 of 0.0001 s, to 0.2 s; the last ends at 0.075\n"), "{text}");
     }
 
     /// The floor holds both grains, so no bond joins them, whatever the gap.

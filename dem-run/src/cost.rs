@@ -33,7 +33,7 @@ pub fn unbroken(scene: &Scene, grains: usize) -> [f64; 2] {
         (_, 2) => DISKS,
         _ => [SPHERES[0], SPHERES[1] * swings * (contacts / FEW).max(1.0).powf(FILL)],
     };
-    let steps = scene.time.steps() as f64;
+    let steps = scene.steps() as f64;
     [STEP[0] + low * contacts, STEP[1] + high * contacts].map(|step| step * steps)
 }
 

@@ -48,7 +48,7 @@ pub fn export(options: &ExportOptions) -> Result<(), RunError> {
     let parameters = History::open(&options.history)?.parameters()?;
     let shown = options.history.display();
     let scene = scene::from_text(&format!("the scene in {shown}"), &parameters.scene, &[])?;
-    let steps = scene.time.steps();
+    let steps = scene.steps();
     if !(1..=steps).contains(&options.step) {
         let (step, wrong) = (options.step, "counted from 1");
         return Err(RunError::Usage(format!(

@@ -199,9 +199,8 @@ impl<D: Dim> Run<'_, D> {
                 self.record(true, checkpoint)?;
             }
             let RunState { world, course, .. } = &mut self.state;
-            let bonds = world.bonds.len();
             let ending = course.advance(self.scene, world)?;
-            if world.bonds.len() > bonds {
+            if course.cemented(self.scene) == Some(world.steps) {
                 self.recorder.bonds_formed(world)?;
             }
             if let Some(ending) = ending {
@@ -281,7 +280,7 @@ impl<D: Dim> Run<'_, D> {
         StepProgress {
             step: self.state.world.steps,
             time: self.state.world.time,
-            end: self.scene.time.last(),
+            end: self.scene.steps() as f64 * self.scene.time.step,
             residual: report.residual,
             iterations: report.work.iterations(),
             broken: self.state.course.broken(),

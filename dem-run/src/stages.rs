@@ -52,8 +52,7 @@ impl<D: Dim> Stages<D> {
         if world.steps <= began {
             return Ok(None);
         }
-        let steps = stage.duration.map(|duration| (duration / scene.time.step).round().max(1.0) as u64);
-        let over = steps.is_some_and(|steps| world.steps - began >= steps);
+        let over = stage.steps(scene.time.step).is_some_and(|steps| world.steps - began >= steps);
         if !over && self.until.ending(world, broken).is_none() {
             return Ok(None);
         }

@@ -414,11 +414,20 @@ impl Scene {
         }
     }
 
+    /// Largest number of steps of a run: to `time.end`, or to the end of the last stage if all
+    /// stages have a duration. A condition may end the run earlier.
+    #[must_use]
+    pub fn steps(&self) -> u64 {
+        let stages = self.stages.iter().map(|stage| stage.steps(self.time.step));
+        let stages = stages.reduce(|sum, steps| Some(sum?.saturating_add(steps?))).flatten();
+        stages.unwrap_or(u64::MAX).min(self.time.steps())
+    }
+
     /// Number of frames of a run to the end: the initial state, one every
     /// [`Scene::steps_per_frame`], and the last.
     #[must_use]
     pub fn frames(&self) -> u64 {
-        1 + self.time.steps().div_ceil(self.steps_per_frame())
+        1 + self.steps().div_ceil(self.steps_per_frame())
     }
 
     /// The scene as JSON, from which [`super::from_text`] reads the same scene, bit for bit.

@@ -51,6 +51,15 @@ pub struct StageDrive {
     pub stress: Option<Function>,
 }
 
+impl Stage {
+    /// Number of time steps of length `step` (s) in its duration, at least one; none without a
+    /// duration.
+    #[must_use]
+    pub fn steps(&self, step: f64) -> Option<u64> {
+        self.duration.map(|duration| (duration / step).round().max(1.0) as u64)
+    }
+}
+
 impl StageDrive {
     /// How the wall moves. A wall that is held has a velocity of zero, so it has a load.
     #[must_use]

@@ -346,7 +346,7 @@ impl<D: Dim> Trial<'_, D> {
         let (mut world, numbers) = self.sample.world(self.scene, self.variant);
         let mut state = Followed::new(self.scene, &world);
         let mut problems = Problems { list: vec![], most: self.problems, every: 1 };
-        let steps = self.scene.time.steps();
+        let steps = self.scene.steps();
         let ended = loop {
             if world.steps >= steps {
                 break End::Scene(Ending::Time);

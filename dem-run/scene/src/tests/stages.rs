@@ -48,6 +48,21 @@ fn what_a_stage_asks_of_a_wall_is_checked_at_the_wall() {
 }
 
 #[test]
+fn a_run_has_no_more_steps_than_its_stages() {
+    let steps = |stages: &str, end: &str| {
+        let scene = staged(stages, &["time.step=0.01", end, "output={\"every_steps\": 4}"]).expect("right");
+        (scene.steps(), scene.frames())
+    };
+    let two = r#"[{"name": "a", "duration": 0.1}, {"name": "b", "duration": 0.014}]"#;
+    // 10 steps and one: durations are rounded
+    assert_eq!(steps(two, "time.end=1"), (11, 4));
+    assert_eq!(steps(two, "time.end=0.05"), (5, 3));
+    assert_eq!(steps("[]", "time.end=0.2"), (20, 6));
+    let open = r#"[{"name": "a", "duration": 0.1}, {"name": "b", "until": {"broken_fraction": 0.5}}]"#;
+    assert_eq!(steps(open, "time.end=0.2"), (20, 6));
+}
+
+#[test]
 fn bonds_form_once_at_the_start_or_in_one_later_stage() {
     let stages = |cement: [bool; 3]| {
         let stage = |(k, cement): (usize, &bool)| format!(r#"{{"name": "{k}", "duration": 0.1, "cement": {cement}}}"#);
