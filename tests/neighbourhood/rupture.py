@@ -96,12 +96,10 @@ def failure(n, t, b, w, strength, mu, nu, a, xi):
     return n + strength, ratios.max(0), np.array(["SHEAR", "ROLLING", "TWIST"])[ratios.argmax(0)], ratios
 
 
-def check_intact(h, p, report):
-    """After a step no intact bond is at its limit; with `end_of_step` exactly the bonds at their
-    limit break."""
-    rows = np.flatnonzero(h.bond >= 0)
-    b, s = h.bond[rows], h.row_step[rows]
-    n, ratio, _, _ = failure(
+def failure_of_rows(h, rows):
+    """The same of these rows of bonds."""
+    b = h.bond[rows]
+    return failure(
         h.rn[rows],
         norm(h.rt[rows]),
         norm(h.bending[rows]),
@@ -112,6 +110,14 @@ def check_intact(h, p, report):
         h.mean_diameter[b],
         h.bond_twist[b],
     )
+
+
+def check_intact(h, p, report):
+    """After a step no intact bond is at its limit; with `end_of_step` exactly the bonds at their
+    limit break."""
+    rows = np.flatnonzero(h.bond >= 0)
+    b, s = h.bond[rows], h.row_step[rows]
+    n, ratio, _, _ = failure_of_rows(h, rows)
     eps = tolerances.value("limit")
     slack = tolerances.rounding(np.abs(h.rn[rows]) + h.strength[b] + ratio)
     # positive where the bond is at its limit
