@@ -233,11 +233,7 @@ fn bending_reports_the_peak_and_its_deflection_and_no_collapse_of_zero() {
         assert!(post[name].is_null(), "{name}: {}", post[name]);
     }
     let told = here.dem_post(&["stress-strain", "a.h5", "--quiet"]).succeeds().stdout;
-    assert!(
-        !told.contains("section") && told.contains("m at a displacement of ")
-            || told.contains("N at a displacement of "),
-        "{told}"
-    );
+    assert!(!told.contains("section") && told.contains(" N at a displacement of "), "{told}");
     let table = String::from_utf8(here.read("a-post/stress-strain.csv")).expect("UTF-8");
     let rows: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
     assert_eq!((rows[0][5], rows[0][6]), ("wall_strain", "wall_stress_Pa"));
