@@ -1,7 +1,5 @@
 """Changes of small scenes: each takes a scene and alters one thing of it."""
 
-import copy
-
 import numpy as np
 
 from bases import COHESION, DENSITY, box_of, confining, plane, sides, up

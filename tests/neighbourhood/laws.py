@@ -173,7 +173,7 @@ class Solved:
         stored = norm(self.compliance * np.abs(self.r)) + norm(self.compliance * np.abs(self.carried))
         self.rounding = tolerances.rounding((moving + stored) / self.D + size)
         outer, _ = h.external()
-        load = np.sqrt((norm(outer[:, ~h.fixed]) ** 2).sum(1) + (h.wall_drive_force() ** 2).sum(1))
+        load = np.sqrt((norm(outer[:, ~h.fixed]) ** 2).sum(1) + (h.driving.force ** 2).sum(1))
         square = np.bincount(h.row_step, (self.r**2).sum(1), minlength=h.S)
         self.scale = np.maximum(np.sqrt(square), h.h * load)
         # a map that is as small as the rounding of all velocities counts as zero, in the sum over

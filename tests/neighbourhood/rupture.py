@@ -280,7 +280,7 @@ def largest_reaction(h):
     of residuals."""
     square = np.bincount(h.row_step, h.rn**2 + (h.rt**2).sum(1), minlength=h.S)
     outer, _ = h.external()
-    load = np.sqrt((outer**2).sum((1, 2)) + (h.wall_drive_force() ** 2).sum(1))
+    load = np.sqrt((outer**2).sum((1, 2)) + (h.driving.force ** 2).sum(1))
     size = np.maximum(np.sqrt(square), load)
     return np.maximum(size, np.append(0.0, size[:-1]))
 
