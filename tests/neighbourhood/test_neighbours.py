@@ -48,7 +48,7 @@ def squeezed(bonded):
 
 def oedometer(bonded):
     """Disks between fixed side walls under a plate that comes down."""
-    scene = scenes.disks()
+    scene = bases.disks()
     changes.side_walls(0.2)(scene)
     changes.lid("velocity")(scene)
     del scene["stop"]
