@@ -176,7 +176,7 @@ def kicks(h):
         h.S, bodies
     )
     outer, _ = h.external()
-    total = h.h * (total + np.concatenate([norm(outer), np.abs(h.wall_drive_force())], 1))
+    total = h.h * (total + np.concatenate([norm(outer), np.abs(h.driving.force)], 1))
     grains = np.broadcast_to(h.inverse_mass[: h.N], (h.S, h.N))
     inverse = np.concatenate([grains, 1 / h.driving.mass], 1)
     return (total**2 * inverse).sum(1)
@@ -319,7 +319,7 @@ def check_false_acceleration(h, report):
         return
     free = ~h.fixed
     inertial = (h.mass[None, :, None] * np.diff(h.v, axis=0) / h.h)[:, free]
-    applied = (h.external()[0][:, free] ** 2).sum((1, 2)) + (h.wall_drive_force() ** 2).sum(1)
+    applied = (h.external()[0][:, free] ** 2).sum((1, 2)) + (h.driving.force ** 2).sum(1)
     if h.W:
         seen = h.observed["wall_force"]
         kept = np.where(h.driving.kind == "velocity", (seen * h.wall_direction).sum(2), 0.0)

@@ -1,7 +1,5 @@
 """Changes of small scenes: each takes a scene and alters one thing of it."""
 
-import copy
-
 import numpy as np
 
 from bases import COHESION, DENSITY, box_of, confining, plane, sides, up
@@ -287,9 +285,8 @@ def step(factor):
         if factor < 1:
             scene["time"]["end"] *= 0.3
             for wall in scene["walls"].values():
-                for name in ("force_rate",):
-                    if name in wall:
-                        wall[name] /= 0.3
+                if "force_rate" in wall:
+                    wall["force_rate"] /= 0.3
             for stage in scene.get("stages", []):
                 stage["duration"] *= 0.3
 

@@ -14,8 +14,8 @@ class Driving:
 
     `kind` [S,W]: "fixed", "velocity" or "force"; `value` [S,W]: velocity at the end of the step (m/s), or
     force at the middle (N), with `error`, the size of what it is computed from; `mass` [S,W] (kg) of a
-    wall under a force, infinite for others; `force` [S,W]: the forces alone. `start` [W]: speeds at time
-    zero (m/s). Of slides `across` [W,D], zero for none, and `speed` [S+1,W]. `began`: step after
+    wall under a force, infinite for others; `force` [S,W]: the forces (N), 0 for others. `start` [W]:
+    speeds at time zero (m/s). Of slides `across` [W,D], zero for none, and `speed` [S+1,W]. `began`: step after
     which each stage began; `ended`: that after which the last one ended, if it did."""
 
     def __init__(self, h):

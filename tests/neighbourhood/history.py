@@ -214,11 +214,6 @@ class History:
             torque[:, load["grain"]] += factor * np.asarray(load.get("torque") or np.zeros(self.Q), float)
         return force, torque
 
-    def wall_drive_force(self):
-        """Prescribed forces (N) [S,W] on the walls that a force drives, at the middle of each step;
-        0 for the others."""
-        return self.driving.force
-
 
 def enum_names(dataset, count=None):
     """The names of an array of enumerated values."""

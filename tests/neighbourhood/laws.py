@@ -120,7 +120,7 @@ class Solved:
         self.acts = ~bouncy | (c.gap <= may_touch)
         self.idle_too = bouncy & (c.gap > must_touch) & self.acts
         rigid = self.bonds if h.K and h.stiffness is None else np.zeros(h.M, bool)
-        of_bond = turned(h, c) if h.K and h.stiffness is None else lengthening(h, c)
+        of_bond = turned(h, c) if h.K and h.stiffness is None else lengthening(h, h.row_step, h.i, h.j) / h.h
         self.bias = np.where(self.bonds, of_bond, self.bias)
         self.other = np.where(self.bonds, self.bias, self.other)
         self.rigid = rigid
@@ -173,7 +173,7 @@ class Solved:
         stored = norm(self.compliance * np.abs(self.r)) + norm(self.compliance * np.abs(self.carried))
         self.rounding = tolerances.rounding((moving + stored) / self.D + size)
         outer, _ = h.external()
-        load = np.sqrt((norm(outer[:, ~h.fixed]) ** 2).sum(1) + (h.wall_drive_force() ** 2).sum(1))
+        load = np.sqrt((norm(outer[:, ~h.fixed]) ** 2).sum(1) + (h.driving.force ** 2).sum(1))
         square = np.bincount(h.row_step, (self.r**2).sum(1), minlength=h.S)
         self.scale = np.maximum(np.sqrt(square), h.h * load)
         # a map that is as small as the rounding of all velocities counts as zero, in the sum over
@@ -242,26 +242,25 @@ def turned(h, c):
     """Length correction of rigid bonds that turned (m/s). Grains of bonds without a limit of shear
     or rolling need not turn with the bond: then its rotation follows from its length, from the
     second step on and within round-off."""
-    longer = np.where(h.row_step > 0, lengthening(h, c), 0.0)
-    longer[h.h * longer <= np.finfo(float).eps * h.mean_diameter[h.bond]] = 0.0
+    longer = np.where(h.row_step > 0, lengthening(h, h.row_step, h.i, h.j), 0.0)
+    longer[longer <= np.finfo(float).eps * h.mean_diameter[h.bond]] = 0.0
     with_it = (h.bond_friction[h.bond] > 0) & (h.bond_rolling[h.bond] > 0)
-    return np.where(with_it, turning(h, c), longer)
+    return np.where(with_it, turning(h, c), longer / h.h)
 
 
-def lengthening(h, c):
-    """Elongation of an elastic bond since the last mid-step minus its displacement along the normal
-    of then, over h (m/s).
+def lengthening(h, s, i, j):
+    """Elongation (m) of the bonds of grains `i` and `j` between the mid-steps of steps `s` − 1 and `s`
+    minus their displacement along the normal of the first: ℓ' − ℓ − d_n = d_t² / (ℓ' + ℓ + d_n), with
+    the displacement d.
 
-    Its force follows its length: with the displacement d between two mid-steps, ℓ' − ℓ − d_n = d_t²
-    / (ℓ' + ℓ + d_n) is missing in the normal velocity."""
-    s, i, j = h.row_step, h.i, h.j
+    The normal velocity lacks it. It is corrected in step `s`."""
     last = np.where((s > 0)[:, None], h.mid[s - 1, i] - h.mid[s - 1, j], h.body_x[0, i] - h.body_x[0, j])
     now = h.mid[s, i] - h.mid[s, j]
     length = norm(last)
     n = last / length[:, None]
     along = ((now - last) * n).sum(1)
     across = now - last - along[:, None] * n
-    return (across**2).sum(1) / (norm(now) + length + along) / h.h
+    return (across**2).sum(1) / (norm(now) + length + along)
 
 
 def versine(sine):

@@ -87,14 +87,11 @@ def check_gaps(h, c, p, report):
 def required(h):
     """Over its strength, the strength that the bond of each row needs to bear its reaction; 0 for dry
     contacts."""
-    if not h.K:
-        return np.zeros(h.M)
-    a, b = h.mean_diameter[h.bond], h.bond
-    sizes = (norm(h.rt), norm(h.bending) / a, np.abs(h.twist) / a)
-    limits = (h.bond_friction[b], h.bond_rolling[b], h.bond_twist[b])
-    # a row without a limit carries nothing
-    ratios = [np.divide(size, limit, out=np.zeros(h.M), where=limit > 0) for size, limit in zip(sizes, limits)]
-    return np.where(b >= 0, (np.max(ratios, 0) - h.rn) / h.strength[b], 0.0)
+    out, rows = np.zeros(h.M), np.flatnonzero(h.bond >= 0)
+    if len(rows):
+        _, ratio, _, _ = rupture.failure_of_rows(h, rows)
+        out[rows] = (ratio - h.rn[rows]) / h.strength[h.bond[rows]]
+    return out
 
 
 def check_breaks(h, report):
@@ -138,21 +135,11 @@ def check_recorded(h, report):
     for name, value in told.items():
         off = np.abs(np.abs(e[name]) - np.abs(value))
         report.expect("ruptures", off, tolerances.rounding(size), lambda k, name=name: f"rupture {k}: {name}")
-    a, b = h.mean_diameter[h.bond[m]], h.bond[m]
-    ratios = np.stack(
-        [
-            np.divide(size, limit, out=np.zeros(len(m)), where=limit > 0)
-            for size, limit in (
-                (norm(h.rt)[m], h.bond_friction[b]),
-                (norm(h.bending)[m] / a, h.bond_rolling[b]),
-                (np.abs(h.twist[m]) / a, h.bond_twist[b]),
-            )
-        ]
-    )
+    n, _, _, ratios = rupture.failure_of_rows(h, m)
     # at the limit of a row, unless the bond is pulled with hardly any force across
     names = np.array(["SHEAR", "ROLLING", "TWIST"], dtype=object)
     nearest = ratios >= ratios.max(0) * (1 - 1e-9)
     named = np.array([bool(nearest[:, k][names == mode].any()) for k, mode in enumerate(h.event_mode)])
     eps = tolerances.value("limit")
-    tension = (h.event_mode == "TENSION") & (h.rn[m] + h.strength[b] <= 2 * eps * h.strength[b])
+    tension = (h.event_mode == "TENSION") & (n <= 2 * eps * h.strength[h.bond[m]])
     report.expect("mode of events", (~(named | tension)).astype(float), 0.0, lambda k: f"rupture {k}")

@@ -23,11 +23,13 @@ from pathlib import Path
 
 import numpy as np
 
+import bases
 import programs
 import scenes
 import tolerances
 from check import check
 from history import Unfit
+from transform import transformed
 
 # most processor time of a neighbour (s): then it is asked to stop, and killed after another GRACE
 CPU, GRACE = 60.0, 30.0
@@ -96,7 +98,7 @@ def sample_of(base, folder, program):
         plain |= {"walls": {}, "time": {"step": 1e-9, "end": 1e-9}}
         for name in ("stop", "stages", "load_wall", "rupture", "bonds"):
             plain.pop(name, None)
-        plain["materials"] = scenes.materials()
+        plain["materials"] = bases.materials()
         (folder / f"sample-{key}.json").write_text(json.dumps(plain))
         command = [
             program,
@@ -150,7 +152,7 @@ def written(scene, base, folder, key, program):
         points = sample_of(scenes.BASES[base], folder, program)
     if way:
         materials = way.pop("materials", None)
-        scene, points, _ = scenes.transformed(scene, points, **way)
+        scene, points, _ = transformed(scene, points, **way)
         write_sample(scene, points, folder / f"{key}.csv", materials)
     if listed:
         write_bonds(scene, points, folder / f"{key}.bonds.csv")

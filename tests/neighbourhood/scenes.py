@@ -1,8 +1,7 @@
 """Small scenes and changes of them: the neighbours of the shipped scenes.
 
 A *base* is a scene that runs in a second or two. A *change* alters one thing of a base, a *pair*
-two. The same seed gives the same neighbours. All scenes are dictionaries in SI units; `transformed`
-turns, mirrors, shifts or rescales one with its sample.
+two. The same seed gives the same neighbours. All scenes are dictionaries in SI units.
 """
 
 import random
@@ -17,15 +16,13 @@ from bases import (
     disks,
     elastic,
     heap,
-    materials,
-    plane,
     shear,
     small,
     spheres,
     tension,
 )
-from changes import CHANGES, Inapplicable, in_stages, layers, lid, needs, next_event, notch, side_walls
-from transform import regions_of, transformed
+from changes import CHANGES, Inapplicable, in_stages, layers, needs, next_event, notch
+from transform import regions_of
 
 
 def interface():

@@ -1,8 +1,6 @@
 """Small scenes on whose histories the checker is tried: together they use every field that it
 checks."""
 
-import numpy as np
-
 OUTPUT = {"every_steps": 1}
 DRY = {"density": 2500, "friction": {"grain_grain": 0.3, "grain_wall": 0.2}}
 

@@ -53,6 +53,11 @@ def put(name, at, value):
     return spoil
 
 
+def reaction(pick, rows, value):
+    """Replaces components of the reaction of a contact: `pick(good)` is its row."""
+    return put("contacts/reaction", lambda good: (pick(good), rows), value)
+
+
 def event(column, value):
     """Alters one column of one rupture, the second where there are several."""
 

@@ -20,6 +20,7 @@ from spoil import (
     on_wall,
     other_mode,
     put,
+    reaction,
     worst,
 )
 
@@ -93,36 +94,11 @@ SPOILT = (
             put("observables/solver_residual/value", lambda g: 40, 1e-3),
             "residual accepted",
         ),
-        (
-            "pressed",
-            "a normal reaction of a dry contact",
-            put("contacts/reaction", lambda g: (STICKS(g), 0), lambda r: -r),
-            "cone",
-        ),
-        (
-            "pressed",
-            "a pull between dry grains",
-            put("contacts/reaction", lambda g: (STICKS(g), 0), lambda r: -r),
-            "Signorini",
-        ),
-        (
-            "pressed",
-            "a tangential reaction",
-            put("contacts/reaction", lambda g: (SLIPS(g), 1), lambda r: 1.01 * r),
-            "cone",
-        ),
-        (
-            "pressed",
-            "a friction that pushes along",
-            put("contacts/reaction", lambda g: (SLIPS(g), 1), lambda r: -r),
-            "slip",
-        ),
-        (
-            "pressed",
-            "a reaction that a contact lacks",
-            put("contacts/reaction", lambda g: (STICKS(g), 0), lambda r: 1.001 * r),
-            "Newton's law",
-        ),
+        ("pressed", "a normal reaction of a dry contact", reaction(STICKS, 0, lambda r: -r), "cone"),
+        ("pressed", "a pull between dry grains", reaction(STICKS, 0, lambda r: -r), "Signorini"),
+        ("pressed", "a tangential reaction", reaction(SLIPS, 1, lambda r: 1.01 * r), "cone"),
+        ("pressed", "a friction that pushes along", reaction(SLIPS, 1, lambda r: -r), "slip"),
+        ("pressed", "a reaction that a contact lacks", reaction(STICKS, 0, lambda r: 1.001 * r), "Newton's law"),
         (
             "pressed",
             "a contact that parts and pushes",
@@ -160,18 +136,8 @@ SPOILT = (
             add(G + "angular_velocity/value", grain_of(BONDED), 0, 0.01),
             "elastic bonds",
         ),
-        (
-            "beam",
-            "a force of a spring",
-            put("contacts/reaction", lambda g: (BONDED(g), 1), lambda r: 1.001 * r + 1e-3),
-            "elastic bonds",
-        ),
-        (
-            "bouncing",
-            "a reaction of what does not touch",
-            put("contacts/reaction", lambda g: (apart(g), 0), 1e-4),
-            "contacts that do not touch",
-        ),
+        ("beam", "a force of a spring", reaction(BONDED, 1, lambda r: 1.001 * r + 1e-3), "elastic bonds"),
+        ("bouncing", "a reaction of what does not touch", reaction(apart, 0, 1e-4), "contacts that do not touch"),
         (
             "bouncing",
             "a velocity after a bounce",
@@ -211,19 +177,19 @@ SPOILT = (
         (
             "pressed",
             "an intact bond beyond its limit",
-            put("contacts/reaction", lambda g: (BONDED(g), 1), lambda r: 1e3),
+            reaction(BONDED, 1, lambda r: 1e3),
             "intact bonds within limits",
         ),
         (
             "pressed",
             "an intact bond pulled too much",
-            put("contacts/reaction", lambda g: (BONDED(g), 0), lambda r: -11.0),
+            reaction(BONDED, 0, lambda r: -11.0),
             "intact bonds within limits",
         ),
         (
             "late",
             "a bond that broke within its limit",
-            put("contacts/reaction", lambda g: (broken_late(g), slice(0, 2)), lambda r: r * [1, 0] + [10, 0]),
+            reaction(broken_late, slice(0, 2), lambda r: r * [1, 0] + [10, 0]),
             "only bonds at their limit break",
         ),
         (
@@ -284,12 +250,7 @@ SPOILT = (
             put("walls/force/value", lambda g: (-1, 0, 1), lambda f: f * (1 + 1e-9)),
             "force of walls in frames",
         ),
-        (
-            "pressed",
-            "a force on a wall",
-            put("contacts/reaction", lambda g: (on_wall(g), 0), lambda r: r * (1 + 1e-6)),
-            "stress against walls",
-        ),
+        ("pressed", "a force on a wall", reaction(on_wall, 0, lambda r: r * (1 + 1e-6)), "stress against walls"),
         (
             "pressed",
             "the force at the limit where nothing broke",

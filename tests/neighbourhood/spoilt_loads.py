@@ -2,7 +2,20 @@
 
 import numpy as np
 
-from spoil import BONDED, G, add, broken_late, dry_grain, event, observed, other_mode, put, strongest_of_event, told
+from spoil import (
+    BONDED,
+    G,
+    add,
+    broken_late,
+    dry_grain,
+    event,
+    observed,
+    other_mode,
+    put,
+    reaction,
+    strongest_of_event,
+    told,
+)
 
 # scene, what is altered, how, the check that must fail
 SPOILT = [
@@ -64,25 +77,10 @@ SPOILT = [
     ("events", "a kinetic energy", observed("kinetic_energy", 3, 0, 1e-15), "rest"),
     ("events", "a load", observed("load_time", 3), "applied_force"),
     ("events", "a load beyond the end", observed("load_time", 3, 0, 1.0), "load time"),
-    (
-        "events",
-        "a reaction",
-        put("contacts/reaction", lambda g: (strongest_of_event(g), 0), lambda r: 1.001 * r),
-        "equilibrium",
-    ),
+    ("events", "a reaction", reaction(strongest_of_event, 0, lambda r: 1.001 * r), "equilibrium"),
     ("events", "a moment", put("contacts/moment", lambda g: BONDED(g), lambda m: m + 1e-6), "equilibrium"),
-    (
-        "events",
-        "a bond that breaks early",
-        put("contacts/reaction", lambda g: (broken_late(g), 0), lambda r: r + 1e-2),
-        "breaks",
-    ),
-    (
-        "events",
-        "a bond that holds too much",
-        put("contacts/reaction", lambda g: (BONDED(g), 1), lambda r: r + 50),
-        "breaks",
-    ),
+    ("events", "a bond that breaks early", reaction(broken_late, 0, lambda r: r + 1e-2), "breaks"),
+    ("events", "a bond that holds too much", reaction(BONDED, 1, lambda r: r + 50), "breaks"),
     ("events", "a force without touch", add(G + "radius", dry_grain, -1e-3), "contacts that do not touch"),
     ("events", "a rupture's force", event("rn", lambda n: n * (1 + 1e-9)), "ruptures"),
     ("events", "a rupture's moment", event("m", lambda m: m * (1 + 1e-9) + 1e-12), "ruptures"),

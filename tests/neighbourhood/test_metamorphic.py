@@ -8,10 +8,11 @@ and reactions are those of the stiff limit, which is unique.
 import numpy as np
 import pytest
 
+import bases
 import programs
 import run
-import scenes
 from history import History
+from transform import transformed
 
 WAYS = {
     "turned by 0.3": {"turn": 0.3},
@@ -28,7 +29,7 @@ SAME = 1e-6
 
 def scene_of(dimension, restitution):
     """A sample that is compressed until its first bond breaks."""
-    scene = (scenes.disks if dimension == 2 else scenes.spheres)()
+    scene = (bases.disks if dimension == 2 else bases.spheres)()
     scene["materials"]["restitution"] = {"grain_grain": restitution, "grain_wall": restitution}
     scene["stop"] = {"broken_fraction": 1e-9}
     return scene
@@ -59,8 +60,8 @@ class FirstBreak:
 def first_break(scene, way, folder, name):
     """The first break of a scene with its sample transformed in this way."""
     plain = {**scene}
-    points = run.sample_of(scenes.disks if scene["dimension"] == 2 else scenes.spheres, folder, programs.dem_run())
-    scene, points, how = scenes.transformed(plain, points, **way)
+    points = run.sample_of(bases.disks if scene["dimension"] == 2 else bases.spheres, folder, programs.dem_run())
+    scene, points, how = transformed(plain, points, **way)
     run.write_sample(scene, points, folder / f"{name}.csv")
     return FirstBreak(programs.run(scene, folder, name)[0], how)
 

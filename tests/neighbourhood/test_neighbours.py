@@ -6,6 +6,8 @@ import time
 
 import pytest
 
+import bases
+import changes
 import programs
 import run
 import scenes
@@ -36,8 +38,8 @@ def squeezed(bonded):
         "dimension": 2,
         "thickness": 0.01,
         "sample": {"lattice": {"square": {"diameter": 2e-3, "rows": 3, "columns": 3}}},
-        "materials": scenes.materials(),
-        "walls": {"bottom": scenes.plane([0, 1]), "top": scenes.plane([0, -1]) | {"velocity": {"constant": 0.01}}},
+        "materials": bases.materials(),
+        "walls": {"bottom": bases.plane([0, 1]), "top": bases.plane([0, -1]) | {"velocity": {"constant": 0.01}}},
         "time": {"step": 1e-4, "end": 0.01},
         "output": {"every_steps": 1},
     }
@@ -46,9 +48,9 @@ def squeezed(bonded):
 
 def oedometer(bonded):
     """Disks between fixed side walls under a plate that comes down."""
-    scene = scenes.disks()
-    scenes.side_walls(0.2)(scene)
-    scenes.lid("velocity")(scene)
+    scene = bases.disks()
+    changes.side_walls(0.2)(scene)
+    changes.lid("velocity")(scene)
     del scene["stop"]
     if not bonded:
         del scene["bonds"]

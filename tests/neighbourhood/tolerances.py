@@ -36,7 +36,7 @@ TABLE = {
     ),
     "elastic length": (
         1e-5,
-        "length of an intact elastic bond beside rest length + force over stiffness, over the length, likewise",
+        "length of an intact elastic bond beside that of its force and its turn, over the length",
     ),
     "printed": (0.5, "units in the last digit of a number in the summary's text"),
 }

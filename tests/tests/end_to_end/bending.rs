@@ -1,7 +1,7 @@
 //! The beam in three-point bending: where the force goes, where the crack starts and how it runs
 //! (Guessasma & Fortin 2011, figures 10 and 11), asserted on numbers.
 
-use crate::common::Folder;
+use crate::common::{Folder, sets, wall};
 use dem_run::history::{History, Rupture};
 
 /// Diameter of the disks, middle of the beam and height of its upper face (m).
@@ -35,9 +35,8 @@ fn concentration(history: &History, frame: usize) -> [f64; 3] {
 
 /// Force of the supports upwards on the beam (N).
 fn support(history: &History, frame: usize) -> f64 {
-    let walls = history.walls().expect("walls");
     let force = history.wall_state(frame).expect("state").force;
-    let vertical = |name: &str| -force[2 * walls.iter().position(|w| w.name == name).expect("a support") + 1];
+    let vertical = |name| -force[2 * wall(history, name) + 1];
     vertical("left") + vertical("right")
 }
 
@@ -115,17 +114,15 @@ fn a_rigid_beam_under_a_slow_force_breaks_first_at_its_lower_face() {
 #[test]
 fn a_polydisperse_beam_cracks_upwards_through_its_middle() {
     let here = Folder::new();
-    let set = [
+    let sixth = sets(&[
         "sample.random.count=700",
         "sample.random.width=0.44",
         "walls.left.shape.circle.center=[0.03, -0.1]",
         "walls.right.shape.circle.center=[0.41, -0.1]",
         "walls.loader.shape.circle.center=[0.22, 0.3]",
         "time.end=0.04",
-    ];
-    let mut args = vec!["-o", "a.h5", "--quiet"];
-    set.iter().for_each(|set| args.extend(["--set", set]));
-    let summary = here.run_config("bending-polydisperse.json", &args);
+    ]);
+    let summary = here.run_config("bending-polydisperse.json", &[&["-o", "a.h5", "--quiet"], &sixth[..]].concat());
     assert_eq!((&summary["rejected"], &summary["missed_tolerance"]), (&0.into(), &0.into()), "{summary}");
     let history = here.history("a.h5");
     let grains = history.grain_state(0).expect("grains");

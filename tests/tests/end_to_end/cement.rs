@@ -1,6 +1,6 @@
 //! Stages that cement: bonds that form later than at the start.
 
-use crate::common::{Folder, config, content, number, run, series};
+use crate::common::{Folder, config, content, number, run, series, wall};
 use dem_run::history::{BondStatus, History, NOT_FORMED};
 use serde_json::{Value, json};
 
@@ -125,7 +125,7 @@ fn a_sample_is_consolidated_cemented_and_tested_in_stages() {
     assert_eq!((&summary["ending"], &summary["load_wall"]), (&json!("stages"), &json!("top")));
     let history = here.history("a.h5");
     assert_eq!(history.bonds().expect("bonds").formed, Some(200));
-    let top = history.walls().expect("walls").iter().position(|wall| wall.name == "top").expect("the lid");
+    let top = wall(&history, "top");
     let (load, height) =
         (series(&history, "wall_force_at_limit", &[top, 1]), series(&history, "wall_position", &[top, 1]));
     // 200 Pa on 20 mm by 1 m, before and after; the peak is 17 micrometres away

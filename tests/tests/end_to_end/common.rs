@@ -137,6 +137,11 @@ pub fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("no number: {value}"))
 }
 
+/// The arguments of these assignments.
+pub fn sets<'a>(assignments: &[&'a str]) -> Vec<&'a str> {
+    assignments.iter().flat_map(|assignment| ["--set", assignment]).collect()
+}
+
 /// Runs the scene in the file `scene` into `a.h5`, and gives its summary.
 pub fn run(here: &Folder, scene: &str, args: &[&str]) -> Value {
     here.dem_run(&[&["run", scene, "-o", "a.h5", "--force", "--quiet", "--json"], args].concat()).json()
@@ -150,6 +155,12 @@ pub fn observable(history: &History, name: &str) -> Series {
 /// One component of an observable, step by step.
 pub fn series(history: &History, name: &str, index: &[usize]) -> Vec<f64> {
     observable(history, name).component(index).unwrap_or_else(|| panic!("{name} has no {index:?}"))
+}
+
+/// Index of a wall.
+pub fn wall(history: &History, name: &str) -> usize {
+    let walls = history.walls().expect("walls");
+    walls.iter().position(|wall| wall.name == name).unwrap_or_else(|| panic!("no wall {name}"))
 }
 
 /// All that a history holds, part by part, but its parameters and the processor time.

@@ -1,14 +1,8 @@
 //! Loads of laboratory tests: walls by stress, shear under a normal load, glued platens, the end at
 //! a drop of the load; and the shipped scenes that use them.
 
-use crate::common::{Folder, config, number, run, series};
-use dem_run::history::History;
+use crate::common::{Folder, config, number, run, series, sets, wall};
 use serde_json::json;
-
-/// Index of a wall.
-fn wall(history: &History, name: &str) -> usize {
-    history.walls().expect("walls").iter().position(|wall| wall.name == name).expect("the wall")
-}
 
 /// The side walls press with their stress on the present distance of lid and floor, at the middle
 /// of each step, and grow farther apart; a greater stress makes a stronger sample.
@@ -135,15 +129,14 @@ fn a_cemented_layer_in_a_shear_box_has_a_peak_and_a_residual_strength() {
 #[test]
 fn the_side_plates_of_a_triaxial_test_hold_their_stress() {
     let here = Folder::new();
-    let small = [
+    let small = sets(&[
         "sample.random.count=80",
         "sample.random.width=0.009",
         "sample.random.depth=0.009",
         "sample.random.preparation.compaction.solid_fraction=0.45",
         "time.end=0.02",
-    ];
-    let sets: Vec<&str> = small.iter().flat_map(|set| ["--set", set]).collect();
-    let summary = run(&here, &config("triaxial.json"), &sets);
+    ]);
+    let summary = run(&here, &config("triaxial.json"), &small);
     assert_eq!((number(&summary["grains"]), &summary["load_wall"]), (80.0, &json!("top")));
     let history = here.history("a.h5");
     let h = 1e-4;
@@ -217,15 +210,12 @@ fn a_layer_is_pulled_off_at_a_weak_interface_and_breaks_itself_at_a_strong_one()
 fn scattered_strengths_lower_the_load_of_the_first_break_and_it_is_proportional_to_them() {
     let here = Folder::new();
     let small = [
-        "--set",
         "sample.random.count=60",
-        "--set",
         "sample.random.width=0.011",
-        "--set",
         "sample.random.preparation.compaction.solid_fraction=0.7",
     ];
-    let first = |set: &str| {
-        let summary = run(&here, &config("uniaxial-scatter.json"), &[&small[..], &["--set", set]].concat());
+    let first = |set| {
+        let summary = run(&here, &config("uniaxial-scatter.json"), &sets(&[&small[..], &[set]].concat()));
         number(&summary["failure"]["first_break"])
     };
     let (whole, scattered, doubled) = (first("bonds.scatter=null"), first("seed=1"), first("bonds.strength=20"));

@@ -1,12 +1,10 @@
 //! `dem-run limit`: the bound on the first break, and what it answers where there is none.
 
-use crate::common::{Folder, SMALL, config};
+use crate::common::{Folder, SMALL, config, sets};
 use serde_json::Value;
 
-fn limit(scene: &str, sets: &[&str]) -> Value {
-    let path = config(scene);
-    let sets = sets.iter().flat_map(|set| ["--set", set]);
-    Folder::new().dem_run(&["limit", &path, "--json"].into_iter().chain(sets).collect::<Vec<_>>()).json()
+fn limit(scene: &str, assignments: &[&str]) -> Value {
+    Folder::new().dem_run(&[&["limit", &config(scene), "--json"], &sets(assignments)[..]].concat()).json()
 }
 
 fn close(value: &Value, expected: f64) {
@@ -40,11 +38,11 @@ fn compression_breaks_first_below_its_limit_at_any_cohesion() {
     let small: Vec<&str> = SMALL.iter().copied().filter(|arg| *arg != "--set").collect();
     let mut per_cohesion = vec![];
     for strength in ["bonds.strength=10", "bonds.strength=20"] {
-        let sets = [&small[..], &[strength]].concat();
-        let found = limit("compression.json", &sets);
+        let assignments = [&small[..], &[strength]].concat();
+        let found = limit("compression.json", &assignments);
         assert_eq!(found["outcome"], "limit", "{found}");
         let load = found["loads"][0]["limit"].as_f64().expect("a load");
-        let args: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).chain(["-o", "a.h5"]).collect();
+        let args = [&["-o", "a.h5"], &sets(&assignments)[..]].concat();
         let first = Folder::new().run_config("compression.json", &args);
         let first = first["failure"]["first_break"].as_f64().unwrap_or_else(|| panic!("{first}"));
         assert!(first <= load + 100.0 * 1e-4, "first break at {first} N, limit {load} N");

@@ -1,19 +1,17 @@
 //! Several materials in one scene, regions without bonds, and lists of bonds.
 
-use crate::common::{Folder, SMALL, config, content};
+use crate::common::{Folder, SMALL, config, content, sets};
 use dem_run::history::{History, RuptureMode};
 
 /// Run a scene of `configs/` with these assignments.
-fn run(scene: &str, sets: &[&str]) -> (Folder, History) {
+fn run(scene: &str, assignments: &[&str]) -> (Folder, History) {
     let here = Folder::new();
-    let history = again(&here, scene, sets);
+    let history = again(&here, scene, assignments);
     (here, history)
 }
 
-fn again(here: &Folder, scene: &str, sets: &[&str]) -> History {
-    let sets = sets.iter().flat_map(|set| ["--set", set]);
-    let args: Vec<&str> = ["-o", "a.h5", "--force"].into_iter().chain(sets).collect();
-    here.run_config(scene, &args);
+fn again(here: &Folder, scene: &str, assignments: &[&str]) -> History {
+    here.run_config(scene, &[&["-o", "a.h5", "--force"], &sets(assignments)[..]].concat());
     assert!(here.dem_post(&["info", "--check", "a.h5"]).succeeds().stdout.contains("sound    yes"));
     here.history("a.h5")
 }
@@ -111,8 +109,8 @@ fn several_materials_go_on_and_come_back_from_a_table_to_the_bit() {
     let named = r#"materials.named=[{"name": "stone", "density": 3000, "wall_friction": 0.4,
         "regions": [{"ball": {"center": [7e-3, 1e-2], "radius": 5e-3}}, {"box": {"from": [0, 0], "to": [7e-3, 4e-3]}}]}]"#;
     let pairs = r#"materials.pairs=[{"between": ["stone", "base"], "friction": 0.5, "bonds": {"strength": 6}}]"#;
-    let sets = [small(), vec![named, pairs]].concat();
-    let whole = again(&here, "compression.json", &sets);
+    let two = [small(), vec![named, pairs]].concat();
+    let whole = again(&here, "compression.json", &two);
     let materials = whole.grains().expect("grains").material;
     let stones = materials.iter().filter(|material| **material == 1).count();
     assert!((10..50).contains(&stones), "{stones} grains of stone");
@@ -121,9 +119,8 @@ fn several_materials_go_on_and_come_back_from_a_table_to_the_bit() {
     let expected = content(&whole);
 
     // half of it, then the rest
-    let args: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
     let half = ["-o", "half.h5", "--set", "time.end=0.2", "--write-sample", "sample.csv"];
-    here.run_config("compression.json", &[&args[..], &half].concat());
+    here.run_config("compression.json", &[&sets(&two)[..], &half].concat());
     here.dem_run(&["resume", "half.h5", "--until", "0.5"]).succeeds();
     assert!(content(&here.history("half.h5")) == expected, "the resumed run differs");
 
@@ -164,14 +161,14 @@ fn no_bond_crosses_a_notch_and_all_others_stay() {
 fn a_list_of_all_bonds_is_the_scene_without_it_and_its_values_come_first() {
     let here = Folder::new();
     let scatter = r#"bonds.scatter={"weibull": {"modulus": 4}}"#;
-    let sets = [small(), vec![scatter]].concat();
-    let plain = again(&here, "compression.json", &sets);
+    let scattered = [small(), vec![scatter]].concat();
+    let plain = again(&here, "compression.json", &scattered);
     let (expected, bonds) = (content(&plain), plain.bonds().expect("bonds"));
     // backwards, with the grains of a pair exchanged
     let rows: String = bonds.pair.iter().rev().map(|[i, j]| format!("{j},{i}\n")).collect();
     here.write("bonds.csv", format!("i,j\n{rows}"));
     let list = format!("bonds.list={:?}", here.path("bonds.csv"));
-    let listed = again(&here, "compression.json", &[&sets[..], &[&list]].concat());
+    let listed = again(&here, "compression.json", &[&scattered[..], &[&list]].concat());
     assert!(content(&listed) == expected, "the run of the list differs");
 
     // a listed strength is not scattered, and the others stay as drawn for their place

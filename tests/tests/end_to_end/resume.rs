@@ -170,14 +170,19 @@ fn an_interrupted_run_goes_on_from_its_last_step() {
     assert_eq!(here.read("a.h5"), before);
 }
 
+/// A run to `end` (s), in `short.h5`, that goes on to `later` gives the same as one in one piece.
+fn goes_on(here: &Folder, end: &str, later: &str) {
+    run(here, "long.h5", &["--set", &format!("time.end={later}"), "--quiet"]);
+    run(here, "short.h5", &["--set", &format!("time.end={end}"), "--quiet"]);
+    here.dem_run(&["resume", "short.h5", "--until", later, "--quiet"]).succeeds();
+    same(&here.history("long.h5"), &here.history("short.h5"));
+}
+
 #[test]
 fn a_finished_run_goes_on_to_a_later_end() {
     let here = Folder::new();
     // the first end lies between two frames
-    run(&here, "long.h5", &["--set", "time.end=0.08", "--quiet"]);
-    run(&here, "short.h5", &["--set", "time.end=0.0403", "--quiet"]);
-    here.dem_run(&["resume", "short.h5", "--until", "0.08", "--quiet"]).succeeds();
-    same(&here.history("long.h5"), &here.history("short.h5"));
+    goes_on(&here, "0.0403", "0.08");
     // the summary counts the whole run
     let summary = here.dem_run(&["resume", "short.h5", "--until", "0.09", "--json", "--quiet"]).json();
     assert_eq!(summary["steps"], 900);
@@ -189,10 +194,7 @@ fn a_finished_run_goes_on_to_a_later_end() {
 #[test]
 fn the_text_of_the_scene_may_become_longer() {
     let here = Folder::new();
-    run(&here, "long.h5", &["--set", "time.end=0.0205", "--quiet"]);
-    run(&here, "short.h5", &["--set", "time.end=0.02", "--quiet"]);
-    here.dem_run(&["resume", "short.h5", "--until", "0.0205", "--quiet"]).succeeds();
-    same(&here.history("long.h5"), &here.history("short.h5"));
+    goes_on(&here, "0.02", "0.0205");
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Specimens that are cut and split: the Brazilian test in the plane, and a small cylinder through
 //! every view.
 
-use crate::common::Folder;
+use crate::common::{Folder, sets};
 
 #[test]
 fn a_disk_breaks_first_at_its_loaded_diameter_and_at_a_load_in_proportion_to_the_cohesion() {
@@ -32,23 +32,15 @@ fn a_disk_breaks_first_at_its_loaded_diameter_and_at_a_load_in_proportion_to_the
 #[test]
 fn a_cylinder_of_spheres_breaks_and_its_cracks_are_surfaces() {
     let here = Folder::new();
-    let set = [
-        "--set",
+    let small = sets(&[
         "sample.random.count=120",
-        "--set",
         "sample.random.width=0.012",
-        "--set",
         "sample.random.preparation.compaction.solid_fraction=0.4",
-        "--set",
         "walls.top.force_rate=2000",
-        "--set",
         "time.step=1e-4",
-        "--set",
         "time.end=0.03",
-        "-o",
-        "cylinder.h5",
-    ];
-    let summary = here.run_config("cylinder-compression.json", &set);
+    ]);
+    let summary = here.run_config("cylinder-compression.json", &[&["-o", "cylinder.h5"], &small[..]].concat());
     assert!(summary["bonds"].as_u64().expect("bonds") > 200, "{summary}");
     let found = here.dem_post(&["cracks", "cylinder.h5", "-o", "views", "--json"]).json();
     let surfaces = found["surfaces"].as_array().expect("surfaces");
