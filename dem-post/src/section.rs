@@ -7,6 +7,7 @@ use dem_history::History;
 use serde::Serialize;
 
 use crate::output::{PostError, Result};
+use crate::title::Titles;
 
 /// Width and height of a chart: small, so that its text stays legible on a narrow screen.
 const CHART: (f64, f64) = (500.0, 400.0);
@@ -24,11 +25,19 @@ pub trait OnPage {
     /// Its head.
     const TITLE: &'static str;
 
-    /// The section; its maps show the frames `frames`.
+    /// The section.
     ///
     /// # Errors
     /// Those of reading the history and of drawing.
-    fn section(&self, history: &History, frames: &[usize]) -> Result<Section>;
+    fn section(&self, history: &History, maps: &Maps) -> Result<Section>;
+}
+
+/// What the maps of the page show.
+pub struct Maps {
+    /// Their frames.
+    pub frames: Vec<usize>,
+    /// The titles of frames.
+    pub titles: Titles,
 }
 
 /// A section of the page.

@@ -20,6 +20,7 @@ use crate::frames::{self, Subject};
 use crate::options::{Files, LoadWall};
 use crate::output::{Folder, PostError, Result, WriteError, facts, progress, quantity};
 use crate::stress_strain;
+use crate::title::Titles;
 use pace::Shown;
 use picture::{Animation, Picture};
 
@@ -81,6 +82,8 @@ struct Curves {
     energy: Vec<(f64, f64)>,
     /// Time of each observed step (s).
     times: Vec<f64>,
+    /// The titles of frames, with the same load.
+    titles: Titles,
 }
 
 impl Analysis for Command {
@@ -167,7 +170,7 @@ impl From<WriteError> for NoWebm {
 fn animate(history: &History, report: &Report, path: &Path, quiet: bool) -> Result<()> {
     let failed = |why: String| PostError::Write(WriteError { path: path.into(), why });
     let bar = progress(report.pictures.len() as u64, quiet, "{bar:24} {pos} of {len} pictures, {eta} left");
-    let view = frames::shown(history, &report.frames)?;
+    let view = frames::shown(history, &report.frames, &report.curves.titles)?;
     let mut animation: Option<Animation> = None;
     for (k, shown) in report.pictures.iter().enumerate() {
         let frame = report.frames.frames[shown.frame];
@@ -213,6 +216,7 @@ impl Curves {
             Ok(load) => {
                 let millimetres = load.displacement.iter().map(|x| 1e3 * x);
                 curves.load = millimetres.zip(load.load.iter().copied()).collect();
+                curves.titles = Titles::with(&load);
                 curves.times = load.time;
             }
             // no wall is driven, or its force and position were not observed

@@ -9,6 +9,7 @@ use crate::extent::first_box;
 use crate::frames::{self, Subject};
 use crate::output::{PostError, Result, counted, number, quantity, short};
 use crate::section::{Figure, Section, capitalised, chart_figure, map_figure};
+use crate::title::Titles;
 use crate::{cracks, info, moments, stress_strain};
 
 /// A moment of which the page shows a picture.
@@ -27,6 +28,8 @@ pub struct Parts<'a> {
     pub cracks: Option<&'a cracks::Report>,
     /// Times of the pictures that were asked for (s).
     pub times: &'a [f64],
+    /// The titles of frames.
+    pub titles: &'a Titles,
 }
 
 /// The section.
@@ -37,7 +40,7 @@ pub fn section(history: &History, parts: &Parts) -> Result<Section> {
     let (ruptures, load) = (history.ruptures()?, parts.load);
     let shown = shown(history, &ruptures, load, parts.times)?;
     let pictured: Vec<usize> = shown.iter().map(|moment| moment.frame).collect();
-    let figures = pictures(history, &shown, load)?;
+    let figures = pictures(history, &shown, parts)?;
     let mut player = player::read(history, &pictured, load)?;
     let charts = charts(history, &ruptures, load);
     let text = sentences(history, parts, &ruptures)?;
@@ -82,7 +85,7 @@ fn shown(
 }
 
 /// A picture of each moment, all on one scale.
-fn pictures(history: &History, shown: &[Moment], load: Option<&stress_strain::Report>) -> Result<Vec<Figure>> {
+fn pictures(history: &History, shown: &[Moment], parts: &Parts) -> Result<Vec<Figure>> {
     let times: Vec<f64> = shown.iter().map(|moment| history.times()[moment.frame]).collect();
     let bonded = !history.bonds()?.is_empty();
     // what the sample has: bonds, else forces, else speeds
@@ -98,11 +101,11 @@ fn pictures(history: &History, shown: &[Moment], load: Option<&stress_strain::Re
         }
     }
     let Some(chosen) = chosen else { return Ok(vec![]) };
-    let view = frames::shown(history, &chosen)?;
+    let view = frames::shown(history, &chosen, parts.titles)?;
     let mut figures = vec![];
     for Moment { name, frame } in shown {
         let time = number(history.times()[*frame]);
-        let load = load.and_then(|load| load.load_at(history.steps()[*frame]));
+        let load = parts.load.and_then(|load| load.load_at(history.steps()[*frame]));
         let load = load.map_or_else(String::new, |load| format!(", load {} N", short(load)));
         let named = if name.is_empty() { String::new() } else { format!("{}: ", capitalised(name)) };
         let caption = format!("{named}t = {time} s{load}.");
