@@ -16,6 +16,7 @@ use dem_output::command_line::whole;
 use serde::Serialize;
 
 use crate::analysis::{Analysis, note};
+use crate::cracks::report::total_over_time;
 use crate::frames::{self, Subject};
 use crate::options::{Files, LoadWall};
 use crate::output::{Folder, PostError, Result, WriteError, facts, progress, quantity};
@@ -224,10 +225,7 @@ impl Curves {
             Err(error) => return Err(error),
         }
         if !history.bonds()?.is_empty() {
-            let ends = [history.times().first(), history.times().last()].map(|time| time.copied().unwrap_or(0.0));
-            let counts = ruptures.iter().enumerate().map(|(k, &time)| (time, (k + 1) as f64));
-            curves.broken =
-                [(ends[0], 0.0)].into_iter().chain(counts).chain([(ends[1], ruptures.len() as f64)]).collect();
+            curves.broken = total_over_time(history, ruptures);
         } else if curves.load.is_empty()
             && let Some(energy) = history.observable("kinetic_energy")?
         {
