@@ -21,14 +21,15 @@ pub fn volume(dimension: usize, radius: f64) -> f64 {
 /// # Errors
 /// Those of reading the history; it must have a frame.
 pub fn first_box(history: &History) -> Result<Vec<[f64; 2]>> {
-    let (radius, position) = (history.grains()?.radius, history.grain_state(0)?.position);
-    let d = history.dimension();
+    Ok(box_around(&history.grains()?.radius, &history.grain_state(0)?.position, history.dimension()))
+}
+
+/// The box around grains of these radii at these positions, D numbers each, m: its ends along each
+/// axis.
+pub fn box_around(radius: &[f64], position: &[f64], dimension: usize) -> Vec<[f64; 2]> {
     let ends = |axis: usize| {
-        let reach = |sign: f64| {
-            let reach = radius.iter().zip(position.chunks(d)).map(|(r, x)| sign * x[axis] + r);
-            sign * reach.fold(f64::NEG_INFINITY, f64::max)
-        };
-        [reach(-1.0), reach(1.0)]
+        let reach = |sign: f64| radius.iter().zip(position.chunks(dimension)).map(move |(r, x)| x[axis] + sign * r);
+        [range(reach(-1.0))[0], range(reach(1.0))[1]]
     };
-    Ok((0..d).map(ends).collect())
+    (0..dimension).map(ends).collect()
 }

@@ -175,7 +175,8 @@ impl Report {
 /// # Errors
 /// [`PostError::Write`], and those of reading the history.
 pub fn write(history: &History, report: &Report, folder: &mut Folder, quiet: bool) -> Result<()> {
-    let shown = shown(history, report)?;
+    let titles = Titles::read(history)?;
+    let shown = shown(history, report, &titles)?;
     let bar = progress(report.frames.len() as u64, quiet, "{bar:24} {pos} of {len} pictures, {eta} left");
     let names: Vec<String> = (0..report.frames.len()).map(|k| format!("frame-{k:05}.png")).collect();
     folder.announce(&names)?;
@@ -196,21 +197,21 @@ pub(crate) fn drawing(history: &History, report: &Report, shown: &Shown, frame: 
 }
 
 /// What all pictures of a series share.
-pub(crate) struct Shown {
+pub(crate) struct Shown<'a> {
     sample: Sample,
     view: View,
-    titles: Titles,
+    titles: &'a Titles,
 }
 
 /// The part of the plane that shows all frames.
-pub(crate) fn shown(history: &History, report: &Report) -> Result<Shown> {
+pub(crate) fn shown<'a>(history: &History, report: &Report, titles: &'a Titles) -> Result<Shown<'a>> {
     let sample = Sample::with_depth(history)?;
     let mut view = View::EMPTY;
     for &frame in &report.frames {
         let (grains, walls) = (history.grain_state(frame)?, history.wall_state(frame)?);
         view = view.join(sample.view(std::iter::once((&grains, &walls))));
     }
-    Ok(Shown { sample, view, titles: Titles::read(history)? })
+    Ok(Shown { sample, view, titles })
 }
 
 fn picture(history: &History, report: &Report, frame: usize) -> Result<(Panel, Vec<Key>)> {

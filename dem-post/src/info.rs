@@ -10,7 +10,7 @@ use crate::analysis::Analysis;
 use crate::cracks::Modes;
 use crate::extent::range;
 use crate::output::{Result, facts, in_shell, number, quantity};
-use crate::section::{OnPage, Section};
+use crate::section::{Maps, OnPage, Section};
 use crate::{check, pack, stress_strain};
 
 /// Print the content of a history in about twenty lines; --check verifies the file, --repair closes
@@ -200,7 +200,7 @@ impl OnPage for Report {
     const ID: &'static str = "run";
     const TITLE: &'static str = "Run";
 
-    fn section(&self, _: &History, _: &[usize]) -> Result<Section> {
+    fn section(&self, _: &History, _: &Maps) -> Result<Section> {
         let facts = self.facts().into_iter().map(|(name, value)| (name.to_string(), value)).collect();
         Ok(Section { facts, ..Section::of::<Self>() })
     }

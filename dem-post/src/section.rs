@@ -7,6 +7,7 @@ use dem_history::History;
 use serde::Serialize;
 
 use crate::output::{PostError, Result};
+use crate::title::Titles;
 
 /// Width and height of a chart: small, so that its text stays legible on a narrow screen.
 const CHART: (f64, f64) = (500.0, 400.0);
@@ -24,11 +25,19 @@ pub trait OnPage {
     /// Its head.
     const TITLE: &'static str;
 
-    /// The section; its maps show the frames `frames`.
+    /// The section.
     ///
     /// # Errors
     /// Those of reading the history and of drawing.
-    fn section(&self, history: &History, frames: &[usize]) -> Result<Section>;
+    fn section(&self, history: &History, maps: &Maps) -> Result<Section>;
+}
+
+/// What the maps of the page show.
+pub struct Maps {
+    /// Their frames.
+    pub frames: Vec<usize>,
+    /// The titles of frames.
+    pub titles: Titles,
 }
 
 /// A section of the page.
@@ -118,7 +127,7 @@ struct PlotCurve {
 }
 
 impl Plot {
-    fn of(titles: [String; 2], whole: bool, curves: Vec<Curve>, axes: &Axes, size: (f64, f64)) -> Self {
+    fn of(chart: &Chart, axes: &Axes, size: (f64, f64)) -> Self {
         let [left, top, right, bottom] = axes.area;
         let round = |share: f64| (1e5 * share).round() / 1e5;
         Self {
@@ -126,26 +135,23 @@ impl Plot {
             x: axes.x,
             y: axes.y,
             log: axes.log,
-            whole,
-            time: [("time (s)", 1.0), ("time (ms)", 1e3)]
-                .iter()
-                .find(|(title, _)| *title == titles[0])
-                .map_or(0.0, |unit| unit.1),
-            titles,
-            curves: curves.into_iter().map(|curve| PlotCurve::of(curve, axes)).collect(),
+            whole: chart.y_is_count,
+            titles: [chart.x.clone(), chart.y.clone()],
+            time: chart.second().unwrap_or(0.0),
+            curves: chart.curves.iter().map(|curve| PlotCurve::of(curve, axes)).collect(),
         }
     }
 }
 
 impl PlotCurve {
-    fn of(curve: Curve, axes: &Axes) -> Self {
+    fn of(curve: &Curve, axes: &Axes) -> Self {
         let inside = |point: &(f64, f64)| axes.share(*point).iter().all(|x| (-1e-9..=1.0 + 1e-9).contains(x));
         let kept: Vec<usize> = (0..curve.points.len()).filter(|&k| inside(&curve.points[k])).collect();
         let points: Vec<(f64, f64)> = kept.iter().map(|&k| curve.points[k]).collect();
         let kept: Vec<usize> = thinned(&points, CURVE_POINTS).into_iter().map(|k| kept[k]).collect();
         let times = if curve.style == Style::Level { &[][..] } else { &curve.times };
         Self {
-            name: curve.label,
+            name: curve.label.clone(),
             colour: curve.colour,
             points: quantised(kept.iter().flat_map(|&k| axes.share(curve.points[k]))),
             times: kept.iter().filter_map(|&k| times.get(k)).map(|time| rounded(*time)).collect(),
@@ -154,7 +160,7 @@ impl PlotCurve {
 }
 
 /// A number with six significant digits: fewer letters in the page.
-fn rounded(value: f64) -> f64 {
+pub fn rounded(value: f64) -> f64 {
     format!("{value:.5e}").parse().unwrap_or(value)
 }
 
@@ -193,19 +199,12 @@ impl Table {
 
 /// A chart as SVG, with its curves for the script of the page.
 pub fn chart_figure(chart: Chart, alt: &str, caption: &str) -> Figure {
-    let mut chart = chart.readable();
-    let (titles, whole) = ([chart.x.clone(), chart.y.clone()], chart.y_is_count);
-    let curves: Vec<Curve> = chart.curves.iter_mut().map(copied).collect();
-    let (drawing, axes) = Chart::draw_located(vec![chart], CHART);
+    let chart = chart.readable();
+    let (drawing, axes) = Chart::draw_located(vec![chart.clone()], CHART);
     let source = address("svg+xml", drawing.svg().as_bytes());
-    let plot = axes.first().map(|axes| Plot::of(titles, whole, curves, axes, drawing.size()));
+    let plot = axes.first().map(|axes| Plot::of(&chart, axes, drawing.size()));
     let curves = plot.and_then(|plot| json(&plot).ok()).unwrap_or_default();
     Figure { source, alt: alt.into(), caption: caption.into(), class: "chart", curves }
-}
-
-fn copied(curve: &mut Curve) -> Curve {
-    let Curve { label, points, style, colour, times } = curve;
-    Curve { label: label.clone(), points: points.clone(), style: *style, colour, times: std::mem::take(times) }
 }
 
 /// A map as SVG or PNG, whichever is smaller.

@@ -17,7 +17,7 @@ use crate::map::{Arrow, Key, Panel, Ramp, Sample, Scale, draw};
 use crate::moments;
 use crate::options::Moments;
 use crate::output::{Folder, Result, Text, number, short};
-use crate::section::{OnPage, Section, map_figure};
+use crate::section::{Maps, OnPage, Section, map_figure};
 use crate::title::Titles;
 use dem_drawing::{Drawing, colour};
 use dem_output::row;
@@ -202,18 +202,17 @@ pub fn write(history: &History, report: &Report, folder: &mut Folder) -> Result<
         })
     });
     folder.table("velocities", &head, rows)?;
-    Ok(folder.draw("velocities", &map(history, report)?)?)
+    Ok(folder.draw("velocities", &map(history, report, &Titles::read(history)?)?)?)
 }
 
 /// The map of the velocities.
 ///
 /// # Errors
 /// Those of reading the history.
-pub fn map(history: &History, report: &Report) -> Result<Drawing> {
+pub fn map(history: &History, report: &Report, titles: &Titles) -> Result<Drawing> {
     let scale = |title: &str, high: f64| Scale { title: title.into(), low: 0.0, high, ramp: Ramp::Areas };
     // in 3D the arrow of a square would be a mean over all depths
     let flat = history.dimension() == 2;
-    let titles = Titles::read(history)?;
     let radius = history.grains()?.radius;
     let diameter = 2.0 * radius.iter().sum::<f64>() / radius.len() as f64;
     let duration = history.times().last().zip(history.times().first()).map_or(0.0, |(last, first)| last - first);
@@ -249,13 +248,17 @@ impl OnPage for Report {
     const ID: &'static str = "velocities";
     const TITLE: &'static str = "Velocities";
 
-    fn section(&self, history: &History, _: &[usize]) -> Result<Section> {
+    fn section(&self, history: &History, maps: &Maps) -> Result<Section> {
         let mut figures = vec![];
         for field in &self.fields {
             let one = Self { fields: vec![field.clone()] };
             let time = number(field.time);
             let alt = format!("Grains coloured by their speed at t = {time} s, with arrows of the mean velocity.");
-            figures.push(map_figure(&map(history, &one)?, &alt, &format!("Velocities at t = {time} s."))?);
+            figures.push(map_figure(
+                &map(history, &one, &maps.titles)?,
+                &alt,
+                &format!("Velocities at t = {time} s."),
+            )?);
         }
         Ok(Section { figures, ..Section::of::<Self>() })
     }

@@ -180,7 +180,7 @@
     const order = all.filter(one => one);
     if (d === 3) order.sort((a, b) => b.depth - a.depth);
     const paper = colour('--paper');
-    const [held, free, rim] = [colour('--grain'), colour('--released'), colour('--rim')];
+    const [held, free, rim, intact] = ['--grain', '--released', '--rim', '--bond'].map(colour);
     for (const one of order) {
       const size = Math.max(radius[one.k] * one.magnified * scale, 0.3);
       const disk = (fill, share, alpha) => {
@@ -212,14 +212,13 @@
         if (!a || !b) continue;
         const apart = Math.hypot(...a.point.map((x, k) => x - b.point[k]));
         if (cracks && apart >= 1.5 * (radius[i] + radius[j])) continue;
-        pen.strokeStyle = cracks ? run.colours[mode[bond]] : colour_of_bonds;
+        pen.strokeStyle = cracks ? run.colours[mode[bond]] : intact;
         path([a, b], false);
         pen.stroke();
       }
     }
     for (const wall of run.walls) if (d === 3 && !wall.behind && !wall.radius) draw_wall(wall, shown, false);
   };
-  let colour_of_bonds = colour('--bond');
 
   const show = moment => {
     shown = moment;
@@ -249,11 +248,8 @@
     timer = setInterval(() => (shown < moments - 1 ? show(shown + 1) : stop()), 100);
   });
   slider.addEventListener('input', () => { stop(); show(Number(slider.value)); });
-  const again = () => { colour_of_bonds = colour('--bond'); draw(); };
-  window.addEventListener('resize', again);
-  window.matchMedia('(prefers-color-scheme: dark)').addEventListener('change', again);
-  window.addEventListener('beforeprint', again);
-  window.addEventListener('afterprint', again);
+  window.matchMedia('(prefers-color-scheme: dark)').addEventListener('change', draw);
+  for (const event of ['resize', 'beforeprint', 'afterprint']) window.addEventListener(event, draw);
   player.querySelector('.stage').hidden = false;
   show(run.start);
 })();

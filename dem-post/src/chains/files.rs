@@ -7,6 +7,7 @@ use dem_output::row;
 use super::pictures::{chain_map, distribution_chart, length_charts, network_map};
 use super::report::Report;
 use crate::output::{Folder, Result};
+use crate::title::Titles;
 
 /// Writes `forces.csv`, `distribution.csv`, `force-chains.csv`, `force-chain-lengths.csv`, and as
 /// drawings `chains` (the network), `distribution`, `force-chains` and, where chains differ in
@@ -41,10 +42,11 @@ pub fn write(history: &History, report: &Report, folder: &mut Folder) -> Result<
         network.distribution.iter().map(|(ratio, density)| row![network.step, network.time, ratio, density])
     });
     folder.table("distribution", &["step", "time_s", "ratio_to_mean", "density"], rows)?;
-    folder.draw("chains", &network_map(history, report, report.greatest_mean())?)?;
+    let titles = Titles::read(history)?;
+    folder.draw("chains", &network_map(history, report, &titles, report.greatest_mean())?)?;
     folder.draw("distribution", &Chart::draw(vec![distribution_chart(report)]))?;
     write_chains(report, folder)?;
-    folder.draw("force-chains", &chain_map(history, report)?)?;
+    folder.draw("force-chains", &chain_map(history, report, &titles)?)?;
     let charts = length_charts(report);
     if !charts.is_empty() {
         folder.draw("force-chain-lengths", &Chart::draw(charts))?;

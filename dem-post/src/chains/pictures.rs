@@ -72,10 +72,9 @@ pub fn length_charts(report: &Report) -> Vec<Chart> {
 ///
 /// # Errors
 /// Those of reading the history.
-pub fn chain_map(history: &History, report: &Report) -> Result<Drawing> {
+pub fn chain_map(history: &History, report: &Report, titles: &Titles) -> Result<Drawing> {
     let d = history.dimension();
     let grains = history.grains()?.radius.len();
-    let titles = Titles::read(history)?;
     let mut panels = vec![];
     for network in &report.networks {
         let state = history.grain_state(network.frame)?;
@@ -135,11 +134,10 @@ pub fn distribution_chart(report: &Report) -> Chart {
 ///
 /// # Errors
 /// Those of reading the history.
-pub fn network_map(history: &History, report: &Report, mean: f64) -> Result<Drawing> {
+pub fn network_map(history: &History, report: &Report, titles: &Titles, mean: f64) -> Result<Drawing> {
     let (sample, d) = (Sample::with_depth(history)?, history.dimension());
     let grains = history.grains()?.radius.len();
     let mut panels = vec![];
-    let titles = Titles::read(history)?;
     for network in &report.networks {
         let state = history.grain_state(network.frame)?;
         let caption = format!("⟨f⟩ = {} N", short(network.statistics.mean));

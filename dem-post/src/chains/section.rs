@@ -5,13 +5,13 @@ use dem_history::History;
 use super::pictures::{chain_map, distribution_chart, length_charts, network_map};
 use super::report::{CHAIN_HEAD, Report};
 use crate::output::{Result, number};
-use crate::section::{Figure, OnPage, Section, Table, capitalised, chart_figure, map_figure};
+use crate::section::{Figure, Maps, OnPage, Section, Table, capitalised, chart_figure, map_figure};
 
 impl OnPage for Report {
     const ID: &'static str = "chains";
     const TITLE: &'static str = "Forces and chains";
 
-    fn section(&self, history: &History, _: &[usize]) -> Result<Section> {
+    fn section(&self, history: &History, maps: &Maps) -> Result<Section> {
         let mut figures: Vec<Figure> = vec![];
         let mean = self.greatest_mean();
         for network in &self.networks {
@@ -20,13 +20,11 @@ impl OnPage for Report {
             let alt = format!(
                 "Contact forces as lines at t = {time} s: blue is compression, orange is tension, width is magnitude."
             );
-            figures.push(map_figure(
-                &network_map(history, &one, mean)?,
-                &alt,
-                &format!("Force network at t = {time} s."),
-            )?);
+            let network = network_map(history, &one, &maps.titles, mean)?;
+            figures.push(map_figure(&network, &alt, &format!("Force network at t = {time} s."))?);
             let alt = format!("Grains in force chains at t = {time} s, blue in compression, orange in tension.");
-            figures.push(map_figure(&chain_map(history, &one)?, &alt, &format!("Force chains at t = {time} s."))?);
+            let chains = chain_map(history, &one, &maps.titles)?;
+            figures.push(map_figure(&chains, &alt, &format!("Force chains at t = {time} s."))?);
         }
         let alt = "Probability density of the normal forces over their mean, at each moment.";
         figures.push(chart_figure(distribution_chart(self), alt, alt));

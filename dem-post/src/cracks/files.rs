@@ -9,6 +9,7 @@ use crate::fragments::{Fragment, fragment_list};
 use crate::map::Sample;
 use crate::moments;
 use crate::output::{Folder, Result, cell};
+use crate::title::Titles;
 use dem_drawing::Chart;
 use dem_output::row;
 
@@ -49,11 +50,11 @@ pub fn write(history: &History, report: &Report, times: &[f64], folder: &mut Fol
     folder.draw("broken", &Chart::draw(vec![broken_chart(&curve, end)]))?;
     folder.draw("fragments", &Chart::draw(fragment_charts(&report.fragments)))?;
     let in_space = history.dimension() == 3;
-    let sample = Sample::with_depth(history)?;
-    folder.draw("fragment-map", &fragment_map(history, &sample, &frames, &fragments)?)?;
-    folder.draw("decohesion", &decohesion(history, &sample, &frames)?)?;
+    let (sample, titles) = (Sample::with_depth(history)?, Titles::read(history)?);
+    folder.draw("fragment-map", &fragment_map(history, &sample, &titles, &frames, &fragments)?)?;
+    folder.draw("decohesion", &decohesion(history, &sample, &titles, &frames)?)?;
     if in_space {
-        folder.draw("decohesion-inside", &decohesion(history, &Sample::cut_open(history)?, &frames)?)?;
+        folder.draw("decohesion-inside", &decohesion(history, &Sample::cut_open(history)?, &titles, &frames)?)?;
     }
     let sizes = if !report.cracks.is_empty() {
         write_cracks(report, folder)?;

@@ -244,9 +244,14 @@ fn filled_panel(history: &History, titles: &Titles, frame: usize, fills: Vec<Col
 ///
 /// # Errors
 /// Those of reading the history.
-pub fn fragment_map(history: &History, sample: &Sample, frames: &[usize], lists: &[Vec<Fragment>]) -> Result<Drawing> {
+pub fn fragment_map(
+    history: &History,
+    sample: &Sample,
+    titles: &Titles,
+    frames: &[usize],
+    lists: &[Vec<Fragment>],
+) -> Result<Drawing> {
     let grains = history.grains()?.radius.len();
-    let titles = Titles::read(history)?;
     let (mut panels, mut shown) = (vec![], 0);
     for (&frame, list) in frames.iter().zip(lists) {
         let mut fills = vec![Colour::from(PALE[0]); grains];
@@ -258,7 +263,7 @@ pub fn fragment_map(history: &History, sample: &Sample, frames: &[usize], lists:
         let heaviest = 100.0 * list.first().map_or(0.0, |f| f.mass_fraction);
         let plural = if list.len() == 1 { "" } else { "s" };
         let what = format!("{} fragment{plural}, the heaviest {heaviest:.1} %", list.len());
-        panels.push(filled_panel(history, &titles, frame, fills, what)?);
+        panels.push(filled_panel(history, titles, frame, fills, what)?);
     }
     let names = ["heaviest", "second", "third", "fourth", "fifth", "sixth"];
     let coloured = FRAGMENTS.iter().zip(names).take(shown);
@@ -271,9 +276,8 @@ pub fn fragment_map(history: &History, sample: &Sample, frames: &[usize], lists:
 ///
 /// # Errors
 /// Those of reading the history.
-pub fn decohesion(history: &History, sample: &Sample, frames: &[usize]) -> Result<Drawing> {
+pub fn decohesion(history: &History, sample: &Sample, titles: &Titles, frames: &[usize]) -> Result<Drawing> {
     let bonds = history.bonds()?;
-    let titles = Titles::read(history)?;
     let mut panels = vec![];
     for &frame in frames {
         let status = history.bond_status(frame)?;
@@ -284,7 +288,7 @@ pub fn decohesion(history: &History, sample: &Sample, frames: &[usize]) -> Resul
             broken += 1;
         }
         let what = format!("{broken} of {} bonds broken", bonds.len());
-        panels.push(filled_panel(history, &titles, frame, fills, what)?);
+        panels.push(filled_panel(history, titles, frame, fills, what)?);
     }
     let legend = [
         Key::Disk(BONDED, OUTLINE, "lost no bond".into()),

@@ -184,6 +184,14 @@ impl From<&Rupture> for Event {
     }
 }
 
+/// Number of broken bonds over time (s), from the first frame to the last; `times` are those of the
+/// ruptures, in order.
+pub fn total_over_time(history: &History, times: &[f64]) -> Vec<(f64, f64)> {
+    let [first, last] = [history.times().first(), history.times().last()].map(|time| time.copied().unwrap_or(0.0));
+    let counts = times.iter().enumerate().map(|(k, &time)| (time, (k + 1) as f64));
+    [(first, 0.0)].into_iter().chain(counts).chain([(last, times.len() as f64)]).collect()
+}
+
 /// Cumulative number of broken bonds by mode after each time of a rupture: (time s, [tension,
 /// shear, rolling, twist]).
 pub fn broken_over_time(events: &[Event]) -> Vec<(f64, [usize; 4])> {

@@ -6,13 +6,13 @@ use super::pictures::{broken_chart, crack_map, decohesion, fragment_charts, fron
 use super::report::{Report, broken_over_time};
 use crate::map::Sample;
 use crate::output::{Result, number, quantity};
-use crate::section::{OnPage, Section, Table, capitalised, chart_figure, map_figure};
+use crate::section::{Maps, OnPage, Section, Table, capitalised, chart_figure, map_figure};
 
 impl OnPage for Report {
     const ID: &'static str = "cracks";
     const TITLE: &'static str = "Cracks";
 
-    fn section(&self, history: &History, frames: &[usize]) -> Result<Section> {
+    fn section(&self, history: &History, maps: &Maps) -> Result<Section> {
         let end = history.times().last().copied().unwrap_or(0.0);
         let mut figures = vec![];
         if !self.cracks.is_empty() {
@@ -31,7 +31,7 @@ impl OnPage for Report {
             figures.push(map_figure(&front, alt, "The same, seen along y.")?);
             figures.push(map_figure(&side, alt, "The same, seen in the direction −x.")?);
         }
-        for &frame in frames {
+        for &frame in &maps.frames {
             let time = number(history.times()[frame]);
             let alt = format!("Grains at t = {time} s; those that lost a bond are white.");
             // spheres hide the breaks behind them
@@ -41,7 +41,7 @@ impl OnPage for Report {
                 (Sample::cut_open(history)?, ", cut open along the middle")
             };
             let caption = format!("Lost bonds at t = {time} s{seen}.");
-            figures.push(map_figure(&decohesion(history, &sample, &[frame])?, &alt, &caption)?);
+            figures.push(map_figure(&decohesion(history, &sample, &maps.titles, &[frame])?, &alt, &caption)?);
         }
         if self.broken.total() > 0 {
             let curve = broken_chart(&broken_over_time(&self.events), end);

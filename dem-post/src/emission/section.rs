@@ -5,13 +5,13 @@ use dem_history::History;
 use super::pictures::{course, frequencies, magnitudes};
 use super::report::Report;
 use crate::output::Result;
-use crate::section::{OnPage, Section, capitalised, chart_figure};
+use crate::section::{Maps, OnPage, Section, capitalised, chart_figure};
 
 impl OnPage for Report {
     const ID: &'static str = "emission";
     const TITLE: &'static str = "Acoustic emission";
 
-    fn section(&self, _: &History, _: &[usize]) -> Result<Section> {
+    fn section(&self, _: &History, _: &Maps) -> Result<Section> {
         let mut figures = vec![];
         for (chart, text) in [
             (course(self), "Load, broken bonds and events over time, each over its greatest value."),

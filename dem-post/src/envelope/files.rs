@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use dem_drawing::{Chart, Drawing, Style, colour};
+use dem_drawing::{Chart, Style, colour};
 use dem_output::row;
 
 use super::report::Report;
@@ -11,13 +11,6 @@ use crate::output::{Folder, Result, cell, number, short};
 
 /// Points of a half circle.
 const ARC: usize = 60;
-/// Width of a chart of circles, and of its axis, in units of a drawing; the rest are margins.
-const WIDTH: f64 = 640.0;
-const AXIS: f64 = 555.0;
-/// Heights of a chart of circles that stay legible, and what of them is not axis.
-const HEIGHTS: [f64; 2] = [240.0, 900.0];
-const MARGINS: f64 = 106.0;
-
 /// Writes `envelope.csv` with a row for each run, and as drawings `envelope`, the circles with
 /// their line, and `envelope-principal`, the principal stresses with theirs.
 ///
@@ -29,13 +22,12 @@ pub fn write(report: &Report, folder: &mut Folder) -> Result<()> {
         report.circles.iter().map(|c| row![c.run, c.time, c.load, c.major, cell(c.intermediate), c.minor, ""]);
     let left_out = report.left_out.iter().map(|out| row![out.run, "", "", "", "", "", out.why]);
     folder.table("envelope", &head, circles.chain(left_out))?;
-    folder.draw("envelope", &circles_drawing(report))?;
+    folder.draw("envelope", &Chart::draw(vec![circles_chart(report)]))?;
     Ok(folder.draw("envelope-principal", &Chart::draw(vec![principal(report)]))?)
 }
 
-/// Half circles over the normal stress, with the line that they touch; both axes have about the
-/// same scale.
-fn circles_drawing(report: &Report) -> Drawing {
+/// Half circles over the normal stress, with the line that they touch; both axes have one scale.
+fn circles_chart(report: &Report) -> Chart {
     let mut chart = Chart::new("normal stress (kPa), compression positive", "shear stress (kPa)");
     let mut points = vec![];
     // one curve: from circle to circle along the axis
@@ -46,22 +38,19 @@ fn circles_drawing(report: &Report) -> Drawing {
             points.push((1e-3 * (centre + radius * angle.cos()), 1e-3 * radius * angle.sin().max(0.0)));
         }
     }
-    let ([low, high], [_, top]) = (range(points.iter().map(|p| p.0)), range(points.iter().map(|p| p.1)));
+    let [low, high] = range(points.iter().map(|p| p.0));
     chart = chart.curve("at failure", colour::BLUE, Style::Thin, points);
-    let mut above = top;
+    chart.equal = true;
     if let Some(line) = &report.envelope {
         let tan = line.friction_angle.value.to_radians().tan();
         let at = |normal: f64| (normal, 1e-3 * line.shear(1e3 * normal));
         // where the shear stress is zero, if that is not far beyond the circles
         let zero = -1e-3 * line.cohesion.value / tan;
         let first = if tan > 0.0 { zero.max(low - 0.5 * (high - low)).min(high) } else { low };
-        above = above.max(at(high).1);
         let name = format!("φ = {}°, c = {} kPa", short(line.friction_angle.value), short(1e-3 * line.cohesion.value));
         chart = chart.curve(&name, colour::VERMILLION, Style::Line, vec![at(first), at(high)]);
     }
-    let [low, high] = range(chart.curves.iter().flat_map(|curve| &curve.points).map(|p| p.0));
-    let height = if high > low { MARGINS + AXIS * above / (high - low) } else { HEIGHTS[0] };
-    Chart::draw_sized(vec![chart], (WIDTH, height.clamp(HEIGHTS[0], HEIGHTS[1])))
+    chart
 }
 
 /// The principal stresses at failure, with the fitted line.

@@ -6,13 +6,13 @@ use dem_history::History;
 use super::pictures::{anisotropy, coordination, crack_density, dilation, porosity, stress};
 use super::report::Report;
 use crate::output::Result;
-use crate::section::{OnPage, Section, capitalised, chart_figure};
+use crate::section::{Maps, OnPage, Section, capitalised, chart_figure};
 
 impl OnPage for Report {
     const ID: &'static str = "fabric";
     const TITLE: &'static str = "The sample as a continuum";
 
-    fn section(&self, _: &History, _: &[usize]) -> Result<Section> {
+    fn section(&self, _: &History, _: &Maps) -> Result<Section> {
         let drawn = |chart: &Chart| chart.curves.iter().any(|curve| curve.points.len() > 1);
         let mut charts = vec![stress(self), dilation(self), porosity(self), coordination(self), anisotropy(self)];
         if self.rows.last().is_some_and(|row| row.broken > 0) {

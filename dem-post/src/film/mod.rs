@@ -16,10 +16,12 @@ use dem_output::command_line::whole;
 use serde::Serialize;
 
 use crate::analysis::{Analysis, note};
+use crate::cracks::report::total_over_time;
 use crate::frames::{self, Subject};
 use crate::options::{Files, LoadWall};
 use crate::output::{Folder, PostError, Result, WriteError, facts, progress, quantity};
 use crate::stress_strain;
+use crate::title::Titles;
 use pace::Shown;
 use picture::{Animation, Picture};
 
@@ -81,6 +83,8 @@ struct Curves {
     energy: Vec<(f64, f64)>,
     /// Time of each observed step (s).
     times: Vec<f64>,
+    /// The titles of frames, with the same load.
+    titles: Titles,
 }
 
 impl Analysis for Command {
@@ -167,7 +171,7 @@ impl From<WriteError> for NoWebm {
 fn animate(history: &History, report: &Report, path: &Path, quiet: bool) -> Result<()> {
     let failed = |why: String| PostError::Write(WriteError { path: path.into(), why });
     let bar = progress(report.pictures.len() as u64, quiet, "{bar:24} {pos} of {len} pictures, {eta} left");
-    let view = frames::shown(history, &report.frames)?;
+    let view = frames::shown(history, &report.frames, &report.curves.titles)?;
     let mut animation: Option<Animation> = None;
     for (k, shown) in report.pictures.iter().enumerate() {
         let frame = report.frames.frames[shown.frame];
@@ -213,6 +217,7 @@ impl Curves {
             Ok(load) => {
                 let millimetres = load.displacement.iter().map(|x| 1e3 * x);
                 curves.load = millimetres.zip(load.load.iter().copied()).collect();
+                curves.titles = Titles::with(&load);
                 curves.times = load.time;
             }
             // no wall is driven, or its force and position were not observed
@@ -220,10 +225,7 @@ impl Curves {
             Err(error) => return Err(error),
         }
         if !history.bonds()?.is_empty() {
-            let ends = [history.times().first(), history.times().last()].map(|time| time.copied().unwrap_or(0.0));
-            let counts = ruptures.iter().enumerate().map(|(k, &time)| (time, (k + 1) as f64));
-            curves.broken =
-                [(ends[0], 0.0)].into_iter().chain(counts).chain([(ends[1], ruptures.len() as f64)]).collect();
+            curves.broken = total_over_time(history, ruptures);
         } else if curves.load.is_empty()
             && let Some(energy) = history.observable("kinetic_energy")?
         {

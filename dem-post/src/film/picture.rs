@@ -34,9 +34,9 @@ impl Picture {
             whole.put(chart, (left.size[0], top));
             top += chart.size[1];
         }
-        let rounded = |channel: &mut u8| *channel = channel.saturating_add(STEP / 2) / STEP * STEP;
-        whole.0.pixels.iter_mut().filter(|channel| **channel < 255 - STEP / 2).for_each(rounded);
-        whole.0.pixels.iter_mut().filter(|channel| **channel >= 255 - STEP / 2).for_each(|channel| *channel = 255);
+        for channel in &mut whole.0.pixels {
+            *channel = if *channel < 255 - STEP / 2 { (*channel + STEP / 2) / STEP * STEP } else { 255 };
+        }
         Ok(whole)
     }
 

@@ -1,4 +1,4 @@
-//! Viewpoint and outlines of walls for other drawers than the canvas.
+//! The part shown, the viewpoint and the outlines of walls as numbers, for the slider of the page.
 
 use dem_history::{Wall, WallKind};
 

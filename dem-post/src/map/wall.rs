@@ -53,9 +53,9 @@ pub(super) fn draw_load(canvas: &mut Canvas, wall: &Wall, position: &[f64], forc
     let load = (sign * wall.direction[0], -sign * wall.direction[1]);
     let normal = (wall.normal[0], -wall.normal[1]);
     let from = frame.at([position[0], position[1]]);
-    let middle = (frame.corner.0 + 0.5 * frame.size.0, frame.corner.1 + 0.5 * frame.size.1);
-    let off = (middle.0 - from.0) * -normal.1 + (middle.1 - from.1) * normal.0;
-    let foot = (from.0 - normal.1 * off, from.1 + normal.0 * off);
+    let line = (-normal.1, normal.0);
+    let off = to_the_middle(frame, from, line);
+    let foot = (from.0 + line.0 * off, from.1 + line.1 * off);
     let at = |s: f64| (foot.0 + s * load.0, foot.1 + s * load.1);
     let pushes = load.0 * normal.0 + load.1 * normal.1 > 0.0;
     let (tail, head) = if pushes { (-ARROW, -2.0) } else { (2.0, ARROW) };
@@ -89,15 +89,21 @@ fn draw_plate(canvas: &mut Canvas, place: &Place, wall: &Wall, position: &[f64],
     }
 }
 
+/// The way from a point along a line, with this unit vector, to the place that is nearest to the
+/// middle of the panel.
+fn to_the_middle(frame: &Frame, from: (f64, f64), line: (f64, f64)) -> f64 {
+    let middle = (frame.corner.0 + 0.5 * frame.size.0, frame.corner.1 + 0.5 * frame.size.1);
+    (middle.0 - from.0) * line.0 + (middle.1 - from.1) * line.1
+}
+
 /// A line across the panel, hatched on the side away from the grains.
 fn draw_plane(canvas: &mut Canvas, point: [f64; 2], normal: [f64; 2], frame: &Frame) {
     let length = normal[0].hypot(normal[1]);
     // on the sheet y points down
     let (n, t) = ((normal[0] / length, -normal[1] / length), (normal[1] / length, normal[0] / length));
     // from the point of the line nearest to the middle of the panel, in whole lines of the hatching
-    let (from, middle) = (frame.at(point), [0.5 * frame.size.0, 0.5 * frame.size.1]);
-    let off = [frame.corner.0 + middle[0] - from.0, frame.corner.1 + middle[1] - from.1];
-    let nearest = HATCH * ((off[0] * t.0 + off[1] * t.1) / HATCH).round();
+    let from = frame.at(point);
+    let nearest = HATCH * (to_the_middle(frame, from, t) / HATCH).round();
     let centre = (from.0 + nearest * t.0, from.1 + nearest * t.1);
     let at = |s: f64| (centre.0 + s * t.0, centre.1 + s * t.1);
     let steps = ((frame.size.0 + frame.size.1) / HATCH) as i64;

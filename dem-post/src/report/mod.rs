@@ -15,7 +15,8 @@ use serde::Serialize;
 use crate::analysis::Analysis;
 use crate::options::{LoadWall, Moments};
 use crate::output::{Folder, PostError, Result, facts, number};
-use crate::section::{OnPage, Section};
+use crate::section::{Maps, OnPage, Section};
+use crate::title::Titles;
 use crate::{chains, cracks, emission, fabric, info, stress_strain, velocities};
 
 mod page;
@@ -154,36 +155,40 @@ fn if_there<R: OnPage>(found: Result<R>, left_out: &mut Vec<EmptySection>) -> Re
 impl Report {
     /// The sections of the page, in order.
     fn sections(&self, history: &History) -> Result<Vec<Section>> {
-        let frames: Vec<usize> = self.velocities.fields.iter().map(|field| field.frame).collect();
+        let maps = Maps {
+            frames: self.velocities.fields.iter().map(|field| field.frame).collect(),
+            titles: self.stress_strain.as_ref().map_or_else(Titles::default, Titles::with),
+        };
         let parts = result::Parts {
             info: &self.info,
             load: self.stress_strain.as_ref(),
             cracks: self.cracks.as_ref(),
             times: &self.times,
+            titles: &maps.titles,
         };
         let mut sections = vec![
             result::section(history, &parts)?,
-            self.section_of(self.stress_strain.as_ref(), history, &frames)?,
-            self.section_of(self.cracks.as_ref(), history, &frames)?,
+            self.section_of(self.stress_strain.as_ref(), history, &maps)?,
+            self.section_of(self.cracks.as_ref(), history, &maps)?,
         ];
         if let Some(emission) = &self.emission {
-            sections.push(emission.section(history, &frames)?);
+            sections.push(emission.section(history, &maps)?);
         }
-        sections.push(self.section_of(self.chains.as_ref(), history, &frames)?);
-        sections.push(self.velocities.section(history, &frames)?);
+        sections.push(self.section_of(self.chains.as_ref(), history, &maps)?);
+        sections.push(self.velocities.section(history, &maps)?);
         if let Some(fabric) = &self.fabric {
-            sections.push(fabric.section(history, &frames)?);
+            sections.push(fabric.section(history, &maps)?);
         }
         sections.push(sections::energy(history)?);
-        sections.push(self.accuracy.section(history, &frames)?);
-        sections.push(self.info.section(history, &frames)?);
+        sections.push(self.accuracy.section(history, &maps)?);
+        sections.push(self.info.section(history, &maps)?);
         Ok(sections)
     }
 
     /// The section of an analysis, or the reason why it has none.
-    fn section_of<R: OnPage>(&self, found: Option<&R>, history: &History, frames: &[usize]) -> Result<Section> {
+    fn section_of<R: OnPage>(&self, found: Option<&R>, history: &History, maps: &Maps) -> Result<Section> {
         if let Some(found) = found {
-            return found.section(history, frames);
+            return found.section(history, maps);
         }
         let why = self.left_out.iter().find(|out| out.section == R::ID);
         let text = why.map_or_else(String::new, |out| format!("None: {}.", out.why));

@@ -6,7 +6,7 @@
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use dem_history::{History, RuptureMode, WallDrive, WallKind};
+use dem_history::{History, Rupture, RuptureMode, WallDrive, WallKind};
 use serde::Serialize;
 
 use crate::cracks::mode_colour;
@@ -15,7 +15,7 @@ use crate::film;
 use crate::frames;
 use crate::map::{Perspective, Sample, View};
 use crate::output::Result;
-use crate::section::{Player, json, quantised};
+use crate::section::{Player, json, quantised, rounded};
 use crate::stress_strain;
 
 /// Maximum number of moments, without those of the pictures.
@@ -83,11 +83,16 @@ struct WallData {
 ///
 /// # Errors
 /// Those of reading the history.
-pub fn read(history: &History, frames: &[usize], load: Option<&stress_strain::Report>) -> Result<Option<Player>> {
+pub fn read(
+    history: &History,
+    ruptures: &[Rupture],
+    frames: &[usize],
+    load: Option<&stress_strain::Report>,
+) -> Result<Option<Player>> {
     let (grains, bonds, d) = (history.grains()?, history.bonds()?, history.dimension());
     let room = NUMBERS.saturating_sub(5 * bonds.len()) / (grains.radius.len() * d).max(1);
-    let ruptures: Vec<f64> = history.ruptures()?.iter().map(|rupture| rupture.time).collect();
-    let moments = moments(history.times(), &ruptures, frames, room.min(MOMENTS));
+    let times: Vec<f64> = ruptures.iter().map(|rupture| rupture.time).collect();
+    let moments = moments(history.times(), &times, frames, room.min(MOMENTS));
     if moments.len() < 2 {
         return Ok(None);
     }
@@ -142,7 +147,7 @@ pub fn read(history: &History, frames: &[usize], load: Option<&stress_strain::Re
         time,
         step,
     };
-    let twist = history.ruptures()?.iter().any(|rupture| rupture.mode == RuptureMode::Twist);
+    let twist = ruptures.iter().any(|rupture| rupture.mode == RuptureMode::Twist);
     Ok(Some(Player {
         moments: moments.len(),
         data: json(&data)?,
@@ -193,7 +198,7 @@ fn walls(history: &History, sample: &Sample, view: View, positions: &[Vec<f64>])
             }
             let (points, behind) = sample.outline(wall, position, view);
             data.behind = behind;
-            data.points.extend(points.into_iter().map(|x| format!("{x:.5e}").parse::<f64>().unwrap_or(x)));
+            data.points.extend(points.into_iter().map(rounded));
         }
         found.push(data);
     }

@@ -5,10 +5,12 @@ use dem_history::{History, Rupture};
 
 use super::player;
 use crate::collapse::peak;
+use crate::cracks::report::total_over_time;
 use crate::extent::first_box;
 use crate::frames::{self, Subject};
 use crate::output::{PostError, Result, counted, number, quantity, short};
 use crate::section::{Figure, Section, capitalised, chart_figure, map_figure};
+use crate::title::Titles;
 use crate::{cracks, info, moments, stress_strain};
 
 /// A moment of which the page shows a picture.
@@ -27,6 +29,8 @@ pub struct Parts<'a> {
     pub cracks: Option<&'a cracks::Report>,
     /// Times of the pictures that were asked for (s).
     pub times: &'a [f64],
+    /// The titles of frames.
+    pub titles: &'a Titles,
 }
 
 /// The section.
@@ -37,8 +41,8 @@ pub fn section(history: &History, parts: &Parts) -> Result<Section> {
     let (ruptures, load) = (history.ruptures()?, parts.load);
     let shown = shown(history, &ruptures, load, parts.times)?;
     let pictured: Vec<usize> = shown.iter().map(|moment| moment.frame).collect();
-    let figures = pictures(history, &shown, load)?;
-    let mut player = player::read(history, &pictured, load)?;
+    let figures = pictures(history, &shown, parts)?;
+    let mut player = player::read(history, &ruptures, &pictured, load)?;
     let charts = charts(history, &ruptures, load);
     let text = sentences(history, parts, &ruptures)?;
     let mut section = Section { id: "result", title: "Result", text, figures, ..Section::default() };
@@ -82,9 +86,8 @@ fn shown(
 }
 
 /// A picture of each moment, all on one scale.
-fn pictures(history: &History, shown: &[Moment], load: Option<&stress_strain::Report>) -> Result<Vec<Figure>> {
+fn pictures(history: &History, shown: &[Moment], parts: &Parts) -> Result<Vec<Figure>> {
     let times: Vec<f64> = shown.iter().map(|moment| history.times()[moment.frame]).collect();
-    let bonded = !history.bonds()?.is_empty();
     // what the sample has: bonds, else forces, else speeds
     let mut chosen = None;
     for subject in [Subject::Bonds, Subject::Forces, Subject::Speed] {
@@ -98,16 +101,20 @@ fn pictures(history: &History, shown: &[Moment], load: Option<&stress_strain::Re
         }
     }
     let Some(chosen) = chosen else { return Ok(vec![]) };
-    let view = frames::shown(history, &chosen)?;
+    let view = frames::shown(history, &chosen, parts.titles)?;
+    let what = match chosen.subject {
+        Subject::Bonds => "bonds and those that broke",
+        Subject::Forces => "contact forces",
+        Subject::Speed => "speeds",
+    };
     let mut figures = vec![];
     for Moment { name, frame } in shown {
         let time = number(history.times()[*frame]);
-        let load = load.and_then(|load| load.load_at(history.steps()[*frame]));
+        let load = parts.load.and_then(|load| load.load_at(history.steps()[*frame]));
         let load = load.map_or_else(String::new, |load| format!(", load {} N", short(load)));
         let named = if name.is_empty() { String::new() } else { format!("{}: ", capitalised(name)) };
         let caption = format!("{named}t = {time} s{load}.");
-        let what = if bonded { "with its bonds and those that broke" } else { "and its forces or speeds" };
-        let alt = format!("The sample {what} at t = {time} s.");
+        let alt = format!("The sample with its {what} at t = {time} s.");
         figures.push(map_figure(&frames::drawing(history, &chosen, &view, *frame)?, &alt, &caption)?);
     }
     Ok(figures)
@@ -123,9 +130,8 @@ fn charts(history: &History, ruptures: &[Rupture], load: Option<&stress_strain::
         figures.push(chart_figure(chart, &text, &text));
     }
     if !ruptures.is_empty() {
-        let ends = [history.times().first(), history.times().last()].map(|time| time.copied().unwrap_or(0.0));
-        let counts = ruptures.iter().enumerate().map(|(k, rupture)| (rupture.time, (k + 1) as f64));
-        let points = [(ends[0], 0.0)].into_iter().chain(counts).chain([(ends[1], ruptures.len() as f64)]).collect();
+        let times: Vec<f64> = ruptures.iter().map(|rupture| rupture.time).collect();
+        let points = total_over_time(history, &times);
         let mut chart =
             Chart::new("time (s)", "broken bonds").curve("broken bonds", colour::BLUE, Style::Steps, points);
         chart.y_is_count = true;

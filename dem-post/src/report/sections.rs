@@ -5,7 +5,7 @@ use dem_history::{History, Series};
 
 use super::solver::Accuracy;
 use crate::output::{Result, number};
-use crate::section::{OnPage, Section, capitalised, chart_figure};
+use crate::section::{Maps, OnPage, Section, capitalised, chart_figure};
 
 /// The points of an observable over time; empty if it was not recorded.
 fn points(series: Option<Series>) -> Vec<(f64, f64)> {
@@ -16,7 +16,7 @@ impl OnPage for Accuracy {
     const ID: &'static str = "accuracy";
     const TITLE: &'static str = "Accuracy of the solver";
 
-    fn section(&self, history: &History, _: &[usize]) -> Result<Section> {
+    fn section(&self, history: &History, _: &Maps) -> Result<Section> {
         let mut figures = vec![];
         for (name, title, alt, steps) in [
             ("solver_residual", "residual", "Residual of the accepted solve of each step over time.", false),

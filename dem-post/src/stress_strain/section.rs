@@ -5,13 +5,13 @@ use dem_history::History;
 use super::pictures::{force_displacement, load_breaks, onset, stress_strain};
 use super::report::Report;
 use crate::output::{Result, quantity};
-use crate::section::{OnPage, Section, chart_figure};
+use crate::section::{Maps, OnPage, Section, chart_figure};
 
 impl OnPage for Report {
     const ID: &'static str = "load";
     const TITLE: &'static str = "Load and displacement";
 
-    fn section(&self, _: &History, _: &[usize]) -> Result<Section> {
+    fn section(&self, _: &History, _: &Maps) -> Result<Section> {
         let breaks = load_breaks(self).map(|chart| {
             let alt = "Load at which each bond breaks over the number of broken bonds.";
             chart_figure(chart, alt, "The load of each break: it falls where the sample bears less.")

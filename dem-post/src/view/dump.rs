@@ -2,13 +2,13 @@
 //! and contacts between grains as pairs of their numbers.
 
 use std::io::Write;
-use std::path::Path;
 
 use dem_history::{BondStatus, Bonds, Grains, History};
 use dem_output::shortest;
 
 use super::outline::Outline;
 use super::report::Report;
+use crate::extent::{box_around, range};
 use crate::output::{Folder, PostError, Result, WriteError, progress};
 
 /// Writes a file of each kind with all frames.
@@ -24,6 +24,7 @@ pub(super) fn write(history: &History, report: &mut Report, folder: &mut Folder,
         companion.bytes = folder.make(companion.name, |path| {
             let failed = |error: std::io::Error| WriteError { path: path.into(), why: error.to_string() };
             let mut file = std::io::BufWriter::new(std::fs::File::create(path).map_err(failed)?);
+            let mut bytes = 0;
             for frame in 0..history.frames() {
                 let text = match companion.name {
                     "grains.dump" => grains_of(history, &grains, frame)?,
@@ -31,37 +32,32 @@ pub(super) fn write(history: &History, report: &mut Report, folder: &mut Folder,
                     _ => bonds_of(history, &grains, &bonds, frame)?,
                 };
                 file.write_all(text.as_bytes()).map_err(failed)?;
+                bytes += text.len() as u64;
                 bar.inc(1);
             }
             file.flush().map_err(failed)?;
-            length(path)
+            Ok::<_, PostError>(bytes)
         })?;
     }
     bar.finish_and_clear();
     Ok(())
 }
 
-fn length(path: &Path) -> Result<u64> {
-    let failed = |error: std::io::Error| WriteError { path: path.into(), why: error.to_string() };
-    Ok(std::fs::metadata(path).map_err(failed).map_err(PostError::from)?.len())
-}
-
-/// The head of a frame: time, step, number of rows and the box around the grains.
-fn head(history: &History, grains: &Grains, frame: usize, rows: usize, of: &str) -> Result<String> {
-    let (state, d) = (history.grain_state(frame)?, history.dimension());
+/// The head of a frame: time, step, number of rows and the box around the grains at `position`.
+fn head(history: &History, grains: &Grains, frame: usize, position: &[f64], rows: usize, of: &str) -> String {
     let mut text = format!(
         "ITEM: TIME\n{}\nITEM: TIMESTEP\n{}\nITEM: NUMBER OF {of}\n{rows}\nITEM: BOX BOUNDS ss ss ss\n",
         shortest(history.times()[frame]),
         history.steps()[frame]
     );
-    for axis in 0..3 {
-        let centres = state.position.chunks_exact(d).map(|centre| centre.get(axis).copied().unwrap_or(0.0));
-        let ends = centres
-            .zip(&grains.radius)
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], (x, r)| [low.min(x - r), high.max(x + r)]);
-        text += &line(&ends);
+    let mut ends = box_around(&grains.radius, position, history.dimension());
+    if ends.len() == 2 {
+        // disks are drawn as spheres
+        let [_, largest] = range(grains.radius.iter().copied());
+        ends.push([-largest, largest]);
     }
-    Ok(text)
+    ends.iter().for_each(|ends| text += &line(ends));
+    text
 }
 
 /// Numbers with blanks between them, as a line.
@@ -77,7 +73,7 @@ fn grains_of(history: &History, grains: &Grains, frame: usize) -> Result<String>
         2 => " omegaz angle",
         _ => " omegax omegay omegaz quatw quati quatj quatk",
     };
-    let mut text = head(history, grains, frame, n, "ATOMS")?;
+    let mut text = head(history, grains, frame, &state.position, n, "ATOMS");
     text += "ITEM: ATOMS id type radius mass x y z vx vy vz";
     text += if turning { turns } else { "" };
     text += "\n";
@@ -105,7 +101,8 @@ fn bonds_of(history: &History, grains: &Grains, bonds: &Bonds, frame: usize) -> 
     // before a stage forms the bonds there is no status
     let status = history.bond_status(frame)?;
     let intact: Vec<usize> = (0..status.len()).filter(|&bond| status[bond] == BondStatus::Intact).collect();
-    let mut text = head(history, grains, frame, intact.len(), "ENTRIES")?;
+    let position = history.grain_state(frame)?.position;
+    let mut text = head(history, grains, frame, &position, intact.len(), "ENTRIES");
     text += "ITEM: ENTRIES index batom1 batom2 strength\n";
     for bond in intact {
         let [i, j] = bonds.pair[bond].map(|grain| grains.id[grain as usize]);
@@ -118,7 +115,8 @@ fn bonds_of(history: &History, grains: &Grains, bonds: &Bonds, frame: usize) -> 
 fn contacts_of(history: &History, grains: &Grains, frame: usize, outline: &Outline) -> Result<String> {
     let contacts = history.contacts(frame)?;
     let between: Vec<usize> = (0..contacts.len()).filter(|&c| contacts.pair[c][1] >= 0).collect();
-    let mut text = head(history, grains, frame, between.len(), "ENTRIES")?;
+    let position = history.grain_state(frame)?.position;
+    let mut text = head(history, grains, frame, &position, between.len(), "ENTRIES");
     text += "ITEM: ENTRIES index patom1 patom2 status gap";
     text += match outline.reaction_rows {
         0 => "\n",

@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use dem_history::{Bonds, ContactRows, Grains, History};
+use dem_history::{Bonds, ContactRows, GrainState, Grains, History};
 
 use super::outline::Outline;
 use super::report::Report;
@@ -34,11 +34,12 @@ pub(super) fn write(history: &History, report: &mut Report, folder: &mut Folder,
     let names: Vec<String> = (0..frames).flat_map(|frame| kinds.iter().map(move |kind| file(kind, frame))).collect();
     folder.announce(&names)?;
     for frame in 0..frames {
+        let state = history.grain_state(frame)?;
         for companion in &mut report.companions {
             let poly = match companion.name {
-                "grains.pvd" => grains(history, &constant, frame)?,
-                "contacts.pvd" => contacts(history, frame, &report.outline)?,
-                _ => bonds(history, &constant, frame)?,
+                "grains.pvd" => grains(&constant, &state, history.dimension()),
+                "contacts.pvd" => contacts(history, frame, &state, &report.outline)?,
+                _ => bonds(history, &constant, frame, &state)?,
             };
             let text = poly.xml(history.times()[frame]);
             folder.write(&file(kind(companion.name), frame), text.as_bytes())?;
@@ -78,8 +79,7 @@ struct Constant {
     bonds: Bonds,
 }
 
-fn grains(history: &History, constant: &Constant, frame: usize) -> Result<Poly> {
-    let (state, d) = (history.grain_state(frame)?, history.dimension());
+fn grains(constant: &Constant, state: &GrainState, d: usize) -> Poly {
     let Grains { id, radius, mass, material, .. } = &constant.grains;
     let mut poly = Poly::new(&padded(&state.position, d), (0..radius.len() as i64).collect(), 1);
     let data = &mut poly.point_data;
@@ -98,12 +98,11 @@ fn grains(history: &History, constant: &Constant, frame: usize) -> Result<Poly> 
         let (name, width) = if d == 2 { ("angle", 1) } else { ("orientation", 4) };
         reals(data, name, width, &state.orientation);
     }
-    Ok(poly)
+    poly
 }
 
-fn bonds(history: &History, constant: &Constant, frame: usize) -> Result<Poly> {
-    let (state, bonds) = (history.grain_state(frame)?, &constant.bonds);
-    let status = history.bond_status(frame)?;
+fn bonds(history: &History, constant: &Constant, frame: usize, state: &GrainState) -> Result<Poly> {
+    let (bonds, status) = (&constant.bonds, history.bond_status(frame)?);
     // none before a stage forms them
     let count = status.len();
     let lines = bonds.pair[..count].as_flattened().iter().map(|&grain| grain.into()).collect();
@@ -123,8 +122,8 @@ fn bonds(history: &History, constant: &Constant, frame: usize) -> Result<Poly> {
 
 /// Lines between the centres of two grains, or from a grain's centre to its point of contact with
 /// a wall. The points are the grains, followed by the points on walls.
-fn contacts(history: &History, frame: usize, outline: &Outline) -> Result<Poly> {
-    let (mut points, d) = (history.grain_state(frame)?.position, history.dimension());
+fn contacts(history: &History, frame: usize, state: &GrainState, outline: &Outline) -> Result<Poly> {
+    let (mut points, d) = (state.position.clone(), history.dimension());
     let contacts = history.contacts(frame)?;
     let mut lines = Vec::with_capacity(2 * contacts.len());
     for (&[i, j], point) in contacts.pair.iter().zip(contacts.point.chunks_exact(d)) {
@@ -200,7 +199,7 @@ impl Poly {
 }
 
 /// Rows of `d` numbers padded to three.
-pub(super) fn padded(values: &[f64], d: usize) -> Vec<f64> {
+fn padded(values: &[f64], d: usize) -> Vec<f64> {
     values.chunks_exact(d).flat_map(|row| (0..3).map(|k| row.get(k).copied().unwrap_or(0.0))).collect()
 }
 

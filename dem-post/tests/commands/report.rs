@@ -86,6 +86,25 @@ fn the_page_begins_with_the_result() {
 }
 
 #[test]
+fn titles_of_maps_have_the_load_of_the_wall_that_is_asked_for() {
+    let mut both = layout(2);
+    (both.walls[0].drive, both.walls[0].direction) = (WallDrive::Force, [0.0, 1.0, 0.0]);
+    // at the end 100 N on the upper wall, and none on the lower one
+    both.parameters.scene = "{\"thickness\": 0.5, \"load_wall\": \"top\"}".into();
+    for (options, title) in [(&[][..], "t = 0.1 s, F = 100 N"), (&["--wall", "bottom"], "t = 0.1 s, F = 0 N")] {
+        let (_folder, path) = sample(&both);
+        let page = page(&path, options);
+        let addresses = page.split("src=\"data:image/svg+xml;base64,").skip(1);
+        let decode = |address: &str| STANDARD.decode(address.split('"').next().unwrap()).unwrap();
+        let drawings: Vec<String> = addresses.map(|address| String::from_utf8(decode(address)).unwrap()).collect();
+        let last: Vec<&String> = drawings.iter().filter(|svg| svg.contains("t = 0.1 s, ")).collect();
+        // result, lost bonds, forces, chains, velocities
+        assert_eq!(last.len(), 5);
+        assert!(last.iter().all(|svg| svg.contains(title)), "{title}");
+    }
+}
+
+#[test]
 fn the_slider_has_the_positions_of_the_history() {
     for d in [2, 3] {
         let l = layout(d);

@@ -12,6 +12,8 @@ use crate::{Anchor, Canvas, Drawing, colour};
 
 /// Width and height of one chart, in units of a drawing.
 const CHART: (f64, f64) = (640.0, 460.0);
+/// Heights of a chart with equal units on both axes that stay legible.
+const HEIGHTS: [f64; 2] = [240.0, 900.0];
 /// Margin around the cells of a figure, and between them.
 pub(crate) const PADDING: f64 = 6.0;
 pub(crate) const SPACING: f64 = 20.0;
@@ -22,8 +24,9 @@ const BELOW: f64 = 62.0;
 const LEGEND_ROW: f64 = 19.0;
 /// The axis of smaller counts ends at this value.
 const FEW: f64 = 5.0;
-/// Title of an axis of time, and the time below which it is in milliseconds (s).
+/// Titles of an axis of time, and the time below which it is in milliseconds (s).
 const TIME: &str = "time (s)";
+const SHORT_TIME: &str = "time (ms)";
 const SHORT: f64 = 0.05;
 /// Maximum number of points of a curve: more than the pixels of its width, so that no visible point
 /// is lost.
@@ -89,6 +92,9 @@ pub struct Chart {
     /// Whether the horizontal axis extends a little beyond the first and the last value, so that a
     /// steep rise there is visible.
     pub pad_x: bool,
+    /// Whether a unit is as long on the vertical axis as on the horizontal one. The height of the
+    /// chart follows from its width; of a chart beside others, more of an axis is shown.
+    pub equal: bool,
     /// Whether values on the vertical axis are counts.
     pub y_is_count: bool,
     /// Whether values on the horizontal axis are counts.
@@ -164,12 +170,18 @@ impl Chart {
         let times = || self.curves.iter().flat_map(|curve| &curve.points).map(|p| p.0.abs());
         let last = times().filter(|time| time.is_finite()).fold(0.0, f64::max);
         if self.x == TIME && !self.log_x && last > 0.0 && last < SHORT {
-            self.x = "time (ms)".into();
+            self.x = SHORT_TIME.into();
             self.curves.iter_mut().flat_map(|curve| &mut curve.points).for_each(|point| point.0 *= 1e3);
             self.bars.iter_mut().flat_map(|bars| &mut bars.bars).for_each(|bar| bar.0 *= 1e3);
             self.moments.iter_mut().for_each(|moment| *moment *= 1e3);
         }
         self
+    }
+
+    /// Units of the horizontal axis in a second of the run; `None` where the axis is not the time.
+    pub fn second(&self) -> Option<f64> {
+        let units = [(TIME, 1.0), (SHORT_TIME, 1e3)];
+        units.into_iter().find(|(title, _)| *title == self.x).map(|(_, units)| units)
     }
 
     /// Draws the charts side by side, each with its legend above it.
@@ -192,14 +204,18 @@ impl Chart {
     pub(crate) fn draw_in_columns(charts: Vec<Self>, size: (f64, f64), columns: usize) -> (Drawing, Vec<Axes>) {
         let (columns, count) = (columns.max(1), charts.len());
         let kept = charts.clone();
-        let corner = |k: usize| {
-            let place = |k: usize, length: f64| PADDING + k as f64 * (length + SPACING);
-            (place(k % columns, size.0), place(k / columns, size.1))
-        };
         let legends: Vec<Vec<Named>> = charts.iter().map(Self::legend).collect();
         // all begin at one height
         let most = legends.iter().map(|legend| legend_rows(legend, size.0).len()).max().unwrap_or(0);
         let above = ABOVE.max(LEGEND_ROW * most as f64 + 6.0);
+        let size = match charts.as_slice() {
+            [chart] if chart.equal => (size.0, chart.equal_height(above, size)),
+            _ => size,
+        };
+        let corner = |k: usize| {
+            let place = |k: usize, length: f64| PADDING + k as f64 * (length + SPACING);
+            (place(k % columns, size.0), place(k / columns, size.1))
+        };
         let mut axes: Vec<Axes> = vec![];
         let (plots, layouts) = charts
             .into_iter()
@@ -262,6 +278,7 @@ impl Chart {
             .with_height(size.1)
             .with_box_axes();
         layout.show_legend = false;
+        layout.equal_aspect = self.equal;
         layout = self.scale_axes(layout, lift);
         for (value, _) in self.levels {
             layout = layout.with_reference_line(ReferenceLine::horizontal(value * lift).with_color(colour::GREY));
@@ -270,6 +287,16 @@ impl Chart {
             layout = layout.with_reference_line(ReferenceLine::vertical(value).with_color(colour::GREY));
         }
         (plots, layout, lift)
+    }
+
+    /// The height at which a unit is as long on the vertical axis as on the horizontal one, if it
+    /// is legible.
+    fn equal_height(&self, above: f64, size: (f64, f64)) -> f64 {
+        let (_, layout, lift) = Self { equal: false, ..self.clone() }.build(above, size);
+        let Axes { area: [left, top, right, bottom], x, y, .. } =
+            Axes::of(&ComputedLayout::from_layout(&layout), (0.0, 0.0), lift);
+        let unit = (right - left) / (x[1] - x[0]);
+        (size.1 - (bottom - top) + unit * (y[1] - y[0])).max(HEIGHTS[0]).min(HEIGHTS[1])
     }
 
     /// Factor, a power of ten, of the values on a logarithmic vertical axis: the plotting crate
@@ -505,6 +532,24 @@ mod tests {
         assert!(points.len() <= CURVE_POINTS);
         assert!(points.contains(&(54_321.0, 7.0)));
         assert_eq!((points[0].0, points[points.len() - 1].0), (0.0, 99_999.0));
+    }
+
+    #[test]
+    fn a_circle_is_round_if_units_are_equal() {
+        let circle = |flat: f64| -> Vec<(f64, f64)> {
+            (0..=60).map(|k| f64::from(k) * 0.1).map(|t| (50.0 * t.cos(), flat * 50.0 * t.sin())).collect()
+        };
+        // of a flat curve the height has a limit, and more of the vertical axis is shown
+        for (flat, size) in [(1.0, (640.0, 460.0)), (1.0, (300.0, 216.0)), (0.01, (640.0, 460.0))] {
+            let mut chart = Chart::new("x", "y").curve("", colour::BLUE, Style::Line, circle(flat));
+            chart.equal = true;
+            let (drawing, axes) = Chart::draw_located(vec![chart], size);
+            let Axes { area: [left, top, right, bottom], x, y, .. } = axes[0];
+            let units = [(right - left) / (x[1] - x[0]), (bottom - top) / (y[1] - y[0])];
+            assert!((units[0] / units[1] - 1.0).abs() < 1e-9, "{units:?}");
+            assert!(bottom < drawing.size().1 && drawing.size().0 == size.0 + 2.0 * PADDING);
+            assert!(x[0] <= -50.0 && x[1] >= 50.0 && y[0] <= -50.0 * flat && y[1] >= 50.0 * flat, "{x:?}, {y:?}");
+        }
     }
 
     #[test]
