@@ -187,7 +187,7 @@ fn walls(history: &History, sample: &Sample, view: View, positions: &[Vec<f64>])
         let mut data = WallData {
             name: wall.name.clone(),
             driven: wall.drive != WallDrive::Fixed,
-            radius: if wall.kind == WallKind::Plane { 0.0 } else { wall.radius },
+            radius: wall.radius,
             behind: false,
             points: vec![],
         };

@@ -16,6 +16,7 @@ fn full(dimension: usize) -> Layout {
         radius,
         drive,
         direction: [0.0, -1.0, 0.0],
+        ..Wall::default()
     };
     Layout {
         dimension,
