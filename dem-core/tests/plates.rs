@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{down, floor, grain, pressed, run, settings, world};
+use common::{down, floor, grain, pressed, run, settings, solver, world};
 use dem_core::body::{Drive, Shape, Wall};
 use dem_core::dim::{D2, D3, Dim, Vect};
 use dem_core::plate::Plate;
@@ -112,6 +112,7 @@ fn turns_off<D: Dim>(speed: f64, friction: f64) -> f64 {
         disk.spin = about;
     }
     let mut w = with_gravity(vec![disk], vec![level(&wall_at, &[0.2, 0.2], friction)], 2e-6);
+    w.settings.solver = solver(1e-9);
     let (mut normal, mut cosine) = (D::Vector::zero(), 1.0);
     normal[D::N - 1] = 1.0;
     for _ in 0..200_000 {

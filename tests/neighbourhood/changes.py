@@ -68,7 +68,7 @@ def lid(drive):
 
     def change(scene):
         top = scene["walls"].get("top") or plane(up(scene["dimension"], -1.0))
-        needs(drive not in ("stress", "slide") or "plane" in top["shape"])
+        needs(drive not in ("stress", "slide") or {"plane", "plate"} & set(top["shape"]))
         for old in ("force", "force_rate", "velocity", "stress", "slide", "grip", "direction", "mass"):
             if not (old == "direction" and "plane" not in top["shape"]):
                 top.pop(old, None)

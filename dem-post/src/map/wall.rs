@@ -32,11 +32,12 @@ pub(super) fn draw(canvas: &mut Canvas, eye: &Eye, wall: &Wall, position: &[f64]
     }
 }
 
-/// Draws the parts in front of the grains: in perspective, the edges of a plane or a plate.
+/// Draws the parts in front of the grains: plates in 2D; in perspective, the edges of a plane or a
+/// plate.
 pub(super) fn draw_in_front(canvas: &mut Canvas, eye: &Eye, wall: &Wall, position: &[f64], frame: &Frame) {
     match (wall.kind, eye.place()) {
         (WallKind::Plane, Some(place)) => draw_plate(canvas, place, wall, position, frame, false),
-        (WallKind::Plate, Some(_)) => draw_plate_wall(canvas, eye, wall, position, frame, false),
+        (WallKind::Plate, _) => draw_plate_wall(canvas, eye, wall, position, frame, false),
         _ => {}
     }
 }
@@ -112,17 +113,17 @@ pub(super) fn corners(wall: &Wall, position: &[f64]) -> Vec<Vec<f64>> {
 fn draw_plate_wall(canvas: &mut Canvas, eye: &Eye, wall: &Wall, position: &[f64], frame: &Frame, behind: bool) {
     let corners = corners(wall, position);
     let on_sheet: Vec<(f64, f64)> = corners.iter().map(|corner| frame.at(eye.flat(corner))).collect();
-    if let [from, to] = on_sheet[..] {
-        canvas.line(from, to, colour::BLACK, 3.5);
-        return;
-    }
-    match eye.place() {
+    match (&on_sheet[..], eye.place()) {
+        // in front: the grains that touch it reach into the width of the line
+        (&[from, to], _) if !behind => canvas.line(from, to, colour::BLACK, 3.0),
+        (&[_, _], _) => {}
         // parallel to an axis, and often seen from its edge
-        None => canvas.polygon(&on_sheet, "none", colour::BLACK, 1.8),
-        Some(place) if place.is_behind(position, wall.normal) == behind => {
+        (_, None) if behind => canvas.polygon(&on_sheet, "none", colour::BLACK, 1.8),
+        (_, None) => {}
+        (_, Some(place)) if place.is_behind(position, wall.normal) == behind => {
             canvas.polygon(&on_sheet, if behind { "#e4e4e4" } else { "none" }, colour::GREY, 1.2);
         }
-        Some(_) => {}
+        (_, Some(_)) => {}
     }
 }
 

@@ -6,7 +6,7 @@
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use dem_history::{History, Rupture, RuptureMode, WallDrive, WallKind};
+use dem_history::{History, Rupture, RuptureMode, WallDrive};
 use serde::Serialize;
 
 use crate::cracks::mode_colour;
