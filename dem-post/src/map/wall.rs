@@ -166,3 +166,33 @@ fn draw_plane(canvas: &mut Canvas, point: [f64; 2], normal: [f64; 2], frame: &Fr
         canvas.line(from, to, colour::GREY, 0.8);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_plate_has_its_ends_and_its_corners() {
+        let plate = Wall { kind: WallKind::Plate, side: [0.6, 0.8, 0.0], length: 2.0, ..Wall::default() };
+        assert_eq!(corners(&plate, &[1.0, 5.0]), [[0.4, 4.2], [1.6, 5.8]]);
+        let plate = Wall { normal: [0.8, -0.6, 0.0], width: 4.0, ..plate };
+        // normal × side = (0, 0, 1)
+        let expected = [[0.4, 4.2, 1.0], [1.6, 5.8, 1.0], [1.6, 5.8, 5.0], [0.4, 4.2, 5.0]];
+        let off = corners(&plate, &[1.0, 5.0, 3.0])
+            .concat()
+            .iter()
+            .zip(expected.concat())
+            .map(|(a, b)| a - b)
+            .collect::<Vec<_>>();
+        assert!(off.iter().all(|x: &f64| x.abs() < 1e-15), "{off:?}");
+    }
+
+    /// The part of a plate beyond the limits is not shown.
+    #[test]
+    fn a_plate_widens_the_picture_up_to_the_limits() {
+        let plate = Wall { kind: WallKind::Plate, side: [1.0, 0.0, 0.0], length: 8.0, ..Wall::default() };
+        let limits = [[-2.0, -2.0], [9.0, 9.0]];
+        let found = extent(&Eye::Along([0, 1]), &plate, &[0.0, 1.0], limits);
+        assert_eq!(found, Some([[-2.0, 1.0], [4.0, 1.0]]));
+    }
+}

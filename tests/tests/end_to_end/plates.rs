@@ -98,7 +98,7 @@ fn the_punch_loads_only_the_grains_that_it_covers() {
         assert!(beside < grains.radius[*i as usize], "grain {i} is {beside} m beside the punch");
     }
     let force = *series(&history, "applied_force", &[punch]).last().expect("a step");
-    assert!(touching > 1 && (-borne / force - 1.0).abs() < 1e-6, "{borne} N of {force} N on {touching} grains");
+    assert!(touching > 1 && (-borne / force - 1.0).abs() < 1e-4, "{borne} N of {force} N on {touching} grains");
     here.dem_post(&["chains", "a.h5", "-o", "out"]).succeeds();
     here.dem_post(&["report", "a.h5", "-o", "out"]).succeeds();
     here.dem_post(&["view", "a.h5", "-o", "out"]).succeeds();
