@@ -74,7 +74,7 @@ pub enum Shape {
     Sphere(Sphere),
     /// 3D: an infinite cylinder, or a hollow one around the grains.
     Cylinder(Cylinder),
-    /// A plane piece without thickness: a segment in 2D, a rectangle in 3D.
+    /// A segment in 2D, a rectangle in 3D; solid from both sides.
     Plate(Plate),
 }
 
