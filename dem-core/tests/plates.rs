@@ -62,8 +62,8 @@ fn a_long_plate_is_a_plane_to_the_last_bit() {
 }
 
 /// A grain that lies in an opening between the edges of two plates, in 3D also on the corners of
-/// three: each bears W/(n cos φ) along the line from its edge to the centre, R sin φ the distance of
-/// the edge from the vertical through the centre.
+/// three: each bears W/(n cos φ) along the line from its edge to the centre, R sin φ the distance
+/// of the edge from the vertical through the centre.
 #[test]
 fn a_grain_in_an_opening_rests_on_the_edges() {
     fn case<D: Dim>(walls: Vec<Wall<D>>, distance: f64) {
@@ -117,8 +117,8 @@ fn turns_off<D: Dim>(speed: f64, friction: f64) -> f64 {
     normal[D::N - 1] = 1.0;
     for _ in 0..200_000 {
         w.step().expect("a step");
-        // a gap of less than 1e-6 R counts as closed, so on the edge the reaction may be zero for some
-        // steps
+        // a gap of less than 1e-6 R counts as closed, so on the edge the reaction may be zero for
+        // some steps
         let Some(touch) = w.touches().next().filter(|t| t.gap < 1e-4 * R) else { break };
         let turned = D::normal(&touch.frame);
         let way = w.grains.velocity[0].norm() * w.settings.step;

@@ -208,7 +208,7 @@ impl<D: Dim> World<D> {
         }
     }
 
-    /// The radius of the smaller body of a pair (m); at a plane or a plate, the radius of the grain.
+    /// The radius of the smaller body of a pair (m); at a plane or a plate, that of the grain.
     pub(super) fn smaller(&self, pair: [u32; 2]) -> f64 {
         let [i, j] = pair.map(|k| k as usize);
         let size = match j.checked_sub(self.grains.len()) {

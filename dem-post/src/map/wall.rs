@@ -127,8 +127,8 @@ fn draw_plate_wall(canvas: &mut Canvas, eye: &Eye, wall: &Wall, position: &[f64]
     }
 }
 
-/// A plane in perspective, as a rectangle of the sample's size: filled if it is behind the grains, only
-/// its edges if it is in front of them.
+/// A plane in perspective, as a rectangle of the sample's size: filled if it is behind the grains,
+/// only its edges if it is in front of them.
 fn draw_plate(canvas: &mut Canvas, place: &Place, wall: &Wall, position: &[f64], frame: &Frame, behind: bool) {
     let (corners, is_behind) = place.plane(position, wall.normal);
     if is_behind == behind {

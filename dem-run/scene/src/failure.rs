@@ -35,8 +35,9 @@ pub struct Disk {
 
 impl Disk {
     /// The disk of a scene in which the wall `wall` loads it across its axis against another plane
-    /// wall, in 2D also between plates; none for another test. The diameter is from the scene. The length is the thickness in
-    /// 2D; in 3D it is the initial extent of the sample along the axis (`extents`, m).
+    /// wall, in 2D also between plates; none for another test. The diameter is from the scene. The
+    /// length is the thickness in 2D; in 3D it is the initial extent of the sample along the axis
+    /// (`extents`, m).
     #[must_use]
     pub fn of(scene: &Scene, wall: &str, extents: &[f64]) -> Option<Self> {
         let Sample::Random(random) = &scene.sample else { return None };
