@@ -1,6 +1,6 @@
 //! Plates: walls of finite extent, from the scene to the pictures.
 
-use crate::common::{Folder, config, number, run, series, sets, wall};
+use crate::common::{Folder, config, run, series, sets, wall};
 use serde_json::{Value, json};
 
 /// Five grains of radius 0.5 in a row on a floor, under a plate.
@@ -80,7 +80,7 @@ fn plates_in_the_wrong_place_are_refused_with_the_remedy() {
 fn the_punch_loads_only_the_grains_that_it_covers() {
     let here = Folder::new();
     let summary = run(&here, &config("punch.json"), &sets(&["time.end=0.02", "output.every_steps=20"]));
-    assert_eq!(number(&summary["bonds_broken"]), 0.0);
+    assert_eq!(summary["broken"], json!([0, 0, 0, 0]));
     let history = here.history("a.h5");
     let (punch, frame) = (wall(&history, "punch"), history.frames() - 1);
     let (grains, state) = (history.grains().expect("grains"), history.grain_state(frame).expect("grains"));
@@ -98,7 +98,7 @@ fn the_punch_loads_only_the_grains_that_it_covers() {
         assert!(beside < grains.radius[*i as usize], "grain {i} is {beside} m beside the punch");
     }
     let force = *series(&history, "applied_force", &[punch]).last().expect("a step");
-    assert!(touching > 1 && (-borne / force - 1.0).abs() < 1e-4, "{borne} N of {force} N on {touching} grains");
+    assert!(touching > 1 && (-borne / force - 1.0).abs() < 1e-9, "{borne} N of {force} N on {touching} grains");
     here.dem_post(&["chains", "a.h5", "-o", "out"]).succeeds();
     here.dem_post(&["report", "a.h5", "-o", "out"]).succeeds();
     here.dem_post(&["view", "a.h5", "-o", "out"]).succeeds();
