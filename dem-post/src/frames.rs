@@ -16,7 +16,7 @@ use crate::analysis::Analysis;
 use crate::chains::pictures::{force_legend, links};
 use crate::chains::report::{normal_forces, require_reactions, statistics};
 use crate::cracks::{Modes, mode_colour};
-use crate::map::{Key, Link, Panel, Ramp, Sample, Scale, View, draw_view};
+use crate::map::{Key, Link, Panel, Ramp, Sample, Scale, View, draw, draw_view};
 use crate::moments;
 use crate::options::Files;
 use crate::output::{Folder, PostError, Result, facts, in_shell, progress, quantity, short};
@@ -194,6 +194,12 @@ pub(crate) fn drawing(history: &History, report: &Report, shown: &Shown, frame: 
     let (mut panel, legend) = picture(history, report, frame)?;
     panel.caption.insert(0, shown.titles.of(history, frame));
     Ok(draw_view(&shown.sample, shown.view, &[panel], &legend))
+}
+
+/// The sample at a frame on a sheet of its own, without a caption and a legend.
+pub(crate) fn plain(history: &History, report: &Report, frame: usize) -> Result<Drawing> {
+    let (panel, _) = picture(history, report, frame)?;
+    Ok(draw(&Sample::with_depth(history)?, &[Panel { caption: vec![], ..panel }], &[]))
 }
 
 /// What all pictures of a series share.

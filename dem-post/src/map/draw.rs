@@ -46,13 +46,14 @@ pub fn draw_view(sample: &Sample, View([low, high]): View, panels: &[Panel], leg
     let even = |length: f64| (length / EVEN).ceil() * EVEN;
     let width = even((columns as f64 * (size.0 + MARGIN) + MARGIN).max(420.0));
     let rows = legend_rows(legend, width - 2.0 * MARGIN);
-    let below = lines as f64 * (CAPTION + size.1);
+    let caption = if panels.iter().any(|panel| !panel.caption.is_empty()) { CAPTION } else { MARGIN };
+    let below = lines as f64 * (caption + size.1);
     let mut canvas = Canvas::new(width, even(below + LEGEND * (rows.len() as f64 + 1.0) + MARGIN));
     let left = 0.5 * (width - columns as f64 * (size.0 + MARGIN) + MARGIN);
     for (k, panel) in panels.iter().enumerate() {
         let (column, line) = if stacked { (0, k) } else { (k, 0) };
-        let top = line as f64 * (CAPTION + size.1);
-        let corner = (left + column as f64 * (size.0 + MARGIN), top + CAPTION);
+        let top = line as f64 * (caption + size.1);
+        let corner = (left + column as f64 * (size.0 + MARGIN), top + caption);
         draw_panel(&mut canvas, sample, panel, &Frame { low, scale, corner, size });
     }
     let base = below + 0.7 * LEGEND;

@@ -1,6 +1,6 @@
-//! A run on one page: a self-contained HTML file that begins with the result in a sentence, three
-//! moments and a slider over the run; then pictures, curves, tables, the energy balance, the
-//! solver's own measures of its accuracy, and the scene.
+//! A run, or a [`sweep`], on one page: a self-contained HTML file. That of a run begins with the
+//! result in a sentence, three moments and a slider over the run; then pictures, curves, tables,
+//! the energy balance, the solver's own measures of its accuracy, and the scene.
 //!
 //! Without scripts the page shows all but the slider and the values of the curves.
 //!
@@ -8,15 +8,19 @@
 //! are inside the page as `data:` addresses. Long curves are thinned, as in all charts. A section
 //! without content gives the reason.
 
+use std::path::PathBuf;
+
 use clap::Args;
 use dem_history::History;
+use dem_output::command_line::seconds;
 use serde::Serialize;
 
 use crate::analysis::Analysis;
-use crate::options::{LoadWall, Moments};
+use crate::options::{Files, LoadWall};
 use crate::output::{Folder, PostError, Result, facts, number};
 use crate::section::{Maps, OnPage, Section};
 use crate::title::Titles;
+use crate::strength::{self, Measure};
 use crate::{chains, cracks, emission, fabric, info, stress_strain, velocities};
 
 mod page;
@@ -24,42 +28,116 @@ mod player;
 mod result;
 mod sections;
 pub mod solver;
+pub mod sweep;
 
+use page::Page;
 use solver::Accuracy;
+use sweep::Sweep;
 
-/// Report of the run as one self-contained HTML page: pictures, curves, tables, accuracy, energy,
-/// scene.
+/// Report of a run, or of a whole sweep, as one self-contained HTML page: pictures, curves, tables,
+/// accuracy, scene.
 #[derive(Debug, Args)]
 pub struct Command {
-    #[command(flatten)]
-    moments: Moments,
+    /// The history of a run, or the folder of a sweep.
+    #[arg(value_name = "RUN")]
+    run: PathBuf,
+    /// Folder for the page, created if missing [default: RUN-post, of a sweep RUN-report, in the
+    /// current folder].
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Overwrite a results folder of another history: its results are removed.
+    #[arg(long)]
+    force: bool,
     #[command(flatten)]
     load_wall: LoadWall,
+    /// Of a run, times of the maps (s), as in 0.1,0.15 [default: first break, collapse or peak,
+    /// end].
+    #[arg(long, value_name = "T,…", value_delimiter = ',', value_parser = seconds)]
+    times: Vec<f64>,
+    /// Of a sweep, the field of the strength, as --set names it [default: the one that differs].
+    #[arg(long, value_name = "FIELD")]
+    against: Option<String>,
+    /// Of a sweep, the definition of the strength: the load at … [default: broken]
+    #[arg(long, value_enum)]
+    measure: Option<Measure>,
+}
+
+/// What the page is about.
+pub enum Input {
+    /// A run.
+    Run(Box<History>),
+    /// A sweep.
+    Sweep(Box<Sweep>),
+}
+
+/// The content of a page.
+#[derive(Clone, Debug, Serialize)]
+#[serde(untagged)]
+pub enum Found {
+    /// Of a run.
+    Run(Box<Report>),
+    /// Of a sweep.
+    Sweep(Box<sweep::Report>),
 }
 
 impl Analysis for Command {
     const NAME: &'static str = "report";
-    type Input = History;
-    type Report = Report;
+    type Input = Input;
+    type Report = Found;
 
-    fn open(&self) -> Result<History> {
-        self.moments.files.open()
+    fn open(&self) -> Result<Input> {
+        if self.run.is_dir() {
+            if !self.times.is_empty() {
+                return Err(PostError::Usage("--times is of the page of one run: give its history".into()));
+            }
+            return Ok(Input::Sweep(Box::new(Sweep::open(&self.run)?)));
+        }
+        if self.against.is_some() || self.measure.is_some() {
+            let option = if self.against.is_some() { "--against" } else { "--measure" };
+            return Err(PostError::Usage(format!("{option} is of the page of a sweep: give the folder of one")));
+        }
+        Ok(Input::Run(Box::new(History::open(&self.run)?)))
     }
 
-    fn read(&self, history: &History, quiet: bool) -> Result<Report> {
-        read(history, &self.moments.times, self.load_wall.name(), quiet)
+    fn read(&self, input: &Input, quiet: bool) -> Result<Found> {
+        let wall = self.load_wall.name();
+        Ok(match input {
+            Input::Run(history) => Found::Run(Box::new(read(history, &self.times, wall, quiet)?)),
+            Input::Sweep(sweep) => {
+                let strength = strength::Options {
+                    against: self.against.clone(),
+                    measure: self.measure.unwrap_or_default(),
+                    wall: wall.map(String::from),
+                };
+                Found::Sweep(Box::new(sweep::read(sweep, &sweep::Options { strength, quiet })?))
+            }
+        })
     }
 
-    fn table(report: &Report) -> String {
-        report.table()
+    fn table(report: &Found) -> String {
+        match report {
+            Found::Run(report) => report.table(),
+            Found::Sweep(report) => report.table(),
+        }
     }
 
-    fn folder(&self, history: &History) -> Result<Option<Folder>> {
-        self.moments.files.folder(history, Self::NAME)
+    fn folder(&self, input: &Input) -> Result<Option<Folder>> {
+        match input {
+            Input::Run(history) => {
+                let files = Files { history: self.run.clone(), output: self.output.clone(), force: self.force };
+                files.folder(history, Self::NAME)
+            }
+            Input::Sweep(sweep) => sweep.folder(self.output.as_deref(), self.force).map(Some),
+        }
     }
 
-    fn write(&self, history: &History, report: &mut Report, folder: &mut Folder, _: bool) -> Result<()> {
-        write(history, report, folder)
+    fn write(&self, input: &Input, report: &mut Found, folder: &mut Folder, _: bool) -> Result<()> {
+        match (input, report) {
+            (Input::Run(history), Found::Run(report)) => write(history, report, folder),
+            (Input::Sweep(sweep), Found::Sweep(report)) => sweep::write(sweep, report, folder),
+            // a report is read from its own input
+            _ => Ok(()),
+        }
     }
 }
 
@@ -226,6 +304,11 @@ impl Report {
 /// # Errors
 /// [`PostError::Write`], and those of reading the history.
 pub fn write(history: &History, report: &Report, folder: &mut Folder) -> Result<()> {
-    let page = page::render(history, report.sections(history)?)?;
-    Ok(folder.write("report.html", page.as_bytes())?)
+    let scene = history.parameters()?.scene;
+    let tree: serde_json::Value = serde_json::from_str(&scene).unwrap_or_default();
+    let name = history.path().file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+    let title = tree["title"].as_str().map_or_else(|| name.clone(), |title| format!("{name}: {title}"));
+    let sections = report.sections(history)?;
+    let page = Page { title, sections, scene: page::pretty(&scene), scene_of: "As it was run.".into() };
+    Ok(folder.write("report.html", page.render()?.as_bytes())?)
 }

@@ -236,7 +236,7 @@ fn place(history: &History, rupture: &Rupture) -> Result<String> {
 }
 
 /// `a, b and c`.
-fn joined(parts: &[String]) -> String {
+pub(super) fn joined(parts: &[String]) -> String {
     match parts {
         [] => String::new(),
         [one] => one.clone(),

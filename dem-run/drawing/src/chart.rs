@@ -65,6 +65,8 @@ pub struct Curve {
     pub colour: &'static str,
     /// Time of each point (s); empty if the points are at no times of the run.
     pub times: Vec<f64>,
+    /// Whether the legend has it.
+    pub listed: bool,
 }
 
 /// Means with error bars.
@@ -153,7 +155,7 @@ impl Chart {
 
     /// Adds a curve.
     pub fn curve(mut self, label: &str, colour: &'static str, style: Style, points: Vec<(f64, f64)>) -> Self {
-        self.curves.push(Curve { label: label.into(), points, style, colour, times: vec![] });
+        self.curves.push(Curve { label: label.into(), points, style, colour, times: vec![], listed: true });
         self
     }
 
@@ -161,6 +163,14 @@ impl Chart {
     pub fn timed(mut self, times: &[f64]) -> Self {
         if let Some(curve) = self.curves.last_mut() {
             curve.times = times.to_vec();
+        }
+        self
+    }
+
+    /// Leaves the last curve out of the legend: it has the colour of a curve that is there.
+    pub fn unlisted(mut self) -> Self {
+        if let Some(curve) = self.curves.last_mut() {
+            curve.listed = false;
         }
         self
     }
@@ -247,7 +257,8 @@ impl Chart {
 
     /// Name, colour and style of each curve and each marked level; a single entry needs no name.
     fn legend(&self) -> Vec<Named> {
-        let curves = self.curves.iter().map(|curve| (curve.label.clone(), curve.colour, curve.style));
+        let listed = self.curves.iter().filter(|curve| curve.listed);
+        let curves = listed.map(|curve| (curve.label.clone(), curve.colour, curve.style));
         let bars = self.bars.iter().map(|bars| (bars.label.clone(), bars.colour, Style::Bars));
         let levels = self.levels.iter().map(|(_, label)| (label.clone(), colour::GREY, Style::Level));
         let entries: Vec<_> = curves.chain(bars).chain(levels).collect();
