@@ -412,7 +412,7 @@ fn share(r: f64) -> String {
 }
 
 /// A field or a load with its unit, as on an axis.
-pub(super) fn axis(name: &str, unit: &str) -> String {
+pub(crate) fn axis(name: &str, unit: &str) -> String {
     if unit.is_empty() { name.to_string() } else { format!("{name} ({unit})") }
 }
 

@@ -2,60 +2,76 @@
 
 use dem_drawing::{Chart, Style, colour};
 use dem_history::History;
+use serde_json::Value;
 
+use super::sections::cell;
 use super::{Report, Run};
 use crate::frames::{self, Subject};
 use crate::output::{PostError, Result, number, short};
+use crate::strength::report::axis;
+use crate::strength::scenes::unit;
 use crate::section::{Figure, Section, capitalised, map_figure_of};
 
 /// Maximum number of bytes of all pictures of samples in the page.
-const BYTES: usize = 1_900_000;
-/// Pixels per unit of a picture.
-const PIXELS: f32 = 0.75;
+const BYTES: usize = 2_000_000;
+/// Pixels per unit of a picture: of a few runs, and of many.
+const PIXELS: [f32; 2] = [1.0, 0.5];
+const FEW: usize = 12;
 /// Least strain on the logarithmic axis.
 const LEAST_STRAIN: f64 = 1e-9;
 
 /// The load over the strain of all runs, on a linear and on a logarithmic axis, each with its
-/// caption; runs with one value of the field of the strength have one colour.
-pub fn curves(report: &Report) -> Vec<(Chart, &'static str)> {
+/// caption. Runs with one value of a field have one colour: of the field of the strength, else of
+/// the first that has few values.
+pub fn curves(report: &Report) -> Vec<(Chart, String)> {
     let drawn: Vec<&Run> = report.runs.iter().filter(|run| run.curve.len() > 1).collect();
     if drawn.is_empty() {
         return vec![];
     }
-    let value = |run: &Run| run.values.get(report.strength.as_ref()?.field.as_str())?.as_f64();
-    let mut values: Vec<f64> = drawn.iter().filter_map(|run| value(run)).collect();
-    values.sort_by(f64::total_cmp);
-    values.dedup();
-    let grouped = (2..=colour::CYCLE.len()).contains(&values.len()) && drawn.iter().all(|run| value(run).is_some());
+    let fields = report.strength.iter().map(|found| &found.field).chain(&report.fields);
+    let grouped = fields.map(|field| (field, values(&drawn, field)));
+    let grouped = grouped.into_iter().find(|(_, values)| (2..=colour::CYCLE.len()).contains(&values.len()));
     let draw = |mut chart: Chart, x: &dyn Fn(f64) -> f64| {
         let mut named = vec![];
         for run in &drawn {
-            let group = value(run).filter(|_| grouped).and_then(|v| values.iter().position(|other| *other == v));
-            let label = match group {
-                Some(k) => format!("{} {}", report.strength.as_ref().map_or("", |s| s.field.as_str()), number(values[k])),
-                None => format!("run {}", run.id),
-            };
+            let group = grouped.as_ref().and_then(|(field, values)| {
+                let own = run.values.get(*field)?;
+                values.iter().position(|value| *value == own).map(|k| (k, cell(own)))
+            });
             let points = run.curve.iter().map(|(strain, load)| (x(*strain), *load)).collect();
-            chart = chart.curve(&label, colour::CYCLE[group.unwrap_or(0)], Style::Thin, points);
-            if !grouped || named.contains(&group) {
+            let (k, label) = group.unwrap_or_else(|| (0, format!("run {}", run.id)));
+            chart = chart.curve(&label, colour::CYCLE[k], Style::Thin, points);
+            if grouped.is_none() || named.contains(&label) {
                 chart = chart.unlisted();
             }
-            named.push(group);
+            named.push(label);
         }
         chart
     };
+    let by = grouped.as_ref().map_or_else(String::new, |(field, _)| format!(", in colours by {}", axis(field, &unit(field))));
     let mut linear = Chart::new("axial strain (%)", "load (N)");
     linear.pad_x = true;
-    let mut onset = Chart::new("magnitude of the axial strain", "load (N)");
-    onset.log_x = true;
-    let visible = |strain: f64| if strain < LEAST_STRAIN { f64::NAN } else { strain };
-    let mut charts = vec![(draw(linear, &|strain| 1e2 * strain), "Load over strain of all runs.")];
+    let mut charts = vec![(draw(linear, &|strain| 1e2 * strain), format!("Load over strain of all runs{by}."))];
     // before its collapse a rigid sample has no strain to show
     if drawn.iter().any(|run| run.collapse.is_some()) {
-        let caption = "Load over the logarithm of the strain of all runs: the onset of collapse.";
+        let mut onset = Chart::new("magnitude of the axial strain", "load (N)");
+        onset.log_x = true;
+        let visible = |strain: f64| if strain < LEAST_STRAIN { f64::NAN } else { strain };
+        let caption = format!("The onset of collapse: load over the logarithm of the strain{by}.");
         charts.push((draw(onset, &visible), caption));
     }
     charts
+}
+
+/// The values of a field, in the order of the runs.
+fn values<'a>(runs: &[&'a Run], field: &str) -> Vec<&'a Value> {
+    let mut found: Vec<&Value> = vec![];
+    for value in runs.iter().filter_map(|run| run.values.get(field)) {
+        if !found.contains(&value) {
+            found.push(value);
+        }
+    }
+    found
 }
 
 /// A picture of each run at its collapse or, without one, at its end, as many as the page has room
@@ -67,7 +83,7 @@ pub fn section(report: &Report) -> Result<Section> {
     let (mut figures, mut bytes, mut legend) = (vec![], 0, vec![]);
     let with_history = report.runs.iter().filter(|run| run.history.is_some()).count();
     for run in &report.runs {
-        let Some((figure, keys)) = picture(run)? else { continue };
+        let Some((figure, keys)) = picture(run, PIXELS[usize::from(with_history > FEW)])? else { continue };
         bytes += figure.source.len();
         if bytes > BYTES {
             break;
@@ -94,7 +110,7 @@ pub fn section(report: &Report) -> Result<Section> {
 type Entry = (&'static str, String);
 
 /// The picture of a run and its legend; `None` without frames or without anything to draw.
-fn picture(run: &Run) -> Result<Option<(Figure, Vec<Entry>)>> {
+fn picture(run: &Run, pixels: f32) -> Result<Option<(Figure, Vec<Entry>)>> {
     let Some(path) = &run.history else { return Ok(None) };
     let history = History::open(path)?;
     let Some(last) = history.frames().checked_sub(1) else { return Ok(None) };
@@ -110,7 +126,7 @@ fn picture(run: &Run) -> Result<Option<(Figure, Vec<Entry>)>> {
                 let load = peak.map_or_else(String::new, |load| format!(", greatest load {} N", short(load)));
                 let caption = format!("Run {}: {what}, t = {} s{load}.", run.id, number(time));
                 let alt = format!("The sample of run {} at its {what}.", run.id);
-                let figure = map_figure_of(&drawing, PIXELS, &alt, &capitalised(&caption))?;
+                let figure = map_figure_of(&drawing, pixels, &alt, &capitalised(&caption))?;
                 let legend = if subject == Subject::Bonds { frames::bond_legend(history.dimension(), false) } else { vec![] };
                 return Ok(Some((Figure { class: "small", ..figure }, legend)));
             }

@@ -16,7 +16,7 @@ use crate::strength::Measure;
 use crate::strength::runs::Course;
 
 /// Points of the curves of all runs together, and the least number for a run.
-const POINTS: usize = 24_000;
+const POINTS: usize = 12_000;
 const LEAST_POINTS: usize = 60;
 
 /// A run.

@@ -12,7 +12,7 @@ use crate::output::{Result, counted, number, quantity, short};
 use crate::report::result::joined;
 use crate::section::{Section, Table, chart_figure};
 use crate::strength;
-use crate::strength::report::estimate;
+use crate::strength::report::{axis, estimate};
 use crate::strength::scenes::unit;
 
 /// Maximum number of values of a field that are listed, and of letters of one of them.
@@ -49,7 +49,7 @@ fn sentences(report: &Report) -> String {
     let mut said = vec![if varied.is_empty() {
         format!("{}: {runs} of {}.", report.sweep, report.scene)
     } else {
-        format!("{}: {runs} of {}, which vary {}.", report.sweep, report.scene, joined(&varied))
+        format!("{}: {runs} of {}, over {}.", report.sweep, report.scene, joined(&varied))
     }];
     said.push(endings(report));
     said.extend(strength_sentence(report));
@@ -78,9 +78,10 @@ fn in_words(report: &Report, field: &str) -> String {
     let unit = unit(field);
     let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
     let text = if numbers.len() < values.len() || numbers.is_empty() {
-        let short: Vec<String> = values.iter().map(|value| cell(value)).collect();
-        let fit = short.len() <= VALUES && short.iter().all(|text| !text.ends_with('…'));
-        if fit { short.join(", ") } else { counted(values.len(), "value") }
+        // tables have no place in a sentence
+        let plain = values.len() <= VALUES && !values.iter().any(|value| value.is_array() || value.is_object());
+        let listed = || values.iter().map(|value| cell(value)).collect::<Vec<_>>().join(", ");
+        if plain { listed() } else { counted(values.len(), "value") }
     } else {
         numbers.sort_by(f64::total_cmp);
         let (first, last) = (numbers[0], numbers[numbers.len() - 1]);
@@ -110,6 +111,7 @@ fn endings(report: &Report) -> String {
         ends.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
         let each: Vec<String> = ends.iter().map(|(why, count)| format!("{count} {why}")).collect();
         parts.push(match &ends[..] {
+            [(why, 1)] if done == report.runs.len() => format!("It ended {why}"),
             [(why, _)] if done == report.runs.len() => format!("All ended {why}"),
             [(why, _)] => format!("{done} ended {why}"),
             _ => format!("{done} ended: {}", joined(&each)),
@@ -166,10 +168,7 @@ fn strength_sentence(report: &Report) -> Option<String> {
 /// The runs as a table: its head and its rows.
 pub(super) fn run_rows(report: &Report) -> (Vec<String>, Vec<Vec<String>>) {
     let mut head = vec!["run".to_string()];
-    head.extend(report.fields.iter().map(|field| {
-        let unit = unit(field);
-        if unit.is_empty() { field.clone() } else { format!("{field} ({unit})") }
-    }));
+    head.extend(report.fields.iter().map(|field| axis(field, &unit(field))));
     let measured = ["first break (N)", "5 % broken (N)", "collapse (N)", "peak (N)", "broken bonds", "missed steps"];
     head.extend(["state", "ended by"].into_iter().chain(measured).chain(["CPU (s)"]).map(String::from));
     let row = |run: &Run| {
@@ -187,7 +186,7 @@ pub(super) fn run_rows(report: &Report) -> (Vec<String>, Vec<Vec<String>>) {
 }
 
 /// A value of a field in a cell.
-fn cell(value: &Value) -> String {
+pub(super) fn cell(value: &Value) -> String {
     let text = match value {
         Value::Null => "–".into(),
         Value::String(text) => text.clone(),
@@ -256,7 +255,7 @@ fn curves(report: &Report) -> Section {
                 grains to one piece, strain before the first break is solver error.";
     let figures: Vec<_> = pictures::curves(report)
         .into_iter()
-        .map(|(chart, caption)| chart_figure(chart, caption, caption))
+        .map(|(chart, caption)| chart_figure(chart, &caption, &caption))
         .collect();
     let text = if figures.is_empty() { "None: no run has a load and a strain." } else { text };
     Section { id: "curves", title: "Load and strain", text: text.into(), figures, ..Section::default() }
