@@ -15,7 +15,7 @@ fn page(path: &Path, options: &[&str]) -> String {
 }
 
 /// Checks that every element is closed, in order, and that no attribute is open.
-fn well_formed(page: &str) {
+pub(super) fn well_formed(page: &str) {
     let mut open: Vec<&str> = vec![];
     let mut rest = page.strip_prefix("<!doctype html>").expect("a document type");
     while let Some((_, tail)) = rest.split_once('<') {
@@ -47,7 +47,7 @@ fn data(page: &str, tag: &str) -> Value {
     serde_json::from_str(script).unwrap()
 }
 
-fn bytes(value: &Value) -> Vec<u8> {
+pub(super) fn bytes(value: &Value) -> Vec<u8> {
     STANDARD.decode(value.as_str().unwrap()).unwrap()
 }
 

@@ -2,8 +2,8 @@
 
 use dem_drawing::{Chart, Style, colour};
 use dem_history::History;
-use serde_json::Value;
 
+use super::runs::{same, values};
 use super::sections::cell;
 use super::{Report, Run};
 use crate::frames::{self, Subject};
@@ -36,7 +36,7 @@ pub fn curves(report: &Report) -> Vec<(Chart, String)> {
         for run in &drawn {
             let group = grouped.as_ref().and_then(|(field, values)| {
                 let own = run.values.get(*field)?;
-                values.iter().position(|value| *value == own).map(|k| (k, cell(own)))
+                values.iter().position(|value| same(value, own)).map(|k| (k, cell(own)))
             });
             let points = run.curve.iter().map(|(strain, load)| (x(*strain), *load)).collect();
             let (k, label) = group.unwrap_or_else(|| (0, format!("run {}", run.id)));
@@ -61,17 +61,6 @@ pub fn curves(report: &Report) -> Vec<(Chart, String)> {
         charts.push((draw(onset, &visible), caption));
     }
     charts
-}
-
-/// The values of a field, in the order of the runs.
-fn values<'a>(runs: &[&'a Run], field: &str) -> Vec<&'a Value> {
-    let mut found: Vec<&Value> = vec![];
-    for value in runs.iter().filter_map(|run| run.values.get(field)) {
-        if !found.contains(&value) {
-            found.push(value);
-        }
-    }
-    found
 }
 
 /// A picture of each run at its collapse or, without one, at its end, as many as the page has room

@@ -164,3 +164,19 @@ impl Run {
         Ok(())
     }
 }
+
+/// The values of a field, in the order of the runs.
+pub fn values<'a>(runs: &[&'a Run], field: &str) -> Vec<&'a Value> {
+    let mut found: Vec<&Value> = vec![];
+    for value in runs.iter().filter_map(|run| run.values.get(field)) {
+        if !found.iter().any(|other| same(other, value)) {
+            found.push(value);
+        }
+    }
+    found
+}
+
+/// Whether two values are the same: 1 and 1.0 are.
+pub fn same(a: &Value, b: &Value) -> bool {
+    a == b || a.as_f64().zip(b.as_f64()).is_some_and(|(a, b)| a == b)
+}

@@ -6,6 +6,7 @@ use dem_history::sweep::State;
 use serde_json::Value;
 
 use super::pictures;
+use super::runs::values;
 use super::{Report, Run};
 use crate::envelope;
 use crate::output::{Result, counted, number, quantity, short};
@@ -57,8 +58,8 @@ fn sentences(report: &Report) -> String {
         let (angle, cohesion) = (short(line.friction_angle.value), short(1e-3 * line.cohesion.value));
         format!("The circles at failure touch a line of friction angle {angle}° and cohesion {cohesion} kPa.")
     }));
-    let missed: usize = report.runs.iter().filter_map(|run| run.missed_tolerance).sum();
-    let steps: usize = report.runs.iter().map(|run| run.steps).sum();
+    let solved = report.runs.iter().filter_map(|run| Some((run.missed_tolerance?, run.steps)));
+    let (missed, steps) = solved.fold((0, 0), |all, run| (all.0 + run.0, all.1 + run.1));
     if steps > 0 {
         let missed = if missed == 0 { "None".into() } else { missed.to_string() };
         said.push(format!("{missed} of {} missed the tolerance of the solver.", counted(steps, "step")));
@@ -68,12 +69,7 @@ fn sentences(report: &Report) -> String {
 
 /// A field with its values: `bonds.strength (5, 10, 20 N)`, `seed (1 to 10)`.
 fn in_words(report: &Report, field: &str) -> String {
-    let mut values: Vec<&Value> = vec![];
-    for value in report.runs.iter().filter_map(|run| run.values.get(field)) {
-        if !values.contains(&value) {
-            values.push(value);
-        }
-    }
+    let values = values(&report.runs.iter().collect::<Vec<_>>(), field);
     let mut numbers: Vec<f64> = values.iter().filter_map(|value| value.as_f64()).collect();
     let unit = unit(field);
     let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
