@@ -37,28 +37,50 @@ pub(super) fn draw_in_front(canvas: &mut Canvas, eye: &Eye, wall: &Wall, positio
     }
 }
 
-/// An arrow of the load at a driven plane in 2D, at the middle of the panel: towards the grains
-/// where the wall pushes. None where no grain acts on the wall.
-pub(super) fn draw_load(canvas: &mut Canvas, wall: &Wall, position: &[f64], force: &[f64], frame: &Frame) {
-    if !bears_arrow(wall) || position.len() != 2 || force.len() != 2 {
+/// An arrow of the load at a driven plane: towards the grains where the wall pushes. It stands at
+/// the middle of the panel, in perspective at the middle of the plate. None where no grain acts on
+/// the wall, and at a plane parallel to the sheet. Only that of a plate behind the grains is drawn
+/// with `behind`.
+pub(super) fn draw_load(
+    canvas: &mut Canvas,
+    eye: &Eye,
+    wall: &Wall,
+    [position, force]: [&[f64]; 2],
+    frame: &Frame,
+    behind: bool,
+) {
+    let d = position.len();
+    if !bears_arrow(wall) || force.len() != d {
         return;
     }
     // the load is opposite to the force of the grains
-    let along = -(force[0] * wall.direction[0] + force[1] * wall.direction[1]);
+    let along = -force.iter().zip(&wall.direction).map(|(f, direction)| f * direction).sum::<f64>();
     if along == 0.0 {
         return;
     }
-    let sign = along.signum();
+    let load = wall.direction.map(|x| along.signum() * x);
+    let pushes = load.iter().zip(&wall.normal).map(|(f, n)| f * n).sum::<f64>() > 0.0;
+    let [tail, head] = if pushes { [-ARROW, -2.0] } else { [2.0, ARROW] };
+    if let Some(place) = eye.place() {
+        let (corners, is_behind) = place.plane(position, wall.normal);
+        if is_behind == behind {
+            let middle = [0, 1, 2].map(|k| corners.iter().map(|corner| corner[k]).sum::<f64>() / 4.0);
+            let at = |s: f64| frame.at(place.flat(&[0, 1, 2].map(|k| middle[k] + s / frame.scale * load[k])));
+            draw_arrow(canvas, at(tail), at(head));
+        }
+        return;
+    }
     // on the sheet y points down
-    let load = (sign * wall.direction[0], -sign * wall.direction[1]);
-    let normal = (wall.normal[0], -wall.normal[1]);
-    let from = frame.at([position[0], position[1]]);
-    let line = (-normal.1, normal.0);
+    let [load, normal] = [load, wall.normal].map(|x| eye.flat(&x[..d])).map(|[x, y]| (x, -y));
+    let length = normal.0.hypot(normal.1);
+    if behind || length < 1e-6 {
+        return;
+    }
+    let from = frame.at(eye.flat(position));
+    let line = (-normal.1 / length, normal.0 / length);
     let off = to_the_middle(frame, from, line);
     let foot = (from.0 + line.0 * off, from.1 + line.1 * off);
     let at = |s: f64| (foot.0 + s * load.0, foot.1 + s * load.1);
-    let pushes = load.0 * normal.0 + load.1 * normal.1 > 0.0;
-    let (tail, head) = if pushes { (-ARROW, -2.0) } else { (2.0, ARROW) };
     draw_arrow(canvas, at(tail), at(head));
 }
 

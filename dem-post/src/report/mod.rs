@@ -8,7 +8,7 @@
 //! are inside the page as `data:` addresses. Long curves are thinned, as in all charts. A section
 //! without content gives the reason.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use dem_history::History;
@@ -23,6 +23,7 @@ use crate::title::Titles;
 use crate::strength::{self, Measure};
 use crate::{chains, cracks, emission, fabric, info, stress_strain, velocities};
 
+pub mod limit;
 mod page;
 mod player;
 mod result;
@@ -30,6 +31,7 @@ mod sections;
 pub mod solver;
 pub mod sweep;
 
+use limit::LimitLoad;
 use page::Page;
 use solver::Accuracy;
 use sweep::Sweep;
@@ -54,6 +56,9 @@ pub struct Command {
     /// end].
     #[arg(long, value_name = "T,…", value_delimiter = ',', value_parser = seconds)]
     times: Vec<f64>,
+    /// Of a run, the limit load of its scene: a file with what `dem-run limit SCENE --json` prints.
+    #[arg(long, value_name = "FILE.json")]
+    limit: Option<PathBuf>,
     /// Of a sweep, the field of the strength, as --set names it [default: the one that differs].
     #[arg(long, value_name = "FIELD")]
     against: Option<String>,
@@ -87,8 +92,9 @@ impl Analysis for Command {
 
     fn open(&self) -> Result<Input> {
         if self.run.is_dir() {
-            if !self.times.is_empty() {
-                return Err(PostError::Usage("--times is of the page of one run: give its history".into()));
+            if !self.times.is_empty() || self.limit.is_some() {
+                let option = if self.limit.is_some() { "--limit" } else { "--times" };
+                return Err(PostError::Usage(format!("{option} is of the page of one run: give its history")));
             }
             return Ok(Input::Sweep(Box::new(Sweep::open(&self.run)?)));
         }
@@ -102,7 +108,7 @@ impl Analysis for Command {
     fn read(&self, input: &Input, quiet: bool) -> Result<Found> {
         let wall = self.load_wall.name();
         Ok(match input {
-            Input::Run(history) => Found::Run(Box::new(read(history, &self.times, wall, quiet)?)),
+            Input::Run(history) => Found::Run(Box::new(read(history, &self.times, wall, self.limit.as_deref(), quiet)?)),
             Input::Sweep(sweep) => {
                 let strength = strength::Options {
                     against: self.against.clone(),
@@ -166,6 +172,9 @@ pub struct Report {
     /// Force and displacement of the load wall; `None` without a driven wall that was observed.
     #[serde(skip)]
     pub stress_strain: Option<stress_strain::Report>,
+    /// The limit load of its load wall, if it was given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub limit_load: Option<LimitLoad>,
     /// The sections without content.
     pub left_out: Vec<EmptySection>,
 }
@@ -180,22 +189,34 @@ pub struct EmptySection {
 }
 
 /// Reads the content of the page. Maps show the frames nearest to `times` (s), or chosen ones; the
-/// load is that of `wall`, or of the scene's load wall.
+/// load is that of `wall`, or of the scene's load wall; its limit load that in the file `limit`.
 ///
 /// # Errors
 /// [`PostError::Usage`] for times outside the history, for a wall that is not driven, and where
-/// several walls are driven and none is chosen; [`PostError::Lacking`] for a history without
+/// several walls are driven and none is chosen, and as [`limit::read`]; [`PostError::Lacking`] for a history without
 /// frames.
-pub fn read(history: &History, times: &[f64], wall: Option<&str>, quiet: bool) -> Result<Report> {
+pub fn read(
+    history: &History,
+    times: &[f64],
+    wall: Option<&str>,
+    limit: Option<&Path>,
+    quiet: bool,
+) -> Result<Report> {
     // called first: it reports wrong times and a history without frames
     let velocities = velocities::read(history, times)?;
     let mut left_out = vec![];
+    // called before the slow analysis of cracks: they report a wrong wall and a wrong limit load
+    let stress_strain = if_there(stress_strain::read(history, wall), &mut left_out)?;
+    let limit_load = limit.map(|file| match &stress_strain {
+        Some(load) => limit::read(file, history, &load.summary.wall),
+        None => Err(PostError::Usage("--limit: the run has no load wall to compare the limit load with".into())),
+    });
     Ok(Report {
         velocities,
         info: info::read(history)?,
         accuracy: solver::read(history)?,
-        // called before the slow analysis of cracks: it reports a wrong wall
-        stress_strain: if_there(stress_strain::read(history, wall), &mut left_out)?,
+        stress_strain,
+        limit_load: limit_load.transpose()?,
         cracks: if_there(cracks::read(history, quiet), &mut left_out)?,
         chains: if_there(chains::read(history, times), &mut left_out)?,
         emission: emission(history, wall)?,
@@ -240,6 +261,7 @@ impl Report {
         let parts = result::Parts {
             info: &self.info,
             load: self.stress_strain.as_ref(),
+            limit: self.limit_load.as_ref(),
             cracks: self.cracks.as_ref(),
             times: &self.times,
             titles: &maps.titles,

@@ -2,7 +2,7 @@
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::*;
 
@@ -224,4 +224,66 @@ fn a_report_needs_nothing_but_itself() {
     // an empty section gives the reason
     let section = page.split("<section id=\"cracks\">").nth(1).unwrap().split("</section>").next().unwrap();
     assert!(section.contains("None: ") && section.contains("bonds"), "{section}");
+}
+
+/// The file that `dem-run limit --json` would print for a scene, with this limit of the upper wall.
+fn limit_file(folder: &Path, limit: Option<f64>, outcome: &str, scene: &Value) -> PathBuf {
+    let path = folder.join("limit.json");
+    let loads = [json!({ "load": "grains.loads.0", "limit": 1.0 }), json!({ "load": "walls.top", "limit": limit })];
+    let file = json!({ "outcome": outcome, "loads": loads, "grains": 4, "bonds": 4, "scene": scene });
+    std::fs::write(&path, file.to_string()).unwrap();
+    path
+}
+
+#[test]
+fn a_limit_load_is_a_line_in_the_load_and_a_sentence() {
+    let (folder, path) = sample(&layout(2));
+    let scene = json!({ "thickness": 0.5, "title": "another", "solver": { "tolerance": 1e-9 }, "time": { "step": 2 } });
+    let limit = |load: f64| limit_file(folder.path(), Some(load), "limit", &scene);
+    // 30 N at the first break, 100 N at the end; the load of a wall that pulls is negative
+    for (load, shown) in [(120.0, true), (-120.0, true), (60.0, true), (550.0, false)] {
+        limit(load);
+        let page = page(&path, &["--limit", "limit.json"]);
+        let load = f64::abs(load);
+        let said = format!(
+            "The limit load, an upper bound of that of the first break, is {load} N: the first bond broke at {} % of it.",
+            dem_output::short(3000.0 / load)
+        );
+        assert!(page.contains(&said), "{said}");
+        let caption = page.split("<figcaption>").find(|text| text.starts_with("Load of wall top over time")).unwrap();
+        assert_eq!(caption.starts_with("Load of wall top over time, with the limit load."), shown);
+        assert_eq!(caption.contains("; the limit load, 550 N, is beyond the axis."), !shown);
+        let chart = page.split("alt=\"Load of wall top over time").next().unwrap();
+        let source = chart.rsplit("src=\"data:image/svg+xml;base64,").next().unwrap().split('"').next().unwrap();
+        let svg = String::from_utf8(STANDARD.decode(source).unwrap()).unwrap();
+        assert_eq!(svg.contains(&format!("limit load: {load} N")), shown);
+        if shown {
+            // the axis holds the level
+            let chart = data(&page[page.find("alt=\"Load of wall top over time").unwrap()..], "<script type=\"application/json\">");
+            assert!(chart["y"][1].as_f64().unwrap() > load.max(100.0) * 0.999);
+        }
+    }
+    for (outcome, said) in [("unbounded", "some reactions bear any load"), ("broken_at_start", "the constant loads alone")] {
+        limit_file(folder.path(), None, outcome, &scene);
+        assert!(page(&path, &["--limit", "limit.json"]).contains(said), "{outcome}");
+    }
+}
+
+#[test]
+fn the_limit_load_of_another_scene_is_refused() {
+    let (folder, path) = sample(&layout(2));
+    let report = || dem_post(&path, &["report", "--limit", "limit.json"]);
+    limit_file(folder.path(), Some(50.0), "limit", &json!({ "thickness": 0.6 }));
+    refused(&report(), 2, &["limit.json", "another scene: thickness is 0.6 there and 0.5 in the run", "dem-run limit"]);
+    limit_file(folder.path(), Some(50.0), "limit", &json!({ "thickness": 0.5, "seed": 2, "timer": 1 }));
+    refused(&report(), 2, &["seed is 2 there and absent in the run"]);
+    // without the scene, as older programs print it
+    std::fs::write(folder.path().join("limit.json"), r#"{"outcome": "limit", "loads": []}"#).unwrap();
+    refused(&report(), 2, &["limit.json", "missing field `scene`", "dem-run limit"]);
+    std::fs::write(folder.path().join("limit.json"), r#"{"outcome": "limit", "loads": [{"load": "walls.left"}], "scene": {"thickness": 0.5}}"#).unwrap();
+    refused(&report(), 2, &["no load of the load wall, walls.top, but of walls.left"]);
+    refused(&dem_post(&path, &["report", "--limit", "missing.json"]), 2, &["missing.json", "cannot be read"]);
+    let (folder, path) = sample(&Layout { walls: vec![], observables: vec![], ..layout(2) });
+    limit_file(folder.path(), Some(50.0), "limit", &json!({ "thickness": 0.5 }));
+    refused(&dem_post(&path, &["report", "--limit", "limit.json"]), 2, &["no load wall"]);
 }

@@ -373,6 +373,13 @@ impl Chart {
             if high < FEW {
                 layout = layout.with_y_axis_min(0.0).with_y_axis_max(FEW);
             }
+        } else {
+            // a marked level above all values is visible
+            let [low, high] = values().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], p| [l.min(p.1), h.max(p.1)]);
+            let level = self.levels.iter().map(|(value, _)| value * lift).fold(high, f64::max);
+            if low < high && level > high {
+                layout = layout.with_y_axis_max(level + 0.08 * (level - low));
+            }
         }
         layout
     }
