@@ -17,12 +17,12 @@ use dem_output::row;
 
 /// Writes `ruptures.csv`, `broken.csv`, `fragments.csv` and `fragment-list.csv`, and as drawings
 /// `broken`, `fragments`, `fragment-map` and `decohesion`, for spheres also `decohesion-inside`.
-/// The list and the maps are at the moments nearest to `times` (s), or at chosen ones. The colours of cracks show `by`. Where cracks
-/// were found, also `cracks.csv`, `crack-growth.csv`, and the drawings `cracks` and, where one grew
-/// step by step or round by round, `crack-front`; in 2D `crack-segments.csv`, `crack-front.csv`
-/// and, where the cracks fill a small part of the sample, the drawing `cracks-near`; in 3D
-/// `crack-facets.csv`, their corners in `crack-facets.vtk`, and the drawings `cracks-along-y` and
-/// `cracks-along-x`.
+/// The list and the maps are at the moments nearest to `times` (s), or at chosen ones. Where cracks
+/// were found, also `cracks.csv`, `crack-growth.csv`, and the drawings `cracks`, whose colours show
+/// `by`, and, where one grew step by step or round by round, `crack-front`; in 2D
+/// `crack-segments.csv`, `crack-front.csv` and, where the cracks fill a small part of the sample,
+/// the drawing `cracks-near`; in 3D `crack-facets.csv`, their corners in `crack-facets.vtk`, and
+/// the drawings `cracks-along-y` and `cracks-along-x`.
 ///
 /// # Errors
 /// [`crate::output::PostError::Write`], and [`crate::output::PostError::Usage`] for times outside

@@ -12,7 +12,7 @@ use crate::options::Moments;
 use crate::output::{Folder, Result};
 pub use files::write;
 pub use modes::{Modes, mode_colour, mode_name};
-use pictures::ColourBy;
+pub use pictures::ColourBy;
 pub use report::{Report, read};
 
 mod files;

@@ -9,14 +9,8 @@ use crate::output::Result;
 /// Pale fills of the materials, in the order of their list; further ones have the last.
 const FILLS: [&str; 6] = ["#f0f0f0", "#b9dcf2", "#f6d9a0", "#a9dfc8", "#ecc5db", "#f2eb9c"];
 /// The same in the page of a report, whose style says them for a light and a dark screen.
-const IN_PAGE: [&str; 6] = [
-    "var(--grain)",
-    "var(--grain-1)",
-    "var(--grain-2)",
-    "var(--grain-3)",
-    "var(--grain-4)",
-    "var(--grain-5)",
-];
+const IN_PAGE: [&str; 6] =
+    ["var(--grain)", "var(--grain-1)", "var(--grain-2)", "var(--grain-3)", "var(--grain-4)", "var(--grain-5)"];
 /// Share of white in the fill of a grain that lost a bond.
 const RELEASED: f64 = 0.7;
 
@@ -93,7 +87,7 @@ mod tests {
         let some = Materials { of: vec![2, 0, 2], names: names.clone() };
         assert_eq!([0, 1].map(|grain| some.fill(grain)), [FILLS[2], FILLS[0]]);
         assert_eq!(some.named(), [(0, "base".into()), (2, "steel".into())]);
-        assert!(some.released(0) > some.fill(0).into());
+        assert!(some.released(0) > Colour::from(some.fill(0)));
         let all = Materials { of: (0..7).collect(), names };
         assert_eq!(all.named().last(), Some(&(5, "c, d".to_string())));
     }

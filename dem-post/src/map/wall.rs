@@ -37,51 +37,53 @@ pub(super) fn draw_in_front(canvas: &mut Canvas, eye: &Eye, wall: &Wall, positio
     }
 }
 
-/// An arrow of the load at a driven plane: towards the grains where the wall pushes. It stands at
-/// the middle of the panel, in perspective at the middle of the plate. None where no grain acts on
-/// the wall, and at a plane parallel to the sheet. Only that of a plate behind the grains is drawn
-/// with `behind`.
-pub(super) fn draw_load(
-    canvas: &mut Canvas,
+/// Draws the arrow of the load at a wall, if it has one; with `behind` only at a plate behind the
+/// grains, else only at other walls.
+pub(super) fn draw_load(canvas: &mut Canvas, eye: &Eye, wall: &Wall, at: [&[f64]; 2], frame: &Frame, behind: bool) {
+    if let Some(([from, to], is_behind)) = load_arrow(eye, wall, at, frame)
+        && is_behind == behind
+    {
+        draw_arrow(canvas, from, to);
+    }
+}
+
+/// The ends of the arrow of the load at a driven plane, and whether the plane is a plate behind the
+/// grains. The arrow points towards the grains where the wall pushes. It stands at the middle of
+/// the panel, in perspective at the middle of the plate. None where no grain acts on the wall, and
+/// at a plane parallel to the sheet.
+fn load_arrow(
     eye: &Eye,
     wall: &Wall,
     [position, force]: [&[f64]; 2],
     frame: &Frame,
-    behind: bool,
-) {
+) -> Option<([(f64, f64); 2], bool)> {
     let d = position.len();
-    if !bears_arrow(wall) || force.len() != d {
-        return;
-    }
     // the load is opposite to the force of the grains
     let along = -force.iter().zip(&wall.direction).map(|(f, direction)| f * direction).sum::<f64>();
-    if along == 0.0 {
-        return;
+    if !bears_arrow(wall) || force.len() != d || along == 0.0 {
+        return None;
     }
     let load = wall.direction.map(|x| along.signum() * x);
     let pushes = load.iter().zip(&wall.normal).map(|(f, n)| f * n).sum::<f64>() > 0.0;
-    let [tail, head] = if pushes { [-ARROW, -2.0] } else { [2.0, ARROW] };
+    let ends = if pushes { [-ARROW, -2.0] } else { [2.0, ARROW] };
     if let Some(place) = eye.place() {
-        let (corners, is_behind) = place.plane(position, wall.normal);
-        if is_behind == behind {
-            let middle = [0, 1, 2].map(|k| corners.iter().map(|corner| corner[k]).sum::<f64>() / 4.0);
-            let at = |s: f64| frame.at(place.flat(&[0, 1, 2].map(|k| middle[k] + s / frame.scale * load[k])));
-            draw_arrow(canvas, at(tail), at(head));
-        }
-        return;
+        let (corners, behind) = place.plane(position, wall.normal);
+        let middle = [0, 1, 2].map(|k| corners.iter().map(|corner| corner[k]).sum::<f64>() / 4.0);
+        let at = |s: f64| frame.at(place.flat(&[0, 1, 2].map(|k| middle[k] + s / frame.scale * load[k])));
+        return Some((ends.map(at), behind));
     }
     // on the sheet y points down
     let [load, normal] = [load, wall.normal].map(|x| eye.flat(&x[..d])).map(|[x, y]| (x, -y));
     let length = normal.0.hypot(normal.1);
-    if behind || length < 1e-6 {
-        return;
+    if length < 1e-6 {
+        return None;
     }
     let from = frame.at(eye.flat(position));
     let line = (-normal.1 / length, normal.0 / length);
     let off = to_the_middle(frame, from, line);
     let foot = (from.0 + line.0 * off, from.1 + line.1 * off);
     let at = |s: f64| (foot.0 + s * load.0, foot.1 + s * load.1);
-    draw_arrow(canvas, at(tail), at(head));
+    Some((ends.map(at), false))
 }
 
 /// Whether a wall has an arrow of its load: a driven plane.
@@ -138,5 +140,60 @@ fn draw_plane(canvas: &mut Canvas, point: [f64; 2], normal: [f64; 2], frame: &Fr
         let from = at(s);
         let to = (from.0 - HATCH * (n.0 + t.0) * 0.8, from.1 - HATCH * (n.1 + t.1) * 0.8);
         canvas.line(from, to, colour::GREY, 0.8);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame() -> Frame {
+        Frame { low: [-2.0, -2.0], scale: 100.0, corner: (0.0, 0.0), size: (400.0, 400.0) }
+    }
+
+    /// The upper wall of a cube of side 2 m, driven along an axis of d.
+    fn lid(axis: usize, sign: f64) -> Wall {
+        let unit = |sign: f64| [0, 1, 2].map(|k| if k == axis { sign } else { 0.0 });
+        Wall {
+            name: String::new(),
+            kind: WallKind::Plane,
+            normal: unit(-1.0),
+            radius: 0.0,
+            drive: WallDrive::Force,
+            direction: unit(sign),
+        }
+    }
+
+    #[test]
+    fn the_arrow_of_a_pushing_wall_points_at_its_middle() {
+        let eye = Eye::Along([0, 1]);
+        // the grains act upwards: the load is 5 N downwards, whatever the sense of the drive
+        for sign in [-1.0, 1.0] {
+            let ends = load_arrow(&eye, &lid(1, sign), [&[0.5, 1.0], &[0.0, 5.0]], &frame());
+            assert_eq!(ends, Some(([(200.0, 100.0 - ARROW), (200.0, 98.0)], false)));
+            let pulled = load_arrow(&eye, &lid(1, sign), [&[0.5, 1.0], &[0.0, -5.0]], &frame());
+            assert_eq!(pulled, Some(([(200.0, 98.0), (200.0, 100.0 - ARROW)], false)));
+        }
+        assert_eq!(load_arrow(&eye, &lid(1, 1.0), [&[0.5, 1.0], &[0.0, 0.0]], &frame()), None);
+        // seen along y: the lid is a line, a wall that is driven along y is parallel to the sheet
+        let eye = Eye::Along([0, 2]);
+        let ends = load_arrow(&eye, &lid(2, 1.0), [&[0.0, 0.0, 1.0], &[0.0, 0.0, 5.0]], &frame());
+        assert_eq!(ends, Some(([(200.0, 100.0 - ARROW), (200.0, 98.0)], false)));
+        assert_eq!(load_arrow(&eye, &lid(1, 1.0), [&[0.0, 1.0, 0.0], &[0.0, 5.0, 0.0]], &frame()), None);
+    }
+
+    #[test]
+    fn in_perspective_the_arrow_stands_on_the_middle_of_the_plate() {
+        let place = Place::of([[-1.0; 3], [1.0; 3]].iter().map(<[f64; 3]>::as_slice));
+        let middle = frame().at(place.flat(&[0.0, 0.0, 1.0]));
+        let eye = Eye::At(place);
+        let ([tail, head], behind) =
+            load_arrow(&eye, &lid(2, 1.0), [&[9.0, 9.0, 1.0], &[0.0, 0.0, 5.0]], &frame()).unwrap();
+        // from above, at the plate; a vertical line stays vertical
+        assert!(!behind && tail.1 < head.1 && head.1 < middle.1);
+        assert!((head.1 - middle.1).abs() < 3.0 && (head.0 - middle.0).abs() < 1e-9 && (tail.0 - head.0).abs() < 1e-9);
+        // a wall behind the grains has its arrow there
+        let back = load_arrow(&eye, &lid(1, 1.0), [&[0.0, 1.0, 0.0], &[0.0, 5.0, 0.0]], &frame()).unwrap();
+        assert!(back.1);
     }
 }

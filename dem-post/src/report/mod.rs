@@ -19,8 +19,8 @@ use crate::analysis::Analysis;
 use crate::options::{Files, LoadWall};
 use crate::output::{Folder, PostError, Result, facts, number};
 use crate::section::{Maps, OnPage, Section};
-use crate::title::Titles;
 use crate::strength::{self, Measure};
+use crate::title::Titles;
 use crate::{chains, cracks, emission, fabric, info, stress_strain, velocities};
 
 pub mod limit;
@@ -108,7 +108,9 @@ impl Analysis for Command {
     fn read(&self, input: &Input, quiet: bool) -> Result<Found> {
         let wall = self.load_wall.name();
         Ok(match input {
-            Input::Run(history) => Found::Run(Box::new(read(history, &self.times, wall, self.limit.as_deref(), quiet)?)),
+            Input::Run(history) => {
+                Found::Run(Box::new(read(history, &self.times, wall, self.limit.as_deref(), quiet)?))
+            }
             Input::Sweep(sweep) => {
                 let strength = strength::Options {
                     against: self.against.clone(),
@@ -193,15 +195,9 @@ pub struct EmptySection {
 ///
 /// # Errors
 /// [`PostError::Usage`] for times outside the history, for a wall that is not driven, and where
-/// several walls are driven and none is chosen, and as [`limit::read`]; [`PostError::Lacking`] for a history without
-/// frames.
-pub fn read(
-    history: &History,
-    times: &[f64],
-    wall: Option<&str>,
-    limit: Option<&Path>,
-    quiet: bool,
-) -> Result<Report> {
+/// several walls are driven and none is chosen, and as [`limit::read`]; [`PostError::Lacking`] for a
+/// history without frames.
+pub fn read(history: &History, times: &[f64], wall: Option<&str>, limit: Option<&Path>, quiet: bool) -> Result<Report> {
     // called first: it reports wrong times and a history without frames
     let velocities = velocities::read(history, times)?;
     let mut left_out = vec![];

@@ -153,12 +153,7 @@ pub fn read(
     let twist = ruptures.iter().any(|rupture| rupture.mode == RuptureMode::Twist);
     let mut legend = if bonds.is_empty() { vec![] } else { frames::bond_legend(d, twist) };
     legend.extend(materials.iter().flat_map(Materials::in_page));
-    Ok(Some(Player {
-        moments: moments.len(),
-        data: json(&data)?,
-        legend,
-        charts: vec![],
-    }))
+    Ok(Some(Player { moments: moments.len(), data: json(&data)?, legend, charts: vec![] }))
 }
 
 /// The frames of at most `count` moments, and of the pictures.

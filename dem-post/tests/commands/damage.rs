@@ -118,7 +118,7 @@ fn reads(good: &Path) -> Vec<Command<'_>> {
 /// The writing part of every command.
 fn writes(good: &Path) -> Vec<Command<'_>> {
     vec![
-        command("cracks", |h, folder| cracks::write(h, &cracks::read(h, true)?, &[], folder)),
+        command("cracks", |h, folder| cracks::write(h, &cracks::read(h, true)?, &[], cracks::ColourBy::Time, folder)),
         command("emission", |h, folder| emission::write(&emission::read(h, &emission::Options::default())?, folder)),
         command("why", |h, folder| why::write(&why::read(h, why::Which::Number(0), None, true)?, folder)),
         command("chains", |h, folder| chains::write(h, &chains::read(h, &[])?, folder)),

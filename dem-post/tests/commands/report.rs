@@ -157,6 +157,29 @@ fn the_slider_has_the_positions_of_the_history() {
 }
 
 #[test]
+fn materials_have_colours_and_names() {
+    let mut l = layout(2);
+    l.materials = ["base", "mortar"].map(String::from).to_vec();
+    l.grains.material = vec![0, 0, 1, 1];
+    let (_folder, path) = sample(&l);
+    let several = page(&path, &[]);
+    let found = data(&several, "<script type=\"application/json\" id=\"moments\">");
+    assert_eq!(bytes(&found["material"]), [0, 0, 1, 1]);
+    assert!(several.contains("<i style=\"background:var(--grain-1)\"></i>mortar"));
+    let result = several.split("<section id=\"result\">").nth(1).unwrap().split("</section>").next().unwrap();
+    let source = result.split("src=\"data:image/svg+xml;base64,").nth(1).unwrap().split('"').next().unwrap();
+    let svg = String::from_utf8(STANDARD.decode(source).unwrap()).unwrap();
+    // at the first break grains 0 and 1 have lost a bond: grains 2 and 3, and the legend
+    assert_eq!((svg.matches("#b9dcf2").count(), svg.contains(">mortar<")), (3, true), "{svg}");
+    // one material needs neither
+    let (_folder, path) = sample(&layout(2));
+    let one = page(&path, &[]);
+    assert!(
+        data(&one, "<script type=\"application/json\" id=\"moments\">")["material"] == "" && !one.contains("</i>base")
+    );
+}
+
+#[test]
 fn a_history_of_one_frame_has_a_page_without_a_slider() {
     let l = layout(2);
     let folder = tempfile::tempdir().unwrap();
@@ -259,11 +282,16 @@ fn a_limit_load_is_a_line_in_the_load_and_a_sentence() {
         assert_eq!(svg.contains(&format!("limit load: {load} N")), shown);
         if shown {
             // the axis holds the level
-            let chart = data(&page[page.find("alt=\"Load of wall top over time").unwrap()..], "<script type=\"application/json\">");
+            let chart = data(
+                &page[page.find("alt=\"Load of wall top over time").unwrap()..],
+                "<script type=\"application/json\">",
+            );
             assert!(chart["y"][1].as_f64().unwrap() > load.max(100.0) * 0.999);
         }
     }
-    for (outcome, said) in [("unbounded", "some reactions bear any load"), ("broken_at_start", "the constant loads alone")] {
+    for (outcome, said) in
+        [("unbounded", "some reactions bear any load"), ("broken_at_start", "the constant loads alone")]
+    {
         limit_file(folder.path(), None, outcome, &scene);
         assert!(page(&path, &["--limit", "limit.json"]).contains(said), "{outcome}");
     }
@@ -280,7 +308,11 @@ fn the_limit_load_of_another_scene_is_refused() {
     // without the scene, as older programs print it
     std::fs::write(folder.path().join("limit.json"), r#"{"outcome": "limit", "loads": []}"#).unwrap();
     refused(&report(), 2, &["limit.json", "missing field `scene`", "dem-run limit"]);
-    std::fs::write(folder.path().join("limit.json"), r#"{"outcome": "limit", "loads": [{"load": "walls.left"}], "scene": {"thickness": 0.5}}"#).unwrap();
+    std::fs::write(
+        folder.path().join("limit.json"),
+        r#"{"outcome": "limit", "loads": [{"load": "walls.left"}], "scene": {"thickness": 0.5}}"#,
+    )
+    .unwrap();
     refused(&report(), 2, &["no load of the load wall, walls.top, but of walls.left"]);
     refused(&dem_post(&path, &["report", "--limit", "missing.json"]), 2, &["missing.json", "cannot be read"]);
     let (folder, path) = sample(&Layout { walls: vec![], observables: vec![], ..layout(2) });

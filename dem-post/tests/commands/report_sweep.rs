@@ -109,13 +109,22 @@ fn the_page_of_a_sweep_begins_with_its_result() {
     let row = |run: &str| {
         let row = result.split("<tr>").find(|row| row.contains(&format!(">{run}<"))).unwrap();
         let cells = row.split("<td>").skip(1).map(|cell| cell.split("</td>").next().unwrap().to_string());
-        cells.map(|cell| cell.rsplit_once("</a>").map_or(cell.clone(), |(link, _)| link.rsplit('>').next().unwrap().into()))
+        cells
+            .map(|cell| {
+                cell.rsplit_once("</a>").map_or(cell.clone(), |(link, _)| link.rsplit('>').next().unwrap().into())
+            })
             .collect::<Vec<String>>()
     };
     // the sample shortens from 41 N on: with an intact rigid sample that is solver error
     let done = ["done", "broken fraction"];
-    assert_eq!(row("0001"), [&["0001", "10", "1000", "1"][..], &done, &["20", "20", "40", "–", "2", "–", "1.5"]].concat());
-    assert_eq!(row("0003"), [&["0003", "30", "3000", "1"][..], &done, &["60", "60", "–", "–", "2", "–", "1.5"]].concat());
+    assert_eq!(
+        row("0001"),
+        [&["0001", "10", "1000", "1"][..], &done, &["20", "20", "40", "–", "2", "–", "1.5"]].concat()
+    );
+    assert_eq!(
+        row("0003"),
+        [&["0003", "30", "3000", "1"][..], &done, &["60", "60", "–", "–", "2", "–", "1.5"]].concat()
+    );
     assert_eq!(
         row("0004"),
         ["0004", "10", "1000", "2", "failed", "no convergence", "25", "25", "–", "–", "1", "–", "1.5"]
@@ -159,7 +168,8 @@ fn the_curves_of_all_runs_are_on_one_chart() {
     let curves = section(&page, "curves");
     let data = curves.split("<script type=\"application/json\">").nth(1).unwrap().split("</script>").next().unwrap();
     let chart: Value = serde_json::from_str(data).unwrap();
-    let names: Vec<&str> = chart["curves"].as_array().unwrap().iter().map(|one| one["name"].as_str().unwrap()).collect();
+    let names: Vec<&str> =
+        chart["curves"].as_array().unwrap().iter().map(|one| one["name"].as_str().unwrap()).collect();
     assert_eq!(names, ["10", "20", "30", "10"]);
     let colours: Vec<&Value> = chart["curves"].as_array().unwrap().iter().map(|one| &one["colour"]).collect();
     assert!(colours[0] == colours[3] && colours[0] != colours[1] && colours[1] != colours[2]);
@@ -180,7 +190,13 @@ fn runs_that_differ_in_the_loads_of_walls_have_an_envelope() {
     let mut planned = Planned::new(folder.path(), &["walls.left.force"]);
     for minor in [0.0, 500.0, 1000.0, 4000.0] {
         let path = planned.run(&[json!(minor)], State::Done);
-        envelope::run(path.parent().unwrap(), path.file_name().unwrap().to_str().unwrap(), 2, [minor, envelope::major(minor)], true);
+        envelope::run(
+            path.parent().unwrap(),
+            path.file_name().unwrap().to_str().unwrap(),
+            2,
+            [minor, envelope::major(minor)],
+            true,
+        );
     }
     let page = planned.page(&[]);
     let found = section(&page, "envelope");

@@ -3,14 +3,14 @@
 use dem_drawing::{Chart, Style, colour};
 use dem_history::History;
 
-use super::runs::{same, values};
-use super::sections::cell;
-use super::{Report, Run};
+use super::report::Report;
+use super::runs::{Run, same, values};
+use super::table::cell;
 use crate::frames::{self, Subject};
 use crate::output::{PostError, Result, number, short};
+use crate::section::{Figure, Section, capitalised, map_figure_of};
 use crate::strength::report::axis;
 use crate::strength::scenes::unit;
-use crate::section::{Figure, Section, capitalised, map_figure_of};
 
 /// Maximum number of bytes of all pictures of samples in the page.
 const BYTES: usize = 2_000_000;
@@ -48,7 +48,9 @@ pub fn curves(report: &Report) -> Vec<(Chart, String)> {
         }
         chart
     };
-    let by = grouped.as_ref().map_or_else(String::new, |(field, _)| format!(", in colours by {}", axis(field, &unit(field))));
+    let by = grouped
+        .as_ref()
+        .map_or_else(String::new, |(field, _)| format!(", in colours by {}", axis(field, &unit(field))));
     let mut linear = Chart::new("axial strain (%)", "load (N)");
     linear.pad_x = true;
     let mut charts = vec![(draw(linear, &|strain| 1e2 * strain), format!("Load over strain of all runs{by}."))];
@@ -86,10 +88,7 @@ pub fn section(report: &Report) -> Result<Section> {
     }
     let mut text = "Each run at its collapse (strain 10⁻⁴) or, without one, at its end.".to_string();
     if figures.len() < with_history {
-        text += &format!(
-            " {} of {with_history} runs are shown: the page has no room for more.",
-            figures.len()
-        );
+        text += &format!(" {} of {with_history} runs are shown: the page has no room for more.", figures.len());
     }
     text += " The page of one run: dem-post report RUN.h5.";
     Ok(Section { id: "samples", title: "Samples", text, figures, legend, ..Section::default() })
@@ -116,7 +115,8 @@ fn picture(run: &Run, pixels: f32) -> Result<Option<(Figure, Vec<Entry>)>> {
                 let caption = format!("Run {}: {what}, t = {} s{load}.", run.id, number(time));
                 let alt = format!("The sample of run {} at its {what}.", run.id);
                 let figure = map_figure_of(&drawing, pixels, &alt, &capitalised(&caption))?;
-                let legend = if subject == Subject::Bonds { frames::bond_legend(history.dimension(), false) } else { vec![] };
+                let legend =
+                    if subject == Subject::Bonds { frames::bond_legend(history.dimension(), false) } else { vec![] };
                 return Ok(Some((Figure { class: "small", ..figure }, legend)));
             }
             Err(PostError::Lacking { .. }) => {}

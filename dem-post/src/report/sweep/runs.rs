@@ -3,13 +3,12 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use dem_drawing::thinned;
 use dem_history::History;
 use dem_history::sweep::{Entry, Manifest, State, Store};
-use dem_drawing::thinned;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::Options;
 use crate::output::{PostError, Result, progress};
 use crate::report::solver;
 use crate::strength::Measure;
@@ -69,15 +68,15 @@ pub struct Run {
     pub curve: Vec<(f64, f64)>,
 }
 
-/// Reads the runs of a sweep; with a bar on a terminal.
+/// Reads the runs of a sweep; with a bar on a terminal unless `quiet`.
 ///
 /// # Errors
-/// As [`super::read`].
-pub fn read(store: &Store, manifest: &Manifest, options: &Options) -> Result<Vec<Run>> {
-    let bar = progress(manifest.runs.len() as u64, options.quiet, "{bar:24} {pos} of {len} runs, {eta} left");
+/// As [`super::report::read`].
+pub fn read(store: &Store, manifest: &Manifest, wall: Option<&str>, quiet: bool) -> Result<Vec<Run>> {
+    let bar = progress(manifest.runs.len() as u64, quiet, "{bar:24} {pos} of {len} runs, {eta} left");
     let points = (POINTS / manifest.runs.len().max(1)).max(LEAST_POINTS);
     let read = |entry: &Entry| {
-        let run = run(store, entry, options.strength.wall.as_deref(), points);
+        let run = run(store, entry, wall, points);
         bar.inc(1);
         run
     };

@@ -3,11 +3,11 @@
 use std::path::{Component, Path};
 
 use dem_history::sweep::State;
-use serde_json::Value;
 
 use super::pictures;
-use super::runs::values;
-use super::{Report, Run};
+use super::report::Report;
+use super::runs::{Run, values};
+use super::table::{cell, run_rows};
 use crate::envelope;
 use crate::output::{Result, counted, number, quantity, short};
 use crate::report::result::joined;
@@ -16,9 +16,8 @@ use crate::strength;
 use crate::strength::report::{axis, estimate};
 use crate::strength::scenes::unit;
 
-/// Maximum number of values of a field that are listed, and of letters of one of them.
+/// Maximum number of values of a field that are listed.
 const VALUES: usize = 8;
-const LETTERS: usize = 24;
 
 /// The sections, in order; links lead from the folder `from` to the histories.
 ///
@@ -34,7 +33,7 @@ pub fn all(report: &Report, from: &Path) -> Result<Vec<Section>> {
 
 /// The result in words, and the tables of the runs.
 fn result(report: &Report, from: &Path) -> Section {
-    let (head, rows) = run_rows(report);
+    let (head, rows) = run_rows(&report.fields, &report.runs);
     let links = report.runs.iter().map(|run| run.history.as_deref().and_then(|path| link(from, path))).collect();
     let head: Vec<&str> = head.iter().map(String::as_str).collect();
     let caption = "The runs, with links to their histories.";
@@ -151,48 +150,16 @@ fn strength_sentence(report: &Report) -> Option<String> {
     let found = report.strength.as_ref()?;
     let low = found.runs.iter().map(|run| run.strength).fold(f64::INFINITY, f64::min);
     let high = found.runs.iter().map(|run| run.strength).fold(f64::NEG_INFINITY, f64::max);
-    let range = if low < high { format!("{} to {} N", number(low), number(high)) } else { format!("{} N", number(low)) };
+    let range =
+        if low < high { format!("{} to {} N", number(low), number(high)) } else { format!("{} N", number(low)) };
     let line = found.line.as_ref().map_or_else(String::new, |line| {
-        let error = line.slope.standard_error.map_or_else(String::new, |error| {
-            format!(", slope ± {} (standard error)", number(error))
-        });
+        let error = line
+            .slope
+            .standard_error
+            .map_or_else(String::new, |error| format!(", slope ± {} (standard error)", number(error)));
         format!("; over {} it is y = {}{error}", found.field, found.equation(line).trim_start_matches("y = "))
     });
     Some(format!("The {} is {range}{line}.", found.measure.title()))
-}
-
-/// The runs as a table: its head and its rows.
-pub(super) fn run_rows(report: &Report) -> (Vec<String>, Vec<Vec<String>>) {
-    let mut head = vec!["run".to_string()];
-    head.extend(report.fields.iter().map(|field| axis(field, &unit(field))));
-    let measured = ["first break (N)", "5 % broken (N)", "collapse (N)", "peak (N)", "broken bonds", "missed steps"];
-    head.extend(["state", "ended by"].into_iter().chain(measured).chain(["CPU (s)"]).map(String::from));
-    let row = |run: &Run| {
-        let plain = |value: Option<f64>| quantity(value, "");
-        let count = |value: Option<usize>| value.map_or_else(|| "–".into(), |n| n.to_string());
-        let mut row = vec![run.id.clone()];
-        row.extend(report.fields.iter().map(|field| run.values.get(field).map_or_else(|| "–".into(), cell)));
-        let ending = run.ending.as_deref().map_or_else(|| "–".into(), |ending| ending.replace('_', " "));
-        row.extend([run.state.name().into(), ending]);
-        row.extend([run.first_break, run.broken_5_percent, run.collapse, run.peak].map(plain));
-        row.extend([count(run.bonds_broken), count(run.missed_tolerance), plain(run.cpu_time)]);
-        row
-    };
-    (head, report.runs.iter().map(row).collect())
-}
-
-/// A value of a field in a cell.
-pub(super) fn cell(value: &Value) -> String {
-    let text = match value {
-        Value::Null => "–".into(),
-        Value::String(text) => text.clone(),
-        Value::Number(plain) => plain.as_f64().map_or_else(|| plain.to_string(), number),
-        other => other.to_string(),
-    };
-    if text.chars().count() <= LETTERS {
-        return text;
-    }
-    text.chars().take(LETTERS - 1).chain(['…']).collect()
 }
 
 /// The runs that failed, with their messages.
@@ -238,7 +205,11 @@ fn strength_section(report: &Report) -> Section {
 fn envelope_section(found: &envelope::Report) -> Section {
     let mut facts = vec![("Failure".to_string(), found.measure.title().to_string())];
     if let Some(line) = &found.envelope {
-        facts.extend(envelope::report::line_facts(line).into_iter().map(|(name, value)| (crate::section::capitalised(name.trim()), value)));
+        facts.extend(
+            envelope::report::line_facts(line)
+                .into_iter()
+                .map(|(name, value)| (crate::section::capitalised(name.trim()), value)),
+        );
     }
     facts.extend(found.notes.iter().map(|note| ("Note".to_string(), note.clone())));
     let figures = envelope::charts(found).map(|(chart, alt)| chart_figure(chart, alt, alt)).into();
@@ -249,10 +220,8 @@ fn envelope_section(found: &envelope::Report) -> Section {
 fn curves(report: &Report) -> Section {
     let text = "The load over the axial strain of the grains, fitted to their displacements. If rigid bonds join all \
                 grains to one piece, strain before the first break is solver error.";
-    let figures: Vec<_> = pictures::curves(report)
-        .into_iter()
-        .map(|(chart, caption)| chart_figure(chart, &caption, &caption))
-        .collect();
+    let figures: Vec<_> =
+        pictures::curves(report).into_iter().map(|(chart, caption)| chart_figure(chart, &caption, &caption)).collect();
     let text = if figures.is_empty() { "None: no run has a load and a strain." } else { text };
     Section { id: "curves", title: "Load and strain", text: text.into(), figures, ..Section::default() }
 }
@@ -298,13 +267,5 @@ mod tests {
         assert_eq!(link(&page, &history).as_deref(), Some("../a%20b/runs/0001%20100%25.h5"));
         assert_eq!(link(&runs, &history).as_deref(), Some("0001%20100%25.h5"));
         assert_eq!(link(&page, &runs.join("none.h5")), None);
-    }
-
-    #[test]
-    fn a_long_value_is_cut() {
-        let table = serde_json::json!([[0, 0], [0.01, 150], [0.02, 300], [0.03, 450]]);
-        assert_eq!(cell(&table).chars().count(), LETTERS);
-        assert!(cell(&table).ends_with('…'));
-        assert_eq!([cell(&serde_json::json!(0.1)), cell(&Value::Null), cell(&"a".into())], ["0.1", "–", "a"]);
     }
 }
