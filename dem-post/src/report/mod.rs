@@ -195,8 +195,8 @@ pub struct EmptySection {
 ///
 /// # Errors
 /// [`PostError::Usage`] for times outside the history, for a wall that is not driven, and where
-/// several walls are driven and none is chosen, and as [`limit::read`]; [`PostError::Lacking`] for a
-/// history without frames.
+/// several walls are driven and none is chosen, and those of [`limit::read`];
+/// [`PostError::Lacking`] for a history without frames.
 pub fn read(history: &History, times: &[f64], wall: Option<&str>, limit: Option<&Path>, quiet: bool) -> Result<Report> {
     // called first: it reports wrong times and a history without frames
     let velocities = velocities::read(history, times)?;

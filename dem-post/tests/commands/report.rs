@@ -260,8 +260,10 @@ fn limit_file(folder: &Path, limit: Option<f64>, outcome: &str, scene: &Value) -
 
 #[test]
 fn a_limit_load_is_a_line_in_the_load_and_a_sentence() {
-    let (folder, path) = sample(&layout(2));
-    let scene = json!({ "thickness": 0.5, "title": "another", "solver": { "tolerance": 1e-9 }, "time": { "step": 2 } });
+    let mut l = layout(2);
+    l.parameters.scene = json!({ "thickness": 0.5, "time": { "step": 1, "end": 3 } }).to_string();
+    let (folder, path) = sample(&l);
+    let scene = json!({ "thickness": 0.5, "title": "another", "solver": { "tolerance": 1e-9 }, "time": { "step": 2, "end": 3.0 } });
     let limit = |load: f64| limit_file(folder.path(), Some(load), "limit", &scene);
     // 30 N at the first break, 100 N at the end; the load of a wall that pulls is negative
     for (load, shown) in [(120.0, true), (-120.0, true), (60.0, true), (550.0, false)] {

@@ -13,7 +13,7 @@ use crate::output::{Result, counted, number, quantity, short};
 use crate::report::result::joined;
 use crate::section::{Section, Table, chart_figure};
 use crate::strength;
-use crate::strength::report::{axis, estimate};
+use crate::strength::report::estimate;
 use crate::strength::scenes::unit;
 
 /// Maximum number of values of a field that are listed.
