@@ -9,7 +9,7 @@ use super::report::Report;
 use super::runs::{Run, values};
 use super::table::{cell, run_rows};
 use crate::envelope;
-use crate::output::{Result, counted, number, quantity, short};
+use crate::output::{Result, counted, number, short};
 use crate::report::result::joined;
 use crate::section::{Section, Table, chart_figure};
 use crate::strength;
