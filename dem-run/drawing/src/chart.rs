@@ -503,23 +503,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ticks_are_powers_of_ten() {
-        for (value, text) in [
-            (1e-4, "10⁻⁴"),
-            (1e3, "10³"),
-            (0.1, "10⁻¹"),
-            (1.0, "1"),
-            (2e-5, "2·10⁻⁵"),
-            (5e-3, "0.005"),
-            (0.02, "0.02"),
-            (4.99999996e-6, "5·10⁻⁶"),
-            (2e-13, "2·10⁻¹³"),
-        ] {
-            assert_eq!(power_of_ten(value), text);
-        }
-    }
-
-    #[test]
     fn a_thinned_curve_keeps_its_peak_and_its_ends() {
         let mut points: Vec<(f64, f64)> = (0..100_000).map(|k| (f64::from(k), 0.0)).collect();
         points[54_321].1 = 7.0;
@@ -579,5 +562,27 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_level_above_all_values_is_on_the_axis() {
+        let chart = |level: f64| {
+            let mut chart = Chart::new("x", "y").curve("a", colour::BLUE, Style::Line, vec![(0.0, 0.0), (1.0, 10.0)]);
+            chart.levels.push((level, "level".into()));
+            Chart::draw_located(vec![chart], CHART).1[0].y[1]
+        };
+        assert!(chart(35.0) > 35.0 && chart(5.0) < 15.0);
+    }
+
+    #[test]
+    fn an_unlisted_curve_is_drawn_without_an_entry() {
+        let points = || vec![(0.0, 0.0), (1.0, 1.0)];
+        let chart = Chart::new("x", "y").curve("first", colour::BLUE, Style::Line, points());
+        let chart = chart.curve("second", colour::GREEN, Style::Line, points());
+        let both = Chart::draw(vec![chart.clone()]).svg();
+        let one =
+            Chart::draw(vec![chart.clone().curve("third", colour::GREEN, Style::Line, points()).unlisted()]).svg();
+        assert!(both.contains(">second<") && one.contains(">second<") && !one.contains("third"));
+        assert!(one.len() > both.len());
     }
 }

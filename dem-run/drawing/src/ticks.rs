@@ -25,3 +25,25 @@ pub(crate) fn power_of_ten(value: f64) -> String {
     };
     format!("{factor}10{}", format!("{power:.0}").chars().map(raise).collect::<String>())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_powers_of_ten() {
+        for (value, text) in [
+            (1e-4, "10⁻⁴"),
+            (1e3, "10³"),
+            (0.1, "10⁻¹"),
+            (1.0, "1"),
+            (2e-5, "2·10⁻⁵"),
+            (5e-3, "0.005"),
+            (0.02, "0.02"),
+            (4.99999996e-6, "5·10⁻⁶"),
+            (2e-13, "2·10⁻¹³"),
+        ] {
+            assert_eq!(power_of_ten(value), text);
+        }
+    }
+}
