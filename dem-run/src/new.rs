@@ -32,6 +32,7 @@ pub const SCENES: &[(&str, &str)] = scenes![
     "incline",
     "notched-beam",
     "pull-off",
+    "punch",
     "shear-box",
     "staged-biaxial",
     "triaxial",

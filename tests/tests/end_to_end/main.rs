@@ -18,6 +18,7 @@ mod materials;
 mod next_event;
 mod pack;
 mod packings;
+mod plates;
 mod resume;
 mod solves;
 mod specimens;
