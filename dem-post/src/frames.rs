@@ -16,7 +16,7 @@ use crate::analysis::Analysis;
 use crate::chains::pictures::{force_legend, links};
 use crate::chains::report::{normal_forces, require_reactions, statistics};
 use crate::cracks::{Modes, mode_colour};
-use crate::map::{Key, Link, Panel, Ramp, Sample, Scale, View, draw_view};
+use crate::map::{Key, Link, Materials, Panel, Ramp, Sample, Scale, View, draw, draw_view};
 use crate::moments;
 use crate::options::Files;
 use crate::output::{Folder, PostError, Result, facts, in_shell, progress, quantity, short};
@@ -196,6 +196,12 @@ pub(crate) fn drawing(history: &History, report: &Report, shown: &Shown, frame: 
     Ok(draw_view(&shown.sample, shown.view, &[panel], &legend))
 }
 
+/// The sample at a frame on a sheet of its own, without a caption and a legend.
+pub(crate) fn plain(history: &History, report: &Report, frame: usize) -> Result<Drawing> {
+    let (panel, _) = picture(history, report, frame)?;
+    Ok(draw(&Sample::with_depth(history)?, &[Panel { caption: vec![], ..panel }], &[]))
+}
+
 /// What all pictures of a series share.
 pub(crate) struct Shown<'a> {
     sample: Sample,
@@ -217,16 +223,18 @@ pub(crate) fn shown<'a>(history: &History, report: &Report, titles: &'a Titles) 
 fn picture(history: &History, report: &Report, frame: usize) -> Result<(Panel, Vec<Key>)> {
     let grains = history.grain_state(frame)?;
     let number_of_grains = history.grains()?.radius.len();
+    let materials = Materials::read(history)?;
+    let fill = |grain: usize| materials.as_ref().map_or(GRAIN[0], |materials| materials.fill(grain));
     let mut panel = Panel {
         walls: history.wall_state(frame)?,
-        fills: vec![GRAIN[0].into(); number_of_grains],
+        fills: (0..number_of_grains).map(|grain| fill(grain).into()).collect(),
         outline: GRAIN[1],
         grains,
         ..Panel::default()
     };
     let scale = report.scale.unwrap_or(1.0);
-    let legend = match report.subject {
-        Subject::Bonds => bonds(history, frame, &mut panel)?,
+    let mut legend = match report.subject {
+        Subject::Bonds => bonds(history, frame, &mut panel, materials.as_ref())?,
         Subject::Forces => {
             let contacts = history.contacts(frame)?;
             panel.links = links(&contacts, &panel.grains.position, scale, history.dimension());
@@ -244,6 +252,9 @@ fn picture(history: &History, report: &Report, frame: usize) -> Result<(Panel, V
             vec![Key::Bar(scale)]
         }
     };
+    // speeds have the fills of grains, and forces of spheres are drawn without grains
+    let shown = report.subject != Subject::Speed && !panel.fills.is_empty();
+    legend.extend(materials.iter().filter(|_| shown).flat_map(|materials| materials.keys(GRAIN[1])));
     Ok((panel, legend))
 }
 
@@ -263,7 +274,7 @@ pub(crate) fn bond_legend(dimension: usize, twist: bool) -> Vec<(&'static str, S
 }
 
 /// A line for each bond, in the colour of its mode of rupture.
-fn bonds(history: &History, frame: usize, panel: &mut Panel) -> Result<Vec<Key>> {
+fn bonds(history: &History, frame: usize, panel: &mut Panel, materials: Option<&Materials>) -> Result<Vec<Key>> {
     let (d, bonds, status) = (history.dimension(), history.bonds()?, history.bond_status(frame)?);
     let mut modes = Modes::default();
     let centre =
@@ -273,7 +284,9 @@ fn bonds(history: &History, frame: usize, panel: &mut Panel) -> Result<Vec<Key>>
             continue;
         };
         modes.add(mode);
-        pair.iter().for_each(|&grain| panel.fills[grain as usize] = RELEASED.into());
+        for grain in pair.map(|grain| grain as usize) {
+            panel.fills[grain] = materials.map_or(RELEASED.into(), |materials| materials.released(grain));
+        }
         let (from, to) = (centre(panel, pair[0]), centre(panel, pair[1]));
         let distance = from.iter().zip(&to).map(|(a, b)| (b - a).powi(2)).sum::<f64>().sqrt();
         // no line across the sample between grains that have moved apart

@@ -2,10 +2,12 @@
 
 use dem_history::History;
 
-use crate::output::{PostError, Result};
+use crate::output::{PostError, Result, plain};
 
 /// Share of broken bonds at which a map is drawn.
 const BROKEN: f64 = 0.05;
+/// Rounding of a time, as a share of the length of the run.
+const ROUNDING: f64 = 1e-9;
 
 /// The frames nearest to `times` (s). Without times: the first frame after the first rupture, the
 /// first after 5 % of the bonds have broken, and the last. In order, without repetition.
@@ -20,8 +22,11 @@ pub fn chosen(history: &History, times: &[f64]) -> Result<Vec<usize>> {
     };
     let mut frames = vec![];
     for &time in times {
+        // times of frames are sums of steps: what is printed of the last may be a little beyond it
+        let room = ROUNDING * (last - first);
         // this form also rejects NaN
-        if !(first..=last).contains(&time) {
+        if !(first - room..=last + room).contains(&time) {
+            let [first, last] = [first, last].map(plain);
             return Err(PostError::Usage(format!("--times {time}: the history runs from {first} s to {last} s")));
         }
         frames.extend(history.frame_at(time));

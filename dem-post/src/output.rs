@@ -8,7 +8,8 @@ use dem_history::{History, HistoryError};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 pub use dem_output::{
-    Folder, Source, Text, WriteError, cell, default_folder, escaped, facts, in_shell, number, print, quantity, short,
+    Folder, Source, Text, WriteError, cell, default_folder, escaped, facts, in_shell, number, plain, print, quantity,
+    short,
 };
 
 /// The errors of an analysis.

@@ -53,6 +53,8 @@ pub struct Section {
     pub facts: Vec<(String, String)>,
     /// Pictures.
     pub figures: Vec<Figure>,
+    /// The legend of its maps, if they have none themselves: colour and text.
+    pub legend: Vec<(&'static str, String)>,
     /// Tables.
     pub tables: Vec<Table>,
     /// The slider.
@@ -80,8 +82,10 @@ impl Section {
     /// The maps and then the charts, each with the name of its kind; kinds without a picture are
     /// omitted.
     pub(crate) fn groups(&self) -> Vec<(&'static str, Vec<&Figure>)> {
-        let (charts, maps): (Vec<_>, Vec<_>) = self.figures.iter().partition(|figure| figure.class == "chart");
-        [("maps", maps), ("charts", charts)].into_iter().filter(|(_, figures)| !figures.is_empty()).collect()
+        let of = |kinds: &[&str]| self.figures.iter().filter(|figure| kinds.contains(&figure.class)).collect();
+        let groups: [(_, Vec<_>); 3] =
+            [("maps", of(&["map", "wide"])), ("charts", of(&["chart"])), ("pictures", of(&["small"]))];
+        groups.into_iter().filter(|(_, figures)| !figures.is_empty()).collect()
     }
 }
 
@@ -93,7 +97,7 @@ pub struct Figure {
     pub alt: String,
     /// The line below it.
     pub caption: String,
-    /// Its size class: `chart`, `map` or `wide`.
+    /// Its size class: `chart`, `map`, `wide`, or `small` for a picture of many.
     pub class: &'static str,
     /// Of a chart: axes and curves, as JSON for the page; empty for maps.
     pub curves: String,
@@ -188,12 +192,20 @@ pub struct Table {
     pub head: Vec<String>,
     /// Its rows.
     pub rows: Vec<Vec<String>>,
+    /// What the first cell of each row links to; none for a table without links.
+    pub links: Vec<Option<String>>,
 }
 
 impl Table {
     /// A table with the cells of a table on the terminal.
     pub fn new(caption: &str, head: &[&str], rows: Vec<Vec<String>>) -> Self {
-        Self { caption: caption.into(), head: head.iter().map(ToString::to_string).collect(), rows }
+        Self { caption: caption.into(), head: head.iter().map(ToString::to_string).collect(), rows, links: vec![] }
+    }
+
+    /// The rows, each with what its first cell links to.
+    pub(crate) fn linked(&self) -> Vec<(Option<&str>, &[String])> {
+        let link = |row: usize| self.links.get(row)?.as_deref();
+        self.rows.iter().enumerate().map(|(k, row)| (link(k), row.as_slice())).collect()
     }
 }
 
@@ -212,10 +224,18 @@ pub fn chart_figure(chart: Chart, alt: &str, caption: &str) -> Figure {
 /// # Errors
 /// [`PostError::Usage`] with the plotting crate's message.
 pub fn map_figure(drawing: &Drawing, alt: &str, caption: &str) -> Result<Figure> {
+    map_figure_of(drawing, PIXELS, alt, caption)
+}
+
+/// As [`map_figure`], with so many pixels per unit of the drawing.
+///
+/// # Errors
+/// As [`map_figure`].
+pub fn map_figure_of(drawing: &Drawing, pixels: f32, alt: &str, caption: &str) -> Result<Figure> {
     let (width, height) = drawing.size();
     let class = if width > 1.2 * height { "wide" } else { "map" };
     let svg = drawing.svg();
-    let png = drawing.png_scaled(PIXELS).map_err(|why| PostError::Usage(format!("the map {caption}: {why}")))?;
+    let png = drawing.png_scaled(pixels).map_err(|why| PostError::Usage(format!("the map {caption}: {why}")))?;
     let source = if svg.len() < png.len() { address("svg+xml", svg.as_bytes()) } else { address("png", &png) };
     Ok(Figure { source, alt: alt.into(), caption: caption.into(), class, curves: String::new() })
 }

@@ -103,7 +103,7 @@
   const radius = places(run.radius).map(share => share / MOST * run.largest);
   const packed = places(run.position);
   const pairs = new DataView(bytes(run.pair).buffer);
-  const broke = bytes(run.broke), mode = bytes(run.mode);
+  const broke = bytes(run.broke), mode = bytes(run.mode), material = bytes(run.material);
   const [west, south, east, north] = run.view;
   const margin = 0.02 * Math.max(east - west, north - south);
   const size = [east - west + 2 * margin, north - south + 2 * margin];
@@ -181,6 +181,7 @@
     if (d === 3) order.sort((a, b) => b.depth - a.depth);
     const paper = colour('--paper');
     const [held, free, rim, intact] = ['--grain', '--released', '--rim', '--bond'].map(colour);
+    const fills = [held, ...[1, 2, 3, 4, 5].map(k => colour(`--grain-${k}`))];
     for (const one of order) {
       const size = Math.max(radius[one.k] * one.magnified * scale, 0.3);
       const disk = (fill, share, alpha) => {
@@ -190,7 +191,11 @@
         pen.fillStyle = fill;
         pen.fill();
       };
-      disk(released[one.k] ? free : held, 1, 1);
+      const own = material.length ? fills[material[one.k]] : held;
+      disk(released[one.k] ? free : own, 1, 1);
+      // what lost a bond keeps a tint of its material
+      if (released[one.k] && material.length) disk(own, 1, 0.3);
+      pen.globalAlpha = 1;
       pen.strokeStyle = rim;
       pen.lineWidth = Math.min(0.15 * size, 0.8);
       pen.stroke();

@@ -123,7 +123,22 @@ fn limit_in<D: Dim>(scene: &Scene, options: &LimitOptions, interrupt: &Interrupt
                     straight line";
         let _ = writeln!(std::io::stderr(), "warning: {load} {text}");
     }
-    Ok(print_result(&loads.limit(scene, &mut world)?, options.json)?)
+    let limit = loads.limit(scene, &mut world)?;
+    Ok(print_result(&OfScene { limit, scene: serde_json::to_value(scene)? }, options.json)?)
+}
+
+/// A limit load with its scene, so that a reader can compare it with that of a run.
+#[derive(Serialize)]
+struct OfScene {
+    #[serde(flatten)]
+    limit: Limit,
+    scene: serde_json::Value,
+}
+
+impl fmt::Display for OfScene {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.limit.fmt(f)
+    }
 }
 
 /// The loads of a scene that grow.

@@ -2,7 +2,9 @@
 
 use dem_history::History;
 
-use super::pictures::{broken_chart, crack_map, decohesion, fragment_charts, fragment_map, front_charts, surface_maps};
+use super::pictures::{
+    ColourBy, broken_chart, crack_map, decohesion, fragment_charts, fragment_map, front_charts, surface_maps,
+};
 use super::report::{Report, broken_over_time};
 use super::surfaces::Facet;
 use crate::fragments::{Fragment, fragment_list};
@@ -16,16 +18,16 @@ use dem_output::row;
 /// Writes `ruptures.csv`, `broken.csv`, `fragments.csv` and `fragment-list.csv`, and as drawings
 /// `broken`, `fragments`, `fragment-map` and `decohesion`, for spheres also `decohesion-inside`.
 /// The list and the maps are at the moments nearest to `times` (s), or at chosen ones. Where cracks
-/// were found, also `cracks.csv`, `crack-growth.csv`, and the drawings `cracks` and, where one grew
-/// step by step or round by round, `crack-front`; in 2D `crack-segments.csv`, `crack-front.csv`
-/// and, where the cracks fill a small part of the sample, the drawing `cracks-near`; in 3D
-/// `crack-facets.csv`, their corners in `crack-facets.vtk`, and the drawings `cracks-along-y` and
-/// `cracks-along-x`.
+/// were found, also `cracks.csv`, `crack-growth.csv`, and the drawings `cracks`, whose colours show
+/// `by`, and, where one grew step by step or round by round, `crack-front`; in 2D
+/// `crack-segments.csv`, `crack-front.csv` and, where the cracks fill a small part of the sample,
+/// the drawing `cracks-near`; in 3D `crack-facets.csv`, their corners in `crack-facets.vtk`, and
+/// the drawings `cracks-along-y` and `cracks-along-x`.
 ///
 /// # Errors
 /// [`crate::output::PostError::Write`], and [`crate::output::PostError::Usage`] for times outside
 /// the history.
-pub fn write(history: &History, report: &Report, times: &[f64], folder: &mut Folder) -> Result<()> {
+pub fn write(history: &History, report: &Report, times: &[f64], by: ColourBy, folder: &mut Folder) -> Result<()> {
     let frames = moments::chosen(history, times)?;
     write_ruptures(report, folder)?;
     let curve = broken_over_time(&report.events);
@@ -60,7 +62,7 @@ pub fn write(history: &History, report: &Report, times: &[f64], folder: &mut Fol
         write_cracks(report, folder)?;
         write_segments(report, folder)?;
         write_fronts(report, folder)?;
-        let (all, near) = crack_map(history, report)?;
+        let (all, near) = crack_map(history, report, by)?;
         folder.draw("cracks", &all)?;
         if let Some(near) = near {
             folder.draw("cracks-near", &near)?;
@@ -69,7 +71,7 @@ pub fn write(history: &History, report: &Report, times: &[f64], folder: &mut Fol
     } else if !report.surfaces.is_empty() {
         write_surfaces(report, folder)?;
         write_facets(report, folder)?;
-        let [whole, front, side] = surface_maps(history, report)?;
+        let [whole, front, side] = surface_maps(history, report, by)?;
         folder.draw("cracks", &whole)?;
         folder.draw("cracks-along-y", &front)?;
         folder.draw("cracks-along-x", &side)?;

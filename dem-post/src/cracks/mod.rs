@@ -12,6 +12,7 @@ use crate::options::Moments;
 use crate::output::{Folder, Result};
 pub use files::write;
 pub use modes::{Modes, mode_colour, mode_name};
+pub use pictures::ColourBy;
 pub use report::{Report, read};
 
 mod files;
@@ -31,6 +32,9 @@ pub mod voids;
 pub struct Command {
     #[command(flatten)]
     moments: Moments,
+    /// What the colours of the cracks show.
+    #[arg(long, value_enum, default_value_t)]
+    colour: ColourBy,
 }
 
 impl Analysis for Command {
@@ -55,6 +59,6 @@ impl Analysis for Command {
     }
 
     fn write(&self, history: &History, report: &mut Report, folder: &mut Folder, _: bool) -> Result<()> {
-        write(history, report, &self.moments.times, folder)
+        write(history, report, &self.moments.times, self.colour, folder)
     }
 }

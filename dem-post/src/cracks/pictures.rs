@@ -1,14 +1,16 @@
 //! The drawings of cracks.
 
+use clap::ValueEnum;
 use dem_history::{BondStatus, History, RuptureMode};
 
 use super::front::Growth;
 use super::modes::{mode_colour, mode_name};
 use super::paths::Crack;
-use super::report::{Pieces, Report};
+use super::report::{Event, Pieces, Report};
 use super::surfaces::Facet;
+use crate::extent::range;
 use crate::fragments::{Fragment, Fragments};
-use crate::map::{Colour, Key, Link, Panel, Patch, Ramp, Sample, Scale, draw, draw_view};
+use crate::map::{Colour, Key, Link, Materials, Panel, Patch, Ramp, Sample, Scale, draw, draw_view};
 use crate::output::{Result, counted, number};
 use crate::title::Titles;
 use dem_drawing::{Chart, Drawing, Style, colour};
@@ -126,40 +128,52 @@ fn cascade_chart(report: &Report) -> Option<Chart> {
     Some(chart)
 }
 
-/// Colours by the time of rupture, or by the round of the cascade where all bonds broke in one
-/// step.
-struct When<'a> {
-    report: &'a Report,
-    one_step: bool,
+/// What the colours of cracks show.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum ColourBy {
+    /// The time at which each bond broke; the round of the cascade, where all broke in one step.
+    #[default]
+    Time,
+    /// The rank of each break in their order, from 1; breaks of one round of a step have one rank.
+    Rank,
+}
+
+/// The rank of each break, which are in order: one more than the number of those before its round.
+fn ranks(events: &[Event]) -> Vec<f64> {
+    let rounds = events.chunk_by(|a, b| (a.step, a.round) == (b.step, b.round));
+    let mut before = 0;
+    let mut ranks = Vec::with_capacity(events.len());
+    for round in rounds {
+        ranks.extend(std::iter::repeat_n((before + 1) as f64, round.len()));
+        before += round.len();
+    }
+    ranks
+}
+
+/// The value of each break, and its colours.
+struct When {
+    values: Vec<f64>,
     scale: Scale,
 }
 
-impl<'a> When<'a> {
-    fn of(report: &'a Report) -> Self {
-        let (first, last) = (report.events.first(), report.events.last());
-        let span = first.zip(last).map_or([0.0; 2], |(first, last)| [first.time, last.time]);
-        let one_step = span[0] == span[1];
-        let title = if one_step {
-            format!("round of the cascade at t = {} s", number(span[0]))
-        } else {
-            "broken at t (s)".into()
+impl When {
+    fn of(report: &Report, by: ColourBy) -> Self {
+        let events = &report.events;
+        let span = events.first().zip(events.last()).map_or([0.0; 2], |(first, last)| [first.time, last.time]);
+        let (title, values) = match by {
+            ColourBy::Rank => ("rank of the break".into(), ranks(events)),
+            ColourBy::Time if span[0] == span[1] => (
+                format!("round of the cascade at t = {} s", number(span[0])),
+                events.iter().map(|event| f64::from(event.round)).collect(),
+            ),
+            ColourBy::Time => ("broken at t (s)".into(), events.iter().map(|event| event.time).collect()),
         };
-        let scale = Scale { title, low: f64::INFINITY, high: f64::NEG_INFINITY, ramp: Ramp::Lines };
-        let mut when = Self { report, one_step, scale };
-        for event in 0..report.events.len() {
-            let value = when.value(event);
-            (when.scale.low, when.scale.high) = (when.scale.low.min(value), when.scale.high.max(value));
-        }
-        when
-    }
-
-    fn value(&self, event: usize) -> f64 {
-        let event = &self.report.events[event];
-        if self.one_step { f64::from(event.round) } else { event.time }
+        let [low, high] = range(values.iter().copied());
+        Self { values, scale: Scale { title, low, high, ramp: Ramp::Lines } }
     }
 
     fn colour(&self, event: usize) -> Colour {
-        self.scale.colour(self.value(event))
+        self.scale.colour(self.values[event])
     }
 
     /// The legend of the colours; a single value needs none.
@@ -168,48 +182,54 @@ impl<'a> When<'a> {
     }
 }
 
-/// The grains of the first frame, pale; the caption gives the numbers of cracks and broken bonds.
-fn pale_panel(history: &History, report: &Report, cracks: usize) -> Result<Panel> {
-    Ok(Panel {
+/// The grains of the first frame, pale, with the legend of their materials; the caption gives the
+/// numbers of cracks and broken bonds.
+fn pale_panel(history: &History, report: &Report, cracks: usize) -> Result<(Panel, Vec<Key>)> {
+    let materials = Materials::read(history)?;
+    let fill = |grain: usize| materials.as_ref().map_or(PALE[0], |materials| materials.fill(grain));
+    let keys = materials.iter().flat_map(|materials| materials.keys(PALE[1])).collect();
+    let panel = Panel {
         caption: vec![
             format!("{} of {}", counted(cracks, "crack"), counted(report.broken.total(), "broken bond")),
             "positions in the first frame".into(),
         ],
         grains: history.grain_state(0)?,
         walls: history.wall_state(0)?,
-        fills: vec![PALE[0].into(); history.grains()?.radius.len()],
+        fills: (0..history.grains()?.radius.len()).map(|grain| fill(grain).into()).collect(),
         outline: PALE[1],
         ..Panel::default()
-    })
+    };
+    Ok((panel, keys))
 }
 
-/// The facets of cracks in 3D, coloured by the time at which each bond broke, or by the round of
-/// the cascade where all broke in one step: in perspective, and over the grains of the first frame
-/// along y and against x.
+/// The facets of cracks in 3D, in colours that show when each bond broke: in perspective, and over
+/// the grains of the first frame along y and against x.
 ///
 /// # Errors
 /// Those of reading the history.
-pub fn surface_maps(history: &History, report: &Report) -> Result<[Drawing; 3]> {
-    let when = When::of(report);
-    let mut panel = pale_panel(history, report, report.surfaces.len())?;
+pub fn surface_maps(history: &History, report: &Report, by: ColourBy) -> Result<[Drawing; 3]> {
+    let when = When::of(report, by);
+    let (mut panel, materials) = pale_panel(history, report, report.surfaces.len())?;
     let patch = |facet: &Facet| Patch { corners: facet.corners.clone(), colour: when.colour(facet.event) };
     panel.patches = report.faces.seen().map(patch).collect();
-    let legend: Vec<Key> = when.key().into_iter().collect();
-    let map = |sample: &Sample, panel: &Panel| draw(sample, std::slice::from_ref(panel), &legend);
-    let [front, side] = [Sample::read(history)?, Sample::from_the_side(history)?].map(|sample| map(&sample, &panel));
-    panel.fills.clear();
-    Ok([map(&Sample::with_depth(history)?, &panel), front, side])
+    let mut legend: Vec<Key> = when.key().into_iter().collect();
+    let map = |sample: &Sample, panel: &Panel, legend: &[Key]| draw(sample, std::slice::from_ref(panel), legend);
+    // without the grains
+    let facets = Panel { fills: vec![], ..panel.clone() };
+    let whole = map(&Sample::with_depth(history)?, &facets, &legend);
+    legend.extend(materials);
+    let [front, side] = [Sample::read(history)?, Sample::from_the_side(history)?];
+    Ok([whole, map(&front, &panel, &legend), map(&side, &panel, &legend)])
 }
 
-/// The cracks over the grains of the first frame, coloured by the time at which each bond broke, or
-/// by the round of the cascade where all broke in one step. The second drawing shows the part
-/// around the cracks, if this part is small.
+/// The cracks over the grains of the first frame, in colours that show when each bond broke. The
+/// second drawing shows the part around the cracks, if this part is small.
 ///
 /// # Errors
 /// Those of reading the history.
-pub fn crack_map(history: &History, report: &Report) -> Result<(Drawing, Option<Drawing>)> {
-    let when = When::of(report);
-    let mut panel = pale_panel(history, report, report.cracks.len())?;
+pub fn crack_map(history: &History, report: &Report, by: ColourBy) -> Result<(Drawing, Option<Drawing>)> {
+    let when = When::of(report, by);
+    let (mut panel, materials) = pale_panel(history, report, report.cracks.len())?;
     // the latest first, so that the origin of the crack is on top
     for segment in report.paths.segments.iter().rev() {
         let [a, b, c] = segment.line.map(Vec::from);
@@ -220,6 +240,7 @@ pub fn crack_map(history: &History, report: &Report) -> Result<(Drawing, Option<
     let mut legend: Vec<Key> = when.key().into_iter().collect();
     legend.push(Key::Line(colour::GREY, WIDTHS[0], "path of a crack".into()));
     legend.push(Key::Line(colour::GREY, WIDTHS[1], "branch".into()));
+    legend.extend(materials);
     let (sample, panels) = (Sample::read(history)?, [panel]);
     let all = sample.view(panels.iter().map(|panel| (&panel.grains, &panel.walls)));
     let near = sample.near(report.paths.segments.iter().flat_map(|s| s.line.iter().map(|x| x.as_slice())), all);
@@ -295,4 +316,16 @@ pub fn decohesion(history: &History, sample: &Sample, titles: &Titles, frames: &
         Key::Disk(RELEASED, OUTLINE, "lost at least one bond".into()),
     ];
     Ok(draw(sample, &panels, &legend))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn breaks_of_one_round_have_one_rank() {
+        let event = |(step, round): (i64, i32)| Event { step, round, ..Event::default() };
+        let events: Vec<Event> = [(3, 0), (5, 0), (5, 0), (5, 1), (9, 0)].map(event).to_vec();
+        assert_eq!(ranks(&events), [1.0, 2.0, 2.0, 4.0, 5.0]);
+    }
 }

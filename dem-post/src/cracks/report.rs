@@ -46,7 +46,7 @@ pub struct Pieces {
 }
 
 /// A rupture in the list.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Event {
     /// Step.
     pub step: i64,

@@ -2,7 +2,7 @@
 
 use dem_history::History;
 
-use super::pictures::{broken_chart, crack_map, decohesion, fragment_charts, front_charts, surface_maps};
+use super::pictures::{ColourBy, broken_chart, crack_map, decohesion, fragment_charts, front_charts, surface_maps};
 use super::report::{Report, broken_over_time};
 use crate::map::Sample;
 use crate::output::{Result, number, quantity};
@@ -16,7 +16,7 @@ impl OnPage for Report {
         let end = history.times().last().copied().unwrap_or(0.0);
         let mut figures = vec![];
         if !self.cracks.is_empty() {
-            let (all, near) = crack_map(history, self)?;
+            let (all, near) = crack_map(history, self, ColourBy::Time)?;
             let alt =
                 "Broken bonds as lines over the grains of the first frame, coloured by the time at which they broke.";
             figures.push(map_figure(&all, alt, "Cracks by the time at which each bond broke.")?);
@@ -26,7 +26,7 @@ impl OnPage for Report {
         }
         if !self.surfaces.is_empty() {
             let alt = "Facets of broken bonds at their positions in the first frame, coloured by the time at which they broke.";
-            let [whole, front, side] = surface_maps(history, self)?;
+            let [whole, front, side] = surface_maps(history, self, ColourBy::Time)?;
             figures.push(map_figure(&whole, alt, "Cracks by the time at which each bond broke.")?);
             figures.push(map_figure(&front, alt, "The same, seen along y.")?);
             figures.push(map_figure(&side, alt, "The same, seen in the direction −x.")?);

@@ -22,8 +22,18 @@ pub fn write(report: &Report, folder: &mut Folder) -> Result<()> {
         report.circles.iter().map(|c| row![c.run, c.time, c.load, c.major, cell(c.intermediate), c.minor, ""]);
     let left_out = report.left_out.iter().map(|out| row![out.run, "", "", "", "", "", out.why]);
     folder.table("envelope", &head, circles.chain(left_out))?;
-    folder.draw("envelope", &Chart::draw(vec![circles_chart(report)]))?;
-    Ok(folder.draw("envelope-principal", &Chart::draw(vec![principal(report)]))?)
+    for (name, (chart, _)) in ["envelope", "envelope-principal"].into_iter().zip(charts(report)) {
+        folder.draw(name, &Chart::draw(vec![chart]))?;
+    }
+    Ok(())
+}
+
+/// The circles and the principal stresses, each with its line and what it shows in words.
+pub(crate) fn charts(report: &Report) -> [(Chart, &'static str); 2] {
+    [
+        (circles_chart(report), "Mohr circles at failure, with the line that they touch."),
+        (principal(report), "Principal stresses at failure, with the line through them."),
+    ]
 }
 
 /// Half circles over the normal stress, with the line that they touch; both axes have one scale.

@@ -27,6 +27,7 @@ use crate::analysis::Analysis;
 use crate::options::{LoadWall, Runs};
 use crate::output::{Folder, Result};
 use crate::strength::Measure;
+pub(crate) use files::charts;
 pub use files::write;
 pub use report::{Report, read};
 

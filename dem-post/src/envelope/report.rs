@@ -112,6 +112,18 @@ fn circle(path: &Path, measure: Measure, wall: Option<&str>) -> Result<(std::res
     Ok((Ok(circle), scene))
 }
 
+/// The line of an envelope: names and values.
+pub(crate) fn line_facts(line: &Envelope) -> Vec<(&'static str, String)> {
+    let mut facts = vec![
+        ("friction angle", estimate(&line.friction_angle, "°")),
+        ("cohesion", estimate(&line.cohesion, "Pa")),
+        ("unconfined strength", estimate(&line.unconfined_strength, "Pa")),
+        ("slope of σ₁ over σ₃", estimate(&line.slope, "")),
+    ];
+    facts.extend(line.r_squared.map(|share| ("  R²", number(share))));
+    facts
+}
+
 impl Report {
     /// Whether every run has a circle.
     ///
@@ -150,13 +162,7 @@ impl Report {
             ("differ in", varied),
         ];
         if let Some(line) = &self.envelope {
-            lines.extend([
-                ("friction angle", estimate(&line.friction_angle, "°")),
-                ("cohesion", estimate(&line.cohesion, "Pa")),
-                ("unconfined strength", estimate(&line.unconfined_strength, "Pa")),
-                ("slope of σ₁ over σ₃", estimate(&line.slope, "")),
-            ]);
-            lines.extend(line.r_squared.map(|share| ("  R²", number(share))));
+            lines.extend(line_facts(line));
         }
         let mut table = Text::new(&["run", "time (s)", "load (N)", "σ₁ (Pa)", "σ₂ (Pa)", "σ₃ (Pa)"]);
         for c in &self.circles {

@@ -37,7 +37,7 @@ pub fn draw_view(sample: &Sample, View([low, high]): View, panels: &[Panel], leg
     let stacked = extent[0] > STACKED * extent[1];
     let widest = if stacked { WIDE } else { PANEL.0 };
     // room for the hatching of walls, or for arrows
-    let loaded = sample.dimension == 2 && sample.walls.iter().any(wall::bears_arrow);
+    let loaded = sample.walls.iter().any(wall::bears_arrow);
     let room = if loaded { ARROW + 4.0 } else { 2.0 * HATCH };
     let scale = ((widest - 2.0 * room) / extent[0]).min((PANEL.1 - 2.0 * room) / extent[1]);
     let low = low.map(|x| x - room / scale);
@@ -46,13 +46,14 @@ pub fn draw_view(sample: &Sample, View([low, high]): View, panels: &[Panel], leg
     let even = |length: f64| (length / EVEN).ceil() * EVEN;
     let width = even((columns as f64 * (size.0 + MARGIN) + MARGIN).max(420.0));
     let rows = legend_rows(legend, width - 2.0 * MARGIN);
-    let below = lines as f64 * (CAPTION + size.1);
+    let caption = if panels.iter().any(|panel| !panel.caption.is_empty()) { CAPTION } else { MARGIN };
+    let below = lines as f64 * (caption + size.1);
     let mut canvas = Canvas::new(width, even(below + LEGEND * (rows.len() as f64 + 1.0) + MARGIN));
     let left = 0.5 * (width - columns as f64 * (size.0 + MARGIN) + MARGIN);
     for (k, panel) in panels.iter().enumerate() {
         let (column, line) = if stacked { (0, k) } else { (k, 0) };
-        let top = line as f64 * (CAPTION + size.1);
-        let corner = (left + column as f64 * (size.0 + MARGIN), top + CAPTION);
+        let top = line as f64 * (caption + size.1);
+        let corner = (left + column as f64 * (size.0 + MARGIN), top + caption);
         draw_panel(&mut canvas, sample, panel, &Frame { low, scale, corner, size });
     }
     let base = below + 0.7 * LEGEND;
@@ -72,6 +73,7 @@ fn draw_panel(canvas: &mut Canvas, sample: &Sample, panel: &Panel, frame: &Frame
     for (wall, position) in sample.walls.iter().zip(panel.walls.position.chunks(sample.dimension)) {
         wall::draw(canvas, &sample.eye, wall, position, frame);
     }
+    draw_loads(canvas, sample, panel, frame, true);
     let mut order: Vec<usize> = (0..panel.fills.len()).collect();
     if sample.dimension == 3 {
         farthest_first(&mut order, |grain| sample.eye.depth(&panel.grains.position[grain * 3..]));
@@ -82,12 +84,7 @@ fn draw_panel(canvas: &mut Canvas, sample: &Sample, panel: &Panel, frame: &Frame
     for (wall, position) in sample.walls.iter().zip(panel.walls.position.chunks(sample.dimension)) {
         wall::draw_in_front(canvas, &sample.eye, wall, position, frame);
     }
-    for (k, wall) in sample.walls.iter().enumerate() {
-        let own = k * sample.dimension..(k + 1) * sample.dimension;
-        if let (Some(position), Some(force)) = (panel.walls.position.get(own.clone()), panel.walls.force.get(own)) {
-            wall::draw_load(canvas, wall, position, force, frame);
-        }
-    }
+    draw_loads(canvas, sample, panel, frame, false);
     // lines between tiny grains must not merge
     let diameter = 2.0 * frame.scale * sample.radius.iter().sum::<f64>() / sample.radius.len() as f64;
     let widest = (0.6 * diameter).max(1.0);
@@ -106,6 +103,16 @@ fn draw_panel(canvas: &mut Canvas, sample: &Sample, panel: &Panel, frame: &Frame
         draw_arrow(canvas, from, to);
     }
     canvas.end_clip();
+}
+
+/// The arrows of the loads at walls, of those behind the grains or of the others.
+fn draw_loads(canvas: &mut Canvas, sample: &Sample, panel: &Panel, frame: &Frame, behind: bool) {
+    for (k, wall) in sample.walls.iter().enumerate() {
+        let own = k * sample.dimension..(k + 1) * sample.dimension;
+        if let (Some(position), Some(force)) = (panel.walls.position.get(own.clone()), panel.walls.force.get(own)) {
+            wall::draw_load(canvas, &sample.eye, wall, [position, force], frame, behind);
+        }
+    }
 }
 
 /// The drawing order: the farthest first, so that nearer objects cover it.

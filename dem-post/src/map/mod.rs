@@ -4,6 +4,7 @@
 pub use draw::{draw, draw_view};
 pub use eye::Perspective;
 pub use legend::Key;
+pub use material::Materials;
 pub use panel::{Arrow, Link, Panel, Patch};
 pub use sample::{Sample, View};
 pub use scale::{Colour, Ramp, Scale};
@@ -14,6 +15,7 @@ mod draw;
 mod eye;
 mod frame;
 mod legend;
+mod material;
 mod outline;
 mod panel;
 mod sample;

@@ -5,7 +5,7 @@ use dem_history::{GrainState, WallState};
 use super::scale::Colour;
 
 /// One moment.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub struct Panel {
     /// Lines of text above it.
     pub caption: Vec<String>,

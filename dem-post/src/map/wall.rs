@@ -42,37 +42,63 @@ pub(super) fn draw_in_front(canvas: &mut Canvas, eye: &Eye, wall: &Wall, positio
     }
 }
 
-/// An arrow of the load at a driven plane or plate in 2D, at the middle of the panel or of the
-/// plate: towards the grains where the wall pushes. None where no grain acts on the wall.
-pub(super) fn draw_load(canvas: &mut Canvas, wall: &Wall, position: &[f64], force: &[f64], frame: &Frame) {
-    if !bears_arrow(wall) || position.len() != 2 || force.len() != 2 {
-        return;
+/// Draws the arrow of the load at a wall, if it has one; with `behind` only at a plate behind the
+/// grains, else only at other walls.
+pub(super) fn draw_load(canvas: &mut Canvas, eye: &Eye, wall: &Wall, at: [&[f64]; 2], frame: &Frame, behind: bool) {
+    if let Some(([from, to], is_behind)) = load_arrow(eye, wall, at, frame)
+        && is_behind == behind
+    {
+        draw_arrow(canvas, from, to);
     }
+}
+
+/// The ends of the arrow of the load at a driven plane or plate, and whether it is drawn behind the
+/// grains. The arrow points towards the grains where the wall pushes. It stands at the middle of
+/// the plate, at a plane at the middle of the panel, in perspective of the part that is drawn. None
+/// where no grain acts on the wall, and at a wall parallel to the sheet.
+fn load_arrow(
+    eye: &Eye,
+    wall: &Wall,
+    [position, force]: [&[f64]; 2],
+    frame: &Frame,
+) -> Option<([(f64, f64); 2], bool)> {
+    let d = position.len();
     // the load is opposite to the force of the grains
-    let along = -(force[0] * wall.direction[0] + force[1] * wall.direction[1]);
-    if along == 0.0 {
-        return;
+    let along = -force.iter().zip(&wall.direction).map(|(f, direction)| f * direction).sum::<f64>();
+    if !bears_arrow(wall) || force.len() != d || along == 0.0 {
+        return None;
     }
-    let sign = along.signum();
+    let load = wall.direction.map(|x| along.signum() * x);
+    let along_normal = |x: &[f64]| x.iter().zip(&wall.normal).map(|(x, n)| x * n).sum::<f64>();
+    let mut towards = along_normal(&load);
+    // the grains of a plate may be on either side: they press it away from them
+    if wall.kind == WallKind::Plate && along_normal(force) > 0.0 {
+        towards = -towards;
+    }
+    let pushes = towards > 0.0;
+    let ends = if pushes { [-ARROW, -2.0] } else { [2.0, ARROW] };
+    if let Some(place) = eye.place() {
+        let (corners, behind) = place.plane(position, wall.normal);
+        let middle = match wall.kind {
+            WallKind::Plate => [position[0], position[1], position[2]],
+            _ => [0, 1, 2].map(|k| corners.iter().map(|corner| corner[k]).sum::<f64>() / 4.0),
+        };
+        let behind = behind && wall.kind == WallKind::Plane;
+        let at = |s: f64| frame.at(place.flat(&[0, 1, 2].map(|k| middle[k] + s / frame.scale * load[k])));
+        return Some((ends.map(at), behind));
+    }
     // on the sheet y points down
-    let load = (sign * wall.direction[0], -sign * wall.direction[1]);
-    let mut normal = (wall.normal[0], -wall.normal[1]);
-    let from = frame.at([position[0], position[1]]);
-    let line = (-normal.1, normal.0);
-    let mut off = to_the_middle(frame, from, line);
-    if wall.kind == WallKind::Plate {
-        off = 0.0;
-        // its grains may be on either side: they press it away from them
-        let pressed = force[0] * wall.normal[0] + force[1] * wall.normal[1];
-        if pressed > 0.0 {
-            normal = (-normal.0, -normal.1);
-        }
+    let [load, normal] = [load, wall.normal].map(|x| eye.flat(&x[..d])).map(|[x, y]| (x, -y));
+    let length = normal.0.hypot(normal.1);
+    if length < 1e-6 {
+        return None;
     }
+    let from = frame.at(eye.flat(position));
+    let line = (-normal.1 / length, normal.0 / length);
+    let off = if wall.kind == WallKind::Plate { 0.0 } else { to_the_middle(frame, from, line) };
     let foot = (from.0 + line.0 * off, from.1 + line.1 * off);
     let at = |s: f64| (foot.0 + s * load.0, foot.1 + s * load.1);
-    let pushes = load.0 * normal.0 + load.1 * normal.1 > 0.0;
-    let (tail, head) = if pushes { (-ARROW, -2.0) } else { (2.0, ARROW) };
-    draw_arrow(canvas, at(tail), at(head));
+    Some((ends.map(at), false))
 }
 
 /// Whether a wall has an arrow of its load: a driven plane or plate.
@@ -170,6 +196,67 @@ fn draw_plane(canvas: &mut Canvas, point: [f64; 2], normal: [f64; 2], frame: &Fr
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn frame() -> Frame {
+        Frame { low: [-2.0, -2.0], scale: 100.0, corner: (0.0, 0.0), size: (400.0, 400.0) }
+    }
+
+    /// The upper wall of a cube of side 2 m, driven along an axis of d.
+    fn lid(axis: usize, sign: f64) -> Wall {
+        let unit = |sign: f64| [0, 1, 2].map(|k| if k == axis { sign } else { 0.0 });
+        Wall {
+            name: String::new(),
+            kind: WallKind::Plane,
+            normal: unit(-1.0),
+            radius: 0.0,
+            drive: WallDrive::Force,
+            direction: unit(sign),
+            ..Wall::default()
+        }
+    }
+
+    #[test]
+    fn the_arrow_of_a_pushing_wall_points_at_its_middle() {
+        let eye = Eye::Along([0, 1]);
+        // the grains act upwards: the load is 5 N downwards, whatever the sense of the drive
+        for sign in [-1.0, 1.0] {
+            let ends = load_arrow(&eye, &lid(1, sign), [&[0.5, 1.0], &[0.0, 5.0]], &frame());
+            assert_eq!(ends, Some(([(200.0, 100.0 - ARROW), (200.0, 98.0)], false)));
+            let pulled = load_arrow(&eye, &lid(1, sign), [&[0.5, 1.0], &[0.0, -5.0]], &frame());
+            assert_eq!(pulled, Some(([(200.0, 98.0), (200.0, 100.0 - ARROW)], false)));
+        }
+        assert_eq!(load_arrow(&eye, &lid(1, 1.0), [&[0.5, 1.0], &[0.0, 0.0]], &frame()), None);
+        // seen along y: the lid is a line, a wall that is driven along y is parallel to the sheet
+        let eye = Eye::Along([0, 2]);
+        let ends = load_arrow(&eye, &lid(2, 1.0), [&[0.0, 0.0, 1.0], &[0.0, 0.0, 5.0]], &frame());
+        assert_eq!(ends, Some(([(200.0, 100.0 - ARROW), (200.0, 98.0)], false)));
+        assert_eq!(load_arrow(&eye, &lid(1, 1.0), [&[0.0, 1.0, 0.0], &[0.0, 5.0, 0.0]], &frame()), None);
+    }
+
+    #[test]
+    fn the_arrow_of_a_plate_stands_at_its_middle_on_the_side_away_from_its_grains() {
+        let eye = Eye::Along([0, 1]);
+        for normal in [-1.0, 1.0] {
+            let plate = Wall { kind: WallKind::Plate, normal: [0.0, normal, 0.0], ..lid(1, -1.0) };
+            let ends = load_arrow(&eye, &plate, [&[0.5, 1.0], &[0.0, 5.0]], &frame());
+            assert_eq!(ends, Some(([(250.0, 100.0 - ARROW), (250.0, 98.0)], false)));
+        }
+    }
+
+    #[test]
+    fn in_perspective_the_arrow_stands_on_the_middle_of_the_plate() {
+        let place = Place::of([[-1.0; 3], [1.0; 3]].iter().map(<[f64; 3]>::as_slice));
+        let middle = frame().at(place.flat(&[0.0, 0.0, 1.0]));
+        let eye = Eye::At(place);
+        let ([tail, head], behind) =
+            load_arrow(&eye, &lid(2, 1.0), [&[9.0, 9.0, 1.0], &[0.0, 0.0, 5.0]], &frame()).unwrap();
+        // from above, at the plate; a vertical line stays vertical
+        assert!(!behind && tail.1 < head.1 && head.1 < middle.1);
+        assert!((head.1 - middle.1).abs() < 3.0 && (head.0 - middle.0).abs() < 1e-9 && (tail.0 - head.0).abs() < 1e-9);
+        // a wall behind the grains has its arrow there
+        let back = load_arrow(&eye, &lid(1, 1.0), [&[0.0, 1.0, 0.0], &[0.0, 5.0, 0.0]], &frame()).unwrap();
+        assert!(back.1);
+    }
 
     #[test]
     fn a_plate_has_its_ends_and_its_corners() {

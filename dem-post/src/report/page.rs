@@ -1,7 +1,6 @@
 //! The page as HTML.
 
 use askama::Template;
-use dem_history::History;
 
 use crate::output::{PostError, Result};
 use crate::section::Section;
@@ -9,31 +8,40 @@ use crate::section::Section;
 /// The page.
 #[derive(Template)]
 #[template(path = "report.html")]
-struct Page {
-    title: String,
-    sections: Vec<Section>,
-    scene: String,
+struct Filled<'a> {
+    page: &'a Page,
     style: &'static str,
     script: &'static str,
+}
+
+/// The content of a page: its sections, and after them a scene.
+pub struct Page {
+    /// Its title.
+    pub title: String,
+    /// Its sections.
+    pub sections: Vec<Section>,
+    /// The scene.
+    pub scene: String,
+    /// The line above the scene.
+    pub scene_of: String,
 }
 
 const STYLE: &str = include_str!("../../templates/report.css");
 const SCRIPT: &str = include_str!("../../templates/report.js");
 
-/// The whole page: its sections, and after them the scene.
-///
-/// # Errors
-/// Those of reading the history and of drawing.
-pub fn render(history: &History, sections: Vec<Section>) -> Result<String> {
-    let scene = history.parameters()?.scene;
-    let tree: serde_json::Value = serde_json::from_str(&scene).unwrap_or_default();
-    let name = history.path().file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-    let title = tree
-        .get("title")
-        .and_then(|title| title.as_str())
-        .map_or_else(|| name.clone(), |title| format!("{name}: {title}"));
-    // a scene that is not JSON is printed unchanged
-    let scene = if tree.is_null() { scene } else { serde_json::to_string_pretty(&tree).unwrap_or(scene) };
-    let page = Page { title, sections, scene, style: STYLE, script: SCRIPT };
-    page.render().map_err(|error| PostError::Usage(format!("the page: {error}")))
+impl Page {
+    /// The page as HTML.
+    ///
+    /// # Errors
+    /// [`PostError::Usage`] with the message of the template.
+    pub fn render(&self) -> Result<String> {
+        let filled = Filled { page: self, style: STYLE, script: SCRIPT };
+        filled.render().map_err(|error| PostError::Usage(format!("the page: {error}")))
+    }
+}
+
+/// A scene in lines; one that is not JSON, unchanged.
+pub fn pretty(scene: &str) -> String {
+    let tree: serde_json::Value = serde_json::from_str(scene).unwrap_or_default();
+    if tree.is_null() { scene.into() } else { serde_json::to_string_pretty(&tree).unwrap_or_else(|_| scene.into()) }
 }

@@ -13,7 +13,7 @@ use crate::cracks::mode_colour;
 use crate::extent::{first_box, range};
 use crate::film;
 use crate::frames;
-use crate::map::{Perspective, Sample, View};
+use crate::map::{Materials, Perspective, Sample, View};
 use crate::output::Result;
 use crate::section::{Player, json, quantised, rounded};
 use crate::stress_strain;
@@ -55,6 +55,8 @@ struct Data {
     /// The greatest radius (m), and the radii over it.
     largest: f64,
     radius: String,
+    /// Number of the colour of each grain, as bytes; empty for grains of one material.
+    material: String,
     /// The two grains of each bond, as 32-bit numbers.
     pair: String,
     /// The first moment at which each bond is broken, and its mode, as bytes.
@@ -97,7 +99,7 @@ pub fn read(
     if moments.len() < 2 {
         return Ok(None);
     }
-    let sample = Sample::with_depth(history)?;
+    let (sample, materials) = (Sample::with_depth(history)?, Materials::read(history)?);
     let (mut view, mut place, mut outlines) = (View::EMPTY, vec![], vec![]);
     let mut broke = vec![NEVER; bonds.len()];
     let mut mode = vec![0; bonds.len()];
@@ -140,6 +142,7 @@ pub fn read(
         high: ends.iter().map(|end| end[1]).collect(),
         radius: quantised(grains.radius.iter().map(|radius| radius / largest)),
         largest,
+        material: STANDARD.encode(materials.as_ref().map_or_else(Vec::new, Materials::colours)),
         pair: STANDARD.encode(bonds.pair.iter().flatten().flat_map(|grain| grain.to_le_bytes()).collect::<Vec<u8>>()),
         broke: STANDARD.encode(broke),
         mode: STANDARD.encode(&mode),
@@ -149,12 +152,9 @@ pub fn read(
         step,
     };
     let twist = ruptures.iter().any(|rupture| rupture.mode == RuptureMode::Twist);
-    Ok(Some(Player {
-        moments: moments.len(),
-        data: json(&data)?,
-        legend: if bonds.is_empty() { vec![] } else { frames::bond_legend(d, twist) },
-        charts: vec![],
-    }))
+    let mut legend = if bonds.is_empty() { vec![] } else { frames::bond_legend(d, twist) };
+    legend.extend(materials.iter().flat_map(Materials::in_page));
+    Ok(Some(Player { moments: moments.len(), data: json(&data)?, legend, charts: vec![] }))
 }
 
 /// The frames of at most `count` moments, and of the pictures.

@@ -3,6 +3,7 @@
 use dem_drawing::{Chart, Style, colour};
 use dem_history::{History, Rupture};
 
+use super::limit::LimitLoad;
 use super::player;
 use crate::collapse::peak;
 use crate::cracks::report::total_over_time;
@@ -12,6 +13,9 @@ use crate::output::{PostError, Result, counted, number, quantity, short};
 use crate::section::{Figure, Section, capitalised, chart_figure, map_figure};
 use crate::title::Titles;
 use crate::{cracks, info, moments, stress_strain};
+
+/// Greatest ratio of a limit load to the loads of the run at which the chart of the load shows it.
+const FAR: f64 = 5.0;
 
 /// A moment of which the page shows a picture.
 struct Moment {
@@ -25,6 +29,8 @@ pub struct Parts<'a> {
     pub info: &'a info::Report,
     /// The load, if a wall is driven.
     pub load: Option<&'a stress_strain::Report>,
+    /// The limit load, if it was given.
+    pub limit: Option<&'a LimitLoad>,
     /// The breaks, if there are bonds.
     pub cracks: Option<&'a cracks::Report>,
     /// Times of the pictures that were asked for (s).
@@ -43,7 +49,7 @@ pub fn section(history: &History, parts: &Parts) -> Result<Section> {
     let pictured: Vec<usize> = shown.iter().map(|moment| moment.frame).collect();
     let figures = pictures(history, &shown, parts)?;
     let mut player = player::read(history, &ruptures, &pictured, load)?;
-    let charts = charts(history, &ruptures, load);
+    let charts = charts(history, &ruptures, parts);
     let text = sentences(history, parts, &ruptures)?;
     let mut section = Section { id: "result", title: "Result", text, figures, ..Section::default() };
     match &mut player {
@@ -121,12 +127,22 @@ fn pictures(history: &History, shown: &[Moment], parts: &Parts) -> Result<Vec<Fi
 }
 
 /// Load and broken bonds over time.
-fn charts(history: &History, ruptures: &[Rupture], load: Option<&stress_strain::Report>) -> Vec<Figure> {
+fn charts(history: &History, ruptures: &[Rupture], parts: &Parts) -> Vec<Figure> {
     let mut figures = vec![];
-    if let Some(load) = load {
+    if let Some(load) = parts.load {
         let points = load.time.iter().copied().zip(load.load.iter().copied()).collect();
-        let chart = Chart::new("time (s)", "load (N)").curve("load", colour::BLUE, Style::Line, points);
-        let text = format!("Load of wall {} over time.", load.summary.wall);
+        let mut chart = Chart::new("time (s)", "load (N)").curve("load", colour::BLUE, Style::Line, points);
+        let mut text = format!("Load of wall {} over time", load.summary.wall);
+        if let Some(limit) = parts.limit.and_then(|limit| limit.load) {
+            // beside a far greater limit load the curve would be flat
+            if limit <= FAR * load.summary.greatest_load {
+                chart.levels.push((limit, format!("limit load: {} N", short(limit))));
+                text += ", with the limit load";
+            } else {
+                text += &format!("; the limit load, {} N, is beyond the axis", short(limit));
+            }
+        }
+        text += ".";
         figures.push(chart_figure(chart, &text, &text));
     }
     if !ruptures.is_empty() {
@@ -144,6 +160,8 @@ fn charts(history: &History, ruptures: &[Rupture], load: Option<&stress_strain::
 fn sentences(history: &History, parts: &Parts, ruptures: &[Rupture]) -> Result<String> {
     let mut said = vec![];
     said.extend(parts.load.map(|load| load_sentence(load, ruptures)));
+    let first_break = parts.load.and_then(|load| load.summary.first_break);
+    said.extend(parts.limit.map(|limit| limit.sentence(first_break)));
     match parts.cracks {
         Some(cracks) => said.push(break_sentence(history, cracks, ruptures)?),
         None => {
@@ -236,7 +254,7 @@ fn place(history: &History, rupture: &Rupture) -> Result<String> {
 }
 
 /// `a, b and c`.
-fn joined(parts: &[String]) -> String {
+pub(super) fn joined(parts: &[String]) -> String {
     match parts {
         [] => String::new(),
         [one] => one.clone(),

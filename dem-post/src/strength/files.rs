@@ -53,7 +53,7 @@ pub fn write(report: &Report, folder: &mut Folder) -> Result<()> {
 }
 
 /// Strengths by sample, their means with the spread, and the line.
-fn chart(report: &Report) -> Chart {
+pub(crate) fn chart(report: &Report) -> Chart {
     let mut chart = Chart::new(&axis(&report.field, &report.unit), &axis(report.measure.title(), "N"));
     chart.pad_x = true;
     chart.log_x = spans_decades(report.runs.iter().map(|run| run.value));

@@ -20,6 +20,7 @@ use clap::Args;
 use crate::analysis::Analysis;
 use crate::options::{LoadWall, Runs};
 use crate::output::{Folder, Result};
+pub(crate) use files::chart;
 pub use files::write;
 pub use report::{Options, Report, read};
 pub use runs::Measure;

@@ -294,39 +294,56 @@ impl Report {
             lines.extend([
                 ("line through all runs", self.equation(line)),
                 ("  slope", estimate(&line.slope, &slope_unit)),
-                ("  intercept", estimate(&Estimate { value: self.plain(line.intercept.value), ..line.intercept }, "N")),
+                ("  intercept", self.intercept(line)),
             ]);
             lines.extend(self.explained(line).map(|told| ("  R²", told)));
         }
-        let over = &self.over_samples;
-        let intercept = over.intercept.map(|found| Spread { mean: self.plain(found.mean), ..found });
-        for (name, found, unit) in [
-            ("slope over samples", &over.slope, slope_unit.as_str()),
-            ("intercept over samples", &intercept, "N"),
-            ("strength/field over samples", &over.ratio, &slope_unit),
-        ] {
-            lines.extend(found.map(|found| (name, spread_line(&found, unit))));
-        }
-        let mut out = facts(&lines) + "\n" + &self.value_table() + "\n" + &self.sample_table();
+        lines.extend(self.scatter());
+        let (head, rows) = self.value_rows();
+        let mut values = Text::new(&head);
+        rows.into_iter().for_each(|row| values.row(row));
+        let mut out = facts(&lines) + "\n" + &values.lines() + "\n" + &self.sample_table();
         out += &left_out::remarks(&self.left_out, "strength.csv", &self.notes);
         out
     }
 
-    fn value_table(&self) -> String {
-        let mut table =
-            Text::new(&[&self.field, "runs", "mean strength", "spread", "95 % of the mean", "strength/field"]);
-        for at in &self.values {
+    /// The intercept of a line with its errors.
+    pub(crate) fn intercept(&self, line: &Line) -> String {
+        estimate(&Estimate { value: self.plain(line.intercept.value), ..line.intercept }, "N")
+    }
+
+    /// The scatter over the samples: names and values.
+    pub(crate) fn scatter(&self) -> Vec<(&'static str, String)> {
+        let (over, unit) = (&self.over_samples, self.slope_unit());
+        let intercept = over.intercept.map(|found| Spread {
+            mean: self.plain(found.mean),
+            deviation: found.deviation.map(|deviation| self.plain(deviation)),
+            interval: found.interval.map(|ends| ends.map(|end| self.plain(end))),
+            ..found
+        });
+        let lines = [
+            ("slope over samples", &over.slope, unit.as_str()),
+            ("intercept over samples", &intercept, "N"),
+            ("strength/field over samples", &over.ratio, &unit),
+        ];
+        lines.into_iter().filter_map(|(name, found, unit)| Some((name, spread_line(&(*found)?, unit)))).collect()
+    }
+
+    /// The runs at each value: the head and the rows of a table.
+    pub(crate) fn value_rows(&self) -> ([&str; 6], Vec<Vec<String>>) {
+        let row = |at: &AtValue| {
             let s = &at.strength;
-            table.row(vec![
+            vec![
                 quantity(Some(at.value), &self.unit),
                 s.count.to_string(),
                 quantity(Some(s.mean), "N"),
                 quantity(s.deviation, "N"),
                 interval(s.interval),
                 quantity(at.ratio.map(|ratio| ratio.mean), &self.slope_unit()),
-            ]);
-        }
-        table.lines()
+            ]
+        };
+        let head = [&self.field, "runs", "mean strength", "spread", "95 % of the mean", "strength/field"];
+        (head, self.values.iter().map(row).collect())
     }
 
     fn sample_table(&self) -> String {
@@ -352,7 +369,7 @@ impl Report {
 
     /// R² of the line through all runs, which includes the scatter of samples, and the least R² of
     /// the samples' own lines, which does not.
-    fn explained(&self, line: &Line) -> Option<String> {
+    pub(crate) fn explained(&self, line: &Line) -> Option<String> {
         let all = line.r_squared.map(share)?;
         let lines = self.samples.iter().filter_map(|sample| sample.line);
         // two points fit a line exactly
@@ -395,7 +412,7 @@ fn share(r: f64) -> String {
 }
 
 /// A field or a load with its unit, as on an axis.
-pub(super) fn axis(name: &str, unit: &str) -> String {
+pub(crate) fn axis(name: &str, unit: &str) -> String {
     if unit.is_empty() { name.to_string() } else { format!("{name} ({unit})") }
 }
 

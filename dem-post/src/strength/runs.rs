@@ -160,7 +160,7 @@ pub(crate) struct Course {
     /// Why the load of a step is not that before anything broke in it; `None` where it is.
     pub(crate) load_after_breaks: Option<String>,
     /// Axial strain fitted to the grains, along the load; empty if not recorded.
-    strain: Vec<f64>,
+    pub(crate) strain: Vec<f64>,
     /// Bonds broken; empty if not recorded.
     broken: Vec<f64>,
 }

@@ -96,7 +96,7 @@ fn reads(good: &Path) -> Vec<Command<'_>> {
         command("chains", |h, _| chains::read(h, &[]).map(|report| drop(report.table()))),
         command("velocities", |h, _| velocities::read(h, &[]).map(|report| drop(report.table()))),
         command("fabric", |h, _| fabric::read(h, &[], true).map(|report| drop(report.table()))),
-        command("report", |h, _| report::read(h, &[], None, true).map(|report| drop(report.table()))),
+        command("report", |h, _| report::read(h, &[], None, None, true).map(|report| drop(report.table()))),
         command("stress-strain", |h, _| stress_strain::read(h, None).map(|report| drop(report.table()))),
         command("frames", |h, _| frames::read(h, frames::Subject::Forces, 1, &[]).map(drop)),
         command("film", |h, _| film::read(h, frames::Subject::Bonds, None, 1).map(drop)),
@@ -118,13 +118,13 @@ fn reads(good: &Path) -> Vec<Command<'_>> {
 /// The writing part of every command.
 fn writes(good: &Path) -> Vec<Command<'_>> {
     vec![
-        command("cracks", |h, folder| cracks::write(h, &cracks::read(h, true)?, &[], folder)),
+        command("cracks", |h, folder| cracks::write(h, &cracks::read(h, true)?, &[], cracks::ColourBy::Time, folder)),
         command("emission", |h, folder| emission::write(&emission::read(h, &emission::Options::default())?, folder)),
         command("why", |h, folder| why::write(&why::read(h, why::Which::Number(0), None, true)?, folder)),
         command("chains", |h, folder| chains::write(h, &chains::read(h, &[])?, folder)),
         command("velocities", |h, folder| velocities::write(h, &velocities::read(h, &[])?, folder)),
         command("fabric", |h, folder| fabric::write(&fabric::read(h, &[], true)?, folder)),
-        command("report", |h, folder| report::write(h, &report::read(h, &[], None, true)?, folder)),
+        command("report", |h, folder| report::write(h, &report::read(h, &[], None, None, true)?, folder)),
         command("stress-strain", |h, folder| stress_strain::write(&stress_strain::read(h, None)?, folder)),
         command("frames", |h, folder| {
             frames::write(h, &frames::read(h, frames::Subject::Bonds, 10, &[])?, folder, true)

@@ -4,7 +4,7 @@ use super::*;
 
 /// A run at a confinement (Pa) whose axial stress grows to `strength` (Pa) in step 5; a bond breaks
 /// in step 6 if `fails`, and the stress has fallen by then.
-fn run(folder: &Path, name: &str, d: usize, stresses: [f64; 2], fails: bool) -> PathBuf {
+pub(super) fn run(folder: &Path, name: &str, d: usize, stresses: [f64; 2], fails: bool) -> PathBuf {
     let path = folder.join(name);
     let mut l = layout(d);
     let [confinement, strength] = stresses;
@@ -36,7 +36,7 @@ fn run(folder: &Path, name: &str, d: usize, stresses: [f64; 2], fails: bool) -> 
 }
 
 /// σ₁ that touches τ = 1000 Pa + σ tan 30° at a confinement: N = 3, σ_c = 2 c √3.
-fn major(minor: f64) -> f64 {
+pub(super) fn major(minor: f64) -> f64 {
     3.0 * minor + 2000.0 * 3f64.sqrt()
 }
 

@@ -15,6 +15,7 @@ mod fabric;
 mod film;
 mod folders;
 mod report;
+mod report_sweep;
 mod solves;
 mod view;
 mod why;

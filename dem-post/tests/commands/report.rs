@@ -2,7 +2,7 @@
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::*;
 
@@ -15,7 +15,7 @@ fn page(path: &Path, options: &[&str]) -> String {
 }
 
 /// Checks that every element is closed, in order, and that no attribute is open.
-fn well_formed(page: &str) {
+pub(super) fn well_formed(page: &str) {
     let mut open: Vec<&str> = vec![];
     let mut rest = page.strip_prefix("<!doctype html>").expect("a document type");
     while let Some((_, tail)) = rest.split_once('<') {
@@ -47,7 +47,7 @@ fn data(page: &str, tag: &str) -> Value {
     serde_json::from_str(script).unwrap()
 }
 
-fn bytes(value: &Value) -> Vec<u8> {
+pub(super) fn bytes(value: &Value) -> Vec<u8> {
     STANDARD.decode(value.as_str().unwrap()).unwrap()
 }
 
@@ -157,6 +157,29 @@ fn the_slider_has_the_positions_of_the_history() {
 }
 
 #[test]
+fn materials_have_colours_and_names() {
+    let mut l = layout(2);
+    l.materials = ["base", "mortar"].map(String::from).to_vec();
+    l.grains.material = vec![0, 0, 1, 1];
+    let (_folder, path) = sample(&l);
+    let several = page(&path, &[]);
+    let found = data(&several, "<script type=\"application/json\" id=\"moments\">");
+    assert_eq!(bytes(&found["material"]), [0, 0, 1, 1]);
+    assert!(several.contains("<i style=\"background:var(--grain-1)\"></i>mortar"));
+    let result = several.split("<section id=\"result\">").nth(1).unwrap().split("</section>").next().unwrap();
+    let source = result.split("src=\"data:image/svg+xml;base64,").nth(1).unwrap().split('"').next().unwrap();
+    let svg = String::from_utf8(STANDARD.decode(source).unwrap()).unwrap();
+    // at the first break grains 0 and 1 have lost a bond: grains 2 and 3, and the legend
+    assert_eq!((svg.matches("#b9dcf2").count(), svg.contains(">mortar<")), (3, true), "{svg}");
+    // one material needs neither
+    let (_folder, path) = sample(&layout(2));
+    let one = page(&path, &[]);
+    assert!(
+        data(&one, "<script type=\"application/json\" id=\"moments\">")["material"] == "" && !one.contains("</i>base")
+    );
+}
+
+#[test]
 fn a_history_of_one_frame_has_a_page_without_a_slider() {
     let l = layout(2);
     let folder = tempfile::tempdir().unwrap();
@@ -224,4 +247,77 @@ fn a_report_needs_nothing_but_itself() {
     // an empty section gives the reason
     let section = page.split("<section id=\"cracks\">").nth(1).unwrap().split("</section>").next().unwrap();
     assert!(section.contains("None: ") && section.contains("bonds"), "{section}");
+}
+
+/// The file that `dem-run limit --json` would print for a scene, with this limit of the upper wall.
+fn limit_file(folder: &Path, limit: Option<f64>, outcome: &str, scene: &Value) -> PathBuf {
+    let path = folder.join("limit.json");
+    let loads = [json!({ "load": "grains.loads.0", "limit": 1.0 }), json!({ "load": "walls.top", "limit": limit })];
+    let file = json!({ "outcome": outcome, "loads": loads, "grains": 4, "bonds": 4, "scene": scene });
+    std::fs::write(&path, file.to_string()).unwrap();
+    path
+}
+
+#[test]
+fn a_limit_load_is_a_line_in_the_load_and_a_sentence() {
+    let mut l = layout(2);
+    l.parameters.scene = json!({ "thickness": 0.5, "time": { "step": 1, "end": 3 } }).to_string();
+    let (folder, path) = sample(&l);
+    let scene = json!({ "thickness": 0.5, "title": "another", "solver": { "tolerance": 1e-9 }, "time": { "step": 2, "end": 3.0 } });
+    let limit = |load: f64| limit_file(folder.path(), Some(load), "limit", &scene);
+    // 30 N at the first break, 100 N at the end; the load of a wall that pulls is negative
+    for (load, shown) in [(120.0, true), (-120.0, true), (60.0, true), (550.0, false)] {
+        limit(load);
+        let page = page(&path, &["--limit", "limit.json"]);
+        let load = f64::abs(load);
+        let said = format!(
+            "The limit load, an upper bound of that of the first break, is {load} N: the first bond broke at {} % of it.",
+            dem_output::short(3000.0 / load)
+        );
+        assert!(page.contains(&said), "{said}");
+        let caption = page.split("<figcaption>").find(|text| text.starts_with("Load of wall top over time")).unwrap();
+        assert_eq!(caption.starts_with("Load of wall top over time, with the limit load."), shown);
+        assert_eq!(caption.contains("; the limit load, 550 N, is beyond the axis."), !shown);
+        let chart = page.split("alt=\"Load of wall top over time").next().unwrap();
+        let source = chart.rsplit("src=\"data:image/svg+xml;base64,").next().unwrap().split('"').next().unwrap();
+        let svg = String::from_utf8(STANDARD.decode(source).unwrap()).unwrap();
+        assert_eq!(svg.contains(&format!("limit load: {load} N")), shown);
+        if shown {
+            // the axis holds the level
+            let chart = data(
+                &page[page.find("alt=\"Load of wall top over time").unwrap()..],
+                "<script type=\"application/json\">",
+            );
+            assert!(chart["y"][1].as_f64().unwrap() > load.max(100.0) * 0.999);
+        }
+    }
+    for (outcome, said) in
+        [("unbounded", "some reactions bear any load"), ("broken_at_start", "the constant loads alone")]
+    {
+        limit_file(folder.path(), None, outcome, &scene);
+        assert!(page(&path, &["--limit", "limit.json"]).contains(said), "{outcome}");
+    }
+}
+
+#[test]
+fn the_limit_load_of_another_scene_is_refused() {
+    let (folder, path) = sample(&layout(2));
+    let report = || dem_post(&path, &["report", "--limit", "limit.json"]);
+    limit_file(folder.path(), Some(50.0), "limit", &json!({ "thickness": 0.6 }));
+    refused(&report(), 2, &["limit.json", "another scene: thickness is 0.6 there and 0.5 in the run", "dem-run limit"]);
+    limit_file(folder.path(), Some(50.0), "limit", &json!({ "thickness": 0.5, "seed": 2, "timer": 1 }));
+    refused(&report(), 2, &["seed is 2 there and absent in the run"]);
+    // without the scene, as older programs print it
+    std::fs::write(folder.path().join("limit.json"), r#"{"outcome": "limit", "loads": []}"#).unwrap();
+    refused(&report(), 2, &["limit.json", "missing field `scene`", "dem-run limit"]);
+    std::fs::write(
+        folder.path().join("limit.json"),
+        r#"{"outcome": "limit", "loads": [{"load": "walls.left"}], "scene": {"thickness": 0.5}}"#,
+    )
+    .unwrap();
+    refused(&report(), 2, &["no load of the load wall, walls.top, but of walls.left"]);
+    refused(&dem_post(&path, &["report", "--limit", "missing.json"]), 2, &["missing.json", "cannot be read"]);
+    let (folder, path) = sample(&Layout { walls: vec![], observables: vec![], ..layout(2) });
+    limit_file(folder.path(), Some(50.0), "limit", &json!({ "thickness": 0.5 }));
+    refused(&dem_post(&path, &["report", "--limit", "limit.json"]), 2, &["no load wall"]);
 }

@@ -46,7 +46,7 @@ fn solved() -> (tempfile::TempDir, PathBuf) {
 /// the locks of files that other tests have open.
 fn reported(path: &Path) -> (serde_json::Value, String) {
     let history = History::open(path).unwrap();
-    let found = report::read(&history, &[], None, true).unwrap();
+    let found = report::read(&history, &[], None, None, true).unwrap();
     let folder = path.with_file_name("run-post");
     report::write(&history, &found, &mut Folder::create(folder.clone()).unwrap()).unwrap();
     (serde_json::to_value(found.accuracy).unwrap(), std::fs::read_to_string(folder.join("report.html")).unwrap())

@@ -8,6 +8,7 @@ use kuva::render::figure::Figure;
 use kuva::render::layout::{ComputedLayout, Layout, TickFormat};
 use kuva::render::plots::Plot;
 
+use crate::ticks::{power_of_ten, whole};
 use crate::{Anchor, Canvas, Drawing, colour};
 
 /// Width and height of one chart, in units of a drawing.
@@ -65,6 +66,8 @@ pub struct Curve {
     pub colour: &'static str,
     /// Time of each point (s); empty if the points are at no times of the run.
     pub times: Vec<f64>,
+    /// Whether the legend has it.
+    pub listed: bool,
 }
 
 /// Means with error bars.
@@ -153,7 +156,7 @@ impl Chart {
 
     /// Adds a curve.
     pub fn curve(mut self, label: &str, colour: &'static str, style: Style, points: Vec<(f64, f64)>) -> Self {
-        self.curves.push(Curve { label: label.into(), points, style, colour, times: vec![] });
+        self.curves.push(Curve { label: label.into(), points, style, colour, times: vec![], listed: true });
         self
     }
 
@@ -161,6 +164,14 @@ impl Chart {
     pub fn timed(mut self, times: &[f64]) -> Self {
         if let Some(curve) = self.curves.last_mut() {
             curve.times = times.to_vec();
+        }
+        self
+    }
+
+    /// Leaves the last curve out of the legend: it has the colour of a curve that is there.
+    pub fn unlisted(mut self) -> Self {
+        if let Some(curve) = self.curves.last_mut() {
+            curve.listed = false;
         }
         self
     }
@@ -247,7 +258,8 @@ impl Chart {
 
     /// Name, colour and style of each curve and each marked level; a single entry needs no name.
     fn legend(&self) -> Vec<Named> {
-        let curves = self.curves.iter().map(|curve| (curve.label.clone(), curve.colour, curve.style));
+        let listed = self.curves.iter().filter(|curve| curve.listed);
+        let curves = listed.map(|curve| (curve.label.clone(), curve.colour, curve.style));
         let bars = self.bars.iter().map(|bars| (bars.label.clone(), bars.colour, Style::Bars));
         let levels = self.levels.iter().map(|(_, label)| (label.clone(), colour::GREY, Style::Level));
         let entries: Vec<_> = curves.chain(bars).chain(levels).collect();
@@ -362,35 +374,16 @@ impl Chart {
             if high < FEW {
                 layout = layout.with_y_axis_min(0.0).with_y_axis_max(FEW);
             }
+        } else {
+            // a marked level above all values is visible
+            let [low, high] = values().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], p| [l.min(p.1), h.max(p.1)]);
+            let level = self.levels.iter().map(|(value, _)| value * lift).fold(high, f64::max);
+            if low < high && level > high {
+                layout = layout.with_y_axis_max(level + 0.08 * (level - low));
+            }
         }
         layout
     }
-}
-
-/// A tick of an axis of counts: none between whole numbers.
-fn whole(value: f64) -> String {
-    if value.fract() == 0.0 { format!("{value}") } else { String::new() }
-}
-
-/// A tick of a logarithmic axis: powers of ten as such, others as numbers.
-fn power_of_ten(value: f64) -> String {
-    let exponent = value.log10();
-    let whole = (exponent - exponent.round()).abs() < 1e-6;
-    if (!whole && exponent > -3.0) || (-0.5..1.5).contains(&exponent) {
-        // round-off: 4.9999999e-6 is 5e-6
-        let rounded = format!("{value:.3e}").parse().unwrap_or(value);
-        return format!("{rounded}");
-    }
-    let power = if whole { exponent.round() } else { exponent.floor() };
-    let factor = if whole { String::new() } else { format!("{:.0}·", value / 10f64.powf(power)) };
-    let raise = |digit: char| match digit {
-        '-' => '⁻',
-        '1' => '¹',
-        '2' => '²',
-        '3' => '³',
-        digit => char::from_u32(0x2070 + digit.to_digit(10).unwrap_or(0)).unwrap_or(digit),
-    };
-    format!("{factor}10{}", format!("{power:.0}").chars().map(raise).collect::<String>())
 }
 
 /// A name of a legend, its colour and style.
@@ -510,23 +503,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ticks_are_powers_of_ten() {
-        for (value, text) in [
-            (1e-4, "10⁻⁴"),
-            (1e3, "10³"),
-            (0.1, "10⁻¹"),
-            (1.0, "1"),
-            (2e-5, "2·10⁻⁵"),
-            (5e-3, "0.005"),
-            (0.02, "0.02"),
-            (4.99999996e-6, "5·10⁻⁶"),
-            (2e-13, "2·10⁻¹³"),
-        ] {
-            assert_eq!(power_of_ten(value), text);
-        }
-    }
-
-    #[test]
     fn a_thinned_curve_keeps_its_peak_and_its_ends() {
         let mut points: Vec<(f64, f64)> = (0..100_000).map(|k| (f64::from(k), 0.0)).collect();
         points[54_321].1 = 7.0;
@@ -586,5 +562,27 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_level_above_all_values_is_on_the_axis() {
+        let chart = |level: f64| {
+            let mut chart = Chart::new("x", "y").curve("a", colour::BLUE, Style::Line, vec![(0.0, 0.0), (1.0, 10.0)]);
+            chart.levels.push((level, "level".into()));
+            Chart::draw_located(vec![chart], CHART).1[0].y[1]
+        };
+        assert!(chart(35.0) > 35.0 && chart(5.0) < 15.0);
+    }
+
+    #[test]
+    fn an_unlisted_curve_is_drawn_without_an_entry() {
+        let points = || vec![(0.0, 0.0), (1.0, 1.0)];
+        let chart = Chart::new("x", "y").curve("first", colour::BLUE, Style::Line, points());
+        let chart = chart.curve("second", colour::GREEN, Style::Line, points());
+        let both = Chart::draw(vec![chart.clone()]).svg();
+        let one =
+            Chart::draw(vec![chart.clone().curve("third", colour::GREEN, Style::Line, points()).unlisted()]).svg();
+        assert!(both.contains(">second<") && one.contains(">second<") && !one.contains("third"));
+        assert!(one.len() > both.len());
     }
 }

@@ -17,6 +17,7 @@ mod chart;
 mod compact;
 mod print;
 mod raster;
+mod ticks;
 
 /// Colours that colour-blind readers can distinguish, also in print (Okabe & Ito).
 pub mod colour {

@@ -104,6 +104,11 @@ fn digits(value: f64, digits: i32) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
 }
 
+/// A number without its round-off: up to ten digits, without zeros at the end.
+pub fn plain(value: f64) -> String {
+    shortest(format!("{value:.9e}").parse().unwrap_or(value))
+}
+
 /// A number with its unit, or a dash for no number.
 pub fn quantity(value: Option<impl Into<f64>>, unit: &str) -> String {
     value.map_or_else(|| "–".into(), |value| with_unit(number(value.into()), unit))
@@ -151,6 +156,15 @@ mod tests {
             (0.001234, "0.001234"),
         ] {
             assert_eq!(number(value), text);
+        }
+    }
+
+    #[test]
+    fn round_off_is_not_printed() {
+        for (value, text) in
+            [(0.47440000000000004, "0.4744"), (0.1 + 0.2, "0.3"), (1.0, "1"), (0.123456789, "0.123456789")]
+        {
+            assert_eq!(plain(value), text);
         }
     }
 

@@ -1,7 +1,7 @@
 //! The errors of a scene, each with the information to correct it.
 
 use std::fmt::{self, Write as _};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
@@ -9,10 +9,12 @@ use serde::Serialize;
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
     /// The file cannot be read, or is not UTF-8 text.
-    #[error("{}: the scene cannot be read: {source}", path.display())]
+    #[error("{}: the scene cannot be read: {source}{}", path.display(), did_you_mean(nearest.as_deref()))]
     Read {
         /// The file.
         path: PathBuf,
+        /// A file of nearly this name, if there is none of it.
+        nearest: Option<PathBuf>,
         /// The system's reason.
         source: std::io::Error,
     },
@@ -38,6 +40,11 @@ pub enum SceneError {
         /// What is wrong, at least one.
         problems: Vec<Problem>,
     },
+}
+
+/// The question for a file of nearly the name given; nothing for none.
+fn did_you_mean(nearest: Option<&Path>) -> String {
+    nearest.map_or_else(String::new, |path| format!("; did you mean {}?", path.display()))
 }
 
 impl SceneError {

@@ -78,7 +78,22 @@ pub fn load(path: &Path, assignments: &[String]) -> Result<Scene, SceneError> {
 pub const MAX_TEXT: u64 = 256 << 20;
 
 fn read(path: &Path) -> Result<String, SceneError> {
-    text(path).map_err(|source| SceneError::Read { path: path.to_path_buf(), source })
+    text(path).map_err(|source| SceneError::Read {
+        nearest: if source.kind() == io::ErrorKind::NotFound { nearest_file(path) } else { None },
+        path: path.to_path_buf(),
+        source,
+    })
+}
+
+/// The JSON file beside `path` whose name is nearest to that of `path`, if it is near enough.
+fn nearest_file(path: &Path) -> Option<PathBuf> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let files = std::fs::read_dir(folder.unwrap_or(Path::new("."))).ok()?;
+    let names = files.filter_map(|file| file.ok()?.file_name().into_string().ok());
+    let mut names: Vec<String> = names.filter(|name| name.ends_with(".json")).collect();
+    names.sort_unstable();
+    let nearest = suggest::nearest(path.file_name()?.to_str()?, names.iter().map(String::as_str))?;
+    Some(folder.map_or_else(|| PathBuf::from(&nearest), |folder| folder.join(&nearest)))
 }
 
 /// The tree of the scene in the file `path`; a sweep is refused.

@@ -59,6 +59,11 @@ fn a_cylinder_of_spheres_breaks_and_its_cracks_are_surfaces() {
     ] {
         assert!(here.path("views").join(name).exists(), "{name}");
     }
+    // the legend says what the colours show
+    let legend = |text: &str| String::from_utf8(here.read("views/cracks.svg")).expect("text").contains(text);
+    assert!(legend("broken at t (s)"));
+    here.dem_post(&["cracks", "cylinder.h5", "-o", "views", "--colour", "rank"]).succeeds();
+    assert!(legend("rank of the break") && !legend("broken at t"));
     here.dem_post(&["report", "cylinder.h5", "-o", "views"]).succeeds();
     here.dem_post(&["view", "cylinder.h5", "-o", "views"]).succeeds();
 }

@@ -137,6 +137,15 @@ fn a_missing_file_and_one_that_is_not_text_are_told_apart() {
     let missing = load(&path, &[]).expect_err("no file");
     assert!(matches!(missing, SceneError::Read { .. }), "{missing}");
     assert!(missing.to_string().contains("scene.json"), "{missing}");
+    assert!(!missing.to_string().contains("did you mean"), "{missing}");
+    // a name that is nearly that of a scene beside it
+    for name in ["compresion.json", "compression"] {
+        std::fs::write(folder.path().join("compression.json"), "{}").expect("write");
+        std::fs::write(folder.path().join("compresion.h5"), "").expect("write");
+        let wrong = load(&folder.path().join(name), &[]).expect_err("no file").to_string();
+        let path = folder.path().join("compression.json").display().to_string();
+        assert!(wrong.ends_with(&format!("; did you mean {path}?")), "{wrong}");
+    }
     std::fs::write(&path, [0xff, 0xfe, 0x00]).expect("write");
     let binary = load(&path, &[]).expect_err("not text");
     assert!(binary.to_string().contains("line 1 is not UTF-8 text from column 1 on"), "{binary}");
