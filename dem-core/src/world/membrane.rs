@@ -22,8 +22,8 @@ use std::f64::consts::{PI, TAU};
 /// Displacement of a grain, over its radius, before the list of its neighbours is rebuilt.
 const SPARE: f64 = 0.5;
 
-/// Angle (rad) by which rounding may put a disk that touches two grains inside a third.
-const ROUNDING: f64 = 1e-9;
+/// Angle (rad) up to which two bodies count as touched at the same time: what rounding may leave.
+const ROUNDING: f64 = 1e-12;
 
 /// A pressure on the free surface of a sample in 2D.
 #[derive(Clone)]
@@ -242,19 +242,22 @@ impl<'a, D: Dim> Rolling<'a, D> {
 
     /// The next grain of a disk on the first plate, from the place `from` of its centre on.
     fn along_the_plate(&self, from: f64, before: Option<Station>) -> Option<(Station, f64)> {
-        let mut next: Option<(f64, usize)> = None;
+        let mut next: Option<(f64, f64, usize)> = None;
         for grain in 0..self.radius.len() {
             let ([s, h], reach) = (self.place(grain), self.reach(grain));
             let half = reach * reach - (h - self.disk).powi(2);
             if half <= 0.0 || before == Some(Station::Grain(grain)) {
                 continue;
             }
-            let touch = s - half.sqrt();
-            if touch >= from - ROUNDING * reach && next.is_none_or(|(least, _)| touch < least) {
-                next = Some((touch, grain));
+            let (touch, rounding) = (s - half.sqrt(), ROUNDING * reach);
+            // of two at the same time, the one nearer to the plate
+            let first =
+                |(least, low, _): (f64, f64, usize)| touch < least - rounding || touch <= least + rounding && h < low;
+            if touch >= from - rounding && next.is_none_or(first) {
+                next = Some((touch, h, grain));
             }
         }
-        let (touch, grain) = next?;
+        let (touch, _, grain) = next?;
         Some((Station::Grain(grain), self.angle_on(grain, [touch, self.disk])))
     }
 
@@ -262,15 +265,19 @@ impl<'a, D: Dim> Rolling<'a, D> {
     /// station, and the place on the plate or the angle on the grain.
     fn around(&self, grain: usize, from: f64, before: Option<Station>) -> Option<(Station, f64)> {
         let (centre, reach) = (self.place(grain), self.reach(grain));
-        let mut next: Option<(f64, f64, Station)> = None;
-        let mut offer = |station: Station, angle: f64| {
+        let mut next: Option<(f64, f64, f64, Station)> = None;
+        let mut offer = |station: Station, distance: f64, angle: f64| {
             let mut way = (from - angle).rem_euclid(TAU);
             // what comes next at the same place is not behind; what the disk comes from is
             if way > TAU - ROUNDING && before != Some(station) {
                 way = 0.0;
             }
-            if next.is_none_or(|(least, ..)| way < least) {
-                next = Some((way, angle, station));
+            // of two at the same time, the nearer grain
+            let first = |(least, nearest, ..): (f64, f64, f64, Station)| {
+                way < least - ROUNDING || way <= least + ROUNDING && distance < nearest
+            };
+            if next.is_none_or(first) {
+                next = Some((way, distance, angle, station));
             }
         };
         for other in self.near.of(grain) {
@@ -279,16 +286,19 @@ impl<'a, D: Dim> Rolling<'a, D> {
             let distance = apart[0].hypot(apart[1]);
             let cosine = (distance * distance + reach * reach - its * its) / (2.0 * distance * reach);
             if distance < reach + its && cosine.abs() < 1.0 {
-                offer(Station::Grain(other), apart[1].atan2(apart[0]) + cosine.acos());
+                offer(Station::Grain(other), distance, apart[1].atan2(apart[0]) + cosine.acos());
             }
         }
         if let Some(height) = self.height {
             let sine = |level: f64| Some((level - centre[1]) / reach).filter(|sine| sine.abs() <= 1.0);
             // down to the first plate on the right of the grain, up to the second on its left
-            sine(self.disk).into_iter().for_each(|sine| offer(Station::First, sine.asin()));
-            sine(height - self.disk).into_iter().for_each(|sine| offer(Station::Second, PI - sine.asin()));
+            let plates = [(Station::First, self.disk), (Station::Second, height - self.disk)];
+            for (station, level) in plates {
+                let Some(angle) = sine(level).map(f64::asin) else { continue };
+                offer(station, f64::INFINITY, if station == Station::First { angle } else { PI - angle });
+            }
         }
-        let (_, angle, station) = next?;
+        let (.., angle, station) = next?;
         let point = [centre[0] + reach * angle.cos(), centre[1] + reach * angle.sin()];
         let arrived = match station {
             Station::Grain(other) => self.angle_on(other, point),
