@@ -19,7 +19,7 @@ use dem_core::detection::pairs_within;
 use dem_core::dim::{Dim, Vect};
 use dem_core::saved::{Mismatch, Reader};
 use dem_core::solver::{GaussSeidelSettings, SolverSettings, StagedSettings, Stages, Start, StiffnessRatio};
-use dem_core::world::{Restitution, Settings, World};
+use dem_core::world::{Membrane, Restitution, Settings, StepError, World};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -33,6 +33,9 @@ pub struct Built<D: Dim> {
     pub warnings: Vec<String>,
 }
 
+/// Radius of the disk that rolls on the surface under a membrane, over the mean radius of the grains.
+/// It spans the pits of lattices, and touches a row at a plate before the next one.
+const DISK: f64 = 1.5;
 /// Maximum number of grain pairs that are reported individually.
 const MOST_TOLD: usize = 10;
 
@@ -62,6 +65,10 @@ pub fn build<D: Dim>(scene: &Scene, packings: Option<&Path>, watch: Watch) -> Re
     warnings.extend(shallow);
     warnings.extend(warnings::of_walls(scene, &walls, Some(&grains)));
     let mut world = World::new(grains, walls, loads(scene), settings(scene));
+    world.membrane = membrane(scene, &world.grains);
+    if let Err(error) = world.find_surface() {
+        return Err(RunError::Sample(vec![no_surface(scene, &world, &error)]));
+    }
     // the world knows which grains its walls hold: those get no bonds among each other
     if scene.cement_stage().is_none() {
         world.add_bonds(bonds::of_sample(scene, &world.grains)?);
@@ -79,7 +86,30 @@ pub fn rebuild<D: Dim>(scene: &Scene, from: &mut Reader) -> Result<World<D>, Mis
         return Err(Mismatch);
     }
     let walls = walls(scene, &grains);
-    World::restored(grains, walls, loads(scene), settings(scene), from)
+    let mut world = World::restored(grains, walls, loads(scene), settings(scene), from)?;
+    world.membrane = membrane(scene, &world.grains);
+    Ok(world)
+}
+
+/// The membrane of a scene, whose surface is not found yet.
+fn membrane<D: Dim>(scene: &Scene, grains: &Grains<D>) -> Option<Membrane<D>> {
+    let membrane = scene.membrane.as_ref()?;
+    let index = |name: &String| scene.wall_index(name).unwrap_or_default();
+    let between = membrane.between.as_ref().map(|between| [index(&between[0]), index(&between[1])]);
+    let mean = grains.radius.iter().sum::<f64>() / grains.len() as f64;
+    let disk = membrane.disk_radius.unwrap_or(DISK * mean);
+    let pressure = scene.first_pressure()?.clone();
+    Some(Membrane::new(schedule(pressure), between, disk))
+}
+
+/// The message about a membrane without a surface at the start.
+fn no_surface<D: Dim>(scene: &Scene, world: &World<D>, error: &StepError) -> String {
+    let wall = |body: u32| scene.walls.keys().nth(body as usize - world.grains.len());
+    let name = |body: u32| wall(body).map_or_else(String::new, |name| format!("wall {name}"));
+    format!(
+        "membrane: {}; seat the plates at the sample (\"place\": \"seated\"), or give another membrane.disk_radius",
+        error.message(&name)
+    )
 }
 
 /// The grains of a scene; the other fields as in [`prepare::Packing`], for a random sample.

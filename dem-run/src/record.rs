@@ -378,6 +378,14 @@ fn observables<D: Dim>(scene: &Scene, world: &World<D>) -> Vec<(Observable, Meas
     add("strain", "", &[d, d], |w, _, out| out.extend(w.strain()));
     list.push((Observable::route(), |_, r, out| out.push(solver_route(r.route).number())));
     list.extend(of_bonds_and_walls(scene, world));
+    if world.membrane.is_some() {
+        list.push((Observable::new("membrane_pressure", "Pa", scalar), |w, _, out| {
+            out.extend(w.membrane.as_ref().map(|membrane| membrane.applied));
+        }));
+        list.push((Observable::new("membrane_area", "m2", scalar), |w, _, out| {
+            out.extend(w.membrane.as_ref().map(|membrane| membrane.area));
+        }));
+    }
     list
 }
 

@@ -60,6 +60,12 @@ impl<D: Dim> Membrane<D> {
         Self { pressure, between, disk, applied: 0.0, area: 0.0, pushes: Vec::new(), near }
     }
 
+    /// The same membrane on a sample whose grains have other numbers.
+    #[must_use]
+    pub fn unfound(&self) -> Self {
+        Self::new(self.pressure.clone(), self.between, self.disk)
+    }
+
     /// Forces over pressure and thickness (m) on the grains of the surface, in its order.
     pub fn pushes(&self) -> impl Iterator<Item = (usize, D::Vector)> {
         self.pushes.iter().map(|push| (push.grain, push.length))

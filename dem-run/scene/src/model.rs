@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::function::Function;
 use super::material::{Materials, PairBonds};
+use super::membrane::Membrane;
 use super::region::Region;
 use super::sample::Sample;
 use super::solver::Solver;
@@ -47,6 +48,9 @@ pub struct Scene {
     /// Walls, by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub walls: BTreeMap<String, Wall>,
+    /// A flexible membrane in 2D: a pressure on the free surface of the sample; default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub membrane: Option<Membrane>,
     /// Name of the driven wall whose force is the load of the sample, as reported at the first
     /// break, at the collapse and at the peak. Default: the wall of `stop.wall_travel`, else the
     /// only driven wall.
@@ -338,6 +342,14 @@ impl Scene {
             (None, Drive::Fixed) if self.stage_drives(name).next().is_some() => StageDrive::default().drive(),
             (None, own) => own,
         }
+    }
+
+    /// The pressure of the membrane at the start of the run: that of the first stage where it has
+    /// one.
+    #[must_use]
+    pub fn first_pressure(&self) -> Option<&Function> {
+        let own = &self.membrane.as_ref()?.pressure;
+        Some(self.stages.first().and_then(|stage| stage.membrane_pressure.as_ref()).unwrap_or(own))
     }
 
     /// The wall that loads the sample ([`choose_load_wall`]); none where no wall is driven, or

@@ -4,6 +4,7 @@
 //! sample exists.
 
 mod material;
+mod membrane;
 pub(crate) mod report;
 mod sample;
 mod stage;
@@ -46,6 +47,7 @@ pub fn validate(scene: &Scene) -> Vec<Problem> {
     for (name, wall) in &scene.walls {
         wall::wall(&mut report, name, wall, &scene.stage_drives(name).map(StageDrive::drive).collect::<Vec<_>>());
     }
+    membrane::membrane(&mut report, scene);
     if let Some(name) = &scene.load_wall {
         driven_wall(&mut report, scene, "load_wall", name);
     }
