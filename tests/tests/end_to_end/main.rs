@@ -14,6 +14,7 @@ mod interrupt;
 mod laboratory;
 mod limit;
 mod loads;
+mod membrane;
 mod materials;
 mod next_event;
 mod pack;
