@@ -39,7 +39,7 @@ impl<D: Dim> Recorder<D> {
     /// Create the history of a world at `path`.
     pub fn create(path: &Path, overwrite: bool, scene: &Scene, built: &Built<D>) -> history::Result<Self> {
         let observables = observables(scene, &built.world);
-        let bonds = describe_bonds(&built.world, scene.cement_stage().map(|_| history::NOT_FORMED));
+        let bonds = describe_bonds(scene, &built.world, scene.cement_stage().map(|_| history::NOT_FORMED));
         let parameters = parameters(scene, built.solid_fraction);
         let (layout, measures) = describe(scene, &built.world, bonds, observables, parameters);
         let writer = Writer::create(path, &layout, overwrite)?;
@@ -69,7 +69,7 @@ impl<D: Dim> Recorder<D> {
             Some(formed) if formed == history::NOT_FORMED || cemented.is_none() => Some(history::NOT_FORMED),
             formed => formed,
         };
-        let (layout, measures) = describe(scene, world, describe_bonds(world, formed), observables, origin);
+        let (layout, measures) = describe(scene, world, describe_bonds(scene, world, formed), observables, origin);
         let layout = Layout { friction: before.friction, ..layout };
         let cpu_time = history.observable("cpu_time")?.map_or(vec![], |series| series.value);
         let cpu_before = kept.steps.checked_sub(1).and_then(|last| cpu_time.get(last)).copied().unwrap_or(0.0);
@@ -310,7 +310,7 @@ fn describe_wall<D: Dim>(wall: &Wall<D>, name: &str) -> history::Wall {
 
 /// The bonds of a world. `formed` is the step after which a stage formed them, or that none has;
 /// nothing if they are there from the start.
-fn describe_bonds<D: Dim>(world: &World<D>, formed: Option<i64>) -> history::Bonds {
+fn describe_bonds<D: Dim>(scene: &Scene, world: &World<D>, formed: Option<i64>) -> history::Bonds {
     let bonds: &[bond::Bond] = if formed == Some(history::NOT_FORMED) { &[] } else { &world.bonds };
     history::Bonds {
         pair: bonds.iter().map(|b| b.pair.map(|k| k as i32)).collect(),
@@ -322,6 +322,7 @@ fn describe_bonds<D: Dim>(world: &World<D>, formed: Option<i64>) -> history::Bon
             true => Vec::new(),
             false => bonds.iter().map(|b| b.rolling).collect(),
         },
+        twist: scene.twists_by_pair().then(|| bonds.iter().map(|b| b.twist).collect()),
         formed,
         mean_diameter: bonds.iter().map(|b| b.mean_diameter).collect(),
     }

@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::model::Scatter;
 use super::region::Region;
 
 /// Name of the material of grains that belong to no named material.
@@ -79,6 +80,14 @@ pub struct PairBonds {
     /// Coefficient of the rolling limit, with the same defaults.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rolling: Option<f64>,
+    /// Coefficient of the twist limit in 3D; zero: these bonds do not resist twist. Default: `twist`
+    /// of `bonds`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub twist: Option<f64>,
+    /// Scatter of the strengths. Default: `scatter` of `bonds`; a normal one of deviation zero is
+    /// none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scatter: Option<Scatter>,
     /// Factor on the stiffness of elastic bonds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stiffness_factor: Option<f64>,
@@ -140,6 +149,11 @@ impl Materials {
             let [first, second] = &pair.between;
             (first == a && second == b) || (first == b && second == a)
         })
+    }
+
+    /// Properties of bonds that are listed for pairs of materials.
+    pub fn pair_bonds(&self) -> impl Iterator<Item = &PairBonds> {
+        self.pairs.iter().filter_map(|pair| pair.bonds.as_ref())
     }
 
     /// Friction of dry contacts between two materials.

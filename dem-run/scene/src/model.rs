@@ -377,16 +377,23 @@ impl Scene {
     /// Whether there are bonds that resist twist.
     #[must_use]
     pub fn twists(&self) -> bool {
-        self.bonds.as_ref().is_some_and(|bonds| bonds.twist.is_some())
+        let resists = |twist: Option<f64>| twist.is_some_and(|twist| twist > 0.0);
+        let of_pairs = || self.materials.pair_bonds().any(|pair| resists(pair.twist));
+        self.bonds.as_ref().is_some_and(|bonds| bonds.twist.is_some() || of_pairs())
+    }
+
+    /// Whether the resistance to twist may differ from bond to bond.
+    #[must_use]
+    pub fn twists_by_pair(&self) -> bool {
+        self.twists() && self.materials.pair_bonds().any(|pair| pair.twist.is_some())
     }
 
     /// Whether some bond can bear a load.
     #[must_use]
     pub fn has_bonds(&self) -> bool {
         let bears = |limit: Option<f64>| limit.is_some_and(|limit| limit > 0.0);
-        let pairs = || self.materials.pairs.iter().filter_map(|pair| pair.bonds.as_ref());
         self.bonds.as_ref().is_some_and(|bonds| {
-            let of_pairs = pairs().any(|pair| bears(pair.strength.or(pair.stress)));
+            let of_pairs = self.materials.pair_bonds().any(|pair| bears(pair.strength.or(pair.stress)));
             bears(bonds.strength.or(bonds.stress)) || of_pairs || bonds.list.is_some()
         })
     }

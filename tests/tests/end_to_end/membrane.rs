@@ -38,9 +38,7 @@ fn a_pressure_in_stages_is_the_same_as_one_table_and_squeezes_an_elastic_block()
     let plates = ["floor", "lid"];
     let table = json!({ "table": [[0, 0], [0.125, 4000], [0.25, 1000]] });
     let whole = run(&here, &scene(json!({ "pressure": table, "between": plates }), json!([])));
-    let stage = |name: &str, from: i32, to: i32| {
-        json!({ "name": name, "duration": 0.125, "membrane_pressure": { "table": [[0, from], [0.125, to]] } })
-    };
+    let stage = |name: &str, from: i32, to: i32| json!({ "name": name, "duration": 0.125, "membrane_pressure": { "table": [[0, from], [0.125, to]] } });
     let stages = json!([stage("press", 0, 4000), stage("release", 4000, 1000)]);
     let staged = scene(json!({ "pressure": { "constant": 7 }, "between": plates }), stages);
     assert_eq!(run(&here, &staged), whole);
