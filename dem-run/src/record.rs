@@ -76,7 +76,7 @@ impl<D: Dim> Recorder<D> {
         let writer = Writer::go_on(history.path(), &layout, history, kept, checkpoint, tell)?;
         let mut recorder = Self::new(writer, &layout, measures, cpu_before);
         if cemented.is_some() && formed == Some(history::NOT_FORMED) {
-            recorder.bonds_formed(world)?;
+            recorder.bonds_formed(scene, world)?;
         }
         Ok(recorder)
     }
@@ -113,9 +113,9 @@ impl<D: Dim> Recorder<D> {
     }
 
     /// Records the bonds that a stage formed after the present step.
-    pub fn bonds_formed(&mut self, world: &World<D>) -> history::Result<()> {
+    pub fn bonds_formed(&mut self, scene: &Scene, world: &World<D>) -> history::Result<()> {
         self.hand_over()?;
-        self.batch.bonds = Some(describe_bonds(world, Some(world.steps as i64)));
+        self.batch.bonds = Some(describe_bonds(scene, world, Some(world.steps as i64)));
         self.hand_over()
     }
 

@@ -201,7 +201,7 @@ impl<D: Dim> Run<'_, D> {
             let RunState { world, course, .. } = &mut self.state;
             let ending = course.advance(self.scene, world)?;
             if course.cemented(self.scene) == Some(world.steps) {
-                self.recorder.bonds_formed(world)?;
+                self.recorder.bonds_formed(self.scene, world)?;
             }
             if let Some(ending) = ending {
                 return Ok(ending);

@@ -189,7 +189,42 @@ def from_break_to_break():
     return scene
 
 
+def wrapped():
+    """`pressed` in a membrane, whose pressure a stage lowers, between the floor and a lid that comes
+    down."""
+    scene = pressed()
+    del scene["gravity"]
+    scene["sample"]["random"]["preparation"]["compaction"]["solid_fraction"] = 0.8
+    scene["bonds"] |= {"gap_tolerance": 0.02, "stiffness": {"young": {"modulus": 1e8, "poisson_ratio": 0.2}}}
+    scene["walls"]["top"] = {"shape": scene["walls"]["top"]["shape"]}
+    scene["membrane"] = {"pressure": {"table": [[0, 0], [2e-3, 2e4]]}, "between": ["bottom", "top"]}
+    scene["stages"] = [
+        {"name": "confine", "duration": 2e-3},
+        {"name": "press", "duration": 4e-3, "walls": {"top": {"velocity": {"constant": 0.05}}}},
+        {"name": "release", "duration": 4e-3, "membrane_pressure": {"table": [[0, 2e4], [2e-3, 5e3]]}},
+    ]
+    return scene
+
+
+def enclosed():
+    """Two rows of disks in a membrane all around, and a loose one outside."""
+    r = 1e-3
+    scene = pressed()
+    del scene["gravity"], scene["walls"]
+    places = [[2 * r * (k % 3), 2 * r * (k // 3)] for k in range(6)] + [[20 * r, 0]]
+    scene["sample"] = {"grains": [{"center": place, "radius": r} for place in places]}
+    scene["bonds"] |= {"strength": 2}
+    # not the same on all sides: the middle grains of the rows are heavier
+    for k in (1, 4):
+        scene["sample"]["grains"][k]["density"] = 4000
+    scene["sample"]["grains"][6]["velocity"] = [-5, 0.1]
+    scene["membrane"] = {"pressure": {"ramp": {"rate": 1e6}}, "disk_radius": 1.2e-3}
+    return scene
+
+
 SCENES = {
+    "wrapped": wrapped,
+    "enclosed": enclosed,
     "layered": layered,
     "listed": listed,
     "confined": confined,
