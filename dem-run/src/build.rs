@@ -33,8 +33,8 @@ pub struct Built<D: Dim> {
     pub warnings: Vec<String>,
 }
 
-/// Radius of the disk that rolls on the surface under a membrane, over the mean radius of the grains.
-/// It spans the pits of lattices, and touches a row at a plate before the next one.
+/// Radius of the disk that rolls on the surface under a membrane, over the mean radius of the
+/// grains. It spans the pits of lattices, and touches a row at a plate before the next one.
 const DISK: f64 = 1.5;
 /// Maximum number of grain pairs that are reported individually.
 const MOST_TOLD: usize = 10;

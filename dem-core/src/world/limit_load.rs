@@ -15,8 +15,8 @@ type Velocities<D> = Arc<[(<D as Dim>::Vector, <D as Dim>::Spin)]>;
 impl<D: Dim> World<D> {
     /// The largest factor λ for which reactions that no contact law excludes balance the loads of
     /// the time `from` (s) and λ times what they grow by until the time `to` (s): weight, loads on
-    /// grains, forces on walls and the pressure of a membrane, with the bodies at their places. Walls without a force drive are
-    /// supports.
+    /// grains, forces on walls and the pressure of a membrane, with the bodies at their places.
+    /// Walls without a force drive are supports.
     ///
     /// All intact bonds take part, and all other pairs whose gap is at most 1e-6 of the smaller
     /// radius. The world does not change.

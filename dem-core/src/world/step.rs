@@ -444,8 +444,8 @@ impl<D: Dim> World<D> {
         0.5 * sum
     }
 
-    /// Work of gravity, loads, membrane and drives in the step (J): force times mean velocity; a wall with
-    /// prescribed velocity does the work of its reaction.
+    /// Work of gravity, loads, membrane and drives in the step (J): force times mean velocity; a
+    /// wall with prescribed velocity does the work of its reaction.
     fn external_work(&self, h: f64, motion: &Motion<D>, problem: &ContactProblem<D>) -> f64 {
         let mean = |k: usize| (motion.before[k].0 + problem.nodes.all[k].velocity) * 0.5;
         let mut work = 0.0;

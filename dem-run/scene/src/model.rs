@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::function::Function;
-use super::material::{Materials, PairBonds};
+use super::material::{Materials, PairBonds, Scatter};
 use super::membrane::Membrane;
 use super::region::Region;
 use super::sample::Sample;
@@ -127,23 +127,6 @@ pub struct Bonds {
     /// relative path starts from the folder of the scene.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub list: Option<PathBuf>,
-}
-
-/// Distribution of the strengths of bonds, relative to `strength` or `stress`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Scatter {
-    /// Weibull: a share exp(−(s/s₀)^m) of the bonds is stronger than s, with the given strength
-    /// as s₀.
-    Weibull {
-        /// Modulus m: the larger it is, the smaller the scatter.
-        modulus: f64,
-    },
-    /// Normal, with the given strength as mean and no strength below zero.
-    Normal {
-        /// Standard deviation over the mean.
-        deviation: f64,
-    },
 }
 
 /// Stiffness of elastic bonds.

@@ -1,8 +1,8 @@
 //! Wrong values in the materials, and in regions.
 
 use super::report::{Number, Report};
-use crate::material::{BASE, MaterialPair, PairBonds};
-use crate::model::{Scatter, Scene};
+use crate::material::{BASE, MaterialPair, PairBonds, Scatter};
+use crate::model::Scene;
 use crate::region::Region;
 use crate::sample::Sample;
 
