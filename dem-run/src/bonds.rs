@@ -62,9 +62,6 @@ struct Laws<'a, D: Dim> {
 impl<D: Dim> Laws<'_, D> {
     /// What is listed for the materials of two grains.
     fn pair(&self, pair: [usize; 2]) -> Option<&scene::PairBonds> {
-        if self.grains.material.is_empty() {
-            return None;
-        }
         let [a, b] = pair.map(|k| self.grains.material_of(k));
         self.scene.materials.pair(a, b)?.bonds.as_ref()
     }

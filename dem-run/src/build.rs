@@ -397,7 +397,7 @@ pub fn settings<D: Dim>(scene: &Scene) -> Settings<D> {
     Settings {
         step: scene.time.step,
         gravity: scene.gravity.as_deref().map(D::Vector::from_slice).filter(|g| g.norm() > 0.0),
-        friction: scene.materials.friction.grain_grain,
+        friction: scene.materials.friction_of(0, 0),
         material_friction: materials::friction(scene),
         restitution: bouncing.then_some(Restitution {
             grain_grain: restitution.grain_grain,
@@ -459,6 +459,17 @@ fn staged(newton: &scene::Newton, stages: Stages, tolerance: f64, accept: f64) -
 mod tests {
     use super::*;
     use dem_core::dim::D2;
+
+    #[test]
+    fn what_a_scene_with_one_material_says_of_its_pair_holds() {
+        let text = include_str!("../../configs/two-grains.json");
+        let friction = |sets: &[&str]| {
+            let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
+            settings::<D2>(&scene::from_text("test", text, &sets).expect("a scene")).friction
+        };
+        let pair = r#"materials.pairs=[{"between": ["base", "base"], "friction": 0.125}]"#;
+        assert_eq!((friction(&[]) == 0.125, friction(&[pair])), (false, 0.125));
+    }
 
     #[test]
     fn the_defaults_of_a_scene_are_those_of_the_library() {

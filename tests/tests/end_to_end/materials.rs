@@ -123,7 +123,7 @@ fn limits_of_twist_differ_by_pair_and_the_history_has_them() {
         let parts = why["broken"]["parts"].as_array().expect("parts").clone();
         let twist = parts.iter().find(|part| part["mode"] == "TWIST").expect("its part");
         assert!((twist["utilisation"].as_f64().expect("a number") - 1.0).abs() < 1e-6, "{twist}");
-        here.dem_post(&["check", "a.h5"]).succeeds();
+        assert!(here.dem_post(&["info", "--check", "a.h5"]).succeeds().stdout.contains("sound    yes"));
     }
 }
 
