@@ -2,6 +2,7 @@
 //! on grains.
 
 use crate::dim::{Dim, Vect};
+use crate::plate::Plate;
 use std::sync::Arc;
 
 /// A prescribed function of time (s).
@@ -157,6 +158,9 @@ pub enum Shape<D: Dim> {
         /// Unit axis of a cylinder.
         axis: Option<D::Vector>,
     },
+    /// A segment (2D) or a rectangle (3D) with its middle at the position; grains are on either
+    /// side.
+    Plate(Plate<D>),
 }
 
 impl<D: Dim> Shape<D> {
@@ -172,14 +176,16 @@ impl<D: Dim> Shape<D> {
                 let outward = direction::<D>(offset, distance);
                 if inside { (wall - distance - radius, -outward) } else { (distance - wall - radius, outward) }
             }
+            Self::Plate(ref plate) => plate.gap(offset, radius),
         }
     }
 
     /// The length (m) to which tolerances at this wall are relative: its smallest radius of
-    /// curvature, infinite for a plane.
+    /// curvature, infinite for a plane. At a plate, too, they are relative to the grain alone: the
+    /// sharp edges of a plate have no length.
     pub fn size(&self) -> f64 {
         match *self {
-            Self::Plane { .. } => f64::INFINITY,
+            Self::Plane { .. } | Self::Plate(_) => f64::INFINITY,
             Self::Round { radius, .. } => radius,
         }
     }
@@ -188,23 +194,25 @@ impl<D: Dim> Shape<D> {
     pub fn flat_normal(&self) -> Option<D::Vector> {
         match *self {
             Self::Plane { normal } => Some(normal),
-            Self::Round { .. } => None,
+            Self::Round { .. } | Self::Plate(_) => None,
         }
     }
 
     /// How far a displacement by this unit vector moves the surface across itself (–): zero for a
-    /// direction along a plane or along the axis of a cylinder.
+    /// direction along a plane or along the axis of a cylinder. A plate that moves along itself
+    /// moves its edges.
     pub fn moves_across(&self, direction: D::Vector) -> f64 {
         match *self {
             Self::Plane { normal } => direction.dot(&normal).abs(),
             Self::Round { axis, .. } => across::<D>(direction, axis).norm(),
+            Self::Plate(_) => direction.norm(),
         }
     }
 
     /// Whether the wall is around the grains.
     pub fn encloses(&self) -> bool {
         match *self {
-            Self::Plane { .. } => false,
+            Self::Plane { .. } | Self::Plate(_) => false,
             Self::Round { inside, .. } => inside,
         }
     }
@@ -212,14 +220,15 @@ impl<D: Dim> Shape<D> {
     /// Smallest gap (m) of a grain that moves from `offset` along the straight displacement `way`
     /// (m).
     pub(crate) fn smallest_gap(&self, offset: D::Vector, way: D::Vector, radius: f64) -> f64 {
-        let end = self.gap(offset + way, radius).0.min(self.gap(offset, radius).0);
+        let end = || self.gap(offset + way, radius).0.min(self.gap(offset, radius).0);
         match *self {
             // along a line the gap to a plane or to an enclosing wall is smallest at an end
-            Self::Plane { .. } | Self::Round { inside: true, .. } => end,
+            Self::Plane { .. } | Self::Round { inside: true, .. } => end(),
+            Self::Plate(ref plate) => plate.smallest_gap(offset, way, radius),
             Self::Round { inside: false, axis, .. } => {
                 let (x, w) = (across::<D>(offset, axis), across::<D>(way, axis));
                 let nearest = -x.dot(&w) / w.dot(&w);
-                if 0.0 < nearest && nearest < 1.0 { self.gap(offset + way * nearest, radius).0 } else { end }
+                if 0.0 < nearest && nearest < 1.0 { self.gap(offset + way * nearest, radius).0 } else { end() }
             }
         }
     }
@@ -287,14 +296,15 @@ pub struct Slide<D: Dim> {
 pub struct Wall<D: Dim> {
     /// Surface.
     pub shape: Shape<D>,
-    /// A point of the plane, or the centre (m).
+    /// A point of the plane, the middle of a plate, or the centre (m).
     pub position: D::Vector,
     /// Velocity (m/s).
     pub velocity: D::Vector,
     /// How it moves.
     pub drive: Drive<D>,
     /// Whether the value of its force drive is a stress (Pa) on the present section of the sample.
-    /// The wall is then a plane whose normal is parallel to an axis.
+    /// The wall is then a plane whose normal is parallel to an axis, or a plate whose sides are
+    /// parallel to axes too.
     pub per_area: bool,
     /// That section in the last step (m²).
     pub section: f64,

@@ -39,6 +39,7 @@ pub mod contact;
 pub mod detection;
 pub mod dim;
 mod linear;
+pub mod plate;
 pub mod problem;
 pub mod saved;
 pub mod solver;
@@ -51,6 +52,7 @@ pub mod prelude {
     pub use crate::bond::{Bond, BondStatus, Bonds, Rupture, Stiffness};
     pub use crate::contact::BondFlow;
     pub use crate::dim::{D2, D3, D3Twist, Dim, Vect};
+    pub use crate::plate::Plate;
     pub use crate::solver::{GaussSeidelSettings, SolverSettings, StagedSettings};
     pub use crate::world::{MaterialFriction, Restitution, Settings, StepError, StepReport, World};
 }

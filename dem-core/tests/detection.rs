@@ -7,10 +7,12 @@ use common::grain;
 use dem_core::body::{Grains, Shape, Wall};
 use dem_core::detection::Candidates;
 use dem_core::dim::{D2, D3, Dim, Vect};
+use dem_core::plate::Plate;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-/// Grains of radii over a decade in a box, a floor and a cylinder around (a circle in 2D).
+/// Grains of radii over a decade in a box, a floor, a cylinder around (a circle in 2D), and a plate
+/// in the middle.
 fn scene<D: Dim>(rng: &mut Pcg64, count: usize) -> (Grains<D>, Vec<Wall<D>>) {
     let grains = (0..count).map(|_| {
         let x: Vec<f64> = (0..D::N).map(|_| rng.random::<f64>()).collect();
@@ -22,7 +24,9 @@ fn scene<D: Dim>(rng: &mut Pcg64, count: usize) -> (Grains<D>, Vec<Wall<D>>) {
     let mut centre = D::Vector::zero();
     (0..D::N).for_each(|k| centre[k] = 0.5);
     let ring = Shape::Round { radius: 0.6, inside: true, axis: (D::N > 2).then_some(axis) };
-    (grains, vec![common::floor(0.1), Wall::fixed(ring, centre, 0.1)])
+    let plate = Shape::Plate(Plate::new(axis, None, &[0.4, 0.2]));
+    let walls = [ring, plate].map(|shape| Wall::fixed(shape, centre, 0.1));
+    (grains, [vec![common::floor(0.1)], walls.to_vec()].concat())
 }
 
 /// Every pair whose gap is at most the sum of the reaches, by brute force.

@@ -35,7 +35,7 @@ impl Run {
         let drive = if self.driven { WallDrive::Force } else { WallDrive::Fixed };
         let direction = if self.driven { [0.0, -1.0, 0.0] } else { [0.0; 3] };
         let normal = [0.0, -1.0, 0.0];
-        let wall = Wall { name: "top".into(), kind: WallKind::Plane, normal, radius: 0.0, drive, direction };
+        let wall = Wall { name: "top".into(), normal, drive, direction, ..Wall::default() };
         let layout = Layout {
             dimension: 2,
             friction: true,

@@ -17,6 +17,7 @@ use dem_core::bond::Rupture;
 use dem_core::contact::{BondFlow, LocalSolve};
 use dem_core::detection::pairs_within;
 use dem_core::dim::{Dim, Vect};
+use dem_core::plate::Plate;
 use dem_core::saved::{Mismatch, Reader};
 use dem_core::solver::{GaussSeidelSettings, SolverSettings, StagedSettings, Stages, Start, StiffnessRatio};
 use dem_core::world::{Membrane, Restitution, Settings, StepError, World};
@@ -292,6 +293,11 @@ fn build_wall<D: Dim>(scene: &Scene, name: &str, wall: &scene::Wall, grains: &Gr
         scene::Shape::Cylinder(c) => {
             (round(c.radius, c.inside, Some(unit::<D>(&c.axis))), D::Vector::from_slice(&c.center))
         }
+        scene::Shape::Plate(p) => {
+            let plate = plate::<D>(p);
+            let ahead = if p.seated { seat_of_plate(&plate, &p.center, grains).unwrap_or(0.0) } else { 0.0 };
+            (Shape::Plate(plate), D::Vector::from_slice(&p.center) + plate.normal() * ahead)
+        }
     };
     let friction = wall.friction.unwrap_or(scene.materials.friction.grain_wall);
     let mut built = Wall::fixed(shape, position, friction);
@@ -335,16 +341,35 @@ fn seat<D: Dim>(shape: &scene::Shape, center: D::Vector, grains: &Grains<D>) -> 
     grains.position.iter().zip(&grains.radius).filter_map(touch).min_by(f64::total_cmp)
 }
 
-/// Messages about seated round walls whose path meets no grain.
+fn plate<D: Dim>(plate: &scene::Plate) -> Plate<D> {
+    Plate::new(unit::<D>(&plate.normal), plate.side.as_deref().map(D::Vector::from_slice), &plate.size)
+}
+
+/// The distance from `center` along the normal to the first contact of a seated plate with a grain
+/// (m); none if its path meets no grain.
+fn seat_of_plate<D: Dim>(plate: &Plate<D>, center: &[f64], grains: &Grains<D>) -> Option<f64> {
+    let center = D::Vector::from_slice(center);
+    let touch = |(x, r): (&D::Vector, &f64)| {
+        let apart = *x - center;
+        let (ahead, [a, b]) = (apart.dot(&plate.normal()), plate.beyond(apart));
+        let height = r * r - (a * a + b * b);
+        (height > 0.0 && ahead > 0.0).then(|| if a == 0.0 && b == 0.0 { ahead - r } else { ahead - height.sqrt() })
+    };
+    grains.position.iter().zip(&grains.radius).filter_map(touch).min_by(f64::total_cmp)
+}
+
+/// Messages about seated round walls and plates whose path meets no grain.
 fn unseated<D: Dim>(scene: &Scene, grains: &Grains<D>) -> Vec<String> {
     let mut wrong = vec![];
     for (name, wall) in &scene.walls {
-        let (scene::Shape::Circle(scene::Circle { center, .. }) | scene::Shape::Sphere(scene::Sphere { center, .. })) =
-            &wall.shape
-        else {
-            continue;
+        let lost = match &wall.shape {
+            scene::Shape::Circle(scene::Circle { center, .. }) | scene::Shape::Sphere(scene::Sphere { center, .. }) => {
+                wall.shape.seat().is_some() && seat(&wall.shape, D::Vector::from_slice(center), grains).is_none()
+            }
+            scene::Shape::Plate(p) => p.seated && seat_of_plate(&plate::<D>(p), &p.center, grains).is_none(),
+            scene::Shape::Plane(_) | scene::Shape::Cylinder(_) => false,
         };
-        if wall.shape.seat().is_some() && seat(&wall.shape, D::Vector::from_slice(center), grains).is_none() {
+        if lost {
             let (low, high) = grains.bounds();
             wrong.push(format!(
                 "walls.{name}: the seated wall meets no grain along its direction; move its centre, or turn its direction: \
@@ -372,8 +397,11 @@ fn buried<D: Dim>(scene: &Scene, walls: &[Wall<D>], grains: &Grains<D>) -> Vec<S
         if count > 0 {
             let more = if count > 1 { format!(" and {} more", count - 1) } else { String::new() };
             wrong.push(format!(
-                "walls.{name}: the wall overlaps grain {} by {:.3e} m{more}; move the wall, or give a plane \"place\": \"seated\"",
-                deepest.0, -deepest.1
+                "walls.{name}: the wall overlaps grain {} by {:.3e} m{more}; move the wall, or give a {} {}",
+                deepest.0,
+                -deepest.1,
+                if matches!(wall.shape, Shape::Plate(_)) { "plate" } else { "plane" },
+                touching::seating(wall)
             ));
         }
     }

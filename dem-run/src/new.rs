@@ -33,6 +33,7 @@ pub const SCENES: &[(&str, &str)] = scenes![
     "membrane-biaxial",
     "notched-beam",
     "pull-off",
+    "punch",
     "shear-box",
     "staged-biaxial",
     "triaxial",

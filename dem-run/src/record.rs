@@ -282,15 +282,22 @@ fn padded<D: Dim>(v: D::Vector) -> [f64; 3] {
 
 fn describe_wall<D: Dim>(wall: &Wall<D>, name: &str) -> history::Wall {
     let zero = D::Vector::zero();
-    let (kind, normal, radius) = match wall.shape {
-        Shape::Plane { normal } => (WallKind::Plane, normal, 0.0),
+    let mut described = history::Wall { name: name.into(), ..history::Wall::default() };
+    let (kind, normal) = match wall.shape {
+        Shape::Plane { normal } => (WallKind::Plane, normal),
         Shape::Round { radius, inside, axis } => {
             let kind = match axis {
                 Some(_) => WallKind::Cylinder,
                 None if D::N == 2 => WallKind::Circle,
                 None => WallKind::Sphere,
             };
-            (kind, axis.unwrap_or(zero), if inside { -radius } else { radius })
+            described.radius = if inside { -radius } else { radius };
+            (kind, axis.unwrap_or(zero))
+        }
+        Shape::Plate(plate) => {
+            described.side = padded::<D>(plate.sides()[0]);
+            [described.length, described.width] = plate.lengths();
+            (WallKind::Plate, plate.normal())
         }
     };
     let (drive, direction) = match wall.drive {
@@ -298,14 +305,7 @@ fn describe_wall<D: Dim>(wall: &Wall<D>, name: &str) -> history::Wall {
         Drive::Velocity { direction, .. } => (WallDrive::Velocity, direction),
         Drive::Force { direction, .. } => (WallDrive::Force, direction),
     };
-    history::Wall {
-        name: name.into(),
-        kind,
-        normal: padded::<D>(normal),
-        radius,
-        drive,
-        direction: padded::<D>(direction),
-    }
+    history::Wall { kind, normal: padded::<D>(normal), drive, direction: padded::<D>(direction), ..described }
 }
 
 /// The bonds of a world. `formed` is the step after which a stage formed them, or that none has;

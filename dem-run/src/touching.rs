@@ -3,8 +3,16 @@
 use crate::output::number;
 use crate::scene::Scene;
 use crate::tolerances::ROUNDED;
-use dem_core::body::{Grains, Wall};
+use dem_core::body::{Grains, Shape, Wall};
 use dem_core::dim::Dim;
+
+/// The field of a scene by which a wall is seated against the sample.
+pub(crate) fn seating<D: Dim>(wall: &Wall<D>) -> &'static str {
+    match wall.shape {
+        Shape::Plate(_) => "\"seated\": true",
+        Shape::Plane { .. } | Shape::Round { .. } => "\"place\": \"seated\"",
+    }
+}
 
 /// Messages about walls that need grains and have none.
 pub(crate) fn apart<D: Dim>(scene: &Scene, walls: &[Wall<D>], grains: &Grains<D>) -> Vec<String> {
@@ -20,15 +28,17 @@ pub(crate) fn apart<D: Dim>(scene: &Scene, walls: &[Wall<D>], grains: &Grains<D>
         if wall.per_area && gap > ROUNDED * radius {
             wrong.push(format!(
                 "walls.{name}.stress: the wall touches nothing at the start, so there is no section to load: its nearest \
-                 grain is {} m away; seat it (\"place\": \"seated\"), or turn its normal towards the sample",
-                number(gap)
+                 grain is {} m away; seat it ({}), or turn its normal towards the sample",
+                number(gap),
+                seating(wall)
             ));
         }
         if let Some(grip) = wall.grip.filter(|grip| gap > *grip) {
             wrong.push(format!(
                 "walls.{name}.grip: no grain is within {grip:?} m of the wall, the nearest is {} m away; seat the wall \
-                 (\"place\": \"seated\"), or enlarge the grip",
-                number(gap)
+                 ({}), or enlarge the grip",
+                number(gap),
+                seating(wall)
             ));
         }
     }

@@ -5,6 +5,7 @@ use crate::output::number;
 use crate::prepare::MOST_STEPS;
 use crate::scene::{Rupture, Sample, Scene};
 use crate::tolerances::{PARALLEL, TOUCHING};
+use crate::touching::seating;
 use dem_core::body::{Drive, Grains, Wall};
 use dem_core::dim::{Dim, Vect};
 
@@ -240,9 +241,10 @@ fn apart<D: Dim>(wall: &Wall<D>, motion: &DriveMotion<D>, grains: &Grains<D>) ->
     (gap > TOUCHING * mean && near < gap).then(|| {
         format!(
             "it touches nothing at the start: its nearest grain is {} m away, and its drive brings it at most {} m nearer by \
-             time.end, so it carries no load: seat it (\"place\": \"seated\"), or turn its direction",
+             time.end, so it carries no load: seat it ({}), or turn its direction",
             number(gap),
-            number(near.max(0.0))
+            number(near.max(0.0)),
+            seating(wall)
         )
     })
 }

@@ -129,8 +129,8 @@ class History:
         if "walls" not in self._file:
             raise ValueError(f"{self.path} has no walls")
         group = self._file["walls"]
-        dimensions = {"kind": ("wall",), "drive": ("wall",), "radius": ("wall",)}
-        dimensions |= {"normal": ("wall", "axis"), "direction": ("wall", "axis")}
+        dimensions = dict.fromkeys(("kind", "drive", "radius", "length", "width"), ("wall",))
+        dimensions |= dict.fromkeys(("normal", "direction", "side"), ("wall", "axis"))
         given = {name: kept for name, kept in dimensions.items() if name in group}
         fixed = {name: (kept, _named(group[name]), _units(group[name])) for name, kept in given.items()}
         trailing = dict.fromkeys(("position", "velocity", "force"), ("wall", "axis"))

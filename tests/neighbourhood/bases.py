@@ -104,6 +104,28 @@ def heap():
     }
 
 
+def plate(normal, center, size, seated=False):
+    """A plate of the plane."""
+    return {"shape": {"plate": {"normal": normal, "center": center, "size": [size], "seated": seated}}}
+
+
+def opening():
+    """A dry heap of 80 disks that falls through an opening between two plates."""
+    scene = heap()
+    scene["walls"] = {
+        "bottom": plate(up(2), [-0.0065, 0.0], 0.027),
+        "shelf": plate(up(2), [0.0265, 0.0], 0.027),
+    }
+    return scene
+
+
+def punch():
+    """60 cemented disks under a plate that is narrower than they are, with a force that grows."""
+    scene = compression(2, small(), 2000.0, 1e-4, 0.03)
+    scene["walls"]["top"] |= plate(up(2, -1.0), [0.008, 0.1], 0.007, True)
+    return scene
+
+
 def elastic():
     """60 disks with elastic bonds compressed."""
     scene = compression(2, packing(60, (2e-3, 4e-3), 0.76, width=0.018), 3000.0, 1e-4, 0.04)

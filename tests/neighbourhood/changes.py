@@ -68,7 +68,7 @@ def lid(drive):
 
     def change(scene):
         top = scene["walls"].get("top") or plane(up(scene["dimension"], -1.0))
-        needs(drive not in ("stress", "slide") or "plane" in top["shape"])
+        needs(drive not in ("stress", "slide") or {"plane", "plate"} & set(top["shape"]))
         for old in ("force", "force_rate", "velocity", "stress", "slide", "grip", "direction", "mass"):
             if not (old == "direction" and "plane" not in top["shape"]):
                 top.pop(old, None)
@@ -160,7 +160,7 @@ def in_stages(scene):
     """Stages of the wall on top: a force, a velocity until a share of the bonds is broken or the
     wall has moved, held, a constant force."""
     top = scene["walls"].get("top")
-    needs(top and "plane" in top["shape"] and not top.get("grip") and not top.get("slide"))
+    needs(top and {"plane", "plate"} & set(top["shape"]) and not top.get("grip") and not top.get("slide"))
     load, end = 20.0 if scene["dimension"] == 2 else 100.0, scene["time"]["end"]
     load *= (scene.get("bonds") or {}).get("strength", COHESION) / COHESION
     for old in ("force", "force_rate", "velocity", "stress"):

@@ -105,16 +105,20 @@ class Driving:
 
 def sections(h, k):
     """Section (m²) of the sample across the normal of the plane wall `k` at the middle of every step,
-    and the size of what it is computed from."""
+    of a plate the part that it covers, and the size of what it is computed from."""
     across = int(np.argmax(np.abs(h.wall_normal[k])))
     for w in range(h.W):
         inside = h.wall_kind[w] == "CYLINDER" and h.wall_radius[w] < 0
-        if inside and int(np.argmax(np.abs(h.wall_normal[w]))) == across:
+        if inside and h.wall_kind[k] != "PLATE" and int(np.argmax(np.abs(h.wall_normal[w]))) == across:
             area = np.full(h.S, np.pi * h.wall_radius[w] ** 2)
             return area, area
     area = size = np.full(h.S, prescribed.thickness(h.scene))
     for axis in set(range(h.D)) - {across}:
         low, high = extent(h, axis)
+        for side, length in h.wall_sides[k]:
+            if abs(side[axis]) == 1:
+                middle = h.mid[:, h.N + k, axis]
+                low, high = np.maximum(low, middle - 0.5 * length), np.minimum(high, middle + 0.5 * length)
         area, size = area * np.maximum(high - low, 0.0), size * (np.abs(high) + np.abs(low))
     return area, size
 

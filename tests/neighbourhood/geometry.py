@@ -25,6 +25,15 @@ def gap_and_normal(h, i, j, xi, xj):
             normal[rows] = h.wall_normal[w]
             gap[rows] = offset @ h.wall_normal[w] - radius
             continue
+        if h.wall_kind[w] == "PLATE":
+            # the nearest point of the plate, side by side
+            nearest = np.zeros(offset.shape)
+            for side, length in h.wall_sides[w]:
+                nearest += np.clip(offset @ side, -0.5 * length, 0.5 * length)[:, None] * side
+            beside = offset - nearest
+            distance = norm(beside)
+            normal[rows], gap[rows] = beside / distance[:, None], distance - radius
+            continue
         if h.wall_kind[w] == "CYLINDER":
             axis = h.wall_normal[w]
             offset = offset - (offset @ axis)[:, None] * axis
@@ -189,9 +198,18 @@ def smallest_gap(h, i, j, begin, end):
     x, way = begin[i] - begin[j], (end - begin)[i] - (end - begin)[j]
     square = (way * way).sum(1)
     at = np.clip(np.divide(-(x * way).sum(1), square, out=np.zeros(len(i)), where=square > 0), 0.0, 1.0)
-    round_bodies = np.concatenate([np.ones(h.N, bool), np.array([k != "PLANE" for k in h.wall_kind], bool)])[j]
+    round_bodies = np.concatenate(
+        [np.ones(h.N, bool), np.array([k not in ("PLANE", "PLATE") for k in h.wall_kind], bool)]
+    )[j]
     ends = [
         gap_and_normal(h, i, j, (begin + t * (end - begin))[i], (begin + t * (end - begin))[j])[0] for t in (0.0, 1.0)
     ]
     nearest = gap_and_normal(h, i, j, x + at[:, None] * way, np.zeros_like(x))[0]
-    return np.where(round_bodies, np.minimum(np.minimum(*ends), nearest), np.minimum(*ends))
+    least = np.where(round_bodies, np.minimum(np.minimum(*ends), nearest), np.minimum(*ends))
+    plates = np.isin(j, [h.N + w for w in range(h.W) if h.wall_kind[w] == "PLATE"])
+    if plates.any():
+        # at points of the way: no less than the smallest gap
+        i, j, x, way = i[plates], j[plates], x[plates], way[plates]
+        points = [gap_and_normal(h, i, j, x + t * way, np.zeros_like(x))[0] for t in np.linspace(0, 1, 65)]
+        least[plates] = np.min(points, 0)
+    return least

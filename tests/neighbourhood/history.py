@@ -80,7 +80,7 @@ class History:
         if self.W == 0:
             self.X = self.V = self.wall_frame_force = np.zeros((frames, 0, self.D))
             self.wall_normal, self.wall_radius = np.zeros((0, self.D)), np.zeros(0)
-            self.wall_kind = []
+            self.wall_kind = self.wall_sides = []
             return
         names = list(group["name"].asstr()[:])
         if names != self.wall_names:
@@ -89,6 +89,7 @@ class History:
         self.wall_frame_force = group["force/value"][:frames]
         self.wall_normal, self.wall_radius = group["normal"][:], group["radius"][:]
         self.wall_kind = enum_names(group["kind"])
+        self.wall_sides = [plate_sides(group, w) if kind == "PLATE" else [] for w, kind in enumerate(self.wall_kind)]
 
     def _rows(self, group):
         start, count = group["start"][: self.S + 1].astype(int), group["count"][: self.S + 1].astype(int)
@@ -217,6 +218,13 @@ class History:
         if self.membrane is not None:
             force += self.membrane.force
         return force, torque
+
+
+def plate_sides(group, w):
+    """Unit vectors along the sides of the plate `w`, each with the length of the side (m)."""
+    side = group["side"][w]
+    sides = [(side, group["length"][w])]
+    return sides if len(side) == 2 else sides + [(np.cross(group["normal"][w], side), group["width"][w])]
 
 
 def enum_names(dataset, count=None):

@@ -69,7 +69,8 @@ def direction(scene, name, wall):
     """Unit direction of the drive of a wall of the scene; zero where it is fixed."""
     if not is_driven(scene, name, wall):
         return np.zeros(scene["dimension"])
-    along = wall.get("direction") or wall["shape"]["plane"]["normal"]
+    flat = wall["shape"].get("plane") or wall["shape"].get("plate")
+    along = wall.get("direction") or flat["normal"]
     return np.asarray(along, float) / np.linalg.norm(along)
 
 

@@ -16,6 +16,8 @@ from bases import (
     disks,
     elastic,
     heap,
+    opening,
+    punch,
     shear,
     small,
     spheres,
@@ -62,6 +64,8 @@ BASES = {
     "interface": interface,
     "staged": staged,
     "events": events,
+    "opening": opening,
+    "punch": punch,
 }
 
 

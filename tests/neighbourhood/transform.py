@@ -61,6 +61,7 @@ class Transform:
                 ("axis", self.along),
                 ("center", self.place),
                 ("seated", self.along),
+                ("side", self.along),
             ):
                 if isinstance(shape.get(key), list):
                     shape[key] = how(shape[key])
@@ -68,6 +69,8 @@ class Transform:
                 shape["place"]["at"] = self.place(shape["place"]["at"])
             if "radius" in shape:
                 shape["radius"] *= self.length
+            if "size" in shape:
+                shape["size"] = [self.length * size for size in shape["size"]]
         if "direction" in wall:
             wall["direction"] = self.along(wall["direction"])
         if "grip" in wall:

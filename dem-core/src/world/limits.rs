@@ -83,8 +83,8 @@ impl<D: Dim> World<D> {
         gap > PASSING * self.smaller(pair)
     }
 
-    /// A pair of grains with a reaction although they would pass at a distance: only the tangent
-    /// plane stopped them.
+    /// A grain with a reaction from another, or from the edge of a plate, although they would pass
+    /// at a distance: only the tangent plane stopped them.
     pub(super) fn pushes_at_a_distance(
         &self,
         mid: &Midpoint<D>,
@@ -96,17 +96,25 @@ impl<D: Dim> World<D> {
             if !stored.wide || stored.bond().is_some() || stored.reaction.n <= 0.0 {
                 return false;
             }
+            let plate = match (stored.pair[1] as usize).checked_sub(self.grains.len()) {
+                None => false,
+                Some(wall) if matches!(self.walls[wall].shape, Shape::Plate(_)) => true,
+                Some(_) => return false,
+            };
             let t = self.touch(mid, stored);
             let margin = PASSING * self.smaller(t.pair);
             if t.gap <= margin {
                 return false;
             }
             let [i, j] = t.pair.map(|k| k as usize);
-            let offset = D::normal(&t.frame) * (t.gap + self.grains.radius[i] + self.grains.radius[j]);
+            let offset = match plate {
+                false => D::normal(&t.frame) * (t.gap + self.grains.radius[i] + self.grains.radius[j]),
+                true => separation::<D>(mid.place(i), mid.place(j)),
+            };
             let way = (nodes.all[i].velocity - nodes.all[j].velocity) * h;
             self.surface(j).smallest_gap(offset, way, self.grains.radius[i]) > margin
         };
-        touches.iter().filter(|t| (t.pair[1] as usize) < self.grains.len()).find(far).map(|t| t.pair)
+        touches.iter().find(far).map(|t| t.pair)
     }
 
     /// The pair that moves furthest beyond its law in a solution, if too far; displacements are
@@ -200,10 +208,14 @@ impl<D: Dim> World<D> {
         }
     }
 
-    /// The radius of the smaller body of a pair (m); at a plane, the radius of the grain.
+    /// The radius of the smaller body of a pair (m); at a plane or a plate, that of the grain.
     pub(super) fn smaller(&self, pair: [u32; 2]) -> f64 {
         let [i, j] = pair.map(|k| k as usize);
-        self.grains.radius[i].min(self.surface(j).size())
+        let size = match j.checked_sub(self.grains.len()) {
+            None => self.grains.radius[j],
+            Some(wall) => self.walls[wall].shape.size(),
+        };
+        self.grains.radius[i].min(size)
     }
 }
 

@@ -5,6 +5,7 @@ use super::World;
 use super::motion::Midpoint;
 use crate::body::Shape;
 use crate::dim::{Dim, Vect};
+use crate::plate::Plate;
 
 /// The only axis along which a vector has a component, if any.
 fn only_axis<V: Vect>(vector: V) -> Option<usize> {
@@ -40,18 +41,25 @@ impl<D: Dim> World<D> {
         }
     }
 
-    /// Section of the sample (m²) across the normal of a plane wall that is parallel to an axis.
+    /// Section of the sample (m²) across the normal of a plane wall that is parallel to an axis; of
+    /// a plate, whose sides are then parallel to axes too, the part of it that the plate covers.
     ///
     /// It is πR² inside a cylinder along this axis. Otherwise it is the product of the extents
     /// along the other axes, in 2D times the thickness. Where planes bound the sample on both
-    /// sides, the extent is the distance of the innermost two, else that of the grains.
+    /// sides, the extent is the distance of the innermost two, else that of the grains. What a
+    /// plate covers is known only without a cylinder.
     fn section(&self, wall: usize, mid: &Midpoint<D>) -> f64 {
-        let across = self.walls[wall].shape.flat_normal().and_then(only_axis);
+        let plate = match &self.walls[wall].shape {
+            Shape::Plate(plate) => Some(plate),
+            _ => None,
+        };
+        let normal = plate.map(Plate::normal).or(self.walls[wall].shape.flat_normal());
+        let across = normal.and_then(only_axis);
         let around = self.walls.iter().find_map(|wall| match wall.shape {
             Shape::Round { radius, inside: true, axis: Some(axis) } if only_axis(axis) == across => Some(radius),
             _ => None,
         });
-        if let Some(radius) = around {
+        if let (Some(radius), None) = (around, plate) {
             return std::f64::consts::PI * radius * radius;
         }
         let mut grains = None;
@@ -61,7 +69,11 @@ impl<D: Dim> World<D> {
                 let (low, high) = *grains.get_or_insert_with(|| self.grains.bounds_at(&mid.grains));
                 (low[axis], high[axis])
             });
-            (high - low).max(0.0)
+            let Some(plate) = plate else { return (high - low).max(0.0) };
+            let mut along = D::Vector::zero();
+            along[axis] = 1.0;
+            let (middle, reach) = (mid.walls[wall][axis], plate.reach(along));
+            (high.min(middle + reach) - low.max(middle - reach)).max(0.0)
         };
         (0..D::N).filter(|axis| Some(*axis) != across).map(extent).product::<f64>() * self.settings.thickness
     }

@@ -263,7 +263,8 @@ fn places(c: &mut Checker) {
     });
 }
 
-/// Checks that the directions of contacts, of planes and cylinders, and of drives are unit vectors.
+/// Checks that the directions of contacts, of planes, plates and cylinders, and of drives are unit
+/// vectors.
 fn directions(c: &mut Checker) {
     let Sizes { d, w, .. } = c.sizes;
     let is_unit = |v: &[f64]| (v.iter().map(|x| x * x).sum::<f64>() - 1.0).abs() <= UNIT;
@@ -276,6 +277,7 @@ fn directions(c: &mut Checker) {
         });
     }
     let has_normal = |kind: u8| WallKind::ALL.get(usize::from(kind)).is_some_and(|kind| kind.has_normal());
+    let has_sides = |kind: u8| WallKind::ALL.get(usize::from(kind)) == Some(&WallKind::Plate);
     let is_driven = |drive: u8| WallDrive::ALL.get(usize::from(drive)).is_some_and(|drive| *drive != WallDrive::Fixed);
     let mut check = |place: &str, of: &str, has: &dyn Fn(u8) -> bool| {
         let vectors = c.rows::<f64>(place, 0..w).unwrap_or_default();
@@ -287,6 +289,7 @@ fn directions(c: &mut Checker) {
         }
     };
     check("walls/normal", "walls/kind", &has_normal);
+    check("walls/side", "walls/kind", &has_sides);
     check("walls/direction", "walls/drive", &is_driven);
 }
 

@@ -106,6 +106,14 @@ impl Place {
         (corners, (eye - middle).dot(&normal) > 0.0)
     }
 
+    /// Whether a plate through `point`, m, is behind the middle of the sample: both the middle and
+    /// the eye are on the same side of it.
+    pub fn is_behind(&self, point: &[f64], normal: [f64; 3]) -> bool {
+        let (point, normal) = (Vector3::from_column_slice(point), Vector3::from(normal));
+        let height = |x: Vector3<f64>| (x - point).dot(&normal);
+        height(self.focus) * height(self.focus - FAR * self.half.norm() * self.ahead) > 0.0
+    }
+
     /// The box in the picture around some points, m.
     pub fn shows(&self, points: &[[f64; 3]]) -> Box2 {
         points.iter().fold(EMPTY, |found, point| union(found, around(self.flat(point), 0.0)))

@@ -4,6 +4,7 @@ use dem_history::{Wall, WallKind};
 
 use super::eye::Perspective;
 use super::sample::{Sample, View};
+use super::wall::corners;
 
 impl View {
     /// Left, lower, right and upper edge, m.
@@ -19,12 +20,17 @@ impl Sample {
         self.eye.place().map(|place| place.as_seen())
     }
 
-    /// Points of a wall at `position` (m): two ends of a line that crosses the view, four corners
-    /// of a plate in perspective, the centre of a round wall; and whether a plate is behind the
+    /// Points of a wall at `position` (m): two ends of a line that crosses the view or of a plate,
+    /// in 3D four corners, the centre of a round wall; and whether a plane or a plate is behind the
     /// grains.
     pub fn outline(&self, wall: &Wall, position: &[f64], view: View) -> (Vec<f64>, bool) {
-        if wall.kind != WallKind::Plane {
-            return (position.to_vec(), true);
+        match wall.kind {
+            WallKind::Plane => {}
+            WallKind::Plate => {
+                let behind = self.eye.place().is_none_or(|place| place.is_behind(position, wall.normal));
+                return (corners(wall, position).concat(), behind);
+            }
+            WallKind::Circle | WallKind::Sphere | WallKind::Cylinder => return (position.to_vec(), true),
         }
         if let Some(place) = self.eye.place() {
             let (corners, behind) = place.plane(position, wall.normal);

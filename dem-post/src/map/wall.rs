@@ -2,9 +2,10 @@
 
 use dem_drawing::{Canvas, colour};
 use dem_history::{Wall, WallDrive, WallKind};
+use nalgebra::Vector3;
 
 use super::arrow::draw_arrow;
-use super::boxes::{Box2, around};
+use super::boxes::{Box2, EMPTY, around, union};
 use super::eye::{Eye, Place};
 use super::frame::{ARROW, Frame, HATCH};
 
@@ -22,6 +23,7 @@ pub(super) fn draw(canvas: &mut Canvas, eye: &Eye, wall: &Wall, position: &[f64]
                 draw_plane(canvas, point, normal, frame);
             }
         }
+        WallKind::Plate => draw_plate_wall(canvas, eye, wall, position, frame, true),
         WallKind::Circle | WallKind::Sphere | WallKind::Cylinder => {
             let (at, radius) = (frame.at(point), wall.radius.abs() * frame.scale);
             let fill = if wall.radius < 0.0 { "none" } else { "#d0d0d0" };
@@ -30,15 +32,18 @@ pub(super) fn draw(canvas: &mut Canvas, eye: &Eye, wall: &Wall, position: &[f64]
     }
 }
 
-/// Draws the parts in front of the grains: in perspective, the edges of a plane.
+/// Draws the parts in front of the grains: plates in 2D; in perspective, the edges of a plane or a
+/// plate.
 pub(super) fn draw_in_front(canvas: &mut Canvas, eye: &Eye, wall: &Wall, position: &[f64], frame: &Frame) {
-    if let (WallKind::Plane, Some(place)) = (wall.kind, eye.place()) {
-        draw_plate(canvas, place, wall, position, frame, false);
+    match (wall.kind, eye.place()) {
+        (WallKind::Plane, Some(place)) => draw_plate(canvas, place, wall, position, frame, false),
+        (WallKind::Plate, _) => draw_plate_wall(canvas, eye, wall, position, frame, false),
+        _ => {}
     }
 }
 
-/// An arrow of the load at a driven plane in 2D, at the middle of the panel: towards the grains
-/// where the wall pushes. None where no grain acts on the wall.
+/// An arrow of the load at a driven plane or plate in 2D, at the middle of the panel or of the
+/// plate: towards the grains where the wall pushes. None where no grain acts on the wall.
 pub(super) fn draw_load(canvas: &mut Canvas, wall: &Wall, position: &[f64], force: &[f64], frame: &Frame) {
     if !bears_arrow(wall) || position.len() != 2 || force.len() != 2 {
         return;
@@ -51,10 +56,18 @@ pub(super) fn draw_load(canvas: &mut Canvas, wall: &Wall, position: &[f64], forc
     let sign = along.signum();
     // on the sheet y points down
     let load = (sign * wall.direction[0], -sign * wall.direction[1]);
-    let normal = (wall.normal[0], -wall.normal[1]);
+    let mut normal = (wall.normal[0], -wall.normal[1]);
     let from = frame.at([position[0], position[1]]);
     let line = (-normal.1, normal.0);
-    let off = to_the_middle(frame, from, line);
+    let mut off = to_the_middle(frame, from, line);
+    if wall.kind == WallKind::Plate {
+        off = 0.0;
+        // its grains may be on either side: they press it away from them
+        let pressed = force[0] * wall.normal[0] + force[1] * wall.normal[1];
+        if pressed > 0.0 {
+            normal = (-normal.0, -normal.1);
+        }
+    }
     let foot = (from.0 + line.0 * off, from.1 + line.1 * off);
     let at = |s: f64| (foot.0 + s * load.0, foot.1 + s * load.1);
     let pushes = load.0 * normal.0 + load.1 * normal.1 > 0.0;
@@ -62,25 +75,60 @@ pub(super) fn draw_load(canvas: &mut Canvas, wall: &Wall, position: &[f64], forc
     draw_arrow(canvas, at(tail), at(head));
 }
 
-/// Whether a wall has an arrow of its load: a driven plane.
+/// Whether a wall has an arrow of its load: a driven plane or plate.
 pub(super) fn bears_arrow(wall: &Wall) -> bool {
-    wall.kind == WallKind::Plane && wall.drive != WallDrive::Fixed
+    matches!(wall.kind, WallKind::Plane | WallKind::Plate) && wall.drive != WallDrive::Fixed
 }
 
-/// The box around a wall in the drawing, of a round wall its part within `limits`; `None` for an
-/// unbounded plane.
+/// The box around a wall in the drawing, of a round wall and a plate the part within `limits`;
+/// `None` for an unbounded plane.
 pub(super) fn extent(eye: &Eye, wall: &Wall, position: &[f64], limits: Box2) -> Option<Box2> {
+    let within = |[x, y]: [f64; 2]| [x.clamp(limits[0][0], limits[1][0]), y.clamp(limits[0][1], limits[1][1])];
     match wall.kind {
         WallKind::Plane => eye.place().map(|place| place.shows(&place.plane(position, wall.normal).0)),
+        WallKind::Plate => {
+            let shown = |found, corner: &Vec<f64>| union(found, around(within(eye.flat(corner)), 0.0));
+            Some(corners(wall, position).iter().fold(EMPTY, shown))
+        }
         WallKind::Circle | WallKind::Sphere | WallKind::Cylinder => {
-            let corners = around(eye.flat(position), wall.radius.abs());
-            Some(corners.map(|[x, y]| [x.clamp(limits[0][0], limits[1][0]), y.clamp(limits[0][1], limits[1][1])]))
+            Some(around(eye.flat(position), wall.radius.abs()).map(within))
         }
     }
 }
 
-/// A plane in perspective, as a plate of the sample's size: filled if it is behind the grains, only
-/// its edges if it is in front of them.
+/// The ends (2D) or corners (3D) of a plate with its middle at `position`, m.
+pub(super) fn corners(wall: &Wall, position: &[f64]) -> Vec<Vec<f64>> {
+    let side = Vector3::from(wall.side);
+    let (a, b) = (0.5 * wall.length * side, 0.5 * wall.width * Vector3::from(wall.normal).cross(&side));
+    let signs: &[[f64; 2]] = match position.len() {
+        2 => &[[-1.0, 0.0], [1.0, 0.0]],
+        _ => &[[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]],
+    };
+    let corner = |[s, t]: &[f64; 2]| (a * *s + b * *t).iter().zip(position).map(|(x, at)| at + x).collect();
+    signs.iter().map(corner).collect()
+}
+
+/// A plate: in 2D a thick line, without hatching, since it is solid from both sides; in 3D its
+/// outline, filled if it is behind the grains.
+fn draw_plate_wall(canvas: &mut Canvas, eye: &Eye, wall: &Wall, position: &[f64], frame: &Frame, behind: bool) {
+    let corners = corners(wall, position);
+    let on_sheet: Vec<(f64, f64)> = corners.iter().map(|corner| frame.at(eye.flat(corner))).collect();
+    match (&on_sheet[..], eye.place()) {
+        // in front: the grains that touch it reach into the width of the line
+        (&[from, to], _) if !behind => canvas.line(from, to, colour::BLACK, 3.0),
+        (&[_, _], _) => {}
+        // parallel to an axis, and often seen from its edge
+        (_, None) if behind => canvas.polygon(&on_sheet, "none", colour::BLACK, 1.8),
+        (_, None) => {}
+        (_, Some(place)) if place.is_behind(position, wall.normal) == behind => {
+            canvas.polygon(&on_sheet, if behind { "#e4e4e4" } else { "none" }, colour::GREY, 1.2);
+        }
+        (_, Some(_)) => {}
+    }
+}
+
+/// A plane in perspective, as a rectangle of the sample's size: filled if it is behind the grains,
+/// only its edges if it is in front of them.
 fn draw_plate(canvas: &mut Canvas, place: &Place, wall: &Wall, position: &[f64], frame: &Frame, behind: bool) {
     let (corners, is_behind) = place.plane(position, wall.normal);
     if is_behind == behind {
@@ -116,5 +164,35 @@ fn draw_plane(canvas: &mut Canvas, point: [f64; 2], normal: [f64; 2], frame: &Fr
         let from = at(s);
         let to = (from.0 - HATCH * (n.0 + t.0) * 0.8, from.1 - HATCH * (n.1 + t.1) * 0.8);
         canvas.line(from, to, colour::GREY, 0.8);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_plate_has_its_ends_and_its_corners() {
+        let plate = Wall { kind: WallKind::Plate, side: [0.6, 0.8, 0.0], length: 2.0, ..Wall::default() };
+        assert_eq!(corners(&plate, &[1.0, 5.0]), [[0.4, 4.2], [1.6, 5.8]]);
+        let plate = Wall { normal: [0.8, -0.6, 0.0], width: 4.0, ..plate };
+        // normal × side = (0, 0, 1)
+        let expected = [[0.4, 4.2, 1.0], [1.6, 5.8, 1.0], [1.6, 5.8, 5.0], [0.4, 4.2, 5.0]];
+        let off = corners(&plate, &[1.0, 5.0, 3.0])
+            .concat()
+            .iter()
+            .zip(expected.concat())
+            .map(|(a, b)| a - b)
+            .collect::<Vec<_>>();
+        assert!(off.iter().all(|x: &f64| x.abs() < 1e-15), "{off:?}");
+    }
+
+    /// The part of a plate beyond the limits is not shown.
+    #[test]
+    fn a_plate_widens_the_picture_up_to_the_limits() {
+        let plate = Wall { kind: WallKind::Plate, side: [1.0, 0.0, 0.0], length: 8.0, ..Wall::default() };
+        let limits = [[-2.0, -2.0], [9.0, 9.0]];
+        let found = extent(&Eye::Along([0, 1]), &plate, &[0.0, 1.0], limits);
+        assert_eq!(found, Some([[-2.0, 1.0], [4.0, 1.0]]));
     }
 }

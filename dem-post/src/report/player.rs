@@ -70,11 +70,12 @@ struct Data {
 struct WallData {
     name: String,
     driven: bool,
-    /// Radius of a round wall (m), 0 for a plane; negative where the grains are inside.
+    /// Radius of a round wall (m), 0 for a plane and a plate; negative where the grains are inside.
     radius: f64,
     /// Whether a plane is behind the grains, in 3D.
     behind: bool,
-    /// Of a plane the ends (2D) or the corners (3D), of a round wall its centre, moment by moment.
+    /// Of a plane or a plate the ends (2D) or the corners (3D), of a round wall its centre, moment
+    /// by moment.
     points: Vec<f64>,
 }
 
@@ -187,7 +188,7 @@ fn walls(history: &History, sample: &Sample, view: View, positions: &[Vec<f64>])
         let mut data = WallData {
             name: wall.name.clone(),
             driven: wall.drive != WallDrive::Fixed,
-            radius: if wall.kind == WallKind::Plane { 0.0 } else { wall.radius },
+            radius: if matches!(wall.kind, WallKind::Plane | WallKind::Plate) { 0.0 } else { wall.radius },
             behind: false,
             points: vec![],
         };

@@ -5,6 +5,7 @@ use std::path::Path;
 use dem_history::{History, Series, Wall, WallDrive, WallKind};
 use dem_scene::failure::{Disk, Splitting};
 use dem_scene::{Scene, choose_load_wall};
+use nalgebra::Vector3;
 use serde::Serialize;
 use serde_json::Value;
 
@@ -138,7 +139,7 @@ pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
         series.map_or_else(|| Ok(vec![]), |series| component(history, &series, &[axis, axis], name))
     };
     let (size, push) = sample_size(history, k, axis, motion.sense * direction[axis])?;
-    let plate = walls[k].kind == WallKind::Plane && axis_of(&walls[k].normal) == axis;
+    let plate = axis_of(&walls[k].normal) == axis && covers(history, &walls[k], k)?;
     let mut report = Report {
         displacement: motion.way.iter().map(|x| motion.sense * x).collect(),
         load: motion.load.iter().map(|f| motion.sense * f).collect(),
@@ -350,6 +351,29 @@ fn sample_size(history: &History, wall: usize, axis: usize, drive: f64) -> Resul
     // a wall above that moves down pushes, one that moves up pulls
     let push = if drive * (place - middle) > 0.0 { -1.0 } else { 1.0 };
     Ok((Size { height: extents[axis], area, extents }, push))
+}
+
+/// Whether the wall `k` is a plane, or a plate that reaches beyond the sample on all sides at the
+/// start. A punch that is narrower than the sample gives no stress on the section of the sample.
+fn covers(history: &History, wall: &Wall, k: usize) -> Result<bool> {
+    if wall.kind != WallKind::Plate {
+        return Ok(wall.kind == WallKind::Plane);
+    }
+    let (d, ends) = (history.dimension(), first_box(history)?);
+    let state = history.wall_state(0)?;
+    let Some(middle) = state.position.get(k * d..(k + 1) * d) else { return Ok(false) };
+    let side = Vector3::from(wall.side);
+    let sides = [(side, wall.length), (Vector3::from(wall.normal).cross(&side), wall.width)];
+    // how far the box around the grains reaches along a side, from the middle of the plate
+    let reach = |side: &Vector3<f64>| {
+        let (mut low, mut high) = (0.0, 0.0);
+        for (axis, end) in ends.iter().enumerate() {
+            let [a, b] = end.map(|x| side[axis] * (x - middle[axis]));
+            (low, high) = (low + a.min(b), high + a.max(b));
+        }
+        f64::max(high, -low)
+    };
+    Ok(sides.iter().take(d - 1).all(|(side, length)| reach(side) <= 0.5 * length))
 }
 
 impl Summary {

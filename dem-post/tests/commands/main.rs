@@ -48,6 +48,7 @@ fn layout(dimension: usize) -> Layout {
         radius: 0.0,
         drive,
         direction: if drive == WallDrive::Fixed { [0.0; 3] } else { [0.0, sign, 0.0] },
+        ..Wall::default()
     };
     let d = dimension;
     Layout {

@@ -503,6 +503,8 @@ pub fn thinned(points: &[(f64, f64)], most: usize) -> Vec<usize> {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     use kuva::backend::svg::SvgBackend;
 
     use super::*;
@@ -537,7 +539,7 @@ mod tests {
     #[test]
     fn a_circle_is_round_if_units_are_equal() {
         let circle = |flat: f64| -> Vec<(f64, f64)> {
-            (0..=60).map(|k| f64::from(k) * 0.1).map(|t| (50.0 * t.cos(), flat * 50.0 * t.sin())).collect()
+            (0..=64).map(|k| f64::from(k) * PI / 32.0).map(|t| (50.0 * t.cos(), flat * 50.0 * t.sin())).collect()
         };
         // of a flat curve the height has a limit, and more of the vertical axis is shown
         for (flat, size) in [(1.0, (640.0, 460.0)), (1.0, (300.0, 216.0)), (0.01, (640.0, 460.0))] {

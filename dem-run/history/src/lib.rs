@@ -21,12 +21,17 @@
 //!     id, radius, mass, inertia [N]
 //!     material u8[N]       place in /materials/name, if there are several materials
 //! /materials/name [K]      if there are several; `base` comes first
-//! /walls/                  name, kind [W]       enum PLANE, CIRCLE, CYLINDER, SPHERE
+//! /walls/                  name, kind [W]       enum PLANE, CIRCLE, CYLINDER, SPHERE, PLATE
 //!     drive [W]            enum FIXED, VELOCITY, FORCE
-//!     normal [W,D]         plane: unit normal towards the grains; cylinder: unit axis; else 0
-//!     radius [W]           m; 0 for planes, negative where the grains are inside
+//!     normal [W,D]         plane: unit normal towards the grains; plate: unit normal; cylinder:
+//!                          unit axis; else 0
+//!     radius [W]           m; 0 for planes and plates, negative where the grains are inside
+//!     side [W,D]           plate: unit vector along its first side, the second is normal × side;
+//!                          else 0. `side`, `length`, `width` only if there are plates
+//!     length, width [W]    plate: m, of its first and second side; in 2D there is no `width`
 //!     direction [W,D]      unit direction of the drive; 0 for fixed walls
-//!     position, velocity   {step, time, value[T,W,D]}: m, m/s; a point of a plane, else the centre
+//!     position, velocity   {step, time, value[T,W,D]}: m, m/s; a point of a plane, the middle of a
+//!                          plate, else the centre
 //!     force                {step, time, value[T,W,D]}: N, of the grains on the wall
 //! /contacts/               step, time [T]; start u64[T], count u32[T]: rows of each frame
 //!     pair i32[M,2]        grains i, j; j < 0 is wall −1−j. The normal points from j to i
@@ -111,5 +116,5 @@ pub use writer::Writer;
 /// Version of the layout. It increases with every change that an older reader would misread. 2:
 /// bonds also break in twist. 3: a rupture stores its twisting moment apart from the bending
 /// moment. 4: the load error is that of the solver alone (NaN where no solve reports one), and the
-/// false acceleration is separate; observables may be enumerations.
-pub const SCHEMA_VERSION: u32 = 4;
+/// false acceleration is separate; observables may be enumerations. 5: walls may be plates.
+pub const SCHEMA_VERSION: u32 = 5;

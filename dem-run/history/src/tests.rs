@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use super::*;
 
 mod cement;
+mod plate;
 
 /// Three grains, two walls, two bonds, in `dimension` dimensions.
 fn full(dimension: usize) -> Layout {
@@ -16,6 +17,7 @@ fn full(dimension: usize) -> Layout {
         radius,
         drive,
         direction: [0.0, -1.0, 0.0],
+        ..Wall::default()
     };
     Layout {
         dimension,

@@ -11,10 +11,16 @@ pub struct Wall {
     pub name: String,
     /// Its shape.
     pub kind: WallKind,
-    /// Plane: unit normal towards the grains; cylinder: unit axis; else zero.
+    /// Plane: unit normal towards the grains; plate: unit normal; cylinder: unit axis; else zero.
     pub normal: [f64; 3],
-    /// Radius, m: 0 for a plane, negative where the grains are inside.
+    /// Radius, m: 0 for a plane and a plate, negative where the grains are inside.
     pub radius: f64,
+    /// Plate: unit vector along its first side; in 3D the second is normal × side. Else zero.
+    pub side: [f64; 3],
+    /// Plate: length of its first side, m. Else zero.
+    pub length: f64,
+    /// Plate in 3D: length of its second side, m. Else zero.
+    pub width: f64,
     /// Its drive.
     pub drive: WallDrive,
     /// Unit direction of the drive; zero for fixed walls.
@@ -31,15 +37,17 @@ codes! {
     /// An endless cylinder in 3D.
     Cylinder = 2 "CYLINDER",
     /// A sphere in 3D.
-    Sphere = 3 "SPHERE"
+    Sphere = 3 "SPHERE",
+    /// A segment in 2D, a rectangle in 3D.
+    Plate = 4 "PLATE"
 }
 
 impl WallKind {
-    /// Whether `/walls/normal` has a unit vector for it: the normal of a plane, the axis of a
-    /// cylinder.
+    /// Whether `/walls/normal` has a unit vector for it: the normal of a plane or a plate, the axis
+    /// of a cylinder.
     pub fn has_normal(self) -> bool {
         match self {
-            Self::Plane | Self::Cylinder => true,
+            Self::Plane | Self::Cylinder | Self::Plate => true,
             Self::Circle | Self::Sphere => false,
         }
     }
@@ -56,10 +64,28 @@ codes! {
     Force = 2 "FORCE"
 }
 
+impl Default for Wall {
+    /// A fixed plane without a name or a normal.
+    fn default() -> Self {
+        let zero = [0.0; 3];
+        Self {
+            name: String::new(),
+            kind: WallKind::Plane,
+            normal: zero,
+            radius: 0.0,
+            side: zero,
+            length: 0.0,
+            width: 0.0,
+            drive: WallDrive::Fixed,
+            direction: zero,
+        }
+    }
+}
+
 impl Wall {
     /// A wall whose columns are still zero.
     pub(super) fn unmeasured(name: String, kind: WallKind, drive: WallDrive) -> Self {
-        Self { name, kind, normal: [0.0; 3], radius: 0.0, drive, direction: [0.0; 3] }
+        Self { name, kind, drive, ..Self::default() }
     }
 }
 
@@ -84,6 +110,9 @@ impl WallColumn {
         Self { name: "normal", unit: "", vector: true, always: true, field: |wall| &mut wall.normal },
         Self { name: "direction", unit: "", vector: true, always: true, field: |wall| &mut wall.direction },
         Self { name: "radius", unit: "m", vector: false, always: true, field: |wall| from_mut(&mut wall.radius) },
+        Self { name: "side", unit: "", vector: true, always: false, field: |wall| &mut wall.side },
+        Self { name: "length", unit: "m", vector: false, always: false, field: |wall| from_mut(&mut wall.length) },
+        Self { name: "width", unit: "m", vector: false, always: false, field: |wall| from_mut(&mut wall.width) },
     ];
 
     /// The shape of one row.

@@ -35,8 +35,9 @@ pub struct Disk {
 
 impl Disk {
     /// The disk of a scene in which the wall `wall` loads it across its axis against another plane
-    /// wall; none for another test. The diameter is from the scene. The length is the thickness in
-    /// 2D; in 3D it is the initial extent of the sample along the axis (`extents`, m).
+    /// wall, in 2D also between plates; none for another test. The diameter is from the scene. The
+    /// length is the thickness in 2D; in 3D it is the initial extent of the sample along the axis
+    /// (`extents`, m).
     #[must_use]
     pub fn of(scene: &Scene, wall: &str, extents: &[f64]) -> Option<Self> {
         let Sample::Random(random) = &scene.sample else { return None };
@@ -47,9 +48,11 @@ impl Disk {
             _ => return None,
         };
         let load = scene.walls.get(wall).filter(|found| !scene.drives(wall, found).is_empty())?;
+        let normal = |shape| normal(shape, scene.dimension);
         let (normal, across) = (normal(&load.shape)?, only_axis(load.drive_direction()?)?);
         let faces = |shape: &Shape| {
-            self::normal(shape).is_some_and(|n| only_axis(n) == Some(across) && n[across] * normal[across] < 0.0)
+            self::normal(shape, scene.dimension)
+                .is_some_and(|n| only_axis(n) == Some(across) && n[across] * normal[across] < 0.0)
         };
         if only_axis(normal) != Some(across) || axis == Some(across) || !scene.walls.values().any(|w| faces(&w.shape)) {
             return None;
@@ -66,8 +69,13 @@ impl Disk {
     }
 }
 
-fn normal(shape: &Shape) -> Option<&[f64]> {
-    if let Shape::Plane(plane) = shape { Some(&plane.normal) } else { None }
+fn normal(shape: &Shape, dimension: u8) -> Option<&[f64]> {
+    match shape {
+        Shape::Plane(plane) => Some(&plane.normal),
+        // in 3D a plate may be shorter than the cylinder
+        Shape::Plate(plate) if dimension == 2 => Some(&plate.normal),
+        _ => None,
+    }
 }
 
 /// The axis parallel to a vector, if any.

@@ -6,6 +6,10 @@ use serde::{Deserialize, Serialize};
 use super::function::{Function, Ramp};
 use super::validate::report::Report;
 
+/// Largest cosine of the angle between two vectors that counts as a right angle: decimal directions
+/// are not exact.
+pub(crate) const PERPENDICULAR: f64 = 1e-6;
+
 /// A rigid wall. It is fixed, or driven by one of `velocity`, `force`, `force_rate` and `stress`
 /// along one direction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -26,9 +30,10 @@ pub struct Wall {
     /// mass.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub force_rate: Option<f64>,
-    /// Drive of a plane along its normal: stress, a function of time (Pa). The force in each step
-    /// is the stress times the present section of the sample across the wall. The wall needs a
-    /// mass, its normal is parallel to an axis, and it touches the sample at the start.
+    /// Drive of a plane or a plate along its normal: stress, a function of time (Pa). The force in
+    /// each step is the stress times the present section of the sample across the wall, of a plate
+    /// the part of it that the plate covers. The wall needs a mass, its normal (and the sides of a
+    /// plate) are parallel to axes, and it touches the sample at the start.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stress: Option<Function>,
     /// Prescribed velocity across a drive by a force or a stress.
@@ -42,7 +47,7 @@ pub struct Wall {
     /// Mass of a wall that is driven by a force.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mass: Option<WallMass>,
-    /// Direction of the drive, of any length. Default for a plane: its normal.
+    /// Direction of the drive, of any length. Default for a plane or a plate: its normal.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub direction: Option<Vec<f64>>,
 }
@@ -69,6 +74,8 @@ pub enum Shape {
     Sphere(Sphere),
     /// 3D: an infinite cylinder, or a hollow one around the grains.
     Cylinder(Cylinder),
+    /// A segment in 2D, a rectangle in 3D; solid from both sides.
+    Plate(Plate),
 }
 
 /// A plane.
@@ -140,6 +147,26 @@ pub struct Cylinder {
     pub inside: bool,
 }
 
+/// A plate: a segment (2D) or a rectangle (3D). It is solid from both sides and at its edges: a
+/// grain touches the point of the plate that is nearest to the centre of the grain.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Plate {
+    /// Normal, of any length: the direction in which the plate is seated and, by default, driven.
+    pub normal: Vec<f64>,
+    /// Its middle (m).
+    pub center: Vec<f64>,
+    /// Lengths of its sides (m): one in 2D, two in 3D.
+    pub size: Vec<f64>,
+    /// 3D: direction of its first side, of any length, perpendicular to the normal.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub side: Option<Vec<f64>>,
+    /// Seated against the sample: moved from `center` along its normal until it touches the first
+    /// grain.
+    #[serde(default)]
+    pub seated: bool,
+}
+
 /// The mass of a wall that is driven by a force.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -172,13 +199,14 @@ impl Shape {
             Self::Circle(_) => "circle",
             Self::Sphere(_) => "sphere",
             Self::Cylinder(_) => "cylinder",
+            Self::Plate(_) => "plate",
         }
     }
 
     /// The dimension that it belongs to; none if it has a meaning in both.
     fn dimension(&self) -> Option<usize> {
         match self {
-            Self::Plane(_) => None,
+            Self::Plane(_) | Self::Plate(_) => None,
             Self::Circle(_) => Some(2),
             Self::Sphere(_) | Self::Cylinder(_) => Some(3),
         }
@@ -188,7 +216,8 @@ impl Shape {
     pub(crate) fn check(&self, report: &mut Report, path: &str) {
         let (name, path) = (self.name(), format!("{path}.{}", self.name()));
         if self.dimension().is_some_and(|dimension| dimension != report.dimension) {
-            let allowed = if report.dimension == 3 { "plane, sphere or cylinder" } else { "plane or circle" };
+            let allowed =
+                if report.dimension == 3 { "plane, plate, sphere or cylinder" } else { "plane, plate or circle" };
             report.wrong(&path, format!("a {name} in {} dimensions", report.dimension), allowed);
             return;
         }
@@ -222,6 +251,7 @@ impl Shape {
                 report.direction(&format!("{path}.axis"), &cylinder.axis);
                 round(report, &cylinder.center, cylinder.radius);
             }
+            Self::Plate(plate) => plate.check(report, &path),
         }
     }
 
@@ -237,6 +267,46 @@ impl Shape {
     }
 }
 
+impl Plate {
+    fn check(&self, report: &mut Report, path: &str) {
+        let before = report.problems.len();
+        report.direction(&format!("{path}.normal"), &self.normal);
+        report.vector(&format!("{path}.center"), &self.center);
+        if self.size.len() + 1 == report.dimension {
+            for (k, length) in self.size.iter().enumerate() {
+                report.positive(format!("{path}.size.{k}"), *length, "m");
+            }
+        } else {
+            let allowed =
+                if report.dimension == 2 { "an array of one length (m)" } else { "an array of two lengths (m)" };
+            report.wrong(format!("{path}.size"), format!("an array of {}", self.size.len()), allowed);
+        }
+        let place = format!("{path}.side");
+        match &self.side {
+            Some(side) if report.dimension == 2 => {
+                report.wrong(place, format!("{side:?}"), "nothing: in 2 dimensions the normal determines it");
+            }
+            None if report.dimension == 3 => {
+                report.wrong(place, "nothing", "a vector perpendicular to the normal: the direction of the first side");
+            }
+            Some(side) => {
+                report.direction(&place, side);
+                if report.problems.len() == before && cosine(side, &self.normal).abs() > PERPENDICULAR {
+                    let allowed = format!("a vector perpendicular to the normal, {:?}", self.normal);
+                    report.wrong(place, format!("{side:?}"), allowed);
+                }
+            }
+            None => {}
+        }
+    }
+}
+
+/// Cosine of the angle between two vectors of one dimension.
+pub(crate) fn cosine(a: &[f64], b: &[f64]) -> f64 {
+    let norm = |v: &[f64]| v.iter().fold(0.0_f64, |length, x| length.hypot(*x));
+    a.iter().zip(b).map(|(x, y)| (x / norm(a)) * (y / norm(b))).sum()
+}
+
 impl Wall {
     /// How the wall moves: `force_rate` is a ramp from zero at t = 0.
     #[must_use]
@@ -250,12 +320,13 @@ impl Wall {
         }
     }
 
-    /// The direction of the drive, not normalised: the one given, or else a plane's normal.
+    /// The direction of the drive, not normalised: the one given, or else the normal of a plane or
+    /// a plate.
     #[must_use]
     pub fn drive_direction(&self) -> Option<&[f64]> {
         match (&self.direction, &self.shape) {
             (Some(direction), _) => Some(direction),
-            (None, Shape::Plane(plane)) => Some(&plane.normal),
+            (None, Shape::Plane(Plane { normal, .. }) | Shape::Plate(Plate { normal, .. })) => Some(normal),
             (None, _) => None,
         }
     }

@@ -19,6 +19,7 @@ mod membrane;
 mod next_event;
 mod pack;
 mod packings;
+mod plates;
 mod resume;
 mod solves;
 mod specimens;

@@ -105,6 +105,26 @@ const FLAT_CASES: &[(&str, &str)] = &[
     ("walls.roller.shape.circle.center=[0, 0, 0]", "walls.roller.shape.circle.center"),
     ("walls.roller.shape={\"sphere\": {\"center\": [0, 0], \"radius\": 1}}", "walls.roller.shape.sphere"),
     ("walls.roller.direction=null", "walls.roller.direction"),
+    (
+        r#"walls.bottom.shape={"plate": {"normal": [0, 0], "center": [0, 0], "size": [1]}}"#,
+        "walls.bottom.shape.plate.normal",
+    ),
+    (
+        r#"walls.bottom.shape={"plate": {"normal": [0, 1], "center": [0], "size": [1]}}"#,
+        "walls.bottom.shape.plate.center",
+    ),
+    (
+        r#"walls.bottom.shape={"plate": {"normal": [0, 1], "center": [0, 0], "size": [0]}}"#,
+        "walls.bottom.shape.plate.size.0",
+    ),
+    (
+        r#"walls.bottom.shape={"plate": {"normal": [0, 1], "center": [0, 0], "size": [1, 1]}}"#,
+        "walls.bottom.shape.plate.size",
+    ),
+    (
+        r#"walls.bottom.shape={"plate": {"normal": [0, 1], "center": [0, 0], "size": [1], "side": [1, 0]}}"#,
+        "walls.bottom.shape.plate.side",
+    ),
     ("walls.roller.direction=[0, 0]", "walls.roller.direction"),
     ("walls.roller.mass={\"kg\": 1}", "walls.roller.mass"),
     ("walls.top.mass=null", "walls.top.mass"),
@@ -182,6 +202,18 @@ const SOLID_CASES: &[(&str, &str)] = &[
     ),
     ("sample={\"file\": {\"path\": \"\"}}", "sample.file.path"),
     ("walls.drum.shape.cylinder.axis=[0, 0, 0]", "walls.drum.shape.cylinder.axis"),
+    (
+        r#"walls.drum.shape={"plate": {"normal": [0, 0, 1], "center": [0, 0, 0], "size": [1, 1]}}"#,
+        "walls.drum.shape.plate.side",
+    ),
+    (
+        r#"walls.drum.shape={"plate": {"normal": [0, 0, 1], "center": [0, 0, 0], "size": [1, 1], "side": [0, 1, 1e-3]}}"#,
+        "walls.drum.shape.plate.side",
+    ),
+    (
+        r#"walls.drum.shape={"plate": {"normal": [0, 0, 1], "center": [0, 0, 0], "size": [1], "side": [0, 1, 0]}}"#,
+        "walls.drum.shape.plate.size",
+    ),
     ("walls.drum.shape={\"circle\": {\"center\": [0, 0, 0], \"radius\": 1}}", "walls.drum.shape.circle"),
     ("walls={\"a.b\": {\"shape\": {\"plane\": {\"normal\": [0, 0, 1], \"place\": \"seated\"}}}}", "walls.a.b"),
 ];
@@ -302,6 +334,30 @@ fn a_stress_needs_a_plane_along_an_axis_a_mass_and_no_other_direction() {
         let paths: Vec<&str> = error.problems().iter().map(|problem| problem.path.as_str()).collect();
         assert!(paths.contains(&path), "{set}: {error}");
     }
+}
+
+#[test]
+fn a_plate_is_driven_and_stressed_along_its_normal() {
+    let plate = |normal: &str| {
+        format!(
+            r#"walls.top.shape={{"plate": {{"normal": {normal}, "center": [0, 9], "size": [0.5], "seated": true}}}}"#
+        )
+    };
+    let scene = stressed(&[&plate("[0, -1]")]).expect("right");
+    assert_eq!(scene.walls["top"].drive_direction(), Some(&[0.0, -1.0][..]));
+    assert_eq!(only(stressed(&[&plate("[0.1, -1]")])).path, "walls.top.shape.plate.normal");
+    // what a plate covers of a round section is not known
+    let block = |axis: &str| {
+        let plate = r#"{"normal": [0, 0, -1], "center": [0, 0, 9], "size": [1, 1], "side": [1, 0, 0]}"#;
+        let tube = format!(r#"{{"center": [0, 0, 0], "axis": {axis}, "radius": 9, "inside": true}}"#);
+        let walls = format!(
+            r#"walls={{"top": {{"shape": {{"plate": {plate}}}, "mass": "sample", "stress": {{"constant": 1}}}}, "tube": {{"shape": {{"cylinder": {tube}}}}}}}"#
+        );
+        read(SOLID, &[&walls])
+    };
+    assert!(block("[1, 0, 0]").is_ok());
+    let problem = only(block("[0, 0, 2]"));
+    assert!(problem.path == "walls.top.stress" && problem.found.contains("walls.tube"), "{problem}");
 }
 
 #[test]

@@ -15,7 +15,6 @@ use std::collections::HashMap;
 use super::error::Problem;
 use super::model::{Bonds, Load, Rupture, Scene, Stiffness};
 use super::solver::SolverKind;
-use super::stage::StageDrive;
 use super::stop::{Stop, TravelFrom};
 use super::wall::Drive;
 pub use report::{LARGEST, MAX_GRAINS};
@@ -45,7 +44,7 @@ pub fn validate(scene: &Scene) -> Vec<Problem> {
     }
     grains(&mut report, scene);
     for (name, wall) in &scene.walls {
-        wall::wall(&mut report, name, wall, &scene.stage_drives(name).map(StageDrive::drive).collect::<Vec<_>>());
+        wall::wall(&mut report, scene, name, wall);
     }
     membrane::membrane(&mut report, scene);
     if let Some(name) = &scene.load_wall {

@@ -1,14 +1,14 @@
 //! Wrong values in a wall.
 
 use super::report::Report;
-use crate::wall::{Drive, Shape, Slide, Wall, WallMass};
+use crate::model::Scene;
+use crate::stage::StageDrive;
+use crate::wall::{Cylinder, Drive, PERPENDICULAR, Shape, Slide, Wall, WallMass, cosine};
 
-/// Largest cosine of the angle between a slide and a drive that counts as a right angle: decimal
-/// directions are not exact.
-const PERPENDICULAR: f64 = 1e-6;
-
-/// Checks the wall `name`; `staged` are the drives that stages give it.
-pub(super) fn wall(report: &mut Report, name: &str, wall: &Wall, staged: &[Drive]) {
+/// Checks the wall `name`.
+pub(super) fn wall(report: &mut Report, scene: &Scene, name: &str, wall: &Wall) {
+    // the drives that stages give it
+    let staged = &scene.stage_drives(name).map(StageDrive::drive).collect::<Vec<_>>();
     let path = format!("walls.{name}");
     report.name(&path, name);
     wall.shape.check(report, &format!("{path}.shape"));
@@ -36,7 +36,7 @@ pub(super) fn wall(report: &mut Report, name: &str, wall: &Wall, staged: &[Drive
     mass_and_direction(report, &path, wall, staged);
     let stressed = staged.iter().any(|drive| matches!(drive, Drive::Stress(_)));
     if given.len() < 2 && (wall.stress.is_some() || stressed) {
-        stress(report, &path, wall);
+        stress(report, scene, &path, wall);
     }
     if let Some(slide) = &wall.slide {
         self::slide(report, &path, wall, slide);
@@ -51,17 +51,31 @@ pub(super) fn wall(report: &mut Report, name: &str, wall: &Wall, staged: &[Drive
 }
 
 /// Checks the shape and the direction of a wall that is driven by a stress.
-fn stress(report: &mut Report, path: &str, wall: &Wall) {
-    match &wall.shape {
-        Shape::Plane(plane) if plane.normal.iter().filter(|x| **x != 0.0).count() > 1 => {
+fn stress(report: &mut Report, scene: &Scene, path: &str, wall: &Wall) {
+    let mut along_an_axis = |place: &str, vector: &[f64]| {
+        if vector.iter().filter(|x| **x != 0.0).count() > 1 {
             let allowed = "a vector along one axis: the section of the sample is known only there";
-            report.wrong(format!("{path}.shape.plane.normal"), format!("{:?}", plane.normal), allowed);
+            report.wrong(format!("{path}.shape.{place}"), format!("{vector:?}"), allowed);
         }
-        Shape::Plane(_) => {}
-        shape => report.wrong(format!("{path}.stress"), format!("a {}", shape.name()), "a plane"),
+    };
+    match &wall.shape {
+        Shape::Plane(plane) => along_an_axis("plane.normal", &plane.normal),
+        Shape::Plate(plate) => {
+            along_an_axis("plate.normal", &plate.normal);
+            plate.side.iter().for_each(|side| along_an_axis("plate.side", side));
+            let around = scene.walls.iter().find(|(_, wall)| match &wall.shape {
+                Shape::Cylinder(Cylinder { axis, inside, .. }) => *inside && cosine(axis, &plate.normal).abs() > 0.5,
+                _ => false,
+            });
+            if let Some((name, _)) = around {
+                let found = format!("a plate inside the cylinder walls.{name}");
+                report.wrong(format!("{path}.stress"), found, "a plane, or a plate with a force");
+            }
+        }
+        shape => report.wrong(format!("{path}.stress"), format!("a {}", shape.name()), "a plane or a plate"),
     }
     if let Some(direction) = &wall.direction {
-        let allowed = "nothing: a stress acts along the normal of its plane";
+        let allowed = "nothing: a stress acts along the normal of its wall";
         report.wrong(format!("{path}.direction"), format!("{direction:?}"), allowed);
     }
 }
@@ -79,9 +93,7 @@ fn slide(report: &mut Report, path: &str, wall: &Wall, slide: &Slide) {
         return;
     }
     let Some(drive) = wall.drive_direction().filter(|drive| drive.len() == direction.len()) else { return };
-    let norm = |v: &[f64]| v.iter().fold(0.0_f64, |length, x| length.hypot(*x));
-    let along: f64 = drive.iter().zip(direction).map(|(a, b)| (a / norm(drive)) * (b / norm(direction))).sum();
-    if report.problems.len() == before && along.abs() > PERPENDICULAR {
+    if report.problems.len() == before && cosine(drive, direction).abs() > PERPENDICULAR {
         report.wrong(place, format!("{direction:?}"), format!("a vector perpendicular to the drive, {drive:?}"));
     }
 }
@@ -116,7 +128,7 @@ fn mass_and_direction(report: &mut Report, path: &str, wall: &Wall, staged: &[Dr
         Some(_) if by_stress => {}
         Some(vector) => report.direction(&direction, vector),
         None if driven && !by_stress && wall.drive_direction().is_none() => {
-            report.wrong(direction, "nothing", "a vector: only a plane has a default direction, its normal");
+            report.wrong(direction, "nothing", "a vector: only a plane or a plate has a default direction, its normal");
         }
         None => {}
     }
