@@ -33,7 +33,7 @@ impl<D: Dim> Candidates<D> {
     /// Make the list hold every pair whose gap at these positions is at most the sum of the `reach`
     /// (m) of its two bodies; bodies are numbered grains first. A list that is no longer valid is
     /// rebuilt with skins of `reach` + `spare` (m): each body may then move by `spare` before the
-    /// next rebuild.
+    /// next rebuild. Returns whether it was rebuilt.
     pub fn cover(
         &mut self,
         grains: &Grains<D>,
@@ -42,12 +42,12 @@ impl<D: Dim> Candidates<D> {
         wall_position: &[D::Vector],
         reach: impl Fn(usize) -> f64,
         spare: impl Fn(usize) -> f64,
-    ) {
+    ) -> bool {
         let bodies = grains.len() + walls.len();
         let now = || position.iter().chain(wall_position);
         let within = |(k, (x, then)): (usize, (&D::Vector, &D::Vector))| (*x - *then).norm() + reach(k) <= self.skin[k];
         if self.then.len() == bodies && now().zip(&self.then).enumerate().all(within) {
-            return;
+            return false;
         }
         let skin: Vec<f64> = (0..bodies).map(|k| reach(k) + spare(k)).collect();
         self.pairs = Grids::new(grains, position, &skin).pairs();
@@ -63,6 +63,7 @@ impl<D: Dim> Candidates<D> {
         self.then.clear();
         self.then.extend(now());
         self.skin = skin;
+        true
     }
 }
 

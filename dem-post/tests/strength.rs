@@ -53,6 +53,7 @@ impl Run {
                 strength: vec![self.cohesion],
                 friction: vec![0.3],
                 rolling: vec![],
+                twist: None,
                 mean_diameter: vec![2e-3],
                 formed: None,
             },

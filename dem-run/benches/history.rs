@@ -30,6 +30,7 @@ fn layout(single: bool) -> Layout {
             strength: vec![10.0; CONTACTS],
             friction: vec![0.3; CONTACTS],
             rolling: vec![],
+            twist: None,
             mean_diameter: vec![2e-3; CONTACTS],
             formed: None,
         },

@@ -36,7 +36,7 @@ pub fn of_sample<D: Dim>(scene: &Scene, grains: &Grains<D>) -> Result<Vec<Bond>,
         bond.strength = strength.unwrap_or_else(|| laws.strength(pair, bond.mean_diameter));
         let limits = laws.limits(pair);
         (bond.shear, bond.rolling) = (shear.unwrap_or(limits[0]), rolling.unwrap_or(limits[1]));
-        bond.twist = bonds.twist.unwrap_or(0.0);
+        bond.twist = laws.pair(pair).and_then(|pair| pair.twist).or(bonds.twist).unwrap_or(0.0);
         bond.stiffness = bonds.stiffness.map(|stiffness| {
             let factor = laws.stiffness_factor(pair);
             scaled(bond_stiffness::<D>(stiffness, bond.mean_diameter, scene.thickness()), factor)
@@ -44,10 +44,11 @@ pub fn of_sample<D: Dim>(scene: &Scene, grains: &Grains<D>) -> Result<Vec<Bond>,
     }
     // a strength of zero is no bond
     list.retain(|listed| listed.bond.strength > 0.0);
-    if let Some(scatter) = bonds.scatter {
-        let drawn = list.iter_mut().filter(|listed| listed.strength.is_none()).map(|listed| &mut listed.bond);
-        scatter_strengths(drawn, scatter, scene.seed);
-    }
+    let drawn = list.iter_mut().filter(|listed| listed.strength.is_none()).filter_map(|listed| {
+        let own = laws.pair(listed.bond.pair.map(|k| k as usize)).and_then(|pair| pair.scatter);
+        Some((&mut listed.bond, own.or(bonds.scatter)?))
+    });
+    scatter_strengths(drawn, scene.seed);
     Ok(list.into_iter().map(|listed| listed.bond).collect())
 }
 
@@ -61,9 +62,6 @@ struct Laws<'a, D: Dim> {
 impl<D: Dim> Laws<'_, D> {
     /// What is listed for the materials of two grains.
     fn pair(&self, pair: [usize; 2]) -> Option<&scene::PairBonds> {
-        if self.grains.material.is_empty() {
-            return None;
-        }
         let [a, b] = pair.map(|k| self.grains.material_of(k));
         self.scene.materials.pair(a, b)?.bonds.as_ref()
     }
@@ -128,8 +126,9 @@ fn scaled(k: bond::Stiffness, factor: f64) -> bond::Stiffness {
     }
 }
 
-/// Multiplies the strength of each bond by a random factor, in the order of the bonds' pairs.
-fn scatter_strengths<'a>(bonds: impl Iterator<Item = &'a mut Bond>, scatter: scene::Scatter, seed: u64) {
+/// Multiplies the strength of each bond by a random factor of its distribution, in the order of the
+/// bonds' pairs.
+fn scatter_strengths<'a>(bonds: impl Iterator<Item = (&'a mut Bond, scene::Scatter)>, seed: u64) {
     // a separate stream: the packing uses the default stream of the seed
     let mut rng = Pcg64::new(u128::from(seed), SCATTER_STREAM);
     let mut share = || loop {
@@ -138,7 +137,7 @@ fn scatter_strengths<'a>(bonds: impl Iterator<Item = &'a mut Bond>, scatter: sce
             break share;
         }
     };
-    for bond in bonds {
+    for (bond, scatter) in bonds {
         bond.strength *= match scatter {
             scene::Scatter::Weibull { modulus } => (-share().ln()).powf(1.0 / modulus),
             scene::Scatter::Normal { deviation } => loop {
@@ -194,7 +193,7 @@ mod tests {
         let grains = (0..count + 1).map(|k| Grain::<D2>::at_rest([f64::from(k), 0.0].into(), 0.5, 1.0)).collect();
         let mut world = World::new(grains, vec![], vec![], Settings::default());
         world.form_bonds(1e-6, |_| 10.0, 0.3);
-        scatter_strengths(world.bonds.iter_mut(), scatter, seed);
+        scatter_strengths(world.bonds.iter_mut().map(|bond| (bond, scatter)), seed);
         world.bonds.iter().map(|bond| bond.strength).collect()
     }
 

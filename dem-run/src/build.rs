@@ -20,7 +20,7 @@ use dem_core::dim::{Dim, Vect};
 use dem_core::plate::Plate;
 use dem_core::saved::{Mismatch, Reader};
 use dem_core::solver::{GaussSeidelSettings, SolverSettings, StagedSettings, Stages, Start, StiffnessRatio};
-use dem_core::world::{Restitution, Settings, World};
+use dem_core::world::{Membrane, Restitution, Settings, StepError, World};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -34,6 +34,9 @@ pub struct Built<D: Dim> {
     pub warnings: Vec<String>,
 }
 
+/// Radius of the disk that rolls on the surface under a membrane, over the mean radius of the
+/// grains. It spans the pits of lattices, and touches a row at a plate before the next one.
+const DISK: f64 = 1.5;
 /// Maximum number of grain pairs that are reported individually.
 const MOST_TOLD: usize = 10;
 
@@ -63,6 +66,10 @@ pub fn build<D: Dim>(scene: &Scene, packings: Option<&Path>, watch: Watch) -> Re
     warnings.extend(shallow);
     warnings.extend(warnings::of_walls(scene, &walls, Some(&grains)));
     let mut world = World::new(grains, walls, loads(scene), settings(scene));
+    world.membrane = membrane(scene, &world.grains);
+    if let Err(error) = world.find_surface() {
+        return Err(RunError::Sample(vec![no_surface(scene, &world, &error)]));
+    }
     // the world knows which grains its walls hold: those get no bonds among each other
     if scene.cement_stage().is_none() {
         world.add_bonds(bonds::of_sample(scene, &world.grains)?);
@@ -80,7 +87,30 @@ pub fn rebuild<D: Dim>(scene: &Scene, from: &mut Reader) -> Result<World<D>, Mis
         return Err(Mismatch);
     }
     let walls = walls(scene, &grains);
-    World::restored(grains, walls, loads(scene), settings(scene), from)
+    let mut world = World::restored(grains, walls, loads(scene), settings(scene), from)?;
+    world.membrane = membrane(scene, &world.grains);
+    Ok(world)
+}
+
+/// The membrane of a scene, whose surface is not found yet.
+fn membrane<D: Dim>(scene: &Scene, grains: &Grains<D>) -> Option<Membrane<D>> {
+    let membrane = scene.membrane.as_ref()?;
+    let index = |name: &String| scene.wall_index(name).unwrap_or_default();
+    let between = membrane.between.as_ref().map(|between| [index(&between[0]), index(&between[1])]);
+    let mean = grains.radius.iter().sum::<f64>() / grains.len() as f64;
+    let disk = membrane.disk_radius.unwrap_or(DISK * mean);
+    let pressure = scene.first_pressure()?.clone();
+    Some(Membrane::new(schedule(pressure), between, disk))
+}
+
+/// The message about a membrane without a surface at the start.
+fn no_surface<D: Dim>(scene: &Scene, world: &World<D>, error: &StepError) -> String {
+    let wall = |body: u32| scene.walls.keys().nth(body as usize - world.grains.len());
+    let name = |body: u32| wall(body).map_or_else(String::new, |name| format!("wall {name}"));
+    format!(
+        "membrane: {}; seat the plates at the sample (\"place\": \"seated\"), or give another membrane.disk_radius",
+        error.message(&name)
+    )
 }
 
 /// The grains of a scene; the other fields as in [`prepare::Packing`], for a random sample.
@@ -395,7 +425,7 @@ pub fn settings<D: Dim>(scene: &Scene) -> Settings<D> {
     Settings {
         step: scene.time.step,
         gravity: scene.gravity.as_deref().map(D::Vector::from_slice).filter(|g| g.norm() > 0.0),
-        friction: scene.materials.friction.grain_grain,
+        friction: scene.materials.friction_of(0, 0),
         material_friction: materials::friction(scene),
         restitution: bouncing.then_some(Restitution {
             grain_grain: restitution.grain_grain,
@@ -457,6 +487,17 @@ fn staged(newton: &scene::Newton, stages: Stages, tolerance: f64, accept: f64) -
 mod tests {
     use super::*;
     use dem_core::dim::D2;
+
+    #[test]
+    fn what_a_scene_with_one_material_says_of_its_pair_holds() {
+        let text = include_str!("../../configs/two-grains.json");
+        let friction = |sets: &[&str]| {
+            let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
+            settings::<D2>(&scene::from_text("test", text, &sets).expect("a scene")).friction
+        };
+        let pair = r#"materials.pairs=[{"between": ["base", "base"], "friction": 0.125}]"#;
+        assert_eq!((friction(&[]) == 0.125, friction(&[pair])), (false, 0.125));
+    }
 
     #[test]
     fn the_defaults_of_a_scene_are_those_of_the_library() {

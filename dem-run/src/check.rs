@@ -42,6 +42,9 @@ pub struct Check {
     pub bonds: bool,
     /// The walls.
     pub walls: Vec<CheckedWall>,
+    /// Pressure of the membrane over time, if there is one, with those of later stages.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub membrane: Option<String>,
     /// Number of steps to the end.
     pub steps: u64,
     /// Time step (s).
@@ -127,6 +130,7 @@ impl Check {
             sizes,
             bonds: scene.has_bonds(),
             walls: walls.collect(),
+            membrane: membrane(scene),
             steps: scene.steps(),
             step: scene.time.step,
             end,
@@ -187,6 +191,9 @@ impl fmt::Display for Check {
         writeln!(f, "walls      {}", if walls.is_empty() { "none".to_string() } else { walls.join(", ") })?;
         for (wall, course) in self.walls.iter().filter_map(|wall| Some((wall, wall.course.as_ref()?))) {
             writeln!(f, "drive      {}: {} {course}", wall.name, wall.drive)?;
+        }
+        if let Some(course) = &self.membrane {
+            writeln!(f, "membrane   pressure {course}")?;
         }
         let (step, end, last) = (self.step, self.end, number(self.last_step_ends));
         let early = if (self.last_step_ends - end).abs() > 1e-9 * end {
@@ -285,6 +292,16 @@ fn course(scene: &Scene, name: &str, wall: &Wall) -> (&'static str, Option<Strin
         _ => format!("{begins}: {} {unit} at {} s", number(function.at(scene.time.end)), scene.time.end),
     };
     (drive, Some(course))
+}
+
+/// The pressure of the membrane over time in words.
+fn membrane(scene: &Scene) -> Option<String> {
+    let begins = scene.first_pressure()?;
+    let later = scene.stages.iter().skip(1).filter_map(|stage| {
+        let pressure = over_time(stage.membrane_pressure.as_ref()?, "Pa");
+        Some(format!("; from stage {} on: {pressure}", stage.name))
+    });
+    Some(over_time(begins, "Pa") + &later.collect::<String>())
 }
 
 /// The name of a drive, its function of time and its unit; none for a fixed wall.

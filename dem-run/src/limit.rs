@@ -201,7 +201,8 @@ fn growing(scene: &Scene) -> Vec<Growth> {
     });
     let loads = scene.grains.iter().flat_map(|grains| &grains.loads).enumerate();
     let loads = loads.map(|(k, load)| of(format!("grains.loads.{k}"), &load.time));
-    walls.chain(loads).filter(|(_, from, to, _)| from != to).collect()
+    let membrane = scene.membrane.iter().map(|membrane| of("membrane".into(), &membrane.pressure));
+    walls.chain(loads).chain(membrane).filter(|(_, from, to, _)| from != to).collect()
 }
 
 /// Whether a function of time is linear from 0 to `end`.
@@ -228,7 +229,7 @@ fn pushed(scene: &Scene) -> Result<(usize, &str), RunError> {
     let found = walls.find(|(_, (name, wall))| load_wall == Some(name.as_str()) && moves(wall));
     found.map(|(place, (name, _))| (place, name.as_str())).ok_or_else(|| {
         RunError::Usage(
-            "no load of the scene grows between t = 0 and time.end: give a wall a force_rate or a load on a grain a ramp; \
+            "no load of the scene grows between t = 0 and time.end: give a wall a force_rate, or a load on a grain or the pressure of a membrane a ramp; \
              of a wall that is driven by a velocity the force is taken, if it is the only driven wall or the load_wall"
                 .into(),
         )
@@ -300,7 +301,11 @@ impl Limit {
 
 impl fmt::Display for Limit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let unit = |load: &GrowingLoad| if load.load.starts_with("walls.") { " N" } else { "" };
+        let unit = |load: &GrowingLoad| match load.load.as_str() {
+            "membrane" => " Pa",
+            name if name.starts_with("walls.") => " N",
+            _ => "",
+        };
         let mut lines = vec![("sample", format!("{} grains, {} bonds", self.grains, self.bonds))];
         for load in &self.loads {
             let unit = unit(load);

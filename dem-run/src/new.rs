@@ -30,6 +30,7 @@ pub const SCENES: &[(&str, &str)] = scenes![
     "cylinder-compression",
     "direct-tension",
     "incline",
+    "membrane-biaxial",
     "notched-beam",
     "pull-off",
     "punch",

@@ -39,7 +39,7 @@ impl<D: Dim> Recorder<D> {
     /// Create the history of a world at `path`.
     pub fn create(path: &Path, overwrite: bool, scene: &Scene, built: &Built<D>) -> history::Result<Self> {
         let observables = observables(scene, &built.world);
-        let bonds = describe_bonds(&built.world, scene.cement_stage().map(|_| history::NOT_FORMED));
+        let bonds = describe_bonds(scene, &built.world, scene.cement_stage().map(|_| history::NOT_FORMED));
         let parameters = parameters(scene, built.solid_fraction);
         let (layout, measures) = describe(scene, &built.world, bonds, observables, parameters);
         let writer = Writer::create(path, &layout, overwrite)?;
@@ -69,14 +69,14 @@ impl<D: Dim> Recorder<D> {
             Some(formed) if formed == history::NOT_FORMED || cemented.is_none() => Some(history::NOT_FORMED),
             formed => formed,
         };
-        let (layout, measures) = describe(scene, world, describe_bonds(world, formed), observables, origin);
+        let (layout, measures) = describe(scene, world, describe_bonds(scene, world, formed), observables, origin);
         let layout = Layout { friction: before.friction, ..layout };
         let cpu_time = history.observable("cpu_time")?.map_or(vec![], |series| series.value);
         let cpu_before = kept.steps.checked_sub(1).and_then(|last| cpu_time.get(last)).copied().unwrap_or(0.0);
         let writer = Writer::go_on(history.path(), &layout, history, kept, checkpoint, tell)?;
         let mut recorder = Self::new(writer, &layout, measures, cpu_before);
         if cemented.is_some() && formed == Some(history::NOT_FORMED) {
-            recorder.bonds_formed(world)?;
+            recorder.bonds_formed(scene, world)?;
         }
         Ok(recorder)
     }
@@ -113,9 +113,9 @@ impl<D: Dim> Recorder<D> {
     }
 
     /// Records the bonds that a stage formed after the present step.
-    pub fn bonds_formed(&mut self, world: &World<D>) -> history::Result<()> {
+    pub fn bonds_formed(&mut self, scene: &Scene, world: &World<D>) -> history::Result<()> {
         self.hand_over()?;
-        self.batch.bonds = Some(describe_bonds(world, Some(world.steps as i64)));
+        self.batch.bonds = Some(describe_bonds(scene, world, Some(world.steps as i64)));
         self.hand_over()
     }
 
@@ -310,7 +310,7 @@ fn describe_wall<D: Dim>(wall: &Wall<D>, name: &str) -> history::Wall {
 
 /// The bonds of a world. `formed` is the step after which a stage formed them, or that none has;
 /// nothing if they are there from the start.
-fn describe_bonds<D: Dim>(world: &World<D>, formed: Option<i64>) -> history::Bonds {
+fn describe_bonds<D: Dim>(scene: &Scene, world: &World<D>, formed: Option<i64>) -> history::Bonds {
     let bonds: &[bond::Bond] = if formed == Some(history::NOT_FORMED) { &[] } else { &world.bonds };
     history::Bonds {
         pair: bonds.iter().map(|b| b.pair.map(|k| k as i32)).collect(),
@@ -322,6 +322,7 @@ fn describe_bonds<D: Dim>(world: &World<D>, formed: Option<i64>) -> history::Bon
             true => Vec::new(),
             false => bonds.iter().map(|b| b.rolling).collect(),
         },
+        twist: scene.twists_by_pair().then(|| bonds.iter().map(|b| b.twist).collect()),
         formed,
         mean_diameter: bonds.iter().map(|b| b.mean_diameter).collect(),
     }
@@ -378,6 +379,14 @@ fn observables<D: Dim>(scene: &Scene, world: &World<D>) -> Vec<(Observable, Meas
     add("strain", "", &[d, d], |w, _, out| out.extend(w.strain()));
     list.push((Observable::route(), |_, r, out| out.push(solver_route(r.route).number())));
     list.extend(of_bonds_and_walls(scene, world));
+    if world.membrane.is_some() {
+        list.push((Observable::new("membrane_pressure", "Pa", scalar), |w, _, out| {
+            out.extend(w.membrane.as_ref().map(|membrane| membrane.applied));
+        }));
+        list.push((Observable::new("membrane_area", "m2", scalar), |w, _, out| {
+            out.extend(w.membrane.as_ref().map(|membrane| membrane.area));
+        }));
+    }
     list
 }
 

@@ -35,8 +35,16 @@ pub struct ResumeOptions {
 /// Fields that may change: the steps already made do not depend on them.
 const FREE: [&str; 5] = ["title", "$schema", "time.end", "stop", "load_wall"];
 /// Fields that may change with `--force`: the run then differs from a run of either scene alone.
-const OPEN: [&str; 7] =
-    ["solver", "gravity", "rupture", "materials.friction", "materials.restitution", "grains.loads", "bonds.flow"];
+const OPEN: [&str; 8] = [
+    "solver",
+    "gravity",
+    "rupture",
+    "materials.friction",
+    "materials.restitution",
+    "grains.loads",
+    "membrane.pressure",
+    "bonds.flow",
+];
 /// Fields of a wall that may change with `--force`.
 const OPEN_WALL: [&str; 6] = ["force", "force_rate", "velocity", "stress", "slide", "friction"];
 

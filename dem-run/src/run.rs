@@ -201,7 +201,7 @@ impl<D: Dim> Run<'_, D> {
             let RunState { world, course, .. } = &mut self.state;
             let ending = course.advance(self.scene, world)?;
             if course.cemented(self.scene) == Some(world.steps) {
-                self.recorder.bonds_formed(world)?;
+                self.recorder.bonds_formed(self.scene, world)?;
             }
             if let Some(ending) = ending {
                 return Ok(ending);
@@ -259,6 +259,9 @@ impl<D: Dim> Run<'_, D> {
                 "; a smaller time.step, more max_sweeps or a larger solver.accept may help"
             }
             StepError::NotFinite { .. } => "; a smaller time.step may help",
+            StepError::NoSurface { .. } => {
+                "; end the run before (stop, time.end), or give a larger membrane.disk_radius"
+            }
             StepError::Yielded { .. } => "; a smaller solver.tolerance or time.step may help",
             // the message about too fast a step includes the remedy
             _ => "",

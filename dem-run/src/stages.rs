@@ -11,6 +11,7 @@ use crate::summary::Ending;
 use dem_core::dim::Dim;
 use dem_core::saved::{Mismatch, Reader, Saved};
 use dem_core::world::World;
+use std::sync::Arc;
 
 /// The stages of a run, in progress.
 pub struct Stages<D: Dim> {
@@ -115,9 +116,13 @@ fn cement<D: Dim>(scene: &Scene, world: &mut World<D>, stage: usize) -> Result<(
     Ok(())
 }
 
-/// Gives the walls the drives of a stage that begins after the step `start`.
+/// Gives the walls the drives of a stage that begins after the step `start`, and the membrane its
+/// pressure.
 fn set_drives<D: Dim>(scene: &Scene, world: &mut World<D>, stage: usize, start: u64) {
     let time = start as f64 * scene.time.step;
+    if let (Some(pressure), Some(membrane)) = (scene.stages[stage].membrane_pressure.clone(), &mut world.membrane) {
+        membrane.pressure = Arc::new(move |t| pressure.at(t - time));
+    }
     for (name, change) in &scene.stages[stage].walls {
         let Some(index) = scene.wall_index(name) else { continue };
         let Some(direction) = drive_direction(&world.walls[index]) else { continue };

@@ -110,13 +110,14 @@ pub(crate) fn of_walls<D: Dim>(scene: &Scene, walls: &[Wall<D>], grains: Option<
     told
 }
 
-/// Whether something other than a wall may press grains together: gravity, a load or a moving
-/// grain.
+/// Whether something other than a wall may press grains together: gravity, a load, a membrane or a
+/// moving grain.
 fn others_push(scene: &Scene) -> bool {
     let nonzero = |values: &[f64]| values.iter().any(|value| *value != 0.0);
     let moving = |values: &Option<Vec<f64>>| values.as_deref().is_some_and(nonzero);
     scene.gravity.as_deref().is_some_and(nonzero)
         || scene.grains.as_ref().is_some_and(|grains| !grains.loads.is_empty())
+        || scene.membrane.is_some()
         || matches!(&scene.sample, Sample::Grains(list) if list.iter().any(|g| moving(&g.velocity) || moving(&g.spin)))
 }
 

@@ -240,6 +240,11 @@ def reference_volume(h):
     return float(np.prod(high - low)) * prescribed.thickness(h.scene)
 
 
+def membrane_moment(h):
+    """What the pushes of a membrane add to the stress times the volume (N m) [S,D,D]."""
+    return 0.0 if h.membrane is None else h.membrane.moment
+
+
 def check_stress(h, c, report):
     """Love and Weber: Σ ℓ ⊗ f over contacts; ℓ joins the centres, at a wall the contact point to
     the centre."""
@@ -247,7 +252,7 @@ def check_stress(h, c, report):
     branch = c.n * (c.lever_i + c.lever_j)[:, None]
     tensor = branch[:, :, None] * h.force[:, None, :]
     volume = reference_volume(h)
-    total = sums(h.row_step, tensor, h.S) / volume
+    total = (sums(h.row_step, tensor, h.S) + membrane_moment(h)) / volume
     size = sums(h.row_step, np.where(single, (c.lever_i + c.lever_j + c.place) * norm(h.force), 0.0), h.S) / volume
     off = np.abs(h.observed["stress"] - total).max((1, 2), initial=0.0)
     report.expect("stress", np.where(h.single, off, 0.0), tolerances.rounding(size), of_step("stress (Pa)"))
@@ -270,7 +275,7 @@ def check_virial(h, c, report):
     bodies = np.einsum("sna,snb->sab", middle, moved)
     rows = np.flatnonzero(h.on_wall)
     walls = sums(h.row_step[rows], h.point[rows][:, :, None] * h.force[rows][:, None, :], h.S)
-    total = (bodies - walls) / reference_volume(h)
+    total = (bodies - walls + membrane_moment(h)) / reference_volume(h)
     forces = sums(h.row_step, norm(h.force) * c.place, h.S)
     size = forces + (norm(middle) * (h.mass * (norm(h.v[1:]) + norm(h.v[:-1])) / h.h + norm(outer))).sum(1)
     off = np.abs(h.observed["stress"] - total).max((1, 2), initial=0.0)

@@ -19,6 +19,7 @@ import balance
 import geometry
 import laws
 import materials
+import membrane
 import motion
 import next_event
 import rupture
@@ -44,6 +45,7 @@ def check(path, told=None, text=None):
     contacts = geometry.Contacts(h)
     solved = laws.Solved(h, contacts)
     materials.check(h, report)
+    membrane.check(h, report)
     if h.quasi_static:
         next_event.check(h, contacts, solved, report)
         if told is not None:

@@ -14,6 +14,7 @@ import materials
 import prescribed
 from drives import Driving
 from geometry import gap_and_normal
+from membrane import Membrane
 
 
 class Unfit(Exception):
@@ -177,6 +178,7 @@ class History:
         self.gravity = np.asarray(scene.get("gravity") or np.zeros(self.D), float)
         self._parts()
         self.driving = Driving(self)
+        self.membrane = Membrane(self) if self.scene.get("membrane") else None
         # bodies that no contact moves
         self.immovable = np.concatenate([self.fixed, ~np.isfinite(self.driving.mass).any(0)])
 
@@ -213,6 +215,8 @@ class History:
             factor = prescribed.at(load.get("time") or {"constant": 1.0}, self.load_times)[:, None]
             force[:, load["grain"]] += factor * np.asarray(load.get("force") or np.zeros(self.D), float)
             torque[:, load["grain"]] += factor * np.asarray(load.get("torque") or np.zeros(self.Q), float)
+        if self.membrane is not None:
+            force += self.membrane.force
         return force, torque
 
 

@@ -103,8 +103,8 @@ def listed(h):
 
 
 class Bonds:
-    """The bonds that the scene prescribes for pairs of grains `i` < `j`: strength, shear and
-    rolling, factor on the stiffness, and whether the strength is scattered."""
+    """The bonds that the scene prescribes for pairs of grains `i` < `j`: strength, shear, rolling
+    and twist, factor on the stiffness, whether the strength is scattered, and how."""
 
     def __init__(self, h, i, j):
         scene, bonds = h.scene, h.scene["bonds"]
@@ -118,22 +118,27 @@ class Bonds:
         )
         limit = lambda key: mu.copy() if bonds.get(key) is None else np.full(len(i), float(bonds[key]))
         self.shear, self.rolling = limit("shear"), limit("rolling")
+        self.twist = np.full(len(i), float(bonds.get("twist") or 0.0))
+        self.scatter = np.full(len(i), bonds.get("scatter"), object)
         for a in range(len(names(scene))):
             for b in range(a, len(names(scene))):
                 own = of_pair(scene, a, b).get("bonds")
                 rows = (np.minimum(h.material[i], h.material[j]) == a) & (np.maximum(h.material[i], h.material[j]) == b)
                 if own:
                     self._of_pair(scene, own, rows)
-        self.scattered = np.full(len(i), bonds.get("scatter") is not None)
+        self.scattered = np.array([scatter is not None for scatter in self.scatter], bool)
         self.rows = listed(h)
         if self.rows is not None:
             self._of_list(i, j)
 
     def _of_pair(self, scene, own, rows):
         self.strength[rows] = prescribed.strength(scene, self.a[rows], own)
-        for key, values in (("shear", self.shear), ("rolling", self.rolling), ("stiffness_factor", self.factor)):
+        limits = (("shear", self.shear), ("rolling", self.rolling), ("twist", self.twist))
+        for key, values in (*limits, ("stiffness_factor", self.factor)):
             if own.get(key) is not None:
                 values[rows] = own[key]
+        if own.get("scatter") is not None:
+            self.scatter[rows] = own["scatter"]
 
     def _of_list(self, i, j):
         for k, pair in enumerate(zip(i.tolist(), j.tolist())):
@@ -160,8 +165,8 @@ def bonded_pairs(h, i, j):
     return out
 
 
-def scatter_factors(scene, count):
-    """Factors on the strengths of `count` bonds in the order of their pairs.
+def scatter_factors(scene, scatters):
+    """Factors on the strengths of bonds with these distributions, in the order of their pairs.
 
     The generator is PCG XSL RR 128/64 (O'Neill 2014) with the seed of the scene as initial state and
     stream 1; a number is the upper 53 bits of a draw."""
@@ -183,8 +188,9 @@ def scatter_factors(scene, count):
             if value > 0:
                 return value
 
-    (kind, given), out = next(iter(scene["bonds"]["scatter"].items())), []
-    while len(out) < count:
+    out = []
+    while len(out) < len(scatters):
+        kind, given = next(iter(scatters[len(out)].items()))
         if kind == "weibull":
             out.append((-np.log(share())) ** (1 / given["modulus"]))
             continue
@@ -225,13 +231,14 @@ def check_bonds(h, report):
     given = Bonds(h, bi, bj)
     strength = given.strength.copy()
     if given.scattered.any():
-        strength[given.scattered] *= scatter_factors(h.scene, int(given.scattered.sum()))
+        strength[given.scattered] *= scatter_factors(h.scene, given.scatter[given.scattered])
     told = {
         "rest_gap": (h.rest_gap, rest, norm(h.x[0, bi]) + norm(h.x[0, bj]) + given.a),
         "mean_diameter": (h.mean_diameter, given.a, given.a),
         "strength": (h.strength, strength, strength),
         "shear": (h.bond_friction, given.shear, given.shear),
         "rolling": (h.bond_rolling, given.rolling, given.rolling),
+        "twist": (h.bond_twist, given.twist, given.twist),
     }
     for name, (found, expected, scale) in told.items():
         off = np.abs(found - expected)

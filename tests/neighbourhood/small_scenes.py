@@ -58,12 +58,17 @@ def beam():
 
 
 def arm():
-    """configs/bent-arm.json with a frame at every step: spheres, a fixed one, a load, twist."""
+    """configs/bent-arm.json with a frame at every step: spheres, a fixed one, a load, twist, which is
+    another at the bend, between two materials."""
     centres = [[0, 0, 0], [4, 0, 0], [8, 0, 0], [12, 0, 0], [12, 4, 0], [12, 8, 0], [12, 12, 0]]
+    grains = [{"center": [1e-3 * x for x in c], "radius": 2e-3} for c in centres]
+    for grain in grains[4:]:
+        grain["material"] = "upper"
+    pairs = [{"between": ["upper", "base"], "bonds": {"twist": 0.05}}]
     return {
         "dimension": 3,
-        "sample": {"grains": [{"center": [1e-3 * x for x in c], "radius": 2e-3} for c in centres]},
-        "materials": DRY,
+        "sample": {"grains": grains},
+        "materials": DRY | {"named": [{"name": "upper"}], "pairs": pairs},
         "bonds": {"strength": 100, "gap_tolerance": 1e-3, "twist": 0.1},
         "grains": {"fixed": [0], "loads": [{"grain": 6, "force": [0, 0, 1], "time": {"ramp": {"rate": 1000}}}]},
         "time": {"step": 1e-4, "end": 0.006},
@@ -109,7 +114,7 @@ def layered():
         "wall_friction": 0.4,
         "regions": [{"half_space": {"point": [0, 0.009], "normal": [0.2, 1]}}],
     }
-    own = {"strength": 6, "shear": 0.2, "rolling": 0.1}
+    own = {"strength": 6, "shear": 0.2, "rolling": 0.1, "scatter": {"normal": {"deviation": 0.2}}}
     pairs = [{"between": ["upper", "base"], "friction": 0.1, "bonds": own}]
     scene["materials"] = DRY | {"named": [upper], "pairs": pairs}
     return scene
@@ -189,7 +194,39 @@ def from_break_to_break():
     return scene
 
 
+def wrapped():
+    """`pressed` in a membrane, whose pressure a stage lowers, between the floor and a lid that comes
+    down."""
+    scene = pressed()
+    del scene["gravity"]
+    scene["sample"]["random"]["preparation"]["compaction"]["solid_fraction"] = 0.77
+    scene["bonds"] |= {"gap_tolerance": 0.02, "stiffness": {"young": {"modulus": 1e8, "poisson_ratio": 0.2}}}
+    scene["walls"]["top"] = {"shape": scene["walls"]["top"]["shape"]}
+    scene["membrane"] = {"pressure": {"table": [[0, 0], [2e-3, 2e4]]}, "between": ["bottom", "top"]}
+    scene["stages"] = [
+        {"name": "confine", "duration": 2e-3},
+        {"name": "press", "duration": 4e-3, "walls": {"top": {"velocity": {"constant": 0.05}}}},
+        {"name": "release", "duration": 4e-3, "membrane_pressure": {"table": [[0, 2e4], [2e-3, 5e3]]}},
+    ]
+    return scene
+
+
+def enclosed():
+    """Two rows of disks in a membrane all around, and one that flies into them."""
+    r = 1e-3
+    scene = pressed()
+    del scene["gravity"], scene["walls"]
+    places = [[2 * r * (k % 3), 2 * r * (k // 3)] for k in range(6)] + [[20 * r, 0]]
+    scene["sample"] = {"grains": [{"center": place, "radius": r} for place in places]}
+    scene["bonds"] |= {"strength": 0.5}
+    scene["sample"]["grains"][6]["velocity"] = [-5, 0.1]
+    scene["membrane"] = {"pressure": {"ramp": {"rate": 1e6}}, "disk_radius": 1.2e-3}
+    return scene
+
+
 SCENES = {
+    "wrapped": wrapped,
+    "enclosed": enclosed,
     "layered": layered,
     "listed": listed,
     "confined": confined,

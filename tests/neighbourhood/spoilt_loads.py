@@ -34,6 +34,14 @@ SPOILT = [
         "bonds formed",
     ),
     ("layered", "a limit of a pair", told("materials", "pairs", 0, "bonds", "shear", value=0.21), "bonds formed"),
+    (
+        "layered",
+        "the scatter of a pair",
+        told("materials", "pairs", 0, "bonds", "scatter", "normal", "deviation", value=0.21),
+        "bonds formed",
+    ),
+    ("arm", "the twist of a pair", told("materials", "pairs", 0, "bonds", "twist", value=0.06), "bonds formed"),
+    ("arm", "a limit of twist", add("bonds/twist", lambda g: 1), "bonds formed"),
     ("layered", "a notch", told("bonds", "absent", value=lambda r: r[:0]), "bonds formed"),
     ("layered", "a scattered strength", add("bonds/strength", lambda g: 3), "bonds formed"),
     ("layered", "a rolling limit", add("bonds/rolling", lambda g: 3), "bonds formed"),
@@ -71,6 +79,16 @@ SPOILT = [
         "applied_force",
     ),
     ("staged", "the work at its beginning", observed("external_work", -1), "external_work"),
+    # a membrane
+    ("wrapped", "a pressure", told("membrane", "pressure", "table", 1, 1, value=2e4 * (1 + 1e-6)), "membrane"),
+    (
+        "wrapped",
+        "a pressure of a stage",
+        told("stages", 2, "membrane_pressure", "table", 1, 1, value=5001),
+        "membrane",
+    ),
+    ("wrapped", "an area", observed("membrane_area"), "membrane"),
+    ("enclosed", "the disk", told("membrane", "disk_radius", value=0.2e-3), "membrane"),
     # loading from break to break
     ("events", "a place", add(G + "position/value", lambda g: (5, 3, 1), 0, 1e-15), "rest"),
     ("events", "a speed", add(G + "velocity/value", lambda g: (5, 3, 1), 0, 1e-15), "rest"),

@@ -15,6 +15,12 @@ MODES = ("TENSION", "SHEAR", "ROLLING", "TWIST")
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 
 
+def twists(scene):
+    """Whether some bonds resist twist: all, or those of a pair of materials."""
+    pairs = [(pair.get("bonds") or {}).get("twist") for pair in scene["materials"].get("pairs") or []]
+    return scene["bonds"].get("twist") is not None or any(twist is not None and twist > 0 for twist in pairs)
+
+
 def check(h, report, told, text=None):
     """The summary `told` (from --json), and `text` (without it) where there is one."""
     expected = recomputed(h, told)
@@ -86,7 +92,7 @@ def recomputed(h, told):
         "bonds": h.K,
         "tolerance": float(tolerance),
         "elastic": bool(h.K and h.stiffness is not None),
-        "twists": h.D == 3 and (h.scene.get("bonds") or {}).get("twist") is not None,
+        "twists": h.D == 3 and h.scene.get("bonds") is not None and twists(h.scene),
         "broken": [modes.count(mode) for mode in MODES],
         "worst_residual": float(residual.max(initial=0.0)),
         # before version 4 of histories, steps counted too whose load error missed its own tolerance

@@ -44,7 +44,9 @@ impl<D: Dim> World<D> {
     /// a load up to the time `until`, the loads of that time act and no bond breaks.
     pub(super) fn load_to_next_event(&mut self, until: f64) -> Result<StepReport<D>, StepError> {
         self.stop_motion();
-        self.measure_sections(&self.midpoint(self.settings.step));
+        let start = self.midpoint(self.settings.step);
+        self.measure_sections(&start);
+        self.follow_surface(&start)?;
         let mut done = Solves::default();
         let found = self.next_event(until, &mut done)?;
         if found.excess.is_infinite() {
@@ -56,6 +58,9 @@ impl<D: Dim> World<D> {
         for (wall, force) in self.walls.iter_mut().zip(forces) {
             wall.applied = wall.applied_force(at);
             (wall.reaction, wall.reaction_at_limit) = (force, force);
+        }
+        if let Some(membrane) = &mut self.membrane {
+            membrane.applied = (membrane.pressure)(at);
         }
         breaks.iter().for_each(|failed| self.bonds[failed.bond as usize].status = failed.mode);
         (self.stored, self.mid, self.turns, self.last_part) = (touches, mid, turns, self.settings.step);

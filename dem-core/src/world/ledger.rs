@@ -12,7 +12,7 @@ use crate::problem::{ContactProblem, Group, GroupVisitor, KINDS, Nodes};
 pub struct Ledger {
     /// Kinetic energy of grains and force-driven walls.
     pub kinetic: f64,
-    /// Work of gravity, prescribed forces and wall drives.
+    /// Work of gravity, prescribed forces, the pressure of a membrane and wall drives.
     pub external_work: f64,
     /// Energy lost by the normal rows of dry contacts.
     pub impact: f64,

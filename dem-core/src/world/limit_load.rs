@@ -15,14 +15,16 @@ type Velocities<D> = Arc<[(<D as Dim>::Vector, <D as Dim>::Spin)]>;
 impl<D: Dim> World<D> {
     /// The largest factor λ for which reactions that no contact law excludes balance the loads of
     /// the time `from` (s) and λ times what they grow by until the time `to` (s): weight, loads on
-    /// grains and forces on walls, with the bodies at their places. Walls without a force drive are
-    /// supports.
+    /// grains, forces on walls and the pressure of a membrane, with the bodies at their places.
+    /// Walls without a force drive are supports.
     ///
     /// All intact bonds take part, and all other pairs whose gap is at most 1e-6 of the smaller
     /// radius. The world does not change.
     pub fn limit_load(&mut self, from: f64, to: f64) -> LimitLoad {
         let mid = Midpoint::of(&self.grains, &self.walls);
         self.measure_sections(&mid);
+        // where it has no surface, the last one remains
+        self.follow_surface(&mid).unwrap_or_default();
         let start = self.velocities_given(true, |value| value(from));
         // without the weight, whose rounding would be a load
         let growth = self.velocities_given(false, |value| value(to) - value(from));
@@ -54,6 +56,11 @@ impl<D: Dim> World<D> {
             let factor = of(&*load.factor);
             given[load.grain].0 += load.force * (factor * inverse_mass);
             given[load.grain].1 += load.torque * (factor * inverse_inertia);
+        }
+        if let Some(membrane) = &self.membrane {
+            for (grain, force) in self.membrane_forces(of(&*membrane.pressure)) {
+                given[grain].0 += force * self.grains.inverse(grain).0;
+            }
         }
         given.extend(self.walls.iter().map(|wall| match &wall.drive {
             Drive::Force { direction, mass, .. } => {

@@ -10,6 +10,7 @@ mod ledger;
 mod limit_load;
 mod limits;
 mod loads;
+mod membrane;
 mod motion;
 mod observe;
 mod report;
@@ -20,6 +21,7 @@ mod touch;
 mod turning;
 
 pub use ledger::{Ledger, Momentum};
+pub use membrane::Membrane;
 pub use report::{StepError, StepReport, Violation};
 pub use touch::{Break, Counts, Touch, TouchStatus};
 
@@ -94,6 +96,8 @@ pub struct World<D: Dim> {
     pub bonds: Bonds,
     /// Prescribed forces and torques.
     pub loads: Vec<Load<D>>,
+    /// The membrane on the free surface of the sample, if there is one (2D).
+    pub membrane: Option<Membrane<D>>,
     /// Settings of the run.
     pub settings: Settings<D>,
     /// Time (s).
@@ -192,6 +196,7 @@ impl<D: Dim> World<D> {
             grains,
             walls,
             loads,
+            membrane: None,
             settings,
         };
         world.refer_to(world.grains.position.clone());

@@ -34,7 +34,8 @@ impl<D: Dim> World<D> {
 
     /// Mean stress σ = (1/V) Σ ℓ ⊗ f over the contacts of the last step (Pa, D × D row by row;
     /// compression positive), after Love and Weber. ℓ joins the centres, or at a wall the contact
-    /// point to the centre; V is the box around the sample at time zero.
+    /// point to the centre, or under a membrane the point of the grain where its push acts to the
+    /// centre; V is the box around the sample at time zero.
     pub fn stress(&self) -> Vec<f64> {
         let mut sum = vec![0.0; D::N * D::N];
         for touch in self.touches() {
@@ -43,6 +44,15 @@ impl<D: Dim> World<D> {
             for row in 0..D::N {
                 for col in 0..D::N {
                     sum[row * D::N + col] += branch[row] * force[col];
+                }
+            }
+        }
+        let pressure = self.membrane.as_ref().map_or(0.0, |membrane| membrane.applied);
+        for (grain, force) in self.membrane_forces(pressure) {
+            let size = force.norm();
+            for row in (0..D::N).filter(|_| size > 0.0) {
+                for col in 0..D::N {
+                    sum[row * D::N + col] += self.grains.radius[grain] / size * force[row] * force[col];
                 }
             }
         }

@@ -156,6 +156,16 @@ pub enum StepError {
         /// The body with the largest momentum (walls follow the grains).
         body: u32,
     },
+    /// A membrane has no surface: its disk rolls past the sample, or does not fit between the
+    /// plates.
+    NoSurface {
+        /// Time of the last accepted state (s).
+        time: f64,
+        /// The plates, if it is between plates (walls follow the grains).
+        walls: Option<[u32; 2]>,
+        /// Radius of the disk (m).
+        disk: f64,
+    },
     /// A velocity is not a finite number.
     NotFinite {
         /// The body (walls follow the grains).
@@ -189,7 +199,7 @@ impl StepError {
             Self::NotAccepted { verdict, .. } | Self::Yielded { violation: Violation { verdict, .. }, .. } => {
                 Some(verdict)
             }
-            Self::TooFast { .. } | Self::Unbalanced { .. } | Self::NotFinite { .. } => None,
+            Self::TooFast { .. } | Self::Unbalanced { .. } | Self::NoSurface { .. } | Self::NotFinite { .. } => None,
         }
     }
 
@@ -224,6 +234,13 @@ impl StepError {
                 "no equilibrium under the loads of {load_time:.6e} s: {} moves, and others with it",
                 name(*body)
             ),
+            Self::NoSurface { time, walls, disk } => {
+                let between = walls.map(|walls| format!(" between {}", listed(&walls, name))).unwrap_or_default();
+                format!(
+                    "the membrane finds no surface of the sample{between} at t = {time:.6e} s: a disk of radius {disk:.6e} m \
+                     rolls past the grains there, or does not fit"
+                )
+            }
             Self::NotFinite { time, body } => format!(
                 "the velocity of {} is not a finite number at t = {time:.6e} s: look for grains squeezed between bodies that \
                  cannot yield",

@@ -95,6 +95,7 @@ impl<D: Dim> World<D> {
     ) -> Result<StepReport<D>, StepError> {
         let mid = self.midpoint(h);
         self.measure_sections(&mid);
+        self.follow_surface(&mid)?;
         let loaded_at = self.time + 0.5 * h;
         let motion = self.free_motion(h, loaded_at);
         let applied = self.applied_impulse(h, loaded_at);
@@ -161,12 +162,13 @@ impl<D: Dim> World<D> {
     }
 
     /// The contact problem that the next step would start from, for export and for benchmarks. The
-    /// world does not move.
+    /// world does not move. Where a membrane has no surface, the last one remains.
     pub fn contact_problem(&mut self) -> ContactProblem<D> {
         let h = self.settings.step;
         let loaded_at = self.time + 0.5 * h;
         let mid = self.midpoint(h);
         self.measure_sections(&mid);
+        self.follow_surface(&mid).unwrap_or_default();
         let motion = self.free_motion(h, loaded_at);
         let touches = self.detect(&mid, &motion, h);
         let brought = self.brought(&mid, &touches, &motion, h);
@@ -182,6 +184,11 @@ impl<D: Dim> World<D> {
         }
     }
 
+    /// Whether forces may act on grains that are not those of contacts.
+    fn has_external_forces(&self) -> bool {
+        self.settings.gravity.is_some() || !self.loads.is_empty() || self.membrane.is_some()
+    }
+
     /// Prescribed force on each grain (N), and torque (N m), at the time `at`.
     fn external_forces(&self, at: f64) -> Vec<(D::Vector, D::Spin)> {
         let gravity = self.settings.gravity.unwrap_or(D::Vector::zero());
@@ -190,6 +197,9 @@ impl<D: Dim> World<D> {
             let factor = (load.factor)(at);
             forces[load.grain].0 += load.force * factor;
             forces[load.grain].1 += load.torque * factor;
+        }
+        if let Some(membrane) = &self.membrane {
+            self.membrane_forces((membrane.pressure)(at)).for_each(|(grain, force)| forces[grain].0 += force);
         }
         forces
     }
@@ -200,7 +210,7 @@ impl<D: Dim> World<D> {
         let g = &self.grains;
         let mut before: Vec<_> = g.velocity.iter().copied().zip(g.spin.iter().copied()).collect();
         let mut free = before.clone();
-        if self.settings.gravity.is_some() || !self.loads.is_empty() {
+        if self.has_external_forces() {
             for (k, (force, torque)) in self.external_forces(at).into_iter().enumerate() {
                 let (inverse_mass, inverse_inertia) = g.inverse(k);
                 free[k].0 += force * (h * inverse_mass);
@@ -231,7 +241,7 @@ impl<D: Dim> World<D> {
     /// ‖h F_ext‖ over all bodies that can move (N s), with the loads of the time `at`.
     pub(super) fn applied_impulse(&self, h: f64, at: f64) -> f64 {
         let mut sum = 0.0;
-        if self.settings.gravity.is_some() || !self.loads.is_empty() {
+        if self.has_external_forces() {
             for (k, (force, _)) in self.external_forces(at).into_iter().enumerate() {
                 if !self.grains.fixed[k] {
                     sum += force.dot(&force);
@@ -360,6 +370,9 @@ impl<D: Dim> World<D> {
             wall.position = mid.walls[w] + wall.velocity * (0.5 * h);
             wall.applied = wall.applied_force(self.time + 0.5 * h);
         }
+        if let Some(membrane) = &mut self.membrane {
+            membrane.applied = (membrane.pressure)(self.time + 0.5 * h);
+        }
         let forces = self.wall_forces(&mid, &touches);
         for (wall, force) in self.walls.iter_mut().zip(forces) {
             (wall.reaction, wall.reaction_at_limit) = (force, force);
@@ -431,12 +444,12 @@ impl<D: Dim> World<D> {
         0.5 * sum
     }
 
-    /// Work of gravity, loads and drives in the step (J): force times mean velocity; a wall with
-    /// prescribed velocity does the work of its reaction.
+    /// Work of gravity, loads, membrane and drives in the step (J): force times mean velocity; a
+    /// wall with prescribed velocity does the work of its reaction.
     fn external_work(&self, h: f64, motion: &Motion<D>, problem: &ContactProblem<D>) -> f64 {
         let mean = |k: usize| (motion.before[k].0 + problem.nodes.all[k].velocity) * 0.5;
         let mut work = 0.0;
-        if self.settings.gravity.is_some() || !self.loads.is_empty() {
+        if self.has_external_forces() {
             for (k, (force, torque)) in self.external_forces(self.time + 0.5 * h).iter().enumerate() {
                 if !self.grains.fixed[k] {
                     let spin = (motion.before[k].1 + problem.nodes.all[k].spin) * 0.5;

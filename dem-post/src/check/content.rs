@@ -224,7 +224,7 @@ fn signs(c: &mut Checker) {
     for place in [RADIUS, "particles/grains/mass", "bonds/mean_diameter"] {
         every(c, place, |value| (value <= 0.0).then(|| format!("{value} is not positive")));
     }
-    for place in ["particles/grains/inertia", "bonds/strength", "bonds/friction", "bonds/rolling"] {
+    for place in ["particles/grains/inertia", "bonds/strength", "bonds/friction", "bonds/rolling", "bonds/twist"] {
         every(c, place, |value| (value < 0.0).then(|| format!("{value} is negative")));
     }
     if c.sizes.n == 0 {

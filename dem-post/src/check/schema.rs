@@ -271,6 +271,9 @@ fn bonds(c: &mut Checker) {
     if c.has("bonds/rolling") {
         c.table("bonds/rolling", &F64, b, &[], "");
     }
+    if c.has("bonds/twist") {
+        c.table("bonds/twist", &F64, b, &[], "");
+    }
     if c.has("bonds/formed") {
         c.table("bonds/formed", &I64, 1, &[], "");
     }

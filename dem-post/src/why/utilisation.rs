@@ -92,7 +92,8 @@ pub struct Greatest {
 }
 
 impl Limits {
-    /// The limits of the bond `bond`. The coefficient of twist is that of the scene.
+    /// The limits of the bond `bond`. Where the history has no coefficients of twist, that of the
+    /// scene holds for all.
     ///
     /// # Errors
     /// Those of reading the history.
@@ -102,7 +103,12 @@ impl Limits {
             strength: bonds.strength[bond],
             shear: friction,
             rolling: bonds.rolling.get(bond).copied().unwrap_or(friction),
-            twist: if history.dimension() == 3 { twist(history)? } else { Twist::Free },
+            twist: match bonds.twist.as_ref().map(|twist| twist[bond]) {
+                _ if history.dimension() < 3 => Twist::Free,
+                Some(coefficient) if coefficient > 0.0 => Twist::Coefficient(coefficient),
+                Some(_) => Twist::Free,
+                None => twist(history)?,
+            },
             arm: bonds.mean_diameter[bond],
         })
     }

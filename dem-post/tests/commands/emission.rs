@@ -18,6 +18,7 @@ fn chain(steps: &[i64], energy: f64) -> (tempfile::TempDir, PathBuf) {
         strength: vec![10.0; bonds],
         friction: vec![0.3; bonds],
         rolling: vec![],
+        twist: None,
         mean_diameter: vec![2e-3; bonds],
         formed: None,
     };

@@ -63,6 +63,7 @@ fn layout(dimension: usize) -> Layout {
             strength: vec![10.0; 4],
             friction: vec![0.3; 4],
             rolling: vec![],
+            twist: None,
             mean_diameter: vec![2e-3; 4],
             formed: None,
         },

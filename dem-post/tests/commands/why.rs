@@ -16,6 +16,7 @@ fn two_grains(dimension: usize) -> Layout {
             strength: vec![10.0],
             friction: vec![0.3],
             rolling: vec![0.2],
+            twist: None,
             mean_diameter: vec![4e-3],
             formed: None,
         },
@@ -192,6 +193,28 @@ fn what_a_history_lacks_is_said_and_not_guessed() {
     let (_folder, path) = sample(&moved);
     let text = String::from_utf8(dem_post(&path, &["why", "0"]).stdout).unwrap();
     assert!(text.contains("not known: the history has no wall_force_at_limit of wall top"), "{text}");
+}
+
+#[test]
+fn a_bond_with_a_coefficient_of_twist_of_its_own_is_judged_by_it() {
+    let own = |twist: f64| {
+        let mut l = two_grains(3);
+        l.bonds.twist = Some(vec![twist]);
+        let (_folder, path) = history(&l, true);
+        json(&dem_post(&path, &["why", "0", "--json"]))
+    };
+    let limit = |found: &serde_json::Value| {
+        let parts = found["broken"]["parts"].as_array().unwrap().iter();
+        parts.filter(|part| part["mode"] == "TWIST").find_map(|part| part["limit"].as_f64())
+    };
+    let (scene, half, free) = (own(0.5), own(0.25), own(0.0));
+    assert_eq!(
+        (&scene["twist"], &half["twist"], &free["twist"]),
+        (&0.5.into(), &0.25.into(), &serde_json::Value::Null)
+    );
+    assert!((limit(&half).unwrap() / limit(&scene).unwrap() - 0.5).abs() < 1e-12);
+    // a bond that does not resist twist has no part of that mode
+    assert_eq!(limit(&free), None);
 }
 
 #[test]

@@ -304,14 +304,16 @@ struct LaterBonds {
 }
 
 /// Columns of the properties of bonds: name, unit, values.
-fn columns(bonds: &Bonds) -> [(&'static str, &'static str, &[f64]); 5] {
-    [
+fn columns(bonds: &Bonds) -> Vec<(&'static str, &'static str, &[f64])> {
+    let mut columns: Vec<(&str, &str, &[f64])> = vec![
         ("rest_gap", "m", &bonds.rest_gap),
         ("strength", "N", &bonds.strength),
         ("friction", "", &bonds.friction),
         ("rolling", "", &bonds.rolling),
         ("mean_diameter", "m", &bonds.mean_diameter),
-    ]
+    ];
+    columns.extend(bonds.twist.as_ref().map(|twist| ("twist", "", twist.as_slice())));
+    columns
 }
 
 impl BondTables {

@@ -58,6 +58,7 @@ const AXES: &[(&str, &[&str])] = &[
     ("bonds/strength", &["bond"]),
     ("bonds/friction", &["bond"]),
     ("bonds/rolling", &["bond"]),
+    ("bonds/twist", &["bond"]),
     ("bonds/mean_diameter", &["bond"]),
     ("bonds/status/value", &[FRAMES, "bond"]),
     ("bonds/formed", &["stage"]),

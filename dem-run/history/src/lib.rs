@@ -43,7 +43,8 @@
 //!     gap [M], status [M]  m; enum OPEN, STICK, SLIP, BONDED
 //!     bond i32[M]          −1 for none; if bonds
 //! /bonds/                  pair i32[B,2]; rest_gap (m), strength (N), friction,
-//!                          mean_diameter (m) [B]; rolling [B] if it differs from friction
+//!                          mean_diameter (m) [B]; rolling [B] if it differs from friction;
+//!                          twist [B] if it may differ by pair of materials
 //!     status               {step, time, value[T,B]}: enum INTACT, TENSION, SHEAR, ROLLING, TWIST
 //!     formed i64[1]        if a stage forms the bonds: the step after which, −1 until then. B is 0
 //!                          until then; in frames up to this step there are no bonds, and `status`

@@ -68,6 +68,8 @@ pub struct Bonds {
     pub friction: Vec<f64>,
     /// Coefficient of the rolling limit ν; empty if ν = μ for all bonds.
     pub rolling: Vec<f64>,
+    /// Coefficient of the twist limit ξ; none if that of the scene holds for all bonds.
+    pub twist: Option<Vec<f64>>,
     /// Mean diameter a_moy, m.
     pub mean_diameter: Vec<f64>,
     /// The step after which a stage formed them, or [`NOT_FORMED`]; none if they are there from the

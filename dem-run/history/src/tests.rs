@@ -44,7 +44,7 @@ fn full(dimension: usize) -> Layout {
             friction: vec![0.3, 0.2],
             rolling: vec![0.1, 0.25],
             mean_diameter: vec![0.3, 0.5],
-            formed: None,
+            ..Bonds::default()
         },
         materials: vec!["base".into(), "pâte".into()],
         observables: vec![
@@ -431,7 +431,7 @@ fn a_file_with_wrong_bytes_never_makes_the_reader_panic() {
 fn a_packed_history_is_the_same_and_smaller() {
     let (folder, path) = folder();
     let packed = folder.path().join("packed.h5");
-    let twisting = Layout { twist: true, ..full(3) };
+    let twisting = Layout { twist: true, bonds: Bonds { twist: Some(vec![0.5, 0.0]), ..full(3).bonds }, ..full(3) };
     for layout in [full(2), full(3), twisting, Layout { single: true, without_reactions: true, ..full(3) }] {
         let _ = fs::remove_file(&path);
         let mut writer = Writer::create(&path, &layout, false).unwrap();

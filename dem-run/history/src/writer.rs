@@ -427,6 +427,9 @@ fn check_bonds(bonds: &Bonds) -> Result<()> {
     if !bonds.rolling.is_empty() {
         check_length("bonds/rolling", bonds.rolling.len(), bonds.len())?;
     }
+    if let Some(twist) = &bonds.twist {
+        check_length("bonds/twist", twist.len(), bonds.len())?;
+    }
     Ok(())
 }
 

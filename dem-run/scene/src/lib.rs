@@ -17,6 +17,7 @@ mod error;
 pub mod failure;
 mod function;
 mod material;
+mod membrane;
 mod model;
 pub mod page;
 pub mod parse;
@@ -42,10 +43,10 @@ pub use difference::{Difference, differences};
 pub use error::shorten;
 pub use error::{Origin, Problem, SceneError};
 pub use function::{Function, Ramp};
-pub use material::{BASE, Friction, MaterialPair, Materials, NamedMaterial, PairBonds, Restitution};
+pub use material::{BASE, Friction, MaterialPair, Materials, NamedMaterial, PairBonds, Restitution, Scatter};
+pub use membrane::Membrane;
 pub use model::{
-    Bonds, Flow, Grains, Load, Output, Precision, Rupture, Scatter, Scene, Springs, Stiffness, Time, Young,
-    choose_load_wall,
+    Bonds, Flow, Grains, Load, Output, Precision, Rupture, Scene, Springs, Stiffness, Time, Young, choose_load_wall,
 };
 pub use region::Region;
 pub use sample::{

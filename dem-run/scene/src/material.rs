@@ -79,9 +79,34 @@ pub struct PairBonds {
     /// Coefficient of the rolling limit, with the same defaults.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rolling: Option<f64>,
+    /// Coefficient of the twist limit in 3D; zero: these bonds do not resist twist. Default:
+    /// `twist` of `bonds`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub twist: Option<f64>,
+    /// Scatter of the strengths; a normal one of deviation zero is none. Default: `scatter` of
+    /// `bonds`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scatter: Option<Scatter>,
     /// Factor on the stiffness of elastic bonds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stiffness_factor: Option<f64>,
+}
+
+/// Distribution of the strengths of bonds, relative to `strength` or `stress`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Scatter {
+    /// Weibull: a share exp(−(s/s₀)^m) of the bonds is stronger than s, with the given strength
+    /// as s₀.
+    Weibull {
+        /// Modulus m: the larger it is, the smaller the scatter.
+        modulus: f64,
+    },
+    /// Normal, with the given strength as mean and no strength below zero.
+    Normal {
+        /// Standard deviation over the mean.
+        deviation: f64,
+    },
 }
 
 /// Coefficients of friction, for each pair of kinds.
@@ -140,6 +165,11 @@ impl Materials {
             let [first, second] = &pair.between;
             (first == a && second == b) || (first == b && second == a)
         })
+    }
+
+    /// Properties of bonds that are listed for pairs of materials.
+    pub fn pair_bonds(&self) -> impl Iterator<Item = &PairBonds> {
+        self.pairs.iter().filter_map(|pair| pair.bonds.as_ref())
     }
 
     /// Friction of dry contacts between two materials.

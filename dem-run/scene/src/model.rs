@@ -8,7 +8,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::function::Function;
-use super::material::{Materials, PairBonds};
+use super::material::{Materials, PairBonds, Scatter};
+use super::membrane::Membrane;
 use super::region::Region;
 use super::sample::Sample;
 use super::solver::Solver;
@@ -47,6 +48,9 @@ pub struct Scene {
     /// Walls, by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub walls: BTreeMap<String, Wall>,
+    /// A flexible membrane in 2D: a pressure on the free surface of the sample; default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub membrane: Option<Membrane>,
     /// Name of the driven wall whose force is the load of the sample, as reported at the first
     /// break, at the collapse and at the peak. Default: the wall of `stop.wall_travel`, else the
     /// only driven wall.
@@ -123,23 +127,6 @@ pub struct Bonds {
     /// relative path starts from the folder of the scene.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub list: Option<PathBuf>,
-}
-
-/// Distribution of the strengths of bonds, relative to `strength` or `stress`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Scatter {
-    /// Weibull: a share exp(−(s/s₀)^m) of the bonds is stronger than s, with the given strength
-    /// as s₀.
-    Weibull {
-        /// Modulus m: the larger it is, the smaller the scatter.
-        modulus: f64,
-    },
-    /// Normal, with the given strength as mean and no strength below zero.
-    Normal {
-        /// Standard deviation over the mean.
-        deviation: f64,
-    },
 }
 
 /// Stiffness of elastic bonds.
@@ -340,6 +327,14 @@ impl Scene {
         }
     }
 
+    /// The pressure of the membrane at the start of the run: that of the first stage where it has
+    /// one.
+    #[must_use]
+    pub fn first_pressure(&self) -> Option<&Function> {
+        let own = &self.membrane.as_ref()?.pressure;
+        Some(self.stages.first().and_then(|stage| stage.membrane_pressure.as_ref()).unwrap_or(own))
+    }
+
     /// The wall that loads the sample ([`choose_load_wall`]); none where no wall is driven, or
     /// where several are and the scene does not say which.
     #[must_use]
@@ -365,16 +360,23 @@ impl Scene {
     /// Whether there are bonds that resist twist.
     #[must_use]
     pub fn twists(&self) -> bool {
-        self.bonds.as_ref().is_some_and(|bonds| bonds.twist.is_some())
+        let resists = |twist: Option<f64>| twist.is_some_and(|twist| twist > 0.0);
+        let of_pairs = || self.materials.pair_bonds().any(|pair| resists(pair.twist));
+        self.bonds.as_ref().is_some_and(|bonds| bonds.twist.is_some() || of_pairs())
+    }
+
+    /// Whether the resistance to twist may differ from bond to bond.
+    #[must_use]
+    pub fn twists_by_pair(&self) -> bool {
+        self.twists() && self.materials.pair_bonds().any(|pair| pair.twist.is_some())
     }
 
     /// Whether some bond can bear a load.
     #[must_use]
     pub fn has_bonds(&self) -> bool {
         let bears = |limit: Option<f64>| limit.is_some_and(|limit| limit > 0.0);
-        let pairs = || self.materials.pairs.iter().filter_map(|pair| pair.bonds.as_ref());
         self.bonds.as_ref().is_some_and(|bonds| {
-            let of_pairs = pairs().any(|pair| bears(pair.strength.or(pair.stress)));
+            let of_pairs = self.materials.pair_bonds().any(|pair| bears(pair.strength.or(pair.stress)));
             bears(bonds.strength.or(bonds.stress)) || of_pairs || bonds.list.is_some()
         })
     }

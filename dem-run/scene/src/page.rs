@@ -16,7 +16,8 @@ Complete scenes are in [the gallery](gallery.md), commands in [running scenes](r
 
 A run goes through these stages: the grains are packed, or placed as listed; walls that are `seated` move until they
 touch a grain; grains nearer than `bonds.gap_tolerance` are bonded, unless a stage of loading has `cement`; then the
-drives of the walls, gravity and the loads on grains act, from t = 0 on, until `time.end` or a condition of `stop`.
+drives of the walls, gravity, the loads on grains and a membrane act, from t = 0 on, until `time.end` or a condition of
+`stop`.
 
 ![A plane with its normal; a circle, sphere or cylinder outside the grains, seated; and one around
 them.](images/walls.svg)

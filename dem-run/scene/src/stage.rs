@@ -33,6 +33,10 @@ pub struct Stage {
     /// not named keeps its drive.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub walls: BTreeMap<String, StageDrive>,
+    /// Pressure of the membrane from the beginning of the stage on (Pa); its times count from
+    /// there. Default: it goes on as before.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub membrane_pressure: Option<Function>,
 }
 
 /// The drive of a wall in a stage: one function, whose times count from the beginning of the stage,

@@ -11,7 +11,7 @@ use dem_core::bond::{Bond, Bonds};
 use dem_core::contact::Local;
 use dem_core::dim::{Dim, Vect};
 use dem_core::problem::ContactProblem;
-use dem_core::world::{StepError, StepReport, World};
+use dem_core::world::{Membrane, StepError, StepReport, World};
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -110,14 +110,15 @@ pub struct Sample<D: Dim> {
     pub grains: Grains<D>,
     walls: Vec<Wall<D>>,
     loads: Vec<Load<D>>,
+    membrane: Option<Membrane<D>>,
 }
 
 impl<D: Dim> Sample<D> {
     /// The sample of a world at time zero.
     #[must_use]
     pub fn of(built: Built<D>) -> Self {
-        let World { grains, walls, loads, bonds, .. } = built.world;
-        Self { solid_fraction: built.solid_fraction, bonds, grains, walls, loads }
+        let World { grains, walls, loads, bonds, membrane, .. } = built.world;
+        Self { solid_fraction: built.solid_fraction, bonds, grains, walls, loads, membrane }
     }
 
     /// Whether the bonds have a stiffness.
@@ -131,6 +132,7 @@ impl<D: Dim> Sample<D> {
         let mut world = World::new(self.grains.clone(), self.walls.clone(), self.loads.clone(), settings(scene));
         let mut numbers: Vec<u32> = (0..self.bonds.len() as u32).collect();
         world.bonds.clone_from(&self.bonds);
+        world.membrane.clone_from(&self.membrane);
         match variant {
             Variant::AsGiven => {}
             Variant::Order(seed) => (world, numbers) = self.reordered(scene, seed),
@@ -157,6 +159,7 @@ impl<D: Dim> Sample<D> {
         let mut world = World::new(grains, self.walls.clone(), loads, settings(scene));
         let (bonds, numbers): (Vec<_>, Vec<_>) = bonds.into_iter().unzip();
         world.bonds = bonds.into();
+        world.membrane = self.membrane.as_ref().map(Membrane::unfound);
         (world, numbers)
     }
 

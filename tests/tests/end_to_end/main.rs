@@ -15,6 +15,7 @@ mod laboratory;
 mod limit;
 mod loads;
 mod materials;
+mod membrane;
 mod next_event;
 mod pack;
 mod packings;

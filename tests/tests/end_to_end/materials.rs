@@ -77,6 +77,87 @@ fn limits_of_shear_and_rolling_differ_by_pair() {
     }
 }
 
+/// Two bonded spheres, the first fixed, the second under a torque about the bond that grows by 0.1
+/// N m a second; a bond of 10 N and 4 mm.
+fn twisted(twist: &str, pair: &str) -> (Folder, History) {
+    let here = Folder::new();
+    let scene = format!(
+        r#"{{ "dimension": 3,
+            "sample": {{ "grains": [{{ "center": [0, 0, 0], "radius": 2e-3 }},
+                {{ "center": [4e-3, 0, 0], "radius": 2e-3, "material": "hard" }}] }},
+            "materials": {{ "density": 2500, "friction": {{ "grain_grain": 0.3, "grain_wall": 0.3 }},
+                "named": [{{ "name": "hard" }}], "pairs": [{{ "between": ["hard", "base"], "bonds": {pair} }}] }},
+            "bonds": {{ "strength": 10, "gap_tolerance": 1e-3 {twist} }},
+            "grains": {{ "fixed": [0],
+                "loads": [{{ "grain": 1, "torque": [1, 0, 0], "time": {{ "ramp": {{ "rate": 0.1 }} }} }}] }},
+            "time": {{ "step": 1e-4, "end": 0.2 }}, "output": {{ "every_steps": 100 }} }}"#
+    );
+    here.write("scene.json", scene);
+    here.dem_run(&["run", "scene.json", "-o", "a.h5", "--quiet"]).succeeds();
+    let history = here.history("a.h5");
+    (here, history)
+}
+
+#[test]
+fn limits_of_twist_differ_by_pair_and_the_history_has_them() {
+    // ξ a r_coh: 0.004 N m after 0.04 s with ξ = 0.1, twice that with 0.2
+    for (twist, pair, coefficient) in [
+        (r#", "twist": 0.1"#, "{}", 0.1),
+        (r#", "twist": 0.1"#, r#"{ "twist": 0.2 }"#, 0.2),
+        ("", r#"{ "twist": 0.2 }"#, 0.2),
+        (r#", "twist": 0.1"#, r#"{ "twist": 0 }"#, 0.0),
+    ] {
+        let (here, history) = twisted(twist, pair);
+        let own = history.bonds().expect("bonds").twist;
+        assert_eq!(own, (pair != "{}").then(|| vec![coefficient]));
+        let ruptures = history.ruptures().expect("ruptures");
+        let why = here.dem_post(&["why", "a.h5", "0", "--json"]).json();
+        if coefficient == 0.0 {
+            assert!(ruptures.is_empty(), "it twists freely");
+            assert_eq!(why["twist"], serde_json::Value::Null);
+            continue;
+        }
+        assert_eq!(ruptures[0].mode, RuptureMode::Twist);
+        assert!((ruptures[0].time - 0.4 * coefficient).abs() < 1.01e-4, "{pair}: {} s", ruptures[0].time);
+        assert_eq!(why["twist"], coefficient);
+        let parts = why["broken"]["parts"].as_array().expect("parts").clone();
+        let twist = parts.iter().find(|part| part["mode"] == "TWIST").expect("its part");
+        assert!((twist["utilisation"].as_f64().expect("a number") - 1.0).abs() < 1e-6, "{twist}");
+        assert!(here.dem_post(&["info", "--check", "a.h5"]).succeeds().stdout.contains("sound    yes"));
+    }
+}
+
+#[test]
+fn strengths_scatter_by_pair() {
+    let strengths = |sets: &[&str]| {
+        let (_here, history) = run("compression.json", &[&small()[..], sets].concat());
+        let bonds = history.bonds().expect("bonds");
+        let material = history.grains().expect("grains").material;
+        let of_base = bonds.pair.iter().map(|pair| pair.iter().all(|k| material.get(*k as usize) != Some(&1)));
+        bonds.strength.into_iter().zip(of_base).collect::<Vec<_>>()
+    };
+    let pair = |scatter: &str| {
+        format!(r#"materials.pairs=[{{"between": ["base", "base"], "bonds": {{"scatter": {scatter}}}}}]"#)
+    };
+    let weibull = r#"{"weibull": {"modulus": 4}}"#;
+    let all = format!("bonds.scatter={weibull}");
+    // of the only pair, it is that of the scene to the bit
+    assert_eq!(strengths(&[&pair(weibull)]), strengths(&[&all]));
+    // two materials: the strengths of one pair scatter, or those of all others
+    let two =
+        r#"materials.named=[{"name": "hard", "regions": [{"half_space": {"point": [0, 0.01], "normal": [0, 1]}}]}]"#;
+    for (sets, scatters_in_base) in
+        [(vec![two, &pair(weibull)], true), (vec![two, &all, &pair(r#"{"normal": {"deviation": 0}}"#)], false)]
+    {
+        let found = strengths(&sets);
+        assert!(found.iter().any(|(_, base)| *base) && found.iter().any(|(_, base)| !base));
+        let even = strengths(&[two])[0].0;
+        for (strength, base) in found {
+            assert_eq!(strength != even, base == scatters_in_base, "{strength} N, base {base}");
+        }
+    }
+}
+
 /// A region that holds all grains.
 const ALL: &str = r#""regions": [{"half_space": {"point": [0, -1], "normal": [0, 1]}}]"#;
 

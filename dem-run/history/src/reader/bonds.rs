@@ -35,6 +35,7 @@ impl History {
             strength: column("strength")?,
             friction: column("friction")?,
             rolling: if self.source.has(&place("rolling")) { column("rolling")? } else { Vec::new() },
+            twist: if self.source.has(&place("twist")) { Some(column("twist")?) } else { None },
             mean_diameter: column("mean_diameter")?,
             formed: self.bonds_formed()?,
             pair,

@@ -1,5 +1,6 @@
 //! Scenes from text to error message. Each case changes one thing in a scene that is right.
 
+mod membrane;
 mod stages;
 mod structure;
 mod values;

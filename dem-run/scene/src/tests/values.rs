@@ -72,6 +72,14 @@ const FLAT_CASES: &[(&str, &str)] = &[
         "materials.pairs.0.bonds.shear",
     ),
     (
+        "materials.pairs=[{\"between\": [\"base\", \"base\"], \"bonds\": {\"twist\": 0.1}}]",
+        "materials.pairs.0.bonds.twist",
+    ),
+    (
+        "materials.pairs=[{\"between\": [\"base\", \"base\"], \"bonds\": {\"scatter\": {\"weibull\": {\"modulus\": 0}}}}]",
+        "materials.pairs.0.bonds.scatter.weibull.modulus",
+    ),
+    (
         "materials.pairs=[{\"between\": [\"base\", \"base\"], \"bonds\": {\"strength\": 1, \"stress\": 1}}]",
         "materials.pairs.0.bonds",
     ),
@@ -209,6 +217,21 @@ const SOLID_CASES: &[(&str, &str)] = &[
     ("walls.drum.shape={\"circle\": {\"center\": [0, 0, 0], \"radius\": 1}}", "walls.drum.shape.circle"),
     ("walls={\"a.b\": {\"shape\": {\"plane\": {\"normal\": [0, 0, 1], \"place\": \"seated\"}}}}", "walls.a.b"),
 ];
+
+/// Twist by pair: the coefficient is checked, and springs resist twist where some pair does.
+#[test]
+fn twist_by_pair_is_twist() {
+    let bonds = r#"bonds={"strength": 1, "gap_tolerance": 0.1}"#;
+    let pair =
+        |twist: &str| format!(r#"materials.pairs=[{{"between": ["base", "base"], "bonds": {{"twist": {twist}}}}}]"#);
+    assert!(read(SOLID, &[bonds, &pair("0.1")]).is_ok_and(|scene| scene.twists() && scene.twists_by_pair()));
+    assert!(read(SOLID, &[bonds, &pair("0")]).is_ok_and(|scene| !scene.twists() && !scene.twists_by_pair()));
+    assert!(read(SOLID, &[bonds, "bonds.twist=1"]).is_ok_and(|scene| scene.twists() && !scene.twists_by_pair()));
+    assert_eq!(only(read(SOLID, &[bonds, &pair("-1")])).path, "materials.pairs.0.bonds.twist");
+    let springs = r#"bonds.stiffness={"springs": {"normal": 1, "tangential": 1, "rolling": 1}}"#;
+    assert_eq!(only(read(SOLID, &[bonds, springs, &pair("0.1")])).path, "bonds.stiffness.springs.twist");
+    read(SOLID, &[bonds, springs, "bonds.stiffness.springs.twist=1", &pair("0.1")]).expect("springs that twist");
+}
 
 fn check(text: &str, cases: &[(&str, &str)]) {
     for (set, path) in cases {

@@ -1,7 +1,7 @@
 //! Wrong values in the materials, and in regions.
 
 use super::report::{Number, Report};
-use crate::material::{BASE, MaterialPair, PairBonds};
+use crate::material::{BASE, MaterialPair, PairBonds, Scatter};
 use crate::model::Scene;
 use crate::region::Region;
 use crate::sample::Sample;
@@ -106,11 +106,41 @@ fn pair_bonds(report: &mut Report, scene: &Scene, path: &str, bonds: &PairBonds)
     }
     report.bond_strength(path, bonds.strength, bonds.stress);
     report.bond_coefficients(path, &[("shear", bonds.shear), ("rolling", bonds.rolling)]);
+    if let Some(twist) = bonds.twist {
+        report.non_negative(format!("{path}.twist"), twist, "no unit; zero: these bonds do not resist twist");
+        no_twist_of_disks(report, &format!("{path}.twist"), scene.dimension);
+    }
+    if let Some(scatter) = bonds.scatter {
+        self::scatter(report, &format!("{path}.scatter"), scatter);
+    }
     if let Some(factor) = bonds.stiffness_factor {
         let place = format!("{path}.stiffness_factor");
         match all.stiffness {
             Some(_) => report.positive(place, factor, "no unit"),
             None => report.wrong(place, Number(factor), "nothing: without bonds.stiffness bonds are rigid"),
+        }
+    }
+}
+
+/// Reports a coefficient of twist in 2D.
+pub(super) fn no_twist_of_disks(report: &mut Report, path: &str, dimension: u8) {
+    if dimension == 2 {
+        report.wrong(path, "a value in a scene of dimension 2", "no value: disks do not twist");
+    }
+}
+
+/// Checks the distribution of strengths at `path`.
+pub(super) fn scatter(report: &mut Report, path: &str, scatter: Scatter) {
+    match scatter {
+        Scatter::Weibull { modulus } => report.positive(format!("{path}.weibull.modulus"), modulus, "no unit"),
+        Scatter::Normal { deviation } => {
+            let allowed = "a number from 0 to 0.5: above, many drawn strengths would be negative";
+            report.range(
+                format!("{path}.normal.deviation"),
+                deviation,
+                (0.0..=0.5).contains(&deviation),
+                allowed.to_string(),
+            );
         }
     }
 }

@@ -4,6 +4,7 @@
 //! sample exists.
 
 mod material;
+mod membrane;
 pub(crate) mod report;
 mod sample;
 mod stage;
@@ -12,7 +13,7 @@ mod wall;
 use std::collections::HashMap;
 
 use super::error::Problem;
-use super::model::{Bonds, Load, Rupture, Scatter, Scene, Stiffness};
+use super::model::{Bonds, Load, Rupture, Scene, Stiffness};
 use super::solver::SolverKind;
 use super::stop::{Stop, TravelFrom};
 use super::wall::Drive;
@@ -39,12 +40,13 @@ pub fn validate(scene: &Scene) -> Vec<Problem> {
     sample::sample(&mut report, scene);
     material::materials(&mut report, scene);
     if let Some(bonds) = &scene.bonds {
-        self::bonds(&mut report, bonds, scene.dimension);
+        self::bonds(&mut report, scene, bonds);
     }
     grains(&mut report, scene);
     for (name, wall) in &scene.walls {
         wall::wall(&mut report, scene, name, wall);
     }
+    membrane::membrane(&mut report, scene);
     if let Some(name) = &scene.load_wall {
         driven_wall(&mut report, scene, "load_wall", name);
     }
@@ -61,7 +63,7 @@ pub fn validate(scene: &Scene) -> Vec<Problem> {
     report.problems
 }
 
-fn bonds(report: &mut Report, bonds: &Bonds, dimension: u8) {
+fn bonds(report: &mut Report, scene: &Scene, bonds: &Bonds) {
     match (bonds.strength, bonds.stress) {
         (Some(strength), Some(stress)) => {
             let found = format!("strength {strength:?} N and stress {stress:?} Pa");
@@ -88,24 +90,12 @@ fn bonds(report: &mut Report, bonds: &Bonds, dimension: u8) {
             report.wrong("bonds.absent", format!("{} regions", bonds.absent.len()), allowed);
         }
     }
-    match bonds.scatter {
-        Some(Scatter::Weibull { modulus }) => report.positive("bonds.scatter.weibull.modulus", modulus, "no unit"),
-        Some(Scatter::Normal { deviation }) => {
-            let allowed = "a number from 0 to 0.5: above, many drawn strengths would be negative";
-            report.range(
-                "bonds.scatter.normal.deviation",
-                deviation,
-                (0.0..=0.5).contains(&deviation),
-                allowed.to_string(),
-            );
-        }
-        None => {}
+    if let Some(scatter) = bonds.scatter {
+        material::scatter(report, "bonds.scatter", scatter);
     }
     if let Some(twist) = bonds.twist {
         report.positive("bonds.twist", twist, "no unit; without it bonds do not resist twist");
-        if dimension == 2 {
-            report.wrong("bonds.twist", "a value in a scene of dimension 2", "no value: disks do not twist");
-        }
+        material::no_twist_of_disks(report, "bonds.twist", scene.dimension);
     }
     match &bonds.stiffness {
         Some(Stiffness::Springs(springs)) => {
@@ -113,17 +103,15 @@ fn bonds(report: &mut Report, bonds: &Bonds, dimension: u8) {
             report.positive(path("normal"), springs.normal, "N/m");
             report.positive(path("tangential"), springs.tangential, "N/m");
             report.positive(path("rolling"), springs.rolling, "N m/rad");
-            match (bonds.twist, springs.twist) {
-                (Some(_), Some(twist)) => report.positive(path("twist"), twist, "N m/rad"),
-                (Some(_), None) => {
-                    report.wrong(path("twist"), "nothing", "a stiffness (N m/rad), as bonds.twist is given")
-                }
-                (None, Some(_)) => report.wrong(
+            match (scene.twists(), springs.twist) {
+                (true, Some(twist)) => report.positive(path("twist"), twist, "N m/rad"),
+                (false, None) => {}
+                (true, None) => report.wrong(path("twist"), "nothing", "a stiffness (N m/rad), as bonds resist twist"),
+                (false, Some(_)) => report.wrong(
                     path("twist"),
                     "a value",
                     "no value, or a value of bonds.twist: these bonds do not resist twist",
                 ),
-                (None, None) => {}
             }
         }
         Some(Stiffness::Young(young)) => {
