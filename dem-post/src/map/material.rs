@@ -87,7 +87,7 @@ mod tests {
         let some = Materials { of: vec![2, 0, 2], names: names.clone() };
         assert_eq!([0, 1].map(|grain| some.fill(grain)), [FILLS[2], FILLS[0]]);
         assert_eq!(some.named(), [(0, "base".into()), (2, "steel".into())]);
-        assert!(some.released(0) > Colour::from(some.fill(0)));
+        assert!(*some.released(0) > *some.fill(0));
         let all = Materials { of: (0..7).collect(), names };
         assert_eq!(all.named().last(), Some(&(5, "c, d".to_string())));
     }
