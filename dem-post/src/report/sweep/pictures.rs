@@ -24,22 +24,25 @@ const LEAST_STRAIN: f64 = 1e-9;
 /// caption. Runs with one value of a field have one colour: of the field of the strength, else of
 /// the first that has few values.
 pub fn curves(report: &Report) -> Vec<(Chart, String)> {
-    let drawn: Vec<&Run> = report.runs.iter().filter(|run| run.curve.len() > 1).collect();
+    let mut drawn: Vec<&Run> = report.runs.iter().filter(|run| run.curve.len() > 1).collect();
     if drawn.is_empty() {
         return vec![];
     }
     let fields = report.strength.iter().map(|found| &found.field).chain(&report.fields);
     let grouped = fields.map(|field| (field, values(&drawn, field)));
     let grouped = grouped.into_iter().find(|(_, values)| (2..=colour::CYCLE.len()).contains(&values.len()));
+    let group = |run: &Run| {
+        let (field, values) = grouped.as_ref()?;
+        let own = run.values.get(*field)?;
+        values.iter().position(|value| same(value, own)).map(|k| (k, cell(own)))
+    };
+    // the legend has the order of the curves
+    drawn.sort_by_key(|run| group(run).map(|(k, _)| k));
     let draw = |mut chart: Chart, x: &dyn Fn(f64) -> f64| {
         let mut named = vec![];
         for run in &drawn {
-            let group = grouped.as_ref().and_then(|(field, values)| {
-                let own = run.values.get(*field)?;
-                values.iter().position(|value| same(value, own)).map(|k| (k, cell(own)))
-            });
             let points = run.curve.iter().map(|(strain, load)| (x(*strain), *load)).collect();
-            let (k, label) = group.unwrap_or_else(|| (0, format!("run {}", run.id)));
+            let (k, label) = group(run).unwrap_or_else(|| (0, format!("run {}", run.id)));
             chart = chart.curve(&label, colour::CYCLE[k], Style::Thin, points);
             if grouped.is_none() || named.contains(&label) {
                 chart = chart.unlisted();

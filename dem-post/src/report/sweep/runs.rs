@@ -164,13 +164,16 @@ impl Run {
     }
 }
 
-/// The values of a field, in the order of the runs.
+/// The values of a field: by size if all are numbers, else in the order of the runs.
 pub fn values<'a>(runs: &[&'a Run], field: &str) -> Vec<&'a Value> {
     let mut found: Vec<&Value> = vec![];
     for value in runs.iter().filter_map(|run| run.values.get(field)) {
         if !found.iter().any(|other| same(other, value)) {
             found.push(value);
         }
+    }
+    if found.iter().all(|value| value.is_number()) {
+        found.sort_by(|a, b| a.as_f64().unwrap_or(0.0).total_cmp(&b.as_f64().unwrap_or(0.0)));
     }
     found
 }
