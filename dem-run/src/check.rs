@@ -461,9 +461,10 @@ pub(crate) mod tests {
     #[test]
     fn the_last_stage_ends_a_run_before_its_time() {
         let check = Check::new(&config("staged-biaxial.json", &[])).expect("check");
-        assert_eq!((check.steps, check.frames), (750, 76));
+        // 0.02 + 0.005 + 0.015 + 0.01 + 0.0125 + 0.02 s
+        assert_eq!((check.steps, check.frames), (825, 84));
         let text = check.to_string();
-        assert!(text.contains("steps      750 of 0.0001 s, to 0.2 s; the last ends at 0.075\n"), "{text}");
+        assert!(text.contains("steps      825 of 0.0001 s, to 0.2 s; the last ends at 0.0825\n"), "{text}");
     }
 
     /// The floor holds both grains, so no bond joins them, whatever the gap.

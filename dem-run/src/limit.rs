@@ -20,6 +20,10 @@ use crate::run::{Execution, handle_signals};
 use crate::scene::{self, Function, Scene, SolverKind};
 use crate::signals::Interrupt;
 
+/// Accuracy to which the programme is solved, relative to the growth of the loads: a smaller factor
+/// is zero.
+const ACCURACY: f64 = 1e-10;
+
 /// Options of `dem-run limit`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LimitOptions {
@@ -229,8 +233,9 @@ fn pushed(scene: &Scene) -> Result<(usize, &str), RunError> {
     let found = walls.find(|(_, (name, wall))| load_wall == Some(name.as_str()) && moves(wall));
     found.map(|(place, (name, _))| (place, name.as_str())).ok_or_else(|| {
         RunError::Usage(
-            "no load of the scene grows between t = 0 and time.end: give a wall a force_rate, or a load on a grain or the pressure of a membrane a ramp; \
-             of a wall that is driven by a velocity the force is taken, if it is the only driven wall or the load_wall"
+            "no load of the scene grows between t = 0 and time.end: give a wall a force_rate, or a load on a grain or the \
+             pressure of a membrane a ramp; of a wall that is driven by a velocity the force is taken, if it is the only \
+             driven wall or the load_wall"
                 .into(),
         )
     })
@@ -262,6 +267,7 @@ fn describe<D: Dim>(
         LimitLoad::BrokenAtStart { least } => (Outcome::BrokenAtStart, None, None, Some(least)),
         LimitLoad::Undecided => return Err(NoConvergence::Limit.into()),
     };
+    let factor = factor.map(|factor| if factor.abs() < ACCURACY { 0.0 } else { factor });
     let loads = growing.into_iter().map(|(load, from, to, _)| GrowingLoad {
         load,
         from,
@@ -284,6 +290,9 @@ impl Limit {
     /// The outcome in words.
     pub(crate) fn in_words(&self) -> String {
         match (self.outcome, self.factor, self.least_factor) {
+            (Outcome::Limit, Some(0.0), _) => {
+                "0 of the growth: the smallest load moves a body; is there a grain or a wall without support?".into()
+            }
             (Outcome::Limit, Some(factor), _) => format!("{} of the growth", number(factor)),
             (Outcome::BrokenAtStart, _, Some(least)) => format!(
                 "the loads at t = 0 alone break a bond; with {} of the growth and more they are borne",

@@ -26,6 +26,9 @@ fn two_grains_have_the_limits_that_they_break_at() {
     assert_eq!((&pressed["outcome"], pressed["factor"].as_f64()), (&"unbounded".into(), None));
     let heavy = limit("two-grains.json", &["gravity=[1e6, 0]"]);
     assert_eq!(heavy["outcome"], "never_borne");
+    // without a support the smallest load moves both
+    let loose = limit("two-grains.json", &["grains.fixed=[]"]);
+    assert_eq!((&loose["outcome"], loose["factor"].as_f64()), (&"limit".into(), Some(0.0)));
     // its weight of 314 N pulls at the bond of 10 N, and the load pushes
     let held = limit("two-grains.json", &["gravity=[1e6, 0]", "grains.loads.0.force=[-100, 0]"]);
     assert_eq!(held["outcome"], "broken_at_start");
