@@ -102,7 +102,8 @@ def space(dem_run, tmp_path_factory):
     bonded = ["--set", 'bonds={"strength": 0.01, "gap_tolerance": 1e-3}']
     plate = '{"normal": [0, 0, -1], "center": [0, 0, 1], "size": [0.01, 0.02], "side": [1, 0, 0]}'
     plate = ["--set", f'walls.lid={{"shape": {{"plate": {plate}}}}}']
-    dem_run(folder, "run", ROOT / "tests/problems/scenes/cube.json", "-o", "space.h5", "-q", *bonded, *plate)
+    twist = ["--set", 'materials.pairs=[{"between": ["base", "base"], "bonds": {"twist": 0.1}}]']
+    dem_run(folder, "run", ROOT / "tests/problems/scenes/cube.json", "-o", "space.h5", "-q", *bonded, *plate, *twist)
     return folder / "space.h5"
 
 
@@ -148,8 +149,8 @@ def test_the_page_tells_every_dataset(folder, space, dimension):
         for name in history["contacts"]:
             seen.add(f"/contacts/{name}")
         flat = {"/particles/grains/orientation", "/contacts/tangent", "/quaternion", "/moment_component"}
-        # and the scene in 2D has no plate
-        flat |= {"/walls/side", "/walls/length", "/walls/width"}
+        # and the scene in 2D has no plate and no pair of materials
+        flat |= {"/walls/side", "/walls/length", "/walls/width", "/bonds/twist"}
         absent = {2: flat, 3: {"/particles/grains/angle"}}[dimension]
         # these scenes have one coefficient for shear and rolling
         absent |= {"/bonds/rolling"}
