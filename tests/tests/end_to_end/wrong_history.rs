@@ -8,12 +8,14 @@ const VIEWS: [&str; 10] =
 
 /// Every view refuses the file `a.h5` in this folder.
 fn refused(here: &Folder, parts: &[&str]) {
-    for view in VIEWS {
-        let before = here.names();
-        let outcome = here.dem_post(&[view, "a.h5"]).fails(4, &[&["a.h5"], parts].concat());
-        assert_eq!(outcome.stdout, "", "{view}");
-        assert_eq!(here.names(), before, "{view}");
-    }
+    VIEWS.iter().for_each(|view| refused_by(view, here, 4, parts));
+}
+
+fn refused_by(view: &str, here: &Folder, code: i32, parts: &[&str]) {
+    let before = here.names();
+    let outcome = here.dem_post(&[view, "a.h5"]).fails(code, &[&["a.h5"], parts].concat());
+    assert_eq!(outcome.stdout, "", "{view}");
+    assert_eq!(here.names(), before, "{view}");
 }
 
 #[test]
@@ -21,7 +23,13 @@ fn a_missing_file_and_a_folder() {
     let here = Folder::new();
     refused(&here, &["does not exist", "dem-run run"]);
     std::fs::create_dir(here.path("a.h5")).expect("folder");
-    refused(&here, &["folder", "give the .h5 file"]);
+    for view in VIEWS {
+        // a folder may be a sweep
+        match view {
+            "report" => refused_by(view, &here, 2, &["holds no manifest.json", "dem-run sweep", "or a history"]),
+            _ => refused_by(view, &here, 4, &["folder", "give the .h5 file"]),
+        }
+    }
 }
 
 #[test]

@@ -26,7 +26,7 @@ fn wrong_values_are_refused_with_their_place_and_the_remedy() {
         (
             "bent-arm.json",
             r#"bonds.stiffness={"springs": {"normal": 1e6, "tangential": 1e6, "rolling": 1}}"#,
-            &["bonds.stiffness.springs.twist", "found    nothing", "as bonds.twist is given"],
+            &["bonds.stiffness.springs.twist", "found    nothing", "as bonds resist twist"],
         ),
         ("two-grains.json", "sample.grains.1.radius=-2e-3", &["sample.grains.1.radius", "-0.002", "> 0 (m)"]),
         ("column.json", "time.step=NaN", &["time.step", "NaN", "a number"]),
