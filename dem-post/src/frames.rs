@@ -191,14 +191,14 @@ pub fn write(history: &History, report: &Report, folder: &mut Folder, quiet: boo
 
 /// The drawing of a frame.
 pub(crate) fn drawing(history: &History, report: &Report, shown: &Shown, frame: usize) -> Result<Drawing> {
-    let (mut panel, legend) = picture(history, report, frame)?;
+    let (mut panel, legend) = picture(history, report, shown.materials.as_ref(), frame)?;
     panel.caption.insert(0, shown.titles.of(history, frame));
     Ok(draw_view(&shown.sample, shown.view, &[panel], &legend))
 }
 
 /// The sample at a frame on a sheet of its own, without a caption and a legend.
 pub(crate) fn plain(history: &History, report: &Report, frame: usize) -> Result<Drawing> {
-    let (panel, _) = picture(history, report, frame)?;
+    let (panel, _) = picture(history, report, Materials::read(history)?.as_ref(), frame)?;
     Ok(draw(&Sample::with_depth(history)?, &[Panel { caption: vec![], ..panel }], &[]))
 }
 
@@ -207,6 +207,7 @@ pub(crate) struct Shown<'a> {
     sample: Sample,
     view: View,
     titles: &'a Titles,
+    materials: Option<Materials>,
 }
 
 /// The part of the plane that shows all frames.
@@ -217,14 +218,18 @@ pub(crate) fn shown<'a>(history: &History, report: &Report, titles: &'a Titles) 
         let (grains, walls) = (history.grain_state(frame)?, history.wall_state(frame)?);
         view = view.join(sample.view(std::iter::once((&grains, &walls))));
     }
-    Ok(Shown { sample, view, titles })
+    Ok(Shown { sample, view, titles, materials: Materials::read(history)? })
 }
 
-fn picture(history: &History, report: &Report, frame: usize) -> Result<(Panel, Vec<Key>)> {
+fn picture(
+    history: &History,
+    report: &Report,
+    materials: Option<&Materials>,
+    frame: usize,
+) -> Result<(Panel, Vec<Key>)> {
     let grains = history.grain_state(frame)?;
     let number_of_grains = history.grains()?.radius.len();
-    let materials = Materials::read(history)?;
-    let fill = |grain: usize| materials.as_ref().map_or(GRAIN[0], |materials| materials.fill(grain));
+    let fill = |grain: usize| materials.map_or(GRAIN[0], |materials| materials.fill(grain));
     let mut panel = Panel {
         walls: history.wall_state(frame)?,
         fills: (0..number_of_grains).map(|grain| fill(grain).into()).collect(),
@@ -234,7 +239,7 @@ fn picture(history: &History, report: &Report, frame: usize) -> Result<(Panel, V
     };
     let scale = report.scale.unwrap_or(1.0);
     let mut legend = match report.subject {
-        Subject::Bonds => bonds(history, frame, &mut panel, materials.as_ref())?,
+        Subject::Bonds => bonds(history, frame, &mut panel, materials)?,
         Subject::Forces => {
             let contacts = history.contacts(frame)?;
             panel.links = links(&contacts, &panel.grains.position, scale, history.dimension());

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use dem_core::body::Drive;
 use dem_core::dim::Dim;
-use dem_core::solver::limit_load::LimitLoad;
+use dem_core::solver::limit_load::{ACCURACY, LimitLoad};
 use dem_core::world::World;
 use serde::Serialize;
 
@@ -19,10 +19,6 @@ use crate::output::{facts, number, print_result};
 use crate::run::{Execution, handle_signals};
 use crate::scene::{self, Function, Scene, SolverKind};
 use crate::signals::Interrupt;
-
-/// Accuracy to which the programme is solved, relative to the growth of the loads: a smaller factor
-/// is zero.
-const ACCURACY: f64 = 1e-10;
 
 /// Options of `dem-run limit`.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
-use dem_history::sweep::{State, Store};
+use dem_history::sweep::{Manifest, State, Store};
 use dem_history::{History, WallDrive};
 use dem_scene::Load;
 use dem_scene::failure::{BROKEN_SHARE, STRAINS};
@@ -66,6 +66,23 @@ pub struct Strength {
     pub early: bool,
 }
 
+/// The manifest of a sweep, with how its runs stand. Where the folder has none, the error asks for
+/// the folder of a sweep, or for `other`.
+///
+/// # Errors
+/// [`PostError::Usage`] for a folder without a manifest; [`PostError::Sweep`] for a manifest that
+/// cannot be read.
+pub fn manifest(store: &Store, other: &str) -> Result<Manifest> {
+    let Some(mut manifest) = store.manifest()? else {
+        let shown = store.folder().display();
+        return Err(PostError::Usage(format!(
+            "{shown} holds no manifest.json: give the folder of a `dem-run sweep`, or {other}"
+        )));
+    };
+    store.gather(&mut manifest);
+    Ok(manifest)
+}
+
 /// The histories that `paths` name: files, and the finished runs in folders of sweeps; and,
 /// separately, the unfinished runs.
 ///
@@ -79,15 +96,7 @@ pub fn histories(paths: &[PathBuf]) -> Result<(Vec<PathBuf>, Vec<LeftOut>)> {
             found.push(path.clone());
             continue;
         }
-        let store = Store::new(path.clone());
-        let Some(mut manifest) = store.manifest()? else {
-            let shown = path.display();
-            return Err(PostError::Usage(format!(
-                "{shown} holds no manifest.json: give the folder of a `dem-run sweep`, or the histories"
-            )));
-        };
-        store.gather(&mut manifest);
-        for run in manifest.runs {
+        for run in manifest(&Store::new(path.clone()), "the histories")?.runs {
             let history = path.join(&run.history);
             if run.state == State::Done {
                 found.push(history);

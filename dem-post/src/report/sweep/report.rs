@@ -8,6 +8,7 @@ use serde::Serialize;
 use super::runs::{self, Run};
 use super::table::run_rows;
 use crate::output::{Folder, PostError, Result, Source, Text, counted, default_folder, facts, quantity};
+use crate::strength::runs::manifest;
 use crate::strength::scenes::varied;
 use crate::{envelope, strength};
 
@@ -55,13 +56,7 @@ impl Sweep {
     /// that cannot be read.
     pub fn open(folder: &Path) -> Result<Self> {
         let store = Store::new(folder.into());
-        let Some(mut manifest) = store.manifest()? else {
-            return Err(PostError::Usage(format!(
-                "{} holds no manifest.json: give the folder of a `dem-run sweep`, or a history",
-                folder.display()
-            )));
-        };
-        store.gather(&mut manifest);
+        let manifest = manifest(&store, "a history")?;
         Ok(Self { store, manifest })
     }
 

@@ -69,7 +69,7 @@ fn sentences(report: &Report) -> String {
 /// A field with its values: `bonds.strength (5, 10, 20 N)`, `seed (1 to 10)`.
 fn in_words(report: &Report, field: &str) -> String {
     let values = values(&report.runs.iter().collect::<Vec<_>>(), field);
-    let mut numbers: Vec<f64> = values.iter().filter_map(|value| value.as_f64()).collect();
+    let numbers: Vec<f64> = values.iter().filter_map(|value| value.as_f64()).collect();
     let unit = unit(field);
     let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
     let text = if numbers.len() < values.len() || numbers.is_empty() {
@@ -78,7 +78,6 @@ fn in_words(report: &Report, field: &str) -> String {
         let listed = || values.iter().map(|value| cell(value)).collect::<Vec<_>>().join(", ");
         if plain { listed() } else { counted(values.len(), "value") }
     } else {
-        numbers.sort_by(f64::total_cmp);
         let (first, last) = (numbers[0], numbers[numbers.len() - 1]);
         let consecutive = numbers.len() > 2 && numbers.windows(2).all(|pair| pair[1] - pair[0] == 1.0);
         match numbers.len() {
