@@ -275,9 +275,11 @@ pub(super) mod certificate {
 
 /// The limit load, a conic programme.
 pub(super) mod limit_load {
-    /// Error of the balance, of the mechanism and of the load at which the programme is solved, and
-    /// the largest that is accepted. Double precision reaches some 1e-11 on samples of 430 disks.
+    /// Error of the balance, of the mechanism and of the load at which the programme is solved,
+    /// relative to the growing loads: a smaller factor is zero. Double precision reaches some 1e-11
+    /// on samples of 430 disks.
     pub const TOLERANCE: f64 = 1e-10;
+    /// The largest such error that is accepted.
     pub const ACCEPT: f64 = 1e-7;
     /// Largest net force, or work on a contact, of a certificate, relative to its load.
     pub const CERTIFICATE: f64 = 1e-9;

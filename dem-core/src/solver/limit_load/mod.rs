@@ -36,11 +36,8 @@ use crate::problem::ContactProblem;
 use programme::Programme;
 use std::sync::Arc;
 
+pub use super::tuning::limit_load::TOLERANCE as ACCURACY;
 pub use programme::LimitLoad;
-
-/// Accuracy to which the programme is solved, relative to the growing loads: a smaller factor is
-/// zero.
-pub const ACCURACY: f64 = tuning::TOLERANCE;
 
 /// The limit load of a problem over a step of 1 s. The free velocities of the problem are those
 /// that the constant loads give, M⁻¹ f₀; `growing` are those of the growing loads, M⁻¹ f₁. All its
