@@ -3,6 +3,7 @@ penetration."""
 
 import numpy as np
 
+import laws
 import prescribed
 import tolerances
 from arrays import cross, norm, sums
@@ -92,6 +93,9 @@ def works(h, c, p):
     slid = np.where(given.slides, -(against * across).sum(2), 0.0)
     total["external"] = total["external"] + h.h * (moved + pushed + slid).sum(1)
     sizes = sizes + h.h * (np.where(given.kind == "force", given.error, 0.0) * norm(middle)).sum(1)
+    stored = brought(h)
+    total["external"] = total["external"] + stored
+    sizes = sizes + stored
     # a wall has kinetic energy only under a force: its new drive takes it, or gives it
     mass = moving_mass(h)
     change = np.zeros(h.S)
@@ -99,6 +103,14 @@ def works(h, c, p):
     total["external"] = total["external"] + change
     sizes = sizes + np.abs(change)
     return total, sizes
+
+
+def brought(h):
+    """Energy (J) [S] of the springs of the bonds that form, under the forces that they take over."""
+    out = np.zeros(h.S)
+    if h.K and h.stiffness is not None and h.formed < h.S:
+        out[h.formed] = laws.energy_taken_over(h).sum()
+    return out
 
 
 def check_works(h, c, p, report):
@@ -135,7 +147,7 @@ def check_elastic(h, losses, sizes, report):
         tolerances.rounding(scale),
         of_step("increment of fracture_energy (J)"),
     )
-    told = losses - np.diff(np.append(0.0, seen)) - freed
+    told = losses + brought(h) - np.diff(np.append(0.0, seen)) - freed
     damping = h.observed["dissipation_damping"]
     off = np.where(h.single, np.abs(np.diff(np.append(0.0, damping)) - told), 0.0)
     scale = sizes + np.abs(damping) + seen + np.append(0.0, seen[:-1]) + freed

@@ -180,6 +180,13 @@ def in_stages(scene):
     ]
 
 
+def cemented_in_a_stage(scene):
+    """The stages of `in_stages`; bonds form at the beginning of the second."""
+    needs(scene.get("bonds") and "as list" not in scene)
+    in_stages(scene)
+    scene["stages"][1]["cement"] = True
+
+
 def next_event(scene):
     """Loading from break to break, of prescribed loads and rigid bonds."""
     needs(scene.get("bonds") and "stiffness" not in scene["bonds"] and "stages" not in scene)
@@ -305,6 +312,7 @@ def as_file(turn=0.0, mirror=False, permute=None, units=None, shift=None):
 def as_list(scene):
     """The bonds from a list, some with limits of their own."""
     needs(scene.get("bonds") and not scene["bonds"].get("absent"))
+    needs(not any(stage.get("cement") for stage in scene.get("stages", [])))
     scene["as list"] = True
 
 
@@ -334,6 +342,7 @@ CHANGES = {
     "lid slide": ("lid", lid("slide")),
     "lid that drops": ("lid", lid("that drops")),
     "stages": ("lid", in_stages),
+    "cemented in a stage": ("lid", cemented_in_a_stage),
     "gripped": ("grip", gripped),
     "layers": ("materials", layers),
     "inclusion": ("materials", inclusion),

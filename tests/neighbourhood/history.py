@@ -131,11 +131,15 @@ class History:
 
     def _bonds(self, file):
         self.bonded = "bonds" in file
-        self.events = None
+        # the step after which the bonds formed
+        self.events, self.formed = None, 0
         if not self.bonded:
             self.K = 0
             return
         group = file["bonds"]
+        if "formed" in group:
+            formed = int(group["formed"][0])
+            self.formed = formed if formed >= 0 else self.S
         self.bond_pair = group["pair"][:].astype(int)
         self.rest_gap, self.strength, self.bond_friction, self.mean_diameter = (
             group[k][:] for k in ("rest_gap", "strength", "friction", "mean_diameter")

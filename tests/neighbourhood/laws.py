@@ -140,7 +140,8 @@ class Solved:
             self.compliance = np.where(self.bonds[:, None], 1 / (np.stack(rows, 1) * h.h**2), 0.0)
         last = row_before(h)
         known = (last >= 0) & self.bonds
-        known &= np.where(known, h.bond[last] == h.bond, False)
+        # a bond that forms takes over the reaction of its contact
+        known &= np.where(known, (h.bond[last] == h.bond) | (h.row_step == h.formed), False)
         self.carried[known] = self.r[last[known]]
         self.u = np.where(self.bonds[:, None], self.u + self.compliance * (self.r - self.carried), self.u)
         soft = self.compliance[:, [0, 1, h.D, self.compliance.shape[1] - 1]]
@@ -204,6 +205,24 @@ class Solved:
         return np.where(self.sticks[:, None], change, shifted - project(x, self.mu, self.nu, self.xi, d))
 
 
+def taken_over(h):
+    """Normal and tangential forces (N) of their contacts that the bonds took over when they formed:
+    [K] and [K,D−1]."""
+    normal, tangential = np.zeros(h.K), np.zeros((h.K, h.D - 1))
+    number = {tuple(pair): k for k, pair in enumerate(h.bond_pair.tolist())}
+    for m in np.flatnonzero((h.row_step == h.formed - 1) & ~h.on_wall):
+        k = number.get((int(h.i[m]), int(h.j[m])))
+        if k is not None:
+            normal[k], tangential[k] = h.rn[m], h.rt[m]
+    return normal, tangential
+
+
+def energy_taken_over(h):
+    """Energy (J) [K] of the springs of the bonds under the forces that they took over."""
+    normal, tangential = taken_over(h)
+    return 0.5 * (normal**2 / h.stiffness[0] + (tangential**2).sum(1) / h.stiffness[1])
+
+
 def row_before(h):
     """Row of the same pair in the frame before [M]; −1 where there is none."""
     bodies = h.N + h.W
@@ -241,8 +260,8 @@ def turning(h, c):
 def turned(h, c):
     """Length correction of rigid bonds that turned (m/s). Grains of bonds without a limit of shear
     or rolling need not turn with the bond: then its rotation follows from its length, from the
-    second step on and within round-off."""
-    longer = np.where(h.row_step > 0, lengthening(h, h.row_step, h.i, h.j), 0.0)
+    second step of the bond on and within round-off."""
+    longer = np.where(h.row_step > h.formed, lengthening(h, h.row_step, h.i, h.j), 0.0)
     longer[longer <= np.finfo(float).eps * h.mean_diameter[h.bond]] = 0.0
     with_it = (h.bond_friction[h.bond] > 0) & (h.bond_rolling[h.bond] > 0)
     return np.where(with_it, turning(h, c), longer / h.h)

@@ -152,15 +152,15 @@ class Bonds:
 def bonded_pairs(h, i, j):
     """Excess of the gap over that of a bond (m) of pairs `i` < `j`, minus infinity where the scene
     has a bond and plus infinity where it has none, whatever the gap."""
-    bonds = h.scene["bonds"]
-    gap, _ = gap_and_normal(h, i, j, h.x[0, i], h.x[0, j])
+    bonds, x = h.scene["bonds"], h.x[h.formed]
+    gap, _ = gap_and_normal(h, i, j, x[i], x[j])
     given = Bonds(h, i, j)
     out = gap - bonds["gap_tolerance"] * given.a
     if given.rows is not None:
         out = np.where([pair in given.rows for pair in zip(i.tolist(), j.tolist())], -np.inf, np.inf)
     for region in bonds.get("absent") or []:
         if given.rows is None:
-            out[meets(region, h.x[0, i], h.x[0, j])] = np.inf
+            out[meets(region, x[i], x[j])] = np.inf
     out[(h.fixed[i] & h.fixed[j]) | (given.strength <= 0)] = np.inf
     return out
 
@@ -221,19 +221,20 @@ def check(h, report):
 def check_bonds(h, report):
     """Bonds join exactly the pairs given by the scene, with its strengths and limits."""
     i, j = np.triu_indices(h.N, 1)
-    slack = tolerances.rounding(norm(h.x[0, i]) + norm(h.x[0, j]) + h.radius[i] + h.radius[j])
+    x = h.x[h.formed]
+    slack = tolerances.rounding(norm(x[i]) + norm(x[j]) + h.radius[i] + h.radius[j])
     bonded = np.isin(i * h.N + j, h.bond_pair[:, 0] * h.N + h.bond_pair[:, 1])
     beyond = bonded_pairs(h, i, j)
     off = np.where(bonded, beyond, -beyond)
     report.expect("bonds formed", off, slack, lambda m: f"pair {i[m]}-{j[m]}, bonded: {bool(bonded[m])}")
     bi, bj = h.bond_pair.T
-    rest, _ = gap_and_normal(h, bi, bj, h.x[0, bi], h.x[0, bj])
+    rest, _ = gap_and_normal(h, bi, bj, x[bi], x[bj])
     given = Bonds(h, bi, bj)
     strength = given.strength.copy()
     if given.scattered.any():
         strength[given.scattered] *= scatter_factors(h.scene, given.scatter[given.scattered])
     told = {
-        "rest_gap": (h.rest_gap, rest, norm(h.x[0, bi]) + norm(h.x[0, bj]) + given.a),
+        "rest_gap": (h.rest_gap, rest, norm(x[bi]) + norm(x[bj]) + given.a),
         "mean_diameter": (h.mean_diameter, given.a, given.a),
         "strength": (h.strength, strength, strength),
         "shear": (h.bond_friction, given.shear, given.shear),
@@ -243,4 +244,15 @@ def check_bonds(h, report):
     for name, (found, expected, scale) in told.items():
         off = np.abs(found - expected)
         report.expect("bonds formed", off, tolerances.rounding(scale), lambda k, name=name: f"bond {k}: {name}")
-    report.require("bonds formed", bool((h.bond_status[0] == "INTACT").all()), "a bond is broken at time zero")
+    until = h.bond_status[: h.formed + 1]
+    report.require("bonds formed", bool((until == "INTACT").all()), "a bond is broken before it has formed")
+    check_formed(h, report)
+
+
+def check_formed(h, report):
+    """The bonds form after the last step before the stage with `cement`."""
+    stages = h.scene.get("stages") or []
+    cements = [number for number, stage in enumerate(stages) if stage.get("cement")]
+    begins = [h.driving.began[number] for number in cements if number < len(h.driving.began)]
+    expected = (begins + [h.S])[0] if cements else 0
+    report.require("bonds formed", h.formed == expected, f"after step {h.formed}, not {expected}")

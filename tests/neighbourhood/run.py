@@ -64,6 +64,7 @@ QUICK = [
     "disks, list",
     "disks, file with materials",
     "disks, stages",
+    "disks, cemented in a stage",
     "spheres, inclusion",
     "beam, next event",
     "events, bonds that roll",

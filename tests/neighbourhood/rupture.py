@@ -37,6 +37,8 @@ def check_lengths(h, p, report):
     sum over all steps from rest, where e and f are zero, is ℓ_s − ℓ_0 = −f_{s−1}/k + e_s: however the
     turn changes from step to step, e_s alone is added to the elongation by the force. Solver errors
     in the law, which `elastic bonds` bounds in each step, accumulate in the length over the run.
+    Length and force of a bond that forms in a stage count from its first mid-step and from the force
+    that it took over.
 
     No frame holds the mid-steps of a step in parts, and the first whole step after it corrects the
     change of the step length: lengths are checked at the mid-steps of whole steps that follow whole
@@ -51,24 +53,31 @@ def check_lengths(h, p, report):
         tangential[s] = norm(u - (u * n).sum(1)[:, None] * n)
     length = h.mean_diameter + h.rest_gap
     # intact when the step began
-    intact = h.bond_status[:-1] == "INTACT"
+    intact = (h.bond_status[:-1] == "INTACT") & (np.arange(h.S) >= h.formed)[:, None]
     judged = intact & (h.single & ~h.after_parts)[:, None]
+    # no frame holds the first mid-step of bonds that form in a step in parts
+    judged &= h.formed in (0, h.S) or h.single[h.formed]
     report.figures["largest change of the length of an intact bond (m)"] = float(
         np.abs(np.where(intact, longer, 0)).max(initial=0)
     )
+    # a bond that forms in a stage, between grains that move, is longer at its first mid-step
+    first = longer[h.formed].copy() if 0 < h.formed < h.S else np.zeros(h.K)
     if h.stiffness is None:
         chord = 0.5 * (h.h * np.vstack([tangential[:1], tangential[:-1]])) ** 2 / length
         chord = np.maximum.accumulate(chord, 0) if h.S else chord
         smaller = np.minimum(h.radius[bi], h.radius[bj])
         describe = lambda s, b: f"step {s + 1}, bond {b}: change of length (m)"
-        off = np.where(judged, np.abs(longer), 0.0)
+        off = np.where(judged, np.abs(longer - first), 0.0)
         report.expect("length of rigid bonds", off, tolerances.value("rigid length") * smaller + chord, describe)
     else:
         # the force of a bond after a step follows its length at the next mid-step
         rows = np.flatnonzero((h.bond >= 0) & (h.row_step + 1 < h.S))
         s, b = h.row_step[rows] + 1, h.bond[rows]
         hidden = laws.lengthening(h, s, bi[b], bj[b])
-        off = np.abs(longer[s, b] + h.rn[rows] / h.stiffness[0][b] - hidden)
+        if 0 < h.formed < h.S:
+            first -= laws.lengthening(h, np.full(h.K, h.formed), bi, bj)
+        at_rest = laws.taken_over(h)[0]
+        off = np.abs(longer[s, b] - first[b] + (h.rn[rows] - at_rest[b]) / h.stiffness[0][b] - hidden)
         missed = np.zeros((h.S, h.K))
         known = np.flatnonzero(p.bonds & p.judged & h.row_single)
         missed[h.row_step[known], h.bond[known]] = h.h * np.abs(p.u[known, 0])
@@ -81,7 +90,7 @@ def check_elongation(h, longer, report):
     """The observable `bond_elongation`, where the history has it."""
     if "bond_elongation" not in h.observed:
         return
-    left = h.bond_status[1:] == "INTACT"
+    left = (h.bond_status[1:] == "INTACT") & (np.arange(h.S) >= h.formed)[:, None]
     told = np.abs(np.where(left, longer, 0.0)).max(1, initial=0.0)
     scale = norm(h.x).max(initial=0) * 2 + h.mean_diameter.max()
     off = np.where(h.single, np.abs(told - h.observed["bond_elongation"]), 0.0)
@@ -159,7 +168,8 @@ def check_statuses(h, report):
     # one row for each intact bond, and for each bond that breaks at the end of the step
     late = 1 if h.scene.get("rupture") in ("end_of_step", "next_event") else 0
     rows = np.flatnonzero(h.bond >= 0)
-    held = np.arange(1, h.S + 1)[:, None] < broke_at + late
+    steps = np.arange(1, h.S + 1)[:, None]
+    held = (steps > h.formed) & (steps < broke_at + late)
     seen = np.zeros((h.S, h.K), int)
     np.add.at(seen, (h.row_step[rows], h.bond[rows]), 1)
     # the last part of a step in parts has fewer bonds
@@ -209,16 +219,17 @@ def check_events(h, c, p, report):
 
 def stored_energy(h, b, step):
     """½ Σ f²/k of bonds `b` that broke in steps `step`: their energy at its start, or at its end with
-    `end_of_step`."""
+    `end_of_step`; in their first step the energy that they took over."""
     if h.stiffness is None:
         return np.zeros(len(b)), np.zeros(len(b))
     late = h.scene.get("rupture") == "end_of_step"
     rows = np.flatnonzero(h.bond >= 0)
     row_of = {(int(h.row_step[m]), int(h.bond[m])): m for m in rows[np.isin(h.bond[rows], b)]}
-    out = np.zeros(len(b))
+    out = laws.energy_taken_over(h)[b]
     for k, (bond, s) in enumerate(zip(b, step - 1 if late else step - 2)):
         m = row_of.get((int(s), int(bond)))
-        out[k] = 0.0 if m is None else energy_of_rows(h, np.array([m]))[0]
+        if m is not None:
+            out[k] = energy_of_rows(h, np.array([m]))[0]
     return out, out
 
 

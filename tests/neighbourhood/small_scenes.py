@@ -186,6 +186,34 @@ def staged():
     return scene
 
 
+def cemented():
+    """`pressed` between walls with a stress, cemented by a stage with elastic bonds, then pressed until
+    bonds break."""
+    scene = pressed()
+    stress = {"stress": {"table": [[0, 0], [2e-3, 2e4]]}}
+    scene["bonds"] |= {"gap_tolerance": 0.01, "stiffness": {"young": {"modulus": 1e8, "poisson_ratio": 0.2}}}
+    scene["walls"] |= {"left": side(1), "right": side(-1)}
+    del scene["walls"]["top"]["force_rate"]
+    scene["stages"] = [
+        {"name": "consolidate", "duration": 4e-3, "walls": {"left": stress, "right": stress, "top": stress}},
+        {"name": "cement", "duration": 1e-3, "cement": True},
+        {"name": "press", "duration": 5e-3, "walls": {"top": {"velocity": {"constant": 0.05}}}},
+    ]
+    scene["time"]["end"] = 0.01
+    return scene
+
+
+def cemented_rigid():
+    """`cemented` with rigid bonds of scattered strength and a notch."""
+    scene = cemented()
+    del scene["bonds"]["stiffness"]
+    scene["bonds"] |= {
+        "scatter": {"weibull": {"modulus": 8}},
+        "absent": [{"box": {"from": [0.004, -1], "to": [0.004, 0.008]}}],
+    }
+    return scene
+
+
 def from_break_to_break():
     """`pressed` without weight, from break to break."""
     scene = pressed(rupture="next_event")
@@ -232,6 +260,8 @@ SCENES = {
     "confined": confined,
     "sheared": sheared,
     "staged": staged,
+    "cemented": cemented,
+    "cemented rigid": cemented_rigid,
     "events": from_break_to_break,
     "pressed": pressed,
     "late": lambda: pressed(rupture="end_of_step"),

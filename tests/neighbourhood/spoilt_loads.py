@@ -79,6 +79,15 @@ SPOILT = [
         "applied_force",
     ),
     ("staged", "the work at its beginning", observed("external_work", -1), "external_work"),
+    # bonds that form in a stage
+    ("cemented", "when bonds formed", put("bonds/formed", lambda g: 0, lambda step: step + 1), "bonds formed"),
+    ("cemented", "the stage before", told("stages", 0, "duration", value=3.9e-3), "bonds formed"),
+    ("cemented", "another stage", told("stages", 1, "cement", value=False), "bonds formed"),
+    ("cemented", "the work of cementing", observed("external_work", 40), "external_work"),
+    ("cemented", "the energy of cementing", observed("elastic_energy", 40), "elastic_energy"),
+    ("cemented", "a rest gap", add("bonds/rest_gap", lambda g: 3), "bonds formed"),
+    ("cemented rigid", "a scattered strength", add("bonds/strength", lambda g: 3), "bonds formed"),
+    ("cemented rigid", "a notch", told("bonds", "absent", value=lambda r: r[:0]), "bonds formed"),
     # a membrane
     ("wrapped", "a pressure", told("membrane", "pressure", "table", 1, 1, value=2e4 * (1 + 1e-6)), "membrane"),
     (

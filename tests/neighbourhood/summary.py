@@ -5,6 +5,7 @@ import re
 import numpy as np
 
 import drives
+import laws
 import prescribed
 import tolerances
 from balance import fitted_strain
@@ -100,7 +101,7 @@ def recomputed(h, told):
         "rejected": (rejected, rejected + 1) if failed else rejected,
         "penetration": float(o["penetration"].max(initial=0.0)),
         "mean_diameter": float(2 * h.radius.mean()),
-        "external_work": last("external_work"),
+        "external_work": last("external_work") + of_a_stage_after_the_end(h),
         "energy_remainder": last("energy_remainder"),
         "bond_remainder": last("bond_remainder"),
         "work": {
@@ -116,6 +117,19 @@ def recomputed(h, told):
         out["bond_elongation"] = float(o["bond_elongation"].max(initial=0.0)) if "bond_elongation" in o else 0.0
     out.update(loads(h, told))
     return out
+
+
+def of_a_stage_after_the_end(h):
+    """External work (J) of a stage that begins after the last step: it takes kinetic energy from walls
+    that lose their force, and brings the energy of the bonds that form."""
+    if h.S not in h.driving.began[1:]:
+        return 0.0
+    walls = h.scene["stages"][h.driving.began.index(h.S)].get("walls") or {}
+    lost = [name in walls and not {"force", "stress"} & set(walls[name]) for name in h.wall_names]
+    mass, along = h.driving.mass[-1], (h.V[-1] * h.wall_direction).sum(1)
+    taken = 0.5 * (np.where(np.isfinite(mass) & lost, mass, 0.0) * along**2).sum()
+    forms = h.K > 0 and h.stiffness is not None and h.formed == h.S
+    return float((laws.energy_taken_over(h).sum() if forms else 0.0) - taken)
 
 
 def of_solves(o, route, newton):
