@@ -27,7 +27,8 @@ pub enum Left {
     IfHolds(f64),
     /// Expected time, where costs vary. It is told as a range.
     About(f64),
-    /// Upper end of the range, where a condition without a measure may end the run earlier.
+    /// Upper bound of the time, where a condition without a measure may end the run earlier: twice the
+    /// time at the speed of the window.
     AtMost(f64),
 }
 
@@ -91,7 +92,7 @@ fn digits(count: f64) -> String {
 pub struct Outlook {
     /// Simulated time at the end (s).
     pub end: f64,
-    /// Whether the sample has bonds.
+    /// Whether the sample has bonds, or a stage will form them.
     pub bonded: bool,
     /// Whether the sample has failed, by its strain or its broken bonds.
     pub failed: bool,
@@ -140,7 +141,7 @@ impl Estimate {
         let seconds = self.to_stop(first, now).map_or(to_end, |to_stop| to_stop.min(to_end)) / speed;
         Some(match outlook {
             Outlook { bonded: true, failed: false, .. } => Left::IfHolds(seconds),
-            Outlook { open: true, .. } => Left::AtMost(SPREAD * SLOWING * seconds),
+            Outlook { open: true, .. } => Left::AtMost(SPREAD * seconds),
             Outlook { failed: false, .. } if self.is_even(first, now) => Left::Even(seconds),
             _ => Left::About(SLOWING * seconds),
         })
@@ -257,7 +258,7 @@ mod tests {
         assert_eq!(name(outlook(true, true, true), &even), Some("at_most"));
         // a broken sample slows down: 40 s at the present speed
         near(told(10.0, outlook(true, true, false), even).map(Left::seconds), 24.0);
-        near(told(10.0, outlook(true, true, true), even).map(Left::seconds), 48.0);
+        near(told(10.0, outlook(true, true, true), even).map(Left::seconds), 80.0);
     }
 
     #[test]

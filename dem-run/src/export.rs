@@ -95,6 +95,7 @@ fn export_in<D: Dim>(scene: &Scene, options: &ExportOptions, interrupt: &Interru
             strain: None,
             stop: None,
             may_end_early: false,
+            bonded: scene.has_bonds(),
         });
         if interrupt.requested() {
             return Err(RunError::Interrupted("nothing was written"));

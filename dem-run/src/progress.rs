@@ -53,6 +53,9 @@ pub struct StepProgress {
     /// Whether a condition of which [`Self::stop`] says nothing may end the run before its end.
     #[serde(skip)]
     pub may_end_early: bool,
+    /// Whether the sample has bonds, or a stage will form them.
+    #[serde(skip)]
+    pub bonded: bool,
 }
 
 /// Progress of a family of runs.
@@ -272,7 +275,7 @@ impl StepProgress {
         let by_bonds = self.stop.is_some_and(|stop| stop.condition != TRAVEL);
         let strained = self.strain.is_some_and(|strain| strain.abs() > STRAINS[0]);
         let failed = self.broken > 0 && (strained || self.broken as f64 >= BROKEN_SHARE * self.bonds as f64);
-        Outlook { end: self.end, bonded: self.bonds > 0, failed, open: self.may_end_early || by_bonds }
+        Outlook { end: self.end, bonded: self.bonded, failed, open: self.may_end_early || by_bonds }
     }
 
     /// The most important first: a terminal cuts the rest.
@@ -406,6 +409,7 @@ mod tests {
             strain: Some(4.12e-4),
             stop,
             may_end_early: false,
+            bonded: true,
         }
     }
 

@@ -291,6 +291,7 @@ impl<D: Dim> Run<'_, D> {
             load: self.state.course.load(&self.state.world),
             strain: self.state.course.strain(),
             stop: self.state.course.stop_progress(&self.state.world),
+            bonded: self.scene.has_bonds(),
             may_end_early: self.scene.stop.as_ref().is_some_and(|stop| stop.load_drop.is_some())
                 || self.scene.stages.iter().any(|stage| stage.until.is_some())
                 || self.scene.rupture == Rupture::NextEvent,
