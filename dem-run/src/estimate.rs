@@ -27,8 +27,8 @@ pub enum Left {
     IfHolds(f64),
     /// Expected time, where costs vary. It is told as a range.
     About(f64),
-    /// Upper bound of the time, where a condition without a measure may end the run earlier: twice the
-    /// time at the speed of the window.
+    /// Upper bound of the time, where a condition without a measure may end the run earlier:
+    /// twice the time at the speed of the window.
     AtMost(f64),
 }
 
