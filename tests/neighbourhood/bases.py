@@ -165,6 +165,15 @@ def biaxial():
     return scene | {"load_wall": "top", "stop": {"load_drop": 0.5}}
 
 
+def wrapped():
+    """60 disks with elastic bonds in a membrane, between a floor and a lid that comes down until its
+    load drops."""
+    scene = biaxial()
+    scene["walls"] = {name: wall for name, wall in scene["walls"].items() if not name.startswith("side_")}
+    pressure = {"table": [[0.0, 0.0], [0.005, 400.0]]}
+    return scene | {"membrane": {"pressure": pressure, "between": ["bottom", "top"]}}
+
+
 def block():
     """60 cemented spheres between four walls with a stress and one that comes down."""
     scene = biaxial()

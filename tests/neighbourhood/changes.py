@@ -178,6 +178,8 @@ def in_stages(scene):
         {"name": "confine", "duration": 0.1 * end, "walls": {"top": {"stress": {"constant": 200.0}}}},
         {"name": "unload", "duration": 0.1 * end, "walls": {"top": {"force": {"constant": 0.1 * load}}}},
     ]
+    if scene.get("membrane"):
+        scene["stages"][3]["membrane_pressure"] = {"constant": 200.0}
 
 
 def cemented_in_a_stage(scene):
@@ -185,6 +187,12 @@ def cemented_in_a_stage(scene):
     needs(scene.get("bonds") and "as list" not in scene)
     in_stages(scene)
     scene["stages"][1]["cement"] = True
+
+
+def wide_disk(scene):
+    """A membrane that a larger disk rolls out."""
+    needs(scene.get("membrane"))
+    scene["membrane"]["disk_radius"] = 2.5e-3
 
 
 def next_event(scene):
@@ -344,6 +352,7 @@ CHANGES = {
     "stages": ("lid", in_stages),
     "cemented in a stage": ("lid", cemented_in_a_stage),
     "gripped": ("grip", gripped),
+    "wide disk": ("membrane", wide_disk),
     "layers": ("materials", layers),
     "inclusion": ("materials", inclusion),
     "notch": ("notch", notch),

@@ -22,6 +22,7 @@ from bases import (
     small,
     spheres,
     tension,
+    wrapped,
 )
 from changes import CHANGES, Inapplicable, in_stages, layers, needs, next_event, notch
 from transform import regions_of
@@ -63,6 +64,7 @@ BASES = {
     "tension": tension,
     "interface": interface,
     "staged": staged,
+    "wrapped": wrapped,
     "events": events,
     "opening": opening,
     "punch": punch,

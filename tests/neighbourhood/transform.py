@@ -136,9 +136,17 @@ def transformed(scene, points, **way):
             material["density"] *= how.mass / how.length**3
     for pair in scene["materials"].get("pairs", []):
         how.bonds(pair.get("bonds", {}))
+    pressure = how.force / how.length**2
+    if "membrane" in scene:
+        membrane = scene["membrane"]
+        membrane["pressure"] = scaled(membrane["pressure"], pressure, how.time)
+        if "disk_radius" in membrane:
+            membrane["disk_radius"] *= how.length
     for stage in scene.get("stages", []):
         if "duration" in stage:
             stage["duration"] *= how.time
+        if "membrane_pressure" in stage:
+            stage["membrane_pressure"] = scaled(stage["membrane_pressure"], pressure, how.time)
         for drive in stage["walls"].values():
             how.drive(drive)
     if "thickness" in scene:
