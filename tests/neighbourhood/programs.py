@@ -24,7 +24,7 @@ def run(scene, folder, name="run", text=False):
     (folder / f"{name}.json").write_text(json.dumps(scene, indent=1))
     command = [dem_run(), "run", f"{name}.json", "-o", f"{name}.h5", "--force", "--quiet", "--threads", "1"]
     call = lambda *more: subprocess.run(
-        command + list(more), cwd=folder, check=True, capture_output=True, text=True, timeout=300
+        command + list(more), cwd=folder, check=True, capture_output=True, text=True
     )
     # the second run makes the same history again, to the bit but for its clock
     printed = call().stdout if text else None

@@ -31,7 +31,7 @@ def programs():
 
 def runner(program):
     def run(folder, *arguments):
-        subprocess.run([program, *map(str, arguments)], cwd=folder, check=True, stdout=subprocess.DEVNULL, timeout=300)
+        subprocess.run([program, *map(str, arguments)], cwd=folder, check=True, stdout=subprocess.DEVNULL)
 
     return run
 

@@ -24,7 +24,7 @@ pub const SMALL: [&str; 8] = [
 ];
 
 /// No command takes so long; one that hangs fails its test.
-const PATIENCE: Duration = Duration::from_secs(600);
+pub const PATIENCE: Duration = Duration::from_secs(600);
 
 /// The root of the workspace.
 fn root() -> PathBuf {

@@ -1,6 +1,6 @@
 //! Ctrl-C and SIGTERM in the middle of a run.
 
-use crate::common::{Folder, config, program};
+use crate::common::{Folder, PATIENCE, config, program};
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -21,9 +21,9 @@ fn send(signal: &str, child: &Child) {
     assert!(status.expect("sh").success());
 }
 
-/// The exit code, which comes soon.
+/// The exit code; a run that hangs fails its test.
 fn end(mut child: Child) -> Option<i32> {
-    let patience = Instant::now() + Duration::from_secs(20);
+    let patience = Instant::now() + PATIENCE;
     while Instant::now() < patience {
         if let Some(status) = child.try_wait().expect("status") {
             return status.code();
@@ -31,7 +31,7 @@ fn end(mut child: Child) -> Option<i32> {
         std::thread::sleep(Duration::from_millis(10));
     }
     child.kill().expect("kill");
-    panic!("the run goes on 20 s after the signal");
+    panic!("the run goes on {PATIENCE:?} after the signal");
 }
 
 #[test]

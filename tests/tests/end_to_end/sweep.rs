@@ -1,7 +1,7 @@
 //! Sweeps: every run a history, killed and gone on with, with runs that fail, and refused where
 //! they are wrong.
 
-use crate::common::{Folder, SMALL, config, content, program};
+use crate::common::{Folder, PATIENCE, SMALL, config, content, program};
 use serde_json::{Value, json};
 use std::fs;
 use std::process::{Child, Command, Stdio};
@@ -76,9 +76,9 @@ fn runs_in(here: &Folder) -> bool {
 
 /// Wait until something is so, or fail.
 fn wait_until(what: &str, mut so: impl FnMut() -> bool) {
-    let patience = Instant::now() + Duration::from_secs(60);
+    let patience = Instant::now() + PATIENCE;
     while !so() {
-        assert!(Instant::now() < patience, "not after a minute: {what}");
+        assert!(Instant::now() < patience, "not after {PATIENCE:?}: {what}");
         std::thread::sleep(Duration::from_millis(2));
     }
 }
