@@ -28,6 +28,7 @@ class Transform:
     def __init__(self, dimension, turn=0.0, mirror=False, permute=None, units=None, shift=None):
         self.length, self.mass, self.time = units or (1.0, 1.0, 1.0)
         self.force = self.mass * self.length / self.time**2
+        self.pressure = self.force / self.length**2
         self.permute, self.move = permute, np.full(dimension, shift or 0.0)
         c, s = (0.0, 1.0) if np.isclose(turn, np.pi / 2) else (np.cos(turn), np.sin(turn))
         # vertical is the last axis
@@ -85,8 +86,7 @@ class Transform:
         """Alters the drive of a wall, or that of a stage."""
         if "force_rate" in wall:
             wall["force_rate"] *= self.force / self.time
-        pressure = self.force / self.length**2
-        for drive, unit in (("force", self.force), ("velocity", self.length / self.time), ("stress", pressure)):
+        for drive, unit in (("force", self.force), ("velocity", self.length / self.time), ("stress", self.pressure)):
             if drive in wall:
                 wall[drive] = scaled(wall[drive], unit, self.time)
 
@@ -105,7 +105,7 @@ class Transform:
 
     def bonds(self, fields):
         """Alters the bonds of a scene, or those of a pair of materials."""
-        for key, unit in (("strength", self.force), ("stress", self.force / self.length**2)):
+        for key, unit in (("strength", self.force), ("stress", self.pressure)):
             if key in fields:
                 fields[key] *= unit
         stiffness = fields.get("stiffness", {})
@@ -114,7 +114,7 @@ class Transform:
                 self.force / self.length if key in ("normal", "tangential") else self.force * self.length
             )
         if "young" in stiffness:
-            stiffness["young"]["modulus"] *= self.force / self.length**2
+            stiffness["young"]["modulus"] *= self.pressure
 
 
 def transformed(scene, points, **way):
@@ -136,17 +136,16 @@ def transformed(scene, points, **way):
             material["density"] *= how.mass / how.length**3
     for pair in scene["materials"].get("pairs", []):
         how.bonds(pair.get("bonds", {}))
-    pressure = how.force / how.length**2
     if "membrane" in scene:
         membrane = scene["membrane"]
-        membrane["pressure"] = scaled(membrane["pressure"], pressure, how.time)
+        membrane["pressure"] = scaled(membrane["pressure"], how.pressure, how.time)
         if "disk_radius" in membrane:
             membrane["disk_radius"] *= how.length
     for stage in scene.get("stages", []):
         if "duration" in stage:
             stage["duration"] *= how.time
         if "membrane_pressure" in stage:
-            stage["membrane_pressure"] = scaled(stage["membrane_pressure"], pressure, how.time)
+            stage["membrane_pressure"] = scaled(stage["membrane_pressure"], how.pressure, how.time)
         for drive in stage["walls"].values():
             how.drive(drive)
     if "thickness" in scene:
