@@ -194,12 +194,15 @@ pub struct Table {
     pub rows: Vec<Vec<String>>,
     /// What the first cell of each row links to; none for a table without links.
     pub links: Vec<Option<String>>,
+    /// Whether its last column holds sentences.
+    pub sentences: bool,
 }
 
 impl Table {
     /// A table with the cells of a table on the terminal.
     pub fn new(caption: &str, head: &[&str], rows: Vec<Vec<String>>) -> Self {
-        Self { caption: caption.into(), head: head.iter().map(ToString::to_string).collect(), rows, links: vec![] }
+        let head = head.iter().map(ToString::to_string).collect();
+        Self { caption: caption.into(), head, rows, links: vec![], sentences: false }
     }
 
     /// The rows, each with what its first cell links to.

@@ -169,8 +169,11 @@ fn failed(report: &Report) -> Option<Table> {
         vec![run.id.clone(), code, run.message.clone().unwrap_or_default()]
     };
     let rows: Vec<Vec<String>> = failed.map(row).collect();
+    if rows.is_empty() {
+        return None;
+    }
     let caption = "Runs that failed; their loads are those up to the failure.";
-    (!rows.is_empty()).then(|| Table::new(caption, &["run", "exit code", "message"], rows))
+    Some(Table { sentences: true, ..Table::new(caption, &["run", "exit code", "message"], rows) })
 }
 
 /// The strength over the field that varies, or the reason why there is none.
