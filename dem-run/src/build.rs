@@ -105,8 +105,7 @@ fn membrane<D: Dim>(scene: &Scene, grains: &Grains<D>) -> Option<Membrane<D>> {
 
 /// The message about a membrane without a surface at the start.
 fn no_surface<D: Dim>(scene: &Scene, world: &World<D>, error: &StepError) -> String {
-    let wall = |body: u32| scene.walls.keys().nth(body as usize - world.grains.len());
-    let name = |body: u32| wall(body).map_or_else(String::new, |name| format!("wall {name}"));
+    let name = |body: u32| scene.body_name(world.grains.len(), body as usize);
     format!(
         "membrane: {}; seat the plates at the sample (\"place\": \"seated\"), or give another membrane.disk_radius",
         error.message(&name)

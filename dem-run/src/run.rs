@@ -271,12 +271,7 @@ impl<D: Dim> Run<'_, D> {
 
     /// Name of a body in messages: the number of a grain, or the scene's name of a wall.
     fn name(&self, body: u32) -> String {
-        match (body as usize).checked_sub(self.state.world.grains.len()) {
-            None => format!("grain {body}"),
-            Some(wall) => {
-                self.scene.walls.keys().nth(wall).map_or_else(|| format!("wall {wall}"), |name| format!("wall {name}"))
-            }
-        }
+        self.scene.body_name(self.state.world.grains.len(), body as usize)
     }
 
     fn standing(&self, report: &StepReport<D>) -> StepProgress {

@@ -290,6 +290,17 @@ impl Scene {
         self.walls.keys().position(|other| other == name)
     }
 
+    /// Name of body `body` of a sample of this many grains; walls follow the grains.
+    #[must_use]
+    pub fn body_name(&self, grains: usize, body: usize) -> String {
+        match body.checked_sub(grains) {
+            None => format!("grain {body}"),
+            Some(wall) => {
+                self.walls.keys().nth(wall).map_or_else(|| format!("wall {wall}"), |name| format!("wall {name}"))
+            }
+        }
+    }
+
     /// Names of the driven walls, in order.
     #[must_use]
     pub fn driven_walls(&self) -> Vec<&str> {

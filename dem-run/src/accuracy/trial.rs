@@ -364,7 +364,10 @@ impl<D: Dim> Trial<'_, D> {
             match step {
                 Ok(report) => state.follow(&world, &report),
                 Err(StepError::Unbalanced { .. }) => break End::Scene(Ending::NoEquilibrium),
-                Err(error) => break End::Failed(error.to_string()),
+                Err(error) => {
+                    let name = |body: u32| self.scene.body_name(world.grains.len(), body as usize);
+                    break End::Failed(error.message(&name));
+                }
             }
             if state.blown_up(&world) {
                 break End::Failed(format!(
