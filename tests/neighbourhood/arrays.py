@@ -28,5 +28,5 @@ def turning_velocity(spin, lever):
 
 
 def norm(a):
-    """Norm along the last axis."""
-    return np.sqrt((a * a).sum(-1))
+    """Norm along the last axis; squares of forces of 1e-168 N would be zero."""
+    return np.hypot.reduce(a, axis=-1, initial=0.0)

@@ -368,8 +368,7 @@ def check_status(h, p, report, rows):
     """The status is that of the reaction: nothing carried is OPEN, within the cone STICK, on it
     SLIP; bonds are BONDED."""
     status, open_ = h.status[rows], h.rn[rows] == 0
-    # squares of forces of 1e-168 N would be zero
-    size, limit = np.hypot.reduce(np.abs(h.rt[rows]), axis=1), p.mu[rows] * h.rn[rows]
+    size, limit = norm(h.rt[rows]), p.mu[rows] * h.rn[rows]
     near = np.abs(size - limit) <= 2e-9 * limit + tolerances.rounding(limit)
     told = np.where(p.bonds[rows], "BONDED", np.where(open_, "OPEN", np.where(size >= limit, "SLIP", "STICK")))
     either = near & ~p.bonds[rows] & ~open_ & np.isin(status, ["SLIP", "STICK"])
