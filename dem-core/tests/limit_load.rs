@@ -82,7 +82,49 @@ fn a_row_bears_its_weakest_bond_and_bends_at_its_root() {
     }
 }
 
-/// A beam of 2 n + 1 disks on two round supports without friction, loaded at its middle.
+#[test]
+fn a_leaf_beside_a_grain_that_nothing_presses_hides_no_limit() {
+    // a sphere with one bond turns about its axis; a contact without load is softer by many orders
+    for pull in [1.0, 1e-3] {
+        let at = |x: f64, y: f64| grain::<D3>(&[x, y, 0.0], 1e-3);
+        let mut grains = vec![at(0.0, 0.0), at(2e-3, 0.0), at(2e-3, 2e-3), at(2e-3, -2.002e-3)];
+        grains[0].fixed = true;
+        let mut world = world(grains, vec![], settings(1e-4));
+        world.form_bonds(1e-6, |_| 10.0, 0.3);
+        assert_eq!(world.bonds.len(), 2);
+        world.loads.push(growing(1, &[pull, 0.0, 0.0], &[0.0; 3]));
+        close(limit(&mut world), 10.0 / pull);
+    }
+}
+
+#[test]
+fn grains_that_a_wall_holds_are_part_of_it() {
+    // disks in a row, of which walls hold the first and the last
+    let held = |count: u32, angle: f64| {
+        let disks = (0..count).map(|k| grain::<D2>(&[1e-3 + 2e-3 * f64::from(k), 0.0], 1e-3)).collect();
+        let wall = |side: f64, x: f64| {
+            let shape = Shape::Plane { normal: [side, 0.0].into() };
+            Wall { grip: Some(0.5e-3), ..Wall::fixed(shape, [x, 0.0].into(), 0.3) }
+        };
+        let (left, mut right) = (wall(1.0, 0.0), wall(-1.0, 2e-3 * f64::from(count)));
+        let direction = [angle.cos(), angle.sin()].into();
+        right.drive = Drive::Force { direction, mass: 1.0, force: Arc::new(|t| 2.0 * t) };
+        let mut world = world(disks, vec![left, right], settings(1e-4));
+        world.form_bonds(1e-6, |_| 10.0, 0.3);
+        assert_eq!((world.grains_held_by(0), world.grains_held_by(1)), (1, 1));
+        world.bonds[1].strength = 4.0;
+        world
+    };
+    for count in [3, 4, 10] {
+        for angle in [0.0, 0.3, 1.0] {
+            // the wall bears what is across its way: the weakest bond is pulled along the row
+            close(limit(&mut held(count, angle)), 4.0 * f64::cos(angle) / 2.0);
+        }
+        // walls that cannot part may press on the row as hard as they like
+        assert_eq!(held(count, 0.5 * PI).limit_load(0.0, 1.0), LimitLoad::Unbounded);
+    }
+}
+
 fn beam(n: u32) -> World<D2> {
     let grains = (0..2 * n + 1).map(|k| grain(&[2e-3 * f64::from(k), 0.0], 1e-3)).collect();
     let support = |x: f64| {

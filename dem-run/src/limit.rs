@@ -56,7 +56,7 @@ pub struct GrowingLoad {
     pub from: f64,
     /// At the end of the run.
     pub to: f64,
-    /// At the limit, if there is one.
+    /// At the limit, if there is one and its factor is not 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub limit: Option<f64>,
 }
@@ -268,13 +268,14 @@ fn describe<D: Dim>(
         load,
         from,
         to,
-        limit: factor.map(|factor| from + factor * (to - from)),
+        // where a body moves first, what it comes to rest at may bear more
+        limit: factor.filter(|factor| *factor != 0.0).map(|factor| from + factor * (to - from)),
     });
     Ok(Limit {
         outcome,
         factor,
         factor_error,
-        time: factor.filter(|_| steady).map(|factor| factor * scene.time.end),
+        time: factor.filter(|factor| steady && *factor != 0.0).map(|factor| factor * scene.time.end),
         least_factor,
         loads: loads.collect(),
         grains: world.grains.len(),
@@ -287,7 +288,9 @@ impl Limit {
     pub(crate) fn in_words(&self) -> String {
         match (self.outcome, self.factor, self.least_factor) {
             (Outcome::Limit, Some(0.0), _) => {
-                "0 of the growth: the smallest load moves a body; is there a grain or a wall without support?".into()
+                "0 of the growth: the smallest load moves a body, and where it comes to rest may bear more; is there a grain \
+                 or a wall without support?"
+                    .into()
             }
             (Outcome::Limit, Some(factor), _) => format!("{} of the growth", number(factor)),
             (Outcome::BrokenAtStart, _, Some(least)) => format!(

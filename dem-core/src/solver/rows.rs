@@ -448,8 +448,8 @@ impl<D: Dim> Flatten<'_, D> {
         let sign = if side == 0 { 1.0 } else { -1.0 };
         let zero = D::Moment::zero();
         if k >= nodes.grains {
-            let (n, t) = D::split(&link.axes, nodes.drives[k - nodes.grains]);
-            table.add(-n, -t, zero, self.unknowns.root(node.inverse_mass));
+            let (n, t) = D::split(&link.axes, nodes.drives[k - nodes.grains] * sign);
+            table.add(n, t, zero, self.unknowns.root(node.inverse_mass));
             return 1;
         }
         for axis in 0..D::N {

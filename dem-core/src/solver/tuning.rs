@@ -48,7 +48,7 @@ pub(super) mod gauss_seidel {
     pub const GROWTH: f64 = 2.0;
     /// Share of the trace that is added to the diagonal of Anderson's least-squares matrix, to keep
     /// it positive definite if changes are nearly parallel: some thousand units of round-off.
-    pub const RIDGE: f64 = 1e-12;
+    pub const RIDGE: f64 = 1e-13;
     /// Most repetitions of the predictor–corrector in one visit of a contact; the next sweep
     /// continues.
     pub const ROUNDS: usize = 100;
@@ -289,8 +289,9 @@ pub(super) mod limit_load {
     pub const PATIENCE: usize = 5;
     /// Share of the way to the boundary of the cones.
     pub const TO_THE_BOUNDARY: f64 = 0.99;
-    /// Regularisation of the balance equations, relative to their smallest diagonal entry, and the
-    /// number of refinements that remove it.
-    pub const RIDGE: f64 = 1e-10;
+    /// Regularisation of the balance equations, relative to the diagonal entry of each, and the
+    /// number of refinements that remove it. Samples of 900 spheres end at an error below 1e-10
+    /// with 1e-12 and 1e-13, at some 1e-9 with 1e-10; with 1e-14 two of 33 are not solved.
+    pub const RIDGE: f64 = 1e-13;
     pub const REFINEMENTS: usize = 3;
 }

@@ -4,8 +4,9 @@ use super::World;
 use super::assembly::{Brought, CLOSED};
 use super::motion::{Midpoint, Motion, Turn};
 use crate::body::Drive;
-use crate::contact::Local;
+use crate::contact::{Law, Local};
 use crate::dim::{Dim, Vect};
+use crate::problem::{Contact, VisitorMut};
 use crate::solver::limit_load::{LimitLoad, limit_load};
 use std::sync::Arc;
 
@@ -16,7 +17,7 @@ impl<D: Dim> World<D> {
     /// The largest factor λ for which reactions that no contact law excludes balance the loads of
     /// the time `from` (s) and λ times what they grow by until the time `to` (s): weight, loads on
     /// grains, forces on walls and the pressure of a membrane, with the bodies at their places.
-    /// Walls without a force drive are supports.
+    /// Walls without a force drive are supports. Grains that a wall holds are part of it.
     ///
     /// All intact bonds take part, and all other pairs whose gap is at most 1e-6 of the smaller
     /// radius. The world does not change.
@@ -33,12 +34,15 @@ impl<D: Dim> World<D> {
         let mut touches = self.detect(&mid, &at_rest, 1.0);
         touches.retain(|stored| {
             let gap = self.geometry(&mid, stored.pair).0;
-            stored.bond().is_some() || gap <= CLOSED * self.smaller(stored.pair)
+            let [first, second] = self.walls_of(stored.pair);
+            let apart = first.is_none() || first != second;
+            apart && (stored.bond().is_some() || gap <= CLOSED * self.smaller(stored.pair))
         });
         let (carried, turns) = (vec![Local::zero(); self.bonds.len()], vec![Turn::default(); self.bonds.len()]);
         let motion = Motion { before: at_rest.before, free: start };
         let brought = Brought { carried, turns, strengthened: 1.0 };
-        let (problem, _) = self.assemble(&mid, &touches, &motion, &brought, 0.0, 1.0);
+        let (mut problem, _) = self.assemble(&mid, &touches, &motion, &brought, 0.0, 1.0);
+        problem.visit_mut(&mut OntoWalls { held: &self.held, grains: self.grains.len() });
         limit_load(&problem, growth)
     }
 
@@ -69,5 +73,22 @@ impl<D: Dim> World<D> {
             Drive::Fixed | Drive::Velocity { .. } => still,
         }));
         given.into()
+    }
+}
+
+/// Puts walls in the place of the grains that they hold. A wall does not turn: where on it a
+/// reaction acts does not matter.
+struct OntoWalls<'a> {
+    held: &'a [Option<u32>],
+    grains: usize,
+}
+
+impl<D: Dim> VisitorMut<D> for OntoWalls<'_> {
+    fn visit<L: Law>(&mut self, contact: &mut Contact<D, L>) {
+        for node in &mut contact.link.nodes {
+            if let Some(Some(wall)) = self.held.get(*node as usize) {
+                *node = self.grains as u32 + wall;
+            }
+        }
     }
 }

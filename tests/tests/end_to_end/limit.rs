@@ -29,11 +29,22 @@ fn two_grains_have_the_limits_that_they_break_at() {
     // without a support the smallest load moves both
     let loose = limit("two-grains.json", &["grains.fixed=[]"]);
     assert_eq!((&loose["outcome"], loose["factor"].as_f64()), (&"limit".into(), Some(0.0)));
+    assert_eq!((&loose["loads"][0]["limit"], &loose["time"]), (&Value::Null, &Value::Null), "{loose}");
     // its weight of 314 N pulls at the bond of 10 N, and the load pushes
     let held = limit("two-grains.json", &["gravity=[1e6, 0]", "grains.loads.0.force=[-100, 0]"]);
     assert_eq!(held["outcome"], "broken_at_start");
     let weight = 1e6 * 2500.0 * 0.01 * std::f64::consts::PI * 4e-6;
     close(&held["least_factor"], (weight - 10.0) / 1500.0);
+}
+
+#[test]
+fn a_strip_in_the_grip_of_its_platens_bears_no_more_than_its_limit() {
+    // its run has a peak of 41.5 N
+    let found = limit("direct-tension.json", &[]);
+    let load = found["loads"][0]["limit"].as_f64().expect("a load");
+    assert!(load > 41.5, "{found}");
+    let stronger = limit("direct-tension.json", &["bonds.stress=2e4"]);
+    assert!((stronger["loads"][0]["limit"].as_f64().expect("a load") / load - 2.0).abs() < 1e-7, "{stronger}");
 }
 
 #[test]

@@ -22,8 +22,8 @@ pub(super) struct System<'a> {
     /// S⁻¹ of each contact.
     pub soft: Vec<Soft>,
     pub factors: Factors,
-    /// Regularisation of the balance.
-    pub ridge: f64,
+    /// Scales of the unknowns of H S⁻¹ Hᵀ: with them its regularisation is the unit matrix.
+    pub scales: Vec<f64>,
     /// (H S⁻¹ Hᵀ)⁻¹ f₁, and f₁ · of it.
     pub border: Vec<f64>,
     pub pivot: f64,
@@ -44,16 +44,23 @@ impl<'a> System<'a> {
                 unknowns(row).zip(line).for_each(|(unknown, h)| diagonal[unknown] += h * h * soft.inverse[j][j]);
             }
         }
-        let least = diagonal.into_iter().filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min);
-        let ridge = tuning::RIDGE * if least.is_finite() { least } else { 1.0 };
+        // an unknown of no contact has no entry of its own
+        let least = diagonal.iter().copied().filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min);
+        let least = if least.is_finite() { least } else { 1.0 };
+        let scale = |d: &f64| (tuning::RIDGE * if *d > 0.0 { *d } else { least }).sqrt().recip();
+        let scales: Vec<f64> = diagonal.iter().map(scale).collect();
         let mut factors = Factors::default();
         factors.factorise(&of.graph.tree, |element, out| {
             let c = of.graph.contacts[element];
             let inverse = &soft[c].inverse;
-            of.rows.add_element(&of.rows.list[c], &of.sites[c].of, |i, j| inverse[i][j] / ridge, out);
+            of.rows.add_element(&of.rows.list[c], &of.sites[c].of, |i, j| inverse[i][j], out);
+            let own: Vec<f64> = unknowns(&of.rows.list[c]).map(|unknown| scales[unknown]).collect();
+            for (line, scale) in out.chunks_exact_mut(own.len()).zip(&own) {
+                line.iter_mut().zip(&own).for_each(|(entry, other)| *entry *= scale * other);
+            }
         })?;
         let none = Parts { r: vec![], lambda: 0.0, y: vec![], z: vec![] };
-        let mut system = Self { of, metrics, soft, factors, ridge, border: vec![], pivot: 0.0, by_tau: none };
+        let mut system = Self { of, metrics, soft, factors, scales, border: vec![], pivot: 0.0, by_tau: none };
         system.border = system.inverted(&of.load);
         system.pivot = sum(&of.load, &system.border);
         let cones = vec![[0.0; 3]; of.sides.len()];
@@ -61,11 +68,12 @@ impl<'a> System<'a> {
         (system.pivot > 0.0).then_some(system)
     }
 
-    /// (H S⁻¹ Hᵀ + ridge)⁻¹ x.
+    /// (H S⁻¹ Hᵀ)⁻¹ x, but for the regularisation.
     pub fn inverted(&self, x: &[f64]) -> Vec<f64> {
-        let mut y: Vec<f64> = x.iter().map(|x| x / self.ridge).collect();
+        let scaled = |x: &[f64]| -> Vec<f64> { x.iter().zip(&self.scales).map(|(x, scale)| x * scale).collect() };
+        let mut y = scaled(x);
         self.factors.solve(&self.of.graph.tree, &mut y);
-        y
+        scaled(&y)
     }
 
     /// S⁻¹ x.
