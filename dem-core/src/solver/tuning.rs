@@ -48,7 +48,7 @@ pub(super) mod gauss_seidel {
     pub const GROWTH: f64 = 2.0;
     /// Share of the trace that is added to the diagonal of Anderson's least-squares matrix, to keep
     /// it positive definite if changes are nearly parallel: some thousand units of round-off.
-    pub const RIDGE: f64 = 1e-13;
+    pub const RIDGE: f64 = 1e-12;
     /// Most repetitions of the predictor–corrector in one visit of a contact; the next sweep
     /// continues.
     pub const ROUNDS: usize = 100;
