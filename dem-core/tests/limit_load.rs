@@ -125,6 +125,7 @@ fn grains_that_a_wall_holds_are_part_of_it() {
     }
 }
 
+/// A beam of 2 n + 1 disks on two round supports without friction, loaded at its middle.
 fn beam(n: u32) -> World<D2> {
     let grains = (0..2 * n + 1).map(|k| grain(&[2e-3 * f64::from(k), 0.0], 1e-3)).collect();
     let support = |x: f64| {

@@ -264,18 +264,19 @@ fn describe<D: Dim>(
         LimitLoad::Undecided => return Err(NoConvergence::Limit.into()),
     };
     let factor = factor.map(|factor| if factor.abs() < ACCURACY { 0.0 } else { factor });
+    // a body that the smallest load moves may come to rest where more is borne
+    let bound = factor.filter(|factor| *factor != 0.0);
     let loads = growing.into_iter().map(|(load, from, to, _)| GrowingLoad {
         load,
         from,
         to,
-        // where a body moves first, what it comes to rest at may bear more
-        limit: factor.filter(|factor| *factor != 0.0).map(|factor| from + factor * (to - from)),
+        limit: bound.map(|factor| from + factor * (to - from)),
     });
     Ok(Limit {
         outcome,
         factor,
         factor_error,
-        time: factor.filter(|factor| steady && *factor != 0.0).map(|factor| factor * scene.time.end),
+        time: bound.filter(|_| steady).map(|factor| factor * scene.time.end),
         least_factor,
         loads: loads.collect(),
         grains: world.grains.len(),
