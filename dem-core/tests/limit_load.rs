@@ -220,7 +220,21 @@ fn dry_contacts_bear_what_friction_bears() {
     // a disk above the floor, with nothing under it
     grains.truncate(1);
     grains[0].position[1] += 1e-3;
-    assert_eq!(stand(grains, 0.3, 1.0).limit_load(0.0, 1.0), LimitLoad::NeverBalanced);
+    assert_eq!(stand(grains, 0.3, 1.0).limit_load(0.0, 1.0), LimitLoad::Unsupported { grains: vec![0] });
+}
+
+/// A row that hangs at a fixed grain, and two bonded grains beside it that fall: what their bond
+/// bears is no limit, and a fixed grain is a support.
+#[test]
+fn grains_that_fall_are_named() {
+    let places = [[0.0, 0.0], [2e-3, 0.0], [1e-2, 1e-2], [1.2e-2, 1e-2]];
+    let mut grains = places.map(|place| grain::<D2>(&place, 1e-3));
+    grains[0].fixed = true;
+    let mut world = world(grains.to_vec(), vec![], settings(1e-4));
+    world.loads.push(growing(1, &[1.0, 0.0], &[0.0]));
+    world.settings.gravity = Some([9.81, 0.0].into());
+    world.form_bonds(1e-6, |_| 1.0, 0.3);
+    assert_eq!(world.limit_load(0.0, 1.0), LimitLoad::Unsupported { grains: vec![2, 3] });
 }
 
 /// A block of bonded grains on a lattice, with random radii, strengths and coefficients; a layer is

@@ -76,6 +76,9 @@ pub struct Limit {
     /// Time at which the loads of a run reach the limit (s), if they grow at constant rates.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<f64>,
+    /// Grains with weight that no chain of contacts joins with a support.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub unsupported: Vec<u32>,
     /// Least factor that is borne, if the constant loads alone are not.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub least_factor: Option<f64>,
@@ -254,12 +257,16 @@ fn describe<D: Dim>(
     (growing, steady): (Vec<Growth>, bool),
     found: LimitLoad,
 ) -> Result<Limit, RunError> {
+    let unsupported = match &found {
+        LimitLoad::Unsupported { grains } => grains.clone(),
+        _ => Vec::new(),
+    };
     let (outcome, factor, factor_error, least_factor) = match found {
         LimitLoad::Factor { lower, upper } => {
             (Outcome::Limit, Some(0.5 * (lower + upper)), Some((upper - lower).abs()), None)
         }
         LimitLoad::Unbounded => (Outcome::Unbounded, None, None, None),
-        LimitLoad::NeverBalanced => (Outcome::NeverBorne, None, None, None),
+        LimitLoad::NeverBalanced | LimitLoad::Unsupported { .. } => (Outcome::NeverBorne, None, None, None),
         LimitLoad::BrokenAtStart { least } => (Outcome::BrokenAtStart, None, None, Some(least)),
         LimitLoad::Undecided => return Err(NoConvergence::Limit.into()),
     };
@@ -277,6 +284,7 @@ fn describe<D: Dim>(
         factor,
         factor_error,
         time: bound.filter(|_| steady).map(|factor| factor * scene.time.end),
+        unsupported,
         least_factor,
         loads: loads.collect(),
         grains: world.grains.len(),
@@ -299,12 +307,26 @@ impl Limit {
                 number(least)
             ),
             (Outcome::Unbounded, ..) => "none: reactions within all limits bear any load".into(),
+            _ if !self.unsupported.is_empty() => format!(
+                "the weight moves grains that no chain of contacts joins with a support, {}; leave them out of the sample, \
+                 or let them come to rest first",
+                listed(&self.unsupported)
+            ),
             _ => {
                 "the loads at t = 0 break a bond or move a body, whatever the growing load; is there a grain or a wall \
                   without support?"
                     .into()
             }
         }
+    }
+}
+
+/// The first of a list of grains, and their number if there are more.
+fn listed(grains: &[u32]) -> String {
+    let first: Vec<String> = grains.iter().take(5).map(|grain| format!("grain {grain}")).collect();
+    match grains.len() {
+        count if count > first.len() => format!("{} and others, {count} in all", first.join(", ")),
+        _ => first.join(", "),
     }
 }
 

@@ -3,6 +3,7 @@
 use super::World;
 use super::assembly::{Brought, CLOSED};
 use super::motion::{Midpoint, Motion, Turn};
+use super::touch::StoredTouch;
 use crate::body::Drive;
 use crate::contact::{Law, Local};
 use crate::dim::{Dim, Vect};
@@ -38,12 +39,43 @@ impl<D: Dim> World<D> {
             let apart = first.is_none() || first != second;
             apart && (stored.bond().is_some() || gap <= CLOSED * self.smaller(stored.pair))
         });
+        if self.settings.gravity.is_some() {
+            let grains = self.unsupported(&touches);
+            if !grains.is_empty() {
+                return LimitLoad::Unsupported { grains };
+            }
+        }
         let (carried, turns) = (vec![Local::zero(); self.bonds.len()], vec![Turn::default(); self.bonds.len()]);
         let motion = Motion { before: at_rest.before, free: start };
         let brought = Brought { carried, turns, strengthened: 1.0 };
         let (mut problem, _) = self.assemble(&mid, &touches, &motion, &brought, 0.0, 1.0);
         problem.visit_mut(&mut OntoWalls { held: &self.held, grains: self.grains.len() });
         limit_load(&problem, growth)
+    }
+
+    /// The grains that no chain of contacts joins with a wall or a fixed grain.
+    fn unsupported(&self, touches: &[StoredTouch<D>]) -> Vec<u32> {
+        let grains = self.grains.len();
+        let mut neighbours = vec![Vec::new(); grains];
+        let mut supported = self.grains.fixed.clone();
+        for [a, b] in touches.iter().map(|touch| touch.pair.map(|body| body as usize)) {
+            if b < grains {
+                neighbours[a].push(b);
+                neighbours[b].push(a);
+            } else {
+                supported[a] = true;
+            }
+        }
+        let mut reached: Vec<usize> = (0..grains).filter(|grain| supported[*grain]).collect();
+        while let Some(grain) = reached.pop() {
+            for &next in &neighbours[grain] {
+                if !supported[next] {
+                    supported[next] = true;
+                    reached.push(next);
+                }
+            }
+        }
+        (0..grains).filter(|grain| !supported[*grain]).map(|grain| grain as u32).collect()
     }
 
     /// The velocities that loads give to bodies at rest in a step of 1 s; `of` makes the factor of

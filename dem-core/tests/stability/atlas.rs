@@ -1,10 +1,9 @@
 //! Every parameter over its range, in both dimensions and with every solver, and the table of its
 //! results.
 
-use crate::harness::{Outcome, watch};
+use crate::harness::{Outcome, cause, watch};
 use crate::scene::{Heap, Kind};
 use dem_core::dim::{D2, D3};
-use dem_core::world::StepError;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -168,25 +167,12 @@ impl Run {
         if o.gain > GAIN {
             how.push(format!("energy +{:.0} %", 100.0 * o.gain));
         }
-        match &o.stopped {
-            None => {}
-            Some(StepError::NotAccepted { .. }) => how.push("stops: no convergence".into()),
-            Some(StepError::Yielded { .. }) => how.push("stops: a contact yields".into()),
-            Some(StepError::TooFast { .. }) => how.push("stops: too fast for the step".into()),
-            Some(StepError::NotFinite { .. }) => how.push("stops: not finite".into()),
-            Some(other) => how.push(format!("stops: {other:?}")),
-        }
+        how.extend(o.stopped.as_ref().map(|error| format!("stops: {}", cause(error))));
         how.join(", ")
     }
 
     pub fn name(&self) -> String {
-        let solver = match self.kind {
-            Kind::GaussSeidel => "Gauss–Seidel",
-            Kind::Newton => "Newton",
-            Kind::Auto => "auto",
-            Kind::Interior => "interior",
-        };
-        format!("{solver} {}D", self.dimension)
+        format!("{} {}D", self.kind.name(), self.dimension)
     }
 }
 

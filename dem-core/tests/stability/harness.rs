@@ -2,6 +2,7 @@
 
 use dem_core::bond::BondStatus;
 use dem_core::dim::{Dim, Vect};
+use dem_core::solver::certificate::Verdict;
 use dem_core::world::{StepError, World};
 
 /// The outcome of a run. Ratios are without unit.
@@ -20,6 +21,18 @@ pub struct Outcome {
     pub broken: usize,
     /// Largest displacement of a grain over its radius.
     pub travel: f64,
+}
+
+/// The cause of an error, in the words of the page.
+pub fn cause(error: &StepError) -> String {
+    match error {
+        _ if matches!(error.verdict(), Some(Verdict::NoSolution(_))) => "no motion is admissible".into(),
+        StepError::NotAccepted { .. } => "no convergence".into(),
+        StepError::Yielded { .. } => "a contact yields".into(),
+        StepError::TooFast { .. } => "too fast for the step".into(),
+        StepError::NotFinite { .. } => "not finite".into(),
+        other => format!("{other:?}"),
+    }
 }
 
 /// Make this number of steps, or stop at the first error, which must leave the world unchanged.

@@ -1,7 +1,7 @@
 //! Random scenes: all features of a scene in all combinations, checked by the invariants alone.
 
 use crate::common::DENSITY;
-use crate::harness::watch;
+use crate::harness::{cause, watch};
 use crate::scene::{Kind, SWEEPS};
 use dem_core::body::{Drive, Grain, Load, Shape, Wall};
 use dem_core::bond::{Rupture, Stiffness};
@@ -12,6 +12,7 @@ use dem_core::world::{Restitution, Settings, World};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
@@ -82,8 +83,8 @@ fn across<V: Vect>(normal: V) -> V {
     x * (1.0 / x.norm())
 }
 
-/// A random scene, and the residual that its solver accepts.
-fn scene<D: Dim>(dice: &mut Dice, Size { grains: most, sweeps, solver, cylinders, .. }: Size) -> (World<D>, f64) {
+/// A random scene, its solver, and the residual that this accepts.
+fn scene<D: Dim>(dice: &mut Dice, Size { grains: most, sweeps, solver, cylinders, .. }: Size) -> (World<D>, Kind, f64) {
     let count = dice.decade(2.0, most).round();
     let side = count.powf(1.0 / D::N as f64).ceil() as usize;
     let size = dice.decade(1e-6, 1e2);
@@ -158,14 +159,19 @@ fn scene<D: Dim>(dice: &mut Dice, Size { grains: most, sweeps, solver, cylinders
     }
     let bonded = dice.one_in(2);
     let accept = if bonded { 1e-6 } else { 1e-4 };
+    let step = dice.decade(1e-3, 0.1) * (size / 9.81).sqrt();
+    let gravity = (!dice.one_in(3)).then(|| dice.direction::<D>() * 9.81);
+    let bond_flow = dice.pick(&[BondFlow::Associated, BondFlow::Associated, BondFlow::Bipotential]);
+    let rupture = dice.pick(&[Rupture::Cascade, Rupture::Cascade, Rupture::CascadeWorst, Rupture::EndOfStep]);
+    let solver = solver.unwrap_or(dice.pick(&SOLVERS));
     let mut settings = Settings {
-        step: dice.decade(1e-3, 0.1) * (size / 9.81).sqrt(),
-        gravity: (!dice.one_in(3)).then(|| dice.direction::<D>() * 9.81),
+        step,
+        gravity,
         friction,
         restitution: None,
-        bond_flow: dice.pick(&[BondFlow::Associated, BondFlow::Associated, BondFlow::Bipotential]),
-        rupture: dice.pick(&[Rupture::Cascade, Rupture::Cascade, Rupture::CascadeWorst, Rupture::EndOfStep]),
-        solver: match solver.unwrap_or(dice.pick(&SOLVERS)).settings(1e-8, accept) {
+        bond_flow,
+        rupture,
+        solver: match solver.settings(1e-8, accept) {
             SolverSettings::GaussSeidel(given) => {
                 SolverSettings::GaussSeidel(GaussSeidelSettings { max_sweeps: sweeps, ..given })
             }
@@ -197,32 +203,35 @@ fn scene<D: Dim>(dice: &mut Dice, Size { grains: most, sweeps, solver, cylinders
             });
         }
     }
-    (world, accept)
+    (world, solver, accept)
 }
 
-/// The outcome of a scene: the steps made, whether an error ended it early, whether a contact
-/// carried a reaction at its end, and the number of broken bonds.
-#[derive(Clone, Copy, Debug)]
+/// The outcome of a scene: its seed and solver, the steps made, the cause that ended it early,
+/// whether a contact carried a reaction at its end, and the number of broken bonds.
+#[derive(Clone, Debug)]
 struct Course {
+    seed: u64,
+    solver: Kind,
     steps: usize,
-    stopped: bool,
+    stopped: Option<String>,
     touched: bool,
     broken: usize,
 }
 
 /// Make scene `seed` and run it.
 fn scene_holds(seed: u64, size: Size) -> Course {
-    fn course<D: Dim + PartialEq>(mut dice: Dice, size: Size) -> Course {
-        let (mut world, accept) = scene::<D>(&mut dice, size);
+    fn course<D: Dim + PartialEq>(seed: u64, mut dice: Dice, size: Size) -> Course {
+        let (mut world, solver, accept) = scene::<D>(&mut dice, size);
         let out = watch(&mut world, size.steps, accept);
         let touched = world.touches().any(|t| t.reaction.n != 0.0);
-        Course { steps: out.steps, stopped: out.stopped.is_some(), touched, broken: out.broken }
+        let stopped = out.stopped.as_ref().map(cause);
+        Course { seed, solver, steps: out.steps, stopped, touched, broken: out.broken }
     }
     let mut dice = Dice(Pcg64::seed_from_u64(seed));
     match dice.one_in(2) {
-        true => course::<D2>(dice, size),
-        false if seed.is_multiple_of(3) => course::<D3Twist>(dice, size),
-        false => course::<D3>(dice, size),
+        true => course::<D2>(seed, dice, size),
+        false if seed.is_multiple_of(3) => course::<D3Twist>(seed, dice, size),
+        false => course::<D3>(seed, dice, size),
     }
 }
 
@@ -230,7 +239,7 @@ fn scene_holds(seed: u64, size: Size) -> Course {
 fn failures(seeds: std::ops::Range<u64>, size: Size) -> (Vec<u64>, Vec<Course>) {
     let outcome = |seed: u64| catch_unwind(AssertUnwindSafe(|| scene_holds(seed, size))).map_err(|_| seed);
     let outcomes: Vec<_> = seeds.into_par_iter().map(outcome).collect();
-    let failed = outcomes.iter().filter_map(|outcome| outcome.err()).collect();
+    let failed = outcomes.iter().filter_map(|outcome| outcome.as_ref().err().copied()).collect();
     (failed, outcomes.into_iter().flatten().collect())
 }
 
@@ -241,7 +250,7 @@ fn figures(seeds: std::ops::Range<u64>, size: Size) -> [usize; 4] {
     assert_eq!(failed, [], "seeds of scenes that fail");
     let count = |of: fn(&Course) -> bool| courses.iter().filter(|course| of(course)).count();
     let steps = courses.iter().map(|course| course.steps).sum();
-    [count(|c| c.stopped), steps, count(|c| c.touched), count(|c| c.broken > 0)]
+    [count(|c| c.stopped.is_some()), steps, count(|c| c.touched), count(|c| c.broken > 0)]
 }
 
 #[test]
@@ -281,17 +290,21 @@ fn twenty_thousand_random_scenes() {
         first.parse().expect("a first seed")..end.parse().expect("an end of seeds")
     });
     let size = Size { grains: 200.0, steps: 200, sweeps: FEW_SWEEPS, ..AS_DRAWN };
-    let (mut failed, mut stopped) = (Vec::new(), 0);
+    let (mut failed, mut stopped) = (Vec::new(), BTreeMap::<(&str, String), Vec<u64>>::new());
     for first in seeds.clone().step_by(100) {
         let end = seeds.end.min(first + 100);
         let (fail, courses) = failures(first..end, size);
         failed.extend(fail);
-        stopped += courses.iter().filter(|course| course.stopped).count();
-        eprintln!(
-            "seeds {}..{end}: {stopped} stopped before their end, {} failed {failed:?}",
-            seeds.start,
-            failed.len()
-        );
+        for course in courses {
+            if let Some(cause) = course.stopped {
+                stopped.entry((course.solver.name(), cause)).or_default().push(course.seed);
+            }
+        }
+        let stops: usize = stopped.values().map(Vec::len).sum();
+        eprintln!("seeds {}..{end}: {stops} stopped, {} failed {failed:?}", seeds.start, failed.len());
+    }
+    for ((solver, cause), seeds) in stopped {
+        eprintln!("{solver}: {cause}: {} {seeds:?}", seeds.len());
     }
     assert_eq!(failed, [], "seeds of scenes that fail");
 }

@@ -27,6 +27,15 @@ pub const SWEEPS: u64 = 100_000;
 impl Kind {
     pub const ALL: [Self; 4] = [Self::GaussSeidel, Self::Newton, Self::Auto, Self::Interior];
 
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::GaussSeidel => "Gauss–Seidel",
+            Self::Newton => "Newton",
+            Self::Auto => "auto",
+            Self::Interior => "interior",
+        }
+    }
+
     pub fn settings(self, tolerance: f64, accept: f64) -> SolverSettings {
         let newton = common::newton(tolerance, accept, 1e-5);
         match self {

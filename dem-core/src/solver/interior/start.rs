@@ -8,7 +8,13 @@ use crate::solver::tuning::start as tuning;
 
 /// Cold start: reactions well inside their cones, velocities as large as the free ones.
 pub(super) fn cold(sites: &Sites) -> State {
-    let largest = sites.shift.iter().copied().fold(1.0, f64::max);
+    // the largest reaction that stops the bodies of one contact: far larger than the unit where
+    // masses differ
+    let stopping = sites.list.iter().zip(&sites.normal).filter(|(_, normal)| **normal > 0.0).map(|(site, normal)| {
+        let square = site.part(&sites.free).iter().map(|u| u * u).sum::<f64>();
+        square.sqrt() / normal
+    });
+    let largest = sites.shift.iter().copied().chain(stopping).fold(1.0, f64::max);
     let mut r = vec![0.0; sites.rows];
     for (site, shift) in sites.list.iter().zip(&sites.shift) {
         site.part_mut(&mut r)[0] = (tuning::INSIDE * largest - shift).max(0.0);

@@ -7,7 +7,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 /// What the largest load factor is.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum LimitLoad {
     /// The loads are balanced up to the factor `upper` at most (the dual value), and up to `lower`
     /// (the primal value); both are the same to the accuracy of the solution.
@@ -23,6 +23,12 @@ pub enum LimitLoad {
     /// The loads are balanced at no factor, or only at negative ones: the constant loads drive some
     /// mechanism.
     NeverBalanced,
+    /// The same: no chain of contacts joins these grains, which have weight, with a wall or a fixed
+    /// grain.
+    Unsupported {
+        /// Their indices.
+        grains: Vec<u32>,
+    },
     /// The constant loads alone are not balanced; they are from this factor on.
     BrokenAtStart {
         /// Least factor that is balanced.
