@@ -17,7 +17,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 /// Scenes that once failed, and the number of steps that they now make.
-const REGRESSIONS: [(u64, usize); 2] = [(1208, 200), (12237, 200)];
+const REGRESSIONS: [(u64, usize); 3] = [(1208, 200), (2354, 200), (12237, 200)];
 
 /// Solvers of the scenes. Another solver in the list would change the scene of every seed.
 const SOLVERS: [Kind; 3] = [Kind::GaussSeidel, Kind::Newton, Kind::Auto];

@@ -5,14 +5,20 @@ use super::state::{State, gap};
 use super::system::System;
 use crate::solver::tuning::direction as tuning;
 
-/// The direction of an iteration, and the longest multiple of it inside the cones.
-pub(super) fn direction(system: &System) -> (State, f64) {
+/// The direction of an iteration, and the longest multiple of it inside the cones. The direction is
+/// refined twice: the active set of a solution is read off reactions at their limits. Those that it
+/// is chosen from are refined once if `rough`, that is if round-off shows in them: if fragments
+/// move fast it is as large as the right side, and the length to the boundary of the cones would be
+/// arbitrary.
+pub(super) fn direction(system: &System, rough: &mut bool) -> (State, f64) {
+    let refining = *rough;
+    let towards = |by: &[Point]| system.step(by, refining);
     let at = system.at;
     let products = system.products(&at.x, &at.z);
     let gap = gap(at);
     // predictor
     let to_the_end: Vec<Point> = products.iter().map(|p| [-p[0], -p[1], -p[2]]).collect();
-    let predictor = system.step(&to_the_end);
+    let predictor = towards(&to_the_end);
     let length = system.longest(&predictor).min(1.0);
     let count = at.x.len() as f64;
     let aim = at.x.iter().zip(&at.z).zip(predictor.x.iter().zip(&predictor.z));
@@ -23,7 +29,7 @@ pub(super) fn direction(system: &System) -> (State, f64) {
     let second = system.products(&predictor.x, &predictor.z);
     let mut by: Vec<Point> =
         products.iter().zip(&second).map(|(p, s)| [barrier - p[0] - s[0], -p[1] - s[1], -p[2] - s[2]]).collect();
-    let mut step = system.step(&by);
+    let mut step = towards(&by);
     let mut far = system.longest(&step);
     for _ in 0..tuning::CORRECTORS {
         let length = (far + tuning::LONGER).min(1.0);
@@ -35,7 +41,7 @@ pub(super) fn direction(system: &System) -> (State, f64) {
             moved(by, 1.0, &correction(v, barrier / tuning::APART, barrier * tuning::APART))
         };
         let more: Vec<Point> = by.iter().zip(&products).map(corrected).collect();
-        let other = system.step(&more);
+        let other = towards(&more);
         let reached = system.longest(&other);
         if reached <= tuning::GROWN * far {
             break;
@@ -48,7 +54,7 @@ pub(super) fn direction(system: &System) -> (State, f64) {
         for share in tuning::TO_THE_MIDDLE {
             let barrier = share.max(centring) * gap;
             let by: Vec<Point> = products.iter().map(|p| [barrier - p[0], -p[1], -p[2]]).collect();
-            let other = system.step(&by);
+            let other = towards(&by);
             let reached = system.longest(&other);
             if reached > tuning::WORTH * far {
                 (step, far) = (other, reached);
@@ -56,7 +62,11 @@ pub(super) fn direction(system: &System) -> (State, f64) {
             }
         }
     }
-    let step = system.refined(step, &chosen);
+    let (mut step, far) = system.refined(step, &chosen);
+    if !refining {
+        step = system.refined(step, &chosen).0;
+    }
+    *rough = far < 1.0 / tuning::ROUGH;
     let far = system.longest(&step);
     (step, far)
 }

@@ -20,6 +20,8 @@ pub(super) struct Follow {
     /// Consecutive steps without progress.
     stuck: u32,
     straight: f64,
+    /// Whether round-off shows in the directions.
+    rough: bool,
     by_arc_length: Option<ByArcLength>,
     /// Whether round-off has ended the long steps.
     round_off_reached: bool,
@@ -34,7 +36,7 @@ struct ByArcLength {
 impl Follow {
     /// Follow in long steps, from a point inside all cones.
     pub fn from(at: State) -> Self {
-        Self { at, stuck: 0, straight: tuning::STRAIGHT, by_arc_length: None, round_off_reached: false }
+        Self { at, stuck: 0, straight: tuning::STRAIGHT, rough: false, by_arc_length: None, round_off_reached: false }
     }
 
     /// The current point.
@@ -80,7 +82,7 @@ impl Follow {
 
     /// A predictor–corrector step.
     fn long_step(&mut self, system: &System) -> State {
-        let (mut step, far) = direction(system);
+        let (mut step, far) = direction(system, &mut self.rough);
         let mut length = (steps::TO_THE_BOUNDARY * far).min(1.0);
         let end = |length: f64| {
             let mut end = system.at.clone();

@@ -33,21 +33,21 @@ impl System<'_> {
         all.map(|((x, z), Scaled { scaling, .. })| product(&scaling.x(x), &scaling.z(z))).collect()
     }
 
-    /// The step that changes x ∘ z by `by`, to first order. It is refined once: if fragments move
-    /// fast, its round-off is as large as the right side, and the length to the boundary of the
-    /// cones would be arbitrary.
-    pub fn step(&self, by: &[Point]) -> State {
-        self.refined(self.solved(&self.right, by), by)
+    /// The step that changes x ∘ z by `by`, to first order.
+    pub fn step(&self, by: &[Point], refined: bool) -> State {
+        let step = self.solved(&self.right, by);
+        if refined { self.refined(step, by).0 } else { step }
     }
 
-    /// A step after one refinement, which reduces its round-off.
-    pub fn refined(&self, mut step: State, by: &[Point]) -> State {
+    /// A step after one refinement, which reduces its round-off, and the longest multiple of what
+    /// the refinement adds that stays inside all cones.
+    pub fn refined(&self, mut step: State, by: &[Point]) -> (State, f64) {
         let (left, missing) = self.left(by, &step);
         let more = self.solved(&left, &missing);
         step.r.iter_mut().zip(&more.r).for_each(|(r, d)| *r += d);
         step.z.iter_mut().zip(&more.z).for_each(|(z, d)| *z = moved(z, 1.0, d));
         follow(self.sites, &mut step);
-        step
+        (step, self.longest(&more))
     }
 
     pub fn solved(&self, right: &[f64], by: &[Point]) -> State {

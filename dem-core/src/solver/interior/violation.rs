@@ -52,13 +52,13 @@ impl Interior {
 
     /// The end of the central path of one multiplier iteration.
     fn of_a_round(&mut self, sites: &Sites, coupling: &Coupling, metric: &Metric) -> State {
-        let mut at = cold(sites);
+        let (mut at, mut rough) = (cold(sites), false);
         for _ in 0..tuning::MOST {
             if gap(&at) <= tuning::LEAST_GAP {
                 break;
             }
             let Some(system) = self.factorised(sites, coupling, &at, metric) else { break };
-            let (step, far) = direction(&system);
+            let (step, far) = direction(&system, &mut rough);
             advance(&mut at, (steps::TO_THE_BOUNDARY * far).min(1.0), &step);
         }
         at
