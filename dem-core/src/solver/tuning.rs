@@ -165,8 +165,7 @@ pub(super) mod direction {
     /// Longest step, relative to the step to the boundary of the cones.
     pub const TO_THE_BOUNDARY: f64 = 0.99;
     /// Round-off shows in the directions if refinement adds more than this share of the way to the
-    /// boundary of some cone. With 0.01 clusters of spheres that slide take half as many iterations
-    /// again; if all directions are refined, `compression` takes a sixth more time.
+    /// boundary of some cone. Refining all directions takes up to a sixth more time (decision 36).
     pub const ROUGH: f64 = 1e-6;
     /// Factor by which a step is shortened until its end is central, and the shortest step.
     pub const SHORTER: f64 = 0.8;

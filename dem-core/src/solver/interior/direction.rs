@@ -5,11 +5,10 @@ use super::state::{State, gap};
 use super::system::System;
 use crate::solver::tuning::direction as tuning;
 
-/// The direction of an iteration, and the longest multiple of it inside the cones. The direction is
-/// refined twice: the active set of a solution is read off reactions at their limits. Those that it
-/// is chosen from are refined once if `rough`, that is if round-off shows in them: if fragments
-/// move fast it is as large as the right side, and the length to the boundary of the cones would be
-/// arbitrary.
+/// The direction of an iteration, and the longest multiple of it inside the cones. It is refined
+/// twice. Those that it is chosen from are refined once if `rough`, that is if round-off shows in
+/// the directions: where fragments move fast it is as large as the right side, and the length to
+/// the boundary of the cones would be arbitrary.
 pub(super) fn direction(system: &System, rough: &mut bool) -> (State, f64) {
     let refining = *rough;
     let towards = |by: &[Point]| system.step(by, refining);
