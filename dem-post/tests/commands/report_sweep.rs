@@ -138,6 +138,15 @@ fn the_page_of_a_sweep_begins_with_its_result() {
 }
 
 #[test]
+fn the_page_has_the_title_of_the_sweep_else_the_name_of_its_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut planned = study(folder.path());
+    assert!(planned.page(&[]).contains("<title>a study</title>"));
+    planned.manifest.title = Some("Strength and rate".into());
+    assert!(planned.page(&["--force"]).contains("<title>Strength and rate</title>"));
+}
+
+#[test]
 fn the_page_of_a_sweep_links_to_its_histories_and_needs_nothing_else() {
     let folder = tempfile::tempdir().unwrap();
     let page = study(folder.path()).page(&[]);

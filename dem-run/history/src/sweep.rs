@@ -69,6 +69,9 @@ pub struct Manifest {
     pub program: String,
     /// The sweep file's name.
     pub sweep: String,
+    /// The sweep's title, if it has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub title: Option<String>,
     /// The base scene's name.
     pub scene: String,
     /// Fields that are varied, in the order of the sweep.
@@ -314,7 +317,7 @@ impl Manifest {
     pub fn new(sweep: &Path, scene: &Path, fields: Vec<String>) -> Self {
         let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let program = format!("dem-run {}", env!("CARGO_PKG_VERSION"));
-        Self { format: FORMAT, program, sweep: name(sweep), scene: name(scene), fields, runs: vec![] }
+        Self { format: FORMAT, program, sweep: name(sweep), scene: name(scene), title: None, fields, runs: vec![] }
     }
 
     /// The run of this number, with or without zeros in front.

@@ -23,6 +23,8 @@ pub struct Plan {
     pub sweep: PathBuf,
     /// The base scene of all runs.
     pub scene: PathBuf,
+    /// The title of the sweep.
+    pub title: Option<String>,
     /// The fields that are varied.
     pub fields: Vec<String>,
     /// The runs, no two of the same scene.
@@ -86,7 +88,7 @@ impl Plan {
         }
         let fields = sweep.vary.iter().flat_map(BTreeMap::keys).cloned().collect();
         let places = runs.iter().enumerate().map(|(k, run)| (run.digest.clone(), k)).collect();
-        Ok(Self { sweep: path.to_path_buf(), scene, fields, runs, places })
+        Ok(Self { sweep: path.to_path_buf(), scene, title: sweep.title, fields, runs, places })
     }
 }
 

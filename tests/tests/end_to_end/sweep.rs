@@ -9,7 +9,7 @@ use std::time::{Duration, Instant, SystemTime};
 
 /// Write a sweep of a scene in `configs/` to `sweep.json`.
 fn write(here: &Folder, scene: &str, set: Value, vary: Value) {
-    let sweep = json!({ "scene": config(scene), "set": set, "vary": vary });
+    let sweep = json!({ "title": "A study", "scene": config(scene), "set": set, "vary": vary });
     here.write("sweep.json", sweep.to_string());
 }
 
@@ -96,6 +96,7 @@ fn every_run_of_a_sweep_is_the_run_of_its_scene() {
     let told = here.dem_run(&["sweep", "sweep.json", "--json", "--quiet"]).json();
     assert_eq!(states(&here, "sweep-sweep"), ["done"; 4]);
     assert_eq!(told["runs"], manifest(&here, "sweep-sweep")["runs"]);
+    assert_eq!(manifest(&here, "sweep-sweep")["title"], "A study");
     assert_eq!(told["runs"][3]["values"], json!({ "bonds.strength": 10, "seed": 4, "time.end": 0.11 }));
     assert!(told["runs"][3]["cpu_time"].as_f64().is_some_and(|time| time > 0.0));
     assert_eq!(files(&here, "sweep-sweep", ".h5"), ["0001.h5", "0002.h5", "0003.h5", "0004.h5"]);

@@ -19,10 +19,10 @@ mod table;
 /// [`crate::output::PostError::Write`], and those of reading histories.
 pub fn write(sweep: &Sweep, report: &Report, folder: &mut Folder) -> Result<()> {
     let sections = sections::all(report, folder.path())?;
-    let name = sweep.store.folder().file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    let name = || sweep.store.folder().file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     let first = report.runs.iter().find(|run| !run.scene.is_empty());
     let page = Page {
-        title: name,
+        title: sweep.manifest.title.clone().unwrap_or_else(name),
         sections,
         scene: first.map_or_else(String::new, |run| page::pretty(&run.scene)),
         scene_of: first.map_or_else(|| "No run has one yet.".into(), |run| format!("That of run {}.", run.id)),
