@@ -308,8 +308,8 @@ impl Limit {
             ),
             (Outcome::Unbounded, ..) => "none: reactions within all limits bear any load".into(),
             _ if !self.unsupported.is_empty() => format!(
-                "the weight moves grains that no chain of contacts joins with a support, {}; leave them out of the sample, \
-                 or let them come to rest first",
+                "the weight moves grains that no chain of contacts joins with a support: {}; leave them out of the sample: \
+                 `dem-run pack` writes it, a line for each grain from 0 on, and --json lists them all",
                 listed(&self.unsupported)
             ),
             _ => {
