@@ -15,7 +15,7 @@ use crate::check;
 use crate::error::{NoConvergence, RunError};
 use crate::in_dimension;
 use crate::memory;
-use crate::output::{facts, number, print_result};
+use crate::output::{facts, listed, number, print_result};
 use crate::run::{Execution, handle_signals};
 use crate::scene::{self, Function, Scene, SolverKind};
 use crate::signals::Interrupt;
@@ -308,8 +308,8 @@ impl Limit {
             ),
             (Outcome::Unbounded, ..) => "none: reactions within all limits bear any load".into(),
             _ if !self.unsupported.is_empty() => format!(
-                "the weight moves grains that no chain of contacts joins with a support: {}; leave them out of the sample: \
-                 `dem-run pack` writes it, a line for each grain from 0 on, and --json lists them all",
+                "the weight moves grains that no chain of contacts joins with a support, by number: {}; leave them out of \
+                 the sample: `dem-run pack` writes it, a line for each grain from 0 on, and --json lists them all",
                 listed(&self.unsupported)
             ),
             _ => {
@@ -318,15 +318,6 @@ impl Limit {
                     .into()
             }
         }
-    }
-}
-
-/// The first of a list of grains, and their number if there are more.
-fn listed(grains: &[u32]) -> String {
-    let first: Vec<String> = grains.iter().take(5).map(|grain| format!("grain {grain}")).collect();
-    match grains.len() {
-        count if count > first.len() => format!("{} and others, {count} in all", first.join(", ")),
-        _ => first.join(", "),
     }
 }
 

@@ -16,7 +16,7 @@ use serde::Serialize;
 use crate::clock::cpu_time;
 use crate::error::{NoConvergence, RunError};
 use crate::fclib::Problem;
-use crate::output::{escaped, print_result};
+use crate::output::{escaped, listed, print_result};
 use crate::scene;
 use crate::summary::told;
 
@@ -79,8 +79,6 @@ const FINE: f64 = 1e-6;
 
 /// Remedy if a solution may exist.
 const REMEDY: &str = "; a larger --max-iterations, another --solver or a larger --tolerance may help";
-/// Maximum number of contacts in a message.
-const SHOWN: usize = 8;
 
 /// Default maximum number of Gauss–Seidel sweeps.
 const MOST_SWEEPS: u64 = 100_000;
@@ -160,10 +158,7 @@ impl Solved {
     fn failure(&self, problem: &Assembled) -> String {
         let (verdict, remedy) = match verdict_of_assembled(problem) {
             Verdict::NoSolution(contacts) => {
-                let shown: Vec<String> = contacts.iter().take(SHOWN).map(usize::to_string).collect();
-                let more = contacts.len() - shown.len();
-                let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-                (format!("no velocities satisfy the laws of contacts {}{more}", shown.join(", ")), "")
+                (format!("no velocities satisfy the laws of contacts {}", listed(&contacts)), "")
             }
             Verdict::Guaranteed => ("not solved, though a solution exists".into(), REMEDY),
             Verdict::Undecided => ("not solved, and a solution is not guaranteed".into(), REMEDY),

@@ -7,6 +7,7 @@
 //! cheap for grains, but a limit for a moving plate.
 
 use super::block_matrix::BlockMatrix;
+use petgraph::unionfind::UnionFind;
 use thiserror::Error;
 
 /// Largest number of unknowns of a body, whose block of M is factorised as a dense matrix.
@@ -135,21 +136,19 @@ impl Global<'_> {
     /// their blocks of M and their contacts.
     fn bodies(&self) -> Result<Vec<Body>, GlobalError> {
         let unknowns = self.impulses.len();
-        let mut parent: Vec<usize> = (0..unknowns).collect();
+        let mut coupled = UnionFind::<usize>::new(unknowns);
         for (row, column, _) in self.mass.iter().filter(|(row, column, value)| row != column && *value != 0.0) {
-            let (a, b) = (root(&mut parent, *row), root(&mut parent, *column));
-            // the smaller is the root: the first row of the block
-            parent[a.max(b)] = a.min(b);
+            coupled.union(*row, *column);
         }
-        let mut number = vec![0; unknowns];
+        let mut number = vec![usize::MAX; unknowns];
         let mut bodies: Vec<Body> = Vec::new();
         for row in 0..unknowns {
-            let first = root(&mut parent, row);
-            if first == row {
-                number[row] = bodies.len();
+            let number = &mut number[coupled.find(row)];
+            if *number == usize::MAX {
+                *number = bodies.len();
                 bodies.push(Body::default());
             }
-            bodies[number[first]].rows.push(row);
+            bodies[*number].rows.push(row);
         }
         for body in &mut bodies {
             let order = body.rows.len();
@@ -339,15 +338,6 @@ fn places(bodies: &[Body], unknowns: usize) -> Vec<(usize, usize)> {
         body.rows.iter().enumerate().for_each(|(place, row)| places[*row] = (b, place));
     }
     places
-}
-
-/// The root of an unknown in the union–find forest of coupled unknowns, with path halving.
-fn root(parent: &mut [usize], mut of: usize) -> usize {
-    while parent[of] != of {
-        parent[of] = parent[parent[of]];
-        of = parent[of];
-    }
-    of
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use crate::contact::{Law, Local};
 use crate::dim::{Dim, Vect};
 use crate::problem::{Contact, VisitorMut};
 use crate::solver::limit_load::{LimitLoad, limit_load};
+use petgraph::unionfind::UnionFind;
 use std::sync::Arc;
 
 /// Velocities (m/s, rad/s) of all bodies, grains first.
@@ -56,26 +57,15 @@ impl<D: Dim> World<D> {
     /// The grains that no chain of contacts joins with a wall or a fixed grain.
     fn unsupported(&self, touches: &[StoredTouch<D>]) -> Vec<u32> {
         let grains = self.grains.len();
-        let mut neighbours = vec![Vec::new(); grains];
-        let mut supported = self.grains.fixed.clone();
+        // the last node stands for all supports
+        let mut joined = UnionFind::<usize>::new(grains + 1);
         for [a, b] in touches.iter().map(|touch| touch.pair.map(|body| body as usize)) {
-            if b < grains {
-                neighbours[a].push(b);
-                neighbours[b].push(a);
-            } else {
-                supported[a] = true;
-            }
+            joined.union(a, b.min(grains));
         }
-        let mut reached: Vec<usize> = (0..grains).filter(|grain| supported[*grain]).collect();
-        while let Some(grain) = reached.pop() {
-            for &next in &neighbours[grain] {
-                if !supported[next] {
-                    supported[next] = true;
-                    reached.push(next);
-                }
-            }
-        }
-        (0..grains).filter(|grain| !supported[*grain]).map(|grain| grain as u32).collect()
+        (0..grains).filter(|grain| self.grains.fixed[*grain]).for_each(|grain| {
+            joined.union(grain, grains);
+        });
+        (0..grains).filter(|grain| !joined.equiv(*grain, grains)).map(|grain| grain as u32).collect()
     }
 
     /// The velocities that loads give to bodies at rest in a step of 1 s; `of` makes the factor of

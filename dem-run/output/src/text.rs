@@ -3,6 +3,9 @@
 use std::borrow::Cow;
 use std::fmt::Display;
 
+/// Most members of a list that a message shows.
+const LISTED: usize = 8;
+
 /// A row of a CSV file from numbers and words.
 #[macro_export]
 macro_rules! row {
@@ -74,6 +77,14 @@ impl Text {
 pub fn facts(facts: &[(&str, String)]) -> String {
     let width = facts.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
     facts.iter().map(|(name, value)| format!("{name:<width$}  {value}\n")).collect()
+}
+
+/// The first of a list, and the number of the others.
+pub fn listed(all: &[impl ToString]) -> String {
+    let first: Vec<String> = all.iter().take(LISTED).map(ToString::to_string).collect();
+    let more = all.len() - first.len();
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    format!("{}{more}", first.join(", "))
 }
 
 /// Bytes in hexadecimal digits.

@@ -22,8 +22,8 @@ const MOST_TOLD: usize = 10;
 /// # Errors
 /// Results that are no longer part of the plan, unless `give_up`.
 pub fn reconcile(store: &Store, plan: &Plan, give_up: bool) -> Result<Manifest, RunError> {
-    let mut manifest = Manifest::new(&plan.sweep, &plan.scene, plan.fields.clone());
-    manifest.title.clone_from(&plan.title);
+    let title = plan.title.clone();
+    let mut manifest = Manifest { title, ..Manifest::new(&plan.sweep, &plan.scene, plan.fields.clone()) };
     let old = store.manifest()?;
     if old.is_none() && store.path("", "").exists() && !give_up {
         let remedy = "-o DIR names another folder, --force replaces its runs by those of this sweep".into();

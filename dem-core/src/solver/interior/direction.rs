@@ -61,11 +61,11 @@ pub(super) fn direction(system: &System, rough: &mut bool) -> (State, f64) {
             }
         }
     }
-    let (mut step, far) = system.refined(step, &chosen);
+    let more = system.refine(&mut step, &chosen);
+    *rough = system.longest(&more) < 1.0 / tuning::ROUGH;
     if !refining {
-        step = system.refined(step, &chosen).0;
+        system.refine(&mut step, &chosen);
     }
-    *rough = far < 1.0 / tuning::ROUGH;
     let far = system.longest(&step);
     (step, far)
 }

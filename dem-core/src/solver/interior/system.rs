@@ -35,19 +35,21 @@ impl System<'_> {
 
     /// The step that changes x ∘ z by `by`, to first order.
     pub fn step(&self, by: &[Point], refined: bool) -> State {
-        let step = self.solved(&self.right, by);
-        if refined { self.refined(step, by).0 } else { step }
+        let mut step = self.solved(&self.right, by);
+        if refined {
+            self.refine(&mut step, by);
+        }
+        step
     }
 
-    /// A step after one refinement, which reduces its round-off, and the longest multiple of what
-    /// the refinement adds that stays inside all cones.
-    pub fn refined(&self, mut step: State, by: &[Point]) -> (State, f64) {
-        let (left, missing) = self.left(by, &step);
+    /// Refine a step once, which reduces its round-off. Returns what this adds to it.
+    pub fn refine(&self, step: &mut State, by: &[Point]) -> State {
+        let (left, missing) = self.left(by, step);
         let more = self.solved(&left, &missing);
         step.r.iter_mut().zip(&more.r).for_each(|(r, d)| *r += d);
         step.z.iter_mut().zip(&more.z).for_each(|(z, d)| *z = moved(z, 1.0, d));
-        follow(self.sites, &mut step);
-        (step, self.longest(&more))
+        follow(self.sites, step);
+        more
     }
 
     pub fn solved(&self, right: &[f64], by: &[Point]) -> State {
