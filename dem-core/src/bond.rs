@@ -186,14 +186,19 @@ pub fn failure<T: Vect, B: Moments>(r: &Local<T, B>, shift: f64, cone: Cone) -> 
     if limit <= LIMIT * shift {
         return Some(BondStatus::Tension);
     }
+    let largest = required_limits(r, cone).into_iter().fold(0.0, f64::max);
+    (largest >= (1.0 - LIMIT) * limit).then(|| mode(r, cone))
+}
+
+/// SHEAR, ROLLING or TWIST, whichever of ‖t‖/μ, ‖m‖/ν and |τ|/ξ is the largest (the first of equal
+/// ones).
+pub(crate) fn mode<T: Vect, B: Moments>(r: &Local<T, B>, cone: Cone) -> BondStatus {
     let [shear, rolling, twist] = required_limits(r, cone);
-    if shear.max(rolling).max(twist) < (1.0 - LIMIT) * limit {
-        None
-    } else if twist > shear.max(rolling) {
-        Some(BondStatus::Twist)
+    if twist > shear.max(rolling) {
+        BondStatus::Twist
     } else if rolling > shear {
-        Some(BondStatus::Rolling)
+        BondStatus::Rolling
     } else {
-        Some(BondStatus::Shear)
+        BondStatus::Shear
     }
 }

@@ -100,6 +100,32 @@ fn restitution_begins_at_its_threshold() {
     }
 }
 
+/// A contact that an error has opened by some 1e-9 of the radius, and that bears nothing for a
+/// step, bears its load again without a gap to close first.
+#[test]
+fn what_an_error_opened_is_still_closed_after_a_step_without_a_load() {
+    fn case<D: Dim>() {
+        let mut set = settings(1e-3);
+        set.gravity = down::<D>(G);
+        let mut w = world(vec![above::<D>(0.0)], vec![floor(0.0)], set);
+        let force = |w: &World<D>| w.touches().map(|touch| touch.reaction.n).sum::<f64>();
+        let weight = w.grains.mass[0] * G;
+        run(&mut w, 2);
+        assert!((force(&w) / weight - 1.0).abs() < 1e-9);
+        w.grains.position[0][D::N - 1] += 5e-9 * 0.01;
+        w.settings.gravity = None;
+        run(&mut w, 1);
+        assert_eq!(force(&w), 0.0);
+        w.settings.gravity = down::<D>(G);
+        let before = last::<D>(&w.grains.position[0]);
+        run(&mut w, 1);
+        assert!((force(&w) / weight - 1.0).abs() < 1e-9, "{} of {weight}", force(&w));
+        assert!((last::<D>(&w.grains.position[0]) - before).abs() < 1e-15);
+    }
+    case::<D2>();
+    case::<D3>();
+}
+
 /// A wall that pushes a grain along the first axis, its speed growing by 2 m/s².
 fn pushed<D: Dim>() -> World<D> {
     let mut first = D::Vector::zero();

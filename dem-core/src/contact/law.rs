@@ -94,6 +94,14 @@ pub trait Law: Copy + Send + Sync + 'static {
         false
     }
 
+    /// The part of its limit that the solver found a bond to have reached, if it told.
+    fn reached(&self) -> Option<Reached> {
+        None
+    }
+
+    /// Set [`Law::reached`]; ignored by a dry contact.
+    fn set_reached(&mut self, _: Option<Reached>) {}
+
     /// Velocity that the law adds to u_n (m/s). [`Law::improve`] and [`Law::natural_map`] receive
     /// the relative velocity without it and add it themselves.
     fn bias(&self) -> f64 {
@@ -294,8 +302,18 @@ pub struct Bonded<T, B: Moments> {
     inverse_w: B::Twist,
     xi: B::Twist,
     flow: BondFlow,
+    reached: Option<Reached>,
     bias: f64,
     rows: PhantomData<(T, B)>,
+}
+
+/// A part of the limit of a bond.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reached {
+    /// The apex of its cone: tension.
+    Apex,
+    /// The side of its cone: shear or a moment.
+    Side,
 }
 
 /// A number that is stored for a twist row only.
@@ -326,6 +344,7 @@ impl<T: Vect, B: Moments> Bonded<T, B> {
             inverse_w: only_twist::<B>(1.0 / block.w),
             xi: only_twist::<B>(cone.xi),
             flow,
+            reached: None,
             bias: 0.0,
             rows: PhantomData,
         }
@@ -409,6 +428,14 @@ impl<A: Vect, B: Moments> Law for Bonded<A, B> {
 
     fn breaks(&self) -> bool {
         true
+    }
+
+    fn reached(&self) -> Option<Reached> {
+        self.reached
+    }
+
+    fn set_reached(&mut self, reached: Option<Reached>) {
+        self.reached = reached;
     }
 
     #[inline(always)]
@@ -544,6 +571,14 @@ impl<A: Vect, B: Moments> Law for Elastic<A, B> {
 
     fn breaks(&self) -> bool {
         true
+    }
+
+    fn reached(&self) -> Option<Reached> {
+        self.bond.reached
+    }
+
+    fn set_reached(&mut self, reached: Option<Reached>) {
+        self.bond.reached = reached;
     }
 
     #[inline(always)]

@@ -5,4 +5,4 @@ pub mod law;
 
 pub use cone::{Cone, Local, Weights};
 pub(crate) use cone::{PADDED, Padded};
-pub use law::{Arms, Block, BondFlow, Bonded, Coulomb, Elastic, Frictionless, Law, LocalSolve};
+pub use law::{Arms, Block, BondFlow, Bonded, Coulomb, Elastic, Frictionless, Law, LocalSolve, Reached};

@@ -1,8 +1,8 @@
 //! One contact of the problem: its geometry, its law and its impulse. The geometry maps node
 //! velocities to relative velocities.
 
-use crate::bond::{BondStatus, failure};
-use crate::contact::{Arms, Law, Local, Padded};
+use crate::bond::{BondStatus, failure, mode};
+use crate::contact::{Arms, Law, Local, Padded, Reached};
 use crate::dim::{Axes, Dim, Moments, Vect, in_frame, is_vector, of_frame, resized};
 use std::marker::PhantomData;
 
@@ -118,7 +118,16 @@ impl<D: Dim, L: Law> Contact<D, L> {
     /// Failure mode of a bond under its impulse; `None` for a bond below its limit and for a dry
     /// contact.
     pub(crate) fn failure(&self) -> Option<BondStatus> {
-        if self.law.breaks() { failure(&self.r, self.law.shift(), self.law.cone()) } else { None }
+        let law = &self.law;
+        if !law.breaks() {
+            return None;
+        }
+        failure(&self.r, law.shift(), law.cone()).or_else(|| {
+            law.reached().map(|part| match part {
+                Reached::Apex => BondStatus::Tension,
+                Reached::Side => mode(&self.r, law.cone()),
+            })
+        })
     }
 }
 

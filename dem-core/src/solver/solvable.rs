@@ -2,7 +2,7 @@
 
 use super::rows::{Rows, StiffnessRatio, mass_unit};
 use super::{ContactSolver, GaussSeidel, GaussSeidelSettings, SolveReport, sweep};
-use crate::contact::{Law, LocalSolve, Padded};
+use crate::contact::{Law, LocalSolve, Padded, Reached};
 use crate::dim::{Dim, Vect};
 use crate::problem::assembled::BlockMatrix;
 use crate::problem::residual::{residual, velocity_error};
@@ -25,8 +25,11 @@ pub(super) trait Solvable {
     fn velocity_error(&self) -> f64;
     /// The reactions after some sweeps of Gauss–Seidel, in the unit of the rows.
     fn swept(&mut self, sweeps: usize) -> Vec<Padded>;
-    /// Set the reactions, given in the unit of the rows, and the velocities that they give.
+    /// Set the reactions, given in the unit of the rows, and the velocities that they give. No bond
+    /// is then known to have reached its limit.
     fn write_back(&mut self, reactions: &[Padded]);
+    /// Set what of its limit each contact has reached.
+    fn set_reached(&mut self, _: &[Option<Reached>]) {}
     /// Set the reactions to zero if one of them is not finite.
     fn forget_what_is_not_finite(&mut self);
     /// Gauss–Seidel from the current reactions.
@@ -72,12 +75,23 @@ impl<D: Dim> Solvable for ContactProblem<D> {
             fn visit<L: Law>(&mut self, c: &mut Contact<D, L>) {
                 if let Some(r) = self.0.next() {
                     c.r = c.link.of_frame(&(*r * self.1));
+                    c.law.set_reached(None);
                 }
             }
         }
         let unit = mass_unit(&self.nodes);
         self.visit_mut(&mut OfFrame(reactions.iter(), unit));
         self.velocities_from_reactions();
+    }
+
+    fn set_reached(&mut self, reached: &[Option<Reached>]) {
+        struct Set<'a>(std::slice::Iter<'a, Option<Reached>>);
+        impl<D: Dim> VisitorMut<D> for Set<'_> {
+            fn visit<L: Law>(&mut self, c: &mut Contact<D, L>) {
+                c.law.set_reached(self.0.next().copied().flatten());
+            }
+        }
+        self.visit_mut(&mut Set(reached.iter()));
     }
 
     fn forget_what_is_not_finite(&mut self) {

@@ -195,7 +195,10 @@ impl Staged {
         let by_the_path = |problem: &mut _, sweeps| {
             let (load_error, velocity_error) =
                 best.as_ref().map_or((1.0, 1.0), |found| (found.load_error, found.velocity_error));
-            best.iter().for_each(|found| Solvable::write_back(problem, &found.reactions));
+            if let Some(found) = &best {
+                Solvable::write_back(problem, &found.reactions);
+                Solvable::set_reached(problem, &found.reached);
+            }
             let work = Work { sweeps, newton, factorisations: 0 };
             let report = self.settings.report(work, residual, load_error, velocity_error);
             SolveReport { route: Route::InteriorPoint, ..report }

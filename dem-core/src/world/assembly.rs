@@ -17,7 +17,8 @@ use crate::problem::{Contact, ContactProblem, KINDS, Kind, Link, Node, Nodes, Vi
 const TOUCHING: f64 = 1e-9;
 
 /// The same for a contact with a reaction in the previous step. It was closed then, and only solver
-/// errors have opened it since; a stiff contact would lose its force to them at once.
+/// errors have opened it since; a stiff contact would lose its force to them at once. What they
+/// opened up to its last reaction counts as closed also later.
 pub(super) const CLOSED: f64 = 1e-6;
 
 /// Gap, over the radius of the grain, below which a pair is part of the problem even if it does not
@@ -112,7 +113,8 @@ impl<D: Dim> World<D> {
             let closing = -(approach[0] - approach[1]).dot(&normal);
             let near = NEAR * self.grains.radius[pair[0] as usize];
             if gap <= near + 2.0 * h * closing.max(0.0) {
-                touches.push(StoredTouch { wide: self.is_wide(pair, gap), ..StoredTouch::new(pair, None) });
+                let (wide, left) = (self.is_wide(pair, gap), gap as f32);
+                touches.push(StoredTouch { wide, left, ..StoredTouch::new(pair, None) });
             }
         }
         touches.sort_by_key(|t| t.pair);
@@ -127,6 +129,9 @@ impl<D: Dim> World<D> {
             while old.next_if(|o| o.pair < touch.pair).is_some() {}
             let last = old.peek().filter(|o| o.pair == touch.pair);
             touch.closed = last.is_some_and(|o| o.reaction.n > 0.0);
+            if !touch.closed {
+                touch.left = last.map_or(0.0, |o| o.left);
+            }
             // a bond that formed since then takes over the reaction of the dry contact
             let same = last.filter(|o| o.bond() == touch.bond() || o.bond().is_none());
             if D::Tangents::LEN > 0 {
@@ -217,9 +222,15 @@ impl<D: Dim> World<D> {
 
     /// Velocity that Signorini's law adds to the normal velocity of a dry contact (m/s); `None` if
     /// the contact cannot act in this step.
-    fn bias(&self, touch: &Touch<D>, closed: bool, motion: &Motion<D>, h: f64) -> Option<f64> {
+    fn bias(&self, touch: &Touch<D>, stored: &StoredTouch<D>, motion: &Motion<D>, h: f64) -> Option<f64> {
         let e = self.restitution_of(touch.pair);
-        let none = self.smaller(touch.pair) * if closed { CLOSED } else { TOUCHING };
+        let [none, most] = [TOUCHING, CLOSED].map(|share| share * self.smaller(touch.pair));
+        let left = f64::from(stored.left);
+        let none = match stored.closed {
+            true => most,
+            false if left <= most => none + left.max(0.0),
+            false => none,
+        };
         let touching = touch.gap <= none;
         if e == 0.0 {
             let gap = if self.settings.expel_overlaps || !touching { touch.gap } else { 0.0 };
@@ -312,7 +323,7 @@ impl<D: Dim> World<D> {
             let kind = self.kind(stored);
             let bias = match touch.bond {
                 Some(bond) => Some(brought.turns[bond as usize].bias),
-                None => self.bias(touch, stored.closed, motion, h),
+                None => self.bias(touch, stored, motion, h),
             };
             // without a bias the contact cannot act in this step
             let Some(bias) = bias else { continue };

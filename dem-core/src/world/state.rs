@@ -211,6 +211,7 @@ fn save_touch<D: Dim>(stored: &StoredTouch<D>, to: &mut Saved) {
     to.vector(&stored.reaction.t);
     to.vector(&stored.reaction.m);
     to.real(stored.yielded);
+    to.real(f64::from(stored.left));
     to.count(code(&TOUCHES, &stored.status));
 }
 
@@ -223,6 +224,7 @@ fn restored_touch<D: Dim>(bodies: usize, bonds: usize, from: &mut Reader) -> Res
         _ => return Err(Mismatch),
     };
     let reaction = Local { n: from.real()?, t: from.vector()?, m: from.vector()? };
-    let yielded = from.real()?;
-    Ok(StoredTouch { tangents, reaction, yielded, status: coded(&TOUCHES, from)?, ..StoredTouch::new(pair, bond) })
+    let (yielded, left) = (from.real()?, from.real()? as f32);
+    let status = coded(&TOUCHES, from)?;
+    Ok(StoredTouch { tangents, reaction, yielded, left, status, ..StoredTouch::new(pair, bond) })
 }

@@ -561,8 +561,8 @@ impl<D: Dim> World<D> {
 fn forget_bonds<D: Dim>(touches: &mut [StoredTouch<D>], broken: &[Break<D>]) {
     for failed in broken {
         if let Ok(place) = touches.binary_search_by_key(&failed.pair, |t| t.pair) {
-            let StoredTouch { tangents, wide, closed, .. } = touches[place];
-            touches[place] = StoredTouch { tangents, wide, closed, ..StoredTouch::new(failed.pair, None) };
+            let StoredTouch { tangents, wide, closed, left, .. } = touches[place];
+            touches[place] = StoredTouch { tangents, wide, closed, left, ..StoredTouch::new(failed.pair, None) };
         }
     }
 }

@@ -32,6 +32,9 @@ pub(super) struct StoredTouch<D: Dim> {
     pub wide: bool,
     /// Whether its normal reaction was positive in the previous step.
     pub closed: bool,
+    /// The gap that its last positive reaction left (m); zero if it has had none since its bodies
+    /// came near each other.
+    pub left: f32,
     /// Whether its bond was intact in the previous step.
     pub was_bonded: bool,
     /// The tangents of its frame.
@@ -51,6 +54,7 @@ impl<D: Dim> StoredTouch<D> {
             status: if bond.is_some() { TouchStatus::Bonded } else { TouchStatus::Open },
             wide: bond.is_some(),
             closed: false,
+            left: 0.0,
             was_bonded: false,
             tangents: D::Tangents::zero(),
             reaction: Local::zero(),

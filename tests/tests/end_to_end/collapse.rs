@@ -1,7 +1,7 @@
 //! What cohesion does to a sample in compression: the load at failure, and the bonds that are
 //! broken at one time.
 
-use crate::common::Folder;
+use crate::common::{Folder, config, run, sets};
 
 /// Largest over least.
 fn spread(values: &[f64]) -> f64 {
@@ -42,4 +42,29 @@ fn weaker_bonds_have_broken_in_larger_numbers_at_one_time() {
         })
         .to_vec();
     assert!(broken[0] >= broken[1] && broken[1] >= broken[2] && broken[0] > broken[2], "5, 10, 20 N: {broken:?}");
+}
+
+/// Which bond broke in which step and round does not depend on the tolerance, also with gravity,
+/// which the packings are made without: loose grains fall there and hit the sample.
+#[test]
+fn with_gravity_the_same_bonds_break_at_all_tolerances() {
+    for (seed, until, least) in [("seed=1", "time.end=0.0115", 12), ("seed=7", "time.end=0.007", 20)] {
+        let [coarse, fine] = ["solver.tolerance=1e-8", "solver.tolerance=1e-10"].map(|tolerance| {
+            let here = Folder::new();
+            let args = sets(&[
+                "sample.random.count=100",
+                "sample.random.width=0.018",
+                "sample.random.preparation.compaction.solid_fraction=0.79",
+                "gravity=[0,-9.81]",
+                seed,
+                until,
+                tolerance,
+            ]);
+            run(&here, &config("compression.json"), &args);
+            let ruptures = here.history("a.h5").ruptures().expect("ruptures");
+            ruptures.iter().map(|r| (r.step, r.round, r.bond)).collect::<Vec<_>>()
+        });
+        assert!(fine.len() >= least, "{seed}: {fine:?}");
+        assert_eq!(coarse[..least], fine[..least], "{seed}");
+    }
 }

@@ -1,6 +1,6 @@
 //! Tolerances of the interior-point method, and its result.
 
-use crate::contact::Padded;
+use crate::contact::{Padded, Reached};
 
 /// Tolerances, selection and iteration limit.
 #[derive(Clone, Copy, Debug)]
@@ -32,6 +32,9 @@ impl Aims {
 pub struct Found {
     /// Reactions without the shift, in the unit of the rows.
     pub reactions: Vec<Padded>,
+    /// For each contact, the part of its limit that the minimum-energy reaction has reached; empty
+    /// if these reactions are not required.
+    pub reached: Vec<Option<Reached>>,
     /// Their residual (–), and their load error (–): the relative change of the net impulses in the
     /// last iteration.
     pub residual: f64,

@@ -11,6 +11,7 @@ use super::aims::{Aims, Found};
 use super::metric::Metric;
 use super::sites::{Limit, Sites};
 use super::state::{State, gap};
+use crate::contact::Reached;
 use crate::solver::solvable::Solvable;
 use crate::solver::tuning::selection as tuning;
 
@@ -34,6 +35,8 @@ pub(super) struct Selection {
     /// The limits of r*, once it is known, and the sum of the complementarity gaps up to which a
     /// solution counts.
     limits: Option<Vec<Limit>>,
+    /// What of them the contacts have reached, if the compliance leaves r* accurate.
+    reached: Option<Vec<Option<Reached>>>,
     enough: f64,
     turn: Option<State>,
     anchored: u32,
@@ -45,8 +48,9 @@ pub(super) struct Selection {
 
 impl Selection {
     pub fn new(sites: &Sites, anchor: Vec<f64>, aims: Aims) -> Self {
-        let kappa = (1.0 / (tuning::SHARE * aims.tolerance)).clamp(tuning::KAPPA, tuning::STIFFEST);
-        let metric = Metric::new(sites, anchor, kappa);
+        // the selection is the same for all tolerances
+        let stiffer = (1.0 / (tuning::SHARE * aims.tolerance)).clamp(tuning::KAPPA, tuning::STIFFEST);
+        let metric = Metric::new(sites, anchor, if aims.least { tuning::KAPPA } else { stiffer });
         let limits = (!aims.least).then(Vec::new);
         Self {
             aims,
@@ -54,6 +58,7 @@ impl Selection {
             best: None,
             change: 1.0,
             limits,
+            reached: None,
             enough: f64::INFINITY,
             turn: None,
             anchored: 0,
@@ -69,7 +74,10 @@ impl Selection {
         let energy = self.metric.energy(&at.r).max(tuning::LEAST * self.metric.weight(&at.r));
         let least = tuning::LEAST * energy;
         if self.limits.is_none() && gaps <= least {
-            (self.limits, self.enough) = (Some(sites.limits(at, &self.metric.own)), least);
+            let limits = sites.limits(at, &self.metric.compliance);
+            let is_accurate = self.metric.left(sites, &at.r).0 <= tuning::ACCURATE;
+            self.reached = is_accurate.then(|| sites.reached(at, &limits));
+            (self.limits, self.enough) = (Some(limits), least);
         }
         let selected = self.limits.is_some() && gaps <= self.enough;
         self.iterations = iteration;
@@ -78,13 +86,10 @@ impl Selection {
         if !selected && self.nearest.as_ref().is_none_or(|(least, ..)| gaps < *least) {
             self.nearest = Some((gaps, self.change, at.clone()));
         }
-        let mut solved = selected && self.measure(problem, sites, at, &[]) <= 1.0;
+        let mut solved = selected && self.measure(problem, sites, at, false) <= 1.0;
         if selected && self.aims.least {
-            let limits = self.limits.take().unwrap_or_default();
-            let at_limits = self.measure(problem, sites, at, &limits);
-            self.limits = Some(limits);
             // reactions near r* need not be at its limits
-            solved |= at_limits <= 1.0;
+            solved |= self.measure(problem, sites, at, true) <= 1.0;
         }
         // a gap at round-off cannot fall further
         let exhausted = gaps.is_nan() || gap(at) <= tuning::LEAST_GAP || iteration == self.aims.most;
@@ -117,7 +122,7 @@ impl Selection {
             && let Some((_, change, nearest)) = self.nearest.take()
         {
             self.change = change;
-            self.measure(problem, sites, &nearest, &[]);
+            self.measure(problem, sites, &nearest, false);
         }
         self.best.map(|best| Found { iterations: self.iterations, ..best })
     }
@@ -130,14 +135,20 @@ impl Selection {
         residual > tuning::SHOWS * tolerance || velocity > tuning::SHOWS * load_tolerance * sites.largest_free()
     }
 
-    /// By which factor the reactions of a point, projected on their limits, [miss](Aims::missed)
-    /// the tolerances. The best are kept: of those within the tolerances the last, which are
-    /// nearest to r*, else those that miss least.
-    fn measure(&mut self, problem: &mut impl Solvable, sites: &Sites, at: &State, limits: &[Limit]) -> f64 {
-        let reactions = sites.snapped(at, limits);
+    /// By which factor the reactions of a point, projected on their limits, and on those of r* if
+    /// these are `known`, [miss](Aims::missed) the tolerances. The best are kept: of those within
+    /// the tolerances the last, which are nearest to r*, else those that miss least.
+    fn measure(&mut self, problem: &mut impl Solvable, sites: &Sites, at: &State, known: bool) -> f64 {
+        let limits = self.limits.as_deref().unwrap_or_default();
+        let reactions = sites.snapped(at, if known { limits } else { &[] });
         problem.write_back(&reactions);
         let (residual, velocity_error, load_error) = (problem.residual(), problem.velocity_error(), self.change);
-        let found = Found { reactions, residual, load_error, velocity_error, iterations: self.iterations };
+        let reached = match &self.reached {
+            Some(reached) => reached.clone(),
+            None if limits.is_empty() => Vec::new(),
+            None => sites.reached(at, limits),
+        };
+        let found = Found { reactions, reached, residual, load_error, velocity_error, iterations: self.iterations };
         let missed = found.missed(self.aims);
         if self.best.as_ref().is_none_or(|best| missed <= 1.0 || missed < best.missed(self.aims)) {
             self.best = Some(found);

@@ -11,7 +11,7 @@
 
 use super::cones::{Point, eigenvalues};
 use super::state::State;
-use crate::contact::{PADDED, Padded};
+use crate::contact::{PADDED, Padded, Reached};
 use crate::solver::rows::{Row, Rows, TWIST};
 use crate::solver::tuning::selection as tuning;
 use std::ops::Range;
@@ -252,16 +252,34 @@ impl Sites {
         limits
     }
 
+    /// Which of the `known` limits of a cone are within the relative distance `most` of x.
+    fn near(&self, at: &State, c: usize, shift: f64, known: &[Limit], most: f64) -> Limit {
+        let (x, cone) = (eigenvalues(&at.x[c]), &self.cones[c]);
+        let known = known.get(c).copied().unwrap_or_default();
+        let apex = known.apex && cone.acts_on_normal && at.x[c][0] <= most * cone.slope * shift;
+        Limit { apex, side: known.side && cone.tangents > 0 && x[1] <= most * x[0] }
+    }
+
+    /// For each contact, which part of the limits that r* has reached is next to x.
+    pub fn reached(&self, at: &State, known: &[Limit]) -> Vec<Option<Reached>> {
+        let one = |(site, shift): (&Site, &f64)| {
+            let near = |c: usize| self.near(at, c, *shift, known, tuning::REACHED);
+            if site.cones.clone().any(|c| near(c).apex) {
+                Some(Reached::Apex)
+            } else {
+                site.cones.clone().any(|c| near(c).side).then_some(Reached::Side)
+            }
+        };
+        self.list.iter().zip(&self.shift).map(one).collect()
+    }
+
     /// The reactions of the problem at a point, projected on a limit if x is nearer to it than z is
     /// to its own, or if the limit is `known` and next to x.
     pub fn snapped(&self, at: &State, known: &[Limit]) -> Vec<Padded> {
         let limit = |c: usize, shift: f64| {
             let (x, z) = (eigenvalues(&at.x[c]), eigenvalues(&at.z[c]));
-            let known = known.get(c).copied().unwrap_or_default();
-            Limit {
-                apex: x[0] < z[1] || known.apex && at.x[c][0] <= tuning::BESIDE * self.cones[c].slope * shift,
-                side: x[1] < z[0] || known.side && x[1] <= tuning::BESIDE * x[0],
-            }
+            let near = self.near(at, c, shift, known, tuning::BESIDE);
+            Limit { apex: x[0] < z[1] || near.apex, side: x[1] < z[0] || near.side }
         };
         let one = |(site, shift): (&Site, &f64)| {
             let mut own = [0.0; ROWS];
