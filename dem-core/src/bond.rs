@@ -190,6 +190,26 @@ pub fn failure<T: Vect, B: Moments>(r: &Local<T, B>, shift: f64, cone: Cone) -> 
     (largest >= (1.0 - LIMIT) * limit).then(|| mode(r, cone))
 }
 
+/// A reaction `shown` (N, N m) next to the limit of a bond, moved to the limit: to the apex of the
+/// cone for TENSION, else by a factor on the rows of this mode. `r` is the same reaction in the
+/// unit of the shift.
+pub(crate) fn at_limit<T: Vect, B: Moments, M: Moments, S: Vect>(
+    shown: &Local<S, M>,
+    r: &Local<T, B>,
+    shift: f64,
+    cone: Cone,
+    mode: BondStatus,
+) -> Local<S, M> {
+    let [shear, rolling, twist] = required_limits(r, cone).map(|required| (r.n + shift) / required);
+    match mode {
+        BondStatus::Intact => *shown,
+        BondStatus::Tension => Local { n: -shift * shown.n / r.n, ..Local::zero() },
+        BondStatus::Shear => Local { t: shown.t * shear, ..*shown },
+        BondStatus::Rolling => Local { m: shown.m.scaled(rolling, 1.0), ..*shown },
+        BondStatus::Twist => Local { m: shown.m.scaled(1.0, twist), ..*shown },
+    }
+}
+
 /// SHEAR, ROLLING or TWIST, whichever of ‖t‖/μ, ‖m‖/ν and |τ|/ξ is the largest (the first of equal
 /// ones).
 pub(crate) fn mode<T: Vect, B: Moments>(r: &Local<T, B>, cone: Cone) -> BondStatus {

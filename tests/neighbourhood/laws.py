@@ -107,7 +107,9 @@ class Solved:
         slow = np.abs(before) < (h.scene["materials"].get("restitution") or {}).get("threshold_speed", 0.0)
         bounce = np.where(slow, 0.0, restitution * before)
         self.pushed = pushed_before(h)
-        may_touch = np.where(self.pushed, tolerances.value("closed"), tolerances.value("touching")) * c.smaller
+        closed, touching = (tolerances.value(name) * c.smaller for name in ("closed", "touching"))
+        left = left_by_push(h, self.pushed, c.gap)
+        may_touch = np.where(self.pushed, closed, touching + np.where(left <= closed, np.maximum(left, 0.0), 0.0))
         at_rest = h.h * np.abs(before) <= may_touch
         may_touch = may_touch + tolerances.rounding(c.place)
         must_touch = tolerances.value("touching") * c.smaller - tolerances.rounding(c.place)
@@ -231,6 +233,16 @@ def row_before(h):
         return np.zeros(0, int)
     place = np.minimum(np.searchsorted(key, key - bodies**2), h.M - 1)
     return np.where(key[place] == key - bodies**2, place, -1)
+
+
+def left_by_push(h, pushed, gap):
+    """For each row the gap that the last push of its pair left (m): its gap in the step after; zero
+    if the pair has not pushed while it was near."""
+    left, last = np.where(pushed, gap, 0.0), row_before(h)
+    for m in np.argsort(h.row_step, kind="stable"):
+        if not pushed[m] and last[m] >= 0:
+            left[m] = left[last[m]]
+    return left
 
 
 def pushed_before(h):

@@ -19,10 +19,15 @@ TABLE = {
         1e-9,
         "gap over the radius below which a contact touches: it may count as 0 (docs/theory/time-stepping.md)",
     ),
-    "closed": (1e-6, "the same where the pair pushed in the step before"),
+    "closed": (1e-6, "the same where the pair pushed in the step before; of later gaps, what its last push left counts"),
     "limit": (
         1e-7,
         "distance to its limit, relative, at which a bond counts as being at it (docs/theory/contact-law.md)",
+    ),
+    "breaking": (
+        1e-4,
+        "the same for a bond that breaks: it is at its limit in the reactions of least energy, to which those of the "
+        "solution are next (docs/theory/interior-point.md)",
     ),
     "closing": (
         1e-4,

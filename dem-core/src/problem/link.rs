@@ -122,11 +122,14 @@ impl<D: Dim, L: Law> Contact<D, L> {
         if !law.breaks() {
             return None;
         }
-        failure(&self.r, law.shift(), law.cone()).or_else(|| {
-            law.reached().map(|part| match part {
-                Reached::Apex => BondStatus::Tension,
-                Reached::Side => mode(&self.r, law.cone()),
-            })
+        failure(&self.r, law.shift(), law.cone()).or_else(|| self.failure_next_to_limit())
+    }
+
+    /// Failure mode of a bond that the solver found at its limit, next to its impulse.
+    pub(crate) fn failure_next_to_limit(&self) -> Option<BondStatus> {
+        self.law.reached().map(|part| match part {
+            Reached::Apex => BondStatus::Tension,
+            Reached::Side => mode(&self.r, self.law.cone()),
         })
     }
 }

@@ -8,7 +8,7 @@ use super::report::{PARTS, Solves, StepError, StepReport, Violation};
 use super::touch::{Break, StoredTouch};
 use super::{Counts, World};
 use crate::body::Drive;
-use crate::bond::{BondStatus, Rupture};
+use crate::bond::{BondStatus, Rupture, at_limit, failure};
 use crate::contact::Law;
 use crate::dim::{Dim, Vect};
 use crate::problem::residual::furthest_from_law;
@@ -337,7 +337,12 @@ impl<D: Dim> World<D> {
             // solved again without the bond
             let stored = if self.settings.rupture == Rupture::EndOfStep { contact.r } else { law.carried() };
             let energy = elastic_energy(law, &stored);
-            let (pair, point, reaction) = (touch.pair, touch.point, touch.reaction);
+            let (pair, point) = (touch.pair, touch.point);
+            let (shift, cone) = (law.shift(), law.cone());
+            let reaction = match failure(&contact.r, shift, cone) {
+                Some(_) => touch.reaction,
+                None => at_limit(&touch.reaction, &contact.r, shift, cone, mode),
+            };
             found.push((flow.dot(&flow), Break { bond, pair, mode, round, point, reaction, energy }));
         }
         // a large problem is not ordered by pair

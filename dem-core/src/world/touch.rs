@@ -139,7 +139,7 @@ pub struct Break<D: Dim> {
     pub round: u32,
     /// Contact point (m).
     pub point: D::Vector,
-    /// Reaction at rupture (N, N m).
+    /// Reaction at rupture (N, N m), at the limit of the bond.
     pub reaction: Local<D::Tangent, D::Moment>,
     /// Elastic energy released (J); zero for a rigid bond.
     pub energy: f64,
