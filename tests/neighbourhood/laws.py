@@ -239,9 +239,9 @@ def left_by_push(h, pushed, gap):
     """For each row the gap that the last push of its pair left (m): its gap in the step after; zero
     if the pair has not pushed while it was near."""
     left, last = np.where(pushed, gap, 0.0), row_before(h)
-    for m in np.argsort(h.row_step, kind="stable"):
-        if not pushed[m] and last[m] >= 0:
-            left[m] = left[last[m]]
+    # the rows are in the order of the steps
+    for m in np.flatnonzero(~pushed & (last >= 0)):
+        left[m] = left[last[m]]
     return left
 
 

@@ -115,22 +115,18 @@ impl<D: Dim, A: Axes<D>> Link<D, A> {
 }
 
 impl<D: Dim, L: Law> Contact<D, L> {
-    /// Failure mode of a bond under its impulse; `None` for a bond below its limit and for a dry
-    /// contact.
+    /// Failure mode of a bond that is at its limit, by its impulse or by what the solver found;
+    /// `None` for a bond below its limit and for a dry contact.
     pub(crate) fn failure(&self) -> Option<BondStatus> {
         let law = &self.law;
         if !law.breaks() {
             return None;
         }
-        failure(&self.r, law.shift(), law.cone()).or_else(|| self.failure_next_to_limit())
-    }
-
-    /// Failure mode of a bond that the solver found at its limit, next to its impulse.
-    pub(crate) fn failure_next_to_limit(&self) -> Option<BondStatus> {
-        self.law.reached().map(|part| match part {
+        let next_to_limit = |part| match part {
             Reached::Apex => BondStatus::Tension,
-            Reached::Side => mode(&self.r, self.law.cone()),
-        })
+            Reached::Side => mode(&self.r, law.cone()),
+        };
+        failure(&self.r, law.shift(), law.cone()).or_else(|| law.reached().map(next_to_limit))
     }
 }
 

@@ -113,6 +113,7 @@ impl<D: Dim> World<D> {
             let closing = -(approach[0] - approach[1]).dot(&normal);
             let near = NEAR * self.grains.radius[pair[0] as usize];
             if gap <= near + 2.0 * h * closing.max(0.0) {
+                // what the last step left, if the pair pushed in it
                 let (wide, left) = (self.is_wide(pair, gap), gap as f32);
                 touches.push(StoredTouch { wide, left, ..StoredTouch::new(pair, None) });
             }
@@ -226,10 +227,12 @@ impl<D: Dim> World<D> {
         let e = self.restitution_of(touch.pair);
         let [none, most] = [TOUCHING, CLOSED].map(|share| share * self.smaller(touch.pair));
         let left = f64::from(stored.left);
-        let none = match stored.closed {
-            true => most,
-            false if left <= most => none + left.max(0.0),
-            false => none,
+        let none = if stored.closed {
+            most
+        } else if left <= most {
+            none + left.max(0.0)
+        } else {
+            none
         };
         let touching = touch.gap <= none;
         if e == 0.0 {

@@ -143,15 +143,16 @@ impl Selection {
         let reactions = sites.snapped(at, if known { limits } else { &[] });
         problem.write_back(&reactions);
         let (residual, velocity_error, load_error) = (problem.residual(), problem.velocity_error(), self.change);
-        let reached = match &self.reached {
-            Some(reached) => reached.clone(),
-            None if limits.is_empty() => Vec::new(),
-            None => sites.reached(at, limits),
-        };
-        let found = Found { reactions, reached, residual, load_error, velocity_error, iterations: self.iterations };
+        let (reached, iterations) = (Vec::new(), self.iterations);
+        let found = Found { reactions, reached, residual, load_error, velocity_error, iterations };
         let missed = found.missed(self.aims);
         if self.best.as_ref().is_none_or(|best| missed <= 1.0 || missed < best.missed(self.aims)) {
-            self.best = Some(found);
+            let reached = match &self.reached {
+                Some(reached) => reached.clone(),
+                None if limits.is_empty() => Vec::new(),
+                None => sites.reached(at, limits),
+            };
+            self.best = Some(Found { reached, ..found });
         }
         missed
     }
