@@ -136,10 +136,7 @@ def check_intact(h, p, report):
     report.expect("intact bonds within limits", np.where(intact, over, -np.inf), slack, where(h, rows))
     if h.scene.get("rupture") == "end_of_step":
         broke_now = ~intact & (h.bond_status[s, b] == "INTACT")
-        # positive where the bond is not next to its limit
-        most = tolerances.value("breaking")
-        short = np.minimum(n - most * h.strength[b], (1 - most) * n - ratio)
-        report.expect("only bonds at their limit break", np.where(broke_now, short, -np.inf), slack, where(h, rows))
+        report.expect("only bonds at their limit break", np.where(broke_now, -over, -np.inf), slack, where(h, rows))
 
 
 def check_statuses(h, report):

@@ -24,11 +24,6 @@ TABLE = {
         1e-7,
         "distance to its limit, relative, at which a bond counts as being at it (docs/theory/contact-law.md)",
     ),
-    "breaking": (
-        1e-4,
-        "the same for a bond that breaks: it is at its limit in the reactions of least energy, to which those of the "
-        "solution are next (docs/theory/interior-point.md)",
-    ),
     "closing": (
         1e-4,
         "way that a step closes a pair, or stretches a rigid bond, beyond its law, over the smaller radius",

@@ -94,7 +94,8 @@ pub trait Law: Copy + Send + Sync + 'static {
         false
     }
 
-    /// The part of its limit that the solver found a bond to have reached, if it told.
+    /// The part of its limit that a bond has reached in the reactions of least energy, if the
+    /// solver has found one.
     fn reached(&self) -> Option<Reached> {
         None
     }

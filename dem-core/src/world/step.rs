@@ -325,9 +325,13 @@ impl<D: Dim> World<D> {
         round: u32,
     ) -> Vec<(f64, Break<D>)> {
         let mut found = Vec::new();
+        let late = self.settings.rupture == Rupture::EndOfStep;
         for (contact, place) in group.iter().zip(places) {
             let law = &contact.law;
-            let Some(mode) = contact.failure() else { continue };
+            let (shift, cone) = (law.shift(), law.cone());
+            let by_impulse = failure(&contact.r, shift, cone);
+            // without another solve the impulses stay, and they alone decide
+            let Some(mode) = (if late { by_impulse } else { contact.failure() }) else { continue };
             let touch = self.touch(mid, &touches[*place as usize]);
             let mut u = nodes.relative_velocity::<D::Tangent, D::Moment>(&contact.link, law.arms());
             u.n += law.bias();
@@ -335,11 +339,10 @@ impl<D: Dim> World<D> {
             let Some(bond) = touch.bond else { continue };
             // its entry in the energy balance: the value at the start of the step if the step is
             // solved again without the bond
-            let stored = if self.settings.rupture == Rupture::EndOfStep { contact.r } else { law.carried() };
+            let stored = if late { contact.r } else { law.carried() };
             let energy = elastic_energy(law, &stored);
             let (pair, point) = (touch.pair, touch.point);
-            let (shift, cone) = (law.shift(), law.cone());
-            let reaction = match failure(&contact.r, shift, cone) {
+            let reaction = match by_impulse {
                 Some(_) => touch.reaction,
                 None => at_limit(&touch.reaction, &contact.r, shift, cone, mode),
             };
