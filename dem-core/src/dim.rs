@@ -195,10 +195,10 @@ pub(crate) fn of_frame<D: Dim, T: Vect>(frame: &D::Frame, rows: D::Tangent) -> T
     if is_vector::<D, T>() { resized(D::compose(frame, 0.0, rows)) } else { resized(rows) }
 }
 
-/// 1 − cos φ for s = sin φ, accurate for small φ.
-fn versine(s: f64) -> f64 {
-    let square = s * s;
-    square / (1.0 + (1.0 - square).max(0.0).sqrt())
+/// (1 − cos φ) / sin² φ for s = sin φ. The rotation about a vector s of norm sin φ turns x by
+/// s × x + (1 − cos φ) / sin² φ s × (s × x).
+pub fn versine_share(s: f64) -> f64 {
+    1.0 / (1.0 + (1.0 - s * s).max(0.0).sqrt())
 }
 
 /// The axes that the rows of a contact need: the whole frame, or in 3D the normal alone if there is
@@ -236,9 +236,10 @@ pub trait Dim: Copy + Debug + Default + Send + Sync + 'static {
 
     /// A frame with this unit normal.
     fn frame(normal: Self::Vector) -> Self::Frame;
-    /// The frame with this unit normal that turned least from the tangents `old`, so that
-    /// tangential reactions keep their meaning from step to step.
-    fn transported(old: &Self::Tangents, normal: Self::Vector) -> Self::Frame;
+    /// The frame with this unit normal that turned least from the tangents `old` turned about
+    /// `sine`, so that tangential reactions keep their meaning from step to step. The norm of
+    /// `sine` is the sine of the angle, which is at most a quarter of a turn.
+    fn transported(old: &Self::Tangents, sine: Self::Spin, normal: Self::Vector) -> Self::Frame;
     /// The normal of a frame.
     #[inline(always)]
     fn normal(frame: &Self::Frame) -> Self::Vector {
@@ -281,9 +282,6 @@ pub trait Dim: Copy + Debug + Default + Send + Sync + 'static {
     fn unturned() -> Self::Orientation;
     /// The orientation after turning by the rotation vector `turn` (rad).
     fn turned(orientation: Self::Orientation, turn: Self::Spin) -> Self::Orientation;
-    /// (R − 1) x, the change of a vector by a rotation R about `sine`; the norm of `sine` is the
-    /// sine of the angle, which is at most a quarter of a turn.
-    fn swing(vector: Self::Vector, sine: Self::Spin) -> Self::Vector;
     /// Area (2D) or volume (3D) of a disk or sphere, m² or m³.
     fn volume(radius: f64) -> f64;
     /// Moment of inertia over m R²: 1/2 for a disk, 2/5 for a sphere.
@@ -379,7 +377,7 @@ impl Dim for D2 {
         normal
     }
     #[inline(always)]
-    fn transported(_: &Self::Tangents, normal: Self::Vector) -> Self::Frame {
+    fn transported(_: &Self::Tangents, _: Self::Spin, normal: Self::Vector) -> Self::Frame {
         normal
     }
     #[inline(always)]
@@ -426,10 +424,6 @@ impl Dim for D2 {
     fn turned(orientation: Self::Orientation, turn: Self::Spin) -> Self::Orientation {
         orientation + turn
     }
-    fn swing(x: Self::Vector, sine: Self::Spin) -> Self::Vector {
-        let s = sine[0].clamp(-1.0, 1.0);
-        Self::Vector::from([-x[1], x[0]]) * s - x * versine(s)
-    }
     fn volume(radius: f64) -> f64 {
         std::f64::consts::PI * radius * radius
     }
@@ -460,9 +454,11 @@ where
         let t2: Self::Vector = [b, sign + n[1] * n[1] * a, -n[1]].into();
         Frame3 { n, t: [t1, t2] }
     }
-    fn transported(old: &Self::Tangents, n: Self::Vector) -> Self::Frame {
+    fn transported(old: &Self::Tangents, sine: Self::Spin, n: Self::Vector) -> Self::Frame {
         let old: Self::Vector = resized(*old);
-        let flat = old - n * n.dot(&old);
+        let across = sine.cross(&old);
+        let turned = old + across + sine.cross(&across) * versine_share(sine.norm());
+        let flat = turned - n * n.dot(&turned);
         let norm = flat.norm();
         if norm < 0.5 {
             return Self::frame(n);
@@ -542,14 +538,6 @@ where
         let u = v * c + p * q[0] + p.cross(&v);
         let next: Self::Orientation = [w, u[0], u[1], u[2]].into();
         next / next.norm()
-    }
-    fn swing(x: Self::Vector, sine: Self::Spin) -> Self::Vector {
-        let norm = sine.norm();
-        if norm == 0.0 {
-            return Self::Vector::zero();
-        }
-        let (axis, s) = (sine / norm, norm.min(1.0));
-        axis.cross(&x) * s - (x - axis * Vect::dot(&axis, &x)) * versine(s)
     }
     fn volume(radius: f64) -> f64 {
         4.0 / 3.0 * std::f64::consts::PI * radius.powi(3)

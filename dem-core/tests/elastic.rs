@@ -7,7 +7,7 @@ use common::{bonded_pair, grain, pressed, settings, solver, world};
 use dem_core::body::{Grain, Grains, Load, Schedule, Shape, Wall};
 use dem_core::bond::{BondStatus, Rupture, Stiffness};
 use dem_core::contact::{BondFlow, Law, Local};
-use dem_core::dim::{D2, D3, D3Twist, Dim, Moments, Vect};
+use dem_core::dim::{D2, D3, D3Twist, Dim, Moments, Vect, versine_share};
 use dem_core::problem::ContactProblem;
 use dem_core::solver::{GaussSeidelSettings, SolveStatus, SolverSettings};
 use dem_core::world::World;
@@ -398,6 +398,12 @@ fn never_grows<D: Dim>(periods: f64) {
             // ℓ' − ℓ − d_n without cancellation
             exchanged += (t.reaction.n * way.norm()).abs();
             lost += t.reaction.n * (way.dot(&way) - along * along) / (now.norm() + length + along);
+            // the tangential part of −ω × (ω × x) h², where ω is oblique to x
+            if D::N > 2 {
+                let turn = (spins[i] + spins[j]) * (0.5 * h);
+                let arc = D::velocity(turn, D::velocity(turn, now)) * -versine_share(turn.norm());
+                lost += t.reaction.t.dot(&D::split(&t.frame, arc).1);
+            }
         }
         let damping = w.ledger.damping - damped;
         // the laws are satisfied to the solver's tolerance, 1e-10 of the exchanged work

@@ -19,7 +19,7 @@ import numpy as np
 
 import materials
 import tolerances
-from arrays import norm
+from arrays import norm, turning_velocity
 from geometry import restitution_of, where
 
 
@@ -121,11 +121,12 @@ class Solved:
         # beyond the limit
         self.acts = ~bouncy | (c.gap <= may_touch)
         self.idle_too = bouncy & (c.gap > must_touch) & self.acts
-        rigid = self.bonds if h.K and h.stiffness is None else np.zeros(h.M, bool)
-        of_bond = turned(h, c) if h.K and h.stiffness is None else lengthening(h, h.row_step, h.i, h.j) / h.h
-        self.bias = np.where(self.bonds, of_bond, self.bias)
-        self.other = np.where(self.bonds, self.bias, self.other)
-        self.rigid = rigid
+        self.rigid = self.bonds if h.K and h.stiffness is None else np.zeros(h.M, bool)
+        if h.K:
+            normal, tangential = turned(h, c)
+            self.bias = np.where(self.bonds, normal, self.bias)
+            self.other = np.where(self.bonds, self.bias, self.other)
+            self.u[:, 1 : h.D] += np.where(self.bonds[:, None], tangential, 0.0)
         # no frame holds the last mid-step of a step in parts
         self.unknown = self.bonds & h.after_parts[h.row_step]
 
@@ -251,32 +252,69 @@ def pushed_before(h):
     return (last >= 0) & (h.rn[last] > 0) if h.M else np.zeros(0, bool)
 
 
-def turning(h, c):
-    """b = ½ n·(1 − R) u⁻ of bonds that turn (m/s): R about the mean spin of the pair, by
-    arcsin(h‖ω‖)."""
-    s, i, j = h.row_step, h.i, h.j
-    u = h.body_v[s, i] - h.body_v[s, j]
-    sine = 0.5 * h.h * (h.body_w[s, i] + h.body_w[s, j])
-    if h.D == 2:
-        angle = np.clip(sine[:, 0], -1, 1)
-        away = np.stack([-u[:, 1], u[:, 0]], 1) * angle[:, None] - u * versine(angle)[:, None]
-    else:
-        size = norm(sine)
-        axis = np.divide(sine, size[:, None], out=np.zeros_like(sine), where=size[:, None] > 0)
-        flat = u - axis * (axis * u).sum(1)[:, None]
-        angle = np.minimum(size, 1)
-        away = np.cross(axis, u) * angle[:, None] - flat * versine(angle)[:, None]
-    return -0.5 * (c.n * away).sum(1)
-
-
 def turned(h, c):
-    """Length correction of rigid bonds that turned (m/s). Grains of bonds without a limit of shear
-    or rolling need not turn with the bond: then its rotation follows from its length, from the
-    second step of the bond on and within round-off."""
-    longer = np.where(h.row_step > h.formed, lengthening(h, h.row_step, h.i, h.j), 0.0)
-    longer[longer <= np.finfo(float).eps * h.mean_diameter[h.bond]] = 0.0
-    with_it = (h.bond_friction[h.bond] > 0) & (h.bond_rolling[h.bond] > 0)
-    return np.where(with_it, turning(h, c), longer / h.h)
+    """Bias of bonds that turned, along the normal [M] and the tangents [M,D−1] (m/s).
+
+    The bias of a rigid bond with friction follows from the spin of its fragment. Otherwise, and
+    where its grains have different spins, the normal part follows from its length. Rigid bonds
+    have none in their first step, unless their grains begin it as a rigid body, nor one within
+    round-off."""
+    rigid = h.stiffness is None
+    longer = lengthening(h, h.row_step, h.i, h.j) / h.h
+    spins = spins_of_fragments(h) if rigid else h.body_w
+    along, across = arc(h, c, spins)
+    friction = h.bond_friction[h.bond] > 0
+    s, i, j = h.row_step, h.i, h.j
+    same = (spins[s, i] == spins[s, j]).all(1)
+    n = np.where(friction & rigid & same, along, longer)
+    t = np.where(friction[:, None], across, 0.0)
+    if rigid:
+        small = h.h * np.sqrt(n**2 + (t**2).sum(1)) <= np.finfo(float).eps * h.mean_diameter[h.bond]
+        way, x = h.h * (h.body_v[s, i] - h.body_v[s, j]), c.n * (c.lever_i + c.lever_j)[:, None]
+        turn = h.h * spin_of_bond(c, h.body_w[s, i], h.body_w[s, j])
+        off = norm(way - turning_velocity(turn, x - way / 2)) / norm(x)
+        none = small | ((h.row_step <= h.formed) & ~(friction & same & (off <= 1e-6)))
+        n, t = np.where(none, 0.0, n), np.where(none[:, None], 0.0, t)
+    return n, t
+
+
+def spin_of_bond(c, spins_i, spins_j):
+    """Spin of the vector between the centres of each pair (rad/s): that of its grains, weighted by
+    their distances from the contact point."""
+    a, b = c.lever_i[:, None], c.lever_j[:, None]
+    return (a * spins_i + b * spins_j) / (a + b)
+
+
+def arc(h, c, spins):
+    """(1 − cos φ) of the vector between the centres across the axis of its rotation by φ in a step,
+    over the step, with sin φ = h‖ω‖: along the normal [M] and the tangents [M,D−1] (m/s)."""
+    s, i, j = h.row_step, h.i, h.j
+    sine = h.h * spin_of_bond(c, spins[s, i], spins[s, j])
+    share = 1 / (1 + np.sqrt(np.maximum(1 - norm(sine) ** 2, 0)))
+    x = c.n * (c.lever_i + c.lever_j)[:, None]
+    if h.D == 2:
+        return share * sine[:, 0] ** 2 * (c.lever_i + c.lever_j) / h.h, np.zeros((h.M, 1))
+    out = -np.cross(sine, np.cross(sine, x)) * share[:, None] / h.h
+    return (out * c.n).sum(1), np.einsum("md,mkd->mk", out, h.tangents)
+
+
+def spins_of_fragments(h):
+    """Spins of all bodies at the start of each step, those of grains that rigid bonds make equal to
+    1e-6 rad a step by their mean [S+1,B,Q]."""
+    spins = h.body_w.copy()
+    bonds = h.bond >= 0
+    for s in range(h.S):
+        rows = np.flatnonzero((h.row_step == s) & bonds)
+        i, j = h.i[rows], h.j[rows]
+        equal = norm(h.body_w[s, i] - h.body_w[s, j]) * h.h <= 1e-6
+        label = np.arange(h.N)
+        # labels of neighbours become equal, the smallest wins
+        while (label[i[equal]] != label[j[equal]]).any():
+            for a, b in zip(i[equal], j[equal]):
+                label[a] = label[b] = min(label[a], label[b])
+        for one in np.unique(label[np.concatenate([i[equal], j[equal]])]):
+            spins[s, : h.N][label == one] = h.body_w[s, : h.N][label == one].mean(0)
+    return spins
 
 
 def lengthening(h, s, i, j):
@@ -294,11 +332,6 @@ def lengthening(h, s, i, j):
     return (across**2).sum(1) / (norm(now) + length + along)
 
 
-def versine(sine):
-    """1 − cos φ from sin φ."""
-    return sine**2 / (1 + np.sqrt(np.maximum(1 - sine**2, 0)))
-
-
 def check(h, c, p, report):
     """All checks of the laws; `p` is the solved problem."""
     rows = np.flatnonzero(h.row_single)
@@ -312,6 +345,7 @@ def check(h, c, p, report):
     report.expect("contacts that do not touch", norm(p.r[idle]), 0.0, where(h, idle))
     check_status(h, p, report, rows)
     check_closing(h, c, p, report)
+    check_frames(h, c, p, report, rows)
 
 
 def check_residual(h, p, report):
@@ -386,6 +420,28 @@ def check_status(h, p, report, rows):
     either = near & ~p.bonds[rows] & ~open_ & np.isin(status, ["SLIP", "STICK"])
     off = (status != told) & ~either
     report.expect("status", off.astype(float), 0.0, where(h, rows))
+
+
+def check_frames(h, c, p, report, rows):
+    """The first tangent of a bond is that of the step before, rotated with its grains and then
+    turned least to the new tangent plane."""
+    last = row_before(h)
+    known = p.bonds[rows] & (last[rows] >= 0) & ~h.after_parts[h.row_step[rows]]
+    rows = rows[known]
+    rows = rows[h.bond[last[rows]] == h.bond[rows]]
+    if h.D == 2 or not len(rows):
+        return
+    s, i, j = h.row_step, h.i, h.j
+    sine = h.h * spin_of_bond(c, h.body_w[s, i], h.body_w[s, j])[rows]
+    old = h.tangents[last[rows], 0]
+    across = np.cross(sine, old)
+    share = 1 / (1 + np.sqrt(np.maximum(1 - norm(sine) ** 2, 0)))
+    turned = old + across + np.cross(sine, across) * share[:, None]
+    flat = turned - c.n[rows] * (c.n[rows] * turned).sum(1)[:, None]
+    size = norm(flat)
+    off = np.where(size > 0.5, norm(h.tangents[rows, 0] - flat / size[:, None]), 0.0)
+    relative = c.place / (h.radius[i] + np.where(h.on_wall, 0.0, h.body_radius[j]))
+    report.expect("frames of bonds", off, tolerances.rounding(2.0 + relative)[rows], where(h, rows))
 
 
 def check_closing(h, c, p, report):

@@ -58,6 +58,18 @@ def reaction(pick, rows, value):
     return put("contacts/reaction", lambda good: (pick(good), rows), value)
 
 
+def reverse_frame(pick):
+    """Reverses the tangents of a contact, and the components of its reaction along them."""
+
+    def spoil(file, good):
+        row = pick(good)
+        file["contacts/tangent"][row] = -file["contacts/tangent"][row]
+        for name, part in (("reaction", slice(1, 3)), ("moment", slice(0, 2))):
+            file[f"contacts/{name}"][row, part] = -file[f"contacts/{name}"][row, part]
+
+    return spoil
+
+
 def event(column, value):
     """Alters one column of one rupture, the second where there are several."""
 

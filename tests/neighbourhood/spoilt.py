@@ -21,6 +21,7 @@ from spoil import (
     other_mode,
     put,
     reaction,
+    reverse_frame,
     worst,
 )
 
@@ -70,6 +71,7 @@ SPOILT = (
         ("pressed", "a normal", add("contacts/normal", lambda g: (any_row(g), 0), 1e-9, 1e-9), "normal"),
         ("pressed", "a point", add("contacts/point", lambda g: (any_row(g), 1), 0, 1e-12), "point"),
         ("arm", "a tangent", add("contacts/tangent", lambda g: (BONDED(g), 2), 0, 1e-9), "tangent"),
+        ("arm", "the frame of a bond", reverse_frame(BONDED), "frames of bonds"),
         (
             "pressed",
             "a velocity towards grains that are no neighbours yet",

@@ -103,10 +103,10 @@ pub trait Law: Copy + Send + Sync + 'static {
     /// Set [`Law::reached`]; ignored by a dry contact.
     fn set_reached(&mut self, _: Option<Reached>) {}
 
-    /// Velocity that the law adds to u_n (m/s). [`Law::improve`] and [`Law::natural_map`] receive
-    /// the relative velocity without it and add it themselves.
-    fn bias(&self) -> f64 {
-        0.0
+    /// Velocity that the law adds to u (m/s). [`Law::improve`] and [`Law::natural_map`] receive the
+    /// relative velocity without it and add it themselves.
+    fn bias(&self) -> Local<Self::T, Self::B> {
+        Local::zero()
     }
 
     /// Whether the flow is normal to the cone, so that the law derives from a convex potential.
@@ -194,8 +194,8 @@ impl Law for Frictionless {
         self.inverse
     }
 
-    fn bias(&self) -> f64 {
-        self.bias
+    fn bias(&self) -> Local<V0, V0> {
+        Local { n: self.bias, ..Local::zero() }
     }
 
     fn cone(&self) -> Cone {
@@ -258,8 +258,8 @@ impl<T: Vect> Law for Coulomb<T> {
         self.inverse_n.min(self.inverse_t)
     }
 
-    fn bias(&self) -> f64 {
-        self.bias
+    fn bias(&self) -> Local<T, V0> {
+        Local { n: self.bias, ..Local::zero() }
     }
 
     fn associated(&self) -> bool {
@@ -304,8 +304,9 @@ pub struct Bonded<T, B: Moments> {
     xi: B::Twist,
     flow: BondFlow,
     reached: Option<Reached>,
-    bias: f64,
-    rows: PhantomData<(T, B)>,
+    // of the normal and the tangential rows
+    bias: (f64, T),
+    rows: PhantomData<B>,
 }
 
 /// A part of the limit of a bond.
@@ -346,15 +347,21 @@ impl<T: Vect, B: Moments> Bonded<T, B> {
             xi: only_twist::<B>(cone.xi),
             flow,
             reached: None,
-            bias: 0.0,
+            bias: (0.0, T::zero()),
             rows: PhantomData,
         }
     }
 
-    /// The same bond with this bias of the normal velocity (m/s).
+    /// The same bond with this bias of the normal and the tangential velocity (m/s).
     #[must_use]
-    pub fn with_bias(self, bias: f64) -> Self {
-        Self { bias, ..self }
+    pub fn with_bias(self, n: f64, t: T) -> Self {
+        Self { bias: (n, t), ..self }
+    }
+
+    /// The relative velocity `u` with the bias.
+    #[inline(always)]
+    fn biased(&self, u: Local<T, B>) -> Local<T, B> {
+        Local { n: u.n + self.bias.0, t: u.t + self.bias.1, m: u.m }
     }
 
     /// The local block, recomputed from its inverse.
@@ -377,8 +384,8 @@ impl<A: Vect, B: Moments> Law for Bonded<A, B> {
     type Axes<D: Dim> = D::Frame;
 
     #[inline(always)]
-    fn improve(&self, local: LocalSolve, r: Local<A, B>, mut u: Local<A, B>) -> Local<A, B> {
-        u.n += self.bias;
+    fn improve(&self, local: LocalSolve, r: Local<A, B>, u: Local<A, B>) -> Local<A, B> {
+        let u = self.biased(u);
         match local {
             LocalSolve::Exact => {
                 let stuck = Local {
@@ -400,13 +407,12 @@ impl<A: Vect, B: Moments> Law for Bonded<A, B> {
     }
 
     #[inline(always)]
-    fn natural_map(&self, r: Local<A, B>, mut u: Local<A, B>) -> Local<A, B> {
-        u.n += self.bias;
-        self.predict_correct(r, u) * -1.0
+    fn natural_map(&self, r: Local<A, B>, u: Local<A, B>) -> Local<A, B> {
+        self.predict_correct(r, self.biased(u)) * -1.0
     }
 
-    fn bias(&self) -> f64 {
-        self.bias
+    fn bias(&self) -> Local<A, B> {
+        self.biased(Local::zero())
     }
 
     fn gamma(&self) -> f64 {
@@ -527,10 +533,10 @@ impl<T: Vect, B: Moments> Elastic<T, B> {
         Self { bond, soft: [n, t, m], soft_w: only_twist::<B>(w), carried }
     }
 
-    /// The same bond with this bias of the normal velocity (m/s).
+    /// The same bond with this bias of the normal and the tangential velocity (m/s).
     #[must_use]
-    pub fn with_bias(self, bias: f64) -> Self {
-        Self { bond: self.bond.with_bias(bias), ..self }
+    pub fn with_bias(self, n: f64, t: T) -> Self {
+        Self { bond: self.bond.with_bias(n, t), ..self }
     }
 }
 
@@ -549,8 +555,8 @@ impl<A: Vect, B: Moments> Law for Elastic<A, B> {
         self.bond.natural_map(r, u + self.compliance().times(&(r - self.carried)))
     }
 
-    fn bias(&self) -> f64 {
-        self.bond.bias
+    fn bias(&self) -> Local<A, B> {
+        self.bond.bias()
     }
 
     fn gamma(&self) -> f64 {

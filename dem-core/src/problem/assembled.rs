@@ -329,10 +329,8 @@ impl Assembled {
         let mut shifts = vec![0.0; list.len() * size];
         for (c, item) in list.iter().enumerate() {
             let at = c * size..(c + 1) * size;
-            let mut u = item.velocity(&nodes);
-            u.n += item.bias;
             // an elastic bond: u + C (r − r₀), with C in the matrix
-            u = u - item.compliance.times(&item.carried);
+            let u = item.velocity(&nodes) + item.bias - item.compliance.times(&item.carried);
             rows.write(&u, &mut q[at.clone()]);
             rows.write(&Local { n: item.r.n + item.shift, ..item.r }, &mut r[at]);
             shifts[c * size] = -item.shift;
@@ -365,7 +363,7 @@ struct Item<D: Dim> {
     cone: Cone,
     associated: bool,
     shift: f64,
-    bias: f64,
+    bias: Padded,
     compliance: Weights,
     carried: Padded,
     r: Padded,
@@ -383,7 +381,7 @@ impl<D: Dim> Visitor<D> for List<D> {
             cone: c.law.cone(),
             associated: c.law.associated(),
             shift: c.law.shift(),
-            bias: c.law.bias(),
+            bias: c.link.in_frame(&c.law.bias()),
             compliance: c.law.compliance(),
             carried: c.link.in_frame(&c.law.carried()),
             r: c.link.in_frame(&c.r),

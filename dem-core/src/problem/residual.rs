@@ -116,8 +116,8 @@ impl<D: Dim> Visitor<D> for Largest<'_, D> {
         let (law, arms) = (&c.law, c.law.arms());
         let map = law.natural_map(c.r, nodes.relative_velocity(&c.link, arms));
         let [i, j] = c.link.nodes.map(|k| self.problem.free[k as usize]);
-        let mut free = c.link.relative_velocity::<L::T, L::B>(arms, i, j) - law.compliance().times(&law.carried());
-        free.n += law.bias();
+        let free =
+            c.link.relative_velocity::<L::T, L::B>(arms, i, j) + law.bias() - law.compliance().times(&law.carried());
         let speed = map.dot(&map).sqrt() / law.gamma();
         if speed > self.map {
             (self.map, self.pair) = (speed, c.link.nodes);

@@ -483,8 +483,8 @@ impl<D: Dim> Visitor<D> for Flatten<'_, D> {
             self.rows.coefficients.extend_from_slice(&row[..table.width]);
         }
         // contribution of nodes with given velocities
-        let mut given = c.link.in_frame(&self.still.relative_velocity::<L::T, L::B>(&c.link, arms));
-        given.n += c.law.bias();
+        let still = self.still.relative_velocity::<L::T, L::B>(&c.link, arms);
+        let given = c.link.in_frame(&(still + c.law.bias()));
         let normal: f64 = table.rows[0][..table.width].iter().map(|h| h * h).sum();
         self.normal.push(normal);
         let radius = |side: usize| self.problem.radii.get(c.link.nodes[side] as usize).copied();

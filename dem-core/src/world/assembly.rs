@@ -32,8 +32,8 @@ const SPARE: f64 = 0.15;
 pub(super) struct Brought<D: Dim> {
     /// Reactions of elastic bonds (N, N m); empty if all bonds are rigid.
     pub carried: Vec<Local<D::Tangent, D::Moment>>,
-    /// Length corrections.
-    pub turns: Vec<Turn>,
+    /// Corrections of bonds that turn.
+    pub turns: Vec<Turn<D>>,
     /// Factor on the strengths (–): one, except in trials of next-event loading.
     pub strengthened: f64,
 }
@@ -119,12 +119,14 @@ impl<D: Dim> World<D> {
             }
         }
         touches.sort_by_key(|t| t.pair);
-        self.recall(mid, &mut touches);
+        self.recall(mid, &mut touches, motion, h);
         touches
     }
 
-    /// Copy the reactions of the last step; the frame of each contact turns with its normal.
-    fn recall(&self, mid: &Midpoint<D>, touches: &mut [StoredTouch<D>]) {
+    /// Copy the reactions of the last step; the frame of each contact turns with its normal, that
+    /// of a bond also about it, with its grains.
+    fn recall(&self, mid: &Midpoint<D>, touches: &mut [StoredTouch<D>], motion: &Motion<D>, h: f64) {
+        let span = self.between_midpoints(h);
         let mut old = self.stored.iter().peekable();
         for touch in touches {
             while old.next_if(|o| o.pair < touch.pair).is_some() {}
@@ -137,7 +139,14 @@ impl<D: Dim> World<D> {
             let same = last.filter(|o| o.bond() == touch.bond() || o.bond().is_none());
             if D::Tangents::LEN > 0 {
                 let (_, normal, _) = self.geometry(mid, touch.pair);
-                let frame = same.map_or_else(|| D::frame(normal), |o| D::transported(&o.tangents, normal));
+                let frame = same.map_or_else(
+                    || D::frame(normal),
+                    |o| {
+                        let spins = touch.pair.map(|k| motion.before[k as usize].1);
+                        let spin = o.bond().map_or(D::Spin::zero(), |_| self.spin(mid, touch.pair, spins));
+                        D::transported(&o.tangents, spin * span, normal)
+                    },
+                );
                 touch.tangents = D::tangents(&frame);
             }
             if let Some(o) = same {
@@ -326,7 +335,7 @@ impl<D: Dim> World<D> {
             let kind = self.kind(stored);
             let bias = match touch.bond {
                 Some(bond) => Some(brought.turns[bond as usize].bias),
-                None => self.bias(touch, stored, motion, h),
+                None => self.bias(touch, stored, motion, h).map(|n| Local { n, ..Local::zero() }),
             };
             // without a bias the contact cannot act in this step
             let Some(bias) = bias else { continue };
@@ -341,10 +350,11 @@ impl<D: Dim> World<D> {
                         (h * bond.strength * brought.strengthened, bond.cone(), self.settings.bond_flow);
                     if let Some(compliance) = bond.compliance(h) {
                         let carried = over_arm(brought.carried[number] * h, arm);
-                        let law = Elastic::new(block, compliance, carried, arms, shift, cone, flow).with_bias(bias);
+                        let law =
+                            Elastic::new(block, compliance, carried, arms, shift, cone, flow).with_bias(bias.n, bias.t);
                         problem.elastic.push(Contact { link, law, r });
                     } else {
-                        let law = Bonded::new(block, arms, shift, cone, flow).with_bias(bias);
+                        let law = Bonded::new(block, arms, shift, cone, flow).with_bias(bias.n, bias.t);
                         problem.bonded.push(Contact { link, law, r });
                     }
                 }
@@ -353,7 +363,7 @@ impl<D: Dim> World<D> {
                     let t = of_frame::<D, _>(&link.axes, start.t);
                     problem.dry.push(Contact {
                         link: Link::new(link.nodes, link.axes),
-                        law: Coulomb::new(block, lever, self.friction_of(touch.pair), bias),
+                        law: Coulomb::new(block, lever, self.friction_of(touch.pair), bias.n),
                         r: Local { n: start.n, t, ..Local::zero() },
                     });
                 }
@@ -361,7 +371,7 @@ impl<D: Dim> World<D> {
                     let block = problem.nodes.block(&link, Arms { lever, bending: 0.0 });
                     problem.frictionless.push(Contact {
                         link: Link::new(link.nodes, link.axes),
-                        law: Frictionless::new(block, bias),
+                        law: Frictionless::new(block, bias.n),
                         r: Local { n: start.n, ..Local::zero() },
                     });
                 }

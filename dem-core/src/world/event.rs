@@ -24,7 +24,7 @@ struct Equilibrium<D: Dim> {
     at: f64,
     mid: Midpoint<D>,
     motion: Motion<D>,
-    turns: Vec<Turn>,
+    turns: Vec<Turn<D>>,
     touches: Vec<StoredTouch<D>>,
     problem: ContactProblem<D>,
     /// The largest required strength of an intact bond over its strength, less one (–): zero if the

@@ -225,7 +225,7 @@ impl<D: Dim> World<D> {
 fn beyond_law<D: Dim, L: Law>(nodes: &Nodes<D>, c: &Contact<D, L>) -> Option<f64> {
     let law = &c.law;
     let free = law.compliance().n > 0.0 || c.failure().is_some();
-    let closing = || -(nodes.relative_velocity::<L::T, L::B>(&c.link, law.arms()).n + law.bias());
+    let closing = || -(nodes.relative_velocity::<L::T, L::B>(&c.link, law.arms()).n + law.bias().n);
     (!free).then(closing)
 }
 
@@ -298,7 +298,7 @@ impl<D: Dim> Visitor<D> for Powers<'_, D> {
         let [i, j] = c.link.nodes.map(|k| self.problem.free[k as usize]);
         let free = c.link.relative_velocity::<L::T, L::B>(arms, i, j);
         let after = nodes.relative_velocity::<L::T, L::B>(&c.link, arms);
-        let bias = c.r.n * c.law.bias();
+        let bias = c.r.dot(&c.law.bias());
         self.asked -= c.r.dot(&free) + bias;
         self.left -= c.r.dot(&after) + bias;
         self.largest = self.largest.max(c.r.n.abs());

@@ -116,7 +116,7 @@ pub struct World<D: Dim> {
     /// Length of the last accepted step, or of the last part of it (s); zero before the first.
     last_part: f64,
     /// Length corrections of the bonds in it, by bond index; empty before the first.
-    turns: Vec<Turn>,
+    turns: Vec<Turn<D>>,
     /// The wall that holds each grain; empty if no wall holds one.
     held: Vec<Option<u32>>,
     candidates: Candidates<D>,
@@ -137,7 +137,7 @@ struct Snapshot<D: Dim> {
     stored: Vec<StoredTouch<D>>,
     mid: Midpoint<D>,
     last_part: f64,
-    turns: Vec<Turn>,
+    turns: Vec<Turn<D>>,
     ledger: Ledger,
     time: f64,
 }

@@ -1,7 +1,8 @@
 //! Positions and velocities of the bodies in a step before its contacts are known.
 
 use crate::body::{Grains, Wall};
-use crate::dim::Dim;
+use crate::contact::Local;
+use crate::dim::{Dim, V0};
 use std::sync::Arc;
 
 /// Positions at mid-step (m), at which contacts are detected.
@@ -29,12 +30,18 @@ pub(super) struct Motion<D: Dim> {
     pub free: Arc<[(D::Vector, D::Spin)]>,
 }
 
-/// Length correction of a turning bond in a step.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Turn {
-    /// Velocity that the law of the bond adds to its normal velocity (m/s).
-    pub bias: f64,
-    /// Length of the bond at mid-step beyond the length known to its law, less the hidden length of
+/// Correction of a turning bond in a step, in its frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Turn<D: Dim> {
+    /// Velocity that the law of the bond adds to its relative velocity (m/s).
+    pub bias: Local<D::Tangent, V0>,
+    /// Displacement of the bond at mid-step beyond that known to its law, less the hidden one of
     /// steps of this length (m): zero if all steps had one length.
-    pub owed: f64,
+    pub owed: Local<D::Tangent, V0>,
+}
+
+impl<D: Dim> Default for Turn<D> {
+    fn default() -> Self {
+        Self { bias: Local::zero(), owed: Local::zero() }
+    }
 }

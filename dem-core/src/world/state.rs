@@ -88,7 +88,10 @@ impl<D: Dim> World<D> {
         to.vectors(&self.mid.walls);
         to.real(self.last_part);
         to.count(self.turns.len());
-        self.turns.iter().for_each(|turn| to.reals.extend([turn.bias, turn.owed]));
+        for part in self.turns.iter().flat_map(|turn| [turn.bias, turn.owed]) {
+            to.real(part.n);
+            to.vectors(&[part.t]);
+        }
         to.count(self.stored.len());
         self.stored.iter().for_each(|stored| save_touch(stored, to));
         let l = &self.ledger;
@@ -141,7 +144,10 @@ impl<D: Dim> World<D> {
         world.mid = Midpoint { grains: from.vectors(n)?, walls: from.vectors(bodies - n)? };
         world.last_part = from.real()?;
         world.turns = (0..from.number_of()?)
-            .map(|_| Ok(Turn { bias: from.real()?, owed: from.real()? }))
+            .map(|_| {
+                let mut part = || Ok(Local { n: from.real()?, t: from.vector()?, ..Local::zero() });
+                Ok(Turn { bias: part()?, owed: part()? })
+            })
             .collect::<Result<_, _>>()?;
         world.stored = (0..from.number_of()?).map(|_| restored_touch(bodies, bonds, from)).collect::<Result<_, _>>()?;
         let mut next = || from.real();

@@ -333,8 +333,7 @@ impl<D: Dim> World<D> {
             // without another solve the impulses stay, and they alone decide
             let Some(mode) = (if late { by_impulse } else { contact.failure() }) else { continue };
             let touch = self.touch(mid, &touches[*place as usize]);
-            let mut u = nodes.relative_velocity::<D::Tangent, D::Moment>(&contact.link, law.arms());
-            u.n += law.bias();
+            let u = nodes.relative_velocity::<D::Tangent, D::Moment>(&contact.link, law.arms()) + law.bias();
             let flow = u + law.compliance().times(&(contact.r - law.carried()));
             let Some(bond) = touch.bond else { continue };
             // its entry in the energy balance: the value at the start of the step if the step is

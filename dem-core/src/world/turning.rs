@@ -1,49 +1,106 @@
-//! Length correction of bonds that turn: rigid bonds keep their length, and the force of elastic
-//! bonds follows theirs. The law of a bond knows its normal velocity u_n, but not the lengthening
-//! by rotation.
+//! Correction of bonds that turn: rigid bonds keep their length and direction in the fragment, and
+//! the force of elastic bonds follows theirs. The law of a bond knows the relative velocity u at
+//! mid-step, but not the displacement by rotation.
 //!
 //! Let w be the time between the mid-steps of two steps of lengths h and h'. In this time a bond
-//! lengthens by w u_n, of which its law includes h u_n, and by a *hidden* length e(w) due to
-//! rotation. A step corrects e(h), the hidden length of steps of its own length. If the length of
-//! steps changes, a remainder is *owed*; it is corrected over the step of the scene. See
+//! moves by w u, of which its law includes h u, and by a *hidden* displacement e(w) due to
+//! rotation. A step corrects e(h), the hidden displacement in steps of its own length. If the
+//! length of steps changes, a remainder is *owed*; it is corrected over the step of the scene. See
 //! docs/theory/time-stepping.md, "Bonds that turn in steps of several lengths".
 
 use super::World;
 use super::motion::{Midpoint, Motion, Turn};
 use super::touch::StoredTouch;
 use crate::body::{direction, separation};
-use crate::dim::{Dim, Vect};
+use crate::contact::Local;
+use crate::dim::{Dim, V0, Vect, versine_share};
+use petgraph::unionfind::UnionFind;
+
+/// Angle (rad) in a step by which the spins of two grains of a rigid bond differ at most if they
+/// count as equal, and velocities from those of a rigid body. Solver errors make them differ by
+/// some 1e-9 of the angle of the step; the corrections of a fragment would be incompatible by as
+/// much, and its bonds would respond with forces that add up over the steps.
+const EQUAL: f64 = 1e-6;
 
 impl<D: Dim> World<D> {
-    /// Length corrections of all bonds in a step of length `h`, by bond index.
-    pub(super) fn turns(&self, mid: &Midpoint<D>, touches: &[StoredTouch<D>], motion: &Motion<D>, h: f64) -> Vec<Turn> {
+    /// Time between the mid-steps of the last step and of one of length `h` (s).
+    pub(super) fn between_midpoints(&self, h: f64) -> f64 {
+        let last = if self.last_part > 0.0 { self.last_part } else { h };
+        0.5 * (last + h)
+    }
+
+    /// Corrections of all bonds in a step of length `h`, by bond index.
+    pub(super) fn turns(
+        &self,
+        mid: &Midpoint<D>,
+        touches: &[StoredTouch<D>],
+        motion: &Motion<D>,
+        h: f64,
+    ) -> Vec<Turn<D>> {
         let mut turns = vec![Turn::default(); self.bonds.len()];
+        let spins = self.spins_of_fragments(touches, motion, h);
         for stored in touches {
             if let Some(bond) = stored.bond() {
-                turns[bond as usize] = self.turn(mid, stored, bond as usize, motion, h);
+                turns[bond as usize] = self.turn(mid, stored, bond as usize, motion, &spins, h);
             }
         }
         turns
     }
 
-    /// Length correction of the bond of this contact in a step of length `h`.
-    fn turn(&self, mid: &Midpoint<D>, stored: &StoredTouch<D>, number: usize, motion: &Motion<D>, h: f64) -> Turn {
+    /// Spins of the grains (rad/s), equal to the last bit where rigid bonds make them equal: their
+    /// mean over the fragment.
+    fn spins_of_fragments(&self, touches: &[StoredTouch<D>], motion: &Motion<D>, h: f64) -> Vec<D::Spin> {
+        let mut spins: Vec<D::Spin> = motion.before.iter().map(|(_, spin)| *spin).collect();
+        let mut fragments = UnionFind::<usize>::new(self.grains.len());
+        for stored in touches {
+            let rigid = stored.bond().is_some_and(|bond| self.bonds[bond as usize].stiffness.is_none());
+            let [i, j] = stored.pair.map(|k| k as usize);
+            if rigid && (spins[i] - spins[j]).norm() * h <= EQUAL {
+                fragments.union(i, j);
+            }
+        }
+        let fragments = fragments.into_labeling();
+        let mut sums = vec![(D::Spin::zero(), 0.0); fragments.len()];
+        for (spin, fragment) in spins.iter().zip(&fragments) {
+            let (sum, count) = &mut sums[*fragment];
+            (*sum, *count) = (*sum + *spin, *count + 1.0);
+        }
+        for (spin, fragment) in spins.iter_mut().zip(&fragments) {
+            let (sum, count) = sums[*fragment];
+            *spin = sum * (1.0 / count);
+        }
+        spins
+    }
+
+    /// Correction of the bond of this contact in a step of length `h`.
+    fn turn(
+        &self,
+        mid: &Midpoint<D>,
+        stored: &StoredTouch<D>,
+        number: usize,
+        motion: &Motion<D>,
+        spins: &[D::Spin],
+        h: f64,
+    ) -> Turn<D> {
         let bond = &self.bonds[number];
         let elastic = bond.stiffness.is_some();
-        // the grains turn with a bond that resists shear and rolling
-        let turns_with_it = bond.shear > 0.0 && bond.rolling > 0.0;
-        // the velocities before a frictionless bond formed do not satisfy its constraint
-        if !elastic && !turns_with_it && !stored.was_bonded {
+        let sheared = bond.shear > 0.0;
+        let [i, j] = stored.pair.map(|k| k as usize);
+        let in_a_fragment = !elastic && spins[i] == spins[j];
+        // the velocities before a bond formed need not satisfy its constraint
+        let constrained = stored.was_bonded || in_a_fragment && sheared && self.moves_rigidly(mid, motion, stored, h);
+        if !elastic && !constrained {
             return Turn::default();
         }
         // rigid bonds respond to any misfit with forces, even to round-off
         let rounding = if elastic { 0.0 } else { f64::EPSILON * bond.mean_diameter };
+        let below = |x: &Local<D::Tangent, V0>| x.dot(x) <= rounding * rounding;
         let hidden = |span: f64| {
-            if !elastic && turns_with_it {
-                return self.turning(mid, motion, stored.pair, span);
+            let mut rate = if sheared { self.arc(mid, spins, stored, span) } else { Local::zero() };
+            if !(sheared && in_a_fragment) {
+                rate.n = self.lengthening(mid, motion, stored.pair, span).0;
             }
-            let (speed, _) = self.lengthening(mid, motion, stored.pair, span);
-            if span * speed <= rounding { 0.0 } else { speed }
+            if below(&(rate * span)) { Local::zero() } else { rate }
         };
         let before = self.turns.get(number).copied().unwrap_or_default();
         let last = if self.last_part > 0.0 { self.last_part } else { h };
@@ -51,27 +108,43 @@ impl<D: Dim> World<D> {
         let mut owed = before.owed * (1.0 - last / full);
         let own = hidden(h);
         if last != h {
-            let span = 0.5 * (last + h);
+            let span = self.between_midpoints(h);
             // for a rigid bond the velocity required by its law: solver errors of different bonds
             // are incompatible
-            let speed = if elastic { self.lengthening(mid, motion, stored.pair, span).1 } else { -before.bias };
-            owed += (span - last) * speed + span * hidden(span) - h * own;
+            let velocity = if elastic {
+                Local { n: self.lengthening(mid, motion, stored.pair, span).1, ..Local::zero() }
+            } else {
+                before.bias * -1.0
+            };
+            owed = owed + velocity * (span - last) + hidden(span) * span - own * h;
         }
-        if owed.abs() <= rounding {
-            owed = 0.0;
+        if below(&owed) {
+            owed = Local::zero();
         }
-        Turn { bias: own + owed / full, owed }
+        Turn { bias: own + owed * (1.0 / full), owed }
+    }
+
+    /// Whether the grains of this bond begin the step of length `h` with the velocities of a rigid
+    /// body.
+    fn moves_rigidly(&self, mid: &Midpoint<D>, motion: &Motion<D>, stored: &StoredTouch<D>, h: f64) -> bool {
+        let [i, j] = stored.pair.map(|k| k as usize);
+        let [(v_i, spin_i), (v_j, spin_j)] = [motion.before[i], motion.before[j]];
+        let way = (v_i - v_j) * h;
+        let apart = separation::<D>(mid.grains[i], mid.grains[j]);
+        let turned = D::velocity(self.spin(mid, stored.pair, [spin_i, spin_j]) * h, apart - way * 0.5);
+        (way - turned).norm() <= EQUAL * apart.norm()
     }
 
     /// Rate of hidden lengthening of a bond in the time `span` (s) between the last two mid-steps,
-    /// and its normal velocity at the first of them (m/s). For bonds that may turn without their
-    /// grains: elastic or frictionless ones.
+    /// and its normal velocity at the first of them (m/s). For bonds whose length does not follow
+    /// from the spins of their grains: elastic or frictionless ones, and those of grains that twist
+    /// against each other.
     ///
     /// Between two mid-steps the relative displacement of the grains is d, with d_n along the
     /// normal at the first and d_t across it. The distance ℓ grows by d_n and, because the bond
     /// turned, by ℓ' − ℓ − d_n = d_t² / (ℓ' + ℓ + d_n). The law knows normal velocities only, so
-    /// the second part is hidden from it. In a steady turn it equals the result of
-    /// [`World::turning`]. See docs/theory/elastic-bonds.md.
+    /// the second part is hidden from it. In a steady turn it equals the normal part of
+    /// [`World::arc`]. See docs/theory/elastic-bonds.md.
     fn lengthening(&self, mid: &Midpoint<D>, motion: &Motion<D>, pair: [u32; 2], span: f64) -> (f64, f64) {
         let [i, j] = pair.map(|k| k as usize);
         let apart = separation::<D>(mid.grains[i], mid.grains[j]);
@@ -86,20 +159,32 @@ impl<D: Dim> World<D> {
         (hidden, along / span)
     }
 
-    /// Rate of hidden lengthening of a rigid bond with friction in the time `span` (s) between the
-    /// last two mid-steps (m/s).
+    /// Rate of hidden displacement of a bond with friction in the time `span` (s) between the last
+    /// two mid-steps, in its frame (m/s).
     ///
-    /// A velocity along the tangent at mid-step increases the distance both before and after
-    /// mid-step. A turn by R since the last mid-step alone changes the normal component of the
-    /// bond's velocity u⁻ by n·(1 − R) u⁻. Correcting half of it, u_n⁺ = −½ n·(1 − R) u⁻, makes the
-    /// step symmetric in time: the length is kept, and since u_n⁺ = −u_n⁻ the reaction does no
-    /// work. R is the same for all bonds of a rigid fragment, so their corrections are compatible.
+    /// The rows of its law ask for the velocity ω × x along the tangent, where x is the vector
+    /// between the centres. A rotation R by φ = arcsin(w ‖ω‖) about ω displaces x by
+    /// (R − 1) x = w ω × x − (1 − cos φ) x⊥, with the part x⊥ across ω. The law takes the last term
+    /// from u. It has a tangential part where ω is oblique to x. In a fragment it is the difference
+    /// of one velocity field at both grains, so the corrections of all its bonds are compatible.
     /// See docs/theory/time-stepping.md.
-    fn turning(&self, mid: &Midpoint<D>, motion: &Motion<D>, pair: [u32; 2], span: f64) -> f64 {
-        let (_, normal, _) = self.geometry(mid, pair);
-        let [(v_i, spin_i), (v_j, spin_j)] = pair.map(|k| motion.before[k as usize]);
-        // the tangential row at mid-step determines the spins: sin φ / w, with the angle φ between
-        // two mid-steps
-        -0.5 * normal.dot(&D::swing(v_i - v_j, (spin_i + spin_j) * (0.5 * span)))
+    fn arc(&self, mid: &Midpoint<D>, spins: &[D::Spin], stored: &StoredTouch<D>, span: f64) -> Local<D::Tangent, V0> {
+        let [i, j] = stored.pair.map(|k| k as usize);
+        let apart = separation::<D>(mid.grains[i], mid.grains[j]);
+        let sine = self.spin(mid, stored.pair, [spins[i], spins[j]]) * span;
+        let arc = D::velocity(sine, D::velocity(sine, apart)) * (-versine_share(sine.norm()) / span);
+        let frame = D::with_tangents(direction::<D>(apart, apart.norm()), &stored.tangents);
+        let (n, t) = D::split(&frame, arc);
+        // in 2D ω is never oblique: t is round-off
+        Local { n, t: if D::N > 2 { t } else { D::Tangent::zero() }, ..Local::zero() }
+    }
+
+    /// Spin of the vector between the centres of a bonded pair (rad/s), and of its frame about it:
+    /// the spins i and j of its grains, weighted with their distances from the contact point, as in
+    /// the tangential rows of the bond.
+    pub(super) fn spin(&self, mid: &Midpoint<D>, pair: [u32; 2], [i, j]: [D::Spin; 2]) -> D::Spin {
+        let (gap, _, _) = self.geometry(mid, pair);
+        let [a, b] = pair.map(|k| self.grains.radius[k as usize] + 0.5 * gap);
+        (i * a + j * b) * (1.0 / (a + b))
     }
 }

@@ -302,8 +302,10 @@ fn units_scaled_by_powers_of_two_change_no_bit() {
     everywhere!(case);
 }
 
-/// A block of the hexagonal lattice (2D) or the cubic one (3D), bonded, that turns at ω = 1e-3 / h.
-fn turning<D: Dim + PartialEq>(kind: Kind, steps: usize) -> (f64, f64) {
+/// A block of the hexagonal lattice (2D) or the cubic one (3D), bonded, that turns at ω = 1e-3 / h:
+/// the largest change of a bond's length, that of the angular momentum, and the largest force over
+/// that which keeps a grain at a distance of 2R from the axis on its circle.
+fn turning<D: Dim + PartialEq>(kind: Kind, steps: usize) -> [f64; 3] {
     let mut grains = Vec::new();
     let (side, layers) = if D::N == 2 { (4, 1) } else { (3, 3) };
     for row in 0..side {
@@ -342,14 +344,16 @@ fn turning<D: Dim + PartialEq>(kind: Kind, steps: usize) -> (f64, f64) {
     let out = watch(&mut w, steps, 1e-6);
     assert_eq!((out.stopped, out.broken), (None, 0));
     let turned = (w.momentum().angular - before).norm() / before.norm();
-    (stretch(&w), turned)
+    let largest = w.touches().map(|t| t.reaction.n.abs().max(t.reaction.t.norm())).fold(0.0, f64::max);
+    [stretch(&w), turned, largest / (w.grains.mass[0] * spin.dot(&spin) * 2.0 * R)]
 }
 
 #[test]
 fn a_turning_lattice_keeps_its_bonds_and_its_momentum() {
     for kind in [Kind::Newton, Kind::Auto] {
-        for (stretch, turned) in [turning::<D2>(kind, 2000), turning::<D3>(kind, 500)] {
-            assert!(stretch <= 1e-6 && turned <= 1e-9, "{kind:?}: {stretch:e} {turned:e}");
+        for [stretch, turned, force] in [turning::<D2>(kind, 2000), turning::<D3>(kind, 500)] {
+            let well = stretch <= 1e-6 && turned <= 1e-9 && force <= 3.0;
+            assert!(well, "{kind:?}: {stretch:e} {turned:e} {force}");
         }
     }
 }
@@ -358,9 +362,9 @@ fn a_turning_lattice_keeps_its_bonds_and_its_momentum() {
 #[test]
 #[ignore = "long: see docs/running.md"]
 fn a_lattice_turns_for_a_million_steps() {
-    for (stretch, turned) in [turning::<D2>(Kind::Auto, 1_000_000), turning::<D3>(Kind::Auto, 100_000)] {
-        println!("stretch {stretch:.1e} of a diameter, angular momentum off by {turned:.1e}");
-        assert!(stretch <= 1e-6 && turned <= 1e-9, "{stretch:e} {turned:e}");
+    for [stretch, turned, force] in [turning::<D2>(Kind::Auto, 1_000_000), turning::<D3>(Kind::Auto, 100_000)] {
+        println!("stretch {stretch:.1e} of a diameter, angular momentum off by {turned:.1e}, force {force:.2}");
+        assert!(stretch <= 1e-6 && turned <= 1e-9 && force <= 3.0, "{stretch:e} {turned:e} {force}");
     }
 }
 
