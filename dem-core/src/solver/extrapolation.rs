@@ -169,8 +169,9 @@ impl Extrapolation {
 /// unit of mass): the reaction that closes an open contact or makes a slipping one stick. Infinite
 /// for a sticking contact.
 pub(super) fn margins(rows: &Rows, velocities: &[Padded], reactions: &[Padded]) -> Vec<f64> {
+    // a row group with a limit of zero never sticks
     let beyond = |norm: f64, weight: f64, limit: f64| match norm / weight - limit {
-        beyond if beyond > 0.0 => beyond,
+        beyond if beyond > 0.0 && limit > 0.0 => beyond,
         _ => f64::INFINITY,
     };
     let margin = |((row, u), r): ((&Row, &Padded), &Padded)| {

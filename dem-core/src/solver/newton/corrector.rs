@@ -41,9 +41,11 @@ pub(super) fn operator(row: &Row, u: &Padded, r: &Padded) -> Option<Operator> {
     }
     let q = row.form(u);
     let (w, cone) = (row.metric(), &row.cone);
-    let slip = limit_direction(q.t, w.t, cone.mu * limit);
-    let bend = limit_direction(q.m.fixed_rows::<2>(0).into(), w.m, cone.nu * limit);
-    let twists = q.m.twist() > w.w * cone.xi * limit;
+    // rows of a bond that bear nothing have no stiffness, even where q is zero
+    let free = |c: f64, place: usize| (row.is_bond && c == 0.0 && row.rows.contains(&place)).then(none_at_all);
+    let slip = free(cone.mu, 1).or_else(|| limit_direction(q.t, w.t, cone.mu * limit));
+    let bend = free(cone.nu, 3).or_else(|| limit_direction(q.m.fixed_rows::<2>(0).into(), w.m, cone.nu * limit));
+    let twists = free(cone.xi, TWIST).is_some() || q.m.twist() > w.w * cone.xi * limit;
     if slip.is_none() && bend.is_none() && !twists {
         return Some(Operator::Diagonal(Weights { n: 1.0 / w.n, t: 1.0 / w.t, m: 1.0 / w.m, w: 1.0 / w.w }));
     }
@@ -75,6 +77,11 @@ pub(super) fn operator(row: &Row, u: &Padded, r: &Padded) -> Option<Operator> {
         a += drag * SVector::<f64, PADDED>::ith(0, 1.0).transpose() / w.n;
     }
     Some(Operator::Full(Box::new(a)))
+}
+
+/// The direction and norm for a row group with a limit of zero: [`block`] adds nothing.
+fn none_at_all() -> (Vector2<f64>, f64) {
+    (Vector2::zeros(), 1.0)
 }
 
 /// Direction and norm of a row group's q if the group is at its limit.
