@@ -38,6 +38,9 @@ impl<D: Dim> World<D> {
         h: f64,
     ) -> Vec<Turn<D>> {
         let mut turns = vec![Turn::default(); self.bonds.len()];
+        if touches.iter().all(|stored| stored.bond().is_none()) {
+            return turns;
+        }
         let spins = self.spins_of_fragments(touches, motion, h);
         for stored in touches {
             if let Some(bond) = stored.bond() {
