@@ -236,10 +236,12 @@ pub trait Dim: Copy + Debug + Default + Send + Sync + 'static {
 
     /// A frame with this unit normal.
     fn frame(normal: Self::Vector) -> Self::Frame;
-    /// The frame with this unit normal that turned least from the tangents `old` turned about
-    /// `sine`, so that tangential reactions keep their meaning from step to step. The norm of
-    /// `sine` is the sine of the angle, which is at most a quarter of a turn.
-    fn transported(old: &Self::Tangents, sine: Self::Spin, normal: Self::Vector) -> Self::Frame;
+    /// The frame with this unit normal that turned least from the tangents `old`, so that
+    /// tangential reactions keep their meaning from step to step.
+    fn transported(old: &Self::Tangents, normal: Self::Vector) -> Self::Frame;
+    /// Tangents rotated about `sine`, whose norm is the sine of the angle; it counts as one where
+    /// it is larger.
+    fn rotated(tangents: &Self::Tangents, sine: Self::Spin) -> Self::Tangents;
     /// The normal of a frame.
     #[inline(always)]
     fn normal(frame: &Self::Frame) -> Self::Vector {
@@ -377,8 +379,11 @@ impl Dim for D2 {
         normal
     }
     #[inline(always)]
-    fn transported(_: &Self::Tangents, _: Self::Spin, normal: Self::Vector) -> Self::Frame {
+    fn transported(_: &Self::Tangents, normal: Self::Vector) -> Self::Frame {
         normal
+    }
+    fn rotated(_: &Self::Tangents, _: Self::Spin) -> Self::Tangents {
+        V0::zero()
     }
     #[inline(always)]
     fn tangent(n: &Self::Frame) -> Self::Vector {
@@ -454,17 +459,25 @@ where
         let t2: Self::Vector = [b, sign + n[1] * n[1] * a, -n[1]].into();
         Frame3 { n, t: [t1, t2] }
     }
-    fn transported(old: &Self::Tangents, sine: Self::Spin, n: Self::Vector) -> Self::Frame {
+    fn transported(old: &Self::Tangents, n: Self::Vector) -> Self::Frame {
         let old: Self::Vector = resized(*old);
-        let across = sine.cross(&old);
-        let turned = old + across + sine.cross(&across) * versine_share(sine.norm());
-        let flat = turned - n * n.dot(&turned);
+        let flat = old - n * n.dot(&old);
         let norm = flat.norm();
         if norm < 0.5 {
             return Self::frame(n);
         }
         let t1 = flat / norm;
         Frame3 { n, t: [t1, n.cross(&t1)] }
+    }
+    fn rotated(t: &Self::Tangents, sine: Self::Spin) -> Self::Tangents {
+        let sine = sine / sine.norm().max(1.0);
+        let share = versine_share(sine.norm());
+        let [a, b] = [0, 3].map(|k| {
+            let old: Self::Vector = [t[k], t[k + 1], t[k + 2]].into();
+            let across = sine.cross(&old);
+            old + across + sine.cross(&across) * share
+        });
+        [a[0], a[1], a[2], b[0], b[1], b[2]].into()
     }
     #[inline(always)]
     fn tangent(frame: &Self::Frame) -> Self::Vector {

@@ -336,7 +336,7 @@ fn the_books_balance_through_breaks() {
     }
 }
 
-/// Without forces, kinetic and elastic energy never grow, except by the length correction of
+/// Without forces, kinetic and elastic energy never grow, except by the correction of
 /// turning bonds. The loss of a step is the damping ½ Σ m |Δv|² + ½ Σ k (h u⁺)² + Σ r b, with the
 /// rate b of hidden lengthening before the step.
 fn never_grows<D: Dim>(periods: f64) {

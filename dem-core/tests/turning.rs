@@ -134,6 +134,7 @@ fn tetrahedron<D: Dim>(stiffness: Option<f64>, friction: f64, angle: f64) -> Wor
     set.solver = SolverSettings::Staged(newton(1e-8, 1e-5, 1e-6));
     let mut world = world(grains, vec![], set);
     world.form_bonds(1e-6, |_| 10.0 * force, friction);
+    world.limit_twist(friction);
     if let Some(k) = stiffness {
         world.make_bonds_elastic(|a| stiff(k, a));
     }
@@ -156,10 +157,10 @@ fn a_fragment_that_turns_about_an_oblique_axis_bears_the_forces_of_its_turn_only
             energies.push(world.kinetic_energy());
             forces.push(world.touches().map(|t| [t.reaction.n.abs(), t.reaction.t.norm()]).collect::<Vec<_>>());
         }
-        let least = forces[0].iter().flatten().fold(0.0f64, |most, f| most.max(*f));
+        let largest = forces[0].iter().flatten().fold(0.0f64, |most, f| most.max(*f));
         for (old, new) in forces[0].iter().zip(&forces[1]) {
             for (old, new) in old.iter().zip(new) {
-                assert!((old - new).abs() <= 2e-2 * least, "{stiffness:?}, {angle}: {forces:?}");
+                assert!((old - new).abs() <= 2e-2 * largest, "{stiffness:?}, {angle}: {forces:?}");
             }
         }
         assert!((energies[1] / energies[0] - 1.0).abs() <= 1e-6, "{stiffness:?}, {angle}: {energies:?}");
@@ -212,4 +213,26 @@ fn a_bond_keeps_its_length_while_its_grains_twist() {
     // without its first steps, in which the turn begins
     let (least, most) = lengths[5..].iter().fold((f64::MAX, 0.0f64), |(a, b), x| (a.min(*x), b.max(*x)));
     assert!(most - least <= 1e-3, "{lengths:?}");
+}
+
+/// Two spheres that spin about their bond by an angle of sine 0.1 a step: the tangents of the bond
+/// turn with them.
+#[test]
+fn the_frame_of_a_bond_twists_with_its_grains() {
+    let h = 1e-4;
+    let mut pair: Vec<_> = [-R, R].iter().map(|x| grain::<D3>(&[*x, 0.0, 0.0], R)).collect();
+    pair.iter_mut().for_each(|grain| grain.spin[0] = 0.1 / h);
+    let mut set = settings(h);
+    set.solver = SolverSettings::Staged(newton(1e-8, 1e-5, 1e-6));
+    let mut world = world(pair, vec![], set);
+    world.form_bonds(1e-6, |_| 1e9, 0.3);
+    let mut tangents = Vec::new();
+    for _ in 0..8 {
+        world.step().expect("a step");
+        let touch = world.touches().next().expect("a bond");
+        tangents.push(D3::tangent(&touch.frame));
+    }
+    let angle = 7.0 * 0.1f64.asin();
+    let (along, across) = (tangents[0].dot(&tangents[7]), tangents[0].cross(&tangents[7]));
+    assert!((along - angle.cos()).abs() <= 1e-12 && (across[0] - angle.sin()).abs() <= 1e-12, "{along}, {across:?}");
 }

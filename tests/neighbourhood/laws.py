@@ -313,7 +313,9 @@ def spins_of_fragments(h):
             for a, b in zip(i[equal], j[equal]):
                 label[a] = label[b] = min(label[a], label[b])
         for one in np.unique(label[np.concatenate([i[equal], j[equal]])]):
-            spins[s, : h.N][label == one] = h.body_w[s, : h.N][label == one].mean(0)
+            mean = h.body_w[s, : h.N][label == one].mean(0)
+            near = (label == one) & (norm(h.body_w[s, : h.N] - mean) * h.h <= 1e-6)
+            spins[s, : h.N][near] = mean
     return spins
 
 
@@ -433,6 +435,7 @@ def check_frames(h, c, p, report, rows):
         return
     s, i, j = h.row_step, h.i, h.j
     sine = h.h * spin_of_bond(c, h.body_w[s, i], h.body_w[s, j])[rows]
+    sine = sine / np.maximum(norm(sine), 1.0)[:, None]
     old = h.tangents[last[rows], 0]
     across = np.cross(sine, old)
     share = 1 / (1 + np.sqrt(np.maximum(1 - norm(sine) ** 2, 0)))

@@ -142,9 +142,12 @@ impl<D: Dim> World<D> {
                 let frame = same.map_or_else(
                     || D::frame(normal),
                     |o| {
+                        if o.bond().is_none() {
+                            return D::transported(&o.tangents, normal);
+                        }
                         let spins = touch.pair.map(|k| motion.before[k as usize].1);
-                        let spin = o.bond().map_or(D::Spin::zero(), |_| self.spin(mid, touch.pair, spins));
-                        D::transported(&o.tangents, spin * span, normal)
+                        let turn = self.spin(mid, touch.pair, spins) * span;
+                        D::transported(&D::rotated(&o.tangents, turn), normal)
                     },
                 );
                 touch.tangents = D::tangents(&frame);

@@ -115,7 +115,7 @@ pub struct World<D: Dim> {
     mid: Midpoint<D>,
     /// Length of the last accepted step, or of the last part of it (s); zero before the first.
     last_part: f64,
-    /// Length corrections of the bonds in it, by bond index; empty before the first.
+    /// Corrections of the bonds in it, by bond index; empty before the first.
     turns: Vec<Turn<D>>,
     /// The wall that holds each grain; empty if no wall holds one.
     held: Vec<Option<u32>>,

@@ -54,6 +54,9 @@ impl<D: Dim> World<D> {
     /// mean over the fragment.
     fn spins_of_fragments(&self, touches: &[StoredTouch<D>], motion: &Motion<D>, h: f64) -> Vec<D::Spin> {
         let mut spins: Vec<D::Spin> = motion.before.iter().map(|(_, spin)| *spin).collect();
+        if self.bonds.iter().all(|bond| bond.stiffness.is_some()) {
+            return spins;
+        }
         let mut fragments = UnionFind::<usize>::new(self.grains.len());
         for stored in touches {
             let rigid = stored.bond().is_some_and(|bond| self.bonds[bond as usize].stiffness.is_none());
@@ -70,7 +73,11 @@ impl<D: Dim> World<D> {
         }
         for (spin, fragment) in spins.iter_mut().zip(&fragments) {
             let (sum, count) = sums[*fragment];
-            *spin = sum * (1.0 / count);
+            let mean = sum * (1.0 / count);
+            // in a chain small differences may add up
+            if (*spin - mean).norm() * h <= EQUAL {
+                *spin = mean;
+            }
         }
         spins
     }
@@ -113,9 +120,13 @@ impl<D: Dim> World<D> {
         if last != h {
             let span = self.between_midpoints(h);
             // for a rigid bond the velocity required by its law: solver errors of different bonds
-            // are incompatible
+            // are incompatible; along the tangents that of a steady turn
             let velocity = if elastic {
-                Local { n: self.lengthening(mid, motion, stored.pair, span).1, ..Local::zero() }
+                Local {
+                    n: self.lengthening(mid, motion, stored.pair, span).1,
+                    t: before.bias.t * -1.0,
+                    ..Local::zero()
+                }
             } else {
                 before.bias * -1.0
             };
