@@ -337,8 +337,8 @@ impl<D: Dim> World<D> {
             let start = touch.reaction * h;
             let kind = self.kind(stored);
             let bias = match touch.bond {
-                Some(bond) => Some(brought.turns[bond as usize].bias),
-                None => self.bias(touch, stored, motion, h).map(|n| Local { n, ..Local::zero() }),
+                Some(_) => Some(0.0),
+                None => self.bias(touch, stored, motion, h),
             };
             // without a bias the contact cannot act in this step
             let Some(bias) = bias else { continue };
@@ -346,6 +346,7 @@ impl<D: Dim> World<D> {
                 Kind::Bonded | Kind::Elastic => {
                     let Some(number) = touch.bond.map(|bond| bond as usize) else { continue };
                     let bond = &self.bonds[number];
+                    let bias = brought.turns[number].bias;
                     let arm = bond.mean_diameter;
                     let arms = Arms { lever, bending: arm };
                     let (block, r) = (problem.nodes.block(&link, arms), over_arm(start, arm));
@@ -366,7 +367,7 @@ impl<D: Dim> World<D> {
                     let t = of_frame::<D, _>(&link.axes, start.t);
                     problem.dry.push(Contact {
                         link: Link::new(link.nodes, link.axes),
-                        law: Coulomb::new(block, lever, self.friction_of(touch.pair), bias.n),
+                        law: Coulomb::new(block, lever, self.friction_of(touch.pair), bias),
                         r: Local { n: start.n, t, ..Local::zero() },
                     });
                 }
@@ -374,7 +375,7 @@ impl<D: Dim> World<D> {
                     let block = problem.nodes.block(&link, Arms { lever, bending: 0.0 });
                     problem.frictionless.push(Contact {
                         link: Link::new(link.nodes, link.axes),
-                        law: Frictionless::new(block, bias.n),
+                        law: Frictionless::new(block, bias),
                         r: Local { n: start.n, ..Local::zero() },
                     });
                 }

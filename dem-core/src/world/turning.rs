@@ -38,7 +38,7 @@ impl<D: Dim> World<D> {
         h: f64,
     ) -> Vec<Turn<D>> {
         let mut turns = vec![Turn::default(); self.bonds.len()];
-        if touches.iter().all(|stored| stored.bond().is_none()) {
+        if self.bonds.is_empty() || touches.iter().all(|stored| stored.bond().is_none()) {
             return turns;
         }
         let spins = self.spins_of_fragments(touches, motion, h);
