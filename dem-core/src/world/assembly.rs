@@ -346,7 +346,9 @@ impl<D: Dim> World<D> {
                 Kind::Bonded | Kind::Elastic => {
                     let Some(number) = touch.bond.map(|bond| bond as usize) else { continue };
                     let bond = &self.bonds[number];
-                    let bias = brought.turns[number].bias;
+                    let (bias_n, bias_t) = D::split(&touch.frame, brought.turns[number].bias);
+                    // in 2D no turn is oblique to the bond: what is there is round-off
+                    let bias_t = if D::N > 2 { bias_t } else { D::Tangent::zero() };
                     let arm = bond.mean_diameter;
                     let arms = Arms { lever, bending: arm };
                     let (block, r) = (problem.nodes.block(&link, arms), over_arm(start, arm));
@@ -355,10 +357,10 @@ impl<D: Dim> World<D> {
                     if let Some(compliance) = bond.compliance(h) {
                         let carried = over_arm(brought.carried[number] * h, arm);
                         let law =
-                            Elastic::new(block, compliance, carried, arms, shift, cone, flow).with_bias(bias.n, bias.t);
+                            Elastic::new(block, compliance, carried, arms, shift, cone, flow).with_bias(bias_n, bias_t);
                         problem.elastic.push(Contact { link, law, r });
                     } else {
-                        let law = Bonded::new(block, arms, shift, cone, flow).with_bias(bias.n, bias.t);
+                        let law = Bonded::new(block, arms, shift, cone, flow).with_bias(bias_n, bias_t);
                         problem.bonded.push(Contact { link, law, r });
                     }
                 }

@@ -1,8 +1,7 @@
 //! Positions and velocities of the bodies in a step before its contacts are known.
 
 use crate::body::{Grains, Wall};
-use crate::contact::Local;
-use crate::dim::{Dim, V0};
+use crate::dim::{Dim, Vect};
 use std::sync::Arc;
 
 /// Positions at mid-step (m), at which contacts are detected.
@@ -30,18 +29,18 @@ pub(super) struct Motion<D: Dim> {
     pub free: Arc<[(D::Vector, D::Spin)]>,
 }
 
-/// Correction of a turning bond in a step, in its frame.
+/// Correction of a turning bond in a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Turn<D: Dim> {
     /// Velocity that the law of the bond adds to its relative velocity (m/s).
-    pub bias: Local<D::Tangent, V0>,
+    pub bias: D::Vector,
     /// Displacement of the bond at mid-step beyond that known to its law, less the hidden one of
     /// steps of this length (m): zero if all steps had one length.
-    pub owed: Local<D::Tangent, V0>,
+    pub owed: D::Vector,
 }
 
 impl<D: Dim> Default for Turn<D> {
     fn default() -> Self {
-        Self { bias: Local::zero(), owed: Local::zero() }
+        Self { bias: D::Vector::zero(), owed: D::Vector::zero() }
     }
 }

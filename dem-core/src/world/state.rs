@@ -88,10 +88,7 @@ impl<D: Dim> World<D> {
         to.vectors(&self.mid.walls);
         to.real(self.last_part);
         to.count(self.turns.len());
-        for part in self.turns.iter().flat_map(|turn| [turn.bias, turn.owed]) {
-            to.real(part.n);
-            to.vectors(&[part.t]);
-        }
+        self.turns.iter().for_each(|turn| to.vectors(&[turn.bias, turn.owed]));
         to.count(self.stored.len());
         self.stored.iter().for_each(|stored| save_touch(stored, to));
         let l = &self.ledger;
@@ -144,10 +141,7 @@ impl<D: Dim> World<D> {
         world.mid = Midpoint { grains: from.vectors(n)?, walls: from.vectors(bodies - n)? };
         world.last_part = from.real()?;
         world.turns = (0..from.number_of()?)
-            .map(|_| {
-                let mut part = || Ok(Local { n: from.real()?, t: from.vector()?, ..Local::zero() });
-                Ok(Turn { bias: part()?, owed: part()? })
-            })
+            .map(|_| Ok(Turn { bias: from.vector()?, owed: from.vector()? }))
             .collect::<Result<_, _>>()?;
         world.stored = (0..from.number_of()?).map(|_| restored_touch(bodies, bonds, from)).collect::<Result<_, _>>()?;
         let mut next = || from.real();

@@ -12,8 +12,7 @@ use super::World;
 use super::motion::{Midpoint, Motion, Turn};
 use super::touch::StoredTouch;
 use crate::body::{direction, separation};
-use crate::contact::Local;
-use crate::dim::{Dim, V0, Vect, versine_share};
+use crate::dim::{Dim, Vect, versine_share};
 use petgraph::unionfind::UnionFind;
 
 /// Angle (rad) in a step by which the spins of two grains of a rigid bond differ at most if they
@@ -104,36 +103,47 @@ impl<D: Dim> World<D> {
         }
         // rigid bonds respond to any misfit with forces, even to round-off
         let rounding = if elastic { 0.0 } else { f64::EPSILON * bond.mean_diameter };
-        let below = |x: &Local<D::Tangent, V0>| x.dot(x) <= rounding * rounding;
+        let below = |x: &D::Vector| x.dot(x) <= rounding * rounding;
+        let apart = separation::<D>(mid.grains[i], mid.grains[j]);
+        let normal = direction::<D>(apart, apart.norm());
+        let spin = self.spin(mid, stored.pair, [spins[i], spins[j]]);
         let hidden = |span: f64| {
-            let mut rate = if sheared { self.arc(mid, spins, stored, span) } else { Local::zero() };
+            let mut rate = if sheared { arc::<D>(apart, spin, span) } else { D::Vector::zero() };
             if !(sheared && in_a_fragment) {
-                rate.n = self.lengthening(mid, motion, stored.pair, span).0;
+                let along = self.lengthening(mid, motion, stored.pair, span).0;
+                rate += normal * (along - rate.dot(&normal));
             }
-            if below(&(rate * span)) { Local::zero() } else { rate }
+            if below(&(rate * span)) { D::Vector::zero() } else { rate }
         };
         let before = self.turns.get(number).copied().unwrap_or_default();
         let last = if self.last_part > 0.0 { self.last_part } else { h };
-        let full = self.settings.step;
-        let mut owed = before.owed * (1.0 - last / full);
+        let (full, span) = (self.settings.step, self.between_midpoints(h));
+        // of the last mid-step at this one: in a fragment by its rotation, so that it remains one
+        // velocity field
+        let brought = |old: D::Vector| {
+            let new = rotated::<D>(old, spin * span);
+            if in_a_fragment {
+                return new;
+            }
+            let earlier = apart - (motion.before[i].0 - motion.before[j].0) * span;
+            let along = old.dot(&direction::<D>(earlier, earlier.norm()));
+            let across = if sheared { new - normal * new.dot(&normal) } else { D::Vector::zero() };
+            across + normal * along
+        };
+        let mut owed = if below(&before.owed) { D::Vector::zero() } else { brought(before.owed) * (1.0 - last / full) };
         let own = hidden(h);
         if last != h {
-            let span = self.between_midpoints(h);
             // for a rigid bond the velocity required by its law: solver errors of different bonds
             // are incompatible; along the tangents that of a steady turn
-            let velocity = if elastic {
-                Local {
-                    n: self.lengthening(mid, motion, stored.pair, span).1,
-                    t: before.bias.t * -1.0,
-                    ..Local::zero()
-                }
-            } else {
-                before.bias * -1.0
-            };
+            let mut velocity = brought(before.bias) * -1.0;
+            if elastic {
+                let along = self.lengthening(mid, motion, stored.pair, span).1;
+                velocity += normal * (along - velocity.dot(&normal));
+            }
             owed = owed + velocity * (span - last) + hidden(span) * span - own * h;
         }
         if below(&owed) {
-            owed = Local::zero();
+            owed = D::Vector::zero();
         }
         Turn { bias: own + owed * (1.0 / full), owed }
     }
@@ -158,7 +168,7 @@ impl<D: Dim> World<D> {
     /// normal at the first and d_t across it. The distance ℓ grows by d_n and, because the bond
     /// turned, by ℓ' − ℓ − d_n = d_t² / (ℓ' + ℓ + d_n). The law knows normal velocities only, so
     /// the second part is hidden from it. In a steady turn it equals the normal part of
-    /// [`World::arc`]. See docs/theory/elastic-bonds.md.
+    /// [`arc`]. See docs/theory/elastic-bonds.md.
     fn lengthening(&self, mid: &Midpoint<D>, motion: &Motion<D>, pair: [u32; 2], span: f64) -> (f64, f64) {
         let [i, j] = pair.map(|k| k as usize);
         let apart = separation::<D>(mid.grains[i], mid.grains[j]);
@@ -173,26 +183,6 @@ impl<D: Dim> World<D> {
         (hidden, along / span)
     }
 
-    /// Rate of hidden displacement of a bond with friction in the time `span` (s) between the last
-    /// two mid-steps, in its frame (m/s).
-    ///
-    /// The rows of its law ask for the velocity ω × x along the tangent, where x is the vector
-    /// between the centres. A rotation R by φ = arcsin(w ‖ω‖) about ω displaces x by
-    /// (R − 1) x = w ω × x − (1 − cos φ) x⊥, with the part x⊥ across ω. The law takes the last term
-    /// from u. It has a tangential part where ω is oblique to x. In a fragment it is the difference
-    /// of one velocity field at both grains, so the corrections of all its bonds are compatible.
-    /// See docs/theory/time-stepping.md.
-    fn arc(&self, mid: &Midpoint<D>, spins: &[D::Spin], stored: &StoredTouch<D>, span: f64) -> Local<D::Tangent, V0> {
-        let [i, j] = stored.pair.map(|k| k as usize);
-        let apart = separation::<D>(mid.grains[i], mid.grains[j]);
-        let sine = self.spin(mid, stored.pair, [spins[i], spins[j]]) * span;
-        let arc = D::velocity(sine, D::velocity(sine, apart)) * (-versine_share(sine.norm()) / span);
-        let frame = D::with_tangents(direction::<D>(apart, apart.norm()), &stored.tangents);
-        let (n, t) = D::split(&frame, arc);
-        // in 2D ω is never oblique: t is round-off
-        Local { n, t: if D::N > 2 { t } else { D::Tangent::zero() }, ..Local::zero() }
-    }
-
     /// Spin of the vector between the centres of a bonded pair (rad/s), and of its frame about it:
     /// the spins i and j of its grains, weighted with their distances from the contact point, as in
     /// the tangential rows of the bond.
@@ -201,4 +191,24 @@ impl<D: Dim> World<D> {
         let [a, b] = pair.map(|k| self.grains.radius[k as usize] + 0.5 * gap);
         (i * a + j * b) * (1.0 / (a + b))
     }
+}
+
+/// Rate of hidden displacement (m/s) of a bond with friction in the time `span` (s) between the
+/// last two mid-steps, with the vector `apart` between its centres (m) and the `spin` of this
+/// vector.
+///
+/// The rows of its law ask for the velocity ω × x along the tangent, where x is the vector between
+/// the centres. A rotation R by φ = arcsin(w ‖ω‖) about ω displaces x by (R − 1) x = w ω × x − (1 −
+/// cos φ) x⊥, with the part x⊥ across ω. The law takes the last term from u. It has a tangential
+/// part where ω is oblique to x. In a fragment it is the difference of one velocity field at both
+/// grains, so the corrections of all its bonds are compatible. See docs/theory/time-stepping.md.
+fn arc<D: Dim>(apart: D::Vector, spin: D::Spin, span: f64) -> D::Vector {
+    let sine = spin * span;
+    D::velocity(sine, D::velocity(sine, apart)) * (-versine_share(sine.norm()) / span)
+}
+
+/// The vector rotated about `sine`, whose norm is the sine of the angle.
+fn rotated<D: Dim>(x: D::Vector, sine: D::Spin) -> D::Vector {
+    let across = D::velocity(sine, x);
+    x + across + D::velocity(sine, across) * versine_share(sine.norm())
 }
