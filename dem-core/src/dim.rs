@@ -195,10 +195,17 @@ pub(crate) fn of_frame<D: Dim, T: Vect>(frame: &D::Frame, rows: D::Tangent) -> T
     if is_vector::<D, T>() { resized(D::compose(frame, 0.0, rows)) } else { resized(rows) }
 }
 
-/// (1 − cos φ) / sin² φ for s = sin φ. The rotation about a vector s of norm sin φ turns x by
-/// s × x + (1 − cos φ) / sin² φ s × (s × x).
+/// (1 − cos φ) / sin² φ for s = sin φ.
 pub fn versine_share(s: f64) -> f64 {
     1.0 / (1.0 + (1.0 - s * s).max(0.0).sqrt())
+}
+
+/// The vector x rotated about s = `sine`, whose norm is the sine of the angle φ; it counts as one
+/// where it is larger: x + s × x + (1 − cos φ) / sin² φ s × (s × x).
+pub(crate) fn rotated<D: Dim>(x: D::Vector, sine: D::Spin) -> D::Vector {
+    let sine = sine * (1.0 / sine.norm().max(1.0));
+    let across = D::velocity(sine, x);
+    x + across + D::velocity(sine, across) * versine_share(sine.norm())
 }
 
 /// The axes that the rows of a contact need: the whole frame, or in 3D the normal alone if there is
@@ -236,12 +243,9 @@ pub trait Dim: Copy + Debug + Default + Send + Sync + 'static {
 
     /// A frame with this unit normal.
     fn frame(normal: Self::Vector) -> Self::Frame;
-    /// The frame with this unit normal that turned least from the tangents `old`, so that
-    /// tangential reactions keep their meaning from step to step.
-    fn transported(old: &Self::Tangents, normal: Self::Vector) -> Self::Frame;
-    /// Tangents rotated about `sine`, whose norm is the sine of the angle; it counts as one where
-    /// it is larger.
-    fn rotated(tangents: &Self::Tangents, sine: Self::Spin) -> Self::Tangents;
+    /// The frame with this unit normal that turned least from one with the first tangent `old`, so
+    /// that tangential reactions keep their meaning from step to step.
+    fn transported(old: Self::Vector, normal: Self::Vector) -> Self::Frame;
     /// The normal of a frame.
     #[inline(always)]
     fn normal(frame: &Self::Frame) -> Self::Vector {
@@ -379,11 +383,8 @@ impl Dim for D2 {
         normal
     }
     #[inline(always)]
-    fn transported(_: &Self::Tangents, normal: Self::Vector) -> Self::Frame {
+    fn transported(_: Self::Vector, normal: Self::Vector) -> Self::Frame {
         normal
-    }
-    fn rotated(_: &Self::Tangents, _: Self::Spin) -> Self::Tangents {
-        V0::zero()
     }
     #[inline(always)]
     fn tangent(n: &Self::Frame) -> Self::Vector {
@@ -459,8 +460,7 @@ where
         let t2: Self::Vector = [b, sign + n[1] * n[1] * a, -n[1]].into();
         Frame3 { n, t: [t1, t2] }
     }
-    fn transported(old: &Self::Tangents, n: Self::Vector) -> Self::Frame {
-        let old: Self::Vector = resized(*old);
+    fn transported(old: Self::Vector, n: Self::Vector) -> Self::Frame {
         let flat = old - n * n.dot(&old);
         let norm = flat.norm();
         if norm < 0.5 {
@@ -468,16 +468,6 @@ where
         }
         let t1 = flat / norm;
         Frame3 { n, t: [t1, n.cross(&t1)] }
-    }
-    fn rotated(t: &Self::Tangents, sine: Self::Spin) -> Self::Tangents {
-        let sine = sine / sine.norm().max(1.0);
-        let share = versine_share(sine.norm());
-        let [a, b] = [0, 3].map(|k| {
-            let old: Self::Vector = [t[k], t[k + 1], t[k + 2]].into();
-            let across = sine.cross(&old);
-            old + across + sine.cross(&across) * share
-        });
-        [a[0], a[1], a[2], b[0], b[1], b[2]].into()
     }
     #[inline(always)]
     fn tangent(frame: &Self::Frame) -> Self::Vector {

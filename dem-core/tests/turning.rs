@@ -228,19 +228,26 @@ fn bonds_without_friction_are_solved_from_the_last_active_set() {
     }
 }
 
-/// Two spheres that twist by 0.6 and 0.2 rad a step about their bond, which turns by 0.05 rad.
-#[test]
-fn a_bond_keeps_its_length_while_its_grains_twist() {
+/// Two bonded spheres that spin about their bond, each by its `twist` (rad) a step, while the bond
+/// turns by `turn` (rad).
+fn twisting(twists: [f64; 2], turn: f64) -> World<D3> {
     let h = 1e-4;
     let mut pair: Vec<_> = [-R, R].iter().map(|x| grain::<D3>(&[*x, 0.0, 0.0], R)).collect();
-    for (grain, (side, twist)) in pair.iter_mut().zip([(-1.0, 0.6), (1.0, 0.2)]) {
-        grain.velocity[1] = side * 0.05 / h * R;
-        (grain.spin[0], grain.spin[2]) = (twist / h, 0.05 / h);
+    for (grain, (side, twist)) in pair.iter_mut().zip([-1.0, 1.0].into_iter().zip(twists)) {
+        grain.velocity[1] = side * turn / h * R;
+        (grain.spin[0], grain.spin[2]) = (twist / h, turn / h);
     }
     let mut set = settings(h);
     set.solver = SolverSettings::Staged(newton(1e-8, 1e-5, 1e-6));
     let mut world = world(pair, vec![], set);
     world.form_bonds(1e-6, |_| 1e9, 0.3);
+    world
+}
+
+/// Two spheres that twist by 0.6 and 0.2 rad a step about their bond, which turns by 0.05 rad.
+#[test]
+fn a_bond_keeps_its_length_while_its_grains_twist() {
+    let mut world = twisting([0.6, 0.2], 0.05);
     let mut lengths = Vec::new();
     for _ in 0..60 {
         world.step().expect("a step");
@@ -255,13 +262,7 @@ fn a_bond_keeps_its_length_while_its_grains_twist() {
 /// turn with them.
 #[test]
 fn the_frame_of_a_bond_twists_with_its_grains() {
-    let h = 1e-4;
-    let mut pair: Vec<_> = [-R, R].iter().map(|x| grain::<D3>(&[*x, 0.0, 0.0], R)).collect();
-    pair.iter_mut().for_each(|grain| grain.spin[0] = 0.1 / h);
-    let mut set = settings(h);
-    set.solver = SolverSettings::Staged(newton(1e-8, 1e-5, 1e-6));
-    let mut world = world(pair, vec![], set);
-    world.form_bonds(1e-6, |_| 1e9, 0.3);
+    let mut world = twisting([0.1, 0.1], 0.0);
     let mut tangents = Vec::new();
     for _ in 0..8 {
         world.step().expect("a step");

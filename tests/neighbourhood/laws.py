@@ -290,12 +290,16 @@ def arc(h, c, spins):
     over the step, with sin φ = h‖ω‖: along the normal [M] and the tangents [M,D−1] (m/s)."""
     s, i, j = h.row_step, h.i, h.j
     sine = h.h * spin_of_bond(c, spins[s, i], spins[s, j])
-    share = 1 / (1 + np.sqrt(np.maximum(1 - norm(sine) ** 2, 0)))
     x = c.n * (c.lever_i + c.lever_j)[:, None]
     if h.D == 2:
-        return share * sine[:, 0] ** 2 * (c.lever_i + c.lever_j) / h.h, np.zeros((h.M, 1))
-    out = -np.cross(sine, np.cross(sine, x)) * share[:, None] / h.h
+        return versine_share(sine) * sine[:, 0] ** 2 * (c.lever_i + c.lever_j) / h.h, np.zeros((h.M, 1))
+    out = -np.cross(sine, np.cross(sine, x)) * versine_share(sine)[:, None] / h.h
     return (out * c.n).sum(1), np.einsum("md,mkd->mk", out, h.tangents)
+
+
+def versine_share(sine):
+    """(1 − cos φ)/sin² φ of rotations about `sine`, whose norm is sin φ."""
+    return 1 / (1 + np.sqrt(np.maximum(1 - norm(sine) ** 2, 0)))
 
 
 def spins_of_fragments(h):
@@ -438,8 +442,7 @@ def check_frames(h, c, p, report, rows):
     sine = sine / np.maximum(norm(sine), 1.0)[:, None]
     old = h.tangents[last[rows], 0]
     across = np.cross(sine, old)
-    share = 1 / (1 + np.sqrt(np.maximum(1 - norm(sine) ** 2, 0)))
-    turned = old + across + np.cross(sine, across) * share[:, None]
+    turned = old + across + np.cross(sine, across) * versine_share(sine)[:, None]
     flat = turned - c.n[rows] * (c.n[rows] * turned).sum(1)[:, None]
     size = norm(flat)
     off = np.where(size > 0.5, norm(h.tangents[rows, 0] - flat / size[:, None]), 0.0)

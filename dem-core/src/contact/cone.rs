@@ -209,3 +209,33 @@ fn root(w: f64, q: f64, t: RowGroup, m: RowGroup) -> f64 {
     let [bends, both] = [(m.pull - q) / (w + m.stiff), (t.pull + m.pull - q) / (w + t.stiff + m.stiff)];
     none.max(slips).max(bends).max(both)
 }
+
+/// Predictor and corrector on the cone, as the change of the reaction: P_K(r̂ − γ ũ) − r̂.
+///
+/// A predictor inside the cone is its own projection; the change −γ ũ is then exact, however large
+/// the shift s is beside r.
+#[inline]
+pub(crate) fn predict_correct<T: Vect, B: Moments>(
+    cone: Cone,
+    shift: f64,
+    non_associated: bool,
+    gamma: f64,
+    r: Local<T, B>,
+    mut u: Local<T, B>,
+) -> Local<T, B> {
+    if non_associated {
+        u.n += cone.mu * u.t.norm() + cone.nu * u.m.bending();
+        if B::TWISTS {
+            u.n += cone.xi * u.m.twist();
+        }
+    }
+    let change = u * -gamma;
+    let mut predictor = r + change;
+    predictor.n += shift;
+    if cone.contains(&predictor) {
+        return change;
+    }
+    let mut corrected = cone.project(predictor);
+    corrected.n -= shift;
+    corrected - r
+}

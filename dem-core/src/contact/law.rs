@@ -14,7 +14,7 @@
 //! associated; see docs/theory/contact-law.md. The *exact local solve* returns the r that satisfies
 //! the law of this contact. Both have the same fixed points.
 
-use super::cone::{Cone, Local, Weights};
+use super::cone::{Cone, Local, Weights, predict_correct};
 use crate::dim::{Axes, Dim, Moments, V0, V1, Vect, resized};
 use std::marker::PhantomData;
 
@@ -128,36 +128,6 @@ pub trait Law: Copy + Send + Sync + 'static {
     fn carried(&self) -> Local<Self::T, Self::B> {
         Local::zero()
     }
-}
-
-/// Predictor and corrector on the cone, as the change of the reaction: P_K(r̂ − γ ũ) − r̂.
-///
-/// A predictor inside the cone is its own projection; the change −γ ũ is then exact, however large
-/// the shift s is beside r.
-#[inline]
-pub(crate) fn predict_correct<T: Vect, B: Moments>(
-    cone: Cone,
-    shift: f64,
-    non_associated: bool,
-    gamma: f64,
-    r: Local<T, B>,
-    mut u: Local<T, B>,
-) -> Local<T, B> {
-    if non_associated {
-        u.n += cone.mu * u.t.norm() + cone.nu * u.m.bending();
-        if B::TWISTS {
-            u.n += cone.xi * u.m.twist();
-        }
-    }
-    let change = u * -gamma;
-    let mut predictor = r + change;
-    predictor.n += shift;
-    if cone.contains(&predictor) {
-        return change;
-    }
-    let mut corrected = cone.project(predictor);
-    corrected.n -= shift;
-    corrected - r
 }
 
 /// Signorini's law without friction: one row.

@@ -13,7 +13,7 @@
 pub use super::block_matrix::{Asymmetry, BlockMatrix};
 use super::residual::relative;
 use super::{Contact, ContactProblem, Link, Nodes, Visitor};
-use crate::contact::law::predict_correct;
+use crate::contact::cone::predict_correct;
 use crate::contact::{Arms, Cone, Law, Local, PADDED, Padded, Weights};
 use crate::dim::{Dim, Vect, tangential_rows};
 use thiserror::Error;

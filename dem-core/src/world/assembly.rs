@@ -7,7 +7,7 @@ use super::{MaterialFriction, World};
 use crate::body::{Grains, Wall, direction, separation};
 use crate::bond::{Bond, BondStatus};
 use crate::contact::{Arms, Bonded, Coulomb, Elastic, Frictionless, Law, Local};
-use crate::dim::{Axes, Dim, Moments, Vect, in_frame, of_frame, resized};
+use crate::dim::{Axes, Dim, Moments, Vect, in_frame, of_frame, resized, rotated};
 use crate::problem::{Contact, ContactProblem, KINDS, Kind, Link, Node, Nodes, Visitor, blocks};
 
 /// Gap, over the smaller radius of a pair, up to which a contact touches; also the displacement in
@@ -126,7 +126,7 @@ impl<D: Dim> World<D> {
     /// Copy the reactions of the last step; the frame of each contact turns with its normal, that
     /// of a bond also about it, with its grains.
     fn recall(&self, mid: &Midpoint<D>, touches: &mut [StoredTouch<D>], motion: &Motion<D>, h: f64) {
-        let span = self.between_midpoints(h);
+        let span = 0.5 * (self.last_step(h) + h);
         let mut old = self.stored.iter().peekable();
         for touch in touches {
             while old.next_if(|o| o.pair < touch.pair).is_some() {}
@@ -138,16 +138,16 @@ impl<D: Dim> World<D> {
             // a bond that formed since then takes over the reaction of the dry contact
             let same = last.filter(|o| o.bond() == touch.bond() || o.bond().is_none());
             if D::Tangents::LEN > 0 {
-                let (_, normal, _) = self.geometry(mid, touch.pair);
+                let (gap, normal, _) = self.geometry(mid, touch.pair);
                 let frame = same.map_or_else(
                     || D::frame(normal),
                     |o| {
-                        if o.bond().is_none() {
-                            return D::transported(&o.tangents, normal);
+                        let mut tangent = D::tangent(&D::with_tangents(normal, &o.tangents));
+                        if o.bond().is_some() {
+                            let spins = touch.pair.map(|k| motion.before[k as usize].1);
+                            tangent = rotated::<D>(tangent, self.spin(touch.pair, gap, spins) * span);
                         }
-                        let spins = touch.pair.map(|k| motion.before[k as usize].1);
-                        let turn = self.spin(mid, touch.pair, spins) * span;
-                        D::transported(&D::rotated(&o.tangents, turn), normal)
+                        D::transported(tangent, normal)
                     },
                 );
                 touch.tangents = D::tangents(&frame);

@@ -12,7 +12,7 @@ use super::World;
 use super::motion::{Midpoint, Motion, Turn};
 use super::touch::StoredTouch;
 use crate::body::{direction, separation};
-use crate::dim::{Dim, Vect, versine_share};
+use crate::dim::{Dim, Vect, rotated, versine_share};
 use petgraph::unionfind::UnionFind;
 
 /// Angle (rad) in a step by which the spins of two grains of a rigid bond differ at most if they
@@ -22,10 +22,9 @@ use petgraph::unionfind::UnionFind;
 const EQUAL: f64 = 1e-6;
 
 impl<D: Dim> World<D> {
-    /// Time between the mid-steps of the last step and of one of length `h` (s).
-    pub(super) fn between_midpoints(&self, h: f64) -> f64 {
-        let last = if self.last_part > 0.0 { self.last_part } else { h };
-        0.5 * (last + h)
+    /// Length of the step, or the part of a step, before one of length `h` (s); `h` for the first.
+    pub(super) fn last_step(&self, h: f64) -> f64 {
+        if self.last_part > 0.0 { self.last_part } else { h }
     }
 
     /// Corrections of all bonds in a step of length `h`, by bond index.
@@ -96,28 +95,30 @@ impl<D: Dim> World<D> {
         let sheared = bond.shear > 0.0;
         let [i, j] = stored.pair.map(|k| k as usize);
         let in_a_fragment = !elastic && spins[i] == spins[j];
+        let (gap, normal, _) = self.geometry(mid, stored.pair);
+        let apart = separation::<D>(mid.grains[i], mid.grains[j]);
+        let velocity = motion.before[i].0 - motion.before[j].0;
+        let spin = self.spin(stored.pair, gap, [spins[i], spins[j]]);
         // the velocities before a bond formed need not satisfy its constraint
-        let constrained = stored.was_bonded || in_a_fragment && sheared && self.moves_rigidly(mid, motion, stored, h);
+        let constrained =
+            stored.was_bonded || in_a_fragment && sheared && moves_rigidly::<D>(apart, velocity * h, spin * h);
         if !elastic && !constrained {
             return Turn::default();
         }
         // rigid bonds respond to any misfit with forces, even to round-off
         let rounding = if elastic { 0.0 } else { f64::EPSILON * bond.mean_diameter };
         let below = |x: &D::Vector| x.dot(x) <= rounding * rounding;
-        let apart = separation::<D>(mid.grains[i], mid.grains[j]);
-        let normal = direction::<D>(apart, apart.norm());
-        let spin = self.spin(mid, stored.pair, [spins[i], spins[j]]);
         let hidden = |span: f64| {
             let mut rate = if sheared { arc::<D>(apart, spin, span) } else { D::Vector::zero() };
             if !(sheared && in_a_fragment) {
-                let along = self.lengthening(mid, motion, stored.pair, span).0;
+                let along = lengthening::<D>(apart, velocity * span, span).0;
                 rate += normal * (along - rate.dot(&normal));
             }
             if below(&(rate * span)) { D::Vector::zero() } else { rate }
         };
         let before = self.turns.get(number).copied().unwrap_or_default();
-        let last = if self.last_part > 0.0 { self.last_part } else { h };
-        let (full, span) = (self.settings.step, self.between_midpoints(h));
+        let (full, last) = (self.settings.step, self.last_step(h));
+        let span = 0.5 * (last + h);
         // of the last mid-step at this one: in a fragment by its rotation, so that it remains one
         // velocity field
         let brought = |old: D::Vector| {
@@ -125,7 +126,7 @@ impl<D: Dim> World<D> {
             if in_a_fragment {
                 return new;
             }
-            let earlier = apart - (motion.before[i].0 - motion.before[j].0) * span;
+            let earlier = apart - velocity * span;
             let along = old.dot(&direction::<D>(earlier, earlier.norm()));
             let across = if sheared { new - normal * new.dot(&normal) } else { D::Vector::zero() };
             across + normal * along
@@ -135,12 +136,12 @@ impl<D: Dim> World<D> {
         if last != h {
             // for a rigid bond the velocity required by its law: solver errors of different bonds
             // are incompatible; along the tangents that of a steady turn
-            let mut velocity = brought(before.bias) * -1.0;
+            let mut moves = brought(before.bias) * -1.0;
             if elastic {
-                let along = self.lengthening(mid, motion, stored.pair, span).1;
-                velocity += normal * (along - velocity.dot(&normal));
+                let along = lengthening::<D>(apart, velocity * span, span).1;
+                moves += normal * (along - moves.dot(&normal));
             }
-            owed = owed + velocity * (span - last) + hidden(span) * span - own * h;
+            owed = owed + moves * (span - last) + hidden(span) * span - own * h;
         }
         if below(&owed) {
             owed = D::Vector::zero();
@@ -148,49 +149,42 @@ impl<D: Dim> World<D> {
         Turn { bias: own + owed * (1.0 / full), owed }
     }
 
-    /// Whether the grains of this bond begin the step of length `h` with the velocities of a rigid
-    /// body.
-    fn moves_rigidly(&self, mid: &Midpoint<D>, motion: &Motion<D>, stored: &StoredTouch<D>, h: f64) -> bool {
-        let [i, j] = stored.pair.map(|k| k as usize);
-        let [(v_i, spin_i), (v_j, spin_j)] = [motion.before[i], motion.before[j]];
-        let way = (v_i - v_j) * h;
-        let apart = separation::<D>(mid.grains[i], mid.grains[j]);
-        let turned = D::velocity(self.spin(mid, stored.pair, [spin_i, spin_j]) * h, apart - way * 0.5);
-        (way - turned).norm() <= EQUAL * apart.norm()
-    }
-
-    /// Rate of hidden lengthening of a bond in the time `span` (s) between the last two mid-steps,
-    /// and its normal velocity at the first of them (m/s). For bonds whose length does not follow
-    /// from the spins of their grains: elastic or frictionless ones, and those of grains that twist
-    /// against each other.
-    ///
-    /// Between two mid-steps the relative displacement of the grains is d, with d_n along the
-    /// normal at the first and d_t across it. The distance ℓ grows by d_n and, because the bond
-    /// turned, by ℓ' − ℓ − d_n = d_t² / (ℓ' + ℓ + d_n). The law knows normal velocities only, so
-    /// the second part is hidden from it. In a steady turn it equals the normal part of
-    /// [`arc`]. See docs/theory/elastic-bonds.md.
-    fn lengthening(&self, mid: &Midpoint<D>, motion: &Motion<D>, pair: [u32; 2], span: f64) -> (f64, f64) {
-        let [i, j] = pair.map(|k| k as usize);
-        let apart = separation::<D>(mid.grains[i], mid.grains[j]);
-        let way = (motion.before[i].0 - motion.before[j].0) * span;
-        let before = apart - way;
-        let length = before.norm();
-        let normal = direction::<D>(before, length);
-        let along = way.dot(&normal);
-        let across = way - normal * along;
-        let square = across.dot(&across);
-        let hidden = if square == 0.0 { 0.0 } else { square / (span * (apart.norm() + length + along)) };
-        (hidden, along / span)
-    }
-
     /// Spin of the vector between the centres of a bonded pair (rad/s), and of its frame about it:
     /// the spins i and j of its grains, weighted with their distances from the contact point, as in
     /// the tangential rows of the bond.
-    pub(super) fn spin(&self, mid: &Midpoint<D>, pair: [u32; 2], [i, j]: [D::Spin; 2]) -> D::Spin {
-        let (gap, _, _) = self.geometry(mid, pair);
+    pub(super) fn spin(&self, pair: [u32; 2], gap: f64, [i, j]: [D::Spin; 2]) -> D::Spin {
         let [a, b] = pair.map(|k| self.grains.radius[k as usize] + 0.5 * gap);
         (i * a + j * b) * (1.0 / (a + b))
     }
+}
+
+/// Whether two grains whose centres are `apart` (m) at mid-step begin the step with the velocities
+/// of a rigid body: `way` is their relative displacement in the step (m), `turn` that of their spin
+/// (rad).
+fn moves_rigidly<D: Dim>(apart: D::Vector, way: D::Vector, turn: D::Spin) -> bool {
+    (way - D::velocity(turn, apart - way * 0.5)).norm() <= EQUAL * apart.norm()
+}
+
+/// Rate of hidden lengthening of a bond in the time `span` (s) between the last two mid-steps, and
+/// its normal velocity at the first of them (m/s). `apart` is the vector between its centres at the
+/// second, `way` the relative displacement of its grains (m). For bonds whose length does not
+/// follow from the spins of their grains: elastic or frictionless ones, and those of grains that
+/// twist against each other.
+///
+/// Let d be that displacement, with d_n along the normal at the first mid-step and d_t across it.
+/// The distance ℓ grows by d_n and, because the bond turned, by
+/// ℓ' − ℓ − d_n = d_t² / (ℓ' + ℓ + d_n). The law knows normal velocities only, so the second part
+/// is hidden from it. In a steady turn it equals the normal part of [`arc`]. See
+/// docs/theory/elastic-bonds.md.
+fn lengthening<D: Dim>(apart: D::Vector, way: D::Vector, span: f64) -> (f64, f64) {
+    let before = apart - way;
+    let length = before.norm();
+    let normal = direction::<D>(before, length);
+    let along = way.dot(&normal);
+    let across = way - normal * along;
+    let square = across.dot(&across);
+    let hidden = if square == 0.0 { 0.0 } else { square / (span * (apart.norm() + length + along)) };
+    (hidden, along / span)
 }
 
 /// Rate of hidden displacement (m/s) of a bond with friction in the time `span` (s) between the
@@ -198,17 +192,12 @@ impl<D: Dim> World<D> {
 /// vector.
 ///
 /// The rows of its law ask for the velocity ω × x along the tangent, where x is the vector between
-/// the centres. A rotation R by φ = arcsin(w ‖ω‖) about ω displaces x by (R − 1) x = w ω × x − (1 −
-/// cos φ) x⊥, with the part x⊥ across ω. The law takes the last term from u. It has a tangential
-/// part where ω is oblique to x. In a fragment it is the difference of one velocity field at both
-/// grains, so the corrections of all its bonds are compatible. See docs/theory/time-stepping.md.
+/// the centres. A rotation R by φ = arcsin(w ‖ω‖) about ω displaces x by
+/// (R − 1) x = w ω × x − (1 − cos φ) x⊥, with the part x⊥ across ω. The law takes the last term
+/// from u. It has a tangential part where ω is oblique to x. In a fragment it is the difference of
+/// one velocity field at both grains, so the corrections of all its bonds are compatible. See
+/// docs/theory/time-stepping.md.
 fn arc<D: Dim>(apart: D::Vector, spin: D::Spin, span: f64) -> D::Vector {
     let sine = spin * span;
     D::velocity(sine, D::velocity(sine, apart)) * (-versine_share(sine.norm()) / span)
-}
-
-/// The vector rotated about `sine`, whose norm is the sine of the angle.
-fn rotated<D: Dim>(x: D::Vector, sine: D::Spin) -> D::Vector {
-    let across = D::velocity(sine, x);
-    x + across + D::velocity(sine, across) * versine_share(sine.norm())
 }
