@@ -100,6 +100,11 @@ impl Tree {
         self.unknowns
     }
 
+    /// Floating-point operations of a factorisation.
+    pub fn operations(&self) -> f64 {
+        self.fronts.iter().map(|front| work(front.pivots as f64, front.border() as f64)).sum()
+    }
+
     /// Unknowns of an element.
     pub fn width(&self, element: usize) -> usize {
         self.widths(element).iter().sum()

@@ -5,9 +5,13 @@
 //! |---|---|---|
 //! | [`Route::Extrapolation`] | adds the constant increment of the last steps to the reactions | bonds, while a sample at rest is loaded at a constant rate |
 //! | [`Route::Sweeps`] | Gauss–Seidel from the last reactions | all contacts are dry |
-//! | [`Route::ActiveSet`] | Newton from the active set of the last step | bonds |
-//! | [`Route::InteriorPoint`] | follows the central path through its folds, with Coulomb's law exact | always |
+//! | [`Route::ActiveSet`] | Newton from the active set of the last reactions | bonds, or a cheap problem |
+//! | [`Route::InteriorPoint`] | follows the central path through its folds, with Coulomb's law exact | as Newton |
 //! | [`Route::Sweeps`] | Gauss–Seidel from the best point of the path | the path missed the tolerance |
+//!
+//! A dry problem is cheap if a factorisation takes few operations for each contact
+//! ([`tuning::CHEAP`]). One that is not is swept on to the accepted residual, and goes to Newton
+//! and the path only where that fails.
 //!
 //! A solve that misses the tolerance is accepted up to [`StagedSettings::accept`] and refused
 //! beyond. No stage depends on elapsed time, and only the extrapolation has a back-off. A solve
@@ -15,6 +19,7 @@
 //! extrapolation.
 
 use super::extrapolation::Extrapolation;
+use super::graph::Graph;
 use super::history::history;
 use super::interior::{Aims, Interior};
 use super::newton::Newton;
@@ -61,6 +66,15 @@ pub enum Stages {
     Newton,
     /// The interior-point method, then sweeps from its best point.
     Interior,
+}
+
+/// How far the direct solvers go.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Effort {
+    /// Newton, and a short path.
+    Short,
+    /// Newton, two paths if necessary, and sweeps.
+    Full,
 }
 
 /// Settings of [`Staged`].
@@ -133,11 +147,11 @@ impl Staged {
     /// Solve a problem given by its matrix, from the reactions that it holds.
     pub fn solve_assembled(&mut self, problem: &mut Assembled) -> SolveReport {
         self.newton.margins.clear();
-        self.directly(problem)
+        self.directly(problem, Effort::Full)
     }
 
-    /// Newton, then the interior-point method, then sweeps from its best point.
-    fn directly(&mut self, problem: &mut impl Solvable) -> SolveReport {
+    /// Newton, then the interior-point method, and with full effort sweeps from its best point.
+    fn directly(&mut self, problem: &mut impl Solvable, effort: Effort) -> SolveReport {
         problem.velocities_from_reactions();
         let rows = problem.rows(tuning::KAPPA, self.settings.stiffness);
         // solved already, for example zero reactions of bodies that fly apart, or no body can move
@@ -148,7 +162,7 @@ impl Staged {
         let made = self.newton.made() + self.interior.made;
         let report = match self.by_the_active_set(problem, &rows) {
             Ok(report) => report,
-            Err(before) => self.along_the_path(problem, &rows, before),
+            Err(before) => self.along_the_path(problem, &rows, effort, before),
         };
         let factorisations = self.newton.made() + self.interior.made - made;
         SolveReport { work: Work { factorisations, ..report.work }, ..report }
@@ -166,8 +180,14 @@ impl Staged {
         report.filter(|report| report.status == SolveStatus::Converged).ok_or(iterations)
     }
 
-    /// Result of the interior-point method, or of sweeps from its best point.
-    fn along_the_path(&mut self, problem: &mut impl Solvable, rows: &Rows, mut newton: u64) -> SolveReport {
+    /// Result of the interior-point method, or with full effort of sweeps from its best point.
+    fn along_the_path(
+        &mut self,
+        problem: &mut impl Solvable,
+        rows: &Rows,
+        effort: Effort,
+        mut newton: u64,
+    ) -> SolveReport {
         let StagedSettings { tolerance, accept, .. } = self.settings;
         // margins that Newton left belong to other reactions
         self.newton.margins.clear();
@@ -180,11 +200,14 @@ impl Staged {
         // bonds break by the load that they bear and need minimum-energy reactions; dry contacts
         // need only reactions that balance
         let least = problem.matrix().is_none() && rows.list.iter().any(|row| row.is_bond);
-        let aims = self.aims(least);
+        let mut aims = self.aims(least);
+        if effort == Effort::Short {
+            aims.most = aims.most.min(tuning::MOST_SHORT);
+        }
         let graph = &mut self.newton.graph;
         let mut best = self.interior.solve(problem, rows, graph, &anchor, start, aims);
         newton += best.as_ref().map_or(0, |found| found.iterations);
-        if best.as_ref().is_none_or(|found| found.missed(aims) > accept / tolerance) {
+        if effort == Effort::Full && best.as_ref().is_none_or(|found| found.missed(aims) > accept / tolerance) {
             // another path, from a cold start to any reactions that balance
             let any = Aims { least: false, ..aims };
             let other = self.interior.solve(problem, rows, graph, &anchor, None, any);
@@ -203,7 +226,7 @@ impl Staged {
             let report = self.settings.report(work, residual, load_error, velocity_error);
             SolveReport { route: Route::InteriorPoint, ..report }
         };
-        if residual <= tolerance {
+        if residual <= tolerance || effort == Effort::Short {
             return by_the_path(problem, 0);
         }
         best.iter().for_each(|found| problem.write_back(&found.reactions));
@@ -238,15 +261,48 @@ impl Staged {
         GaussSeidelSettings { local, tolerance, accept, max_sweeps, acceleration: 0 }
     }
 
-    /// Sweeps over dry contacts, first to the tolerances, then to the accepted residual. Residual
-    /// and velocity error may exceed their tolerances by the same factor, `accept / tolerance`.
-    fn swept<D: Dim>(&self, problem: &mut ContactProblem<D>) -> SolveReport {
+    /// Sweeps over dry contacts to the tolerances. Where they miss them, the direct solvers if
+    /// these are cheap, else sweeps to the accepted residual.
+    fn dry<D: Dim>(&mut self, problem: &mut ContactProblem<D>) -> SolveReport {
+        let fine = self.fine_sweeps(problem);
+        if fine.status == SolveStatus::Converged {
+            return fine;
+        }
+        let mut work = fine.work;
+        if self.is_cheap(problem) {
+            let swept = problem.clone();
+            let report = self.directly(problem, Effort::Short);
+            work = work + report.work;
+            if report.status == SolveStatus::Converged {
+                return SolveReport { work, ..report };
+            }
+            *problem = swept;
+        }
+        if fine.status == SolveStatus::Failed {
+            let coarse = self.coarse_sweeps(problem);
+            return SolveReport { work: work + coarse.work, ..coarse };
+        }
+        SolveReport { work, ..fine }
+    }
+
+    /// Whether the direct solvers take about as long as the sweeps that missed the tolerances: by
+    /// the operations of a factorisation.
+    fn is_cheap<D: Dim>(&mut self, problem: &ContactProblem<D>) -> bool {
+        if problem.len() > tuning::COUNTED {
+            return false;
+        }
+        let rows = problem.rows(tuning::KAPPA, self.settings.stiffness);
+        let graph = Graph::of(&rows, &mut self.newton.graph);
+        graph.is_some_and(|graph| graph.tree.operations() <= tuning::CHEAP * problem.len() as f64)
+    }
+
+    /// Sweeps over dry contacts to the tolerances. Residual and velocity error may exceed their
+    /// tolerances by the same factor, `accept / tolerance`.
+    fn fine_sweeps<D: Dim>(&self, problem: &mut ContactProblem<D>) -> SolveReport {
         let StagedSettings { tolerance, accept, .. } = self.settings;
-        let by = |tolerance, most| GaussSeidel::new(self.sweeps(tolerance, most));
-        let most_missed = accept / tolerance;
         let (mut aim, mut work) = (tolerance, Work::default());
         loop {
-            let fine = by(aim, tuning::FINE_SWEEPS - work.sweeps).solve(problem);
+            let fine = GaussSeidel::new(self.sweeps(aim, tuning::FINE_SWEEPS - work.sweeps)).solve(problem);
             work = work + fine.work;
             let missed = self.aims(false).missed(fine.residual, velocity_error(problem));
             // sweeps stop on the residual alone: lower its target to reduce the velocity error
@@ -254,16 +310,18 @@ impl Staged {
                 aim = fine.residual / missed;
                 continue;
             }
-            match SolveStatus::of(missed, 1.0, most_missed) {
-                SolveStatus::Failed => break,
-                status => return SolveReport { status, work, ..fine },
-            }
+            return SolveReport { status: SolveStatus::of(missed, 1.0, accept / tolerance), work, ..fine };
         }
-        let coarse = by(accept, tuning::COARSE_SWEEPS).solve(problem);
+    }
+
+    /// Sweeps over dry contacts to the accepted residual.
+    fn coarse_sweeps<D: Dim>(&self, problem: &mut ContactProblem<D>) -> SolveReport {
+        let StagedSettings { tolerance, accept, .. } = self.settings;
+        let coarse = GaussSeidel::new(self.sweeps(accept, tuning::COARSE_SWEEPS)).solve(problem);
         let missed = self.aims(false).missed(coarse.residual, velocity_error(problem));
         // its target was `accept`: at best it is accepted
-        let status = if missed <= most_missed { SolveStatus::Accepted } else { SolveStatus::Failed };
-        SolveReport { status, work: work + coarse.work, ..coarse }
+        let status = if missed <= accept / tolerance { SolveStatus::Accepted } else { SolveStatus::Failed };
+        SolveReport { status, ..coarse }
     }
 }
 
@@ -287,7 +345,7 @@ impl<D: Dim> ContactSolver<D> for Staged {
         let StagedSettings { tolerance, load_tolerance, stages, .. } = self.settings;
         let mut before = Work::default();
         if stages == Stages::All && is_dry(problem) {
-            let swept = self.swept(problem);
+            let swept = self.dry(problem);
             if swept.status != SolveStatus::Failed {
                 return swept;
             }
@@ -300,7 +358,7 @@ impl<D: Dim> ContactSolver<D> for Staged {
             return SolveReport { status, route, work: before, residual, load_error: Some(load_error) };
         }
         self.newton.margins.clear();
-        let report = self.directly(problem);
+        let report = self.directly(problem, Effort::Full);
         match report.status {
             SolveStatus::Converged if self.newton.margins.len() == problem.len() => {
                 self.extrapolation.learn(problem, &self.newton.margins, load_tolerance);
@@ -312,7 +370,7 @@ impl<D: Dim> ContactSolver<D> for Staged {
 
     /// Skips the sweeps over dry contacts.
     fn solve_finer(&mut self, problem: &mut ContactProblem<D>) -> Option<SolveReport> {
-        (self.settings.stages == Stages::All && is_dry(problem)).then(|| self.directly(problem))
+        (self.settings.stages == Stages::All && is_dry(problem)).then(|| self.directly(problem, Effort::Full))
     }
 
     fn snapshot(&self) -> Box<dyn ContactSolver<D>> {

@@ -29,6 +29,17 @@ pub(super) mod stages {
     /// Most sweeps over dry contacts towards the tolerance. A dry step that converges takes some
     /// hundred (docs/cost.md).
     pub const FINE_SWEEPS: u64 = 2_000;
+    /// Most operations of a factorisation, for each contact, with which the direct solvers are
+    /// tried where `FINE_SWEEPS` missed the tolerance over dry contacts. Dry packings of 200, 1,000
+    /// and 5,000 disks take 2,000, 4,500 and 10,000, and a solve 0.1 to 4 times as long as the
+    /// sweeps; flowing 2,000 spheres take 500,000, and a solve 9 to 360 times as long (decision
+    /// 49).
+    pub const CHEAP: f64 = 1e4;
+    /// Most contacts with which these operations are counted. Counting takes memory, and larger
+    /// plane packings take more than `CHEAP`.
+    pub const COUNTED: usize = 20_000;
+    /// Most interior-point iterations there: most solves take 14 to 30.
+    pub const MOST_SHORT: u64 = 50;
     /// Most further sweeps over dry contacts, towards the accepted residual.
     pub const COARSE_SWEEPS: u64 = 20_000;
     /// Most sweeps from the best point of an interior-point solve that missed the tolerance.

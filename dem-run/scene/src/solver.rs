@@ -29,9 +29,9 @@ pub struct Solver {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SolverKind {
-    /// Methods in a fixed order until one solves the problem: Gauss–Seidel if all contacts are dry,
-    /// Newton from the active set of the last step if there are bonds, then the interior-point
-    /// method.
+    /// Methods in a fixed order until one solves the problem: Gauss–Seidel if all contacts are dry;
+    /// if there are bonds, or if sweeps miss the tolerance of a problem that is cheap to factorise,
+    /// Newton from the active set of the last reactions, then the interior-point method.
     Auto(Newton),
     /// Non-linear Gauss–Seidel: one contact after the other, until none changes.
     GaussSeidel(GaussSeidel),
