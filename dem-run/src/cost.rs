@@ -18,7 +18,8 @@ const FILL: f64 = 0.7;
 /// Greatest time of a contact of spheres with elastic bonds, over that with rigid ones: the loaded
 /// sample swings, so contacts without a bond open, close and slip.
 const SWINGS: f64 = 4.0;
-/// The same of Gauss–Seidel, from tens to thousands of sweeps a step.
+/// The same of Gauss–Seidel and of the default solver without bonds, from tens to thousands of
+/// sweeps a step.
 const SWEEPS: [f64; 2] = [3e-7, 1e-4];
 
 /// Least and greatest processor time (s) of all steps of `scene` with this many grains, if nothing
@@ -30,6 +31,7 @@ pub fn unbroken(scene: &Scene, grains: usize) -> [f64; 2] {
     let swings = if elastic { SWINGS } else { 1.0 };
     let [low, high] = match (&scene.solver.kind, scene.dimension) {
         (SolverKind::GaussSeidel(_), _) => SWEEPS,
+        (SolverKind::Auto(_), _) if !scene.has_bonds() => SWEEPS,
         (_, 2) => DISKS,
         _ => [SPHERES[0], SPHERES[1] * swings * (contacts / FEW).max(1.0).powf(FILL)],
     };
