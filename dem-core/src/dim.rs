@@ -203,9 +203,11 @@ pub fn versine_share(s: f64) -> f64 {
 /// The vector x rotated about s = `sine`, whose norm is the sine of the angle φ; it counts as one
 /// where it is larger: x + s × x + (1 − cos φ) / sin² φ s × (s × x).
 pub(crate) fn rotated<D: Dim>(x: D::Vector, sine: D::Spin) -> D::Vector {
-    let sine = sine * (1.0 / sine.norm().max(1.0));
+    let size = sine.norm();
+    let sine = sine * (1.0 / size.max(1.0));
     let across = D::velocity(sine, x);
-    x + across + D::velocity(sine, across) * versine_share(sine.norm())
+    // of the norm as it was: near a right angle the share has the root of the round-off
+    x + across + D::velocity(sine, across) * versine_share(size)
 }
 
 /// The axes that the rows of a contact need: the whole frame, or in 3D the normal alone if there is
@@ -544,5 +546,25 @@ where
     }
     fn volume(radius: f64) -> f64 {
         4.0 / 3.0 * std::f64::consts::PI * radius.powi(3)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+
+    #[test]
+    fn a_turn_beyond_a_right_angle_counts_as_one() {
+        for axis in [[1.0, 2.0, 3.0], [0.3, -0.1, 0.7], [-5.0, 1e-3, 2.0]] {
+            let axis = Vector3::from(axis).normalize();
+            let x = Vector3::new(0.2, -1.0, 0.5);
+            let along = axis * axis.dot(&x);
+            let wanted = along + axis.cross(&x);
+            for size in [1.0 + 4.0 * f64::EPSILON, 3.0] {
+                let off = (rotated::<D3>(x, axis * size) - wanted).norm();
+                assert!(off < 1e-15, "{axis:?} {size} {off:e}");
+            }
+        }
     }
 }

@@ -303,13 +303,11 @@ def versine_share(sine):
 
 
 def spins_of_fragments(h):
-    """Spins of all bodies at the start of each step, those of grains that rigid bonds make equal to
-    1e-6 rad a step by their mean [S+1,B,Q]."""
+    """Spins of all bodies at the start of each step, those of grains that rigid bonds, those that
+    break in the step included, make equal to 1e-6 rad a step by their mean [S+1,B,Q]."""
     spins = h.body_w.copy()
-    bonds = h.bond >= 0
-    for s in range(h.S):
-        rows = np.flatnonzero((h.row_step == s) & bonds)
-        i, j = h.i[rows], h.j[rows]
+    for s in range(h.formed, h.S):
+        i, j = h.bond_pair[h.bond_status[s] == "INTACT"].T
         equal = norm(h.body_w[s, i] - h.body_w[s, j]) * h.h <= 1e-6
         label = np.arange(h.N)
         # labels of neighbours become equal, the smallest wins
@@ -439,10 +437,12 @@ def check_frames(h, c, p, report, rows):
         return
     s, i, j = h.row_step, h.i, h.j
     sine = h.h * spin_of_bond(c, h.body_w[s, i], h.body_w[s, j])[rows]
+    # near a right angle the share has the root of the rounding
+    share = versine_share(sine)
     sine = sine / np.maximum(norm(sine), 1.0)[:, None]
     old = h.tangents[last[rows], 0]
     across = np.cross(sine, old)
-    turned = old + across + np.cross(sine, across) * versine_share(sine)[:, None]
+    turned = old + across + np.cross(sine, across) * share[:, None]
     flat = turned - c.n[rows] * (c.n[rows] * turned).sum(1)[:, None]
     size = norm(flat)
     off = np.where(size > 0.5, norm(h.tangents[rows, 0] - flat / size[:, None]), 0.0)
