@@ -2,14 +2,13 @@
 
 use crate::error::RunError;
 use crate::scene::{Lattice, Sample, Scene, SolverKind};
+use dem_core::solver::MOST_FACTORISED;
 use std::path::{Path, PathBuf};
 
 /// Memory of the program, its threads and the HDF5 library (bytes).
 const PROGRAM: f64 = 20e6;
 /// Memory of a grain without its contacts (bytes).
 const GRAIN: f64 = 300.0;
-/// Dry contacts up to which the default solver may factorise (dem-core's `COUNTED`).
-const FACTORISED: f64 = 2e4;
 
 /// Peak memory of a run of `scene` with this many grains (bytes), fitted to runs of 500 to 250,000
 /// grains (docs/cost.md). The error is about 20 % for a typical number of contacts. In 3D, the
@@ -20,7 +19,7 @@ pub fn expected(scene: &Scene, grains: usize) -> u64 {
     let contacts = contacts_per_grain(scene) * grains as f64;
     let newton = match scene.solver.kind {
         SolverKind::Newton(_) | SolverKind::Interior(_) => true,
-        SolverKind::Auto(_) => bonded || contacts <= FACTORISED,
+        SolverKind::Auto(_) => bonded || contacts <= MOST_FACTORISED as f64,
         SolverKind::GaussSeidel(_) => false,
     };
     let contact = match (scene.dimension, newton, bonded) {

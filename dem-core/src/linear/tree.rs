@@ -50,6 +50,11 @@ impl Front {
     pub fn border(&self) -> usize {
         self.unknowns.len() - self.pivots
     }
+
+    /// Floating-point operations of its factorisation.
+    fn operations(&self) -> f64 {
+        work(self.pivots as f64, self.border() as f64)
+    }
 }
 
 /// Fronts that one task works on.
@@ -102,7 +107,7 @@ impl Tree {
 
     /// Floating-point operations of a factorisation.
     pub fn operations(&self) -> f64 {
-        self.fronts.iter().map(|front| work(front.pivots as f64, front.border() as f64)).sum()
+        self.fronts.iter().map(Front::operations).sum()
     }
 
     /// Unknowns of an element.
@@ -210,16 +215,14 @@ impl Tree {
     /// Divide the fronts into parts and levels: subtrees that are at most a share of the work,
     /// several of them in a part if they are small, and the fronts above them.
     fn divide(&mut self) {
-        let own = |front: &Front| work(front.pivots as f64, front.border() as f64);
-        let mut subtree: Vec<f64> = self.fronts.iter().map(own).collect();
+        let mut subtree: Vec<f64> = self.fronts.iter().map(Front::operations).collect();
         // the parents come after their children
         for (k, front) in self.fronts.iter().enumerate() {
             if let Some(parent) = front.parent {
                 subtree[parent] += subtree[k];
             }
         }
-        let all: f64 = self.fronts.iter().map(own).sum();
-        let most = (SHARE_OF_A_PART * all).max(WORK_OF_A_PART);
+        let most = (SHARE_OF_A_PART * self.operations()).max(WORK_OF_A_PART);
         let top: Vec<bool> = subtree.iter().map(|work| *work > most).collect();
         let (mut subtrees, mut filled) = (vec![Vec::new()], 0.0);
         let mut of_root = vec![0; self.fronts.len()];

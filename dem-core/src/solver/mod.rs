@@ -22,6 +22,7 @@ mod twofold;
 pub use gauss_seidel::{GaussSeidel, GaussSeidelSettings, sweep};
 pub use rows::StiffnessRatio;
 pub use stages::{Route, Staged, StagedSettings, Stages, Start};
+pub use tuning::stages::MOST_FACTORISED;
 
 use crate::dim::Dim;
 use crate::problem::ContactProblem;

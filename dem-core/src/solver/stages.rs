@@ -147,11 +147,11 @@ impl Staged {
     /// Solve a problem given by its matrix, from the reactions that it holds.
     pub fn solve_assembled(&mut self, problem: &mut Assembled) -> SolveReport {
         self.newton.margins.clear();
-        self.directly(problem, Effort::Full)
+        self.directly(problem)
     }
 
-    /// Newton, then the interior-point method, and with full effort sweeps from its best point.
-    fn directly(&mut self, problem: &mut impl Solvable, effort: Effort) -> SolveReport {
+    /// Newton, then the interior-point method, then sweeps from its best point.
+    fn directly(&mut self, problem: &mut impl Solvable) -> SolveReport {
         problem.velocities_from_reactions();
         let rows = problem.rows(tuning::KAPPA, self.settings.stiffness);
         // solved already, for example zero reactions of bodies that fly apart, or no body can move
@@ -159,10 +159,15 @@ impl Staged {
         if residual == 0.0 || rows.list.iter().all(|row| row.normal == 0.0) {
             return self.settings.report(Work::default(), residual, 0.0, 0.0);
         }
+        self.with_effort(Effort::Full, problem, &rows)
+    }
+
+    /// Newton, then the interior-point method, with the rows of the problem.
+    fn with_effort(&mut self, effort: Effort, problem: &mut impl Solvable, rows: &Rows) -> SolveReport {
         let made = self.newton.made() + self.interior.made;
-        let report = match self.by_the_active_set(problem, &rows) {
+        let report = match self.by_the_active_set(problem, rows) {
             Ok(report) => report,
-            Err(before) => self.along_the_path(problem, &rows, effort, before),
+            Err(before) => self.along_the_path(problem, rows, effort, before),
         };
         let factorisations = self.newton.made() + self.interior.made - made;
         SolveReport { work: Work { factorisations, ..report.work }, ..report }
@@ -269,9 +274,9 @@ impl Staged {
             return fine;
         }
         let mut work = fine.work;
-        if self.is_cheap(problem) {
+        if let Some(rows) = self.cheap(problem) {
             let swept = problem.clone();
-            let report = self.directly(problem, Effort::Short);
+            let report = self.with_effort(Effort::Short, problem, &rows);
             work = work + report.work;
             if report.status == SolveStatus::Converged {
                 return SolveReport { work, ..report };
@@ -285,15 +290,15 @@ impl Staged {
         SolveReport { work, ..fine }
     }
 
-    /// Whether the direct solvers take about as long as the sweeps that missed the tolerances: by
-    /// the operations of a factorisation.
-    fn is_cheap<D: Dim>(&mut self, problem: &ContactProblem<D>) -> bool {
-        if problem.len() > tuning::COUNTED {
-            return false;
+    /// The rows of a dry problem if the direct solvers take about as long as the sweeps that missed
+    /// the tolerances, by the operations of a factorisation.
+    fn cheap<D: Dim>(&mut self, problem: &ContactProblem<D>) -> Option<Rows> {
+        if problem.len() > tuning::MOST_FACTORISED {
+            return None;
         }
         let rows = problem.rows(tuning::KAPPA, self.settings.stiffness);
-        let graph = Graph::of(&rows, &mut self.newton.graph);
-        graph.is_some_and(|graph| graph.tree.operations() <= tuning::CHEAP * problem.len() as f64)
+        let graph = Graph::of(&rows, &mut self.newton.graph)?;
+        (graph.tree.operations() <= tuning::CHEAP * problem.len() as f64).then_some(rows)
     }
 
     /// Sweeps over dry contacts to the tolerances. Residual and velocity error may exceed their
@@ -358,7 +363,7 @@ impl<D: Dim> ContactSolver<D> for Staged {
             return SolveReport { status, route, work: before, residual, load_error: Some(load_error) };
         }
         self.newton.margins.clear();
-        let report = self.directly(problem, Effort::Full);
+        let report = self.directly(problem);
         match report.status {
             SolveStatus::Converged if self.newton.margins.len() == problem.len() => {
                 self.extrapolation.learn(problem, &self.newton.margins, load_tolerance);
@@ -370,7 +375,7 @@ impl<D: Dim> ContactSolver<D> for Staged {
 
     /// Skips the sweeps over dry contacts.
     fn solve_finer(&mut self, problem: &mut ContactProblem<D>) -> Option<SolveReport> {
-        (self.settings.stages == Stages::All && is_dry(problem)).then(|| self.directly(problem, Effort::Full))
+        (self.settings.stages == Stages::All && is_dry(problem)).then(|| self.directly(problem))
     }
 
     fn snapshot(&self) -> Box<dyn ContactSolver<D>> {

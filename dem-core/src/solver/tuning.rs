@@ -35,9 +35,9 @@ pub(super) mod stages {
     /// sweeps; flowing 2,000 spheres take 500,000, and a solve 9 to 360 times as long (decision
     /// 49).
     pub const CHEAP: f64 = 1e4;
-    /// Most contacts with which these operations are counted. Counting takes memory, and larger
+    /// Most dry contacts for which these operations are counted. Counting takes memory, and larger
     /// plane packings take more than `CHEAP`.
-    pub const COUNTED: usize = 20_000;
+    pub const MOST_FACTORISED: usize = 20_000;
     /// Most interior-point iterations there: most solves take 14 to 30.
     pub const MOST_SHORT: u64 = 50;
     /// Most further sweeps over dry contacts, towards the accepted residual.
