@@ -44,8 +44,8 @@ fn dry_disks(centres: impl Iterator<Item = [f64; 2]>, walls: Vec<Wall<D2>>) -> W
     world(centres.map(|x| grain::<D2>(&x, 0.01)).collect(), walls, set)
 }
 
-/// Sweeps carry a force by one disk each, so they miss the tolerance in a column of 200; scenes
-/// without bonds accept residuals up to 1e-4.
+/// A sweep carries forces little further than to the next disk, so sweeps miss the tolerance in a
+/// column of 200. Scenes without bonds accept residuals up to 1e-4.
 #[test]
 fn dry_contacts_that_sweeps_miss_are_solved_exactly() {
     let mut world = dry_disks((0..200).map(|k| [0.0, 0.01 + 0.02 * f64::from(k)]), vec![floor(0.2)]);
