@@ -217,6 +217,15 @@ impl<D: Dim> Shape<D> {
         }
     }
 
+    /// The component of a vector perpendicular to the axis of a round wall around the grains; none
+    /// for other walls.
+    pub(crate) fn around(&self, x: D::Vector) -> Option<D::Vector> {
+        match *self {
+            Self::Round { inside: true, axis, .. } => Some(across::<D>(x, axis)),
+            _ => None,
+        }
+    }
+
     /// Smallest gap (m) of a grain that moves from `offset` along the straight displacement `way`
     /// (m).
     pub(crate) fn smallest_gap(&self, offset: D::Vector, way: D::Vector, radius: f64) -> f64 {

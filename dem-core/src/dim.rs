@@ -139,7 +139,8 @@ pub trait Moments: Vect {
         }
         let norm = self.bending();
         let mut out = if norm <= bending { self } else { self * (bending / norm) };
-        out[2] = self[2].clamp(-twist, twist);
+        // not `clamp`, which panics where the limit is not a number
+        out[2] = if self[2].abs() <= twist { self[2] } else { twist.copysign(self[2]) };
         out
     }
 }

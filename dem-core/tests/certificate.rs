@@ -280,3 +280,24 @@ fn no_verdict_contradicts_a_solution() {
     }
     assert!(counts.iter().all(|count| *count >= 10), "{counts:?}");
 }
+
+/// A bonded row between walls that hold its ends and slide: by the associated flow a bond that
+/// slips opens, for which the walls leave no room. Where the load error counts, the solve is
+/// refused by it; else by the slip of a bond below its limit.
+#[test]
+fn bonds_sheared_between_walls_that_cannot_part_have_no_solution() {
+    fn case<D: Dim>(load_tolerance: f64) {
+        let walls = [plane(&[1.0], &[]), driven(&[-1.0], &[6.0 * R], &[0.0, 1.0])];
+        let held = walls.map(|wall| Wall { grip: Some(1e-3 * R), ..wall });
+        let mut w = world(row::<D>(3), held.to_vec(), set());
+        w.settings.solver = SolverSettings::Staged(newton(1e-8, 1e-6, load_tolerance));
+        w.form_bonds(1e-6, |_| 10.0, 0.3);
+        let outcome = w.step();
+        assert_eq!(matches!(outcome, Err(StepError::Yielded { .. })), load_tolerance > 1.0, "{outcome:?}");
+        assert_eq!(outcome.expect_err("no solution").verdict(), Some(&Verdict::NoSolution(vec![0, 1, 2])));
+    }
+    for load_tolerance in [1e-5, 1e6] {
+        case::<D2>(load_tolerance);
+        case::<D3>(load_tolerance);
+    }
+}

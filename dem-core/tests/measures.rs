@@ -82,6 +82,19 @@ fn the_stress_of_a_column_is_its_load() {
     column::<D3>();
 }
 
+/// A bonded column pulled by walls that hold its ends: the height counts from wall to wall.
+#[test]
+fn the_stress_of_a_column_that_walls_hold_is_its_load() {
+    let r = 0.01;
+    let grains = (0..4).map(|k| grain::<D2>(&[0.0, r + 2.0 * r * f64::from(k)], r)).collect();
+    let lid = force_driven::<D2>([0.0, -1.0].into(), [0.0, 8.0 * r].into(), 1.0, -7.0);
+    let held = [floor(0.2), lid].map(|wall| Wall { grip: Some(1e-3 * r), ..wall });
+    let mut w = world(grains, held.to_vec(), settings(1e-4));
+    w.form_bonds(1e-6, |_| 100.0, 0.3);
+    run(&mut w, 2);
+    assert_stress(&w, |row, col| if row == 1 && col == 1 { -7.0 * 8.0 * r } else { 0.0 }, 1e-9);
+}
+
 /// Grains inside a ring that shrinks onto them from one side: the branch at a wall begins at the
 /// contact point.
 #[test]

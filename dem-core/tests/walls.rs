@@ -8,7 +8,7 @@ use dem_core::bond::Stiffness;
 use dem_core::dim::{D2, D3, Dim, Vect};
 use dem_core::saved::Saved;
 use dem_core::solver::SolverSettings;
-use dem_core::world::World;
+use dem_core::world::{Restitution, World};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -226,4 +226,35 @@ fn a_saved_state_remembers_what_the_walls_hold() {
     assert_eq!(a.counts, b.counts);
     let bits = |s: &Saved| s.reals.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
     assert_eq!(bits(&a), bits(&b));
+}
+
+/// A grain that slides without friction inside a round wall: it keeps its distance from the wall
+/// and its speed, since the wall turns its velocity.
+fn circling<D: Dim>(axis: Option<D::Vector>, restitution: f64) {
+    let mut set = settings(1e-3);
+    set.restitution = (restitution > 0.0).then_some(Restitution {
+        grain_grain: restitution,
+        grain_wall: restitution,
+        threshold_speed: 0.0,
+    });
+    let shape = Shape::Round { radius: 0.1, inside: true, axis };
+    let mut place = vec![0.0; D::N];
+    place[0] = 0.1 - R;
+    let mut start = grain::<D>(&place, R);
+    start.velocity[1] = 1.0;
+    let mut w = world(vec![start], vec![Wall::fixed(shape, D::Vector::zero(), 0.0)], set);
+    for step in 0..2000 {
+        w.step().expect("a step");
+        let (x, v) = (w.grains.position[0].norm(), w.grains.velocity[0].norm());
+        assert!((x / (0.1 - R) - 1.0).abs() < 1e-12 && (v - 1.0).abs() < 1e-12, "{x} m, {v} m/s in step {step}");
+    }
+}
+
+#[test]
+fn a_grain_that_circles_in_a_round_wall_keeps_its_distance_and_speed() {
+    for restitution in [0.0, 0.5] {
+        circling::<D2>(None, restitution);
+        circling::<D3>(None, restitution);
+        circling::<D3>(Some([0.0, 0.0, 1.0].into()), restitution);
+    }
 }

@@ -235,7 +235,14 @@ impl<D: Dim> World<D> {
 
     /// Velocity that Signorini's law adds to the normal velocity of a dry contact (m/s); `None` if
     /// the contact cannot act in this step.
-    fn bias(&self, touch: &Touch<D>, stored: &StoredTouch<D>, motion: &Motion<D>, h: f64) -> Option<f64> {
+    fn bias(
+        &self,
+        mid: &Midpoint<D>,
+        touch: &Touch<D>,
+        stored: &StoredTouch<D>,
+        motion: &Motion<D>,
+        h: f64,
+    ) -> Option<f64> {
         let e = self.restitution_of(touch.pair);
         let [none, most] = [TOUCHING, CLOSED].map(|share| share * self.smaller(touch.pair));
         let left = f64::from(stored.left);
@@ -248,14 +255,16 @@ impl<D: Dim> World<D> {
         };
         let touching = touch.gap <= none;
         if e == 0.0 {
-            let gap = if self.settings.expel_overlaps || !touching { touch.gap } else { 0.0 };
-            return Some(gap / h);
+            let apart = self.settings.expel_overlaps || !touching;
+            return Some(if apart { touch.gap / h } else { self.turn_around(mid, touch.pair, motion, h) });
         }
         let [i, j] = touch.pair.map(|k| motion.before[k as usize].0);
         let approach = (i - j).dot(&D::normal(&touch.frame));
         let threshold = self.settings.restitution.map_or(0.0, |r| r.threshold_speed);
         let at_rest = approach.abs() < threshold || h * approach.abs() <= none;
-        touching.then_some(if at_rest { 0.0 } else { e * approach })
+        let rebound = if at_rest { 0.0 } else { e * approach };
+        let turn = || self.turn_around(mid, touch.pair, motion, h);
+        touching.then(|| Some(turn()).filter(|turn| *turn < 0.0).map_or(rebound, |turn| rebound.min(turn)))
     }
 
     /// Friction coefficient of a dry contact (–).
@@ -338,7 +347,7 @@ impl<D: Dim> World<D> {
             let kind = self.kind(stored);
             let bias = match touch.bond {
                 Some(_) => Some(0.0),
-                None => self.bias(touch, stored, motion, h),
+                None => self.bias(mid, touch, stored, motion, h),
             };
             // without a bias the contact cannot act in this step
             let Some(bias) = bias else { continue };

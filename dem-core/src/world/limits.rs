@@ -12,19 +12,20 @@
 //! between heavy ones, an error that is small beside their weight is a large velocity of the light
 //! grain. If no velocities satisfy the contact laws, as between two walls that close on a grain,
 //! reactions grow until any error is small beside them. Velocities are therefore measured too: in
-//! each step, and summed over the run for each pair, since errors of one sign add up.
+//! each step, and summed over the run for each pair, since errors of one sign add up. A rigid bond
+//! below its limit holds the normal, the tangential and the rolling velocity.
 //!
 //! With `expel_overlaps` the step skips these checks: the speeds of sample preparation have no
 //! physical meaning.
 
 use super::World;
 use super::assembly::Places;
-use super::motion::Midpoint;
+use super::motion::{Midpoint, Turn};
 use super::report::Violation;
 use super::touch::StoredTouch;
 use crate::body::{Drive, Shape, separation};
-use crate::contact::Law;
-use crate::dim::{Dim, Vect};
+use crate::contact::{Cone, Law, Local};
+use crate::dim::{Axes, Dim, Moments, Vect, in_frame, resized};
 use crate::problem::{Contact, ContactProblem, Nodes, Visitor};
 use crate::solver::certificate::{Verdict, verdict};
 
@@ -35,7 +36,7 @@ const DEEP: f64 = 0.5;
 const PASSING: f64 = 0.05;
 
 /// Displacement beyond the contact law, over the smaller radius, that a solve may leave in a step:
-/// closing of a dry contact, or change of length of a rigid bond.
+/// closing of a dry contact, or any displacement in a rigid bond.
 const YIELDING: f64 = 1e-4;
 
 /// The same, summed over the run.
@@ -137,11 +138,12 @@ impl<D: Dim> World<D> {
     pub(super) fn accumulate(
         &self,
         touches: &mut [StoredTouch<D>],
+        turns: &mut [Turn<D>],
         problem: &ContactProblem<D>,
         places: &Places,
         h: f64,
     ) -> Option<Violation> {
-        let mut worst = Accumulating { world: self, touches, places: places.all(), h, pair: [0; 2], share: 0.0 };
+        let mut worst = Accumulating { world: self, touches, turns, places: places.all(), h, pair: [0; 2], share: 0.0 };
         problem.visit(&mut worst);
         let Accumulating { pair, share, .. } = worst;
         (share > YIELDED * self.looseness()).then(|| Violation {
@@ -219,20 +221,35 @@ impl<D: Dim> World<D> {
     }
 }
 
-/// Speed (m/s) at which a contact closes beyond its law; for a rigid bond, at which it shortens.
+/// Velocity of a contact beyond its law (m/s; rotations times the mean diameter): the closing speed
+/// as a negative normal velocity, and for a rigid bond the velocity of all rows that it holds.
 /// `None` where the law sets no bound: an elastic bond deforms, and a bond at its limit flows and
 /// is about to break.
-fn beyond_law<D: Dim, L: Law>(nodes: &Nodes<D>, c: &Contact<D, L>) -> Option<f64> {
+fn beyond_law<D: Dim, L: Law>(nodes: &Nodes<D>, c: &Contact<D, L>) -> Option<Local<L::T, L::B>> {
     let law = &c.law;
-    let free = law.compliance().n > 0.0 || c.failure().is_some();
-    let closing = || -(nodes.relative_velocity::<L::T, L::B>(&c.link, law.arms()).n + law.bias().n);
-    (!free).then(closing)
+    if law.compliance().n > 0.0 || c.failure().is_some() {
+        return None;
+    }
+    let u = nodes.relative_velocity::<L::T, L::B>(&c.link, law.arms()) + law.bias();
+    let Cone { mu, nu, xi } = law.cone();
+    let held = |limit: f64| if law.breaks() && limit > 0.0 { 1.0 } else { 0.0 };
+    Some(Local { n: u.n, t: u.t * held(mu), m: u.m.scaled(held(nu), held(xi)) })
+}
+
+/// The largest part of a displacement or velocity beyond the law of a contact; a dry contact may
+/// open.
+fn largest<T: Vect, B: Moments>(is_bond: bool, beyond: &Local<T, B>) -> f64 {
+    match is_bond {
+        true => beyond.n.abs().max(beyond.t.norm()).max(beyond.m.bending()).max(beyond.m.twist()),
+        false => -beyond.n,
+    }
 }
 
 /// Adds up displacements beyond the contact laws, and finds the largest sum.
 struct Accumulating<'a, D: Dim, P> {
     world: &'a World<D>,
     touches: &'a mut [StoredTouch<D>],
+    turns: &'a mut [Turn<D>],
     places: P,
     h: f64,
     pair: [u32; 2],
@@ -243,12 +260,19 @@ impl<D: Dim, P: Iterator<Item = usize>> Visitor<D> for Accumulating<'_, D, P> {
     #[inline(always)]
     fn visit<L: Law>(&mut self, nodes: &Nodes<D>, c: &Contact<D, L>) {
         let Some(place) = self.places.next() else { return };
-        let Some(speed) = beyond_law(nodes, c) else { return };
+        let Some(beyond) = beyond_law(nodes, c) else { return };
         let stored = &mut self.touches[place];
-        let sum = stored.yielded + self.h * speed;
-        // a dry contact may open
-        stored.yielded = if stored.bond().is_some() { sum } else { sum.max(0.0) };
-        let share = stored.yielded.abs() / self.world.smaller(stored.pair);
+        let sum = stored.yielded - self.h * beyond.n;
+        let bond = stored.bond().and_then(|bond| self.turns.get_mut(bond as usize));
+        stored.yielded = if bond.is_some() { sum } else { sum.max(0.0) };
+        let mut all = Local::<D::Tangent, D::Moment> { n: -stored.yielded, ..Local::zero() };
+        if let Some(Turn { slipped: (t, m), .. }) = bond {
+            let frame = D::with_tangents(c.link.axes.normal(), &stored.tangents);
+            *t += in_frame::<D, _>(&frame, beyond.t) * self.h;
+            *m += resized::<_, D::Moment>(beyond.m) * self.h;
+            (all.t, all.m) = (*t, *m);
+        }
+        let share = largest(c.law.breaks(), &all) / self.world.smaller(stored.pair);
         if share > self.share {
             (self.pair, self.share) = (stored.pair, share);
         }
@@ -265,8 +289,8 @@ struct Yielding<'a, D: Dim> {
 impl<D: Dim> Visitor<D> for Yielding<'_, D> {
     #[inline(always)]
     fn visit<L: Law>(&mut self, nodes: &Nodes<D>, c: &Contact<D, L>) {
-        let Some(closing) = beyond_law(nodes, c) else { return };
-        let speed = if c.law.breaks() { closing.abs() } else { closing };
+        let Some(beyond) = beyond_law(nodes, c) else { return };
+        let speed = largest(c.law.breaks(), &beyond);
         let share = self.world.settings.step * speed / self.world.smaller(c.link.nodes);
         if share > self.share {
             (self.pair, self.share) = (c.link.nodes, share);

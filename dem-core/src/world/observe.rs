@@ -1,6 +1,7 @@
 //! Measures of a world: kinetic energy, momentum, mean stress and strain.
 
 use super::{Momentum, Touch, World};
+use crate::body::separation;
 use crate::dim::{Dim, Vect};
 
 impl<D: Dim> World<D> {
@@ -35,17 +36,32 @@ impl<D: Dim> World<D> {
     /// Mean stress σ = (1/V) Σ ℓ ⊗ f over the contacts of the last step (Pa, D × D row by row;
     /// compression positive), after Love and Weber. ℓ joins the centres, or at a wall the contact
     /// point to the centre, or under a membrane the point of the grain where its push acts to the
-    /// centre; V is the box around the sample at time zero.
+    /// centre; V is the box around the sample at time zero. A wall that holds a grain bears what
+    /// its contacts exert on it.
     pub fn stress(&self) -> Vec<f64> {
         let mut sum = vec![0.0; D::N * D::N];
-        for touch in self.touches() {
-            let force = D::compose(&touch.frame, touch.reaction.n, touch.reaction.t);
-            let branch = self.branch(&touch);
+        let mut add = |branch: D::Vector, force: D::Vector| {
             for row in 0..D::N {
                 for col in 0..D::N {
                     sum[row * D::N + col] += branch[row] * force[col];
                 }
             }
+        };
+        let mut on_held = vec![D::Vector::zero(); self.held.len()];
+        for touch in self.touches() {
+            let force = D::compose(&touch.frame, touch.reaction.n, touch.reaction.t);
+            add(self.branch(&touch), force);
+            for (k, force) in touch.pair.into_iter().zip([force, -force]) {
+                if let Some(sum) = on_held.get_mut(k as usize) {
+                    *sum += force;
+                }
+            }
+        }
+        for (k, (wall, force)) in self.held.iter().zip(on_held).enumerate() {
+            let Some(wall) = wall.map(|wall| wall as usize) else { continue };
+            let (radius, offset) = (self.grains.radius[k], separation::<D>(self.mid.grains[k], self.mid.walls[wall]));
+            let (gap, normal) = self.walls[wall].shape.gap(offset, radius);
+            add(normal * (radius + 0.5 * gap), -force);
         }
         let pressure = self.membrane.as_ref().map_or(0.0, |membrane| membrane.applied);
         for (grain, force) in self.membrane_forces(pressure) {

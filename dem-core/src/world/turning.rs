@@ -42,7 +42,8 @@ impl<D: Dim> World<D> {
         let spins = self.spins_of_fragments(touches, motion, h);
         for stored in touches {
             if let Some(bond) = stored.bond() {
-                turns[bond as usize] = self.turn(mid, stored, bond as usize, motion, &spins, h);
+                let slipped = self.turns.get(bond as usize).map_or(Turn::<D>::default().slipped, |turn| turn.slipped);
+                turns[bond as usize] = Turn { slipped, ..self.turn(mid, stored, bond as usize, motion, &spins, h) };
             }
         }
         turns
@@ -146,7 +147,22 @@ impl<D: Dim> World<D> {
         if below(&owed) {
             owed = D::Vector::zero();
         }
-        Turn { bias: own + owed * (1.0 / full), owed }
+        Turn { bias: own + owed * (1.0 / full), owed, ..Turn::default() }
+    }
+
+    /// Velocity (m/s, at most zero) that the law of a closed contact with a round wall around the
+    /// grain adds to the normal velocity, since the normal turns as the grain moves along the wall;
+    /// zero for other pairs. Without it the grain would sink into the wall by (v h)²/2ρ in each
+    /// step on a circle of radius ρ.
+    pub(super) fn turn_around(&self, mid: &Midpoint<D>, pair: [u32; 2], motion: &Motion<D>, h: f64) -> f64 {
+        let [i, j] = pair.map(|k| k as usize);
+        let around = |x| self.walls.get(j.checked_sub(self.grains.len())?)?.shape.around(x);
+        let velocity = motion.before[i].0 - motion.before[j].0;
+        let span = 0.5 * (self.last_step(h) + h);
+        match (around(separation::<D>(mid.grains[i], mid.place(j))), around(velocity * span)) {
+            (Some(apart), Some(way)) => 0.0 - lengthening::<D>(apart, way, span).0,
+            _ => 0.0,
+        }
     }
 
     /// Spin of the vector between the centres of a bonded pair (rad/s), and of its frame about it:

@@ -21,7 +21,7 @@ impl Aims {
     pub fn missed(&self, residual: f64, velocity_error: f64) -> f64 {
         match residual {
             0.0 => 0.0,
-            _ if residual.is_nan() => f64::INFINITY,
+            _ if residual.is_nan() || velocity_error.is_nan() => f64::INFINITY,
             _ => (velocity_error / self.load_tolerance).max(residual / self.tolerance),
         }
     }
