@@ -13,9 +13,9 @@ pub struct Fragments {
     pub count: usize,
     /// Pieces of a single grain.
     pub singles: usize,
-    /// Grains in the largest piece.
+    /// Grains in the heaviest piece; of equally heavy ones, the one with the most grains.
     pub largest: usize,
-    /// Share of the sample's mass in the heaviest piece, 0 to 1.
+    /// Share of the sample's mass in the same piece, 0 to 1.
     pub largest_mass_fraction: f64,
 }
 
@@ -53,11 +53,12 @@ pub fn fragments(mass: &[f64], bonds: &Bonds, status: &[BondStatus]) -> Fragment
         masses[piece] += mass;
     }
     let total: f64 = mass.iter().sum();
-    let heaviest = masses.iter().copied().fold(0.0, f64::max);
+    let heavier = |a: &(f64, usize), b: &(f64, usize)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+    let (heaviest, largest) = masses.iter().copied().zip(grains.iter().copied()).max_by(heavier).unwrap_or_default();
     Fragments {
         count: grains.iter().filter(|&&n| n > 0).count(),
         singles: grains.iter().filter(|&&n| n == 1).count(),
-        largest: grains.iter().copied().max().unwrap_or(0),
+        largest,
         largest_mass_fraction: if total > 0.0 { heaviest / total } else { 0.0 },
     }
 }
@@ -100,9 +101,12 @@ mod tests {
     fn intact_bonds_hold_pieces_together() {
         let mass = [1.0, 1.0, 1.0, 1.0, 10.0, 10.0, 1.0];
         let found = fragments(&mass, &bonds(), &[BondStatus::Intact; 4]);
-        // the largest piece by grains is the chain, the heaviest is the pair
-        let expected = Fragments { count: 3, singles: 1, largest: 4, largest_mass_fraction: 0.8 };
+        // the chain has more grains, the pair is heavier
+        let expected = Fragments { count: 3, singles: 1, largest: 2, largest_mass_fraction: 0.8 };
         assert_eq!(found, expected);
+        // of equally heavy pieces, the one with the most grains
+        let found = fragments(&[1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 4.0], &bonds(), &[BondStatus::Intact; 4]);
+        assert_eq!((found.largest, found.largest_mass_fraction), (4, 4.0 / 12.0));
     }
 
     #[test]

@@ -6,7 +6,7 @@ use clap::Args;
 use dem_history::History;
 use dem_output::command_line::seconds;
 
-use crate::output::{Folder, Result, Source, default_folder, source};
+use crate::output::{Folder, Result, Source, WriteError, default_folder, source};
 
 /// A history and the folder for what is made of it.
 #[derive(Debug, Args)]
@@ -64,6 +64,17 @@ impl LoadWall {
     }
 }
 
+/// The results folder `path`, as [`Folder::of`].
+///
+/// # Errors
+/// [`crate::output::PostError::Write`], also where `path` is a file.
+pub(crate) fn results(path: PathBuf, command: &str, sources: Vec<Source>, force: bool) -> Result<Folder> {
+    if path.is_file() {
+        return Err(WriteError { path, why: "it is a file, not a folder: choose another with -o".into() }.into());
+    }
+    Ok(Folder::of(path, command, sources, force)?)
+}
+
 impl Runs {
     /// The folder for the results of the command `command`: the requested one, or that named after
     /// the first run and the command.
@@ -74,7 +85,7 @@ impl Runs {
     pub fn folder(&self, command: &str) -> Result<Option<Folder>> {
         let path = self.output.clone().unwrap_or_else(|| default_folder(&self.runs[0], &format!("-{command}")));
         let sources = self.runs.iter().map(|run| Source::new(run, None)).collect();
-        Ok(Some(Folder::of(path, command, sources, self.force)?))
+        Ok(Some(results(path, command, sources, self.force)?))
     }
 }
 
@@ -101,6 +112,6 @@ impl Files {
             _ => "-post",
         };
         let path = self.output.clone().unwrap_or_else(|| default_folder(&self.history, suffix));
-        Ok(Some(Folder::of(path, command, vec![source(history)?], self.force)?))
+        Ok(Some(results(path, command, vec![source(history)?], self.force)?))
     }
 }

@@ -159,7 +159,7 @@ impl Report {
             "max speed (m/s)",
             "grain",
             "drift (m/s)",
-            "kinetic energy (J)",
+            "energy of translation (J)",
         ]);
         for field in &self.fields {
             let drift: Vec<String> = field.drift.iter().map(|v| short(*v)).collect();

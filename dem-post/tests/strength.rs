@@ -262,9 +262,7 @@ fn a_sweep_names_its_runs() {
     for (k, cohesion) in [5.0, 10.0, 20.0].into_iter().enumerate() {
         let id = format!("{:04}", k + 1);
         let failed = cohesion == 20.0;
-        if !failed {
-            Run::new(cohesion, 1, cohesion).write(&runs, &format!("{id}.h5"));
-        }
+        Run::new(cohesion, 1, cohesion).write(&runs, &format!("{id}{}", if failed { ".failed.h5" } else { ".h5" }));
         let state = if failed { "failed" } else { "done" };
         let outcome =
             json!({ "digest": id, "state": state, "exit_code": 3, "wall_time": 1.0, "message": "no convergence" });
@@ -277,7 +275,7 @@ fn a_sweep_names_its_runs() {
     std::fs::write(folder.path().join("sweep/manifest.json"), manifest.to_string()).unwrap();
     let found = json_of(&strength(folder.path(), &["sweep", "--json"]), 1);
     assert_eq!(found["runs"].as_array().unwrap().len(), 2);
-    assert_eq!(found["left_out"][0]["why"], "failed: no convergence");
+    assert_eq!(found["left_out"][0], json!({ "run": "sweep/runs/0003.failed.h5", "why": "failed: no convergence" }));
     assert!(folder.path().join("sweep-strength/strength.csv").exists());
     std::fs::write(folder.path().join("sweep/manifest.json"), "{}").unwrap();
     let output = strength(folder.path(), &["sweep"]);

@@ -15,6 +15,24 @@ use std::f64::consts::PI;
 /// Stream of the random generator from which strengths of bonds are drawn.
 const SCATTER_STREAM: u128 = 1;
 
+/// Which pairs of grains form no bond at any gap.
+pub const EXCEPT: &str = ", except pairs that form no bond: both grains fixed or held by the grip of a wall, a strength \
+                          of 0, or a region of bonds.absent between them";
+
+/// Why a run of this scene has no bonds; `None` if the scene has none either.
+#[must_use]
+pub fn why_none(scene: &Scene) -> Option<String> {
+    let bonds = scene.bonds.as_ref().filter(|_| scene.has_bonds())?;
+    Some(match scene.cement_stage() {
+        // a stage that forms no bond is an error
+        Some(_) => "the stage that forms them did not begin".into(),
+        None => {
+            let gap = bonds.gap_tolerance;
+            format!("no two grains are within bonds.gap_tolerance, {gap} mean diameters{EXCEPT}")
+        }
+    })
+}
+
 /// The bonds of a scene between its grains, sorted by pair.
 ///
 /// # Errors
@@ -176,6 +194,7 @@ fn bond_stiffness<D: Dim>(stiffness: scene::Stiffness, a: f64, thickness: f64) -
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::check::tests::config;
     use dem_core::body::{Grain, Load};
     use dem_core::bond::Rupture;
     use dem_core::dim::{D2, D3Twist};
@@ -250,6 +269,13 @@ mod tests {
         // the same seed gives the same bonds, another seed others
         assert_eq!(bonds, scattered(scene::Scatter::Normal { deviation: 0.2 }, 10_000, 3));
         assert_ne!(bonds, scattered(scene::Scatter::Normal { deviation: 0.2 }, 10_000, 4));
+    }
+
+    #[test]
+    fn a_run_that_ends_before_its_bonds_form_is_told_so() {
+        let why = why_none(&config("staged-biaxial.json", &[])).expect("a scene with bonds");
+        assert_eq!(why, "the stage that forms them did not begin");
+        assert_eq!(why_none(&config("column.json", &[])), None);
     }
 
     #[test]

@@ -7,7 +7,8 @@ use crate::history::{
     self, Background, Batch, BondStatus, Checkpoint, ContactRows, ContactStatus, Frame, GrainState, History, Layout,
     Observable, Parameters, RowCounts, Rupture, RuptureMode, SolverRoute, WallDrive, WallKind, WallState, Writer,
 };
-use crate::scene::{Precision, Scene};
+use crate::load::{drive_direction, load};
+use crate::scene::{self, Drive as SceneDrive, Precision, Scene, StageDrive};
 use dem_core::body::{Drive, Shape, Wall};
 use dem_core::bond;
 use dem_core::dim::{Dim, Moments, Vect};
@@ -225,7 +226,7 @@ fn describe<D: Dim>(
             inertia: world.grains.inertia.clone(),
             material: world.grains.material.clone(),
         },
-        walls: world.walls.iter().zip(scene.walls.keys()).map(|(wall, name)| describe_wall(wall, name)).collect(),
+        walls: world.walls.iter().zip(&scene.walls).map(|(wall, named)| describe_wall(scene, wall, named)).collect(),
         bonds,
         materials: match world.grains.material.is_empty() {
             true => vec![],
@@ -280,9 +281,28 @@ fn padded<D: Dim>(v: D::Vector) -> [f64; 3] {
     out
 }
 
-fn describe_wall<D: Dim>(wall: &Wall<D>, name: &str) -> history::Wall {
+/// Whether a wall is fixed, or its velocity or its force is prescribed.
+fn wall_drive(drive: &SceneDrive) -> WallDrive {
+    match drive {
+        SceneDrive::Fixed => WallDrive::Fixed,
+        SceneDrive::Velocity(_) => WallDrive::Velocity,
+        SceneDrive::Force(_) | SceneDrive::Stress(_) => WallDrive::Force,
+    }
+}
+
+/// Whether a wall has a prescribed velocity in some stages and a prescribed force in others.
+fn drives_change(scene: &Scene) -> bool {
+    scene.walls.iter().any(|(name, wall)| {
+        let first = wall_drive(&scene.first_drive(name, wall));
+        scene.stage_drives(name).map(StageDrive::drive).any(|drive| wall_drive(&drive) != first)
+    })
+}
+
+/// The constant properties of a wall, with the drive that it has at the start of the run: the world
+/// of a resumed run has that of a later stage.
+fn describe_wall<D: Dim>(scene: &Scene, wall: &Wall<D>, (name, of_scene): (&String, &scene::Wall)) -> history::Wall {
     let zero = D::Vector::zero();
-    let mut described = history::Wall { name: name.into(), ..history::Wall::default() };
+    let mut described = history::Wall { name: name.clone(), ..history::Wall::default() };
     let (kind, normal) = match wall.shape {
         Shape::Plane { normal } => (WallKind::Plane, normal),
         Shape::Round { radius, inside, axis } => {
@@ -300,12 +320,9 @@ fn describe_wall<D: Dim>(wall: &Wall<D>, name: &str) -> history::Wall {
             (WallKind::Plate, plate.normal())
         }
     };
-    let (drive, direction) = match wall.drive {
-        Drive::Fixed => (WallDrive::Fixed, zero),
-        Drive::Velocity { direction, .. } => (WallDrive::Velocity, direction),
-        Drive::Force { direction, .. } => (WallDrive::Force, direction),
-    };
-    history::Wall { kind, normal: padded::<D>(normal), drive, direction: padded::<D>(direction), ..described }
+    let drive = wall_drive(&scene.first_drive(name, of_scene));
+    let direction = padded::<D>(drive_direction(wall).unwrap_or(zero));
+    history::Wall { kind, normal: padded::<D>(normal), drive, direction, ..described }
 }
 
 /// The bonds of a world. `formed` is the step after which a stage formed them, or that none has;
@@ -420,6 +437,9 @@ fn of_bonds_and_walls<D: Dim>(scene: &Scene, world: &World<D>) -> Vec<(Observabl
             w.walls.iter().for_each(|x| out.extend(x.reaction_at_limit.as_slice()))
         });
         add("applied_force", "N", &[walls], |w, _, out| out.extend(w.walls.iter().map(applied_force)));
+        if drives_change(scene) {
+            add("wall_load", "N", &[walls], |w, _, out| out.extend(w.walls.iter().map(load)));
+        }
     }
     list
 }

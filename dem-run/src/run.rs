@@ -1,5 +1,6 @@
 //! The run of a scene: prepare, step, record, sum up.
 
+use crate::bonds;
 use crate::build::{build, rebuild};
 use crate::check;
 use crate::clock::cpu_time;
@@ -362,7 +363,7 @@ impl<D: Dim> RunState<D> {
             grains: world.grains.len(),
             solid_fraction,
             bonds: world.bonds.len(),
-            gap_tolerance: scene.bonds.as_ref().filter(|_| scene.has_bonds()).map(|bonds| bonds.gap_tolerance),
+            no_bonds: bonds::why_none(scene).filter(|_| world.bonds.is_empty()),
             elastic,
             broken: course.broken,
             twists: scene.twists(),

@@ -107,9 +107,10 @@ fn cement<D: Dim>(scene: &Scene, world: &mut World<D>, stage: usize) -> Result<(
     let formed = bonds::of_sample(scene, &world.grains)?;
     if formed.is_empty() {
         return Err(RunError::Sample(vec![format!(
-            "stages.{stage}.cement: no two grains are near enough at t = {} s; make the stages before it press them \
+            "stages.{stage}.cement: no two grains are near enough at t = {} s{}; make the stages before it press them \
              together, or bonds.gap_tolerance larger",
-            number(world.time)
+            number(world.time),
+            bonds::EXCEPT
         )]));
     }
     world.add_bonds(formed);

@@ -56,10 +56,9 @@ pub struct Summary {
     pub solid_fraction: Option<f64>,
     /// Bonds at the start.
     pub bonds: usize,
-    /// Gap up to which the scene bonds grains, over their mean diameter (–), if its bonds have any
-    /// strength.
+    /// Why there are no bonds, if the scene has bonds and none was formed.
     #[serde(skip)]
-    pub gap_tolerance: Option<f64>,
+    pub no_bonds: Option<String>,
     /// Whether bonds are elastic: then the sample may deform before the first break.
     pub elastic: bool,
     /// Bonds broken in tension, shear, rolling and twist.
@@ -189,13 +188,9 @@ impl fmt::Display for Summary {
             Some(fraction) => writeln!(f, "sample           {} grains, solid fraction {fraction:.4}", self.grains)?,
             None => writeln!(f, "sample           {} grains", self.grains)?,
         }
-        match self.gap_tolerance {
+        match &self.no_bonds {
             _ if self.bonds > 0 => self.write_bonds(f)?,
-            Some(gap) => writeln!(
-                f,
-                "bonds            none, although the scene has bonds: no two grains are within bonds.gap_tolerance, {gap} mean \
-                 diameters"
-            )?,
+            Some(why) => writeln!(f, "bonds            none, although the scene has bonds: {why}")?,
             None => {}
         }
         if self.steps > 0 {

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use dem_history::{History, WallDrive};
 use serde_json::Value;
 
 fn config(name: &str) -> PathBuf {
@@ -159,4 +160,88 @@ fn every_command_shows_an_example() {
         assert_eq!(code, Some(0));
         assert!(stdout.contains("Example"), "{args:?}");
     }
+}
+
+#[test]
+fn grains_that_touch_and_are_all_fixed_form_no_bond_and_the_summary_says_why() {
+    let folder = folder();
+    let scene = config("two-grains.json");
+    let scene = scene.to_str().expect("UTF-8");
+    let run = |set: &str| dem_run(folder.path(), &["run", scene, "--quiet", "--force", "-o", "a.h5", "--set", set]).1;
+    let near = run("grains.fixed=[0, 1]");
+    let why = "bonds            none, although the scene has bonds: no two grains are within bonds.gap_tolerance, 0.001 \
+               mean diameters, except pairs that form no bond: both grains fixed";
+    assert!(near.contains(why), "{near}");
+    let far = run("sample.grains.1.center=[5e-3, 0]");
+    assert!(far.contains(why), "{far}");
+}
+
+/// A lid on a column of three grains: at rest, then under a force, held, and under a stress.
+const STAGED: &str = r#"{"dimension": 2, "thickness": 0.01, "gravity": [0.3, -9.81],
+    "time": {"step": 1e-3, "end": 0.1}, "output": {"every_steps": 1},
+    "sample": {"grains": [{"center": [0, 0], "radius": 1e-3}, {"center": [0, 2e-3], "radius": 1e-3},
+        {"center": [0, 4e-3], "radius": 1e-3}]},
+    "materials": {"density": 2500, "friction": {"grain_grain": 0.3, "grain_wall": 0.2}},
+    "bonds": {"strength": 1e-3, "gap_tolerance": 1e-3},
+    "walls": {"base": {"shape": {"plane": {"normal": [0, 1], "place": "seated"}}},
+        "lid": {"shape": {"plane": {"normal": [0, -1], "place": "seated"}}, "mass": "sample",
+            "velocity": {"constant": 1e-9}}},
+    "stages": [{"name": "rest", "duration": 0.01},
+        {"name": "press", "duration": 0.02, "walls": {"lid": {"force": {"constant": 1}}}},
+        {"name": "hold", "duration": 0.02, "walls": {"lid": {}}},
+        {"name": "confine", "duration": 0.02, "walls": {"lid": {"stress": {"constant": 1e4}}}}]}"#;
+
+/// Resumed after a change of drive, in a stage with a force.
+#[test]
+fn a_resumed_run_with_stages_has_the_history_of_an_uninterrupted_one() {
+    let folder = folder();
+    std::fs::write(folder.path().join("scene.json"), STAGED).expect("a file");
+    let made = |args: &[&str]| {
+        let (code, _, stderr) = dem_run(folder.path(), args);
+        assert_eq!(code, Some(0), "{stderr}");
+    };
+    made(&["run", "scene.json", "--quiet", "-o", "whole.h5"]);
+    made(&["run", "scene.json", "--quiet", "-o", "parts.h5", "--set", "time.end=0.015"]);
+    made(&["resume", "parts.h5", "--quiet", "--until", "0.1"]);
+    let [whole, parts] = ["whole.h5", "parts.h5"].map(|name| History::open(&folder.path().join(name)).expect("open"));
+    let walls = whole.walls().expect("walls");
+    assert_eq!((walls[0].drive, walls[1].drive), (WallDrive::Fixed, WallDrive::Velocity));
+    assert_eq!(parts.walls().expect("walls"), walls);
+    let names = whole.observable_names().expect("names");
+    assert_eq!(parts.observable_names().expect("names"), names);
+    for name in names.iter().filter(|name| *name != "cpu_time") {
+        let [a, b] = [&whole, &parts].map(|history| history.observable(name).expect("read").expect("recorded").value);
+        assert_eq!(
+            a.iter().map(|x| x.to_bits()).collect::<Vec<_>>(),
+            b.iter().map(|x| x.to_bits()).collect::<Vec<_>>()
+        );
+    }
+}
+
+/// The load is the prescribed force in stages that prescribe one, else the force before the breaks.
+#[test]
+fn the_load_of_each_step_is_recorded_where_the_drive_of_a_wall_changes() {
+    let folder = folder();
+    std::fs::write(folder.path().join("scene.json"), STAGED).expect("a file");
+    let run = |set: &str| {
+        let path = folder.path().join("a.h5");
+        let (code, _, stderr) =
+            dem_run(folder.path(), &["run", "scene.json", "--quiet", "--force", "-o", "a.h5", "--set", set]);
+        assert_eq!(code, Some(0), "{stderr}");
+        History::open(&path).expect("open")
+    };
+    let history = run("time.end=0.1");
+    let of_lid = |name: &str, index: &[usize]| {
+        history.observable(name).expect("read").expect("recorded").component(index).expect("of the lid")
+    };
+    let (load, applied) = (of_lid("wall_load", &[1]), of_lid("applied_force", &[1]));
+    let limit = of_lid("wall_force_at_limit", &[1, 1]);
+    for (k, load) in load.iter().enumerate() {
+        let forced = (10..30).contains(&k) || (50..70).contains(&k);
+        assert_eq!(*load, if forced { applied[k] } else { limit[k] }, "step {}", k + 1);
+    }
+    assert_eq!((load.len(), load[10..30].iter().all(|load| *load == 1.0)), (70, true));
+    // one kind of drive: `applied_force` and `wall_force_at_limit` are enough
+    let same = run(r#"stages=[{"name": "press", "duration": 0.01, "walls": {"lid": {"force": {"constant": 1}}}}]"#);
+    assert!(same.observable("wall_load").expect("read").is_none());
 }

@@ -20,6 +20,7 @@ OBSERVABLES = {
     "wall_force": ("wall", "axis"),
     "wall_force_at_limit": ("wall", "axis"),
     "applied_force": ("wall",),
+    "wall_load": ("wall",),
 }
 RUPTURE_UNITS = {
     "time": "s", "x": "m", "y": "m", "z": "m", "rn": "N", "rt": "N", "m": "N m", "twist": "N m", "energy": "J",
@@ -71,6 +72,7 @@ class History:
         return self
 
     def _open(self):
+        _check_superblock(self.path)
         try:
             self._file = h5py.File(self.path, "r")
         except FileNotFoundError:
@@ -242,7 +244,8 @@ class History:
                 return data[first:end:stride]
             frames = range(first, end, stride)
         # h5py wants increasing numbers, each once
-        numbers, back = np.unique([self._number(frame) for frame in frames], return_inverse=True)
+        numbers = np.array([self._number(frame) for frame in frames], dtype=int)
+        numbers, back = np.unique(numbers, return_inverse=True)
         return data[numbers][back]
 
     def _rows(self, data, counted):
@@ -263,6 +266,29 @@ class History:
         if "axis" in dataset.dims:
             coordinates = {**coordinates, "axis": AXES[: self.dimension]}
         return dataset.assign_coords(coordinates)
+
+
+def _check_superblock(path):
+    """Raises OSError for files that are not HDF5 and for truncated files.
+
+    HDF5 may read a truncated file without end.
+    """
+    with open(path, "rb") as file:
+        head = file.read(48)
+        # after the superblock: the file of a running program grows
+        size = os.fstat(file.fileno()).st_size
+    signature = b"\x89HDF\r\n\x1a\n"
+    if not head or head[:8] != signature[: len(head)]:
+        raise OSError(f"{path} is not an HDF5 file: give the .h5 file that `dem-run run` wrote")
+    expected = 48
+    if len(head) == 48:
+        # dem-run writes only version 3, with addresses of 8 bytes; HDF5 checks the others
+        expected = int.from_bytes(head[28:36], "little") if (head[8], head[9]) == (3, 8) else 0
+    if size < expected:
+        raise OSError(
+            f"{path} is truncated: it holds {size} bytes, and HDF5 recorded at least {expected}. "
+            "Copy it again, or run the scene again"
+        )
 
 
 def _names(dtype, values):

@@ -53,6 +53,24 @@ def test_frames_are_chosen_as_in_numpy(history, raw, frames):
     assert numpy.array_equal(grains["time"].values, raw["particles/grains/position/time"][:][frames])
 
 
+def test_no_frames_are_chosen_by_an_empty_list(history):
+    grains = history.grains([])
+    assert grains["position"].shape == (0, len(grains["grain"]), 2) and len(grains["time"]) == 0
+    assert history.bond_status([]).shape[0] == 0
+
+
+def test_a_truncated_history_is_refused(compression, tmp_path):
+    content, path = (compression / "compression.h5").read_bytes(), tmp_path / "cut.h5"
+    for size in (40, 600_000, len(content) - 1):
+        path.write_bytes(content[:size])
+        with pytest.raises(OSError, match=f"cut.h5 is truncated: it holds {size} bytes, and HDF5 recorded at least"):
+            dem.open(path)
+    for other in (b"", b"{}\n"):
+        path.write_bytes(other)
+        with pytest.raises(OSError, match="cut.h5 is not an HDF5 file"):
+            dem.open(path)
+
+
 def test_one_frame_has_no_time_axis(history, raw):
     grains = history.grains(-1)
     assert grains["position"].dims == ("grain", "axis") and float(grains["time"]) == history.times[-1]

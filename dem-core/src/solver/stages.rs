@@ -113,18 +113,15 @@ impl Default for StagedSettings {
 }
 
 impl StagedSettings {
-    /// Report of a solve with this residual, load error and velocity error. All three may exceed
-    /// their tolerances by the same factor, `accept / tolerance`.
+    /// Report of a solve with this residual, load error and velocity error.
     pub(super) fn report(&self, work: Work, residual: f64, load_error: f64, velocity_error: f64) -> SolveReport {
-        let missed = self.aims(false).missed(residual, load_error.max(velocity_error));
-        let status = SolveStatus::of(missed, 1.0, self.accept / self.tolerance);
+        // with a residual of zero only round-off still changes
+        let load_converged = load_error.max(velocity_error) <= self.load_tolerance || residual == 0.0;
+        let status = match SolveStatus::of(residual, self.tolerance, self.accept) {
+            SolveStatus::Converged if !load_converged => SolveStatus::Accepted,
+            status => status,
+        };
         SolveReport { status, route: Route::ActiveSet, work, residual, load_error: Some(load_error) }
-    }
-
-    /// Tolerances and iteration limit of the interior-point method.
-    fn aims(&self, least: bool) -> Aims {
-        let Self { tolerance, load_tolerance, max_iterations, .. } = *self;
-        Aims { tolerance, load_tolerance, least, most: max_iterations }
     }
 }
 
@@ -208,7 +205,7 @@ impl Staged {
         // bonds break by the load that they bear and need minimum-energy reactions; dry contacts
         // need only reactions that balance
         let least = problem.matrix().is_none() && rows.list.iter().any(|row| row.is_bond);
-        let mut aims = self.settings.aims(least);
+        let mut aims = self.aims(least);
         if effort == Effort::Short {
             aims.most = aims.most.min(tuning::MOST_SHORT);
         }
@@ -255,6 +252,12 @@ impl Staged {
             Start::StiffLimit => vec![Padded::zero(); rows.list.len()],
             Start::LastStep => multipliers(rows),
         }
+    }
+
+    /// Tolerances and iteration limit of the interior-point method.
+    fn aims(&self, least: bool) -> Aims {
+        let StagedSettings { tolerance, load_tolerance, max_iterations, .. } = self.settings;
+        Aims { tolerance, load_tolerance, least, most: max_iterations }
     }
 
     /// Settings of Gauss–Seidel for this target residual.
@@ -306,7 +309,7 @@ impl Staged {
         loop {
             let fine = GaussSeidel::new(self.sweeps(aim, tuning::FINE_SWEEPS - work.sweeps)).solve(problem);
             work = work + fine.work;
-            let missed = self.settings.aims(false).missed(fine.residual, velocity_error(problem));
+            let missed = self.aims(false).missed(fine.residual, velocity_error(problem));
             // sweeps stop on the residual alone: lower its target to reduce the velocity error
             if missed > 1.0 && fine.residual <= aim && work.sweeps < tuning::FINE_SWEEPS {
                 aim = fine.residual / missed;
@@ -320,7 +323,7 @@ impl Staged {
     fn coarse_sweeps<D: Dim>(&self, problem: &mut ContactProblem<D>) -> SolveReport {
         let StagedSettings { tolerance, accept, .. } = self.settings;
         let coarse = GaussSeidel::new(self.sweeps(accept, tuning::COARSE_SWEEPS)).solve(problem);
-        let missed = self.settings.aims(false).missed(coarse.residual, velocity_error(problem));
+        let missed = self.aims(false).missed(coarse.residual, velocity_error(problem));
         // its target was `accept`: at best it is accepted
         let status = if missed <= accept / tolerance { SolveStatus::Accepted } else { SolveStatus::Failed };
         SolveReport { status, ..coarse }

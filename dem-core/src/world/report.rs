@@ -124,6 +124,8 @@ pub enum StepError {
         step: f64,
         /// Residual of its solve (–).
         residual: f64,
+        /// Load error of its solve (–), if that is what was not accepted.
+        load_error: Option<f64>,
         /// Iterations of its solve.
         iterations: u64,
         /// The bodies of the contact that is furthest from its law (walls follow the grains).
@@ -206,7 +208,8 @@ impl StepError {
     /// The message; `name` maps the index of a body to its name, grains first, then walls.
     pub fn message(&self, name: &dyn Fn(u32) -> String) -> String {
         match self {
-            Self::NotAccepted { time, step, residual, iterations, pair, verdict } => {
+            Self::NotAccepted { time, step, residual, load_error, iterations, pair, verdict } => {
+                let load_error = load_error.map(|error| format!(", load error {error:.2e}")).unwrap_or_default();
                 let [opening, known] = match verdict {
                     Verdict::NoSolution(bodies) => {
                         [format!("no motion satisfies {}", listed(bodies, name)), String::new()]
@@ -218,8 +221,8 @@ impl StepError {
                     }
                 };
                 format!(
-                    "{opening} at t = {time:.6e} s: residual {residual:.2e} after {iterations} iterations, with the step cut to \
-                     {step:.2e} s{known}"
+                    "{opening} at t = {time:.6e} s: residual {residual:.2e}{load_error} after {iterations} iterations, with \
+                     the step cut to {step:.2e} s{known}"
                 )
             }
             Self::TooFast { time, pair } => format!(

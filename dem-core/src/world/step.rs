@@ -116,6 +116,7 @@ impl<D: Dim> World<D> {
             self.refuse_unaccepted(solve, &problem, h, last_attempt)?;
             if limits_apply {
                 self.refuse_violation(self.yielding(&problem), &problem, last_attempt)?;
+                self.refuse_unbalanced(solve, &problem, h, last_attempt)?;
             }
             write_reactions(&mut touches, &problem, &places, h);
             let missed = self.missed(&mid, &touches, &problem.nodes, h);
@@ -268,14 +269,42 @@ impl<D: Dim> World<D> {
         {
             return Err(StepError::NotFinite { time: self.time, body: body as u32 });
         }
-        if solve.status == SolveStatus::Failed {
-            let SolveReport { residual, work, .. } = solve;
-            let (iterations, verdict) =
-                (work.iterations(), if last_attempt { self.verdict(problem) } else { Verdict::Undecided });
-            let pair = furthest_from_law(problem);
-            return Err(StepError::NotAccepted { time: self.time, step: h, residual, iterations, pair, verdict });
+        match solve.status {
+            SolveStatus::Failed => Err(self.not_accepted(solve, None, problem, h, last_attempt)),
+            _ => Ok(()),
         }
-        Ok(())
+    }
+
+    /// Refuse a solve whose load error is beyond its tolerance by a larger factor than the accepted
+    /// residual: reactions that still grow, as where no motion satisfies rigid bonds.
+    fn refuse_unbalanced(
+        &self,
+        solve: SolveReport,
+        problem: &ContactProblem<D>,
+        h: f64,
+        last_attempt: bool,
+    ) -> Result<(), StepError> {
+        let solver = &self.settings.solver;
+        let most = solver.load_tolerance().map(|tolerance| tolerance * solver.accept() / solver.tolerance());
+        match solve.load_error.zip(most) {
+            Some((error, most)) if error > most => Err(self.not_accepted(solve, Some(error), problem, h, last_attempt)),
+            _ => Ok(()),
+        }
+    }
+
+    fn not_accepted(
+        &self,
+        solve: SolveReport,
+        load_error: Option<f64>,
+        problem: &ContactProblem<D>,
+        h: f64,
+        last_attempt: bool,
+    ) -> StepError {
+        let SolveReport { residual, work, .. } = solve;
+        let (iterations, verdict) =
+            (work.iterations(), if last_attempt { self.verdict(problem) } else { Verdict::Undecided });
+        let pair = furthest_from_law(problem);
+        StepError::NotAccepted { time: self.time, step: h, residual, load_error, iterations, pair, verdict }
     }
 
     fn refuse_violation(

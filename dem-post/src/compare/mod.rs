@@ -15,6 +15,7 @@ use clap::Args;
 use dem_history::History;
 
 use crate::analysis::Analysis;
+use crate::options::results;
 use crate::output::{Folder, Result, default_folder, source};
 pub use files::write;
 pub use report::{Report, read};
@@ -62,7 +63,7 @@ impl Analysis for Command {
 
     fn folder(&self, [a, b]: &Self::Input) -> Result<Option<Folder>> {
         let path = self.output.clone().unwrap_or_else(|| default_folder(&self.a, "-compare"));
-        Ok(Some(Folder::of(path, Self::NAME, vec![source(a)?, source(b)?], self.force)?))
+        Ok(Some(results(path, Self::NAME, vec![source(a)?, source(b)?], self.force)?))
     }
 
     fn write(&self, [a, _]: &Self::Input, report: &mut Report, folder: &mut Folder, _: bool) -> Result<()> {

@@ -112,9 +112,9 @@ pub struct Report {
 pub fn read(history: &History, quiet: bool) -> Result<Report> {
     let bonds = history.bonds()?;
     if bonds.is_empty() {
-        let what =
-            "cracks need bonds, and none was formed: add `bonds` to the scene, or raise its bonds.gap_tolerance".into();
-        return Err(PostError::Lacking { path: history.path().into(), what });
+        let what = "cracks need bonds, and none was formed: add `bonds` to the scene, raise its bonds.gap_tolerance, or \
+                    release fixed grains";
+        return Err(PostError::Lacking { path: history.path().into(), what: what.into() });
     }
     let ruptures = history.ruptures()?;
     let mut broken = Modes::default();

@@ -105,7 +105,8 @@ pub fn read(history: &History, options: &Options) -> Result<Report> {
     let bonds = history.bonds()?;
     if bonds.is_empty() {
         return Err(lacking(
-            "events need bonds, and none was formed: add `bonds` to the scene, or raise its bonds.gap_tolerance",
+            "events need bonds, and none was formed: add `bonds` to the scene, raise its bonds.gap_tolerance, or release \
+             fixed grains",
         ));
     }
     let ruptures = history.ruptures()?;

@@ -7,7 +7,8 @@ use super::report::Report;
 use crate::output::{Folder, Result, cell};
 
 /// Writes `fabric.csv` with a row for each frame, and as drawings `fabric`, coordination,
-/// anisotropy and crack density, and `fabric-stress`, p and q, dilation and porosity.
+/// anisotropy and crack density, and `fabric-stress`, p and q, dilation and porosity; quantities
+/// that the history does not have are not drawn.
 ///
 /// # Errors
 /// [`crate::output::PostError::Write`].
@@ -37,6 +38,14 @@ pub fn write(report: &Report, folder: &mut Folder) -> Result<()> {
         cells
     });
     folder.table("fabric", &head.iter().map(String::as_str).collect::<Vec<_>>(), rows)?;
-    folder.draw("fabric", &Chart::draw(vec![coordination(report), anisotropy(report), crack_density(report)]))?;
-    Ok(folder.draw("fabric-stress", &Chart::draw(vec![stress(report), dilation(report), porosity(report)]))?)
+    for (name, mut charts) in [
+        ("fabric", vec![coordination(report), anisotropy(report), crack_density(report)]),
+        ("fabric-stress", vec![stress(report), dilation(report), porosity(report)]),
+    ] {
+        charts.retain(|chart| chart.curves.iter().any(|curve| !curve.points.is_empty()));
+        if !charts.is_empty() {
+            folder.draw(name, &Chart::draw(charts))?;
+        }
+    }
+    Ok(())
 }

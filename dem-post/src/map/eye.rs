@@ -34,7 +34,7 @@ pub struct Perspective {
 /// A viewpoint from which spheres are seen in perspective.
 pub(super) struct Place {
     /// The middle of the sample, at which the eye looks, and half the sides of the box around the
-    /// sample, m.
+    /// centres, at least a radius, m.
     focus: Vector3<f64>,
     half: Vector3<f64>,
     /// Unit vectors to the right, up, and away from the eye.
@@ -57,15 +57,17 @@ const SHADE: f64 = 0.6;
 const BEYOND: f64 = 1.15;
 
 impl Place {
-    /// The viewpoint for a sample with these centres (m): z points up, y into the sheet.
-    pub fn of<'a>(centres: impl Iterator<Item = &'a [f64]> + Clone) -> Self {
+    /// The viewpoint for a sample with these centres and this greatest radius (m): z points up, y
+    /// into the sheet.
+    pub fn of<'a>(centres: impl Iterator<Item = &'a [f64]> + Clone, radius: f64) -> Self {
         let corner = |pick: fn(&Vector3<f64>, &Vector3<f64>) -> Vector3<f64>| {
             centres.clone().map(Vector3::from_column_slice).reduce(|a, b| pick(&a, &b)).unwrap_or_default()
         };
         let (low, high) = (corner(Vector3::inf), corner(Vector3::sup));
         let ahead = Vector3::new(-ASIDE.sin() * ABOVE.cos(), ASIDE.cos() * ABOVE.cos(), -ABOVE.sin());
         let right = Vector3::new(ASIDE.cos(), ASIDE.sin(), 0.0);
-        Self { focus: 0.5 * (low + high), half: 0.5 * (high - low), right, up: right.cross(&ahead), ahead }
+        let half = (0.5 * (high - low)).sup(&Vector3::repeat(radius));
+        Self { focus: 0.5 * (low + high), half, right, up: right.cross(&ahead), ahead }
     }
 
     /// The viewpoint as numbers.
@@ -180,7 +182,7 @@ mod tests {
     use super::*;
 
     fn place() -> Place {
-        Place::of([[-1.0, -2.0, -3.0], [1.0, 2.0, 3.0]].iter().map(<[f64; 3]>::as_slice))
+        Place::of([[-1.0, -2.0, -3.0], [1.0, 2.0, 3.0]].iter().map(<[f64; 3]>::as_slice), 0.5)
     }
 
     #[test]

@@ -63,8 +63,9 @@ impl Sample {
         if history.dimension() < 3 {
             return Self::read(history);
         }
+        let [_, radius] = range(history.grains()?.radius);
         let first = history.grain_state(0)?;
-        Self::seen(history, Eye::At(Place::of(first.position.chunks(3))))
+        Self::seen(history, Eye::At(Place::of(first.position.chunks(3), radius)))
     }
 
     /// As [`Sample::read`], of spheres cut open by a plane: through the middle of their first

@@ -245,7 +245,7 @@ mod tests {
 
     #[test]
     fn in_perspective_the_arrow_stands_on_the_middle_of_the_plate() {
-        let place = Place::of([[-1.0; 3], [1.0; 3]].iter().map(<[f64; 3]>::as_slice));
+        let place = Place::of([[-1.0; 3], [1.0; 3]].iter().map(<[f64; 3]>::as_slice), 0.1);
         let middle = frame().at(place.flat(&[0.0, 0.0, 1.0]));
         let eye = Eye::At(place);
         let ([tail, head], behind) =

@@ -10,7 +10,8 @@ use crate::output::{Result, number};
 pub struct Distribution {
     /// Median.
     pub median: f64,
-    /// 99th percentile: one step in a hundred exceeds it.
+    /// 99th percentile: one step in a hundred exceeds it; of fewer than 100 steps the greatest
+    /// value.
     pub high: f64,
     /// Greatest value.
     pub worst: f64,
@@ -113,7 +114,10 @@ impl Accuracy {
                 || "not recorded".into(),
                 |s| {
                     let [median, high, worst, time] = [s.median, s.high, s.worst, s.time].map(number);
-                    format!("median {median}; 1 % of the steps above {high}; worst {worst} at t = {time} s")
+                    // with fewer than 100 steps no step is above
+                    let above =
+                        if s.high < s.worst { format!("1 % of the steps above {high}; ") } else { String::new() };
+                    format!("median {median}; {above}worst {worst} at t = {time} s")
                 },
             )
         };
@@ -170,5 +174,16 @@ mod tests {
         let found = distribution(&time, (0..200).rev().map(f64::from).collect());
         assert_eq!(found, Distribution { median: 99.0, high: 197.0, worst: 199.0, time: 0.0 });
         assert_eq!(distribution(&[2.0], vec![7.0]), Distribution { median: 7.0, high: 7.0, worst: 7.0, time: 2.0 });
+    }
+
+    #[test]
+    fn a_share_above_is_named_only_if_a_step_is_above() {
+        let line = |steps: u32| {
+            let time: Vec<f64> = (0..steps).map(f64::from).collect();
+            let residual = Some(distribution(&time, time.clone()));
+            Accuracy { residual, ..Accuracy::default() }.lines()[1].1.clone()
+        };
+        assert_eq!(line(78), "median 38; worst 77 at t = 77 s");
+        assert_eq!(line(200), "median 99; 1 % of the steps above 197; worst 199 at t = 199 s");
     }
 }

@@ -104,7 +104,10 @@ pub fn histories(paths: &[PathBuf]) -> Result<(Vec<PathBuf>, Vec<LeftOut>)> {
             }
             let why = run.message.as_deref().and_then(|message| message.lines().next()).unwrap_or_default();
             let why = if why.is_empty() { String::new() } else { format!(": {why}") };
-            left_out.push(LeftOut { run: name(&history), why: format!("{}{why}", run.state.name()) });
+            // the history up to a failure or that of a run in progress, else the scene
+            let files = ["failed.h5", "part.h5", "json"].map(|ending| history.with_extension(ending));
+            let file = files.iter().find(|file| file.exists()).unwrap_or(&history);
+            left_out.push(LeftOut { run: name(file), why: format!("{}{why}", run.state.name()) });
         }
     }
     if found.is_empty() {

@@ -16,7 +16,8 @@
 //!
 //! **The load** is the prescribed force, or, where the motion is prescribed, the force of the wall
 //! on the grains before any bond broke in the step (`wall_force_at_limit`; in histories without it
-//! `wall_force`, the force after the breaks).
+//! `wall_force`, the force after the breaks). Where some stages prescribe the one and some the
+//! other, each step has its own (`wall_load`; without it that of the first stage holds for all).
 //!
 //! **Collapse load** (under an ever-growing force there is no peak): the load at the last step
 //! before the strain fitted to the grains exceeds 1e-4; also reported at 1e-3. There is no collapse

@@ -162,8 +162,7 @@ pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
     let bonds = Bonding::of(history)?;
     report.summarise(&history.bonds()?.strength, bonds, history.observable("solver_residual")?);
     let s = &mut report.summary;
-    s.work =
-        work(if walls[k].drive == WallDrive::Force { &report.load } else { &report.reaction }, &report.displacement);
+    s.work = work(&motion.applied, &motion.way);
     let disk = serde_json::from_str::<Scene>(&scene).ok().and_then(|scene| Disk::of(&scene, &s.wall, &size.extents));
     let collapse = s.collapse_load.filter(|_| !s.collapse_early[0]);
     s.splitting = disk.map(|disk| Splitting::of(disk, collapse, s.peak_load));
@@ -217,6 +216,9 @@ struct Motion {
     way: Vec<f64>,
     /// Force of the grains on the wall, N; empty if not recorded.
     reaction: Vec<f64>,
+    /// Force that drives the wall at the end of each step, N: the prescribed one, or that which
+    /// keeps a prescribed velocity.
+    applied: Vec<f64>,
     /// The load, N.
     load: Vec<f64>,
     /// Whether it is that before anything broke in a step.
@@ -234,12 +236,22 @@ fn motion(history: &History, wall: &Wall, k: usize) -> Result<Motion> {
         Some(series) => along(history, &series, k, direction, "wall_force")?,
         None => vec![],
     };
+    let recorded = |name: &str| -> Result<Option<Series>> {
+        Ok(history.observable(name)?.filter(|series| !series.step.is_empty()))
+    };
+    let applied = match recorded("applied_force")? {
+        Some(series) => component(history, &series, &[k], "applied_force")?,
+        None => reaction.iter().map(|f| -f).collect(),
+    };
     // the load is counted in the sense of the prescribed force, or of the prescribed motion
-    let (load, load_before_breaks) = match wall.drive {
-        WallDrive::Force => (component(history, &required(history, "applied_force")?, &[k], "applied_force")?, true),
-        _ => {
-            let at_limit = history.observable("wall_force_at_limit")?.filter(|series| !series.step.is_empty());
-            let (series, name, before) = match at_limit {
+    let (load, load_before_breaks) = match (recorded("wall_load")?, wall.drive) {
+        // stages change what is prescribed
+        (Some(series), _) => (component(history, &series, &[k], "wall_load")?, true),
+        (None, WallDrive::Force) => {
+            (component(history, &required(history, "applied_force")?, &[k], "applied_force")?, true)
+        }
+        (None, _) => {
+            let (series, name, before) = match recorded("wall_force_at_limit")? {
                 Some(series) => (series, "wall_force_at_limit", true),
                 None => (required(history, "wall_force")?, "wall_force", false),
             };
@@ -247,7 +259,7 @@ fn motion(history: &History, wall: &Wall, k: usize) -> Result<Motion> {
         }
     };
     let sense = sense(if wall.drive == WallDrive::Force { &load } else { &way });
-    Ok(Motion { step: position.step, time: position.time, way, reaction, load, load_before_breaks, sense })
+    Ok(Motion { step: position.step, time: position.time, way, reaction, applied, load, load_before_breaks, sense })
 }
 
 /// The sign of the value of greatest magnitude.
@@ -303,10 +315,11 @@ pub(crate) fn driven(path: &Path, walls: &[Wall], scene: &str, asked: Option<&st
 
 fn required(history: &History, name: &str) -> Result<Series> {
     history.observable(name)?.filter(|series| !series.step.is_empty()).ok_or_else(|| {
-        lacking(
-            history.path(),
-            format!("it has no steps of /observables/{name}: run the scene again with walls observed"),
-        )
+        let what = match history.observed_steps() {
+            0 => "no step of its run was completed".into(),
+            _ => format!("it has no steps of /observables/{name}: run the scene again with walls observed"),
+        };
+        lacking(history.path(), what)
     })
 }
 

@@ -11,7 +11,7 @@ fn column(table: &str, name: &str) -> Vec<Option<f64>> {
 
 /// A square lattice of `n` × `n` (× `n`) grains of radius 1 mm whose contacts along the last axis
 /// are open at the second of two frames.
-fn lattice(dimension: usize, n: usize) -> (tempfile::TempDir, PathBuf) {
+pub(super) fn lattice(dimension: usize, n: usize) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.h5");
     let d = dimension;
@@ -91,6 +91,17 @@ fn a_square_lattice_is_isotropic_until_one_direction_opens() {
         let known = if d == 2 { [7.0, 2.5, 0.03] } else { [5.0, (3.0 * 16.0 + 3.0 * 2.25f64).sqrt(), 0.06] };
         close(vec![p, q, e], known.to_vec());
         assert!(rows[1]["crack_density"].is_null());
+    }
+}
+
+#[test]
+fn quantities_that_a_history_lacks_are_not_drawn() {
+    let ((_loose, loose), (_bonded, bonded)) = (lattice(2, 3), sample(&layout(2)));
+    for (path, cracks) in [(&loose, false), (&bonded, true)] {
+        assert!(dem_post(path, &["fabric"]).status.success());
+        let drawn = std::fs::read_to_string(path.with_file_name("run-post").join("fabric.svg")).unwrap();
+        assert!(drawn.contains("coordination number"));
+        assert_eq!(drawn.contains("crack density"), cracks);
     }
 }
 

@@ -193,3 +193,14 @@ fn a_file_that_another_program_writes_is_not_called_damaged() {
     held.unlock().unwrap();
     assert!(command.output().unwrap().status.success());
 }
+
+#[test]
+fn a_file_is_no_folder_for_results() {
+    let (here, _paths) = two();
+    std::fs::write(here.path().join("a.json"), "{}").unwrap();
+    for arguments in
+        [&["cracks", "A/0001.h5", "-o", "a.json"][..], &["compare", "A/0001.h5", "B/0001.h5", "-o", "a.json"]]
+    {
+        refused(&run(here.path(), arguments), 4, &["cannot write a.json", "it is a file, not a folder"]);
+    }
+}

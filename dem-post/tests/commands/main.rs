@@ -352,6 +352,40 @@ fn a_wall_that_moves_loads_with_the_force_before_the_breaks_of_a_step() {
     assert!((found["work"].as_f64().unwrap() - 31e-6).abs() < 1e-12, "{}", found["work"]);
 }
 
+/// 10 N are prescribed in steps 1 and 2, a velocity in step 3, in which a bond breaks.
+#[test]
+fn the_load_of_a_wall_is_that_of_the_drive_of_each_step() {
+    for first in [WallDrive::Force, WallDrive::Velocity] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.h5");
+        let mut l = layout(2);
+        l.walls[1].drive = first;
+        l.observables.push(Observable::new("wall_force_at_limit", "N", &[2, 2]));
+        l.observables.push(Observable::new("wall_load", "N", &[2]));
+        let mut writer = Writer::create(&path, &l, false).unwrap();
+        frame(&mut writer, &l, COURSE, 0, 4e-3);
+        for (step, load, applied, left, limit) in
+            [(1, 10.0, 10.0, 8.0, 8.0), (2, 10.0, 10.0, 9.0, 9.0), (3, 30.0, 1.0, 1.0, 30.0)]
+        {
+            let top = 4e-3 - 1e-6 * step as f64;
+            let broken = if step == 3 { 1.0 } else { 0.0 };
+            let (walls, tensors) = ([0.0, 0.0, 0.0, top, 0.0, -left, 0.0, left, 0.0, applied], [0.0; 8]);
+            let row = [&walls[..], &tensors, &[broken, 0.0, 0.0, 0.0, limit, 0.0, load]].concat();
+            writer.observe(step, step as f64 * 1e-3, &row).unwrap();
+        }
+        frame(&mut writer, &l, COURSE, 3, 4e-3 - 3e-6);
+        writer.finish().unwrap();
+        let found = json(&dem_post(&path, &["stress-strain", "--json"]));
+        assert_eq!((&found["first_break"], &found["greatest_load"]), (&30.0.into(), &30.0.into()), "{first:?}");
+        // the work is that of the driving force: 10 N, 10 N, and 1 N at the end of step 3
+        assert!((found["work"].as_f64().unwrap() - 21e-6).abs() < 1e-12, "{first:?}: {}", found["work"]);
+        assert!(dem_post(&path, &["stress-strain"]).status.success());
+        let csv = std::fs::read_to_string(path.with_file_name("run-post").join("stress-strain.csv")).unwrap();
+        let loads: Vec<f64> = csv.lines().filter_map(|line| line.split(',').nth(3)?.parse().ok()).collect();
+        assert_eq!(loads, [10.0, 10.0, 30.0], "{first:?}");
+    }
+}
+
 #[test]
 fn the_load_wall_is_the_one_asked_for_or_that_of_the_scene() {
     let scene = |more: &str| {

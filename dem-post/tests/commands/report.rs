@@ -321,3 +321,14 @@ fn the_limit_load_of_another_scene_is_refused() {
     limit_file(folder.path(), Some(50.0), "limit", &json!({ "thickness": 0.5 }));
     refused(&dem_post(&path, &["report", "--limit", "limit.json"]), 2, &["no load wall"]);
 }
+
+#[test]
+fn a_single_sphere_is_drawn() {
+    let (_folder, path) = fabric::lattice(3, 1);
+    for command in ["velocities", "report"] {
+        let output = dem_post(&path, &[command]);
+        assert!(output.status.success(), "{command}: {}", String::from_utf8_lossy(&output.stderr));
+    }
+    let table = dem_post(&path, &["velocities", "-o", "other"]);
+    assert!(String::from_utf8_lossy(&table.stdout).contains("energy of translation (J)"));
+}

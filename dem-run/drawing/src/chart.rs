@@ -7,8 +7,9 @@ use kuva::render::annotations::ReferenceLine;
 use kuva::render::figure::Figure;
 use kuva::render::layout::{ComputedLayout, Layout, TickFormat};
 use kuva::render::plots::Plot;
+use kuva::render::render_utils::generate_ticks;
 
-use crate::ticks::{power_of_ten, whole};
+use crate::ticks::{linear, power_of_ten, whole};
 use crate::{Anchor, Canvas, Drawing, colour};
 
 /// Width and height of one chart, in units of a drawing.
@@ -291,7 +292,7 @@ impl Chart {
             .with_box_axes();
         layout.show_legend = false;
         layout.equal_aspect = self.equal;
-        layout = self.scale_axes(layout, lift);
+        layout = self.label_ticks(self.scale_axes(layout, lift));
         for (value, _) in self.levels {
             layout = layout.with_reference_line(ReferenceLine::horizontal(value * lift).with_color(colour::GREY));
         }
@@ -319,6 +320,22 @@ impl Chart {
         if low < 1e-9 { 10f64.powi(-low.log10().floor() as i32) } else { 1.0 }
     }
 
+    /// Labels of the ticks of linear axes.
+    fn label_ticks(&self, mut layout: Layout) -> Layout {
+        // the labels have a width, on which the number of ticks depends
+        for _ in 0..2 {
+            let computed = ComputedLayout::from_layout(&layout);
+            let format = |(low, high), count| TickFormat::Custom(Arc::new(linear(&generate_ticks(low, high, count))));
+            if !self.log_x && !self.x_is_count {
+                layout = layout.with_x_tick_format(format(computed.x_range, computed.x_ticks));
+            }
+            if !self.log_y && !self.y_is_count {
+                layout = layout.with_y_tick_format(format(computed.y_range, computed.y_ticks));
+            }
+        }
+        layout
+    }
+
     /// Axes limited to the range of the values, with matching ticks. Values of y are multiplied by
     /// `lift`.
     fn scale_axes(&self, mut layout: Layout, lift: f64) -> Layout {
@@ -337,12 +354,6 @@ impl Chart {
         } else if low < high {
             let off = if self.pad_x { 0.03 * (high - low) } else { 0.0 };
             layout = layout.with_x_axis_min(low - off).with_x_axis_max(high + off);
-            // with the plotting crate's three digits several ticks would have the same label
-            if high - low < 0.05 * low.abs().max(high.abs()) {
-                let decimals = (10.0 / (high - low)).log10().ceil().max(0.0) as usize;
-                let tick = move |value: f64| format!("{value:.decimals$}");
-                layout = layout.with_x_tick_format(TickFormat::Custom(Arc::new(tick)));
-            }
         }
         if self.x_is_count && !self.log_x {
             layout = layout.with_x_tick_format(TickFormat::Custom(Arc::new(whole)));

@@ -5,6 +5,30 @@ pub(crate) fn whole(value: f64) -> String {
     if value.fract() == 0.0 { format!("{value}") } else { String::new() }
 }
 
+/// The format of the ticks of a linear axis: all have the digits that their step needs and, far
+/// from 1, one power of ten.
+pub(crate) fn linear(ticks: &[f64]) -> impl Fn(f64) -> String + use<> {
+    let greatest = ticks.iter().fold(0.0, |most: f64, tick| most.max(tick.abs()));
+    let power = if greatest > 0.0 && !(1e-2..1e6).contains(&greatest) {
+        // round-off: 9.9999999e10 is 1e11
+        (greatest.log10() + 1e-9).floor() as i32
+    } else {
+        0
+    };
+    let unit = 10f64.powi(power);
+    let step = ticks.windows(2).map(|pair| pair[1] - pair[0]).fold(greatest, f64::min);
+    let whole = |digits: &i32| {
+        let scaled = step / unit * 10f64.powi(*digits);
+        (scaled - scaled.round()).abs() < 1e-6 * scaled
+    };
+    let digits = (0..=15).find(whole).unwrap_or(0) as usize;
+    move |value: f64| match power {
+        _ if value.abs() < 1e-6 * step => "0".into(),
+        0 => format!("{value:.digits$}"),
+        power => format!("{:.digits$}e{power}", value / unit),
+    }
+}
+
 /// A tick of a logarithmic axis: powers of ten as such, others as numbers.
 pub(crate) fn power_of_ten(value: f64) -> String {
     let exponent = value.log10();
@@ -29,6 +53,36 @@ pub(crate) fn power_of_ten(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{Chart, Style, colour};
+
+    #[test]
+    fn ticks_of_a_linear_axis_have_the_digits_of_their_step() {
+        for (ticks, texts) in [
+            (&[0.0555, 0.05575, 0.056][..], &["0.05550", "0.05575", "0.05600"][..]),
+            (&[0.0, 2.5e-3, 5e-3, 7.5e-3, 0.01, 0.0125], &["0", "0.0025", "0.0050", "0.0075", "0.0100", "0.0125"]),
+            (&[0.0911, 0.09111, 0.09112], &["0.09110", "0.09111", "0.09112"]),
+            (&[0.0, 9.999999999999998e10, 2e11, 3.9999999999999994e11], &["0", "1e11", "2e11", "4e11"]),
+            (&[-2e-17, 5e-4, 1e-3], &["0", "0.5e-3", "1.0e-3"]),
+            (&[-50.0, 0.0, 50.0], &["-50", "0", "50"]),
+            (&[1_000.0, 1_200.0], &["1000", "1200"]),
+            (&[3.5], &["3.5"]),
+            (&[0.0], &["0"]),
+        ] {
+            let label = linear(ticks);
+            let found: Vec<String> = ticks.iter().map(|tick| label(*tick)).collect();
+            assert_eq!(found, texts);
+        }
+    }
+
+    #[test]
+    fn ticks_of_a_chart_are_exact() {
+        let points = vec![(0.0, 0.0555), (0.0125, 0.0565)];
+        let chart = Chart::new("x", "y").curve("", colour::BLUE, Style::Line, points);
+        let svg = Chart::draw(vec![chart]).svg();
+        for label in ["0.05550", "0.05575", "0.0025", "0.0125"] {
+            assert!(svg.contains(&format!(">{label}<")), "{label}");
+        }
+    }
 
     #[test]
     fn ticks_are_powers_of_ten() {

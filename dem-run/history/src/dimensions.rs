@@ -72,7 +72,7 @@ fn axes_of(observable: &str) -> &'static [&'static str] {
         "angular_momentum" => &["spin_axis"],
         "stress" | "strain" => &["axis", "other_axis"],
         "wall_position" | "wall_force" | "wall_force_at_limit" => &["wall", "axis"],
-        "applied_force" => &["wall"],
+        "applied_force" | "wall_load" => &["wall"],
         _ => &[],
     }
 }
@@ -135,7 +135,9 @@ fn attach(
     let mut list: Vec<VarLenArray<ObjectReference1>> = vec![];
     for (dimension, (length, name)) in dataset.shape().into_iter().zip(axes).enumerate() {
         if !scales.contains_key(name) && *name != FRAMES && *name != STEPS {
-            create(file, name, length)?;
+            // bonds of a stage have no length yet, also in a copy that begins with them
+            let grows = *name == "bond" && file.link_exists(path::FORMED);
+            create(file, name, if grows { 0 } else { length })?;
         }
         list.push([file.reference(name)?].into());
         scales.entry(name).or_default().push(Labelled { dataset: itself, dimension: dimension as i32 });

@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::runs::{self, Run};
 use super::table::run_rows;
+use crate::options::results;
 use crate::output::{Folder, PostError, Result, Source, Text, counted, default_folder, facts, quantity};
 use crate::strength::runs::manifest;
 use crate::strength::scenes::varied;
@@ -67,7 +68,7 @@ impl Sweep {
     pub fn folder(&self, output: Option<&Path>, force: bool) -> Result<Folder> {
         let folder = self.store.folder();
         let path = output.map_or_else(|| default_folder(folder, "-report"), PathBuf::from);
-        Ok(Folder::of(path, "report", vec![Source::new(folder, None)], force)?)
+        results(path, "report", vec![Source::new(folder, None)], force)
     }
 }
 

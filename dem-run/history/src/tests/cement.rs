@@ -50,6 +50,8 @@ fn bonds_that_form_later_are_read_from_then_on() {
     assert_eq!((h.bonds().unwrap(), states(&h)), (bonds.clone(), expected.clone()));
     assert_eq!(h.ruptures().unwrap(), [rupture(3)]);
 
+    let axis = |path: &Path| hdf5::File::open(path).unwrap().dataset("bond").unwrap().shape();
+    assert_eq!(axis(&path), [0]);
     // packed, and continued from before or after the bonds formed, whatever came later
     let packed = folder.path().join("b.h5");
     copy(&h, &packed, CopyAs::Packed, &mut |_| true).unwrap();
@@ -68,6 +70,7 @@ fn bonds_that_form_later_are_read_from_then_on() {
         writer.rupture(&rupture(3)).unwrap();
         frame(&mut writer, 3);
         writer.finish().unwrap();
+        assert_eq!(axis(&again), [0]);
         let again = History::open(&again).unwrap();
         assert_eq!((again.bonds().unwrap(), states(&again)), (bonds.clone(), expected.clone()), "after {frames}");
         assert_eq!(again.ruptures().unwrap(), [rupture(3)]);
