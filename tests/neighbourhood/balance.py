@@ -7,6 +7,7 @@ import laws
 import prescribed
 import tolerances
 from arrays import cross, norm, sums
+from geometry import gap_and_normal
 from rupture import energy_of_rows
 
 
@@ -257,14 +258,35 @@ def membrane_moment(h):
     return 0.0 if h.membrane is None else h.membrane.moment
 
 
+def forces_on_grains(h):
+    """Forces of contacts on the grains (N) [S,N,D]."""
+    i, j, s = h.i, h.j, h.row_step
+    into = sums(s * h.N + i, h.force, h.S * h.N)
+    grains = ~h.on_wall
+    into -= sums((s * h.N + j)[grains], h.force[grains], h.S * h.N)
+    return into.reshape(h.S, h.N, h.D)
+
+
+def branches_of_grips(h):
+    """From the wall that holds a grain to its centre (m) [S,N,D]; zero for other grains."""
+    branch = np.zeros((h.S, h.N, h.D))
+    for k in np.flatnonzero(h.holder >= 0):
+        wall = h.N + h.holder[k]
+        bodies = np.full(h.S, k), np.full(h.S, wall)
+        gap, normal = gap_and_normal(h, *bodies, h.mid[:, k], h.mid[:, wall])
+        branch[:, k] = normal * (h.radius[k] + 0.5 * gap)[:, None]
+    return branch
+
+
 def check_stress(h, c, report):
     """Love and Weber: Σ ℓ ⊗ f over contacts; ℓ joins the centres, at a wall the contact point to
-    the centre."""
+    the centre. A wall exerts the opposite of the contacts on a grain that it holds."""
     single = h.row_single
     branch = c.n * (c.lever_i + c.lever_j)[:, None]
     tensor = branch[:, :, None] * h.force[:, None, :]
     volume = reference_volume(h)
-    total = (sums(h.row_step, tensor, h.S) + membrane_moment(h)) / volume
+    grips = -np.einsum("sna,snb->sab", branches_of_grips(h), forces_on_grains(h))
+    total = (sums(h.row_step, tensor, h.S) + grips + membrane_moment(h)) / volume
     size = sums(h.row_step, np.where(single, (c.lever_i + c.lever_j + c.place) * norm(h.force), 0.0), h.S) / volume
     off = np.abs(h.observed["stress"] - total).max((1, 2), initial=0.0)
     report.expect("stress", np.where(h.single, off, 0.0), tolerances.rounding(size), of_step("stress (Pa)"))
@@ -275,15 +297,9 @@ def check_virial(h, c, report):
     and accelerations."""
     outer, _ = h.external()
     moved = h.mass[:, None] * (h.v[1:] - h.v[:-1]) / h.h - outer
-    held = np.zeros((h.S, h.N, h.D))
-    if h.fixed.any():
-        i, j, s = h.i, h.j, h.row_step
-        into = sums(s * h.N + i, h.force, h.S * h.N)
-        grains = ~h.on_wall
-        into -= sums((s * h.N + j)[grains], h.force[grains], h.S * h.N)
-        held = into.reshape(h.S, h.N, h.D)
-    moved = np.where(h.fixed[:, None], held, moved)
-    middle = h.mid[:, : h.N]
+    moved = np.where(h.fixed[:, None], forces_on_grains(h), moved)
+    # what holds a grain acts where its wall touches it
+    middle = h.mid[:, : h.N] - branches_of_grips(h)
     bodies = np.einsum("sna,snb->sab", middle, moved)
     rows = np.flatnonzero(h.on_wall)
     walls = sums(h.row_step[rows], h.point[rows][:, :, None] * h.force[rows][:, None, :], h.S)

@@ -100,6 +100,13 @@ pub struct SolveReport {
     pub load_error: Option<f64>,
 }
 
+impl SolveReport {
+    /// The load error; zero with a residual of zero, where it is round-off.
+    pub(crate) fn load_error_beyond_rounding(&self) -> Option<f64> {
+        self.load_error.map(|error| if self.residual == 0.0 { 0.0 } else { error })
+    }
+}
+
 /// A method that solves a contact problem, starting from the impulses in it.
 pub trait ContactSolver<D: Dim>: Send {
     /// Update the impulses and node velocities of `problem` until the tolerance or an iteration

@@ -101,9 +101,7 @@ impl Solves {
         self.route = self.route.max(solve.route);
         self.work = self.work + solve.work;
         self.residual = self.residual.max(solve.residual);
-        // where the residual is zero, a load error is round-off
-        let load_error = solve.load_error.map(|error| if solve.residual == 0.0 { 0.0 } else { error });
-        self.load_error = larger(self.load_error, load_error);
+        self.load_error = larger(self.load_error, solve.load_error_beyond_rounding());
         self.missed_aim |= solve.status != SolveStatus::Converged;
     }
 

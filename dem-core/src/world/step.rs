@@ -286,7 +286,7 @@ impl<D: Dim> World<D> {
     ) -> Result<(), StepError> {
         let solver = &self.settings.solver;
         let most = solver.load_tolerance().map(|tolerance| tolerance * solver.accept() / solver.tolerance());
-        match solve.load_error.zip(most) {
+        match solve.load_error_beyond_rounding().zip(most) {
             Some((error, most)) if error > most => Err(self.not_accepted(solve, Some(error), problem, h, last_attempt)),
             _ => Ok(()),
         }
