@@ -3,7 +3,7 @@
 mod common;
 
 use common::{down, floor, force_driven, grain, newton, run, settings, world};
-use dem_core::body::{Drive, Grains, Shape, Wall};
+use dem_core::body::{Drive, Grains, Load, Shape, Wall};
 use dem_core::dim::{D2, D3, Dim, Vect};
 use dem_core::solver::{Route, SolverSettings};
 use dem_core::world::{Counts, World};
@@ -82,17 +82,22 @@ fn the_stress_of_a_column_is_its_load() {
     column::<D3>();
 }
 
-/// A bonded column pulled by walls that hold its ends: the height counts from wall to wall.
+/// A bonded column between walls that hold its ends, with a force on the grain in the middle: the
+/// walls bear it, and Σ ℓ ⊗ f is that of the forces on the column from outside, −Σ x ⊗ f.
 #[test]
-fn the_stress_of_a_column_that_walls_hold_is_its_load() {
-    let r = 0.01;
-    let grains = (0..4).map(|k| grain::<D2>(&[0.0, r + 2.0 * r * f64::from(k)], r)).collect();
-    let lid = force_driven::<D2>([0.0, -1.0].into(), [0.0, 8.0 * r].into(), 1.0, -7.0);
+fn the_stress_of_a_column_that_walls_hold_counts_their_forces() {
+    let (r, force) = (0.01, 5.0);
+    let grains: Grains<D2> = (0..3).map(|k| grain(&[0.0, r + 2.0 * r * f64::from(k)], r)).collect();
+    let lid = Wall::fixed(Shape::Plane { normal: [0.0, -1.0].into() }, [0.0, 6.0 * r].into(), 0.2);
     let held = [floor(0.2), lid].map(|wall| Wall { grip: Some(1e-3 * r), ..wall });
-    let mut w = world(grains, held.to_vec(), settings(1e-4));
+    let load = Load { grain: 1, force: [0.0, force].into(), torque: [0.0].into(), factor: Arc::new(|_| 1.0) };
+    let mut w = World::new(grains, held.to_vec(), vec![load], settings(1e-4));
     w.form_bonds(1e-6, |_| 100.0, 0.3);
     run(&mut w, 2);
-    assert_stress(&w, |row, col| if row == 1 && col == 1 { -7.0 * 8.0 * r } else { 0.0 }, 1e-9);
+    let [below, above] = [0, 1].map(|wall: usize| w.walls[wall].reaction[1]);
+    assert!((below + above - force).abs() < 1e-9 * force && above > 0.1 * force, "{below} {above}");
+    let expected = 6.0 * r * above - 3.0 * r * force;
+    assert_stress(&w, |row, col| if row == 1 && col == 1 { expected } else { 0.0 }, 1e-9);
 }
 
 /// Grains inside a ring that shrinks onto them from one side: the branch at a wall begins at the

@@ -27,6 +27,7 @@ use crate::body::{Drive, Shape, separation};
 use crate::contact::{Cone, Law, Local};
 use crate::dim::{Axes, Dim, Moments, Vect, in_frame, resized};
 use crate::problem::{Contact, ContactProblem, Nodes, Visitor};
+use crate::solver::SolveReport;
 use crate::solver::certificate::{Verdict, verdict};
 
 /// Overlap, over the smaller radius, that half a step may add to a pair.
@@ -42,8 +43,12 @@ const YIELDING: f64 = 1e-4;
 /// The same, summed over the run.
 const YIELDED: f64 = 1e-3;
 
+/// Load error (–) of a solve above which its reactions are not known.
+const UNKNOWN: f64 = 1e-3;
+
 /// Largest solver tolerance (`FINE`) and largest accepted residual (`ACCEPTED`) for which
-/// `YIELDING` and `YIELDED` apply unchanged; coarser values loosen both in proportion.
+/// `YIELDING`, `YIELDED` and `UNKNOWN` apply unchanged; coarser values loosen them in
+/// proportion.
 const FINE: f64 = 1e-6;
 const ACCEPTED: f64 = 1e-4;
 
@@ -155,7 +160,13 @@ impl<D: Dim> World<D> {
         })
     }
 
-    /// Factor by which the tolerances of the solver loosen `YIELDING` and `YIELDED`.
+    /// The load error of a solve (–) if it is too large: that of reactions that still grow, as
+    /// where no motion satisfies rigid bonds.
+    pub(super) fn large_load_error(&self, solve: SolveReport) -> Option<f64> {
+        solve.load_error_beyond_rounding().filter(|error| *error > UNKNOWN * self.looseness())
+    }
+
+    /// Factor by which the tolerances of the solver loosen these limits.
     fn looseness(&self) -> f64 {
         let solver = &self.settings.solver;
         (solver.tolerance() / FINE).max(solver.accept() / ACCEPTED).max(1.0)

@@ -116,7 +116,7 @@ impl<D: Dim> World<D> {
             self.refuse_unaccepted(solve, &problem, h, last_attempt)?;
             if limits_apply {
                 self.refuse_violation(self.yielding(&problem), &problem, last_attempt)?;
-                self.refuse_unbalanced(solve, &problem, h, last_attempt)?;
+                self.refuse_load_error(solve, &problem, h, last_attempt)?;
             }
             write_reactions(&mut touches, &problem, &places, h);
             let missed = self.missed(&mid, &touches, &problem.nodes, h);
@@ -275,20 +275,17 @@ impl<D: Dim> World<D> {
         }
     }
 
-    /// Refuse a solve whose load error is beyond its tolerance by a larger factor than the accepted
-    /// residual: reactions that still grow, as where no motion satisfies rigid bonds.
-    fn refuse_unbalanced(
+    /// Refuse a solve whose load error is too large.
+    fn refuse_load_error(
         &self,
         solve: SolveReport,
         problem: &ContactProblem<D>,
         h: f64,
         last_attempt: bool,
     ) -> Result<(), StepError> {
-        let solver = &self.settings.solver;
-        let most = solver.load_tolerance().map(|tolerance| tolerance * solver.accept() / solver.tolerance());
-        match solve.load_error_beyond_rounding().zip(most) {
-            Some((error, most)) if error > most => Err(self.not_accepted(solve, Some(error), problem, h, last_attempt)),
-            _ => Ok(()),
+        match self.large_load_error(solve) {
+            None => Ok(()),
+            error => Err(self.not_accepted(solve, error, problem, h, last_attempt)),
         }
     }
 
