@@ -159,18 +159,21 @@ fn what_a_slow_wall_squeezes_is_found_in_the_sum_over_the_steps() {
             let mut w = world::<D>(grains, vec![plane(&[1.0], &[], 0.3), press], settings(h, kind));
             w.form_bonds(1e-6, |_| 1.0, 0.3);
             let error = (0..400).find_map(|_| w.step().err()).expect("nothing can obey both walls");
-            let StepError::Yielded { violation, .. } = error else {
-                // Gauss–Seidel may not converge either; the others see a load error at once
-                let known = Some(&Verdict::NoSolution((0..count as u32 + 2).collect()));
-                let at_once = matches!(error, StepError::NotAccepted { load_error: Some(_), time: 0.0, .. });
-                assert!(kind == Kind::GaussSeidel || at_once && error.verdict() == known, "{error}");
-                assert!(matches!(error, StepError::NotAccepted { .. }), "{error}");
-                continue;
-            };
-            let walls = [count as u32, count as u32 + 1];
-            assert!(violation.accumulated && violation.jammed.as_deref() == Some(&walls), "{violation:?}");
-            assert_eq!(violation.verdict, Verdict::NoSolution((0..count as u32 + 2).collect()));
             let closed = 2.0 * R * f64::from(count) - w.walls[1].position[0];
+            let walls = [count as u32, count as u32 + 1];
+            match &error {
+                StepError::Yielded { violation, .. } => {
+                    assert!(violation.accumulated && violation.jammed.as_deref() == Some(&walls), "{violation:?}");
+                }
+                // the reactions grow from step to step
+                StepError::NotAccepted { load_error: Some(_), .. } => {}
+                // Gauss–Seidel may not converge either
+                _ => {
+                    assert!(kind == Kind::GaussSeidel && matches!(error, StepError::NotAccepted { .. }), "{error}");
+                    continue;
+                }
+            }
+            assert_eq!(error.verdict(), Some(&Verdict::NoSolution((0..count as u32 + 2).collect())));
             assert!(closed <= 4e-3 * R, "{kind:?}, {count}: {closed:e}");
         }
     }
