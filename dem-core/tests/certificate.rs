@@ -333,12 +333,13 @@ impl<D: Dim> ContactSolver<D> for Idle {
     }
 }
 
-/// A rigid bond below its limit yields by its elongation, its slip and its rolling: in one step, or
-/// by the sum over many.
+/// A rigid bond below its limit yields by its elongation, its slip and its rolling in one step, and
+/// by the sum of its elongation over many.
 #[test]
 fn a_rigid_bond_yields_in_each_of_its_rows() {
     fn case<D: Dim>(row: usize) {
-        for (share, steps) in [(2e-4, 1), (0.3e-4, 40)] {
+        // the sum is that along the normal
+        for (share, steps) in [(2e-4, 1), (0.3e-4, 40)].into_iter().take(if row == 0 { 2 } else { 1 }) {
             let mut pair = self::row::<D>(2);
             pair[0].fixed = true;
             let speed = share * R / STEP;

@@ -12,20 +12,20 @@
 //! between heavy ones, an error that is small beside their weight is a large velocity of the light
 //! grain. If no velocities satisfy the contact laws, as between two walls that close on a grain,
 //! reactions grow until any error is small beside them. Velocities are therefore measured too: in
-//! each step, and summed over the run for each pair, since errors of one sign add up. A rigid bond
-//! below its limit holds the normal, the tangential and the rolling velocity.
+//! each step, and summed over the run for each pair, since errors of one sign add up. Slip and
+//! rolling of a rigid bond below its limit count in each step only.
 //!
 //! With `expel_overlaps` the step skips these checks: the speeds of sample preparation have no
 //! physical meaning.
 
 use super::World;
 use super::assembly::Places;
-use super::motion::{Midpoint, Turn};
+use super::motion::Midpoint;
 use super::report::Violation;
 use super::touch::StoredTouch;
 use crate::body::{Drive, Shape, separation};
 use crate::contact::{Cone, Law, Local};
-use crate::dim::{Axes, Dim, Moments, Vect, in_frame, resized};
+use crate::dim::{Dim, Moments, Vect};
 use crate::problem::{Contact, ContactProblem, Nodes, Visitor};
 use crate::solver::SolveReport;
 use crate::solver::certificate::{Verdict, verdict};
@@ -40,7 +40,7 @@ const PASSING: f64 = 0.05;
 /// closing of a dry contact, or any displacement in a rigid bond.
 const YIELDING: f64 = 1e-4;
 
-/// The same, summed over the run.
+/// The same, along the normal, summed over the run.
 const YIELDED: f64 = 1e-3;
 
 /// Load error (–) of a solve above which its reactions are not known.
@@ -143,12 +143,11 @@ impl<D: Dim> World<D> {
     pub(super) fn accumulate(
         &self,
         touches: &mut [StoredTouch<D>],
-        turns: &mut [Turn<D>],
         problem: &ContactProblem<D>,
         places: &Places,
         h: f64,
     ) -> Option<Violation> {
-        let mut worst = Accumulating { world: self, touches, turns, places: places.all(), h, pair: [0; 2], share: 0.0 };
+        let mut worst = Accumulating { world: self, touches, places: places.all(), h, pair: [0; 2], share: 0.0 };
         problem.visit(&mut worst);
         let Accumulating { pair, share, .. } = worst;
         (share > YIELDED * self.looseness()).then(|| Violation {
@@ -247,20 +246,10 @@ fn beyond_law<D: Dim, L: Law>(nodes: &Nodes<D>, c: &Contact<D, L>) -> Option<Loc
     Some(Local { n: u.n, t: u.t * held(mu), m: u.m.scaled(held(nu), held(xi)) })
 }
 
-/// The largest part of a displacement or velocity beyond the law of a contact; a dry contact may
-/// open.
-fn largest<T: Vect, B: Moments>(is_bond: bool, beyond: &Local<T, B>) -> f64 {
-    match is_bond {
-        true => beyond.n.abs().max(beyond.t.norm()).max(beyond.m.bending()).max(beyond.m.twist()),
-        false => -beyond.n,
-    }
-}
-
 /// Adds up displacements beyond the contact laws, and finds the largest sum.
 struct Accumulating<'a, D: Dim, P> {
     world: &'a World<D>,
     touches: &'a mut [StoredTouch<D>],
-    turns: &'a mut [Turn<D>],
     places: P,
     h: f64,
     pair: [u32; 2],
@@ -274,16 +263,9 @@ impl<D: Dim, P: Iterator<Item = usize>> Visitor<D> for Accumulating<'_, D, P> {
         let Some(beyond) = beyond_law(nodes, c) else { return };
         let stored = &mut self.touches[place];
         let sum = stored.yielded - self.h * beyond.n;
-        let bond = stored.bond().and_then(|bond| self.turns.get_mut(bond as usize));
-        stored.yielded = if bond.is_some() { sum } else { sum.max(0.0) };
-        let mut all = Local::<D::Tangent, D::Moment> { n: -stored.yielded, ..Local::zero() };
-        if let Some(Turn { slipped: (t, m), .. }) = bond {
-            let frame = D::with_tangents(c.link.axes.normal(), &stored.tangents);
-            *t += in_frame::<D, _>(&frame, beyond.t) * self.h;
-            *m += resized::<_, D::Moment>(beyond.m) * self.h;
-            (all.t, all.m) = (*t, *m);
-        }
-        let share = largest(c.law.breaks(), &all) / self.world.smaller(stored.pair);
+        // a dry contact may open
+        stored.yielded = if stored.bond().is_some() { sum } else { sum.max(0.0) };
+        let share = stored.yielded.abs() / self.world.smaller(stored.pair);
         if share > self.share {
             (self.pair, self.share) = (stored.pair, share);
         }
@@ -301,7 +283,10 @@ impl<D: Dim> Visitor<D> for Yielding<'_, D> {
     #[inline(always)]
     fn visit<L: Law>(&mut self, nodes: &Nodes<D>, c: &Contact<D, L>) {
         let Some(beyond) = beyond_law(nodes, c) else { return };
-        let speed = largest(c.law.breaks(), &beyond);
+        let speed = match c.law.breaks() {
+            true => beyond.n.abs().max(beyond.t.norm()).max(beyond.m.bending()).max(beyond.m.twist()),
+            false => -beyond.n,
+        };
         let share = self.world.settings.step * speed / self.world.smaller(c.link.nodes);
         if share > self.share {
             (self.pair, self.share) = (c.link.nodes, share);

@@ -29,8 +29,7 @@ pub(super) struct Motion<D: Dim> {
     pub free: Arc<[(D::Vector, D::Spin)]>,
 }
 
-/// What a bond brings to a step besides its reaction: the correction of its turn, and solver
-/// errors.
+/// Correction of a turning bond in a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Turn<D: Dim> {
     /// Velocity that the law of the bond adds to its relative velocity (m/s).
@@ -38,13 +37,10 @@ pub(super) struct Turn<D: Dim> {
     /// Displacement of the bond at mid-step beyond that known to its law, less the hidden one of
     /// steps of this length (m): zero if all steps had one length.
     pub owed: D::Vector,
-    /// Displacement along the tangents (m), and rotation times the mean diameter (m), of a rigid
-    /// bond beyond its law, in its frame: solver errors, summed over the steps.
-    pub slipped: (D::Tangent, D::Moment),
 }
 
 impl<D: Dim> Default for Turn<D> {
     fn default() -> Self {
-        Self { bias: D::Vector::zero(), owed: D::Vector::zero(), slipped: (D::Tangent::zero(), D::Moment::zero()) }
+        Self { bias: D::Vector::zero(), owed: D::Vector::zero() }
     }
 }

@@ -88,11 +88,7 @@ impl<D: Dim> World<D> {
         to.vectors(&self.mid.walls);
         to.real(self.last_part);
         to.count(self.turns.len());
-        for Turn { bias, owed, slipped: (t, m) } in &self.turns {
-            to.vectors(&[*bias, *owed]);
-            to.vector(t);
-            to.vector(m);
-        }
+        self.turns.iter().for_each(|turn| to.vectors(&[turn.bias, turn.owed]));
         to.count(self.stored.len());
         self.stored.iter().for_each(|stored| save_touch(stored, to));
         let l = &self.ledger;
@@ -145,7 +141,7 @@ impl<D: Dim> World<D> {
         world.mid = Midpoint { grains: from.vectors(n)?, walls: from.vectors(bodies - n)? };
         world.last_part = from.real()?;
         world.turns = (0..from.number_of()?)
-            .map(|_| Ok(Turn { bias: from.vector()?, owed: from.vector()?, slipped: (from.vector()?, from.vector()?) }))
+            .map(|_| Ok(Turn { bias: from.vector()?, owed: from.vector()? }))
             .collect::<Result<_, _>>()?;
         world.stored = (0..from.number_of()?).map(|_| restored_touch(bodies, bonds, from)).collect::<Result<_, _>>()?;
         let mut next = || from.real();

@@ -105,7 +105,7 @@ impl<D: Dim> World<D> {
         if limits_apply {
             self.refuse_crossing(self.crossing(|k| self.place(k), |k| motion.before[k].0, 0.5 * h))?;
         }
-        let mut brought = self.brought(&mid, &touches, &motion, h);
+        let brought = self.brought(&mid, &touches, &motion, h);
         let mut done = Solves::default();
         let mut breaks: Vec<Break<D>> = Vec::new();
         let mut walls_at_limit = None;
@@ -141,8 +141,7 @@ impl<D: Dim> World<D> {
             let velocity = |k: usize| problem.nodes.all[k].velocity;
             self.refuse_crossing(self.pushes_at_a_distance(&mid, &touches, &problem.nodes, h))?;
             self.refuse_crossing(self.crossing(|k| mid.place(k), velocity, 0.5 * h))?;
-            let yielded = self.accumulate(&mut touches, &mut brought.turns, &problem, &places, h);
-            self.refuse_violation(yielded, &problem, last_attempt)?;
+            self.refuse_violation(self.accumulate(&mut touches, &problem, &places, h), &problem, last_attempt)?;
         }
         self.commit(h, mid, &motion, &problem, touches, &breaks);
         (self.turns, self.last_part) = (brought.turns, h);

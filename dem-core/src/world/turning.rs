@@ -42,8 +42,7 @@ impl<D: Dim> World<D> {
         let spins = self.spins_of_fragments(touches, motion, h);
         for stored in touches {
             if let Some(bond) = stored.bond() {
-                let slipped = self.turns.get(bond as usize).map_or(Turn::<D>::default().slipped, |turn| turn.slipped);
-                turns[bond as usize] = Turn { slipped, ..self.turn(mid, stored, bond as usize, motion, &spins, h) };
+                turns[bond as usize] = self.turn(mid, stored, bond as usize, motion, &spins, h);
             }
         }
         turns
@@ -147,7 +146,7 @@ impl<D: Dim> World<D> {
         if below(&owed) {
             owed = D::Vector::zero();
         }
-        Turn { bias: own + owed * (1.0 / full), owed, ..Turn::default() }
+        Turn { bias: own + owed * (1.0 / full), owed }
     }
 
     /// Velocity (m/s, at most zero) that the law of a closed contact with a round wall around the
