@@ -153,15 +153,14 @@ impl<D: Dim> World<D> {
     /// grain adds to the normal velocity, since the normal turns as the grain moves along the wall;
     /// zero for other pairs. Without it the grain would sink into the wall by (v h)²/2ρ in each
     /// step on a circle of radius ρ.
+    #[inline]
     pub(super) fn turn_around(&self, mid: &Midpoint<D>, pair: [u32; 2], motion: &Motion<D>, h: f64) -> f64 {
         let [i, j] = pair.map(|k| k as usize);
-        let around = |x| self.walls.get(j.checked_sub(self.grains.len())?)?.shape.around(x);
-        let velocity = motion.before[i].0 - motion.before[j].0;
+        let Some(wall) = j.checked_sub(self.grains.len()).map(|wall| &self.walls[wall]) else { return 0.0 };
+        let Some(apart) = wall.shape.around(separation::<D>(mid.grains[i], mid.place(j))) else { return 0.0 };
         let span = 0.5 * (self.last_step(h) + h);
-        match (around(separation::<D>(mid.grains[i], mid.place(j))), around(velocity * span)) {
-            (Some(apart), Some(way)) => 0.0 - lengthening::<D>(apart, way, span).0,
-            _ => 0.0,
-        }
+        let way = wall.shape.around((motion.before[i].0 - motion.before[j].0) * span);
+        way.map_or(0.0, |way| 0.0 - lengthening::<D>(apart, way, span).0)
     }
 
     /// Spin of the vector between the centres of a bonded pair (rad/s), and of its frame about it:
