@@ -314,13 +314,17 @@ pub(crate) fn driven(path: &Path, walls: &[Wall], scene: &str, asked: Option<&st
 }
 
 fn required(history: &History, name: &str) -> Result<Series> {
-    history.observable(name)?.filter(|series| !series.step.is_empty()).ok_or_else(|| {
-        let what = match history.observed_steps() {
-            0 => "no step of its run was completed".into(),
-            _ => format!("it has no steps of /observables/{name}: run the scene again with walls observed"),
-        };
-        lacking(history.path(), what)
-    })
+    match history.observable(name)? {
+        Some(series) if !series.step.is_empty() => Ok(series),
+        Some(_) => {
+            let what = format!("it has no steps of /observables/{name}: no step of its run was completed");
+            Err(lacking(history.path(), what))
+        }
+        None => {
+            let what = format!("it has no steps of /observables/{name}: run the scene again with walls observed");
+            Err(lacking(history.path(), what))
+        }
+    }
 }
 
 fn component(history: &History, series: &Series, index: &[usize], name: &str) -> Result<Vec<f64>> {
