@@ -313,7 +313,7 @@ fn bonds_sheared_between_walls_that_cannot_part_have_no_solution() {
     }
 }
 
-/// Finds the free velocities good enough.
+/// Takes the free velocities for the solution.
 struct Idle;
 
 impl<D: Dim> ContactSolver<D> for Idle {

@@ -254,17 +254,17 @@ impl<D: Dim> World<D> {
             none
         };
         let touching = touch.gap <= none;
+        let turn = || self.turn_around(mid, touch.pair, motion, h);
         if e == 0.0 {
             let apart = self.settings.expel_overlaps || !touching;
-            return Some(if apart { touch.gap / h } else { self.turn_around(mid, touch.pair, motion, h) });
+            return Some(if apart { touch.gap / h } else { turn().unwrap_or(0.0) });
         }
         let [i, j] = touch.pair.map(|k| motion.before[k as usize].0);
         let approach = (i - j).dot(&D::normal(&touch.frame));
         let threshold = self.settings.restitution.map_or(0.0, |r| r.threshold_speed);
         let at_rest = approach.abs() < threshold || h * approach.abs() <= none;
         let rebound = if at_rest { 0.0 } else { e * approach };
-        let turn = || self.turn_around(mid, touch.pair, motion, h);
-        touching.then(|| Some(turn()).filter(|turn| *turn < 0.0).map_or(rebound, |turn| rebound.min(turn)))
+        touching.then(|| turn().map_or(rebound, |turn| rebound.min(turn)))
     }
 
     /// Friction coefficient of a dry contact (–).

@@ -44,10 +44,10 @@ const YIELDING: f64 = 1e-4;
 const YIELDED: f64 = 1e-3;
 
 /// Load error (–) of a solve above which its reactions are not known.
-const UNKNOWN: f64 = 1e-3;
+const LOAD_ERROR: f64 = 1e-3;
 
 /// Largest solver tolerance (`FINE`) and largest accepted residual (`ACCEPTED`) for which
-/// `YIELDING`, `YIELDED` and `UNKNOWN` apply unchanged; coarser values loosen them in
+/// `YIELDING`, `YIELDED` and `LOAD_ERROR` apply unchanged; coarser values loosen them in
 /// proportion.
 const FINE: f64 = 1e-6;
 const ACCEPTED: f64 = 1e-4;
@@ -162,7 +162,7 @@ impl<D: Dim> World<D> {
     /// The load error of a solve (–) if it is too large: that of reactions that still grow, as
     /// where no motion satisfies rigid bonds.
     pub(super) fn large_load_error(&self, solve: SolveReport) -> Option<f64> {
-        solve.load_error_beyond_rounding().filter(|error| *error > UNKNOWN * self.looseness())
+        solve.load_error_beyond_rounding().filter(|error| *error > LOAD_ERROR * self.looseness())
     }
 
     /// Factor by which the tolerances of the solver loosen these limits.

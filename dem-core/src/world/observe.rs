@@ -1,7 +1,6 @@
 //! Measures of a world: kinetic energy, momentum, mean stress and strain.
 
 use super::{Momentum, Touch, World};
-use crate::body::separation;
 use crate::dim::{Dim, Vect};
 
 impl<D: Dim> World<D> {
@@ -36,8 +35,8 @@ impl<D: Dim> World<D> {
     /// Mean stress σ = (1/V) Σ ℓ ⊗ f over the contacts of the last step (Pa, D × D row by row;
     /// compression positive), after Love and Weber. ℓ joins the centres, or at a wall the contact
     /// point to the centre, or under a membrane the point of the grain where its push acts to the
-    /// centre; V is the box around the sample at time zero. A wall that holds a grain bears what
-    /// its contacts exert on it.
+    /// centre; V is the box around the sample at time zero. A wall that holds a grain exerts on it
+    /// the opposite of what its contacts do.
     pub fn stress(&self) -> Vec<f64> {
         let mut sum = vec![0.0; D::N * D::N];
         let mut add = |branch: D::Vector, force: D::Vector| {
@@ -58,10 +57,9 @@ impl<D: Dim> World<D> {
             }
         }
         for (k, (wall, force)) in self.held.iter().zip(on_held).enumerate() {
-            let Some(wall) = wall.map(|wall| wall as usize) else { continue };
-            let (radius, offset) = (self.grains.radius[k], separation::<D>(self.mid.grains[k], self.mid.walls[wall]));
-            let (gap, normal) = self.walls[wall].shape.gap(offset, radius);
-            add(normal * (radius + 0.5 * gap), -force);
+            let Some(wall) = wall else { continue };
+            let (gap, normal, _) = self.geometry(&self.mid, [k as u32, self.grains.len() as u32 + wall]);
+            add(normal * (self.grains.radius[k] + 0.5 * gap), -force);
         }
         let pressure = self.membrane.as_ref().map_or(0.0, |membrane| membrane.applied);
         for (grain, force) in self.membrane_forces(pressure) {

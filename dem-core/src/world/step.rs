@@ -116,7 +116,9 @@ impl<D: Dim> World<D> {
             self.refuse_unaccepted(solve, &problem, h, last_attempt)?;
             if limits_apply {
                 self.refuse_violation(self.yielding(&problem), &problem, last_attempt)?;
-                self.refuse_load_error(solve, &problem, h, last_attempt)?;
+                if self.large_load_error(solve).is_some() {
+                    return Err(self.not_accepted(solve, &problem, h, last_attempt));
+                }
             }
             write_reactions(&mut touches, &problem, &places, h);
             let missed = self.missed(&mid, &touches, &problem.nodes, h);
@@ -269,37 +271,17 @@ impl<D: Dim> World<D> {
             return Err(StepError::NotFinite { time: self.time, body: body as u32 });
         }
         match solve.status {
-            SolveStatus::Failed => Err(self.not_accepted(solve, None, problem, h, last_attempt)),
+            SolveStatus::Failed => Err(self.not_accepted(solve, problem, h, last_attempt)),
             _ => Ok(()),
         }
     }
 
-    /// Refuse a solve whose load error is too large.
-    fn refuse_load_error(
-        &self,
-        solve: SolveReport,
-        problem: &ContactProblem<D>,
-        h: f64,
-        last_attempt: bool,
-    ) -> Result<(), StepError> {
-        match self.large_load_error(solve) {
-            None => Ok(()),
-            error => Err(self.not_accepted(solve, error, problem, h, last_attempt)),
-        }
-    }
-
-    fn not_accepted(
-        &self,
-        solve: SolveReport,
-        load_error: Option<f64>,
-        problem: &ContactProblem<D>,
-        h: f64,
-        last_attempt: bool,
-    ) -> StepError {
+    /// The error of a solve that is not accepted, because it failed or by its load error.
+    fn not_accepted(&self, solve: SolveReport, problem: &ContactProblem<D>, h: f64, last_attempt: bool) -> StepError {
         let SolveReport { residual, work, .. } = solve;
-        let (iterations, verdict) =
-            (work.iterations(), if last_attempt { self.verdict(problem) } else { Verdict::Undecided });
-        let pair = furthest_from_law(problem);
+        let load_error = self.large_load_error(solve).filter(|_| solve.status != SolveStatus::Failed);
+        let verdict = if last_attempt { self.verdict(problem) } else { Verdict::Undecided };
+        let (iterations, pair) = (work.iterations(), furthest_from_law(problem));
         StepError::NotAccepted { time: self.time, step: h, residual, load_error, iterations, pair, verdict }
     }
 

@@ -149,18 +149,19 @@ impl<D: Dim> World<D> {
         Turn { bias: own + owed * (1.0 / full), owed }
     }
 
-    /// Velocity (m/s, at most zero) that the law of a closed contact with a round wall around the
-    /// grain adds to the normal velocity, since the normal turns as the grain moves along the wall;
-    /// zero for other pairs. Without it the grain would sink into the wall by (v h)²/2ρ in each
-    /// step on a circle of radius ρ.
+    /// Velocity (m/s, negative) that the law of a closed contact with a round wall around the grain
+    /// adds to the normal velocity, since the normal turns as the grain moves along the wall; none
+    /// if it does not turn, and for other pairs. Without it the grain would sink into the wall by
+    /// (v h)²/2ρ in each step on a circle of radius ρ.
     #[inline]
-    pub(super) fn turn_around(&self, mid: &Midpoint<D>, pair: [u32; 2], motion: &Motion<D>, h: f64) -> f64 {
+    pub(super) fn turn_around(&self, mid: &Midpoint<D>, pair: [u32; 2], motion: &Motion<D>, h: f64) -> Option<f64> {
         let [i, j] = pair.map(|k| k as usize);
-        let Some(wall) = j.checked_sub(self.grains.len()).map(|wall| &self.walls[wall]) else { return 0.0 };
-        let Some(apart) = wall.shape.around(separation::<D>(mid.grains[i], mid.place(j))) else { return 0.0 };
+        let shape = &self.walls[j.checked_sub(self.grains.len())?].shape;
+        let apart = shape.around(separation::<D>(mid.grains[i], mid.place(j)))?;
         let span = 0.5 * (self.last_step(h) + h);
-        let way = wall.shape.around((motion.before[i].0 - motion.before[j].0) * span);
-        way.map_or(0.0, |way| 0.0 - lengthening::<D>(apart, way, span).0)
+        let way = shape.around((motion.before[i].0 - motion.before[j].0) * span)?;
+        let hidden = lengthening::<D>(apart, way, span).0;
+        (hidden > 0.0).then_some(-hidden)
     }
 
     /// Spin of the vector between the centres of a bonded pair (rad/s), and of its frame about it:

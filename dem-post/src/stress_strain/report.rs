@@ -314,17 +314,12 @@ pub(crate) fn driven(path: &Path, walls: &[Wall], scene: &str, asked: Option<&st
 }
 
 fn required(history: &History, name: &str) -> Result<Series> {
-    match history.observable(name)? {
-        Some(series) if !series.step.is_empty() => Ok(series),
-        Some(_) => {
-            let what = format!("it has no steps of /observables/{name}: no step of its run was completed");
-            Err(lacking(history.path(), what))
-        }
-        None => {
-            let what = format!("it has no steps of /observables/{name}: run the scene again with walls observed");
-            Err(lacking(history.path(), what))
-        }
-    }
+    let why = match history.observable(name)? {
+        Some(series) if !series.step.is_empty() => return Ok(series),
+        Some(_) => "no step of its run was completed",
+        None => "run the scene again with walls observed",
+    };
+    Err(lacking(history.path(), format!("it has no steps of /observables/{name}: {why}")))
 }
 
 fn component(history: &History, series: &Series, index: &[usize], name: &str) -> Result<Vec<f64>> {
