@@ -235,6 +235,7 @@ impl<D: Dim> World<D> {
 /// as a negative normal velocity, and for a rigid bond the velocity of all rows that it holds.
 /// `None` where the law sets no bound: an elastic bond deforms, and a bond at its limit flows and
 /// is about to break.
+#[inline(always)] // callers need some rows only
 fn beyond_law<D: Dim, L: Law>(nodes: &Nodes<D>, c: &Contact<D, L>) -> Option<Local<L::T, L::B>> {
     let law = &c.law;
     if law.compliance().n > 0.0 || c.failure().is_some() {
