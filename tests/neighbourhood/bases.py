@@ -119,6 +119,23 @@ def opening():
     return scene
 
 
+def drum():
+    """A dry heap of 50 disks that falls on the inside of a drum and swings there."""
+    scene = heap() | {"sample": packing(50, (2e-3, 4e-3), 0.76, width=0.02)}
+    scene["walls"] = {"bottom": {"shape": {"circle": {"center": [0.012, 0.014], "radius": 0.019, "inside": True}}}}
+    scene["time"]["end"] = 0.1
+    return scene
+
+
+def pipe():
+    """40 dry spheres that fall on the inside of a lying pipe, above its axis and beside it."""
+    scene = heap()
+    del scene["thickness"]
+    shape = {"cylinder": {"axis": [1.0, 0.0, 0.0], "center": [0.0, 0.005, 0.007], "radius": 0.0115, "inside": True}}
+    scene |= {"dimension": 3, "sample": packing(40, (2e-3, 3.5e-3), 0.45, width=0.008, depth=0.008)}
+    return scene | {"gravity": [0.0, 0.0, -9.81], "walls": {"bottom": {"shape": shape}}}
+
+
 def punch():
     """60 cemented disks under a plate that is narrower than they are, with a force that grows."""
     scene = compression(2, small(), 2000.0, 1e-4, 0.03)

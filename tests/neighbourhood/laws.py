@@ -115,8 +115,10 @@ class Solved:
         must_touch = tolerances.value("touching") * c.smaller - tolerances.rounding(c.place)
         near = (c.gap > 0) & (c.gap <= may_touch)
         bouncy = restitution > 0
-        self.bias = np.where(bouncy, bounce, np.maximum(c.gap, 0.0) / h.h)
-        self.other = np.where((near & ~bouncy) | (at_rest & bouncy), 0.0, self.bias)
+        turn = turned_around(h, c)
+        rebound, none = (np.where(turn < 0, np.minimum(speed, turn), speed) for speed in (bounce, 0.0))
+        self.bias = np.where(bouncy, rebound, np.where(c.gap > 0, c.gap / h.h, turn))
+        self.other = np.where((near & ~bouncy) | (at_rest & bouncy), none, self.bias)
         # with restitution touching contacts act: certainly those within round-off, never those
         # beyond the limit
         self.acts = ~bouncy | (c.gap <= may_touch)
@@ -128,7 +130,7 @@ class Solved:
             self.other = np.where(self.bonds, self.bias, self.other)
             self.u[:, 1 : h.D] += np.where(self.bonds[:, None], tangential, 0.0)
         # no frame holds the last mid-step of a step in parts
-        self.unknown = self.bonds & h.after_parts[h.row_step]
+        self.unknown = (self.bonds | (turn < 0)) & h.after_parts[h.row_step]
 
     def _elastic(self, h):
         """u + C (r − r₀) in place of u, C = 1/(k h²)."""
@@ -224,6 +226,26 @@ def energy_taken_over(h):
     """Energy (J) [K] of the springs of the bonds under the forces that they took over."""
     normal, tangential = taken_over(h)
     return 0.5 * (normal**2 / h.stiffness[0] + (tangential**2).sum(1) / h.stiffness[1])
+
+
+def turned_around(h, c):
+    """Bias (m/s) of contacts with round walls around the grains, whose normal turns as a grain moves
+    along the wall [M]; zero elsewhere.
+
+    It is that of bonds whose length is kept: with the displacement between the last two mid-steps
+    at the velocities before the step."""
+    out = np.zeros(h.M)
+    for w in np.flatnonzero(h.wall_radius < 0) if h.W else ():
+        rows = np.flatnonzero(h.j == h.N + w)
+        s, i, j = h.row_step[rows], h.i[rows], h.j[rows]
+        span = np.where(s > 0, h.h, 0.5 * h.h)
+        now = h.mid[s, i] - h.mid[s, j]
+        way = (h.body_v[s, i] - h.body_v[s, j]) * span[:, None]
+        if h.wall_kind[w] == "CYLINDER":
+            axis = h.wall_normal[w]
+            now, way = (x - (x @ axis)[:, None] * axis for x in (now, way))
+        out[rows] = -hidden_lengthening(now - way, now) / span
+    return out
 
 
 def row_before(h):
@@ -328,7 +350,11 @@ def lengthening(h, s, i, j):
 
     The normal velocity lacks it. It is corrected in step `s`."""
     last = np.where((s > 0)[:, None], h.mid[s - 1, i] - h.mid[s - 1, j], h.body_x[0, i] - h.body_x[0, j])
-    now = h.mid[s, i] - h.mid[s, j]
+    return hidden_lengthening(last, h.mid[s, i] - h.mid[s, j])
+
+
+def hidden_lengthening(last, now):
+    """The same of vectors `last` and `now` between the centres (m)."""
     length = norm(last)
     n = last / length[:, None]
     along = ((now - last) * n).sum(1)

@@ -14,9 +14,11 @@ from bases import (
     block,
     compression,
     disks,
+    drum,
     elastic,
     heap,
     opening,
+    pipe,
     punch,
     shear,
     small,
@@ -67,6 +69,8 @@ BASES = {
     "wrapped": wrapped,
     "events": events,
     "opening": opening,
+    "drum": drum,
+    "pipe": pipe,
     "punch": punch,
 }
 
