@@ -17,9 +17,13 @@ use crate::{cracks, info, moments, stress_strain};
 /// Greatest ratio of a limit load to the loads of the run at which the chart of the load shows it.
 const FAR: f64 = 5.0;
 
+/// Times are equal within this part of them.
+const SAME: f64 = 1e-9;
+
 /// A moment of which the page shows a picture.
 struct Moment {
-    name: &'static str,
+    /// What happened, with its time where that of the frame is another (s).
+    events: Vec<(&'static str, Option<f64>)>,
     frame: usize,
 }
 
@@ -67,28 +71,38 @@ fn shown(
     times: &[f64],
 ) -> Result<Vec<Moment>> {
     if !times.is_empty() {
-        return Ok(moments::chosen(history, times)?.into_iter().map(|frame| Moment { name: "", frame }).collect());
+        let chosen = moments::chosen(history, times)?;
+        return Ok(chosen.into_iter().map(|frame| Moment { events: vec![], frame }).collect());
     }
+    let of_frame = |time: f64, frame: usize| (time - history.times()[frame]).abs() <= SAME * time.abs();
+    let event = |name, time: f64, frame| (frame, name, Some(time).filter(|time| !of_frame(*time, frame)));
     let mut found = vec![];
     let after = |time: f64| history.times().iter().position(|other| *other >= time);
-    if let Some(frame) = ruptures.first().and_then(|rupture| after(rupture.time)) {
-        found.push(Moment { name: "first break", frame });
+    if let Some(time) = ruptures.first().map(|rupture| rupture.time) {
+        found.extend(after(time).map(|frame| event("first break", time, frame)));
     }
     if let Some(load) = load {
         let s = &load.summary;
         let collapse = s.collapse_time.filter(|_| !s.collapse_early[0]).map(|time| ("collapse", time));
         let peak = || peak(&load.load).and_then(|row| load.time.get(row)).map(|time| ("peak load", *time));
-        let moment = collapse.or_else(peak).and_then(|(name, time)| Some((name, history.frame_at(time)?)));
-        found.extend(moment.map(|(name, frame)| Moment { name, frame }));
+        if let Some((name, time)) = collapse.or_else(peak) {
+            found.extend(history.frame_at(time).map(|frame| event(name, time, frame)));
+        }
     }
     let last = history.frames() - 1;
     if found.len() < 2 && last > 0 {
-        found.insert(0, Moment { name: "start", frame: 0 });
+        found.insert(0, (0, "start", None));
     }
-    found.push(Moment { name: "end", frame: last });
-    found.sort_by_key(|moment| moment.frame);
-    found.dedup_by_key(|moment| moment.frame);
-    Ok(found)
+    found.push((last, "end", None));
+    found.sort_by_key(|(frame, ..)| *frame);
+    let mut moments: Vec<Moment> = vec![];
+    for (frame, name, time) in found {
+        match moments.last_mut().filter(|moment| moment.frame == frame) {
+            Some(moment) => moment.events.push((name, time)),
+            None => moments.push(Moment { events: vec![(name, time)], frame }),
+        }
+    }
+    Ok(moments)
 }
 
 /// A picture of each moment, all on one scale.
@@ -114,16 +128,22 @@ fn pictures(history: &History, shown: &[Moment], parts: &Parts) -> Result<Vec<Fi
         Subject::Speed => "speeds",
     };
     let mut figures = vec![];
-    for Moment { name, frame } in shown {
+    for Moment { events, frame } in shown {
         let time = number(history.times()[*frame]);
         let load = parts.load.and_then(|load| load.load_at(history.steps()[*frame]));
         let load = load.map_or_else(String::new, |load| format!(", load {} N", short(load)));
-        let named = if name.is_empty() { String::new() } else { format!("{}: ", capitalised(name)) };
-        let caption = format!("{named}t = {time} s{load}.");
+        let caption = format!("{}t = {time} s{load}.", told(events));
         let alt = format!("The sample with its {what} at t = {time} s.");
         figures.push(map_figure(&frames::drawing(history, &chosen, &view, *frame)?, &alt, &caption)?);
     }
     Ok(figures)
+}
+
+/// The events of a picture, as in `First break at 0.031 s, end: `.
+fn told(events: &[(&str, Option<f64>)]) -> String {
+    let at = |time: Option<f64>| time.map_or_else(String::new, |time| format!(" at {} s", number(time)));
+    let each: Vec<String> = events.iter().map(|(name, time)| format!("{name}{}", at(*time))).collect();
+    if each.is_empty() { String::new() } else { format!("{}: ", capitalised(&each.join(", "))) }
 }
 
 /// Load and broken bonds over time.

@@ -162,7 +162,7 @@ pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
     let bonds = Bonding::of(history)?;
     report.summarise(&history.bonds()?.strength, bonds, history.observable("solver_residual")?);
     let s = &mut report.summary;
-    s.work = work(&motion.applied, &motion.way);
+    s.work = work(&motion.applied, &motion.way) + slide_work(history, k, &direction, &motion.way)?;
     let disk = serde_json::from_str::<Scene>(&scene).ok().and_then(|scene| Disk::of(&scene, &s.wall, &size.extents));
     let collapse = s.collapse_load.filter(|_| !s.collapse_early[0]);
     s.splitting = disk.map(|disk| Splitting::of(disk, collapse, s.peak_load));
@@ -260,6 +260,24 @@ fn motion(history: &History, wall: &Wall, k: usize) -> Result<Motion> {
     };
     let sense = sense(if wall.drive == WallDrive::Force { &load } else { &way });
     Ok(Motion { step: position.step, time: position.time, way, reaction, applied, load, load_before_breaks, sense })
+}
+
+/// Work of a wall on the grains as it slides across its drive (J): `way` is its displacement along the
+/// drive (m). Zero where nothing is recorded.
+fn slide_work(history: &History, wall: usize, drive: &[f64; 3], way: &[f64]) -> Result<f64> {
+    let Some(force) = history.observable("wall_force")? else { return Ok(0.0) };
+    let position = required(history, "wall_position")?;
+    let mut sum = 0.0;
+    for d in 0..history.dimension() {
+        let mut axis = [0.0; 3];
+        axis[d] = 1.0;
+        let start = start_of(history, wall, &axis)?;
+        let place = component(history, &position, &[wall, d], "wall_position")?;
+        let across: Vec<f64> = place.iter().zip(way).map(|(x, way)| x - start - drive[d] * way).collect();
+        let push: Vec<f64> = component(history, &force, &[wall, d], "wall_force")?.iter().map(|f| -f).collect();
+        sum += work(&push, &across);
+    }
+    Ok(sum)
 }
 
 /// The sign of the value of greatest magnitude.

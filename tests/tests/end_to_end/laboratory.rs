@@ -71,6 +71,10 @@ fn a_block_under_a_lid_that_slides_is_held_back_by_the_friction_of_its_floor() {
     }
     let way = *series(&history, "wall_position", &[lid, 0]).last().expect("a step");
     assert!((way / (0.5 * 0.01 * 0.2 * 0.2) - 1.0).abs() < 1e-9, "{way} m");
+    // the lid does the work of its stress and of its slide; nothing else acts on the block
+    let outside = *series(&history, "external_work", &[]).last().expect("a step");
+    let work = number(&here.dem_post(&["stress-strain", "a.h5", "--json", "--quiet"]).json()["work"]);
+    assert!(outside > 0.0 && (work / outside - 1.0).abs() < 1e-9, "{work} J by the lid, {outside} J in all");
     assert_eq!(number(&summary["broken"][0]) + number(&summary["broken"][1]), 0.0);
     here.dem_post(&["info", "a.h5", "--check"]).succeeds();
 }
