@@ -277,6 +277,13 @@ fn a_sweep_names_its_runs() {
     assert_eq!(found["runs"].as_array().unwrap().len(), 2);
     assert_eq!(found["left_out"][0], json!({ "run": "sweep/runs/0003.failed.h5", "why": "failed: no convergence" }));
     assert!(folder.path().join("sweep-strength/strength.csv").exists());
+    // a truncated history does not take the results of the others with it
+    let cut = std::fs::OpenOptions::new().write(true).open(runs.join("0002.h5")).unwrap();
+    cut.set_len(cut.metadata().unwrap().len() / 2).unwrap();
+    let found = json_of(&strength(folder.path(), &["sweep", "--json", "--force"]), 1);
+    assert_eq!(found["runs"].as_array().unwrap().len(), 1);
+    let why = found["left_out"][0]["why"].as_str().unwrap();
+    assert!(why.contains("truncated") && why.contains("delete sweep/runs/0002.h5"), "{why}");
     std::fs::write(folder.path().join("sweep/manifest.json"), "{}").unwrap();
     let output = strength(folder.path(), &["sweep"]);
     assert_eq!(output.status.code(), Some(4), "{}", String::from_utf8_lossy(&output.stderr));

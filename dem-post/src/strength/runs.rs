@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use dem_history::sweep::{Manifest, State, Store};
-use dem_history::{History, WallDrive};
+use dem_history::{History, HistoryError, WallDrive};
 use dem_scene::Load;
 use dem_scene::failure::{BROKEN_SHARE, STRAINS};
 use serde::Serialize;
@@ -84,7 +84,7 @@ pub fn manifest(store: &Store, other: &str) -> Result<Manifest> {
 }
 
 /// The histories that `paths` name: files, and the finished runs in folders of sweeps; and,
-/// separately, the unfinished runs.
+/// separately, the unfinished runs and those whose history cannot be read.
 ///
 /// # Errors
 /// [`PostError::Usage`] for no path, for a folder without a manifest, and where no run is done;
@@ -99,7 +99,10 @@ pub fn histories(paths: &[PathBuf]) -> Result<(Vec<PathBuf>, Vec<LeftOut>)> {
         for run in manifest(&Store::new(path.clone()), "the histories")?.runs {
             let history = path.join(&run.history);
             if run.state == State::Done {
-                found.push(history);
+                match History::open(&history) {
+                    Ok(_) => found.push(history),
+                    Err(error) => left_out.push(LeftOut { run: name(&history), why: unreadable(&history, &error) }),
+                }
                 continue;
             }
             let why = run.message.as_deref().and_then(|message| message.lines().next()).unwrap_or_default();
@@ -120,6 +123,15 @@ pub fn histories(paths: &[PathBuf]) -> Result<(Vec<PathBuf>, Vec<LeftOut>)> {
         return Err(PostError::Usage(format!("{what} histories, or the folder of a sweep that has been run")));
     }
     Ok((found, left_out))
+}
+
+/// Why a finished run of a sweep has no result, and what to do.
+pub(crate) fn unreadable(history: &Path, error: &HistoryError) -> String {
+    let why = match error {
+        HistoryError::Truncated { .. } => "its history is truncated".into(),
+        other => other.to_string(),
+    };
+    format!("{why}; to make it again, delete {} and repeat the sweep", history.display())
 }
 
 /// The note on `count` runs whose failure is [`Failure::early`]; `None` without such runs.

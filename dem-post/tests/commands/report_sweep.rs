@@ -93,6 +93,19 @@ fn values<'a>(page: &'a str, attribute: &str) -> Vec<&'a str> {
 }
 
 #[test]
+fn a_truncated_history_does_not_stop_the_page_of_a_sweep() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = study(folder.path());
+    let path = study.store.path("0002", ".h5");
+    let cut = std::fs::OpenOptions::new().write(true).open(path).unwrap();
+    cut.set_len(cut.metadata().unwrap().len() / 2).unwrap();
+    let page = study.page(&[]);
+    let result = section(&page, "result");
+    assert!(result.contains("its history is truncated"), "{result}");
+    assert!(result.contains("2 ended when enough bonds were broken, 2 failed, 1 of them with exit code 3"), "{result}");
+}
+
+#[test]
 fn the_page_of_a_sweep_begins_with_its_result() {
     let folder = tempfile::tempdir().unwrap();
     let page = study(folder.path()).page(&[]);

@@ -12,7 +12,7 @@ use serde_json::Value;
 use crate::output::{PostError, Result, progress};
 use crate::report::solver;
 use crate::strength::Measure;
-use crate::strength::runs::Course;
+use crate::strength::runs::{Course, unreadable};
 
 /// Points of the curves of all runs together, and the least number for a run.
 const POINTS: usize = 12_000;
@@ -122,7 +122,9 @@ fn run(store: &Store, entry: &Entry, wall: Option<&str>, points: usize) -> Resul
         Ok(history) => run.read(&history, &path, wall, points)?,
         // a run may fail before its first frame
         Err(_) if entry.state == State::Failed => {}
-        Err(error) => return Err(error.into()),
+        Err(error) => {
+            (run.state, run.ending, run.message) = (State::Failed, None, Some(unreadable(&path, &error)));
+        }
     }
     Ok(run)
 }

@@ -114,9 +114,11 @@ fn endings(report: &Report) -> String {
     let failed: Vec<&Run> = report.runs.iter().filter(|run| run.state == State::Failed).collect();
     if !failed.is_empty() {
         let mut codes: Vec<String> = failed.iter().filter_map(|run| run.exit_code).map(|c| c.to_string()).collect();
+        let of_them = if codes.len() < failed.len() { format!(", {} of them", codes.len()) } else { String::new() };
         codes.sort();
         codes.dedup();
-        let codes = if codes.is_empty() { String::new() } else { format!(" with exit code {}", joined(&codes)) };
+        let codes =
+            if codes.is_empty() { String::new() } else { format!("{of_them} with exit code {}", joined(&codes)) };
         parts.push(format!("{} failed{codes}", failed.len()));
     }
     for (state, what) in [(State::Running, "in progress"), (State::Left, "not started")] {
