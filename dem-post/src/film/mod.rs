@@ -47,8 +47,8 @@ pub struct Command {
     /// What to draw.
     #[arg(long, value_enum, default_value_t)]
     draw: Subject,
-    /// Length of the film (s).
-    #[arg(long, value_name = "N", default_value_t = 12, value_parser = whole::<u16>(1..=600))]
+    /// Length of the film (s); its last picture stays for 2 s of it.
+    #[arg(long, value_name = "N", default_value_t = 14, value_parser = whole::<u16>(3..=600))]
     seconds: u16,
 }
 
@@ -129,7 +129,7 @@ pub fn read(history: &History, subject: Subject, wall: Option<&str>, seconds: u1
     let times: Vec<f64> = frames.frames.iter().map(|&frame| history.times()[frame]).collect();
     let ruptures: Vec<f64> = history.ruptures()?.iter().map(|rupture| rupture.time).collect();
     let curves = Curves::read(history, wall, &ruptures)?;
-    let pictures = pace::pictures(&times, &ruptures, usize::from(RATE) * usize::from(seconds));
+    let pictures = pace::pictures(&times, &ruptures, usize::from(RATE) * usize::from(seconds - LAST));
     let ticks: usize = pictures.iter().map(|shown| shown.ticks).sum();
     let length = ticks as f64 / f64::from(RATE) + f64::from(LAST);
     Ok(Report { subject, pictures, span: frames.span, length, webm: false, frames, curves })

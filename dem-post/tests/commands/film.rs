@@ -10,7 +10,7 @@ fn a_film_is_one_animated_picture_and_a_webm_where_there_is_ffmpeg() {
         std::fs::create_dir(&programs).unwrap();
         let film = |options: &[&str]| {
             let mut command = Command::new(env!("CARGO_BIN_EXE_dem-post"));
-            command.args(["film", "run.h5", "--seconds", "2", "--json"]).args(options);
+            command.args(["film", "run.h5", "--seconds", "4", "--json"]).args(options);
             command.current_dir(path.parent().unwrap()).env("PATH", &programs).output().unwrap()
         };
         let output = film(&[]);

@@ -9,8 +9,10 @@ use kuva::render::layout::{ComputedLayout, Layout, TickFormat};
 use kuva::render::plots::Plot;
 use kuva::render::render_utils::generate_ticks;
 
+use crate::legend::{self, Named};
 use crate::ticks::{linear, power_of_ten, whole};
-use crate::{Anchor, Canvas, Drawing, colour};
+use crate::titles;
+use crate::{Canvas, Drawing, colour};
 
 /// Width and height of one chart, in units of a drawing.
 const CHART: (f64, f64) = (640.0, 460.0);
@@ -22,8 +24,6 @@ pub(crate) const SPACING: f64 = 20.0;
 /// Margins above the axes, for the legend, and below.
 const ABOVE: f64 = 44.0;
 const BELOW: f64 = 62.0;
-/// Distance between the rows of a legend.
-const LEGEND_ROW: f64 = 19.0;
 /// The axis of smaller counts ends at this value.
 const FEW: f64 = 5.0;
 /// Titles of an axis of time, and the time below which it is in milliseconds (s).
@@ -218,12 +218,13 @@ impl Chart {
         let kept = charts.clone();
         let legends: Vec<Vec<Named>> = charts.iter().map(Self::legend).collect();
         // all begin at one height
-        let most = legends.iter().map(|legend| legend_rows(legend, size.0).len()).max().unwrap_or(0);
-        let above = ABOVE.max(LEGEND_ROW * most as f64 + 6.0);
+        let most = legends.iter().map(|legend| legend::rows(legend, size.0).len()).max().unwrap_or(0);
+        let above = ABOVE.max(legend::ROW * most as f64 + 6.0);
         let size = match charts.as_slice() {
             [chart] if chart.equal => (size.0, chart.equal_height(above, size)),
             _ => size,
         };
+        let size = (size.0, size.1.max(titles::height(&charts, above, BELOW)));
         let corner = |k: usize| {
             let place = |k: usize, length: f64| PADDING + k as f64 * (length + SPACING);
             (place(k % columns, size.0), place(k / columns, size.1))
@@ -246,12 +247,13 @@ impl Chart {
         let figure = if count > 1 { figure.with_labels_lowercase() } else { figure };
         // round ends would fill the gaps of dashed lines
         let mut canvas = Canvas { scene: figure.render(), round_ends: false };
+        titles::wrap(&mut canvas.scene.elements, &kept, size.0);
         for (k, legend) in legends.iter().enumerate() {
             let (left, top) = corner(k);
-            let rows = legend_rows(legend, size.0);
+            let rows = legend::rows(legend, size.0);
             for (r, row) in rows.iter().enumerate() {
-                let y = top + 0.5 * above + LEGEND_ROW * (r as f64 - 0.5 * (rows.len() - 1) as f64);
-                draw_legend(&mut canvas, row, (left + 0.55 * size.0, y));
+                let y = top + 0.5 * above + legend::ROW * (r as f64 - 0.5 * (rows.len() - 1) as f64);
+                legend::draw(&mut canvas, row, (left + 0.55 * size.0, y));
             }
         }
         (Drawing { charts: kept, ..canvas.finish() }, axes)
@@ -283,7 +285,7 @@ impl Chart {
         let mut layout = Layout::auto_from_plots(&plots)
             .with_x_label(&self.x)
             .with_y_label(&self.y)
-            .with_label_size(15)
+            .with_label_size(titles::SIZE)
             .with_tick_size(13)
             .with_body_size(13)
             .with_force_margins_y(above, BELOW)
@@ -394,54 +396,6 @@ impl Chart {
             }
         }
         layout
-    }
-}
-
-/// A name of a legend, its colour and style.
-type Named = (String, &'static str, Style);
-
-fn legend_width(legend: &[Named]) -> f64 {
-    legend.iter().map(|(text, ..)| 50.0 + 7.8 * text.chars().count() as f64).sum()
-}
-
-/// A legend beside the letter of a chart of width `width`, in as many rows as necessary.
-fn legend_rows(legend: &[Named], width: f64) -> Vec<&[Named]> {
-    let mut rows = vec![];
-    let mut rest = legend;
-    while !rest.is_empty() {
-        let fits = (1..=rest.len()).take_while(|n| legend_width(&rest[..*n]) <= 0.86 * width).last().unwrap_or(1);
-        let (row, left) = rest.split_at(fits);
-        rows.push(row);
-        rest = left;
-    }
-    rows
-}
-
-/// The names of the curves in one row around `middle`.
-fn draw_legend(canvas: &mut Canvas, legend: &[Named], middle: (f64, f64)) {
-    let (mut x, y) = (middle.0 - 0.5 * legend_width(legend), middle.1);
-    for entry in legend {
-        let (text, colour, style) = entry;
-        match style {
-            Style::Level => {
-                for dash in [0.0, 7.0, 14.0, 21.0] {
-                    canvas.line((x + dash, y), (x + dash + 4.0, y), colour, 1.4);
-                }
-            }
-            Style::Points => {}
-            Style::Bars => {
-                canvas.line((x + 13.0, y - 6.5), (x + 13.0, y + 6.5), colour, 1.4);
-                for end in [-6.5, 6.5] {
-                    canvas.line((x + 9.0, y + end), (x + 17.0, y + end), colour, 1.4);
-                }
-            }
-            _ => canvas.line((x, y), (x + 26.0, y), colour, 2.2),
-        }
-        if matches!(style, Style::Marked | Style::Points | Style::Bars) {
-            canvas.disk((x + 13.0, y), 3.5, colour, colour, 0.5);
-        }
-        canvas.text((x + 33.0, y + 5.0), text, 14, Anchor::Start);
-        x += legend_width(std::slice::from_ref(entry));
     }
 }
 

@@ -15,9 +15,11 @@ pub use raster::{RGB, Raster};
 mod canvas;
 mod chart;
 mod compact;
+mod legend;
 mod print;
 mod raster;
 mod ticks;
+mod titles;
 
 /// Colours that colour-blind readers can distinguish, also in print (Okabe & Ito).
 pub mod colour {
