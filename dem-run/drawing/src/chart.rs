@@ -10,7 +10,7 @@ use kuva::render::plots::Plot;
 use kuva::render::render_utils::generate_ticks;
 
 use crate::legend::{self, Named};
-use crate::ticks::{linear, power_of_ten, whole};
+use crate::ticks::{self, linear, power_of_ten, whole};
 use crate::titles;
 use crate::{Canvas, Drawing, colour};
 
@@ -24,6 +24,8 @@ pub(crate) const SPACING: f64 = 20.0;
 /// Margins above the axes, for the legend, and below.
 const ABOVE: f64 = 44.0;
 const BELOW: f64 = 62.0;
+/// Size of the labels of ticks.
+const TICK: u32 = 13;
 /// The axis of smaller counts ends at this value.
 const FEW: f64 = 5.0;
 /// Titles of an axis of time, and the time below which it is in milliseconds (s).
@@ -286,7 +288,7 @@ impl Chart {
             .with_x_label(&self.x)
             .with_y_label(&self.y)
             .with_label_size(titles::SIZE)
-            .with_tick_size(13)
+            .with_tick_size(TICK)
             .with_body_size(13)
             .with_force_margins_y(above, BELOW)
             .with_width(size.0)
@@ -327,12 +329,17 @@ impl Chart {
         // the labels have a width, on which the number of ticks depends
         for _ in 0..2 {
             let computed = ComputedLayout::from_layout(&layout);
-            let format = |(low, high), count| TickFormat::Custom(Arc::new(linear(&generate_ticks(low, high, count))));
             if !self.log_x && !self.x_is_count {
-                layout = layout.with_x_tick_format(format(computed.x_range, computed.x_ticks));
+                let ticks = generate_ticks(computed.x_range.0, computed.x_range.1, computed.x_ticks);
+                let unit = computed.plot_width() / (computed.x_range.1 - computed.x_range.0);
+                if let Some(step) = ticks::step(&ticks, unit, f64::from(TICK)) {
+                    layout = layout.with_x_tick_step(step);
+                }
+                layout = layout.with_x_tick_format(TickFormat::Custom(Arc::new(linear(&ticks))));
             }
             if !self.log_y && !self.y_is_count {
-                layout = layout.with_y_tick_format(format(computed.y_range, computed.y_ticks));
+                let ticks = generate_ticks(computed.y_range.0, computed.y_range.1, computed.y_ticks);
+                layout = layout.with_y_tick_format(TickFormat::Custom(Arc::new(linear(&ticks))));
             }
         }
         layout

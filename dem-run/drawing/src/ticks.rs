@@ -29,6 +29,18 @@ pub(crate) fn linear(ticks: &[f64]) -> impl Fn(f64) -> String + use<> {
     }
 }
 
+/// The step at which labels of the size `size` of a linear axis do not touch, a multiple of that of
+/// `ticks`; `None` where theirs is large enough. `unit` is the length of a unit of the axis.
+pub(crate) fn step(ticks: &[f64], unit: f64, size: f64) -> Option<f64> {
+    let [first, second, ..] = ticks else { return None };
+    let (own, label) = (second - first, linear(ticks));
+    let widest = ticks.iter().map(|tick| label(*tick).chars().count()).max().unwrap_or(0);
+    // digits are 0.64 times as wide as high, and a blank separates two labels
+    let room = 0.64 * size * (widest as f64 + 1.0);
+    let times = [1.0, 2.0, 4.0].into_iter().find(|times| times * own * unit >= room).unwrap_or(4.0);
+    (times > 1.0).then_some(times * own)
+}
+
 /// A tick of a logarithmic axis: powers of ten as such, others as numbers.
 pub(crate) fn power_of_ten(value: f64) -> String {
     let exponent = value.log10();
@@ -54,6 +66,16 @@ pub(crate) fn power_of_ten(value: f64) -> String {
 mod tests {
     use super::*;
     use crate::{Chart, Style, colour};
+
+    #[test]
+    fn labels_that_would_touch_are_farther_apart() {
+        // five letters and a blank take 50 of 13 units each
+        let ticks = [0.18, 0.185, 0.19, 0.195];
+        for (unit, found) in [(11e3, None), (6e3, Some(0.01)), (3e3, Some(0.02)), (1.0, Some(0.02))] {
+            let step = step(&ticks, unit, 13.0);
+            assert!(step.zip(found).map_or(step == found, |(a, b): (f64, f64)| (a - b).abs() < 1e-12), "{step:?}");
+        }
+    }
 
     #[test]
     fn ticks_of_a_linear_axis_have_the_digits_of_their_step() {
