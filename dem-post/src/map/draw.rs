@@ -4,7 +4,7 @@ use dem_drawing::{Anchor, Canvas, Drawing};
 
 use super::arrow::draw_arrow;
 use super::frame::{ARROW, Frame, HATCH};
-use super::legend::{Key, draw_legend, legend_rows, scale_bar};
+use super::legend::{Key, draw_legend, key_width, legend_rows, scale_bar};
 use super::panel::{Link, Panel, Patch};
 use super::sample::{Sample, View};
 use super::scale::mixed;
@@ -44,7 +44,8 @@ pub fn draw_view(sample: &Sample, View([low, high]): View, panels: &[Panel], leg
     let size = (extent[0] * scale + 2.0 * room, extent[1] * scale + 2.0 * room);
     let (columns, lines) = if stacked { (1, panels.len()) } else { (panels.len(), 1) };
     let even = |length: f64| (length / EVEN).ceil() * EVEN;
-    let width = even((columns as f64 * (size.0 + MARGIN) + MARGIN).max(420.0));
+    let entry = legend.iter().map(key_width).fold(0.0, f64::max);
+    let width = even((columns as f64 * (size.0 + MARGIN) + MARGIN).max(420.0).max(entry + 2.0 * MARGIN));
     let rows = legend_rows(legend, width - 2.0 * MARGIN);
     let caption = if panels.iter().any(|panel| !panel.caption.is_empty()) { CAPTION } else { MARGIN };
     let below = lines as f64 * (caption + size.1);

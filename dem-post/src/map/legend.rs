@@ -48,7 +48,7 @@ fn metres(length: f64) -> String {
 }
 
 /// Width of an entry of the legend, from the number of its characters.
-fn key_width(key: &Key) -> f64 {
+pub(super) fn key_width(key: &Key) -> f64 {
     let letters = |text: &str| LETTER * text.chars().count() as f64;
     match key {
         Key::Disk(_, _, text) | Key::Line(_, _, text) | Key::Arrow(text) => 46.0 + letters(text),
