@@ -9,7 +9,7 @@ use crate::packings;
 use crate::prepare::{self, Watch};
 use crate::sample_file::{self, Table};
 use crate::scene::{self, Place, Sample, Scene, SolverKind};
-use crate::tolerances::{DEEPEST, ROUNDED, TOUCHING};
+use crate::tolerances::{DEEPEST, HIDDEN, ROUNDED, TOUCHING};
 use crate::touching;
 use crate::warnings;
 use dem_core::body::{Drive, Grain, Grains, Load, Schedule, Shape, Slide, Wall};
@@ -49,6 +49,7 @@ const MOST_TOLD: usize = 10;
 pub fn build<D: Dim>(scene: &Scene, packings: Option<&Path>, watch: Watch) -> Result<Built<D>, RunError> {
     let Sampled { mut grains, solid_fraction, unsettled } = grains::<D>(scene, packings, watch)?;
     refuse_other_units(&grains)?;
+    refuse_far_away(&grains)?;
     let mut wrong = hold_fixed(scene, &mut grains);
     let lost = scene.grains.iter().flat_map(|g| &g.loads).filter(|load| load.grain >= grains.len());
     wrong.extend(lost.map(|load| missing_grain("grains.loads", load.grain, grains.len())));
@@ -208,6 +209,20 @@ fn refuse_other_units<D: Dim>(grains: &Grains<D>) -> Result<(), RunError> {
     Err(RunError::Sample(vec![format!(
         "sample: the volume of the grains is {} times that of the box around them: are radii and centres in the same unit?",
         number(solid / space)
+    )]))
+}
+
+/// Rejects grains so far from the origin that the round-off of their positions hides which of them
+/// touch.
+fn refuse_far_away<D: Dim>(grains: &Grains<D>) -> Result<(), RunError> {
+    let off = |k: usize| f64::EPSILON * grains.position[k].norm();
+    let Some(k) = (0..grains.len()).find(|&k| off(k) > HIDDEN * grains.radius[k]) else { return Ok(()) };
+    Err(RunError::Sample(vec![format!(
+        "sample: grain {k} is {} m from the origin, where positions are rounded by {:.1e} m, and its radius is {} m: \
+         contacts would be lost; move the sample to the origin",
+        number(grains.position[k].norm()),
+        off(k),
+        number(grains.radius[k])
     )]))
 }
 

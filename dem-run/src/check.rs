@@ -517,6 +517,14 @@ pub(crate) mod tests {
                 "x,y,radius\n0,1,1\n1,1,1\n5,1,1\n5,2,1\n",
                 &["grains 0 and 1 overlap by 1", "grains 2 and 3 overlap by 1"],
             ),
+            (
+                "x,y,radius\n0,1,1\n1e7,1,1\n",
+                &[
+                    "grain 1 is 1.000e7 m from the origin",
+                    "its radius is 1 m: contacts would",
+                    "move the sample to the origin",
+                ],
+            ),
             // the wall also overlaps grains
             ("x,y,radius\n0,1,1\n1,1,1\n0,9,1\n", &["grains 0 and 1 overlap"]),
         ] {

@@ -11,3 +11,6 @@ pub(crate) const ROUNDED: f64 = 1e-3;
 /// Sine (cosine) of an angle below which two directions count as parallel (perpendicular): decimal
 /// directions are not exact.
 pub(crate) const PARALLEL: f64 = 1e-6;
+/// Round-off of the position of a grain, over its radius, above which touching grains may count as
+/// apart: the gap up to which a contact is closed.
+pub(crate) const HIDDEN: f64 = 1e-9;
