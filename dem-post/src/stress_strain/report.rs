@@ -262,8 +262,8 @@ fn motion(history: &History, wall: &Wall, k: usize) -> Result<Motion> {
     Ok(Motion { step: position.step, time: position.time, way, reaction, applied, load, load_before_breaks, sense })
 }
 
-/// Work of a wall on the grains as it slides across its drive (J): `way` is its displacement along the
-/// drive (m). Zero where nothing is recorded.
+/// Work of a wall on the grains as it slides across its drive (J); `way` is its displacement along
+/// the drive (m). Zero where nothing is recorded.
 fn slide_work(history: &History, wall: usize, drive: &[f64; 3], way: &[f64]) -> Result<f64> {
     let Some(force) = history.observable("wall_force")? else { return Ok(0.0) };
     let position = required(history, "wall_position")?;

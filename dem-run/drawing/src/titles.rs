@@ -13,8 +13,8 @@ const LETTER: f64 = 24.0;
 /// Mean width of a letter over its size, at most.
 const EM: f64 = 0.53;
 
-/// Height of charts with room for their vertical titles below the letters of the charts; `above` and
-/// `below` are the margins of their areas.
+/// Height of charts with room for their vertical titles below the letters of the charts; `above`
+/// and `below` are the margins of their areas.
 pub(crate) fn height(charts: &[Chart], above: f64, below: f64) -> f64 {
     let longest = charts.iter().map(|chart| length(&chart.y)).fold(0.0, f64::max);
     // a title stands at the middle of the area
