@@ -9,7 +9,7 @@ use kuva::render::layout::{ComputedLayout, Layout, TickFormat};
 use kuva::render::plots::Plot;
 use kuva::render::render_utils::generate_ticks;
 
-use crate::legend::{self, Named};
+use crate::legend::{self, Named, Style};
 use crate::ticks::{self, linear, power_of_ten, whole};
 use crate::titles;
 use crate::{Canvas, Drawing, colour};
@@ -35,25 +35,6 @@ const SHORT: f64 = 0.05;
 /// Maximum number of points of a curve: more than the pixels of its width, so that no visible point
 /// is lost.
 const CURVE_POINTS: usize = 4000;
-
-/// Style of a curve.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Style {
-    /// Joined points.
-    Line,
-    /// Points joined by a thin line, for scattered values.
-    Thin,
-    /// A value that holds until the next point.
-    Steps,
-    /// Joined points, each with a dot.
-    Marked,
-    /// Dots alone.
-    Points,
-    /// Error bars around a mean; see [`Bars`].
-    Bars,
-    /// A dashed level in the legend.
-    Level,
-}
 
 /// A named curve.
 #[derive(Clone)]
@@ -218,6 +199,7 @@ impl Chart {
     pub(crate) fn draw_in_columns(charts: Vec<Self>, size: (f64, f64), columns: usize) -> (Drawing, Vec<Axes>) {
         let (columns, count) = (columns.max(1), charts.len());
         let kept = charts.clone();
+        let titles: Vec<String> = charts.iter().map(|chart| chart.clone().readable().x).collect();
         let legends: Vec<Vec<Named>> = charts.iter().map(Self::legend).collect();
         // all begin at one height
         let most = legends.iter().map(|legend| legend::rows(legend, size.0).len()).max().unwrap_or(0);
@@ -226,7 +208,7 @@ impl Chart {
             [chart] if chart.equal => (size.0, chart.equal_height(above, size)),
             _ => size,
         };
-        let size = (size.0, size.1.max(titles::height(&charts, above, BELOW)));
+        let size = (size.0, size.1.max(titles::height(charts.iter().map(|chart| chart.y.as_str()), above, BELOW)));
         let corner = |k: usize| {
             let place = |k: usize, length: f64| PADDING + k as f64 * (length + SPACING);
             (place(k % columns, size.0), place(k / columns, size.1))
@@ -249,7 +231,7 @@ impl Chart {
         let figure = if count > 1 { figure.with_labels_lowercase() } else { figure };
         // round ends would fill the gaps of dashed lines
         let mut canvas = Canvas { scene: figure.render(), round_ends: false };
-        titles::wrap(&mut canvas.scene.elements, &kept, size.0);
+        titles::wrap(&mut canvas.scene.elements, &titles, size.0);
         for (k, legend) in legends.iter().enumerate() {
             let (left, top) = corner(k);
             let rows = legend::rows(legend, size.0);

@@ -1,10 +1,28 @@
 //! Legends of charts.
 
-use crate::chart::Style;
-use crate::{Anchor, Canvas};
+use crate::canvas::{Anchor, Canvas};
 
 /// Distance between the rows of a legend.
 pub(crate) const ROW: f64 = 19.0;
+
+/// Style of a curve.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Style {
+    /// Joined points.
+    Line,
+    /// Points joined by a thin line, for scattered values.
+    Thin,
+    /// A value that holds until the next point.
+    Steps,
+    /// Joined points, each with a dot.
+    Marked,
+    /// Dots alone.
+    Points,
+    /// Error bars around a mean; see [`Bars`](crate::Bars).
+    Bars,
+    /// A dashed level in the legend.
+    Level,
+}
 
 /// A name of a legend, its colour and style.
 pub(crate) type Named = (String, &'static str, Style);

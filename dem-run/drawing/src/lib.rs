@@ -8,8 +8,9 @@ use kuva::backend::svg::SvgBackend;
 use kuva::render::render::Scene;
 
 pub use canvas::{Anchor, Canvas};
-pub use chart::{Axes, Bars, Chart, Curve, Style, thinned};
+pub use chart::{Axes, Bars, Chart, Curve, thinned};
 use compact::compact;
+pub use legend::Style;
 pub use raster::{RGB, Raster};
 
 mod canvas;

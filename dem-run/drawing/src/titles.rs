@@ -2,8 +2,6 @@
 
 use kuva::render::render::Primitive;
 
-use crate::Chart;
-
 /// Size of their letters in units of a drawing.
 pub(crate) const SIZE: u32 = 15;
 /// Distance of two lines.
@@ -15,8 +13,8 @@ const EM: f64 = 0.53;
 
 /// Height of charts with room for their vertical titles below the letters of the charts; `above`
 /// and `below` are the margins of their areas.
-pub(crate) fn height(charts: &[Chart], above: f64, below: f64) -> f64 {
-    let longest = charts.iter().map(|chart| length(&chart.y)).fold(0.0, f64::max);
+pub(crate) fn height<'a>(titles: impl Iterator<Item = &'a str>, above: f64, below: f64) -> f64 {
+    let longest = titles.map(length).fold(0.0, f64::max);
     // a title stands at the middle of the area
     (longest + (2.0 * LETTER + below - above).max(above - below)).ceil()
 }
@@ -28,8 +26,8 @@ fn length(title: &str) -> f64 {
 
 /// Breaks horizontal titles that are longer than a chart of width `width` into two lines, and moves
 /// those that would end beyond it.
-pub(crate) fn wrap(elements: &mut Vec<Primitive>, charts: &[Chart], width: f64) {
-    let is_title = |text: &str| charts.iter().any(|chart| chart.clone().readable().x == text);
+pub(crate) fn wrap(elements: &mut Vec<Primitive>, titles: &[String], width: f64) {
+    let is_title = |text: &str| titles.iter().any(|title| title == text);
     let mut out = Vec::with_capacity(elements.len());
     for element in elements.drain(..) {
         let Primitive::Text { x, y, content, size: SIZE, anchor, rotate: None, bold, color } = element else {
