@@ -182,3 +182,22 @@ fn a_restored_world_finds_the_same_events() {
     }
     assert_eq!(restored.load_time.to_bits(), world.load_time.to_bits());
 }
+
+/// A load that rises above the strength and falls again before the next trial is met all the same,
+/// since the times at which it turns are known.
+#[test]
+fn a_peak_of_the_load_between_two_trials_is_met() {
+    let strengths = [10.0, 12.0];
+    let [first, _] = loads_of_the_fork(strengths);
+    // 8 N at 3 s, nothing before 1 s and after 5 s; then 1 N
+    let peak = |t: f64| if t < 6.0 { (8.0 - 4.0 * (t - 3.0).abs()).max(0.0) } else { (t - 6.0).min(1.0) };
+    for step in [1e-4, 0.1, 1.0, 10.0] {
+        let mut world = fork::<D2>(strengths, peak);
+        world.settings.step = step;
+        world.load_knots = vec![1.0, 3.0, 5.0, 6.0, 7.0];
+        let report = world.step().expect("an event");
+        assert_eq!(report.breaks.len(), 1, "step {step}");
+        assert!((peak(world.load_time) / first - 1.0).abs() < ACCURACY, "step {step}: {} s", world.load_time);
+        assert!(world.load_time < 3.0, "step {step}: {} s", world.load_time);
+    }
+}

@@ -68,6 +68,7 @@ pub fn build<D: Dim>(scene: &Scene, packings: Option<&Path>, watch: Watch) -> Re
     warnings.extend(warnings::of_walls(scene, &walls, Some(&grains)));
     let mut world = World::new(grains, walls, loads(scene), settings(scene));
     world.membrane = membrane(scene, &world.grains);
+    world.load_knots = scene.load_knots();
     if let Err(error) = world.find_surface() {
         return Err(RunError::Sample(vec![no_surface(scene, &world, &error)]));
     }
@@ -90,6 +91,7 @@ pub fn rebuild<D: Dim>(scene: &Scene, from: &mut Reader) -> Result<World<D>, Mis
     let walls = walls(scene, &grains);
     let mut world = World::restored(grains, walls, loads(scene), settings(scene), from)?;
     world.membrane = membrane(scene, &world.grains);
+    world.load_knots = scene.load_knots();
     Ok(world)
 }
 

@@ -255,6 +255,10 @@ impl<D: Dim> Run<'_, D> {
             };
         }
         let help = match error {
+            // the length of a step changes nothing
+            StepError::NotAccepted { .. } if self.scene.rupture == Rupture::NextEvent => {
+                "; another solver.kind.auto.start (\"stiff_limit\") or a larger solver.accept may help"
+            }
             StepError::NotAccepted { .. } if newton => "; a smaller time.step or a larger solver.accept may help",
             StepError::NotAccepted { .. } => {
                 "; a smaller time.step, more max_sweeps or a larger solver.accept may help"

@@ -143,7 +143,7 @@ class History:
         group = self._group("bonds")
         pair = group["pair"][:]
         columns, units = {"i": pair[:, 0], "j": pair[:, 1]}, {}
-        for name in ("rest_gap", "strength", "friction", "rolling", "mean_diameter"):
+        for name in ("rest_gap", "strength", "friction", "rolling", "twist", "mean_diameter"):
             if name in group:
                 columns[name] = group[name][:]
                 units |= _unit_of(name, group[name])
@@ -170,9 +170,9 @@ class History:
     def contacts(self, frame=-1):
         """The contacts of a frame as a data frame.
 
-        `i` and `j` are grains; a contact with a wall has the name of the wall in `wall` and j < 0. The
-        normal points from j to i. Forces are those of j on i, along the normal (pressing is
-        positive) and the tangents.
+        `i` and `j` are grains; a contact with a wall has the name of the wall in `wall` and j < 0;
+        without a wall `wall.isna()` holds. The normal points from j to i. Forces are those of j on
+        i, along the normal (pressing is positive) and the tangents.
         """
         group, frame = self._group("contacts"), self._number(frame)
         start, count = int(group["start"][frame]), int(group["count"][frame])

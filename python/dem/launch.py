@@ -11,6 +11,10 @@ from pathlib import Path
 from .history import History
 
 
+# fields of a scene that are paths
+PATHS = ("sample.file.path", "bonds.list")
+
+
 class RunFailed(RuntimeError):
     """`dem-run` ended with an error: its message, and its exit code in `code`."""
 
@@ -22,8 +26,8 @@ class RunFailed(RuntimeError):
 def run(scene, output=None, *, force=False, threads=None, program=None, **sets):
     """Runs a scene and returns its history, with what the run printed at its end in `summary`.
 
-    `scene` is a file, or a dict; a dict needs `output`, and the path of its sample file starts in
-    the current folder. `output` is the history to write, by default the name of the scene with .h5
+    `scene` is a file, or a dict; a dict needs `output`, and the paths of its sample file and of its
+    list of bonds start in the current folder. `output` is the history to write, by default the name of the scene with .h5
     in the current folder; with `force`, one that exists is replaced. Other arguments set fields of
     the scene, with two underscores for a full stop: `bonds__strength=5`; also as
     `**{"bonds.strength": 5}`. None is JSON's null. `program` is `dem-run` by its path, by default
@@ -32,9 +36,11 @@ def run(scene, output=None, *, force=False, threads=None, program=None, **sets):
     Raises RunFailed if the scene is wrong, a step does not converge, or a file cannot be written.
     """
     command = [_program(program), "run", "--json", "--progress", "none"]
+    sets = {name.replace("__", "."): value for name, value in sets.items()}
+    if isinstance(scene, dict):
+        sets = {name: os.path.abspath(v) if name in PATHS and isinstance(v, str) else v for name, v in sets.items()}
     for name, value in sets.items():
-        text = json.dumps(value, allow_nan=False)
-        command += ["--set", f"{name.replace('__', '.')}={text}"]
+        command += ["--set", f"{name}={_json(value)}"]
     if force:
         command.append("--force")
     if threads is not None:
@@ -46,7 +52,7 @@ def run(scene, output=None, *, force=False, threads=None, program=None, **sets):
         raise TypeError("run() of a dict needs output, the history to write")
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "scene.json"
-        file.write_text(json.dumps(_absolute(scene), allow_nan=False), encoding="utf-8")
+        file.write_text(_json(_absolute(scene)), encoding="utf-8")
         return _run(command, str(file), os.fspath(output))
 
 
@@ -73,9 +79,28 @@ def _program(program):
     return found
 
 
+def _json(value):
+    """JSON of a value; numbers and arrays of numpy are those of Python."""
+    return json.dumps(value, allow_nan=False, default=_plain)
+
+
+def _plain(value):
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    raise TypeError(f"a {type(value).__name__} cannot be a value of a scene: {value!r}")
+
+
 def _absolute(scene):
-    """The scene with a path of its sample file that does not depend on the folder of the scene."""
-    file = scene.get("sample", {}).get("file") if isinstance(scene.get("sample"), dict) else None
-    if not isinstance(file, dict) or "path" not in file:
-        return scene
-    return {**scene, "sample": {"file": {**file, "path": os.path.abspath(file["path"])}}}
+    """The scene with paths that do not depend on its folder."""
+    for place in PATHS:
+        scene = _with_absolute(scene, place.split("."))
+    return scene
+
+
+def _with_absolute(value, place):
+    """`value`, a scene or a part of it, with an absolute path at `place`, where there is a path."""
+    if not place:
+        return os.path.abspath(value) if isinstance(value, str) else value
+    if not isinstance(value, dict) or place[0] not in value:
+        return value
+    return {**value, place[0]: _with_absolute(value[place[0]], place[1:])}

@@ -192,6 +192,14 @@ def test_a_run_takes_values_of_fields(program, tmp_path):
         scene = {**history.scene, "sample": {"file": {"path": "sample.csv"}}}
     with dem.run(scene, "file.h5") as history:
         assert history.grains(0)["radius"].values.tolist() == [2e-3]
+    # as a field, too, and a list of bonds; numbers may be numpy's
+    (tmp_path / "two.csv").write_text("x,y,radius\n0,2e-3,2e-3\n4e-3,2e-3,2e-3\n")
+    (tmp_path / "bonds.csv").write_text("i,j\n0,1\n")
+    bonded = scene | {"bonds": {"strength": 5.0, "gap_tolerance": 1e-6, "list": "bonds.csv"}}
+    with dem.run(bonded, "bonds.h5", sample__file__path="two.csv", seed=numpy.int64(4)) as history:
+        assert len(history.bonds()) == 1 and history.scene["seed"] == 4
+    with pytest.raises(TypeError, match="set cannot be a value of a scene"):
+        dem.run(scene, "no.h5", seed={1})
 
 
 def test_a_wrong_scene_is_an_exception_with_the_message(program, monkeypatch):

@@ -81,8 +81,9 @@ impl<D: Dim> World<D> {
         let mut step = if rises { self.settings.step } else { -self.settings.step };
         let mut next = last.at + step;
         loop {
-            let beyond = if rises { next >= end } else { next <= end };
-            let trial = self.equilibrium(if beyond { end } else { next }, done)?;
+            let next_or_end = if rises { next.min(end) } else { next.max(end) };
+            let to = up_to_knot(&self.load_knots, last.at, next_or_end);
+            let trial = self.equilibrium(to, done)?;
             if trial.excess.abs() <= LIMIT {
                 return Ok(trial);
             }
@@ -90,7 +91,7 @@ impl<D: Dim> World<D> {
                 let [low, above] = if rises { [last, trial] } else { [trial, last] };
                 return self.bisect(low.place(), above, done);
             }
-            if beyond {
+            if to == end {
                 return Ok(trial);
             }
             // no further than to where the secant meets the limit, else ever longer steps
@@ -227,6 +228,13 @@ fn node_impulse<D: Dim>(nodes: &Nodes<D>, k: usize) -> f64 {
         0.0
     };
     (node.velocity.norm() / node.inverse_mass).hypot(spin)
+}
+
+/// The first of the `knots` strictly between two times, on the way from one to the other; else the
+/// other.
+fn up_to_knot(knots: &[f64], from: f64, to: f64) -> f64 {
+    let between = knots.iter().copied().filter(|knot| from.min(to) < *knot && *knot < from.max(to));
+    if from < to { between.fold(to, f64::min) } else { between.fold(to, f64::max) }
 }
 
 /// Where the line through two points of time and excess meets zero.

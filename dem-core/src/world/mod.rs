@@ -107,6 +107,9 @@ pub struct World<D: Dim> {
     /// With [`Rupture::NextEvent`], the time at which the load functions give the load of the last
     /// event (s). It decreases where the load must be lowered.
     pub load_time: f64,
+    /// Times at which a load function turns, in increasing order (s): loading to the next event
+    /// looks at each of them, and takes the loads to be affine in between.
+    pub load_knots: Vec<f64>,
     /// Energy balance since the start.
     pub ledger: Ledger,
     /// Contacts of the last accepted step, sorted by pair, with their reactions.
@@ -193,6 +196,7 @@ impl<D: Dim> World<D> {
             time: 0.0,
             steps: 0,
             load_time: 0.0,
+            load_knots: Vec::new(),
             grains,
             walls,
             loads,

@@ -219,8 +219,8 @@ impl StepError {
                     }
                 };
                 format!(
-                    "{opening} at t = {time:.6e} s: residual {residual:.2e}{load_error} after {iterations} iterations, with \
-                     the step cut to {step:.2e} s{known}"
+                    "{opening} at t = {time:.6e} s: residual {residual:.2e}{load_error} after {iterations} iterations, in a \
+                     step of {step:.2e} s{known}"
                 )
             }
             Self::TooFast { time, pair } => format!(

@@ -123,6 +123,12 @@ pub fn read(a: &History, b: &History, tolerance: f64) -> Result<Report> {
     if a.dimension() != b.dimension() {
         return Err(differs(format!("one is in {}D, the other in {}D", a.dimension(), b.dimension())));
     }
+    let counts = |history: &History| Ok::<bool, PostError>(history.observable("load_time")?.is_some());
+    if counts(a)? != counts(b)? {
+        let what = "one loads from break to break (rupture next_event), and its time counts breaks: compare \
+                    ruptures.csv of `dem-post cracks` and the loads in stress-strain.csv of `dem-post stress-strain`";
+        return Err(differs(what.into()));
+    }
     let [n, m] = [&radii[0], &radii[1]].map(Vec::len);
     if n != m {
         return Err(differs(format!("{n} grains there, {m} here: choose two runs of one sample")));

@@ -40,6 +40,16 @@ impl Function {
         }
     }
 
+    /// The times at which the function turns (s): it is affine in between.
+    #[must_use]
+    pub fn knots(&self) -> Vec<f64> {
+        match self {
+            Self::Constant(_) => vec![],
+            Self::Ramp(ramp) => vec![ramp.start],
+            Self::Table(rows) => rows.iter().map(|row| row[0]).collect(),
+        }
+    }
+
     /// Whether the function is zero at all times.
     #[must_use]
     pub fn is_zero(&self) -> bool {

@@ -346,6 +346,19 @@ impl Scene {
         Some(self.stages.first().and_then(|stage| stage.membrane_pressure.as_ref()).unwrap_or(own))
     }
 
+    /// Times at which a force, a stress, the pressure of the membrane or the factor of a load turns, in
+    /// increasing order (s).
+    #[must_use]
+    pub fn load_knots(&self) -> Vec<f64> {
+        let walls = self.walls.values().flat_map(|wall| wall.force.iter().chain(&wall.stress));
+        let pressures = self.membrane.iter().map(|membrane| &membrane.pressure);
+        let factors = self.grains.iter().flat_map(|grains| &grains.loads).map(|load| &load.time);
+        let mut knots: Vec<f64> = walls.chain(pressures).chain(factors).flat_map(Function::knots).collect();
+        knots.sort_by(f64::total_cmp);
+        knots.dedup();
+        knots
+    }
+
     /// The wall that loads the sample ([`choose_load_wall`]); none where no wall is driven, or
     /// where several are and the scene does not say which.
     #[must_use]
