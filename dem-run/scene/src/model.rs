@@ -346,8 +346,8 @@ impl Scene {
         Some(self.stages.first().and_then(|stage| stage.membrane_pressure.as_ref()).unwrap_or(own))
     }
 
-    /// Times at which a force, a stress, the pressure of the membrane or the factor of a load turns,
-    /// in increasing order (s).
+    /// Times at which a force, a stress, the membrane's pressure or the factor of a load turns, in
+    /// increasing order (s).
     #[must_use]
     pub fn load_knots(&self) -> Vec<f64> {
         let walls = self.walls.values().flat_map(|wall| wall.force.iter().chain(&wall.stress));
