@@ -24,6 +24,7 @@ use super::motion::Midpoint;
 use super::report::Violation;
 use super::touch::StoredTouch;
 use crate::body::{Drive, Shape, separation};
+use crate::bond::{Bond, BondStatus};
 use crate::contact::{Cone, Law, Local};
 use crate::dim::{Dim, Moments, Vect};
 use crate::problem::{Contact, ContactProblem, Nodes, Visitor};
@@ -43,7 +44,7 @@ const YIELDING: f64 = 1e-4;
 /// The same, along the normal, summed over the run.
 const YIELDED: f64 = 1e-3;
 
-/// Load error (–) of a solve above which its reactions are not known.
+/// Load error (–) of a solve above which the reactions of rigid bonds are not known.
 const LOAD_ERROR: f64 = 1e-3;
 
 /// Largest solver tolerance (`FINE`) and largest accepted residual (`ACCEPTED`) for which
@@ -160,9 +161,12 @@ impl<D: Dim> World<D> {
     }
 
     /// The load error of a solve (–) if it is too large: that of reactions that still grow, as
-    /// where no motion satisfies rigid bonds.
+    /// where no motion satisfies rigid bonds. The deformation of elastic bonds bounds their
+    /// reactions, whose load error is large where they are as small as round-off.
     pub(super) fn large_load_error(&self, solve: SolveReport) -> Option<f64> {
-        solve.load_error_beyond_rounding().filter(|error| *error > LOAD_ERROR * self.looseness())
+        let rigid = |bond: &Bond| bond.status == BondStatus::Intact && bond.stiffness.is_none();
+        let error = solve.load_error_beyond_rounding().filter(|error| *error > LOAD_ERROR * self.looseness())?;
+        self.bonds.iter().any(rigid).then_some(error)
     }
 
     /// Factor by which the tolerances of the solver loosen these limits.
