@@ -1,7 +1,8 @@
 //! Bonds with a stiffness, from the scene to the history.
 
-use crate::common::{Folder, SMALL, config, observable};
+use crate::common::{Folder, SMALL, config, observable, run};
 use dem_run::history::History;
+use serde_json::json;
 
 const SPRINGS: &str = r#"bonds.stiffness={"springs": {"normal": 1e7, "tangential": 5e6, "rolling": 5}}"#;
 const YOUNG: &str = r#"bonds.stiffness={"young": {"modulus": 1e9, "poisson_ratio": 0.2}}"#;
@@ -117,4 +118,29 @@ fn columns_of_springs_have_their_modulus() {
     let value = |name: &str| found["elastic"][name]["value"].as_f64().expect("a number");
     assert!((value("young_modulus") / 2e7 - 1.0).abs() < 1e-3, "{found}");
     assert!(value("poisson_ratio").abs() < 1e-6, "{found}");
+}
+
+/// A lattice torn apart between two grips bears forces as small as round-off, whose load error is
+/// large: the run goes on.
+#[test]
+fn a_torn_sample_is_followed_to_the_end() {
+    let here = Folder::new();
+    let plane = |sign: i32| json!({ "plane": { "normal": [0, sign], "place": "seated" } });
+    let scene = json!({
+        "dimension": 2, "thickness": 0.01,
+        "sample": { "lattice": { "hexagonal": { "columns": 6, "rows": 6, "diameter": 0.004 } } },
+        "materials": { "density": 2500, "friction": { "grain_grain": 0.3, "grain_wall": 0.2 } },
+        "bonds": { "strength": 10, "gap_tolerance": 1e-3, "scatter": { "weibull": { "modulus": 3 } },
+            "stiffness": { "springs": { "normal": 1e6, "tangential": 5e5, "rolling": 1 } } },
+        "walls": {
+            "bottom": { "shape": plane(1), "grip": 1e-4 },
+            "top": { "shape": plane(-1), "grip": 1e-4, "direction": [0, 1], "velocity": { "constant": 1e-5 } },
+        },
+        "time": { "step": 0.01, "end": 4 }, "output": { "every_steps": 100 }
+    });
+    here.write("torn.json", scene.to_string());
+    let summary = run(&here, "torn.json", &[]);
+    assert_eq!(summary["ending"], json!("time"));
+    let broken = values(&here.history("a.h5"), "bonds_broken");
+    assert!(broken.last().is_some_and(|broken| *broken > 10.0), "{:?}", broken.last());
 }
