@@ -9,6 +9,10 @@ const BROKEN: f64 = 0.05;
 /// Rounding of a time, as a share of the length of the run.
 const ROUNDING: f64 = 1e-9;
 
+/// Times closer than this share of the later one are equal: the clocks of two time steps round
+/// differently.
+pub(crate) const SAME_TIME: f64 = 1e-9;
+
 /// The frames nearest to `times` (s). Without times: the first frame after the first rupture, the
 /// first after 5 % of the bonds have broken, and the last. In order, without repetition.
 ///

@@ -27,18 +27,18 @@ def run(scene, output=None, *, force=False, threads=None, program=None, **sets):
     """Runs a scene and returns its history, with what the run printed at its end in `summary`.
 
     `scene` is a file, or a dict; a dict needs `output`, and the paths of its sample file and of its
-    list of bonds start in the current folder. `output` is the history to write, by default the name of the scene with .h5
-    in the current folder; with `force`, one that exists is replaced. Other arguments set fields of
-    the scene, with two underscores for a full stop: `bonds__strength=5`; also as
-    `**{"bonds.strength": 5}`. None is JSON's null. `program` is `dem-run` by its path, by default
-    that in the environment variable DEM_RUN, else that on PATH.
+    list of bonds start in the current folder. `output` is the history to write, by default the name
+    of the scene with .h5 in the current folder; with `force`, one that exists is replaced. Other
+    arguments set fields of the scene, with two underscores for a full stop: `bonds__strength=5`;
+    also as `**{"bonds.strength": 5}`. None is JSON's null. `program` is `dem-run` by its path, by
+    default that in the environment variable DEM_RUN, else that on PATH.
 
     Raises RunFailed if the scene is wrong, a step does not converge, or a file cannot be written.
     """
     command = [_program(program), "run", "--json", "--progress", "none"]
     sets = {name.replace("__", "."): value for name, value in sets.items()}
     if isinstance(scene, dict):
-        sets = {name: os.path.abspath(v) if name in PATHS and isinstance(v, str) else v for name, v in sets.items()}
+        sets = {name: _absolute(value, name.split(".")) for name, value in sets.items()}
     for name, value in sets.items():
         command += ["--set", f"{name}={_json(value)}"]
     if force:
@@ -90,15 +90,18 @@ def _plain(value):
     raise TypeError(f"a {type(value).__name__} cannot be a value of a scene: {value!r}")
 
 
-def _absolute(scene):
-    """The scene with paths that do not depend on its folder."""
-    for place in PATHS:
-        scene = _with_absolute(scene, place.split("."))
-    return scene
+def _absolute(value, place=()):
+    """The value of the field of a scene at `place`, or a scene, with paths that do not depend on its
+    folder."""
+    for path in PATHS:
+        names = path.split(".")
+        if names[: len(place)] == list(place):
+            value = _with_absolute(value, names[len(place) :])
+    return value
 
 
 def _with_absolute(value, place):
-    """`value`, a scene or a part of it, with an absolute path at `place`, where there is a path."""
+    """`value` with an absolute path at `place`, where there is a path."""
     if not place:
         return os.path.abspath(value) if isinstance(value, str) else value
     if not isinstance(value, dict) or place[0] not in value:

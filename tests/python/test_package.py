@@ -198,6 +198,8 @@ def test_a_run_takes_values_of_fields(program, tmp_path):
     bonded = scene | {"bonds": {"strength": 5.0, "gap_tolerance": 1e-6, "list": "bonds.csv"}}
     with dem.run(bonded, "bonds.h5", sample__file__path="two.csv", seed=numpy.int64(4)) as history:
         assert len(history.bonds()) == 1 and history.scene["seed"] == 4
+    with dem.run(scene, "two.h5", sample={"file": {"path": "two.csv"}}) as history:
+        assert len(history.grains(0)["radius"]) == 2
     with pytest.raises(TypeError, match="set cannot be a value of a scene"):
         dem.run(scene, "no.h5", seed={1})
 

@@ -6,12 +6,10 @@ use dem_history::{History, Rupture};
 use dem_scene::{Difference, differences};
 use serde::Serialize;
 
+use crate::moments::SAME_TIME;
 use crate::output::{PostError, Result, Text, counted, facts, number, quantity};
 use crate::stress_strain;
 
-/// Times closer than this share of the later one are equal: the clocks of two time steps round
-/// differently.
-const SAME_TIME: f64 = 1e-9;
 /// Maximum number of differences of the scenes, and of bonds, in the table.
 const SHOWN: usize = 12;
 
@@ -123,8 +121,7 @@ pub fn read(a: &History, b: &History, tolerance: f64) -> Result<Report> {
     if a.dimension() != b.dimension() {
         return Err(differs(format!("one is in {}D, the other in {}D", a.dimension(), b.dimension())));
     }
-    let counts = |history: &History| Ok::<bool, PostError>(history.observable("load_time")?.is_some());
-    if counts(a)? != counts(b)? {
+    if a.follows_breaks()? != b.follows_breaks()? {
         let what = "one loads from break to break (rupture next_event), and its time counts breaks: compare \
                     ruptures.csv of `dem-post cracks` and the loads in stress-strain.csv of `dem-post stress-strain`";
         return Err(differs(what.into()));

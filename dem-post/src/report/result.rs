@@ -9,16 +9,14 @@ use crate::collapse::peak;
 use crate::cracks::report::total_over_time;
 use crate::extent::first_box;
 use crate::frames::{self, Subject};
+use crate::moments::{self, SAME_TIME};
 use crate::output::{PostError, Result, counted, number, quantity, short};
 use crate::section::{Figure, Section, capitalised, chart_figure, map_figure};
 use crate::title::Titles;
-use crate::{cracks, info, moments, stress_strain};
+use crate::{cracks, info, stress_strain};
 
 /// Greatest ratio of a limit load to the loads of the run at which the chart of the load shows it.
 const FAR: f64 = 5.0;
-
-/// Times are equal within this part of them.
-const SAME: f64 = 1e-9;
 
 /// A moment of which the page shows a picture.
 struct Moment {
@@ -74,7 +72,7 @@ fn shown(
         let chosen = moments::chosen(history, times)?;
         return Ok(chosen.into_iter().map(|frame| Moment { events: vec![], frame }).collect());
     }
-    let of_frame = |time: f64, frame: usize| (time - history.times()[frame]).abs() <= SAME * time.abs();
+    let of_frame = |time: f64, frame: usize| (time - history.times()[frame]).abs() <= SAME_TIME * time.abs();
     let event = |name, time: f64, frame| (frame, name, Some(time).filter(|time| !of_frame(*time, frame)));
     let mut found = vec![];
     let after = |time: f64| history.times().iter().position(|other| *other >= time);

@@ -148,7 +148,7 @@ pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
         reaction: motion.reaction.iter().map(|f| -motion.sense * f).collect(),
         strain: tensor("strain")?.iter().map(|e| -push * e).collect(),
         stress: tensor("stress")?.iter().map(|s| push * s).collect(),
-        follows_breaks: history.observable("load_time")?.is_some(),
+        follows_breaks: history.follows_breaks()?,
         broken: history.observable("bonds_broken")?.map(|series| series.value).unwrap_or_default(),
         summary: Summary {
             wall: walls[k].name.clone(),
@@ -162,7 +162,7 @@ pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
     let bonds = Bonding::of(history)?;
     report.summarise(&history.bonds()?.strength, bonds, history.observable("solver_residual")?);
     let s = &mut report.summary;
-    s.work = work(&motion.applied, &motion.way) + slide_work(history, k, &direction, &motion.way)?;
+    s.work = work(&motion.applied, &motion.way) + motion.slide_work;
     let disk = serde_json::from_str::<Scene>(&scene).ok().and_then(|scene| Disk::of(&scene, &s.wall, &size.extents));
     let collapse = s.collapse_load.filter(|_| !s.collapse_early[0]);
     s.splitting = disk.map(|disk| Splitting::of(disk, collapse, s.peak_load));
@@ -214,6 +214,8 @@ struct Motion {
     time: Vec<f64>,
     /// Displacement since the first frame, m.
     way: Vec<f64>,
+    /// Work of the wall on the grains as it slides across its drive, J; 0 if not recorded.
+    slide_work: f64,
     /// Force of the grains on the wall, N; empty if not recorded.
     reaction: Vec<f64>,
     /// Force that drives the wall at the end of each step, N: the prescribed one, or that which
@@ -232,9 +234,12 @@ fn motion(history: &History, wall: &Wall, k: usize) -> Result<Motion> {
     let position = required(history, "wall_position")?;
     let start = start_of(history, k, direction)?;
     let way: Vec<f64> = along(history, &position, k, direction, "wall_position")?.iter().map(|x| x - start).collect();
-    let reaction = match history.observable("wall_force")? {
-        Some(series) => along(history, &series, k, direction, "wall_force")?,
-        None => vec![],
+    let (reaction, slide_work) = match history.observable("wall_force")? {
+        Some(force) => (
+            along(history, &force, k, direction, "wall_force")?,
+            slide_work(history, k, direction, &position, &way, &force)?,
+        ),
+        None => (vec![], 0.0),
     };
     let recorded = |name: &str| -> Result<Option<Series>> {
         Ok(history.observable(name)?.filter(|series| !series.step.is_empty()))
@@ -259,23 +264,29 @@ fn motion(history: &History, wall: &Wall, k: usize) -> Result<Motion> {
         }
     };
     let sense = sense(if wall.drive == WallDrive::Force { &load } else { &way });
-    Ok(Motion { step: position.step, time: position.time, way, reaction, applied, load, load_before_breaks, sense })
+    let (step, time) = (position.step, position.time);
+    Ok(Motion { step, time, way, slide_work, reaction, applied, load, load_before_breaks, sense })
 }
 
-/// Work of a wall on the grains as it slides across its drive (J); `way` is its displacement along
-/// the drive (m). Zero where nothing is recorded.
-fn slide_work(history: &History, wall: usize, drive: &[f64; 3], way: &[f64]) -> Result<f64> {
-    let Some(force) = history.observable("wall_force")? else { return Ok(0.0) };
-    let position = required(history, "wall_position")?;
+/// Work of a wall on the grains as it slides across its drive (J), from its `position` (m), its
+/// displacement `way` along the drive (m) and the `force` of the grains on it (N).
+fn slide_work(
+    history: &History,
+    wall: usize,
+    drive: &[f64; 3],
+    position: &Series,
+    way: &[f64],
+    force: &Series,
+) -> Result<f64> {
     let mut sum = 0.0;
     for d in 0..history.dimension() {
         let mut axis = [0.0; 3];
         axis[d] = 1.0;
         let start = start_of(history, wall, &axis)?;
-        let place = component(history, &position, &[wall, d], "wall_position")?;
+        let place = component(history, position, &[wall, d], "wall_position")?;
         let across: Vec<f64> = place.iter().zip(way).map(|(x, way)| x - start - drive[d] * way).collect();
-        let push: Vec<f64> = component(history, &force, &[wall, d], "wall_force")?.iter().map(|f| -f).collect();
-        sum += work(&push, &across);
+        // that of the wall on the grains is opposite
+        sum -= work(&component(history, force, &[wall, d], "wall_force")?, &across);
     }
     Ok(sum)
 }

@@ -199,7 +199,6 @@ impl Chart {
     pub(crate) fn draw_in_columns(charts: Vec<Self>, size: (f64, f64), columns: usize) -> (Drawing, Vec<Axes>) {
         let (columns, count) = (columns.max(1), charts.len());
         let kept = charts.clone();
-        let titles: Vec<String> = charts.iter().map(|chart| chart.clone().readable().x).collect();
         let legends: Vec<Vec<Named>> = charts.iter().map(Self::legend).collect();
         // all begin at one height
         let most = legends.iter().map(|legend| legend::rows(legend, size.0).len()).max().unwrap_or(0);
@@ -213,11 +212,13 @@ impl Chart {
             let place = |k: usize, length: f64| PADDING + k as f64 * (length + SPACING);
             (place(k % columns, size.0), place(k / columns, size.1))
         };
-        let mut axes: Vec<Axes> = vec![];
+        let (mut axes, mut titles): (Vec<Axes>, Vec<String>) = (vec![], vec![]);
         let (plots, layouts) = charts
             .into_iter()
             .map(|chart| {
-                let (plots, layout, lift) = chart.readable().build(above, size);
+                let chart = chart.readable();
+                titles.push(chart.x.clone());
+                let (plots, layout, lift) = chart.build(above, size);
                 axes.push(Axes::of(&ComputedLayout::from_layout(&layout), corner(axes.len()), lift));
                 (plots, layout)
             })

@@ -435,6 +435,14 @@ impl History {
         observed::series(&self.source, name, 0..self.observed_steps())
     }
 
+    /// Whether the time counts breaks: the run loads from break to break (`rupture: next_event`).
+    ///
+    /// # Errors
+    /// [`HistoryError::Damaged`].
+    pub fn follows_breaks(&self) -> Result<bool> {
+        Ok(self.observable("load_time")?.is_some())
+    }
+
     /// Every bond that broke, in order; empty for a scene without bonds.
     ///
     /// # Errors
