@@ -137,11 +137,16 @@ fn pictures(history: &History, shown: &[Moment], parts: &Parts) -> Result<Vec<Fi
     Ok(figures)
 }
 
-/// The events of a picture, as in `First break at 0.031 s, end: `.
+/// What comes before the time of a picture: its events, as in `First break: ` or, where the frame
+/// has another time, `First break at 0.031 s; shown: `.
 fn told(events: &[(&str, Option<f64>)]) -> String {
+    if events.is_empty() {
+        return String::new();
+    }
     let at = |time: Option<f64>| time.map_or_else(String::new, |time| format!(" at {} s", number(time)));
     let each: Vec<String> = events.iter().map(|(name, time)| format!("{name}{}", at(*time))).collect();
-    if each.is_empty() { String::new() } else { format!("{}: ", capitalised(&each.join(", "))) }
+    let shown = if events.iter().any(|(_, time)| time.is_some()) { "; shown: " } else { ": " };
+    format!("{}{shown}", capitalised(&each.join(", ")))
 }
 
 /// Load and broken bonds over time.
