@@ -95,8 +95,9 @@ pub struct SolveReport {
     pub work: Work,
     /// Residual reached (–), see [`crate::problem::residual`].
     pub residual: f64,
-    /// Load error (–): the estimated error of the net impulses of the contacts on the bodies,
-    /// relative to those impulses. Gauss–Seidel reports none.
+    /// Load error (–): the estimated error of the reactions r relative to them, in the norm of
+    /// r·(W + C) r. For rigid contacts that is the error of the net impulses on the bodies.
+    /// Gauss–Seidel reports none.
     pub load_error: Option<f64>,
 }
 

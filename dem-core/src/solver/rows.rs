@@ -329,6 +329,17 @@ impl Rows {
         y
     }
 
+    /// √(r·(W + C) r): for rigid contacts the norm of the net impulses on the bodies.
+    pub fn load(&self, reactions: &[Padded]) -> f64 {
+        let moving = self.pushed(reactions).iter().map(|y| y * y).sum::<f64>();
+        (moving + self.elastic(reactions)).sqrt()
+    }
+
+    /// r·C r.
+    pub fn elastic(&self, reactions: &[Padded]) -> f64 {
+        self.list.iter().zip(reactions).map(|(row, r)| row.compliance.times(r).dot(r)).sum()
+    }
+
     /// The largest coefficient of each unknown; 1 for an unknown without coefficients.
     pub fn largest(&self) -> Vec<f64> {
         let mut most = vec![0.0f64; self.unknowns];
@@ -372,18 +383,12 @@ impl Rows {
     }
 }
 
-/// Difference of the net impulses on the bodies between two sets of reactions, relative to those of
-/// the second.
+/// Difference between two sets of reactions, relative to the second, in the norm of r·(W + C) r: for
+/// rigid contacts that of the net impulses on the bodies.
 pub(super) fn net_change(rows: &Rows, from: &[Padded], to: &[Padded]) -> f64 {
-    let mut change = vec![0.0; rows.unknowns];
-    let mut total = vec![0.0; rows.unknowns];
-    for ((row, from), to) in rows.list.iter().zip(from).zip(to) {
-        rows.apply(row, &(*to - *from), &mut change);
-        rows.apply(row, to, &mut total);
-    }
-    let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
-    let (change, total) = (norm(&change), norm(&total));
-    if change == 0.0 { 0.0 } else { change / total }
+    let changes: Vec<Padded> = from.iter().zip(to).map(|(from, to)| *to - *from).collect();
+    let change = rows.load(&changes);
+    if change == 0.0 { 0.0 } else { change / rows.load(to) }
 }
 
 /// The unit of mass (kg), 1 or 2, chosen so that the heaviest grain has an even binary exponent.

@@ -79,7 +79,7 @@ pub(super) mod newton {
     /// Most iterations of one inner problem.
     pub const MOST_ITERATIONS: u64 = 30;
     /// Newton gives up if the step to the active set of the last solve leaves more than this share
-    /// of ‖F‖ and more than the net impulses of the contacts. An active set that is right but for a
+    /// of ‖F‖ and more than the load. An active set that is right but for a
     /// few contacts leaves 1e-5 to 1e-10, any other 1e-4 to 10. Three failures of four thus end
     /// after one factorisation instead of four (ablation).
     pub const LEFT_BY_GUESS: f64 = 1e-3;

@@ -162,7 +162,7 @@ impl<D: Dim> World<D> {
 
     /// The load error of a solve (–) if it is too large: that of reactions that still grow, as
     /// where no motion satisfies rigid bonds. The deformation of elastic bonds bounds their
-    /// reactions, whose load error is large where they are as small as round-off.
+    /// reactions.
     pub(super) fn large_load_error(&self, solve: SolveReport) -> Option<f64> {
         let rigid = |bond: &Bond| bond.status == BondStatus::Intact && bond.stiffness.is_none();
         let error = solve.load_error_beyond_rounding().filter(|error| *error > LOAD_ERROR * self.looseness())?;

@@ -35,7 +35,7 @@ pub struct Found {
     /// For each contact, the part of its limit that the minimum-energy reaction has reached; empty
     /// if these reactions are not required.
     pub reached: Vec<Option<Reached>>,
-    /// Their residual (–), and their load error (–): the relative change of the net impulses in the
+    /// Their residual (–), and their load error (–): the relative change of the reactions in the
     /// last iteration.
     pub residual: f64,
     pub load_error: f64,

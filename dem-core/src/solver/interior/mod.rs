@@ -94,7 +94,7 @@ impl Interior {
             }
             let Some(system) = self.factorised(&sites, &coupling, &at, &selection.metric) else { break };
             let Some(step) = follow.step(&system, &sites) else { break };
-            selection.change = system.net_change(&step);
+            selection.change = system.change(&step);
         }
         selection.found(problem, &sites)
     }

@@ -30,7 +30,7 @@ pub(super) struct Selection {
     aims: Aims,
     pub metric: Metric,
     best: Option<Found>,
-    /// Relative change of the net impulses in the last iteration (–).
+    /// Relative [change](super::system::System::change) of the reactions in the last iteration (–).
     pub change: f64,
     /// The limits of r*, once it is known, and the sum of the complementarity gaps up to which a
     /// solution counts.
@@ -40,8 +40,8 @@ pub(super) struct Selection {
     enough: f64,
     turn: Option<State>,
     anchored: u32,
-    /// The unmeasured point of least gap: the sum of its complementarity gaps, the change of the
-    /// net impulses in the iteration that led to it, and the point.
+    /// The unmeasured point of least gap: the sum of its complementarity gaps, the relative change
+    /// of the reactions in the iteration that led to it, and the point.
     nearest: Option<(f64, f64, State)>,
     iterations: u64,
 }

@@ -73,11 +73,14 @@ impl System<'_> {
         (left.collect(), (0..by.len()).map(missing).collect())
     }
 
-    /// Relative change of the net impulses on the bodies by a step, in the mass metric (–).
-    pub fn net_change(&self, step: &State) -> f64 {
+    /// Relative change of the reactions by a step, in the norm of r·(W + C) r (–).
+    pub fn change(&self, step: &State) -> f64 {
+        let load = |r: &[f64], moving: &[f64]| {
+            let each = r.iter().zip(moving).zip(&self.sites.compliance);
+            each.map(|((r, u), c)| r * (u + c * r)).sum::<f64>().abs()
+        };
         let moving = self.coupling.velocity(self.sites, &step.r);
-        let square = |r: &[f64], u: &[f64]| r.iter().zip(u).map(|(r, u)| r * u).sum::<f64>().abs();
-        (square(&step.r, &moving) / square(&self.at.r, &self.velocity).max(f64::MIN_POSITIVE)).sqrt()
+        (load(&step.r, &moving) / load(&self.at.r, &self.velocity).max(f64::MIN_POSITIVE)).sqrt()
     }
 
     /// The longest multiple of a step that stays inside all cones.

@@ -77,7 +77,7 @@ impl Newton {
     }
 }
 
-/// Convergence of the proximal iterations: the last change of the net impulses.
+/// Convergence of the proximal iterations: the last change of the reactions.
 struct Shrinking {
     last: f64,
 }
