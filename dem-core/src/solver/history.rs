@@ -23,13 +23,14 @@ use std::sync::Arc;
 /// if the matrix is singular.
 pub(super) fn history(rows: &Rows, graph: &mut Option<Arc<Graph>>) -> Vec<Padded> {
     let all: Vec<Padded> = rows.list.iter().map(|row| row.multiplier).collect();
-    let is_rigid_bond = |row: &Row| row.is_bond && row.compliance.n == 0.0;
-    let Some(graph) = rows.list.iter().any(is_rigid_bond).then(|| Graph::of(rows, graph)).flatten() else { return all };
+    let Some(graph) = rows.list.iter().any(Row::is_rigid_bond).then(|| Graph::of(rows, graph)).flatten() else {
+        return all;
+    };
     let stiff = stiffness(rows);
     let mut factors = Factors::default();
     let made = factors.factorise(&graph.tree, |e, out| {
         let row = &rows.list[graph.contacts[e]];
-        if is_rigid_bond(row) {
+        if row.is_rigid_bond() {
             let every: Vec<usize> = (0..row.rows.len()).collect();
             let weights = row.weights.in_order();
             let entry = |i: usize, j: usize| if i == j { stiff / weights[row.rows[i]] } else { 0.0 };
@@ -43,19 +44,19 @@ pub(super) fn history(rows: &Rows, graph: &mut Option<Arc<Graph>>) -> Vec<Padded
     rows.list
         .iter()
         .zip(&all)
-        .filter(|(row, _)| is_rigid_bond(row))
+        .filter(|(row, _)| row.is_rigid_bond())
         .for_each(|(row, r)| rows.apply(row, r, &mut pushed));
     // one step of refinement removes the effect of the identity
     let mut moved = vec![0.0; rows.unknowns];
     for _ in 0..2 {
         let mut left = pushed.clone();
-        for row in rows.list.iter().filter(|row| is_rigid_bond(row)) {
+        for row in rows.list.iter().filter(|row| row.is_rigid_bond()) {
             rows.apply(row, &(stiffened(rows, row, stiff, &moved) * -1.0), &mut left);
         }
         factors.solve(&graph.tree, &mut left);
         moved.iter_mut().zip(&left).for_each(|(x, d)| *x += d);
     }
-    let history = |(row, r): (&Row, Padded)| if is_rigid_bond(row) { stiffened(rows, row, stiff, &moved) } else { r };
+    let history = |(row, r): (&Row, Padded)| if row.is_rigid_bond() { stiffened(rows, row, stiff, &moved) } else { r };
     rows.list.iter().zip(all).map(history).collect()
 }
 

@@ -85,6 +85,11 @@ impl Row {
         self.count[0] + self.count[1]
     }
 
+    /// Whether it is a bond without compliance.
+    pub fn is_rigid_bond(&self) -> bool {
+        self.is_bond && self.compliance.n == 0.0
+    }
+
     /// Weights of the corrector's quadratic form, 1/ρ + C.
     #[inline]
     pub fn metric(&self) -> Weights {

@@ -23,7 +23,7 @@ use super::graph::Graph;
 use super::history::history;
 use super::interior::{Aims, Interior};
 use super::newton::Newton;
-use super::rows::{Rows, StiffnessRatio};
+use super::rows::{Row, Rows, StiffnessRatio};
 use super::solvable::Solvable;
 use super::{ContactSolver, GaussSeidel, GaussSeidelSettings, SolveReport, SolveStatus, Work};
 use crate::contact::{LocalSolve, Padded};
@@ -202,9 +202,9 @@ impl Staged {
             _ => self.anchor(rows),
         };
         let start = (!is_cold(rows)).then_some(&begun[..]);
-        // bonds break by the load that they bear and need minimum-energy reactions; dry contacts
-        // need only reactions that balance
-        let least = problem.matrix().is_none() && rows.list.iter().any(|row| row.is_bond);
+        // rigid bonds break by the load that they bear and need minimum-energy reactions; elastic
+        // bonds have unique reactions, and dry contacts need only reactions that balance
+        let least = problem.matrix().is_none() && rows.list.iter().any(Row::is_rigid_bond);
         let mut aims = self.aims(least);
         if effort == Effort::Short {
             aims.most = aims.most.min(tuning::MOST_SHORT);

@@ -41,11 +41,6 @@ impl Iterate {
     pub fn from_reactions(rows: &Rows, reactions: &[Padded]) -> Self {
         Self::at(rows, rows.given_by(reactions))
     }
-
-    /// √(‖y − y_f‖² + r·C r): in a solution [`Rows::load`].
-    fn load(&self, rows: &Rows) -> f64 {
-        distance(&self.y, &rows.free).hypot(rows.elastic(&self.reactions).sqrt())
-    }
 }
 
 impl Newton {
@@ -54,8 +49,9 @@ impl Newton {
     /// gives up if this active set leaves much of F. Returns the iterations made and whether ‖F‖
     /// reached its target.
     pub(super) fn inner(&mut self, rows: &Rows, state: &mut Iterate, guess: &Guess, warm: bool) -> (u64, bool) {
-        // at least the load
-        let much = (tuning::LEFT_BY_GUESS * state.norm).max(state.load(rows));
+        // at least the load: in a solution that of the reactions
+        let load = distance(&state.y, &rows.free).hypot(rows.elastic(&state.reactions).sqrt());
+        let much = (tuning::LEFT_BY_GUESS * state.norm).max(load);
         let (mut least, mut since) = (f64::INFINITY, 0);
         for iteration in 0..tuning::MOST_ITERATIONS {
             let guessed = (iteration == 0).then_some(guess);
@@ -81,7 +77,7 @@ impl Newton {
     /// An error of F becomes an error of velocity when v is computed from the reactions. Round-off
     /// comes from ρ u, where u is a sum of velocities.
     fn target(&self, rows: &Rows, state: &Iterate) -> f64 {
-        let load = state.load(rows);
+        let change = distance(&state.y, &rows.free);
         let (mut rounding, mut carried) = (0.0, 0.0);
         for (row, r) in rows.list.iter().zip(&state.reactions) {
             let speed: f64 = (0..2).map(|side| norm2(&state.y[row.at[side]..][..row.count[side]])).sum();
@@ -90,7 +86,7 @@ impl Newton {
             carried += row.size * r.dot(r);
         }
         let wanted =
-            tuning::SHARE * (self.settings.load_tolerance * load).min(self.settings.tolerance * carried.sqrt());
+            tuning::SHARE * (self.settings.load_tolerance * change).min(self.settings.tolerance * carried.sqrt());
         wanted.max(tuning::ROUNDING * rounding.sqrt())
     }
 
