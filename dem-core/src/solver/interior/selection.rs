@@ -104,8 +104,8 @@ impl Selection {
                 if self.anchored == tuning::MOST_ANCHORED {
                     return Next::Arrived;
                 }
-                // the same metric once more, then stiffer ones
-                let share = if self.anchored == 0 { 1.0 } else { tuning::HARDER };
+                // where r* counts the same metric once more, then stiffer ones
+                let share = if self.aims.least && self.anchored == 0 { 1.0 } else { tuning::HARDER };
                 self.metric.anchor_at(at.r.clone(), share);
                 self.enough *= share;
                 self.anchored += 1;
