@@ -120,8 +120,8 @@ fn columns_of_springs_have_their_modulus() {
     assert!(value("poisson_ratio").abs() < 1e-6, "{found}");
 }
 
-/// A lattice pulled slowly apart between two grips: the net impulses on its grains are a millionth
-/// of the forces in it, and once torn it bears forces as small as round-off. All steps meet their
+/// A lattice pulled slowly apart between two grips: the net impulses on its grains are far smaller
+/// than the forces in it, and once torn it bears forces as small as round-off. All steps meet their
 /// tolerances with few factorisations, and the forces are as accurate as the load error says.
 #[test]
 fn a_slow_test_meets_its_load_tolerance_to_the_end() {
