@@ -61,8 +61,8 @@ pub struct GaussSeidel {
 #[serde(deny_unknown_fields, default)]
 pub struct Newton {
     /// Tolerance of the load error (estimated error of the net forces on the bodies and of elastic
-    /// bonds, relative to these forces) and of the velocity error (violation of the contact laws, relative to the free
-    /// velocities).
+    /// bonds, relative to these forces) and of the velocity error (violation of the contact laws,
+    /// relative to the free velocities).
     pub load_tolerance: f64,
     /// Initial reactions of every step.
     pub start: Start,
