@@ -39,8 +39,9 @@ pub struct Event {
     pub time: f64,
     /// Round of the cascade of its first rupture.
     pub round: i32,
-    /// Time from its first to its last rupture, s.
-    pub duration: f64,
+    /// Time from its first to its last rupture, s; `None` where the load follows the breaks and no
+    /// time passes.
+    pub duration: Option<f64>,
     /// Number of rounds, in all steps, in which its bonds broke.
     pub rounds: usize,
     /// Load of the sample in the step of its first rupture, before anything broke in it, N; `None`
@@ -150,7 +151,7 @@ impl Event {
             step: first.step,
             time: first.time,
             round: first.round,
-            duration: last.time - first.time,
+            duration: Some(last.time - first.time),
             rounds: rounds.len(),
             load: None,
             bonds: own.len(),
@@ -263,7 +264,7 @@ mod tests {
     fn an_event_has_the_sums_and_means_of_its_ruptures() {
         let list = [rupture(2, 1, 0), rupture(2, 1, 2), rupture(2, 2, 4), rupture(4, 0, 6)];
         let event = Event::of(&list.iter().collect::<Vec<_>>());
-        assert_eq!((event.step, event.time, event.round, event.duration), (2, 1.0, 1, 1.0));
+        assert_eq!((event.step, event.time, event.round, event.duration), (2, 1.0, 1, Some(1.0)));
         assert_eq!((event.bonds, event.rounds, event.energy), (4, 3, 8.0));
         assert_eq!((event.place, event.radius), ([3.0, 0.0, 0.0], 5f64.sqrt()));
         assert_eq!(event.modes.tension, 4);

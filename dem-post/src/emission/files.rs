@@ -49,7 +49,7 @@ pub fn write(report: &Report, folder: &mut Folder) -> Result<()> {
             m.rolling,
             m.twist,
             e.rounds,
-            e.duration,
+            cell(e.duration),
             e.energy,
             magnitude,
             x,

@@ -44,15 +44,29 @@ impl Default for Options {
     }
 }
 
-/// The load, and what had broken, over the steps.
+/// The load, and what had broken, over time, or over the steps where the load follows the breaks.
 #[derive(Clone, Debug, Default)]
 pub struct Curves {
-    /// Time, s, and load, N; empty for a run without a load.
+    /// Whether the load follows the breaks.
+    pub follows_breaks: bool,
+    /// Time, s, or step, and load, N; empty for a run without a load.
     pub load: Vec<(f64, f64)>,
-    /// Time of each rupture, s, and its energy, J.
+    /// Time, s, or step of each rupture, and its energy, J.
     pub ruptures: Vec<(f64, f64)>,
-    /// End of the run, s.
+    /// End of the run, s, or its last step.
     pub end: f64,
+}
+
+impl Curves {
+    /// Title of the axis.
+    pub fn axis(&self) -> &'static str {
+        if self.follows_breaks { "step" } else { "time (s)" }
+    }
+
+    /// Place of an event on it.
+    pub fn place(&self, event: &Event) -> f64 {
+        if self.follows_breaks { event.step as f64 } else { event.time }
+    }
 }
 
 /// The events of a run.
@@ -118,12 +132,15 @@ pub fn read(history: &History, options: &Options) -> Result<Report> {
         ));
     }
     let (course, load_note) = load(history, options.wall.as_deref())?;
+    let follows_breaks = history.follows_breaks()?;
+    let at = |time: f64, step: i64| if follows_breaks { step as f64 } else { time };
     let own = |event: &Vec<usize>| {
         let mut event = Event::of(&event.iter().map(|&k| &ruptures[k]).collect::<Vec<_>>());
         if load_note.is_empty() {
             let row = course.step.binary_search(&event.step).ok();
             event.load = row.and_then(|row| course.load.get(row).copied());
         }
+        event.duration = event.duration.filter(|_| !follows_breaks);
         event.magnitude = match scale {
             Scale::Energy => (event.energy > 0.0).then(|| event.energy.log10() / 1.5),
             Scale::Size => Some((event.bonds as f64).log10()),
@@ -153,9 +170,10 @@ pub fn read(history: &History, options: &Options) -> Result<Report> {
         frequencies,
         events,
         curves: Curves {
-            load: course.time.iter().copied().zip(course.load).collect(),
-            ruptures: ruptures.iter().map(|rupture| (rupture.time, rupture.energy)).collect(),
-            end: history.times().last().copied().unwrap_or(0.0),
+            follows_breaks,
+            load: course.time.iter().zip(&course.step).map(|(time, step)| at(*time, *step)).zip(course.load).collect(),
+            ruptures: ruptures.iter().map(|r| (at(r.time, r.step), r.energy)).collect(),
+            end: history.times().last().zip(history.steps().last()).map_or(0.0, |(time, step)| at(*time, *step)),
         },
     })
 }
@@ -252,17 +270,19 @@ impl Report {
         });
         largest.truncate(SHOWN);
         largest.sort_unstable();
-        let head = ["event", "time (s)", "load (N)", "bonds", "rounds", "duration (s)", "energy (J)", "magnitude"];
+        let follows = self.curves.follows_breaks;
+        let when = if follows { "step" } else { "time (s)" };
+        let head = ["event", when, "load (N)", "bonds", "rounds", "duration (s)", "energy (J)", "magnitude"];
         let mut table = Text::new(&head);
         for k in largest {
             let e = &self.events[k];
             table.row(vec![
                 (k + 1).to_string(),
-                number(e.time),
+                if follows { e.step.to_string() } else { number(e.time) },
                 quantity(e.load, ""),
                 e.bonds.to_string(),
                 e.rounds.to_string(),
-                number(e.duration),
+                quantity(e.duration, ""),
                 number(e.energy),
                 quantity(e.magnitude, ""),
             ]);
