@@ -54,10 +54,10 @@ fn the_branch_beyond_the_peak_does_not_depend_on_the_order_of_the_contacts() {
             .succeeds();
         here.dem_post(&["info", "--check", "run.h5"]).succeeds();
         // steps count breaks: nothing lasts
-        let emission = here.dem_post(&["emission", "run.h5", "--json"]).json();
+        let emission = here.dem_post(&["emission", "run.h5", "--json", "--force"]).json();
         let bursts = emission["events"].as_array().expect("a list");
         assert!(!bursts.is_empty() && bursts.iter().all(|burst| burst["duration"].is_null()), "{emission}");
-        let told = here.dem_post(&["emission", "run.h5"]).succeeds().stdout;
+        let told = here.dem_post(&["emission", "run.h5", "--force"]).succeeds().stdout;
         assert!(told.contains("step") && !told.contains("time (s)"), "{told}");
         events(&here, "run.h5", |grain| order[grain as usize])
     });
