@@ -43,9 +43,9 @@ impl OnPage for Accuracy {
             text:
                 "The residual is the violation of the contact laws, relative to the reactions and the load. The load \
                    error is the estimated error of the net impulses of the contacts on the bodies, and of elastic \
-                   forces, relative to these; only the direct solvers report it. The false acceleration is the inertial force of the \
-                   grains relative to the load. It should be zero in a scene at rest; it can be large although the \
-                   residual is small."
+                   forces, relative to these; only the direct solvers report it. The false acceleration is the \
+                   inertial force of the grains relative to the load. It should be zero in a scene at rest; it can be \
+                   large although the residual is small."
                     .into(),
             facts: self.lines(),
             figures,
