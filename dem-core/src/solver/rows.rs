@@ -390,7 +390,7 @@ impl Rows {
 
 /// Difference between two sets of reactions, relative to the second, in the norm of r·(W + C) r:
 /// for rigid contacts that of the net impulses on the bodies.
-pub(super) fn net_change(rows: &Rows, from: &[Padded], to: &[Padded]) -> f64 {
+pub(super) fn change(rows: &Rows, from: &[Padded], to: &[Padded]) -> f64 {
     let changes: Vec<Padded> = from.iter().zip(to).map(|(from, to)| *to - *from).collect();
     let change = rows.load(&changes);
     if change == 0.0 { 0.0 } else { change / rows.load(to) }

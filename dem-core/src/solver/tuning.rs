@@ -79,9 +79,9 @@ pub(super) mod newton {
     /// Most iterations of one inner problem.
     pub const MOST_ITERATIONS: u64 = 30;
     /// Newton gives up if the step to the active set of the last solve leaves more than this share
-    /// of ‖F‖ and more than the load. An active set that is right but for a
-    /// few contacts leaves 1e-5 to 1e-10, any other 1e-4 to 10. Three failures of four thus end
-    /// after one factorisation instead of four (ablation).
+    /// of ‖F‖ and more than the load. An active set that is right but for a few contacts leaves
+    /// 1e-5 to 1e-10, any other 1e-4 to 10. Three failures of four thus end after one factorisation
+    /// instead of four (ablation).
     pub const LEFT_BY_GUESS: f64 = 1e-3;
     /// An iteration makes progress if it brings ‖F‖ below the share `PROGRESS` of its value at the
     /// last progress. An inner problem ends after `PATIENCE` iterations without progress. (The line
@@ -245,8 +245,8 @@ pub(super) mod selection {
     /// The same ratio at which a point is stored, to follow the path again from it with another
     /// anchor. At far smaller gaps the paths of two anchors differ.
     pub const BACK: f64 = 0.03;
-    /// Factor on the compliance of the metric at each new anchor after the first, and the most new
-    /// anchors.
+    /// Factor on the compliance of the metric at each new anchor (after the first, where the
+    /// minimum-energy reactions are required), and the most new anchors.
     pub const HARDER: f64 = 0.01;
     pub const MOST_ANCHORED: u32 = 5;
     /// Share of the tolerances above which the effect of the compliance requires a new anchor.

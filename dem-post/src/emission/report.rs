@@ -1,7 +1,7 @@
 //! The events of a run: the report, and how it is computed from a history.
 
 use clap::ValueEnum;
-use dem_history::{History, Rupture};
+use dem_history::{History, Rupture, Series};
 use serde::Serialize;
 
 use super::events::{Event, Rule, bursts, cluster};
@@ -63,10 +63,20 @@ impl Curves {
         if self.follows_breaks { "step" } else { "time (s)" }
     }
 
+    /// What runs along it, in words.
+    pub fn over(&self) -> &'static str {
+        if self.follows_breaks { "the steps" } else { "time" }
+    }
+
     /// Place of an event on it.
     pub fn place(&self, event: &Event) -> f64 {
-        if self.follows_breaks { event.step as f64 } else { event.time }
+        place(self.follows_breaks, event.time, event.step)
     }
+}
+
+/// Place of a step on the axis of the curves.
+fn place(follows_breaks: bool, time: f64, step: i64) -> f64 {
+    if follows_breaks { step as f64 } else { time }
 }
 
 /// The events of a run.
@@ -132,8 +142,9 @@ pub fn read(history: &History, options: &Options) -> Result<Report> {
         ));
     }
     let (course, load_note) = load(history, options.wall.as_deref())?;
-    let follows_breaks = history.follows_breaks()?;
-    let at = |time: f64, step: i64| if follows_breaks { step as f64 } else { time };
+    let load_times = history.observable("load_time")?;
+    let follows_breaks = load_times.is_some();
+    let at = |time: f64, step: i64| place(follows_breaks, time, step);
     let own = |event: &Vec<usize>| {
         let mut event = Event::of(&event.iter().map(|&k| &ruptures[k]).collect::<Vec<_>>());
         if load_note.is_empty() {
@@ -148,7 +159,7 @@ pub fn read(history: &History, options: &Options) -> Result<Report> {
         event
     };
     let grains = history.grains()?.radius.len();
-    let (rule, place) = rule_of(history, options.rule, &ruptures)?;
+    let (rule, place) = rule_of(load_times.as_ref(), options.rule, &ruptures);
     let events: Vec<Event> = cluster(&ruptures, &place, grains, &bonds, rule).iter().map(own).collect();
     let values = if scale == Scale::Energy { Values::Bins(options.bin) } else { Values::Sizes };
     let magnitudes: Vec<f64> = events.iter().filter_map(|event| event.magnitude).collect();
@@ -179,15 +190,14 @@ pub fn read(history: &History, options: &Options) -> Result<Report> {
 }
 
 /// The rule by which ruptures are linked, and the step of each rupture, or its burst.
-fn rule_of(history: &History, asked: Rule, ruptures: &[Rupture]) -> Result<(Rule, Vec<i64>)> {
+fn rule_of(load_times: Option<&Series>, asked: Rule, ruptures: &[Rupture]) -> (Rule, Vec<i64>) {
     let steps: Vec<i64> = ruptures.iter().map(|rupture| rupture.step).collect();
-    let loads = if asked.steps.is_none() { history.observable("load_time")? } else { None };
-    let Some(loads) = loads else {
-        return Ok((Rule { steps: asked.steps.or(Some(1)), ..asked }, steps));
+    let Some(loads) = load_times.filter(|_| asked.steps.is_none()) else {
+        return (Rule { steps: asked.steps.or(Some(1)), ..asked }, steps);
     };
     let burst = bursts(&loads.value);
     let of = |step: &i64| loads.step.binary_search(step).ok().and_then(|row| burst.get(row)).copied();
-    Ok((asked, steps.iter().map(|step| of(step).unwrap_or(0)).collect()))
+    (asked, steps.iter().map(|step| of(step).unwrap_or(0)).collect())
 }
 
 /// The load over the steps, and why that of an event is not known; empty where it is.
@@ -271,8 +281,8 @@ impl Report {
         largest.truncate(SHOWN);
         largest.sort_unstable();
         let follows = self.curves.follows_breaks;
-        let when = if follows { "step" } else { "time (s)" };
-        let head = ["event", when, "load (N)", "bonds", "rounds", "duration (s)", "energy (J)", "magnitude"];
+        let head =
+            ["event", self.curves.axis(), "load (N)", "bonds", "rounds", "duration (s)", "energy (J)", "magnitude"];
         let mut table = Text::new(&head);
         for k in largest {
             let e = &self.events[k];

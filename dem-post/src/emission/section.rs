@@ -12,13 +12,17 @@ impl OnPage for Report {
     const TITLE: &'static str = "Acoustic emission";
 
     fn section(&self, _: &History, _: &Maps) -> Result<Section> {
+        let over = self.curves.over();
         let mut figures = vec![];
         for (chart, text) in [
-            (course(self), "Load, broken bonds and events over time, each over its greatest value."),
-            (magnitudes(self), "Magnitude of each event at its time."),
-            (frequencies(self), "Number of events by magnitude, and the Gutenberg–Richter law where it is fitted."),
+            (course(self), format!("Load, broken bonds and events over {over}, each over its greatest value.")),
+            (magnitudes(self), format!("Magnitude of the events over {over}.")),
+            (
+                frequencies(self),
+                "Number of events by magnitude, and the Gutenberg–Richter law where it is fitted.".to_string(),
+            ),
         ] {
-            figures.push(chart_figure(chart, text, text));
+            figures.push(chart_figure(chart, &text, &text));
         }
         let facts = self.lines().into_iter().map(|(name, value)| (capitalised(name.trim_start()), value)).collect();
         let text = "Broken bonds that are near each other in the sample and in time are one event; the defaults of \

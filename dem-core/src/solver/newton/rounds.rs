@@ -5,7 +5,7 @@ use super::guess::Guess;
 use super::inner::{Iterate, distance};
 use super::{Newton, SolveReport};
 use crate::solver::extrapolation::margins;
-use crate::solver::rows::{Rows, net_change};
+use crate::solver::rows::{Rows, change};
 use crate::solver::solvable::Solvable;
 use crate::solver::tuning::newton as tuning;
 use crate::solver::{SolveStatus, Work};
@@ -48,7 +48,7 @@ impl Newton {
             }
             problem.write_back(&state.reactions);
             let multipliers: Vec<_> = rows.list.iter().map(|row| row.multiplier).collect();
-            let load_error = shrinking.error(net_change(rows, &multipliers, &state.reactions));
+            let load_error = shrinking.error(change(rows, &multipliers, &state.reactions));
             let (error, velocity_error) = (problem.residual(), problem.velocity_error());
             rows.move_multipliers(&state.reactions);
             guess = Guess::of(state.reactions);
