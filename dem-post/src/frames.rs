@@ -15,6 +15,7 @@ use serde::Serialize;
 use crate::analysis::Analysis;
 use crate::chains::pictures::{force_legend, links};
 use crate::chains::report::{normal_forces, require_reactions, statistics};
+use crate::clock::Clock;
 use crate::cracks::{Modes, mode_colour};
 use crate::map::{Key, Link, Materials, Panel, Ramp, Sample, Scale, View, draw, draw_view};
 use crate::moments;
@@ -46,7 +47,7 @@ pub struct Command {
     /// Draw every N-th frame, and the last.
     #[arg(long, value_name = "N", default_value_t = 1, conflicts_with = "times", value_parser = whole::<usize>(1..=u64::MAX))]
     every: usize,
-    /// Draw the frames nearest to these times (s).
+    /// Draw the frames nearest to these times (s), or steps of a run from break to break.
     #[arg(long, value_name = "T,…", value_delimiter = ',', value_parser = seconds)]
     times: Vec<f64>,
 }
@@ -100,6 +101,9 @@ pub struct Report {
     pub frames: Vec<usize>,
     /// Time of the first and of the last, s.
     pub span: [f64; 2],
+    /// What their times count.
+    #[serde(skip)]
+    pub clock: Clock,
     /// The folder of the pictures, once they are written.
     #[serde(skip)]
     pub folder: Option<PathBuf>,
@@ -107,7 +111,7 @@ pub struct Report {
     pub scale: Option<f64>,
 }
 
-/// Chooses the frames: those nearest to `times` (s), or every `every`-th and the last.
+/// Chooses the frames: those nearest to `times` (s or steps), or every `every`-th and the last.
 ///
 /// # Errors
 /// [`PostError::Usage`] for times outside the history or `every` of zero; [`PostError::Lacking`]
@@ -144,7 +148,14 @@ pub fn read(history: &History, subject: Subject, every: usize, times: &[f64]) ->
         return Err(lacking(&format!("{what} in these frames: choose others with --times, or another --draw")));
     }
     let time = |frame: Option<&usize>| frame.map_or(0.0, |&frame| history.times()[frame]);
-    Ok(Report { subject, span: [time(frames.first()), time(frames.last())], frames, folder: None, scale })
+    Ok(Report {
+        subject,
+        span: [time(frames.first()), time(frames.last())],
+        frames,
+        clock: Clock::of(history),
+        folder: None,
+        scale,
+    })
 }
 
 fn greatest(frames: &[usize], value: impl Fn(usize) -> Result<f64>) -> Result<f64> {
@@ -162,8 +173,8 @@ impl Report {
         facts(&[
             ("pictures", self.frames.len().to_string()),
             ("of", subject),
-            ("from", quantity(Some(self.span[0]), "s")),
-            ("to", quantity(Some(self.span[1]), "s")),
+            ("from", self.clock.moment(self.span[0])),
+            ("to", self.clock.moment(self.span[1])),
             ("scale made for", quantity(self.scale, unit)),
             ("a film", format!("ffmpeg -framerate 25 -i {pictures} -pix_fmt yuv420p film.mp4")),
         ])

@@ -7,6 +7,7 @@ use dem_history::{CopyAs, History, RuptureMode, Series, Wall, WallDrive};
 use serde::Serialize;
 
 use crate::analysis::Analysis;
+use crate::clock::Clock;
 use crate::cracks::Modes;
 use crate::extent::range;
 use crate::output::{Result, facts, in_shell, number, quantity};
@@ -125,6 +126,9 @@ pub struct Report {
     pub contacts: Option<usize>,
     /// Greatest residual, and the time at which it occurred (s).
     pub worst_residual: Option<(f64, f64)>,
+    /// What times count.
+    #[serde(skip)]
+    pub clock: Clock,
     /// Mean and greatest number of iterations.
     pub iterations: Option<[f64; 2]>,
     /// Greatest penetration, m.
@@ -174,6 +178,7 @@ pub fn read(history: &History) -> Result<Report> {
         cohesion: (!bonds.is_empty()).then(|| range(bonds.strength.iter().copied())),
         broken,
         frames,
+        clock: Clock::of(history),
         first: (frames > 0).then(|| moment(0)),
         last: (frames > 0).then(|| moment(frames - 1)),
         observed: history.observed_steps(),
@@ -278,7 +283,8 @@ impl Report {
             ("contacts", self.contacts.map_or_else(|| "–".into(), |n| format!("{n} at the last frame"))),
             (
                 "worst residual",
-                self.worst_residual.map_or_else(|| "–".into(), |(r, t)| format!("{} at {} s", number(r), number(t))),
+                self.worst_residual
+                    .map_or_else(|| "–".into(), |(r, t)| format!("{} at {}", number(r), self.clock.moment(t))),
             ),
             (
                 "iterations",
@@ -308,14 +314,11 @@ impl Report {
 
     fn time_line(&self) -> String {
         match (self.first, self.last) {
-            (Some(first), Some(last)) => format!(
-                "{} to {} s, steps {} to {}, {} frames",
-                number(first.1),
-                number(last.1),
-                first.0,
-                last.0,
-                self.frames
-            ),
+            (Some(first), Some(last)) => {
+                let times = format!("{} to {} s, ", number(first.1), number(last.1));
+                let times = if self.clock.step().is_some() { "" } else { &times };
+                format!("{times}steps {} to {}, {} frames", first.0, last.0, self.frames)
+            }
             _ => "no frame".into(),
         }
     }

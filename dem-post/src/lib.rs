@@ -30,6 +30,7 @@ pub mod why;
 pub mod analysis;
 pub mod check;
 pub mod cli;
+pub mod clock;
 pub mod collapse;
 pub mod extent;
 pub mod fragments;

@@ -2,6 +2,7 @@
 
 use dem_history::History;
 
+use crate::clock::Clock;
 use crate::output::{PostError, Result, plain};
 
 /// Share of broken bonds at which a map is drawn.
@@ -13,7 +14,7 @@ const ROUNDING: f64 = 1e-9;
 /// differently.
 pub(crate) const SAME_TIME: f64 = 1e-9;
 
-/// The frames nearest to `times` (s). Without times: the first frame after the first rupture, the
+/// The frames nearest to `times`, in the unit of the clock (s or steps). Without times: the first frame after the first rupture, the
 /// first after 5 % of the bonds have broken, and the last. In order, without repetition.
 ///
 /// # Errors
@@ -24,14 +25,21 @@ pub fn chosen(history: &History, times: &[f64]) -> Result<Vec<usize>> {
         let what = "it holds no frame yet: wait for the run to write one".into();
         return Err(PostError::Lacking { path: history.path().into(), what });
     };
+    let clock = Clock::of(history);
     let mut frames = vec![];
-    for &time in times {
+    for &asked in times {
+        let time = clock.time(asked);
         // times of frames are sums of steps: what is printed of the last may be a little beyond it
         let room = ROUNDING * (last - first);
         // this form also rejects NaN
         if !(first - room..=last + room).contains(&time) {
-            let [first, last] = [first, last].map(plain);
-            return Err(PostError::Usage(format!("--times {time}: the history runs from {first} s to {last} s")));
+            let [first, last] = [first, last].map(|time| plain(clock.value(time)));
+            let range = if clock.step().is_some() {
+                format!("counts steps, from {first} to {last}")
+            } else {
+                format!("runs from {first} s to {last} s")
+            };
+            return Err(PostError::Usage(format!("--times {asked}: the history {range}")));
         }
         frames.extend(history.frame_at(time));
     }

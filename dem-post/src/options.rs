@@ -44,7 +44,8 @@ pub struct Moments {
     /// The files.
     #[command(flatten)]
     pub files: Files,
-    /// Times of the maps (s), as in 0.1,0.15 [default: first break, 5 % broken, end].
+    /// Times of the maps (s), or steps of a run from break to break, as in 0.1,0.15 [default: first
+    /// break, 5 % broken, end].
     #[arg(long, value_name = "T,…", value_delimiter = ',', value_parser = seconds)]
     pub times: Vec<f64>,
 }

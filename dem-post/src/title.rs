@@ -2,7 +2,8 @@
 
 use dem_history::History;
 
-use crate::output::{PostError, Result, number, short};
+use crate::clock::Clock;
+use crate::output::{PostError, Result, short};
 use crate::stress_strain;
 
 /// A strain below this may be the solver's own, in rigid samples, and is not told.
@@ -35,9 +36,9 @@ impl Titles {
         Self { step: load.step.clone(), load: load.load.clone(), strain: load.strain.clone() }
     }
 
-    /// `t = 0.244 s, F = 48.8 N, ε = 0.013 %`.
+    /// `t = 0.244 s, F = 48.8 N, ε = 0.013 %`, or `step 61, …` where the time counts steps.
     pub fn of(&self, history: &History, frame: usize) -> String {
-        let mut title = format!("t = {} s", number(history.times()[frame]));
+        let mut title = Clock::of(history).at(history.times()[frame]);
         let Ok(row) = self.step.binary_search(&history.steps()[frame]) else { return title };
         if let Some(load) = self.load.get(row) {
             title += &format!(", F = {} N", short(*load));

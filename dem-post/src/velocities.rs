@@ -12,6 +12,7 @@ use dem_history::{GrainState, History};
 use serde::Serialize;
 
 use crate::analysis::Analysis;
+use crate::clock::Clock;
 use crate::extent::range;
 use crate::map::{Arrow, Key, Panel, Ramp, Sample, Scale, draw};
 use crate::moments;
@@ -100,9 +101,12 @@ pub struct Field {
 pub struct Report {
     /// One entry for each moment.
     pub fields: Vec<Field>,
+    /// What times count.
+    #[serde(skip)]
+    pub clock: Clock,
 }
 
-/// Reads the motion at the frames nearest to `times` (s), or at chosen ones.
+/// Reads the motion at the frames nearest to `times` (s or steps), or at chosen ones.
 ///
 /// # Errors
 /// [`crate::output::PostError::Usage`] for times outside the history.
@@ -113,7 +117,7 @@ pub fn read(history: &History, times: &[f64]) -> Result<Report> {
         let state = history.grain_state(frame)?;
         fields.push(field(frame, (history.steps()[frame], history.times()[frame]), state, &mass, history.dimension()));
     }
-    Ok(Report { fields })
+    Ok(Report { fields, clock: Clock::of(history) })
 }
 
 fn field(frame: usize, (step, time): (i64, f64), state: GrainState, mass: &[f64], d: usize) -> Field {
@@ -153,7 +157,7 @@ impl Report {
     /// The report as a table.
     pub fn table(&self) -> String {
         let mut table = Text::new(&[
-            "time (s)",
+            self.clock.title(),
             "mean speed (m/s)",
             "rms speed (m/s)",
             "max speed (m/s)",
@@ -164,7 +168,7 @@ impl Report {
         for field in &self.fields {
             let drift: Vec<String> = field.drift.iter().map(|v| short(*v)).collect();
             table.row(vec![
-                number(field.time),
+                number(self.clock.value(field.time)),
                 number(field.mean_speed),
                 number(field.rms_speed),
                 number(field.greatest_speed),
@@ -251,14 +255,10 @@ impl OnPage for Report {
     fn section(&self, history: &History, maps: &Maps) -> Result<Section> {
         let mut figures = vec![];
         for field in &self.fields {
-            let one = Self { fields: vec![field.clone()] };
-            let time = number(field.time);
-            let alt = format!("Grains coloured by their speed at t = {time} s, with arrows of the mean velocity.");
-            figures.push(map_figure(
-                &map(history, &one, &maps.titles)?,
-                &alt,
-                &format!("Velocities at t = {time} s."),
-            )?);
+            let one = Self { fields: vec![field.clone()], ..*self };
+            let at = self.clock.at(field.time);
+            let alt = format!("Grains coloured by their speed at {at}, with arrows of the mean velocity.");
+            figures.push(map_figure(&map(history, &one, &maps.titles)?, &alt, &format!("Velocities at {at}."))?);
         }
         Ok(Section { figures, ..Section::of::<Self>() })
     }

@@ -15,6 +15,9 @@
     const rounded = Number((Math.round(value / unit) * unit).toPrecision(10)), size = Math.abs(rounded);
     return size && (size < 1e-3 || size >= 1e6) ? rounded.toExponential().replace('e+', 'e') : String(rounded);
   };
+  // A time of the run in words; in a run from break to break it counts steps.
+  const per_step = Number(document.body.dataset.step);
+  const when = time => (per_step ? `step ${Math.round(time / per_step)}` : `t = ${number(time)} s`);
   const element = (name, kind, parent) => {
     const made = document.createElement(name);
     made.className = kind;
@@ -62,7 +65,7 @@
       const { curve, k } = best, at = [curve.places[k], curve.places[k + 1]];
       move(dot, ...at, curve.colour);
       const name = curves.length > 1 && curve.name ? `${curve.name}\n` : '';
-      const moment = curve.times.length ? `\ntime (s): ${number(curve.times[k / 2])}` : '';
+      const moment = curve.times.length ? `\n${when(curve.times[k / 2])}` : '';
       tip.textContent = `${name}${titles[0]}: ${value(x, at[0], log[0], false)}\n`
         + `${titles[1]}: ${value(y, at[1], log[1], whole)}${moment}`;
       // beside the point, within the picture
@@ -229,7 +232,7 @@
     shown = moment;
     slider.value = String(moment);
     const time = run.time[moment], load = run.load[moment];
-    const parts = [`t = ${number(time)} s`];
+    const parts = [when(time)];
     if (load !== undefined && load !== null) parts.push(`load ${number(load)} N`);
     if (run.bonds) parts.push(`${run.broken[moment]} of ${run.bonds} bonds broken`);
     told.textContent = parts.join(' · ');

@@ -364,6 +364,7 @@ impl<D: Dim> RunState<D> {
             steps: world.steps,
             has_reactions: scene.output.reactions && world.touches().any(|t| t.reaction.n != 0.0),
             time: world.time,
+            load_time: (scene.rupture == Rupture::NextEvent).then_some(world.load_time),
             grains: world.grains.len(),
             solid_fraction,
             bonds: world.bonds.len(),

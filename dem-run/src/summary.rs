@@ -50,6 +50,9 @@ pub struct Summary {
     pub has_reactions: bool,
     /// Simulated time (s).
     pub time: f64,
+    /// With `rupture: next_event`, where that counts steps, the time of the loads (s).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub load_time: Option<f64>,
     /// Grains.
     pub grains: usize,
     /// Solid fraction of a random sample in its box (–).
@@ -183,7 +186,12 @@ impl fmt::Display for Summary {
             Ending::Interrupted => "interrupted",
             Ending::NoConvergence => "a step was not solved",
         };
-        writeln!(f, "ended            t = {:.6} s after {} steps: {ending}", self.time, self.steps)?;
+        match self.load_time {
+            Some(time) => {
+                writeln!(f, "ended            after {} steps, at the loads of t = {time:.6} s: {ending}", self.steps)?;
+            }
+            None => writeln!(f, "ended            t = {:.6} s after {} steps: {ending}", self.time, self.steps)?,
+        }
         match self.solid_fraction {
             Some(fraction) => writeln!(f, "sample           {} grains, solid fraction {fraction:.4}", self.grains)?,
             None => writeln!(f, "sample           {} grains", self.grains)?,

@@ -208,6 +208,12 @@ fn degrees<D: Dim>(nodes: &Nodes<D>, k: usize, moves: bool) -> usize {
 }
 
 impl Rows {
+    /// Whether neither loads, velocities nor elastic bonds act: without reactions all bodies rest.
+    pub fn nothing_acts(&self) -> bool {
+        let rests = |row: &Row| row.given == Padded::zero() && row.carried == Padded::zero();
+        self.free.iter().all(|y| *y == 0.0) && self.list.iter().all(rests)
+    }
+
     /// The rows of a problem. Normal rows have ρ = κ / (mean normal entry of W), times the relative
     /// stiffness of the pair: in 3D that of a cylinder of the mean diameter, so that ρ grows with
     /// the diameter; in 2D all pairs are alike.

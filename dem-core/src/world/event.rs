@@ -146,7 +146,7 @@ impl<D: Dim> World<D> {
             let (mut problem, places) = self.assemble(&mid, &touches, &motion, &brought, applied, h);
             let solve = self.solver.solve(&mut problem);
             done.add(solve);
-            self.refuse_unaccepted(solve, &problem, h, true)?;
+            self.refuse_unaccepted(solve, &problem, (at, h), true)?;
             let excess = self.excess(&touches, &problem, &places);
             if 1.0 + excess < (1.0 - LIMIT) * brought.strengthened || excess.is_infinite() {
                 write_reactions(&mut touches, &problem, &places, h);

@@ -116,7 +116,8 @@ impl Solves {
 pub enum StepError {
     /// No solve was accepted, down to the shortest step that the settings allow.
     NotAccepted {
-        /// Time at which the step that failed began (s), or its half.
+        /// Time at which the step that failed began (s), or its half; with
+        /// [`crate::bond::Rupture::NextEvent`] the time of the loads.
         time: f64,
         /// The shortest step tried (s).
         step: f64,

@@ -113,11 +113,11 @@ impl<D: Dim> World<D> {
             let (mut problem, places) = self.assemble(&mid, &touches, &motion, &brought, applied, h);
             let solve = self.solve(&mut problem, limits_apply);
             done.add(solve);
-            self.refuse_unaccepted(solve, &problem, h, last_attempt)?;
+            self.refuse_unaccepted(solve, &problem, (self.time, h), last_attempt)?;
             if limits_apply {
                 self.refuse_violation(self.yielding(&problem), &problem, last_attempt)?;
                 if self.large_load_error(solve).is_some() {
-                    return Err(self.not_accepted(solve, &problem, h, last_attempt));
+                    return Err(self.not_accepted(solve, &problem, (self.time, h), last_attempt));
                 }
             }
             write_reactions(&mut touches, &problem, &places, h);
@@ -257,32 +257,39 @@ impl<D: Dim> World<D> {
         h * f64::sqrt(sum)
     }
 
+    /// Refuses a solve that failed, of a step from a time and of a length (s).
     pub(super) fn refuse_unaccepted(
         &self,
         solve: SolveReport,
         problem: &ContactProblem<D>,
-        h: f64,
+        (time, h): (f64, f64),
         last_attempt: bool,
     ) -> Result<(), StepError> {
         let finite = |v: &[f64]| v.iter().all(|c| c.is_finite());
         if let Some(body) =
             problem.nodes.all.iter().position(|n| !(finite(n.velocity.as_slice()) && finite(n.spin.as_slice())))
         {
-            return Err(StepError::NotFinite { time: self.time, body: body as u32 });
+            return Err(StepError::NotFinite { time, body: body as u32 });
         }
         match solve.status {
-            SolveStatus::Failed => Err(self.not_accepted(solve, problem, h, last_attempt)),
+            SolveStatus::Failed => Err(self.not_accepted(solve, problem, (time, h), last_attempt)),
             _ => Ok(()),
         }
     }
 
     /// The error of a solve that is not accepted, because it failed or by its load error.
-    fn not_accepted(&self, solve: SolveReport, problem: &ContactProblem<D>, h: f64, last_attempt: bool) -> StepError {
+    fn not_accepted(
+        &self,
+        solve: SolveReport,
+        problem: &ContactProblem<D>,
+        (time, h): (f64, f64),
+        last_attempt: bool,
+    ) -> StepError {
         let SolveReport { residual, work, .. } = solve;
         let load_error = self.large_load_error(solve).filter(|_| solve.status != SolveStatus::Failed);
         let verdict = if last_attempt { self.verdict(problem) } else { Verdict::Undecided };
         let (iterations, pair) = (work.iterations(), furthest_from_law(problem));
-        StepError::NotAccepted { time: self.time, step: h, residual, load_error, iterations, pair, verdict }
+        StepError::NotAccepted { time, step: h, residual, load_error, iterations, pair, verdict }
     }
 
     fn refuse_violation(

@@ -4,7 +4,7 @@ use dem_history::{ContactRows, History};
 
 use super::report::{CARRIES, Report};
 use crate::map::{Colour, Key, Link, Panel, Sample, draw};
-use crate::output::{Result, number, short};
+use crate::output::{Result, short};
 use crate::title::Titles;
 use dem_drawing::{Chart, Drawing, Style, colour};
 
@@ -58,7 +58,7 @@ pub fn length_charts(report: &Report) -> Vec<Chart> {
                 left -= chains;
             }
             let colour = colour::CYCLE[k % colour::CYCLE.len()];
-            chart = chart.curve(&format!("t = {} s", number(network.time)), colour, Style::Marked, points);
+            chart = chart.curve(&report.clock.at(network.time), colour, Style::Marked, points);
         }
         // a single point is no distribution
         if chart.curves.iter().any(|curve| curve.points.len() > 1) {
@@ -123,7 +123,7 @@ pub fn distribution_chart(report: &Report) -> Chart {
     (chart.log_y, chart.pad_x) = (true, true);
     for (k, network) in report.networks.iter().enumerate() {
         let colour = colour::CYCLE[k % colour::CYCLE.len()];
-        let label = format!("t = {} s", number(network.time));
+        let label = report.clock.at(network.time);
         chart = chart.curve(&label, colour, Style::Marked, network.distribution.clone());
     }
     chart

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::quasilinear::{Chains, Kind, find};
 use super::stress::{grain_stress, thickness};
+use crate::clock::Clock;
 use crate::moments;
 use crate::output::{PostError, Result, Text, number};
 
@@ -15,9 +16,8 @@ pub(super) const CARRIES: f64 = 1e-9;
 const BIN: f64 = 0.25;
 const LEAST: usize = 5;
 
-/// The columns of the table of chains.
-pub const CHAIN_HEAD: [&str; 8] = [
-    "time (s)",
+/// The columns of the table of chains, after the time.
+const CHAIN_HEAD: [&str; 7] = [
     "chains in",
     "number",
     "mean length (grains)",
@@ -100,26 +100,30 @@ pub struct Network {
 pub struct Report {
     /// One entry for each moment.
     pub networks: Vec<Network>,
+    /// What times count.
+    #[serde(skip)]
+    pub clock: Clock,
 }
 
-/// Reads the networks at the frames nearest to `times` (s), or at chosen ones.
+/// Reads the networks at the frames nearest to `times` (s or steps), or at chosen ones.
 ///
 /// # Errors
 /// [`PostError::Usage`] for times outside the history; [`PostError::Lacking`] where no contact
 /// carries a force at any of these moments, or where forces were not recorded.
 pub fn read(history: &History, times: &[f64]) -> Result<Report> {
     require_reactions(history)?;
+    let clock = Clock::of(history);
     let mut networks = vec![];
     for frame in moments::chosen(history, times)? {
         networks.push(network(history, frame)?);
     }
     if networks.iter().all(|network| network.statistics.contacts == 0) {
-        let moments: Vec<String> = networks.iter().map(|network| format!("{} s", number(network.time))).collect();
+        let moments: Vec<String> = networks.iter().map(|network| clock.moment(network.time)).collect();
         let what =
             format!("no contact carries a normal force at {}: choose other times with --times", moments.join(", "));
         return Err(PostError::Lacking { path: history.path().into(), what });
     }
-    Ok(Report { networks })
+    Ok(Report { networks, clock })
 }
 
 /// Rejects a history without the reactions of its contacts.
@@ -252,7 +256,7 @@ impl Report {
     /// The report as a table.
     pub fn table(&self) -> String {
         let mut table = Text::new(&[
-            "time (s)",
+            self.clock.title(),
             "contacts",
             "in tension",
             "<f> (N)",
@@ -265,7 +269,7 @@ impl Report {
         for network in &self.networks {
             let s = network.statistics;
             table.row(vec![
-                number(network.time),
+                number(self.clock.value(network.time)),
                 s.contacts.to_string(),
                 s.in_tension.to_string(),
                 number(s.mean),
@@ -279,12 +283,17 @@ impl Report {
         table.lines() + "\n" + &self.chain_table()
     }
 
-    /// The chains at each moment, one kind per line, in the columns of [`CHAIN_HEAD`].
+    /// The columns of the table of chains.
+    pub fn chain_head(&self) -> Vec<&'static str> {
+        [self.clock.title()].into_iter().chain(CHAIN_HEAD).collect()
+    }
+
+    /// The chains at each moment, one kind per line.
     pub fn chain_rows(&self) -> Vec<Vec<String>> {
         let rows = self.networks.iter().flat_map(|network| network.chain_figures.iter().map(|f| (network.time, f)));
         let row = |(time, f): (f64, &ChainFigures)| {
             vec![
-                number(time),
+                number(self.clock.value(time)),
                 f.kind.label().into(),
                 f.count.to_string(),
                 format!("{:.1}", f.mean_length),
@@ -298,7 +307,7 @@ impl Report {
     }
 
     fn chain_table(&self) -> String {
-        let mut table = Text::new(&CHAIN_HEAD);
+        let mut table = Text::new(&self.chain_head());
         self.chain_rows().into_iter().for_each(|row| table.row(row));
         table.lines()
     }

@@ -48,7 +48,7 @@ pub fn write(a: &History, report: &Report, folder: &mut Folder) -> Result<()> {
 
 /// Distances over time; the logarithmic axis cannot show zero distances.
 fn distance_chart(report: &Report) -> Chart {
-    let mut chart = Chart::new("time (s)", "distance between the grains of the two runs (radii)");
+    let mut chart = report.clock.chart("distance between the grains of the two runs (radii)");
     chart.log_y = report.gaps.iter().any(|gap| gap.greatest > 0.0);
     let points = |value: fn(&Gap) -> f64| report.gaps.iter().map(|gap| (gap.time, value(gap))).collect();
     chart.curve("greatest", colour::BLUE, Style::Line, points(|gap| gap.greatest)).curve(
@@ -61,7 +61,7 @@ fn distance_chart(report: &Report) -> Chart {
 
 fn broken_chart(report: &Report) -> Chart {
     let end = report.gaps.last().map_or(0.0, |gap| gap.time);
-    let mut chart = Chart::new("time (s)", "broken bonds");
+    let mut chart = report.clock.chart("broken bonds");
     chart.y_is_count = true;
     for (k, list) in report.breaks.iter().enumerate() {
         let steps = list.iter().enumerate().map(|(n, found)| (found.time, (n + 1) as f64));
@@ -76,7 +76,7 @@ fn broken_chart(report: &Report) -> Chart {
 fn load_charts(report: &Report) -> Vec<Chart> {
     let mut charts = vec![
         Chart::new("displacement of the wall (mm)", "force (N)"),
-        Chart::new("time (s)", "displacement of the wall (mm)"),
+        report.clock.chart("displacement of the wall (mm)"),
     ];
     for (k, curve) in report.curves.iter().enumerate() {
         let [way, load] = &curve.wall;

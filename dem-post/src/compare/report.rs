@@ -6,8 +6,9 @@ use dem_history::{History, Rupture};
 use dem_scene::{Difference, differences};
 use serde::Serialize;
 
+use crate::clock::Clock;
 use crate::moments::SAME_TIME;
-use crate::output::{PostError, Result, Text, counted, facts, number, quantity};
+use crate::output::{PostError, Result, Text, counted, facts, number};
 use crate::stress_strain;
 
 /// Maximum number of differences of the scenes, and of bonds, in the table.
@@ -102,6 +103,9 @@ pub struct Report {
     /// The curves of the two runs.
     #[serde(skip)]
     pub curves: [Curve; 2],
+    /// What times count.
+    #[serde(skip)]
+    pub clock: Clock,
 }
 
 /// Compares two runs; frames count as equal up to `tolerance` radii.
@@ -121,7 +125,7 @@ pub fn read(a: &History, b: &History, tolerance: f64) -> Result<Report> {
     if a.dimension() != b.dimension() {
         return Err(differs(format!("one is in {}D, the other in {}D", a.dimension(), b.dimension())));
     }
-    if a.follows_breaks()? != b.follows_breaks()? {
+    if a.follows_breaks() != b.follows_breaks() {
         let what = "one loads from break to break (rupture next_event), and its time counts breaks: compare \
                     ruptures.csv of `dem-post cracks` and the loads in stress-strain.csv of `dem-post stress-strain`";
         return Err(differs(what.into()));
@@ -158,6 +162,7 @@ pub fn read(a: &History, b: &History, tolerance: f64) -> Result<Report> {
         fates,
         breaks,
         curves: [curve(a)?, curve(b)?],
+        clock: Clock::of(a),
     })
 }
 
@@ -245,12 +250,18 @@ impl Report {
             ("common times", self.gaps.len().to_string()),
             ("compared until", self.until()),
             ("tolerance", tolerance),
-            ("frames differ from", self.first_difference.as_ref().map_or_else(|| "never".into(), gap_line)),
-            ("at the last common time", last.map_or_else(|| "–".into(), gap_line)),
+            (
+                "frames differ from",
+                self.first_difference.as_ref().map_or_else(|| "never".into(), |gap| self.gap_line(gap)),
+            ),
+            ("at the last common time", last.map_or_else(|| "–".into(), |gap| self.gap_line(gap))),
             ("bonds broken in both", both.to_string()),
             ("only in A", a.to_string()),
             ("only in B", b.to_string()),
-            ("first other break", self.parting.as_ref().map_or_else(|| "none".into(), parting_line)),
+            (
+                "first other break",
+                self.parting.as_ref().map_or_else(|| "none".into(), |parting| self.parting_line(parting)),
+            ),
         ]);
         if !self.scene.is_empty() {
             let mut table = Text::new(&["scene", "A", "B"]);
@@ -271,27 +282,27 @@ impl Report {
     /// The time up to which breaks are compared, in words.
     fn until(&self) -> String {
         let [a, b] = self.ends;
-        let time = quantity(Some(a.min(b)), "s");
+        let time = self.clock.moment(a.min(b));
         match a - b {
             apart if apart.abs() <= SAME_TIME * a.max(b) => format!("{time}, the end of both"),
             apart => format!("{time}, the end of {}", if apart < 0.0 { "A" } else { "B" }),
         }
     }
-}
 
-fn gap_line(gap: &Gap) -> String {
-    let distance = number(gap.greatest);
-    format!("t = {} s: grain {} by {distance} radii, rms {}", number(gap.time), gap.grain, number(gap.rms))
-}
+    fn gap_line(&self, gap: &Gap) -> String {
+        let (at, distance) = (self.clock.at(gap.time), number(gap.greatest));
+        format!("{at}: grain {} by {distance} radii, rms {}", gap.grain, number(gap.rms))
+    }
 
-fn parting_line(parting: &Parting) -> String {
-    let side = |found: Option<Break>| {
-        found.map_or_else(
-            || "no more".into(),
-            |f| format!("{}–{} {} at {}", f.grains[0], f.grains[1], f.mode, quantity(Some(f.time), "s")),
-        )
-    };
-    format!("after {} equal breaks: A {}, B {}", parting.alike, side(parting.a), side(parting.b))
+    fn parting_line(&self, parting: &Parting) -> String {
+        let side = |found: Option<Break>| {
+            found.map_or_else(
+                || "no more".into(),
+                |f| format!("{}–{} {} at {}", f.grains[0], f.grains[1], f.mode, self.clock.moment(f.time)),
+            )
+        };
+        format!("after {} equal breaks: A {}, B {}", parting.alike, side(parting.a), side(parting.b))
+    }
 }
 
 /// A value of a scene, shortened to fit a line.

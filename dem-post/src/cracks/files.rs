@@ -49,8 +49,8 @@ pub fn write(history: &History, report: &Report, times: &[f64], by: ColourBy, fo
     let fragments = frames.iter().map(list).collect::<Result<Vec<_>>>()?;
     write_fragments(history, &frames, &fragments, folder)?;
     let end = history.times().last().copied().unwrap_or(0.0);
-    folder.draw("broken", &Chart::draw(vec![broken_chart(&curve, end)]))?;
-    folder.draw("fragments", &Chart::draw(fragment_charts(&report.fragments)))?;
+    folder.draw("broken", &Chart::draw(vec![broken_chart(report, &curve, end)]))?;
+    folder.draw("fragments", &Chart::draw(fragment_charts(report)))?;
     let in_space = history.dimension() == 3;
     let (sample, titles) = (Sample::with_depth(history)?, Titles::read(history)?);
     folder.draw("fragment-map", &fragment_map(history, &sample, &titles, &frames, &fragments)?)?;

@@ -6,12 +6,12 @@ use dem_history::{BondStatus, History, RuptureMode};
 use super::front::Growth;
 use super::modes::{mode_colour, mode_name};
 use super::paths::Crack;
-use super::report::{Event, Pieces, Report};
+use super::report::{Event, Report};
 use super::surfaces::Facet;
 use crate::extent::range;
 use crate::fragments::{Fragment, Fragments};
 use crate::map::{Colour, Key, Link, Materials, Panel, Patch, Ramp, Sample, Scale, draw, draw_view};
-use crate::output::{Result, counted, number};
+use crate::output::{Result, counted};
 use crate::title::Titles;
 use dem_drawing::{Chart, Drawing, Style, colour};
 
@@ -34,13 +34,13 @@ const PALER: [&str; 3] = ["#7fb8d8", "#eaae7f", "#7fceb9"];
 const FRONTS: usize = 3;
 
 /// Broken bonds over time, by mode, until `end` (s).
-pub fn broken_chart(curve: &[(f64, [usize; 4])], end: f64) -> Chart {
+pub fn broken_chart(report: &Report, curve: &[(f64, [usize; 4])], end: f64) -> Chart {
     let points = |count: &dyn Fn(&[usize; 4]) -> usize| -> Vec<(f64, f64)> {
         let last = curve.last().map_or(0, |(_, n)| count(n));
         let inner = curve.iter().map(|(time, n)| (*time, count(n) as f64));
         std::iter::once((0.0, 0.0)).chain(inner).chain([(end, last as f64)]).collect()
     };
-    let mut chart = Chart::new("time (s)", "broken bonds");
+    let mut chart = report.clock.chart("broken bonds");
     chart = chart.curve("all", colour::BLACK, Style::Steps, points(&|n| n.iter().sum()));
     for (k, mode) in RuptureMode::ALL.iter().enumerate() {
         // few samples have bonds that resist twist
@@ -53,13 +53,14 @@ pub fn broken_chart(curve: &[(f64, [usize; 4])], end: f64) -> Chart {
 }
 
 /// Number of fragments, and mass of the largest, over time.
-pub fn fragment_charts(pieces: &[Pieces]) -> Vec<Chart> {
+pub fn fragment_charts(report: &Report) -> Vec<Chart> {
+    let pieces = &report.fragments;
     let points = |value: &dyn Fn(&Fragments) -> f64| pieces.iter().map(|p| (p.time, value(&p.fragments))).collect();
-    let mut number = Chart::new("time (s)", "number of fragments")
+    let mut number = (report.clock.chart("number of fragments"))
         .curve("all", colour::BLACK, Style::Steps, points(&|f| f.count as f64))
         .curve("single grains", colour::VERMILLION, Style::Steps, points(&|f| f.singles as f64));
     (number.y_is_count, number.pad_x) = (true, true);
-    let mut largest = Chart::new("time (s)", "largest fragment (% of the mass)").curve(
+    let mut largest = report.clock.chart("largest fragment (% of the mass)").curve(
         "largest fragment",
         colour::BLUE,
         Style::Steps,
@@ -73,7 +74,7 @@ pub fn fragment_charts(pieces: &[Pieces]) -> Vec<Chart> {
 /// and, where a step broke bonds in several rounds, these sizes over the rounds of the step with
 /// the most rounds.
 pub fn front_charts(report: &Report) -> Vec<Chart> {
-    let mut over_time = Chart::new("time (s)", "position of the tips along the crack (mm)");
+    let mut over_time = report.clock.chart("position of the tips along the crack (mm)");
     over_time.pad_x = true;
     // a crack has no curve over time if all its bonds broke at one time
     let grown = |crack: &&Crack| crack.first < crack.last;
@@ -107,7 +108,7 @@ fn growth_chart(report: &Report) -> Option<Chart> {
     report.growth.first().zip(report.growth.last()).filter(|(first, last)| first.time < last.time)?;
     let (label, unit) = size_of_cracks(report);
     let points = |size: fn(&Growth) -> f64| report.growth.iter().map(|row| (row.time, unit * size(row))).collect();
-    let mut chart = Chart::new("time (s)", label)
+    let mut chart = (report.clock.chart(label))
         .curve("all", colour::BLACK, Style::Steps, points(|row| row.size))
         .curve(largest(report), colour::BLUE, Style::Steps, points(|row| row.largest));
     chart.pad_x = true;
@@ -163,10 +164,13 @@ impl When {
         let (title, values) = match by {
             ColourBy::Rank => ("rank of the break".into(), ranks(events)),
             ColourBy::Time if span[0] == span[1] => (
-                format!("round of the cascade at t = {} s", number(span[0])),
+                format!("round of the cascade at {}", report.clock.at(span[0])),
                 events.iter().map(|event| f64::from(event.round)).collect(),
             ),
-            ColourBy::Time => ("broken at t (s)".into(), events.iter().map(|event| event.time).collect()),
+            ColourBy::Time => {
+                let title = if report.clock.step().is_some() { "broken in step" } else { "broken at t (s)" };
+                (title.into(), events.iter().map(|event| report.clock.value(event.time)).collect())
+            }
         };
         let [low, high] = range(values.iter().copied());
         Self { values, scale: Scale { title, low, high, ramp: Ramp::Lines } }

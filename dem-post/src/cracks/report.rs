@@ -7,31 +7,21 @@ use super::front::{Front, Growth, fronts, growth};
 use super::modes::Modes;
 use super::paths::{Crack, Paths};
 use super::surfaces::{Surface, Surfaces};
+use crate::clock::Clock;
 use crate::fragments::{Fragments, fragments};
-use crate::output::{PostError, Result, Text, facts, number, progress, quantity};
+use crate::output::{PostError, Result, Text, facts, number, progress};
 
 /// Maximum number of events in the table on the terminal; the CSV has all.
 const SHOWN: usize = 12;
 /// Maximum number of cracks in the table on the terminal.
 const CRACKS: usize = 6;
 
-/// The columns of the table of cracks.
-pub const CRACK_HEAD: [&str; 10] = [
-    "crack",
-    "bonds",
-    "T/S/R",
-    "length (mm)",
-    "path (mm)",
-    "end to end (mm)",
-    "tortuosity",
-    "orientation (°)",
-    "first (s)",
-    "last (s)",
-];
+/// The columns of the table of cracks, before the times of their breaks.
+const CRACK_HEAD: [&str; 8] =
+    ["crack", "bonds", "T/S/R", "length (mm)", "path (mm)", "end to end (mm)", "tortuosity", "orientation (°)"];
 
-/// The columns of the table of cracks in 3D.
-pub const SURFACE_HEAD: [&str; 9] =
-    ["crack", "bonds", "T/S/R/Tw", "area (mm²)", "extent (mm)", "normal", "flatness", "first (s)", "last (s)"];
+/// The same in 3D.
+const SURFACE_HEAD: [&str; 7] = ["crack", "bonds", "T/S/R/Tw", "area (mm²)", "extent (mm)", "normal", "flatness"];
 
 /// The pieces at one frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -97,6 +87,9 @@ pub struct Report {
     pub fronts: Vec<Front>,
     /// The cracks after each round of breaks.
     pub growth: Vec<Growth>,
+    /// What times count.
+    #[serde(skip)]
+    pub clock: Clock,
     /// The cracks with their segments.
     #[serde(skip)]
     pub paths: Paths,
@@ -142,6 +135,12 @@ pub fn read(history: &History, quiet: bool) -> Result<Report> {
     }
     let growth =
         if history.dimension() == 2 { growth(paths.parts(), &ruptures) } else { growth(faces.parts(), &ruptures) };
+    let clock = Clock::of(history);
+    let mut fronts = fronts(&paths, &ruptures);
+    if clock.step().is_some() {
+        // steps have no speed
+        fronts.iter_mut().for_each(|row| (row.back_speed, row.front_speed) = (None, None));
+    }
     Ok(Report {
         bonds: bonds.len(),
         broken,
@@ -151,8 +150,9 @@ pub fn read(history: &History, quiet: bool) -> Result<Report> {
         fragments: pieces,
         cracks: paths.cracks.clone(),
         surfaces: faces.cracks.clone(),
-        fronts: fronts(&paths, &ruptures),
+        fronts,
         growth,
+        clock,
         paths,
         faces,
     })
@@ -222,9 +222,10 @@ impl Report {
         if self.broken.twist > 0 {
             lines.push(("  TWIST", self.broken.twist.to_string()));
         }
+        let told = |time: Option<f64>| time.map_or_else(|| "–".into(), |time| self.clock.moment(time));
         lines.extend([
-            ("first break", quantity(self.first_break, "s")),
-            ("5 % broken", quantity(self.time_of_5_percent, "s")),
+            ("first break", told(self.first_break)),
+            ("5 % broken", told(self.time_of_5_percent)),
             (
                 "fragments at the end",
                 last.map_or_else(|| "–".into(), |f| format!("{} ({} single grains)", f.count, f.singles)),
@@ -242,7 +243,7 @@ impl Report {
             out += &format!("\n{}", self.event_table());
         }
         if let Some((head, rows)) = self.crack_rows() {
-            let mut table = Text::new(head);
+            let mut table = Text::new(&head);
             rows.into_iter().for_each(|row| table.row(row));
             let rest = (self.cracks.len() + self.surfaces.len()).saturating_sub(CRACKS);
             let more = if rest > 0 { format!("… and {rest} more in cracks.csv\n") } else { String::new() };
@@ -252,11 +253,13 @@ impl Report {
     }
 
     fn event_table(&self) -> String {
-        let mut table =
-            Text::new(&["time (s)", "step", "round", "bond", "grains", "mode", "r_n (N)", "r_t (N)", "m (N m)"]);
+        // a time that counts steps says no more than these
+        let timed = self.clock.step().is_none();
+        let head = ["time (s)", "step", "round", "bond", "grains", "mode", "r_n (N)", "r_t (N)", "m (N m)"];
+        let mut table = Text::new(&head[usize::from(!timed)..]);
         for e in self.events.iter().take(SHOWN) {
             let grains = format!("{}–{}", e.grains[0], e.grains[1]);
-            table.row(vec![
+            let row = vec![
                 number(e.time),
                 e.step.to_string(),
                 e.round.to_string(),
@@ -266,20 +269,23 @@ impl Report {
                 number(e.normal_force),
                 number(e.tangential_force),
                 number(e.moment),
-            ]);
+            ];
+            table.row(row[usize::from(!timed)..].to_vec());
         }
         let rest = self.events.len().saturating_sub(SHOWN);
         table.lines() + &if rest > 0 { format!("… and {rest} more in ruptures.csv\n") } else { String::new() }
     }
 
     /// The largest cracks, one per line, below the titles of the columns; none without ruptures.
-    pub fn crack_rows(&self) -> Option<(&'static [&'static str], Vec<Vec<String>>)> {
+    pub fn crack_rows(&self) -> Option<(Vec<&'static str>, Vec<Vec<String>>)> {
+        let times = if self.clock.step().is_some() { ["first step", "last step"] } else { ["first (s)", "last (s)"] };
+        let titles = |head: &[&'static str]| [head, &times].concat();
         let row = |place: usize, bonds: usize, modes: Modes, own: Vec<String>, times: [f64; 2]| {
             let Modes { tension, shear, rolling, twist } = modes;
             // disks do not twist
             let twist = if self.surfaces.is_empty() { String::new() } else { format!("/{twist}") };
             let head = [place.to_string(), bonds.to_string(), format!("{tension}/{shear}/{rolling}{twist}")];
-            head.into_iter().chain(own).chain(times.map(number)).collect::<Vec<_>>()
+            head.into_iter().chain(own).chain(times.map(|time| number(self.clock.value(time)))).collect::<Vec<_>>()
         };
         let line = |c: &Crack| {
             let own = [1e3 * c.length, 1e3 * c.path_length, 1e3 * c.end_to_end, c.tortuosity].map(number);
@@ -297,9 +303,9 @@ impl Report {
             row(c.number, c.bonds, c.modes, own, [c.first, c.last])
         };
         if !self.cracks.is_empty() {
-            Some((&CRACK_HEAD, self.cracks.iter().take(CRACKS).map(line).collect()))
+            Some((titles(&CRACK_HEAD), self.cracks.iter().take(CRACKS).map(line).collect()))
         } else if !self.surfaces.is_empty() {
-            Some((&SURFACE_HEAD, self.surfaces.iter().take(CRACKS).map(surface).collect()))
+            Some((titles(&SURFACE_HEAD), self.surfaces.iter().take(CRACKS).map(surface).collect()))
         } else {
             None
         }

@@ -5,7 +5,7 @@ use dem_history::History;
 use super::pictures::{ColourBy, broken_chart, crack_map, decohesion, fragment_charts, front_charts, surface_maps};
 use super::report::{Report, broken_over_time};
 use crate::map::Sample;
-use crate::output::{Result, number, quantity};
+use crate::output::Result;
 use crate::section::{Maps, OnPage, Section, Table, capitalised, chart_figure, map_figure};
 
 impl OnPage for Report {
@@ -32,28 +32,31 @@ impl OnPage for Report {
             figures.push(map_figure(&side, alt, "The same, seen in the direction −x.")?);
         }
         for &frame in &maps.frames {
-            let time = number(history.times()[frame]);
-            let alt = format!("Grains at t = {time} s; those that lost a bond are white.");
+            let at = self.clock.at(history.times()[frame]);
+            let alt = format!("Grains at {at}; those that lost a bond are white.");
             // spheres hide the breaks behind them
             let (sample, seen) = if history.dimension() == 2 {
                 (Sample::read(history)?, "")
             } else {
                 (Sample::cut_open(history)?, ", cut open along the middle")
             };
-            let caption = format!("Lost bonds at t = {time} s{seen}.");
+            let caption = format!("Lost bonds at {at}{seen}.");
             figures.push(map_figure(&decohesion(history, &sample, &maps.titles, &[frame])?, &alt, &caption)?);
         }
         if self.broken.total() > 0 {
-            let curve = broken_chart(&broken_over_time(&self.events), end);
-            figures.push(chart_figure(curve, "Number of broken bonds over time, by mode.", "Broken bonds by mode."));
-            for curve in fragment_charts(&self.fragments) {
-                let alt = format!("{} over time.", capitalised(&curve.y));
+            let curve = broken_chart(self, &broken_over_time(&self.events), end);
+            let over = self.clock.over();
+            let alt = format!("Number of broken bonds over {over}, by mode.");
+            figures.push(chart_figure(curve, &alt, "Broken bonds by mode."));
+            for curve in fragment_charts(self) {
+                let alt = format!("{} over {over}.", capitalised(&curve.y));
                 figures.push(chart_figure(curve, &alt, &alt));
             }
         }
         if !self.cracks.is_empty() || !self.surfaces.is_empty() {
             for curve in front_charts(self) {
-                let alt = format!("{} over {}.", capitalised(&curve.y), curve.x);
+                let over = if curve.second().is_some() { self.clock.over() } else { &curve.x };
+                let alt = format!("{} over {over}.", capitalised(&curve.y));
                 figures.push(chart_figure(curve, &alt, &alt));
             }
         }
@@ -62,13 +65,14 @@ impl OnPage for Report {
         } else {
             "The largest cracks; T/S/R/Tw: bonds broken in tension, in shear, by rolling, by twist"
         };
-        let tables = self.crack_rows().into_iter().map(|(head, rows)| Table::new(caption, head, rows)).collect();
+        let tables = self.crack_rows().into_iter().map(|(head, rows)| Table::new(caption, &head, rows)).collect();
+        let told = |time: Option<f64>| time.map_or_else(|| "–".into(), |time| self.clock.moment(time));
         let facts = vec![
             ("Bonds".into(), self.bonds.to_string()),
             ("Broken".into(), self.broken.total().to_string()),
             ("Cracks".into(), (self.cracks.len() + self.surfaces.len()).to_string()),
-            ("First break".into(), quantity(self.first_break, "s")),
-            ("5 % broken".into(), quantity(self.time_of_5_percent, "s")),
+            ("First break".into(), told(self.first_break)),
+            ("5 % broken".into(), told(self.time_of_5_percent)),
         ];
         let text = if history.dimension() == 2 {
             "A crack is a set of broken bonds that meet in the voids between the grains; its path is the longest line through it, drawn \

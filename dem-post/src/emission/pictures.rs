@@ -7,7 +7,7 @@ use super::report::{Report, Scale};
 /// Load, broken bonds, events and energy over time or steps, each over its greatest value.
 pub fn course(report: &Report) -> Chart {
     let curves = &report.curves;
-    let mut chart = Chart::new(curves.axis(), "share of the greatest value");
+    let mut chart = curves.clock.chart("share of the greatest value");
     let greatest = curves.load.iter().map(|p| p.1.abs()).fold(0.0, f64::max);
     if greatest > 0.0 {
         let load = curves.load.iter().map(|&(time, load)| (time, load / greatest)).collect();
@@ -16,7 +16,7 @@ pub fn course(report: &Report) -> Chart {
     let ones = |times: &mut dyn Iterator<Item = f64>| times.map(|time| (time, 1.0)).collect::<Vec<_>>();
     let broken = ones(&mut curves.ruptures.iter().map(|r| r.0));
     chart = chart.curve("broken bonds", colour::BLUE, Style::Steps, sums(&broken, curves.end));
-    let events = ones(&mut report.events.iter().map(|event| curves.place(event)));
+    let events = ones(&mut report.events.iter().map(|event| event.time));
     chart = chart.curve("events", colour::VERMILLION, Style::Steps, sums(&events, curves.end));
     if report.energy > 0.0 {
         chart = chart.curve("energy released", colour::GREEN, Style::Steps, sums(&curves.ruptures, curves.end));
@@ -40,8 +40,8 @@ fn sums(parts: &[(f64, f64)], end: f64) -> Vec<(f64, f64)> {
 /// The magnitude of each event at its time or step.
 pub fn magnitudes(report: &Report) -> Chart {
     let curves = &report.curves;
-    let points = report.events.iter().filter_map(|event| Some((curves.place(event), event.magnitude?))).collect();
-    let mut chart = Chart::new(curves.axis(), report.axis()).curve("events", colour::BLUE, Style::Points, points);
+    let points = report.events.iter().filter_map(|event| Some((event.time, event.magnitude?))).collect();
+    let mut chart = curves.clock.chart(report.axis()).curve("events", colour::BLUE, Style::Points, points);
     chart.pad_x = true;
     chart
 }

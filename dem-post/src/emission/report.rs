@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::events::{Event, Rule, bursts, cluster};
 use super::frequency::{BValue, FEWEST, Frequency, Values, maximum_curvature};
+use crate::clock::Clock;
 use crate::output::{PostError, Result, Text, counted, facts, number, quantity};
 use crate::strength::runs::Course;
 
@@ -44,39 +45,17 @@ impl Default for Options {
     }
 }
 
-/// The load, and what had broken, over time, or over the steps where the load follows the breaks.
+/// The load, and what had broken, over time.
 #[derive(Clone, Debug, Default)]
 pub struct Curves {
-    /// Whether the load follows the breaks.
-    pub follows_breaks: bool,
-    /// Time, s, or step, and load, N; empty for a run without a load.
+    /// What times count.
+    pub clock: Clock,
+    /// Time, s, and load, N; empty for a run without a load.
     pub load: Vec<(f64, f64)>,
-    /// Time, s, or step of each rupture, and its energy, J.
+    /// Time of each rupture, s, and its energy, J.
     pub ruptures: Vec<(f64, f64)>,
-    /// End of the run, s, or its last step.
+    /// End of the run, s.
     pub end: f64,
-}
-
-impl Curves {
-    /// Title of the axis.
-    pub fn axis(&self) -> &'static str {
-        if self.follows_breaks { "step" } else { "time (s)" }
-    }
-
-    /// What runs along it, in words.
-    pub fn over(&self) -> &'static str {
-        if self.follows_breaks { "the steps" } else { "time" }
-    }
-
-    /// Place of an event on it.
-    pub fn place(&self, event: &Event) -> f64 {
-        place(self.follows_breaks, event.time, event.step)
-    }
-}
-
-/// Place of a step on the axis of the curves.
-fn place(follows_breaks: bool, time: f64, step: i64) -> f64 {
-    if follows_breaks { step as f64 } else { time }
 }
 
 /// The events of a run.
@@ -143,15 +122,14 @@ pub fn read(history: &History, options: &Options) -> Result<Report> {
     }
     let (course, load_note) = load(history, options.wall.as_deref())?;
     let load_times = history.observable("load_time")?;
-    let follows_breaks = load_times.is_some();
-    let at = |time: f64, step: i64| place(follows_breaks, time, step);
+    let clock = Clock::of(history);
     let own = |event: &Vec<usize>| {
         let mut event = Event::of(&event.iter().map(|&k| &ruptures[k]).collect::<Vec<_>>());
         if load_note.is_empty() {
             let row = course.step.binary_search(&event.step).ok();
             event.load = row.and_then(|row| course.load.get(row).copied());
         }
-        event.duration = event.duration.filter(|_| !follows_breaks);
+        event.duration = event.duration.filter(|_| clock.step().is_none());
         event.magnitude = match scale {
             Scale::Energy => (event.energy > 0.0).then(|| event.energy.log10() / 1.5),
             Scale::Size => Some((event.bonds as f64).log10()),
@@ -181,10 +159,10 @@ pub fn read(history: &History, options: &Options) -> Result<Report> {
         frequencies,
         events,
         curves: Curves {
-            follows_breaks,
-            load: course.time.iter().zip(&course.step).map(|(time, step)| at(*time, *step)).zip(course.load).collect(),
-            ruptures: ruptures.iter().map(|r| (at(r.time, r.step), r.energy)).collect(),
-            end: history.times().last().zip(history.steps().last()).map_or(0.0, |(time, step)| at(*time, *step)),
+            clock,
+            load: course.time.into_iter().zip(course.load).collect(),
+            ruptures: ruptures.iter().map(|r| (r.time, r.energy)).collect(),
+            end: history.times().last().copied().unwrap_or(0.0),
         },
     })
 }
@@ -280,15 +258,14 @@ impl Report {
         });
         largest.truncate(SHOWN);
         largest.sort_unstable();
-        let follows = self.curves.follows_breaks;
-        let head =
-            ["event", self.curves.axis(), "load (N)", "bonds", "rounds", "duration (s)", "energy (J)", "magnitude"];
+        let clock = self.curves.clock;
+        let head = ["event", clock.title(), "load (N)", "bonds", "rounds", "duration (s)", "energy (J)", "magnitude"];
         let mut table = Text::new(&head);
         for k in largest {
             let e = &self.events[k];
             table.row(vec![
                 (k + 1).to_string(),
-                if follows { e.step.to_string() } else { number(e.time) },
+                number(clock.value(e.time)),
                 quantity(e.load, ""),
                 e.bonds.to_string(),
                 e.rounds.to_string(),

@@ -12,7 +12,7 @@ impl OnPage for Report {
     const TITLE: &'static str = "Acoustic emission";
 
     fn section(&self, _: &History, _: &Maps) -> Result<Section> {
-        let over = self.curves.over();
+        let over = self.curves.clock.over();
         let mut figures = vec![];
         for (chart, text) in [
             (course(self), format!("Load, broken bonds and events over {over}, each over its greatest value.")),

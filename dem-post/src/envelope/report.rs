@@ -6,6 +6,7 @@ use dem_history::History;
 use serde::Serialize;
 
 use super::mohr::{Envelope, envelope, one_confinement};
+use crate::clock::Clock;
 use crate::output::{PostError, Result, Text, facts, number, quantity};
 use crate::strength::left_out::{self, LeftOut};
 use crate::strength::report::estimate;
@@ -20,6 +21,9 @@ pub struct Circle {
     pub run: String,
     /// Time of the state, s.
     pub time: f64,
+    /// What it counts.
+    #[serde(skip)]
+    pub clock: Clock,
     /// Load of the sample in the step of failure, N.
     pub load: f64,
     /// Greatest principal stress σ₁, Pa, positive in compression.
@@ -103,6 +107,7 @@ fn circle(path: &Path, measure: Measure, wall: Option<&str>) -> Result<(std::res
     let circle = Circle {
         run: name(path),
         time: course.time[row],
+        clock: Clock::of(&history),
         load: course.load[at],
         major: values[0],
         intermediate: (d == 3).then(|| values[1]),
@@ -164,10 +169,18 @@ impl Report {
         if let Some(line) = &self.envelope {
             lines.extend(line_facts(line));
         }
-        let mut table = Text::new(&["run", "time (s)", "load (N)", "σ₁ (Pa)", "σ₂ (Pa)", "σ₃ (Pa)"]);
+        let clock = self.circles.first().map(|circle| circle.clock).unwrap_or_default();
+        let mut table = Text::new(&["run", clock.title(), "load (N)", "σ₁ (Pa)", "σ₂ (Pa)", "σ₃ (Pa)"]);
         for c in &self.circles {
             let middle = quantity(c.intermediate, "");
-            table.row(vec![c.run.clone(), number(c.time), number(c.load), number(c.major), middle, number(c.minor)]);
+            table.row(vec![
+                c.run.clone(),
+                number(c.clock.value(c.time)),
+                number(c.load),
+                number(c.major),
+                middle,
+                number(c.minor),
+            ]);
         }
         facts(&lines) + "\n" + &table.lines() + &left_out::remarks(&self.left_out, "envelope.csv", &self.notes)
     }

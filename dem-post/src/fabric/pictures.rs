@@ -11,12 +11,12 @@ fn over_time(report: &Report, of: &dyn Fn(&Row) -> Option<f64>) -> Vec<(f64, f64
 }
 
 fn single(report: &Report, title: &str, of: &dyn Fn(&Row) -> Option<f64>) -> Chart {
-    Chart::new("time (s)", title).curve("", colour::BLUE, Style::Line, over_time(report, of))
+    report.clock.chart(title).curve("", colour::BLUE, Style::Line, over_time(report, of))
 }
 
 /// Mean stress and deviator.
 pub fn stress(report: &Report) -> Chart {
-    Chart::new("time (s)", "stress (kPa)")
+    (report.clock.chart("stress (kPa)"))
         .curve("mean stress p", colour::BLUE, Style::Thin, over_time(report, &|row| Some(1e-3 * row.p?)))
         .curve("deviator q", colour::VERMILLION, Style::Thin, over_time(report, &|row| Some(1e-3 * row.q?)))
 }
@@ -43,7 +43,7 @@ pub fn anisotropy(report: &Report) -> Chart {
 
 /// Principal values of the crack density.
 pub fn crack_density(report: &Report) -> Chart {
-    let mut chart = Chart::new("time (s)", "crack density (1/m)");
+    let mut chart = report.clock.chart("crack density (1/m)");
     let names = ["greatest principal value", if report.dimension == 2 { "least" } else { "middle" }, "least"];
     for (k, name) in names[..report.dimension].iter().enumerate() {
         let value = |row: &Row| Some(principal(row.crack_density.as_ref()?, report.dimension)[k]);

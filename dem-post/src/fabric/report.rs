@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::region::Region;
 use super::tensors::{Dyads, anisotropy, direction};
+use crate::clock::Clock;
 use crate::extent::first_box;
 use crate::moments;
 use crate::output::{Result, Text, number, progress, quantity};
@@ -57,6 +58,9 @@ pub struct Report {
     pub region_centre: Vec<f64>,
     /// Its radius, m.
     pub region_radius: f64,
+    /// What times count.
+    #[serde(skip)]
+    pub clock: Clock,
     /// A row for each frame.
     pub rows: Vec<Row>,
     /// The rows of the table on the terminal.
@@ -64,8 +68,8 @@ pub struct Report {
     pub shown: Vec<usize>,
 }
 
-/// Reads the report, with a bar unless `quiet`; its table shows the frames nearest to `times` (s),
-/// or chosen ones.
+/// Reads the report, with a bar unless `quiet`; its table shows the frames nearest to `times` (s
+/// or steps), or chosen ones.
 ///
 /// # Errors
 /// [`crate::output::PostError::Usage`] for times outside the history,
@@ -106,7 +110,7 @@ pub fn read(history: &History, times: &[f64], quiet: bool) -> Result<Report> {
     }
     bar.finish_and_clear();
     let (region_centre, region_radius) = (region.centre, region.radius);
-    Ok(Report { dimension: d, extents, region_centre, region_radius, rows, shown })
+    Ok(Report { dimension: d, extents, region_centre, region_radius, clock: Clock::of(history), rows, shown })
 }
 
 /// The value of an observable at a step; `None` where it was not observed.
@@ -198,7 +202,7 @@ impl Report {
     /// The report as a table of the shown frames.
     pub fn table(&self) -> String {
         let mut table = Text::new(&[
-            "time (s)",
+            self.clock.title(),
             "p (Pa)",
             "q (Pa)",
             "dilation",
@@ -210,7 +214,7 @@ impl Report {
         ]);
         for row in self.shown.iter().filter_map(|&frame| self.rows.get(frame)) {
             table.row(vec![
-                number(row.time),
+                number(self.clock.value(row.time)),
                 quantity(row.p, ""),
                 quantity(row.q, ""),
                 quantity(row.volumetric_strain, ""),

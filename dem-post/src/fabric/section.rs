@@ -19,7 +19,7 @@ impl OnPage for Report {
             charts.push(crack_density(self));
         }
         let figures = charts.into_iter().filter(drawn).map(|chart| {
-            let text = format!("{} over time.", capitalised(&chart.y));
+            let text = format!("{} over {}.", capitalised(&chart.y), self.clock.over());
             chart_figure(chart, &text, &text)
         });
         let text = "Stress and crack density are over the box around the sample at the first frame; the porosity is \

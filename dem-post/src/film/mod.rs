@@ -16,6 +16,7 @@ use dem_output::command_line::whole;
 use serde::Serialize;
 
 use crate::analysis::{Analysis, note};
+use crate::clock::Clock;
 use crate::cracks::report::total_over_time;
 use crate::frames::{self, Subject};
 use crate::options::{Files, LoadWall};
@@ -83,6 +84,8 @@ struct Curves {
     energy: Vec<(f64, f64)>,
     /// Time of each observed step (s).
     times: Vec<f64>,
+    /// What the times count.
+    clock: Clock,
     /// The titles of frames, with the same load.
     titles: Titles,
 }
@@ -103,8 +106,8 @@ impl Analysis for Command {
     fn table(report: &Report) -> String {
         facts(&[
             ("pictures", report.pictures.len().to_string()),
-            ("from", quantity(Some(report.span[0]), "s")),
-            ("to", quantity(Some(report.span[1]), "s")),
+            ("from", report.frames.clock.moment(report.span[0])),
+            ("to", report.frames.clock.moment(report.span[1])),
             ("length", quantity(Some(report.length), "s")),
             ("WebM", if report.webm { "film.webm" } else { "none: it takes ffmpeg" }.into()),
         ])
@@ -212,7 +215,7 @@ fn webm(png: &Path, webm: &Path) -> std::result::Result<(), NoWebm> {
 impl Curves {
     /// Reads the curves; `ruptures` are the times at which bonds broke (s), in order.
     fn read(history: &History, wall: Option<&str>, ruptures: &[f64]) -> Result<Self> {
-        let mut curves = Self::default();
+        let mut curves = Self { clock: Clock::of(history), ..Self::default() };
         match stress_strain::read(history, wall) {
             Ok(load) => {
                 let millimetres = load.displacement.iter().map(|x| 1e3 * x);
@@ -250,7 +253,7 @@ impl Curves {
             if points.is_empty() {
                 continue;
             }
-            let mut chart = Chart::new("time (s)", title);
+            let mut chart = self.clock.chart(title);
             let steps = title == "broken bonds";
             chart.y_is_count = steps;
             chart.moments.push(time);

@@ -16,6 +16,7 @@ use dem_output::command_line::seconds;
 use serde::Serialize;
 
 use crate::analysis::Analysis;
+use crate::clock::Clock;
 use crate::options::{Files, LoadWall};
 use crate::output::{Folder, PostError, Result, facts, number};
 use crate::section::{Maps, OnPage, Section};
@@ -52,8 +53,8 @@ pub struct Command {
     force: bool,
     #[command(flatten)]
     load_wall: LoadWall,
-    /// Of a run, times of the maps (s), as in 0.1,0.15 [default: first break, collapse or peak,
-    /// end].
+    /// Of a run, times of the maps (s), or steps of a run from break to break, as in 0.1,0.15
+    /// [default: first break, collapse or peak, end].
     #[arg(long, value_name = "T,…", value_delimiter = ',', value_parser = seconds)]
     times: Vec<f64>,
     /// Of a run, the limit load of its scene: a file with what `dem-run limit SCENE --json` prints.
@@ -327,6 +328,7 @@ pub fn write(history: &History, report: &Report, folder: &mut Folder) -> Result<
     let name = history.path().file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
     let title = tree["title"].as_str().map_or_else(|| name.clone(), |title| format!("{name}: {title}"));
     let sections = report.sections(history)?;
-    let page = Page { title, sections, scene: page::pretty(&scene), scene_of: "As it was run.".into() };
+    let (scene, step) = (page::pretty(&scene), Clock::of(history).step());
+    let page = Page { title, sections, step, scene, scene_of: "As it was run.".into() };
     Ok(folder.write("report.html", page.render()?.as_bytes())?)
 }

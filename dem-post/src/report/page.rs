@@ -20,6 +20,8 @@ pub struct Page {
     pub title: String,
     /// Its sections.
     pub sections: Vec<Section>,
+    /// Where the times of the run count steps, what a step adds to them (s).
+    pub step: Option<f64>,
     /// The scene.
     pub scene: String,
     /// The line above the scene.

@@ -1,10 +1,11 @@
 //! The beginning of the page: the result in a sentence, three moments as pictures, and the slider.
 
-use dem_drawing::{Chart, Style, colour};
+use dem_drawing::{Style, colour};
 use dem_history::{History, Rupture};
 
 use super::limit::LimitLoad;
 use super::player;
+use crate::clock::Clock;
 use crate::collapse::peak;
 use crate::cracks::report::total_over_time;
 use crate::extent::first_box;
@@ -105,7 +106,8 @@ fn shown(
 
 /// A picture of each moment, all on one scale.
 fn pictures(history: &History, shown: &[Moment], parts: &Parts) -> Result<Vec<Figure>> {
-    let times: Vec<f64> = shown.iter().map(|moment| history.times()[moment.frame]).collect();
+    let clock = Clock::of(history);
+    let times: Vec<f64> = shown.iter().map(|moment| clock.value(history.times()[moment.frame])).collect();
     // what the sample has: bonds, else forces, else speeds
     let mut chosen = None;
     for subject in [Subject::Bonds, Subject::Forces, Subject::Speed] {
@@ -127,11 +129,11 @@ fn pictures(history: &History, shown: &[Moment], parts: &Parts) -> Result<Vec<Fi
     };
     let mut figures = vec![];
     for Moment { events, frame } in shown {
-        let time = number(history.times()[*frame]);
+        let at = clock.at(history.times()[*frame]);
         let load = parts.load.and_then(|load| load.load_at(history.steps()[*frame]));
         let load = load.map_or_else(String::new, |load| format!(", load {} N", short(load)));
-        let caption = format!("{}t = {time} s{load}.", told(events));
-        let alt = format!("The sample with its {what} at t = {time} s.");
+        let caption = format!("{}{at}{load}.", told(events, clock));
+        let alt = format!("The sample with its {what} at {at}.");
         figures.push(map_figure(&frames::drawing(history, &chosen, &view, *frame)?, &alt, &caption)?);
     }
     Ok(figures)
@@ -139,11 +141,11 @@ fn pictures(history: &History, shown: &[Moment], parts: &Parts) -> Result<Vec<Fi
 
 /// What comes before the time of a picture: its events, as in `First break: ` or, where the frame
 /// has another time, `First break at 0.031 s; shown: `.
-fn told(events: &[(&str, Option<f64>)]) -> String {
+fn told(events: &[(&str, Option<f64>)], clock: Clock) -> String {
     if events.is_empty() {
         return String::new();
     }
-    let at = |time: Option<f64>| time.map_or_else(String::new, |time| format!(" at {} s", number(time)));
+    let at = |time: Option<f64>| time.map_or_else(String::new, |time| format!(" at {}", clock.moment(time)));
     let each: Vec<String> = events.iter().map(|(name, time)| format!("{name}{}", at(*time))).collect();
     let shown = if events.iter().any(|(_, time)| time.is_some()) { "; shown: " } else { ": " };
     format!("{}{shown}", capitalised(&each.join(", ")))
@@ -151,11 +153,12 @@ fn told(events: &[(&str, Option<f64>)]) -> String {
 
 /// Load and broken bonds over time.
 fn charts(history: &History, ruptures: &[Rupture], parts: &Parts) -> Vec<Figure> {
-    let mut figures = vec![];
+    let clock = Clock::of(history);
+    let (mut figures, over) = (vec![], clock.over());
     if let Some(load) = parts.load {
         let points = load.time.iter().copied().zip(load.load.iter().copied()).collect();
-        let mut chart = Chart::new("time (s)", "load (N)").curve("load", colour::BLUE, Style::Line, points);
-        let mut text = format!("Load of wall {} over time", load.summary.wall);
+        let mut chart = clock.chart("load (N)").curve("load", colour::BLUE, Style::Line, points);
+        let mut text = format!("Load of wall {} over {over}", load.summary.wall);
         if let Some(limit) = parts.limit.and_then(|limit| limit.load) {
             // beside a far greater limit load the curve would be flat
             if limit <= FAR * load.summary.greatest_load {
@@ -171,10 +174,10 @@ fn charts(history: &History, ruptures: &[Rupture], parts: &Parts) -> Vec<Figure>
     if !ruptures.is_empty() {
         let times: Vec<f64> = ruptures.iter().map(|rupture| rupture.time).collect();
         let points = total_over_time(history, &times);
-        let mut chart =
-            Chart::new("time (s)", "broken bonds").curve("broken bonds", colour::BLUE, Style::Steps, points);
+        let mut chart = clock.chart("broken bonds").curve("broken bonds", colour::BLUE, Style::Steps, points);
         chart.y_is_count = true;
-        figures.push(chart_figure(chart, "Number of broken bonds over time.", "Broken bonds over time."));
+        let text = format!("Broken bonds over {over}.");
+        figures.push(chart_figure(chart, &format!("Number of broken bonds over {over}."), &text));
     }
     figures
 }
@@ -195,7 +198,7 @@ fn sentences(history: &History, parts: &Parts, ruptures: &[Rupture]) -> Result<S
                 .kinetic_energy
                 .map(|energy| format!(", with a kinetic energy of {} J at the end", number(energy)));
             let energy = energy.unwrap_or_default();
-            said.push(format!("{} without bonds, until t = {} s{energy}.", counted(n, "grain"), number(last)));
+            said.push(format!("{} without bonds, until {}{energy}.", counted(n, "grain"), Clock::of(history).at(last)));
         }
     }
     if parts.info.open_ended {
@@ -211,7 +214,7 @@ fn load_sentence(load: &stress_strain::Report, ruptures: &[Rupture]) -> String {
     let mut parts = vec![];
     if let (Some(first), Some(rupture)) = (s.first_break, ruptures.first()) {
         let mode = rupture.mode.label().to_lowercase();
-        parts.push(format!("the first bond broke at {} (t = {} s, in {mode})", newton(first), number(rupture.time)));
+        parts.push(format!("the first bond broke at {} ({}, in {mode})", newton(first), load.clock.at(rupture.time)));
     }
     if let Some(collapse) = s.collapse_load.filter(|_| !s.collapse_early[0]) {
         parts.push(format!("the sample collapsed at {} (strain 10⁻⁴)", newton(collapse)));

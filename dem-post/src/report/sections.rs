@@ -1,9 +1,10 @@
 //! Sections of the page without an analysis of their own: the accuracy of the solver, the energy.
 
-use dem_drawing::{Chart, Style, colour};
+use dem_drawing::{Style, colour};
 use dem_history::{History, Series};
 
 use super::solver::Accuracy;
+use crate::clock::Clock;
 use crate::output::{Result, number};
 use crate::section::{Maps, OnPage, Section, capitalised, chart_figure};
 
@@ -18,26 +19,27 @@ impl OnPage for Accuracy {
 
     fn section(&self, history: &History, _: &Maps) -> Result<Section> {
         let mut figures = vec![];
-        for (name, title, alt, steps) in [
-            ("solver_residual", "residual", "Residual of the accepted solve of each step over time.", false),
-            ("solver_load_error", "load error", "Load error of each step over time.", false),
-            ("false_acceleration", "false acceleration", "False acceleration of each step over time.", false),
-            ("solver_iterations", "iterations of a step", "Iterations of each step over time.", true),
-            ("penetration", "penetration (m)", "Deepest penetration of each step over time.", false),
+        for (name, title, what, steps) in [
+            ("solver_residual", "residual", "Residual of the accepted solve of each step", false),
+            ("solver_load_error", "load error", "Load error of each step", false),
+            ("false_acceleration", "false acceleration", "False acceleration of each step", false),
+            ("solver_iterations", "iterations of a step", "Iterations of each step", true),
+            ("penetration", "penetration (m)", "Deepest penetration of each step", false),
         ] {
             let points: Vec<(f64, f64)> = points(history.observable(name)?).into_iter().filter(|p| p.1 > 0.0).collect();
             // a logarithmic axis shows no zeros
             if points.len() < 2 {
                 continue;
             }
-            let mut curve = Chart::new("time (s)", title).curve(title, colour::BLUE, Style::Thin, points);
+            let mut curve = self.clock.chart(title).curve(title, colour::BLUE, Style::Thin, points);
             curve.log_y = true;
             let tolerance = self.tolerance.filter(|_| name == "solver_residual");
             if let Some(tolerance) = tolerance {
                 curve.levels.push((tolerance, format!("tolerance: {tolerance:e}")));
             }
-            let what = if steps { "steps without any are left out" } else { "steps where it is zero are left out" };
-            figures.push(chart_figure(curve, alt, &format!("{alt} {}.", capitalised(what))));
+            let alt = format!("{what} over {}.", self.clock.over());
+            let left_out = if steps { "steps without any are left out" } else { "steps where it is zero are left out" };
+            figures.push(chart_figure(curve, &alt, &format!("{alt} {}.", capitalised(left_out))));
         }
         Ok(Section {
             text:
@@ -71,7 +73,8 @@ pub fn energy(history: &History) -> Result<Section> {
         ("energy_remainder", "energy remainder (should be 0)"),
     ];
     let mut facts = vec![];
-    let mut curves = Chart::new("time (s)", "energy (J)");
+    let clock = Clock::of(history);
+    let mut curves = clock.chart("energy (J)");
     for (name, label) in books {
         let points = points(history.observable(name)?);
         let Some(&(_, end)) = points.last() else {
@@ -87,7 +90,7 @@ pub fn energy(history: &History) -> Result<Section> {
         }
     }
     curves.pad_x = true;
-    let alt = "External work, kinetic energy and dissipation over time.";
-    let figures = if curves.curves.is_empty() { vec![] } else { vec![chart_figure(curves, alt, alt)] };
+    let alt = format!("External work, kinetic energy and dissipation over {}.", clock.over());
+    let figures = if curves.curves.is_empty() { vec![] } else { vec![chart_figure(curves, &alt, &alt)] };
     Ok(Section { id: "energy", title: "Energy", facts, figures, ..Section::default() })
 }

@@ -3,6 +3,7 @@
 use dem_history::{FALSE_ACCELERATION, History, LOAD_ERROR, ROUTE, SolverRoute};
 use serde::Serialize;
 
+use crate::clock::Clock;
 use crate::output::{Result, number};
 
 /// The distribution of a measure over the steps.
@@ -50,6 +51,9 @@ pub struct Accuracy {
     pub newton: Option<[f64; 2]>,
     /// Processor time of the run, s.
     pub cpu_time: Option<f64>,
+    /// What times count.
+    #[serde(skip)]
+    pub clock: Clock,
 }
 
 /// Reads the solver's figures.
@@ -93,6 +97,7 @@ pub fn read(history: &History) -> Result<Accuracy> {
         mean_iterations: mean_of("solver_iterations")?,
         newton: mean_of("solver_newton_iterations")?.zip(mean_of("solver_factorisations")?).map(|(n, f)| [n, f]),
         cpu_time: series("cpu_time")?.and_then(|(_, value)| value.last().copied()),
+        clock: Clock::of(history),
     })
 }
 
@@ -113,11 +118,11 @@ impl Accuracy {
             found.map_or_else(
                 || "not recorded".into(),
                 |s| {
-                    let [median, high, worst, time] = [s.median, s.high, s.worst, s.time].map(number);
+                    let [median, high, worst] = [s.median, s.high, s.worst].map(number);
                     // with fewer than 100 steps no step is above
                     let above =
                         if s.high < s.worst { format!("1 % of the steps above {high}; ") } else { String::new() };
-                    format!("median {median}; {above}worst {worst} at t = {time} s")
+                    format!("median {median}; {above}worst {worst} at {}", self.clock.at(s.time))
                 },
             )
         };

@@ -30,9 +30,7 @@ pub fn force_displacement(report: &Report) -> Chart {
 
 /// The load of each break over the number of broken bonds, where the load follows the breaks.
 pub fn load_breaks(report: &Report) -> Option<Chart> {
-    if !report.follows_breaks {
-        return None;
-    }
+    report.clock.step()?;
     let mut chart = Chart::new("broken bonds", "load of the break (N)");
     (chart.pad_x, chart.x_is_count) = (true, true);
     Some(chart.curve("applied force", colour::BLUE, Style::Line, pairs(&report.broken, 1.0, &report.load, 1.0)))

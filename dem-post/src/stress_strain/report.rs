@@ -11,6 +11,7 @@ use serde_json::Value;
 
 use super::elastic::{Curves, Elastic, RANGE};
 use crate::chains::stress::thickness;
+use crate::clock::Clock;
 use crate::collapse::{Bonding, Collapse, peak, work};
 use crate::extent::first_box;
 use crate::output::{PostError, Result, facts, number, quantity};
@@ -109,9 +110,9 @@ pub struct Report {
     /// Bonds broken; empty if not recorded.
     #[serde(skip)]
     pub broken: Vec<f64>,
-    /// Whether each step is the load at which the next bond breaks (`rupture: next_event`).
+    /// What times count: steps where each is the load at which the next bond breaks.
     #[serde(skip)]
-    pub follows_breaks: bool,
+    pub clock: Clock,
     /// The summary.
     pub summary: Summary,
 }
@@ -148,7 +149,7 @@ pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
         reaction: motion.reaction.iter().map(|f| -motion.sense * f).collect(),
         strain: tensor("strain")?.iter().map(|e| -push * e).collect(),
         stress: tensor("stress")?.iter().map(|s| push * s).collect(),
-        follows_breaks: history.follows_breaks()?,
+        clock: Clock::of(history),
         broken: history.observable("bonds_broken")?.map(|series| series.value).unwrap_or_default(),
         summary: Summary {
             wall: walls[k].name.clone(),
@@ -533,7 +534,7 @@ impl Report {
             ("collapse load (strain 1e-3)", s.collapse(1)),
             ("load with 5 % of bonds broken", quantity(s.load_at_5_percent_broken, "N")),
             ("collapse load / cohesion", quantity(s.collapse_over_cohesion, "")),
-            ("collapse at", quantity(s.collapse_time, "s")),
+            ("collapse at", s.collapse_time.map_or_else(|| "–".into(), |time| self.clock.moment(time))),
             ("peak load", s.peak()),
             ("strain at the peak", quantity(s.peak_strain, "")),
         ]);

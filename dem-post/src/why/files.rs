@@ -72,7 +72,7 @@ fn of(parts: &[Part], mode: RuptureMode) -> Option<&Part> {
 
 /// The utilisation of each mode over time, up to the rupture.
 fn chart(report: &Report) -> Chart {
-    let mut chart = Chart::new("time (s)", &format!("utilisation of bond {}", report.bond));
+    let mut chart = report.clock.chart(&format!("utilisation of bond {}", report.bond));
     chart.pad_x = true;
     for &mode in RuptureMode::ALL {
         let ratio = |parts: &[Part]| of(parts, mode).and_then(|part| part.utilisation);

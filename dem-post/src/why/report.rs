@@ -6,6 +6,7 @@ use serde::Serialize;
 use super::bond::Which;
 use super::rupture::Broken;
 use super::utilisation::{Greatest, Limits, Load, Part, Twist, greatest};
+use crate::clock::Clock;
 use crate::output::{PostError, Result, progress};
 use crate::stress_strain::driven;
 
@@ -69,6 +70,9 @@ pub struct Report {
     /// What it bears.
     #[serde(skip)]
     pub limits: Limits,
+    /// What times count.
+    #[serde(skip)]
+    pub clock: Clock,
 }
 
 /// Reads what happened to the bond `which`, with a bar unless `quiet`; the load is that of `wall`,
@@ -117,6 +121,7 @@ pub fn read(history: &History, which: Which, wall: Option<&str>, quiet: bool) ->
         frames_note: note(history, &frames),
         frames,
         limits,
+        clock: Clock::of(history),
     })
 }
 

@@ -16,8 +16,7 @@ impl Report {
         lines.extend([("strength", self.strength_line()), ("breaks at", self.limit_line())]);
         match &self.broken {
             Some(broken) => lines.extend(self.broken_lines(broken)),
-            None => lines
-                .push(("state", format!("intact at {} s, step {}, the last frame", number(self.end.1), self.end.0))),
+            None => lines.push(("state", format!("intact at {}, the last frame", self.when(self.end.1, self.end.0)))),
         }
         lines.extend(self.frame_lines());
         facts(&lines)
@@ -44,13 +43,7 @@ impl Report {
         let mut lines = vec![
             (
                 "state",
-                format!(
-                    "broke in {} at {} s, step {}, round {} of the cascade",
-                    b.mode,
-                    number(b.time),
-                    b.step,
-                    b.round
-                ),
+                format!("broke in {} at {}, round {} of the cascade", b.mode, self.when(b.time, b.step), b.round),
             ),
             ("place", place(&b.point)),
         ];
@@ -77,10 +70,16 @@ impl Report {
         lines
     }
 
+    /// A time (s) and its step: `0.24 s, step 240`, or `step 240` where the time counts steps.
+    fn when(&self, time: f64, step: i64) -> String {
+        let moment = self.clock.moment(time);
+        if self.clock.step().is_some() { moment } else { format!("{moment}, step {step}") }
+    }
+
     fn neighbour(&self, other: &Neighbour) -> String {
         let Neighbour { bond, grains: [i, j], mode, step, time, round, distance } = other;
         let away = format!("{} mm ({} a)", number(1e3 * distance), number(distance / self.mean_diameter));
-        let when = format!("{} s, step {step}, round {round}", number(*time));
+        let when = format!("{}, round {round}", self.when(*time, *step));
         format!("bond {bond} ({i}–{j}), {mode}, {when}; {away} away")
     }
 
@@ -91,19 +90,20 @@ impl Report {
         }
         let mut lines = vec![];
         if let Some((moment, most)) = self.peak() {
-            let when = format!("{} s, step {}", number(moment.time), moment.step);
+            let when = self.when(moment.time, moment.step);
             let frames = self.frames.len();
             lines.push(("utilisation", format!("at most {} at {when}; {frames} frames", share(most))));
         }
         for level in LEVELS {
             if let Some(moment) = self.reached(level) {
                 let mode = moment.greatest.map_or("", |most| most.mode);
-                lines.push(("", format!("at least {} first at {} s ({mode})", number(level), number(moment.time))));
+                let when = self.clock.moment(moment.time);
+                lines.push(("", format!("at least {} first at {when} ({mode})", number(level))));
             }
         }
         if let Some((moment, most)) = self.frames.last().and_then(|moment| Some((moment, moment.greatest?))) {
             let last = if self.broken.is_some() { "in the last frame before it broke" } else { "in the last frame" };
-            lines.push(("", format!("{} {last}, {} s", share(most), number(moment.time))));
+            lines.push(("", format!("{} {last}, {}", share(most), self.clock.moment(moment.time))));
         }
         lines
     }

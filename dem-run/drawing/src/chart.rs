@@ -32,6 +32,8 @@ const FEW: f64 = 5.0;
 const TIME: &str = "time (s)";
 const SHORT_TIME: &str = "time (ms)";
 const SHORT: f64 = 0.05;
+/// Title of an axis of time that counts steps.
+const STEP: &str = "step";
 /// Maximum number of points of a curve: more than the pixels of its width, so that no visible point
 /// is lost.
 const CURVE_POINTS: usize = 4000;
@@ -94,6 +96,8 @@ pub struct Chart {
     pub levels: Vec<(f64, String)>,
     /// Marked values of x.
     pub moments: Vec<f64>,
+    /// Where an axis of time counts steps, what a step adds to the time (s).
+    pub step: Option<f64>,
 }
 
 /// The axes of a chart in its drawing.
@@ -138,6 +142,11 @@ impl Chart {
         Self { x: x.into(), y: y.into(), ..Self::default() }
     }
 
+    /// A chart over the time (s).
+    pub fn over_time(y: &str) -> Self {
+        Self::new(TIME, y)
+    }
+
     /// Adds a curve.
     pub fn curve(mut self, label: &str, colour: &'static str, style: Style, points: Vec<(f64, f64)>) -> Self {
         self.curves.push(Curve { label: label.into(), points, style, colour, times: vec![], listed: true });
@@ -160,23 +169,37 @@ impl Chart {
         self
     }
 
-    /// With a short time in milliseconds.
+    /// With a short time in milliseconds, and with a time that counts steps in steps.
     pub fn readable(mut self) -> Self {
+        if self.x != TIME || self.log_x {
+            return self;
+        }
         let times = || self.curves.iter().flat_map(|curve| &curve.points).map(|p| p.0.abs());
         let last = times().filter(|time| time.is_finite()).fold(0.0, f64::max);
-        if self.x == TIME && !self.log_x && last > 0.0 && last < SHORT {
+        if let Some(step) = self.step {
+            (self.x, self.x_is_count) = (STEP.into(), true);
+            self.map_x(|time| (time / step).round());
+        } else if last > 0.0 && last < SHORT {
             self.x = SHORT_TIME.into();
-            self.curves.iter_mut().flat_map(|curve| &mut curve.points).for_each(|point| point.0 *= 1e3);
-            self.bars.iter_mut().flat_map(|bars| &mut bars.bars).for_each(|bar| bar.0 *= 1e3);
-            self.moments.iter_mut().for_each(|moment| *moment *= 1e3);
+            self.map_x(|time| 1e3 * time);
         }
         self
     }
 
+    fn map_x(&mut self, to: impl Fn(f64) -> f64) {
+        self.curves.iter_mut().flat_map(|curve| &mut curve.points).for_each(|point| point.0 = to(point.0));
+        self.bars.iter_mut().flat_map(|bars| &mut bars.bars).for_each(|bar| bar.0 = to(bar.0));
+        self.moments.iter_mut().for_each(|moment| *moment = to(*moment));
+    }
+
     /// Units of the horizontal axis in a second of the run; `None` where the axis is not the time.
     pub fn second(&self) -> Option<f64> {
-        let units = [(TIME, 1.0), (SHORT_TIME, 1e3)];
-        units.into_iter().find(|(title, _)| *title == self.x).map(|(_, units)| units)
+        match &*self.x {
+            TIME => Some(1.0),
+            SHORT_TIME => Some(1e3),
+            STEP => self.step.map(|step| 1.0 / step),
+            _ => None,
+        }
     }
 
     /// Draws the charts side by side, each with its legend above it.

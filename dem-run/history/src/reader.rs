@@ -436,11 +436,8 @@ impl History {
     }
 
     /// Whether the time counts breaks: the run loads from break to break (`rupture: next_event`).
-    ///
-    /// # Errors
-    /// [`HistoryError::Damaged`].
-    pub fn follows_breaks(&self) -> Result<bool> {
-        Ok(self.observable("load_time")?.is_some())
+    pub fn follows_breaks(&self) -> bool {
+        self.source.has("observables/load_time")
     }
 
     /// Every bond that broke, in order; empty for a scene without bonds.

@@ -22,6 +22,7 @@ pub fn write(sweep: &Sweep, report: &Report, folder: &mut Folder) -> Result<()> 
     let name = || sweep.store.folder().file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     let first = report.runs.iter().find(|run| !run.scene.is_empty());
     let page = Page {
+        step: None,
         title: sweep.manifest.title.clone().unwrap_or_else(name),
         sections,
         scene: first.map_or_else(String::new, |run| page::pretty(&run.scene)),
