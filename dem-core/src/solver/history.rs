@@ -31,10 +31,10 @@ pub(super) fn history(rows: &Rows, graph: &mut Option<Arc<Graph>>) -> Vec<Padded
     let made = factors.factorise(&graph.tree, |e, out| {
         let row = &rows.list[graph.contacts[e]];
         if row.is_rigid_bond() {
-            let every: Vec<usize> = (0..row.rows.len()).collect();
+            let bearing: Vec<usize> = (0..row.rows.len()).filter(|k| row.bears(row.rows[*k])).collect();
             let weights = row.weights.in_order();
-            let entry = |i: usize, j: usize| if i == j { stiff / weights[row.rows[i]] } else { 0.0 };
-            rows.add_element(row, &every, entry, out);
+            let entry = |i: usize, j: usize| if i == j { stiff / weights[row.rows[bearing[i]]] } else { 0.0 };
+            rows.add_element(row, &bearing, entry, out);
         }
     });
     if made.is_none() {
@@ -63,7 +63,9 @@ pub(super) fn history(rows: &Rows, graph: &mut Option<Arc<Graph>>) -> Vec<Padded
 /// ρ H̃ᵀ y of a bond.
 fn stiffened(rows: &Rows, row: &Row, stiff: f64, y: &[f64]) -> Padded {
     let (mut r, weights) = (rows.pulled(row, y).in_order(), row.weights.in_order());
-    r.iter_mut().zip(weights.iter()).for_each(|(r, w)| *r *= stiff / w);
+    for (place, (r, w)) in r.iter_mut().zip(weights.iter()).enumerate() {
+        *r *= if row.bears(place) { stiff / w } else { 0.0 };
+    }
     Padded::from_order(&r)
 }
 
@@ -135,6 +137,28 @@ mod tests {
         wanted.iter().zip(&kept).for_each(|(a, b)| assert!((a - b).abs() < 1e-10, "{a} {b}"));
         assert!(energy(&rows, &after) < 0.7 * energy(&rows, &before));
         // the result has no self-stress
+        rows.move_multipliers(&after);
+        let again = history(&rows, &mut None);
+        after.iter().zip(&again).for_each(|(a, b)| assert!((*a - *b).dot(&(*a - *b)).sqrt() < 1e-10));
+    }
+
+    /// Grains joined by pins: a bond without rolling strength carries no moment, so none may share
+    /// its load in the anchor.
+    #[test]
+    fn rows_that_bear_nothing_take_no_part() {
+        let mut rows = network();
+        for row in &mut rows.list {
+            row.cone.nu = 0.0;
+            row.multiplier.m = Padded::zero().m;
+        }
+        let after = history(&rows, &mut None);
+        assert!(after.iter().all(|r| r.m == Padded::zero().m));
+        let before: Vec<Padded> = rows.list.iter().map(|row| row.multiplier).collect();
+        net(&rows, &before)
+            .iter()
+            .zip(&net(&rows, &after))
+            .for_each(|(a, b)| assert!((a - b).abs() < 1e-10, "{a} {b}"));
+        // reactions without self-stress are their own history
         rows.move_multipliers(&after);
         let again = history(&rows, &mut None);
         after.iter().zip(&again).for_each(|(a, b)| assert!((*a - *b).dot(&(*a - *b)).sqrt() < 1e-10));

@@ -85,6 +85,17 @@ impl Row {
         self.count[0] + self.count[1]
     }
 
+    /// Whether the row at a place of a padded vector can carry a reaction.
+    pub fn bears(&self, place: usize) -> bool {
+        let Cone { mu, nu, xi } = self.cone;
+        match place {
+            0 => true,
+            1 | 2 => mu > 0.0,
+            TWIST => xi > 0.0,
+            _ => nu > 0.0,
+        }
+    }
+
     /// Whether it is a bond without compliance.
     pub fn is_rigid_bond(&self) -> bool {
         self.is_bond && self.compliance.n == 0.0

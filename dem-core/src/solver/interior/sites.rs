@@ -143,12 +143,6 @@ impl Sites {
 
     fn add(&mut self, row: &Row, u: &Padded, normal: f64, soft: f64) {
         let (mu, nu, xi) = (row.cone.mu, row.cone.nu, row.cone.xi);
-        let limit = |place: usize| match place {
-            0 => f64::INFINITY,
-            1 | 2 => mu,
-            TWIST => xi,
-            _ => nu,
-        };
         let mut site = Site {
             places: [0; ROWS],
             of: [0; ROWS],
@@ -158,7 +152,7 @@ impl Sites {
             duals: 0,
             matrix: self.matrices,
         };
-        for (k, place) in row.rows.iter().enumerate().filter(|(_, place)| limit(**place) > 0.0) {
+        for (k, place) in row.rows.iter().enumerate().filter(|(_, place)| row.bears(**place)) {
             (site.places[site.rows], site.of[site.rows]) = (*place, k);
             site.rows += 1;
         }
