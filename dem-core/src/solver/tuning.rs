@@ -70,11 +70,12 @@ pub(super) mod gauss_seidel {
 
 /// Newton's method from an active set (decision 7).
 pub(super) mod newton {
-    /// Gauss–Seidel sweeps that correct the active set of the last step, in 2D.
+    /// Gauss–Seidel sweeps that correct the active set of the last step where it fails, in 2D.
     pub const SWEEPS: usize = 5;
     /// Gauss–Seidel sweeps that estimate the active set in a cold start.
     pub const COLD_SWEEPS: usize = 100;
-    /// Most factorisations of a solve; the interior-point method takes 8 to 20.
+    /// Most factorisations from one guess of the active set; the interior-point method takes 8 to
+    /// 20.
     pub const MOST_FACTORISATIONS: u64 = 8;
     /// Most iterations of one inner problem.
     pub const MOST_ITERATIONS: u64 = 30;

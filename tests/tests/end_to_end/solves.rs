@@ -68,3 +68,21 @@ fn gauss_seidel_reports_no_load_error() {
     assert_eq!(report["accuracy"]["load_error"], Value::Null);
     assert_eq!(report["accuracy"]["routes"], serde_json::json!([0, 0, 0, summary["steps"]]));
 }
+
+/// Bonds without rolling strength carry no moment, so none may share the load in the reactions from
+/// which a path measures: the first bond breaks at the load that Newton finds.
+#[test]
+fn grains_joined_by_pins_break_at_one_load_with_every_solver() {
+    let here = Folder::new();
+    let scene = config("compression.json");
+    let pins = ["--set", "bonds.rolling=0", "--set", "time.step=1e-3", "--set", "stop={\"broken_fraction\": 0.01}"];
+    for seed in ["seed=2", "seed=4"] {
+        let first_break = |kind: &str| {
+            let own = ["run", &scene, "-o", "pins.h5", "--force", "-q", "--json", "--set", seed, "--set", kind];
+            let summary = here.dem_run(&[&own[..], &SMALL, &pins].concat()).json();
+            summary["failure"]["first_break"].as_f64().expect("a load")
+        };
+        let [path, stages] = ["solver.kind={\"interior\": {}}", "solver.kind={\"auto\": {}}"].map(first_break);
+        assert_eq!(path, stages, "{seed}");
+    }
+}

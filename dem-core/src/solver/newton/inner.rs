@@ -6,7 +6,7 @@ use super::guess::Guess;
 use crate::contact::Padded;
 use crate::solver::graph::Graph;
 use crate::solver::rows::{Operator, Rows};
-use crate::solver::tuning::newton as tuning;
+use crate::solver::tuning::{extrapolation, newton as tuning};
 
 /// An iterate of the inner problem.
 pub(super) struct Iterate {
@@ -85,8 +85,9 @@ impl Newton {
             rounding += row.size * (speed * row.size / (soft * soft) + r.dot(r));
             carried += row.size * r.dot(r);
         }
-        let wanted =
-            tuning::SHARE * (self.settings.load_tolerance * change).min(self.settings.tolerance * carried.sqrt());
+        // iterations with kept factors are cheap, and the extrapolation learns the growth from them
+        let share = if self.kept_alone { tuning::SHARE * extrapolation::SHARE } else { tuning::SHARE };
+        let wanted = share * (self.settings.load_tolerance * change).min(self.settings.tolerance * carried.sqrt());
         wanted.max(tuning::ROUNDING * rounding.sqrt())
     }
 

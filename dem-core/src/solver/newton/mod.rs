@@ -27,7 +27,7 @@ mod rounds;
 use super::graph::Graph;
 use super::rows::Rows;
 use super::solvable::Solvable;
-use super::{SolveReport, StagedSettings};
+use super::{SolveReport, SolveStatus, StagedSettings};
 use crate::saved::{Mismatch, Reader, Saved};
 use crate::solver::tuning::newton as tuning;
 use factor::Factor;
@@ -41,8 +41,10 @@ pub(super) struct Newton {
     factor: Factor,
     /// Graph of the last problem.
     pub graph: Option<Arc<Graph>>,
-    /// Number of factorisations, since the first solve, at which this solve is given up.
+    /// Number of factorisations, since the first solve, at which this guess is given up.
     most_made: u64,
+    /// Whether this guess has the kept factors alone.
+    kept_alone: bool,
     /// Margins of the contacts to another status, in the first proximal iteration of the last
     /// solve.
     pub margins: Vec<f64>,
@@ -51,7 +53,7 @@ pub(super) struct Newton {
 impl Newton {
     /// A solver with these settings.
     pub fn new(settings: StagedSettings) -> Self {
-        Self { settings, factor: Factor::default(), graph: None, most_made: 0, margins: Vec::new() }
+        Self { settings, factor: Factor::default(), graph: None, most_made: 0, kept_alone: false, margins: Vec::new() }
     }
 
     /// Factorisations so far.
@@ -59,9 +61,11 @@ impl Newton {
         self.factor.made
     }
 
-    /// Proximal iterations from the active set of the reactions in the problem. In 2D and in a cold
-    /// start some Gauss–Seidel sweeps correct the active set first; in 3D unconverged sweeps would
-    /// spoil the slip directions. None if Newton fails.
+    /// Proximal iterations from the active set of the reactions in the problem. In 2D they are
+    /// repeated from that after some Gauss–Seidel sweeps where they fail, and a cold start has this
+    /// guess alone; in 3D unconverged sweeps would spoil the slip directions. The first of two
+    /// guesses is for steps without a change of status: it has the kept factors alone, or half of
+    /// the factorisations where there are none. None if Newton fails.
     pub fn solve(
         &mut self,
         problem: &mut impl Solvable,
@@ -69,11 +73,24 @@ impl Newton {
         cold: bool,
         iterations: &mut u64,
     ) -> Option<SolveReport> {
+        if !cold && !rows.in_space() {
+            let multipliers: Vec<_> = rows.list.iter().map(|row| row.multiplier).collect();
+            let reactions = problem.swept(0);
+            self.kept_alone = self.factor.fits(rows.unknowns);
+            self.most_made = self.made() + if self.kept_alone { 0 } else { tuning::MOST_FACTORISATIONS / 2 };
+            let report = self.rounds(problem, rows, Guess::of(reactions.clone()), true, iterations);
+            if report.is_some_and(|report| report.status == SolveStatus::Converged) {
+                return report;
+            }
+            rows.move_multipliers(&multipliers);
+            problem.write_back(&reactions);
+        }
         let sweeps = match rows.in_space() {
             _ if cold => tuning::COLD_SWEEPS,
             true => 0,
             false => tuning::SWEEPS,
         };
+        self.kept_alone = false;
         self.most_made = self.made() + tuning::MOST_FACTORISATIONS;
         let guess = Guess::of(problem.swept(sweeps));
         let report = self.rounds(problem, rows, guess, !cold, iterations);
