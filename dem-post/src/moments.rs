@@ -14,8 +14,9 @@ const ROUNDING: f64 = 1e-9;
 /// differently.
 pub(crate) const SAME_TIME: f64 = 1e-9;
 
-/// The frames nearest to `times`, in the unit of the clock (s or steps). Without times: the first frame after the first rupture, the
-/// first after 5 % of the bonds have broken, and the last. In order, without repetition.
+/// The frames nearest to `times`, in the unit of the clock (s or steps). Without times: the first
+/// frame after the first rupture, the first after 5 % of the bonds have broken, and the last. In
+/// order, without repetition.
 ///
 /// # Errors
 /// [`PostError::Usage`] for a time outside the history, [`PostError::Lacking`] for a history

@@ -240,7 +240,8 @@ pub(super) mod selection {
     pub const SHARE: f64 = 0.1;
     pub const STIFFEST: f64 = 1e12;
     /// Sum of the complementarity gaps, relative to the energy of the metric, at which the
-    /// minimum-energy reactions are known; also the least energy that counts, relative to Σ r²/ρ. A
+    /// minimum-energy reactions are known; also the least energy that counts, relative to Σ r²/ρ,
+    /// and the most gaps and energy, relative to the same, with which a jammed path ends. A
     /// thousandth left reactions 3 % from them.
     pub const LEAST: f64 = 1e-5;
     /// The same ratio at which a point is stored, to follow the path again from it with another

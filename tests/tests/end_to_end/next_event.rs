@@ -57,8 +57,18 @@ fn the_branch_beyond_the_peak_does_not_depend_on_the_order_of_the_contacts() {
         let emission = here.dem_post(&["emission", "run.h5", "--json", "--force"]).json();
         let bursts = emission["events"].as_array().expect("a list");
         assert!(!bursts.is_empty() && bursts.iter().all(|burst| burst["duration"].is_null()), "{emission}");
-        let told = here.dem_post(&["emission", "run.h5", "--force"]).succeeds().stdout;
-        assert!(told.contains("step") && !told.contains("time (s)"), "{told}");
+        for analysis in ["emission", "cracks", "chains", "fabric", "velocities", "compare"] {
+            let files = if analysis == "compare" { &["run.h5", "run.h5"][..] } else { &["run.h5"] };
+            let told = here.dem_post(&[&[analysis], files, &["--force"]].concat()).succeeds().stdout;
+            let seconds = ["time (s)", "first (s)", "t ="].iter().any(|words| told.contains(words));
+            assert!(told.contains("step") && !seconds, "{told}");
+        }
+        let late = ["chains", "run.h5", "--force", "--times", "3,900"];
+        here.dem_post(&late).fails(2, &["counts steps, from 0 to"]);
+        here.dem_post(&["report", "run.h5", "--force"]).succeeds();
+        let page = String::from_utf8(here.read("run-post/report.html")).expect("UTF-8");
+        assert!(page.contains("data-step=") && page.contains("over the steps") && !page.contains("over time"));
+        assert!(page.contains("First break: step 1") && !page.contains("t = 0."));
         events(&here, "run.h5", |grain| order[grain as usize])
     });
     let [first, others @ ..] = &branches;
@@ -81,6 +91,24 @@ fn the_branch_beyond_the_peak_does_not_depend_on_the_order_of_the_contacts() {
     let reached = summary["failure"]["first_break"].as_f64().expect("a load");
     // a step of 1e-4 s adds 0.01 N
     assert!(reached >= loads[0] * (1.0 - 1e-6) && reached <= loads[0] + 0.0101, "{reached} N, {} N", loads[0]);
+}
+
+/// A run that is resumed with it begins without loads, where no reactions are left.
+#[test]
+fn a_stepped_run_goes_on_from_break_to_break() {
+    let here = Folder::new();
+    let scene = config("compression.json");
+    let run = |file: &str, more: &[&str]| {
+        here.dem_run(&[&["run", &scene, "-o", file, "-q", "--json"][..], &SMALL, more].concat()).json()
+    };
+    let stop = ["--set", "stop={\"broken_fraction\": 0.03}"];
+    let whole = run("whole.h5", &[&NEXT[..2], &stop].concat());
+    run("stepped.h5", &["--set", "time.end=0.01"]);
+    let next = ["resume", "stepped.h5", "-q", "--json", "--force", "--until", "1", "--set", "rupture=next_event"];
+    let resumed = here.dem_run(&[&next[..], &stop].concat()).json();
+    let first = |summary: &Value| summary["failure"]["first_break"].as_f64().expect("a load");
+    assert!((first(&resumed) / first(&whole) - 1.0).abs() < 1e-6, "{resumed}");
+    assert_eq!(resumed["ending"], "broken_fraction");
 }
 
 #[test]

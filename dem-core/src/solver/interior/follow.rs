@@ -44,6 +44,11 @@ impl Follow {
         self.by_arc_length.as_ref().map_or_else(|| self.at.clone(), |by| by.continuation.state())
     }
 
+    /// Whether the path is followed in long steps, which have not jammed.
+    pub fn is_in_long_steps(&self) -> bool {
+        self.by_arc_length.is_none()
+    }
+
     /// Continue from an earlier point of the path.
     pub fn turn_back(&mut self, to: State, sites: &Sites) {
         let by_arc_length = self.by_arc_length.take().is_some();

@@ -93,8 +93,13 @@ impl Interior {
                 }
             }
             let Some(system) = self.factorised(&sites, &coupling, &at, &selection.metric) else { break };
+            let in_long_steps = follow.is_in_long_steps();
             let Some(step) = follow.step(&system, &sites) else { break };
             selection.change = system.change(&step);
+            let has_jammed = in_long_steps && !follow.is_in_long_steps();
+            if has_jammed && selection.ends_at_nearest(problem, &sites) {
+                break;
+            }
         }
         selection.found(problem, &sites)
     }

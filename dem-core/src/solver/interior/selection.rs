@@ -6,6 +6,8 @@
 //!    between bodies of very different masses, the path is followed again with the metric anchored
 //!    at r*, then with stiffer metrics. It starts from an earlier point of the path, since steps
 //!    near the boundary are short.
+//! 3. Where the path jams before that, its point of least gap is the result if it is a solution and
+//!    its gaps and its energy are far below Σ r²/ρ.
 
 use super::aims::{Aims, Found};
 use super::metric::Metric;
@@ -74,10 +76,7 @@ impl Selection {
         let energy = self.metric.energy(&at.r).max(tuning::LEAST * self.metric.weight(&at.r));
         let least = tuning::LEAST * energy;
         if self.limits.is_none() && gaps <= least {
-            let limits = sites.limits(at, &self.metric.compliance);
-            let is_accurate = self.metric.left(sites, &at.r).0 <= tuning::ACCURATE;
-            self.reached = is_accurate.then(|| sites.reached(at, &limits));
-            (self.limits, self.enough) = (Some(limits), least);
+            self.know(sites, at, least);
         }
         let selected = self.limits.is_some() && gaps <= self.enough;
         self.iterations = iteration;
@@ -113,6 +112,35 @@ impl Selection {
             }
             _ => Next::Onwards,
         }
+    }
+
+    /// Take a point as r*: its limits are known, and gaps up to `enough` count.
+    fn know(&mut self, sites: &Sites, at: &State, enough: f64) {
+        let limits = sites.limits(at, &self.metric.compliance);
+        let is_accurate = self.metric.left(sites, &at.r).0 <= tuning::ACCURATE;
+        self.reached = is_accurate.then(|| sites.reached(at, &limits));
+        (self.limits, self.enough) = (Some(limits), enough);
+    }
+
+    /// Where the path has jammed: whether its point of least gap is a solution whose reactions
+    /// hardly differ from the anchor. They would require gaps near round-off, at which it jams.
+    pub fn ends_at_nearest(&mut self, problem: &mut impl Solvable, sites: &Sites) -> bool {
+        if self.limits.is_some() {
+            return false;
+        }
+        let Some((gaps, change, nearest)) = self.nearest.take() else { return false };
+        let enough = tuning::LEAST * self.metric.weight(&nearest.r);
+        let last = std::mem::replace(&mut self.change, change);
+        if gaps.max(self.metric.energy(&nearest.r)) <= enough {
+            self.know(sites, &nearest, enough);
+            let missed = [false, true].map(|known| self.measure(problem, sites, &nearest, known));
+            if missed.iter().any(|missed| *missed <= 1.0) {
+                return true;
+            }
+            (self.limits, self.reached, self.enough) = (None, None, f64::INFINITY);
+        }
+        (self.change, self.nearest) = (last, Some((gaps, change, nearest)));
+        false
     }
 
     /// The best point, or the unmeasured point of least gap if no measured one is a solution and
