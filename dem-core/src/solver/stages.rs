@@ -206,14 +206,15 @@ impl Staged {
         // bonds have unique reactions, and dry contacts need only reactions that balance
         let least = problem.matrix().is_none() && rows.list.iter().any(Row::is_rigid_bond);
         let mut aims = self.aims(least);
-        if effort == Effort::Short {
+        let nothing_acts = rows.nothing_acts();
+        if effort == Effort::Short || nothing_acts {
             aims.most = aims.most.min(tuning::MOST_SHORT);
         }
         let graph = &mut self.newton.graph;
         let mut best = self.interior.solve(problem, rows, graph, &anchor, start, aims);
         newton += best.as_ref().map_or(0, |found| found.iterations);
         let refused = best.as_ref().is_none_or(|found| found.missed(aims) > accept / tolerance);
-        if refused && rows.nothing_acts() {
+        if refused && nothing_acts {
             // all measures are relative to reactions that may vanish; zero ones balance exactly
             problem.write_back(&vec![Padded::zero(); rows.list.len()]);
             if problem.residual() == 0.0 {
