@@ -86,7 +86,7 @@ impl Newton {
             carried += row.size * r.dot(r);
         }
         // iterations with kept factors are cheap, and the extrapolation learns the growth from them
-        let share = if self.kept_alone { tuning::SHARE * extrapolation::SHARE } else { tuning::SHARE };
+        let share = if self.is_first_guess { tuning::SHARE * extrapolation::SHARE } else { tuning::SHARE };
         let wanted = share * (self.settings.load_tolerance * change).min(self.settings.tolerance * carried.sqrt());
         wanted.max(tuning::ROUNDING * rounding.sqrt())
     }

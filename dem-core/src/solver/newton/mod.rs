@@ -43,8 +43,8 @@ pub(super) struct Newton {
     pub graph: Option<Arc<Graph>>,
     /// Number of factorisations, since the first solve, at which this guess is given up.
     most_made: u64,
-    /// Whether this guess has the kept factors alone.
-    kept_alone: bool,
+    /// Whether it is the first of two guesses.
+    is_first_guess: bool,
     /// Margins of the contacts to another status, in the first proximal iteration of the last
     /// solve.
     pub margins: Vec<f64>,
@@ -53,7 +53,14 @@ pub(super) struct Newton {
 impl Newton {
     /// A solver with these settings.
     pub fn new(settings: StagedSettings) -> Self {
-        Self { settings, factor: Factor::default(), graph: None, most_made: 0, kept_alone: false, margins: Vec::new() }
+        Self {
+            settings,
+            factor: Factor::default(),
+            graph: None,
+            most_made: 0,
+            is_first_guess: false,
+            margins: Vec::new(),
+        }
     }
 
     /// Factorisations so far.
@@ -76,8 +83,9 @@ impl Newton {
         if !cold && !rows.in_space() {
             let multipliers: Vec<_> = rows.list.iter().map(|row| row.multiplier).collect();
             let reactions = problem.swept(0);
-            self.kept_alone = self.factor.fits(rows.unknowns);
-            self.most_made = self.made() + if self.kept_alone { 0 } else { tuning::MOST_FACTORISATIONS / 2 };
+            self.is_first_guess = true;
+            let fits = self.factor.fits(rows.unknowns);
+            self.most_made = self.made() + if fits { 0 } else { tuning::MOST_FACTORISATIONS / 2 };
             let report = self.rounds(problem, rows, Guess::of(reactions.clone()), true, iterations);
             if report.is_some_and(|report| report.status == SolveStatus::Converged) {
                 return report;
@@ -90,7 +98,7 @@ impl Newton {
             true => 0,
             false => tuning::SWEEPS,
         };
-        self.kept_alone = false;
+        self.is_first_guess = false;
         self.most_made = self.made() + tuning::MOST_FACTORISATIONS;
         let guess = Guess::of(problem.swept(sweeps));
         let report = self.rounds(problem, rows, guess, !cold, iterations);

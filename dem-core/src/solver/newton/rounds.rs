@@ -29,7 +29,7 @@ impl Newton {
             let mut state = Iterate::from_reactions(rows, &guess.reactions);
             let (made, solved) = self.inner(rows, &mut state, &guess, warm && self.margins.is_empty());
             *iterations += made.max(1);
-            if !solved && made > 1 && last_error <= self.settings.tolerance {
+            if !solved && !self.is_first_guess && made > 1 && last_error <= self.settings.tolerance {
                 // the last iteration met the residual tolerance, and this one was to measure its
                 // load error: the velocities give it
                 let begun = rows.given_by(&guess.reactions);
