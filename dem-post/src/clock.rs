@@ -54,6 +54,11 @@ impl Clock {
         }
     }
 
+    /// The same for a time that may be unknown: `–` where it is.
+    pub fn moment_if_known(self, time: Option<f64>) -> String {
+        time.map_or_else(|| "–".into(), |time| self.moment(time))
+    }
+
     /// A time (s) in a title: `t = 0.244 s`, `step 61`.
     pub fn at(self, time: f64) -> String {
         if self.step.is_some() { self.moment(time) } else { format!("t = {}", self.moment(time)) }
@@ -75,6 +80,7 @@ mod tests {
         assert_eq!([seconds.moment(0.061), seconds.at(0.061)], ["0.061 s", "t = 0.061 s"]);
         // 61 sums of a step are not 61 steps exactly
         assert_eq!([steps.moment(0.0610000001), steps.at(0.061)], ["step 61", "step 61"]);
+        assert_eq!([steps.moment_if_known(Some(0.061)), steps.moment_if_known(None)], ["step 61", "–"]);
         assert_eq!((steps.value(0.061), steps.time(61.0), seconds.time(61.0)), (61.0, 0.061, 61.0));
     }
 }

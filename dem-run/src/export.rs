@@ -86,6 +86,7 @@ fn export_in<D: Dim>(scene: &Scene, options: &ExportOptions, interrupt: &Interru
         progress.step(&StepProgress {
             step: world.steps,
             time: world.time,
+            counts_steps: scene.rupture == scene::Rupture::NextEvent,
             end: (options.step - 1) as f64 * scene.time.step,
             residual: report.residual,
             iterations: report.work.iterations(),

@@ -34,6 +34,9 @@ pub struct StepProgress {
     pub step: u64,
     /// Simulated time (s).
     pub time: f64,
+    /// Whether it counts steps (`rupture: next_event`).
+    #[serde(skip)]
+    pub counts_steps: bool,
     /// Simulated time at the end (s).
     pub end: f64,
     /// Relative residual of the last solve.
@@ -291,7 +294,7 @@ impl StepProgress {
             },
             Some(left.map_or("? left".to_string(), |left| left.to_string())),
             stop.map(|stop| format!("stop: {} {:.0} %", stop.condition, 100.0 * stop.reached)),
-            Some(format!("t {time:.4} of {end} s")),
+            (!self.counts_steps).then(|| format!("t {time:.4} of {end} s")),
             Some(format!("step {step}  residual {residual:.1e} ({iterations} iterations)")),
         ];
         parts.into_iter().flatten().collect::<Vec<_>>().join("  ")
@@ -400,6 +403,7 @@ mod tests {
         StepProgress {
             step,
             time: step as f64 * 0.1,
+            counts_steps: false,
             end: 1.0,
             residual: 8.2e-5,
             iterations: 12,

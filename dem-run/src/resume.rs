@@ -132,9 +132,12 @@ fn resume_in<D: Dim>(
         if options.json {
             return Ok(print_json(&serde_json::json!({ "history": path, "time": time, "steps_made": 0 }))?);
         }
+        let ended = match scene.rupture {
+            scene::Rupture::NextEvent => format!("after {} steps", state.world.steps),
+            _ => format!("at t = {} s", number(time)),
+        };
         return Ok(print_line(&format!(
-            "nothing to do: the run ended at t = {} s; --until T resumes it to a later end, --set stop=null beyond a stop",
-            number(time)
+            "nothing to do: the run ended {ended}; --until T resumes it to a later end, --set stop=null beyond a stop"
         ))?);
     }
     let kept = kept(history, scene, &checkpoint)?;

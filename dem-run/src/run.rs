@@ -283,6 +283,7 @@ impl<D: Dim> Run<'_, D> {
         StepProgress {
             step: self.state.world.steps,
             time: self.state.world.time,
+            counts_steps: self.scene.rupture == Rupture::NextEvent,
             end: self.scene.steps() as f64 * self.scene.time.step,
             residual: report.residual,
             iterations: report.work.iterations(),

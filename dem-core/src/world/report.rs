@@ -171,7 +171,8 @@ pub enum StepError {
     NotFinite {
         /// The body (walls follow the grains).
         body: u32,
-        /// Time of the last accepted state (s).
+        /// Time of the last accepted state (s); with [`crate::bond::Rupture::NextEvent`] the time
+        /// of the loads.
         time: f64,
     },
 }

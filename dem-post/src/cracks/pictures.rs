@@ -56,7 +56,9 @@ pub fn broken_chart(report: &Report, curve: &[(f64, [usize; 4])], end: f64) -> C
 pub fn fragment_charts(report: &Report) -> Vec<Chart> {
     let pieces = &report.fragments;
     let points = |value: &dyn Fn(&Fragments) -> f64| pieces.iter().map(|p| (p.time, value(&p.fragments))).collect();
-    let mut number = (report.clock.chart("number of fragments"))
+    let mut number = report
+        .clock
+        .chart("number of fragments")
         .curve("all", colour::BLACK, Style::Steps, points(&|f| f.count as f64))
         .curve("single grains", colour::VERMILLION, Style::Steps, points(&|f| f.singles as f64));
     (number.y_is_count, number.pad_x) = (true, true);
@@ -108,9 +110,12 @@ fn growth_chart(report: &Report) -> Option<Chart> {
     report.growth.first().zip(report.growth.last()).filter(|(first, last)| first.time < last.time)?;
     let (label, unit) = size_of_cracks(report);
     let points = |size: fn(&Growth) -> f64| report.growth.iter().map(|row| (row.time, unit * size(row))).collect();
-    let mut chart = (report.clock.chart(label))
-        .curve("all", colour::BLACK, Style::Steps, points(|row| row.size))
-        .curve(largest(report), colour::BLUE, Style::Steps, points(|row| row.largest));
+    let mut chart = report.clock.chart(label).curve("all", colour::BLACK, Style::Steps, points(|row| row.size)).curve(
+        largest(report),
+        colour::BLUE,
+        Style::Steps,
+        points(|row| row.largest),
+    );
     chart.pad_x = true;
     Some(chart)
 }

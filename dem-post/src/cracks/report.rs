@@ -222,10 +222,9 @@ impl Report {
         if self.broken.twist > 0 {
             lines.push(("  TWIST", self.broken.twist.to_string()));
         }
-        let told = |time: Option<f64>| time.map_or_else(|| "–".into(), |time| self.clock.moment(time));
         lines.extend([
-            ("first break", told(self.first_break)),
-            ("5 % broken", told(self.time_of_5_percent)),
+            ("first break", self.clock.moment_if_known(self.first_break)),
+            ("5 % broken", self.clock.moment_if_known(self.time_of_5_percent)),
             (
                 "fragments at the end",
                 last.map_or_else(|| "–".into(), |f| format!("{} ({} single grains)", f.count, f.singles)),
@@ -254,9 +253,9 @@ impl Report {
 
     fn event_table(&self) -> String {
         // a time that counts steps says no more than these
-        let timed = self.clock.step().is_none();
+        let from = usize::from(self.clock.step().is_some());
         let head = ["time (s)", "step", "round", "bond", "grains", "mode", "r_n (N)", "r_t (N)", "m (N m)"];
-        let mut table = Text::new(&head[usize::from(!timed)..]);
+        let mut table = Text::new(&head[from..]);
         for e in self.events.iter().take(SHOWN) {
             let grains = format!("{}–{}", e.grains[0], e.grains[1]);
             let row = vec![
@@ -270,7 +269,7 @@ impl Report {
                 number(e.tangential_force),
                 number(e.moment),
             ];
-            table.row(row[usize::from(!timed)..].to_vec());
+            table.row(row[from..].to_vec());
         }
         let rest = self.events.len().saturating_sub(SHOWN);
         table.lines() + &if rest > 0 { format!("… and {rest} more in ruptures.csv\n") } else { String::new() }

@@ -66,13 +66,12 @@ impl OnPage for Report {
             "The largest cracks; T/S/R/Tw: bonds broken in tension, in shear, by rolling, by twist"
         };
         let tables = self.crack_rows().into_iter().map(|(head, rows)| Table::new(caption, &head, rows)).collect();
-        let told = |time: Option<f64>| time.map_or_else(|| "–".into(), |time| self.clock.moment(time));
         let facts = vec![
             ("Bonds".into(), self.bonds.to_string()),
             ("Broken".into(), self.broken.total().to_string()),
             ("Cracks".into(), (self.cracks.len() + self.surfaces.len()).to_string()),
-            ("First break".into(), told(self.first_break)),
-            ("5 % broken".into(), told(self.time_of_5_percent)),
+            ("First break".into(), self.clock.moment_if_known(self.first_break)),
+            ("5 % broken".into(), self.clock.moment_if_known(self.time_of_5_percent)),
         ];
         let text = if history.dimension() == 2 {
             "A crack is a set of broken bonds that meet in the voids between the grains; its path is the longest line through it, drawn \

@@ -16,7 +16,9 @@ fn single(report: &Report, title: &str, of: &dyn Fn(&Row) -> Option<f64>) -> Cha
 
 /// Mean stress and deviator.
 pub fn stress(report: &Report) -> Chart {
-    (report.clock.chart("stress (kPa)"))
+    report
+        .clock
+        .chart("stress (kPa)")
         .curve("mean stress p", colour::BLUE, Style::Thin, over_time(report, &|row| Some(1e-3 * row.p?)))
         .curve("deviator q", colour::VERMILLION, Style::Thin, over_time(report, &|row| Some(1e-3 * row.q?)))
 }

@@ -16,7 +16,6 @@ use dem_output::command_line::seconds;
 use serde::Serialize;
 
 use crate::analysis::Analysis;
-use crate::clock::Clock;
 use crate::options::{Files, LoadWall};
 use crate::output::{Folder, PostError, Result, facts, number};
 use crate::section::{Maps, OnPage, Section};
@@ -328,7 +327,7 @@ pub fn write(history: &History, report: &Report, folder: &mut Folder) -> Result<
     let name = history.path().file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
     let title = tree["title"].as_str().map_or_else(|| name.clone(), |title| format!("{name}: {title}"));
     let sections = report.sections(history)?;
-    let (scene, step) = (page::pretty(&scene), Clock::of(history).step());
+    let (scene, step) = (page::pretty(&scene), report.info.clock.step());
     let page = Page { title, sections, step, scene, scene_of: "As it was run.".into() };
     Ok(folder.write("report.html", page.render()?.as_bytes())?)
 }

@@ -106,7 +106,7 @@ fn shown(
 
 /// A picture of each moment, all on one scale.
 fn pictures(history: &History, shown: &[Moment], parts: &Parts) -> Result<Vec<Figure>> {
-    let clock = Clock::of(history);
+    let clock = parts.info.clock;
     let times: Vec<f64> = shown.iter().map(|moment| clock.value(history.times()[moment.frame])).collect();
     // what the sample has: bonds, else forces, else speeds
     let mut chosen = None;
@@ -153,7 +153,7 @@ fn told(events: &[(&str, Option<f64>)], clock: Clock) -> String {
 
 /// Load and broken bonds over time.
 fn charts(history: &History, ruptures: &[Rupture], parts: &Parts) -> Vec<Figure> {
-    let clock = Clock::of(history);
+    let clock = parts.info.clock;
     let (mut figures, over) = (vec![], clock.over());
     if let Some(load) = parts.load {
         let points = load.time.iter().copied().zip(load.load.iter().copied()).collect();
@@ -198,7 +198,7 @@ fn sentences(history: &History, parts: &Parts, ruptures: &[Rupture]) -> Result<S
                 .kinetic_energy
                 .map(|energy| format!(", with a kinetic energy of {} J at the end", number(energy)));
             let energy = energy.unwrap_or_default();
-            said.push(format!("{} without bonds, until {}{energy}.", counted(n, "grain"), Clock::of(history).at(last)));
+            said.push(format!("{} without bonds, until {}{energy}.", counted(n, "grain"), parts.info.clock.at(last)));
         }
     }
     if parts.info.open_ended {

@@ -534,7 +534,7 @@ impl Report {
             ("collapse load (strain 1e-3)", s.collapse(1)),
             ("load with 5 % of bonds broken", quantity(s.load_at_5_percent_broken, "N")),
             ("collapse load / cohesion", quantity(s.collapse_over_cohesion, "")),
-            ("collapse at", s.collapse_time.map_or_else(|| "–".into(), |time| self.clock.moment(time))),
+            ("collapse at", self.clock.moment_if_known(s.collapse_time)),
             ("peak load", s.peak()),
             ("strain at the peak", quantity(s.peak_strain, "")),
         ]);
