@@ -113,6 +113,8 @@ def recomputed(h, told):
     }
     if h.route is not None:
         out |= of_solves(o, h.route, newton)
+    if h.quasi_static:
+        out["load_time"] = last("load_time")
     if "bond_elongation" in told:
         out["bond_elongation"] = float(o["bond_elongation"].max(initial=0.0)) if "bond_elongation" in o else 0.0
     out.update(loads(h, told))
@@ -241,7 +243,8 @@ def text_lines(h, told):
     new = "solved_steps" in told
     per_step = lambda n: n / max(told["solved_steps" if new else "steps"], 1)
     work = told["work"]
-    lines = [("ended", [told["time"], told["steps"]])]
+    ended = [told["steps"], told["load_time"]] if h.quasi_static else [told["time"], told["steps"]]
+    lines = [("ended", ended)]
     lines.append(
         ("sample", [told["grains"]] + ([told["solid_fraction"]] if told["solid_fraction"] is not None else []))
     )
