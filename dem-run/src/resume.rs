@@ -10,6 +10,7 @@ use crate::record::Recorder;
 use crate::run::{Execution, Run, RunOptions, RunState, handle_signals, run_in};
 use crate::scene::{self, Scene, differences};
 use crate::signals::Interrupt;
+use crate::summary::Ending;
 use dem_core::dim::Dim;
 use std::path::{Path, PathBuf};
 
@@ -127,7 +128,11 @@ fn resume_in<D: Dim>(
     };
     let mut state = RunState::<D>::restored(scene, &checkpoint)
         .map_err(|mismatch| RunError::InputOutput(format!("{shown}: {mismatch}; run the scene again")))?;
-    if state.world.steps >= scene.time.steps() || state.course.advance(scene, &mut state.world)?.is_some() {
+    let ending = match state.world.steps >= scene.time.steps() {
+        true => Some(Ending::Time),
+        false => state.course.advance(scene, &mut state.world)?,
+    };
+    if let Some(ending) = ending {
         let time = state.world.time;
         if options.json {
             return Ok(print_json(&serde_json::json!({ "history": path, "time": time, "steps_made": 0 }))?);
@@ -136,9 +141,16 @@ fn resume_in<D: Dim>(
             scene::Rupture::NextEvent => format!("after {} steps", state.world.steps),
             _ => format!("at t = {} s", number(time)),
         };
-        return Ok(print_line(&format!(
-            "nothing to do: the run ended {ended}; --until T resumes it to a later end, --set stop=null beyond a stop"
-        ))?);
+        let further = match ending {
+            Ending::WallTravel | Ending::BrokenFraction | Ending::LoadDrop => {
+                "--set stop=null resumes it beyond the stop"
+            }
+            Ending::Stages => {
+                "its last stage ended, and stages cannot change during a run: run the scene anew with another one"
+            }
+            _ => "--until T resumes it to a later end",
+        };
+        return Ok(print_line(&format!("nothing to do: the run ended {ended}; {further}"))?);
     }
     let kept = kept(history, scene, &checkpoint)?;
     let solid_fraction = history.parameters()?.solid_fraction;

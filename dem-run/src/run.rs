@@ -10,7 +10,7 @@ use crate::error::{NoConvergence, RunError};
 use crate::history::Checkpoint;
 use crate::in_dimension;
 use crate::memory;
-use crate::output::print_result;
+use crate::output::{number, print_result};
 use crate::progress::{Progress, ProgressMode, StepProgress};
 use crate::record::Recorder;
 use crate::sample_file;
@@ -20,9 +20,11 @@ use crate::signals::{self, Interrupt};
 use crate::summary::{Ending, Summary, WallLoads};
 use crate::warnings;
 use dem_core::body::{Drive, Wall};
+use dem_core::bond::BondStatus;
 use dem_core::dim::{Dim, Vect};
 use dem_core::saved::{Mismatch, Reader, Saved};
 use dem_core::solver::certificate::Verdict;
+use dem_core::solver::limit_load::LimitLoad;
 use dem_core::world::{StepError, StepReport, World};
 use std::path::{Path, PathBuf};
 
@@ -228,20 +230,57 @@ impl<D: Dim> Run<'_, D> {
 
     fn failed(&mut self, error: StepError) -> Result<Ending, RunError> {
         self.state.course.rejected += u64::from(matches!(error, StepError::NotAccepted { .. }));
-        let remedy = self.remedy(&error);
+        let remedy = match self.against_rigid_bonds(&error) {
+            Some(remedy) => remedy,
+            None => self.remedy(&error),
+        };
         Err(NoConvergence::Step { error: error.message(&|body| self.name(body)), remedy }.into())
+    }
+
+    /// Where a solve failed although a solution may exist and one wall moves by a velocity against
+    /// rigid bonds: what they bear of it, if that is the likely cause, and the remedies.
+    fn against_rigid_bonds(&mut self, error: &StepError) -> Option<String> {
+        let of_a_solve = matches!(error, StepError::NotAccepted { .. } | StepError::Yielded { .. });
+        if !of_a_solve || self.squeezed(error).is_some() {
+            return None;
+        }
+        let world = &mut self.state.world;
+        if !world.bonds.iter().any(|bond| bond.status == BondStatus::Intact && bond.stiffness.is_none()) {
+            return None;
+        }
+        let mut moving = (0..world.walls.len()).filter_map(|wall| Some((wall, world.motion_of_drive(wall)?.norm())));
+        let (Some((wall, speed)), None) = (moving.next(), moving.next()) else { return None };
+        let mass: f64 = world.grains.mass.iter().sum();
+        let limit = world.limit_of_motion(wall)?;
+        let name = self.name((self.state.world.grains.len() + wall) as u32);
+        match limit {
+            LimitLoad::Unbounded => Some(format!(
+                "; reactions within all limits bear any force of {name} (`dem-run limit`): the sample cannot fail under it, and \
+                 its motion may have no solution"
+            )),
+            LimitLoad::Factor { lower: force, .. } => {
+                // the reactions at the limit, relative to those of the motion alone
+                let ratio = force * self.scene.time.step / (mass * speed);
+                (ratio * self.scene.solver.accept() >= 1.0).then(|| {
+                    format!(
+                        "; rigid bonds bear up to {} N of {name}, {ratio:.0e} times what its motion needs without them: drive \
+                         it by a force (force_rate), move it faster, or give the bonds a stiffness (bonds.stiffness)",
+                        number(force)
+                    )
+                })
+            }
+            LimitLoad::NeverBalanced
+            | LimitLoad::Unsupported { .. }
+            | LimitLoad::BrokenAtStart { .. }
+            | LimitLoad::Undecided => None,
+        }
     }
 
     /// Possible remedies for an error, with the fields of the scene.
     fn remedy(&self, error: &StepError) -> String {
         let newton = !matches!(self.scene.solver.kind, SolverKind::GaussSeidel(_));
         let grains = self.state.world.grains.len();
-        let squeezed = match (error, error.verdict()) {
-            (_, Some(Verdict::NoSolution(bodies))) => Some(bodies),
-            (StepError::Yielded { violation, .. }, _) => violation.jammed.as_ref(),
-            _ => None,
-        };
-        if let Some(bodies) = squeezed {
+        if let Some(bodies) = self.squeezed(error) {
             let wall =
                 |body: &u32| (*body as usize).checked_sub(grains).and_then(|wall| self.scene.walls.iter().nth(wall));
             let driven = bodies.iter().filter_map(wall).filter(|(_, wall)| wall.velocity.is_some());
@@ -272,6 +311,15 @@ impl<D: Dim> Run<'_, D> {
             _ => "",
         };
         help.into()
+    }
+
+    /// The bodies that no motion satisfies.
+    fn squeezed<'e>(&self, error: &'e StepError) -> Option<&'e Vec<u32>> {
+        match (error, error.verdict()) {
+            (_, Some(Verdict::NoSolution(bodies))) => Some(bodies),
+            (StepError::Yielded { violation, .. }, _) => violation.jammed.as_ref(),
+            _ => None,
+        }
     }
 
     /// Name of a body in messages: the number of a grain, or the scene's name of a wall.

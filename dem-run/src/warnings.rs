@@ -95,6 +95,7 @@ pub(crate) fn of_walls<D: Dim>(scene: &Scene, walls: &[Wall<D>], grains: Option<
         let Some(motion) = DriveMotion::of(wall, scene.time.end) else { continue };
         let alone = !others_push(scene) && !pushes.iter().enumerate().any(|(other, push)| *push && other != k);
         let word = match grains {
+            _ if motion.along_surface && wall.grip.is_some() => None,
             _ if motion.along_surface => {
                 let own = scene.walls[name].friction;
                 let materials = 0..=scene.materials.named.len();
@@ -107,7 +108,30 @@ pub(crate) fn of_walls<D: Dim>(scene: &Scene, walls: &[Wall<D>], grains: Option<
         };
         told.extend(word.map(|word| format!("walls.{name}: {word}")));
     }
+    told.extend(grains.into_iter().flat_map(|grains| gripped_twice(scene, walls, grains)));
     told
+}
+
+/// Warnings about grains within the grip of several walls, one of which may move: the first wall
+/// holds them.
+fn gripped_twice<D: Dim>(scene: &Scene, walls: &[Wall<D>], grains: &Grains<D>) -> Vec<String> {
+    let holds = |wall: &Wall<D>, k: usize| {
+        wall.grip.is_some_and(|depth| wall.shape.gap(grains.position[k] - wall.position, grains.radius[k]).0 <= depth)
+    };
+    let driven = |name: &&String| !scene.drives(name, &scene.walls[*name]).is_empty();
+    let lines = (0..grains.len()).filter(|k| !grains.fixed[*k]).filter_map(|k| {
+        let holders: Vec<&String> =
+            scene.walls.keys().zip(walls).filter(|(_, wall)| holds(wall, k)).map(|(name, _)| name).collect();
+        let [first, others @ ..] = holders.as_slice() else { return None };
+        (!others.is_empty() && holders.iter().any(driven)).then(|| {
+            let others: Vec<String> = others.iter().map(|name| format!("walls.{name}")).collect();
+            let others = others.join(" and ");
+            format!(
+                "walls.{first}.grip: it holds grain {k}, which is also within the grip of {others}: make one smaller"
+            )
+        })
+    });
+    first_few(lines.collect(), "grains are within the grip of several walls")
 }
 
 /// Whether something other than a wall may press grains together: gravity, a load, a membrane or a
@@ -311,6 +335,23 @@ mod tests {
         ] {
             assert_eq!(told(&lid(place, drive), sets), [""; 0], "{drive}");
         }
+    }
+
+    #[test]
+    fn grips_carry_along_a_surface_and_hold_a_grain_once() {
+        let glued = r#""seated""#;
+        let along = lid(glued, r#""grip": 0.1, "direction": [1, 0], "velocity": { "constant": 1 }"#);
+        assert_eq!(told(&along, &[]), [""; 0]);
+        let both = told(&along, &["walls.floor.grip=0.1"]);
+        assert_eq!(both.len(), 2, "{both:?}");
+        for (k, line) in both.iter().enumerate() {
+            let expected = format!(
+                "walls.floor.grip: it holds grain {k}, which is also within the grip of walls.lid: make one smaller"
+            );
+            assert_eq!(*line, expected);
+        }
+        // fixed walls hold it in the same place
+        assert_eq!(told(&lid(glued, r#""grip": 0.1"#), &["walls.floor.grip=0.1"]), [""; 0]);
     }
 
     #[test]

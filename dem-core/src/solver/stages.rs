@@ -21,11 +21,11 @@
 use super::extrapolation::Extrapolation;
 use super::graph::Graph;
 use super::history::history;
-use super::interior::{Aims, Interior};
+use super::interior::{Aims, Found, Interior};
 use super::newton::Newton;
 use super::rows::{Row, Rows, StiffnessRatio};
 use super::solvable::Solvable;
-use super::{ContactSolver, GaussSeidel, GaussSeidelSettings, SolveReport, SolveStatus, Work};
+use super::{ContactSolver, GaussSeidelSettings, SolveReport, SolveStatus, Work};
 use crate::contact::{LocalSolve, Padded};
 use crate::dim::Dim;
 use crate::problem::ContactProblem;
@@ -115,13 +115,36 @@ impl Default for StagedSettings {
 impl StagedSettings {
     /// Report of a solve with this residual, load error and velocity error.
     pub(super) fn report(&self, work: Work, residual: f64, load_error: f64, velocity_error: f64) -> SolveReport {
-        // with a residual of zero only round-off still changes
-        let load_converged = load_error.max(velocity_error) <= self.load_tolerance || residual == 0.0;
-        let status = match SolveStatus::of(residual, self.tolerance, self.accept) {
-            SolveStatus::Converged if !load_converged => SolveStatus::Accepted,
+        let status = match self.status(residual, velocity_error) {
+            // with a residual of zero only round-off still changes
+            SolveStatus::Converged if load_error > self.load_tolerance && residual != 0.0 => SolveStatus::Accepted,
             status => status,
         };
         SolveReport { status, route: Route::ActiveSet, work, residual, load_error: Some(load_error) }
+    }
+
+    /// The status of a solution with this residual and velocity error.
+    fn status(&self, residual: f64, velocity_error: f64) -> SolveStatus {
+        if self.aims(false).missed(residual, velocity_error) <= 1.0 {
+            SolveStatus::Converged
+        } else if self.accepts(residual, velocity_error) {
+            SolveStatus::Accepted
+        } else {
+            SolveStatus::Failed
+        }
+    }
+
+    /// Whether a residual is at most `accept`, and a velocity error in the same proportion: the
+    /// residual alone is small beside any large reactions, whatever the velocities.
+    fn accepts(&self, residual: f64, velocity_error: f64) -> bool {
+        let velocity = self.accept * (defaults::LOAD_TOLERANCE / defaults::TOLERANCE);
+        residual <= self.accept && velocity_error <= velocity.max(self.load_tolerance)
+    }
+
+    /// Tolerances and iteration limit of the interior-point method.
+    fn aims(&self, least: bool) -> Aims {
+        let Self { tolerance, load_tolerance, max_iterations, .. } = *self;
+        Aims { tolerance, load_tolerance, least, most: max_iterations }
     }
 }
 
@@ -193,7 +216,6 @@ impl Staged {
         effort: Effort,
         mut newton: u64,
     ) -> SolveReport {
-        let StagedSettings { tolerance, accept, .. } = self.settings;
         // margins that Newton left belong to other reactions
         self.newton.margins.clear();
         let begun = multipliers(rows);
@@ -205,7 +227,7 @@ impl Staged {
         // rigid bonds break by the load that they bear and need minimum-energy reactions; elastic
         // bonds have unique reactions, and dry contacts need only reactions that balance
         let least = problem.matrix().is_none() && rows.list.iter().any(Row::is_rigid_bond);
-        let mut aims = self.aims(least);
+        let mut aims = self.settings.aims(least);
         let nothing_acts = rows.nothing_acts();
         if effort == Effort::Short || nothing_acts {
             aims.most = aims.most.min(tuning::MOST_SHORT);
@@ -213,7 +235,9 @@ impl Staged {
         let graph = &mut self.newton.graph;
         let mut best = self.interior.solve(problem, rows, graph, &anchor, start, aims);
         newton += best.as_ref().map_or(0, |found| found.iterations);
-        let refused = best.as_ref().is_none_or(|found| found.missed(aims) > accept / tolerance);
+        let accepted =
+            |found: &Found| self.settings.accepts(found.residual, found.velocity_error.max(found.load_error));
+        let refused = !best.as_ref().is_some_and(accepted);
         if refused && nothing_acts {
             // all measures are relative to reactions that may vanish; zero ones balance exactly
             problem.write_back(&vec![Padded::zero(); rows.list.len()]);
@@ -241,19 +265,18 @@ impl Staged {
             let report = self.settings.report(work, residual, load_error, velocity_error);
             SolveReport { route: Route::InteriorPoint, ..report }
         };
-        if residual <= tolerance || effort == Effort::Short {
+        if residual <= self.settings.tolerance || effort == Effort::Short {
             return by_the_path(problem, 0);
         }
         best.iter().for_each(|found| problem.write_back(&found.reactions));
         problem.forget_what_is_not_finite();
-        let swept = problem.gauss_seidel(self.sweeps(tolerance, tuning::LAST_SWEEPS));
-        let velocity_error = problem.velocity_error();
-        if best.as_ref().is_some_and(|found| found.missed(aims) <= aims.missed(swept.residual, velocity_error)) {
+        let [least, most] = tuning::LAST_SWEEPS;
+        let most = (tuning::LAST_VISITS / rows.list.len() as u64).clamp(least, most);
+        let (swept, missed) = self.sweep(problem, most);
+        if best.as_ref().is_some_and(|found| found.missed(aims) <= missed) {
             return by_the_path(problem, swept.work.sweeps);
         }
-        let work = Work { newton, ..swept.work };
-        let SolveReport { status, .. } = self.settings.report(work, swept.residual, 0.0, velocity_error);
-        SolveReport { status, work, ..swept }
+        SolveReport { work: Work { newton, ..swept.work }, ..swept }
     }
 
     /// The anchor, from which the energy of the minimum-energy reactions is measured.
@@ -262,12 +285,6 @@ impl Staged {
             Start::StiffLimit => vec![Padded::zero(); rows.list.len()],
             Start::LastStep => multipliers(rows),
         }
-    }
-
-    /// Tolerances and iteration limit of the interior-point method.
-    fn aims(&self, least: bool) -> Aims {
-        let StagedSettings { tolerance, load_tolerance, max_iterations, .. } = self.settings;
-        Aims { tolerance, load_tolerance, least, most: max_iterations }
     }
 
     /// Settings of Gauss–Seidel for this target residual.
@@ -279,7 +296,7 @@ impl Staged {
     /// Sweeps over dry contacts to the tolerances. Where they miss them, the direct solvers if
     /// these are cheap, else sweeps to the accepted residual.
     fn dry<D: Dim>(&mut self, problem: &mut ContactProblem<D>) -> SolveReport {
-        let fine = self.fine_sweeps(problem);
+        let (fine, _) = self.sweep(problem, tuning::FINE_SWEEPS);
         if fine.status == SolveStatus::Converged {
             return fine;
         }
@@ -311,32 +328,31 @@ impl Staged {
         (graph.tree.operations() <= tuning::CHEAP * problem.len() as f64).then_some(rows)
     }
 
-    /// Sweeps over dry contacts to the tolerances. Residual and velocity error may exceed their
-    /// tolerances by the same factor, `accept / tolerance`.
-    fn fine_sweeps<D: Dim>(&self, problem: &mut ContactProblem<D>) -> SolveReport {
-        let StagedSettings { tolerance, accept, .. } = self.settings;
+    /// Sweeps to the tolerances of the residual and of the velocity error. Returns also by which
+    /// factor these are missed.
+    fn sweep(&self, problem: &mut impl Solvable, most: u64) -> (SolveReport, f64) {
+        let StagedSettings { tolerance, .. } = self.settings;
         let (mut aim, mut work) = (tolerance, Work::default());
         loop {
-            let fine = GaussSeidel::new(self.sweeps(aim, tuning::FINE_SWEEPS - work.sweeps)).solve(problem);
-            work = work + fine.work;
-            let missed = self.aims(false).missed(fine.residual, velocity_error(problem));
+            let swept = problem.gauss_seidel(self.sweeps(aim, most - work.sweeps));
+            work = work + swept.work;
+            let velocity_error = problem.velocity_error();
+            let missed = self.settings.aims(false).missed(swept.residual, velocity_error);
             // sweeps stop on the residual alone: lower its target to reduce the velocity error
-            if missed > 1.0 && fine.residual <= aim && work.sweeps < tuning::FINE_SWEEPS {
-                aim = fine.residual / missed;
+            if missed > 1.0 && swept.residual <= aim && work.sweeps < most {
+                aim = swept.residual / missed;
                 continue;
             }
-            return SolveReport { status: SolveStatus::of(missed, 1.0, accept / tolerance), work, ..fine };
+            let status = self.settings.status(swept.residual, velocity_error);
+            return (SolveReport { status, work, ..swept }, missed);
         }
     }
 
     /// Sweeps over dry contacts to the accepted residual.
     fn coarse_sweeps<D: Dim>(&self, problem: &mut ContactProblem<D>) -> SolveReport {
-        let StagedSettings { tolerance, accept, .. } = self.settings;
-        let coarse = GaussSeidel::new(self.sweeps(accept, tuning::COARSE_SWEEPS)).solve(problem);
-        let missed = self.aims(false).missed(coarse.residual, velocity_error(problem));
-        // its target was `accept`: at best it is accepted
-        let status = if missed <= accept / tolerance { SolveStatus::Accepted } else { SolveStatus::Failed };
-        SolveReport { status, ..coarse }
+        let accept = self.settings.accept;
+        let coarse = problem.gauss_seidel(self.sweeps(accept, tuning::COARSE_SWEEPS));
+        SolveReport { status: self.settings.status(coarse.residual, velocity_error(problem)), ..coarse }
     }
 }
 

@@ -42,8 +42,12 @@ pub(super) mod stages {
     pub const MOST_SHORT: u64 = 50;
     /// Most further sweeps over dry contacts, towards the accepted residual.
     pub const COARSE_SWEEPS: u64 = 20_000;
-    /// Most sweeps from the best point of an interior-point solve that missed the tolerance.
-    pub const LAST_SWEEPS: u64 = 2_000;
+    /// Most sweeps from the best point of a path that missed the tolerance: as many as make
+    /// `LAST_VISITS` of a contact, about a second, between these bounds. The residual of a bent
+    /// hexagonal beam of 297 disks with friction 0.7 rises and falls for 20,000 sweeps before it
+    /// converges.
+    pub const LAST_SWEEPS: [u64; 2] = [2_000, 20_000];
+    pub const LAST_VISITS: u64 = 20_000_000;
 }
 
 /// Gauss–Seidel, plain and accelerated (decision 9).

@@ -24,13 +24,51 @@ impl<D: Dim> World<D> {
     /// All intact bonds take part, and all other pairs whose gap is at most 1e-6 of the smaller
     /// radius. The world does not change.
     pub fn limit_load(&mut self, from: f64, to: f64) -> LimitLoad {
+        self.limit(|world| {
+            let start = world.velocities_given(true, |value| value(from));
+            // without the weight, whose rounding would be a load
+            let growth = world.velocities_given(false, |value| value(to) - value(from));
+            (start, growth)
+        })
+    }
+
+    /// The largest force (N) of a wall driven by a velocity, in the way that it moves in the next
+    /// step, with the loads that act now; `None` if it does not move. See [`World::limit_load`].
+    ///
+    /// # Panics
+    /// If there is no such wall.
+    pub fn limit_of_motion(&mut self, wall: usize) -> Option<LimitLoad> {
+        let moves = self.motion_of_drive(wall)?;
+        let (time, still) = (self.time, (D::Vector::zero(), D::Spin::zero()));
+        let mass: f64 = self.grains.mass.iter().sum();
+        let pushed = Drive::Force { direction: moves * (1.0 / moves.norm()), mass, force: Arc::new(|_| 0.0) };
+        let drive = std::mem::replace(&mut self.walls[wall].drive, pushed);
+        let found = self.limit(|world| {
+            let start = world.velocities_given(true, |value| value(time));
+            let mut growth = vec![still; start.len()];
+            growth[world.grains.len() + wall].0 = moves * (1.0 / (moves.norm() * mass));
+            (start, growth.into())
+        });
+        self.walls[wall].drive = drive;
+        Some(found)
+    }
+
+    /// The velocity (m/s) that a wall's drive prescribes for the next step, if it does and if this
+    /// is not zero.
+    pub fn motion_of_drive(&self, wall: usize) -> Option<D::Vector> {
+        let Drive::Velocity { direction, speed } = &self.walls[wall].drive else { return None };
+        let velocity = *direction * speed(self.time + self.settings.step);
+        (velocity.norm() > 0.0).then_some(velocity)
+    }
+
+    /// The limit under the velocities that `given` returns: those of the loads at the start, and
+    /// those of their growth.
+    fn limit(&mut self, given: impl FnOnce(&Self) -> (Velocities<D>, Velocities<D>)) -> LimitLoad {
         let mid = Midpoint::of(&self.grains, &self.walls);
         self.measure_sections(&mid);
         // where it has no surface, the last one remains
         self.follow_surface(&mid).unwrap_or_default();
-        let start = self.velocities_given(true, |value| value(from));
-        // without the weight, whose rounding would be a load
-        let growth = self.velocities_given(false, |value| value(to) - value(from));
+        let (start, growth) = given(self);
         let still: Vec<_> = start.iter().map(|_| (D::Vector::zero(), D::Spin::zero())).collect();
         let at_rest = Motion { before: still.clone(), free: still.into() };
         let mut touches = self.detect(&mid, &at_rest, 1.0);

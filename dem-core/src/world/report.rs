@@ -123,6 +123,8 @@ pub enum StepError {
         step: f64,
         /// Residual of its solve (–).
         residual: f64,
+        /// Velocity error of its solve (–), if the residual alone would be accepted.
+        velocity_error: Option<f64>,
         /// Load error of its solve (–), if that is what was not accepted.
         load_error: Option<f64>,
         /// Iterations of its solve.
@@ -208,8 +210,11 @@ impl StepError {
     /// The message; `name` maps the index of a body to its name, grains first, then walls.
     pub fn message(&self, name: &dyn Fn(u32) -> String) -> String {
         match self {
-            Self::NotAccepted { time, step, residual, load_error, iterations, pair, verdict } => {
-                let load_error = load_error.map(|error| format!(", load error {error:.2e}")).unwrap_or_default();
+            Self::NotAccepted { time, step, residual, velocity_error, load_error, iterations, pair, verdict } => {
+                let further = |what: &str, error: &Option<f64>| {
+                    error.map(|error| format!(", {what} error {error:.2e}")).unwrap_or_default()
+                };
+                let further = further("velocity", velocity_error) + &further("load", load_error);
                 let [opening, known] = match verdict {
                     Verdict::NoSolution(bodies) => {
                         [format!("no motion satisfies {}", listed(bodies, name)), String::new()]
@@ -221,7 +226,7 @@ impl StepError {
                     }
                 };
                 format!(
-                    "{opening} at t = {time:.6e} s: residual {residual:.2e}{load_error} after {iterations} iterations, in a \
+                    "{opening} at t = {time:.6e} s: residual {residual:.2e}{further} after {iterations} iterations, in a \
                      step of {step:.2e} s{known}"
                 )
             }

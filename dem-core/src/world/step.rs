@@ -11,7 +11,7 @@ use crate::body::Drive;
 use crate::bond::{BondStatus, Rupture, at_limit, failure};
 use crate::contact::Law;
 use crate::dim::{Dim, Vect};
-use crate::problem::residual::furthest_from_law;
+use crate::problem::residual::{furthest_from_law, velocity_error};
 use crate::problem::{Contact, ContactProblem, Group, Kind, Nodes, Visitor};
 use crate::solver::certificate::Verdict;
 use crate::solver::{SolveReport, SolveStatus};
@@ -113,12 +113,12 @@ impl<D: Dim> World<D> {
             let (mut problem, places) = self.assemble(&mid, &touches, &motion, &brought, applied, h);
             let solve = self.solve(&mut problem, limits_apply);
             done.add(solve);
-            self.refuse_unaccepted(solve, &problem, (self.time, h), last_attempt)?;
-            if limits_apply {
+            if limits_apply && solve.residual <= self.settings.solver.accept() {
                 self.refuse_violation(self.yielding(&problem), &problem, last_attempt)?;
-                if self.large_load_error(solve).is_some() {
-                    return Err(self.not_accepted(solve, &problem, (self.time, h), last_attempt));
-                }
+            }
+            self.refuse_unaccepted(solve, &problem, (self.time, h), last_attempt)?;
+            if limits_apply && self.large_load_error(solve).is_some() {
+                return Err(self.not_accepted(solve, &problem, (self.time, h), last_attempt));
             }
             write_reactions(&mut touches, &problem, &places, h);
             let missed = self.missed(&mid, &touches, &problem.nodes, h);
@@ -287,9 +287,11 @@ impl<D: Dim> World<D> {
     ) -> StepError {
         let SolveReport { residual, work, .. } = solve;
         let load_error = self.large_load_error(solve).filter(|_| solve.status != SolveStatus::Failed);
+        let small = solve.status == SolveStatus::Failed && residual <= self.settings.solver.accept();
+        let velocity_error = small.then(|| velocity_error(problem));
         let verdict = if last_attempt { self.verdict(problem) } else { Verdict::Undecided };
         let (iterations, pair) = (work.iterations(), furthest_from_law(problem));
-        StepError::NotAccepted { time, step: h, residual, load_error, iterations, pair, verdict }
+        StepError::NotAccepted { time, step: h, residual, velocity_error, load_error, iterations, pair, verdict }
     }
 
     fn refuse_violation(

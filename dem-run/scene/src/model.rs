@@ -330,9 +330,15 @@ impl Scene {
     /// wall that only later stages drive is held until then.
     #[must_use]
     pub fn first_drive(&self, name: &str, wall: &Wall) -> Drive {
-        let first = self.stages.first().and_then(|stage| stage.walls.get(name));
-        match (first, wall.drive()) {
-            (Some(first), _) => first.drive(),
+        self.drive_in_stage(0, name, wall)
+    }
+
+    /// The drive of a wall in a stage, by number: the last that it or an earlier stage gives it. A
+    /// wall that only later stages drive is held until then.
+    pub(crate) fn drive_in_stage(&self, stage: usize, name: &str, wall: &Wall) -> Drive {
+        let last = self.stages.iter().take(stage + 1).rev().find_map(|stage| stage.walls.get(name));
+        match (last, wall.drive()) {
+            (Some(last), _) => last.drive(),
             (None, Drive::Fixed) if self.stage_drives(name).next().is_some() => StageDrive::default().drive(),
             (None, own) => own,
         }

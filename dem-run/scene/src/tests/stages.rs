@@ -48,6 +48,33 @@ fn what_a_stage_asks_of_a_wall_is_checked_at_the_wall() {
 }
 
 #[test]
+fn a_condition_of_a_stage_asks_for_the_drive_of_that_stage() {
+    let of = |second: &str, until: &str| {
+        format!(
+            r#"[{{"name": "a", "duration": 0.1, "walls": {{"top": {{"velocity": {{"constant": 1}}}}}}}},
+                {{"name": "b", "walls": {{"top": {second}}}, "until": {until}}}]"#
+        )
+    };
+    let travel = r#"{"wall_travel": {"wall": "top", "fraction_of_height": 0.1}}"#;
+    let moves = r#"{"velocity": {"constant": 1}}"#;
+    let pushed = r#"{"force": {"constant": 1}}"#;
+    let sets = ["load_wall=top", "walls.top.mass=sample"];
+    for (drive, until) in
+        [(moves, travel), (pushed, travel), (moves, r#"{"load_drop": 0.5}"#), ("{}", r#"{"load_drop": 0.5}"#)]
+    {
+        staged(&of(drive, until), &sets).unwrap_or_else(|error| panic!("{drive} {until}: {error}"));
+    }
+    for (drive, until, path, found) in [
+        ("{}", travel, "stages.1.until.wall_travel.wall", "\"top\", which is held"),
+        (pushed, r#"{"load_drop": 0.5}"#, "stages.1.until.load_drop", "the load of walls.top is prescribed"),
+    ] {
+        let problem = only(staged(&of(drive, until), &sets));
+        assert_eq!(problem.path, path);
+        assert!(problem.found.contains(found), "{}", problem.found);
+    }
+}
+
+#[test]
 fn a_run_has_no_more_steps_than_its_stages() {
     let steps = |stages: &str, end: &str| {
         let scene = staged(stages, &["time.step=0.01", end, "output={\"every_steps\": 4}"]).expect("right");
