@@ -125,6 +125,39 @@ fn grains_that_a_wall_holds_are_part_of_it() {
     }
 }
 
+/// A velocity drives a wall: its limit is that of a force in its way, under the loads of the
+/// moment.
+#[test]
+fn a_wall_that_moves_has_the_limit_of_its_force() {
+    // a row of disks, of which walls hold the first and the last
+    let moved = |speed: f64| {
+        let disks = (0..4).map(|k| grain::<D2>(&[1e-3 + 2e-3 * f64::from(k), 0.0], 1e-3)).collect();
+        let wall = |side: f64, x: f64| {
+            let shape = Shape::Plane { normal: [side, 0.0].into() };
+            Wall { grip: Some(0.5e-3), ..Wall::fixed(shape, [x, 0.0].into(), 0.3) }
+        };
+        let (left, mut right) = (wall(1.0, 0.0), wall(-1.0, 8e-3));
+        right.drive = Drive::Velocity { direction: [2.0, 0.0].into(), speed: Arc::new(move |_| speed) };
+        let mut world = world(disks, vec![left, right], settings(1e-4));
+        world.form_bonds(1e-6, |_| 10.0, 0.3);
+        world.bonds[0].strength = 7.0;
+        world
+    };
+    for mut world in [moved(1e-3), moved(1e3)] {
+        let Some(LimitLoad::Factor { lower, upper }) = world.limit_of_motion(1) else { panic!("no limit") };
+        close(0.5 * (lower + upper), 7.0);
+        // the second bond is pulled by a load of the moment, in the way of the wall
+        let (force, torque) = ([3.0, 0.0].into(), <D2 as Dim>::Spin::zero());
+        world.loads = vec![Load { grain: 1, force, torque, factor: Arc::new(|_| 1.0) }];
+        let Some(LimitLoad::Factor { lower, upper }) = world.limit_of_motion(1) else { panic!("no limit") };
+        close(0.5 * (lower + upper), 4.0);
+        assert!(matches!(world.walls[1].drive, Drive::Velocity { .. }), "its drive is as before");
+    }
+    assert_eq!(moved(-1e-3).limit_of_motion(1), Some(LimitLoad::Unbounded));
+    let mut still = moved(0.0);
+    assert_eq!((still.limit_of_motion(0), still.limit_of_motion(1)), (None, None));
+}
+
 /// A beam of 2 n + 1 disks on two round supports without friction, loaded at its middle.
 fn beam(n: u32) -> World<D2> {
     let grains = (0..2 * n + 1).map(|k| grain(&[2e-3 * f64::from(k), 0.0], 1e-3)).collect();

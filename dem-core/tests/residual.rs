@@ -128,6 +128,34 @@ fn the_velocity_error_of_a_spring_is_relative_to_what_its_force_would_leave() {
     sprung::<D3>();
 }
 
+/// A grain at 1 mm/s towards one that it touches; a third comes at 10 mm/s and stays apart in the
+/// step, by 5 mm/s over it.
+#[test]
+fn the_velocity_error_is_relative_to_velocities_that_must_change() {
+    fn case<D: Dim>(speed: f64) -> ContactProblem<D> {
+        let at = |x: f64| [vec![x], vec![0.0; D::N - 1]].concat();
+        let grains = [0.0, 0.02, 0.04 + 2e-5].map(|x| grain::<D>(&at(x), 0.01));
+        let mut w = world(grains.to_vec(), vec![], settings(1e-3));
+        w.grains.velocity[0] = D::Vector::from_slice(&at(speed));
+        w.grains.velocity[2] = D::Vector::from_slice(&at(-1e-2));
+        let problem = w.contact_problem();
+        assert_eq!((problem.len(), problem.dry.len()), (2, 2));
+        problem
+    }
+    fn errors<D: Dim>() {
+        let close = |found: f64, expected: f64| assert!((found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
+        close(velocity_error(&case::<D>(1e-3)), 1.0);
+        // they part: nothing must change, and a reaction between them is an error beside the other
+        let mut apart = case::<D>(-1e-3);
+        assert_eq!(velocity_error(&apart), 0.0);
+        let push = 0.5 * apart.dry[0].law.gamma() * 1e-3;
+        apart.dry[0].r.n = push;
+        close(velocity_error(&apart), 0.5e-3 / 5e-3);
+    }
+    errors::<D2>();
+    errors::<D3>();
+}
+
 /// One contact with its matrix: W = diag(w, w/2), q = −w r − `push` in the normal row, so that u_n
 /// is −`push`.
 fn assembled(w: f64, r: f64, push: f64, shift: f64, applied: f64) -> Assembled {

@@ -268,14 +268,20 @@ impl Assembled {
     }
 
     /// The velocity error (–): the largest natural map of a contact as a velocity, over the largest
-    /// velocity without cohesion and contact reactions. If reactions diverge because no solution
-    /// exists, the velocity error stays near one while the residual vanishes.
+    /// velocity without cohesion and contact reactions, of associated contacts and of those that
+    /// would close, if there are any. If reactions diverge because no solution exists, the velocity
+    /// error stays near one while the residual vanishes.
     #[must_use]
     pub fn velocity_error(&self) -> f64 {
         let size = self.parts.rows.count();
         let mut none = vec![0.0; self.r.len()];
         self.parts.shift.iter().enumerate().for_each(|(c, shift)| none[c * size] = *shift);
-        let speed = self.velocities_from(&none).iter().map(|u| u.abs()).fold(0.0, f64::max);
+        let free = self.velocities_from(&none);
+        let asks = |c: usize, u: &[f64]| self.parts.shift[c] > 0.0 || self.parts.associated[c] || u[0] < 0.0;
+        let contacts = || free.chunks_exact(size).enumerate();
+        let any = contacts().any(|(c, u)| asks(c, u));
+        let asked = contacts().filter(|(c, u)| asks(*c, u) || !any);
+        let speed = asked.flat_map(|(_, u)| u).map(|u| u.abs()).fold(0.0, f64::max);
         let map = |(c, d): (usize, f64)| {
             let change = self.correction(c, 1.0 / d, self.reaction(c), self.velocity(c));
             d * change.dot(&change).sqrt()

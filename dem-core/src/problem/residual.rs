@@ -82,10 +82,15 @@ pub(super) fn relative(map: f64, rounded: f64, scale: f64) -> f64 {
 
 /// The velocity error of the impulses and node velocities that the problem now holds (–): the
 /// largest natural map of a contact as a velocity, D ‖map‖, over the largest relative velocity
-/// without reactions.
+/// without reactions of the contacts that must change theirs: of bonds, and of dry contacts that
+/// would close. Where there are none, that of all contacts.
 pub fn velocity_error<D: Dim>(problem: &ContactProblem<D>) -> f64 {
-    let Largest { map, free, .. } = Largest::of(problem);
-    if map == 0.0 { 0.0 } else { map / free }
+    let Largest { map, asked, free, .. } = Largest::of(problem);
+    match map {
+        0.0 => 0.0,
+        _ if asked > 0.0 => map / asked,
+        _ => map / free,
+    }
 }
 
 /// The nodes of the contact with the largest velocity error.
@@ -94,17 +99,19 @@ pub fn furthest_from_law<D: Dim>(problem: &ContactProblem<D>) -> [u32; 2] {
 }
 
 /// Largest velocities over all contacts (m/s): `map` of the natural map, at the contact between the
-/// nodes `pair`, and `free` without reactions.
+/// nodes `pair`; `free` without reactions; `asked` the same of the contacts that must change it:
+/// beside the gap of one that stays open, over a short step, any other velocity vanishes.
 struct Largest<'a, D: Dim> {
     problem: &'a ContactProblem<D>,
     map: f64,
     pair: [u32; 2],
+    asked: f64,
     free: f64,
 }
 
 impl<'a, D: Dim> Largest<'a, D> {
     fn of(problem: &'a ContactProblem<D>) -> Self {
-        let mut largest = Self { problem, map: 0.0, pair: [0; 2], free: 0.0 };
+        let mut largest = Self { problem, map: 0.0, pair: [0; 2], asked: 0.0, free: 0.0 };
         problem.visit(&mut largest);
         largest
     }
@@ -122,6 +129,10 @@ impl<D: Dim> Visitor<D> for Largest<'_, D> {
         if speed > self.map {
             (self.map, self.pair) = (speed, c.link.nodes);
         }
-        self.free = self.free.max(free.dot(&free).sqrt());
+        let speed = free.dot(&free).sqrt();
+        self.free = self.free.max(speed);
+        if law.breaks() || free.n < 0.0 {
+            self.asked = self.asked.max(speed);
+        }
     }
 }

@@ -144,7 +144,7 @@ impl StagedSettings {
     /// Tolerances and iteration limit of the interior-point method.
     fn aims(&self, least: bool) -> Aims {
         let Self { tolerance, load_tolerance, max_iterations, .. } = *self;
-        Aims { tolerance, load_tolerance, least, most: max_iterations }
+        Aims { tolerance, load_tolerance, least, far: false, most: max_iterations }
     }
 }
 
@@ -247,8 +247,8 @@ impl Staged {
             }
         }
         if refused && effort == Effort::Full {
-            // another path, from a cold start to any reactions that balance
-            let any = Aims { least: false, ..aims };
+            // another path, from a far cold start to any reactions that balance
+            let any = Aims { least: false, far: true, ..aims };
             let other = self.interior.solve(problem, rows, graph, &anchor, None, any);
             newton += other.as_ref().map_or(0, |found| found.iterations);
             best = best.into_iter().chain(other).min_by(|a, b| a.missed(aims).total_cmp(&b.missed(aims)));

@@ -153,6 +153,9 @@ pub(super) mod start {
     /// least product of a pair, relative to the complementarity gap. A thousandth fails on some of
     /// thirty problems, a tenth on none.
     pub const INSIDE: f64 = 0.1;
+    /// Factor on that distance in a second path: a wall that moves slowly against rigid bonds gives
+    /// reactions that are some 1e7 times those that stop the bodies.
+    pub const FAR: f64 = 1e3;
 }
 
 /// The direction of a predictor–corrector iteration, and its length.

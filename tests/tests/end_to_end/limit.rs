@@ -96,3 +96,43 @@ fn a_wall_with_a_velocity_is_pressed_by_a_force_and_a_scene_without_loads_is_ref
     still.fails(2, &["no load of the scene grows", "force_rate"]);
     assert_eq!(here.names(), [""; 0]);
 }
+
+/// Cemented spheres under a lid that moves by 1e-4 of `rate` in its first step.
+fn under_a_slow_lid(seed: u32, width: f64, solid_fraction: f64, rate: f64) -> String {
+    format!(
+        r#"{{ "dimension": 3, "seed": {seed},
+            "sample": {{ "random": {{ "count": 20, "width": {width}, "depth": {width},
+                "diameter": {{ "uniform": {{ "min": 0.002, "max": 0.0035 }} }},
+                "preparation": {{ "compaction": {{ "solid_fraction": {solid_fraction} }} }} }} }},
+            "materials": {{ "density": 2500, "friction": {{ "grain_grain": 0.3, "grain_wall": 0.2 }} }},
+            "bonds": {{ "strength": 10, "gap_tolerance": 1e-3 }},
+            "walls": {{
+                "bottom": {{ "shape": {{ "plane": {{ "normal": [0, 0, 1], "place": "seated" }} }} }},
+                "top": {{ "shape": {{ "plane": {{ "normal": [0, 0, -1], "place": "seated" }} }},
+                    "velocity": {{ "ramp": {{ "rate": {rate} }} }} }} }},
+            "time": {{ "step": 1e-4, "end": 2e-4 }}, "output": {{ "every_steps": 1 }} }}"#
+    )
+}
+
+/// Reactions that break rigid bonds are 1e7 times those that stop the grains under a slow lid. The
+/// first break is the same at each velocity, or the run stops and says why.
+#[test]
+fn a_lid_that_moves_too_slowly_for_rigid_bonds_is_told() {
+    let here = Folder::new();
+    for (name, rate) in [("fast.json", 1.0), ("slow.json", 1e-2), ("slower.json", 1e-4)] {
+        here.write(name, under_a_slow_lid(1, 0.008, 0.38, rate));
+    }
+    here.write("any.json", under_a_slow_lid(7506, 0.01, 0.42, 1e-4));
+    let first = |scene: &str| {
+        let told = here.dem_run(&["run", scene, "-o", "a.h5", "--force", "--quiet", "--json"]).json();
+        told["failure"]["first_break"].as_f64().expect("a first break")
+    };
+    let (fast, slow) = (first("fast.json"), first("slow.json"));
+    assert!((slow / fast - 1.0).abs() < 0.01, "{fast} and {slow}");
+    let limit = here.dem_run(&["limit", "slower.json", "--json"]).json()["loads"][0]["limit"].as_f64().expect("a load");
+    assert!(fast < limit * 1.001, "{fast} above {limit}");
+    let bound = format!("rigid bonds bear up to {limit:.1} N of wall top");
+    let run = |scene: &str| here.dem_run(&["run", scene, "-o", "b.h5", "--force", "--quiet"]);
+    run("slower.json").fails(3, &["velocity error", &bound, "force_rate", "bonds.stiffness"]);
+    run("any.json").fails(3, &["reactions within all limits bear any force of wall top", "may have no solution"]);
+}

@@ -11,6 +11,8 @@ pub struct Aims {
     pub load_tolerance: f64,
     /// Whether the minimum-energy reactions in the metric are required.
     pub least: bool,
+    /// Whether the reactions may be far larger than those that stop the bodies.
+    pub far: bool,
     /// Most iterations.
     pub most: u64,
 }

@@ -127,7 +127,7 @@ impl Follow {
         let continuation = if raised <= tuning::MOST_RAISED {
             Continuation::new(&self.at, below, tuning::RAISED.powi(raised), self.straight)
         } else if raised == tuning::MOST_RAISED + 1 {
-            let start = cold(sites);
+            let start = cold(sites, false);
             Continuation::new(&start, below, gap(&start) / below, self.straight)
         } else {
             return None;

@@ -78,7 +78,7 @@ impl Interior {
         let coupling = Coupling::of(rows, problem.matrix(), graph.as_deref(), &sites, sites.speed / sites.force)?;
         let begun = match start {
             Some(reactions) => warm(&sites, &coupling, &sites.gathered(reactions)),
-            None => cold(&sites),
+            None => cold(&sites, aims.far),
         };
         let mut selection = Selection::new(&sites, sites.gathered(anchor), aims);
         let mut follow = Follow::from(begun);

@@ -51,8 +51,12 @@ pub(super) struct Selection {
 impl Selection {
     pub fn new(sites: &Sites, anchor: Vec<f64>, aims: Aims) -> Self {
         // the selection is the same for all tolerances
-        let stiffer = (1.0 / (tuning::SHARE * aims.tolerance)).clamp(tuning::KAPPA, tuning::STIFFEST);
-        let metric = Metric::new(sites, anchor, if aims.least { tuning::KAPPA } else { stiffer });
+        let kappa = match aims {
+            Aims { least: true, .. } => tuning::KAPPA,
+            Aims { far: true, .. } => tuning::STIFFEST,
+            _ => (1.0 / (tuning::SHARE * aims.tolerance)).clamp(tuning::KAPPA, tuning::STIFFEST),
+        };
+        let metric = Metric::new(sites, anchor, kappa);
         let limits = (!aims.least).then(Vec::new);
         Self {
             aims,

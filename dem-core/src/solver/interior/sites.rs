@@ -191,10 +191,14 @@ impl Sites {
         self.list.push(site);
     }
 
-    /// The largest velocity without reactions.
+    /// The largest velocity without reactions, of bonds and of contacts that would close, if there
+    /// are any: the scale of [`velocity_error`](crate::problem::residual::velocity_error).
     pub fn largest_free(&self) -> f64 {
-        let rows = self.free.iter().zip(&self.compliance).zip(&self.carried);
-        rows.map(|((u, c), r0)| (u - c * r0).abs()).fold(0.0, f64::max)
+        let asks = |k: usize| self.shift[k] > 0.0 || self.free[self.list[k].at] < 0.0;
+        let any = (0..self.list.len()).any(asks);
+        let asked = self.list.iter().enumerate().filter(|(k, _)| asks(*k) || !any);
+        let rows = asked.flat_map(|(_, site)| site.at..site.at + site.rows);
+        rows.map(|row| (self.free[row] - self.compliance[row] * self.carried[row]).abs()).fold(0.0, f64::max)
     }
 
     /// x = G r̂ of all cones.

@@ -6,8 +6,9 @@ use super::sites::Sites;
 use super::state::{State, gap};
 use crate::solver::tuning::start as tuning;
 
-/// Cold start: reactions well inside their cones, velocities as large as the free ones.
-pub(super) fn cold(sites: &Sites) -> State {
+/// Cold start: reactions well inside their cones, or `far` inside, and velocities as large as the
+/// free ones.
+pub(super) fn cold(sites: &Sites, far: bool) -> State {
     // the largest reaction that stops the bodies of one contact: far larger than the unit where
     // masses differ
     let stopping = sites.list.iter().zip(&sites.normal).filter(|(_, normal)| **normal > 0.0).map(|(site, normal)| {
@@ -15,9 +16,10 @@ pub(super) fn cold(sites: &Sites) -> State {
         square.sqrt() / normal
     });
     let largest = sites.shift.iter().copied().chain(stopping).fold(1.0, f64::max);
+    let inside = tuning::INSIDE * if far { tuning::FAR * largest } else { largest };
     let mut r = vec![0.0; sites.rows];
     for (site, shift) in sites.list.iter().zip(&sites.shift) {
-        site.part_mut(&mut r)[0] = (tuning::INSIDE * largest - shift).max(0.0);
+        site.part_mut(&mut r)[0] = (inside - shift).max(0.0);
     }
     let speed = sites.free.iter().map(|u| u.abs()).fold(0.0, f64::max).max(f64::MIN_POSITIVE);
     State { x: sites.primal(&r), r, z: vec![[speed, 0.0, 0.0]; sites.cones.len()] }

@@ -52,7 +52,7 @@ impl Interior {
 
     /// The end of the central path of one multiplier iteration.
     fn of_a_round(&mut self, sites: &Sites, coupling: &Coupling, metric: &Metric) -> State {
-        let (mut at, mut rough) = (cold(sites), false);
+        let (mut at, mut rough) = (cold(sites, false), false);
         for _ in 0..tuning::MOST {
             if gap(&at) <= tuning::LEAST_GAP {
                 break;

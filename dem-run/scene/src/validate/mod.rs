@@ -8,16 +8,14 @@ mod membrane;
 pub(crate) mod report;
 mod sample;
 mod stage;
+mod stop;
 mod wall;
 
 use std::collections::HashMap;
 
 use super::error::Problem;
-use super::function::Function;
 use super::model::{Bonds, Load, Rupture, Scene, Stiffness};
 use super::solver::SolverKind;
-use super::stop::{Stop, TravelFrom};
-use super::wall::{Drive, Wall};
 pub use report::{LARGEST, MAX_GRAINS};
 use report::{Number, Report};
 
@@ -48,9 +46,9 @@ pub fn validate(scene: &Scene) -> Vec<Problem> {
         wall::wall(&mut report, scene, name, wall);
     }
     membrane::membrane(&mut report, scene);
-    let drives: &Drives = &|name, wall| scene.drives(name, wall);
+    let drives: &stop::Drives = &|name, wall| scene.drives(name, wall);
     if let Some(name) = &scene.load_wall {
-        driven_wall(&mut report, scene, "load_wall", name, drives);
+        stop::driven_wall(&mut report, scene, "load_wall", name, drives);
     }
     if let Some(gravity) = &scene.gravity {
         report.vector("gravity", gravity);
@@ -59,9 +57,9 @@ pub fn validate(scene: &Scene) -> Vec<Problem> {
     solver(&mut report, scene);
     rupture(&mut report, scene);
     if let Some(stop) = &scene.stop {
-        self::stop(&mut report, scene, "stop", stop, drives);
+        stop::check(&mut report, scene, "stop", stop, drives);
     }
-    stage::check(&mut report, scene, stop);
+    stage::check(&mut report, scene);
     report.problems
 }
 
@@ -246,69 +244,5 @@ fn rupture(report: &mut Report, scene: &Scene) {
     }
     if matches!(scene.solver.kind, SolverKind::GaussSeidel(_)) {
         report.wrong("solver.kind", "gauss_seidel, with rupture next_event", "auto, newton or interior");
-    }
-}
-
-/// The drives that a wall of this name has while a condition is looked at.
-type Drives<'a> = dyn Fn(&str, &Wall) -> Vec<Drive> + 'a;
-
-/// Checks that `name`, found at `path`, is the name of a wall with one of these drives.
-fn driven_wall(report: &mut Report, scene: &Scene, path: &str, name: &str, drives: &Drives) {
-    match scene.walls.get(name) {
-        None => report.unknown(path, name, "a wall", scene.walls.keys().map(String::as_str).collect()),
-        Some(wall) if drives(name, wall).is_empty() => {
-            report.wrong(path, format!("\"{name}\", which is fixed"), "a wall that is driven");
-        }
-        Some(_) => {}
-    }
-}
-
-/// Checks the stop conditions at `path`, of the run or of a stage.
-fn stop(report: &mut Report, scene: &Scene, path: &str, stop: &Stop, drives: &Drives) {
-    let bonds_needed = "bonds in the scene: it has none";
-    if let Some(travel) = &stop.wall_travel {
-        let wall = format!("{path}.wall_travel.wall");
-        driven_wall(report, scene, &wall, &travel.wall, drives);
-        let held = [Drive::Velocity(Function::Constant(0.0))];
-        if scene.walls.get(&travel.wall).is_some_and(|wall| drives(&travel.wall, wall) == held) {
-            report.wrong(wall, format!("\"{}\", which is held", travel.wall), "a wall that moves");
-        }
-        report.positive(format!("{path}.wall_travel.fraction_of_height"), travel.fraction_of_height, "no unit");
-        if travel.after == TravelFrom::FirstBreak && scene.bonds.is_none() {
-            report.wrong(format!("{path}.wall_travel.after"), "first_break", bonds_needed);
-        }
-    }
-    if let Some(fraction) = stop.broken_fraction {
-        let allowed = "a number above 0, at most 1";
-        report.range(format!("{path}.broken_fraction"), fraction, fraction > 0.0 && fraction <= 1.0, allowed);
-        if scene.bonds.is_none() {
-            report.wrong(format!("{path}.broken_fraction"), Number(fraction), bonds_needed);
-        }
-    }
-    if let Some(share) = stop.load_drop {
-        load_drop(report, scene, &format!("{path}.load_drop"), share, drives);
-    }
-}
-
-fn load_drop(report: &mut Report, scene: &Scene, path: &str, share: f64, drives: &Drives) {
-    report.range(path, share, share > 0.0 && share < 1.0, "a number above 0 and below 1");
-    if scene.bonds.is_none() {
-        report.wrong(
-            path,
-            Number(share),
-            "bonds in the scene: it has none, and the peak is sought after a first break",
-        );
-    }
-    let Some(name) = scene.load_wall() else {
-        let allowed = match scene.load_unknown() {
-            Some(names) => format!("a load_wall in the scene: one of {names}"),
-            None => "a wall with a velocity in the scene, whose load it is".to_string(),
-        };
-        report.wrong(path, Number(share), allowed);
-        return;
-    };
-    if !drives(name, &scene.walls[name]).iter().any(|drive| matches!(drive, Drive::Velocity(_))) {
-        let found = format!("{share:?}, and the load of walls.{name} is prescribed");
-        report.wrong(path, found, "a load wall that is driven by a velocity: a prescribed load does not drop");
     }
 }

@@ -1,14 +1,14 @@
 //! Wrong values in the stages of loading.
 
-use super::Drives;
 use super::report::Report;
+use super::stop;
 use crate::model::Scene;
 use crate::stage::StageDrive;
 use crate::stop::Stop;
 use crate::wall::{Drive, Wall};
 
-/// Reports wrong values of the stages; `stop` checks conditions.
-pub(super) fn check(report: &mut Report, scene: &Scene, stop: impl Fn(&mut Report, &Scene, &str, &Stop, &Drives)) {
+/// Reports wrong values of the stages.
+pub(super) fn check(report: &mut Report, scene: &Scene) {
     for (k, stage) in scene.stages.iter().enumerate() {
         let path = format!("stages.{k}");
         if scene.stages[..k].iter().any(|other| other.name == stage.name) {
@@ -34,7 +34,7 @@ pub(super) fn check(report: &mut Report, scene: &Scene, stop: impl Fn(&mut Repor
                 let drive = scene.drive_in_stage(k, name, wall);
                 if drive == Drive::Fixed { vec![] } else { vec![drive] }
             };
-            stop(report, scene, &format!("{path}.until"), until, &drives);
+            stop::check(report, scene, &format!("{path}.until"), until, &drives);
         }
         if stage.cement {
             cement(report, scene, k, &format!("{path}.cement"));
