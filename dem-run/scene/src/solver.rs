@@ -17,8 +17,9 @@ pub struct Solver {
     pub kind: SolverKind,
     /// Relative residual at which the solver stops: the tolerance.
     pub tolerance: f64,
-    /// Largest relative residual with which a solve is accepted, at least the tolerance. Default:
-    /// 1e-6 with bonds and 1e-4 without, or the tolerance if that is larger.
+    /// Largest relative residual with which a solve is accepted, at least the tolerance; its
+    /// velocity error may be a thousand times that, except with `gauss_seidel`, which ignores it.
+    /// Default: 1e-6 with bonds and 1e-4 without, or the tolerance if that is larger.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accept: Option<f64>,
     /// Number of times that a step is halved when its solve is not accepted, before the run stops.

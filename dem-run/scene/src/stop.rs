@@ -27,7 +27,7 @@ pub struct WallTravel {
     /// Name of a driven wall.
     pub wall: String,
     /// Distance along the wall's direction, as a fraction of the sample's extent along it at the
-    /// start.
+    /// start of the run, or of the stage.
     pub fraction_of_height: f64,
     /// Start of the measured travel.
     #[serde(default)]
