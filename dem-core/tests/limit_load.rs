@@ -143,19 +143,24 @@ fn a_wall_that_moves_has_the_limit_of_its_force() {
         world.bonds[0].strength = 7.0;
         world
     };
+    let unit = |velocity: Option<<D2 as Dim>::Vector>| velocity.expect("it moves").normalize();
     for mut world in [moved(1e-3), moved(1e3)] {
-        let Some(LimitLoad::Factor { lower, upper }) = world.limit_of_motion(1) else { panic!("no limit") };
+        let direction = unit(world.motion_of_drive(1));
+        let LimitLoad::Factor { lower, upper } = world.limit_of_force(1, direction) else { panic!("no limit") };
         close(0.5 * (lower + upper), 7.0);
         // the second bond is pulled by a load of the moment, in the way of the wall
         let (force, torque) = ([3.0, 0.0].into(), <D2 as Dim>::Spin::zero());
         world.loads = vec![Load { grain: 1, force, torque, factor: Arc::new(|_| 1.0) }];
-        let Some(LimitLoad::Factor { lower, upper }) = world.limit_of_motion(1) else { panic!("no limit") };
+        let direction = unit(world.motion_of_drive(1));
+        let LimitLoad::Factor { lower, upper } = world.limit_of_force(1, direction) else { panic!("no limit") };
         close(0.5 * (lower + upper), 4.0);
         assert!(matches!(world.walls[1].drive, Drive::Velocity { .. }), "its drive is as before");
     }
-    assert_eq!(moved(-1e-3).limit_of_motion(1), Some(LimitLoad::Unbounded));
-    let mut still = moved(0.0);
-    assert_eq!((still.limit_of_motion(0), still.limit_of_motion(1)), (None, None));
+    let mut back = moved(-1e-3);
+    let direction = unit(back.motion_of_drive(1));
+    assert_eq!(back.limit_of_force(1, direction), LimitLoad::Unbounded);
+    let still = moved(0.0);
+    assert_eq!((still.motion_of_drive(0), still.motion_of_drive(1)), (None, None));
 }
 
 /// A beam of 2 n + 1 disks on two round supports without friction, loaded at its middle.

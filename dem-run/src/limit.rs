@@ -2,7 +2,6 @@
 
 use std::fmt;
 use std::io::Write;
-use std::sync::Arc;
 
 use dem_core::body::Drive;
 use dem_core::dim::Dim;
@@ -163,15 +162,20 @@ impl<'a> Loads<'a> {
         Ok(Self { growing, pushed })
     }
 
-    /// The limit load of the world of that scene. A wall that is pushed has a force from then on.
+    /// The limit load of the world of that scene.
     ///
     /// # Errors
     /// [`NoConvergence::Limit`].
     pub fn limit<D: Dim>(mut self, scene: &Scene, world: &mut World<D>) -> Result<Limit, RunError> {
         // in a run a velocity drives a pushed wall: no force reaches the limit at some time
         let steady = self.pushed.is_none() && self.growing.iter().all(|(_, _, _, straight)| *straight);
-        self.growing.extend(self.pushed.and_then(|wall| push(scene, world, wall)));
-        let found = world.limit_load(0.0, scene.time.end);
+        let found = match self.pushed.and_then(|(wall, name)| Some((wall, name, push(scene, world, wall)?))) {
+            Some((wall, name, (sign, direction))) => {
+                self.growing.push((format!("walls.{name}"), 0.0, sign, true));
+                world.limit_of_force(wall, direction)
+            }
+            None => world.limit_load(0.0, scene.time.end),
+        };
         describe(scene, world, (self.growing, steady), found)
     }
 }
@@ -240,14 +244,12 @@ fn pushed(scene: &Scene) -> Result<(usize, &str), RunError> {
     })
 }
 
-/// Drives a wall by a force instead of its velocity; returns that force as a load.
-fn push<D: Dim>(scene: &Scene, world: &mut World<D>, (place, name): (usize, &str)) -> Option<Growth> {
-    let Drive::Velocity { direction, speed } = &world.walls[place].drive else { return None };
-    let (mass, end) = (world.grains.mass.iter().sum(), scene.time.end);
-    // the way that the wall moves
-    let sign = if speed(end) < 0.0 { -1.0 } else { 1.0 };
-    world.walls[place].drive = Drive::Force { direction: *direction, mass, force: Arc::new(move |t| sign * t / end) };
-    Some((format!("walls.{name}"), 0.0, sign, true))
+/// The way that a wall driven by a velocity moves: the sign of its last speed, and the unit
+/// direction of that way.
+fn push<D: Dim>(scene: &Scene, world: &World<D>, wall: usize) -> Option<(f64, D::Vector)> {
+    let Drive::Velocity { direction, speed } = &world.walls[wall].drive else { return None };
+    let sign = if speed(scene.time.end) < 0.0 { -1.0 } else { 1.0 };
+    Some((sign, *direction * sign))
 }
 
 /// The limit load found. `steady`: the loads of a run grow at constant rates.

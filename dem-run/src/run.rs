@@ -230,10 +230,7 @@ impl<D: Dim> Run<'_, D> {
 
     fn failed(&mut self, error: StepError) -> Result<Ending, RunError> {
         self.state.course.rejected += u64::from(matches!(error, StepError::NotAccepted { .. }));
-        let remedy = match self.against_rigid_bonds(&error) {
-            Some(remedy) => remedy,
-            None => self.remedy(&error),
-        };
+        let remedy = self.against_rigid_bonds(&error).unwrap_or_else(|| self.remedy(&error));
         Err(NoConvergence::Step { error: error.message(&|body| self.name(body)), remedy }.into())
     }
 
@@ -248,10 +245,10 @@ impl<D: Dim> Run<'_, D> {
         if !world.bonds.iter().any(|bond| bond.status == BondStatus::Intact && bond.stiffness.is_none()) {
             return None;
         }
-        let mut moving = (0..world.walls.len()).filter_map(|wall| Some((wall, world.motion_of_drive(wall)?.norm())));
-        let (Some((wall, speed)), None) = (moving.next(), moving.next()) else { return None };
-        let mass: f64 = world.grains.mass.iter().sum();
-        let limit = world.limit_of_motion(wall)?;
+        let mut moving = (0..world.walls.len()).filter_map(|wall| Some((wall, world.motion_of_drive(wall)?)));
+        let (Some((wall, velocity)), None) = (moving.next(), moving.next()) else { return None };
+        let (mass, speed) = (world.grains.mass.iter().sum::<f64>(), velocity.norm());
+        let limit = world.limit_of_force(wall, velocity * (1.0 / speed));
         let name = self.name((self.state.world.grains.len() + wall) as u32);
         match limit {
             LimitLoad::Unbounded => Some(format!(

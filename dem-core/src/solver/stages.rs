@@ -30,7 +30,6 @@ use crate::contact::{LocalSolve, Padded};
 use crate::dim::Dim;
 use crate::problem::ContactProblem;
 use crate::problem::assembled::Assembled;
-use crate::problem::residual::velocity_error;
 use crate::saved::{Mismatch, Reader, Saved};
 use crate::solver::tuning::{defaults, stages as tuning};
 
@@ -352,7 +351,7 @@ impl Staged {
     fn coarse_sweeps<D: Dim>(&self, problem: &mut ContactProblem<D>) -> SolveReport {
         let accept = self.settings.accept;
         let coarse = problem.gauss_seidel(self.sweeps(accept, tuning::COARSE_SWEEPS));
-        SolveReport { status: self.settings.status(coarse.residual, velocity_error(problem)), ..coarse }
+        SolveReport { status: self.settings.status(coarse.residual, problem.velocity_error()), ..coarse }
     }
 }
 

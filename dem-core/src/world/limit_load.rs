@@ -32,25 +32,24 @@ impl<D: Dim> World<D> {
         })
     }
 
-    /// The largest force (N) of a wall driven by a velocity, in the way that it moves in the next
-    /// step, with the loads that act now; `None` if it does not move. See [`World::limit_load`].
+    /// The largest force (N) of a wall along a unit direction, in place of its drive and with the
+    /// other loads that act now. See [`World::limit_load`].
     ///
     /// # Panics
     /// If there is no such wall.
-    pub fn limit_of_motion(&mut self, wall: usize) -> Option<LimitLoad> {
-        let moves = self.motion_of_drive(wall)?;
+    pub fn limit_of_force(&mut self, wall: usize, direction: D::Vector) -> LimitLoad {
         let (time, still) = (self.time, (D::Vector::zero(), D::Spin::zero()));
         let mass: f64 = self.grains.mass.iter().sum();
-        let pushed = Drive::Force { direction: moves * (1.0 / moves.norm()), mass, force: Arc::new(|_| 0.0) };
+        let pushed = Drive::Force { direction, mass, force: Arc::new(|_| 0.0) };
         let drive = std::mem::replace(&mut self.walls[wall].drive, pushed);
         let found = self.limit(|world| {
             let start = world.velocities_given(true, |value| value(time));
             let mut growth = vec![still; start.len()];
-            growth[world.grains.len() + wall].0 = moves * (1.0 / (moves.norm() * mass));
+            growth[world.grains.len() + wall].0 = direction * (1.0 / mass);
             (start, growth.into())
         });
         self.walls[wall].drive = drive;
-        Some(found)
+        found
     }
 
     /// The velocity (m/s) that a wall's drive prescribes for the next step, if it does and if this
