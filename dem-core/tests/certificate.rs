@@ -288,7 +288,7 @@ fn no_verdict_contradicts_a_solution() {
 
 /// A bonded row between walls that hold its ends and slide: by the associated flow a bond that
 /// slips opens, for which the walls leave no room. The residual is small beside ever larger
-/// reactions. In a fast slide a bond yields; in a slow one the velocity error is too large.
+/// reactions, but the velocity error is not. In a fast slide a bond may yield as well.
 #[test]
 fn bonds_sheared_between_walls_that_cannot_part_have_no_solution() {
     fn case<D: Dim>(slow: bool) {
@@ -302,7 +302,7 @@ fn bonds_sheared_between_walls_that_cannot_part_have_no_solution() {
         w.form_bonds(1e-6, |_| 10.0, 0.3);
         let error = w.step().expect_err("no solution");
         match &error {
-            StepError::NotAccepted { velocity_error: Some(error), .. } => assert!(slow && *error > 1e-3, "{error}"),
+            StepError::NotAccepted { velocity_error: Some(error), .. } => assert!(*error > 1e-3, "{error}"),
             error => assert!(!slow && matches!(error, StepError::Yielded { .. }), "{error}"),
         }
         assert_eq!(error.verdict(), Some(&Verdict::NoSolution(vec![0, 1, 2])));
