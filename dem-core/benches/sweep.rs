@@ -5,7 +5,7 @@
 //! `cargo bench -p dem-core --bench sweep`; criterion's throughput line gives contacts per second,
 //! 1e9 / that is ns a contact.
 
-#[path = "../tests/common/mod.rs"]
+#[path = "../tests/core/common/mod.rs"]
 mod common;
 
 use common::family::{FEATURES, Feature, layers_of_spheres, rows_of_disks};

@@ -2,7 +2,7 @@
 //! disks|spheres|twisting FEATURE ROWS COLUMNS sweep|step TIMES` prints the number of grains and
 //! contacts, the bytes of a contact, and the peak resident size (kB).
 
-#[path = "../tests/common/mod.rs"]
+#[path = "../tests/core/common/mod.rs"]
 mod common;
 
 use common::family::{FEATURES, layers_of_spheres, rows_of_disks};

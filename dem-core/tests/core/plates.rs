@@ -1,8 +1,6 @@
 //! Walls of finite extent: segments in 2D, rectangles in 3D.
 
-mod common;
-
-use common::{down, floor, grain, pressed, run, settings, solver, world};
+use crate::common::{down, floor, grain, pressed, run, settings, solver, world};
 use dem_core::body::{Drive, Shape, Wall};
 use dem_core::dim::{D2, D3, Dim, Vect};
 use dem_core::plate::Plate;

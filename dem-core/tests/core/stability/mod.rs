@@ -3,8 +3,6 @@
 
 mod atlas;
 mod cases;
-#[path = "../common/mod.rs"]
-mod common;
 mod harness;
 mod random;
 mod scene;
@@ -19,7 +17,7 @@ fn what_must_hold_holds_with_the_default_solver_and_the_interior_point_method() 
     ROWS.par_iter().for_each(|row| row.check(&row.runs(row.must_hold, &[Kind::Auto, Kind::Interior], &[2, 3], 25)));
 }
 
-/// `cargo test --release -p dem-core --test stability page -- --ignored`
+/// `cargo test --release -p dem-core --test core stability::page -- --ignored`
 #[test]
 #[ignore = "long: see docs/running.md"]
 fn page() {

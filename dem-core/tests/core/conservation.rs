@@ -1,8 +1,6 @@
 //! Momentum is conserved, and energy never grows without work.
 
-mod common;
-
-use common::{down, floor, grain, run, settings, solver, world};
+use crate::common::{down, floor, grain, run, settings, solver, world};
 use dem_core::dim::{D2, D3, Dim, Vect};
 use dem_core::world::{Restitution, World};
 use rand::{RngExt, SeedableRng};
@@ -111,7 +109,7 @@ fn the_ledger_closes_under_gravity_loads_and_drives() {
         let (column, row) = (k % 5, k / 5);
         grain::<D2>(&[0.022 * column as f64 + 0.002 * rng.random::<f64>(), 0.012 + 0.023 * row as f64], 0.01)
     });
-    let mut lid = common::force_driven::<D2>([0.0, -1.0].into(), [0.0, 0.16].into(), 3.0, 40.0);
+    let mut lid = crate::common::force_driven::<D2>([0.0, -1.0].into(), [0.0, 0.16].into(), 3.0, 40.0);
     lid.velocity = [0.0, -0.1].into();
     let mut w = world(grains.collect(), vec![floor(0.2), lid], set);
     // a wall that moves in from the left at a prescribed speed

@@ -1,11 +1,9 @@
 //! The limit load: closed forms, an independent conic solver, and the first break of runs.
 
-mod common;
-
+use crate::common::{DENSITY, bonded_pair, down, floor, grain, settings, world};
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::SupportedConeT::{self, NonnegativeConeT, SecondOrderConeT, ZeroConeT};
 use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver};
-use common::{DENSITY, bonded_pair, down, floor, grain, settings, world};
 use dem_core::body::{Drive, Grain, Load, Shape, Wall};
 use dem_core::dim::{D2, D3, D3Twist, Dim, Vect};
 use dem_core::solver::SolverSettings;

@@ -1,9 +1,7 @@
 //! Bonds that turn: a rotating pair keeps its length, its angular velocity and its energy, with
 //! every kind of bond.
 
-mod common;
-
-use common::{grain, newton, settings, world};
+use crate::common::{grain, newton, settings, world};
 use dem_core::body::{Shape, Wall};
 use dem_core::bond::Stiffness;
 use dem_core::dim::{D2, D3, D3Twist, Dim, Vect};

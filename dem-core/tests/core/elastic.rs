@@ -1,9 +1,7 @@
 //! Elastic bonds: waves, moduli, energy, stability, rupture, and the same unique solution with
 //! every solver.
 
-mod common;
-
-use common::{bonded_pair, grain, pressed, settings, solver, world};
+use crate::common::{bonded_pair, grain, pressed, settings, solver, world};
 use dem_core::body::{Grain, Grains, Load, Schedule, Shape, Wall};
 use dem_core::bond::{BondStatus, Rupture, Stiffness};
 use dem_core::contact::{BondFlow, Law, Local};
@@ -26,7 +24,7 @@ const K: f64 = 1e6;
 const UNBREAKABLE: f64 = 1e3;
 
 fn newton(tolerance: f64, load_tolerance: f64) -> SolverSettings {
-    SolverSettings::Staged(common::newton(tolerance, 100.0 * tolerance, load_tolerance))
+    SolverSettings::Staged(crate::common::newton(tolerance, 100.0 * tolerance, load_tolerance))
 }
 
 /// Springs with this ratio of tangential to normal stiffness; they bend like a bar as wide as it is

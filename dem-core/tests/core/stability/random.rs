@@ -1,8 +1,8 @@
 //! Random scenes: all features of a scene in all combinations, checked by the invariants alone.
 
+use super::harness::{cause, watch};
+use super::scene::{Kind, SWEEPS};
 use crate::common::DENSITY;
-use crate::harness::{cause, watch};
-use crate::scene::{Kind, SWEEPS};
 use dem_core::body::{Drive, Grain, Load, Shape, Wall};
 use dem_core::bond::{Rupture, Stiffness};
 use dem_core::contact::BondFlow;
@@ -247,7 +247,7 @@ fn failures(seeds: std::ops::Range<u64>, size: Size) -> (Vec<u64>, Vec<Course>) 
 /// stop, the total number of steps, and the numbers of scenes with contacts and with broken bonds.
 fn figures(seeds: std::ops::Range<u64>, size: Size) -> [usize; 4] {
     let (failed, courses) = failures(seeds, size);
-    assert_eq!(failed, [], "seeds of scenes that fail");
+    assert!(failed.is_empty(), "seeds of scenes that fail: {failed:?}");
     let count = |of: fn(&Course) -> bool| courses.iter().filter(|course| of(course)).count();
     let steps = courses.iter().map(|course| course.steps).sum();
     [count(|c| c.stopped.is_some()), steps, count(|c| c.touched), count(|c| c.broken > 0)]
@@ -280,7 +280,7 @@ fn random_scenes_keep_what_must_hold_between_cylinders() {
     assert!(shown, "{stopped} {steps} {touched} {breaking}");
 }
 
-/// `STABILITY_SCENES=0..20000 cargo test --release -p dem-core --test stability twenty_thousand --
+/// `STABILITY_SCENES=0..20000 cargo test --release -p dem-core --test core twenty_thousand --
 /// --ignored --nocapture`
 #[test]
 #[ignore = "long: see docs/running.md"]
@@ -306,5 +306,5 @@ fn twenty_thousand_random_scenes() {
     for ((solver, cause), seeds) in stopped {
         eprintln!("{solver}: {cause}: {} {seeds:?}", seeds.len());
     }
-    assert_eq!(failed, [], "seeds of scenes that fail");
+    assert!(failed.is_empty(), "seeds of scenes that fail: {failed:?}");
 }

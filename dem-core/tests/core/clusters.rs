@@ -1,9 +1,7 @@
 //! Fragments that fly and slide: bonds far below their limits, and contacts with fast slip and
 //! small reactions.
 
-mod common;
-
-use common::{down, floor, grain, newton, settings, world};
+use crate::common::{down, floor, grain, newton, settings, world};
 use dem_core::dim::D3;
 use dem_core::solver::{SolverSettings, StagedSettings, Stages};
 use dem_core::world::World;

@@ -2,9 +2,7 @@
 //! of two and walls of every drive: each is the transpose of the other, rigid motion has no
 //! relative velocity at any contact, and local blocks are the effect of unit impulses.
 
-mod common;
-
-use common::{force_driven, grain, settings, world};
+use crate::common::{force_driven, grain, settings, world};
 use dem_core::body::{Shape, Wall};
 use dem_core::bond::{BondStatus, Stiffness};
 use dem_core::contact::{Arms, Law, Local};

@@ -1,8 +1,6 @@
 //! The Newton solver against Gauss–Seidel, closed forms, and itself from other starts.
 
-mod common;
-
-use common::{down, floor, force_driven, grain, settings, solver, world};
+use crate::common::{down, floor, force_driven, grain, settings, solver, world};
 use dem_core::body::{Drive, Load, Shape, Wall};
 use dem_core::bond::failure;
 use dem_core::contact::Law;
@@ -17,7 +15,7 @@ use rand_pcg::Pcg64;
 use std::sync::Arc;
 
 fn newton(tolerance: f64, start: Start) -> SolverSettings {
-    SolverSettings::Staged(StagedSettings { start, ..common::newton(tolerance, tolerance, 1e-6) })
+    SolverSettings::Staged(StagedSettings { start, ..crate::common::newton(tolerance, tolerance, 1e-6) })
 }
 
 #[test]
@@ -64,7 +62,7 @@ fn dry_contacts_that_sweeps_miss_are_solved_exactly() {
 fn solved_cold<D: Dim>(world: &mut World<D>) -> ContactProblem<D> {
     let mut problem = world.contact_problem();
     // accepted sweeps would end far from the solution
-    let settings = SolverSettings::Staged(common::newton(1e-10, 1e-3, 1e-9));
+    let settings = SolverSettings::Staged(crate::common::newton(1e-10, 1e-3, 1e-9));
     let report = settings.build::<D>().solve(&mut problem);
     assert_eq!(report.status, SolveStatus::Converged, "{report:?}");
     assert!(report.work.newton <= 30, "{report:?}");
@@ -223,7 +221,7 @@ fn gauss_seidel_approaches_newton_in_3d() {
     let problem = pressed::<D3>(0, true).contact_problem();
     // the last path leaves a load error of 3e-8 or 4e-6, depending on round-off: small beside the
     // thousandth required below
-    let found = solved(&problem, SolverSettings::Staged(common::newton(1e-10, 1e-10, 1e-5)));
+    let found = solved(&problem, SolverSettings::Staged(crate::common::newton(1e-10, 1e-10, 1e-5)));
     let [coarse, fine] = [1e-5, 1e-7].map(|tolerance| apart(&problem, &found, tolerance));
     assert!(fine <= 0.1 * coarse && fine <= 1e-3, "{coarse:e}, then {fine:e}");
 }

@@ -1,8 +1,6 @@
 //! Walls driven by a stress, walls that slide under their load, and walls that hold grains.
 
-mod common;
-
-use common::{floor, force_driven, grain, newton, settings, solver, world};
+use crate::common::{floor, force_driven, grain, newton, settings, solver, world};
 use dem_core::body::{Drive, Grains, Shape, Slide, Wall};
 use dem_core::bond::Stiffness;
 use dem_core::dim::{D2, D3, Dim, Vect};

@@ -1,8 +1,8 @@
 //! Single situations that break simulators, each in its smallest scene.
 
+use super::harness::{stretch, watch};
+use super::scene::{Heap, Kind, TOLERANCE};
 use crate::common::{self, DENSITY, down, floor, world};
-use crate::harness::{stretch, watch};
-use crate::scene::{Heap, Kind, TOLERANCE};
 use dem_core::body::{Drive, Grain, Load, Shape, Wall};
 use dem_core::bond::BondStatus;
 use dem_core::dim::{D2, D3, Dim, Vect};

@@ -1,8 +1,6 @@
 //! Verdicts on problems that were not solved, against closed forms.
 
-mod common;
-
-use common::{force_driven, grain, newton, settings, world};
+use crate::common::{force_driven, grain, newton, settings, world};
 use dem_core::body::{Drive, Grain, Shape, Wall};
 use dem_core::bond::Stiffness;
 use dem_core::contact::{BondFlow, LocalSolve};

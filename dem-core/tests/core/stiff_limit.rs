@@ -6,9 +6,7 @@
 //! and G J/a with a³, and J = 2 I. In 2D all bonds are alike, except for the arm a of their
 //! moments.
 
-mod common;
-
-use common::{grain, newton, settings};
+use crate::common::{grain, newton, settings};
 use dem_core::body::{Grain, Grains, Load};
 use dem_core::dim::{D2, D3, D3Twist, Dim, Moments, Vect};
 use dem_core::solver::{SolverSettings, StagedSettings, StiffnessRatio};

@@ -5,9 +5,7 @@
 //! (sums, products, quotients and roots) in an order fixed by the scene. For an intended change,
 //! the test prints the new value for [`GOLDEN`].
 
-mod common;
-
-use common::pressed;
+use crate::common::pressed;
 use dem_core::body::Drive;
 use dem_core::contact::BondFlow;
 use dem_core::dim::D2;
@@ -37,7 +35,7 @@ fn compressed() -> World<D2> {
     let mut w = pressed::<D2>(3, 6, 0.3, Some(BondFlow::Associated));
     w.stop_motion();
     w.settings.gravity = None;
-    w.set_solver(common::solver(1e-6));
+    w.set_solver(crate::common::solver(1e-6));
     w.bonds.iter_mut().for_each(|bond| bond.strength *= 100.0);
     if let Drive::Force { force, .. } = &mut w.walls[1].drive {
         *force = Arc::new(|t| 5e4 * t);
@@ -76,7 +74,7 @@ fn a_short_compression_has_the_bits_it_had() {
         hash.0,
         GOLDEN,
         "the run ends in other bits: 0x{:016x}, with {broken} of {} bonds broken after {} steps. If that is meant, make it the \
-         value of GOLDEN in dem-core/tests/golden.rs, and list the change in CHANGELOG.md",
+         value of GOLDEN in dem-core/tests/core/golden.rs, and list the change in CHANGELOG.md",
         hash.0,
         w.bonds.len(),
         w.steps

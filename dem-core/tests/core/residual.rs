@@ -1,9 +1,7 @@
 //! The residual of a pair of grains against its definition: its scale, and the round-off below
 //! which it is zero.
 
-mod common;
-
-use common::{grain, settings, world};
+use crate::common::{grain, settings, world};
 use dem_core::bond::Stiffness;
 use dem_core::contact::Law;
 use dem_core::dim::{D2, D3, Dim, Vect};

@@ -1,8 +1,6 @@
 //! Scenes with a closed-form solution, in 2D, and in 3D where the same law applies.
 
-mod common;
-
-use common::{bonded_pair, down, floor, grain, run, settings, solver, world};
+use crate::common::{bonded_pair, down, floor, grain, run, settings, solver, world};
 use dem_core::body::{Drive, Shape, Wall};
 use dem_core::bond::BondStatus;
 use dem_core::dim::{D2, D3, Dim, Vect};

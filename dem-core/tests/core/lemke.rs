@@ -6,9 +6,7 @@
 //! lexicographic ratio test of section 4.9; friction as in Stewart & Trinkle, Int. J. Numer.
 //! Methods Eng. 39, 1996.
 
-mod common;
-
-use common::newton;
+use crate::common::newton;
 use dem_core::problem::assembled::{Assembled, BlockMatrix, ContactRows, Parts};
 use dem_core::solver::{SolveStatus, Staged, StagedSettings, Stages};
 use nalgebra::{DMatrix, DVector};

@@ -1,8 +1,8 @@
 //! Every parameter over its range, in both dimensions and with every solver, and the table of its
 //! results.
 
-use crate::harness::{Outcome, cause, watch};
-use crate::scene::{Heap, Kind};
+use super::harness::{Outcome, cause, watch};
+use super::scene::{Heap, Kind};
 use dem_core::dim::{D2, D3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;

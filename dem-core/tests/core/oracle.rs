@@ -4,12 +4,10 @@
 //! minimise ½ r̂·W r̂ + q·r̂ over the cones; K = { ‖t‖ ≤ μ n, ‖m‖ ≤ ν n, |τ| ≤ ξ n } consists of
 //! second-order cones on the same n.
 
-mod common;
-
+use crate::common::{pressed, solver};
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::SupportedConeT::{self, NonnegativeConeT, SecondOrderConeT, ZeroConeT};
 use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver};
-use common::{pressed, solver};
 use dem_core::contact::BondFlow;
 use dem_core::dim::{D2, D3, D3Twist, Dim};
 use dem_core::problem::ContactProblem;
@@ -89,7 +87,7 @@ fn interior_point(problem: &Assembled) -> Vec<f64> {
 }
 
 fn newton() -> SolverSettings {
-    SolverSettings::Staged(common::newton(1e-11, 1e-11, 1e-6))
+    SolverSettings::Staged(crate::common::newton(1e-11, 1e-11, 1e-6))
 }
 
 /// Largest difference of the relative velocities, over the largest of them.

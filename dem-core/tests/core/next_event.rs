@@ -1,9 +1,7 @@
 //! Loading to the next event: the load of each break against closed forms, its independence of the
 //! load function, and branches on which the load decreases.
 
-mod common;
-
-use common::{grain, newton, settings};
+use crate::common::{grain, newton, settings};
 use dem_core::body::{Grains, Load};
 use dem_core::bond::{Bond, BondStatus, Rupture};
 use dem_core::dim::{D2, D3, D3Twist, Dim, Vect};

@@ -1,8 +1,6 @@
 //! The measures of a world against closed forms: stress, strain, volume.
 
-mod common;
-
-use common::{down, floor, force_driven, grain, newton, run, settings, world};
+use crate::common::{down, floor, force_driven, grain, newton, run, settings, world};
 use dem_core::body::{Drive, Grains, Load, Shape, Wall};
 use dem_core::dim::{D2, D3, Dim, Vect};
 use dem_core::solver::{Route, SolverSettings};
