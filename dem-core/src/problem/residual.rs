@@ -12,12 +12,16 @@
 //! solvers of [`crate::solver::Staged`] stop on both.
 
 use super::{Contact, ContactProblem, Group, GroupVisitor, Nodes, Visitor};
-use crate::contact::Law;
+use crate::contact::{Law, Weights};
 use crate::dim::{Dim, Vect};
 use rayon::prelude::*;
 
 /// Relative round-off up to which the natural map counts as zero.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
+
+/// Share of its strength that an elastic bond counts as bearing at least, in the scale of the
+/// elastic error: an impulse far below is rounded as the strength is.
+const LEAST_BORNE: f64 = 0.1;
 
 #[derive(Default)]
 struct Sums {
@@ -90,6 +94,45 @@ pub fn velocity_error<D: Dim>(problem: &ContactProblem<D>) -> f64 {
         0.0 => 0.0,
         _ if asked > 0.0 => map / asked,
         _ => map / free,
+    }
+}
+
+/// The elastic error of the impulses and node velocities that the problem now holds (–): that by
+/// which elastic bonds violate their law, as impulses C⁻¹ D map, relative to their impulses, both in
+/// the norm of r·C r. Bonds count as bearing a tenth of their strength at least. Zero without
+/// elastic bonds.
+///
+/// Where bonds are stiff for the step, C ≪ D, neither the residual nor the velocity error shows how
+/// they share a load: both are relative to the velocities that the load would give free bodies.
+pub fn elastic_error<D: Dim>(problem: &ContactProblem<D>) -> f64 {
+    let mut elastic = Elastic::default();
+    problem.visit(&mut elastic);
+    let Elastic { wrong, size, least } = elastic;
+    if wrong == 0.0 { 0.0 } else { (wrong / size.max(least)).sqrt() }
+}
+
+/// Sums over elastic bonds: r·C r of the impulses that their velocities lack, of their impulses,
+/// and of the least that count.
+#[derive(Default)]
+struct Elastic {
+    wrong: f64,
+    size: f64,
+    least: f64,
+}
+
+impl<D: Dim> Visitor<D> for Elastic {
+    #[inline(always)]
+    fn visit<L: Law>(&mut self, nodes: &Nodes<D>, c: &Contact<D, L>) {
+        let (law, soft) = (&c.law, c.law.compliance());
+        if soft.n == 0.0 {
+            return;
+        }
+        let inverse = |soft: f64| if soft > 0.0 { 1.0 / soft } else { 0.0 };
+        let stiff = Weights { n: inverse(soft.n), t: inverse(soft.t), m: inverse(soft.m), w: inverse(soft.w) };
+        let map = law.natural_map(c.r, nodes.relative_velocity(&c.link, law.arms())) * (1.0 / law.gamma());
+        self.wrong += stiff.times(&map).dot(&map);
+        self.size += soft.times(&c.r).dot(&c.r);
+        self.least += soft.n * (LEAST_BORNE * law.shift()).powi(2);
     }
 }
 

@@ -42,6 +42,7 @@ impl Solvable for Assembled {
                 shift: parts.shift[c],
                 given: rows.padded(&given),
                 weights,
+                lowered: Weights::default(),
                 multiplier: self.own_reaction(c),
                 // the compliance of elastic bonds is part of W and q
                 compliance: Weights::default(),

@@ -13,7 +13,7 @@ use super::backoff::Backoff;
 use super::rows::{Row, Rows, mass_unit};
 use crate::contact::Padded;
 use crate::dim::{Dim, Moments, Vect};
-use crate::problem::residual::{residual, velocity_error};
+use crate::problem::residual::{elastic_error, residual, velocity_error};
 use crate::problem::{ContactProblem, KINDS};
 use crate::saved::{Mismatch, Reader, Saved};
 use crate::solver::tuning::extrapolation as tuning;
@@ -63,16 +63,17 @@ impl Extrapolation {
         let brought = problem.reactions();
         problem.set_reactions(&self.grown(&self.base, &self.rate));
         problem.velocities_from_reactions();
-        let (residual, load_error) = (residual(problem), motion(problem));
+        let (residual, moves, elastic_error) = (residual(problem), motion(problem), elastic_error(problem));
         let allowed = load_tolerance.min((tuning::MORE * self.moves).max(tuning::SHARE * load_tolerance));
         let holds = residual <= tuning::SHARE * tolerance
-            && load_error <= allowed
+            && moves <= allowed
+            && elastic_error <= load_tolerance
             && velocity_error(problem) <= load_tolerance
             && self.keeps_status();
         if holds && !problem.is_at_limit() {
             (self.steps, self.left, self.last_extrapolated) = (self.steps + 1, self.left - 1, true);
             self.backoff.forget();
-            return Some((residual, load_error));
+            return Some((residual, moves.max(elastic_error)));
         }
         problem.set_reactions(&brought);
         self.left = 0;

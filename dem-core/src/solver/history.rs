@@ -107,6 +107,7 @@ mod tests {
                     shift: 1.0,
                     given: Padded::zero(),
                     weights: Weights { n: 1.0, t: 2.0, m: 12.0, w: 1.0 },
+                    lowered: Weights::default(),
                     multiplier: Padded::from_order(&r.into()),
                     compliance: Weights { n: 0.0, t: 0.0, m: 0.0, w: 0.0 },
                     carried: Padded::zero(),

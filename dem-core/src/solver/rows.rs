@@ -64,8 +64,10 @@ pub(super) struct Row {
     pub shift: f64,
     /// Relative velocity due to given velocities, with the bias (m/s).
     pub given: Padded,
-    /// 1/ρ of each group.
+    /// 1/ρ of each group; zero for an elastic bond.
     pub weights: Weights,
+    /// The same that an elastic bond has once ρ is lowered.
+    pub lowered: Weights,
     /// Multiplier: a reaction without the shift, which would cause round-off (N s).
     pub multiplier: Padded,
     /// Compliance of an elastic bond; zero for a rigid contact.
@@ -99,6 +101,11 @@ impl Row {
     /// Whether it is a bond without compliance.
     pub fn is_rigid_bond(&self) -> bool {
         self.is_bond && self.compliance.n == 0.0
+    }
+
+    /// Whether it is a bond with compliance.
+    pub fn is_elastic(&self) -> bool {
+        self.compliance.n > 0.0
     }
 
     /// Weights of the corrector's quadratic form, 1/ρ + C.
@@ -253,6 +260,9 @@ impl Rows {
         let soft = mean(rows.list.iter().map(|r| r.weights.n).sum());
         let scale = mean(normal.iter().sum()) / (soft * kappa);
         rows.soften(scale);
+        // their own compliance determines the reactions of elastic bonds
+        let elastic = rows.list.iter_mut().filter(|row| row.is_elastic());
+        elastic.for_each(|row| row.lowered = std::mem::take(&mut row.weights));
         rows
     }
 
@@ -264,7 +274,7 @@ impl Rows {
     /// Divide ρ of all rows by `factor`.
     pub fn soften(&mut self, factor: f64) {
         for row in &mut self.list {
-            row.weights = row.weights * factor;
+            row.weights = (row.weights + std::mem::take(&mut row.lowered)) * factor;
         }
     }
 
@@ -360,6 +370,14 @@ impl Rows {
     /// r·C r.
     pub fn elastic(&self, reactions: &[Padded]) -> f64 {
         self.list.iter().zip(reactions).map(|(row, r)| row.compliance.times(r).dot(r)).sum()
+    }
+
+    /// The error of the scaled velocities that may change the reactions of elastic bonds by as much
+    /// as these are, in the norm of r·C r: |H̃ᵀ y|² ≤ size y². Infinite without elastic bonds.
+    pub fn deforming(&self, reactions: &[Padded]) -> f64 {
+        let elastic = self.list.iter().filter(|row| row.is_elastic());
+        let most = elastic.map(|row| row.size / row.compliance.n).fold(0.0, f64::max);
+        if most == 0.0 { f64::INFINITY } else { (self.elastic(reactions) / most).sqrt() }
     }
 
     /// The largest coefficient of each unknown; 1 for an unknown without coefficients.
@@ -529,6 +547,7 @@ impl<D: Dim> Visitor<D> for Flatten<'_, D> {
             shift: c.law.shift() / unit,
             given,
             weights: self.ratio.weights(soft),
+            lowered: Weights::default(),
             multiplier: c.link.in_frame(&c.r) * (1.0 / unit),
             compliance: c.law.compliance() * unit,
             carried: c.link.in_frame(&c.law.carried()) * (1.0 / unit),

@@ -5,7 +5,7 @@ use super::{ContactSolver, GaussSeidel, GaussSeidelSettings, SolveReport, sweep}
 use crate::contact::{Law, LocalSolve, Padded, Reached};
 use crate::dim::{Dim, Vect};
 use crate::problem::assembled::BlockMatrix;
-use crate::problem::residual::{residual, velocity_error};
+use crate::problem::residual::{elastic_error, residual, velocity_error};
 use crate::problem::{Contact, ContactProblem, Nodes, Visitor, VisitorMut};
 
 /// A problem that can be converted to rows over scaled unknowns, swept and measured.
@@ -23,6 +23,10 @@ pub(super) trait Solvable {
     fn residual(&self) -> f64;
     /// Their velocity error (–).
     fn velocity_error(&self) -> f64;
+    /// Their elastic error (–); zero where a compliance is part of the matrix.
+    fn elastic_error(&self) -> f64 {
+        0.0
+    }
     /// The reactions after some sweeps of Gauss–Seidel, in the unit of the rows.
     fn swept(&mut self, sweeps: usize) -> Vec<Padded>;
     /// Set the reactions, given in the unit of the rows, and the velocities that they give. No bond
@@ -51,6 +55,10 @@ impl<D: Dim> Solvable for ContactProblem<D> {
 
     fn velocity_error(&self) -> f64 {
         velocity_error(self)
+    }
+
+    fn elastic_error(&self) -> f64 {
+        elastic_error(self)
     }
 
     fn swept(&mut self, sweeps: usize) -> Vec<Padded> {

@@ -148,20 +148,25 @@ impl<D: Dim> World<D> {
             done.add(solve);
             self.refuse_unaccepted(solve, &problem, (at, h), true)?;
             let excess = self.excess(&touches, &problem, &places);
-            if 1.0 + excess < (1.0 - LIMIT) * brought.strengthened || excess.is_infinite() {
+            // stronger bonds may hold bodies that move where a bond yields
+            let yields = 1.0 + excess >= (1.0 - LIMIT) * brought.strengthened;
+            if !yields || brought.strengthened >= 1.0 / LIMIT {
                 write_reactions(&mut touches, &problem, &places, h);
+                let excess = if yields || !self.balances(&problem) { f64::INFINITY } else { excess };
                 return Ok(Equilibrium { at, mid, motion, turns: brought.turns, touches, problem, excess });
             }
         }
     }
 
-    /// [`Equilibrium::excess`] of a solved problem.
-    fn excess(&self, touches: &[StoredTouch<D>], problem: &ContactProblem<D>, places: &Places) -> f64 {
+    /// Whether the bodies stay at rest in a solved problem. Without loads nothing can move: contacts
+    /// do no positive work on bodies at rest.
+    fn balances(&self, problem: &ContactProblem<D>) -> bool {
         let tolerance = self.settings.solver.load_tolerance().unwrap_or(self.settings.solver.tolerance());
-        // without loads nothing can move: contacts do no positive work on bodies at rest
-        if problem.applied > 0.0 && unbalanced_impulse(problem) > tolerance * self.scale_of(problem) {
-            return f64::INFINITY;
-        }
+        problem.applied == 0.0 || unbalanced_impulse(problem) <= tolerance * self.scale_of(problem)
+    }
+
+    /// The largest required strength of an intact bond over its strength, less one (–).
+    fn excess(&self, touches: &[StoredTouch<D>], problem: &ContactProblem<D>, places: &Places) -> f64 {
         let h = self.settings.step;
         let bonds = problem.bonded.iter().zip(places.of(Kind::Bonded));
         let shares = bonds.filter_map(|(contact, place)| {

@@ -140,6 +140,31 @@ fn constant_loads_are_part_of_the_equilibrium() {
     }
 }
 
+/// Two rows of six disks in squares, the two at one end fixed, the lower one of the other end pulled
+/// across the rows. Once the upper bond at the fixed end is broken, the lower one alone bears the
+/// load, and its moment is F 9 R: this load is less than half of the first.
+#[test]
+fn a_rest_that_bears_less_than_half_of_the_released_load_breaks_at_what_it_bears() {
+    for rolling in [0.5, 0.45, 0.3, 0.1] {
+        let at = |k: usize| grain::<D2>(&[2.0 * R * (k / 2) as f64, 2.0 * R * (k % 2) as f64], R);
+        let mut grains: Grains<D2> = (0..12).map(at).collect();
+        (grains.fixed[0], grains.fixed[1]) = (true, true);
+        let force = <D2 as Dim>::Vector::new(0.0, -1.0);
+        let load = Load { grain: 10, force, torque: Vect::zero(), factor: Arc::new(|t| t) };
+        let mut world = World::new(grains, Vec::new(), vec![load], event_settings(1e3));
+        world.form_bonds(1e-6 * R, |_| 10.0, 5.0);
+        world.bonds.iter_mut().for_each(|bond| bond.rolling = rolling);
+        let first = world.step().expect("an event").breaks;
+        assert_eq!(first.iter().map(|b| b.pair).collect::<Vec<_>>(), [[1, 3]], "{rolling}");
+        let peak = world.load_time;
+        let second = world.step().expect("an event").breaks;
+        assert_eq!(second.iter().map(|b| (b.pair, b.mode)).collect::<Vec<_>>(), [([0, 2], BondStatus::Rolling)]);
+        let expected = rolling * 2.0 * R * 10.0 / (9.0 * R);
+        assert!((world.load_time / expected - 1.0).abs() < ACCURACY, "{rolling}: {} N", world.load_time);
+        assert!(rolling == 0.5 || world.load_time < 0.5 * peak, "{rolling}: {} N after {peak} N", world.load_time);
+    }
+}
+
 /// Events are those of a stepped run whose steps are small; its load grows by `rate` each second.
 #[test]
 fn the_first_break_is_that_of_a_stepped_run_with_small_steps() {

@@ -1,8 +1,9 @@
 //! The differences between two runs of one sample: scenes, frames, broken bonds, curves.
 //!
-//! * **Frames** are compared at equal times. The distance of two frames is the greatest distance
-//!   between the two centres of a grain, relative to its radius. Frames differ if their distance
-//!   exceeds the tolerance. The default tolerance is zero: equal then means equal in every bit.
+//! * **Frames** are compared at equal times, or equal steps of two runs that load from break to
+//!   break. The distance of two frames is the greatest distance between the two centres of a grain,
+//!   relative to its radius. Frames differ if their distance exceeds the tolerance. The default
+//!   tolerance is zero: equal then means equal in every bit.
 //! * **Bonds** are identified by their two grains. Events are compared in order: the first
 //!   difference is the first place at which bond or mode differ between the two lists.
 //!

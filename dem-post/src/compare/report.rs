@@ -134,12 +134,17 @@ pub fn read(a: &History, b: &History, tolerance: f64) -> Result<Report> {
     if n != m {
         return Err(differs(format!("{n} grains there, {m} here: choose two runs of one sample")));
     }
-    let gaps = gaps(a, b, &radii[0])?;
+    let clocks = [Clock::of(a), Clock::of(b)];
+    let gaps = gaps([a, b], clocks, &radii[0])?;
     if gaps.is_empty() {
         return Err(differs("the two runs have no frame at a common time".into()));
     }
     let mut breaks = [breaks(&a.ruptures()?), breaks(&b.ruptures()?)];
-    let ends = [end(a, &breaks[0]), end(b, &breaks[1])];
+    let mut curves = [curve(a)?, curve(b)?];
+    let mut ends = [end(a, &breaks[0]), end(b, &breaks[1])];
+    // a step is as long in both runs where the time counts steps
+    let others = breaks[1].iter_mut().map(|found| &mut found.time).chain(&mut curves[1].time).chain(&mut ends[1..]);
+    others.for_each(|time| *time = clocks[0].time(clocks[1].value(*time)));
     let both = ends[0].min(ends[1]) * (1.0 + SAME_TIME);
     breaks.iter_mut().for_each(|list| list.retain(|found| found.time <= both));
     let fates = fates(&breaks);
@@ -161,19 +166,20 @@ pub fn read(a: &History, b: &History, tolerance: f64) -> Result<Report> {
         parting: parting(&breaks),
         fates,
         breaks,
-        curves: [curve(a)?, curve(b)?],
-        clock: Clock::of(a),
+        curves,
+        clock: clocks[0],
     })
 }
 
-/// The distances at all times for which both runs have a frame.
-fn gaps(a: &History, b: &History, radius: &[f64]) -> Result<Vec<Gap>> {
+/// The distances at all times of A for which both runs have a frame.
+fn gaps([a, b]: [&History; 2], clocks: [Clock; 2], radius: &[f64]) -> Result<Vec<Gap>> {
     let mut gaps = vec![];
     for (frame, &time) in a.times().iter().enumerate() {
-        let Some(other) = b.frame_at(time) else {
+        let in_b = clocks[1].time(clocks[0].value(time));
+        let Some(other) = b.frame_at(in_b) else {
             continue;
         };
-        if (b.times()[other] - time).abs() > SAME_TIME * time.abs() {
+        if (b.times()[other] - in_b).abs() > SAME_TIME * in_b.abs() {
             continue;
         }
         let positions = [a.grain_state(frame)?.position, b.grain_state(other)?.position];

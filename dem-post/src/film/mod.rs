@@ -76,7 +76,8 @@ pub struct Report {
 /// What the charts beside the sample show.
 #[derive(Debug, Default)]
 struct Curves {
-    /// Load curve, if a wall is driven: displacement (mm) and load (N) at each step.
+    /// Load curve, if a wall is driven: the load (N) at each step over the displacement (mm), or
+    /// over the broken bonds where the load follows the breaks.
     load: Vec<(f64, f64)>,
     /// Number of broken bonds over time (s), if there are bonds.
     broken: Vec<(f64, f64)>,
@@ -218,8 +219,9 @@ impl Curves {
         let mut curves = Self { clock: Clock::of(history), ..Self::default() };
         match stress_strain::read(history, wall) {
             Ok(load) => {
-                let millimetres = load.displacement.iter().map(|x| 1e3 * x);
-                curves.load = millimetres.zip(load.load.iter().copied()).collect();
+                let (over, unit) =
+                    if curves.clock.step().is_some() { (&load.broken, 1.0) } else { (&load.displacement, 1e3) };
+                curves.load = over.iter().map(|x| unit * x).zip(load.load.iter().copied()).collect();
                 curves.titles = Titles::with(&load);
                 curves.times = load.time;
             }
@@ -241,8 +243,10 @@ impl Curves {
     fn charts(&self, time: f64) -> Vec<Drawing> {
         let mut charts = vec![];
         if !self.load.is_empty() {
-            let mut chart = Chart::new("displacement of the wall (mm)", "load (N)");
-            chart.pad_x = true;
+            let follows_breaks = self.clock.step().is_some();
+            let over = if follows_breaks { "broken bonds" } else { "displacement of the wall (mm)" };
+            let mut chart = Chart::new(over, "load (N)");
+            (chart.pad_x, chart.x_is_count) = (true, follows_breaks);
             chart = chart.curve("load", colour::BLUE, Style::Line, self.load.clone());
             // the last step that is done by then
             let step = self.times.partition_point(|other| *other <= time * (1.0 + 1e-12));

@@ -126,6 +126,21 @@ fn a_resumed_run_goes_on_to_the_same_events() {
     assert_eq!(events(&here, "whole.h5", name), events(&here, "parts.h5", name));
 }
 
+/// Their times are those of a ramp that the loads do not follow.
+#[test]
+fn runs_with_unlike_steps_are_compared_step_by_step() {
+    let here = Folder::new();
+    here.write("row.json", row(5, 5.0).to_string());
+    for (file, step) in [("a.h5", "time.step=1e-3"), ("b.h5", "time.step=4e-4")] {
+        here.dem_run(&["run", "row.json", "-o", file, "-q", "--set", step, "--set", "stop=null"]).succeeds();
+    }
+    let found = here.dem_post(&["compare", "a.h5", "b.h5", "--json"]).json();
+    let gaps = found["gaps"].as_array().expect("a list");
+    assert_eq!(gaps.len(), here.history("a.h5").frames());
+    assert!(gaps.iter().all(|gap| gap["frames"][0] == gap["frames"][1]), "{found}");
+    assert_eq!((&found["ends"][0], &found["parting"]), (&found["ends"][1], &Value::Null));
+}
+
 /// Where bonds break at the end of a step, its frame still has their contacts.
 #[test]
 fn a_history_in_which_bonds_break_at_the_end_of_a_step_is_sound() {

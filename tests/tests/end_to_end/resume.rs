@@ -6,7 +6,7 @@ use dem_run::history::History;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// That two histories hold the same to the bit, but for the processor time, and come from the same
 /// scene.
@@ -42,9 +42,9 @@ struct Killed {
     beyond: usize,
 }
 
-/// Starts the scene, or goes on with it, and kills the process `after` so long; none if it ended
-/// before.
-fn kill(here: &Folder, file: &str, after: Duration) -> bool {
+/// Starts the scene, or goes on with it, and kills the process when its file has so many `bytes`;
+/// false if it ended before.
+fn kill(here: &Folder, file: &str, bytes: u64) -> bool {
     let resumed = here.path(file).exists();
     let mut command = Command::new(program("dem-run"));
     match resumed {
@@ -53,8 +53,12 @@ fn kill(here: &Folder, file: &str, after: Duration) -> bool {
     };
     let command = command.current_dir(here.path("")).arg("--quiet").stdout(Stdio::null());
     let mut child = command.spawn().expect("start");
-    std::thread::sleep(after);
-    let running = child.try_wait().expect("status").is_none();
+    let written = || std::fs::metadata(here.path(file)).map_or(0, |file| file.len());
+    let mut runs = || child.try_wait().expect("status").is_none();
+    while written() < bytes && runs() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let running = runs();
     child.kill().expect("kill");
     child.wait().expect("end");
     running
@@ -62,11 +66,11 @@ fn kill(here: &Folder, file: &str, after: Duration) -> bool {
 
 /// Kills a run, and what goes on with it, at `moments` random moments; it then goes on to its end.
 /// The kills that hit.
-fn killed(here: &Folder, whole: &History, file: &str, seed: u64, moments: usize, longest: Duration) -> Vec<Killed> {
+fn killed(here: &Folder, whole: &History, file: &str, seed: u64, moments: usize) -> Vec<Killed> {
     let mut rng = Pcg64::seed_from_u64(seed);
     let mut hits = vec![];
     for _ in 0..moments {
-        let hit = kill(here, file, longest.mul_f64(rng.random::<f64>()));
+        let hit = kill(here, file, rng.random_range(0..whole.length()));
         if !here.path(file).exists() {
             // not even begun: the sample was being packed
             continue;
@@ -95,21 +99,19 @@ fn killed(here: &Folder, whole: &History, file: &str, seed: u64, moments: usize,
     hits
 }
 
-/// The scene run without a stop, and how long that took.
-fn whole(here: &Folder) -> (History, Duration) {
-    program("dem-run");
-    let start = Instant::now();
+/// The scene run without a stop.
+fn whole(here: &Folder) -> History {
     run(here, "whole.h5", &[]);
-    (here.history("whole.h5"), start.elapsed())
+    here.history("whole.h5")
 }
 
 #[test]
 fn a_killed_run_goes_on_as_if_it_had_never_stopped() {
     let here = Folder::new();
-    let (whole, took) = whole(&here);
+    let whole = whole(&here);
     let mut hits = 0;
     for file in ["a.h5", "b.h5", "c.h5"] {
-        hits += killed(&here, &whole, file, file.len() as u64 + u64::from(file.as_bytes()[0]), 4, took).len();
+        hits += killed(&here, &whole, file, file.len() as u64 + u64::from(file.as_bytes()[0]), 4).len();
     }
     assert!(hits > 0, "no kill hit a run");
 }
@@ -119,11 +121,11 @@ fn a_killed_run_goes_on_as_if_it_had_never_stopped() {
 #[ignore = "takes minutes: 200 kills"]
 fn two_hundred_kills_lose_nothing() {
     let here = Folder::new();
-    let (whole, took) = whole(&here);
+    let whole = whole(&here);
     let mut hits = vec![];
     for round in 0.. {
         let file = format!("{round}.h5");
-        hits.extend(killed(&here, &whole, &file, round, 5, took));
+        hits.extend(killed(&here, &whole, &file, round, 5));
         std::fs::remove_file(here.path(&file)).unwrap_or_default();
         if hits.len() >= 200 {
             break;
@@ -142,7 +144,7 @@ fn two_hundred_kills_lose_nothing() {
 #[test]
 fn an_interrupted_run_goes_on_from_its_last_step() {
     let here = Folder::new();
-    let (whole, _) = whole(&here);
+    let whole = whole(&here);
     let mut command = Command::new(program("dem-run"));
     command.arg("run").args(scene()).args(["-o", "a.h5", "--quiet"]).current_dir(here.path("")).stdout(Stdio::null());
     let mut child = command.stderr(Stdio::null()).spawn().expect("start");

@@ -1,4 +1,5 @@
-//! Selection among many reactions: the minimum-energy reactions r* in the metric.
+//! Selection among many reactions: the minimum-energy reactions r* in the metric. Elastic bonds have
+//! no metric: their own compliance determines their reactions.
 //!
 //! 1. With the compliance of the metric the path is followed until the complementarity gaps are far
 //!    below the energy of the metric. The reactions are then r*, and the limits of r* are known.
@@ -42,6 +43,8 @@ pub(super) struct Selection {
     enough: f64,
     turn: Option<State>,
     anchored: u32,
+    /// Whether there are elastic bonds.
+    is_elastic: bool,
     /// The unmeasured point of least gap: the sum of its complementarity gaps, the relative change
     /// of the reactions in the iteration that led to it, and the point.
     nearest: Option<(f64, f64, State)>,
@@ -68,6 +71,7 @@ impl Selection {
             enough: f64::INFINITY,
             turn: None,
             anchored: 0,
+            is_elastic: sites.has_elastic(),
             nearest: None,
             iterations: 0,
         }
@@ -174,15 +178,17 @@ impl Selection {
         let limits = self.limits.as_deref().unwrap_or_default();
         let reactions = sites.snapped(at, if known { limits } else { &[] });
         problem.write_back(&reactions);
-        let (residual, velocity_error, load_error) = (problem.residual(), problem.velocity_error(), self.change);
+        let (residual, velocity_error) = (problem.residual(), problem.velocity_error());
+        let load_error = self.change.max(problem.elastic_error());
         let (reached, iterations) = (Vec::new(), self.iterations);
         let found = Found { reactions, reached, residual, load_error, velocity_error, iterations };
         let missed = found.missed(self.aims);
         if self.best.as_ref().is_none_or(|best| missed <= 1.0 || missed < best.missed(self.aims)) {
             let reached = match &self.reached {
                 Some(reached) => reached.clone(),
-                None if limits.is_empty() => Vec::new(),
-                None => sites.reached(at, limits),
+                None if !limits.is_empty() => sites.reached(at, limits),
+                None if self.is_elastic => sites.reached(at, &sites.limits(at, &self.metric.compliance)),
+                None => Vec::new(),
             };
             self.best = Some(Found { reached, ..found });
         }

@@ -134,7 +134,9 @@ impl Sites {
         let at_hand = mean(reactions.iter().map(|r| r.dot(r)).sum()).sqrt();
         sites.force = stopping.max(at_hand).max(rows.applied / count.sqrt());
         sites.speed = normal * sites.force;
-        let soft = mean(rows.list.iter().map(|row| row.weights.n).sum());
+        let metric = rows.list.iter().filter(|row| !row.is_elastic());
+        let (soft, of) = metric.fold((0.0, 0.0), |(sum, count), row| (sum + row.weights.n, count + 1.0));
+        let soft = if soft > 0.0 { soft / of } else { 1.0 };
         for (row, u) in rows.list.iter().zip(&velocities) {
             sites.add(row, u, normal, soft);
         }
@@ -199,6 +201,11 @@ impl Sites {
         let asked = self.list.iter().enumerate().filter(|(k, _)| asks(*k) || !any);
         let rows = asked.flat_map(|(_, site)| site.at..site.at + site.rows);
         rows.map(|row| (self.free[row] - self.compliance[row] * self.carried[row]).abs()).fold(0.0, f64::max)
+    }
+
+    /// Whether there are elastic bonds.
+    pub fn has_elastic(&self) -> bool {
+        self.compliance.iter().any(|c| *c > 0.0)
     }
 
     /// x = G r̂ of all cones.

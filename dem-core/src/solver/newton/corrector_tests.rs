@@ -39,6 +39,7 @@ fn contact(rng: &mut Pcg64, tangents: usize, moments: usize, associated: bool, e
         shift,
         given: Padded::zero(),
         weights: weights(rng),
+        lowered: Weights::default(),
         multiplier: padded(rng, rows),
         compliance: if elastic { weights(rng) } else { Weights::default() },
         carried: if elastic { padded(rng, rows) } else { Padded::zero() },

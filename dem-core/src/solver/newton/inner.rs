@@ -1,8 +1,8 @@
 //! The inner problem F(y) = 0 for fixed multipliers: state, Newton direction, line search.
 
-use super::Newton;
 use super::corrector::{correct, operator};
 use super::guess::Guess;
+use super::{Newton, StagedSettings};
 use crate::contact::Padded;
 use crate::solver::graph::Graph;
 use crate::solver::rows::{Operator, Rows};
@@ -74,8 +74,9 @@ impl Newton {
 
     /// Target of ‖F‖: a tenth of what the stricter tolerance allows, but at least its round-off.
     ///
-    /// An error of F becomes an error of velocity when v is computed from the reactions. Round-off
-    /// comes from ρ u, where u is a sum of velocities.
+    /// An error of F becomes an error of velocity when v is computed from the reactions, which must
+    /// also be small beside the velocities at which elastic bonds deform. Round-off comes from ρ u,
+    /// where u is a sum of velocities.
     fn target(&self, rows: &Rows, state: &Iterate) -> f64 {
         let change = distance(&state.y, &rows.free);
         let (mut rounding, mut carried) = (0.0, 0.0);
@@ -87,7 +88,9 @@ impl Newton {
         }
         // iterations with kept factors are cheap, and the extrapolation learns the growth from them
         let share = if self.is_first_guess { tuning::SHARE * extrapolation::SHARE } else { tuning::SHARE };
-        let wanted = share * (self.settings.load_tolerance * change).min(self.settings.tolerance * carried.sqrt());
+        let StagedSettings { tolerance, load_tolerance, .. } = self.settings;
+        let wanted = share * (load_tolerance * change).min(tolerance * carried.sqrt());
+        let wanted = wanted.min(tuning::SHARE * load_tolerance * rows.deforming(&state.reactions));
         wanted.max(tuning::ROUNDING * rounding.sqrt())
     }
 

@@ -24,6 +24,7 @@ impl Newton {
     ) -> Option<SolveReport> {
         let mut shrinking = Shrinking::default();
         let (mut last_error, mut last_velocity_error, mut softened, mut made_in_all) = (f64::INFINITY, 0.0, 0, 0);
+        let mut elastic_error: f64 = 0.0;
         self.margins.clear();
         loop {
             let mut state = Iterate::from_reactions(rows, &guess.reactions);
@@ -33,7 +34,7 @@ impl Newton {
                 // the last iteration met the residual tolerance, and this one was to measure its
                 // load error: the velocities give it
                 let begun = rows.given_by(&guess.reactions);
-                let load_error = distance(&begun, &state.y) / distance(&begun, &rows.free);
+                let load_error = (distance(&begun, &state.y) / distance(&begun, &rows.free)).max(elastic_error);
                 let report = self.report(*iterations, last_error, load_error, last_velocity_error);
                 if report.status == SolveStatus::Converged {
                     return Some(report);
@@ -48,7 +49,8 @@ impl Newton {
             }
             problem.write_back(&state.reactions);
             let multipliers: Vec<_> = rows.list.iter().map(|row| row.multiplier).collect();
-            let load_error = shrinking.error(change(rows, &multipliers, &state.reactions));
+            elastic_error = problem.elastic_error();
+            let load_error = shrinking.error(change(rows, &multipliers, &state.reactions)).max(elastic_error);
             let (error, velocity_error) = (problem.residual(), problem.velocity_error());
             rows.move_multipliers(&state.reactions);
             guess = Guess::of(state.reactions);
