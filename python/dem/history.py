@@ -31,8 +31,8 @@ class History:
     """A history of `dem-run`.
 
     A frame is a number from 0, or from the end if negative; `frames` of a method is a number, a
-    slice, or a list of numbers, and None for all. Values of large histories are read when they are
-    asked for, so choose frames where there are many.
+    slice, a list of numbers or a mask of all frames, and None for all. Values of large histories are
+    read when they are asked for, so choose frames where there are many.
     """
 
     def __init__(self, path):
@@ -228,6 +228,8 @@ class History:
         return self._file[name]
 
     def _number(self, frame):
+        if not isinstance(frame, (int, np.integer)) or isinstance(frame, bool):
+            raise TypeError(f"frame {frame!r}: give the number of a frame")
         number = frame + self.frames if frame < 0 else frame
         if not 0 <= number < self.frames:
             raise IndexError(f"frame {frame} of a history with {self.frames} frames")
@@ -243,8 +245,13 @@ class History:
             if stride > 0:
                 return data[first:end:stride]
             frames = range(first, end, stride)
+        chosen = np.asarray(frames)
+        if chosen.dtype == bool and chosen.shape == (self.frames,):
+            chosen = np.flatnonzero(chosen)
+        if chosen.ndim != 1 or chosen.size and not np.issubdtype(chosen.dtype, np.integer):
+            raise TypeError(f"frames {frames!r}: give a number, a slice, a list of numbers or a mask of all frames")
         # h5py wants increasing numbers, each once
-        numbers = np.array([self._number(frame) for frame in frames], dtype=int)
+        numbers = np.array([self._number(frame) for frame in chosen], dtype=int)
         numbers, back = np.unique(numbers, return_inverse=True)
         return data[numbers][back]
 

@@ -77,6 +77,15 @@ def test_one_frame_has_no_time_axis(history, raw):
     assert history.frame_at(history.times[4]) == 4
     with pytest.raises(IndexError, match="frame 99999 of a history with"):
         history.grains(99999)
+    for other in (1.5, [0.5], [True, False]):
+        with pytest.raises(TypeError, match="give a number, a slice, a list of numbers or a mask of all frames"):
+            history.grains(other)
+
+
+def test_a_mask_selects_frames(history):
+    late = history.times > history.times[3]
+    grains = history.grains(late)
+    assert grains.sizes["time"] == late.sum() and (grains["time"].values == history.times[late]).all()
     with pytest.raises(ValueError, match="no frame at -1 s"):
         history.frame_at(-1)
 

@@ -98,8 +98,8 @@ pub fn velocity_error<D: Dim>(problem: &ContactProblem<D>) -> f64 {
 }
 
 /// The elastic error of the impulses and node velocities that the problem now holds (–): that by
-/// which elastic bonds violate their law, as impulses C⁻¹ D map, relative to their impulses, both in
-/// the norm of r·C r. Bonds count as bearing a tenth of their strength at least. Zero without
+/// which elastic bonds violate their law, as impulses C⁻¹ D map, relative to their impulses, both
+/// in the norm of r·C r. Bonds count as bearing a tenth of their strength at least. Zero without
 /// elastic bonds.
 ///
 /// Where bonds are stiff for the step, C ≪ D, neither the residual nor the velocity error shows how

@@ -96,8 +96,9 @@ pub struct SolveReport {
     /// Residual reached (–), see [`crate::problem::residual`].
     pub residual: f64,
     /// Load error (–): the estimated error of the reactions r relative to them, in the norm of
-    /// r·(W + C) r. For rigid contacts that is the error of the net impulses on the bodies.
-    /// Gauss–Seidel reports none.
+    /// r·(W + C) r, at least the
+    /// [elastic error](crate::problem::residual::elastic_error). For rigid contacts that is the
+    /// error of the net impulses on the bodies. Gauss–Seidel reports none.
     pub load_error: Option<f64>,
 }
 

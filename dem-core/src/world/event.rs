@@ -158,8 +158,8 @@ impl<D: Dim> World<D> {
         }
     }
 
-    /// Whether the bodies stay at rest in a solved problem. Without loads nothing can move: contacts
-    /// do no positive work on bodies at rest.
+    /// Whether the bodies stay at rest in a solved problem. Without loads nothing can move:
+    /// contacts do no positive work on bodies at rest.
     fn balances(&self, problem: &ContactProblem<D>) -> bool {
         let tolerance = self.settings.solver.load_tolerance().unwrap_or(self.settings.solver.tolerance());
         problem.applied == 0.0 || unbalanced_impulse(problem) <= tolerance * self.scale_of(problem)

@@ -140,9 +140,9 @@ fn constant_loads_are_part_of_the_equilibrium() {
     }
 }
 
-/// Two rows of six disks in squares, the two at one end fixed, the lower one of the other end pulled
-/// across the rows. Once the upper bond at the fixed end is broken, the lower one alone bears the
-/// load, and its moment is F 9 R: this load is less than half of the first.
+/// Two rows of six disks in squares, the two at one end fixed, the lower one of the other end
+/// pulled across the rows. Once the upper bond at the fixed end is broken, the lower one alone
+/// bears the load, and its moment is F 9 R: this load is less than half of the first.
 #[test]
 fn a_rest_that_bears_less_than_half_of_the_released_load_breaks_at_what_it_bears() {
     for rolling in [0.5, 0.45, 0.3, 0.1] {

@@ -187,6 +187,8 @@ pub(crate) struct Course {
     pub(crate) strain: Vec<f64>,
     /// Bonds broken; empty if not recorded.
     broken: Vec<f64>,
+    /// Whether the run loads from break to break.
+    follows_breaks: bool,
 }
 
 impl Course {
@@ -209,6 +211,7 @@ impl Course {
                     load: found.load,
                     strain: found.strain,
                     broken: found.broken,
+                    follows_breaks: history.follows_breaks(),
                 })
             }
         }
@@ -241,8 +244,21 @@ impl Course {
                 strain.iter_mut().zip(part).for_each(|(sum, part)| *sum += weight * part);
             }
         }
-        let load = steps.time.iter().map(|&t| size * load.time.at(t)).collect();
-        Ok(Self { step: steps.step, time: steps.time, load, strain, broken: steps.value, load_after_breaks: None })
+        let times = match history.observable("load_time")? {
+            Some(series) => series.value,
+            // the loads of a step are those of its middle
+            None => steps.step.iter().zip(&steps.time).map(|(n, t)| t * (1.0 - 0.5 / (*n).max(1) as f64)).collect(),
+        };
+        let load = times.iter().map(|&t| size * load.time.at(t)).collect();
+        Ok(Self {
+            step: steps.step,
+            time: steps.time,
+            load,
+            strain,
+            broken: steps.value,
+            load_after_breaks: None,
+            follows_breaks: history.follows_breaks(),
+        })
     }
 
     /// The failure of the sample by a measure; for a run that did not fail, the state it reached.
@@ -264,8 +280,12 @@ impl Course {
     }
 
     /// The row whose end is the state that the sample still bore: that of the failure or, if bonds
-    /// broke in it, the one before; `None` if they did in the first.
+    /// broke in it, the one before; `None` if they did in the first. A run that loads from break to
+    /// break records the state before each break.
     pub(crate) fn borne(&self, failure: Failure) -> Option<usize> {
+        if self.follows_breaks {
+            return Some(failure.at);
+        }
         let broken = |row: usize| self.broken.get(row).copied().unwrap_or(0.0);
         match failure.at.checked_sub(1) {
             None => (broken(0) == 0.0).then_some(0),
@@ -332,6 +352,7 @@ mod tests {
             strain: vec![0.0, 0.0, 0.0, -5e-5, -2e-4, -2e-3],
             load_after_breaks: None,
             broken: vec![0.0, 0.0, 1.0, 1.0, 5.0, 9.0],
+            follows_breaks: false,
         }
     }
 

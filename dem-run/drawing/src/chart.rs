@@ -319,7 +319,8 @@ impl Chart {
         let Axes { area: [left, top, right, bottom], x, y, .. } =
             Axes::of(&ComputedLayout::from_layout(&layout), (0.0, 0.0), lift);
         let unit = (right - left) / (x[1] - x[0]);
-        (size.1 - (bottom - top) + unit * (y[1] - y[0])).clamp(HEIGHTS[0], HEIGHTS[1])
+        // a whole number, as SVG states sizes
+        (size.1 - (bottom - top) + unit * (y[1] - y[0])).round().clamp(HEIGHTS[0], HEIGHTS[1])
     }
 
     /// Factor, a power of ten, of the values on a logarithmic vertical axis: the plotting crate

@@ -90,6 +90,18 @@ mod tests {
     }
 
     #[test]
+    fn a_chart_with_equal_units_states_its_size() {
+        for flat in [0.61, 0.87, 1.0] {
+            let mut chart = Chart::new("x", "y").curve("", colour::BLUE, Style::Line, vec![(0.0, 0.0), (1.0, flat)]);
+            chart.equal = true;
+            let drawing = Chart::draw(vec![chart]);
+            for millimetres in [60.0, 85.0, 174.0] {
+                printed(&drawing, Print { width: 1e-3 * millimetres, dots: 1e4 }).expect("a drawing");
+            }
+        }
+    }
+
+    #[test]
     fn a_wide_map_tells_that_its_letters_are_small() {
         let mut canvas = crate::Canvas::new(1000.0, 300.0);
         canvas.text((10.0, 20.0), "a", 14, crate::Anchor::Start);

@@ -126,6 +126,20 @@ fn a_resumed_run_goes_on_to_the_same_events() {
     assert_eq!(events(&here, "whole.h5", name), events(&here, "parts.h5", name));
 }
 
+/// A force on a grain, 100 N/s, breaks a bond of 10 N: at 10 N from break to break, else in the
+/// step whose middle is the first beyond.
+#[test]
+fn the_strength_of_a_pair_is_the_load_of_its_break() {
+    let here = Folder::new();
+    let scene = config("two-grains.json");
+    for (more, load) in [(&[][..], 10.005), (&["--set", "time.step=1e-2"], 10.5), (&NEXT, 10.0)] {
+        here.dem_run(&[&["run", &scene, "-o", "run.h5", "--force", "-q"], more].concat()).succeeds();
+        let found = here.dem_post(&["strength", "run.h5", "--json", "--force"]).json();
+        let strength = found["runs"][0]["strength"].as_f64().expect("a load");
+        assert!((strength / load - 1.0).abs() < 1e-6, "{strength} N, not {load} N");
+    }
+}
+
 /// Their times are those of a ramp that the loads do not follow.
 #[test]
 fn runs_with_unlike_steps_are_compared_step_by_step() {

@@ -1,5 +1,5 @@
-//! Selection among many reactions: the minimum-energy reactions r* in the metric. Elastic bonds have
-//! no metric: their own compliance determines their reactions.
+//! Selection among many reactions: the minimum-energy reactions r* in the metric. Elastic bonds
+//! have no metric: their own compliance determines their reactions.
 //!
 //! 1. With the compliance of the metric the path is followed until the complementarity gaps are far
 //!    below the energy of the metric. The reactions are then r*, and the limits of r* are known.
