@@ -128,8 +128,9 @@ fn close(value: &Value, expected: f64) {
 fn the_force_at_the_first_break_is_the_strength() {
     for driven in [true, false] {
         let folder = tempfile::tempdir().unwrap();
-        // the same ramp in the scene, for a grain that is pulled
-        let pull = json!({ "loads": [{ "grain": 1, "force": [0, -2], "time": { "ramp": { "rate": 250 } } }] });
+        // the same loads in the scene, for a grain that is pulled: those of the middle of each step
+        let table = [[0.0, 0.125], [0.06, 15.125]];
+        let pull = json!({ "loads": [{ "grain": 1, "force": [0, -2], "time": { "table": table } }] });
         for cohesion in [5.0, 10.0, 20.0] {
             let scene = if driven { json!({}) } else { json!({ "grains": pull }) };
             let run = Run { driven, scene, ..Run::new(cohesion, 1, cohesion) };

@@ -328,7 +328,7 @@ impl fmt::Display for Limit {
         let unit = |load: &GrowingLoad| match load.load.as_str() {
             "membrane" => " Pa",
             name if name.starts_with("walls.") => " N",
-            _ => "",
+            _ => " times its force and torque",
         };
         let mut lines = vec![("sample", format!("{} grains, {} bonds", self.grains, self.bonds))];
         for load in &self.loads {

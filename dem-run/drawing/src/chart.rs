@@ -16,6 +16,10 @@ use crate::{Canvas, Drawing, colour};
 
 /// Width and height of one chart, in units of a drawing.
 const CHART: (f64, f64) = (640.0, 460.0);
+/// Relative range up to which values are drawn as constant: the ticks of a smaller one would need
+/// more digits than are legible, and show round-off.
+const CONSTANT: f64 = 1e-6;
+
 /// Heights of a chart with equal units on both axes that stay legible.
 const HEIGHTS: [f64; 2] = [240.0, 900.0];
 /// Margin around the cells of a figure, and between them.
@@ -405,7 +409,10 @@ impl Chart {
             // a marked level above all values is visible
             let [low, high] = values().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], p| [l.min(p.1), h.max(p.1)]);
             let level = self.levels.iter().map(|(value, _)| value * lift).fold(high, f64::max);
-            if low < high && level > high {
+            let size = low.abs().max(high.abs());
+            if low < high && high - low < CONSTANT * size {
+                layout = layout.with_y_axis_min(low - 0.05 * size).with_y_axis_max(high + 0.05 * size);
+            } else if low < high && level > high {
                 layout = layout.with_y_axis_max(level + 0.08 * (level - low));
             }
         }
@@ -506,6 +513,16 @@ mod tests {
             assert!((units[0] / units[1] - 1.0).abs() < 1e-9, "{units:?}");
             assert!(bottom < drawing.size().1 && drawing.size().0 == size.0 + 2.0 * PADDING);
             assert!(x[0] <= -50.0 && x[1] >= 50.0 && y[0] <= -50.0 * flat && y[1] >= 50.0 * flat, "{x:?}, {y:?}");
+        }
+    }
+
+    #[test]
+    fn round_off_is_drawn_as_a_constant() {
+        for value in [0.06086, -17.0, 3e7] {
+            let points = (0..50).map(|k| (f64::from(k), value * (1.0 + 1e-12 * f64::from(k * k % 7)))).collect();
+            let chart = Chart::new("x", "y").curve("", colour::BLUE, Style::Line, points);
+            let Axes { y: [low, high], .. } = Chart::draw_located(vec![chart], (460.0, 330.0)).1[0];
+            assert!(high - low > 0.05 * value.abs() && low < value && value < high, "{low} to {high}");
         }
     }
 
