@@ -80,14 +80,14 @@ def test_one_frame_has_no_time_axis(history, raw):
     for other in (1.5, [0.5], [True, False]):
         with pytest.raises(TypeError, match="give a number, a slice, a list of numbers or a mask of all frames"):
             history.grains(other)
+    with pytest.raises(ValueError, match="no frame at -1 s"):
+        history.frame_at(-1)
 
 
 def test_a_mask_selects_frames(history):
     late = history.times > history.times[3]
     grains = history.grains(late)
     assert grains.sizes["time"] == late.sum() and (grains["time"].values == history.times[late]).all()
-    with pytest.raises(ValueError, match="no frame at -1 s"):
-        history.frame_at(-1)
 
 
 def test_contacts_are_a_data_frame(history, raw):

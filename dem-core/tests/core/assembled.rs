@@ -1,6 +1,6 @@
 //! The assembled problem, with its matrix, is the matrix-free problem.
 
-use crate::common::{pressed, solver};
+use crate::common::{self, pressed, solver};
 use dem_core::contact::{BondFlow, Law, Local, LocalSolve};
 use dem_core::dim::{D2, D3, D3Twist, Dim, Vect, resized};
 use dem_core::problem::assembled::{Assembled, AssemblyError, BlockMatrix, ContactRows, Parts};
@@ -128,7 +128,7 @@ fn newton_finds_the_same_velocities() {
 
 /// Newton on the matrix and on the bodies, from a cold start to the stiff limit.
 fn newton_is_newton<D: Dim>(mut problem: ContactProblem<D>, tolerance: f64) {
-    let settings = crate::common::newton(tolerance, tolerance, 1e-6);
+    let settings = common::newton(tolerance, tolerance, 1e-6);
     let mut assembled = Assembled::of(&problem);
     let report = Staged::new(settings).solve_assembled(&mut assembled);
     assert_eq!(report.status, SolveStatus::Converged, "{report:?}");

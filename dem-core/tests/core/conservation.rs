@@ -1,6 +1,6 @@
 //! Momentum is conserved, and energy never grows without work.
 
-use crate::common::{down, floor, grain, run, settings, solver, world};
+use crate::common::{self, down, floor, grain, run, settings, solver, world};
 use dem_core::dim::{D2, D3, Dim, Vect};
 use dem_core::world::{Restitution, World};
 use rand::{RngExt, SeedableRng};
@@ -21,12 +21,7 @@ fn cloud<D: Dim>(seed: u64, friction: f64, restitution: f64) -> World<D> {
     let side: usize = if D::N == 2 { 7 } else { 4 };
     let mut grains = Vec::new();
     for k in 0..side.pow(D::N as u32) {
-        let mut x = vec![0.0; D::N];
-        let mut rest = k;
-        for c in &mut x {
-            *c = 0.02 * (rest % side) as f64;
-            rest /= side;
-        }
+        let x = common::cell::<D>(k, side, |c| 0.02 * c as f64);
         let mut g = grain::<D>(&x, 0.01 * (0.7 + 0.3 * rng.random::<f64>()));
         let centre = 0.01 * (side - 1) as f64;
         for axis in 0..D::N {
@@ -109,7 +104,7 @@ fn the_ledger_closes_under_gravity_loads_and_drives() {
         let (column, row) = (k % 5, k / 5);
         grain::<D2>(&[0.022 * column as f64 + 0.002 * rng.random::<f64>(), 0.012 + 0.023 * row as f64], 0.01)
     });
-    let mut lid = crate::common::force_driven::<D2>([0.0, -1.0].into(), [0.0, 0.16].into(), 3.0, 40.0);
+    let mut lid = common::force_driven::<D2>([0.0, -1.0].into(), [0.0, 0.16].into(), 3.0, 40.0);
     lid.velocity = [0.0, -0.1].into();
     let mut w = world(grains.collect(), vec![floor(0.2), lid], set);
     // a wall that moves in from the left at a prescribed speed

@@ -1,7 +1,7 @@
 //! The list of candidates while bodies move: it holds every pair within reach, and is kept until a
 //! body has used up its skin.
 
-use crate::common::grain;
+use crate::common::{self, grain};
 use dem_core::body::{Grains, Shape, Wall};
 use dem_core::detection::Candidates;
 use dem_core::dim::{D2, D3, Dim, Vect};
@@ -24,7 +24,7 @@ fn scene<D: Dim>(rng: &mut Pcg64, count: usize) -> (Grains<D>, Vec<Wall<D>>) {
     let ring = Shape::Round { radius: 0.6, inside: true, axis: (D::N > 2).then_some(axis) };
     let plate = Shape::Plate(Plate::new(axis, None, &[0.4, 0.2]));
     let walls = [ring, plate].map(|shape| Wall::fixed(shape, centre, 0.1));
-    (grains, [vec![crate::common::floor(0.1)], walls.to_vec()].concat())
+    (grains, [vec![common::floor(0.1)], walls.to_vec()].concat())
 }
 
 /// Every pair whose gap is at most the sum of the reaches, by brute force.
@@ -110,13 +110,6 @@ fn the_list_is_kept_until_a_body_has_used_up_its_skin() {
     assert_eq!(pairs(-1.5, 0.01, 0.02), 0);
     assert_eq!(pairs(-1.5201, 0.01, 2.0), 1);
     // another number of bodies requires a new list
-    candidates.cover(
-        &grains,
-        &grains.position,
-        &[crate::common::floor(0.0)],
-        &[[0.0, -0.09].into()],
-        |_| 0.01,
-        |_| 0.02,
-    );
+    candidates.cover(&grains, &grains.position, &[common::floor(0.0)], &[[0.0, -0.09].into()], |_| 0.01, |_| 0.02);
     assert_eq!(candidates.pairs, [[0, 2], [1, 2]]);
 }

@@ -1,7 +1,7 @@
 //! The same bits for every run and every number of threads.
 
 use crate::common::family::{Feature, rows_of_disks};
-use crate::common::{down, floor, grain, settings, solver, world};
+use crate::common::{self, down, floor, grain, settings, solver, world};
 use dem_core::dim::{D2, D3, Dim, Vect};
 use dem_core::solver::{SolveStatus, SolverSettings};
 use dem_core::world::World;
@@ -37,7 +37,7 @@ fn bits<D: Dim>(threads: usize, build: fn() -> World<D>, steps: usize) -> Vec<u6
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     pool.install(|| {
         let mut w = build();
-        crate::common::run(&mut w, steps);
+        common::run(&mut w, steps);
         let g = &w.grains;
         let moving = g.position.iter().chain(&g.velocity).flat_map(|v| v.as_slice().to_vec());
         moving.chain(g.spin.iter().flat_map(|s| s.as_slice().to_vec())).map(f64::to_bits).collect()
@@ -81,8 +81,7 @@ fn blocks_swept_at_once_solve_the_problem() {
         assert_eq!(report.status, SolveStatus::Converged);
         w.grains.velocity
     };
-    let (swept, newton) =
-        (settled(solver(1e-10)), settled(SolverSettings::Staged(crate::common::newton(1e-12, 1e-12, 1e-9))));
+    let (swept, newton) = (settled(solver(1e-10)), settled(SolverSettings::Staged(common::newton(1e-12, 1e-12, 1e-9))));
     let fastest = newton.iter().map(|v| v.norm()).fold(0.0, f64::max);
     let apart = swept.iter().zip(&newton).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
     assert!(apart <= 1e-7 * fastest, "{apart:e} of {fastest:e} m/s");

@@ -5,7 +5,7 @@
 //! (sums, products, quotients and roots) in an order fixed by the scene. For an intended change,
 //! the test prints the new value for [`GOLDEN`].
 
-use crate::common::pressed;
+use crate::common::{self, pressed};
 use dem_core::body::Drive;
 use dem_core::contact::BondFlow;
 use dem_core::dim::D2;
@@ -35,7 +35,7 @@ fn compressed() -> World<D2> {
     let mut w = pressed::<D2>(3, 6, 0.3, Some(BondFlow::Associated));
     w.stop_motion();
     w.settings.gravity = None;
-    w.set_solver(crate::common::solver(1e-6));
+    w.set_solver(common::solver(1e-6));
     w.bonds.iter_mut().for_each(|bond| bond.strength *= 100.0);
     if let Drive::Force { force, .. } = &mut w.walls[1].drive {
         *force = Arc::new(|t| 5e4 * t);

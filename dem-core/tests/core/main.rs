@@ -1,5 +1,5 @@
 //! Worlds and problems against closed forms, conservation laws and independent solvers. They are
-//! one program, since the generic code of dem-core is compiled once for each.
+//! one program, since generic code is compiled anew for each program.
 
 mod assembled;
 mod certificate;
@@ -26,6 +26,7 @@ mod rupture;
 mod spheres;
 mod stability;
 mod state;
+mod stiff_bonds;
 mod stiff_limit;
 mod turning;
 mod walls;

@@ -1,6 +1,6 @@
 //! The measures of a world against closed forms: stress, strain, volume.
 
-use crate::common::{down, floor, force_driven, grain, newton, run, settings, world};
+use crate::common::{cell, down, floor, force_driven, grain, newton, run, settings, world};
 use dem_core::body::{Drive, Grains, Load, Shape, Wall};
 use dem_core::dim::{D2, D3, Dim, Vect};
 use dem_core::solver::{Route, SolverSettings};
@@ -118,7 +118,7 @@ fn strained<D: Dim>() {
     let side: usize = 3;
     let grains: Grains<D> = (0..side.pow(D::N as u32))
         .map(|k| {
-            let x: Vec<f64> = (0..D::N).map(|c| 0.3 + 0.021 * ((k / side.pow(c as u32)) % side) as f64).collect();
+            let x = cell::<D>(k, side, |c| 0.3 + 0.021 * c as f64);
             grain::<D>(&x, 0.01)
         })
         .collect();

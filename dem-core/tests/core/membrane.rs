@@ -1,6 +1,6 @@
 //! The pressure of a membrane: closed forms, conservation, and surfaces found in another way.
 
-use crate::common::{floor, grain, newton, run, settings};
+use crate::common::{self, floor, grain, newton, run, settings};
 use dem_core::body::{Grains, Schedule, Shape, Wall};
 use dem_core::dim::{D2, Dim, Vect};
 use dem_core::saved::Saved;
@@ -27,7 +27,7 @@ fn exact() -> Settings<D2> {
 /// Grains of radius `R` at these places (m) under a membrane, with the surface found.
 fn under(places: &[[f64; 2]], walls: Vec<Wall<D2>>, between: Option<[usize; 2]>, disk: f64) -> World<D2> {
     let list = places.iter().map(|x| grain(x, R)).collect();
-    let mut world = crate::common::world(list, walls, exact());
+    let mut world = common::world(list, walls, exact());
     world.membrane = Some(Membrane::new(constant(P), between, disk));
     world.find_surface().expect("a surface");
     world
@@ -313,7 +313,7 @@ fn fragments_beyond_the_reach_of_the_disk_are_outside() {
 fn a_sample_that_came_apart_has_no_surface() {
     let places: Vec<[f64; 2]> = block(3, 2).into_iter().chain(block(3, 1).iter().map(|x| [x[0], 8.0 * R])).collect();
     let list = places.iter().map(|x| grain(x, R)).collect();
-    let mut world = crate::common::world(list, plates(0.0, 9.0 * R), exact());
+    let mut world = common::world(list, plates(0.0, 9.0 * R), exact());
     for (disk, found) in [(1.4 * R, false), (1.6 * R, true), (4.6 * R, false)] {
         world.membrane = Some(Membrane::new(constant(P), Some([0, 1]), disk));
         let error = StepError::NoSurface { time: 0.0, walls: Some([9, 10]), disk };

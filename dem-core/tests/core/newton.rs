@@ -1,6 +1,6 @@
 //! The Newton solver against Gauss–Seidel, closed forms, and itself from other starts.
 
-use crate::common::{down, floor, force_driven, grain, settings, solver, world};
+use crate::common::{self, down, floor, force_driven, grain, settings, solver, world};
 use dem_core::body::{Drive, Load, Shape, Wall};
 use dem_core::bond::failure;
 use dem_core::contact::Law;
@@ -15,7 +15,7 @@ use rand_pcg::Pcg64;
 use std::sync::Arc;
 
 fn newton(tolerance: f64, start: Start) -> SolverSettings {
-    SolverSettings::Staged(StagedSettings { start, ..crate::common::newton(tolerance, tolerance, 1e-6) })
+    SolverSettings::Staged(StagedSettings { start, ..common::newton(tolerance, tolerance, 1e-6) })
 }
 
 #[test]
@@ -62,7 +62,7 @@ fn dry_contacts_that_sweeps_miss_are_solved_exactly() {
 fn solved_cold<D: Dim>(world: &mut World<D>) -> ContactProblem<D> {
     let mut problem = world.contact_problem();
     // accepted sweeps would end far from the solution
-    let settings = SolverSettings::Staged(crate::common::newton(1e-10, 1e-3, 1e-9));
+    let settings = SolverSettings::Staged(common::newton(1e-10, 1e-3, 1e-9));
     let report = settings.build::<D>().solve(&mut problem);
     assert_eq!(report.status, SolveStatus::Converged, "{report:?}");
     assert!(report.work.newton <= 30, "{report:?}");
@@ -136,12 +136,7 @@ fn pressed<D: Dim>(seed: u64, bonded: bool) -> World<D> {
     let side: usize = if D::N == 2 { 8 } else { 4 };
     let mut grains = Vec::new();
     for k in 0..side.pow(D::N as u32) {
-        let mut x = vec![0.0; D::N];
-        let mut rest = k;
-        for c in &mut x {
-            *c = 0.01 + 0.02 * (rest % side) as f64;
-            rest /= side;
-        }
+        let x = common::cell::<D>(k, side, |c| 0.01 + 0.02 * c as f64);
         let mut g = grain::<D>(&x, 0.01 * (0.98 + 0.02 * rng.random::<f64>()));
         g.velocity[0] = 0.05 * (rng.random::<f64>() - 0.5);
         grains.push(g);
@@ -221,7 +216,7 @@ fn gauss_seidel_approaches_newton_in_3d() {
     let problem = pressed::<D3>(0, true).contact_problem();
     // the last path leaves a load error of 3e-8 or 4e-6, depending on round-off: small beside the
     // thousandth required below
-    let found = solved(&problem, SolverSettings::Staged(crate::common::newton(1e-10, 1e-10, 1e-5)));
+    let found = solved(&problem, SolverSettings::Staged(common::newton(1e-10, 1e-10, 1e-5)));
     let [coarse, fine] = [1e-5, 1e-7].map(|tolerance| apart(&problem, &found, tolerance));
     assert!(fine <= 0.1 * coarse && fine <= 1e-3, "{coarse:e}, then {fine:e}");
 }

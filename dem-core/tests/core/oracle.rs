@@ -4,7 +4,7 @@
 //! minimise ½ r̂·W r̂ + q·r̂ over the cones; K = { ‖t‖ ≤ μ n, ‖m‖ ≤ ν n, |τ| ≤ ξ n } consists of
 //! second-order cones on the same n.
 
-use crate::common::{pressed, solver};
+use crate::common::{self, pressed, solver};
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::SupportedConeT::{self, NonnegativeConeT, SecondOrderConeT, ZeroConeT};
 use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver};
@@ -87,7 +87,7 @@ fn interior_point(problem: &Assembled) -> Vec<f64> {
 }
 
 fn newton() -> SolverSettings {
-    SolverSettings::Staged(crate::common::newton(1e-11, 1e-11, 1e-6))
+    SolverSettings::Staged(common::newton(1e-11, 1e-11, 1e-6))
 }
 
 /// Largest difference of the relative velocities, over the largest of them.

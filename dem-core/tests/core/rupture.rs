@@ -1,7 +1,7 @@
 //! Rupture of bonds: thresholds, cascades, broken bonds as dry contacts, and refused solves that
 //! change nothing.
 
-use crate::common::{grain, settings, world};
+use crate::common::{self, grain, settings, world};
 use dem_core::body::{Grains, Load, Shape, Wall};
 use dem_core::bond::{BondStatus, Rupture};
 use dem_core::dim::{D2, D3, D3Twist, Dim, Vect};
@@ -88,8 +88,8 @@ fn without_a_twist_row_a_bonded_grain_spins_freely_about_its_normal() {
     let torque = 1e-4;
     let mut free = pair::<D3>(&[0.0; 3], &[torque, 0.0, 0.0]);
     let mut held = pair::<D3Twist>(&[0.0; 3], &[torque, 0.0, 0.0]);
-    crate::common::run(&mut free, 10);
-    crate::common::run(&mut held, 10);
+    common::run(&mut free, 10);
+    common::run(&mut held, 10);
     let spin = torque * 1e-3 / free.grains.inertia[1];
     assert!((free.grains.spin[1][0] / spin - 1.0).abs() < 1e-9, "{}", free.grains.spin[1]);
     assert!(held.grains.spin[1].norm() < 1e-9 * spin, "{}", held.grains.spin[1]);
@@ -243,7 +243,7 @@ fn a_step_whose_second_half_fails_is_taken_back_whole() {
 fn a_force_driven_wall_on_a_fixed_grain_carries_its_force() {
     let mut held = grain::<D2>(&[0.0, 0.01], 0.01);
     held.fixed = true;
-    let lid = crate::common::force_driven::<D2>([0.0, -1.0].into(), [0.0, 0.02].into(), 1.0, 10.0);
+    let lid = common::force_driven::<D2>([0.0, -1.0].into(), [0.0, 0.02].into(), 1.0, 10.0);
     let mut w = world(vec![held], vec![lid], settings(1e-4));
     w.step().unwrap();
     assert!((w.walls[0].reaction[1] - 10.0).abs() < 1e-9, "{}", w.walls[0].reaction[1]);

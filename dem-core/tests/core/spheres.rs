@@ -1,7 +1,7 @@
 //! 3D against 2D and against itself: a flat twin, a rotated scene, a spinning sphere, a cantilever
 //! of spheres.
 
-use crate::common::{DENSITY, down, floor, force_driven, newton, settings, solver};
+use crate::common::{self, DENSITY, down, floor, force_driven, newton, settings, solver};
 use dem_core::body::{Drive, Grain, Grains, Load, Shape, Wall};
 use dem_core::bond::{BondStatus, Stiffness, failure};
 use dem_core::contact::Law;
@@ -208,11 +208,11 @@ fn matrix(q: &SVector<f64, 4>) -> Matrix3<f64> {
 
 #[test]
 fn a_free_sphere_spins_on() {
-    let mut grain = crate::common::grain::<D3>(&[0.0; 3], 0.01);
+    let mut grain = common::grain::<D3>(&[0.0; 3], 0.01);
     grain.spin = [30.0, -20.0, 50.0].into();
     let (spin, h, steps) = (grain.spin, 1e-3, 1_000_000);
-    let mut world = crate::common::world::<D3>(vec![grain], Vec::new(), settings(h));
-    crate::common::run(&mut world, steps);
+    let mut world = common::world::<D3>(vec![grain], Vec::new(), settings(h));
+    common::run(&mut world, steps);
     assert_eq!(world.grains.spin[0], spin, "nothing acts on it");
     let q = world.grains.orientation[0];
     assert!((q.norm() - 1.0).abs() < 1e-12);
@@ -227,8 +227,7 @@ fn a_free_sphere_spins_on() {
 #[test]
 fn a_cantilever_of_spheres_carries_its_load_at_the_root() {
     let (r, count, force) = (0.01, 12, 0.05);
-    let mut list: Vec<Grain<D3>> =
-        (0..count).map(|k| crate::common::grain(&[2.0 * r * k as f64, 0.0, 0.0], r)).collect();
+    let mut list: Vec<Grain<D3>> = (0..count).map(|k| common::grain(&[2.0 * r * k as f64, 0.0, 0.0], r)).collect();
     list[0].fixed = true;
     // across the chain in both directions, so that both bending rows carry
     let load = Load {
@@ -241,7 +240,7 @@ fn a_cantilever_of_spheres_carries_its_load_at_the_root() {
     let newton = SolverSettings::Staged(StagedSettings { start: Start::StiffLimit, ..newton(1e-13, 1e-13, 1e-12) });
     let mut world = World::new(grains, Vec::new(), vec![load], Settings { solver: newton, ..settings(1e-4) });
     world.form_bonds(1e-6, |_| 1e3, 0.3);
-    crate::common::run(&mut world, 3);
+    common::run(&mut world, 3);
     for (k, touch) in world.touches().enumerate() {
         // from the contact point to the load
         let length = r * (2 * (count - 1 - k) - 1) as f64;
@@ -256,7 +255,7 @@ fn a_cantilever_of_spheres_carries_its_load_at_the_root() {
 fn bent_arm(solver: SolverSettings) -> World<D3Twist> {
     let (row, arm) = (6, 4);
     let centre = |k: usize| if k < row { [k as f64, 0.0, 0.0] } else { [(row - 1) as f64, (k + 1 - row) as f64, 0.0] };
-    let list = (0..row + arm).map(|k| crate::common::grain::<D3Twist>(&centre(k).map(|x| 0.02 * x), 0.01));
+    let list = (0..row + arm).map(|k| common::grain::<D3Twist>(&centre(k).map(|x| 0.02 * x), 0.01));
     let mut grains: Grains<D3Twist> = list.collect();
     grains.fixed[0] = true;
     let force = Vector3::z() * ARM_FORCE;
@@ -275,7 +274,7 @@ fn an_arm_twists_the_row_that_carries_it() {
     let stiff = StagedSettings { start: Start::StiffLimit, ..newton(1e-13, 1e-13, 1e-12) };
     for solver in [SolverSettings::Staged(stiff), solver(1e-13)] {
         let mut world = bent_arm(solver);
-        crate::common::run(&mut world, 3);
+        common::run(&mut world, 3);
         for touch in world.touches() {
             let along_row = touch.point[1].abs() < 1e-9;
             // the load is 80 mm off the row, and 100 mm from its root
@@ -296,8 +295,8 @@ fn cemented() -> World<D3> {
     let side = 5;
     let (mut grains, mut loads) = (Vec::new(), Vec::new());
     for k in 0..side * side * side {
-        let x = [k % side, k / side % side, k / side / side].map(|c| 0.02 * c as f64);
-        let mut g = crate::common::grain::<D3>(&x, 0.01 * (0.98 + 0.02 * rng.random::<f64>()));
+        let x = common::cell::<D3>(k, side, |c| 0.02 * c as f64);
+        let mut g = common::grain::<D3>(&x, 0.01 * (0.98 + 0.02 * rng.random::<f64>()));
         g.fixed = k < side * side;
         grains.push(g);
         if k >= side * side * (side - 1) {

@@ -1,6 +1,6 @@
 //! A world restored from its saved state continues bit for bit.
 
-use crate::common::pressed;
+use crate::common::{self, pressed};
 use dem_core::body::{Drive, Grains, Shape, Wall};
 use dem_core::bond::Stiffness;
 use dem_core::contact::BondFlow;
@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 fn settings() -> StagedSettings {
     let stiffness = StiffnessRatio { tangential: 0.5, rolling: 0.1 };
-    StagedSettings { stiffness, ..crate::common::newton(1e-8, 1e-4, 1e-5) }
+    StagedSettings { stiffness, ..common::newton(1e-8, 1e-4, 1e-5) }
 }
 
 fn saved<D: Dim>(world: &World<D>) -> Saved {
@@ -89,7 +89,7 @@ fn goes_on<D: Dim>(mut world: World<D>, solver: SolverSettings) -> World<D> {
     world.set_solver(solver);
     let mut broken = 0;
     for steps in [1, 2, 7, 12] {
-        crate::common::run(&mut world, steps);
+        common::run(&mut world, steps);
         let state = saved(&world);
         let mut other = restored(&state, &world).expect("the state of this world");
         assert_eq!(bits(&saved(&other)), bits(&state), "what is restored is what was saved");
@@ -110,7 +110,7 @@ fn goes_on<D: Dim>(mut world: World<D>, solver: SolverSettings) -> World<D> {
 fn a_state_goes_on_to_the_bit_with_every_solver() {
     let [newton, auto] =
         [Stages::Newton, Stages::All].map(|stages| SolverSettings::Staged(StagedSettings { stages, ..settings() }));
-    for solver in [newton, auto, crate::common::solver(1e-6)] {
+    for solver in [newton, auto, common::solver(1e-6)] {
         let world = goes_on(pressed::<D2>(3, 8, 0.3, Some(BondFlow::Associated)), solver);
         assert!(world.intact_bonds() > 0 && world.intact_bonds() < world.bonds.len(), "some bonds broke");
         goes_on(pressed::<D3>(3, 4, 0.3, Some(BondFlow::Associated)), solver);
@@ -130,11 +130,11 @@ fn a_state_goes_on_to_the_bit_with_every_solver() {
 #[test]
 fn a_state_goes_on_between_steps_that_are_predicted() {
     // a bonded row at rest on a floor
-    let mut set = crate::common::settings(1e-3);
-    set.gravity = crate::common::down::<D2>(9.81);
+    let mut set = common::settings(1e-3);
+    set.gravity = common::down::<D2>(9.81);
     set.solver = SolverSettings::Staged(settings());
-    let row = (0..5).map(|k| crate::common::grain::<D2>(&[0.02 * f64::from(k), 0.01], 0.01)).collect();
-    let mut world = crate::common::world(row, vec![crate::common::floor(0.2)], set);
+    let row = (0..5).map(|k| common::grain::<D2>(&[0.02 * f64::from(k), 0.01], 0.01)).collect();
+    let mut world = common::world(row, vec![common::floor(0.2)], set);
     world.form_bonds(1e-6, |_| 1e3, 0.3);
     let mut predicted = 0;
     for _ in 0..60 {
@@ -151,10 +151,10 @@ fn a_state_goes_on_between_steps_that_are_predicted() {
 #[test]
 fn a_step_that_fails_leaves_the_world_and_its_solver_as_they_were() {
     // a bonded column at rest below a lid that later reaches it
-    let mut set = crate::common::settings(1e-3);
-    set.gravity = crate::common::down::<D2>(9.81);
+    let mut set = common::settings(1e-3);
+    set.gravity = common::down::<D2>(9.81);
     set.solver = SolverSettings::Staged(settings());
-    let column = (0..5).map(|k| crate::common::grain::<D2>(&[0.0, 0.01 + 0.02 * f64::from(k)], 0.01)).collect();
+    let column = (0..5).map(|k| common::grain::<D2>(&[0.0, 0.01 + 0.02 * f64::from(k)], 0.01)).collect();
     let lid = Wall {
         shape: Shape::Plane { normal: [0.0, -1.0].into() },
         position: [0.0, 0.1].into(),
@@ -162,9 +162,9 @@ fn a_step_that_fails_leaves_the_world_and_its_solver_as_they_were() {
             direction: [0.0, -1.0].into(),
             speed: Arc::new(|time| if time < 0.0205 { 0.0 } else { 0.1 }),
         },
-        ..crate::common::floor(0.2)
+        ..common::floor(0.2)
     };
-    let mut world = crate::common::world(column, vec![crate::common::floor(0.2), lid], set);
+    let mut world = common::world(column, vec![common::floor(0.2), lid], set);
     world.form_bonds(1e-6, |_| 1e3, 0.3);
     let mut before = saved(&world);
     let mut steps = 0;
@@ -182,7 +182,7 @@ fn a_step_that_fails_leaves_the_world_and_its_solver_as_they_were() {
 fn numbers_that_do_not_fit_are_refused() {
     let mut world = pressed::<D2>(3, 6, 0.3, Some(BondFlow::Associated));
     world.set_solver(SolverSettings::Staged(settings()));
-    crate::common::run(&mut world, 5);
+    common::run(&mut world, 5);
     let state = saved(&world);
     // truncated anywhere, at either end of either list
     for cut in 0..state.counts.len() {
@@ -210,16 +210,16 @@ fn numbers_that_do_not_fit_are_refused() {
 #[test]
 fn bonds_that_are_added_between_steps_keep_the_numbers_of_the_others_right() {
     // a chain; at first its middle alone is bonded, so that later bonds come before and after it
-    let mut set = crate::common::settings(1e-4);
+    let mut set = common::settings(1e-4);
     set.solver = SolverSettings::Staged(settings());
-    let chain = (0..5).map(|k| crate::common::grain::<D2>(&[0.02 * f64::from(k), 0.0], 0.01)).collect();
-    let mut world = crate::common::world(chain, vec![], set);
+    let chain = (0..5).map(|k| common::grain::<D2>(&[0.02 * f64::from(k), 0.0], 0.01)).collect();
+    let mut world = common::world(chain, vec![], set);
     world.form_bonds(1e-6, |_| 5.0, 0.3);
     let middle = world.bonds[2];
     assert_eq!(world.bonds.iter().map(|b| b.pair).collect::<Vec<_>>(), [[0, 1], [1, 2], [2, 3], [3, 4]]);
     world.bonds = vec![middle].into();
     world.grains.velocity[2][1] = 1e-5;
-    crate::common::run(&mut world, 1);
+    common::run(&mut world, 1);
     let carried = world.touches().find(|t| t.pair == [2, 3]).unwrap();
     assert!(carried.bond == Some(0) && carried.reaction.t.norm() > 0.0);
     // twice: pairs that have a bond keep it
@@ -229,16 +229,16 @@ fn bonds_that_are_added_between_steps_keep_the_numbers_of_the_others_right() {
     }
     let after = world.touches().find(|t| t.pair == [2, 3]).unwrap();
     assert_eq!((after.bond, after.reaction), (Some(2), carried.reaction));
-    crate::common::run(&mut world, 3);
+    common::run(&mut world, 3);
     assert_eq!(world.touches().filter(|t| t.bond.is_some()).count(), 4);
 }
 
 #[test]
 fn settings_that_change_between_steps_are_followed() {
     let mut world = pressed::<D2>(3, 6, 0.3, Some(BondFlow::Associated));
-    crate::common::run(&mut world, 2);
+    common::run(&mut world, 2);
     let mut other = pressed::<D2>(3, 6, 0.3, Some(BondFlow::Associated));
-    crate::common::run(&mut other, 2);
+    common::run(&mut other, 2);
     world.settings.solver = SolverSettings::Staged(settings());
     other.set_solver(SolverSettings::Staged(settings()));
     for _ in 0..3 {

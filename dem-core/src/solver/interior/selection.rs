@@ -43,8 +43,6 @@ pub(super) struct Selection {
     enough: f64,
     turn: Option<State>,
     anchored: u32,
-    /// Whether there are elastic bonds.
-    is_elastic: bool,
     /// The unmeasured point of least gap: the sum of its complementarity gaps, the relative change
     /// of the reactions in the iteration that led to it, and the point.
     nearest: Option<(f64, f64, State)>,
@@ -71,7 +69,6 @@ impl Selection {
             enough: f64::INFINITY,
             turn: None,
             anchored: 0,
-            is_elastic: sites.has_elastic(),
             nearest: None,
             iterations: 0,
         }
@@ -187,7 +184,7 @@ impl Selection {
             let reached = match &self.reached {
                 Some(reached) => reached.clone(),
                 None if !limits.is_empty() => sites.reached(at, limits),
-                None if self.is_elastic => sites.reached(at, &sites.limits(at, &self.metric.compliance)),
+                None if sites.has_elastic() => sites.reached(at, &sites.limits(at, &self.metric.compliance)),
                 None => Vec::new(),
             };
             self.best = Some(Found { reached, ..found });

@@ -62,6 +62,12 @@ pub fn world<D: Dim>(grains: Vec<Grain<D>>, walls: Vec<Wall<D>>, settings: Setti
     World::new(grains.into_iter().collect(), walls, Vec::new(), settings)
 }
 
+/// The place of cell `k` of a grid with `side` cells along each axis; `at` is the coordinate of a
+/// cell from its number along an axis.
+pub fn cell<D: Dim>(k: usize, side: usize, at: impl FnMut(usize) -> f64) -> Vec<f64> {
+    (0..D::N).map(|axis| k / side.pow(axis as u32) % side).map(at).collect()
+}
+
 /// A floor through the origin, normal to the last axis.
 pub fn floor<D: Dim>(friction: f64) -> Wall<D> {
     let mut normal = D::Vector::zero();
@@ -105,7 +111,7 @@ pub fn pressed<D: Dim>(seed: u64, side: usize, friction: f64, bonds: Option<Bond
     let mut rng = Pcg64::seed_from_u64(seed);
     let mut grains = Vec::new();
     for k in 0..side.pow(D::N as u32) {
-        let x: Vec<f64> = (0..D::N).map(|c| 0.01 + 0.02 * ((k / side.pow(c as u32)) % side) as f64).collect();
+        let x = cell::<D>(k, side, |c| 0.01 + 0.02 * c as f64);
         let mut g = grain::<D>(&x, 0.01 * (0.98 + 0.02 * rng.random::<f64>()));
         g.velocity[0] = 0.05 * (rng.random::<f64>() - 0.5);
         grains.push(g);
