@@ -14,7 +14,7 @@ use serde::Serialize;
 
 use crate::analysis::Analysis;
 use crate::chains::pictures::{force_legend, links};
-use crate::chains::report::{normal_forces, require_reactions, statistics};
+use crate::chains::report::{contacts, normal_forces, require_reactions, statistics};
 use crate::clock::Clock;
 use crate::cracks::{Modes, mode_colour};
 use crate::map::{Key, Link, Materials, Panel, Ramp, Sample, Scale, View, draw, draw_view};
@@ -136,8 +136,7 @@ pub fn read(history: &History, subject: Subject, every: usize, times: &[f64]) ->
     let scale = match subject {
         Subject::Bonds => None,
         Subject::Forces => Some(greatest(&frames, |frame| {
-            let contacts = history.contacts(frame)?;
-            Ok(statistics(&normal_forces(&contacts)).mean)
+            Ok(statistics(&normal_forces(&contacts(history, frame)?)).mean)
         })?),
         Subject::Speed => {
             Some(greatest(&frames, |frame| Ok(usual_speed(speeds(&history.grain_state(frame)?, history.dimension()))))?)
@@ -252,7 +251,7 @@ fn picture(
     let mut legend = match report.subject {
         Subject::Bonds => bonds(history, frame, &mut panel, materials)?,
         Subject::Forces => {
-            let contacts = history.contacts(frame)?;
+            let contacts = contacts(history, frame)?;
             panel.links = links(&contacts, &panel.grains.position, scale, history.dimension());
             if history.dimension() == 3 {
                 // in 3D grains would hide the lines

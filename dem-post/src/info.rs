@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use dem_history::{CopyAs, History, RuptureMode, Series, Wall, WallDrive};
+use dem_history::{CopyAs, Ending, History, RuptureMode, Series, Wall, WallDrive};
 use serde::Serialize;
 
 use crate::analysis::Analysis;
@@ -86,6 +86,9 @@ pub struct Report {
     pub bytes: u64,
     /// Whether it was never closed.
     pub open_ended: bool,
+    /// Why the run ended, as in the summary of `dem-run`; `None` if it has not ended, was killed, or the
+    /// program did not record it.
+    pub ending: Option<Ending>,
     /// Program, build, host and start of the run.
     pub origin: String,
     /// Dimension.
@@ -162,6 +165,7 @@ pub fn read(history: &History) -> Result<Report> {
         file: history.path().display().to_string(),
         bytes: history.length(),
         open_ended: history.open_ended(),
+        ending: Some(history.ending()?).filter(|ending| *ending != Ending::Open),
         origin: format!(
             "dem-run {} (git {revision}, {}) on {}, {}",
             parameters.version, parameters.build, parameters.host, parameters.start
@@ -269,8 +273,9 @@ impl Report {
             lines.push(("wall", format!("{name}: {kind}, {drive}{load}")));
         }
         lines.push(("bonds", self.bond_line()));
+        lines.push(("time", self.time_line()));
+        lines.extend(self.ending.map(|ending| ("ended", ending.reason().into())));
         lines.extend([
-            ("time", self.time_line()),
             ("observed", format!("{} steps of {}", self.observed, self.observables.join(", "))),
         ]);
         lines.extend(self.measure_lines());

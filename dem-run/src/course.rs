@@ -7,7 +7,7 @@ use crate::scene::Scene;
 use crate::scene::failure::in_one_piece;
 use crate::stages::Stages;
 use crate::stop::{StopProgress, Stops};
-use crate::summary::Ending;
+use crate::history::Ending;
 use dem_core::bond::{BondStatus, Rupture};
 use dem_core::dim::{Dim, Vect};
 use dem_core::saved::{Mismatch, Reader, Saved};

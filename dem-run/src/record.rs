@@ -4,7 +4,7 @@
 use crate::build::Built;
 use crate::clock::cpu_time;
 use crate::history::{
-    self, Background, Batch, BondStatus, Checkpoint, ContactRows, ContactStatus, Frame, GrainState, History, Layout,
+    self, Background, Batch, BondStatus, Checkpoint, ContactRows, ContactStatus, Ending, Frame, GrainState, History, Layout,
     Observable, Parameters, RowCounts, Rupture, RuptureMode, SolverRoute, WallDrive, WallKind, WallState, Writer,
 };
 use crate::load::{drive_direction, load};
@@ -153,8 +153,9 @@ impl<D: Dim> Recorder<D> {
         self.writer.write(std::mem::take(&mut self.batch))
     }
 
-    /// Close the history.
-    pub fn finish(mut self) -> history::Result<()> {
+    /// Record why the run ended, and close the history.
+    pub fn finish(mut self, ending: Ending) -> history::Result<()> {
+        self.batch.ending = Some(ending);
         self.hand_over()?;
         self.writer.finish()
     }

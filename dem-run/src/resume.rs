@@ -3,14 +3,13 @@
 
 use crate::check::free_space;
 use crate::error::RunError;
-use crate::history::{Checkpoint, History, HistoryError, RowCounts, refuse_busy};
+use crate::history::{Checkpoint, Ending, History, HistoryError, RowCounts, refuse_busy};
 use crate::in_dimension;
 use crate::output::{number, print_json, print_line};
 use crate::record::Recorder;
 use crate::run::{Execution, Run, RunOptions, RunState, handle_signals, run_in};
 use crate::scene::{self, Scene, differences};
 use crate::signals::Interrupt;
-use crate::summary::Ending;
 use dem_core::dim::Dim;
 use std::path::{Path, PathBuf};
 

@@ -7,7 +7,7 @@ use crate::load::drive_direction;
 use crate::output::number;
 use crate::scene::Scene;
 use crate::stop::Stops;
-use crate::summary::Ending;
+use crate::history::Ending;
 use dem_core::dim::Dim;
 use dem_core::saved::{Mismatch, Reader, Saved};
 use dem_core::world::World;

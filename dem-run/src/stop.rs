@@ -2,7 +2,7 @@
 
 use crate::load::{drive_direction, load};
 use crate::scene::{Scene, Stop, TravelFrom};
-use crate::summary::Ending;
+use crate::history::Ending;
 use dem_core::dim::{Dim, Vect};
 use dem_core::saved::{Mismatch, Reader, Saved};
 use dem_core::world::World;

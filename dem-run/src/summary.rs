@@ -1,36 +1,13 @@
 //! The summary of a run, printed on stdout.
 
 use crate::collapse::{Collapse, Failure};
+use crate::history::Ending;
 use crate::output::{in_shell, number, quantity};
 use crate::scene::failure::{STRAINS, Splitting};
 use dem_core::solver::Work;
 use serde::Serialize;
 use std::fmt;
 use std::path::PathBuf;
-
-/// Why a run ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Ending {
-    /// The end of the scene's time.
-    Time,
-    /// The wall has moved far enough.
-    WallTravel,
-    /// Enough bonds have broken.
-    BrokenFraction,
-    /// The load has dropped far enough below its peak.
-    LoadDrop,
-    /// The last stage has ended.
-    Stages,
-    /// Loading to the next event: no bond breaks under the loads up to the end of the scene's time.
-    NoBreak,
-    /// Loading to the next event: the bodies do not stay at rest under the load that comes next.
-    NoEquilibrium,
-    /// Ctrl-C or SIGTERM.
-    Interrupted,
-    /// A step was not solved.
-    NoConvergence,
-}
 
 /// Shortest preparation that is printed (s).
 const SHORTEST_TOLD: f64 = 0.05;
@@ -89,7 +66,7 @@ pub struct Summary {
     pub tolerance: f64,
     /// Largest residual of an accepted solve (–).
     pub worst_residual: f64,
-    /// Tolerance of the load error (–); none if the solver reports no load error.
+    /// Tolerance of the load error (–); none of Gauss–Seidel, which stops on the residual alone.
     pub load_tolerance: Option<f64>,
     /// Largest load error of an accepted solve (–); none if no solve reported one.
     pub worst_load_error: Option<f64>,
@@ -175,17 +152,7 @@ impl WallLoads {
 
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let ending = match self.ending {
-            Ending::Time => "time.end was reached",
-            Ending::WallTravel => "stop.wall_travel was reached",
-            Ending::BrokenFraction => "stop.broken_fraction was reached",
-            Ending::LoadDrop => "stop.load_drop was reached",
-            Ending::Stages => "the last of stages ended",
-            Ending::NoBreak => "the loads up to time.end break no further bond",
-            Ending::NoEquilibrium => "the sample bears no further load",
-            Ending::Interrupted => "interrupted",
-            Ending::NoConvergence => "a step was not solved",
-        };
+        let ending = self.ending.reason();
         match self.load_time {
             Some(time) => {
                 writeln!(f, "ended            after {} steps, at the loads of t = {time:.6} s: {ending}", self.steps)?;
@@ -245,9 +212,15 @@ impl Summary {
             "accuracy         worst residual {:.2e} (tolerance {:.0e}), {} steps missed it, {} solves not accepted",
             self.worst_residual, self.tolerance, self.missed_tolerance, self.rejected
         )?;
-        if let Some((worst, tolerance)) = self.worst_load_error.zip(self.load_tolerance) {
-            let missed = self.missed_load_tolerance;
-            writeln!(f, "load error       worst {worst:.2e} (tolerance {tolerance:.0e}), {missed} steps missed it")?;
+        match (self.worst_load_error, self.load_tolerance) {
+            (Some(worst), Some(tolerance)) => {
+                let missed = self.missed_load_tolerance;
+                writeln!(f, "load error       worst {worst:.2e} (tolerance {tolerance:.0e}), {missed} steps missed it")?;
+            }
+            (Some(worst), None) => {
+                writeln!(f, "load error       worst {worst:.2e}, of elastic bonds (Gauss–Seidel has no tolerance for it)")?;
+            }
+            (None, _) => {}
         }
         writeln!(
             f,

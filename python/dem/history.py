@@ -82,6 +82,18 @@ class History:
             self._file = h5py.File(self.path, "r", swmr=True)
 
     @property
+    def ending(self):
+        """Why the run ended, as `ending` of its summary (`"time"`, `"no_convergence"` …).
+
+        None if it has not ended, was killed, or the program that wrote the history did not record it.
+        """
+        if "ending" not in self._file:
+            return None
+        data = self._file["ending"]
+        ending = str(_names(data.dtype, [data[()]])[0])
+        return None if ending == "OPEN" else ending.lower()
+
+    @property
     def times(self):
         """Times of the frames (s)."""
         return self._read("particles/grains/position/time")

@@ -90,6 +90,15 @@ def test_a_mask_selects_frames(history):
     assert grains.sizes["time"] == late.sum() and (grains["time"].values == history.times[late]).all()
 
 
+def test_a_history_tells_why_its_run_ended(program):
+    with dem.run(COLUMN, "a.h5", time__end=2e-3) as history:
+        assert history.ending == history.summary["ending"] == "time"
+    with h5py.File("a.h5", "a") as file:
+        del file["ending"]
+    with dem.open("a.h5") as history:
+        assert history.ending is None
+
+
 def test_contacts_are_a_data_frame(history, raw):
     frame = history.frames // 2
     contacts, group = history.contacts(frame), raw["contacts"]

@@ -10,7 +10,7 @@ use super::anderson::Anderson;
 use super::{ContactSolver, Route, SolveReport, SolveStatus, Work};
 use crate::contact::{Law, LocalSolve};
 use crate::dim::Dim;
-use crate::problem::residual::residual;
+use crate::problem::residual::{elastic_error, residual};
 use crate::problem::{ContactProblem, Group, GroupVisitorMut, Nodes, blocks};
 use crate::saved::{Mismatch, Reader, Saved};
 use crate::solver::tuning::{defaults, gauss_seidel as tuning};
@@ -189,7 +189,9 @@ pub(super) fn iterate(problem: &mut impl Sweepable, settings: &GaussSeidelSettin
 impl<D: Dim> ContactSolver<D> for GaussSeidel {
     fn solve(&mut self, problem: &mut ContactProblem<D>) -> SolveReport {
         let settings = self.settings;
-        among_threads(blocks::are_several(problem.nodes.grains), || iterate(problem, &settings))
+        let report = among_threads(blocks::are_several(problem.nodes.grains), || iterate(problem, &settings));
+        let load_error = (!problem.elastic.is_empty()).then(|| elastic_error(problem));
+        SolveReport { load_error, ..report }
     }
 
     fn snapshot(&self) -> Box<dyn ContactSolver<D>> {

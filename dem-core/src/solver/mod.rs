@@ -98,7 +98,8 @@ pub struct SolveReport {
     /// Load error (–): the estimated error of the reactions r relative to them, in the norm of
     /// r·(W + C) r, at least the
     /// [elastic error](crate::problem::residual::elastic_error). For rigid contacts that is the
-    /// error of the net impulses on the bodies. Gauss–Seidel reports none.
+    /// error of the net impulses on the bodies. Gauss–Seidel reports the elastic error alone, and
+    /// none without elastic bonds.
     pub load_error: Option<f64>,
 }
 
@@ -169,7 +170,7 @@ impl SolverSettings {
         }
     }
 
-    /// Target load error (–); none for a solver that reports no load error.
+    /// Target load error (–); none for Gauss–Seidel, which stops on the residual alone.
     pub fn load_tolerance(&self) -> Option<f64> {
         match self {
             Self::GaussSeidel(_) => None,

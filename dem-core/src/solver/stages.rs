@@ -327,15 +327,15 @@ impl Staged {
         (graph.tree.operations() <= tuning::CHEAP * problem.len() as f64).then_some(rows)
     }
 
-    /// Sweeps to the tolerances of the residual and of the velocity error. Returns also by which
-    /// factor these are missed.
+    /// Sweeps to the tolerances of the residual, of the velocity error and of the elastic error.
+    /// Returns also by which factor these are missed.
     fn sweep(&self, problem: &mut impl Solvable, most: u64) -> (SolveReport, f64) {
         let StagedSettings { tolerance, .. } = self.settings;
         let (mut aim, mut work) = (tolerance, Work::default());
         loop {
             let swept = problem.gauss_seidel(self.sweeps(aim, most - work.sweeps));
             work = work + swept.work;
-            let velocity_error = problem.velocity_error();
+            let velocity_error = problem.velocity_error().max(swept.load_error.unwrap_or(0.0));
             let missed = self.settings.aims(false).missed(swept.residual, velocity_error);
             // sweeps stop on the residual alone: lower its target to reduce the velocity error
             if missed > 1.0 && swept.residual <= aim && work.sweeps < most {

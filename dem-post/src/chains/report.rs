@@ -140,7 +140,7 @@ pub fn require_reactions(history: &History) -> Result<()> {
 
 /// The network at frame `frame`.
 fn network(history: &History, frame: usize) -> Result<Network> {
-    let (contacts, d) = (history.contacts(frame)?, history.dimension());
+    let (contacts, d) = (contacts(history, frame)?, history.dimension());
     let forces = normal_forces(&contacts);
     let statistics = statistics(&forces);
     let (radius, position) = (history.grains()?.radius, history.grain_state(frame)?.position);
@@ -158,12 +158,34 @@ fn network(history: &History, frame: usize) -> Result<Network> {
     })
 }
 
-/// Normal force of each contact, N, positive in compression; zero where it is negligible relative
-/// to the greatest tangential force, that is, solver error.
+/// The contacts of a frame, without the normal forces that are solver error.
+///
+/// # Errors
+/// Those of reading the history.
+pub fn contacts(history: &History, frame: usize) -> Result<ContactRows> {
+    let mut contacts = history.contacts(frame)?;
+    let greatest_radius = history.grains()?.radius.into_iter().fold(0.0, f64::max);
+    drop_round_off(&mut contacts, greatest_radius);
+    Ok(contacts)
+}
+
+/// Sets normal forces to zero that are negligible relative to the greatest tangential force, or to
+/// the greatest moment over the greatest radius (m).
+fn drop_round_off(contacts: &mut ContactRows, greatest_radius: f64) {
+    let tangential = (0..contacts.len()).map(|c| contacts.tangential_force(c));
+    let moments = contacts.moment.iter().map(|moment| moment.abs() / greatest_radius);
+    let greatest = tangential.chain(moments).fold(0.0, f64::max);
+    let rows = contacts.reaction_rows();
+    for normal in contacts.reaction.iter_mut().step_by(rows.max(1)) {
+        if normal.abs() <= CARRIES * greatest {
+            *normal = 0.0;
+        }
+    }
+}
+
+/// Normal force of each contact, N, positive in compression.
 pub fn normal_forces(contacts: &ContactRows) -> Vec<f64> {
-    let greatest = (0..contacts.len()).map(|c| contacts.tangential_force(c)).fold(0.0, f64::max);
-    let force = |c| Some(contacts.normal_force(c)).filter(|f| f.abs() > CARRIES * greatest).unwrap_or(0.0);
-    (0..contacts.len()).map(force).collect()
+    (0..contacts.len()).map(|c| contacts.normal_force(c)).collect()
 }
 
 /// The chains in numbers, in a sample of `grains` grains.
@@ -328,14 +350,18 @@ mod tests {
     }
 
     #[test]
-    fn what_the_solver_leaves_beside_tangential_forces_is_no_normal_force() {
-        let contacts = ContactRows {
+    fn what_the_solver_leaves_beside_tangential_forces_or_moments_is_no_normal_force() {
+        let mut contacts = ContactRows {
             pair: vec![[0, 1], [1, 2], [2, 3]],
             reaction: vec![1e-10, 1.0, 1e-3, 0.5, 0.0, 0.0],
             normal: vec![0.0; 6],
             ..ContactRows::default()
         };
+        drop_round_off(&mut contacts, 1e-3);
         assert_eq!(normal_forces(&contacts), [0.0, 1e-3, 0.0]);
+        contacts.moment = vec![0.0, 1e4, 0.0];
+        drop_round_off(&mut contacts, 1e-3);
+        assert_eq!(normal_forces(&contacts), [0.0; 3]);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Checks names, types, shapes and units against the layout.
 
-use dem_history::{BondStatus, ContactStatus, ROUTE, RuptureMode, SolverRoute, WallColumn, WallDrive, WallKind};
+use dem_history::{BondStatus, ContactStatus, Ending, ROUTE, RuptureMode, SolverRoute, WallColumn, WallDrive, WallKind};
 use hdf5::Attribute;
 use hdf5::types::{CompoundField, EnumMember, EnumType, FloatSize, IntSize, TypeDescriptor, VarLenUnicode};
 
@@ -194,6 +194,11 @@ fn commit(c: &mut Checker) {
     let t = c.sizes.t;
     if c.typed("commit", &U64).is_some_and(|shape| !shape.is_empty()) {
         c.wrong("commit", None, "is not a single number");
+    }
+    let endings = bytes(Ending::ALL.iter().map(|ending| ending.label()));
+    // files of earlier programs have none
+    if c.has("ending") && c.typed("ending", &endings).is_some_and(|shape| !shape.is_empty()) {
+        c.wrong("ending", None, "is not a single value");
     }
     for name in ["contacts", "steps"] {
         c.table(&format!("commit_rows/{name}"), &U64, t, &[], "");

@@ -1,7 +1,7 @@
 //! The beginning of the page: the result in a sentence, three moments as pictures, and the slider.
 
 use dem_drawing::{Style, colour};
-use dem_history::{History, Rupture};
+use dem_history::{Ending, History, Rupture};
 
 use super::limit::LimitLoad;
 use super::player;
@@ -200,6 +200,14 @@ fn sentences(history: &History, parts: &Parts, ruptures: &[Rupture]) -> Result<S
             let energy = energy.unwrap_or_default();
             said.push(format!("{} without bonds, until {}{energy}.", counted(n, "grain"), parts.info.clock.at(last)));
         }
+    }
+    let last = history.times().last().copied().unwrap_or(0.0);
+    match parts.info.ending {
+        Some(Ending::NoConvergence) => {
+            said.push(format!("The run ended at {} because the next step was not solved.", parts.info.clock.at(last)));
+        }
+        Some(Ending::Interrupted) => said.push(format!("The run was interrupted at {}.", parts.info.clock.at(last))),
+        _ => {}
     }
     if parts.info.open_ended {
         said.push("The run was not closed: it is in progress or was stopped.".into());

@@ -4,6 +4,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
 
 use super::checkpoint::Checkpoint;
+use super::ending::Ending;
 use super::error::Result;
 use super::model::{Bonds, Frame, Rupture};
 use super::writer::Writer;
@@ -11,7 +12,8 @@ use super::writer::Writer;
 /// Maximum number of batches in the queue.
 const WAITING: usize = 4;
 
-/// A batch: observations and ruptures since the last batch, then a frame, then a checkpoint.
+/// A batch: observations and ruptures since the last batch, then a frame, then a
+/// checkpoint, at last why the run ended.
 #[derive(Debug, Default)]
 pub struct Batch {
     /// Steps, times and observables, one row each.
@@ -24,6 +26,8 @@ pub struct Batch {
     pub frame: Option<Frame>,
     /// The state of that frame.
     pub checkpoint: Option<Checkpoint>,
+    /// Why the run ended.
+    pub ending: Option<Ending>,
 }
 
 /// A [`Writer`] on its own thread.
@@ -102,6 +106,9 @@ fn write(writer: &mut Writer, batch: &Batch) -> Result<()> {
     }
     if let Some(checkpoint) = &batch.checkpoint {
         writer.checkpoint(checkpoint)?;
+    }
+    if let Some(ending) = batch.ending {
+        writer.ending(ending)?;
     }
     Ok(())
 }

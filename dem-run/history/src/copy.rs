@@ -66,7 +66,7 @@ pub fn copy(history: &History, path: &Path, how: CopyAs, tell: &mut dyn FnMut(f6
 
 fn copy_to(history: &History, part: &Path, how: CopyAs, tell: &mut dyn FnMut(f64) -> bool) -> Result<u64> {
     let (layout, kept) = (history.layout()?, history.complete()?);
-    let checkpoint = history.checkpoint()?;
+    let (checkpoint, ending) = (history.checkpoint()?, history.ending()?);
     let mut writer = Writer::closed_copy(part, &layout, how == CopyAs::Packed)?;
     let mut comparison = Comparison::default();
     // read twice: for writing and for the comparison
@@ -75,10 +75,11 @@ fn copy_to(history: &History, part: &Path, how: CopyAs, tell: &mut dyn FnMut(f64
     if let Some(checkpoint) = &checkpoint {
         writer.checkpoint(checkpoint)?;
     }
+    writer.ending(ending)?;
     writer.visit(kept, &mut comparison)?;
     writer.finish()?;
     let copy = History::open(part)?;
-    let same = copy.layout()? == layout && copy.complete()? == kept && copy.checkpoint()? == checkpoint;
+    let same = copy.layout()? == layout && copy.complete()? == kept && copy.checkpoint()? == checkpoint && copy.ending()? == ending;
     if !same {
         return Err(copy.source().damaged("", DIFFERS));
     }

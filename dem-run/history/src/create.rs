@@ -4,6 +4,7 @@ use hdf5::types::VarLenUnicode;
 use hdf5::{Dataset, File, Group};
 
 use super::codes::{BondCode, Coded, ContactCode, RouteCode, SolverRoute};
+use super::ending::{Ending, EndingCode};
 use super::error::{HistoryError, Result};
 use super::model::{Bonds, Frame, Layout, Observable, ValueKind};
 use super::schema::{CREATOR, FALSE_ACCELERATION, LOAD_ERROR, path};
@@ -429,4 +430,10 @@ pub(super) fn commit(file: &File, bonded: bool, storage: Storage) -> hdf5::Resul
         steps: table("steps")?,
         events: if bonded { Some(table("events")?) } else { None },
     })
+}
+
+pub(super) fn ending(file: &File) -> hdf5::Result<Dataset> {
+    let dataset = file.new_dataset::<EndingCode>().obj_track_times(false).create(path::ENDING)?;
+    dataset.write_scalar(&Ending::Open.code())?;
+    Ok(dataset)
 }

@@ -55,6 +55,9 @@
 //! /observables/            step i64[S], time [S], shared by all (hard links, as H5MD allows)
 //!     NAME                 {step, time, value[S,…]}, f64
 //!     solver_route         the same, enum EXTRAPOLATION, ACTIVE_SET, INTERIOR_POINT, SWEEPS
+//! /ending                  enum OPEN until the run ends, then TIME, WALL_TRAVEL, BROKEN_FRACTION,
+//!                          LOAD_DROP, STAGES, NO_BREAK, NO_EQUILIBRIUM, INTERRUPTED or
+//!                          NO_CONVERGENCE
 //! /parameters/             scene (the JSON as run); attributes schema_version, seed, version,
 //!                          git_revision, build, host, start; solid_fraction, if packed
 //! /grain, axis, wall, …    names of the axes of datasets, without values (`dimensions.rs`)
@@ -79,6 +82,7 @@ mod codes;
 mod copy;
 mod create;
 mod dimensions;
+mod ending;
 mod error;
 mod lock;
 mod model;
@@ -101,6 +105,7 @@ pub use background::{Background, Batch};
 pub use checkpoint::Checkpoint;
 pub use codes::{BondStatus, ContactStatus, RuptureMode, SolverRoute};
 pub use copy::{CopyAs, copy};
+pub use ending::Ending;
 pub use error::{HistoryError, Result, reason};
 pub use lock::refuse_busy;
 pub use model::{

@@ -7,7 +7,8 @@ use std::path::Path;
 use hdf5::types::VarLenUnicode;
 
 use super::checkpoint::Checkpoint;
-use super::codes::ContactCode;
+use super::codes::{Coded, ContactCode};
+use super::ending::{Ending, EndingCode};
 use super::error::{HistoryError, Result, refused, while_reading};
 use super::model::{ContactRows, GrainState, Grains, Layout, Parameters, RowCounts, Rupture, WallState};
 use super::observed::{self, Series};
@@ -127,6 +128,19 @@ impl History {
             Some(last) => checkpoint::newest(&self.source, *last),
             None => Ok(None),
         }
+    }
+
+    /// Whether the run ended, and why; [`Ending::Open`] also in a file of a program that did not
+    /// record it.
+    ///
+    /// # Errors
+    /// [`HistoryError::Damaged`].
+    pub fn ending(&self) -> Result<Ending> {
+        if !self.source.has(path::ENDING) {
+            return Ok(Ending::Open);
+        }
+        let code = self.source.scalar::<EndingCode>(path::ENDING)?;
+        Ending::from_code(code).ok_or_else(|| self.source.damaged(path::ENDING, "an unknown value"))
     }
 
     /// The process that writes the file, if any.

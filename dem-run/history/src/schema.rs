@@ -22,6 +22,7 @@ pub(super) mod path {
     pub const WALLS: &str = "walls";
     pub const CONTACTS: &str = "contacts";
     pub const BONDS: &str = "bonds";
+    pub const ENDING: &str = "ending";
     pub const FORMED: &str = "bonds/formed";
     pub const RUPTURE: &str = "events/rupture";
     pub const OBSERVABLES: &str = "observables";

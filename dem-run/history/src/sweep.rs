@@ -89,7 +89,9 @@ pub struct Entry {
     pub values: BTreeMap<String, Value>,
     /// Digest of its scene.
     pub digest: String,
-    /// Path of its history relative to the folder of the sweep; absent until the run is done.
+    /// Path of its history relative to the folder of the sweep; of a failed run, that of its history
+    /// up to the failure. No such file exists until the run is done, or if it failed before its
+    /// first frame.
     pub history: String,
     /// State of the run.
     pub state: State,
@@ -270,6 +272,7 @@ impl Store {
                 None => State::Left,
                 Some(outcome) => outcome.state,
             };
+            run.history = history(&run.id, run.state);
             run.wall_time = outcome.as_ref().map(|outcome| outcome.wall_time);
             run.cpu_time = outcome.as_ref().and_then(Outcome::cpu_time);
             run.message = outcome.and_then(|outcome| outcome.message);
@@ -332,9 +335,15 @@ impl Entry {
     /// A run not yet started.
     #[must_use]
     pub fn new(id: String, values: BTreeMap<String, Value>, digest: String) -> Self {
-        let history = format!("runs/{id}.h5");
+        let history = history(&id, State::Left);
         Self { id, values, digest, history, state: State::Left, message: None, wall_time: None, cpu_time: None }
     }
+}
+
+/// Path of the history of a run relative to the folder of the sweep.
+fn history(id: &str, state: State) -> String {
+    let ending = if state == State::Failed { ".failed.h5" } else { ".h5" };
+    format!("runs/{id}{ending}")
 }
 
 fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {

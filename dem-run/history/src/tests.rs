@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use super::*;
 
 mod cement;
+mod ending;
 mod plate;
 
 /// Three grains, two walls, two bonds, in `dimension` dimensions.

@@ -3,13 +3,14 @@
 use std::os::unix::fs::{FileExt, MetadataExt};
 use std::path::{Path, PathBuf};
 
-use hdf5::File;
+use hdf5::{Dataset, File};
 
 use dem_output::replace::{replace_synced, sync};
 
 use super::checkpoint::{Checkpoint, Slots};
 use super::codes::{BondCode, Coded};
 use super::create::{self, BondTables, Column, Commit, ContactTables, Observables, check_length};
+use super::ending::Ending;
 use super::error::{HistoryError, Result, refused, while_writing};
 use super::model::{Bonds, Frame, Layout, RowCounts, Rupture};
 use super::reader::History;
@@ -48,6 +49,7 @@ pub struct Writer {
     rupture_block: Vec<RuptureRow>,
     observables: Observables,
     commit: Commit,
+    ending: Dataset,
     slots: Slots,
     /// Device and inode of the open file: those of `path` differ once another file has its name.
     identity: Option<(u64, u64)>,
@@ -162,6 +164,7 @@ impl Writer {
         };
         let observables = create::observables(&file, &layout.observables, storage)?;
         let commit = create::commit(&file, bonded, storage)?;
+        let ending = create::ending(&file)?;
         let slots = Slots::create(&file, storage)?;
         dimensions::label(&file)?;
         Ok(Self {
@@ -177,6 +180,7 @@ impl Writer {
             rupture_block: Vec::with_capacity(BLOCK),
             observables,
             commit,
+            ending,
             slots,
             identity: None,
             head: Head::default(),
@@ -217,6 +221,14 @@ impl Writer {
     pub fn checkpoint(&mut self, checkpoint: &Checkpoint) -> Result<()> {
         let file = &self.file;
         self.slots.write(checkpoint, || file.flush()).map_err(while_writing(&self.path))
+    }
+
+    /// Records why the run ended.
+    ///
+    /// # Errors
+    /// [`HistoryError::Write`] where the disk refuses.
+    pub fn ending(&mut self, ending: Ending) -> Result<()> {
+        self.ending.write_scalar(&ending.code()).map_err(while_writing(&self.path))
     }
 
     /// The dimension D of the layout.

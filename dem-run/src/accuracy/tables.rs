@@ -139,7 +139,7 @@ fn failure(report: &Report) -> String {
         }
         cells.push(row.outcome.broken.len().to_string());
         cells.push(row.jaccard.map_or("–".into(), |j| format!("{j:.2}")));
-        cells.push(row.outcome.ended.name().into());
+        cells.push(row.outcome.ended.name());
         table.row(cells);
     }
     table.lines()

@@ -5,7 +5,7 @@ use crate::clock::thread_time;
 use crate::collapse::{Collapse, Failure};
 use crate::course::Course;
 use crate::scene::{GaussSeidel, Newton, Scene, SolverKind};
-use crate::summary::Ending;
+use crate::history::Ending;
 use dem_core::body::{Grain, Grains, Load, Wall};
 use dem_core::bond::{Bond, Bonds};
 use dem_core::contact::Local;
@@ -245,18 +245,11 @@ pub enum End {
 impl End {
     /// Short name.
     #[must_use]
-    pub fn name(&self) -> &'static str {
+    pub fn name(&self) -> String {
         match self {
-            Self::Collapsed => "collapse",
-            Self::Scene(Ending::Time) => "time",
-            Self::Scene(Ending::WallTravel) => "wall travel",
-            Self::Scene(Ending::BrokenFraction) => "broken fraction",
-            Self::Scene(Ending::LoadDrop) => "load drop",
-            Self::Scene(Ending::Stages) => "stages",
-            Self::Scene(Ending::NoBreak) => "no break",
-            Self::Scene(Ending::NoEquilibrium) => "no equilibrium",
-            Self::Scene(Ending::Interrupted) => "interrupted",
-            Self::Scene(Ending::NoConvergence) | Self::Failed(_) => "NO CONVERGENCE",
+            Self::Collapsed => "collapse".into(),
+            Self::Scene(Ending::NoConvergence) | Self::Failed(_) => "NO CONVERGENCE".into(),
+            Self::Scene(ending) => ending.label().to_lowercase().replace('_', " "),
         }
     }
 }

@@ -56,7 +56,8 @@ fn an_interrupted_run_closes_its_history_after_the_last_state() {
         assert!(history.steps().len() > 1 && sweeps.step.len() > 1);
         assert_eq!(history.steps().last(), sweeps.step.last(), "{signal}");
         history.grain_state(history.frames() - 1).expect("the last state");
-        here.dem_post(&["info", "long.h5"]).succeeds();
+        let told = here.dem_post(&["info", "long.h5"]).succeeds();
+        assert!(told.stdout.contains("interrupted"), "{}", told.stdout);
         here.dem_post(&["chains", "long.h5"]).succeeds();
     }
 }

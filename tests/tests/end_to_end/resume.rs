@@ -163,6 +163,7 @@ fn an_interrupted_run_goes_on_from_its_last_step() {
     drop(history);
     here.dem_run(&["resume", "a.h5", "--quiet"]).succeeds();
     same(&whole, &here.history("a.h5"));
+    assert_eq!(here.history("a.h5").ending().expect("read"), whole.ending().expect("read"));
     // and again: there is nothing to do
     let before = here.read("a.h5");
     let told = here.dem_run(&["resume", "a.h5", "--quiet"]).succeeds();

@@ -114,8 +114,7 @@ fn run(store: &Store, entry: &Entry, wall: Option<&str>, points: usize) -> Resul
         curve: vec![],
     };
     let path = match entry.state {
-        State::Done => store.folder().join(&entry.history),
-        State::Failed => store.path(&entry.id, ".failed.h5"),
+        State::Done | State::Failed => store.folder().join(&entry.history),
         State::Left | State::Running => return Ok(run),
     };
     match History::open(&path) {
