@@ -135,9 +135,9 @@ pub fn read(history: &History, subject: Subject, every: usize, times: &[f64]) ->
     }
     let scale = match subject {
         Subject::Bonds => None,
-        Subject::Forces => Some(greatest(&frames, |frame| {
-            Ok(statistics(&normal_forces(&contacts(history, frame)?)).mean)
-        })?),
+        Subject::Forces => {
+            Some(greatest(&frames, |frame| Ok(statistics(&normal_forces(&contacts(history, frame)?)).mean))?)
+        }
         Subject::Speed => {
             Some(greatest(&frames, |frame| Ok(usual_speed(speeds(&history.grain_state(frame)?, history.dimension()))))?)
         }

@@ -10,7 +10,7 @@ use crate::analysis::Analysis;
 use crate::clock::Clock;
 use crate::cracks::Modes;
 use crate::extent::range;
-use crate::output::{Result, facts, in_shell, number, quantity};
+use crate::output::{Result, escaped, facts, in_shell, number, quantity};
 use crate::section::{Maps, OnPage, Section};
 use crate::{check, pack, stress_strain};
 
@@ -43,6 +43,13 @@ pub enum Answer {
     Check(check::Report),
     /// The copy that replaced it: `--repair`.
     Repair(pack::Report),
+    /// That it needs no repair: `--repair` of a history that was closed.
+    Closed {
+        /// The history.
+        file: String,
+        /// Always false.
+        repaired: bool,
+    },
 }
 
 impl Analysis for Command {
@@ -55,7 +62,9 @@ impl Analysis for Command {
     }
 
     fn read(&self, history: &History, quiet: bool) -> Result<Answer> {
-        Ok(if self.repair {
+        Ok(if self.repair && !history.open_ended() {
+            Answer::Closed { file: history.path().display().to_string(), repaired: false }
+        } else if self.repair {
             Answer::Repair(pack::write(history, &self.history, CopyAs::Plain, quiet)?)
         } else if self.check {
             Answer::Check(check::read(history, quiet)?)
@@ -69,6 +78,9 @@ impl Analysis for Command {
             Answer::Contents(report) => report.table(),
             Answer::Check(report) => report.table(),
             Answer::Repair(report) => report.table(),
+            Answer::Closed { file, .. } => {
+                format!("nothing to repair: {} is closed; --check verifies it", escaped(file))
+            }
         }
     }
 
@@ -275,9 +287,7 @@ impl Report {
         lines.push(("bonds", self.bond_line()));
         lines.push(("time", self.time_line()));
         lines.extend(self.ending.map(|ending| ("ended", ending.reason().into())));
-        lines.extend([
-            ("observed", format!("{} steps of {}", self.observed, self.observables.join(", "))),
-        ]);
+        lines.extend([("observed", format!("{} steps of {}", self.observed, self.observables.join(", ")))]);
         lines.extend(self.measure_lines());
         lines
     }

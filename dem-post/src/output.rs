@@ -8,8 +8,8 @@ use dem_history::{History, HistoryError};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 pub use dem_output::{
-    Folder, Source, Text, WriteError, cell, default_folder, escaped, facts, in_shell, number, plain, print, quantity,
-    short,
+    Folder, Source, Text, WriteError, cell, counted, default_folder, escaped, facts, in_shell, number, plain, print,
+    quantity, short,
 };
 
 /// The errors of an analysis.
@@ -64,11 +64,6 @@ pub(crate) fn progress(length: u64, quiet: bool, template: &str) -> ProgressBar 
         bar.set_style(style);
     }
     bar
-}
-
-/// A number of things in words: `1 bond`, `2 bonds`.
-pub(crate) fn counted(number: usize, word: &str) -> String {
-    format!("{number} {word}{}", if number == 1 { "" } else { "s" })
 }
 
 /// A history as the source of results: its path, and the properties of its run that do not change

@@ -75,6 +75,7 @@ pub fn build<D: Dim>(scene: &Scene, packings: Option<&Path>, watch: Watch) -> Re
     // the world knows which grains its walls hold: those get no bonds among each other
     if scene.cement_stage().is_none() {
         world.add_bonds(bonds::of_sample(scene, &world.grains)?);
+        warnings.extend(warnings::of_stiff_bonds(&world));
     }
     Ok(Built { world, solid_fraction, warnings })
 }

@@ -2,12 +2,12 @@
 
 use crate::collapse::{Collapse, LoadStep};
 use crate::error::RunError;
+use crate::history::Ending;
 use crate::load::{drive_direction, load};
 use crate::scene::Scene;
 use crate::scene::failure::in_one_piece;
 use crate::stages::Stages;
 use crate::stop::{StopProgress, Stops};
-use crate::history::Ending;
 use dem_core::bond::{BondStatus, Rupture};
 use dem_core::dim::{Dim, Vect};
 use dem_core::saved::{Mismatch, Reader, Saved};

@@ -14,7 +14,7 @@ use crate::check;
 use crate::error::{NoConvergence, RunError};
 use crate::in_dimension;
 use crate::memory;
-use crate::output::{facts, listed, number, print_result};
+use crate::output::{counted, facts, listed, number, print_result};
 use crate::run::{Execution, handle_signals};
 use crate::scene::{self, Function, Scene, SolverKind};
 use crate::signals::Interrupt;
@@ -330,7 +330,7 @@ impl fmt::Display for Limit {
             name if name.starts_with("walls.") => " N",
             _ => " times its force and torque",
         };
-        let mut lines = vec![("sample", format!("{} grains, {} bonds", self.grains, self.bonds))];
+        let mut lines = vec![("sample", format!("{}, {}", counted(self.grains, "grain"), counted(self.bonds, "bond")))];
         for load in &self.loads {
             let unit = unit(load);
             lines.push(("growing load", format!("{}, {} to {}{unit}", load.load, number(load.from), number(load.to))));

@@ -4,8 +4,9 @@
 use crate::build::Built;
 use crate::clock::cpu_time;
 use crate::history::{
-    self, Background, Batch, BondStatus, Checkpoint, ContactRows, ContactStatus, Ending, Frame, GrainState, History, Layout,
-    Observable, Parameters, RowCounts, Rupture, RuptureMode, SolverRoute, WallDrive, WallKind, WallState, Writer,
+    self, Background, Batch, BondStatus, Checkpoint, ContactRows, ContactStatus, Ending, Frame, GrainState, History,
+    Layout, Observable, Parameters, RowCounts, Rupture, RuptureMode, SolverRoute, WallDrive, WallKind, WallState,
+    Writer,
 };
 use crate::load::{drive_direction, load};
 use crate::scene::{self, Drive as SceneDrive, Precision, Scene, StageDrive};

@@ -3,11 +3,11 @@
 use crate::bonds;
 use crate::drive::set_drive;
 use crate::error::RunError;
+use crate::history::Ending;
 use crate::load::drive_direction;
 use crate::output::number;
 use crate::scene::Scene;
 use crate::stop::Stops;
-use crate::history::Ending;
 use dem_core::dim::Dim;
 use dem_core::saved::{Mismatch, Reader, Saved};
 use dem_core::world::World;

@@ -1,8 +1,8 @@
 //! The stop conditions of a scene, followed from step to step.
 
+use crate::history::Ending;
 use crate::load::{drive_direction, load};
 use crate::scene::{Scene, Stop, TravelFrom};
-use crate::history::Ending;
 use dem_core::dim::{Dim, Vect};
 use dem_core::saved::{Mismatch, Reader, Saved};
 use dem_core::world::World;

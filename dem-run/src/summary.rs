@@ -2,7 +2,7 @@
 
 use crate::collapse::{Collapse, Failure};
 use crate::history::Ending;
-use crate::output::{in_shell, number, quantity};
+use crate::output::{counted, in_shell, number, quantity};
 use crate::scene::failure::{STRAINS, Splitting};
 use dem_core::solver::Work;
 use serde::Serialize;
@@ -153,15 +153,16 @@ impl WallLoads {
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let ending = self.ending.reason();
+        let (steps, grains) = (counted(self.steps as usize, "step"), counted(self.grains, "grain"));
         match self.load_time {
             Some(time) => {
-                writeln!(f, "ended            after {} steps, at the loads of t = {time:.6} s: {ending}", self.steps)?;
+                writeln!(f, "ended            after {steps}, at the loads of t = {time:.6} s: {ending}")?;
             }
-            None => writeln!(f, "ended            t = {:.6} s after {} steps: {ending}", self.time, self.steps)?,
+            None => writeln!(f, "ended            t = {:.6} s after {steps}: {ending}", self.time)?,
         }
         match self.solid_fraction {
-            Some(fraction) => writeln!(f, "sample           {} grains, solid fraction {fraction:.4}", self.grains)?,
-            None => writeln!(f, "sample           {} grains", self.grains)?,
+            Some(fraction) => writeln!(f, "sample           {grains}, solid fraction {fraction:.4}")?,
+            None => writeln!(f, "sample           {grains}")?,
         }
         match &self.no_bonds {
             _ if self.bonds > 0 => self.write_bonds(f)?,
@@ -215,10 +216,16 @@ impl Summary {
         match (self.worst_load_error, self.load_tolerance) {
             (Some(worst), Some(tolerance)) => {
                 let missed = self.missed_load_tolerance;
-                writeln!(f, "load error       worst {worst:.2e} (tolerance {tolerance:.0e}), {missed} steps missed it")?;
+                writeln!(
+                    f,
+                    "load error       worst {worst:.2e} (tolerance {tolerance:.0e}), {missed} steps missed it"
+                )?;
             }
             (Some(worst), None) => {
-                writeln!(f, "load error       worst {worst:.2e}, of elastic bonds (Gauss–Seidel has no tolerance for it)")?;
+                writeln!(
+                    f,
+                    "load error       worst {worst:.2e}, of elastic bonds (Gauss–Seidel has no tolerance for it)"
+                )?;
             }
             (None, _) => {}
         }

@@ -8,9 +8,16 @@ use crate::tolerances::{PARALLEL, TOUCHING};
 use crate::touching::seating;
 use dem_core::body::{Drive, Grains, Wall};
 use dem_core::dim::{Dim, Vect};
+use dem_core::solver::SolverSettings;
+use dem_core::world::World;
 
 /// Maximum number of grains, or loads of one kind, that are reported individually.
 const MOST_TOLD: usize = 5;
+/// Load error of stiff elastic bonds, over the precision of the solver times k h²/m (measured: 2 to
+/// 13 with three bonds in a row).
+const ERROR_OF_STIFF: f64 = 10.0;
+/// Load error (–) above which a warning is given.
+const LARGE_LOAD_ERROR: f64 = 1e-3;
 /// Number of times at which a drive is sampled.
 const MOMENTS: usize = 1000;
 
@@ -72,6 +79,34 @@ pub(crate) fn of_packing(moved: f64) -> String {
         "sample.random: the packing still moved by {moved:.1e} mean radii per step after {MOST_STEPS} steps: some grains may not touch \
          their neighbours; try another seed or a wider container, or look at it with `dem-post view`"
     )
+}
+
+/// Warning about elastic bonds that are so stiff for the step that the solver's precision does not
+/// tell how they share a load.
+pub(crate) fn of_stiff_bonds<D: Dim>(world: &World<D>) -> Option<String> {
+    let settings = &world.settings;
+    let (precision, remedy) = match settings.solver {
+        SolverSettings::GaussSeidel(_) => {
+            (settings.solver.tolerance(), "leave solver.kind to the default, or take a smaller time.step")
+        }
+        _ => (f64::EPSILON, "take a smaller time.step, or leave the bonds rigid"),
+    };
+    let grains = &world.grains;
+    let ratio = world.bonds.iter().filter_map(|bond| {
+        let stiffness = bond.stiffness?;
+        let inverse_mass = |k: &u32| if grains.fixed[*k as usize] { 0.0 } else { 1.0 / grains.mass[*k as usize] };
+        let inverse_mass: f64 = bond.pair.iter().map(inverse_mass).sum();
+        Some(stiffness.normal.max(stiffness.tangential) * settings.step.powi(2) * inverse_mass)
+    });
+    let ratio = ratio.fold(0.0, f64::max);
+    let error = ERROR_OF_STIFF * precision * ratio;
+    (error > LARGE_LOAD_ERROR).then(|| {
+        let error = if error < 1.0 { format!("about {error:.0e}") } else { "1 or more".into() };
+        format!(
+            "bonds.stiffness: bonds so stiff for time.step (k h²/m up to {ratio:.0e}) share a load with a relative error of \
+             {error}, told by the load error of each step: {remedy}"
+        )
+    })
 }
 
 /// The first lines of one kind, and the number of the others.
@@ -296,6 +331,31 @@ mod tests {
 
     fn lid(place: &str, drive: &str) -> String {
         format!(r#"{{ "shape": {{ "plane": {{ "normal": [0, -1], "place": {place} }} }}, {drive} }}"#)
+    }
+
+    /// The bonds of two grains of 3.14 kg have k h²/m up to 6e9, 6e3 and 6e13.
+    #[test]
+    fn bonds_too_stiff_for_the_precision_of_the_solver_are_told() {
+        let bonded = |k: &str, kind: &str| {
+            let springs =
+                format!(r#""stiffness": {{ "springs": {{ "normal": {k}, "tangential": 1, "rolling": 1 }} }}"#);
+            let bonds = format!(r#"bonds={{ "strength": 1, "gap_tolerance": 1e-3, "shear": 0.5, {springs} }}"#);
+            let kind = format!("solver.kind={kind}");
+            told(&lid(r#""seated""#, r#""velocity": { "constant": 1 }"#), &[&bonds, &kind])
+        };
+        let (auto, sweeps) = (r#"{ "auto": {} }"#, r#"{ "gauss_seidel": {} }"#);
+        for (k, kind, expected) in [
+            ("1e12", auto, None),
+            ("1e6", sweeps, None),
+            ("1e12", sweeps, Some("solver.kind")),
+            ("1e16", auto, Some("rigid")),
+        ] {
+            let told = bonded(k, kind);
+            assert_eq!(told.len(), usize::from(expected.is_some()), "{k}, {kind}: {told:?}");
+            let fits =
+                told.iter().all(|told| told.starts_with("bonds.stiffness: ") && told.contains(expected.unwrap()));
+            assert!(fits, "{told:?}");
+        }
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use dem_history::{ContactRows, History};
 
 use super::report::{CARRIES, Report};
-use crate::map::{Colour, Key, Link, Panel, Sample, draw};
+use crate::map::{Colour, Key, Link, Materials, Panel, Sample, draw};
 use crate::output::{Result, short};
 use crate::title::Titles;
 use dem_drawing::{Chart, Drawing, Style, colour};
@@ -35,9 +35,16 @@ pub fn force_legend(d: usize, scale: f64) -> Vec<Key> {
     legend
 }
 
-/// Fills of the grains behind lines; none for spheres, which would hide the lines.
-fn behind_lines(grains: usize, d: usize) -> Vec<Colour> {
-    if d == 2 { vec![GRAIN[0].into(); grains] } else { vec![] }
+/// Fills of the grains behind lines, with the legend of their materials; none for spheres, which
+/// would hide the lines.
+fn behind_lines(history: &History) -> Result<(Vec<Colour>, Vec<Key>)> {
+    if history.dimension() == 3 {
+        return Ok((vec![], vec![]));
+    }
+    let materials = Materials::read(history)?;
+    let fill = |grain: usize| materials.as_ref().map_or(GRAIN[0], |materials| materials.fill(grain)).into();
+    let fills = (0..history.grains()?.radius.len()).map(fill).collect();
+    Ok((fills, materials.iter().flat_map(|materials| materials.keys(GRAIN[1])).collect()))
 }
 
 /// Number of chains with at least so many grains, at each moment: one chart for each kind with
@@ -74,12 +81,12 @@ pub fn length_charts(report: &Report) -> Vec<Chart> {
 /// Those of reading the history.
 pub fn chain_map(history: &History, report: &Report, titles: &Titles) -> Result<Drawing> {
     let d = history.dimension();
-    let grains = history.grains()?.radius.len();
+    let (grains, materials) = behind_lines(history)?;
     let mut panels = vec![];
     for network in &report.networks {
         let state = history.grain_state(network.frame)?;
         let centre = |grain: usize| state.position[grain * d..(grain + 1) * d].to_vec();
-        let (mut fills, mut links) = (behind_lines(grains, d), vec![]);
+        let (mut fills, mut links) = (grains.clone(), vec![]);
         for (k, chains) in network.chains.iter().enumerate() {
             for chain in &chains.chains {
                 for &grain in chain {
@@ -110,10 +117,11 @@ pub fn chain_map(history: &History, report: &Report, titles: &Titles) -> Result<
             ..Panel::default()
         });
     }
-    let legend = [
+    let mut legend = vec![
         Key::Line(colour::BLUE, CHAIN[d - 2], "chain in compression".into()),
         Key::Line(colour::VERMILLION, CHAIN[d - 2], "chain in tension".into()),
     ];
+    legend.extend(materials);
     Ok(draw(&Sample::with_depth(history)?, &panels, &legend))
 }
 
@@ -136,7 +144,7 @@ pub fn distribution_chart(report: &Report) -> Chart {
 /// Those of reading the history.
 pub fn network_map(history: &History, report: &Report, titles: &Titles, mean: f64) -> Result<Drawing> {
     let (sample, d) = (Sample::with_depth(history)?, history.dimension());
-    let grains = history.grains()?.radius.len();
+    let (grains, materials) = behind_lines(history)?;
     let mut panels = vec![];
     for network in &report.networks {
         let state = history.grain_state(network.frame)?;
@@ -146,12 +154,14 @@ pub fn network_map(history: &History, report: &Report, titles: &Titles, mean: f6
             links: links(&network.contacts, &state.position, mean, d),
             grains: state,
             walls: history.wall_state(network.frame)?,
-            fills: behind_lines(grains, d),
+            fills: grains.clone(),
             outline: GRAIN[1],
             ..Panel::default()
         });
     }
-    Ok(draw(&sample, &panels, &force_legend(d, mean)))
+    let mut legend = force_legend(d, mean);
+    legend.extend(materials);
+    Ok(draw(&sample, &panels, &legend))
 }
 
 /// The lines of a network, the strongest last, so that they lie on top. For spheres only the lines

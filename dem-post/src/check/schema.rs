@@ -1,6 +1,8 @@
 //! Checks names, types, shapes and units against the layout.
 
-use dem_history::{BondStatus, ContactStatus, Ending, ROUTE, RuptureMode, SolverRoute, WallColumn, WallDrive, WallKind};
+use dem_history::{
+    BondStatus, ContactStatus, Ending, ROUTE, RuptureMode, SolverRoute, WallColumn, WallDrive, WallKind,
+};
 use hdf5::Attribute;
 use hdf5::types::{CompoundField, EnumMember, EnumType, FloatSize, IntSize, TypeDescriptor, VarLenUnicode};
 
@@ -195,11 +197,7 @@ fn commit(c: &mut Checker) {
     if c.typed("commit", &U64).is_some_and(|shape| !shape.is_empty()) {
         c.wrong("commit", None, "is not a single number");
     }
-    let endings = bytes(Ending::ALL.iter().map(|ending| ending.label()));
-    // files of earlier programs have none
-    if c.has("ending") && c.typed("ending", &endings).is_some_and(|shape| !shape.is_empty()) {
-        c.wrong("ending", None, "is not a single value");
-    }
+    ending(c);
     for name in ["contacts", "steps"] {
         c.table(&format!("commit_rows/{name}"), &U64, t, &[], "");
     }
@@ -209,6 +207,17 @@ fn commit(c: &mut Checker) {
     }
     c.sizes.m = c.complete("commit_rows/contacts");
     c.sizes.s = c.complete("commit_rows/steps");
+}
+
+/// Why the run ended; files of earlier programs do not tell.
+fn ending(c: &mut Checker) {
+    let Some(dataset) = c.dataset("ending") else { return };
+    let Some(shape) = c.typed("ending", &bytes(Ending::ALL.iter().map(|ending| ending.label()))) else { return };
+    if !shape.is_empty() {
+        c.wrong("ending", None, "is not a single value");
+    } else if !dataset.read_scalar::<u8>().is_ok_and(|code| usize::from(code) < Ending::ALL.len()) {
+        c.wrong("ending", None, "is an unknown code");
+    }
 }
 
 fn grains(c: &mut Checker) {

@@ -240,7 +240,10 @@ fn load_sentence(load: &stress_strain::Report, ruptures: &[Rupture]) -> String {
 /// How many bonds broke, in which modes, where the first, and what is left.
 fn break_sentence(history: &History, cracks: &cracks::Report, ruptures: &[Rupture]) -> Result<String> {
     let Some(first) = ruptures.first() else {
-        return Ok(format!("None of the {} broke.", counted(cracks.bonds, "bond")));
+        return Ok(match cracks.bonds {
+            1 => "The bond did not break.".into(),
+            bonds => format!("None of the {bonds} bonds broke."),
+        });
     };
     let broken = cracks.broken;
     let modes = [

@@ -6,7 +6,7 @@ use hdf5::{File, H5Type, Hyperslab, SliceOrIndex};
 use super::*;
 
 /// A byte where one of an enumeration is expected: 0 for the states of bonds, 1 for contacts, 2 for
-/// walls, 3 for drives.
+/// walls, 3 for drives, 4 for endings.
 #[derive(Clone, Copy)]
 #[repr(transparent)]
 pub struct Code<const OF: usize>(pub u8);
@@ -18,7 +18,8 @@ unsafe impl<const OF: usize> H5Type for Code<OF> {
             0 => BondStatus::ALL.iter().map(|status| status.label()).collect(),
             1 => ContactStatus::ALL.iter().map(|status| status.label()).collect(),
             2 => WallKind::ALL.iter().map(|kind| kind.label()).collect(),
-            _ => WallDrive::ALL.iter().map(|drive| drive.label()).collect(),
+            3 => WallDrive::ALL.iter().map(|drive| drive.label()).collect(),
+            _ => Ending::ALL.iter().map(|ending| ending.label()).collect(),
         };
         let members = names.iter().zip(0..).map(|(name, value)| EnumMember { name: name.to_string(), value }).collect();
         TypeDescriptor::Enum(EnumType { size: IntSize::U1, signed: false, members })

@@ -41,6 +41,7 @@ fn spoils(place: &str, kind: &TypeDescriptor) -> Vec<(String, Spoil)> {
         (TypeDescriptor::Enum(_), "contacts/status") => vec![("code".into(), spoil(Code::<1>(250)))],
         (TypeDescriptor::Enum(_), "walls/kind") => vec![("code".into(), spoil(Code::<2>(250)))],
         (TypeDescriptor::Enum(_), "walls/drive") => vec![("code".into(), spoil(Code::<3>(250)))],
+        (TypeDescriptor::Enum(_), "ending") => vec![("code".into(), spoil(Code::<4>(250)))],
         (TypeDescriptor::Compound(_), _) => vec![
             ("step".into(), spoil(EventStep { step: i64::MAX })),
             ("time".into(), spoil(EventTime { time: f64::NAN })),

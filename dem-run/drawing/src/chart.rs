@@ -32,6 +32,8 @@ const BELOW: f64 = 62.0;
 const TICK: u32 = 13;
 /// The axis of smaller counts ends at this value.
 const FEW: f64 = 5.0;
+/// Share of a vertical axis that half a marker covers at most.
+const MARKER: f64 = 0.02;
 /// Titles of an axis of time, and the time below which it is in milliseconds (s).
 const TIME: &str = "time (s)";
 const SHORT_TIME: &str = "time (ms)";
@@ -306,7 +308,7 @@ impl Chart {
             .with_box_axes();
         layout.show_legend = false;
         layout.equal_aspect = self.equal;
-        layout = self.label_ticks(self.scale_axes(layout, lift));
+        layout = self.label_ticks(self.keep_markers_off_edges(self.scale_axes(layout, lift)));
         for (value, _) in self.levels {
             layout = layout.with_reference_line(ReferenceLine::horizontal(value * lift).with_color(colour::GREY));
         }
@@ -333,6 +335,17 @@ impl Chart {
         let values = self.curves.iter().flat_map(|curve| &curve.points).map(|p| p.1);
         let low = values.filter(|y| self.log_y && *y > 0.0).fold(1.0, f64::min);
         if low < 1e-9 { 10f64.powi(-low.log10().floor() as i32) } else { 1.0 }
+    }
+
+    /// A linear vertical axis that is longer where a marker would be cut at its end.
+    fn keep_markers_off_edges(&self, layout: Layout) -> Layout {
+        let marked = self.curves.iter().filter(|curve| matches!(curve.style, Style::Points | Style::Marked));
+        let points = marked.filter(|_| !self.log_y).flat_map(|curve| &curve.points);
+        let [least, most] = points.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, m], p| [l.min(p.1), m.max(p.1)]);
+        let (low, high) = ComputedLayout::from_layout(&layout).y_range;
+        let marker = MARKER * (high - low);
+        let layout = if least < low + marker { layout.with_y_axis_min(low - 2.0 * marker) } else { layout };
+        if most > high - marker { layout.with_y_axis_max(high + 2.0 * marker) } else { layout }
     }
 
     /// Labels of the ticks of linear axes.

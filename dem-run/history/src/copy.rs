@@ -79,7 +79,10 @@ fn copy_to(history: &History, part: &Path, how: CopyAs, tell: &mut dyn FnMut(f64
     writer.visit(kept, &mut comparison)?;
     writer.finish()?;
     let copy = History::open(part)?;
-    let same = copy.layout()? == layout && copy.complete()? == kept && copy.checkpoint()? == checkpoint && copy.ending()? == ending;
+    let same = copy.layout()? == layout
+        && copy.complete()? == kept
+        && copy.checkpoint()? == checkpoint
+        && copy.ending()? == ending;
     if !same {
         return Err(copy.source().damaged("", DIFFERS));
     }

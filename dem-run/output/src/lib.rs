@@ -13,4 +13,4 @@ pub use error::{Result, WriteError};
 pub use folder::{Folder, Picture, Print, Printed, default_folder};
 pub use owner::Source;
 pub use print::{escaped, in_shell, print, print_json, print_line, print_result};
-pub use text::{Cell, Text, cell, facts, hex, listed, number, plain, quantity, short, shortest, size};
+pub use text::{Cell, Text, cell, counted, facts, hex, listed, number, plain, quantity, short, shortest, size};

@@ -92,6 +92,11 @@ pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
+/// A number of things in words: `1 bond`, `2 bonds`.
+pub fn counted(number: usize, word: &str) -> String {
+    format!("{number} {word}{}", if number == 1 { "" } else { "s" })
+}
+
 /// A readable number: four digits, and a power of ten for very large or small values.
 pub fn number(value: f64) -> String {
     digits(value, 4)

@@ -4,7 +4,7 @@ use super::report::{Indeterminacy, LimitLoad, Report, Row};
 use super::spread::MinMeanMax;
 use super::trial::{End, Outcome};
 use crate::limit::GrowingLoad;
-use crate::output::{Folder, Result, Text, cell, number, short};
+use crate::output::{Folder, Result, Text, cell, counted, number, short};
 use crate::row;
 
 /// All tables, as they are printed.
@@ -23,10 +23,6 @@ pub fn text(report: &Report) -> String {
     }
     text += &profile(report);
     text
-}
-
-fn counted(count: usize, what: &str) -> String {
-    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
 fn tolerance(value: f64) -> String {

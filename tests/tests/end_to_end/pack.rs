@@ -57,4 +57,10 @@ fn the_file_of_a_killed_run_is_made_whole() {
     assert_eq!(here.history("a.h5").frames(), frames);
     here.dem_post(&["info", "a.h5", "--check"]).succeeds();
     here.dem_post(&["view", "a.h5"]).succeeds();
+    // a packed file stays packed
+    here.dem_post(&["pack", "a.h5"]).succeeds();
+    let before = here.read("a.h5");
+    let told = here.dem_post(&["info", "a.h5", "--repair"]).succeeds();
+    assert!(told.stdout.starts_with("nothing to repair"), "{}", told.stdout);
+    assert_eq!(here.read("a.h5"), before);
 }

@@ -185,7 +185,10 @@ fn a_run_that_fails_does_not_end_the_others() {
     assert_eq!(files(&here, "sweep-sweep", ".h5"), ["0001.h5", "0002.failed.h5", "0003.h5"]);
     let table = String::from_utf8(here.read("sweep-sweep/runs.csv")).expect("text");
     assert!(table.contains("runs/0002.failed.h5") && !table.contains("runs/0002.h5"), "{table}");
-    assert_eq!(here.dem_post(&["info", "sweep-sweep/runs/0002.failed.h5", "--json"]).json()["ending"], "no_convergence");
+    assert_eq!(
+        here.dem_post(&["info", "sweep-sweep/runs/0002.failed.h5", "--json"]).json()["ending"],
+        "no_convergence"
+    );
 
     // it would fail again: it is left alone unless asked for
     let record = || here.path("sweep-sweep/runs/0002.state.json").metadata().and_then(|m| m.modified()).expect("time");
