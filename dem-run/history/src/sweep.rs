@@ -89,9 +89,9 @@ pub struct Entry {
     pub values: BTreeMap<String, Value>,
     /// Digest of its scene.
     pub digest: String,
-    /// Path of its history relative to the folder of the sweep; of a failed run, that of its history
-    /// up to the failure. No such file exists until the run is done, or if it failed before its
-    /// first frame.
+    /// Path of its history relative to the folder of the sweep; of a failed run, that up to the
+    /// failure. There is no such file until the run is done, or if it failed before its first
+    /// frame.
     pub history: String,
     /// State of the run.
     pub state: State,
