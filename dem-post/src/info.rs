@@ -98,8 +98,8 @@ pub struct Report {
     pub bytes: u64,
     /// Whether it was never closed.
     pub open_ended: bool,
-    /// Why the run ended, as in the summary of `dem-run`; `None` if it has not ended, was killed, or
-    /// the program did not record it.
+    /// Why the run ended, as in the summary of `dem-run`; `None` if it has not ended, was killed,
+    /// or the program did not record it.
     pub ending: Option<Ending>,
     /// Program, build, host and start of the run.
     pub origin: String,
