@@ -8,7 +8,7 @@ use clap::{ArgMatches, Args};
 use dem_output::Print;
 use serde::Serialize;
 
-use crate::output::{Folder, PostError, Result, escaped, print};
+use crate::output::{Folder, PostError, Result, counted, escaped, print};
 
 /// Maximum number of files for which stderr names each file.
 const MANY: usize = 24;
@@ -117,7 +117,7 @@ fn run<A: Analysis>(options: &ArgMatches, shown: Shown) -> Result<()> {
 /// Names the files that were written, on stderr.
 fn name_files(folder: &Folder) {
     if folder.removed() > 0 {
-        note(&format!("removed {} files of the history to which the folder belonged", folder.removed()));
+        note(&format!("removed {} of the history to which the folder belonged", counted(folder.removed(), "file")));
     }
     for (name, points) in folder.small() {
         note(&format!(

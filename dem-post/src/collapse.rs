@@ -7,7 +7,7 @@ use serde_json::Value;
 use crate::output::Result;
 
 /// A maximum is a peak if the load falls by at least this share afterwards.
-const PEAK_DROP: f64 = 0.05;
+pub const PEAK_DROP: f64 = 0.05;
 
 /// The kind of bonds of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

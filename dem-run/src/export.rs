@@ -45,14 +45,17 @@ pub struct ExportOptions {
 pub fn export(options: &ExportOptions) -> Result<(), RunError> {
     let interrupt = handle_signals()?;
     options.execution.start_threads()?;
-    let parameters = History::open(&options.history)?.parameters()?;
+    let history = History::open(&options.history)?;
+    let parameters = history.parameters()?;
     let shown = options.history.display();
     let scene = scene::from_text(&format!("the scene in {shown}"), &parameters.scene, &[])?;
-    let steps = scene.steps();
+    // the step after the last frame may be the one that was not solved
+    let last = history.steps().last().map_or(0, |last| *last as u64);
+    let steps = scene.steps().min(last + 1);
     if !(1..=steps).contains(&options.step) {
-        let (step, wrong) = (options.step, "counted from 1");
+        let step = options.step;
         return Err(RunError::Usage(format!(
-            "there is no step {step} in {shown}: its scene has {steps} steps, {wrong}"
+            "there is no step {step} in {shown}: steps 1 to {steps} can be exported, the last frame is of step {last}"
         )));
     }
     let (version, revision) = (env!("CARGO_PKG_VERSION"), option_env!("DEM_GIT_REVISION").unwrap_or_default());

@@ -127,6 +127,12 @@ fn resume_in<D: Dim>(
     };
     let mut state = RunState::<D>::restored(scene, &checkpoint)
         .map_err(|mismatch| RunError::InputOutput(format!("{shown}: {mismatch}; run the scene again")))?;
+    if let Some(until) = options.until.filter(|_| scene.time.steps() < state.world.steps) {
+        return Err(RunError::Usage(format!(
+            "--until {until} s is before the last state of {shown}, at {} s: resume the run to a later time",
+            number(state.world.time)
+        )));
+    }
     let ending = match state.world.steps >= scene.time.steps() {
         true => Some(Ending::Time),
         false => state.course.advance(scene, &mut state.world)?,

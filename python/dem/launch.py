@@ -3,6 +3,7 @@
 import json
 import os
 import shutil
+import signal
 import subprocess
 import tempfile
 import warnings
@@ -34,6 +35,7 @@ def run(scene, output=None, *, force=False, threads=None, program=None, **sets):
     default that in the environment variable DEM_RUN, else that on PATH.
 
     Raises RunFailed if the scene is wrong, a step does not converge, or a file cannot be written.
+    After Ctrl-C the run ends with the current step; its history is closed, and `dem-run resume` goes on.
     """
     command = [_program(program), "run", "--json", "--progress", "none"]
     sets = {name.replace("__", "."): value for name, value in sets.items()}
@@ -57,14 +59,29 @@ def run(scene, output=None, *, force=False, threads=None, program=None, **sets):
 
 
 def _run(command, scene, output):
-    done = subprocess.run([*command, "-o", output, "--", scene], capture_output=True, encoding="utf-8", errors="replace")
-    if done.returncode != 0:
-        raise RunFailed(done.returncode, done.stderr.strip().removeprefix("error: "))
-    for line in done.stderr.splitlines():
+    # in a session of its own: Ctrl-C in a terminal reaches Python alone, which passes it on
+    with subprocess.Popen(
+        [*command, "-o", output, "--", scene],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        encoding="utf-8",
+        errors="replace",
+        start_new_session=True,
+    ) as program:
+        try:
+            printed, told = program.communicate()
+        except KeyboardInterrupt:
+            program.send_signal(signal.SIGINT)
+            program.communicate()
+            raise
+    if program.returncode != 0:
+        message = told.strip().removeprefix("error: ").replace("--force", "force=True")
+        raise RunFailed(program.returncode, message)
+    for line in told.splitlines():
         if line.startswith("warning: "):
             warnings.warn(line.removeprefix("warning: "), stacklevel=3)
     history = History(output)
-    history.summary = json.loads(done.stdout)
+    history.summary = json.loads(printed)
     return history
 
 

@@ -31,7 +31,8 @@ def programs():
 
 def runner(program):
     def run(folder, *arguments):
-        subprocess.run([program, *map(str, arguments)], cwd=folder, check=True, stdout=subprocess.DEVNULL)
+        command = [program, *map(str, arguments)]
+        return subprocess.run(command, cwd=folder, check=True, stdout=subprocess.PIPE, encoding="utf-8").stdout
 
     return run
 
@@ -50,7 +51,8 @@ def dem_post(programs):
 
 @pytest.fixture(scope="session")
 def compression(dem_run, tmp_path_factory):
-    """The folder of compression.h5, made as README says."""
+    """The folder of compression.h5, made as README says, and of summary.txt, which that prints."""
     folder = tmp_path_factory.mktemp("compression")
-    dem_run(folder, "run", ROOT / "configs/compression.json", "--quiet")
+    told = dem_run(folder, "run", ROOT / "configs/compression.json", "--quiet")
+    (folder / "summary.txt").write_text(told, encoding="utf-8")
     return folder

@@ -11,6 +11,8 @@ use dem_drawing::{Chart, Drawing, Style, colour};
 /// Width of a line that carries the force of the scale, and the greatest width, units of the
 /// drawing: of disks, and of spheres.
 const WIDTH: [(f64, f64); 2] = [(1.3, 8.0), (0.6, 4.0)];
+/// Width of the thinnest lines, which stay visible where the forces of other moments are far greater.
+const HAIRLINE: f64 = 0.15;
 /// Colours of the weak network, compression and tension; also of grains in chains.
 const PALE: [&str; 2] = ["#9cc9e3", "#f0b27a"];
 /// Fill and outline of other grains.
@@ -178,7 +180,7 @@ pub fn links(contacts: &ContactRows, position: &[f64], mean: f64, d: usize) -> V
         Link {
             from: centre(i),
             to: if j < 0 { contacts.point[c * d..(c + 1) * d].to_vec() } else { centre(j) },
-            width: (width * ratio).min(greatest),
+            width: (width * ratio).clamp(HAIRLINE, greatest),
             colour: if ratio > 1.0 { [colour::BLUE, colour::VERMILLION][tension] } else { PALE[tension] }.into(),
         }
     };

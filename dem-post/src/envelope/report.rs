@@ -10,7 +10,7 @@ use crate::clock::Clock;
 use crate::output::{PostError, Result, Text, facts, number, quantity};
 use crate::strength::left_out::{self, LeftOut};
 use crate::strength::report::estimate;
-use crate::strength::runs::{Course, Failure, Measure, early, histories, name};
+use crate::strength::runs::{Course, Measure, histories, name};
 use crate::strength::scenes::varied;
 use crate::tensor::principal;
 
@@ -32,8 +32,6 @@ pub struct Circle {
     pub intermediate: Option<f64>,
     /// The least one, Pa: the confinement.
     pub minor: f64,
-    /// Whether no rigid bond had broken before the collapse.
-    pub early: bool,
 }
 
 /// The failure envelope of some runs.
@@ -103,16 +101,14 @@ fn circle(path: &Path, measure: Measure, wall: Option<&str>) -> Result<(std::res
     let stress = stress.ok_or_else(lacking)?;
     let stress = stress.value.get(row * d * d..(row + 1) * d * d).ok_or_else(lacking)?;
     let values = principal(stress, d);
-    let Failure { at, early } = failure;
     let circle = Circle {
         run: name(path),
         time: course.time[row],
         clock: Clock::of(&history),
-        load: course.load[at],
+        load: course.load[failure],
         major: values[0],
         intermediate: (d == 3).then(|| values[1]),
         minor: values[d - 1],
-        early,
     };
     Ok((Ok(circle), scene))
 }
@@ -154,7 +150,6 @@ impl Report {
             }
             Some(_) => {}
         }
-        notes.extend(early(self.circles.iter().filter(|circle| circle.early).count()));
         notes
     }
 

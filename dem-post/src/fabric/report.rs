@@ -185,7 +185,7 @@ impl Row {
         }
     }
 
-    /// Area of cracks in a unit of volume, 1/m.
+    /// Area of the sections of broken bonds in a unit of volume, 1/m.
     pub fn crack_area(&self) -> Option<f64> {
         let tensor = self.crack_density.as_ref()?;
         let d = if tensor.len() == 4 { 2 } else { 3 };
@@ -210,7 +210,7 @@ impl Report {
             "coordination",
             "anisotropy",
             "broken",
-            "crack area (1/m)",
+            "broken sections (1/m)",
         ]);
         for row in self.shown.iter().filter_map(|&frame| self.rows.get(frame)) {
             table.row(vec![
@@ -228,8 +228,8 @@ impl Report {
         let kind = if self.dimension == 2 { "disk" } else { "sphere" };
         table.lines()
             + &format!(
-                "\nporosity of a {kind} of {} m in the middle of the sample; stress and crack area over the box around \
-                 it at the first frame\n",
+                "\nporosity of a {kind} of {} m in the middle of the sample; stress and sections of broken bonds over the box \
+                 around it at the first frame\n",
                 number(2.0 * self.region_radius)
             )
     }

@@ -158,6 +158,7 @@ fn charts(history: &History, ruptures: &[Rupture], parts: &Parts) -> Vec<Figure>
     if let Some(load) = parts.load {
         let points = load.time.iter().copied().zip(load.load.iter().copied()).collect();
         let mut chart = clock.chart("load (N)").curve("load", colour::BLUE, Style::Line, points);
+        chart.pad_x = true;
         let mut text = format!("Load of wall {} over {over}", load.summary.wall);
         if let Some(limit) = parts.limit.and_then(|limit| limit.load) {
             // beside a far greater limit load the curve would be flat
@@ -175,7 +176,7 @@ fn charts(history: &History, ruptures: &[Rupture], parts: &Parts) -> Vec<Figure>
         let times: Vec<f64> = ruptures.iter().map(|rupture| rupture.time).collect();
         let points = total_over_time(history, &times);
         let mut chart = clock.chart("broken bonds").curve("broken bonds", colour::BLUE, Style::Steps, points);
-        chart.y_is_count = true;
+        (chart.y_is_count, chart.pad_x) = (true, true);
         let text = format!("Broken bonds over {over}.");
         figures.push(chart_figure(chart, &format!("Number of broken bonds over {over}."), &text));
     }

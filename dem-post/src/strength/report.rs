@@ -6,8 +6,9 @@ use serde::Serialize;
 
 use super::fit::{Estimate, Line, Spread, line, spread};
 use super::left_out::{self, LeftOut};
-use super::runs::{self, Found, Measure, early, histories, name};
+use super::runs::{self, Found, Measure, histories, name};
 use super::scenes::{design, unit};
+use crate::collapse::PEAK_DROP;
 use crate::extent::range;
 use crate::output::{Result, Text, counted, facts, number, quantity};
 
@@ -40,9 +41,8 @@ pub struct Run {
     pub time: f64,
     /// Strength over the field's value; `None` where that is zero.
     pub ratio: Option<f64>,
-    /// Whether no rigid bond had broken before the collapse. If so, the strain of a sample in one
-    /// piece is solver error.
-    pub early: bool,
+    /// The greatest load up to this time, N.
+    pub greatest_before: f64,
 }
 
 /// The runs at one value of the field.
@@ -135,7 +135,8 @@ pub fn read(paths: &[PathBuf], options: &Options) -> Result<Report> {
             Ok(at) => {
                 let sample = design.samples[design.sample[k]].clone();
                 let ratio = (value != 0.0).then(|| at.load / value);
-                runs.push(Run { run, value, sample, strength: at.load, time: at.time, ratio, early: at.early });
+                let (strength, time, greatest_before) = (at.load, at.time, at.greatest_before);
+                runs.push(Run { run, value, sample, strength, time, ratio, greatest_before });
                 grains.push(one.grains);
             }
             Err(why) => left_out.push(LeftOut { run, why }),
@@ -269,7 +270,13 @@ impl Report {
                  sample mixes different samples"
             ));
         }
-        notes.extend(early(self.runs.iter().filter(|run| run.early).count()));
+        let fallen = self.runs.iter().filter(|run| run.strength < (1.0 - PEAK_DROP) * run.greatest_before).count();
+        if fallen > 0 {
+            notes.push(format!(
+                "in {} the load was larger before, and had fallen: --measure peak takes the greatest load",
+                counted(fallen, "run")
+            ));
+        }
         notes
     }
 

@@ -12,7 +12,7 @@ use serde_json::Value;
 
 use super::left_out::LeftOut;
 use crate::collapse::{Bonding, Collapse, peak};
-use crate::output::{PostError, Result, counted, quantity};
+use crate::output::{PostError, Result, quantity};
 use crate::stress_strain;
 
 /// Definition of the strength of a run: the load at …
@@ -62,8 +62,8 @@ pub struct Strength {
     pub load: f64,
     /// Its time, s.
     pub time: f64,
-    /// Whether all rigid bonds were intact when the strain exceeded the limit of collapse.
-    pub early: bool,
+    /// The greatest load up to this time, N.
+    pub greatest_before: f64,
 }
 
 /// The manifest of a sweep, with how its runs stand. Where the folder has none, the error asks for
@@ -96,9 +96,10 @@ pub fn histories(paths: &[PathBuf]) -> Result<(Vec<PathBuf>, Vec<LeftOut>)> {
             found.push(path.clone());
             continue;
         }
-        for run in manifest(&Store::new(path.clone()), "the histories")?.runs {
-            let history = path.join(&run.history);
+        let store = Store::new(path.clone());
+        for run in manifest(&store, "the histories")?.runs {
             if run.state == State::Done {
+                let history = path.join(&run.history);
                 match History::open(&history) {
                     Ok(_) => found.push(history),
                     Err(error) => left_out.push(LeftOut { run: name(&history), why: unreadable(&history, &error) }),
@@ -108,8 +109,8 @@ pub fn histories(paths: &[PathBuf]) -> Result<(Vec<PathBuf>, Vec<LeftOut>)> {
             let why = run.message.as_deref().and_then(|message| message.lines().next()).unwrap_or_default();
             let why = if why.is_empty() { String::new() } else { format!(": {why}") };
             // the history up to a failure or that of a run in progress, else the scene
-            let files = ["failed.h5", "part.h5", "json"].map(|ending| history.with_extension(ending));
-            let file = files.iter().find(|file| file.exists()).unwrap_or(&history);
+            let files = [".failed.h5", ".part.h5", ".json"].map(|ending| store.path(&run.id, ending));
+            let file = files.iter().find(|file| file.exists()).unwrap_or(&files[2]);
             left_out.push(LeftOut { run: name(file), why: format!("{}{why}", run.state.name()) });
         }
     }
@@ -134,12 +135,6 @@ pub(crate) fn unreadable(history: &Path, error: &HistoryError) -> String {
     format!("{why}; to make it again, delete {} and repeat the sweep", history.display())
 }
 
-/// The note on `count` runs whose failure is [`Failure::early`]; `None` without such runs.
-pub(crate) fn early(count: usize) -> Option<String> {
-    let why = "if bonds join all grains to one piece, the strain is solver error";
-    (count > 0).then(|| format!("in {} no bond had broken before the collapse: {why}", counted(count, "run")))
-}
-
 /// The name of a run in tables.
 pub fn name(path: &Path) -> String {
     path.display().to_string()
@@ -154,22 +149,17 @@ pub fn read(path: &Path, measure: Measure, wall: Option<&str>) -> Result<Found> 
     let history = History::open(path)?;
     let course = Course::read(&history, wall)?;
     let failure = course.failure(&history, measure)?;
-    let at = |found: Failure| Strength { load: course.load[found.at], time: course.time[found.at], early: found.early };
+    let at = |row: usize| Strength {
+        load: course.load[row],
+        time: course.time[row],
+        greatest_before: course.load[..=row].iter().copied().fold(f64::NEG_INFINITY, f64::max),
+    };
     Ok(Found {
         path: path.into(),
         scene: history.parameters()?.scene,
         strength: failure.map(at),
         grains: (history.grains()?.radius, history.bonds()?.pair),
     })
-}
-
-/// The failure of a sample.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Failure {
-    /// Its row of the observed steps.
-    pub(crate) at: usize,
-    /// Whether all rigid bonds were intact when the strain exceeded the limit of collapse.
-    pub(crate) early: bool,
 }
 
 /// The curves of a run, one entry per observed step.
@@ -261,12 +251,13 @@ impl Course {
         })
     }
 
-    /// The failure of the sample by a measure; for a run that did not fail, the state it reached.
+    /// The row of the observed steps in which the sample fails by a measure; for a run that did not
+    /// fail, the state it reached.
     ///
     /// # Errors
     /// [`PostError::Lacking`] for a run without the observables of the measure; those of reading
     /// it.
-    pub(crate) fn failure(&self, history: &History, measure: Measure) -> Result<std::result::Result<Failure, String>> {
+    pub(crate) fn failure(&self, history: &History, measure: Measure) -> Result<std::result::Result<usize, String>> {
         let (path, bonds) = (history.path(), history.bonds()?.len());
         if bonds == 0 && matches!(measure, Measure::FirstBreak | Measure::Broken) {
             let what = "it has no bonds: choose --measure collapse or peak".into();
@@ -276,30 +267,31 @@ impl Course {
             return self.collapse(path, Bonding::of(history)?);
         }
         let step = self.gives_way(path, measure, bonds)?;
-        Ok(step.map(|at| Failure { at, early: false }).ok_or_else(|| self.how_far(measure, bonds)))
+        Ok(step.ok_or_else(|| self.how_far(measure, bonds)))
     }
 
-    /// The row whose end is the state that the sample still bore: that of the failure or, if bonds
-    /// broke in it, the one before; `None` if they did in the first. A run that loads from break to
+    /// The row whose end is the state that the sample still bore: that of its failure or, if bonds
+    /// broke in that, the one before; `None` if they did in the first. A run that loads from break to
     /// break records the state before each break.
-    pub(crate) fn borne(&self, failure: Failure) -> Option<usize> {
+    pub(crate) fn borne(&self, failure: usize) -> Option<usize> {
         if self.follows_breaks {
-            return Some(failure.at);
+            return Some(failure);
         }
         let broken = |row: usize| self.broken.get(row).copied().unwrap_or(0.0);
-        match failure.at.checked_sub(1) {
+        match failure.checked_sub(1) {
             None => (broken(0) == 0.0).then_some(0),
-            Some(before) if broken(failure.at) > broken(before) => Some(before),
-            Some(_) => Some(failure.at),
+            Some(before) if broken(failure) > broken(before) => Some(before),
+            Some(_) => Some(failure),
         }
     }
 
     /// The collapse, or the reason why there is none.
-    fn collapse(&self, path: &Path, bonds: Bonding) -> Result<std::result::Result<Failure, String>> {
+    fn collapse(&self, path: &Path, bonds: Bonding) -> Result<std::result::Result<usize, String>> {
         recorded(path, &self.strain, "strain")?;
         let found = Collapse::read(&self.load, &self.strain, &self.broken, STRAINS[0], bonds);
         Ok(match found.step {
-            Some(at) => Ok(Failure { at, early: found.early }),
+            Some(_) if found.early => Err(format!("it has no collapse load: its strain exceeds 1e-4 {}", found.note)),
+            Some(at) => Ok(at),
             None if found.note.is_empty() => Err(self.how_far(Measure::Collapse, 0)),
             None => Err(format!("it has no collapse load: {}", found.note)),
         })
@@ -368,7 +360,10 @@ mod tests {
             (Some(4), Some(2), None)
         );
         let collapse = |bonds| course().collapse(Path::new("run.h5"), bonds).unwrap();
-        assert_eq!(collapse(Bonding::None), Ok(Failure { at: 3, early: false }));
+        assert_eq!(collapse(Bonding::None), Ok(3));
+        let intact = Course { broken: vec![0.0; 6], ..course() };
+        let early = intact.collapse(Path::new("run.h5"), Bonding::Rigid { one_piece: false }).unwrap();
+        assert!(early.clone().unwrap_err().contains("not all grains are bonded"), "{early:?}");
         assert_eq!(step(Measure::Peak, 100), Some(4));
         assert!(Course::default().collapse(Path::new("a.h5"), Bonding::None).is_err());
     }
@@ -376,10 +371,10 @@ mod tests {
     #[test]
     fn what_a_sample_bore_is_before_the_breaks_of_its_failure() {
         // bonds break at rows 2, 4 and 5
-        let borne = |at: usize| course().borne(Failure { at, early: false });
+        let borne = |at: usize| course().borne(at);
         assert_eq!([0, 1, 2, 3, 4, 5].map(borne), [Some(0), Some(1), Some(1), Some(3), Some(3), Some(4)]);
         let at_once = Course { broken: vec![1.0, 2.0], ..course() };
-        assert_eq!(at_once.borne(Failure { at: 0, early: false }), None);
-        assert_eq!(Course { broken: vec![], ..course() }.borne(Failure { at: 4, early: false }), Some(4));
+        assert_eq!(at_once.borne(0), None);
+        assert_eq!(Course { broken: vec![], ..course() }.borne(4), Some(4));
     }
 }

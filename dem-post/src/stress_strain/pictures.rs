@@ -47,7 +47,7 @@ pub fn onset(report: &Report) -> Option<Chart> {
     }
     let mut chart = Chart::new("magnitude of the axial strain, from the grains", "applied force (N)");
     chart = chart.curve("applied force", colour::BLUE, Style::Line, points);
-    chart.log_x = true;
+    (chart.log_x, chart.pad_x) = (true, true);
     chart.moments = COLLAPSE.to_vec();
     if let Some(load) = report.summary.level() {
         chart.levels.push((load, format!("at strain 10⁻⁴: {} N", short(load))));

@@ -1,24 +1,17 @@
 //! Charts of curves.
 
-use std::sync::Arc;
-
 use kuva::plot::{LinePlot, ScatterPlot};
 use kuva::render::annotations::ReferenceLine;
 use kuva::render::figure::Figure;
-use kuva::render::layout::{ComputedLayout, Layout, TickFormat};
+use kuva::render::layout::{ComputedLayout, Layout};
 use kuva::render::plots::Plot;
-use kuva::render::render_utils::generate_ticks;
 
 use crate::legend::{self, Named, Style};
-use crate::ticks::{self, linear, power_of_ten, whole};
 use crate::titles;
 use crate::{Canvas, Drawing, colour};
 
 /// Width and height of one chart, in units of a drawing.
 const CHART: (f64, f64) = (640.0, 460.0);
-/// Relative range up to which values are drawn as constant: the ticks of a smaller one would need
-/// more digits than are legible, and show round-off.
-const CONSTANT: f64 = 1e-6;
 
 /// Heights of a chart with equal units on both axes that stay legible.
 const HEIGHTS: [f64; 2] = [240.0, 900.0];
@@ -29,11 +22,7 @@ pub(crate) const SPACING: f64 = 20.0;
 const ABOVE: f64 = 44.0;
 const BELOW: f64 = 62.0;
 /// Size of the labels of ticks.
-const TICK: u32 = 13;
-/// The axis of smaller counts ends at this value.
-const FEW: f64 = 5.0;
-/// Share of a vertical axis that half a marker covers at most.
-const MARKER: f64 = 0.02;
+pub(crate) const TICK: u32 = 13;
 /// Titles of an axis of time, and the time below which it is in milliseconds (s).
 const TIME: &str = "time (s)";
 const SHORT_TIME: &str = "time (ms)";
@@ -309,6 +298,7 @@ impl Chart {
         layout.show_legend = false;
         layout.equal_aspect = self.equal;
         layout = self.label_ticks(self.keep_markers_off_edges(self.scale_axes(layout, lift)));
+        layout = self.with_room_for_powers(layout, lift);
         for (value, _) in self.levels {
             layout = layout.with_reference_line(ReferenceLine::horizontal(value * lift).with_color(colour::GREY));
         }
@@ -327,109 +317,6 @@ impl Chart {
         let unit = (right - left) / (x[1] - x[0]);
         // a whole number, as SVG states sizes
         (size.1 - (bottom - top) + unit * (y[1] - y[0])).round().clamp(HEIGHTS[0], HEIGHTS[1])
-    }
-
-    /// Factor, a power of ten, of the values on a logarithmic vertical axis: the plotting crate
-    /// misplaces values below 1e-10.
-    fn lift(&self) -> f64 {
-        let values = self.curves.iter().flat_map(|curve| &curve.points).map(|p| p.1);
-        let low = values.filter(|y| self.log_y && *y > 0.0).fold(1.0, f64::min);
-        if low < 1e-9 { 10f64.powi(-low.log10().floor() as i32) } else { 1.0 }
-    }
-
-    /// A linear vertical axis that is longer where a marker would be cut at its end.
-    fn keep_markers_off_edges(&self, layout: Layout) -> Layout {
-        let marked = self.curves.iter().filter(|curve| matches!(curve.style, Style::Points | Style::Marked));
-        let points = marked.filter(|_| !self.log_y).flat_map(|curve| &curve.points);
-        let [least, most] = points.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, m], p| [l.min(p.1), m.max(p.1)]);
-        let (low, high) = ComputedLayout::from_layout(&layout).y_range;
-        let marker = MARKER * (high - low);
-        let layout = if least < low + marker { layout.with_y_axis_min(low - 2.0 * marker) } else { layout };
-        if most > high - marker { layout.with_y_axis_max(high + 2.0 * marker) } else { layout }
-    }
-
-    /// Labels of the ticks of linear axes.
-    fn label_ticks(&self, mut layout: Layout) -> Layout {
-        // the labels have a width, on which the number of ticks depends
-        for _ in 0..2 {
-            let computed = ComputedLayout::from_layout(&layout);
-            if !self.log_x && !self.x_is_count {
-                let ticks = generate_ticks(computed.x_range.0, computed.x_range.1, computed.x_ticks);
-                let unit = computed.plot_width() / (computed.x_range.1 - computed.x_range.0);
-                if let Some(step) = ticks::step(&ticks, unit, f64::from(TICK)) {
-                    layout = layout.with_x_tick_step(step);
-                }
-                layout = layout.with_x_tick_format(TickFormat::Custom(Arc::new(linear(&ticks))));
-            }
-            if !self.log_y && !self.y_is_count {
-                let ticks = generate_ticks(computed.y_range.0, computed.y_range.1, computed.y_ticks);
-                layout = layout.with_y_tick_format(TickFormat::Custom(Arc::new(linear(&ticks))));
-            }
-        }
-        layout
-    }
-
-    /// Axes limited to the range of the values, with matching ticks. Values of y are multiplied by
-    /// `lift`.
-    fn scale_axes(&self, mut layout: Layout, lift: f64) -> Layout {
-        let values = || self.curves.iter().flat_map(|curve| &curve.points);
-        let bars = self.bars.iter().flat_map(|bars| &bars.bars);
-        let places: Vec<f64> = values().map(|p| p.0).chain(bars.map(|bar| bar.0)).collect();
-        let low = places.iter().copied().fold(f64::INFINITY, f64::min);
-        let high = places.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        if self.log_x {
-            layout = layout.with_log_x().with_x_tick_format(TickFormat::Custom(Arc::new(power_of_ten)));
-            if self.pad_x && 0.0 < low && low < high {
-                // the same share of the axis as in the linear case
-                let off = (high / low).powf(0.04);
-                layout = layout.with_x_axis_min(low / off).with_x_axis_max(high * off);
-            }
-        } else if low < high {
-            let off = if self.pad_x { 0.03 * (high - low) } else { 0.0 };
-            layout = layout.with_x_axis_min(low - off).with_x_axis_max(high + off);
-        }
-        if self.x_is_count && !self.log_x {
-            layout = layout.with_x_tick_format(TickFormat::Custom(Arc::new(whole)));
-            if high - low < FEW {
-                layout = layout.with_x_axis_min(low).with_x_axis_max(low + FEW);
-            }
-        }
-        if self.log_y {
-            // the axis includes the marked levels, so that they are visible
-            let levels = self.levels.iter().map(|(value, _)| value * lift).filter(|value| *value > 0.0);
-            let shown: Vec<f64> = values().map(|p| p.1).chain(levels).collect();
-            let low = shown.iter().copied().fold(f64::INFINITY, f64::min);
-            let high = shown.iter().copied().fold(0.0, f64::max);
-            let tick = move |value: f64| power_of_ten(value / lift);
-            layout = layout.with_log_y().with_y_tick_format(TickFormat::Custom(Arc::new(tick)));
-            if high > 10.0 * low {
-                layout = layout.with_y_axis_min(0.6 * low).with_y_axis_max(1.6 * high);
-            } else if low <= high {
-                // within a decade there may be no tick at all: show the whole decade
-                let decade = |x: f64| 10f64.powf(x);
-                // a point on the edge would be clipped
-                let (below, above) = ((0.8 * low).log10().floor(), (1.25 * high).log10().ceil());
-                layout = layout.with_y_axis_min(decade(below)).with_y_axis_max(decade(above));
-            }
-        } else if self.y_is_count {
-            layout = layout.with_y_tick_format(TickFormat::Custom(Arc::new(whole)));
-            let high = values().map(|p| p.1).fold(0.0, f64::max);
-            // on a shorter axis ticks would stand between whole numbers
-            if high < FEW {
-                layout = layout.with_y_axis_min(0.0).with_y_axis_max(FEW);
-            }
-        } else {
-            // a marked level above all values is visible
-            let [low, high] = values().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], p| [l.min(p.1), h.max(p.1)]);
-            let level = self.levels.iter().map(|(value, _)| value * lift).fold(high, f64::max);
-            let size = low.abs().max(high.abs());
-            if low < high && high - low < CONSTANT * size {
-                layout = layout.with_y_axis_min(low - 0.05 * size).with_y_axis_max(high + 0.05 * size);
-            } else if low < high && level > high {
-                layout = layout.with_y_axis_max(level + 0.08 * (level - low));
-            }
-        }
-        layout
     }
 }
 

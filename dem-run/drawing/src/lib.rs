@@ -13,6 +13,7 @@ use compact::compact;
 pub use legend::Style;
 pub use raster::{RGB, Raster};
 
+mod axis;
 mod canvas;
 mod chart;
 mod compact;

@@ -45,7 +45,7 @@ pub(crate) fn step(ticks: &[f64], unit: f64, size: f64) -> Option<f64> {
 pub(crate) fn power_of_ten(value: f64) -> String {
     let exponent = value.log10();
     let whole = (exponent - exponent.round()).abs() < 1e-6;
-    if (!whole && exponent > -3.0) || (-0.5..1.5).contains(&exponent) {
+    if (!whole && exponent > -1.0) || (-0.5..1.5).contains(&exponent) {
         // round-off: 4.9999999e-6 is 5e-6
         let rounded = format!("{value:.3e}").parse().unwrap_or(value);
         return format!("{rounded}");

@@ -89,9 +89,8 @@ pub struct Entry {
     pub values: BTreeMap<String, Value>,
     /// Digest of its scene.
     pub digest: String,
-    /// Path of its history relative to the folder of the sweep; of a failed run, that up to the
-    /// failure. There is no such file until the run is done, or if it failed before its first
-    /// frame.
+    /// Path of its history relative to the folder of the sweep, where it will be once the run is
+    /// done; of a failed run, that up to the failure, empty where there is none.
     pub history: String,
     /// State of the run.
     pub state: State,
@@ -121,6 +120,12 @@ pub enum State {
 }
 
 impl State {
+    /// The ending of the history of such a run.
+    #[must_use]
+    pub fn ending(self) -> &'static str {
+        if self == Self::Failed { ".failed.h5" } else { ".h5" }
+    }
+
     /// Its name in files.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -272,7 +277,10 @@ impl Store {
                 None => State::Left,
                 Some(outcome) => outcome.state,
             };
-            run.history = history(&run.id, run.state);
+            run.history = match run.state {
+                State::Failed if !self.path(&run.id, ".failed.h5").exists() => String::new(),
+                state => history(&run.id, state),
+            };
             run.wall_time = outcome.as_ref().map(|outcome| outcome.wall_time);
             run.cpu_time = outcome.as_ref().and_then(Outcome::cpu_time);
             run.message = outcome.and_then(|outcome| outcome.message);
@@ -342,8 +350,7 @@ impl Entry {
 
 /// Path of the history of a run relative to the folder of the sweep.
 fn history(id: &str, state: State) -> String {
-    let ending = if state == State::Failed { ".failed.h5" } else { ".h5" };
-    format!("runs/{id}{ending}")
+    format!("runs/{id}{}", state.ending())
 }
 
 fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {

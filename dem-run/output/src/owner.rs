@@ -192,19 +192,13 @@ impl Owner {
 
 /// The reason why a folder with results of `before` rejects results of `now`.
 fn refusal(before: &[Source], now: &[Source]) -> String {
-    let paths = |sources: &[Source]| -> Vec<PathBuf> { sources.iter().map(|source| source.path.clone()).collect() };
-    // two runs at one path differ by their descriptions
-    let same_place = paths(before) == paths(now);
+    let paths = |sources: &[Source]| sources.iter().map(|source| source.path.clone()).collect::<Vec<_>>();
     let name = |sources: &[Source]| {
-        let name = |source: &Source| match &source.run {
-            Some(run) if same_place => format!("{} of the run {run}", source.path.display()),
-            _ => source.path.display().to_string(),
-        };
-        sources.iter().map(name).collect::<Vec<_>>().join(" and ")
+        paths(sources).iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(" and ")
     };
-    format!(
-        "it holds results of {}, not of {}: choose another folder with -o DIR, or remove those results with --force",
-        name(before),
-        name(now)
-    )
+    let held = match paths(before) == paths(now) {
+        true => format!("an earlier run in {}, which has been made anew", name(now)),
+        false => format!("{}, not of {}", name(before), name(now)),
+    };
+    format!("it holds results of {held}: choose another folder with -o DIR, or remove those results with --force")
 }

@@ -59,7 +59,11 @@ fn table(manifest: &Manifest, summary: &dyn Fn(&str) -> Option<Value>) -> Result
         let mut row = vec![run.id.clone()];
         row.extend(manifest.fields.iter().map(|field| run.values.get(field).map_or(String::new(), plain)));
         row.push(run.state.name().into());
-        row.extend(MEASURED.iter().map(|(_, place)| summary.pointer(place).map_or(String::new(), plain)));
+        row.extend(MEASURED.iter().map(|(_, place)| match place.strip_prefix("/failure/collapse/") {
+            // strain before any bond broke is no collapse
+            Some(k) if summary["failure"]["early"][k.parse::<usize>().unwrap_or(0)] == true => String::new(),
+            _ => summary.pointer(place).map_or(String::new(), plain),
+        }));
         row.extend([broken.map_or(String::new(), |n| n.to_string()), time(run.wall_time), time(run.cpu_time)]);
         row.extend([run.history.clone(), run.message.clone().unwrap_or_default()]);
         writer.write_record(row)?;

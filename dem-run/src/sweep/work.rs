@@ -144,7 +144,7 @@ impl Crew<'_> {
             return Ok(None);
         }
         let outcome = outcome(store, job, status, &summary, began.elapsed());
-        let history = store.path(id, if outcome.state == State::Done { ".h5" } else { ".failed.h5" });
+        let history = store.path(id, outcome.state.ending());
         // a run that failed before its first frame has no history
         if outcome.state == State::Done || part.is_file() {
             move_to(&part, &history).map_err(|e| failed("put in its place", e))?;
@@ -227,9 +227,14 @@ fn outcome(store: &Store, job: &Job<'_>, status: ExitStatus, summary: &str, wall
     if said.trim().is_empty() {
         let _ = fs::remove_file(&log);
     }
-    let summary: Option<serde_json::Value> = serde_json::from_str(summary).ok();
+    let mut summary: Option<serde_json::Value> = serde_json::from_str(summary).ok();
     // exit code 0 without a summary counts as a failure
     let done = status.success() && summary.is_some();
+    let state = if done { State::Done } else { State::Failed };
+    // the history is moved there when the run has ended
+    if let Some(history) = summary.as_mut().and_then(|summary| summary.get_mut("history")) {
+        *history = store.path(job.id, state.ending()).to_string_lossy().into();
+    }
     let why = match said.trim().trim_start_matches("error: ") {
         "" => format!("the run ended with {status} and no message"),
         said if status.code().is_none() => format!("the run ended with {status}: {said}"),
@@ -237,7 +242,7 @@ fn outcome(store: &Store, job: &Job<'_>, status: ExitStatus, summary: &str, wall
     };
     Outcome {
         digest: job.run.digest.clone(),
-        state: if done { State::Done } else { State::Failed },
+        state,
         exit_code: status.code(),
         message: (!done).then_some(why),
         wall_time: wall_time.as_secs_f64(),

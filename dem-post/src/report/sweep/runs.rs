@@ -145,9 +145,9 @@ impl Run {
             }
             Err(error) => return Err(error),
         };
-        // the failure by a measure: its row, unless the strain is solver error
+        // the row of the failure by a measure
         let at = |measure| match course.failure(history, measure) {
-            Ok(found) => Ok(found.ok().filter(|failure| !failure.early).map(|failure| failure.at)),
+            Ok(found) => Ok(found.ok()),
             Err(PostError::Lacking { .. }) => Ok(None),
             Err(error) => Err(error),
         };

@@ -196,7 +196,7 @@ fn strength_section(report: &Report) -> Section {
     facts.extend(found.notes.iter().map(|note| ("Note".to_string(), note.clone())));
     let out = found.left_out.len();
     if out > 0 {
-        facts.push(("Left out".into(), format!("{}, which did not fail or are not done", counted(out, "run"))));
+        facts.push(("Left out".into(), format!("{}: not done, or the sample did not fail", counted(out, "run"))));
     }
     let alt = format!("The {} over {}: runs by sample, means and line.", found.measure.title(), found.field);
     let figures = vec![chart_figure(strength::chart(found), &alt, &alt)];
