@@ -522,7 +522,12 @@ impl<A: Vect, B: Moments> Law for Elastic<A, B> {
 
     #[inline(always)]
     fn natural_map(&self, r: Local<A, B>, u: Local<A, B>) -> Local<A, B> {
-        self.bond.natural_map(r, u + self.compliance().times(&(r - self.carried)))
+        let u = u + self.compliance().times(&(r - self.carried));
+        let step = self.bond.biased(u) * self.bond.gamma();
+        let mut x = r - step;
+        x.n += self.bond.shift;
+        // inside the cone without the round-off of the shift, far above the forces of strong bonds
+        if self.bond.limits().contains(&x) { step } else { self.bond.natural_map(r, u) }
     }
 
     fn bias(&self) -> Local<A, B> {

@@ -19,10 +19,6 @@ use rayon::prelude::*;
 /// Relative round-off up to which the natural map counts as zero.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
-/// Share of its strength that an elastic bond counts as bearing at least, in the scale of the
-/// elastic error: an impulse far below is rounded as the strength is.
-const LEAST_BORNE: f64 = 0.1;
-
 #[derive(Default)]
 struct Sums {
     map: f64,
@@ -62,12 +58,18 @@ impl Sums {
         self.map += map.dot(&map);
         self.reaction += c.r.dot(&c.r);
         let gamma = c.law.gamma();
-        for (node, lever) in c.link.nodes.iter().zip(c.law.arms().lever) {
-            let node = &nodes.all[*node as usize];
-            let speed = node.velocity.dot(&node.velocity) + lever * lever * node.spin.dot(&node.spin);
-            self.motion += gamma * gamma * speed;
-        }
+        self.motion += gamma * gamma * speeds(nodes, c);
     }
+}
+
+/// Squares of the velocities of the bodies of a contact at its point, summed.
+#[inline(always)]
+fn speeds<D: Dim, L: Law>(nodes: &Nodes<D>, c: &Contact<D, L>) -> f64 {
+    let speed = |(node, lever): (&u32, f64)| {
+        let node = &nodes.all[*node as usize];
+        node.velocity.dot(&node.velocity) + lever * lever * node.spin.dot(&node.spin)
+    };
+    c.link.nodes.iter().zip(c.law.arms().lever).map(speed).sum()
 }
 
 /// The residual of the impulses and node velocities that the problem now holds (–). NaN propagates.
@@ -99,25 +101,23 @@ pub fn velocity_error<D: Dim>(problem: &ContactProblem<D>) -> f64 {
 
 /// The elastic error of the impulses and node velocities that the problem now holds (–): that by
 /// which elastic bonds violate their law, as impulses C⁻¹ D map, relative to their impulses, both
-/// in the norm of r·C r. Bonds count as bearing a tenth of their strength at least. Zero without
-/// elastic bonds.
+/// in the norm of r·C r. Zero without elastic bonds, and within the round-off of the velocities.
 ///
 /// Where bonds are stiff for the step, C ≪ D, neither the residual nor the velocity error shows how
 /// they share a load: both are relative to the velocities that the load would give free bodies.
 pub fn elastic_error<D: Dim>(problem: &ContactProblem<D>) -> f64 {
     let mut elastic = Elastic::default();
     problem.visit(&mut elastic);
-    let Elastic { wrong, size, least } = elastic;
-    if wrong == 0.0 { 0.0 } else { (wrong / size.max(least)).sqrt() }
+    relative(elastic.wrong.sqrt(), elastic.rounded.sqrt(), elastic.size.sqrt())
 }
 
 /// Sums over elastic bonds: r·C r of the impulses that their velocities lack, of their impulses,
-/// and of the least that count.
+/// and of those that the velocities of their bodies would give.
 #[derive(Default)]
 struct Elastic {
     wrong: f64,
     size: f64,
-    least: f64,
+    rounded: f64,
 }
 
 impl<D: Dim> Visitor<D> for Elastic {
@@ -132,7 +132,7 @@ impl<D: Dim> Visitor<D> for Elastic {
         let map = law.natural_map(c.r, nodes.relative_velocity(&c.link, law.arms())) * (1.0 / law.gamma());
         self.wrong += stiff.times(&map).dot(&map);
         self.size += soft.times(&c.r).dot(&c.r);
-        self.least += soft.n * (LEAST_BORNE * law.shift()).powi(2);
+        self.rounded += stiff.n * speeds(nodes, c);
     }
 }
 

@@ -262,7 +262,13 @@ impl Rows {
         rows.soften(scale);
         // their own compliance determines the reactions of elastic bonds
         let elastic = rows.list.iter_mut().filter(|row| row.is_elastic());
-        elastic.for_each(|row| row.lowered = std::mem::take(&mut row.weights));
+        elastic.for_each(|row| {
+            row.lowered = std::mem::take(&mut row.weights);
+            // a bond that does not resist twist has no compliance there, and 0/0 is no reaction
+            if row.compliance.w == 0.0 {
+                row.weights.w = std::mem::take(&mut row.lowered.w);
+            }
+        });
         rows
     }
 
