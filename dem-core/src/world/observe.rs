@@ -2,6 +2,10 @@
 
 use super::{Momentum, Touch, World};
 use crate::dim::{Dim, Vect};
+use nalgebra::{DMatrix, SymmetricEigen};
+
+/// Share of the spread of the grains over all directions below which they have no extent in one.
+const FLAT: f64 = 1e-12;
 
 impl<D: Dim> World<D> {
     /// Kinetic energy of grains and force-driven walls (J).
@@ -88,8 +92,8 @@ impl<D: Dim> World<D> {
     }
 
     /// Strain of the sample: the displacement gradient E of the affine fit u ≈ a + E x to the
-    /// displacements of all grains since time zero (–, D × D row by row; elongation positive). Zero
-    /// if the grains do not span all directions.
+    /// displacements of all grains since time zero (–, D × D row by row; elongation positive). Across
+    /// a direction in which the grains have no extent, as of a row or a layer of grains, it is zero.
     pub fn strain(&self) -> Vec<f64> {
         let n = self.grains.len() as f64;
         let mean =
@@ -98,8 +102,8 @@ impl<D: Dim> World<D> {
         let moved = |k: usize| self.grains.position[k] - self.reference[k];
         let drift = mean(&mut (0..self.grains.len()).map(moved));
         // normal equations E S = U, S = Σ x xᵀ, U = Σ u xᵀ
-        let mut s = nalgebra::DMatrix::<f64>::zeros(D::N, D::N);
-        let mut u = nalgebra::DMatrix::<f64>::zeros(D::N, D::N);
+        let mut s = DMatrix::<f64>::zeros(D::N, D::N);
+        let mut u = DMatrix::<f64>::zeros(D::N, D::N);
         for k in 0..self.grains.len() {
             let (x, d) = (self.reference[k] - centre, moved(k) - drift);
             for row in 0..D::N {
@@ -110,13 +114,18 @@ impl<D: Dim> World<D> {
             }
         }
         let spread = s.trace();
-        match s.cholesky() {
-            Some(factor) if factor.l().diagonal().iter().all(|d| d * d > 1e-12 * spread) => {
-                // S is symmetric: E = (S⁻¹ Uᵀ)ᵀ, whose column-major storage of the transpose is E
-                // row by row
+        // S is symmetric: E = (S⁻¹ Uᵀ)ᵀ, whose column-major storage of the transpose is E row by row
+        match s.clone().cholesky() {
+            Some(factor) if factor.l().diagonal().iter().all(|d| d * d > FLAT * spread) => {
                 factor.solve(&u.transpose()).as_slice().to_vec()
             }
-            _ => vec![0.0; D::N * D::N],
+            // the least gradient of those that fit
+            _ => {
+                let SymmetricEigen { eigenvalues, eigenvectors } = s.symmetric_eigen();
+                let kept = eigenvalues.map(|value| if value > FLAT * spread { 1.0 / value } else { 0.0 });
+                let inverse = &eigenvectors * DMatrix::from_diagonal(&kept) * eigenvectors.transpose();
+                (inverse * u.transpose()).as_slice().to_vec()
+            }
         }
     }
 }

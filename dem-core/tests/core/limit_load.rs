@@ -80,6 +80,18 @@ fn a_row_bears_its_weakest_bond_and_bends_at_its_root() {
     }
 }
 
+/// The tip of a row is pulled obliquely. The force F and the moment of its cross part at the middle
+/// of the first bond meet its rolling limit: 0.2 · 1.5 a F = ν a (r_coh − F), so that F = r_coh/2.
+#[test]
+fn far_stronger_bonds_do_not_hide_the_limit_of_a_weak_one() {
+    for strong in [1.0, 1e3, 1e7, 1e12] {
+        let mut world = row(3);
+        world.bonds[1].strength *= strong;
+        world.loads = vec![growing(2, &[1.0, 0.2], &[0.0])];
+        close(limit(&mut world), 5.0);
+    }
+}
+
 #[test]
 fn a_leaf_beside_a_grain_that_nothing_presses_hides_no_limit() {
     // a sphere with one bond turns about its axis; a contact without load is softer by many orders

@@ -151,15 +151,25 @@ fn the_strain_is_the_gradient_of_the_displacements() {
     strained::<D2>();
     strained::<D3>();
     // grains in a row span one direction only, even if every other grain is off by a ten-millionth
-    // of a radius
+    // of a radius: there is no strain across it
     let of_row = |off: f64| {
         let place = |k: u8| [0.02 * f64::from(k), off * f64::from(k % 2)];
         let mut w = world((0..4).map(|k| grain::<D2>(&place(k), 0.01)).collect(), Vec::new(), settings(1e-3));
         w.grains.position[3][0] += 1e-3;
         w.strain()
     };
-    assert_eq!(of_row(0.0), [0.0; 4]);
-    assert_eq!(of_row(1e-9), [0.0; 4]);
+    for off in [0.0, 1e-9] {
+        let strain = of_row(off);
+        // Σ u x / Σ x² with the one grain that moves by 1 mm at 30 mm from the middle
+        assert!((strain[0] - 0.015).abs() < 1e-12, "{strain:?}");
+        assert!(strain[1..].iter().all(|e| e.abs() < 1e-8), "{strain:?}");
+    }
+    // a layer of spheres that is stretched in it
+    let layer = (0..9u8).map(|k| grain::<D3>(&[0.02 * f64::from(k % 3), 0.0, 0.02 * f64::from(k / 3)], 0.01));
+    let mut w = World::new(layer.collect(), Vec::new(), Vec::new(), settings(1e-3));
+    w.grains.position.iter_mut().for_each(|x| x[2] *= 1.001);
+    let strain = w.strain();
+    assert!((strain[8] - 1e-3).abs() < 1e-12 && strain[..8].iter().all(|e| e.abs() < 1e-12), "{strain:?}");
     assert!(of_row(1e-6)[0] > 0.0);
 }
 

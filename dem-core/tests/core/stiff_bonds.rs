@@ -76,3 +76,37 @@ fn the_interior_point_method_breaks_elastic_bonds_at_their_limit() {
         assert_eq!((w.steps, w.bonds[0].status), (31, BondStatus::Shear), "{mobility:e}");
     }
 }
+
+/// The forces of the bonds are known however far below their strength they are: three disks in a
+/// row, the outer ones fixed, one bond a hundred million times as strong as the other. Each bears
+/// half of the load, and the weak one breaks at twice its strength.
+#[test]
+fn a_strong_bond_leaves_the_weak_one_its_share() {
+    fn check<D: Dim>() {
+        for strong in [1.0, 1e4, 1e8] {
+            for mobility in [1e3, 1e6] {
+                let mut grains = [0.0, A, 2.0 * A].map(|x| grain::<D>(&[&[x], &[0.0; 2][..D::N - 1]].concat(), R));
+                (grains[0].fixed, grains[2].fixed) = (true, true);
+                let step = (mobility * grains[1].mass / K).sqrt();
+                let mut force = D::Vector::zero();
+                force[0] = 1.0;
+                let factor: Schedule = Arc::new(move |t| 0.05 * t / step);
+                let load = Load { grain: 1, force, torque: D::Spin::zero(), factor };
+                let mut w = World::new(grains.into_iter().collect(), vec![], vec![load], settings(step));
+                w.form_bonds(1e-6, |_| 1.0, 0.3);
+                w.bonds[1].strength = strong;
+                w.make_bonds_elastic(springs(K, 0.4));
+                let mut made = 0;
+                while w.bonds[0].status == BondStatus::Intact && w.steps < 60 {
+                    made += w.step().unwrap().work.factorisations;
+                }
+                // the middle of step 41 is at 2.025 N
+                assert_eq!(w.steps, 41, "{strong:e}, {mobility:e}");
+                // the same factors serve until the break: no bond is at a limit
+                assert!(made <= 4, "{strong:e}, {mobility:e}: {made} factorisations");
+            }
+        }
+    }
+    check::<D2>();
+    check::<D3>();
+}

@@ -190,12 +190,14 @@ fn elastic(
 ) -> Result<std::result::Result<Elastic, &'static str>> {
     // the mean over the other axes, positive along the load as the axial one
     let lateral = |name: &str, sign: f64| -> Result<Vec<f64>> {
-        let axes: Vec<usize> = (0..history.dimension()).filter(|&k| k != axis).collect();
         let mut sum = vec![0.0; report.load.len()];
         let Some(series) = history.observable(name)? else { return Ok(vec![]) };
-        for &k in &axes {
-            let part = component(history, &series, &[k, k], name)?;
-            sum.iter_mut().zip(part).for_each(|(sum, x)| *sum += sign * x / axes.len() as f64);
+        let others = (0..history.dimension()).filter(|&k| k != axis);
+        let parts = others.map(|k| component(history, &series, &[k, k], name)).collect::<Result<Vec<_>>>()?;
+        // there is none across a layer of grains
+        let parts: Vec<_> = parts.into_iter().filter(|part| part.iter().any(|x| *x != 0.0)).collect();
+        for part in &parts {
+            sum.iter_mut().zip(part).for_each(|(sum, x)| *sum += sign * x / parts.len() as f64);
         }
         Ok(sum)
     };

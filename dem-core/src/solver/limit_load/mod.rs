@@ -48,21 +48,38 @@ pub fn limit_load<D: Dim>(problem: &ContactProblem<D>, growing: Arc<[(D::Vector,
         let loaded = ContactProblem { free, ..problem.clone() };
         Rows::of(&loaded, 1.0, StiffnessRatio::default())
     };
-    let load = rows(growing).free;
-    let mut programme = match Programme::of(rows(Arc::clone(&problem.free)), load) {
+    let (bonded, load) = (rows(Arc::clone(&problem.free)), rows(growing).free);
+    let strengths = || bonded.list.iter().map(|row| row.shift).filter(|shift| *shift > 0.0);
+    let strongest = strengths().fold(0.0, f64::max);
+    let mut cap = tuning::SPREAD * strengths().fold(f64::INFINITY, f64::min);
+    loop {
+        let (found, holds) = capped(bonded.clone(), load.clone(), constant, cap);
+        if holds || cap >= strongest {
+            return found;
+        }
+        cap *= tuning::SPREAD;
+    }
+}
+
+/// The limit load with strengths of at most `cap`, and whether it is that of the strengths
+/// themselves: a bond that is far inside its capped cone does not limit the load, since the
+/// programme is convex. Strengths of very unlike sizes would leave the weaker ones to round-off.
+fn capped(mut rows: Rows, load: Vec<f64>, constant: bool, cap: f64) -> (LimitLoad, bool) {
+    rows.list.iter_mut().for_each(|row| row.shift = row.shift.min(cap));
+    let mut programme = match Programme::of(rows, load, cap) {
         Ok(programme) => programme,
-        Err(known) => return known,
+        Err(known) => return (known, true),
     };
     let mut borne = !constant;
     if constant {
         // whether they are balanced at λ = 0: the least λ
         programme.sense = 1.0;
         match programme.solve() {
-            LimitLoad::Unbounded => {}
-            LimitLoad::Factor { lower, upper } => {
+            (LimitLoad::Unbounded, _) => {}
+            (LimitLoad::Factor { lower, upper }, holds) => {
                 let least = 0.5 * (lower + upper);
                 if lower > tuning::ACCEPT.max((upper - lower).abs()) {
-                    return LimitLoad::BrokenAtStart { least };
+                    return (LimitLoad::BrokenAtStart { least }, holds);
                 }
                 borne = true;
             }
@@ -71,14 +88,14 @@ pub fn limit_load<D: Dim>(problem: &ContactProblem<D>, growing: Arc<[(D::Vector,
         programme.sense = -1.0;
     }
     match programme.solve() {
-        LimitLoad::Factor { lower, upper } if upper < -tuning::ACCEPT.max((upper - lower).abs()) => {
-            LimitLoad::NeverBalanced
+        (LimitLoad::Factor { lower, upper }, holds) if upper < -tuning::ACCEPT.max((upper - lower).abs()) => {
+            (LimitLoad::NeverBalanced, holds)
         }
-        LimitLoad::Unbounded if !borne => {
+        (LimitLoad::Unbounded, _) if !borne => {
             // the growing loads are balanced in both directions; the constant ones may not be
             programme.sense = 0.0;
             match programme.solve() {
-                LimitLoad::Factor { .. } => LimitLoad::Unbounded,
+                (LimitLoad::Factor { .. }, _) => (LimitLoad::Unbounded, true),
                 other => other,
             }
         }

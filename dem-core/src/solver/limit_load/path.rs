@@ -7,8 +7,9 @@ use crate::solver::interior::cones::{Point, dot, eigenvalues, moved, product, re
 use crate::solver::tuning::limit_load as tuning;
 
 impl Programme {
-    /// The outcome at the end of the central path.
-    pub fn solve(&self) -> LimitLoad {
+    /// The outcome at the end of the central path, and whether it would be the same without the cap
+    /// on the strengths.
+    pub fn solve(&self) -> (LimitLoad, bool) {
         let cones = self.sides.len();
         let e = [1.0, 0.0, 0.0];
         let mut at = Iterate {
@@ -20,20 +21,22 @@ impl Programme {
             tau: 1.0,
             kappa: 1.0,
         };
-        // the best score, its error and its factors
-        let mut best = (f64::INFINITY, f64::INFINITY, LimitLoad::Undecided);
+        // the best score, its error, its factors, and whether no cap matters there
+        let mut best = (f64::INFINITY, f64::INFINITY, LimitLoad::Undecided, false);
         let mut since = 0;
         for _ in 0..tuning::MOST {
             let residual = self.residual(&at);
             if let Some(proved) = self.proved(&at, &residual) {
-                return proved;
+                // larger cones are no less unbounded
+                let holds = proved == LimitLoad::Unbounded;
+                return (proved, holds);
             }
             let (error, apart, found) = self.error(&at, &residual);
             // the factor itself may be zero
             let score = error.max(apart.min(error.sqrt()));
             since += 1;
             if score < best.0 {
-                (best, since) = ((score, error, found), 0);
+                (best, since) = ((score, error, found, self.is_far_inside_caps(&at)), 0);
             }
             let stalled = since > tuning::PATIENCE && best.1 <= tuning::ACCEPT;
             if stalled || error.max(apart) <= tuning::TOLERANCE {
@@ -42,7 +45,17 @@ impl Programme {
             let Some(next) = self.next(&at, &residual) else { break };
             at = next;
         }
-        if best.1 <= tuning::ACCEPT { best.2 } else { LimitLoad::Undecided }
+        if best.1 <= tuning::ACCEPT { (best.2, best.3) } else { (LimitLoad::Undecided, false) }
+    }
+
+    /// Whether the reactions of all bonds of capped strength are far inside their cones.
+    fn is_far_inside_caps(&self, at: &Iterate) -> bool {
+        let mut capped = self.sites.iter().zip(&self.rows.list).filter(|(_, row)| row.shift >= self.cap);
+        capped.all(|(site, row)| {
+            let far = 0.5 * row.shift / self.force * at.tau;
+            let cones = self.sides[site.cones.clone()].iter().zip(&at.s[site.cones.clone()]);
+            cones.into_iter().all(|(side, s)| eigenvalues(s)[1] >= far * side.slope)
+        })
     }
 
     /// The error of a point as a solution, relative to the loads; the difference of its two factors

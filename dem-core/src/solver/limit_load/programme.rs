@@ -69,6 +69,10 @@ pub(super) struct Programme {
     pub sense: f64,
     /// The factor that one unit of the unknown λ stands for.
     pub unit: f64,
+    /// The reaction that one unit of the unknowns stands for, and the largest strength, to which
+    /// larger ones were reduced.
+    pub force: f64,
+    pub cap: f64,
 }
 
 pub(super) fn most(values: &[f64]) -> f64 {
@@ -81,7 +85,7 @@ pub(super) fn sum(a: &[f64], b: &[f64]) -> f64 {
 
 impl Programme {
     /// The programme of these rows and this growing load; or what is known without it.
-    pub fn of(mut rows: Rows, mut load: Vec<f64>) -> Result<Self, LimitLoad> {
+    pub fn of(mut rows: Rows, mut load: Vec<f64>, cap: f64) -> Result<Self, LimitLoad> {
         let mut constant = std::mem::take(&mut rows.free);
         rows.list.retain(|row| row.width() > 0);
         // forces in place of scaled ones: the largest coefficient of each unknown becomes 1
@@ -114,7 +118,7 @@ impl Programme {
         let unit = force / most(&load);
         load.iter_mut().for_each(|f| *f *= unit / force);
         let graph = Graph::of(&rows, &mut None).ok_or(LimitLoad::Undecided)?;
-        Ok(Self { rows, graph, sites, sides, size, b, load, sense: -1.0, unit })
+        Ok(Self { rows, graph, sites, sides, size, b, load, sense: -1.0, unit, force, cap })
     }
 
     /// H r.
