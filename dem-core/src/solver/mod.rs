@@ -118,9 +118,15 @@ pub trait ContactSolver<D: Dim>: Send {
     /// before and after.
     fn solve(&mut self, problem: &mut ContactProblem<D>) -> SolveReport;
 
-    /// Solve a problem again by a more accurate method, because its accepted solution violates the
-    /// contact laws by too large displacements; none if there is no such method.
-    fn solve_finer(&mut self, _problem: &mut ContactProblem<D>) -> Option<SolveReport> {
+    /// Solve a problem again more accurately, because its solution `_found` violates the contact
+    /// laws by displacements that are too large by the factor `_excess`; none if that is not
+    /// possible.
+    fn solve_finer(
+        &mut self,
+        _problem: &mut ContactProblem<D>,
+        _found: SolveReport,
+        _excess: f64,
+    ) -> Option<SolveReport> {
         None
     }
 

@@ -30,6 +30,7 @@ use crate::contact::{LocalSolve, Padded};
 use crate::dim::Dim;
 use crate::problem::ContactProblem;
 use crate::problem::assembled::Assembled;
+use crate::problem::residual::velocity_error;
 use crate::saved::{Mismatch, Reader, Saved};
 use crate::solver::tuning::{defaults, stages as tuning};
 
@@ -398,9 +399,29 @@ impl<D: Dim> ContactSolver<D> for Staged {
         SolveReport { work: before + report.work, ..report }
     }
 
-    /// Skips the sweeps over dry contacts.
-    fn solve_finer(&mut self, problem: &mut ContactProblem<D>) -> Option<SolveReport> {
-        (self.settings.stages == Stages::All && is_dry(problem)).then(|| self.directly(problem))
+    /// Skips the sweeps over dry contacts; with bonds the tolerances are smaller.
+    fn solve_finer(&mut self, problem: &mut ContactProblem<D>, found: SolveReport, excess: f64) -> Option<SolveReport> {
+        if is_dry(problem) {
+            let swept = self.settings.stages == Stages::All && found.status == SolveStatus::Accepted;
+            return swept.then(|| self.directly(problem));
+        }
+        let settings = self.settings;
+        // displacements are in proportion to both errors
+        let smaller = |tolerance: f64| 0.5 * tolerance / excess;
+        let (tolerance, load_tolerance) = (smaller(found.residual), smaller(settings.load_tolerance));
+        let finer = StagedSettings { tolerance, load_tolerance, ..settings };
+        (self.settings, self.newton.settings) = (finer, finer);
+        let coarse = problem.clone();
+        let report = self.directly(problem);
+        (self.settings, self.newton.settings) = (settings, settings);
+        self.extrapolation.forget();
+        if report.residual >= found.residual {
+            *problem = coarse;
+            return None;
+        }
+        let velocity_error = velocity_error(problem);
+        let reported = settings.report(report.work, report.residual, report.load_error.unwrap_or(0.0), velocity_error);
+        Some(SolveReport { route: report.route, ..reported })
     }
 
     fn snapshot(&self) -> Box<dyn ContactSolver<D>> {

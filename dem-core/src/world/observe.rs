@@ -92,8 +92,8 @@ impl<D: Dim> World<D> {
     }
 
     /// Strain of the sample: the displacement gradient E of the affine fit u ≈ a + E x to the
-    /// displacements of all grains since time zero (–, D × D row by row; elongation positive). Across
-    /// a direction in which the grains have no extent, as of a row or a layer of grains, it is zero.
+    /// displacements of all grains since time zero (–, D × D row by row; elongation positive). It
+    /// is zero across a direction in which the grains have no extent: a row, or a layer of grains.
     pub fn strain(&self) -> Vec<f64> {
         let n = self.grains.len() as f64;
         let mean =
@@ -114,7 +114,8 @@ impl<D: Dim> World<D> {
             }
         }
         let spread = s.trace();
-        // S is symmetric: E = (S⁻¹ Uᵀ)ᵀ, whose column-major storage of the transpose is E row by row
+        // S is symmetric: E = (S⁻¹ Uᵀ)ᵀ, whose column-major storage of the transpose is E row by
+        // row
         match s.clone().cholesky() {
             Some(factor) if factor.l().diagonal().iter().all(|d| d * d > FLAT * spread) => {
                 factor.solve(&u.transpose()).as_slice().to_vec()

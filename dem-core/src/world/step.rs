@@ -153,14 +153,15 @@ impl<D: Dim> World<D> {
         Ok(self.report(h, &motion, &problem, done, breaks))
     }
 
-    /// Solve a contact problem. If `limits_apply` and an accepted solution yields, solve again with
-    /// the solver's finer method, if it has one.
+    /// Solve a contact problem. If `limits_apply` and an accepted solution yields, solve again more
+    /// finely, if the solver can.
     fn solve(&mut self, problem: &mut ContactProblem<D>, limits_apply: bool) -> SolveReport {
         let solve = self.solver.solve(problem);
-        if !limits_apply || solve.status != SolveStatus::Accepted || self.yielding(problem).is_none() {
+        if !limits_apply || solve.status == SolveStatus::Failed {
             return solve;
         }
-        let finer = self.solver.solve_finer(problem);
+        let Some(excess) = self.excess_of_yielding(problem) else { return solve };
+        let finer = self.solver.solve_finer(problem, solve, excess);
         finer.map_or(solve, |finer| SolveReport { work: solve.work + finer.work, ..finer })
     }
 

@@ -92,7 +92,9 @@ fn a_strong_bond_leaves_the_weak_one_its_share() {
                 force[0] = 1.0;
                 let factor: Schedule = Arc::new(move |t| 0.05 * t / step);
                 let load = Load { grain: 1, force, torque: D::Spin::zero(), factor };
-                let mut w = World::new(grains.into_iter().collect(), vec![], vec![load], settings(step));
+                let mut set = settings(step);
+                set.solver = SolverSettings::Staged(StagedSettings::default());
+                let mut w = World::new(grains.into_iter().collect(), vec![], vec![load], set);
                 w.form_bonds(1e-6, |_| 1.0, 0.3);
                 w.bonds[1].strength = strong;
                 w.make_bonds_elastic(springs(K, 0.4));
@@ -102,7 +104,7 @@ fn a_strong_bond_leaves_the_weak_one_its_share() {
                 }
                 // the middle of step 41 is at 2.025 N
                 assert_eq!(w.steps, 41, "{strong:e}, {mobility:e}");
-                // the same factors serve until the break: no bond is at a limit
+                // the same factors suffice until the break: no bond is at a limit
                 assert!(made <= 4, "{strong:e}, {mobility:e}: {made} factorisations");
             }
         }

@@ -256,3 +256,24 @@ fn a_grain_that_circles_in_a_round_wall_keeps_its_distance_and_speed() {
         circling::<D3>(Some([0.0, 0.0, 1.0].into()), restitution);
     }
 }
+
+/// In a step the force would move free grains by 1e9 radii: a residual of 1e-12 leaves them moving
+/// by a thousandth of a radius, and is not small enough.
+#[test]
+fn a_force_far_above_what_moves_the_grains_in_a_step_is_borne() {
+    let grains = vec![grain::<D2>(&[0.0, R], R), grain(&[0.0, 3.0 * R], R)];
+    let (step, ratio) = (1e-3, 1e9);
+    let force = ratio * grains[0].mass * grains[0].radius / (step * step);
+    let mut set = settings(step);
+    set.solver = SolverSettings::default();
+    let mut lid = force_driven::<D2>([0.0, -1.0].into(), [0.0, 0.04].into(), grains[0].mass, 0.0);
+    let Drive::Force { force: of_time, .. } = &mut lid.drive else { panic!("driven by a force") };
+    *of_time = Arc::new(move |t| force * t / (20.0 * step));
+    let mut w = world(grains, vec![floor(0.0), lid], set);
+    w.form_bonds(1e-6, |_| 1e-3 * force, 0.3);
+    for _ in 0..40 {
+        w.step().unwrap();
+    }
+    let pressed = w.walls[0].reaction[1];
+    assert!((pressed + force * 39.5 / 20.0).abs() < 1e-6 * force, "{pressed} N");
+}

@@ -11,7 +11,7 @@ use dem_drawing::{Chart, Drawing, Style, colour};
 /// Width of a line that carries the force of the scale, and the greatest width, units of the
 /// drawing: of disks, and of spheres.
 const WIDTH: [(f64, f64); 2] = [(1.3, 8.0), (0.6, 4.0)];
-/// Width of the thinnest lines, which stay visible where the forces of other moments are far greater.
+/// Width of the thinnest lines: visible where the forces of other moments are far greater.
 const HAIRLINE: f64 = 0.15;
 /// Colours of the weak network, compression and tension; also of grains in chains.
 const PALE: [&str; 2] = ["#9cc9e3", "#f0b27a"];

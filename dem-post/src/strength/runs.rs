@@ -271,8 +271,8 @@ impl Course {
     }
 
     /// The row whose end is the state that the sample still bore: that of its failure or, if bonds
-    /// broke in that, the one before; `None` if they did in the first. A run that loads from break to
-    /// break records the state before each break.
+    /// broke in that, the one before; `None` if they did in the first. A run that loads from break
+    /// to break records the state before each break.
     pub(crate) fn borne(&self, failure: usize) -> Option<usize> {
         if self.follows_breaks {
             return Some(failure);

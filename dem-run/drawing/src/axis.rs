@@ -16,7 +16,7 @@ const CONSTANT: f64 = 1e-6;
 const MARKER: f64 = 0.02;
 /// The axis of smaller counts ends at this value.
 const FEW: f64 = 5.0;
-/// Width of a letter of the label of a tick, and of what is beside the labels: the title and the ticks.
+/// Width of a letter of the label of a tick, and of what is beside the labels: title and ticks.
 const LETTER: f64 = 7.8;
 const BESIDE: f64 = 42.0;
 
