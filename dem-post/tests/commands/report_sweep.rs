@@ -145,7 +145,7 @@ fn the_page_of_a_sweep_begins_with_its_result() {
     assert_eq!(row("0005"), ["0005", "20", "2000", "2", "left", "–", "–", "–", "–", "–", "–", "–", "–"]);
     assert!(result.contains("step 31 &#60;was&#62; not solved") && !page.contains("and more"));
     let strength = section(&page, "strength");
-    assert!(strength.contains("<td>y = 2 x</td>") && strength.contains("2 runs, which did not fail or are not done"));
+    assert!(strength.contains("<td>y = 2 x</td>") && strength.contains("2 runs: not done, or the sample did not fail"));
     // the runs differ in their bonds: no envelope
     assert!(!page.contains("id=\"envelope\""));
 }

@@ -138,3 +138,51 @@ impl Chart {
         layout
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Axes, colour};
+
+    fn axes(chart: Chart) -> Axes {
+        let (_, mut axes) = Chart::draw_located(vec![chart], (640.0, 460.0));
+        axes.remove(0)
+    }
+
+    fn chart(style: Style, points: &[(f64, f64)]) -> Chart {
+        Chart::new("x", "y").curve("", colour::BLUE, style, points.to_vec())
+    }
+
+    #[test]
+    fn marked_levels_and_moments_are_within_the_axes() {
+        let mut chart = chart(Style::Line, &[(2.0, 22.1), (3.0, 22.3)]);
+        chart.levels.push((22.02, "level".into()));
+        chart.moments = vec![1.5];
+        let Axes { x, y, .. } = axes(chart);
+        assert!(x[0] <= 1.5 && x[1] >= 3.0 && y[0] < 22.02 && y[1] > 22.3, "{x:?} {y:?}");
+    }
+
+    #[test]
+    fn markers_are_not_cut_at_the_ends_of_the_axis() {
+        for points in [[(1.0, 0.0), (2.0, 2.0)], [(1.0, -1.0), (2.0, 0.5)]] {
+            for style in [Style::Points, Style::Marked] {
+                let Axes { y, .. } = axes(chart(style, &points));
+                let marker = 0.99 * MARKER * (y[1] - y[0]);
+                let inside = |value: f64| y[0] + marker < value && value < y[1] - marker;
+                assert!(points.iter().all(|point| inside(point.1)), "{y:?}");
+            }
+        }
+    }
+
+    /// A label such as 5·10⁻¹⁰ is wider than the plotting crate takes it to be.
+    #[test]
+    fn labels_of_powers_of_ten_have_room_beside_the_title() {
+        let left = |low: f64| {
+            let mut chart = chart(Style::Marked, &[(1.0, low), (2.0, 3.0 * low)]);
+            chart.log_y = true;
+            axes(chart).area[0]
+        };
+        // seven letters and the title
+        assert!(left(2e-10) > 7.0 * LETTER + 20.0 && left(2e-10) > left(2.0), "{}", left(2e-10));
+    }
+}
