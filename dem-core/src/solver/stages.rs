@@ -421,7 +421,7 @@ impl<D: Dim> ContactSolver<D> for Staged {
         }
         let velocity_error = velocity_error(problem);
         let reported = settings.report(report.work, report.residual, report.load_error.unwrap_or(0.0), velocity_error);
-        Some(SolveReport { route: report.route, ..reported })
+        Some(SolveReport { route: report.route, load_error: report.load_error, ..reported })
     }
 
     fn snapshot(&self) -> Box<dyn ContactSolver<D>> {

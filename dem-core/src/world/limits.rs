@@ -127,18 +127,20 @@ impl<D: Dim> World<D> {
     /// By which factor a solution exceeds what bodies may move beyond their law; none if it does
     /// not.
     pub(super) fn excess_of_yielding(&self, problem: &ContactProblem<D>) -> Option<f64> {
+        let excess = self.worst_yielding(problem).share / (YIELDING * self.looseness());
+        (excess > 1.0).then_some(excess)
+    }
+
+    fn worst_yielding(&self, problem: &ContactProblem<D>) -> Yielding<'_, D> {
         let mut worst = Yielding { world: self, pair: [0; 2], share: 0.0 };
         problem.visit(&mut worst);
-        let excess = worst.share / (YIELDING * self.looseness());
-        (excess > 1.0).then_some(excess)
+        worst
     }
 
     /// The pair that moves furthest beyond its law in a solution, if too far; displacements are
     /// those of a whole step of the scene.
     pub(super) fn yielding(&self, problem: &ContactProblem<D>) -> Option<Violation> {
-        let mut worst = Yielding { world: self, pair: [0; 2], share: 0.0 };
-        problem.visit(&mut worst);
-        let Yielding { pair, share, .. } = worst;
+        let Yielding { pair, share, .. } = self.worst_yielding(problem);
         (share > YIELDING * self.looseness()).then(|| Violation {
             pair,
             share,

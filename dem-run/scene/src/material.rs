@@ -104,7 +104,7 @@ pub enum Scatter {
     },
     /// Normal, with the given strength as mean and no strength below zero.
     Normal {
-        /// Standard deviation over the mean.
+        /// Standard deviation over the mean, at most 0.5.
         deviation: f64,
     },
 }

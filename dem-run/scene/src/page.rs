@@ -19,7 +19,7 @@ touch a grain; grains nearer than `bonds.gap_tolerance` are bonded, unless a sta
 drives of the walls, gravity, the loads on grains and a membrane act, from t = 0 on, until `time.end` or a condition of
 `stop`.
 
-![A plane with its normal; a circle, sphere or cylinder outside the grains, seated; and one around
+![A plane with its normal; a circle or sphere outside the grains, seated; a circle, sphere or cylinder around
 them.](images/walls.svg)
 
 ![The drives of a wall: velocity; force with a mass; stress on the section of the sample; a biaxial test; a slide across
