@@ -314,9 +314,9 @@ pub(super) mod limit_load {
     pub const ACCEPT: f64 = 1e-7;
     /// Largest net force, or work on a contact, of a certificate, relative to its load.
     pub const CERTIFICATE: f64 = 1e-9;
-    /// Largest ratio of two strengths in one programme; larger strengths are reduced, and raised by
-    /// this factor where they matter. Of three disks with bonds of 100 N and 1e9 N the limit is
-    /// 71 N without this, in place of 50 N.
+    /// Largest ratio of two strengths in the first programme; larger strengths are reduced, and
+    /// raised by the root of this factor where they matter. Of three disks with bonds of 100 N and
+    /// 1e9 N the limit is 71 N without this, in place of 50 N (decision 55).
     pub const SPREAD: f64 = 1e4;
     /// Most iterations. Samples take 15 to 40.
     pub const MOST: usize = 150;

@@ -499,3 +499,25 @@ fn the_first_break_comes_before_the_limit() {
     // the bound is of the size of the loads: 0.1 to 0.85 of it break the first bond, 0.4 on average
     assert!(reached >= 15, "{reached} of 50 bear half the limit");
 }
+
+/// A loose disk beside a rough wall rolls down it, whatever pulls at the others: the mechanism has
+/// no bound where it also leaves the wall.
+#[test]
+fn a_loose_grain_beside_a_rough_wall_is_not_borne() {
+    let mut grains: Vec<Grain<D2>> = [[0.0, 1e-3], [0.0, 3e-3], [5e-3, 3e-3]].iter().map(|x| grain(x, 1e-3)).collect();
+    grains[0].fixed = true;
+    let mut wall = Wall::fixed(Shape::Plane { normal: [-1.0, 0.0].into() }, [6e-3, 0.0].into(), 0.0);
+    for friction in [0.0, 0.3] {
+        wall.friction = friction;
+        let mut set = settings(1e-4);
+        set.gravity = Some([0.0, -9.81].into());
+        let mut w = World::new(
+            grains.iter().cloned().collect(),
+            vec![wall.clone()],
+            vec![growing(1, &[1.0, 0.0], &[0.0])],
+            set,
+        );
+        w.form_bonds(1e-6, |_| 10.0, 0.3);
+        assert_eq!(w.limit_load(0.0, 1.0), LimitLoad::NeverBalanced, "friction {friction}");
+    }
+}

@@ -57,13 +57,13 @@ pub fn limit_load<D: Dim>(problem: &ContactProblem<D>, growing: Arc<[(D::Vector,
         if holds || cap >= strongest {
             return found;
         }
-        cap *= tuning::SPREAD;
+        cap *= tuning::SPREAD.sqrt();
     }
 }
 
 /// The limit load with strengths of at most `cap`, and whether it is that of the strengths
-/// themselves: a bond that is far inside its capped cone does not limit the load, since the
-/// programme is convex. Strengths of very unlike sizes would leave the weaker ones to round-off.
+/// themselves: a bond that is inside its capped cone does not limit the load, since the programme
+/// is convex. Strengths of very unlike sizes would leave the weaker ones to round-off.
 fn capped(mut rows: Rows, load: Vec<f64>, constant: bool, cap: f64) -> (LimitLoad, bool) {
     rows.list.iter_mut().for_each(|row| row.shift = row.shift.min(cap));
     let mut programme = match Programme::of(rows, load, cap) {

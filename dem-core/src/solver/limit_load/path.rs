@@ -36,7 +36,7 @@ impl Programme {
             let score = error.max(apart.min(error.sqrt()));
             since += 1;
             if score < best.0 {
-                (best, since) = ((score, error, found, self.is_far_inside_caps(&at)), 0);
+                (best, since) = ((score, error, found, self.is_inside_caps(&at)), 0);
             }
             let stalled = since > tuning::PATIENCE && best.1 <= tuning::ACCEPT;
             if stalled || error.max(apart) <= tuning::TOLERANCE {
@@ -48,11 +48,12 @@ impl Programme {
         if best.1 <= tuning::ACCEPT { (best.2, best.3) } else { (LimitLoad::Undecided, false) }
     }
 
-    /// Whether the reactions of all bonds of capped strength are far inside their cones.
-    fn is_far_inside_caps(&self, at: &Iterate) -> bool {
+    /// Whether the reactions of all bonds of capped strength are inside their cones, by the least
+    /// strength or more.
+    fn is_inside_caps(&self, at: &Iterate) -> bool {
         let mut capped = self.sites.iter().zip(&self.rows.list).filter(|(_, row)| row.shift >= self.cap);
         capped.all(|(site, row)| {
-            let far = 0.5 * row.shift / self.force * at.tau;
+            let far = row.shift / tuning::SPREAD / self.force * at.tau;
             let cones = self.sides[site.cones.clone()].iter().zip(&at.s[site.cones.clone()]);
             cones.into_iter().all(|(side, s)| eigenvalues(s)[1] >= far * side.slope)
         })
@@ -91,8 +92,24 @@ impl Programme {
         }
         // a mechanism, with its velocities y, on which the loads do work at every λ
         let work = -sum(&self.b, &at.y);
-        let strain = most(&residual.x).max(sum(&self.load, &at.y).abs());
+        let strain = self.outside_duals(&at.y).max(sum(&self.load, &at.y).abs());
         (work > 0.0 && strain <= tuning::CERTIFICATE * work).then_some(LimitLoad::NeverBalanced)
+    }
+
+    /// By how much the velocities of contacts that y gives are outside the dual cones at most,
+    /// where reactions do no work: Σ slope ‖u_k‖ − u_n. The duals z are not asked: where bodies
+    /// part freely y is large, and z differs from it by its round-off.
+    fn outside_duals(&self, y: &[f64]) -> f64 {
+        let pulled = self.pulled(y);
+        let outside = self.sites.iter().map(|site| {
+            let own = &pulled[site.at..];
+            let across = self.sides[site.cones.clone()].iter().map(|side| {
+                let [a, b] = side.others.map(|place| place.map_or(0.0, |k| own[k]));
+                side.slope * a.hypot(b)
+            });
+            across.sum::<f64>() - own[0]
+        });
+        outside.fold(0.0, f64::max)
     }
 
     /// The next point; none if no step can be computed.
