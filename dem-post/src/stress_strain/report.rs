@@ -13,7 +13,7 @@ use super::elastic::{Curves, Elastic, RANGE};
 use crate::chains::stress::thickness;
 use crate::clock::Clock;
 use crate::collapse::{Bonding, Collapse, peak, work};
-use crate::extent::first_box;
+use crate::extent::{first_box, range};
 use crate::output::{PostError, Result, facts, number, quantity};
 use crate::strength::fit::Estimate;
 
@@ -21,6 +21,8 @@ use crate::strength::fit::Estimate;
 pub(super) const COLLAPSE: [f64; 2] = [1e-4, 1e-3];
 /// Share of broken bonds whose load is reported.
 const BROKEN: f64 = 0.05;
+/// Extent of the centres of the grains, over that along the load, up to which they are one layer.
+const FLAT: f64 = 1e-6;
 
 /// The results in numbers. `None`: the event did not occur, or the quantity was not recorded.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -188,16 +190,23 @@ fn elastic(
     axis: usize,
     push: f64,
 ) -> Result<std::result::Result<Elastic, &'static str>> {
+    // a layer of grains has no strain across it
+    let (d, position) = (history.dimension(), history.grain_state(0)?.position);
+    let extent = |k: usize| {
+        let [low, high] = range(position.iter().skip(k).step_by(d).copied());
+        high - low
+    };
+    let others: Vec<usize> = (0..d).filter(|&k| k != axis && extent(k) > FLAT * extent(axis)).collect();
+    if others.is_empty() {
+        return Ok(Err("the grains have no extent across the load"));
+    }
     // the mean over the other axes, positive along the load as the axial one
     let lateral = |name: &str, sign: f64| -> Result<Vec<f64>> {
         let mut sum = vec![0.0; report.load.len()];
         let Some(series) = history.observable(name)? else { return Ok(vec![]) };
-        let others = (0..history.dimension()).filter(|&k| k != axis);
-        let parts = others.map(|k| component(history, &series, &[k, k], name)).collect::<Result<Vec<_>>>()?;
-        // there is none across a layer of grains
-        let parts: Vec<_> = parts.into_iter().filter(|part| part.iter().any(|x| *x != 0.0)).collect();
-        for part in &parts {
-            sum.iter_mut().zip(part).for_each(|(sum, x)| *sum += sign * x / parts.len() as f64);
+        for &k in &others {
+            let part = component(history, &series, &[k, k], name)?;
+            sum.iter_mut().zip(part).for_each(|(sum, x)| *sum += sign * x / others.len() as f64);
         }
         Ok(sum)
     };
