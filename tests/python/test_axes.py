@@ -50,7 +50,7 @@ def test_each_axis_has_a_scale_of_its_length(histories, dimension):
         assert history["walls/force/value"].dims[0].values()[0] == times[0]
         assert history["observables/wall_force/value"].dims[0].values()[0] == times[1]
     # names without values take no room
-    assert {name for name, size in sizes.items() if size} == {"commit"}
+    assert {name for name, size in sizes.items() if size} == {"commit", "ending"}
     expected = {
         "particles/grains/radius": ["grain"],
         "particles/grains/position/value": ["time", "grain", "axis"],
