@@ -136,7 +136,9 @@ pub fn read(history: &History, subject: Subject, every: usize, times: &[f64]) ->
     let scale = match subject {
         Subject::Bonds => None,
         Subject::Forces => {
-            Some(greatest(&frames, |frame| Ok(statistics(&normal_forces(&contacts(history, frame)?)).mean))?)
+            let radius = history.grains()?.radius;
+            let mean = |frame| Ok(statistics(&normal_forces(&contacts(history, frame, &radius)?)).mean);
+            Some(greatest(&frames, mean)?)
         }
         Subject::Speed => {
             Some(greatest(&frames, |frame| Ok(usual_speed(speeds(&history.grain_state(frame)?, history.dimension()))))?)
@@ -238,11 +240,10 @@ fn picture(
     frame: usize,
 ) -> Result<(Panel, Vec<Key>)> {
     let grains = history.grain_state(frame)?;
-    let number_of_grains = history.grains()?.radius.len();
-    let fill = |grain: usize| materials.map_or(GRAIN[0], |materials| materials.fill(grain));
+    let radius = history.grains()?.radius;
     let mut panel = Panel {
         walls: history.wall_state(frame)?,
-        fills: (0..number_of_grains).map(|grain| fill(grain).into()).collect(),
+        fills: Materials::fills(materials, radius.len(), GRAIN[0]),
         outline: GRAIN[1],
         grains,
         ..Panel::default()
@@ -251,7 +252,7 @@ fn picture(
     let mut legend = match report.subject {
         Subject::Bonds => bonds(history, frame, &mut panel, materials)?,
         Subject::Forces => {
-            let contacts = contacts(history, frame)?;
+            let contacts = contacts(history, frame, &radius)?;
             panel.links = links(&contacts, &panel.grains.position, scale, history.dimension());
             if history.dimension() == 3 {
                 // in 3D grains would hide the lines

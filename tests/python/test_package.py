@@ -1,7 +1,10 @@
 """The Python package: what it reads is what h5py reads, with names and units."""
 
 import json
+import os
+import signal
 import subprocess
+import sys
 import time
 
 import dem
@@ -262,6 +265,19 @@ def test_a_running_file_is_read_and_grows(programs, tmp_path):
     finally:
         run.kill()
         run.wait()
+
+
+def test_ctrl_c_ends_a_run_with_its_step(programs, tmp_path):
+    script = f"import dem; dem.run({str(COLUMN)!r}, 'long.h5', time__end=1e4, output__every_steps=100)"
+    environment = os.environ | {"DEM_RUN": str(programs["dem-run"]), "PYTHONPATH": str(ROOT / "python")}
+    python = subprocess.Popen([sys.executable, "-c", script], cwd=tmp_path, env=environment, stderr=subprocess.DEVNULL)
+    deadline = time.monotonic() + 60
+    while not (tmp_path / "long.h5").exists() and time.monotonic() < deadline:
+        time.sleep(0.02)
+    python.send_signal(signal.SIGINT)
+    assert python.wait(60) != 0
+    with dem.open(tmp_path / "long.h5") as history:
+        assert history.ending == "interrupted"
 
 
 def test_the_versions_of_package_and_programs_agree():

@@ -409,11 +409,8 @@ impl<D: Dim> ContactSolver<D> for Staged {
         // displacements are in proportion to both errors
         let smaller = |tolerance: f64| 0.5 * tolerance / excess;
         let (tolerance, load_tolerance) = (smaller(found.residual), smaller(settings.load_tolerance));
-        let finer = StagedSettings { tolerance, load_tolerance, ..settings };
-        (self.settings, self.newton.settings) = (finer, finer);
         let coarse = problem.clone();
-        let report = self.directly(problem);
-        (self.settings, self.newton.settings) = (settings, settings);
+        let report = Self::new(StagedSettings { tolerance, load_tolerance, ..settings }).directly(problem);
         self.extrapolation.forget();
         if report.residual >= found.residual {
             *problem = coarse;

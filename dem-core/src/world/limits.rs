@@ -124,23 +124,16 @@ impl<D: Dim> World<D> {
         touches.iter().find(far).map(|t| t.pair)
     }
 
-    /// By which factor a solution exceeds what bodies may move beyond their law; none if it does
-    /// not.
-    pub(super) fn excess_of_yielding(&self, problem: &ContactProblem<D>) -> Option<f64> {
-        let excess = self.worst_yielding(problem).share / (YIELDING * self.looseness());
-        (excess > 1.0).then_some(excess)
-    }
-
-    fn worst_yielding(&self, problem: &ContactProblem<D>) -> Yielding<'_, D> {
+    /// The pair that moves furthest beyond its law in a solution whose residual is small enough, if
+    /// too far; displacements are those of a whole step of the scene.
+    pub(super) fn yielding_of(&self, solve: SolveReport, problem: &ContactProblem<D>) -> Option<Violation> {
+        let is_small = solve.residual <= self.settings.solver.accept();
+        if !is_small {
+            return None;
+        }
         let mut worst = Yielding { world: self, pair: [0; 2], share: 0.0 };
         problem.visit(&mut worst);
-        worst
-    }
-
-    /// The pair that moves furthest beyond its law in a solution, if too far; displacements are
-    /// those of a whole step of the scene.
-    pub(super) fn yielding(&self, problem: &ContactProblem<D>) -> Option<Violation> {
-        let Yielding { pair, share, .. } = self.worst_yielding(problem);
+        let Yielding { pair, share, .. } = worst;
         (share > YIELDING * self.looseness()).then(|| Violation {
             pair,
             share,
@@ -148,6 +141,11 @@ impl<D: Dim> World<D> {
             jammed: self.jammed(problem),
             verdict: Verdict::Undecided,
         })
+    }
+
+    /// By which factor a violation in one step exceeds what is allowed.
+    pub(super) fn excess_of(&self, violation: &Violation) -> f64 {
+        violation.share / (YIELDING * self.looseness())
     }
 
     /// Add the displacement of each contact beyond its law to the sum over the previous steps;

@@ -111,11 +111,9 @@ impl<D: Dim> World<D> {
         let mut walls_at_limit = None;
         let (problem, places) = loop {
             let (mut problem, places) = self.assemble(&mid, &touches, &motion, &brought, applied, h);
-            let solve = self.solve(&mut problem, limits_apply);
+            let (solve, violation) = self.solve(&mut problem, limits_apply);
             done.add(solve);
-            if limits_apply && solve.residual <= self.settings.solver.accept() {
-                self.refuse_violation(self.yielding(&problem), &problem, last_attempt)?;
-            }
+            self.refuse_violation(violation, &problem, last_attempt)?;
             self.refuse_unaccepted(solve, &problem, (self.time, h), last_attempt)?;
             if limits_apply && self.large_load_error(solve).is_some() {
                 return Err(self.not_accepted(solve, &problem, (self.time, h), last_attempt));
@@ -154,15 +152,17 @@ impl<D: Dim> World<D> {
     }
 
     /// Solve a contact problem. If `limits_apply` and an accepted solution yields, solve again more
-    /// finely, if the solver can.
-    fn solve(&mut self, problem: &mut ContactProblem<D>, limits_apply: bool) -> SolveReport {
+    /// finely, if the solver can. Returns also the violation that remains.
+    fn solve(&mut self, problem: &mut ContactProblem<D>, limits_apply: bool) -> (SolveReport, Option<Violation>) {
         let solve = self.solver.solve(problem);
-        if !limits_apply || solve.status == SolveStatus::Failed {
-            return solve;
+        let violation = if limits_apply { self.yielding_of(solve, problem) } else { None };
+        let Some(found) = violation.as_ref().filter(|_| solve.status != SolveStatus::Failed) else {
+            return (solve, violation);
+        };
+        match self.solver.solve_finer(problem, solve, self.excess_of(found)) {
+            Some(finer) => (SolveReport { work: solve.work + finer.work, ..finer }, self.yielding_of(finer, problem)),
+            None => (solve, violation),
         }
-        let Some(excess) = self.excess_of_yielding(problem) else { return solve };
-        let finer = self.solver.solve_finer(problem, solve, excess);
-        finer.map_or(solve, |finer| SolveReport { work: solve.work + finer.work, ..finer })
     }
 
     /// The contact problem that the next step would start from, for export and for benchmarks. The

@@ -44,8 +44,7 @@ fn behind_lines(history: &History) -> Result<(Vec<Colour>, Vec<Key>)> {
         return Ok((vec![], vec![]));
     }
     let materials = Materials::read(history)?;
-    let fill = |grain: usize| materials.as_ref().map_or(GRAIN[0], |materials| materials.fill(grain)).into();
-    let fills = (0..history.grains()?.radius.len()).map(fill).collect();
+    let fills = Materials::fills(materials.as_ref(), history.grains()?.radius.len(), GRAIN[0]);
     Ok((fills, materials.iter().flat_map(|materials| materials.keys(GRAIN[1])).collect()))
 }
 
@@ -83,12 +82,12 @@ pub fn length_charts(report: &Report) -> Vec<Chart> {
 /// Those of reading the history.
 pub fn chain_map(history: &History, report: &Report, titles: &Titles) -> Result<Drawing> {
     let d = history.dimension();
-    let (grains, materials) = behind_lines(history)?;
+    let (behind, materials) = behind_lines(history)?;
     let mut panels = vec![];
     for network in &report.networks {
         let state = history.grain_state(network.frame)?;
         let centre = |grain: usize| state.position[grain * d..(grain + 1) * d].to_vec();
-        let (mut fills, mut links) = (grains.clone(), vec![]);
+        let (mut fills, mut links) = (behind.clone(), vec![]);
         for (k, chains) in network.chains.iter().enumerate() {
             for chain in &chains.chains {
                 for &grain in chain {
@@ -146,7 +145,7 @@ pub fn distribution_chart(report: &Report) -> Chart {
 /// Those of reading the history.
 pub fn network_map(history: &History, report: &Report, titles: &Titles, mean: f64) -> Result<Drawing> {
     let (sample, d) = (Sample::with_depth(history)?, history.dimension());
-    let (grains, materials) = behind_lines(history)?;
+    let (behind, materials) = behind_lines(history)?;
     let mut panels = vec![];
     for network in &report.networks {
         let state = history.grain_state(network.frame)?;
@@ -156,7 +155,7 @@ pub fn network_map(history: &History, report: &Report, titles: &Titles, mean: f6
             links: links(&network.contacts, &state.position, mean, d),
             grains: state,
             walls: history.wall_state(network.frame)?,
-            fills: grains.clone(),
+            fills: behind.clone(),
             outline: GRAIN[1],
             ..Panel::default()
         });

@@ -140,10 +140,11 @@ pub fn require_reactions(history: &History) -> Result<()> {
 
 /// The network at frame `frame`.
 fn network(history: &History, frame: usize) -> Result<Network> {
-    let (contacts, d) = (contacts(history, frame)?, history.dimension());
+    let (radius, d) = (history.grains()?.radius, history.dimension());
+    let contacts = contacts(history, frame, &radius)?;
     let forces = normal_forces(&contacts);
     let statistics = statistics(&forces);
-    let (radius, position) = (history.grains()?.radius, history.grain_state(frame)?.position);
+    let position = history.grain_state(frame)?.position;
     let stress = grain_stress(&contacts, &position, &radius, d, thickness(history)?);
     let chains = [Kind::Compression, Kind::Tension].map(|kind| find(kind, &contacts, &position, &stress, d)).to_vec();
     Ok(Network {
@@ -158,14 +159,14 @@ fn network(history: &History, frame: usize) -> Result<Network> {
     })
 }
 
-/// The contacts of a frame, without the normal forces that are solver error.
+/// The contacts of a frame, without the normal forces that are solver error; `radius` is that of
+/// each grain (m).
 ///
 /// # Errors
 /// Those of reading the history.
-pub fn contacts(history: &History, frame: usize) -> Result<ContactRows> {
+pub fn contacts(history: &History, frame: usize, radius: &[f64]) -> Result<ContactRows> {
     let mut contacts = history.contacts(frame)?;
-    let greatest_radius = history.grains()?.radius.into_iter().fold(0.0, f64::max);
-    drop_round_off(&mut contacts, greatest_radius);
+    drop_round_off(&mut contacts, radius.iter().copied().fold(0.0, f64::max));
     Ok(contacts)
 }
 

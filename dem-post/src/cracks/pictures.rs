@@ -195,7 +195,6 @@ impl When {
 /// numbers of cracks and broken bonds.
 fn pale_panel(history: &History, report: &Report, cracks: usize) -> Result<(Panel, Vec<Key>)> {
     let materials = Materials::read(history)?;
-    let fill = |grain: usize| materials.as_ref().map_or(PALE[0], |materials| materials.fill(grain));
     let keys = materials.iter().flat_map(|materials| materials.keys(PALE[1])).collect();
     let panel = Panel {
         caption: vec![
@@ -204,7 +203,7 @@ fn pale_panel(history: &History, report: &Report, cracks: usize) -> Result<(Pane
         ],
         grains: history.grain_state(0)?,
         walls: history.wall_state(0)?,
-        fills: (0..history.grains()?.radius.len()).map(|grain| fill(grain).into()).collect(),
+        fills: Materials::fills(materials.as_ref(), history.grains()?.radius.len(), PALE[0]),
         outline: PALE[1],
         ..Panel::default()
     };

@@ -32,6 +32,11 @@ impl Materials {
         Ok(several.then_some(Self { of, names }))
     }
 
+    /// The fills of all grains: those of `materials`, or `plain` where there is one material.
+    pub fn fills(materials: Option<&Self>, grains: usize, plain: &'static str) -> Vec<Colour> {
+        (0..grains).map(|grain| materials.map_or(plain, |materials| materials.fill(grain)).into()).collect()
+    }
+
     /// The fill of a grain.
     pub fn fill(&self, grain: usize) -> &'static str {
         fill(usize::from(self.of[grain]))

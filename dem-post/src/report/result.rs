@@ -189,25 +189,24 @@ fn sentences(history: &History, parts: &Parts, ruptures: &[Rupture]) -> Result<S
     said.extend(parts.load.map(|load| load_sentence(load, ruptures)));
     let first_break = parts.load.and_then(|load| load.summary.first_break);
     said.extend(parts.limit.map(|limit| limit.sentence(first_break)));
+    let end = parts.info.clock.at(history.times().last().copied().unwrap_or(0.0));
     match parts.cracks {
         Some(cracks) => said.push(break_sentence(history, cracks, ruptures)?),
         None => {
             let n = parts.info.grains;
-            let last = history.times().last().copied().unwrap_or(0.0);
             let energy = parts
                 .info
                 .kinetic_energy
                 .map(|energy| format!(", with a kinetic energy of {} J at the end", number(energy)));
             let energy = energy.unwrap_or_default();
-            said.push(format!("{} without bonds, until {}{energy}.", counted(n, "grain"), parts.info.clock.at(last)));
+            said.push(format!("{} without bonds, until {end}{energy}.", counted(n, "grain")));
         }
     }
-    let last = history.times().last().copied().unwrap_or(0.0);
     match parts.info.ending {
         Some(Ending::NoConvergence) => {
-            said.push(format!("The run ended at {} because the next step was not solved.", parts.info.clock.at(last)));
+            said.push(format!("The run ended at {end} because the next step was not solved."));
         }
-        Some(Ending::Interrupted) => said.push(format!("The run was interrupted at {}.", parts.info.clock.at(last))),
+        Some(Ending::Interrupted) => said.push(format!("The run was interrupted at {end}.")),
         _ => {}
     }
     if parts.info.open_ended {

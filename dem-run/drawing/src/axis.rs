@@ -42,12 +42,14 @@ impl Chart {
 
     /// A left margin in which the labels of a logarithmic axis and its title fit.
     pub(crate) fn with_room_for_powers(&self, layout: Layout, lift: f64) -> Layout {
+        if !self.log_y {
+            return layout;
+        }
         let computed = ComputedLayout::from_layout(&layout);
         let ticks = generate_ticks_log(computed.y_range.0, computed.y_range.1);
         let letters = ticks.into_iter().map(|tick| power_of_ten(tick / lift).chars().count()).max().unwrap_or(0);
-        let left = LETTER * letters as f64 + BESIDE;
-        let fits = !self.log_y || left <= computed.margin_left;
-        if fits { layout } else { layout.with_force_margins(left, computed.margin_right) }
+        let left = computed.margin_left.max(LETTER * letters as f64 + BESIDE);
+        layout.with_force_margins(left, computed.margin_right)
     }
 
     /// Labels of the ticks of linear axes.

@@ -12,8 +12,8 @@ use super::writer::Writer;
 /// Maximum number of batches in the queue.
 const WAITING: usize = 4;
 
-/// A batch: observations and ruptures since the last batch, then a frame, then a
-/// checkpoint, at last why the run ended.
+/// A batch: observations and ruptures since the last batch, then a frame, then a checkpoint, at
+/// last why the run ended.
 #[derive(Debug, Default)]
 pub struct Batch {
     /// Steps, times and observables, one row each.

@@ -192,13 +192,14 @@ impl Owner {
 
 /// The reason why a folder with results of `before` rejects results of `now`.
 fn refusal(before: &[Source], now: &[Source]) -> String {
-    let paths = |sources: &[Source]| sources.iter().map(|source| source.path.clone()).collect::<Vec<_>>();
     let name = |sources: &[Source]| {
-        paths(sources).iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(" and ")
+        sources.iter().map(|source| source.path.display().to_string()).collect::<Vec<_>>().join(" and ")
     };
-    let held = match paths(before) == paths(now) {
-        true => format!("an earlier run in {}, which has been made anew", name(now)),
-        false => format!("{}, not of {}", name(before), name(now)),
+    let [before, now] = [name(before), name(now)];
+    let held = if before == now {
+        format!("an earlier run in {now}, which has been made anew")
+    } else {
+        format!("{before}, not of {now}")
     };
     format!("it holds results of {held}: choose another folder with -o DIR, or remove those results with --force")
 }

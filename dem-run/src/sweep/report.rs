@@ -10,6 +10,7 @@ use super::plan::describe;
 use crate::error::RunError;
 use crate::history::sweep::{Entry, Manifest, State, Store};
 use crate::output::number;
+use crate::scene::failure::STRAINS;
 
 /// Columns of the table from the summary of a run: name, and path in the summary.
 const MEASURED: [(&str, &str); 15] = [
@@ -53,17 +54,19 @@ fn table(manifest: &Manifest, summary: &dyn Fn(&str) -> Option<Value>) -> Result
     let tail = ["broken", "wall_time", "cpu_time", "history", "message"];
     writer.write_record(head.chain(tail))?;
     for run in &manifest.runs {
-        let summary = if run.state == State::Left { None } else { summary(&run.id) }.unwrap_or_default();
+        let mut summary = if run.state == State::Left { None } else { summary(&run.id) }.unwrap_or_default();
+        for k in 0..STRAINS.len() {
+            // strain before any bond broke is no collapse
+            if summary["failure"]["early"][k] == true {
+                summary["failure"]["collapse"][k] = Value::Null;
+            }
+        }
         let broken = summary["broken"].as_array().map(|modes| modes.iter().filter_map(Value::as_u64).sum::<u64>());
         let time = |time: Option<f64>| time.map_or(String::new(), |time| time.to_string());
         let mut row = vec![run.id.clone()];
         row.extend(manifest.fields.iter().map(|field| run.values.get(field).map_or(String::new(), plain)));
         row.push(run.state.name().into());
-        row.extend(MEASURED.iter().map(|(_, place)| match place.strip_prefix("/failure/collapse/") {
-            // strain before any bond broke is no collapse
-            Some(k) if summary["failure"]["early"][k.parse::<usize>().unwrap_or(0)] == true => String::new(),
-            _ => summary.pointer(place).map_or(String::new(), plain),
-        }));
+        row.extend(MEASURED.iter().map(|(_, place)| summary.pointer(place).map_or(String::new(), plain)));
         row.extend([broken.map_or(String::new(), |n| n.to_string()), time(run.wall_time), time(run.cpu_time)]);
         row.extend([run.history.clone(), run.message.clone().unwrap_or_default()]);
         writer.write_record(row)?;

@@ -209,6 +209,8 @@ fn a_run_goes_on_with_the_observables_that_its_history_has() {
     file.unlink("observables/substeps").expect("unlink");
     drop(file);
     here.dem_run(&["resume", "a.h5", "--until", "0.03", "--quiet"]).succeeds();
+    let back = ["resume", "a.h5", "--until", "0.02", "--quiet"];
+    here.dem_run(&back).fails(2, &["--until 0.02 s", "before the last state"]);
     let history = here.history("a.h5");
     assert!(history.observable("substeps").expect("read").is_none());
     let residual = history.observable("solver_residual").expect("read").expect("an observable");

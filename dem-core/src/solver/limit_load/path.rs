@@ -92,8 +92,9 @@ impl Programme {
         }
         // a mechanism, with its velocities y, on which the loads do work at every λ
         let work = -sum(&self.b, &at.y);
-        let strain = self.outside_duals(&at.y).max(sum(&self.load, &at.y).abs());
-        (work > 0.0 && strain <= tuning::CERTIFICATE * work).then_some(LimitLoad::NeverBalanced)
+        let least = tuning::CERTIFICATE * work;
+        let proved = work > 0.0 && sum(&self.load, &at.y).abs() <= least && self.outside_duals(&at.y) <= least;
+        proved.then_some(LimitLoad::NeverBalanced)
     }
 
     /// By how much the velocities of contacts that y gives are outside the dual cones at most,
@@ -101,13 +102,10 @@ impl Programme {
     /// part freely y is large, and z differs from it by its round-off.
     fn outside_duals(&self, y: &[f64]) -> f64 {
         let pulled = self.pulled(y);
+        let in_cones = self.in_cones(&pulled);
         let outside = self.sites.iter().map(|site| {
-            let own = &pulled[site.at..];
-            let across = self.sides[site.cones.clone()].iter().map(|side| {
-                let [a, b] = side.others.map(|place| place.map_or(0.0, |k| own[k]));
-                side.slope * a.hypot(b)
-            });
-            across.sum::<f64>() - own[0]
+            let own = self.sides[site.cones.clone()].iter().zip(&in_cones[site.cones.clone()]);
+            own.map(|(side, [_, a, b])| side.slope * a.hypot(*b)).sum::<f64>() - pulled[site.at]
         });
         outside.fold(0.0, f64::max)
     }

@@ -37,7 +37,7 @@ use std::sync::Arc;
 /// Augmented-Lagrangian semismooth Newton.
 #[derive(Clone)]
 pub(super) struct Newton {
-    pub settings: StagedSettings,
+    settings: StagedSettings,
     factor: Factor,
     /// Graph of the last problem.
     pub graph: Option<Arc<Graph>>,
