@@ -268,9 +268,12 @@ def test_a_running_file_is_read_and_grows(programs, tmp_path):
 
 
 def test_ctrl_c_ends_a_run_with_its_step(programs, tmp_path):
-    script = f"import dem; dem.run({str(COLUMN)!r}, 'long.h5', time__end=1e4, output__every_steps=100)"
+    # in the background of a script SIGINT is ignored, and Python leaves it so
+    handler = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
+    run = f"import dem; dem.run({str(COLUMN)!r}, 'long.h5', time__end=1e4, output__every_steps=100)"
     environment = os.environ | {"DEM_RUN": str(programs["dem-run"]), "PYTHONPATH": str(ROOT / "python")}
-    python = subprocess.Popen([sys.executable, "-c", script], cwd=tmp_path, env=environment, stderr=subprocess.DEVNULL)
+    command = [sys.executable, "-c", f"{handler}; {run}"]
+    python = subprocess.Popen(command, cwd=tmp_path, env=environment, stderr=subprocess.DEVNULL)
     deadline = time.monotonic() + 60
     while not (tmp_path / "long.h5").exists() and time.monotonic() < deadline:
         time.sleep(0.02)
