@@ -22,6 +22,9 @@ use crate::warnings;
 
 /// Mean diameter (m) from which `check` asks whether millimetres were meant.
 const BOULDER: f64 = 0.5;
+/// Density (kg/m³) below which `check` asks whether g/cm³ were meant: no solid grain is so light,
+/// and none has so many g/cm³.
+const LIGHT: f64 = 25.0;
 
 /// Preview of a run of a scene.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -148,6 +151,11 @@ impl Check {
             let told =
                 format!("the mean diameter of the grains is {} m: if you meant mm, write 1e-3 for each", number(mean));
             check.warnings.push(format!("sample: {told}"));
+        }
+        let density = scene.materials.density;
+        if density < LIGHT {
+            let told = format!("{} kg/m³ is lighter than any grain: if you meant g/cm³, write 1e3 for each", number(density));
+            check.warnings.push(format!("materials.density: {told}"));
         }
         if !enough {
             check.warnings.push("the run needs more memory than is free: use fewer grains, or another machine".into());
@@ -419,6 +427,12 @@ pub(crate) mod tests {
         assert!(told.len() == 1 && told[0].contains("mean diameter of the grains is 2.5"), "{:?}", check.warnings);
         let check = Check::new(&config("compression.json", &[])).expect("check");
         assert!(check.warnings.is_empty(), "{:?}", check.warnings);
+    }
+
+    #[test]
+    fn grams_given_as_kilograms_are_told() {
+        let check = Check::new(&config("compression.json", &["materials.density=2.65"])).expect("check");
+        assert!(matches!(check.warnings.as_slice(), [only] if only.contains("g/cm³")), "{:?}", check.warnings);
     }
 
     /// The normal of a plane says where the grains are, so the sample need not be packed.

@@ -336,12 +336,15 @@ impl fmt::Display for Limit {
             lines.push(("growing load", format!("{}, {} to {}{unit}", load.load, number(load.from), number(load.to))));
         }
         lines.push(("limit", self.in_words()));
+        let error = self.factor.filter(|factor| *factor != 0.0).and(self.factor_error);
+        lines.extend(error.map(|error| ("  known within", format!("{} of the growth", number(error)))));
         for load in &self.loads {
             if let Some(limit) = load.limit {
                 lines.push(("limit load", format!("{}, {}{}", load.load, number(limit), unit(load))));
             }
         }
-        lines.extend(self.time.map(|time| ("reached at", format!("{} s", number(time)))));
+        let late = if self.factor > Some(1.0) { ", after the end of the run" } else { "" };
+        lines.extend(self.time.map(|time| ("reached at", format!("{} s{late}", number(time)))));
         write!(f, "{}", facts(&lines).trim_end())
     }
 }

@@ -48,16 +48,15 @@ pub fn obtain<D: Dim>(folder: &Path, sample: &RandomSample, seed: u64, watch: Wa
     let _held = claim(&lock, &mut *watch)?;
     // another process may have packed it in the meantime
     let packing = match read(&path, &name) {
-        Some(packing) => packing,
-        None => {
-            let packing = pack::<D>(sample, seed, watch)?;
+        Some(packing) => Ok(packing),
+        None => pack::<D>(sample, seed, watch).map_err(RunError::from).and_then(|packing| {
             write(&path, &name, &packing)?;
-            packing
-        }
+            Ok(packing)
+        }),
     };
-    // only once the packing is there: whoever then locks a new file reads the packing first
+    // whoever then locks a new file reads the packing first, if there is one
     let _ = fs::remove_file(lock);
-    Ok(packing)
+    packing
 }
 
 /// Digest of the values that determine a packing.
@@ -210,6 +209,14 @@ mod tests {
         assert!(packed.iter().all(|(bits, _)| *bits == packed[0].0));
         assert_eq!(packed.iter().filter(|(_, packed)| *packed).count(), 1);
         assert_eq!(files(folder.path()).len(), 1, "no lock is left");
+    }
+
+    #[test]
+    fn a_packing_that_fails_leaves_no_lock() {
+        let folder = tempfile::tempdir().expect("folder");
+        let failed = obtain::<D2>(folder.path(), &sample(), 3, &mut |_| false);
+        assert!(failed.is_err());
+        assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 0);
     }
 
     #[test]

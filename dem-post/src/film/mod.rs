@@ -12,6 +12,7 @@ use std::process::{Command as Process, Stdio};
 use clap::Args;
 use dem_drawing::{Chart, Drawing, Style, colour};
 use dem_history::History;
+use dem_output::Print;
 use dem_output::command_line::whole;
 use serde::Serialize;
 
@@ -145,7 +146,8 @@ pub fn read(history: &History, subject: Subject, wall: Option<&str>, seconds: u1
 /// # Errors
 /// [`PostError::Write`], and those of reading the history.
 pub fn write(history: &History, report: &mut Report, folder: &mut Folder, quiet: bool) -> Result<()> {
-    folder.make("film.png", |path| animate(history, report, path, quiet))?;
+    let print = folder.print();
+    folder.make("film.png", |path| animate(history, report, path, (print, quiet)))?;
     let png = folder.path().join("film.png");
     let made = folder.make("film.webm", |path| webm(&png, path));
     report.webm = made.is_ok();
@@ -171,8 +173,8 @@ impl From<WriteError> for NoWebm {
     }
 }
 
-/// Draws and writes the animated PNG.
-fn animate(history: &History, report: &Report, path: &Path, quiet: bool) -> Result<()> {
+/// Draws and writes the animated PNG, as wide as `print` asks for.
+fn animate(history: &History, report: &Report, path: &Path, (print, quiet): (Option<Print>, bool)) -> Result<()> {
     let failed = |why: String| PostError::Write(WriteError { path: path.into(), why });
     let bar = progress(report.pictures.len() as u64, quiet, "{bar:24} {pos} of {len} pictures, {eta} left");
     let view = frames::shown(history, &report.frames, &report.curves.titles)?;
@@ -181,7 +183,7 @@ fn animate(history: &History, report: &Report, path: &Path, quiet: bool) -> Resu
         let frame = report.frames.frames[shown.frame];
         let sample = frames::drawing(history, &report.frames, &view, frame)?;
         let charts = report.curves.charts(history.times()[frame]);
-        let picture = Picture::beside(&sample, &charts, PIXELS).map_err(failed)?;
+        let picture = Picture::beside(&sample, &charts, scale(&sample, &charts, print)).map_err(failed)?;
         let last = if k + 1 == report.pictures.len() { RATE * LAST } else { 0 };
         let ticks = u16::try_from(shown.ticks).unwrap_or(u16::MAX).saturating_add(last);
         let animation = match &mut animation {
@@ -193,6 +195,12 @@ fn animate(history: &History, report: &Report, path: &Path, quiet: bool) -> Resu
     }
     bar.finish_and_clear();
     animation.map_or(Ok(()), Animation::finish).map_err(failed)
+}
+
+/// Pixels per unit of a drawing with charts beside it.
+fn scale(sample: &Drawing, charts: &[Drawing], print: Option<Print>) -> f32 {
+    let widest = charts.iter().map(|chart| chart.size().0).fold(0.0, f64::max);
+    print.map_or(PIXELS, |print| (print.width * print.dots / (sample.size().0 + widest)) as f32)
 }
 
 /// Makes a WebM of an animated PNG with ffmpeg.

@@ -140,15 +140,19 @@ fn pictures(history: &History, shown: &[Moment], parts: &Parts) -> Result<Vec<Fi
 }
 
 /// What comes before the time of a picture: its events, as in `First break: ` or, where the frame
-/// has another time, `First break at 0.031 s; shown: `.
+/// has another time than some of them, `First break at 0.031 s; shown: collapse, `.
 fn told(events: &[(&str, Option<f64>)], clock: Clock) -> String {
     if events.is_empty() {
         return String::new();
     }
-    let at = |time: Option<f64>| time.map_or_else(String::new, |time| format!(" at {}", clock.moment(time)));
-    let each: Vec<String> = events.iter().map(|(name, time)| format!("{name}{}", at(*time))).collect();
-    let shown = if events.iter().any(|(_, time)| time.is_some()) { "; shown: " } else { ": " };
-    format!("{}{shown}", capitalised(&each.join(", ")))
+    let before = events.iter().filter_map(|(name, time)| Some(format!("{name} at {}", clock.moment((*time)?))));
+    let before: Vec<String> = before.collect();
+    let own: Vec<&str> = events.iter().filter(|(_, time)| time.is_none()).map(|(name, _)| *name).collect();
+    match (before.join(", "), own.join(", ")) {
+        (before, own) if before.is_empty() => capitalised(&format!("{own}: ")),
+        (before, own) if own.is_empty() => capitalised(&format!("{before}; shown: ")),
+        (before, own) => capitalised(&format!("{before}; shown: {own}, ")),
+    }
 }
 
 /// Load and broken bonds over time.

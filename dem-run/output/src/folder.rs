@@ -105,6 +105,11 @@ impl Folder {
         &self.written
     }
 
+    /// The size on paper of the pictures, if one was asked for.
+    pub fn print(&self) -> Option<Print> {
+        self.print
+    }
+
     /// The folder itself.
     pub fn path(&self) -> &Path {
         &self.path

@@ -34,7 +34,8 @@ pub fn curves(report: &Report) -> Vec<(Chart, String)> {
     let group = |run: &Run| {
         let (field, values) = grouped.as_ref()?;
         let own = run.values.get(*field)?;
-        values.iter().position(|value| same(value, own)).map(|k| (k, cell(own)))
+        let name = field.rsplit_once('.').map_or(field.as_str(), |(_, name)| name);
+        values.iter().position(|value| same(value, own)).map(|k| (k, format!("{name} {}", cell(own))))
     };
     // the legend has the order of the curves
     drawn.sort_by_key(|run| group(run).map(|(k, _)| k));
