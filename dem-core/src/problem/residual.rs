@@ -99,6 +99,16 @@ pub fn velocity_error<D: Dim>(problem: &ContactProblem<D>) -> f64 {
     }
 }
 
+/// The false motion of the impulses and node velocities that the problem now holds (–): the largest
+/// natural map of a contact as a velocity, over the largest relative velocity of any contact. Where
+/// a step asks no contact to change its velocity, as between fragments that drift apart, the
+/// velocity error relates the round-off of strong reactions to velocities near zero; this tells how
+/// wrong the motion is.
+pub fn false_motion<D: Dim>(problem: &ContactProblem<D>) -> f64 {
+    let Largest { map, moving, .. } = Largest::of(problem);
+    if map == 0.0 { 0.0 } else { map / moving }
+}
+
 /// The elastic error of the impulses and node velocities that the problem now holds (–): that by
 /// which elastic bonds violate their law, as impulses C⁻¹ D map, relative to their impulses, both
 /// in the norm of r·C r. Zero without elastic bonds, and within the round-off of the velocities.
@@ -142,19 +152,21 @@ pub fn furthest_from_law<D: Dim>(problem: &ContactProblem<D>) -> [u32; 2] {
 }
 
 /// Largest velocities over all contacts (m/s): `map` of the natural map, at the contact between the
-/// nodes `pair`; `free` without reactions; `asked` the same of the contacts that must change it:
-/// beside the gap of one that stays open, over a short step, any other velocity vanishes.
+/// nodes `pair`; `moving` of the contacts; `free` without reactions; `asked` the same of the contacts
+/// that must change it: beside the gap of one that stays open, over a short step, any other velocity
+/// vanishes.
 struct Largest<'a, D: Dim> {
     problem: &'a ContactProblem<D>,
     map: f64,
     pair: [u32; 2],
+    moving: f64,
     asked: f64,
     free: f64,
 }
 
 impl<'a, D: Dim> Largest<'a, D> {
     fn of(problem: &'a ContactProblem<D>) -> Self {
-        let mut largest = Self { problem, map: 0.0, pair: [0; 2], asked: 0.0, free: 0.0 };
+        let mut largest = Self { problem, map: 0.0, pair: [0; 2], moving: 0.0, asked: 0.0, free: 0.0 };
         problem.visit(&mut largest);
         largest
     }
@@ -164,7 +176,9 @@ impl<D: Dim> Visitor<D> for Largest<'_, D> {
     #[inline(always)]
     fn visit<L: Law>(&mut self, nodes: &Nodes<D>, c: &Contact<D, L>) {
         let (law, arms) = (&c.law, c.law.arms());
-        let map = law.natural_map(c.r, nodes.relative_velocity(&c.link, arms));
+        let relative = nodes.relative_velocity(&c.link, arms);
+        self.moving = self.moving.max(relative.dot(&relative).sqrt());
+        let map = law.natural_map(c.r, relative);
         let [i, j] = c.link.nodes.map(|k| self.problem.free[k as usize]);
         let free =
             c.link.relative_velocity::<L::T, L::B>(arms, i, j) + law.bias() - law.compliance().times(&law.carried());

@@ -30,7 +30,7 @@ use crate::contact::{LocalSolve, Padded};
 use crate::dim::Dim;
 use crate::problem::ContactProblem;
 use crate::problem::assembled::Assembled;
-use crate::problem::residual::velocity_error;
+use crate::problem::residual::{false_motion, velocity_error};
 use crate::saved::{Mismatch, Reader, Saved};
 use crate::solver::tuning::{defaults, stages as tuning};
 
@@ -139,6 +139,12 @@ impl StagedSettings {
     fn accepts(&self, residual: f64, velocity_error: f64) -> bool {
         let velocity = self.accept * (defaults::LOAD_TOLERANCE / defaults::TOLERANCE);
         residual <= self.accept && velocity_error <= velocity.max(self.load_tolerance)
+    }
+
+    /// Whether a residual is at most `accept`, and the false motion within the load tolerance: where
+    /// a step asks for next to no velocities, no velocity error can be small.
+    fn is_accepted_in_motion<D: Dim>(&self, problem: &ContactProblem<D>, residual: f64) -> bool {
+        residual <= self.accept && false_motion(problem) <= self.load_tolerance
     }
 
     /// Tolerances and iteration limit of the interior-point method.
@@ -389,7 +395,10 @@ impl<D: Dim> ContactSolver<D> for Staged {
             return SolveReport { status, route, work: before, residual, load_error: Some(load_error) };
         }
         self.newton.margins.clear();
-        let report = self.directly(problem);
+        let mut report = self.directly(problem);
+        if report.status == SolveStatus::Failed && self.settings.is_accepted_in_motion(problem, report.residual) {
+            report.status = SolveStatus::Accepted;
+        }
         match report.status {
             SolveStatus::Converged if self.newton.margins.len() == problem.len() => {
                 self.extrapolation.learn(problem, &self.newton.margins, load_tolerance);

@@ -27,6 +27,7 @@ use crate::body::{Drive, Shape, separation};
 use crate::bond::{Bond, BondStatus};
 use crate::contact::{Cone, Law, Local};
 use crate::dim::{Dim, Moments, Vect};
+use crate::problem::residual::false_motion;
 use crate::problem::{Contact, ContactProblem, Nodes, Visitor};
 use crate::solver::SolveReport;
 use crate::solver::certificate::{Verdict, verdict};
@@ -171,11 +172,13 @@ impl<D: Dim> World<D> {
 
     /// The load error of a solve (–) if it is too large: that of reactions that still grow, as
     /// where no motion satisfies rigid bonds. The deformation of elastic bonds bounds their
-    /// reactions.
-    pub(super) fn large_load_error(&self, solve: SolveReport) -> Option<f64> {
+    /// reactions. Beside a motion that is right, only reactions that balance each other can be
+    /// wrong.
+    pub(super) fn large_load_error(&self, solve: SolveReport, problem: &ContactProblem<D>) -> Option<f64> {
         let rigid = |bond: &Bond| bond.status == BondStatus::Intact && bond.stiffness.is_none();
         let error = solve.load_error_beyond_rounding().filter(|error| *error > LOAD_ERROR * self.looseness())?;
-        self.bonds.iter().any(rigid).then_some(error)
+        let aim = self.settings.solver.load_tolerance().unwrap_or(0.0);
+        (self.bonds.iter().any(rigid) && false_motion(problem) > aim).then_some(error)
     }
 
     /// Factor by which the tolerances of the solver loosen these limits.

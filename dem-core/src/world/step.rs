@@ -115,7 +115,7 @@ impl<D: Dim> World<D> {
             done.add(solve);
             self.refuse_violation(violation, &problem, last_attempt)?;
             self.refuse_unaccepted(solve, &problem, (self.time, h), last_attempt)?;
-            if limits_apply && self.large_load_error(solve).is_some() {
+            if limits_apply && self.large_load_error(solve, &problem).is_some() {
                 return Err(self.not_accepted(solve, &problem, (self.time, h), last_attempt));
             }
             write_reactions(&mut touches, &problem, &places, h);
@@ -287,7 +287,7 @@ impl<D: Dim> World<D> {
         last_attempt: bool,
     ) -> StepError {
         let SolveReport { residual, work, .. } = solve;
-        let load_error = self.large_load_error(solve).filter(|_| solve.status != SolveStatus::Failed);
+        let load_error = self.large_load_error(solve, problem).filter(|_| solve.status != SolveStatus::Failed);
         let small = solve.status == SolveStatus::Failed && residual <= self.settings.solver.accept();
         let velocity_error = small.then(|| velocity_error(problem));
         let verdict = if last_attempt { self.verdict(problem) } else { Verdict::Undecided };

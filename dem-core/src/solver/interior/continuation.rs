@@ -131,6 +131,12 @@ impl Continuation {
         State { r: self.at.r.clone(), x, z }
     }
 
+    /// Whether the current point is the end of a step along the tangent. Others are corrections,
+    /// far from the path where it has been lost.
+    pub fn is_on_path(&self) -> bool {
+        self.predictor.is_some() && self.corrections == 0
+    }
+
     /// One iteration, with the system at the current pairs: a Newton step and, if that is short, a
     /// step along the tangent.
     pub fn step(&mut self, system: &System, sites: &Sites) -> Progress {

@@ -49,6 +49,11 @@ impl Follow {
         self.by_arc_length.is_none()
     }
 
+    /// Whether the current point is next to the path: always in long steps.
+    pub fn is_on_path(&self) -> bool {
+        self.by_arc_length.as_ref().is_none_or(|by| by.continuation.is_on_path())
+    }
+
     /// Continue from an earlier point of the path.
     pub fn turn_back(&mut self, to: State, sites: &Sites) {
         let by_arc_length = self.by_arc_length.take().is_some();

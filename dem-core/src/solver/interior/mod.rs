@@ -84,7 +84,7 @@ impl Interior {
         let mut follow = Follow::from(begun);
         for iteration in 0..=aims.most {
             let at = follow.state();
-            match selection.assess(problem, &sites, &at, iteration) {
+            match selection.assess(problem, &sites, (&at, follow.is_on_path()), iteration) {
                 Next::Arrived => break,
                 Next::Onwards => {}
                 Next::Anchored(turn) => {

@@ -74,13 +74,19 @@ impl Selection {
         }
     }
 
-    /// Measure a point, and decide how the path continues.
-    pub fn assess(&mut self, problem: &mut impl Solvable, sites: &Sites, at: &State, iteration: u64) -> Next {
+    /// Measure a point, and decide how the path continues. Only a point `on_path` can be r*.
+    pub fn assess(
+        &mut self,
+        problem: &mut impl Solvable,
+        sites: &Sites,
+        (at, on_path): (&State, bool),
+        iteration: u64,
+    ) -> Next {
         let gaps = gap(at) * at.x.len() as f64;
         // reactions that hardly differ from the anchor are known well enough
         let energy = self.metric.energy(&at.r).max(tuning::LEAST * self.metric.weight(&at.r));
         let least = tuning::LEAST * energy;
-        if self.limits.is_none() && gaps <= least {
+        if self.limits.is_none() && gaps <= least && on_path {
             self.know(sites, at, least);
         }
         let selected = self.limits.is_some() && gaps <= self.enough;
@@ -127,6 +133,11 @@ impl Selection {
         (self.limits, self.enough) = (Some(limits), enough);
     }
 
+    /// Take no point as r* any more.
+    fn forget(&mut self) {
+        (self.limits, self.reached, self.enough) = (None, None, f64::INFINITY);
+    }
+
     /// Where the path has jammed: whether its point of least gap is a solution whose reactions
     /// hardly differ from the anchor. They would require gaps near round-off, at which it jams.
     pub fn ends_at_nearest(&mut self, problem: &mut impl Solvable, sites: &Sites) -> bool {
@@ -142,7 +153,7 @@ impl Selection {
             if missed.iter().any(|missed| *missed <= 1.0) {
                 return true;
             }
-            (self.limits, self.reached, self.enough) = (None, None, f64::INFINITY);
+            self.forget();
         }
         (self.change, self.nearest) = (last, Some((gaps, change, nearest)));
         false
@@ -154,7 +165,9 @@ impl Selection {
         if self.best.as_ref().is_none_or(|best| best.missed(self.aims) > 1.0)
             && let Some((_, change, nearest)) = self.nearest.take()
         {
+            // what was taken for r* has led to no solution
             self.change = change;
+            self.forget();
             self.measure(problem, sites, &nearest, false);
         }
         self.best.map(|best| Found { iterations: self.iterations, ..best })
