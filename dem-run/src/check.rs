@@ -154,7 +154,8 @@ impl Check {
         }
         let density = scene.materials.density;
         if density < LIGHT {
-            let told = format!("{} kg/m³ is lighter than any grain: if you meant g/cm³, write 1e3 for each", number(density));
+            let told =
+                format!("{} kg/m³ is lighter than any grain: if you meant g/cm³, write 1e3 for each", number(density));
             check.warnings.push(format!("materials.density: {told}"));
         }
         if !enough {

@@ -152,9 +152,9 @@ pub fn furthest_from_law<D: Dim>(problem: &ContactProblem<D>) -> [u32; 2] {
 }
 
 /// Largest velocities over all contacts (m/s): `map` of the natural map, at the contact between the
-/// nodes `pair`; `moving` of the contacts; `free` without reactions; `asked` the same of the contacts
-/// that must change it: beside the gap of one that stays open, over a short step, any other velocity
-/// vanishes.
+/// nodes `pair`; `moving` of the contacts; `free` without reactions; `asked` the same of the
+/// contacts that must change it: beside the gap of one that stays open, over a short step, any
+/// other velocity vanishes.
 struct Largest<'a, D: Dim> {
     problem: &'a ContactProblem<D>,
     map: f64,

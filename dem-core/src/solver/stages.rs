@@ -141,8 +141,8 @@ impl StagedSettings {
         residual <= self.accept && velocity_error <= velocity.max(self.load_tolerance)
     }
 
-    /// Whether a residual is at most `accept`, and the false motion within the load tolerance: where
-    /// a step asks for next to no velocities, no velocity error can be small.
+    /// Whether a residual is at most `accept`, and the false motion within the load tolerance:
+    /// where a step asks for next to no velocities, no velocity error can be small.
     fn is_accepted_in_motion<D: Dim>(&self, problem: &ContactProblem<D>, residual: f64) -> bool {
         residual <= self.accept && false_motion(problem) <= self.load_tolerance
     }

@@ -106,7 +106,7 @@ fn a_pair_that_a_grain_leaves_does_not_break() {
         "output": { "every_steps": 1 }
     });
     here.write("pair.csv", "i,j\n0,1\n");
-    here.write("pair.json", &scene.to_string());
+    here.write("pair.json", scene.to_string());
     for kind in ["auto", "newton", "interior"] {
         let summary = run(&here, "pair.json", &["--set", &format!("solver.kind={{\"{kind}\": {{}}}}")]);
         assert_eq!(summary["broken"], serde_json::json!([0, 0, 0, 0]), "{kind}");
@@ -142,7 +142,7 @@ fn a_step_that_asks_for_hardly_any_velocity_is_accepted() {
         "time": { "step": 1e-4, "end": 3e-4 },
         "output": { "every_steps": 1 }
     });
-    here.write("impact.json", &scene.to_string());
+    here.write("impact.json", scene.to_string());
     let summary = run(&here, "impact.json", &[]);
     assert_eq!(summary["steps"], 3);
     assert!(number(&summary["worst_residual"]) <= 1e-8);
