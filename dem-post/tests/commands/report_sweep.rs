@@ -192,7 +192,7 @@ fn the_curves_of_all_runs_are_on_one_chart() {
     let chart: Value = serde_json::from_str(data).unwrap();
     let names: Vec<&str> =
         chart["curves"].as_array().unwrap().iter().map(|one| one["name"].as_str().unwrap()).collect();
-    assert_eq!(names, ["10", "10", "20", "30"]);
+    assert_eq!(names, ["strength 10", "strength 10", "strength 20", "strength 30"]);
     let colours: Vec<&Value> = chart["curves"].as_array().unwrap().iter().map(|one| &one["colour"]).collect();
     assert!(colours[0] == colours[1] && colours[1] != colours[2] && colours[2] != colours[3]);
     assert!(curves.contains("in colours by bonds.strength (N)"));
