@@ -47,13 +47,14 @@ pub fn obtain<D: Dim>(folder: &Path, sample: &RandomSample, seed: u64, watch: Wa
     let lock = path.with_extension("lock");
     let _held = claim(&lock, &mut *watch)?;
     // another process may have packed it in the meantime
-    let packing = match read(&path, &name) {
-        Some(packing) => Ok(packing),
-        None => pack::<D>(sample, seed, watch).map_err(RunError::from).and_then(|packing| {
+    let packing = read(&path, &name).map_or_else(
+        || {
+            let packing = pack::<D>(sample, seed, watch)?;
             write(&path, &name, &packing)?;
             Ok(packing)
-        }),
-    };
+        },
+        Ok,
+    );
     // whoever then locks a new file reads the packing first, if there is one
     let _ = fs::remove_file(lock);
     packing

@@ -141,10 +141,16 @@ impl StagedSettings {
         residual <= self.accept && velocity_error <= velocity.max(self.load_tolerance)
     }
 
-    /// Whether a residual is at most `accept`, and the false motion within the load tolerance:
-    /// where a step asks for next to no velocities, no velocity error can be small.
-    fn is_accepted_in_motion<D: Dim>(&self, problem: &ContactProblem<D>, residual: f64) -> bool {
-        residual <= self.accept && false_motion(problem) <= self.load_tolerance
+    /// The report of a solve of `problem`, accepted also where its residual is at most `accept` and
+    /// its false motion within the load tolerance: where a step asks for next to no velocities, no
+    /// velocity error can be small.
+    fn accepted_by_motion<D: Dim>(&self, report: SolveReport, problem: &ContactProblem<D>) -> SolveReport {
+        let missed = report.status == SolveStatus::Failed && report.residual <= self.accept;
+        if missed && false_motion(problem) <= self.load_tolerance {
+            SolveReport { status: SolveStatus::Accepted, ..report }
+        } else {
+            report
+        }
     }
 
     /// Tolerances and iteration limit of the interior-point method.
@@ -395,10 +401,8 @@ impl<D: Dim> ContactSolver<D> for Staged {
             return SolveReport { status, route, work: before, residual, load_error: Some(load_error) };
         }
         self.newton.margins.clear();
-        let mut report = self.directly(problem);
-        if report.status == SolveStatus::Failed && self.settings.is_accepted_in_motion(problem, report.residual) {
-            report.status = SolveStatus::Accepted;
-        }
+        let report = self.directly(problem);
+        let report = self.settings.accepted_by_motion(report, problem);
         match report.status {
             SolveStatus::Converged if self.newton.margins.len() == problem.len() => {
                 self.extrapolation.learn(problem, &self.newton.margins, load_tolerance);
@@ -412,7 +416,10 @@ impl<D: Dim> ContactSolver<D> for Staged {
     fn solve_finer(&mut self, problem: &mut ContactProblem<D>, found: SolveReport, excess: f64) -> Option<SolveReport> {
         if is_dry(problem) {
             let swept = self.settings.stages == Stages::All && found.status == SolveStatus::Accepted;
-            return swept.then(|| self.directly(problem));
+            return swept.then(|| {
+                let report = self.directly(problem);
+                self.settings.accepted_by_motion(report, problem)
+            });
         }
         let settings = self.settings;
         // displacements are in proportion to both errors
@@ -427,7 +434,8 @@ impl<D: Dim> ContactSolver<D> for Staged {
         }
         let velocity_error = velocity_error(problem);
         let reported = settings.report(report.work, report.residual, report.load_error.unwrap_or(0.0), velocity_error);
-        Some(SolveReport { route: report.route, load_error: report.load_error, ..reported })
+        let report = SolveReport { route: report.route, load_error: report.load_error, ..reported };
+        Some(settings.accepted_by_motion(report, problem))
     }
 
     fn snapshot(&self) -> Box<dyn ContactSolver<D>> {

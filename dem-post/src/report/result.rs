@@ -148,11 +148,12 @@ fn told(events: &[(&str, Option<f64>)], clock: Clock) -> String {
     let before = events.iter().filter_map(|(name, time)| Some(format!("{name} at {}", clock.moment((*time)?))));
     let before: Vec<String> = before.collect();
     let own: Vec<&str> = events.iter().filter(|(_, time)| time.is_none()).map(|(name, _)| *name).collect();
-    match (before.join(", "), own.join(", ")) {
-        (before, own) if before.is_empty() => capitalised(&format!("{own}: ")),
-        (before, own) if own.is_empty() => capitalised(&format!("{before}; shown: ")),
-        (before, own) => capitalised(&format!("{before}; shown: {own}, ")),
-    }
+    let (before, own) = (before.join(", "), own.join(", "));
+    capitalised(&match (before.is_empty(), own.is_empty()) {
+        (true, _) => format!("{own}: "),
+        (false, true) => format!("{before}; shown: "),
+        (false, false) => format!("{before}; shown: {own}, "),
+    })
 }
 
 /// Load and broken bonds over time.
