@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use dem_history::History;
+use dem_history::{History, NOT_FORMED};
 
 use crate::output::Result;
 
@@ -21,7 +21,30 @@ pub fn volume(dimension: usize, radius: f64) -> f64 {
 /// # Errors
 /// Those of reading the history; it must have a frame.
 pub fn first_box(history: &History) -> Result<Vec<[f64; 2]>> {
-    Ok(box_around(&history.grains()?.radius, &history.grain_state(0)?.position, history.dimension()))
+    box_at(history, 0)
+}
+
+/// The frame with the grains as they were bonded: the first one, or the first one after a stage has
+/// formed the bonds (the last, where none was recorded since).
+///
+/// # Errors
+/// Those of reading the history.
+pub fn bonded_frame(history: &History) -> Result<usize> {
+    let formed = history.bonds()?.formed.unwrap_or(NOT_FORMED);
+    let found = history.steps().partition_point(|&step| step < formed);
+    Ok(found.min(history.frames().saturating_sub(1)))
+}
+
+/// The box around all grains as they were bonded, m: its ends along each axis.
+///
+/// # Errors
+/// Those of reading the history; it must have a frame.
+pub fn bonded_box(history: &History) -> Result<Vec<[f64; 2]>> {
+    box_at(history, bonded_frame(history)?)
+}
+
+fn box_at(history: &History, frame: usize) -> Result<Vec<[f64; 2]>> {
+    Ok(box_around(&history.grains()?.radius, &history.grain_state(frame)?.position, history.dimension()))
 }
 
 /// The box around grains of these radii at these positions, D numbers each, m: its ends along each

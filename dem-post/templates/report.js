@@ -235,6 +235,7 @@
     const parts = [when(time)];
     if (load !== undefined && load !== null) parts.push(`load ${number(load)} N`);
     if (run.bonds) parts.push(`${run.broken[moment]} of ${run.bonds} bonds broken`);
+    if (run.outside[moment]) parts.push(`${run.outside[moment]} of ${grains} grains outside the picture`);
     told.textContent = parts.join(' · ');
     slider.setAttribute('aria-valuetext', told.textContent);
     draw();

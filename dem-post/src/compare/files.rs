@@ -3,6 +3,7 @@
 use dem_history::History;
 
 use super::report::{Break, Fate, Gap, Report};
+use crate::extent::bonded_frame;
 use crate::map::{Key, Link, Panel, Sample, draw};
 use crate::output::{Folder, Result, cell};
 use dem_drawing::{Chart, Drawing, Style, colour};
@@ -96,9 +97,10 @@ fn load_charts(report: &Report) -> Vec<Chart> {
     charts
 }
 
-/// The bonds that broke, over the grains of the first frame of the first run.
+/// The bonds that broke, over the grains of the first run as they were bonded.
 fn bond_map(history: &History, report: &Report) -> Result<Drawing> {
-    let (d, grains) = (history.dimension(), history.grain_state(0)?);
+    let (d, frame) = (history.dimension(), bonded_frame(history)?);
+    let grains = history.grain_state(frame)?;
     let centre = |grain: i32| grains.position[grain as usize * d..(grain as usize + 1) * d].to_vec();
     let kind = |fate: &Fate| match (fate.a, fate.b) {
         (Some(_), Some(_)) => 0,
@@ -112,9 +114,9 @@ fn bond_map(history: &History, report: &Report) -> Result<Drawing> {
         colour: COLOURS[kind(fate)].into(),
     });
     let panel = Panel {
-        caption: vec!["bonds that broke".into(), "positions in the first frame of A".into()],
+        caption: vec!["bonds that broke".into(), "positions when the bonds of A formed".into()],
         links: links.collect(),
-        walls: history.wall_state(0)?,
+        walls: history.wall_state(frame)?,
         fills: vec!["#f4f4f4".into(); history.grains()?.radius.len()],
         outline: "#cfcfcf",
         grains,

@@ -1,6 +1,6 @@
 //! Cracks as lines, in 2D: segments of broken bonds, joined through the voids between the grains.
 //!
-//! All positions are those of the first frame: the crack is drawn in the cemented sample,
+//! All positions are those when the bonds formed: the crack is drawn in the cemented sample,
 //! independent of the later motion of the fragments.
 //!
 //! * **Segment** of a broken bond: from the middle of the void on one side through its point of

@@ -8,9 +8,9 @@ use super::modes::{mode_colour, mode_name};
 use super::paths::Crack;
 use super::report::{Event, Report};
 use super::surfaces::Facet;
-use crate::extent::range;
+use crate::extent::{bonded_frame, range};
 use crate::fragments::{Fragment, Fragments};
-use crate::map::{Colour, Key, Link, Materials, Panel, Patch, Ramp, Sample, Scale, draw, draw_view};
+use crate::map::{Colour, Key, Link, Materials, Panel, Patch, Ramp, Sample, Scale, draw, draw_part, draw_view};
 use crate::output::{Result, counted};
 use crate::title::Titles;
 use dem_drawing::{Chart, Drawing, Style, colour};
@@ -191,18 +191,18 @@ impl When {
     }
 }
 
-/// The grains of the first frame, pale, with the legend of their materials; the caption gives the
+/// The grains as they were bonded, pale, with the legend of their materials; the caption gives the
 /// numbers of cracks and broken bonds.
 fn pale_panel(history: &History, report: &Report, cracks: usize) -> Result<(Panel, Vec<Key>)> {
-    let materials = Materials::read(history)?;
+    let (materials, frame) = (Materials::read(history)?, bonded_frame(history)?);
     let keys = materials.iter().flat_map(|materials| materials.keys(PALE[1])).collect();
     let panel = Panel {
         caption: vec![
             format!("{} of {}", counted(cracks, "crack"), counted(report.broken.total(), "broken bond")),
-            "positions in the first frame".into(),
+            "positions when the bonds formed".into(),
         ],
-        grains: history.grain_state(0)?,
-        walls: history.wall_state(0)?,
+        grains: history.grain_state(frame)?,
+        walls: history.wall_state(frame)?,
         fills: Materials::fills(materials.as_ref(), history.grains()?.radius.len(), PALE[0]),
         outline: PALE[1],
         ..Panel::default()
@@ -211,7 +211,7 @@ fn pale_panel(history: &History, report: &Report, cracks: usize) -> Result<(Pane
 }
 
 /// The facets of cracks in 3D, in colours that show when each bond broke: in perspective, and over
-/// the grains of the first frame along y and against x.
+/// the grains as they were bonded along y and against x.
 ///
 /// # Errors
 /// Those of reading the history.
@@ -230,7 +230,7 @@ pub fn surface_maps(history: &History, report: &Report, by: ColourBy) -> Result<
     Ok([whole, map(&front, &panel, &legend), map(&side, &panel, &legend)])
 }
 
-/// The cracks over the grains of the first frame, in colours that show when each bond broke. The
+/// The cracks over the grains as they were bonded, in colours that show when each bond broke. The
 /// second drawing shows the part around the cracks, if this part is small.
 ///
 /// # Errors
@@ -252,7 +252,7 @@ pub fn crack_map(history: &History, report: &Report, by: ColourBy) -> Result<(Dr
     let (sample, panels) = (Sample::read(history)?, [panel]);
     let all = sample.view(panels.iter().map(|panel| (&panel.grains, &panel.walls)));
     let near = sample.near(report.paths.segments.iter().flat_map(|s| s.line.iter().map(|x| x.as_slice())), all);
-    let near = near.map(|view| draw_view(&sample, view, &panels, &legend));
+    let near = near.map(|view| draw_part(&sample, view, &panels, &legend));
     Ok((draw_view(&sample, all, &panels, &legend), near))
 }
 

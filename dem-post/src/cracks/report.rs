@@ -8,6 +8,7 @@ use super::modes::Modes;
 use super::paths::{Crack, Paths};
 use super::surfaces::{Surface, Surfaces};
 use crate::clock::Clock;
+use crate::extent::bonded_frame;
 use crate::fragments::{Fragments, fragments};
 use crate::output::{PostError, Result, Text, facts, number, progress};
 
@@ -124,7 +125,7 @@ pub fn read(history: &History, quiet: bool) -> Result<Report> {
     let five = (bonds.len() as f64 * 0.05).ceil() as usize;
     let (mut paths, mut faces) = (Paths::default(), Surfaces::default());
     if history.frames() > 0 {
-        let (position, radius) = (history.grain_state(0)?.position, history.grains()?.radius);
+        let (position, radius) = (history.grain_state(bonded_frame(history)?)?.position, history.grains()?.radius);
         if history.dimension() == 2 {
             let position: Vec<[f64; 2]> = position.chunks(2).map(|x| [x[0], x[1]]).collect();
             paths = Paths::find(&position, &radius, &bonds, &ruptures);

@@ -18,14 +18,15 @@ impl OnPage for Report {
         if !self.cracks.is_empty() {
             let (all, near) = crack_map(history, self, ColourBy::Time)?;
             let alt =
-                "Broken bonds as lines over the grains of the first frame, coloured by the time at which they broke.";
+                "Broken bonds as lines over the grains as they were bonded, coloured by the time at which they broke.";
             figures.push(map_figure(&all, alt, "Cracks by the time at which each bond broke.")?);
             if let Some(near) = near {
                 figures.push(map_figure(&near, &format!("{alt} Enlarged."), "The part around the cracks.")?);
             }
         }
         if !self.surfaces.is_empty() {
-            let alt = "Facets of broken bonds at their positions in the first frame, coloured by the time at which they broke.";
+            let alt =
+                "Facets of broken bonds at their positions when they formed, coloured by the time at which they broke.";
             let [whole, front, side] = surface_maps(history, self, ColourBy::Time)?;
             figures.push(map_figure(&whole, alt, "Cracks by the time at which each bond broke.")?);
             figures.push(map_figure(&front, alt, "The same, seen along y.")?);
@@ -75,10 +76,10 @@ impl OnPage for Report {
         ];
         let text = if history.dimension() == 2 {
             "A crack is a set of broken bonds that meet in the voids between the grains; its path is the longest line through it, drawn \
-             thick. Positions are those of the first frame."
+             thick. Positions are those when the bonds formed."
         } else {
             "A crack is a set of broken bonds whose facets (the common faces of the cells of two grains) meet in the voids between the \
-             grains. Positions are those of the first frame."
+             grains. Positions are those when the bonds formed."
         };
         Ok(Section { text: text.into(), facts, figures, tables, ..Section::of::<Self>() })
     }

@@ -1,6 +1,6 @@
 //! Cracks as surfaces, in 3D: facets of broken bonds, joined where they meet.
 //!
-//! All positions are those of the first frame: the crack is drawn in the cemented sample,
+//! All positions are those when the bonds formed: the crack is drawn in the cemented sample,
 //! independent of the later motion of the fragments.
 //!
 //! * **Facet** of a broken bond: the common face of the cells of its two grains in the power

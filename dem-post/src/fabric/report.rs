@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::region::Region;
 use super::tensors::{Dyads, anisotropy, direction};
 use crate::clock::Clock;
-use crate::extent::first_box;
+use crate::extent::{bonded_box, bonded_frame, first_box};
 use crate::moments;
 use crate::output::{Result, Text, number, progress, quantity};
 use crate::tensor::{mean_and_deviator, principal};
@@ -51,8 +51,7 @@ pub struct Row {
 pub struct Report {
     /// Dimension.
     pub dimension: usize,
-    /// Extents of the box around all grains at the first frame, m: of the volume of stress and
-    /// crack density.
+    /// Extents of the box around all grains at the first frame, m: of the volume of stress.
     pub extents: Vec<f64>,
     /// The region of the porosity.
     pub region_centre: Vec<f64>,
@@ -80,10 +79,9 @@ pub fn read(history: &History, times: &[f64], quiet: bool) -> Result<Report> {
     let ends = first_box(history)?;
     let region = Region::inside(&ends);
     let extents: Vec<f64> = ends.iter().map(|[low, high]| high - low).collect();
-    let volume: f64 = extents.iter().product();
     let radius = history.grains()?.radius;
     let [stress, strain] = [history.observable("stress")?, history.observable("strain")?];
-    let mut cracks = Cracks::new(history, volume)?;
+    let mut cracks = Cracks::new(history)?;
     let mut rows = vec![];
     let bar = progress(history.frames() as u64, quiet, "{bar:24} {percent} % of the frames read, {eta} left");
     for (frame, (&step, &time)) in history.steps().iter().zip(history.times()).enumerate() {
@@ -133,12 +131,13 @@ struct Cracks {
 }
 
 impl Cracks {
-    fn new(history: &History, volume: f64) -> Result<Self> {
+    fn new(history: &History) -> Result<Self> {
         let dimension = history.dimension();
+        let volume = bonded_box(history)?.iter().map(|[low, high]| high - low).product();
         Ok(Self {
             bonds: history.bonds()?,
             ruptures: history.ruptures()?,
-            position: history.grain_state(0)?.position,
+            position: history.grain_state(bonded_frame(history)?)?.position,
             sum: Dyads::new(dimension),
             dimension,
             volume,
@@ -228,8 +227,8 @@ impl Report {
         let kind = if self.dimension == 2 { "disk" } else { "sphere" };
         table.lines()
             + &format!(
-                "\nporosity of a {kind} of {} m in the middle of the sample; stress and sections of broken bonds over the box \
-                 around it at the first frame\n",
+                "\nporosity of a {kind} of {} m in the middle of the sample; stress over the box around it at the first \
+                 frame, sections of broken bonds over that when the bonds formed\n",
                 number(2.0 * self.region_radius)
             )
     }

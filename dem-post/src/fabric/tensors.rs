@@ -8,7 +8,7 @@
 //! & Zhao 2013).
 //!
 //! **Crack density**: C = (1/V) Σ A n ⊗ n over the broken bonds, with the section A of each (m²),
-//! its normal n, from grain to grain at the first frame, and the volume V of the sample (1/m). It
+//! its normal n, from grain to grain as they were bonded, and the volume V of the sample (1/m). It
 //! is Oda's crack tensor (1984) without its factor of length. Its trace is the area of these
 //! sections in a unit of volume, not that of the surfaces of cracks between the grains.
 

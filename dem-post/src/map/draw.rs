@@ -31,8 +31,28 @@ pub fn draw(sample: &Sample, panels: &[Panel], legend: &[Key]) -> Drawing {
     draw_view(sample, view, panels, legend)
 }
 
-/// As [`draw`], for a given part of the plane.
-pub fn draw_view(sample: &Sample, View([low, high]): View, panels: &[Panel], legend: &[Key]) -> Drawing {
+/// As [`draw`], for the part of the plane that contains the sample; captions tell how many grains
+/// are outside.
+pub fn draw_view(sample: &Sample, view: View, panels: &[Panel], legend: &[Key]) -> Drawing {
+    let told = |panel: &Panel| {
+        let mut caption = panel.caption.clone();
+        match (sample.outside(&panel.grains, view), caption.last_mut()) {
+            (0, _) => {}
+            (outside, Some(line)) => *line += &format!(", {}", outside_text(outside)),
+            (outside, None) => caption.push(outside_text(outside)),
+        }
+        Panel { caption, ..panel.clone() }
+    };
+    draw_part(sample, view, &panels.iter().map(told).collect::<Vec<_>>(), legend)
+}
+
+/// `3 grains outside the picture`
+fn outside_text(outside: usize) -> String {
+    format!("{outside} grain{} outside the picture", if outside == 1 { "" } else { "s" })
+}
+
+/// As [`draw`], for a part of the sample.
+pub fn draw_part(sample: &Sample, View([low, high]): View, panels: &[Panel], legend: &[Key]) -> Drawing {
     let extent = [high[0] - low[0], high[1] - low[1]];
     let stacked = extent[0] > STACKED * extent[1];
     let widest = if stacked { WIDE } else { PANEL.0 };

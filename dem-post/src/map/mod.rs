@@ -1,7 +1,7 @@
 //! Maps of the sample: grains, walls, contacts and bonds, several moments side by side on one
 //! scale.
 
-pub use draw::{draw, draw_view};
+pub use draw::{draw, draw_part, draw_view};
 pub use eye::Perspective;
 pub use legend::Key;
 pub use material::Materials;

@@ -10,6 +10,8 @@ use crate::output::Result;
 
 /// A part of the sample smaller than this share has a separate picture.
 const SMALL: f64 = 0.25;
+/// Drawings show a wider part where more than this share of the grains would be outside.
+const OUTSIDE: f64 = 0.05;
 
 /// The common data of all panels: the grains' sizes, the walls, and the viewpoint.
 pub struct Sample {
@@ -19,8 +21,9 @@ pub struct Sample {
     pub(super) eye: Eye,
     /// Depth of the plane that cuts the spheres open, m, if any.
     slice: Option<f64>,
-    /// Corners of the greatest part drawn, m: the first frame with a margin of half its size.
-    limits: Box2,
+    /// Corners of the part drawn at most, m: the first frame with a margin of half its size, and
+    /// the wider part where many grains leave that.
+    limits: [Box2; 2],
 }
 
 /// The part of the plane that a drawing shows: two corners, m.
@@ -89,11 +92,9 @@ impl Sample {
     fn seen(history: &History, eye: Eye) -> Result<Self> {
         let Grains { radius, .. } = history.grains()?;
         let (walls, dimension) = (history.walls()?, history.dimension());
-        let mut sample = Self { radius, walls, dimension, eye, slice: None, limits: [[0.0; 2]; 2] };
+        let mut sample = Self { radius, walls, dimension, eye, slice: None, limits: [EVERYWHERE; 2] };
         let first = history.grain_state(0)?;
-        let [low, high] = sample.bounds(&first, EVERYWHERE);
-        let spread = |k: usize| 0.5 * (high[k] - low[k]);
-        sample.limits = [[low[0] - spread(0), low[1] - spread(1)], [high[0] + spread(0), high[1] + spread(1)]];
+        sample.limits = limits(sample.bounds(&first, EVERYWHERE));
         Ok(sample)
     }
 
@@ -132,6 +133,17 @@ impl Sample {
         View(states.fold(EMPTY, |all, (grains, walls)| union(all, self.extent(grains, walls))))
     }
 
+    /// Number of grains of which nothing is in `view`.
+    pub fn outside(&self, state: &GrainState, View([low, high]): View) -> usize {
+        let off = |grain: &usize| {
+            let place = &state.position[grain * self.dimension..];
+            let [l, h] = around(self.flat(place), self.radius[*grain] * self.eye.magnified(place));
+            // not a place at all if the run failed
+            !(0..2).all(|k| h[k] >= low[k] && l[k] <= high[k])
+        };
+        (0..self.radius.len()).filter(off).count()
+    }
+
     /// The part that contains `points` (m, D numbers each) with a margin, at least five mean
     /// diameters wide; `None` if this part is not small compared with the sample.
     pub fn near<'a>(&self, points: impl Iterator<Item = &'a [f64]>, all: View) -> Option<View> {
@@ -145,16 +157,61 @@ impl Sample {
 
     /// The box around the grains and the near parts of round walls.
     fn extent(&self, grains: &GrainState, walls: &WallState) -> Box2 {
-        let mut found = self.bounds(grains, self.limits);
+        let outside = self.outside(grains, View(self.limits[0]));
+        // a heap spreads and a silo empties; a few fragments that fly off would shrink the rest
+        let limits = self.limits[usize::from(outside as f64 > OUTSIDE * self.radius.len() as f64)];
+        let mut found = self.bounds(grains, limits);
         if found == EMPTY {
             // all grains have left, as a disk on an incline does
             found = self.bounds(grains, EVERYWHERE);
         }
         for (wall, position) in self.walls.iter().zip(walls.position.chunks(self.dimension)) {
-            if let Some(shown) = wall::extent(&self.eye, wall, position, self.limits) {
+            if let Some(shown) = wall::extent(&self.eye, wall, position, limits) {
                 found = union(found, shown);
             }
         }
         found
+    }
+}
+
+/// The parts drawn at most of a sample that is in this box at first.
+fn limits([low, high]: Box2) -> [Box2; 2] {
+    let size = [0, 1].map(|k| high[k] - low[k]);
+    let widened = |by: [f64; 2]| [[0, 1].map(|k| low[k] - by[k]), [0, 1].map(|k| high[k] + by[k])];
+    [widened(size.map(|size| 0.5 * size)), widened([1.5 * size[0].max(size[1]); 2])]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of 20 disks of radius 1 in a row, the first of which has moved by `by`, the disks outside
+    /// the picture and its right edge.
+    fn moved(by: &[f64]) -> (usize, f64) {
+        let position = |k: usize| [2.0 * k as f64 + by.get(k).unwrap_or(&0.0), 0.0];
+        let state = GrainState { position: (0..20).flat_map(position).collect(), ..GrainState::default() };
+        let sample = Sample {
+            radius: vec![1.0; 20],
+            walls: vec![],
+            dimension: 2,
+            eye: Eye::Along([0, 1]),
+            slice: None,
+            limits: limits([[-1.0, -1.0], [39.0, 1.0]]),
+        };
+        let view = sample.view(std::iter::once((&state, &WallState::default())));
+        (sample.outside(&state, view), view.edges()[2])
+    }
+
+    #[test]
+    fn a_heap_that_spreads_is_drawn_whole_and_fragments_are_counted() {
+        assert_eq!(moved(&[]), (0, 39.0));
+        assert_eq!(moved(&[50.0]), (0, 51.0));
+        // a fragment far away would shrink the rest
+        assert_eq!(moved(&[80.0]), (1, 39.0));
+        assert_eq!(moved(&[80.0, 85.0]), (0, 88.0));
+        assert_eq!(moved(&[80.0, 85.0, 2e3]), (1, 88.0));
+        // all have left
+        assert_eq!(moved(&[1e3; 20]), (0, 1039.0));
+        assert_eq!(moved(&[f64::NAN]).0, 1);
     }
 }

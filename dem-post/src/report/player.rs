@@ -6,7 +6,7 @@
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use dem_history::{History, Rupture, RuptureMode, WallDrive, WallKind};
+use dem_history::{GrainState, History, Rupture, RuptureMode, WallDrive, WallKind};
 use serde::Serialize;
 
 use crate::cracks::mode_colour;
@@ -47,6 +47,8 @@ struct Data {
     /// Bonds broken at each, and at the start.
     broken: Vec<usize>,
     bonds: usize,
+    /// Grains outside the part shown, at each.
+    outside: Vec<usize>,
     /// The least and greatest position along each axis, m.
     low: Vec<f64>,
     high: Vec<f64>,
@@ -100,14 +102,14 @@ pub fn read(
         return Ok(None);
     }
     let (sample, materials) = (Sample::with_depth(history)?, Materials::read(history)?);
-    let (mut view, mut place, mut outlines) = (View::EMPTY, vec![], vec![]);
+    let (mut view, mut states, mut outlines) = (View::EMPTY, vec![], vec![]);
     let mut broke = vec![NEVER; bonds.len()];
     let mut mode = vec![0; bonds.len()];
     let mut broken = vec![];
     for (moment, &frame) in moments.iter().enumerate() {
         let (state, walls) = (history.grain_state(frame)?, history.wall_state(frame)?);
         view = view.join(sample.view(std::iter::once((&state, &walls))));
-        place.push(state.position);
+        states.push(state);
         outlines.push(walls.position);
         let mut count = 0;
         for (bond, status) in history.bond_status(frame)?.iter().enumerate().take(bonds.len()) {
@@ -120,8 +122,8 @@ pub fn read(
         }
         broken.push(count);
     }
-    let ends = ends(history, &place)?;
-    let shares = place.iter().flat_map(|place| place.iter().enumerate()).map(|(k, x)| {
+    let ends = ends(history, &states)?;
+    let shares = states.iter().flat_map(|state| state.position.iter().enumerate()).map(|(k, x)| {
         let [low, high] = ends[k % d];
         if high > low { (x - low) / (high - low) } else { 0.5 }
     });
@@ -137,6 +139,7 @@ pub fn read(
         load: load.map_or_else(Vec::new, at),
         broken,
         bonds: bonds.len(),
+        outside: states.iter().map(|state| sample.outside(state, view)).collect(),
         position: quantised(shares),
         low: ends.iter().map(|end| end[0]).collect(),
         high: ends.iter().map(|end| end[1]).collect(),
@@ -167,11 +170,11 @@ fn moments(times: &[f64], ruptures: &[f64], pictures: &[usize], count: usize) ->
 }
 
 /// The least and greatest position along each axis, m.
-fn ends(history: &History, place: &[Vec<f64>]) -> Result<Vec<[f64; 2]>> {
+fn ends(history: &History, states: &[GrainState]) -> Result<Vec<[f64; 2]>> {
     let first = first_box(history)?;
     let size = first.iter().map(|[low, high]| high - low).fold(0.0, f64::max);
     let axis = |(k, [low, high]): (usize, &[f64; 2])| {
-        let all = place.iter().flat_map(|place| place.iter().skip(k).step_by(first.len()).copied());
+        let all = states.iter().flat_map(|state| state.position.iter().skip(k).step_by(first.len()).copied());
         // a grain at an end counts as outside, so the range is a little wider
         let [least, most] = range(all.filter(|x| x.is_finite()));
         let margin = 1e-3 * size;

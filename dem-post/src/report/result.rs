@@ -8,7 +8,7 @@ use super::player;
 use crate::clock::Clock;
 use crate::collapse::peak;
 use crate::cracks::report::total_over_time;
-use crate::extent::first_box;
+use crate::extent::{bonded_box, bonded_frame};
 use crate::frames::{self, Subject};
 use crate::moments::{self, SAME_TIME};
 use crate::output::{PostError, Result, counted, number, quantity, short};
@@ -283,12 +283,14 @@ fn break_sentence(history: &History, cracks: &cracks::Report, ruptures: &[Ruptur
     Ok(text)
 }
 
-/// Where a bond broke, as shares of the sample's box at the first frame.
+/// Where a bond was, as shares of the box of the sample as it was bonded.
 fn place(history: &History, rupture: &Rupture) -> Result<String> {
-    let ends = first_box(history)?;
+    let (ends, state) = (bonded_box(history)?, history.grain_state(bonded_frame(history)?)?);
+    let centre =
+        |k: usize| 0.5 * rupture.pair.map(|grain| state.position[grain as usize * ends.len() + k]).iter().sum::<f64>();
     let names = if ends.len() == 2 { &["width", "height"][..] } else { &["width", "depth", "height"] };
     let share = |(k, [low, high]): (usize, &[f64; 2])| {
-        let share = 100.0 * (rupture.point[k] - low) / (high - low);
+        let share = 100.0 * (centre(k) - low) / (high - low);
         format!("{share:.0} % of the {}", names[k])
     };
     let shares: Vec<String> = ends.iter().enumerate().map(share).collect();

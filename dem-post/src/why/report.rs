@@ -7,6 +7,7 @@ use super::bond::Which;
 use super::rupture::Broken;
 use super::utilisation::{Greatest, Limits, Load, Part, Twist, greatest};
 use crate::clock::Clock;
+use crate::extent::bonded_frame;
 use crate::output::{PostError, Result, progress};
 use crate::stress_strain::driven;
 
@@ -18,7 +19,7 @@ pub(super) const LEVELS: [f64; 2] = [0.5, 0.9];
 pub struct Grain {
     /// Its number.
     pub grain: usize,
-    /// Its centre in the first frame, m.
+    /// Its centre when the bond formed, m.
     pub centre: Vec<f64>,
     /// Its radius, m.
     pub radius: f64,
@@ -101,7 +102,7 @@ pub fn read(history: &History, which: Which, wall: Option<&str>, quiet: bool) ->
     }
     let until = broken.map_or(i64::MAX, |rupture| rupture.step);
     let frames = moments(history, bond, bonds.pair[bond], &limits, until, quiet)?;
-    let (radius, position) = (history.grains()?.radius, history.grain_state(0)?.position);
+    let (radius, position) = (history.grains()?.radius, history.grain_state(bonded_frame(history)?)?.position);
     let d = history.dimension();
     let grain = |grain: i32| {
         let grain = grain as usize;

@@ -115,7 +115,7 @@ fn bonds(count: usize) -> String {
 
 fn describe(grain: &Grain) -> String {
     let Grain { grain, centre, radius } = grain;
-    format!("{grain}: centre {} in the first frame, radius {} mm", place(centre), number(1e3 * radius))
+    format!("{grain}: centre {} when the bond formed, radius {} mm", place(centre), number(1e3 * radius))
 }
 
 fn place(point: &[f64]) -> String {

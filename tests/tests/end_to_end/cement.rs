@@ -92,6 +92,25 @@ fn a_bond_that_forms_under_pressure_bears_its_strength_in_tension() {
     }
 }
 
+/// The upper disk falls by a whole diameter before the bond forms.
+#[test]
+fn what_breaks_is_shown_where_it_was_bonded() {
+    let here = Folder::new();
+    let mut falling = scene(json!({}));
+    falling["sample"]["grains"][1]["center"] = json!([0, 2.0 * A]);
+    here.write("scene.json", falling.to_string());
+    run(&here, "scene.json", &[]);
+    let why = here.dem_post(&["why", "a.h5", "0", "--json"]).json();
+    assert!((number(&why["grains"][1]["centre"][1]) / A - 1.0).abs() < 1e-6, "{why}");
+    // a section of one diameter in a box of one by two
+    let fabric = here.dem_post(&["fabric", "a.h5", "--json"]).json();
+    let density = &fabric["rows"].as_array().expect("rows").last().expect("a frame")["crack_density"];
+    assert!((number(&density[3]) * 2.0 * A - 1.0).abs() < 1e-6, "{density}");
+    here.dem_post(&["report", "a.h5"]).succeeds();
+    let page = String::from_utf8(here.read("a-post/report.html")).expect("text");
+    assert!(page.contains("at 50 % of the width and 50 % of the height, between grains 0 and 1"));
+}
+
 #[test]
 fn a_run_that_is_stopped_before_at_or_after_its_cementing_goes_on_to_the_bit() {
     let here = Folder::new();
