@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use dem_history::{CopyAs, Ending, History, RuptureMode, Series, Wall, WallDrive};
+use dem_history::{CopyAs, Ending, History, Parameters, RuptureMode, Series, Wall, WallDrive};
 use serde::Serialize;
 
 use crate::analysis::Analysis;
@@ -103,6 +103,8 @@ pub struct Report {
     pub ending: Option<Ending>,
     /// Program, build, host and start of the run.
     pub origin: String,
+    /// Last steps of earlier scenes: where `resume --force` changed the scene.
+    pub scene_changed_after: Vec<i64>,
     /// Dimension.
     pub dimension: usize,
     /// Seed.
@@ -182,6 +184,7 @@ pub fn read(history: &History) -> Result<Report> {
             "dem-run {} (git {revision}, {}) on {}, {}",
             parameters.version, parameters.build, parameters.host, parameters.start
         ),
+        scene_changed_after: changes(&parameters),
         dimension: history.dimension(),
         seed: parameters.seed,
         grains: grains.radius.len(),
@@ -225,6 +228,12 @@ impl OnPage for Report {
         let facts = self.facts().into_iter().map(|(name, value)| (name.to_string(), value)).collect();
         Ok(Section { facts, ..Section::of::<Self>() })
     }
+}
+
+/// The last steps of the scenes before the present one.
+fn changes(parameters: &Parameters) -> Vec<i64> {
+    let list: Vec<serde_json::Value> = serde_json::from_str(&parameters.earlier_scenes).unwrap_or_default();
+    list.iter().filter_map(|earlier| earlier["last_step"].as_i64()).collect()
 }
 
 impl Report {
@@ -277,6 +286,10 @@ impl Report {
             ("dimension, seed", format!("{}, {}", self.dimension, self.seed)),
             ("grains", format!("{}, diameters {least} to {most} mm, {} kg in all", self.grains, number(self.mass))),
         ];
+        if !self.scene_changed_after.is_empty() {
+            let steps: Vec<String> = self.scene_changed_after.iter().map(ToString::to_string).collect();
+            lines.push(("scene changed", format!("after step {} (/parameters/earlier_scenes)", steps.join(", "))));
+        }
         if self.walls.is_empty() {
             lines.push(("walls", "none".into()));
         }

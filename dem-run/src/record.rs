@@ -37,6 +37,16 @@ pub struct Recorder<D: Dim> {
 /// Maximum number of steps whose observables are batched for the writer.
 const GATHERED: usize = 256;
 
+/// What the file of a resumed run begins with.
+pub struct Start<'a> {
+    /// The rows of the old file that stay.
+    pub kept: RowCounts,
+    /// The state from which the run goes on.
+    pub checkpoint: &'a Checkpoint,
+    /// What it tells of the run.
+    pub origin: Parameters,
+}
+
 impl<D: Dim> Recorder<D> {
     /// Create the history of a world at `path`.
     pub fn create(path: &Path, overwrite: bool, scene: &Scene, built: &Built<D>) -> history::Result<Self> {
@@ -48,19 +58,17 @@ impl<D: Dim> Recorder<D> {
         Ok(Self::new(writer, &layout, measures, 0.0))
     }
 
-    /// Continues `history` in a new file that replaces it and starts with the rows `kept` and
-    /// `checkpoint`. `cemented` is the step after which a stage formed the bonds of the world, if
-    /// one did; `tell` receives the copied share of the history (0 to 1).
+    /// Continues `history` in a new file that replaces it. `cemented` is the step after which a
+    /// stage formed the bonds of the world, if one did; `tell` receives the copied share of the
+    /// history (0 to 1).
     pub fn go_on(
         history: &History,
-        kept: RowCounts,
-        checkpoint: &Checkpoint,
+        Start { kept, checkpoint, origin }: Start,
         scene: &Scene,
         world: &World<D>,
         cemented: Option<u64>,
         tell: &mut dyn FnMut(f64) -> bool,
     ) -> history::Result<Self> {
-        let origin = Parameters { scene: scene.to_json().unwrap_or_default(), ..history.parameters()? };
         // the layout of a history does not change: without friction at the start, none later; no
         // observable that the program which began it did not know
         let before = history.layout()?;
@@ -350,6 +358,7 @@ fn describe_bonds<D: Dim>(scene: &Scene, world: &World<D>, formed: Option<i64>) 
 fn parameters(scene: &Scene, solid_fraction: Option<f64>) -> Parameters {
     Parameters {
         scene: scene.to_json().unwrap_or_default(),
+        earlier_scenes: String::new(),
         seed: scene.seed,
         version: env!("CARGO_PKG_VERSION").into(),
         git_revision: option_env!("DEM_GIT_REVISION").unwrap_or_default().into(),

@@ -3,10 +3,10 @@
 
 use crate::check::free_space;
 use crate::error::RunError;
-use crate::history::{Checkpoint, Ending, History, HistoryError, RowCounts, refuse_busy};
+use crate::history::{Checkpoint, Ending, History, HistoryError, Parameters, RowCounts, refuse_busy};
 use crate::in_dimension;
 use crate::output::{number, print_json, print_line};
-use crate::record::Recorder;
+use crate::record::{Recorder, Start};
 use crate::run::{Execution, Run, RunOptions, RunState, handle_signals, run_in};
 use crate::scene::{self, Scene, differences};
 use crate::signals::Interrupt;
@@ -57,12 +57,12 @@ pub fn resume(options: &ResumeOptions) -> Result<(), RunError> {
     options.execution.start_threads()?;
     let history = History::open(&options.history)?;
     refuse_busy(&options.history)?;
-    let scene = scene_of(&history, options)?;
-    in_dimension!(scene, D => resume_in::<D>(&scene, &history, options, &interrupt))
+    let (scene, changed) = scene_of(&history, options)?;
+    in_dimension!(scene, D => resume_in::<D>(&scene, changed, &history, options, &interrupt))
 }
 
-/// The scene of the resumed run.
-fn scene_of(history: &History, options: &ResumeOptions) -> Result<Scene, RunError> {
+/// The scene of the resumed run, and whether `--force` changed it.
+fn scene_of(history: &History, options: &ResumeOptions) -> Result<(Scene, bool), RunError> {
     let shown = options.history.display();
     let stored = history.parameters()?.scene;
     let mut sets = options.set.clone();
@@ -98,7 +98,20 @@ fn scene_of(history: &History, options: &ResumeOptions) -> Result<Scene, RunErro
             "the scene in {shown} differs:{lines}\n--force resumes the run with the new scene"
         )));
     }
-    Ok(scene)
+    Ok((scene, !forced.is_empty()))
+}
+
+/// What the new file tells of the run: a scene that was changed stands beside the new one.
+fn origin(history: &History, scene: &Scene, changed: bool, last_step: i64) -> Result<Parameters, RunError> {
+    let before = history.parameters()?;
+    let mut earlier_scenes = before.earlier_scenes.clone();
+    if changed {
+        let mut list: Vec<serde_json::Value> = serde_json::from_str(&earlier_scenes).unwrap_or_default();
+        let old: serde_json::Value = serde_json::from_str(&before.scene).unwrap_or_default();
+        list.push(serde_json::json!({ "last_step": last_step, "scene": old }));
+        earlier_scenes = serde_json::Value::Array(list).to_string();
+    }
+    Ok(Parameters { scene: scene.to_json().unwrap_or_default(), earlier_scenes, ..before })
 }
 
 /// Whether `path` is `field` or a part of it.
@@ -108,6 +121,7 @@ fn is_in(path: &str, field: &str) -> bool {
 
 fn resume_in<D: Dim>(
     scene: &Scene,
+    changed: bool,
     history: &History,
     options: &ResumeOptions,
     interrupt: &Interrupt,
@@ -157,7 +171,11 @@ fn resume_in<D: Dim>(
         };
         return Ok(print_line(&format!("nothing to do: the run ended {ended}; {further}"))?);
     }
-    let kept = kept(history, scene, &checkpoint)?;
+    let start = Start {
+        kept: kept(history, scene, &checkpoint)?,
+        origin: origin(history, scene, changed, checkpoint.step)?,
+        checkpoint: &checkpoint,
+    };
     let solid_fraction = history.parameters()?.solid_fraction;
     refuse_full_disk(history)?;
     let mut progress = options.execution.show();
@@ -166,7 +184,7 @@ fn resume_in<D: Dim>(
         !interrupt.requested()
     };
     let cemented = state.course.cemented(scene);
-    let recorder = Recorder::go_on(history, kept, &checkpoint, scene, &state.world, cemented, &mut tell);
+    let recorder = Recorder::go_on(history, start, scene, &state.world, cemented, &mut tell);
     let recorder = recorder.map_err(|error| match error {
         HistoryError::Interrupted => RunError::Interrupted("the history is unchanged"),
         error => error.into(),

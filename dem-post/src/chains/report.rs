@@ -24,7 +24,7 @@ const CHAIN_HEAD: [&str; 7] = [
     "longest",
     "grains in chains",
     "share of the force",
-    "mean load (kPa)",
+    "threshold (kPa)",
 ];
 
 /// Statistics of the forces at one moment.
@@ -65,7 +65,7 @@ pub struct ChainFigures {
     pub mean_length: f64,
     /// Grains of the longest chain.
     pub longest: usize,
-    /// Mean load of the grains whose load is positive, Pa.
+    /// Mean load of the grains whose load is positive, Pa: the load that a grain of a chain exceeds.
     pub mean_load: f64,
     /// How many chains have how many grains: (grains, chains).
     pub lengths: Vec<(usize, usize)>,

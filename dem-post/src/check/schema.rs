@@ -179,16 +179,25 @@ fn identity(c: &mut Checker) {
     if !number(c, "parameters", "seed").is_ok_and(|seed| seed.read_scalar::<u64>().is_ok()) {
         c.wrong("parameters@seed", None, "is missing, or not a number");
     }
-    if let Some(shape) = c.typed("parameters/scene", &TEXT)
-        && (!shape.is_empty() || scene(c).is_none())
-    {
-        c.wrong("parameters/scene", None, "is not a JSON text");
+    for place in ["parameters/scene", "parameters/earlier_scenes"] {
+        if place.ends_with("/earlier_scenes") && !c.has(place) {
+            continue;
+        }
+        if let Some(shape) = c.typed(place, &TEXT)
+            && (!shape.is_empty() || json(c, place).is_none())
+        {
+            c.wrong(place, None, "is not a JSON text");
+        }
     }
 }
 
 /// The scene, if it is a JSON text.
 pub(super) fn scene(c: &Checker) -> Option<serde_json::Value> {
-    let text = c.file.dataset("parameters/scene").and_then(|scene| scene.read_scalar::<VarLenUnicode>());
+    json(c, "parameters/scene")
+}
+
+fn json(c: &Checker, place: &str) -> Option<serde_json::Value> {
+    let text = c.file.dataset(place).and_then(|dataset| dataset.read_scalar::<VarLenUnicode>());
     serde_json::from_str(&text.ok()?).ok()
 }
 

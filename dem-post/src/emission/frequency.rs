@@ -98,6 +98,12 @@ impl Values {
         }
     }
 
+    /// The least magnitude that counts as not less than `from`: the middle of its bin, or the
+    /// logarithm of a whole number.
+    pub fn least(self, from: f64) -> f64 {
+        self.magnitude(self.first(from))
+    }
+
     /// Number of events of each magnitude that occurs, in order.
     pub fn frequencies(self, magnitudes: &[f64]) -> Vec<Frequency> {
         let mut sorted: Vec<i64> = magnitudes.iter().map(|&m| self.index(m)).collect();

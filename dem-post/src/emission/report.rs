@@ -142,7 +142,8 @@ pub fn read(history: &History, options: &Options) -> Result<Report> {
     let values = if scale == Scale::Energy { Values::Bins(options.bin) } else { Values::Sizes };
     let magnitudes: Vec<f64> = events.iter().filter_map(|event| event.magnitude).collect();
     let frequencies = values.frequencies(&magnitudes);
-    let completeness = options.completeness.or_else(|| maximum_curvature(&frequencies));
+    let given = options.completeness.map(|from| values.least(from));
+    let completeness = given.or_else(|| maximum_curvature(&frequencies));
     let b_value = completeness.and_then(|from| values.b_value(&magnitudes, from));
     Ok(Report {
         rule,

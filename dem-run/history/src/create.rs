@@ -197,8 +197,13 @@ pub(super) fn write_identity(file: &File, layout: &Layout) -> hdf5::Result<()> {
     if let Some(fraction) = run.solid_fraction {
         parameters.new_attr::<f64>().create("solid_fraction")?.write_scalar(&fraction)?;
     }
-    let scene = file.new_dataset::<VarLenUnicode>().obj_track_times(false).create(path::SCENE)?;
-    scene.write_scalar(&text(&run.scene))
+    for (place, value) in [(path::SCENE, &run.scene), (path::EARLIER_SCENES, &run.earlier_scenes)] {
+        if place == path::SCENE || !value.is_empty() {
+            let dataset = file.new_dataset::<VarLenUnicode>().obj_track_times(false).create(place)?;
+            dataset.write_scalar(&text(value))?;
+        }
+    }
+    Ok(())
 }
 
 pub(super) fn grains(file: &File, layout: &Layout) -> hdf5::Result<Group> {

@@ -58,7 +58,8 @@
 //! /ending                  enum OPEN until the run ends, then TIME, WALL_TRAVEL, BROKEN_FRACTION,
 //!                          LOAD_DROP, STAGES, NO_BREAK, NO_EQUILIBRIUM, INTERRUPTED or
 //!                          NO_CONVERGENCE
-//! /parameters/             scene (the JSON as run); attributes schema_version, seed, version,
+//! /parameters/             scene (the JSON as run), earlier_scenes (those before it, where
+//!                          `resume --force` changed it); attributes schema_version, seed, version,
 //!                          git_revision, build, host, start; solid_fraction, if packed
 //! /grain, axis, wall, …    names of the axes of datasets, without values (`dimensions.rs`)
 //! ```

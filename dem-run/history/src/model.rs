@@ -138,6 +138,9 @@ impl Observable {
 pub struct Parameters {
     /// The scene as it was run, JSON.
     pub scene: String,
+    /// The scenes before it, where `resume --force` changed it: a JSON list of `last_step`, the
+    /// last step of such a scene, and `scene`; empty where it never changed.
+    pub earlier_scenes: String,
     /// The seed of every random choice.
     pub seed: u64,
     /// Version of the program.

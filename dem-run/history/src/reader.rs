@@ -242,6 +242,10 @@ impl History {
             |name| Ok::<_, HistoryError>(self.source.attribute::<VarLenUnicode>(path::PARAMETERS, name)?.to_string());
         Ok(Parameters {
             scene: self.source.texts(path::SCENE)?.concat(),
+            earlier_scenes: match self.source.has(path::EARLIER_SCENES) {
+                true => self.source.texts(path::EARLIER_SCENES)?.concat(),
+                false => String::new(),
+            },
             seed: self.source.attribute(path::PARAMETERS, "seed")?,
             version: text("version")?,
             git_revision: text("git_revision")?,

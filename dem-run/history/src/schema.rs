@@ -28,6 +28,7 @@ pub(super) mod path {
     pub const OBSERVABLES: &str = "observables";
     pub const PARAMETERS: &str = "parameters";
     pub const SCENE: &str = "parameters/scene";
+    pub const EARLIER_SCENES: &str = "parameters/earlier_scenes";
 }
 
 /// Bytes across one row of a chunk, about 500 doubles.

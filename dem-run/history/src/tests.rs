@@ -55,6 +55,7 @@ fn full(dimension: usize) -> Layout {
         ],
         parameters: Parameters {
             scene: "{\"dimension\": 2, \"name\": \"été\"}".into(),
+            earlier_scenes: "[{\"last_step\": 12, \"scene\": {}}]".into(),
             seed: u64::MAX,
             version: "0.1.0".into(),
             solid_fraction: Some(0.8),

@@ -5,6 +5,7 @@ use crate::common::{Endless, Folder, SMALL, config, content, problems, program};
 use dem_run::history::History;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
+use serde_json::{Value, json};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
@@ -234,6 +235,18 @@ fn other_scenes_are_refused_with_what_differs() {
     assert_eq!(here.read("a.h5"), before);
     resume("solver.tolerance=1e-7", &["--force"]).succeeds();
     assert_eq!(here.history("a.h5").steps().last(), Some(&300));
+    // the scene before stays beside the new one, also when the run goes on with the new one
+    here.dem_run(&["resume", "a.h5", "--until", "0.04", "--quiet"]).succeeds();
+    let run = here.history("a.h5").parameters().expect("parameters");
+    let scene: Value = serde_json::from_str(&run.scene).expect("JSON");
+    let earlier: Value = serde_json::from_str(&run.earlier_scenes).expect("JSON");
+    assert_eq!(scene["solver"]["tolerance"], 1e-7);
+    assert_eq!((earlier.as_array().map(Vec::len), &earlier[0]["last_step"]), (Some(1), &json!(200)));
+    assert_ne!(earlier[0]["scene"]["solver"]["tolerance"], 1e-7);
+    assert_eq!(here.dem_post(&["info", "a.h5", "--json"]).json()["scene_changed_after"], json!([200]));
+    here.dem_post(&["info", "a.h5", "--check"]).succeeds();
+    let told = here.dem_post(&["info", "a.h5"]).succeeds();
+    assert!(told.stdout.contains("after step 200"), "{}", told.stdout);
 }
 
 #[test]

@@ -166,3 +166,15 @@ fn magnitudes_of_another_law_are_noticed() {
     let sizes: Vec<f64> = (0..100).map(|k| f64::from(20 + k % 3).log10()).collect();
     assert!(!Values::Sizes.b_value(&sizes, 0.0).unwrap().law_holds);
 }
+
+#[test]
+fn a_given_completeness_is_that_of_the_events_that_count() {
+    let bins = Values::Bins(0.1);
+    let magnitudes: Vec<f64> = (0..40).map(|k| 0.1 * f64::from(k % 10)).collect();
+    for (given, used) in [(0.24, 0.2), (0.26, 0.3), (0.3, 0.3)] {
+        assert!((bins.least(given) - used).abs() < 1e-12);
+        let [asked, told] = [given, bins.least(given)].map(|from| bins.b_value(&magnitudes, from));
+        assert_eq!(asked, told);
+    }
+    assert_eq!(Values::Sizes.least(0.5), 4f64.log10());
+}
