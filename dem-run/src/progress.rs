@@ -7,7 +7,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 
 use crate::estimate::{Estimate, Left, Outlook, Sample, duration};
-use crate::output::{escaped, short};
+use crate::output::{escaped, number, short};
 use crate::scene::failure::{BROKEN_SHARE, STRAINS};
 use crate::stop::{StopProgress, TRAVEL};
 
@@ -294,7 +294,7 @@ impl StepProgress {
             },
             Some(left.map_or("? left".to_string(), |left| left.to_string())),
             stop.map(|stop| format!("stop: {} {:.0} %", stop.condition, 100.0 * stop.reached)),
-            (!self.counts_steps).then(|| format!("t {time:.4} of {end} s")),
+            (!self.counts_steps).then(|| format!("t {time:.4} of {} s", number(*end))),
             Some(format!("step {step}  residual {residual:.1e} ({iterations} iterations)")),
         ];
         parts.into_iter().flatten().collect::<Vec<_>>().join("  ")

@@ -72,7 +72,10 @@ fn parse<D: Dim, R: BufRead>(mut lines: Lines<R>, materials: &[&str]) -> Result<
         Ok(found) => {
             let commas = if found.contains([';', '\t']) { ", between commas" } else { "" };
             let found = shorten(&found);
-            wrong.tell(lines.number.max(1), format!("the header is {found}, it must be {header}{commas}"));
+            wrong.tell(
+                lines.number.max(1),
+                format!("the header is {found}, it must be {header} and, if needed, {MATERIAL}{commas}"),
+            );
         }
         Err(what) => wrong.tell(lines.number, what),
     }
@@ -206,7 +209,10 @@ mod tests {
 
     #[test]
     fn a_header_says_what_it_should_be_and_a_line_has_an_end() {
-        assert!(refused("x;y;radius\n0;0;1\n")[0].ends_with("it must be x,y,radius, between commas"));
+        assert!(
+            refused("x;y;radius\n0;0;1\n")[0]
+                .ends_with("it must be x,y,radius and, if needed, material, between commas")
+        );
         assert!(refused("")[0].contains("the header is , it must be x,y,radius"));
         assert!(refused("x,y,radius\n")[0].contains("no grains"));
         for text in ["0".repeat(100_000), format!("x,y,radius\n{}", "0".repeat(100_000))] {
