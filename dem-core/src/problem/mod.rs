@@ -62,6 +62,9 @@ pub struct ContactProblem<D: Dim> {
     pub radii: Vec<f64>,
     /// Euclidean norm of the applied impulses h F_ext (N s), one scale of the residual.
     pub applied: f64,
+    /// Whether it is a problem of statics: its bodies stay at rest, and velocities, those of
+    /// light bodies too, are errors of the balance alone.
+    pub is_static: bool,
 }
 
 /// An operation on every contact of a problem, whatever its law.
@@ -109,7 +112,7 @@ impl<D: Dim> ContactProblem<D> {
     /// A problem without contacts.
     pub fn new(nodes: Nodes<D>, free: Arc<[(D::Vector, D::Spin)]>, applied: f64) -> Self {
         let (bonded, elastic, dry, frictionless) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Self { nodes, free, bonded, elastic, dry, frictionless, radii: Vec::new(), applied }
+        Self { nodes, free, bonded, elastic, dry, frictionless, radii: Vec::new(), applied, is_static: false }
     }
 
     /// Visit every group.

@@ -89,8 +89,11 @@ pub(super) fn relative(map: f64, rounded: f64, scale: f64) -> f64 {
 /// The velocity error of the impulses and node velocities that the problem now holds (–): the
 /// largest natural map of a contact as a velocity, D ‖map‖, over the largest relative velocity
 /// without reactions of the contacts that must change theirs: of bonds, and of dry contacts that
-/// would close. Where there are none, that of all contacts.
+/// would close. Where there are none, that of all contacts. Zero in statics.
 pub fn velocity_error<D: Dim>(problem: &ContactProblem<D>) -> f64 {
+    if problem.is_static {
+        return 0.0;
+    }
     let Largest { map, asked, free, .. } = Largest::of(problem);
     match map {
         0.0 => 0.0,

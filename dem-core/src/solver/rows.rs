@@ -133,6 +133,8 @@ pub(super) struct Rows {
     pub free: Vec<f64>,
     /// Norm of the applied impulses (N s).
     pub applied: f64,
+    /// See [`ContactProblem::is_static`].
+    pub is_static: bool,
 }
 
 /// First unknown of each node.
@@ -228,6 +230,10 @@ fn degrees<D: Dim>(nodes: &Nodes<D>, k: usize, moves: bool) -> usize {
 impl Rows {
     /// Whether neither loads, velocities nor elastic bonds act: without reactions all bodies rest.
     pub fn nothing_acts(&self) -> bool {
+        if self.is_static {
+            // reactions of the last event do
+            return false;
+        }
         let rests = |row: &Row| row.given == Padded::zero() && row.carried == Padded::zero();
         self.free.iter().all(|y| *y == 0.0) && self.list.iter().all(rests)
     }
@@ -241,7 +247,13 @@ impl Rows {
         for (k, (v, w)) in problem.free.iter().enumerate() {
             write_scaled(&problem.nodes, &unknowns, k, v, w, &mut free);
         }
-        let rows = Rows { unknowns: unknowns.total, free, applied: problem.applied / unknowns.unit, ..Rows::default() };
+        let rows = Rows {
+            unknowns: unknowns.total,
+            free,
+            applied: problem.applied / unknowns.unit,
+            is_static: problem.is_static,
+            ..Rows::default()
+        };
         let mut still = problem.nodes.clone();
         for (node, free) in still.all.iter_mut().zip(problem.free.iter()) {
             let moves = node.inverse_mass > 0.0;

@@ -10,7 +10,7 @@
 //! equilibrium.
 
 use super::World;
-use super::assembly::{Places, over_arm, write_reactions};
+use super::assembly::{CLOSED, Places, over_arm, write_reactions};
 use super::motion::{Midpoint, Motion, Turn};
 use super::report::{Solves, StepError, StepReport};
 use super::touch::{Break, StoredTouch};
@@ -47,11 +47,14 @@ impl<D: Dim> World<D> {
         let start = self.midpoint(self.settings.step);
         self.measure_sections(&start);
         self.follow_surface(&start)?;
-        let mut done = Solves::default();
-        let found = self.next_event(until, &mut done)?;
-        if found.excess.is_infinite() {
-            return Err(self.unbalanced(&found));
-        }
+        let (mut done, begun) = (Solves::default(), self.stored.clone());
+        let found = match self.next_event(until, &mut done) {
+            Ok(found) if found.excess.is_finite() => found,
+            outcome => {
+                self.stored = begun;
+                return Err(outcome.map_or_else(|error| error, |found| self.unbalanced(&found)));
+            }
+        };
         let breaks = self.breaks_of(&found);
         let Equilibrium { at, mid, motion, turns, touches, problem, .. } = found;
         let forces = self.wall_forces(&mid, &touches);
@@ -76,6 +79,10 @@ impl<D: Dim> World<D> {
             return Ok(held);
         }
         let rises = held.excess < 0.0;
+        if rises {
+            // the release comes before the growth of the loads, and each part of it before the next
+            self.stored.clone_from(&held.touches);
+        }
         let end = if rises { until } else { 0.0 };
         let mut last = held;
         let mut step = if rises { self.settings.step } else { -self.settings.step };
@@ -94,6 +101,9 @@ impl<D: Dim> World<D> {
             if to == end {
                 return Ok(trial);
             }
+            if rises && to != next_or_end {
+                self.stored.clone_from(&trial.touches);
+            }
             // no further than to where the secant meets the limit, else ever longer steps
             step *= 2.0;
             let meets = secant(last.place(), trial.place()).filter(|at| (*at > trial.at) == rises);
@@ -111,13 +121,14 @@ impl<D: Dim> World<D> {
         done: &mut Solves,
     ) -> Result<Equilibrium<D>, StepError> {
         let mut halve = false;
+        let finest = f64::EPSILON * above.at.abs().max(low.0.abs());
         loop {
             let high = above.place();
             let width = high.0 - low.0;
             let inside = |at: &f64| !halve && *at > low.0 && *at < low.0 + width;
             let at = secant(low, high).filter(inside).unwrap_or(low.0 + 0.5 * width);
-            if at <= low.0 || at >= high.0 {
-                // no number between the two. Another solve at the same time may select other
+            if at <= low.0 || at >= high.0 || width.abs() <= finest {
+                // round-off of the loads in the trials. Another solve at the same time may select other
                 // reactions, so the equilibrium is kept
                 return Ok(above);
             }
@@ -139,11 +150,19 @@ impl<D: Dim> World<D> {
         let h = self.settings.step;
         let (mid, motion, applied) = (self.midpoint(h), self.free_motion(h, at), self.applied_impulse(h, at));
         let mut touches = self.detect(&mid, &motion, h);
+        // bodies at rest close no gap, and what touches is closed
+        touches.retain(|touch| {
+            touch.bond().is_some() || self.geometry(&mid, touch.pair).0 <= CLOSED * self.smaller(touch.pair)
+        });
+        touches.iter_mut().for_each(|touch| touch.closed = true);
         let mut brought = self.brought(&mid, &touches, &motion, h);
         loop {
             // bonds above their limit would yield, and the reactions would not be affine
             brought.strengthened *= 2.0;
             let (mut problem, places) = self.assemble(&mid, &touches, &motion, &brought, applied, h);
+            problem.is_static = true;
+            // loads may vanish where reactions of the last event do not
+            problem.applied = self.scale_of(applied);
             let solve = self.solver.solve(&mut problem);
             done.add(solve);
             self.refuse_unaccepted(solve, &problem, (at, h), true)?;
@@ -152,7 +171,7 @@ impl<D: Dim> World<D> {
             let yields = 1.0 + excess >= (1.0 - LIMIT) * brought.strengthened;
             if !yields || brought.strengthened >= 1.0 / LIMIT {
                 write_reactions(&mut touches, &problem, &places, h);
-                let excess = if yields || !self.balances(&problem) { f64::INFINITY } else { excess };
+                let excess = if yields || !self.balances(&problem, applied) { f64::INFINITY } else { excess };
                 return Ok(Equilibrium { at, mid, motion, turns: brought.turns, touches, problem, excess });
             }
         }
@@ -160,9 +179,9 @@ impl<D: Dim> World<D> {
 
     /// Whether the bodies stay at rest in a solved problem. Without loads nothing can move:
     /// contacts do no positive work on bodies at rest.
-    fn balances(&self, problem: &ContactProblem<D>) -> bool {
+    fn balances(&self, problem: &ContactProblem<D>, applied: f64) -> bool {
         let tolerance = self.settings.solver.load_tolerance().unwrap_or(self.settings.solver.tolerance());
-        problem.applied == 0.0 || unbalanced_impulse(problem) <= tolerance * self.scale_of(problem)
+        applied == 0.0 || unbalanced_impulse(problem) <= tolerance * self.scale_of(applied)
     }
 
     /// The largest required strength of an intact bond over its strength, less one (–).
@@ -178,10 +197,10 @@ impl<D: Dim> World<D> {
 
     /// The larger of the norms of the loads and of the reactions in the last event (N s): without
     /// loads all reactions may vanish.
-    fn scale_of(&self, problem: &ContactProblem<D>) -> f64 {
+    fn scale_of(&self, applied: f64) -> f64 {
         let square = |touch: &StoredTouch<D>| touch.reaction.n.powi(2) + touch.reaction.t.dot(&touch.reaction.t);
         let reactions = self.stored.iter().map(square).sum::<f64>().sqrt();
-        problem.applied.max(self.settings.step * reactions)
+        applied.max(self.settings.step * reactions)
     }
 
     /// The bonds at their limit in an equilibrium: those that break.

@@ -119,12 +119,14 @@ pub(super) struct Sites {
     pub metric: Vec<f64>,
     /// Length of the list of local matrices.
     pub matrices: usize,
+    /// Whether it is a problem of statics.
+    is_static: bool,
 }
 
 impl Sites {
     /// The contacts of `rows`, in units that depend on the problem and on these reactions.
     pub fn of(rows: &Rows, reactions: &[Padded]) -> Self {
-        let mut sites = Self::default();
+        let mut sites = Self { is_static: rows.is_static, ..Self::default() };
         let velocities: Vec<Padded> = rows.list.iter().map(|row| rows.velocity(row, &rows.free)).collect();
         let count = rows.list.len().max(1) as f64;
         let mean = |sum: f64| sum / count;
@@ -194,8 +196,12 @@ impl Sites {
     }
 
     /// The largest velocity without reactions, of bonds and of contacts that would close, if there
-    /// are any: the scale of [`velocity_error`](crate::problem::residual::velocity_error).
+    /// are any: the scale of [`velocity_error`](crate::problem::residual::velocity_error). In
+    /// statics, where no velocity counts, infinity.
     pub fn largest_free(&self) -> f64 {
+        if self.is_static {
+            return f64::INFINITY;
+        }
         let asks = |k: usize| self.shift[k] > 0.0 || self.free[self.list[k].at] < 0.0;
         let any = (0..self.list.len()).any(asks);
         let asked = self.list.iter().enumerate().filter(|(k, _)| asks(*k) || !any);
