@@ -165,7 +165,7 @@ impl<D: Dim> World<D> {
             problem.applied = self.scale_of(applied);
             let solve = self.solver.solve(&mut problem);
             done.add(solve);
-            self.refuse_unaccepted(solve, &problem, (at, h), true)?;
+            self.refuse_unaccepted(solve, &problem, (at, 0.0), true)?;
             let excess = self.excess(&touches, &problem, &places);
             // stronger bonds may hold bodies that move where a bond yields
             let yields = 1.0 + excess >= (1.0 - LIMIT) * brought.strengthened;

@@ -119,7 +119,7 @@ pub enum StepError {
         /// Time at which the step that failed began (s), or its half; with
         /// [`crate::bond::Rupture::NextEvent`] the time of the loads.
         time: f64,
-        /// The shortest step tried (s).
+        /// The shortest step tried (s); zero with [`crate::bond::Rupture::NextEvent`].
         step: f64,
         /// Residual of its solve (–).
         residual: f64,
@@ -225,9 +225,13 @@ impl StepError {
                         ["no convergence".into(), known]
                     }
                 };
+                let (under, of) = match *step {
+                    0.0 => ("under the loads of", String::new()),
+                    step => ("at", format!(", in a step of {step:.2e} s")),
+                };
                 format!(
-                    "{opening} at t = {time:.6e} s: residual {residual:.2e}{further} after {iterations} iterations, in a \
-                     step of {step:.2e} s{known}"
+                    "{opening} {under} t = {time:.6e} s: residual {residual:.2e}{further} after {iterations} \
+                     iterations{of}{known}"
                 )
             }
             Self::TooFast { time, pair } => format!(

@@ -37,6 +37,7 @@ pub use files::write;
 pub use report::{Report, Summary, read};
 pub(crate) use report::{driven, load_wall};
 
+mod axes;
 pub mod elastic;
 mod files;
 mod pictures;

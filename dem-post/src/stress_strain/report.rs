@@ -1,5 +1,6 @@
 //! The report of the load: curves of the run and the numbers that follow from them.
 
+use std::f64::consts::FRAC_1_SQRT_2;
 use std::path::Path;
 
 use dem_history::{History, Series, Wall, WallDrive, WallKind};
@@ -9,11 +10,11 @@ use nalgebra::Vector3;
 use serde::Serialize;
 use serde_json::Value;
 
+use super::axes::{Axes, Size, ends, projected};
 use super::elastic::{Curves, Elastic, RANGE};
-use crate::chains::stress::thickness;
 use crate::clock::Clock;
 use crate::collapse::{Bonding, Collapse, peak, work};
-use crate::extent::{first_box, range};
+use crate::extent::range;
 use crate::output::{PostError, Result, facts, number, quantity};
 use crate::strength::fit::Estimate;
 
@@ -129,20 +130,13 @@ pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
     let walls = history.walls()?;
     let scene = history.parameters()?.scene;
     let k = driven(history.path(), &walls, &scene, wall)?;
-    let direction = walls[k].direction;
-    // the axis nearest to a direction
-    let axis_of = |direction: &[f64; 3]| {
-        let size = |&d: &usize| direction[d].abs();
-        (0..history.dimension()).max_by(|a, b| size(a).total_cmp(&size(b))).unwrap_or(0)
-    };
-    let axis = axis_of(&direction);
+    let axes = Axes::of(&walls[k].direction, history.dimension());
     let motion = motion(history, &walls[k], k)?;
-    let tensor = |name: &str| -> Result<Vec<f64>> {
-        let series = history.observable(name)?;
-        series.map_or_else(|| Ok(vec![]), |series| component(history, &series, &[axis, axis], name))
-    };
-    let (size, push) = sample_size(history, k, axis, motion.sense * direction[axis])?;
-    let plate = axis_of(&walls[k].normal) == axis && covers(history, &walls[k], k)?;
+    let size = Size::of(history, &scene, &axes)?;
+    let tensor = |name: &str| tensor_along(history, name, &axes.along);
+    let push = push(history, k, &size, &axes.along, motion.sense)?;
+    let facing = Vector3::from(walls[k].normal).dot(&axes.along).abs() > FRAC_1_SQRT_2;
+    let plate = facing && covers(history, &walls[k], k)?;
     let mut report = Report {
         displacement: motion.way.iter().map(|x| motion.sense * x).collect(),
         load: motion.load.iter().map(|f| motion.sense * f).collect(),
@@ -150,12 +144,12 @@ pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
         // the reaction of the grains has the opposite sign
         reaction: motion.reaction.iter().map(|f| -motion.sense * f).collect(),
         strain: tensor("strain")?.iter().map(|e| -push * e).collect(),
-        stress: tensor("stress")?.iter().map(|s| push * s).collect(),
+        stress: tensor("stress")?.iter().map(|s| push * size.box_share * s).collect(),
         clock: Clock::of(history),
         broken: history.observable("bonds_broken")?.map(|series| series.value).unwrap_or_default(),
         summary: Summary {
             wall: walls[k].name.clone(),
-            height: size.height,
+            height: size.ends[1] - size.ends[0],
             area: Some(size.area).filter(|_| plate),
             ..Summary::default()
         },
@@ -171,7 +165,7 @@ pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
     s.splitting = disk.map(|disk| Splitting::of(disk, collapse, s.peak_load));
     if bonds == Bonding::Elastic {
         let found = if plate && disk.is_none() {
-            elastic(history, &report, axis, push)?
+            elastic(history, &report, &axes, push, size.box_share)?
         } else {
             Err("only a sample that plates load along its axis has them")
         };
@@ -183,29 +177,33 @@ pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
     Ok(report)
 }
 
-/// The elastic constants, or why there are none; `push` is that of [`sample_size`].
+/// The elastic constants, or why there are none; `push` is that of [`push`], `share` that of
+/// [`Size`].
 fn elastic(
     history: &History,
     report: &Report,
-    axis: usize,
+    axes: &Axes,
     push: f64,
+    share: f64,
 ) -> Result<std::result::Result<Elastic, &'static str>> {
     // a layer of grains has no strain across it
     let (d, position) = (history.dimension(), history.grain_state(0)?.position);
-    let extent = |k: usize| {
-        let [low, high] = range(position.iter().skip(k).step_by(d).copied());
+    let extent = |u: &Vector3<f64>| {
+        let [low, high] = range(position.chunks(d).map(|x| x.iter().zip(u).map(|(x, u)| x * u).sum()));
         high - low
     };
-    let others: Vec<usize> = (0..d).filter(|&k| k != axis && extent(k) > FLAT * extent(axis)).collect();
+    let others: Vec<_> = axes.across.iter().filter(|u| extent(u) > FLAT * extent(&axes.along)).collect();
     if others.is_empty() {
         return Ok(Err("the grains have no extent across the load"));
     }
     // the mean over the other axes, positive along the load as the axial one
     let lateral = |name: &str, sign: f64| -> Result<Vec<f64>> {
         let mut sum = vec![0.0; report.load.len()];
-        let Some(series) = history.observable(name)? else { return Ok(vec![]) };
-        for &k in &others {
-            let part = component(history, &series, &[k, k], name)?;
+        for u in &others {
+            let part = tensor_along(history, name, u)?;
+            if part.is_empty() {
+                return Ok(part);
+            }
             sum.iter_mut().zip(part).for_each(|(sum, x)| *sum += sign * x / others.len() as f64);
         }
         Ok(sum)
@@ -216,7 +214,7 @@ fn elastic(
         strain: &report.strain,
         stress: &report.stress,
         lateral_strain: &lateral("strain", -push)?,
-        lateral_stress: &lateral("stress", push)?,
+        lateral_stress: &lateral("stress", push * share)?,
     }))
 }
 
@@ -382,28 +380,22 @@ fn start_of(history: &History, k: usize, direction: &[f64; 3]) -> Result<f64> {
     Ok(position.get(k * d..(k + 1) * d).into_iter().flatten().zip(direction).map(|(x, n)| x * n).sum())
 }
 
-/// The sample at the first frame.
-struct Size {
-    /// Along the drive, m.
-    height: f64,
-    /// Across it, m².
-    area: f64,
-    /// Of the box around all grains along each axis, m.
-    extents: Vec<f64>,
+/// Whether the load pushes (1) or pulls (−1).
+fn push(history: &History, wall: usize, size: &Size, along: &Vector3<f64>, sense: f64) -> Result<f64> {
+    let d = history.dimension();
+    let middle = 0.5 * (size.ends[0] + size.ends[1]);
+    let position = history.wall_state(0)?.position;
+    let place = position.get(wall * d..(wall + 1) * d).map(|x| x.iter().zip(along).map(|(x, u)| x * u).sum());
+    // a wall above that moves down pushes, one that moves up pulls
+    Ok(if sense * (place.unwrap_or(middle) - middle) > 0.0 { -1.0 } else { 1.0 })
 }
 
-/// The size of the sample, and whether the load pushes (1) or pulls (−1).
-fn sample_size(history: &History, wall: usize, axis: usize, drive: f64) -> Result<(Size, f64)> {
-    let d = history.dimension();
-    let ends = first_box(history)?;
-    let extents: Vec<f64> = ends.iter().map(|[low, high]| high - low).collect();
-    let middle = 0.5 * (ends[axis][0] + ends[axis][1]);
-    let place = history.wall_state(0)?.position.get(wall * d + axis).copied().unwrap_or(middle);
-    let across: f64 = (0..d).filter(|&k| k != axis).map(|k| extents[k]).product();
-    let area = if d == 2 { across * thickness(history)? } else { across };
-    // a wall above that moves down pushes, one that moves up pulls
-    let push = if drive * (place - middle) > 0.0 { -1.0 } else { 1.0 };
-    Ok((Size { height: extents[axis], area, extents }, push))
+/// The component of a tensor along a unit vector in each step; empty where it was not observed.
+fn tensor_along(history: &History, name: &str, u: &Vector3<f64>) -> Result<Vec<f64>> {
+    let Some(series) = history.observable(name)? else { return Ok(vec![]) };
+    projected(&series, history.dimension(), u).ok_or_else(|| {
+        lacking(history.path(), format!("/observables/{name} has shape {:?}, which is not a tensor's", series.shape))
+    })
 }
 
 /// Whether the wall `k` is a plane, or a plate that reaches beyond the sample on all sides at the
@@ -412,21 +404,18 @@ fn covers(history: &History, wall: &Wall, k: usize) -> Result<bool> {
     if wall.kind != WallKind::Plate {
         return Ok(wall.kind == WallKind::Plane);
     }
-    let (d, ends) = (history.dimension(), first_box(history)?);
-    let state = history.wall_state(0)?;
+    let (d, state) = (history.dimension(), history.wall_state(0)?);
     let Some(middle) = state.position.get(k * d..(k + 1) * d) else { return Ok(false) };
     let side = Vector3::from(wall.side);
     let sides = [(side, wall.length), (Vector3::from(wall.normal).cross(&side), wall.width)];
-    // how far the box around the grains reaches along a side, from the middle of the plate
-    let reach = |side: &Vector3<f64>| {
-        let (mut low, mut high) = (0.0, 0.0);
-        for (axis, end) in ends.iter().enumerate() {
-            let [a, b] = end.map(|x| side[axis] * (x - middle[axis]));
-            (low, high) = (low + a.min(b), high + a.max(b));
+    for (side, length) in sides.iter().take(d - 1) {
+        let middle: f64 = middle.iter().zip(side).map(|(x, u)| x * u).sum();
+        let [low, high] = ends(history, side)?;
+        if f64::max(high - middle, middle - low) > 0.5 * length {
+            return Ok(false);
         }
-        f64::max(high, -low)
-    };
-    Ok(sides.iter().take(d - 1).all(|(side, length)| reach(side) <= 0.5 * length))
+    }
+    Ok(true)
 }
 
 impl Summary {

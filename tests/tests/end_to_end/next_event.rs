@@ -1,6 +1,6 @@
 //! `rupture: next_event`: loading from break to break.
 
-use crate::common::{Folder, SMALL, config};
+use crate::common::{Folder, SMALL, config, number, run, series};
 use dem_run::history::RuptureMode;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
@@ -205,4 +205,85 @@ fn the_failure_envelope_of_a_bond_is_its_cone() {
             assert!((first.tangential_force.abs() / expected - 1.0).abs() < 1e-6, "{expected} N, {first:?}");
         }
     }
+}
+
+/// One loose disk on a floor with friction, bonded to a fixed one: a push along the floor that the
+/// bond bears, a load of 20 N on the disk, then a growing push.
+///
+/// While the load is absent the bond bears the whole push; the contact with the floor takes part of
+/// what is added later. The loads of both disks as springs, with Coulomb's law, give 6.364 N; in one
+/// go from zero it would be 9.091 N.
+#[test]
+fn loads_are_followed_in_their_order() {
+    let here = Folder::new();
+    let disk = |x: f64| json!({ "center": [x, 2e-3], "radius": 2e-3 });
+    let push = json!({ "table": [[0, 0], [1, 6], [2, 6], [102, 106]] });
+    let load = json!({ "table": [[0, 0], [1, 0], [2, 20], [3, 20]] });
+    let scene = json!({
+        "dimension": 2, "thickness": 0.01,
+        "sample": { "grains": [disk(0.0), disk(4e-3)] },
+        "materials": { "density": 2500, "friction": { "grain_grain": 0.3, "grain_wall": 0.5 } },
+        "bonds": { "strength": 10, "gap_tolerance": 1e-3, "shear": 1000, "rolling": 1000 },
+        "walls": { "floor": { "shape": { "plane": { "normal": [0, 1], "place": { "at": [0, 0] } } } } },
+        "grains": { "fixed": [0], "loads": [
+            { "grain": 1, "force": [1, 0], "time": push }, { "grain": 1, "force": [0, -1], "time": load }] },
+        "rupture": "next_event",
+        "time": { "step": 1e-2, "end": 102 }, "output": { "every_steps": 1 }, "stop": { "broken_fraction": 1 }
+    });
+    here.write("scene.json", scene.to_string());
+    run(&here, "scene.json", &[]);
+    let time = series(&here.history("a.h5"), "load_time", &[])[0];
+    let push = 6.0 + (time - 2.0);
+    assert!((push / 6.364 - 1.0).abs() < 2e-3, "{push} N");
+}
+
+/// A lid presses a ball that is bonded to a smaller, fixed one, 2 mm higher than this one. Its bond
+/// breaks by rolling at 2 N (0.125 · 10 N · 8 mm over the arm of 5 mm). Then nothing holds it,
+/// whatever `time.step` is.
+#[test]
+fn gaps_stay_open_whatever_the_step() {
+    let here = Folder::new();
+    for step in [1e-4, 1.0, 10.0] {
+        let scene = json!({
+            "dimension": 3,
+            "sample": { "grains": [
+                { "center": [0, 0, 0], "radius": 3e-3 }, { "center": [8e-3, 0, 0], "radius": 5e-3 }] },
+            "materials": { "density": 2500, "friction": { "grain_grain": 0.3, "grain_wall": 0 } },
+            "bonds": { "strength": 10, "gap_tolerance": 1e-3, "shear": 0.5, "rolling": 0.125 },
+            "walls": { "lid": { "shape": { "plane": { "normal": [0, 0, -1], "place": "seated" } },
+                "force": { "ramp": { "rate": 1 } }, "mass": "sample" } },
+            "grains": { "fixed": [0] },
+            "rupture": "next_event",
+            "time": { "step": step, "end": 100 }, "output": { "every_steps": 1 }
+        });
+        here.write("scene.json", scene.to_string());
+        let summary = run(&here, "scene.json", &[]);
+        assert_eq!((&summary["ending"], &summary["steps"]), (&json!("no_equilibrium"), &json!(1)), "{step} s");
+        let load = number(&summary["failure"]["first_break"]);
+        assert!((load / 2.0 - 1.0).abs() < 1e-6, "{load} N at a step of {step} s");
+    }
+}
+
+/// A packing of spheres is followed to its end, through loads of zero, at which velocities have no
+/// size of their own.
+#[test]
+fn a_packing_of_spheres_is_followed_until_nothing_balances_it() {
+    let here = Folder::new();
+    let plane = |up: i32| json!({ "plane": { "normal": [0, 0, up], "place": "seated" } });
+    let scene = json!({
+        "dimension": 3, "seed": 3,
+        "sample": { "random": { "count": 60, "diameter": { "uniform": { "min": 2e-3, "max": 3e-3 } },
+            "width": 0.01, "depth": 0.01, "preparation": { "compaction": { "solid_fraction": 0.47 } } } },
+        "materials": { "density": 2500, "friction": { "grain_grain": 0.3, "grain_wall": 0.2 } },
+        "bonds": { "strength": 5, "gap_tolerance": 0.01, "shear": 0.4, "rolling": 0.15, "twist": 0.1 },
+        "walls": { "bottom": { "shape": plane(1) },
+            "top": { "shape": plane(-1), "mass": "sample", "force": { "ramp": { "rate": 1 } } } },
+        "rupture": "next_event",
+        "time": { "step": 1, "end": 100 }, "output": { "every_steps": 1 }
+    });
+    here.write("scene.json", scene.to_string());
+    let summary = run(&here, "scene.json", &[]);
+    assert_eq!((&summary["ending"], &summary["missed_tolerance"]), (&json!("no_equilibrium"), &json!(0)));
+    let broken: f64 = summary["broken"].as_array().expect("modes").iter().map(number).sum();
+    assert!(broken >= 20.0, "{broken} bonds");
 }
