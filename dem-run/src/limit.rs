@@ -81,6 +81,9 @@ pub struct Limit {
     /// Least factor that is borne, if the constant loads alone are not.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub least_factor: Option<f64>,
+    /// The largest part of the growth that is borne, if the loads at t = 0 alone are not; none if
+    /// any larger part is borne.
+    pub most_factor: Option<f64>,
     /// The loads that grow.
     pub loads: Vec<GrowingLoad>,
     /// Number of grains.
@@ -259,6 +262,7 @@ fn describe<D: Dim>(
     (growing, steady): (Vec<Growth>, bool),
     found: LimitLoad,
 ) -> Result<Limit, RunError> {
+    let most_factor = if let LimitLoad::BrokenAtStart { most, .. } = &found { *most } else { None };
     let unsupported = match &found {
         LimitLoad::Unsupported { grains } => grains.clone(),
         _ => Vec::new(),
@@ -269,7 +273,7 @@ fn describe<D: Dim>(
         }
         LimitLoad::Unbounded => (Outcome::Unbounded, None, None, None),
         LimitLoad::NeverBalanced | LimitLoad::Unsupported { .. } => (Outcome::NeverBorne, None, None, None),
-        LimitLoad::BrokenAtStart { least } => (Outcome::BrokenAtStart, None, None, Some(least)),
+        LimitLoad::BrokenAtStart { least, .. } => (Outcome::BrokenAtStart, None, None, Some(least)),
         LimitLoad::Undecided => return Err(NoConvergence::Limit.into()),
     };
     let factor = factor.map(|factor| if factor.abs() < ACCURACY { 0.0 } else { factor });
@@ -288,6 +292,7 @@ fn describe<D: Dim>(
         time: bound.filter(|_| steady).map(|factor| factor * scene.time.end),
         unsupported,
         least_factor,
+        most_factor,
         loads: loads.collect(),
         grains: world.grains.len(),
         bonds: world.bonds.len(),
@@ -304,10 +309,11 @@ impl Limit {
                     .into()
             }
             (Outcome::Limit, Some(factor), _) => format!("{} of the growth", number(factor)),
-            (Outcome::BrokenAtStart, _, Some(least)) => format!(
-                "the loads at t = 0 alone break a bond; with {} of the growth and more they are borne",
-                number(least)
-            ),
+            (Outcome::BrokenAtStart, _, Some(least)) => {
+                let more = self.most_factor.map_or_else(|| "and more".into(), |most| format!("to {}", number(most)));
+                let least = number(least);
+                format!("the loads at t = 0 alone break a bond; with {least} of the growth {more} they are borne")
+            }
             (Outcome::Unbounded, ..) => "none: reactions within all limits bear any load".into(),
             _ if !self.unsupported.is_empty() => format!(
                 "the weight moves grains that no chain of contacts joins with a support, by number: {}; leave them out of \

@@ -158,10 +158,11 @@ fn accelerated(problem: &mut impl Sweepable, settings: &GaussSeidelSettings) -> 
     }
     let mut memory = Anderson::new(settings.acceleration, problem.gather());
     while error > settings.tolerance && sweeps < settings.max_sweeps {
-        for _ in 0..tuning::BURST {
+        let burst = tuning::BURST.min(settings.max_sweeps - sweeps);
+        for _ in 0..burst {
             problem.sweep(settings.local);
         }
-        sweeps += tuning::BURST;
+        sweeps += burst;
         if sweeps.is_multiple_of(tuning::LOOK * tuning::BURST) || sweeps >= settings.max_sweeps {
             problem.velocities_from_reactions();
             error = problem.residual();

@@ -422,13 +422,18 @@ impl<D: Dim> ContactSolver<D> for Staged {
             });
         }
         let settings = self.settings;
+        if found.residual == 0.0 {
+            // round-off
+            return None;
+        }
         // displacements are in proportion to both errors
         let smaller = |tolerance: f64| 0.5 * tolerance / excess;
         let (tolerance, load_tolerance) = (smaller(found.residual), smaller(settings.load_tolerance));
         let coarse = problem.clone();
         let report = Self::new(StagedSettings { tolerance, load_tolerance, ..settings }).directly(problem);
         self.extrapolation.forget();
-        if report.residual >= found.residual {
+        let is_smaller = report.residual < found.residual;
+        if !is_smaller {
             *problem = coarse;
             return None;
         }

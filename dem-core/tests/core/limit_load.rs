@@ -217,8 +217,20 @@ fn weight_is_borne_first() {
     };
     close(limit(&mut hanging(2.0, 1.0)), 2.0 - 5.0 * weight);
     // held up by the load, from some factor on
-    let LimitLoad::BrokenAtStart { least } = hanging(4.0 * weight, -1.0).limit_load(0.0, 1.0) else { panic!() };
+    let LimitLoad::BrokenAtStart { least, most } = hanging(4.0 * weight, -1.0).limit_load(0.0, 1.0) else { panic!() };
     close(least, weight);
+    assert_eq!(most, None);
+    // the growing load has another size than the weight
+    let LimitLoad::BrokenAtStart { least, .. } = hanging(4.0 * weight, -1e8).limit_load(0.0, 1.0) else { panic!() };
+    close(least, 1e-8 * weight);
+    assert_eq!(hanging(4.0 * weight, 1e8).limit_load(0.0, 1.0), LimitLoad::NeverBalanced);
+    // a shear of 5 N of which the bond bears 3 N, and a load against it
+    let mut between = row(2);
+    let up = Load { factor: Arc::new(|_| 5.0), ..growing(1, &[0.0, 1.0], &[0.0]) };
+    between.loads = vec![up, growing(1, &[0.0, -1.0], &[0.0])];
+    let LimitLoad::BrokenAtStart { least, most } = between.limit_load(0.0, 1.0) else { panic!() };
+    close(least, 2.0);
+    close(most.expect("a largest factor"), 8.0);
     // a load that does not help: the fifth bond from the end carries five weights
     let mut sideways = hanging(4.0 * weight, 0.0);
     sideways.loads[0] = growing(5, &[0.0, 1.0], &[0.0]);

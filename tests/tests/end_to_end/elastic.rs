@@ -1,8 +1,8 @@
 //! Bonds with a stiffness, from the scene to the history.
 
-use crate::common::{Folder, SMALL, config, observable, run};
+use crate::common::{Folder, SMALL, config, number, observable, run};
 use dem_run::history::History;
-use serde_json::json;
+use serde_json::{Value, json};
 
 const SPRINGS: &str = r#"bonds.stiffness={"springs": {"normal": 1e7, "tangential": 5e6, "rolling": 5}}"#;
 const YOUNG: &str = r#"bonds.stiffness={"young": {"modulus": 1e9, "poisson_ratio": 0.2}}"#;
@@ -158,4 +158,52 @@ fn a_slow_test_meets_its_load_tolerance_to_the_end() {
     for (found, exact) in load.iter().zip(&limit) {
         assert!((found - exact).abs() <= 1e-5 * most, "{found} N, not {exact} N");
     }
+}
+
+/// A block of 2 × 2 × 4 balls between smooth plates that face along an oblique direction has the
+/// curve and the modulus of an upright one; inside a cylinder its section is the cylinder's.
+#[test]
+fn a_specimen_is_measured_along_its_load() {
+    let here = Folder::new();
+    let (r, k) = (2e-3, 1e6);
+    let measured = |turn: f64, cylinder: bool| {
+        let turned = |[x, y, z]: [f64; 3]| [turn.cos() * x + turn.sin() * z, y, turn.cos() * z - turn.sin() * x];
+        let places = (0..16).map(|n| [n % 2, n / 2 % 2, n / 4].map(|n| 2.0 * r * f64::from(n)));
+        let grains: Vec<Value> = places.map(|x| json!({ "center": turned(x), "radius": r })).collect();
+        let plate = |up: f64| json!({ "plane": { "normal": turned([0.0, 0.0, up]), "place": "seated" } });
+        let mut walls = json!({
+            "bottom": { "shape": plate(1.0), "friction": 0 },
+            "top": { "shape": plate(-1.0), "friction": 0, "mass": "sample", "force": { "ramp": { "rate": 1000 } } },
+        });
+        if cylinder {
+            walls["side"] = json!({ "friction": 0, "shape": { "cylinder": {
+                "center": [r, r, 0], "axis": [0, 0, 1], "radius": 5e-3, "inside": true } } });
+        }
+        let scene = json!({
+            "dimension": 3, "sample": { "grains": grains }, "walls": walls, "load_wall": "top",
+            "materials": { "density": 2500, "friction": { "grain_grain": 0.3, "grain_wall": 0.2 } },
+            "bonds": { "strength": 1000, "gap_tolerance": 1e-6, "shear": 0.5, "rolling": 0.2,
+                "stiffness": { "springs": { "normal": k, "tangential": 0.5 * k, "rolling": 1 } } },
+            "time": { "step": 1e-3, "end": 0.05 }, "output": { "every_steps": 10 }
+        });
+        here.write("scene.json", scene.to_string());
+        run(&here, "scene.json", &[]);
+        here.dem_post(&["stress-strain", "a.h5", "--force", "--json"]).json()
+    };
+    let upright = measured(0.0, false);
+    assert!((number(&upright["height"]) / 0.016 - 1.0).abs() < 1e-9);
+    // four columns of springs in a section of 8 mm by 8 mm
+    let modulus = k / (2.0 * r);
+    assert!((number(&upright["elastic"]["young_modulus"]["value"]) / modulus - 1.0).abs() < 0.01, "{upright}");
+    let oblique = measured(0.5, false);
+    for of in [&["height"][..], &["area"], &["final_strain"], &["elastic", "young_modulus", "value"]] {
+        let value = |found: &Value| number(of.iter().fold(found, |found, key| &found[*key]));
+        assert!((value(&oblique) / value(&upright) - 1.0).abs() < 1e-4, "{of:?}: {oblique}");
+    }
+    let round = measured(0.0, true);
+    let [section, all] = [std::f64::consts::PI * 25e-6, 64e-6];
+    assert!((number(&round["area"]) / section - 1.0).abs() < 1e-9, "{round}");
+    let young =
+        number(&round["elastic"]["young_modulus"]["value"]) / number(&upright["elastic"]["young_modulus"]["value"]);
+    assert!((young * section / all - 1.0).abs() < 0.01, "{round}");
 }

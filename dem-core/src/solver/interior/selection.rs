@@ -106,11 +106,11 @@ impl Selection {
         if solved || exhausted {
             return Next::Arrived;
         }
-        if gaps <= tuning::BACK * energy && self.turn.is_none() {
+        if gaps <= tuning::BACK * energy && self.turn.is_none() && on_path {
             self.turn = Some(at.clone());
         }
         match &self.turn {
-            Some(turn) if gaps <= least && self.metric_shows(sites, at) => {
+            Some(turn) if gaps <= least && on_path && self.metric_shows(sites, at) => {
                 if self.anchored == tuning::MOST_ANCHORED {
                     return Next::Arrived;
                 }
@@ -136,6 +136,7 @@ impl Selection {
     /// Take no point as r* any more.
     fn forget(&mut self) {
         (self.limits, self.reached, self.enough) = (None, None, f64::INFINITY);
+        self.best.iter_mut().for_each(|best| best.reached.clear());
     }
 
     /// Where the path has jammed: whether its point of least gap is a solution whose reactions

@@ -195,6 +195,11 @@ impl Sites {
         self.list.push(site);
     }
 
+    /// For each row the velocity without reactions, with which elastic bonds return to rest.
+    pub fn asked(&self) -> impl Iterator<Item = f64> {
+        self.free.iter().zip(&self.compliance).zip(&self.carried).map(|((free, soft), carried)| free - soft * carried)
+    }
+
     /// The largest velocity without reactions, of bonds and of contacts that would close, if there
     /// are any: the scale of [`velocity_error`](crate::problem::residual::velocity_error). In
     /// statics, where no velocity counts, infinity.

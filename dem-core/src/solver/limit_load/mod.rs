@@ -70,7 +70,7 @@ fn capped(mut rows: Rows, load: Vec<f64>, constant: bool, cap: f64) -> (LimitLoa
         Ok(programme) => programme,
         Err(known) => return (known, true),
     };
-    let mut borne = !constant;
+    let (mut borne, zero) = (!constant, tuning::ACCEPT * programme.unit);
     if constant {
         // whether they are balanced at λ = 0: the least λ
         programme.sense = 1.0;
@@ -78,8 +78,13 @@ fn capped(mut rows: Rows, load: Vec<f64>, constant: bool, cap: f64) -> (LimitLoa
             (LimitLoad::Unbounded, _) => {}
             (LimitLoad::Factor { lower, upper }, holds) => {
                 let least = 0.5 * (lower + upper);
-                if lower > tuning::ACCEPT.max((upper - lower).abs()) {
-                    return (LimitLoad::BrokenAtStart { least }, holds);
+                if lower > zero.max((upper - lower).abs()) {
+                    programme.sense = -1.0;
+                    let (most, holds_too) = match programme.solve() {
+                        (LimitLoad::Factor { lower, upper }, holds) => (Some(0.5 * (lower + upper)), holds),
+                        (_, holds) => (None, holds),
+                    };
+                    return (LimitLoad::BrokenAtStart { least, most }, holds && holds_too);
                 }
                 borne = true;
             }
@@ -88,7 +93,7 @@ fn capped(mut rows: Rows, load: Vec<f64>, constant: bool, cap: f64) -> (LimitLoa
         programme.sense = -1.0;
     }
     match programme.solve() {
-        (LimitLoad::Factor { lower, upper }, holds) if upper < -tuning::ACCEPT.max((upper - lower).abs()) => {
+        (LimitLoad::Factor { lower, upper }, holds) if upper < -zero.max((upper - lower).abs()) => {
             (LimitLoad::NeverBalanced, holds)
         }
         (LimitLoad::Unbounded, _) if !borne => {

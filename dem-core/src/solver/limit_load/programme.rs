@@ -29,10 +29,12 @@ pub enum LimitLoad {
         /// Their indices.
         grains: Vec<u32>,
     },
-    /// The constant loads alone are not balanced; they are from this factor on.
+    /// The constant loads alone are not balanced; with a part of the growing loads they are.
     BrokenAtStart {
         /// Least factor that is balanced.
         least: f64,
+        /// Largest one; none if there is no largest, or if it was not found.
+        most: Option<f64>,
     },
     /// The method has not come to an end.
     Undecided,
