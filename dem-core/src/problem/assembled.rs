@@ -11,7 +11,7 @@
 //! velocities that a unit impulse causes. See docs/theory/fclib.md.
 
 pub use super::block_matrix::{Asymmetry, BlockMatrix};
-use super::residual::relative;
+use super::residual::{self, relative};
 use super::{Contact, ContactProblem, Link, Nodes, Visitor};
 use crate::contact::cone::predict_correct;
 use crate::contact::{Arms, Cone, Law, Local, PADDED, Padded, Weights};
@@ -261,7 +261,7 @@ impl Assembled {
             let own = Local { n: r.n - self.parts.shift[c], ..r };
             map += change.dot(&change);
             reaction += own.dot(&own);
-            rounding += self.summands(c) / (d * d);
+            rounding += self.summands(c, &self.r) / (d * d);
         }
         let scale = f64::sqrt(reaction).max(self.parts.applied);
         relative(map.sqrt(), rounding.sqrt(), scale)
@@ -269,7 +269,7 @@ impl Assembled {
 
     /// The velocity error (–): the largest natural map of a contact as a velocity, over the largest
     /// velocity without cohesion and contact reactions, of associated contacts and of those that
-    /// would close, if there are any. If reactions diverge because no solution exists, the velocity
+    /// would close, if there are any; zero within the round-off of what cohesion gives. If reactions diverge because no solution exists, the velocity
     /// error stays near one while the residual vanishes.
     #[must_use]
     pub fn velocity_error(&self) -> f64 {
@@ -284,18 +284,21 @@ impl Assembled {
         let speed = asked.flat_map(|(_, u)| u).map(|u| u.abs()).fold(0.0, f64::max);
         let map = |(c, d): (usize, f64)| {
             let change = self.correction(c, 1.0 / d, self.reaction(c), self.velocity(c));
-            d * change.dot(&change).sqrt()
+            let speed = d * change.dot(&change).sqrt();
+            // cohesion alone gives velocities that cancel: reactions that diverge would hide it
+            if speed <= residual::ROUNDING * self.summands(c, &none).sqrt() { 0.0 } else { speed }
         };
         let largest = self.scales().into_iter().enumerate().map(map).fold(0.0, f64::max);
         if largest == 0.0 { 0.0 } else { largest / speed }
     }
 
-    /// Sum of the squares of the summands of a contact's velocity: the scale of its round-off.
-    fn summands(&self, contact: usize) -> f64 {
+    /// Sum of the squares of the summands of a contact's velocity under these shifted reactions: the
+    /// scale of its round-off.
+    fn summands(&self, contact: usize, reactions: &[f64]) -> f64 {
         let size = self.parts.rows.count();
         let mut sum: f64 = self.parts.q[contact * size..(contact + 1) * size].iter().map(|q| q * q).sum();
         for (column, block) in self.parts.matrix.row(contact) {
-            let r = &self.r[column * size..(column + 1) * size];
+            let r = &reactions[column * size..(column + 1) * size];
             for row in block.chunks_exact(size) {
                 sum += row.iter().zip(r).map(|(w, r)| (w * r) * (w * r)).sum::<f64>();
             }

@@ -17,7 +17,7 @@ use crate::dim::{Dim, Vect};
 use rayon::prelude::*;
 
 /// Relative round-off up to which the natural map counts as zero.
-const ROUNDING: f64 = 64.0 * f64::EPSILON;
+pub(super) const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
 #[derive(Default)]
 struct Sums {

@@ -1,13 +1,14 @@
 //! Problems in FCLIB's format: written by `dem-run export`, solved by `dem-run solve`, and the
 //! collection in `problems`.
 
-use crate::common::{Folder, SMALL, problems};
+use crate::common::{Folder, SMALL, problems, run};
 use dem_core::contact::LocalSolve;
 use dem_core::problem::assembled::Assembled;
 use dem_core::solver::assembled::gauss_seidel;
 use dem_core::solver::{GaussSeidelSettings, SolveStatus, Staged, StagedSettings, Stages, Start, StiffnessRatio};
 use dem_run::fclib::Problem;
 use hdf5::File;
+use serde_json::{Value, json};
 use std::path::Path;
 
 /// A history of cemented grains under a plate, and the problem of its step 300.
@@ -47,6 +48,32 @@ fn an_exported_problem_is_solved_by_both_solvers() {
     let again = ["export", "a.h5", "--step", "300", "-o", "c.hdf5", "--quiet", "--threads", "1"];
     here.dem_run(&again).succeeds();
     assert_eq!(here.read("a.hdf5"), here.read("c.hdf5"));
+}
+
+/// A triangle of bonded disks whose load has gone again: cohesion alone gives velocities, which
+/// cancel to round-off.
+#[test]
+fn a_problem_in_which_nothing_acts_any_more_is_solved() {
+    let here = Folder::new();
+    let grains: Vec<Value> = [[0.0, 0.0], [4e-3, 0.0], [2e-3, 0.0034641016151377543]]
+        .iter()
+        .map(|x| json!({ "center": x, "radius": 2e-3 }))
+        .collect();
+    let pulse = json!({ "table": [[0, 0], [0.005, 1], [0.01, 0]] });
+    let scene = json!({
+        "dimension": 2, "thickness": 0.01, "sample": { "grains": grains },
+        "materials": { "density": 2500, "friction": { "grain_grain": 0.3, "grain_wall": 0.2 } },
+        "bonds": { "strength": 10, "gap_tolerance": 1e-3 },
+        "grains": { "fixed": [0], "loads": [{ "grain": 2, "force": [1, 0.3], "time": pulse }] },
+        "time": { "step": 1e-4, "end": 0.011 }, "output": { "every_steps": 10 }
+    });
+    here.write("scene.json", scene.to_string());
+    run(&here, "scene.json", &[]);
+    here.dem_run(&["export", "a.h5", "--step", "102", "-o", "a.hdf5", "--quiet"]).succeeds();
+    for solver in ["interior", "gauss-seidel"] {
+        let answer = here.dem_run(&["solve", "a.hdf5", "--solver", solver, "--json", "--force", "-o", "b.hdf5"]).json();
+        assert_eq!(answer["converged"], json!(true), "{answer}");
+    }
 }
 
 #[test]
