@@ -113,7 +113,8 @@ pub fn read(history: &History, options: &Options) -> Result<Report> {
         ));
     }
     let ruptures = history.ruptures()?;
-    let energy: f64 = ruptures.iter().map(|rupture| rupture.energy).sum();
+    // an empty sum is −0.0 and would be printed with its sign
+    let energy = 0.0 + ruptures.iter().map(|rupture| rupture.energy).sum::<f64>();
     let scale = options.scale.unwrap_or(if energy > 0.0 { Scale::Energy } else { Scale::Size });
     if scale == Scale::Energy && energy <= 0.0 && !ruptures.is_empty() {
         return Err(lacking(

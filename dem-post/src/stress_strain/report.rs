@@ -138,13 +138,13 @@ pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
     let facing = Vector3::from(walls[k].normal).dot(&axes.along).abs() > FRAC_1_SQRT_2;
     let plate = facing && covers(history, &walls[k], k)?;
     let mut report = Report {
-        displacement: motion.way.iter().map(|x| motion.sense * x).collect(),
-        load: motion.load.iter().map(|f| motion.sense * f).collect(),
+        displacement: scaled(&motion.way, motion.sense),
+        load: scaled(&motion.load, motion.sense),
         load_before_breaks: motion.load_before_breaks,
         // the reaction of the grains has the opposite sign
-        reaction: motion.reaction.iter().map(|f| -motion.sense * f).collect(),
-        strain: tensor("strain")?.iter().map(|e| -push * e).collect(),
-        stress: tensor("stress")?.iter().map(|s| push * size.box_share * s).collect(),
+        reaction: scaled(&motion.reaction, -motion.sense),
+        strain: scaled(&tensor("strain")?, -push),
+        stress: scaled(&tensor("stress")?, push * size.box_share),
         clock: Clock::of(history),
         broken: history.observable("bonds_broken")?.map(|series| series.value).unwrap_or_default(),
         summary: Summary {
@@ -175,6 +175,11 @@ pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
         }
     }
     Ok(report)
+}
+
+/// All values times a factor; a zero stays without sign.
+fn scaled(values: &[f64], factor: f64) -> Vec<f64> {
+    values.iter().map(|value| factor * value + 0.0).collect()
 }
 
 /// The elastic constants, or why there are none; `push` is that of [`push`], `share` that of

@@ -24,6 +24,10 @@ pub fn in_one_piece(grains: usize, bonds: impl Iterator<Item = [u32; 2]>) -> boo
     bonds.filter(|[i, j]| pieces.union(*i, *j)).count() + 1 == grains
 }
 
+/// Least extent of a disk over its diameter. Its boundary consists of grains, so that a coarse one
+/// is smaller than its circle.
+const ROUND: f64 = 0.8;
+
 /// A disk, or a cylinder, split between two plates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Disk {
@@ -37,7 +41,7 @@ impl Disk {
     /// The disk of a scene in which the wall `wall` loads it across its axis against another plane
     /// wall, in 2D also between plates; none for another test. The diameter is from the scene. The
     /// length is the thickness in 2D; in 3D it is the initial extent of the sample along the axis
-    /// (`extents`, m).
+    /// (`extents`, m). None also for a packing too small for its cut, which leaves flats.
     #[must_use]
     pub fn of(scene: &Scene, wall: &str, extents: &[f64]) -> Option<Self> {
         let Sample::Random(random) = &scene.sample else { return None };
@@ -55,6 +59,10 @@ impl Disk {
                 .is_some_and(|n| only_axis(n) == Some(across) && n[across] * normal[across] < 0.0)
         };
         if only_axis(normal) != Some(across) || axis == Some(across) || !scene.walls.values().any(|w| faces(&w.shape)) {
+            return None;
+        }
+        let mut across = extents.iter().take(scene.dimension.into()).enumerate().filter(|(k, _)| Some(*k) != axis);
+        if across.any(|(_, extent)| *extent < ROUND * diameter) {
             return None;
         }
         let length = axis.map_or(Some(scene.thickness()), |axis| extents.get(axis).copied())?;
@@ -133,7 +141,8 @@ mod tests {
         let path = format!("{}/../../configs/{config}", env!("CARGO_MANIFEST_DIR"));
         let set: Vec<String> = set.iter().map(ToString::to_string).collect();
         let scene = crate::load(path.as_ref(), &set).expect("scene");
-        Disk::of(&scene, "top", &[0.04, 0.015, 0.039])
+        let extents = if scene.dimension == 2 { &[0.04, 0.039][..] } else { &[0.04, 0.015, 0.039] };
+        Disk::of(&scene, "top", extents)
     }
 
     #[test]
@@ -144,6 +153,8 @@ mod tests {
         let along = r#"walls.top.shape.plane.normal=[0, -1, 0]"#;
         assert_eq!(disk("brazilian-3d.json", &[along, "walls.bottom.shape.plane.normal=[0, 1, 0]"]), None);
         assert_eq!(disk("brazilian-2d.json", &["sample.random.cut=null"]), None);
+        // a circle that cuts off next to nothing
+        assert_eq!(disk("brazilian-2d.json", &[r#"sample.random.cut={"circle": 0.06}"#]), None);
         assert_eq!(disk("brazilian-2d.json", &["walls.bottom.shape.plane.normal=[1, 0]"]), None);
         assert_eq!(disk("cylinder-compression.json", &[]), None);
         assert_eq!(disk("compression.json", &[]), None);

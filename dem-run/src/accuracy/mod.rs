@@ -24,7 +24,7 @@ use crate::memory;
 use crate::output::Folder;
 use crate::progress::Progress;
 use crate::run::handle_signals;
-use crate::scene::Scene;
+use crate::scene::{Rupture, Scene};
 use crate::signals::Interrupt;
 use dem_core::dim::Dim;
 use profile::Profile;
@@ -51,6 +51,11 @@ pub fn accuracy(scene: &Scene, options: &AccuracyOptions) -> Result<(), RunError
             "several walls are driven, {names}: name the one that loads the sample as load_wall in the scene, or with \
              --set load_wall=NAME"
         )));
+    }
+    if scene.rupture == Rupture::NextEvent && options.solvers.contains(&SolverName::GaussSeidel) {
+        return Err(RunError::Usage(
+            "Gauss–Seidel does not solve rupture next_event: name other solvers, as in `--solvers auto,newton`".into(),
+        ));
     }
     if let Some(stage) = scene.cement_stage() {
         return Err(RunError::Usage(format!(

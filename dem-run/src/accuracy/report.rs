@@ -235,7 +235,8 @@ impl Report {
             let (a, b) = (key(&self.runs[*a]), key(&self.runs[*b]));
             a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])).then(a[2].total_cmp(&b[2]))
         };
-        let ended = (0..self.runs.len()).filter(|k| self.runs[*k].outcome.error.is_none());
+        let made = |outcome: &Outcome| outcome.error.is_none() && outcome.steps > 0;
+        let ended = (0..self.runs.len()).filter(|k| made(&self.runs[*k].outcome));
         self.reference = ended.min_by(finer);
         let Some(reference) = self.reference.map(|k| self.runs[k].clone()) else { return };
         let deviation = |a: Option<f64>, b: Option<f64>| Some(a? / b.filter(|b| *b != 0.0)? - 1.0);

@@ -235,3 +235,16 @@ fn an_interruption_leaves_what_was_measured() {
     let report: Value = serde_json::from_slice(&here.read("incline-accuracy/accuracy.json")).expect("JSON");
     assert_eq!((&report["interrupted"], report["runs"].as_array().map(Vec::len)), (&true.into(), Some(1)));
 }
+
+#[test]
+fn loading_to_the_next_event_is_compared_with_solvers_that_know_it() {
+    let here = Folder::new();
+    let scene = config("compression.json");
+    let sets = [&TINY[..], &["--set", "rupture=next_event", "--orders", "0", "--tolerances", "1e-6", "--steps", "1"]];
+    let accuracy =
+        |more: &[&str]| here.dem_run(&[&["accuracy", &scene, "--json", "--quiet"], &sets.concat()[..], more].concat());
+    accuracy(&[]).fails(2, &["Gauss–Seidel", "next_event", "--solvers auto,newton"]);
+    let report = accuracy(&["--solvers", "auto,newton"]).json();
+    let runs = report["runs"].as_array().expect("runs");
+    assert!(runs.iter().all(|run| number(&run["steps"]) > 0.0 && number(&run["jaccard"]) == 1.0), "{runs:?}");
+}
