@@ -10,8 +10,9 @@
 //! compression and strain is positive in elongation.
 //!
 //! **Size of the sample.** Height H along the drive and cross-section A perpendicular to it are
-//! those of the box around all grains at the first frame; in 2D, A is the width times the scene's
-//! `thickness`. Only a plane that moves along its normal has a section: for a round loader no
+//! those of all grains at the first frame, A of the box around them; in 2D, A is the width times
+//! the scene's `thickness`, and πR² inside a cylinder. Strain and stress of the particles are the
+//! components e·E e and e·S e along the drive e, S over the volume H A. Only a plane that moves along its normal has a section: for a round loader no
 //! stress or strain from the walls is reported.
 //!
 //! **The load** is the prescribed force, or, where the motion is prescribed, the force of the wall
