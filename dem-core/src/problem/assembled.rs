@@ -269,8 +269,9 @@ impl Assembled {
 
     /// The velocity error (–): the largest natural map of a contact as a velocity, over the largest
     /// velocity without cohesion and contact reactions, of associated contacts and of those that
-    /// would close, if there are any; zero within the round-off of what cohesion gives. If reactions diverge because no solution exists, the velocity
-    /// error stays near one while the residual vanishes.
+    /// would close, if there are any; zero within the round-off of what cohesion gives. If reactions
+    /// diverge because no solution exists, the velocity error stays near one while the residual
+    /// vanishes.
     #[must_use]
     pub fn velocity_error(&self) -> f64 {
         let size = self.parts.rows.count();
@@ -292,8 +293,8 @@ impl Assembled {
         if largest == 0.0 { 0.0 } else { largest / speed }
     }
 
-    /// Sum of the squares of the summands of a contact's velocity under these shifted reactions: the
-    /// scale of its round-off.
+    /// Sum of the squares of the summands of a contact's velocity under these shifted reactions:
+    /// the scale of its round-off.
     fn summands(&self, contact: usize, reactions: &[f64]) -> f64 {
         let size = self.parts.rows.count();
         let mut sum: f64 = self.parts.q[contact * size..(contact + 1) * size].iter().map(|q| q * q).sum();

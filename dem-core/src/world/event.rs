@@ -128,7 +128,7 @@ impl<D: Dim> World<D> {
             let inside = |at: &f64| !halve && *at > low.0 && *at < low.0 + width;
             let at = secant(low, high).filter(inside).unwrap_or(low.0 + 0.5 * width);
             if at <= low.0 || at >= high.0 || width.abs() <= finest {
-                // round-off of the loads in the trials. Another solve at the same time may select other
+                // round-off of the loads. Another solve at the same time may select other
                 // reactions, so the equilibrium is kept
                 return Ok(above);
             }

@@ -65,7 +65,7 @@ pub struct ChainFigures {
     pub mean_length: f64,
     /// Grains of the longest chain.
     pub longest: usize,
-    /// Mean load of the grains whose load is positive, Pa: the load that a grain of a chain exceeds.
+    /// Mean load of the grains whose load is positive, Pa: grains of a chain have more.
     pub mean_load: f64,
     /// How many chains have how many grains: (grains, chains).
     pub lengths: Vec<(usize, usize)>,

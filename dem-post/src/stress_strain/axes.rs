@@ -13,7 +13,7 @@ use crate::output::Result;
 /// Component of a unit vector along another from which they count as parallel.
 const PARALLEL: f64 = 1.0 - 1e-9;
 
-/// Unit vectors along a drive and perpendicular to it; coordinate axes where the drive is along one.
+/// Unit vectors along a drive and perpendicular to it; coordinate axes if the drive is along one.
 pub(super) struct Axes {
     pub along: Vector3<f64>,
     pub across: Vec<Vector3<f64>>,

@@ -12,8 +12,9 @@
 //! **Size of the sample.** Height H along the drive and cross-section A perpendicular to it are
 //! those of all grains at the first frame, A of the box around them; in 2D, A is the width times
 //! the scene's `thickness`, and πR² inside a cylinder. Strain and stress of the particles are the
-//! components e·E e and e·S e along the drive e, S over the volume H A. Only a plane that moves along its normal has a section: for a round loader no
-//! stress or strain from the walls is reported.
+//! components e·E e and e·S e along the drive e, S over the volume H A. Only a plane that moves
+//! along its normal has a section: for a round loader no stress or strain from the walls is
+//! reported.
 //!
 //! **The load** is the prescribed force, or, where the motion is prescribed, the force of the wall
 //! on the grains before any bond broke in the step (`wall_force_at_limit`; in histories without it

@@ -210,9 +210,9 @@ fn the_failure_envelope_of_a_bond_is_its_cone() {
 /// One loose disk on a floor with friction, bonded to a fixed one: a push along the floor that the
 /// bond bears, a load of 20 N on the disk, then a growing push.
 ///
-/// While the load is absent the bond bears the whole push; the contact with the floor takes part of
-/// what is added later. The loads of both disks as springs, with Coulomb's law, give 6.364 N; in one
-/// go from zero it would be 9.091 N.
+/// While the load is absent the bond bears the whole push; the contact with the floor takes part
+/// of what is added later. Springs of both contacts, with Coulomb's law, give 6.364 N; in one go
+/// from zero it would be 9.091 N.
 #[test]
 fn loads_are_followed_in_their_order() {
     let here = Folder::new();
