@@ -269,9 +269,9 @@ impl Assembled {
 
     /// The velocity error (–): the largest natural map of a contact as a velocity, over the largest
     /// velocity without cohesion and contact reactions, of associated contacts and of those that
-    /// would close, if there are any; zero within the round-off of what cohesion gives. If reactions
-    /// diverge because no solution exists, the velocity error stays near one while the residual
-    /// vanishes.
+    /// would close, if there are any; zero within the round-off of what cohesion gives. If
+    /// reactions diverge because no solution exists, the velocity error stays near one while the
+    /// residual vanishes.
     #[must_use]
     pub fn velocity_error(&self) -> f64 {
         let size = self.parts.rows.count();
