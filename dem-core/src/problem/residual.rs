@@ -102,6 +102,11 @@ pub fn velocity_error<D: Dim>(problem: &ContactProblem<D>) -> f64 {
     }
 }
 
+/// The largest natural map of a contact as a velocity (m/s): how wrong the motion is.
+pub fn wrong_velocity<D: Dim>(problem: &ContactProblem<D>) -> f64 {
+    Largest::of(problem).map
+}
+
 /// The false motion of the impulses and node velocities that the problem now holds (–): the largest
 /// natural map of a contact as a velocity, over the largest relative velocity of any contact. Where
 /// a step asks no contact to change its velocity, as between fragments that drift apart, the

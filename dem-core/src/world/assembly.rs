@@ -14,7 +14,7 @@ use crate::problem::{Contact, ContactProblem, KINDS, Kind, Link, Node, Nodes, Vi
 /// a step up to which its bodies are at rest to each other. Otherwise the round-off of positions
 /// would be a misfit, to which stiff contacts respond with forces; with restitution it would decide
 /// which contacts act.
-const TOUCHING: f64 = 1e-9;
+pub(super) const TOUCHING: f64 = 1e-9;
 
 /// The same for a contact with a reaction in the previous step. It was closed then, and only solver
 /// errors have opened it since; a stiff contact would lose its force to them at once. What they

@@ -155,6 +155,7 @@ impl<D: Dim> World<D> {
     /// finely, if the solver can. Returns also the violation that remains.
     fn solve(&mut self, problem: &mut ContactProblem<D>, limits_apply: bool) -> (SolveReport, Option<Violation>) {
         let solve = self.solver.solve(problem);
+        let solve = self.accepted_as_rest(solve, problem);
         let violation = if limits_apply { self.yielding_of(solve, problem) } else { None };
         let Some(found) = violation.as_ref().filter(|_| solve.status != SolveStatus::Failed) else {
             return (solve, violation);

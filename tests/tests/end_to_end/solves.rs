@@ -3,7 +3,7 @@
 
 use crate::common::{Folder, SMALL, config, number, observable, run};
 use dem_run::history::{History, SolverRoute};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 fn values(history: &History, name: &str) -> Vec<f64> {
     observable(history, name).value
@@ -147,4 +147,27 @@ fn a_step_that_asks_for_hardly_any_velocity_is_accepted() {
     assert_eq!(summary["steps"], 3);
     assert!(number(&summary["worst_residual"]) <= 1e-8);
     assert!(summary["missed_load_tolerance"].as_u64() >= Some(1), "{}", summary["missed_load_tolerance"]);
+}
+
+/// Two gripped plates pull 60 bonded balls apart. Fragments then move as wholes, and no contact has
+/// to change its velocity: what round-off leaves is nothing beside the motion of the plates.
+#[test]
+fn a_specimen_that_has_parted_moves_on() {
+    let here = Folder::new();
+    let plane = |up: i32| json!({ "plane": { "normal": [0, 0, up], "place": "seated" } });
+    let scene = json!({
+        "dimension": 3, "seed": 1,
+        "sample": { "random": { "count": 60, "diameter": { "uniform": { "min": 2e-3, "max": 3e-3 } },
+            "width": 0.0095, "depth": 0.0095, "preparation": { "compaction": { "solid_fraction": 0.45 } } } },
+        "materials": { "density": 2500, "friction": { "grain_grain": 0.3, "grain_wall": 0.2 } },
+        "bonds": { "strength": 5, "gap_tolerance": 0.01, "shear": 0.4, "rolling": 0.15, "twist": 0.1 },
+        "walls": {
+            "bottom": { "shape": plane(1), "grip": 2e-4 },
+            "top": { "shape": plane(-1), "grip": 2e-4, "velocity": { "constant": -0.01 } } },
+        "time": { "step": 1e-4, "end": 5e-3 }, "output": { "every_steps": 1 }
+    });
+    here.write("scene.json", scene.to_string());
+    let summary = run(&here, "scene.json", &[]);
+    assert_eq!((&summary["ending"], &summary["steps"]), (&json!("time"), &json!(50)), "{summary}");
+    assert!(number(&summary["worst_residual"]) <= 1e-8);
 }
