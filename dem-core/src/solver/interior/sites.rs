@@ -195,9 +195,9 @@ impl Sites {
         self.list.push(site);
     }
 
-    /// For each row the velocity without reactions, with which elastic bonds return to rest.
-    pub fn asked(&self) -> impl Iterator<Item = f64> {
-        self.free.iter().zip(&self.compliance).zip(&self.carried).map(|((free, soft), carried)| free - soft * carried)
+    /// Size of the velocity of a row without reactions, with which an elastic bond returns to rest.
+    pub fn asked(&self, row: usize) -> f64 {
+        (self.free[row] - self.compliance[row] * self.carried[row]).abs()
     }
 
     /// The largest velocity without reactions, of bonds and of contacts that would close, if there
@@ -211,7 +211,7 @@ impl Sites {
         let any = (0..self.list.len()).any(asks);
         let asked = self.list.iter().enumerate().filter(|(k, _)| asks(*k) || !any);
         let rows = asked.flat_map(|(_, site)| site.at..site.at + site.rows);
-        rows.map(|row| (self.free[row] - self.compliance[row] * self.carried[row]).abs()).fold(0.0, f64::max)
+        rows.map(|row| self.asked(row)).fold(0.0, f64::max)
     }
 
     /// Whether there are elastic bonds.

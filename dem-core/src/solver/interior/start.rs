@@ -21,7 +21,7 @@ pub(super) fn cold(sites: &Sites, far: bool) -> State {
     for (site, shift) in sites.list.iter().zip(&sites.shift) {
         site.part_mut(&mut r)[0] = (inside - shift).max(0.0);
     }
-    let speed = sites.asked().map(f64::abs).fold(0.0, f64::max).max(f64::MIN_POSITIVE);
+    let speed = (0..sites.rows).map(|row| sites.asked(row)).fold(0.0, f64::max).max(f64::MIN_POSITIVE);
     State { x: sites.primal(&r), r, z: vec![[speed, 0.0, 0.0]; sites.cones.len()] }
 }
 
