@@ -50,7 +50,7 @@ pub(super) mod stages {
     pub const LAST_VISITS: u64 = 20_000_000;
 }
 
-/// Gauss–Seidel, plain and accelerated (decision 9).
+/// Gauss–Seidel, plain and accelerated (docs/theory/gauss-seidel.md).
 pub(super) mod gauss_seidel {
     /// Plain sweeps before the acceleration begins: easy problems need no more.
     pub const PLAIN: u64 = 32;
@@ -306,9 +306,8 @@ pub(super) mod certificate {
 
 /// The limit load, a conic programme.
 pub(super) mod limit_load {
-    /// Error of the balance, of the mechanism and of the load at which the programme is solved,
-    /// relative to the growing loads: a smaller factor is zero. Double precision reaches some 1e-11
-    /// on samples of 430 disks.
+    /// Error of the balance, of the mechanism and of the load at which the programme is solved, in
+    /// its unit. Double precision reaches some 1e-11 on samples of 430 disks.
     pub const TOLERANCE: f64 = 1e-10;
     /// The largest such error that is accepted.
     pub const ACCEPT: f64 = 1e-7;

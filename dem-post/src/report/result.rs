@@ -108,9 +108,11 @@ fn shown(
 fn pictures(history: &History, shown: &[Moment], parts: &Parts) -> Result<Vec<Figure>> {
     let clock = parts.info.clock;
     let times: Vec<f64> = shown.iter().map(|moment| clock.value(history.times()[moment.frame])).collect();
-    // what the sample has: bonds, else forces, else speeds
+    // what the sample has: bonds, else forces or speeds; forces between spheres hide the spheres
+    let dry = [Subject::Forces, Subject::Speed];
+    let [first, second] = if history.dimension() == 2 { dry } else { [dry[1], dry[0]] };
     let mut chosen = None;
-    for subject in [Subject::Bonds, Subject::Forces, Subject::Speed] {
+    for subject in [Subject::Bonds, first, second] {
         match frames::read(history, subject, 1, &times) {
             Ok(found) => {
                 chosen = Some(found);
