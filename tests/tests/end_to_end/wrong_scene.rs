@@ -155,7 +155,7 @@ fn a_sample_file_is_refused_at_its_line() {
         ("x,y,r\n0,0,1e-3\n", &["sample.csv, line 1", "x,y,radius"]),
         ("x,y,radius\n", &["sample.csv", "no grains"]),
         ("x,y,radius\n0,0,1e-3\n0,0,1e-3\n", &["grains 0 and 1 coincide"]),
-        ("x;y;radius\n0;0;1e-3\n", &["sample.csv, line 1", "x,y,radius, between commas"]),
+        ("x;y;radius\n0;0;1e-3\n", &["sample.csv, line 1", "x,y,radius and, if needed, material, between commas"]),
         ("x,y,radius\n0,1,1\n0,1,-2\nzero,1,1\n", &["line 3: radius is -2", "line 4: x is \"zero\""]),
         ("x,y,radius\n0,1,1\n1,1,1\n9,1,1\n9,2,1\n", &["grains 0 and 1 overlap by 1.000e0 m", "grains 2 and 3"]),
     ] {
