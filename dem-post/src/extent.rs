@@ -21,7 +21,7 @@ pub fn volume(dimension: usize, radius: f64) -> f64 {
 /// # Errors
 /// Those of reading the history; it must have a frame.
 pub fn first_box(history: &History) -> Result<Vec<[f64; 2]>> {
-    box_at(history, 0)
+    Ok(box_around(&history.grains()?.radius, &history.grain_state(0)?.position, history.dimension()))
 }
 
 /// The frame with the grains as they were bonded: the first one, or the first one after a stage has
@@ -30,29 +30,20 @@ pub fn first_box(history: &History) -> Result<Vec<[f64; 2]>> {
 /// # Errors
 /// Those of reading the history.
 pub fn bonded_frame(history: &History) -> Result<usize> {
-    let formed = history.bonds()?.formed.unwrap_or(NOT_FORMED);
+    let formed = history.bonds_formed()?.unwrap_or(NOT_FORMED);
     let found = history.steps().partition_point(|&step| step < formed);
     Ok(found.min(history.frames().saturating_sub(1)))
-}
-
-/// The box around all grains as they were bonded, m: its ends along each axis.
-///
-/// # Errors
-/// Those of reading the history; it must have a frame.
-pub fn bonded_box(history: &History) -> Result<Vec<[f64; 2]>> {
-    box_at(history, bonded_frame(history)?)
-}
-
-fn box_at(history: &History, frame: usize) -> Result<Vec<[f64; 2]>> {
-    Ok(box_around(&history.grains()?.radius, &history.grain_state(frame)?.position, history.dimension()))
 }
 
 /// The box around grains of these radii at these positions, D numbers each, m: its ends along each
 /// axis.
 pub fn box_around(radius: &[f64], position: &[f64], dimension: usize) -> Vec<[f64; 2]> {
-    let ends = |axis: usize| {
-        let reach = |sign: f64| radius.iter().zip(position.chunks(dimension)).map(move |(r, x)| x[axis] + sign * r);
-        [range(reach(-1.0))[0], range(reach(1.0))[1]]
-    };
-    (0..dimension).map(ends).collect()
+    (0..dimension).map(|axis| ends_along(radius, position, dimension, |x| x[axis])).collect()
+}
+
+/// How far grains of these radii at these positions, D numbers each, reach along a direction, m;
+/// `place` is the component of a position along it.
+pub fn ends_along(radius: &[f64], position: &[f64], dimension: usize, place: impl Fn(&[f64]) -> f64) -> [f64; 2] {
+    let reach = |sign: f64| range(radius.iter().zip(position.chunks(dimension)).map(|(r, x)| place(x) + sign * r));
+    [reach(-1.0)[0], reach(1.0)[1]]
 }

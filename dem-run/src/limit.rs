@@ -262,18 +262,17 @@ fn describe<D: Dim>(
     (growing, steady): (Vec<Growth>, bool),
     found: LimitLoad,
 ) -> Result<Limit, RunError> {
-    let most_factor = if let LimitLoad::BrokenAtStart { most, .. } = &found { *most } else { None };
     let unsupported = match &found {
         LimitLoad::Unsupported { grains } => grains.clone(),
         _ => Vec::new(),
     };
-    let (outcome, factor, factor_error, least_factor) = match found {
+    let (outcome, factor, factor_error, [least_factor, most_factor]) = match found {
         LimitLoad::Factor { lower, upper } => {
-            (Outcome::Limit, Some(0.5 * (lower + upper)), Some((upper - lower).abs()), None)
+            (Outcome::Limit, Some(0.5 * (lower + upper)), Some((upper - lower).abs()), [None; 2])
         }
-        LimitLoad::Unbounded => (Outcome::Unbounded, None, None, None),
-        LimitLoad::NeverBalanced | LimitLoad::Unsupported { .. } => (Outcome::NeverBorne, None, None, None),
-        LimitLoad::BrokenAtStart { least, .. } => (Outcome::BrokenAtStart, None, None, Some(least)),
+        LimitLoad::Unbounded => (Outcome::Unbounded, None, None, [None; 2]),
+        LimitLoad::NeverBalanced | LimitLoad::Unsupported { .. } => (Outcome::NeverBorne, None, None, [None; 2]),
+        LimitLoad::BrokenAtStart { least, most } => (Outcome::BrokenAtStart, None, None, [Some(least), most]),
         LimitLoad::Undecided => return Err(NoConvergence::Limit.into()),
     };
     let factor = factor.map(|factor| if factor.abs() < ACCURACY { 0.0 } else { factor });

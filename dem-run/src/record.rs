@@ -38,7 +38,7 @@ pub struct Recorder<D: Dim> {
 const GATHERED: usize = 256;
 
 /// What the file of a resumed run begins with.
-pub struct Start<'a> {
+pub struct Beginning<'a> {
     /// The rows of the old file that stay.
     pub kept: RowCounts,
     /// The state from which the run goes on.
@@ -63,7 +63,7 @@ impl<D: Dim> Recorder<D> {
     /// history (0 to 1).
     pub fn go_on(
         history: &History,
-        Start { kept, checkpoint, origin }: Start,
+        Beginning { kept, checkpoint, origin }: Beginning,
         scene: &Scene,
         world: &World<D>,
         cemented: Option<u64>,

@@ -6,7 +6,7 @@ use crate::error::RunError;
 use crate::history::{Checkpoint, Ending, History, HistoryError, Parameters, RowCounts, refuse_busy};
 use crate::in_dimension;
 use crate::output::{number, print_json, print_line};
-use crate::record::{Recorder, Start};
+use crate::record::{Beginning, Recorder};
 use crate::run::{Execution, Run, RunOptions, RunState, handle_signals, run_in};
 use crate::scene::{self, Scene, differences};
 use crate::signals::Interrupt;
@@ -171,7 +171,7 @@ fn resume_in<D: Dim>(
         };
         return Ok(print_line(&format!("nothing to do: the run ended {ended}; {further}"))?);
     }
-    let start = Start {
+    let beginning = Beginning {
         kept: kept(history, scene, &checkpoint)?,
         origin: origin(history, scene, changed, checkpoint.step)?,
         checkpoint: &checkpoint,
@@ -184,7 +184,7 @@ fn resume_in<D: Dim>(
         !interrupt.requested()
     };
     let cemented = state.course.cemented(scene);
-    let recorder = Recorder::go_on(history, start, scene, &state.world, cemented, &mut tell);
+    let recorder = Recorder::go_on(history, beginning, scene, &state.world, cemented, &mut tell);
     let recorder = recorder.map_err(|error| match error {
         HistoryError::Interrupted => RunError::Interrupted("the history is unchanged"),
         error => error.into(),

@@ -2,7 +2,9 @@
 //!
 //! The load functions give the loads as a path, with their time τ as parameter. A step starts from
 //! the reactions of the last event, without those of the bonds that broke in it, and finds the
-//! equilibrium r(τ) of the bodies at rest, with bonds that cannot break. At the τ of the last event
+//! equilibrium r(τ) of the bodies at rest, with bonds that cannot break. While τ grows it starts
+//! anew from the reactions after the release, and from those where a load function turns: dry
+//! contacts keep what they bear. At the τ of the last event
 //! the broken bonds have released their forces to the others. If no other bond exceeds its strength
 //! there, τ grows until the first one reaches it; else τ decreases until the last one meets it: the
 //! load of the next break. While no contact changes its status r(τ) is affine in the loads; where

@@ -161,7 +161,10 @@ impl<D: Dim> World<D> {
             return (solve, violation);
         };
         match self.solver.solve_finer(problem, solve, self.excess_of(found)) {
-            Some(finer) => (SolveReport { work: solve.work + finer.work, ..finer }, self.yielding_of(finer, problem)),
+            Some(finer) => {
+                let finer = self.accepted_as_rest(finer, problem);
+                (SolveReport { work: solve.work + finer.work, ..finer }, self.yielding_of(finer, problem))
+            }
             None => (solve, violation),
         }
     }

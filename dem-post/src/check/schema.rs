@@ -179,15 +179,17 @@ fn identity(c: &mut Checker) {
     if !number(c, "parameters", "seed").is_ok_and(|seed| seed.read_scalar::<u64>().is_ok()) {
         c.wrong("parameters@seed", None, "is missing, or not a number");
     }
-    for place in ["parameters/scene", "parameters/earlier_scenes"] {
-        if place.ends_with("/earlier_scenes") && !c.has(place) {
-            continue;
-        }
-        if let Some(shape) = c.typed(place, &TEXT)
-            && (!shape.is_empty() || json(c, place).is_none())
-        {
-            c.wrong(place, None, "is not a JSON text");
-        }
+    json_text(c, "parameters/scene");
+    if c.has("parameters/earlier_scenes") {
+        json_text(c, "parameters/earlier_scenes");
+    }
+}
+
+fn json_text(c: &mut Checker, place: &str) {
+    if let Some(shape) = c.typed(place, &TEXT)
+        && (!shape.is_empty() || json(c, place).is_none())
+    {
+        c.wrong(place, None, "is not a JSON text");
     }
 }
 

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::region::Region;
 use super::tensors::{Dyads, anisotropy, direction};
 use crate::clock::Clock;
-use crate::extent::{bonded_box, bonded_frame, first_box};
+use crate::extent::{bonded_frame, box_around, first_box};
 use crate::moments;
 use crate::output::{Result, Text, number, progress, quantity};
 use crate::tensor::{mean_and_deviator, principal};
@@ -133,14 +133,15 @@ struct Cracks {
 impl Cracks {
     fn new(history: &History) -> Result<Self> {
         let dimension = history.dimension();
-        let volume = bonded_box(history)?.iter().map(|[low, high]| high - low).product();
+        let position = history.grain_state(bonded_frame(history)?)?.position;
+        let ends = box_around(&history.grains()?.radius, &position, dimension);
         Ok(Self {
             bonds: history.bonds()?,
             ruptures: history.ruptures()?,
-            position: history.grain_state(bonded_frame(history)?)?.position,
+            position,
             sum: Dyads::new(dimension),
             dimension,
-            volume,
+            volume: ends.iter().map(|[low, high]| high - low).product(),
             broken: 0,
         })
     }

@@ -22,9 +22,9 @@ impl OnPage for Report {
             let text = format!("{} over {}.", capitalised(&chart.y), self.clock.over());
             chart_figure(chart, &text, &text)
         });
-        let text = "Stress is over the box around the sample at the first frame, crack density over that when the bonds formed; the porosity is \
-                    that of a round region in its middle. Contacts are those between grains that carry a force or \
-                    are bonded.";
+        let text = "Stress is over the box around the sample at the first frame, crack density over that when the \
+                    bonds formed; the porosity is that of a round region in its middle. Contacts are those between \
+                    grains that carry a force or are bonded.";
         Ok(Section { text: text.into(), figures: figures.collect(), ..Section::of::<Self>() })
     }
 }

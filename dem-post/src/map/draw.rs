@@ -9,6 +9,7 @@ use super::panel::{Link, Panel, Patch};
 use super::sample::{Sample, View};
 use super::scale::mixed;
 use super::wall;
+use crate::output::counted;
 
 /// Width and greatest height of one panel, units of the drawing.
 const PANEL: (f64, f64) = (400.0, 560.0);
@@ -34,25 +35,35 @@ pub fn draw(sample: &Sample, panels: &[Panel], legend: &[Key]) -> Drawing {
 /// As [`draw`], for the part of the plane that contains the sample; captions tell how many grains
 /// are outside.
 pub fn draw_view(sample: &Sample, view: View, panels: &[Panel], legend: &[Key]) -> Drawing {
-    let told = |panel: &Panel| {
+    let caption = |panel: &Panel| {
         let mut caption = panel.caption.clone();
-        match (sample.outside(&panel.grains, view), caption.last_mut()) {
-            (0, _) => {}
-            (outside, Some(line)) => *line += &format!(", {}", outside_text(outside)),
-            (outside, None) => caption.push(outside_text(outside)),
+        let outside = sample.outside(&panel.grains, view);
+        if outside > 0 {
+            let told = format!("{} outside the picture", counted(outside, "grain"));
+            match caption.last_mut() {
+                Some(line) => *line += &format!(", {told}"),
+                None => caption.push(told),
+            }
         }
-        Panel { caption, ..panel.clone() }
+        caption
     };
-    draw_part(sample, view, &panels.iter().map(told).collect::<Vec<_>>(), legend)
-}
-
-/// `3 grains outside the picture`
-fn outside_text(outside: usize) -> String {
-    format!("{outside} grain{} outside the picture", if outside == 1 { "" } else { "s" })
+    draw_sheet(sample, view, panels, &panels.iter().map(caption).collect::<Vec<_>>(), legend)
 }
 
 /// As [`draw`], for a part of the sample.
-pub fn draw_part(sample: &Sample, View([low, high]): View, panels: &[Panel], legend: &[Key]) -> Drawing {
+pub fn draw_part(sample: &Sample, view: View, panels: &[Panel], legend: &[Key]) -> Drawing {
+    let captions: Vec<_> = panels.iter().map(|panel| panel.caption.clone()).collect();
+    draw_sheet(sample, view, panels, &captions, legend)
+}
+
+/// The panels with these captions.
+fn draw_sheet(
+    sample: &Sample,
+    View([low, high]): View,
+    panels: &[Panel],
+    captions: &[Vec<String>],
+    legend: &[Key],
+) -> Drawing {
     let extent = [high[0] - low[0], high[1] - low[1]];
     let stacked = extent[0] > STACKED * extent[1];
     let widest = if stacked { WIDE } else { PANEL.0 };
@@ -67,15 +78,17 @@ pub fn draw_part(sample: &Sample, View([low, high]): View, panels: &[Panel], leg
     let entry = legend.iter().map(key_width).fold(0.0, f64::max);
     let width = even((columns as f64 * (size.0 + MARGIN) + MARGIN).max(420.0).max(entry + 2.0 * MARGIN));
     let rows = legend_rows(legend, width - 2.0 * MARGIN);
-    let caption = if panels.iter().any(|panel| !panel.caption.is_empty()) { CAPTION } else { MARGIN };
-    let below = lines as f64 * (caption + size.1);
+    let above = if captions.iter().any(|caption| !caption.is_empty()) { CAPTION } else { MARGIN };
+    let below = lines as f64 * (above + size.1);
     let mut canvas = Canvas::new(width, even(below + LEGEND * (rows.len() as f64 + 1.0) + MARGIN));
     let left = 0.5 * (width - columns as f64 * (size.0 + MARGIN) + MARGIN);
-    for (k, panel) in panels.iter().enumerate() {
+    for (k, (panel, caption)) in panels.iter().zip(captions).enumerate() {
         let (column, line) = if stacked { (0, k) } else { (k, 0) };
-        let top = line as f64 * (caption + size.1);
-        let corner = (left + column as f64 * (size.0 + MARGIN), top + caption);
-        draw_panel(&mut canvas, sample, panel, &Frame { low, scale, corner, size });
+        let top = line as f64 * (above + size.1);
+        let corner = (left + column as f64 * (size.0 + MARGIN), top + above);
+        let frame = Frame { low, scale, corner, size };
+        draw_caption(&mut canvas, caption, &frame);
+        draw_panel(&mut canvas, sample, panel, &frame);
     }
     let base = below + 0.7 * LEGEND;
     scale_bar(&mut canvas, (left + 2.0 * HATCH, base), scale, size.0);
@@ -85,11 +98,14 @@ pub fn draw_part(sample: &Sample, View([low, high]): View, panels: &[Panel], leg
     canvas.finish()
 }
 
-fn draw_panel(canvas: &mut Canvas, sample: &Sample, panel: &Panel, frame: &Frame) {
-    for (line, text) in panel.caption.iter().enumerate() {
+fn draw_caption(canvas: &mut Canvas, caption: &[String], frame: &Frame) {
+    for (line, text) in caption.iter().enumerate() {
         let at = (frame.corner.0 + 0.5 * frame.size.0, frame.corner.1 - CAPTION + 17.0 + 18.0 * line as f64);
         canvas.text(at, text, 14, Anchor::Middle);
     }
+}
+
+fn draw_panel(canvas: &mut Canvas, sample: &Sample, panel: &Panel, frame: &Frame) {
     canvas.clip(frame.corner, frame.size);
     for (wall, position) in sample.walls.iter().zip(panel.walls.position.chunks(sample.dimension)) {
         wall::draw(canvas, &sample.eye, wall, position, frame);

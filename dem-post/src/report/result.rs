@@ -8,7 +8,7 @@ use super::player;
 use crate::clock::Clock;
 use crate::collapse::peak;
 use crate::cracks::report::total_over_time;
-use crate::extent::{bonded_box, bonded_frame};
+use crate::extent::{bonded_frame, box_around};
 use crate::frames::{self, Subject};
 use crate::moments::{self, SAME_TIME};
 use crate::output::{PostError, Result, counted, number, quantity, short};
@@ -287,10 +287,10 @@ fn break_sentence(history: &History, cracks: &cracks::Report, ruptures: &[Ruptur
 
 /// Where a bond was, as shares of the box of the sample as it was bonded.
 fn place(history: &History, rupture: &Rupture) -> Result<String> {
-    let (ends, state) = (bonded_box(history)?, history.grain_state(bonded_frame(history)?)?);
-    let centre =
-        |k: usize| 0.5 * rupture.pair.map(|grain| state.position[grain as usize * ends.len() + k]).iter().sum::<f64>();
-    let names = if ends.len() == 2 { &["width", "height"][..] } else { &["width", "depth", "height"] };
+    let (d, position) = (history.dimension(), history.grain_state(bonded_frame(history)?)?.position);
+    let ends = box_around(&history.grains()?.radius, &position, d);
+    let centre = |k: usize| 0.5 * rupture.pair.map(|grain| position[grain as usize * d + k]).iter().sum::<f64>();
+    let names = if d == 2 { &["width", "height"][..] } else { &["width", "depth", "height"] };
     let share = |(k, [low, high]): (usize, &[f64; 2])| {
         let share = 100.0 * (centre(k) - low) / (high - low);
         format!("{share:.0} % of the {}", names[k])

@@ -7,7 +7,7 @@ use dem_scene::{Sample, Scene, Section};
 use nalgebra::Vector3;
 
 use crate::chains::stress::thickness;
-use crate::extent::{first_box, range};
+use crate::extent::{box_around, ends_along, range};
 use crate::output::Result;
 
 /// Component of a unit vector along another from which they count as parallel.
@@ -48,12 +48,39 @@ pub(super) fn projected(series: &Series, dimension: usize, u: &Vector3<f64>) -> 
     if series.shape != [dimension, dimension] {
         return None;
     }
-    let of = |tensor: &[f64]| {
-        let entries = tensor.iter().enumerate().map(|(k, t)| u[k / dimension] * u[k % dimension] * t);
-        // zeros of an axis leave the entry as it is
-        entries.fold(0.0, |sum, x| sum + x)
-    };
+    let of =
+        |tensor: &[f64]| tensor.iter().enumerate().map(|(k, t)| u[k / dimension] * u[k % dimension] * t).sum::<f64>();
     Some(series.value.chunks(dimension * dimension).map(of).collect())
+}
+
+/// The grains at the first frame.
+pub(super) struct FirstFrame {
+    pub dimension: usize,
+    pub radius: Vec<f64>,
+    pub position: Vec<f64>,
+}
+
+impl FirstFrame {
+    pub fn read(history: &History) -> Result<Self> {
+        let (radius, position) = (history.grains()?.radius, history.grain_state(0)?.position);
+        Ok(Self { dimension: history.dimension(), radius, position })
+    }
+
+    /// How far the grains reach along a unit vector, m.
+    pub fn ends(&self, u: &Vector3<f64>) -> [f64; 2] {
+        ends_along(&self.radius, &self.position, self.dimension, |x| place_along(x, u))
+    }
+
+    /// Distance of their outermost centres along a unit vector, m: zero for a layer across it.
+    pub fn spread(&self, u: &Vector3<f64>) -> f64 {
+        let [low, high] = range(self.position.chunks(self.dimension).map(|x| place_along(x, u)));
+        high - low
+    }
+}
+
+/// Component of a position along a unit vector, m.
+pub(super) fn place_along(x: &[f64], u: &Vector3<f64>) -> f64 {
+    x.iter().zip(u).map(|(x, u)| x * u).sum()
 }
 
 /// The sample at the first frame.
@@ -71,17 +98,17 @@ pub(super) struct Size {
 }
 
 impl Size {
-    pub fn of(history: &History, scene: &str, axes: &Axes) -> Result<Self> {
-        let (d, first) = (history.dimension(), first_box(history)?);
-        let extents: Vec<f64> = first.iter().map(|[low, high]| high - low).collect();
-        let ends = ends(history, &axes.along)?;
-        let sides: Vec<f64> =
-            axes.across.iter().map(|u| self::ends(history, u).map(|[low, high]| high - low)).collect::<Result<_>>()?;
-        let product: f64 = sides.iter().product();
+    pub fn of(history: &History, first: &FirstFrame, scene: &str, axes: &Axes) -> Result<Self> {
+        let d = first.dimension;
+        let length = |[low, high]: [f64; 2]| high - low;
+        let extents: Vec<f64> = box_around(&first.radius, &first.position, d).into_iter().map(length).collect();
+        let ends = first.ends(&axes.along);
+        let sides = axes.across.iter().map(|u| length(first.ends(u)));
+        let product: f64 = sides.product();
         let section = round_section(history, scene, axes, product)?;
         let box_share = match section {
             None if axes.is_coordinate_axis() => 1.0,
-            section => extents.iter().product::<f64>() / ((ends[1] - ends[0]) * section.unwrap_or(product)),
+            section => extents.iter().product::<f64>() / (length(ends) * section.unwrap_or(product)),
         };
         let area = section.unwrap_or(product);
         Ok(Self { ends, area: if d == 2 { area * thickness(history)? } else { area }, box_share, extents })
@@ -105,16 +132,6 @@ fn round_section(history: &History, scene: &str, axes: &Axes, product: f64) -> R
         matches!(scene.sample, Sample::Random(sample) if sample.section == Section::Circle && sample.cut.is_none())
     });
     Ok((round && axes.along[2].abs() > PARALLEL).then_some(FRAC_PI_4 * product))
-}
-
-/// How far all grains reach along a unit vector at the first frame, m.
-pub(super) fn ends(history: &History, u: &Vector3<f64>) -> Result<[f64; 2]> {
-    let (d, radius, state) = (history.dimension(), history.grains()?.radius, history.grain_state(0)?);
-    let at = |sign: f64| {
-        let place = |x: &[f64]| x.iter().zip(u).map(|(x, u)| x * u).sum::<f64>();
-        range(state.position.chunks(d).zip(&radius).map(|(x, r)| place(x) + sign * r).collect::<Vec<_>>())
-    };
-    Ok([at(-1.0)[0], at(1.0)[1]])
 }
 
 #[cfg(test)]

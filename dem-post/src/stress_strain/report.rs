@@ -10,11 +10,10 @@ use nalgebra::Vector3;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::axes::{Axes, Size, ends, projected};
+use super::axes::{Axes, FirstFrame, Size, place_along, projected};
 use super::elastic::{Curves, Elastic, RANGE};
 use crate::clock::Clock;
 use crate::collapse::{Bonding, Collapse, peak, work};
-use crate::extent::range;
 use crate::output::{PostError, Result, facts, number, quantity};
 use crate::strength::fit::Estimate;
 
@@ -132,11 +131,12 @@ pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
     let k = driven(history.path(), &walls, &scene, wall)?;
     let axes = Axes::of(&walls[k].direction, history.dimension());
     let motion = motion(history, &walls[k], k)?;
-    let size = Size::of(history, &scene, &axes)?;
+    let first = FirstFrame::read(history)?;
+    let size = Size::of(history, &first, &scene, &axes)?;
     let tensor = |name: &str| tensor_along(history, name, &axes.along);
     let push = push(history, k, &size, &axes.along, motion.sense)?;
     let facing = Vector3::from(walls[k].normal).dot(&axes.along).abs() > FRAC_1_SQRT_2;
-    let plate = facing && covers(history, &walls[k], k)?;
+    let plate = facing && covers(history, &first, &walls[k], k)?;
     let mut report = Report {
         displacement: scaled(&motion.way, motion.sense),
         load: scaled(&motion.load, motion.sense),
@@ -165,7 +165,7 @@ pub fn read(history: &History, wall: Option<&str>) -> Result<Report> {
     s.splitting = disk.map(|disk| Splitting::of(disk, collapse, s.peak_load));
     if bonds == Bonding::Elastic {
         let found = if plate && disk.is_none() {
-            elastic(history, &report, &axes, push, size.box_share)?
+            elastic(history, &report, (&first, &axes), push, size.box_share)?
         } else {
             Err("only a sample that plates load along its axis has them")
         };
@@ -187,17 +187,12 @@ fn scaled(values: &[f64], factor: f64) -> Vec<f64> {
 fn elastic(
     history: &History,
     report: &Report,
-    axes: &Axes,
+    (first, axes): (&FirstFrame, &Axes),
     push: f64,
     share: f64,
 ) -> Result<std::result::Result<Elastic, &'static str>> {
     // a layer of grains has no strain across it
-    let (d, position) = (history.dimension(), history.grain_state(0)?.position);
-    let extent = |u: &Vector3<f64>| {
-        let [low, high] = range(position.chunks(d).map(|x| x.iter().zip(u).map(|(x, u)| x * u).sum()));
-        high - low
-    };
-    let others: Vec<_> = axes.across.iter().filter(|u| extent(u) > FLAT * extent(&axes.along)).collect();
+    let others: Vec<_> = axes.across.iter().filter(|u| first.spread(u) > FLAT * first.spread(&axes.along)).collect();
     if others.is_empty() {
         return Ok(Err("the grains have no extent across the load"));
     }
@@ -390,7 +385,7 @@ fn push(history: &History, wall: usize, size: &Size, along: &Vector3<f64>, sense
     let d = history.dimension();
     let middle = 0.5 * (size.ends[0] + size.ends[1]);
     let position = history.wall_state(0)?.position;
-    let place = position.get(wall * d..(wall + 1) * d).map(|x| x.iter().zip(along).map(|(x, u)| x * u).sum());
+    let place = position.get(wall * d..(wall + 1) * d).map(|x| place_along(x, along));
     // a wall above that moves down pushes, one that moves up pulls
     Ok(if sense * (place.unwrap_or(middle) - middle) > 0.0 { -1.0 } else { 1.0 })
 }
@@ -405,7 +400,7 @@ fn tensor_along(history: &History, name: &str, u: &Vector3<f64>) -> Result<Vec<f
 
 /// Whether the wall `k` is a plane, or a plate that reaches beyond the sample on all sides at the
 /// start. A punch that is narrower than the sample gives no stress on the section of the sample.
-fn covers(history: &History, wall: &Wall, k: usize) -> Result<bool> {
+fn covers(history: &History, first: &FirstFrame, wall: &Wall, k: usize) -> Result<bool> {
     if wall.kind != WallKind::Plate {
         return Ok(wall.kind == WallKind::Plane);
     }
@@ -414,8 +409,8 @@ fn covers(history: &History, wall: &Wall, k: usize) -> Result<bool> {
     let side = Vector3::from(wall.side);
     let sides = [(side, wall.length), (Vector3::from(wall.normal).cross(&side), wall.width)];
     for (side, length) in sides.iter().take(d - 1) {
-        let middle: f64 = middle.iter().zip(side).map(|(x, u)| x * u).sum();
-        let [low, high] = ends(history, side)?;
+        let middle = place_along(middle, side);
+        let [low, high] = first.ends(side);
         if f64::max(high - middle, middle - low) > 0.5 * length {
             return Ok(false);
         }

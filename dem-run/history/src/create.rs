@@ -197,13 +197,11 @@ pub(super) fn write_identity(file: &File, layout: &Layout) -> hdf5::Result<()> {
     if let Some(fraction) = run.solid_fraction {
         parameters.new_attr::<f64>().create("solid_fraction")?.write_scalar(&fraction)?;
     }
-    for (place, value) in [(path::SCENE, &run.scene), (path::EARLIER_SCENES, &run.earlier_scenes)] {
-        if place == path::SCENE || !value.is_empty() {
-            let dataset = file.new_dataset::<VarLenUnicode>().obj_track_times(false).create(place)?;
-            dataset.write_scalar(&text(value))?;
-        }
-    }
-    Ok(())
+    let write = |place: &str, value: &str| {
+        file.new_dataset::<VarLenUnicode>().obj_track_times(false).create(place)?.write_scalar(&text(value))
+    };
+    write(path::SCENE, &run.scene)?;
+    if run.earlier_scenes.is_empty() { Ok(()) } else { write(path::EARLIER_SCENES, &run.earlier_scenes) }
 }
 
 pub(super) fn grains(file: &File, layout: &Layout) -> hdf5::Result<Group> {

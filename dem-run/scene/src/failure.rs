@@ -61,8 +61,8 @@ impl Disk {
         if only_axis(normal) != Some(across) || axis == Some(across) || !scene.walls.values().any(|w| faces(&w.shape)) {
             return None;
         }
-        let mut across = extents.iter().take(scene.dimension.into()).enumerate().filter(|(k, _)| Some(*k) != axis);
-        if across.any(|(_, extent)| *extent < ROUND * diameter) {
+        let mut sides = extents.iter().take(scene.dimension.into()).enumerate().filter(|(k, _)| Some(*k) != axis);
+        if sides.any(|(_, extent)| *extent < ROUND * diameter) {
             return None;
         }
         let length = axis.map_or(Some(scene.thickness()), |axis| extents.get(axis).copied())?;

@@ -46,7 +46,10 @@ impl History {
 
     /// The step after which a stage formed the bonds, or [`NOT_FORMED`]; none if they are there
     /// from the start.
-    fn bonds_formed(&self) -> Result<Option<i64>> {
+    ///
+    /// # Errors
+    /// [`HistoryError::Damaged`](crate::HistoryError::Damaged).
+    pub fn bonds_formed(&self) -> Result<Option<i64>> {
         let place = format!("{}/formed", path::BONDS);
         if !self.source.has(&place) {
             return Ok(None);
