@@ -324,12 +324,14 @@ pub struct Wall<D: Dim> {
     pub grip: Option<f64>,
     /// Friction coefficient with grains (–).
     pub friction: f64,
-    /// Force of the grains on the wall at the end of the last step (N), after all ruptures in it.
+    /// Force of the grains on the wall in the last step (N), after all ruptures in it; the mean
+    /// over its parts.
     pub reaction: D::Vector,
     /// The same before the first rupture in the step (N): the equilibrium whose bonds reached their
     /// limit. Equals `reaction` where no solve followed a rupture.
     pub reaction_at_limit: D::Vector,
-    /// Force prescribed at the last step (N); zero for a wall without a force drive.
+    /// Force prescribed in the last step (N), the mean over its parts; zero for a wall without a
+    /// force drive.
     pub applied: f64,
 }
 

@@ -178,9 +178,9 @@ fn required_limits<T: Vect, B: Moments>(r: &Local<T, B>, cone: Cone) -> [f64; 3]
 /// `None` below the limit.
 ///
 /// TENSION if r_n + s ≤ ε s; else SHEAR, ROLLING or TWIST, whichever of ‖t‖/μ, ‖m‖/ν and |τ|/ξ is
-/// the largest (the first of equal ones), if it reaches (1 − ε) (r_n + s). Pure compression never
-/// breaks a bond. A row group with coefficient zero never fails: a bond with μ = ν = ξ = 0 fails in
-/// tension only.
+/// the largest (the first of those within ε of it), if it reaches (1 − ε) (r_n + s). Pure
+/// compression never breaks a bond. A row group with coefficient zero never fails: a bond with
+/// μ = ν = ξ = 0 fails in tension only.
 pub fn failure<T: Vect, B: Moments>(r: &Local<T, B>, shift: f64, cone: Cone) -> Option<BondStatus> {
     let limit = r.n + shift;
     if limit <= LIMIT * shift {
@@ -210,15 +210,35 @@ pub(crate) fn at_limit<T: Vect, B: Moments, M: Moments, S: Vect>(
     }
 }
 
-/// SHEAR, ROLLING or TWIST, whichever of ‖t‖/μ, ‖m‖/ν and |τ|/ξ is the largest (the first of equal
-/// ones).
+/// SHEAR, ROLLING or TWIST, whichever of ‖t‖/μ, ‖m‖/ν and |τ|/ξ is the largest: the first of those
+/// within ε of the largest, since a bond at several limits has them equal but for round-off.
 pub(crate) fn mode<T: Vect, B: Moments>(r: &Local<T, B>, cone: Cone) -> BondStatus {
-    let [shear, rolling, twist] = required_limits(r, cone);
-    if twist > shear.max(rolling) {
-        BondStatus::Twist
-    } else if rolling > shear {
-        BondStatus::Rolling
-    } else {
-        BondStatus::Shear
+    let required = required_limits(r, cone);
+    let least = (1.0 - LIMIT) * required.into_iter().fold(0.0, f64::max);
+    let modes = [BondStatus::Shear, BondStatus::Rolling, BondStatus::Twist];
+    modes.into_iter().zip(required).find(|(_, required)| *required >= least).map_or(BondStatus::Shear, |(mode, _)| mode)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::Padded;
+
+    #[test]
+    fn rounding_does_not_decide_between_limits_that_are_met_at_once() {
+        let (cone, shift) = (Cone { mu: 0.5, nu: 0.3, xi: 0.2 }, 10.0);
+        let at = |shear: f64, rolling: f64, twist: f64| {
+            let limit = 4.0 + shift;
+            let (t, m, w) = (0.5 * limit * shear, 0.3 * limit * rolling, 0.2 * limit * twist);
+            failure(&Padded::from_order(&[4.0, 0.6 * t, 0.8 * t, 0.8 * m, -0.6 * m, -w].into()), shift, cone)
+        };
+        for off in [-3.0, 0.0, 3.0] {
+            let beside = 1.0 + off * f64::EPSILON;
+            assert_eq!(at(1.0, beside, 0.3), Some(BondStatus::Shear));
+            assert_eq!(at(0.9, 1.0, beside), Some(BondStatus::Rolling));
+            assert_eq!(at(1.0, beside, 1.0 + 2.0 * off * f64::EPSILON), Some(BondStatus::Shear));
+        }
+        assert_eq!(at(1.0, 1.0 + 10.0 * LIMIT, 0.3), Some(BondStatus::Rolling));
+        assert_eq!(at(1.0, 0.9, 1.0 + 10.0 * LIMIT), Some(BondStatus::Twist));
     }
 }

@@ -1,13 +1,10 @@
 //! Quantities derived from a load curve: collapse load, peak, work.
 
 use dem_history::History;
-use dem_scene::failure::in_one_piece;
+use dem_scene::failure::{PEAK_DROP, in_one_piece};
 use serde_json::Value;
 
 use crate::output::Result;
-
-/// A maximum is a peak if the load falls by at least this share afterwards.
-pub const PEAK_DROP: f64 = 0.05;
 
 /// The kind of bonds of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,6 +1,6 @@
 //! Failure loads and peak load of a sample, updated at every step.
 
-use crate::scene::failure::{BROKEN_SHARE, STRAINS};
+use crate::scene::failure::{BROKEN_SHARE, PEAK_DROP, STRAINS};
 use dem_core::saved::{Mismatch, Reader, Saved};
 use serde::Serialize;
 
@@ -53,6 +53,8 @@ pub struct Collapse {
     pub peak: Peak,
     /// Whether the peak load is that of the last step.
     pub rising: bool,
+    /// Whether the load has fallen by [`PEAK_DROP`] since the peak load: then that is a strength.
+    pub fallen: bool,
     last_load: f64,
 }
 
@@ -78,6 +80,8 @@ impl Collapse {
         if self.rising {
             self.peak = Peak { load, displacement };
         }
+        // at the peak itself the load has not fallen
+        self.fallen = !self.rising && (self.fallen || load.abs() < (1.0 - PEAK_DROP) * self.peak.load.abs());
         self.last_load = load;
     }
 
@@ -88,7 +92,7 @@ impl Collapse {
             to.flag(load.is_some());
             to.real(load.unwrap_or(0.0));
         }
-        early.into_iter().chain(self.passed).chain([self.rising]).for_each(|flag| to.flag(flag));
+        early.into_iter().chain(self.passed).chain([self.rising, self.fallen]).for_each(|flag| to.flag(flag));
         to.reals.extend([self.peak.load, self.peak.displacement, self.last_load]);
     }
 
@@ -104,9 +108,9 @@ impl Collapse {
         let (first_break, a, b, broken_share) = (load()?, load()?, load()?, load()?);
         let early = [from.flag()?, from.flag()?];
         let failure = Failure { first_break, collapse: [a, b], early, broken_share };
-        let (passed, rising) = ([from.flag()?, from.flag()?], from.flag()?);
+        let (passed, rising, fallen) = ([from.flag()?, from.flag()?], from.flag()?, from.flag()?);
         let peak = Peak { load: from.real()?, displacement: from.real()? };
-        Ok(Self { failure, passed, peak, rising, last_load: from.real()? })
+        Ok(Self { failure, passed, peak, rising, fallen, last_load: from.real()? })
     }
 }
 
@@ -152,5 +156,18 @@ mod tests {
         let collapse = follow(&[0.0, -3.0, 2.0], &[0.0; 3], &[0; 3]);
         assert_eq!((collapse.peak, collapse.rising), (Peak { load: -3.0, displacement: 1e-3 }, false));
         assert!(follow(&[0.0, 1.0], &[0.0; 2], &[0; 2]).rising);
+    }
+
+    #[test]
+    fn a_peak_from_which_the_load_has_not_fallen_is_no_strength() {
+        for (loads, fallen) in [
+            (&[1.0, 2.0][..], false),
+            (&[1.0, 2.0, 1.91], false),
+            (&[1.0, -2.0, -1.89], true),
+            (&[2.0, 1.0, 1.99], true),
+            (&[2.0, 1.0, 2.01], false),
+        ] {
+            assert_eq!(follow(loads, &[0.0; 3], &[0; 3]).fallen, fallen, "{loads:?}");
+        }
     }
 }

@@ -122,7 +122,7 @@ pub(crate) struct RunState<D: Dim> {
 }
 
 /// Version number of the data that [`RunState::save`] writes.
-const FORM: usize = 11;
+const FORM: usize = 12;
 
 impl<D: Dim> RunState<D> {
     /// The state as numbers, without the processor time: two runs of a scene write identical files.
@@ -425,7 +425,7 @@ impl<D: Dim> RunState<D> {
             peak_displacement: chosen.and_then(|loads| loads.peak_displacement),
             splitting: chosen.zip(disk).map(|(loads, disk)| {
                 let collapse = loads.failure.collapse[0].filter(|_| !loads.failure.early[0]);
-                Splitting::of(disk, collapse, loads.peak_load)
+                Splitting::of(disk, collapse, loads.peak_load.filter(|_| loads.fallen))
             }),
             driven_walls,
             tolerance: scene.solver.tolerance,

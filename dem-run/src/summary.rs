@@ -120,6 +120,9 @@ pub struct WallLoads {
     /// Whether the peak load is that of the last step.
     #[serde(skip)]
     pub rising: bool,
+    /// Whether the load fell after it.
+    #[serde(skip)]
+    pub fallen: bool,
 }
 
 impl WallLoads {
@@ -127,7 +130,7 @@ impl WallLoads {
     /// that of a velocity does; `elastic`: bonds are elastic.
     #[must_use]
     pub fn of(wall: &str, may_fall: bool, elastic: bool, found: &Collapse) -> Self {
-        let &Collapse { mut failure, passed, peak, rising, .. } = found;
+        let &Collapse { mut failure, passed, peak, rising, fallen, .. } = found;
         for (load, early) in failure.collapse.iter_mut().zip(failure.early) {
             *load = load.filter(|_| !(elastic && early));
         }
@@ -139,6 +142,7 @@ impl WallLoads {
             peak_displacement: peak.map(|peak| peak.displacement),
             passed,
             rising,
+            fallen,
         }
     }
 

@@ -7,7 +7,7 @@
 //! linear while no contact changes its status; there the acceleration removes long-wave errors,
 //! which sweeps alone reduce only by diffusion.
 
-use crate::solver::tuning::gauss_seidel as tuning;
+use crate::solver::tuning::INVISIBLE;
 use nalgebra::{DMatrix, DVector};
 
 /// The memory of an accelerated iteration.
@@ -54,7 +54,8 @@ impl Anderson {
     pub fn next(&mut self, g: Vec<f64>) -> &[f64] {
         let f = minus(&g, &self.from);
         let size = dot(&f, &f);
-        if size > tuning::GROWTH * tuning::GROWTH * self.least {
+        // twice the least residual so far, squared
+        if size > 2.0 * 2.0 * self.least {
             self.last = None;
             self.changes.clear();
             self.gram.clear();
@@ -94,7 +95,8 @@ impl Anderson {
         if k == 0 {
             return None;
         }
-        let ridge = tuning::RIDGE * (0..k).map(|i| self.gram[i][i]).sum::<f64>();
+        // keeps the matrix positive definite if changes are nearly parallel
+        let ridge = INVISIBLE * (0..k).map(|i| self.gram[i][i]).sum::<f64>();
         let entry = |i: usize, j: usize| self.gram[i.max(j)][i.min(j)] + if i == j { ridge } else { 0.0 };
         let right = DVector::from_iterator(k, self.changes.iter().map(|c| dot(&c.f, f)));
         Some(DMatrix::from_fn(k, k, entry).cholesky()?.solve(&right))

@@ -1,100 +1,86 @@
-//! Gauss–Seidel for a problem given by its matrix ([`Assembled`]), as other codes write it.
-//!
-//! Contacts are visited in their order. The block of a contact may be any symmetric matrix, so
-//! there is no closed-form local solve. The contact sticks if the reaction that stops it lies in
-//! its cone; it is open if zero satisfies its law; otherwise the predictor–corrector is repeated
-//! with γ = 1/(largest eigenvalue of the block), which contracts for associated flow.
+//! A problem given by its matrix W, as a [`Solvable`]: its rows have no coefficients and no
+//! unknowns, and the methods use W itself ([`Solvable::matrix`]).
 
-use super::gauss_seidel::{Sweepable, iterate};
+use super::gauss_seidel::iterate;
+use super::local_problems::LocalProblems;
+use super::rows::{Row, Rows, StiffnessRatio, places};
+use super::solvable::Solvable;
 use super::{GaussSeidelSettings, SolveReport};
-use crate::contact::{LocalSolve, PADDED, Padded};
-use crate::dim::{Moments, Vect};
-use crate::problem::assembled::Assembled;
-use crate::solver::tuning::gauss_seidel as tuning;
-use nalgebra::SMatrix;
+use crate::contact::{Local, LocalSolve, Padded, Weights};
+use crate::problem::assembled::{Assembled, BlockMatrix};
+use std::cell::OnceCell;
 
-type PaddedMatrix = SMatrix<f64, PADDED, PADDED>;
-
-/// The block of a contact, padded, with the data of its local solve.
-struct LocalProblem {
-    block: PaddedMatrix,
-    /// Inverse on the rows that are not zero, if the block has one.
-    inverse: Option<PaddedMatrix>,
-    gamma: f64,
-}
-
-/// Data of all local solves of a problem, computed once.
-pub(super) struct LocalProblems(Vec<LocalProblem>);
-
-impl LocalProblem {
-    fn new(problem: &Assembled, contact: usize, scale: f64) -> Self {
-        let parts = problem.parts();
-        let (rows, values) = (parts.rows, parts.matrix.diagonal(contact));
-        let size = rows.count();
-        let place = |k: usize| if k > rows.tangents { k - rows.tangents + 2 } else { k };
-        let mut block = PaddedMatrix::zeros();
-        for (k, w) in values.iter().enumerate() {
-            block[(place(k / size), place(k % size))] = *w;
-        }
-        // a diagonal entry for each row that the contact lacks makes the matrix invertible
-        let mut filled = block;
-        let lacks: Vec<usize> = (0..PADDED).filter(|k| block.row(*k).iter().all(|w| *w == 0.0)).collect();
-        lacks.iter().for_each(|k| filled[(*k, *k)] = scale);
-        let inverse = filled.cholesky().map(|factor| {
-            let mut inverse = factor.inverse();
-            lacks.iter().for_each(|k| inverse[(*k, *k)] = 0.0);
-            inverse
-        });
-        let largest = block.symmetric_eigenvalues().max().max(scale);
-        Self { block, inverse, gamma: 1.0 / largest }
+impl Assembled {
+    /// The reaction of a contact without the shift.
+    fn own_reaction(&self, c: usize) -> Padded {
+        let r = self.reaction(c);
+        Local { n: r.n - self.parts().shift[c], ..r }
     }
 
-    /// The reaction that satisfies the law of this contact alone, from its reaction and relative
-    /// velocity.
-    fn exact(&self, problem: &Assembled, contact: usize, mut r: Padded, mut u: Padded) -> Padded {
-        let cone = problem.cone(contact);
-        if let Some(inverse) = &self.inverse {
-            let stuck = r + Padded::from_order(&(inverse * u.in_order())) * -1.0;
-            if cone.contains(&stuck) {
-                return stuck;
-            }
+    /// The problem as rows without coefficients; ρ is `kappa` over the mean normal entry of W.
+    pub(super) fn rows(&self, kappa: f64, ratio: StiffnessRatio) -> Rows {
+        let parts = self.parts();
+        let (rows, size) = (parts.rows, parts.rows.count());
+        let normal: f64 = (0..self.len()).map(|c| parts.matrix.diagonal(c)[0]).sum();
+        let soft = normal / (self.len().max(1) as f64 * kappa);
+        let weights = ratio.weights(soft);
+        // for reactions without the shift s: u = W r + (q + W s)
+        let mut shifts = vec![0.0; self.r.len()];
+        (0..self.len()).for_each(|c| shifts[c * size] = parts.shift[c]);
+        let mut out = Rows { applied: parts.applied, ..Rows::default() };
+        for c in 0..self.len() {
+            let mut given = parts.q[c * size..(c + 1) * size].to_vec();
+            parts.matrix.multiply_row(c, &shifts, &mut given);
+            out.list.push(Row {
+                at: [0, 0],
+                count: [0, 0],
+                start: 0,
+                rows: places(rows.tangents, rows.moments),
+                cone: self.cone(c),
+                associated: parts.associated[c],
+                // a matrix tells no more of a bond
+                is_bond: parts.shift[c] > 0.0,
+                shift: parts.shift[c],
+                given: rows.padded(&given),
+                weights,
+                lowered: Weights::default(),
+                multiplier: self.own_reaction(c),
+                // the compliance of elastic bonds is part of W and q
+                compliance: Weights::default(),
+                carried: Padded::zero(),
+                normal: parts.matrix.diagonal(c)[0],
+                // the trace of the block
+                size: parts.matrix.diagonal(c).iter().step_by(size + 1).sum(),
+            });
         }
-        let open = u + Padded::from_order(&(self.block * r.in_order())) * -1.0;
-        let pull = if problem.parts().associated[contact] {
-            cone.mu * Vect::norm(&open.t) + cone.nu * open.m.bending() + cone.xi * open.m.twist()
-        } else {
-            0.0
-        };
-        if open.n >= pull {
-            return Padded::zero();
-        }
-        for _ in 0..tuning::ROUNDS {
-            let change = problem.correction(contact, self.gamma, r, u);
-            r += change;
-            u += Padded::from_order(&(self.block * change.in_order()));
-            if change.dot(&change) <= tuning::UNCHANGED * r.dot(&r) {
-                break;
-            }
-        }
-        r
+        out
     }
 }
 
 /// Non-linear Gauss–Seidel, from the reactions that the problem holds.
 pub fn gauss_seidel(problem: &mut Assembled, settings: &GaussSeidelSettings) -> SolveReport {
-    let locals = LocalProblems::of(problem);
-    iterate(&mut Visited { problem, locals: &locals }, settings)
+    iterate(&mut Visited::new(problem), settings)
 }
 
-/// A problem with the data of its local solves.
-struct Visited<'a> {
+/// A problem with the data of its local solves, which are computed if it is swept.
+pub(super) struct Visited<'a> {
     problem: &'a mut Assembled,
-    locals: &'a LocalProblems,
+    locals: OnceCell<LocalProblems>,
 }
 
-impl Sweepable for Visited<'_> {
-    fn sweep(&mut self, local: LocalSolve) {
-        self.locals.sweep(self.problem, local);
+impl<'a> Visited<'a> {
+    pub fn new(problem: &'a mut Assembled) -> Self {
+        Self { problem, locals: OnceCell::new() }
+    }
+}
+
+impl Solvable for Visited<'_> {
+    fn rows(&self, kappa: f64, ratio: StiffnessRatio) -> Rows {
+        self.problem.rows(kappa, ratio)
+    }
+
+    fn matrix(&self) -> Option<&BlockMatrix> {
+        Some(&self.problem.parts().matrix)
     }
 
     /// Nothing: velocities are computed from W when they are needed.
@@ -104,31 +90,41 @@ impl Sweepable for Visited<'_> {
         self.problem.residual()
     }
 
+    fn velocity_error(&self) -> f64 {
+        self.problem.velocity_error()
+    }
+
+    fn sweep(&mut self, local: LocalSolve) {
+        self.locals.get_or_init(|| LocalProblems::of(self.problem)).sweep(self.problem, local);
+    }
+
     fn gather(&self) -> Vec<f64> {
         self.problem.r.clone()
     }
 
-    fn scatter(&mut self, from: &[f64]) {
-        self.problem.r.copy_from_slice(from);
-    }
-}
-
-impl LocalProblems {
-    pub(super) fn of(problem: &Assembled) -> Self {
-        let scales = problem.scales().into_iter().enumerate();
-        Self(scales.map(|(c, scale)| LocalProblem::new(problem, c, scale)).collect())
+    fn scatter(&mut self, list: &[f64]) {
+        self.problem.r.copy_from_slice(list);
     }
 
-    /// One visit of every contact.
-    pub(super) fn sweep(&self, problem: &mut Assembled, local: LocalSolve) {
-        let (rows, size) = (problem.parts().rows, problem.parts().rows.count());
-        for (c, data) in self.0.iter().enumerate() {
-            let (r, u) = (problem.reaction(c), problem.velocity(c));
-            let r = match local {
-                LocalSolve::Exact => data.exact(problem, c, r, u),
-                LocalSolve::PredictorCorrector => r + problem.correction(c, data.gamma, r, u),
-            };
-            rows.write(&r, &mut problem.r[c * size..(c + 1) * size]);
+    fn in_frames(&self) -> Vec<Padded> {
+        (0..self.problem.len()).map(|c| self.problem.own_reaction(c)).collect()
+    }
+
+    fn write_back(&mut self, reactions: &[Padded]) {
+        let (rows, size) = (self.problem.parts().rows, self.problem.parts().rows.count());
+        for (c, r) in reactions.iter().enumerate() {
+            let shifted = Local { n: r.n + self.problem.parts().shift[c], ..*r };
+            rows.write(&shifted, &mut self.problem.r[c * size..][..size]);
         }
+    }
+
+    fn forget_what_is_not_finite(&mut self) {
+        if !self.problem.r.iter().all(|r| r.is_finite()) {
+            self.problem.r.fill(0.0);
+        }
+    }
+
+    fn gauss_seidel(&mut self, settings: GaussSeidelSettings) -> SolveReport {
+        iterate(self, &settings)
     }
 }

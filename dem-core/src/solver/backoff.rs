@@ -10,6 +10,9 @@ pub(super) struct Backoff {
     next: u64,
 }
 
+/// The longest back-off (solves): twice the steps between two solves.
+const LONGEST: u64 = 2 * tuning::MOST;
+
 impl Backoff {
     /// Whether the method may be tried again.
     pub fn is_over(&self) -> bool {
@@ -25,7 +28,7 @@ impl Backoff {
     /// for twice as many.
     pub fn lengthen(&mut self) {
         self.left = self.next;
-        self.next = (2 * self.next).clamp(1, tuning::LONGEST_BACKOFF);
+        self.next = (2 * self.next).clamp(1, LONGEST);
     }
 
     /// Record a success.
@@ -42,6 +45,6 @@ impl Backoff {
     /// Read the state that [`Backoff::save`] wrote.
     pub fn restored(from: &mut Reader) -> Result<Self, Mismatch> {
         let backoff = Self { left: from.count()? as u64, next: from.count()? as u64 };
-        if backoff.left.max(backoff.next) <= tuning::LONGEST_BACKOFF { Ok(backoff) } else { Err(Mismatch) }
+        if backoff.left.max(backoff.next) <= LONGEST { Ok(backoff) } else { Err(Mismatch) }
     }
 }

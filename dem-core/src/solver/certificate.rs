@@ -17,12 +17,11 @@
 
 use super::interior::{Interior, Least};
 use super::rows::{Row, Rows, StiffnessRatio};
-use super::solvable::Solvable;
-use crate::contact::{Cone, PADDED, Padded, Weights};
+use crate::contact::{Cone, PADDED, Padded};
 use crate::dim::{Dim, Moments};
 use crate::problem::ContactProblem;
 use crate::problem::assembled::{Assembled, BlockMatrix};
-use crate::solver::tuning::certificate as tuning;
+use crate::solver::tuning::{ROUND_OFF, certificate as tuning};
 
 /// The verdict on a problem that was not solved.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -50,31 +49,29 @@ impl<T> Verdict<T> {
 /// The verdict on a problem; its contacts are numbered in the order of [`ContactProblem::visit`].
 #[must_use]
 pub fn verdict<D: Dim>(problem: &ContactProblem<D>) -> Verdict<usize> {
-    of(problem)
+    of(&Rows::of(problem, 1.0, ALIKE), None)
 }
 
 /// The verdict on a problem given by its matrix.
 #[must_use]
 pub fn verdict_of_assembled(problem: &Assembled) -> Verdict<usize> {
-    of(problem)
+    of(&problem.rows(1.0, ALIKE), Some(&problem.parts().matrix))
 }
 
-fn of(problem: &impl Solvable) -> Verdict<usize> {
-    let (rows, matrix) = (problem.rows(1.0, StiffnessRatio { tangential: 1.0, rolling: 1.0 }), problem.matrix());
-    if let Some(d) = certificate(&rows, matrix) {
+/// The proofs do not depend on stiffnesses.
+const ALIKE: StiffnessRatio = StiffnessRatio { tangential: 1.0, rolling: 1.0 };
+
+fn of(rows: &Rows, matrix: Option<&BlockMatrix>) -> Verdict<usize> {
+    if let Some(d) = certificate(rows, matrix) {
         let largest = d.iter().map(|d| d.n).fold(0.0, f64::max);
         return Verdict::NoSolution((0..d.len()).filter(|c| d[*c].n >= tuning::CARRIES * largest).collect());
     }
-    if !rows.in_space() && is_admissible(&rows, matrix) { Verdict::Guaranteed } else { Verdict::Undecided }
+    if !rows.in_space() && is_admissible(rows, matrix) { Verdict::Guaranteed } else { Verdict::Undecided }
 }
 
 /// The cone of a contact in K_S.
 fn strict(row: &Row) -> Cone {
     if row.associated { row.cone } else { Cone { mu: 0.0, nu: 0.0, xi: 0.0 } }
-}
-
-fn is_elastic(row: &Row) -> bool {
-    row.compliance != Weights::default()
 }
 
 /// Impulses that prove that there is no solution.
@@ -84,7 +81,7 @@ fn certificate(rows: &Rows, matrix: Option<&BlockMatrix>) -> Option<Vec<Padded>>
         // round-off may leave them just outside the cone
         let cone = strict(row);
         for (slope, size) in [(cone.mu, d.t.norm()), (cone.nu, d.m.bending()), (cone.xi, d.m.twist())] {
-            d.n = if size > slope * d.n { (1.0 + tuning::ROUNDING) * size / slope } else { d.n };
+            d.n = if size > slope * d.n { (1.0 + ROUND_OFF) * size / slope } else { d.n };
         }
     }
     proves(rows, matrix, &d).then_some(d)
@@ -94,7 +91,7 @@ fn certificate(rows: &Rows, matrix: Option<&BlockMatrix>) -> Option<Vec<Padded>>
 /// then there is no solution.
 fn proves(rows: &Rows, matrix: Option<&BlockMatrix>, d: &[Padded]) -> bool {
     let in_cone =
-        |(row, d): (&Row, &Padded)| if is_elastic(row) { *d == Padded::zero() } else { strict(row).contains(d) };
+        |(row, d): (&Row, &Padded)| if row.is_elastic() { *d == Padded::zero() } else { strict(row).contains(d) };
     let largest =
         d.iter().flat_map(|d| <[f64; PADDED]>::from(d.in_order())).fold(0.0, |most: f64, d| most.max(d.abs()));
     // H̃ d relative to the largest coefficient of each unknown, or W d to the size of each block
@@ -121,7 +118,7 @@ fn least(rows: &Rows, matrix: Option<&BlockMatrix>, cone: impl Fn(&Row) -> Cone,
     let mut convex = rows.clone();
     convex.free.fill(0.0);
     convex.applied = 0.0;
-    convex.list.retain(|row| !is_elastic(row));
+    convex.list.retain(|row| !row.is_elastic());
     if convex.list.is_empty() {
         return None;
     }
@@ -132,7 +129,7 @@ fn least(rows: &Rows, matrix: Option<&BlockMatrix>, cone: impl Fn(&Row) -> Cone,
     let Least { direction, reactions } = Interior::default().least_violation(&convex, matrix)?;
     let spread = |found: Vec<Padded>| {
         let mut found = found.into_iter();
-        let one = |row: &Row| if is_elastic(row) { None } else { found.next() };
+        let one = |row: &Row| if row.is_elastic() { None } else { found.next() };
         rows.list.iter().map(one).map(|r| r.unwrap_or(Padded::zero())).collect()
     };
     Some(Least { direction: spread(direction), reactions: spread(reactions) })
@@ -164,7 +161,7 @@ fn is_admissible(rows: &Rows, matrix: Option<&BlockMatrix>) -> bool {
             let Cone { mu, nu, xi } = row.cone;
             u.n - mu * u.t.norm() - nu * u.m.bending() - xi * u.m.twist()
         };
-        rows.list.iter().zip(u).filter(|(row, _)| !is_elastic(row)).all(|pair| margin(pair) >= least)
+        rows.list.iter().zip(u).filter(|(row, _)| !row.is_elastic()).all(|pair| margin(pair) >= least)
     };
     let given: Vec<Padded> = rows.list.iter().map(|row| row.given).collect();
     if inside(&given, 0.0) {
@@ -174,13 +171,13 @@ fn is_admissible(rows: &Rows, matrix: Option<&BlockMatrix>) -> bool {
     let Some(found) = least(rows, matrix, |row| row.cone, tuning::MARGIN * speed) else { return false };
     let moved = velocities(rows, matrix, &found.reactions);
     let u: Vec<Padded> = given.iter().zip(moved).map(|(given, moved)| *given + moved).collect();
-    inside(&u, tuning::INSIDE * tuning::MARGIN * speed)
+    inside(&u, 0.5 * tuning::MARGIN * speed)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::Local;
+    use crate::contact::{Local, Weights};
     use crate::problem::assembled::{ContactRows, Parts};
 
     /// A disk of unit mass between two walls that close: rows n, t of each contact over (x, y,
@@ -205,7 +202,7 @@ mod tests {
     #[test]
     fn a_certificate_spoilt_by_one_number_is_refused() {
         let problem = squeezed();
-        let (rows, matrix) = (problem.rows(1.0, StiffnessRatio { tangential: 1.0, rolling: 1.0 }), problem.matrix());
+        let (rows, matrix) = (problem.rows(1.0, ALIKE), Some(&problem.parts().matrix));
         let d = certificate(&rows, matrix).expect("no solution");
         assert!(proves(&rows, matrix, &d));
         assert!((d[0].n / d[1].n - 1.0).abs() < 1e-12, "{d:?}");

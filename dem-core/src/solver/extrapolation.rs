@@ -16,7 +16,7 @@ use crate::dim::{Dim, Moments, Vect};
 use crate::problem::residual::{elastic_error, residual, velocity_error};
 use crate::problem::{ContactProblem, KINDS};
 use crate::saved::{Mismatch, Reader, Saved};
-use crate::solver::tuning::extrapolation as tuning;
+use crate::solver::tuning::{INVISIBLE, extrapolation as tuning};
 
 /// Reactions and their growth.
 #[derive(Clone, Default)]
@@ -64,7 +64,8 @@ impl Extrapolation {
         problem.set_reactions(&self.grown(&self.base, &self.rate));
         problem.velocities_from_reactions();
         let (residual, moves, elastic_error) = (residual(problem), motion(problem), elastic_error(problem));
-        let allowed = load_tolerance.min((tuning::MORE * self.moves).max(tuning::SHARE * load_tolerance));
+        // at most twice the momentum that the solve before left
+        let allowed = load_tolerance.min((2.0 * self.moves).max(tuning::SHARE * load_tolerance));
         let holds = residual <= tuning::SHARE * tolerance
             && moves <= allowed
             && elastic_error <= load_tolerance
@@ -105,7 +106,7 @@ impl Extrapolation {
         }
         self.moves = motion(problem);
         let same_limits = margins.iter().zip(&self.margins).all(|(now, base)| now.is_finite() == base.is_finite());
-        let even = off <= (tuning::SAME * tuning::SAME * grown).max(tuning::ROUNDING * tuning::ROUNDING * size)
+        let even = off <= (tuning::SAME * tuning::SAME * grown).max(INVISIBLE * INVISIBLE * size)
             && self.moves <= load_tolerance
             && same_limits;
         self.most = if even { (2 * self.most).clamp(tuning::FIRST, tuning::MOST) } else { 0 };
@@ -131,7 +132,7 @@ impl Extrapolation {
     /// Whether each open or slipping contact keeps its status in the next step.
     fn keeps_status(&self) -> bool {
         let size = self.base.iter().map(|r| r * r).sum::<f64>().sqrt();
-        self.grown(&self.margins, &self.margin_rate).into_iter().all(|margin| margin >= -tuning::ROUNDING * size)
+        self.grown(&self.margins, &self.margin_rate).into_iter().all(|margin| margin >= -INVISIBLE * size)
     }
 
     pub fn save(&self, to: &mut Saved) {

@@ -7,10 +7,11 @@
 //! bursts of sweeps reduces their number by a factor of ten in bonded samples.
 
 use super::anderson::Anderson;
+use super::solvable::Solvable;
 use super::{ContactSolver, Route, SolveReport, SolveStatus, Work};
 use crate::contact::{Law, LocalSolve};
 use crate::dim::Dim;
-use crate::problem::residual::{elastic_error, residual};
+use crate::problem::residual::elastic_error;
 use crate::problem::{ContactProblem, Group, GroupVisitorMut, Nodes, blocks};
 use crate::saved::{Mismatch, Reader, Saved};
 use crate::solver::tuning::{defaults, gauss_seidel as tuning};
@@ -87,45 +88,8 @@ pub fn sweep<D: Dim>(problem: &mut ContactProblem<D>, local: LocalSolve) {
     problem.visit_groups_mut(&mut Sweep(local));
 }
 
-/// Interface of the iteration to a problem, matrix-free or given by its matrix.
-pub(super) trait Sweepable {
-    /// One visit of every contact.
-    fn sweep(&mut self, local: LocalSolve);
-    /// Recompute the velocities from the impulses, without the round-off of the sweeps' increments.
-    fn velocities_from_reactions(&mut self);
-    /// The residual of the current impulses and velocities (–).
-    fn residual(&self) -> f64;
-    /// All impulses in one list.
-    fn gather(&self) -> Vec<f64>;
-    /// The inverse of [`Sweepable::gather`]; also recomputes the velocities from the impulses.
-    fn scatter(&mut self, from: &[f64]);
-}
-
-impl<D: Dim> Sweepable for ContactProblem<D> {
-    fn sweep(&mut self, local: LocalSolve) {
-        sweep(self, local);
-    }
-
-    fn velocities_from_reactions(&mut self) {
-        self.velocities_from_reactions();
-    }
-
-    fn residual(&self) -> f64 {
-        residual(self)
-    }
-
-    fn gather(&self) -> Vec<f64> {
-        self.reactions()
-    }
-
-    fn scatter(&mut self, from: &[f64]) {
-        self.set_reactions(from);
-        self.velocities_from_reactions();
-    }
-}
-
 /// At most `most` plain sweeps; returns how many, and the residual.
-fn plain(problem: &mut impl Sweepable, settings: &GaussSeidelSettings, most: u64) -> (u64, f64) {
+fn plain(problem: &mut impl Solvable, settings: &GaussSeidelSettings, most: u64) -> (u64, f64) {
     let mut error = problem.residual();
     let mut sweeps = 0;
     while error > settings.tolerance && sweeps < most {
@@ -151,7 +115,7 @@ fn plain(problem: &mut impl Sweepable, settings: &GaussSeidelSettings, most: u64
 
 /// Plain sweeps, then accelerated bursts of sweeps. The result is that of a burst, not of an
 /// extrapolation: every impulse is in its cone.
-fn accelerated(problem: &mut impl Sweepable, settings: &GaussSeidelSettings) -> (u64, f64) {
+fn accelerated(problem: &mut impl Solvable, settings: &GaussSeidelSettings) -> (u64, f64) {
     let (mut sweeps, mut error) = plain(problem, settings, tuning::PLAIN.min(settings.max_sweeps));
     if error <= settings.tolerance {
         return (sweeps, error);
@@ -163,7 +127,7 @@ fn accelerated(problem: &mut impl Sweepable, settings: &GaussSeidelSettings) -> 
             problem.sweep(settings.local);
         }
         sweeps += burst;
-        if sweeps.is_multiple_of(tuning::LOOK * tuning::BURST) || sweeps >= settings.max_sweeps {
+        if sweeps.is_multiple_of(tuning::BURST * tuning::BURST) || sweeps >= settings.max_sweeps {
             problem.velocities_from_reactions();
             error = problem.residual();
         }
@@ -176,7 +140,7 @@ fn accelerated(problem: &mut impl Sweepable, settings: &GaussSeidelSettings) -> 
 }
 
 /// The whole solve, from the impulses that the problem holds.
-pub(super) fn iterate(problem: &mut impl Sweepable, settings: &GaussSeidelSettings) -> SolveReport {
+pub(super) fn iterate(problem: &mut impl Solvable, settings: &GaussSeidelSettings) -> SolveReport {
     problem.velocities_from_reactions();
     let (sweeps, residual) = match settings.acceleration {
         0 => plain(problem, settings, settings.max_sweeps),

@@ -16,19 +16,20 @@ use super::graph::Graph;
 use super::rows::{Row, Rows};
 use crate::contact::Padded;
 use crate::linear::Factors;
-use crate::solver::tuning::history as tuning;
+use crate::solver::tuning::STIFF;
 use std::sync::Arc;
 
 /// The multipliers of all contacts, those of the bonds without their self-stress (N s); unchanged
-/// if the matrix is singular.
-pub(super) fn history(rows: &Rows, graph: &mut Option<Arc<Graph>>) -> Vec<Padded> {
+/// if the matrix is singular. Adds its factorisation to `made`.
+pub(super) fn history(rows: &Rows, graph: &mut Option<Arc<Graph>>, made: &mut u64) -> Vec<Padded> {
     let all: Vec<Padded> = rows.list.iter().map(|row| row.multiplier).collect();
     let Some(graph) = rows.list.iter().any(Row::is_rigid_bond).then(|| Graph::of(rows, graph)).flatten() else {
         return all;
     };
     let stiff = stiffness(rows);
     let mut factors = Factors::default();
-    let made = factors.factorise(&graph.tree, |e, out| {
+    *made += 1;
+    let factorised = factors.factorise(&graph.tree, |e, out| {
         let row = &rows.list[graph.contacts[e]];
         if row.is_rigid_bond() {
             let bearing: Vec<usize> = (0..row.rows.len()).filter(|k| row.bears(row.rows[*k])).collect();
@@ -37,7 +38,7 @@ pub(super) fn history(rows: &Rows, graph: &mut Option<Arc<Graph>>) -> Vec<Padded
             rows.add_element(row, &bearing, entry, out);
         }
     });
-    if made.is_none() {
+    if factorised.is_none() {
         return all;
     }
     let mut pushed = vec![0.0; rows.unknowns];
@@ -69,11 +70,11 @@ fn stiffened(rows: &Rows, row: &Row, stiff: f64, y: &[f64]) -> Padded {
     Padded::from_order(&r)
 }
 
-/// The factor on ρ that gives H̃ ρ H̃ᵀ the size [`tuning::STIFF`].
+/// The factor on ρ that gives H̃ ρ H̃ᵀ the size [`STIFF`].
 fn stiffness(rows: &Rows) -> f64 {
     let count = rows.list.len().max(1) as f64;
     let mean = |of: &dyn Fn(&Row) -> f64| rows.list.iter().map(of).sum::<f64>() / count;
-    tuning::STIFF * mean(&|row| row.weights.n) / mean(&|row| row.normal)
+    STIFF * mean(&|row| row.weights.n) / mean(&|row| row.normal)
 }
 
 #[cfg(test)]
@@ -133,13 +134,13 @@ mod tests {
     fn self_stress_is_removed_and_the_net_impulses_stay() {
         let mut rows = network();
         let before: Vec<Padded> = rows.list.iter().map(|row| row.multiplier).collect();
-        let after = history(&rows, &mut None);
+        let after = history(&rows, &mut None, &mut 0);
         let (wanted, kept) = (net(&rows, &before), net(&rows, &after));
         wanted.iter().zip(&kept).for_each(|(a, b)| assert!((a - b).abs() < 1e-10, "{a} {b}"));
         assert!(energy(&rows, &after) < 0.7 * energy(&rows, &before));
         // the result has no self-stress
         rows.move_multipliers(&after);
-        let again = history(&rows, &mut None);
+        let again = history(&rows, &mut None, &mut 0);
         after.iter().zip(&again).for_each(|(a, b)| assert!((*a - *b).dot(&(*a - *b)).sqrt() < 1e-10));
     }
 
@@ -152,7 +153,7 @@ mod tests {
             row.cone.nu = 0.0;
             row.multiplier.m = Padded::zero().m;
         }
-        let after = history(&rows, &mut None);
+        let after = history(&rows, &mut None, &mut 0);
         assert!(after.iter().all(|r| r.m == Padded::zero().m));
         let before: Vec<Padded> = rows.list.iter().map(|row| row.multiplier).collect();
         net(&rows, &before)
@@ -161,7 +162,7 @@ mod tests {
             .for_each(|(a, b)| assert!((a - b).abs() < 1e-10, "{a} {b}"));
         // reactions without self-stress are their own history
         rows.move_multipliers(&after);
-        let again = history(&rows, &mut None);
+        let again = history(&rows, &mut None, &mut 0);
         after.iter().zip(&again).for_each(|(a, b)| assert!((*a - *b).dot(&(*a - *b)).sqrt() < 1e-10));
     }
 
@@ -169,7 +170,7 @@ mod tests {
     fn dry_contacts_keep_their_reactions() {
         let mut rows = network();
         rows.list[3].is_bond = false;
-        let after = history(&rows, &mut None);
+        let after = history(&rows, &mut None, &mut 0);
         assert_eq!(after[3], rows.list[3].multiplier);
         assert_ne!(after[4], rows.list[4].multiplier);
     }

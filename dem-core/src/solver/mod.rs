@@ -3,7 +3,6 @@
 
 mod anderson;
 pub mod assembled;
-mod assembled_rows;
 mod backoff;
 pub mod certificate;
 mod extrapolation;
@@ -12,6 +11,7 @@ mod graph;
 mod history;
 mod interior;
 pub mod limit_load;
+mod local_problems;
 mod newton;
 mod rows;
 mod solvable;

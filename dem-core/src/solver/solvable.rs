@@ -27,8 +27,14 @@ pub(super) trait Solvable {
     fn elastic_error(&self) -> f64 {
         0.0
     }
-    /// The reactions after some sweeps of Gauss–Seidel, in the unit of the rows.
-    fn swept(&mut self, sweeps: usize) -> Vec<Padded>;
+    /// One visit of every contact by Gauss–Seidel.
+    fn sweep(&mut self, local: LocalSolve);
+    /// The reactions in one list.
+    fn gather(&self) -> Vec<f64>;
+    /// Set the reactions from such a list, and the velocities that they give.
+    fn scatter(&mut self, list: &[f64]);
+    /// The reactions of the contacts without the shift, in the unit of the rows.
+    fn in_frames(&self) -> Vec<Padded>;
     /// Set the reactions, given in the unit of the rows, and the velocities that they give. No bond
     /// is then known to have reached its limit.
     fn write_back(&mut self, reactions: &[Padded]);
@@ -61,11 +67,20 @@ impl<D: Dim> Solvable for ContactProblem<D> {
         elastic_error(self)
     }
 
-    fn swept(&mut self, sweeps: usize) -> Vec<Padded> {
+    fn sweep(&mut self, local: LocalSolve) {
+        sweep(self, local);
+    }
+
+    fn gather(&self) -> Vec<f64> {
+        self.reactions()
+    }
+
+    fn scatter(&mut self, list: &[f64]) {
+        self.set_reactions(list);
         self.velocities_from_reactions();
-        for _ in 0..sweeps {
-            sweep(self, LocalSolve::Exact);
-        }
+    }
+
+    fn in_frames(&self) -> Vec<Padded> {
         struct InFrame(Vec<Padded>, f64);
         impl<D: Dim> Visitor<D> for InFrame {
             fn visit<L: Law>(&mut self, _: &Nodes<D>, c: &Contact<D, L>) {

@@ -18,6 +18,7 @@
 //! depends on its problem, the last reactions, Newton's cached factors and the growth known to the
 //! extrapolation.
 
+use super::assembled::Visited;
 use super::extrapolation::Extrapolation;
 use super::graph::Graph;
 use super::history::history;
@@ -32,7 +33,7 @@ use crate::problem::ContactProblem;
 use crate::problem::assembled::Assembled;
 use crate::problem::residual::{false_motion, velocity_error};
 use crate::saved::{Mismatch, Reader, Saved};
-use crate::solver::tuning::{defaults, stages as tuning};
+use crate::solver::tuning::{KAPPA, defaults, stages as tuning};
 
 /// The method that found a solution. A step with several solves reports the last of their routes in
 /// this order.
@@ -182,13 +183,13 @@ impl Staged {
     /// Solve a problem given by its matrix, from the reactions that it holds.
     pub fn solve_assembled(&mut self, problem: &mut Assembled) -> SolveReport {
         self.newton.margins.clear();
-        self.directly(problem)
+        self.directly(&mut Visited::new(problem))
     }
 
     /// Newton, then the interior-point method, then sweeps from its best point.
     fn directly(&mut self, problem: &mut impl Solvable) -> SolveReport {
         problem.velocities_from_reactions();
-        let rows = problem.rows(tuning::KAPPA, self.settings.stiffness);
+        let rows = problem.rows(KAPPA, self.settings.stiffness);
         // solved already, for example zero reactions of bodies that fly apart, or no body can move
         let residual = problem.residual();
         if residual == 0.0 || rows.list.iter().all(|row| row.normal == 0.0) {
@@ -232,7 +233,9 @@ impl Staged {
         self.newton.margins.clear();
         let begun = multipliers(rows);
         let anchor = match self.settings.start {
-            Start::LastStep if problem.matrix().is_none() => history(rows, &mut self.newton.graph),
+            Start::LastStep if problem.matrix().is_none() => {
+                history(rows, &mut self.newton.graph, &mut self.interior.made)
+            }
             _ => self.anchor(rows),
         };
         let start = (!is_cold(rows)).then_some(&begun[..]);
@@ -282,8 +285,7 @@ impl Staged {
         }
         best.iter().for_each(|found| problem.write_back(&found.reactions));
         problem.forget_what_is_not_finite();
-        let [least, most] = tuning::LAST_SWEEPS;
-        let most = (tuning::LAST_VISITS / rows.list.len() as u64).clamp(least, most);
+        let most = (tuning::LAST_VISITS / rows.list.len() as u64).clamp(tuning::FINE_SWEEPS, tuning::COARSE_SWEEPS);
         let (swept, missed) = self.sweep(problem, most);
         if best.as_ref().is_some_and(|found| found.missed(aims) <= missed) {
             return by_the_path(problem, swept.work.sweeps);
@@ -335,7 +337,7 @@ impl Staged {
         if problem.len() > tuning::MOST_FACTORISED {
             return None;
         }
-        let rows = problem.rows(tuning::KAPPA, self.settings.stiffness);
+        let rows = problem.rows(KAPPA, self.settings.stiffness);
         let graph = Graph::of(&rows, &mut self.newton.graph)?;
         (graph.tree.operations() <= tuning::CHEAP * problem.len() as f64).then_some(rows)
     }

@@ -4,6 +4,35 @@
 //! docs/decisions/0035-constants.md: ten different scenes, each heuristic disabled in turn. Solver
 //! code contains no numbers but 0, ½, 1 and 2 (`scripts/check_constants`).
 
+/// Units of round-off: the lower bound of an error, and the distance by which a value that must not
+/// be outside a cone is moved inside.
+pub(super) const ROUND_OFF: f64 = 4.0 * f64::EPSILON;
+/// Thousands of units of round-off: relative size below which a change or a regularisation does not
+/// show.
+pub(super) const INVISIBLE: f64 = 1e-12;
+/// Inverse square root of round-off: the ratio of the sizes of two terms of which neither may take
+/// the digits of the other.
+pub(super) const STIFF: f64 = 1e8;
+/// Penalty ρ of Newton's proximal iteration and stiffness of the metric of the stiff limit,
+/// relative to 1/(mean normal entry of W). On a column of 2,000 disks a residual of 1e-10 meant a
+/// load error of 3e-4 with 1e6, and of 3e-8 with 1e9 (decision 7). As the metric 1e7 left the
+/// reactions after an avalanche 5e-5 from those of stiff contacts, which changes the load of one
+/// sample of ten by 20 %, and the compliance shows in three solves of four. With 1e8 and velocities
+/// in plain double precision round-off decides; with 1e9 and twice the precision loads agree to
+/// 1e-3 (decision 35).
+pub(super) const KAPPA: f64 = 1e9;
+/// Share of a tolerance allowed for one of the errors of a solve.
+pub(super) const SHARE: f64 = 0.1;
+/// An iteration makes progress if it brings its error below this share of the error at the last
+/// progress. A method ends, or changes, after `PATIENCE` iterations without progress. (Two steps
+/// along the path are too few, since a step may go towards the middle of the cones.)
+pub(super) const PROGRESS: f64 = 0.9;
+pub(super) const PATIENCE: u64 = 3;
+/// Longest step along the path, relative to the step to the boundary of the cones.
+pub(super) const TO_THE_BOUNDARY: f64 = 0.99;
+/// Shortest step along the path.
+pub(super) const SHORTEST: f64 = 1e-3;
+
 /// Defaults of the settings, those of a scene.
 pub(super) mod defaults {
     /// Residual that a solver aims at, and the largest that is accepted.
@@ -22,10 +51,6 @@ pub(super) mod defaults {
 
 /// The stages of the default solver.
 pub(super) mod stages {
-    /// Penalty ρ of Newton's proximal iteration, relative to 1/(mean normal entry of W). On a
-    /// column of 2,000 disks a residual of 1e-10 meant a load error of 3e-4 with 1e6, and of 3e-8
-    /// with 1e9 (decision 7).
-    pub const KAPPA: f64 = 1e9;
     /// Most sweeps over dry contacts towards the tolerance. A dry step that converges takes some
     /// hundred (docs/cost.md).
     pub const FINE_SWEEPS: u64 = 2_000;
@@ -42,11 +67,10 @@ pub(super) mod stages {
     pub const MOST_SHORT: u64 = 50;
     /// Most further sweeps over dry contacts, towards the accepted residual.
     pub const COARSE_SWEEPS: u64 = 20_000;
-    /// Most sweeps from the best point of a path that missed the tolerance: as many as make
-    /// `LAST_VISITS` of a contact, about a second, between these bounds. The residual of a bent
-    /// hexagonal beam of 297 disks with friction 0.7 rises and falls for 20,000 sweeps before it
-    /// converges.
-    pub const LAST_SWEEPS: [u64; 2] = [2_000, 20_000];
+    /// Visits of a contact in the sweeps from the best point of a path that missed the tolerance,
+    /// about a second; at least `FINE_SWEEPS` and at most `COARSE_SWEEPS` sweeps. The residual of a
+    /// bent hexagonal beam of 297 disks with friction 0.7 rises and falls for 20,000 sweeps before
+    /// it converges.
     pub const LAST_VISITS: u64 = 20_000_000;
 }
 
@@ -54,22 +78,12 @@ pub(super) mod stages {
 pub(super) mod gauss_seidel {
     /// Plain sweeps before the acceleration begins: easy problems need no more.
     pub const PLAIN: u64 = 32;
-    /// Sweeps between two accelerated steps.
+    /// Sweeps between two accelerated steps, and accelerated steps between two evaluations of the
+    /// residual.
     pub const BURST: u64 = 4;
-    /// Accelerated steps between two evaluations of the residual.
-    pub const LOOK: u64 = 4;
-    /// Anderson's acceleration restarts if the residual exceeds this multiple of its least value so
-    /// far.
-    pub const GROWTH: f64 = 2.0;
-    /// Share of the trace that is added to the diagonal of Anderson's least-squares matrix, to keep
-    /// it positive definite if changes are nearly parallel: some thousand units of round-off.
-    pub const RIDGE: f64 = 1e-12;
     /// Most repetitions of the predictor–corrector in one visit of a contact; the next sweep
     /// continues.
     pub const ROUNDS: usize = 100;
-    /// Squared relative change of a reaction at which these repetitions end: some units of
-    /// round-off.
-    pub const UNCHANGED: f64 = 1e-30;
 }
 
 /// Newton's method from an active set (decision 7).
@@ -88,17 +102,6 @@ pub(super) mod newton {
     /// 1e-5 to 1e-10, any other 1e-4 to 10. Three failures of four thus end after one factorisation
     /// instead of four (ablation).
     pub const LEFT_BY_GUESS: f64 = 1e-3;
-    /// An iteration makes progress if it brings ‖F‖ below the share `PROGRESS` of its value at the
-    /// last progress. An inner problem ends after `PATIENCE` iterations without progress. (The line
-    /// search with Coulomb's law accepts a full step below `PROGRESS`.)
-    pub const PROGRESS: f64 = 0.9;
-    pub const PATIENCE: u64 = 3;
-    /// Growth of ‖F‖ relative to its least value, above which an inner problem counts as diverged.
-    pub const DIVERGED: f64 = 1e6;
-    /// Share of the tolerances of a solve allowed for ‖F‖.
-    pub const SHARE: f64 = 0.1;
-    /// Lower bound of ‖F‖: units of round-off of ρ u and of the reactions.
-    pub const ROUNDING: f64 = 4.0 * f64::EPSILON;
     /// How often the penalty may be lowered in one solve, and by which factor: the round-off of ρ u
     /// is large for fast contacts.
     pub const MOST_SOFTENED: u32 = 4;
@@ -106,17 +109,12 @@ pub(super) mod newton {
     /// Relative distance to a limit within which a reaction counts as at the limit, when the active
     /// set is derived from reactions.
     pub const BEYOND: f64 = 1e-9;
-    /// Relative residual allowed for a linear solve: `TIGHT` is its lower bound; `FAIR` is the
-    /// upper bound in the first iteration, which may be the last, and `LOOSE` in later ones.
-    pub const TIGHT: f64 = 1e-12;
+    /// Largest relative residual allowed for a linear solve: `FAIR` in the first iteration, which
+    /// may be the last, and `LOOSE` in later ones.
     pub const FAIR: f64 = 1e-3;
     pub const LOOSE: f64 = 1e-2;
-    /// Relative residual above which a linear solve with new factors has failed.
-    pub const LOST: f64 = 0.1;
-    /// Most refinements of a linear solve, and the largest ratio of consecutive residuals: above it
-    /// the factors are too old.
+    /// Most refinements of a linear solve.
     pub const MOST_REFINED: usize = 8;
-    pub const REFINED: f64 = 0.5;
     /// The line search of an associated problem ends where the slope has fallen to this share of
     /// its initial value (regula falsi).
     pub const FLAT: f64 = 0.1;
@@ -127,24 +125,11 @@ pub(super) mod extrapolation {
     /// Consecutive extrapolated steps between two solves: initially, and at most.
     pub const FIRST: u64 = 4;
     pub const MOST: u64 = 32;
-    /// `SHARE` of the tolerances is allowed for an extrapolated step, and `MORE` times the momentum
-    /// that the solve before it left.
+    /// Share of the tolerances allowed for an extrapolated step.
     pub const SHARE: f64 = 1e-2;
-    pub const MORE: f64 = 2.0;
-    /// Allowed difference between a solve and its extrapolation: relative to the growth of the
-    /// reactions, and to the reactions.
+    /// Allowed difference between a solve and its extrapolation, relative to the growth of the
+    /// reactions.
     pub const SAME: f64 = 1e-6;
-    pub const ROUNDING: f64 = 1e-12;
-    /// Longest back-off of the extrapolation (solves).
-    pub const LONGEST_BACKOFF: u64 = 64;
-}
-
-/// The anchor: reactions from which those of a step are measured.
-pub(super) mod history {
-    /// Size of H̃ ρ H̃ᵀ relative to the identity that is added to it, so that a body without a bond
-    /// makes no singularity. The inverse square root of round-off; one refinement removes the
-    /// effect of the identity.
-    pub const STIFF: f64 = 1e8;
 }
 
 /// Start of the interior-point method.
@@ -172,41 +157,29 @@ pub(super) mod direction {
     pub const LONGER: f64 = 0.3;
     pub const GROWN: f64 = 1.05;
     pub const APART: f64 = 10.0;
-    /// If the step is shorter than `SHORT`, a direction towards the central path is tried, with
-    /// these shares of the complementarity gap as the barrier. It is taken if the step grows by the
-    /// factor `WORTH`.
-    pub const SHORT: f64 = 0.5;
+    /// If less than half of the step is possible, a direction towards the central path is tried,
+    /// with these shares of the complementarity gap as the barrier. It is taken if the step grows
+    /// by the factor `WORTH`.
     pub const TO_THE_MIDDLE: [f64; 2] = [0.2, 0.7];
     pub const WORTH: f64 = 1.5;
     /// Least product of a pair relative to the complementarity gap: it defines a wide neighbourhood
     /// of the central path.
     pub const CENTRAL: f64 = 1e-3;
-    /// Longest step, relative to the step to the boundary of the cones.
-    pub const TO_THE_BOUNDARY: f64 = 0.99;
     /// Round-off shows in the directions if refinement adds more than this share of the way to the
     /// boundary of some cone. Refining all directions takes up to a sixth more time (decision 36).
     pub const ROUGH: f64 = 1e-6;
-    /// Factor by which a step is shortened until its end is central, and the shortest step.
+    /// Factor by which a step is shortened until its end is central.
     pub const SHORTER: f64 = 0.8;
-    pub const SHORTEST: f64 = 1e-3;
 }
 
 /// When the central path is followed by arc length (decision 33).
 pub(super) mod follow {
-    /// The path jams after `JAMMED` consecutive steps in which the complementarity gap has not
-    /// fallen by the share `PROGRESS`. Two steps are too few, since a step may go towards the
-    /// middle of the cones. With the step length as the criterion a path may oscillate for 300
-    /// iterations.
-    pub const PROGRESS: f64 = 0.1;
-    pub const JAMMED: u32 = 3;
     /// Factor by which the barrier is raised above the complementarity gap of a jam to find the
     /// path, and how often.
     pub const RAISED: f64 = 10.0;
     pub const MOST_RAISED: i32 = 2;
-    /// Relative change per unit of θ up to which the path counts as straight, and the factor on it
-    /// after each jam.
+    /// Relative change per unit of θ up to which the path counts as straight; halved by each jam.
     pub const STRAIGHT: f64 = 4.0;
-    pub const STRAIGHTER: f64 = 0.5;
 }
 
 /// The continuation by arc length (decision 33: 193 to 245 factorisations for the folds of spheres
@@ -216,10 +189,9 @@ pub(super) mod continuation {
     /// to which a longer step is shortened.
     pub const ON_PATH: f64 = 0.3;
     pub const LONGEST_CORRECTION: f64 = 5.0;
-    /// Longest and shortest relative change in a step along the tangent, and the target length of
-    /// the Newton step after it.
+    /// Longest relative change in a step along the tangent, and the target length of the Newton
+    /// step after it.
     pub const LONGEST: f64 = 0.9;
-    pub const SHORTEST: f64 = 1e-3;
     pub const AIM: f64 = 0.15;
     /// Least share of the barrier that remains after a step.
     pub const STEEPEST: f64 = 1e-2;
@@ -235,16 +207,9 @@ pub(super) mod continuation {
 
 /// Selection among many reactions (decision 34).
 pub(super) mod selection {
-    /// Stiffness of the metric, relative to 1/(mean normal entry of W). With 1e7 the reactions
-    /// after an avalanche are 5e-5 from those of stiff contacts, which changes the load of one
-    /// sample of ten by 20 %, and the compliance shows in three solves of four. With 1e8 and
-    /// velocities in plain double precision round-off decides; with 1e9 and twice the precision
-    /// loads agree to 1e-3 (decision 35).
-    pub const KAPPA: f64 = 1e9;
-    /// Where any reactions will do: share of the tolerance allowed for the compliance, which is
-    /// less below a tolerance of 1e-8, and the stiffest metric. A pressed hexagonal block of dry
-    /// disks takes 82 factorisations to 1e-10 with `KAPPA`, and at most 30 so.
-    pub const SHARE: f64 = 0.1;
+    /// The stiffest metric, where any reactions will do and the compliance may take `SHARE` of the
+    /// tolerance. A pressed hexagonal block of dry disks takes 82 factorisations to 1e-10 with
+    /// `KAPPA`, and at most 30 so.
     pub const STIFFEST: f64 = 1e12;
     /// Sum of the complementarity gaps, relative to the energy of the metric, at which the
     /// minimum-energy reactions are known; also the least energy that counts, relative to Σ r²/ρ,
@@ -258,17 +223,14 @@ pub(super) mod selection {
     /// minimum-energy reactions are required), and the most new anchors.
     pub const HARDER: f64 = 0.01;
     pub const MOST_ANCHORED: u32 = 5;
-    /// Share of the tolerances above which the effect of the compliance requires a new anchor.
-    pub const SHOWS: f64 = 0.5;
     /// Complementarity gap, relative to the square of the unit of reactions, below which only
     /// round-off changes.
     pub const LEAST_GAP: f64 = 1e-26;
     /// Relative distance to a known limit within which a bond has reached it: in `compression` 369
     /// of 371 bonds that are at a limit of r* are within 1e-5 of it. Where the compliance leaves a
-    /// residual of at most `ACCURATE` in r*, the distance of r* counts, else that of the solution,
-    /// which may be 5 % away (very unlike masses, random scene 2354).
+    /// residual of at most half the default tolerance in r*, the distance of r* counts, else that
+    /// of the solution, which may be 5 % away (very unlike masses, random scene 2354).
     pub const REACHED: f64 = 1e-4;
-    pub const ACCURATE: f64 = 5e-9;
     /// Relative distance to a known limit within which a reaction is put on it, where it meets the
     /// tolerance there.
     pub const BESIDE: f64 = 1e-6;
@@ -277,13 +239,10 @@ pub(super) mod selection {
 /// The least violation of a problem without a solution (docs/theory/interior-point.md, "What has no
 /// solution").
 pub(super) mod violation {
-    /// Ratio of W to the compliance, and the number of multiplier iterations. Each reduces H̃ d by
-    /// this factor, down to 1e-12 of d.
-    pub const KAPPA: f64 = 1e8;
+    /// Number of multiplier iterations. Each reduces H̃ d by the factor `STIFF`, the ratio of W to
+    /// the compliance, down to 1e-12 of d.
     pub const ROUNDS: usize = 3;
-    /// Most interior-point iterations in each, and the complementarity gap at which it ends,
-    /// relative to the square of the unit of reactions.
-    pub const MOST: usize = 100;
+    /// Complementarity gap at which each ends, relative to the square of the unit of reactions.
     pub const LEAST_GAP: f64 = 1e-18;
 }
 
@@ -293,15 +252,11 @@ pub(super) mod certificate {
     /// certificate; and least −q·d, relative to the sum of the sizes of its terms. A solution would
     /// need velocities of the order of 1/`EXACT` times those at which the contacts close.
     pub const EXACT: f64 = 1e-10;
-    /// Target distance of velocities inside K*, relative to the largest given velocity, and the
-    /// share of it that counts as inside.
+    /// Target distance of velocities inside K*, relative to the largest given velocity; half of it
+    /// counts as inside.
     pub const MARGIN: f64 = 1e-6;
-    pub const INSIDE: f64 = 0.5;
     /// Share of the largest impulse above which a contact belongs to a certificate.
     pub const CARRIES: f64 = 1e-3;
-    /// Relative distance by which an impulse projected on its cone is moved inside, so that
-    /// round-off does not put it outside.
-    pub const ROUNDING: f64 = 4.0 * f64::EPSILON;
 }
 
 /// The limit load, a conic programme.
@@ -317,15 +272,12 @@ pub(super) mod limit_load {
     /// raised by the root of this factor where they matter. Of three disks with bonds of 100 N and
     /// 1e9 N the limit is 71 N without this, in place of 50 N (decision 55).
     pub const SPREAD: f64 = 1e4;
-    /// Most iterations. Samples take 15 to 40.
-    pub const MOST: usize = 150;
-    /// Iterations without progress after which the best point is returned.
+    /// Iterations without progress after which the best point is returned. Samples take 15 to 40
+    /// in all.
     pub const PATIENCE: usize = 5;
-    /// Share of the way to the boundary of the cones.
-    pub const TO_THE_BOUNDARY: f64 = 0.99;
-    /// Regularisation of the balance equations, relative to the diagonal entry of each, and the
-    /// number of refinements that remove it. Samples of 900 spheres end at an error below 1e-10
-    /// with 1e-12 and 1e-13, at some 1e-9 with 1e-10; with 1e-14 two of 33 are not solved.
-    pub const RIDGE: f64 = 1e-13;
+    /// Number of refinements that remove the regularisation of the balance equations, which is
+    /// `INVISIBLE` beside the diagonal entry of each. Samples of 900 spheres end at an error below
+    /// 1e-10 with that and a tenth of it, at some 1e-9 with 1e-10; with 1e-14 two of 33 are not
+    /// solved.
     pub const REFINEMENTS: usize = 3;
 }

@@ -35,7 +35,7 @@ pub struct Membrane<D: Dim> {
     pub between: Option<[usize; 2]>,
     /// Radius of the disk that rolls on the surface (m).
     pub disk: f64,
-    /// Pressure in the last step (Pa).
+    /// Pressure in the last step (Pa), the mean over its parts.
     pub applied: f64,
     /// Area that the surface encloses (m²): that of the polygon through the centres of its grains,
     /// and between plates the plates.

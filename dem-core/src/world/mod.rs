@@ -13,6 +13,7 @@ mod loads;
 mod membrane;
 mod motion;
 mod observe;
+mod parts;
 mod report;
 mod start;
 mod state;
@@ -112,7 +113,8 @@ pub struct World<D: Dim> {
     pub load_knots: Vec<f64>,
     /// Energy balance since the start.
     pub ledger: Ledger,
-    /// Contacts of the last accepted step, sorted by pair, with their reactions.
+    /// Contacts of the last accepted step, or of the last part of it, sorted by pair, with their
+    /// reactions.
     stored: Vec<StoredTouch<D>>,
     /// Positions at mid-step of that step, which determine the geometry of its contacts.
     mid: Midpoint<D>,

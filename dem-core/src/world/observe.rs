@@ -36,11 +36,11 @@ impl<D: Dim> World<D> {
         sum
     }
 
-    /// Mean stress σ = (1/V) Σ ℓ ⊗ f over the contacts of the last step (Pa, D × D row by row;
-    /// compression positive), after Love and Weber. ℓ joins the centres, or at a wall the contact
-    /// point to the centre, or under a membrane the point of the grain where its push acts to the
-    /// centre; V is the box around the sample at time zero. A wall that holds a grain exerts on it
-    /// the opposite of what its contacts do.
+    /// Mean stress σ = (1/V) Σ ℓ ⊗ f over the contacts of the last step, or of the last part of it
+    /// (Pa, D × D row by row; compression positive), after Love and Weber. ℓ joins the centres, or
+    /// at a wall the contact point to the centre, or under a membrane the point of the grain where
+    /// its push acts to the centre; V is the box around the sample at time zero. A wall that holds
+    /// a grain exerts on it the opposite of what its contacts do.
     pub fn stress(&self) -> Vec<f64> {
         let mut sum = vec![0.0; D::N * D::N];
         let mut add = |branch: D::Vector, force: D::Vector| {
@@ -79,8 +79,9 @@ impl<D: Dim> World<D> {
         sum
     }
 
-    /// Contacts of the last accepted step, sorted by pair, with their reactions. Gaps and points
-    /// are those of mid-step, with the present radii and shapes of the bodies.
+    /// Contacts of the last accepted step, or of the last part of it, sorted by pair, with their
+    /// reactions. Gaps and points are those of mid-step, with the present radii and shapes of the
+    /// bodies.
     pub fn touches(&self) -> impl ExactSizeIterator<Item = Touch<D>> {
         self.stored.iter().map(|stored| self.touch(&self.mid, stored))
     }

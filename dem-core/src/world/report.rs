@@ -48,6 +48,9 @@ pub struct StepReport<D: Dim> {
     pub rejected: u32,
     /// Number of parts of the step: 1, or more if a solve was refused or a body was too fast.
     pub substeps: u32,
+    /// Mean stress over the parts of a step in parts (Pa), see
+    /// [`World::stress`](super::World::stress).
+    pub stress: Option<Vec<f64>>,
 }
 
 impl<D: Dim> StepReport<D> {
@@ -373,6 +376,7 @@ mod tests {
             bond_elongation: 0.0,
             rejected: 0,
             substeps: 1,
+            stress: None,
         }
     }
 

@@ -1,10 +1,9 @@
-//! One time step: the scheme of Moreau and Jean with θ = 1/2, its rupture cascade, and halving when
-//! a step is refused.
+//! One time step: the scheme of Moreau and Jean with θ = 1/2, and its rupture cascade.
 
 use super::assembly::{Places, write_reactions};
 use super::ledger::{elastic_energy, losses};
 use super::motion::{Midpoint, Motion};
-use super::report::{PARTS, Solves, StepError, StepReport, Violation};
+use super::report::{Solves, StepError, StepReport, Violation};
 use super::touch::{Break, StoredTouch};
 use super::{Counts, World};
 use crate::body::Drive;
@@ -45,49 +44,9 @@ impl<D: Dim> World<D> {
         Ok(report)
     }
 
-    /// One step of length `h`, or two of half that length if its solve is refused or bodies are too
-    /// fast for it; the step of the scene is `parts` × `h`.
-    fn advance(
-        &mut self,
-        h: f64,
-        halvings: u32,
-        parts: u32,
-        watch: &mut dyn FnMut(usize),
-    ) -> Result<StepReport<D>, StepError> {
-        let last_attempt = halvings == self.settings.max_halvings;
-        let refused = match self.attempt(h, last_attempt, watch) {
-            Err(StepError::NotAccepted { .. }) if halvings < self.settings.max_halvings => 1,
-            Err(StepError::Yielded { violation, .. })
-                if violation.is_of_the_solve() && halvings < self.settings.max_halvings =>
-            {
-                1
-            }
-            Err(StepError::TooFast { .. }) if parts < PARTS => 0,
-            outcome => return outcome,
-        };
-        let before = self.snapshot();
-        let first = self.advance(0.5 * h, halvings + refused, 2 * parts, watch)?;
-        let at_limit = self.walls.iter().map(|w| w.reaction_at_limit).collect::<Vec<_>>();
-        let mut watch_second = |broken| watch(first.breaks.len() + broken);
-        match self.advance(0.5 * h, halvings + refused, 2 * parts, &mut watch_second) {
-            Ok(second) => {
-                // the forces of the first rupture are those of the step
-                if !first.breaks.is_empty() {
-                    self.walls.iter_mut().zip(at_limit).for_each(|(wall, reaction)| wall.reaction_at_limit = reaction);
-                }
-                Ok(first.followed_by(second, refused))
-            }
-            Err(error) => {
-                // after the first half the world is in neither the old state nor the new one
-                self.restore(before);
-                Err(error)
-            }
-        }
-    }
-
     /// One step of length `h`. An error leaves the world unchanged; that of the `last` attempt
     /// includes the verdict on its problem.
-    fn attempt(
+    pub(super) fn attempt(
         &mut self,
         h: f64,
         last_attempt: bool,
@@ -582,6 +541,7 @@ impl<D: Dim> World<D> {
             bond_elongation,
             rejected: 0,
             substeps: 1,
+            stress: None,
         }
     }
 }

@@ -277,3 +277,34 @@ fn a_force_far_above_what_moves_the_grains_in_a_step_is_borne() {
     let pressed = w.walls[0].reaction[1];
     assert!((pressed + force * 39.5 / 20.0).abs() < 1e-6 * force, "{pressed} N");
 }
+
+/// A disk that meets a moving wall too fast for a step: its parts take up the impact and what comes
+/// after it. Wall force, work and stress are those of the whole step.
+#[test]
+fn the_forces_of_a_step_in_parts_are_those_of_the_step() {
+    let (h, speed) = (1e-3, 0.5);
+    for restitution in [0.0, 1.0] {
+        let mut set = settings(h);
+        set.restitution = Some(Restitution { grain_grain: 0.0, grain_wall: restitution, threshold_speed: 0.0 });
+        let wall = moving::<D2>(plane(0, 1.0, 0.0), [1.0, 0.0].into(), speed);
+        let mut disk = grain(&[0.0043, 0.0], 0.1 * R);
+        disk.velocity = [-8.0, 0.0].into();
+        let mut w = world(vec![disk], vec![wall], set);
+        let (mut parts, mut work) = (1, 0.0);
+        for _ in 0..3 {
+            let before = w.momentum().linear[0];
+            let report = w.step().unwrap();
+            let push = (w.momentum().linear[0] - before) / h;
+            let reaction = w.walls[0].reaction;
+            assert!((reaction[0] + push).abs() <= 1e-12 * push.abs(), "{} N for {push} N", reaction[0]);
+            assert_eq!(w.walls[0].reaction_at_limit, reaction);
+            // the branch of a contact with a wall ends at the wall
+            let stress = report.stress.unwrap_or_else(|| w.stress());
+            assert!(push == 0.0 || stress[0] > 0.0, "{stress:?} Pa for {push} N");
+            parts = parts.max(report.substeps);
+            work += push * speed * h;
+        }
+        assert!(parts > 1 && work > 0.0);
+        assert!((work / w.ledger.external_work - 1.0).abs() < 1e-12, "{work} J of {} J", w.ledger.external_work);
+    }
+}

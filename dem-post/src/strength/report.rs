@@ -2,13 +2,13 @@
 
 use std::path::PathBuf;
 
+use dem_scene::failure::PEAK_DROP;
 use serde::Serialize;
 
 use super::fit::{Estimate, Line, Spread, line, spread};
 use super::left_out::{self, LeftOut};
 use super::runs::{self, Found, Measure, histories, name};
 use super::scenes::{design, unit};
-use crate::collapse::PEAK_DROP;
 use crate::extent::range;
 use crate::output::{Result, Text, counted, facts, number, quantity};
 

@@ -16,6 +16,9 @@ pub const STRAINS: [f64; 2] = [1e-4, 1e-3];
 /// Share of broken bonds (–) at which the load is reported.
 pub const BROKEN_SHARE: f64 = 0.05;
 
+/// By which share of its greatest value a load must fall, for that to be a strength (–).
+pub const PEAK_DROP: f64 = 0.05;
+
 /// Whether bonds join all of `grains` grains to one piece. If so, and the bonds are rigid, no grain
 /// moves relative to another until a bond breaks.
 #[must_use]
@@ -101,12 +104,13 @@ pub struct Splitting {
     pub length: f64,
     /// Stress at the collapse load of the strain 1e-4 (Pa); none if no bond had broken by then.
     pub collapse: Option<f64>,
-    /// Stress at the greatest load (Pa).
+    /// Stress at the greatest load (Pa), if the load fell by [`PEAK_DROP`] afterwards.
     pub peak: Option<f64>,
 }
 
 impl Splitting {
-    /// The splitting strength of a disk, from its collapse load and its greatest load (N).
+    /// The splitting strength of a disk, from its collapse load and the greatest load before a fall
+    /// (N).
     #[must_use]
     pub fn of(disk: Disk, collapse: Option<f64>, peak: Option<f64>) -> Self {
         let stress = |load: f64| disk.stress(load);

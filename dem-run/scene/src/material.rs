@@ -102,7 +102,8 @@ pub enum Scatter {
         /// Modulus m: the larger it is, the smaller the scatter.
         modulus: f64,
     },
-    /// Normal, with the given strength as mean and no strength below zero.
+    /// Normal with the given strength as mean; values below zero are drawn again, so with a large
+    /// deviation the mean is higher (by 3 % with half the strength).
     Normal {
         /// Standard deviation over the mean, at most 0.5.
         deviation: f64,

@@ -23,7 +23,7 @@ use super::pairs::{largest, pair};
 use super::sites::Sites;
 use super::state::State;
 use super::system::System;
-use crate::solver::tuning::continuation as tuning;
+use crate::solver::tuning::{SHORTEST, continuation as tuning};
 
 /// A point next to the path, or a change of it.
 #[derive(Clone, Debug)]
@@ -168,7 +168,7 @@ impl Continuation {
         }
         self.length *= tuning::SHORTER;
         self.corrections = 0;
-        let Some(predictor) = self.predictor.as_mut().filter(|_| self.length >= tuning::SHORTEST) else {
+        let Some(predictor) = self.predictor.as_mut().filter(|_| self.length >= SHORTEST) else {
             return Progress::Lost;
         };
         self.correct_start = !self.correct_start;

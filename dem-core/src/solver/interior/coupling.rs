@@ -106,7 +106,7 @@ impl<'a> Coupling<'a> {
     /// W r.
     pub fn velocity(&self, sites: &Sites, r: &[f64]) -> Vec<f64> {
         match self {
-            Self::Bodies { .. } => self.pulled(sites, &self.pushed(sites, r)),
+            Self::Bodies { rows, scale, .. } => sites.pulled(rows, *scale, &sites.pushed(rows, *scale, r)),
             Self::Matrix { blocks, values, .. } => {
                 let mut u = vec![0.0; sites.rows];
                 for block in blocks {
@@ -115,27 +115,6 @@ impl<'a> Coupling<'a> {
                 u
             }
         }
-    }
-
-    /// H̃ r, in the unknowns of the bodies.
-    fn pushed(&self, sites: &Sites, r: &[f64]) -> Vec<f64> {
-        let Self::Bodies { rows, scale, .. } = self else { return Vec::new() };
-        let mut y = vec![0.0; rows.unknowns];
-        for (site, row) in sites.list.iter().zip(&rows.list) {
-            site.of.iter().zip(site.part(r)).for_each(|(k, r)| rows.push_by(row, *k, *scale, *r, &mut y));
-        }
-        y
-    }
-
-    /// H̃ᵀ y.
-    fn pulled(&self, sites: &Sites, y: &[f64]) -> Vec<f64> {
-        let Self::Bodies { rows, scale, .. } = self else { return Vec::new() };
-        let mut u = vec![0.0; sites.rows];
-        for (site, row) in sites.list.iter().zip(&rows.list) {
-            let own = site.of.iter().zip(site.part_mut(&mut u));
-            own.for_each(|(k, u)| *u = scale * rows.pulled_by(row, *k, y));
-        }
-        u
     }
 
     /// Factorise the matrix of a step; D⁻¹ is in the upper left corners of the inverses of the
@@ -158,10 +137,10 @@ impl<'a> Coupling<'a> {
     /// The contact velocities (1 + W D⁻¹)⁻¹ W r: reactions `r` with the response of the contacts.
     pub fn yielded(&self, sites: &Sites, r: &[f64], factors: &Factors) -> Vec<f64> {
         match self {
-            Self::Bodies { .. } => {
-                let mut y = self.pushed(sites, r);
+            Self::Bodies { rows, scale, .. } => {
+                let mut y = sites.pushed(rows, *scale, r);
                 factors.solve(self.tree(), &mut y);
-                self.pulled(sites, &y)
+                sites.pulled(rows, *scale, &y)
             }
             Self::Matrix { .. } => {
                 let mut u = self.velocity(sites, r);

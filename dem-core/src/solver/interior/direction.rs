@@ -48,7 +48,7 @@ pub(super) fn direction(system: &System, rough: &mut bool) -> (State, f64) {
         (step, far, by) = (other, reached, more);
     }
     let mut chosen = by;
-    if far < tuning::SHORT {
+    if far < 0.5 {
         // a short step: try directions towards the central path, without the second-order term
         for share in tuning::TO_THE_MIDDLE {
             let barrier = share.max(centring) * gap;

@@ -12,13 +12,13 @@ use super::sites::Sites;
 use super::start::cold;
 use super::state::{State, gap};
 use super::system::System;
-use crate::solver::tuning::{direction as steps, follow as tuning};
+use crate::solver::tuning::{PATIENCE, PROGRESS, SHORTEST, TO_THE_BOUNDARY, direction as steps, follow as tuning};
 
 /// The current point, and how the path is followed from it.
 pub(super) struct Follow {
     at: State,
     /// Consecutive steps without progress.
-    stuck: u32,
+    stuck: u64,
     straight: f64,
     /// Whether round-off shows in the directions.
     rough: bool,
@@ -71,7 +71,7 @@ impl Follow {
 
     /// One iteration, with the system at the current point. Returns the change of the reactions;
     /// none if the path is lost.
-    pub fn step(&mut self, system: &System, sites: &Sites) -> Option<State> {
+    pub fn step(&mut self, system: &System, sites: &Sites) -> Option<Vec<f64>> {
         let Some(by) = &mut self.by_arc_length else { return Some(self.long_step(system)) };
         let progress = by.continuation.step(system, sites);
         let now = by.continuation.state();
@@ -87,36 +87,36 @@ impl Follow {
             }
             Progress::Lost => self.raise(sites)?,
         }
-        Some(State { r, ..State::default() })
+        Some(r)
     }
 
     /// A predictor–corrector step.
-    fn long_step(&mut self, system: &System) -> State {
+    fn long_step(&mut self, system: &System) -> Vec<f64> {
         let (mut step, far) = direction(system, &mut self.rough);
-        let mut length = (steps::TO_THE_BOUNDARY * far).min(1.0);
+        let mut length = (TO_THE_BOUNDARY * far).min(1.0);
         let end = |length: f64| {
             let mut end = system.at.clone();
             advance(&mut end, length, &step);
             end
         };
         let mut next = end(length);
-        while length > steps::SHORTEST && !is_central(&next) {
+        while length > SHORTEST && !is_central(&next) {
             length *= steps::SHORTER;
             next = end(length);
         }
         let left = gap(&next) / gap(system.at);
-        self.stuck = if left <= 1.0 - tuning::PROGRESS { 0 } else { self.stuck + 1 };
+        self.stuck = if left <= PROGRESS { 0 } else { self.stuck + 1 };
         self.at = next;
         self.round_off_reached = left > 0.5 && is_rounded(&self.at);
         if self.round_off_reached {
             self.jam(1.0);
-        } else if self.stuck == tuning::JAMMED {
+        } else if self.stuck == PATIENCE {
             self.stuck = 0;
-            self.straight *= tuning::STRAIGHTER;
+            self.straight *= 0.5;
             self.jam(tuning::RAISED);
         }
         step.r.iter_mut().for_each(|r| *r *= length);
-        step
+        step.r
     }
 
     /// Seek the path by arc length, from the current point.

@@ -168,26 +168,3 @@ pub(super) fn yield_to(sites: &Sites, inverses: &[f64], t: &[f64], step: &mut St
         }
     }
 }
-
-/// Set the `x` of a step to G r.
-pub(super) fn follow(sites: &Sites, step: &mut State) {
-    step.x.resize(sites.cones.len(), [0.0; 3]);
-    for site in &sites.list {
-        let r = site.part(&step.r);
-        for c in site.cones.clone() {
-            step.x[c] = sites.cones[c].primal(r);
-        }
-    }
-}
-
-/// Σ Bᵀ z of all contacts.
-pub(super) fn opened(sites: &Sites, z: &[Point]) -> Vec<f64> {
-    let mut u = vec![0.0; sites.rows];
-    for site in &sites.list {
-        let own = site.part_mut(&mut u);
-        for c in site.cones.clone() {
-            sites.cones[c].add_velocity(&z[c], own);
-        }
-    }
-    u
-}

@@ -1,6 +1,5 @@
 //! The metric 1/ρ: a compliance that selects among the reactions that balance a load.
 
-use super::local::opened;
 use super::sites::{ROWS, Sites};
 use super::state::State;
 
@@ -63,7 +62,7 @@ impl Metric {
 
 /// ℓ = u + C (r − r₀) + (r − r_a)/ρ − Σ Bᵀ z, for the relative velocities u.
 pub(super) fn lack(sites: &Sites, velocity: &[f64], at: &State, metric: &Metric) -> Vec<f64> {
-    let opened = opened(sites, &at.z);
+    let opened = sites.velocity(&at.z);
     let row = |k: usize| {
         let soft = sites.compliance[k] * (at.r[k] - sites.carried[k]) + metric.own[k] * (at.r[k] - metric.anchor[k]);
         velocity[k] + soft - opened[k]

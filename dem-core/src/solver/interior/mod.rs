@@ -21,11 +21,12 @@ mod continuation;
 mod coupling;
 mod direction;
 mod follow;
+mod limits;
 mod local;
 mod metric;
 mod pairs;
 mod selection;
-mod sites;
+pub(super) mod sites;
 mod start;
 mod state;
 mod system;
@@ -94,8 +95,8 @@ impl Interior {
             }
             let Some(system) = self.factorised(&sites, &coupling, &at, &selection.metric) else { break };
             let in_long_steps = follow.is_in_long_steps();
-            let Some(step) = follow.step(&system, &sites) else { break };
-            selection.change = system.change(&step);
+            let Some(change) = follow.step(&system, &sites) else { break };
+            selection.change = system.change(&change);
             let has_jammed = in_long_steps && !follow.is_in_long_steps();
             if has_jammed && selection.ends_at_nearest(problem, &sites) {
                 break;

@@ -11,12 +11,13 @@
 //!    its gaps and its energy are far below Σ r²/ρ.
 
 use super::aims::{Aims, Found};
+use super::limits::Limit;
 use super::metric::Metric;
-use super::sites::{Limit, Sites};
+use super::sites::Sites;
 use super::state::{State, gap};
 use crate::contact::Reached;
 use crate::solver::solvable::Solvable;
-use crate::solver::tuning::selection as tuning;
+use crate::solver::tuning::{KAPPA, SHARE, defaults, selection as tuning};
 
 /// How the path continues at a point.
 pub(super) enum Next {
@@ -53,9 +54,9 @@ impl Selection {
     pub fn new(sites: &Sites, anchor: Vec<f64>, aims: Aims) -> Self {
         // the selection is the same for all tolerances
         let kappa = match aims {
-            Aims { least: true, .. } => tuning::KAPPA,
+            Aims { least: true, .. } => KAPPA,
             Aims { far: true, .. } => tuning::STIFFEST,
-            _ => (1.0 / (tuning::SHARE * aims.tolerance)).clamp(tuning::KAPPA, tuning::STIFFEST),
+            _ => (1.0 / (SHARE * aims.tolerance)).clamp(KAPPA, tuning::STIFFEST),
         };
         let metric = Metric::new(sites, anchor, kappa);
         let limits = (!aims.least).then(Vec::new);
@@ -128,7 +129,7 @@ impl Selection {
     /// Take a point as r*: its limits are known, and gaps up to `enough` count.
     fn know(&mut self, sites: &Sites, at: &State, enough: f64) {
         let limits = sites.limits(at, &self.metric.compliance);
-        let is_accurate = self.metric.left(sites, &at.r).0 <= tuning::ACCURATE;
+        let is_accurate = self.metric.left(sites, &at.r).0 <= 0.5 * defaults::TOLERANCE;
         self.reached = is_accurate.then(|| sites.reached(at, &limits));
         (self.limits, self.enough) = (Some(limits), enough);
     }
@@ -179,7 +180,7 @@ impl Selection {
     fn metric_shows(&self, sites: &Sites, at: &State) -> bool {
         let Aims { tolerance, load_tolerance, .. } = self.aims;
         let (residual, velocity) = self.metric.left(sites, &at.r);
-        residual > tuning::SHOWS * tolerance || velocity > tuning::SHOWS * load_tolerance * sites.largest_free()
+        residual > 0.5 * tolerance || velocity > 0.5 * load_tolerance * sites.largest_free()
     }
 
     /// By which factor the reactions of a point, projected on their limits, and on those of r* if

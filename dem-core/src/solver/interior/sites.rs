@@ -9,27 +9,18 @@
 //! Signorini's condition, and for each group a cone whose z₀ acts on no row: there B is G without
 //! its normal column, and z₀ is the slip speed.
 
-use super::cones::{Point, eigenvalues};
-use super::state::State;
-use crate::contact::{PADDED, Padded, Reached};
+use super::cones::Point;
+use crate::contact::{PADDED, Padded};
 use crate::solver::rows::{Row, Rows, TWIST};
-use crate::solver::tuning::selection as tuning;
 use std::ops::Range;
 
 /// Most rows of a contact, and most unknowns of its cones.
 pub(super) const ROWS: usize = PADDED;
 pub(super) const CONES: usize = 9;
 
-/// Whether a reaction is at the apex of its cone, or on its side.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Limit {
-    pub apex: bool,
-    pub side: bool,
-}
-
 /// One cone of a contact.
 #[derive(Clone, Debug)]
-pub(super) struct SecondOrderCone {
+pub(in crate::solver) struct SecondOrderCone {
     /// Ratio of x₀ to the shifted normal reaction.
     pub slope: f64,
     /// The contact's rows for the components after x₀; `tangents` of them.
@@ -41,7 +32,7 @@ pub(super) struct SecondOrderCone {
 
 /// One contact.
 #[derive(Clone, Debug)]
-pub(super) struct Site {
+pub(in crate::solver) struct Site {
     /// Places of its rows in a padded vector. A group with a limit of zero has no rows here.
     pub places: [usize; ROWS],
     /// Numbers of these rows among all rows of the contact.
@@ -99,7 +90,7 @@ impl SecondOrderCone {
 
 /// The contacts of a problem, in units in which reactions and velocities are of order one.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Sites {
+pub(in crate::solver) struct Sites {
     pub list: Vec<Site>,
     pub cones: Vec<SecondOrderCone>,
     /// Number of all rows.
@@ -126,7 +117,7 @@ pub(super) struct Sites {
 impl Sites {
     /// The contacts of `rows`, in units that depend on the problem and on these reactions.
     pub fn of(rows: &Rows, reactions: &[Padded]) -> Self {
-        let mut sites = Self { is_static: rows.is_static, ..Self::default() };
+        let mut sites = Self { is_static: rows.is_static, ..Self::cones_of(rows) };
         let velocities: Vec<Padded> = rows.list.iter().map(|row| rows.velocity(row, &rows.free)).collect();
         let count = rows.list.len().max(1) as f64;
         let mean = |sum: f64| sum / count;
@@ -139,13 +130,29 @@ impl Sites {
         let metric = rows.list.iter().filter(|row| !row.is_elastic());
         let (soft, of) = metric.fold((0.0, 0.0), |(sum, count), row| (sum + row.weights.n, count + 1.0));
         let soft = if soft > 0.0 { soft / of } else { 1.0 };
-        for (row, u) in rows.list.iter().zip(&velocities) {
-            sites.add(row, u, normal, soft);
+        for ((site, row), u) in sites.list.iter().zip(&rows.list).zip(&velocities) {
+            let (u, carried) = (u.in_order(), row.carried.in_order());
+            let (weights, compliance) = (row.weights.in_order(), row.compliance.in_order());
+            for place in &site.places[..site.rows] {
+                sites.free.push(u[*place] / sites.speed);
+                sites.compliance.push(compliance[*place] / normal);
+                sites.carried.push(carried[*place] / sites.force);
+                sites.metric.push(weights[*place] / soft);
+            }
+            sites.shift.push(row.shift / sites.force);
+            sites.normal.push(row.normal / normal);
         }
         sites
     }
 
-    fn add(&mut self, row: &Row, u: &Padded, normal: f64, soft: f64) {
+    /// The rows and cones alone.
+    pub fn cones_of(rows: &Rows) -> Self {
+        let mut sites = Self::default();
+        rows.list.iter().for_each(|row| sites.add(row));
+        sites
+    }
+
+    fn add(&mut self, row: &Row) {
         let (mu, nu, xi) = (row.cone.mu, row.cone.nu, row.cone.xi);
         let mut site = Site {
             places: [0; ROWS],
@@ -182,16 +189,6 @@ impl Sites {
         site.duals = self.cones[before..].iter().map(|cone| 1 + cone.tangents).sum();
         self.rows += site.rows;
         self.matrices += site.order() * site.order();
-        let (u, carried) = (u.in_order(), row.carried.in_order());
-        let (weights, compliance) = (row.weights.in_order(), row.compliance.in_order());
-        for place in &site.places[..site.rows] {
-            self.free.push(u[*place] / self.speed);
-            self.compliance.push(compliance[*place] / normal);
-            self.carried.push(carried[*place] / self.force);
-            self.metric.push(weights[*place] / soft);
-        }
-        self.shift.push(row.shift / self.force);
-        self.normal.push(row.normal / normal);
         self.list.push(site);
     }
 
@@ -221,14 +218,51 @@ impl Sites {
 
     /// x = G r̂ of all cones.
     pub fn primal(&self, r: &[f64]) -> Vec<Point> {
-        let mut x = vec![[0.0; 3]; self.cones.len()];
+        let mut x = self.change(r);
         for (site, shift) in self.list.iter().zip(&self.shift) {
-            for c in site.cones.clone() {
-                x[c] = self.cones[c].primal(site.part(r));
-                x[c][0] += self.cones[c].slope * shift;
-            }
+            site.cones.clone().for_each(|c| x[c][0] += self.cones[c].slope * shift);
         }
         x
+    }
+
+    /// G r of all cones: the change of x with the reactions.
+    pub fn change(&self, r: &[f64]) -> Vec<Point> {
+        let of = |site| self.cones_at(site).iter().map(|cone| cone.primal(Site::part(site, r)));
+        self.list.iter().flat_map(of).collect()
+    }
+
+    /// Σ Bᵀ z of all contacts.
+    pub fn velocity(&self, z: &[Point]) -> Vec<f64> {
+        let mut u = vec![0.0; self.rows];
+        for site in &self.list {
+            let own = site.part_mut(&mut u);
+            site.cones.clone().for_each(|c| self.cones[c].add_velocity(&z[c], own));
+        }
+        u
+    }
+
+    /// `scale` H̃ r, over the unknowns of the bodies.
+    pub fn pushed(&self, rows: &Rows, scale: f64, r: &[f64]) -> Vec<f64> {
+        let mut y = vec![0.0; rows.unknowns];
+        for (site, row) in self.list.iter().zip(&rows.list) {
+            site.of.iter().zip(site.part(r)).for_each(|(k, r)| rows.push_by(row, *k, scale, *r, &mut y));
+        }
+        y
+    }
+
+    /// `scale` H̃ᵀ y.
+    pub fn pulled(&self, rows: &Rows, scale: f64, y: &[f64]) -> Vec<f64> {
+        let mut u = vec![0.0; self.rows];
+        for (site, row) in self.list.iter().zip(&rows.list) {
+            let own = site.of.iter().zip(site.part_mut(&mut u));
+            own.for_each(|(k, u)| *u = scale * rows.pulled_by(row, *k, y));
+        }
+        u
+    }
+
+    /// The cones of a contact.
+    pub fn cones_at(&self, site: &Site) -> &[SecondOrderCone] {
+        &self.cones[site.cones.clone()]
     }
 
     /// Reactions of the problem as a list of all rows.
@@ -247,74 +281,9 @@ impl Sites {
     }
 
     /// The rows of one contact as its reaction.
-    fn padded(&self, site: &Site, own: &[f64]) -> Padded {
+    pub fn padded(&self, site: &Site, own: &[f64]) -> Padded {
         let mut r = [0.0; ROWS];
         site.places.iter().zip(own).for_each(|(place, value)| r[*place] = value * self.force);
         Padded::from_order(&r.into())
-    }
-
-    /// The limits that the reactions have reached. For each row z over the compliance is the
-    /// distance beyond a limit; the reaction is at the limit if this exceeds x, the distance
-    /// inside.
-    pub fn limits(&self, at: &State, compliance: &[f64]) -> Vec<Limit> {
-        let mut limits = vec![Limit::default(); self.cones.len()];
-        for site in &self.list {
-            for c in site.cones.clone() {
-                let (x, z) = (eigenvalues(&at.x[c]), eigenvalues(&at.z[c]));
-                let soft = compliance[site.at + self.cones[c].rows[0]];
-                limits[c] = Limit { apex: soft * x[0] < z[1], side: soft * x[1] < z[0] };
-            }
-        }
-        limits
-    }
-
-    /// Which of the `known` limits of a cone are within the relative distance `most` of x.
-    fn near(&self, at: &State, c: usize, shift: f64, known: &[Limit], most: f64) -> Limit {
-        let (x, cone) = (eigenvalues(&at.x[c]), &self.cones[c]);
-        let known = known.get(c).copied().unwrap_or_default();
-        let apex = known.apex && cone.acts_on_normal && at.x[c][0] <= most * cone.slope * shift;
-        Limit { apex, side: known.side && cone.tangents > 0 && x[1] <= most * x[0] }
-    }
-
-    /// For each contact, which part of the limits that r* has reached is next to x.
-    pub fn reached(&self, at: &State, known: &[Limit]) -> Vec<Option<Reached>> {
-        let one = |(site, shift): (&Site, &f64)| {
-            let near = |c: usize| self.near(at, c, *shift, known, tuning::REACHED);
-            if site.cones.clone().any(|c| near(c).apex) {
-                Some(Reached::Apex)
-            } else {
-                site.cones.clone().any(|c| near(c).side).then_some(Reached::Side)
-            }
-        };
-        self.list.iter().zip(&self.shift).map(one).collect()
-    }
-
-    /// The reactions of the problem at a point, projected on a limit if x is nearer to it than z is
-    /// to its own, or if the limit is `known` and next to x.
-    pub fn snapped(&self, at: &State, known: &[Limit]) -> Vec<Padded> {
-        let limit = |c: usize, shift: f64| {
-            let (x, z) = (eigenvalues(&at.x[c]), eigenvalues(&at.z[c]));
-            let near = self.near(at, c, shift, known, tuning::BESIDE);
-            Limit { apex: x[0] < z[1] || near.apex, side: x[1] < z[0] || near.side }
-        };
-        let one = |(site, shift): (&Site, &f64)| {
-            let mut own = [0.0; ROWS];
-            own[..site.rows].copy_from_slice(site.part(&at.r));
-            if site.cones.clone().any(|c| self.cones[c].acts_on_normal && limit(c, *shift).apex) {
-                // at the apex: the shifted reaction is zero
-                own = [0.0; ROWS];
-                own[0] = -shift;
-            } else {
-                for c in site.cones.clone().filter(|c| self.cones[*c].tangents > 0 && limit(*c, *shift).side) {
-                    let cone = &self.cones[c];
-                    let x = cone.primal(&own);
-                    let length = x[1].hypot(x[2]);
-                    let scale = if length > 0.0 { cone.slope * (own[0] + shift) / length } else { 1.0 };
-                    cone.rows[..cone.tangents].iter().for_each(|row| own[*row] *= scale);
-                }
-            }
-            self.padded(site, &own[..site.rows])
-        };
-        self.list.iter().zip(&self.shift).map(one).collect()
     }
 }

@@ -2,7 +2,7 @@
 
 use super::cones::{Point, moved, product, reach};
 use super::coupling::Coupling;
-use super::local::{Scaled, follow, opened, solve, yield_to};
+use super::local::{Scaled, solve, yield_to};
 use super::sites::Sites;
 use super::state::State;
 use crate::linear::Factors;
@@ -48,7 +48,7 @@ impl System<'_> {
         let more = self.solved(&left, &missing);
         step.r.iter_mut().zip(&more.r).for_each(|(r, d)| *r += d);
         step.z.iter_mut().zip(&more.z).for_each(|(z, d)| *z = moved(z, 1.0, d));
-        follow(self.sites, step);
+        step.x = self.sites.change(&step.r);
         more
     }
 
@@ -56,14 +56,14 @@ impl System<'_> {
         let mut step = solve(self.sites, &self.pairs, self.inverses, right, by);
         let yielded = self.coupling.yielded(self.sites, &step.r, self.factors);
         yield_to(self.sites, self.inverses, &yielded, &mut step);
-        follow(self.sites, &mut step);
+        step.x = self.sites.change(&step.r);
         step
     }
 
     /// The residuals of the equations after a step.
     fn left(&self, by: &[Point], step: &State) -> (Vec<f64>, Vec<Point>) {
         let moving = self.coupling.velocity(self.sites, &step.r);
-        let opened = opened(self.sites, &step.z);
+        let opened = self.sites.velocity(&step.z);
         let left = (0..self.sites.rows).map(|k| self.right[k] - moving[k] - self.compliance[k] * step.r[k] + opened[k]);
         let missing = |c: usize| {
             let Scaled { scaling, x, z } = &self.pairs[c];
@@ -73,14 +73,14 @@ impl System<'_> {
         (left.collect(), (0..by.len()).map(missing).collect())
     }
 
-    /// Relative change of the reactions by a step, in the norm of r·(W + C) r (–).
-    pub fn change(&self, step: &State) -> f64 {
+    /// Relative size of a change of the reactions, in the norm of r·(W + C) r (–).
+    pub fn change(&self, change: &[f64]) -> f64 {
         let load = |r: &[f64], moving: &[f64]| {
             let each = r.iter().zip(moving).zip(&self.sites.compliance);
             each.map(|((r, u), c)| r * (u + c * r)).sum::<f64>().abs()
         };
-        let moving = self.coupling.velocity(self.sites, &step.r);
-        (load(&step.r, &moving) / load(&self.at.r, &self.velocity).max(f64::MIN_POSITIVE)).sqrt()
+        let moving = self.coupling.velocity(self.sites, change);
+        (load(change, &moving) / load(&self.at.r, &self.velocity).max(f64::MIN_POSITIVE)).sqrt()
     }
 
     /// The longest multiple of a step that stays inside all cones.

@@ -20,7 +20,7 @@ use crate::contact::Padded;
 use crate::problem::assembled::BlockMatrix;
 use crate::solver::graph::Graph;
 use crate::solver::rows::Rows;
-use crate::solver::tuning::{direction as steps, violation as tuning};
+use crate::solver::tuning::{STIFF, TO_THE_BOUNDARY, defaults, violation as tuning};
 
 /// The least violation.
 pub(in crate::solver) struct Least {
@@ -35,7 +35,7 @@ impl Interior {
     /// be made.
     pub fn least_violation(&mut self, rows: &Rows, matrix: Option<&BlockMatrix>) -> Option<Least> {
         let mut sites = Sites::of(rows, &[]);
-        let ratio = sites.speed / (sites.force * tuning::KAPPA);
+        let ratio = sites.speed / (sites.force * STIFF);
         let graph = if matrix.is_none() { Graph::of(rows, &mut None) } else { None };
         let coupling = Coupling::of(rows, matrix, graph.as_deref(), &sites, ratio)?;
         let metric = Metric::new(&sites, vec![0.0; sites.rows], 1.0);
@@ -45,7 +45,7 @@ impl Interior {
             at = self.of_a_round(&sites, &coupling, &metric);
             let moved = coupling.velocity(&sites, &at.r);
             sites.free.iter_mut().zip(&moved).for_each(|(q, u)| *q += u);
-            reactions.iter_mut().zip(&at.r).for_each(|(sum, d)| *sum += tuning::KAPPA * d);
+            reactions.iter_mut().zip(&at.r).for_each(|(sum, d)| *sum += STIFF * d);
         }
         Some(Least { direction: sites.scattered(&at.r), reactions: sites.scattered(&reactions) })
     }
@@ -53,13 +53,13 @@ impl Interior {
     /// The end of the central path of one multiplier iteration.
     fn of_a_round(&mut self, sites: &Sites, coupling: &Coupling, metric: &Metric) -> State {
         let (mut at, mut rough) = (cold(sites, false), false);
-        for _ in 0..tuning::MOST {
+        for _ in 0..defaults::MAX_ITERATIONS {
             if gap(&at) <= tuning::LEAST_GAP {
                 break;
             }
             let Some(system) = self.factorised(sites, coupling, &at, metric) else { break };
             let (step, far) = direction(&system, &mut rough);
-            advance(&mut at, (steps::TO_THE_BOUNDARY * far).min(1.0), &step);
+            advance(&mut at, (TO_THE_BOUNDARY * far).min(1.0), &step);
         }
         at
     }

@@ -28,10 +28,10 @@ pub(super) struct Residual {
 impl Programme {
     /// The residuals at a point.
     pub fn residual(&self, at: &Iterate) -> Residual {
-        let (pulled, of_cones) = (self.pulled(&at.y), self.of_cones(&at.z));
+        let (pulled, of_cones) = (self.pulled(&at.y), self.sites.velocity(&at.z));
         let pushed = self.pushed(&at.r);
         let balance = pushed.iter().zip(&self.load).zip(&self.b);
-        let own = self.in_cones(&at.r);
+        let own = self.sites.change(&at.r);
         Residual {
             x: pulled.iter().zip(&of_cones).map(|(y, z)| y - z).collect(),
             lambda: sum(&self.load, &at.y) + self.sense * at.tau,

@@ -4,16 +4,16 @@ use super::iterate::{Iterate, Residual};
 use super::programme::{LimitLoad, Programme, most, sum};
 use super::system::System;
 use crate::solver::interior::cones::{Point, dot, eigenvalues, moved, product, reach};
-use crate::solver::tuning::limit_load as tuning;
+use crate::solver::tuning::{TO_THE_BOUNDARY, defaults, limit_load as tuning};
 
 impl Programme {
     /// The outcome at the end of the central path, and whether it would be the same without the cap
     /// on the strengths.
     pub fn solve(&self) -> (LimitLoad, bool) {
-        let cones = self.sides.len();
+        let cones = self.sites.cones.len();
         let e = [1.0, 0.0, 0.0];
         let mut at = Iterate {
-            r: vec![0.0; self.size],
+            r: vec![0.0; self.sites.rows],
             lambda: 0.0,
             y: vec![0.0; self.rows.unknowns],
             s: vec![e; cones],
@@ -24,7 +24,7 @@ impl Programme {
         // the best score, its error, its factors, and whether no cap matters there
         let mut best = (f64::INFINITY, f64::INFINITY, LimitLoad::Undecided, false);
         let mut since = 0;
-        for _ in 0..tuning::MOST {
+        for _ in 0..defaults::MAX_ITERATIONS {
             let residual = self.residual(&at);
             if let Some(proved) = self.proved(&at, &residual) {
                 // larger cones are no less unbounded
@@ -51,11 +51,11 @@ impl Programme {
     /// Whether the reactions of all bonds of capped strength are inside their cones, by the least
     /// strength or more.
     fn is_inside_caps(&self, at: &Iterate) -> bool {
-        let mut capped = self.sites.iter().zip(&self.rows.list).filter(|(_, row)| row.shift >= self.cap);
+        let mut capped = self.sites.list.iter().zip(&self.rows.list).filter(|(_, row)| row.shift >= self.cap);
         capped.all(|(site, row)| {
             let far = row.shift / tuning::SPREAD / self.force * at.tau;
-            let cones = self.sides[site.cones.clone()].iter().zip(&at.s[site.cones.clone()]);
-            cones.into_iter().all(|(side, s)| eigenvalues(s)[1] >= far * side.slope)
+            let cones = self.sites.cones_at(site).iter().zip(&at.s[site.cones.clone()]);
+            cones.into_iter().all(|(cone, s)| eigenvalues(s)[1] >= far * cone.slope)
         })
     }
 
@@ -102,10 +102,10 @@ impl Programme {
     /// part freely y is large, and z differs from it by its round-off.
     fn outside_duals(&self, y: &[f64]) -> f64 {
         let pulled = self.pulled(y);
-        let in_cones = self.in_cones(&pulled);
-        let outside = self.sites.iter().map(|site| {
-            let own = self.sides[site.cones.clone()].iter().zip(&in_cones[site.cones.clone()]);
-            own.map(|(side, [_, a, b])| side.slope * a.hypot(*b)).sum::<f64>() - pulled[site.at]
+        let in_cones = self.sites.change(&pulled);
+        let outside = self.sites.list.iter().map(|site| {
+            let own = self.sites.cones_at(site).iter().zip(&in_cones[site.cones.clone()]);
+            own.map(|(cone, [_, a, b])| cone.slope * a.hypot(*b)).sum::<f64>() - pulled[site.at]
         });
         outside.fold(0.0, f64::max)
     }
@@ -114,7 +114,7 @@ impl Programme {
     fn next(&self, at: &Iterate, residual: &Residual) -> Option<Iterate> {
         let system = System::of(self, at)?;
         let centre = at.s.iter().zip(&at.z).map(|(s, z)| dot(s, z)).sum::<f64>() + at.tau * at.kappa;
-        let mu = centre / (self.sides.len() + 1) as f64;
+        let mu = centre / (self.sites.cones.len() + 1) as f64;
         // predictor
         let scaled: Vec<Point> = system.metrics.iter().zip(&at.z).map(|(w, z)| w.times(z)).collect();
         let towards: Vec<Point> = scaled.iter().map(|x| x.map(|x| -x)).collect();
@@ -132,7 +132,7 @@ impl Programme {
             .collect();
         let last = sigma * mu - at.tau * at.kappa - guess.tau * guess.kappa;
         let step = system.step(at, residual, 1.0 - sigma, &towards, last);
-        let far = (tuning::TO_THE_BOUNDARY * length(at, &step)).min(1.0);
+        let far = (TO_THE_BOUNDARY * length(at, &step)).min(1.0);
         let by = |x: &[f64], d: &[f64]| x.iter().zip(d).map(|(x, d)| x + far * d).collect();
         let cones = |x: &[Point], d: &[Point]| x.iter().zip(d).map(|(x, d)| moved(x, far, d)).collect();
         let next = Iterate {

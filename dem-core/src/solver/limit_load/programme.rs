@@ -1,9 +1,8 @@
 //! The programme: unknowns, cones, right sides, and the maps between them.
 
 use crate::solver::graph::Graph;
-use crate::solver::interior::cones::Point;
-use crate::solver::rows::{Row, Rows, TWIST};
-use std::ops::Range;
+use crate::solver::interior::sites::Sites;
+use crate::solver::rows::{Row, Rows};
 use std::sync::Arc;
 
 /// What the largest load factor is.
@@ -40,30 +39,11 @@ pub enum LimitLoad {
     Undecided,
 }
 
-/// A cone of a contact: s = (slope r_n, r_a, r_b).
-pub(super) struct Side {
-    pub slope: f64,
-    /// Places of the other components among the rows of the contact that take part.
-    pub others: [Option<usize>; 2],
-}
-
-/// The unknown reactions of a contact: the rows that take part.
-pub(super) struct Site {
-    /// Places among the rows of the contact; the first is the normal row.
-    pub of: Vec<usize>,
-    /// Start in a list of reactions.
-    pub at: usize,
-    /// Its cones in the list of all.
-    pub cones: Range<usize>,
-}
-
 pub(super) struct Programme {
     pub rows: Rows,
     pub graph: Arc<Graph>,
-    pub sites: Vec<Site>,
-    pub sides: Vec<Side>,
-    /// Number of reactions.
-    pub size: usize,
+    /// Reactions and cones of the contacts.
+    pub sites: Sites,
     /// Right side of the balance, and the growing load.
     pub b: Vec<f64>,
     pub load: Vec<f64>,
@@ -107,12 +87,9 @@ impl Programme {
             0.0 => most(&load),
             force => force,
         };
-        let (mut sites, mut sides, mut size) = (Vec::new(), Vec::new(), 0);
-        for row in &rows.list {
-            let site = site(row, &mut sides, size);
-            size += site.of.len();
-            sites.push(site);
-        }
+        // the limit load is that of associated contacts
+        rows.list.iter_mut().for_each(|row| row.associated = true);
+        let sites = Sites::cones_of(&rows);
         let mut b: Vec<f64> = constant.iter().map(|f| -f / force).collect();
         for row in rows.list.iter().filter(|row| row.shift > 0.0) {
             rows.push_by(row, 0, 1.0, row.shift / force, &mut b);
@@ -120,81 +97,21 @@ impl Programme {
         let unit = force / most(&load);
         load.iter_mut().for_each(|f| *f *= unit / force);
         let graph = Graph::of(&rows, &mut None).ok_or(LimitLoad::Undecided)?;
-        Ok(Self { rows, graph, sites, sides, size, b, load, sense: -1.0, unit, force, cap })
+        Ok(Self { rows, graph, sites, b, load, sense: -1.0, unit, force, cap })
     }
 
     /// H r.
     pub fn pushed(&self, r: &[f64]) -> Vec<f64> {
-        let mut y = vec![0.0; self.rows.unknowns];
-        for (site, row) in self.sites.iter().zip(&self.rows.list) {
-            site.of.iter().zip(&r[site.at..]).for_each(|(k, r)| self.rows.push_by(row, *k, 1.0, *r, &mut y));
-        }
-        y
+        self.sites.pushed(&self.rows, 1.0, r)
     }
 
     /// Hᵀ y.
     pub fn pulled(&self, y: &[f64]) -> Vec<f64> {
-        let of_site = |(site, row)| {
-            let site: &Site = site;
-            site.of.iter().map(move |k| self.rows.pulled_by(row, *k, y))
-        };
-        self.sites.iter().zip(&self.rows.list).flat_map(of_site).collect()
-    }
-
-    /// L r.
-    pub fn in_cones(&self, r: &[f64]) -> Vec<Point> {
-        let mut s = Vec::with_capacity(self.sides.len());
-        for site in &self.sites {
-            let own = &r[site.at..];
-            for side in &self.sides[site.cones.clone()] {
-                let [a, b] = side.others.map(|place| place.map_or(0.0, |k| own[k]));
-                s.push([side.slope * own[0], a, b]);
-            }
-        }
-        s
-    }
-
-    /// Lᵀ z.
-    pub fn of_cones(&self, z: &[Point]) -> Vec<f64> {
-        let mut r = vec![0.0; self.size];
-        for site in &self.sites {
-            let own = &mut r[site.at..];
-            for (side, z) in self.sides[site.cones.clone()].iter().zip(&z[site.cones.clone()]) {
-                own[0] += side.slope * z[0];
-                for (place, z) in side.others.iter().zip(&z[1..]) {
-                    if let Some(k) = place {
-                        own[*k] += z;
-                    }
-                }
-            }
-        }
-        r
+        self.sites.pulled(&self.rows, 1.0, y)
     }
 }
 
 /// The unknowns of a contact's bodies, in the order of its coefficients.
 pub(super) fn unknowns(row: &Row) -> impl Iterator<Item = usize> {
     (0..2).flat_map(|side| row.at[side]..row.at[side] + row.count[side])
-}
-
-/// The rows of a contact that take part, and its cones. Rows with a coefficient of zero are zero.
-pub(super) fn site(row: &Row, sides: &mut Vec<Side>, at: usize) -> Site {
-    let (first, mut of) = (sides.len(), vec![0]);
-    let groups: [(f64, &[usize]); 3] = [(row.cone.mu, &[1, 2]), (row.cone.nu, &[3, 4]), (row.cone.xi, &[TWIST])];
-    for (slope, places) in groups {
-        let mut others = [None; 2];
-        let mut count = 0;
-        for (k, _) in row.rows.iter().enumerate().filter(|(_, place)| slope > 0.0 && places.contains(place)) {
-            others[count] = Some(of.len());
-            count += 1;
-            of.push(k);
-        }
-        if count > 0 {
-            sides.push(Side { slope, others });
-        }
-    }
-    if sides.len() == first {
-        sides.push(Side { slope: 1.0, others: [None; 2] });
-    }
-    Site { of, at, cones: first..sides.len() }
 }

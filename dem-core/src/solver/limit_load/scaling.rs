@@ -1,8 +1,8 @@
 //! The scaling of cone pairs, and what it makes of the equations of one contact.
 
-use super::programme::{Programme, Site};
 use crate::contact::PADDED;
 use crate::solver::interior::cones::{Point, Scaling, eigenvalues};
+use crate::solver::interior::sites::{Site, Sites};
 use nalgebra::DMatrix;
 
 /// Rows of a local matrix.
@@ -46,17 +46,16 @@ pub(super) struct Soft {
 
 impl Soft {
     /// None if W⁻¹L is singular to rounding.
-    pub fn of(of: &Programme, site: &Site, metrics: &[Metric]) -> Option<Self> {
-        let n = site.of.len();
+    pub fn of(sites: &Sites, site: &Site, metrics: &[Metric]) -> Option<Self> {
+        let n = site.rows;
         let mut lines: Vec<[f64; PADDED]> = Vec::new();
-        for (side, metric) in of.sides[site.cones.clone()].iter().zip(&metrics[site.cones.clone()]) {
+        for (cone, metric) in sites.cones_at(site).iter().zip(&metrics[site.cones.clone()]) {
             let mut block = [[0.0; PADDED]; 3];
-            let parts = [(Some(0), side.slope), (side.others[0], 1.0), (side.others[1], 1.0)];
-            for (component, (place, factor)) in parts.iter().enumerate() {
-                let Some(place) = place else { continue };
-                let mut unit = [0.0; 3];
-                unit[component] = *factor;
-                block.iter_mut().zip(metric.inverse(&unit)).for_each(|(line, value)| line[*place] += value);
+            for row in std::iter::once(0).chain(cone.rows[..cone.tangents].iter().copied()) {
+                let mut unit = [0.0; PADDED];
+                unit[row] = 1.0;
+                let column = metric.inverse(&cone.primal(&unit));
+                block.iter_mut().zip(column).for_each(|(line, value)| line[row] += value);
             }
             lines.extend(block);
         }

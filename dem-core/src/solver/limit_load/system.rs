@@ -5,7 +5,7 @@ use super::programme::{Programme, sum, unknowns};
 use super::scaling::{Metric, Soft};
 use crate::linear::Factors;
 use crate::solver::interior::cones::{Point, moved};
-use crate::solver::tuning::limit_load as tuning;
+use crate::solver::tuning::{INVISIBLE, limit_load as tuning};
 
 /// Right sides, or a solution, of the linear system; z is scaled, W z.
 pub(super) struct Parts {
@@ -34,12 +34,12 @@ pub(super) struct System<'a> {
 impl<'a> System<'a> {
     pub fn of(of: &'a Programme, at: &Iterate) -> Option<Self> {
         let metrics: Vec<Metric> = at.s.iter().zip(&at.z).map(|(s, z)| Metric::of(s, z)).collect();
-        let soft: Option<Vec<Soft>> = of.sites.iter().map(|site| Soft::of(of, site, &metrics)).collect();
+        let soft: Option<Vec<Soft>> = of.sites.list.iter().map(|site| Soft::of(&of.sites, site, &metrics)).collect();
         let soft = soft?;
         let mut diagonal = vec![0.0; of.rows.unknowns];
-        for ((site, row), soft) in of.sites.iter().zip(&of.rows.list).zip(&soft) {
+        for ((site, row), soft) in of.sites.list.iter().zip(&of.rows.list).zip(&soft) {
             // the diagonal entries of S⁻¹ stand for all of it
-            for (j, k) in site.of.iter().enumerate() {
+            for (j, k) in site.of[..site.rows].iter().enumerate() {
                 let line = &of.rows.coefficients[row.start + k * row.width()..][..row.width()];
                 unknowns(row).zip(line).for_each(|(unknown, h)| diagonal[unknown] += h * h * soft.inverse[j][j]);
             }
@@ -47,13 +47,14 @@ impl<'a> System<'a> {
         // an unknown of no contact has no entry of its own
         let least = diagonal.iter().copied().filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min);
         let least = if least.is_finite() { least } else { 1.0 };
-        let scale = |d: &f64| (tuning::RIDGE * if *d > 0.0 { *d } else { least }).sqrt().recip();
+        let scale = |d: &f64| (INVISIBLE * if *d > 0.0 { *d } else { least }).sqrt().recip();
         let scales: Vec<f64> = diagonal.iter().map(scale).collect();
         let mut factors = Factors::default();
         factors.factorise(&of.graph.tree, |element, out| {
             let c = of.graph.contacts[element];
             let inverse = &soft[c].inverse;
-            of.rows.add_element(&of.rows.list[c], &of.sites[c].of, |i, j| inverse[i][j], out);
+            let site = &of.sites.list[c];
+            of.rows.add_element(&of.rows.list[c], &site.of[..site.rows], |i, j| inverse[i][j], out);
             let own: Vec<f64> = unknowns(&of.rows.list[c]).map(|unknown| scales[unknown]).collect();
             for (line, scale) in out.chunks_exact_mut(own.len()).zip(&own) {
                 line.iter_mut().zip(&own).for_each(|(entry, other)| *entry *= scale * other);
@@ -63,8 +64,9 @@ impl<'a> System<'a> {
         let mut system = Self { of, metrics, soft, factors, scales, border: vec![], pivot: 0.0, by_tau: none };
         system.border = system.inverted(&of.load);
         system.pivot = sum(&of.load, &system.border);
-        let cones = vec![[0.0; 3]; of.sides.len()];
-        system.by_tau = system.solve(&Parts { r: vec![0.0; of.size], lambda: -of.sense, y: of.b.clone(), z: cones });
+        let cones = vec![[0.0; 3]; of.sites.cones.len()];
+        system.by_tau =
+            system.solve(&Parts { r: vec![0.0; of.sites.rows], lambda: -of.sense, y: of.b.clone(), z: cones });
         (system.pivot > 0.0).then_some(system)
     }
 
@@ -79,8 +81,8 @@ impl<'a> System<'a> {
     /// S⁻¹ x.
     pub fn softened(&self, x: &[f64]) -> Vec<f64> {
         let mut out = Vec::with_capacity(x.len());
-        for (site, soft) in self.of.sites.iter().zip(&self.soft) {
-            out.extend(soft.times(&x[site.at..], site.of.len()));
+        for (site, soft) in self.of.sites.list.iter().zip(&self.soft) {
+            out.extend(soft.times(site.part(x), site.rows));
         }
         out
     }
@@ -91,7 +93,7 @@ impl<'a> System<'a> {
         let of = self.of;
         let mut found = self.once(right);
         for _ in 0..tuning::REFINEMENTS {
-            let (pulled, of_cones) = (of.pulled(&found.y), of.of_cones(&self.unscaled(&found.z)));
+            let (pulled, of_cones) = (of.pulled(&found.y), of.sites.velocity(&self.unscaled(&found.z)));
             let balance = of.pushed(&found.r).into_iter().zip(&of.load).zip(&right.y);
             let pairs = self.in_scaled_cones(&found.r).into_iter().zip(&found.z).zip(&right.z);
             let left = Parts {
@@ -111,7 +113,7 @@ impl<'a> System<'a> {
 
     /// The same without refinement.
     pub fn once(&self, right: &Parts) -> Parts {
-        let own = self.of.of_cones(&self.unscaled(&right.z));
+        let own = self.of.sites.velocity(&self.unscaled(&right.z));
         let p: Vec<f64> = right.r.iter().zip(own).map(|(r, z)| r - z).collect();
         let (r, lambda, y) = self.reduced(&p, right.lambda, &right.y);
         let pairs = self.in_scaled_cones(&r).into_iter().zip(&right.z);
@@ -126,7 +128,7 @@ impl<'a> System<'a> {
 
     /// W⁻¹ L r.
     pub fn in_scaled_cones(&self, r: &[f64]) -> Vec<Point> {
-        self.unscaled(&self.of.in_cones(r))
+        self.unscaled(&self.of.sites.change(r))
     }
 
     /// The solution of S r + Hᵀy = p, f₁·y = `end`, H r + f₁ λ = q, but for the regularisation.
@@ -158,7 +160,7 @@ impl<'a> System<'a> {
         let with = |own: &[f64], more: &[f64]| own.iter().zip(more).map(|(own, more)| own + tau * more).collect();
         let scaled: Vec<Point> = own.z.iter().zip(&self.by_tau.z).map(|(z, more)| moved(z, tau, more)).collect();
         let r: Vec<f64> = with(&own.r, &self.by_tau.r);
-        let s = of.in_cones(&r).into_iter().zip(&residual.z).map(|(own, z)| moved(&own, -share, z)).collect();
+        let s = of.sites.change(&r).into_iter().zip(&residual.z).map(|(own, z)| moved(&own, -share, z)).collect();
         Iterate {
             r,
             lambda: own.lambda + tau * self.by_tau.lambda,

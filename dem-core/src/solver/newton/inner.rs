@@ -1,12 +1,12 @@
 //! The inner problem F(y) = 0 for fixed multipliers: state, Newton direction, line search.
 
 use super::corrector::{correct, operator};
-use super::guess::Guess;
+use super::guess::guessed_velocity;
 use super::{Newton, StagedSettings};
 use crate::contact::Padded;
 use crate::solver::graph::Graph;
 use crate::solver::rows::{Operator, Rows};
-use crate::solver::tuning::{extrapolation, newton as tuning};
+use crate::solver::tuning::{INVISIBLE, PATIENCE, PROGRESS, ROUND_OFF, SHARE, extrapolation, newton as tuning};
 
 /// An iterate of the inner problem.
 pub(super) struct Iterate {
@@ -48,7 +48,7 @@ impl Newton {
     /// active set of `guess`. With `warm`, the first proximal iteration of a warm start, Newton
     /// gives up if this active set leaves much of F. Returns the iterations made and whether ‖F‖
     /// reached its target.
-    pub(super) fn inner(&mut self, rows: &Rows, state: &mut Iterate, guess: &Guess, warm: bool) -> (u64, bool) {
+    pub(super) fn inner(&mut self, rows: &Rows, state: &mut Iterate, guess: &[Padded], warm: bool) -> (u64, bool) {
         // at least the load: in a solution that of the reactions
         let load = distance(&state.y, &rows.free).hypot(rows.elastic(&state.reactions).sqrt());
         let much = (tuning::LEFT_BY_GUESS * state.norm).max(load);
@@ -58,11 +58,8 @@ impl Newton {
             let target = self.target(rows, state);
             if guessed.is_none() {
                 let wrong = warm && iteration == 1 && state.norm > much;
-                // false for NaN
-                let stays = state.norm <= tuning::DIVERGED * least;
-                (least, since) =
-                    if state.norm < tuning::PROGRESS * least { (state.norm, 0) } else { (least, since + 1) };
-                if state.norm <= target || wrong || !stays || since >= tuning::PATIENCE {
+                (least, since) = if state.norm < PROGRESS * least { (state.norm, 0) } else { (least, since + 1) };
+                if state.norm <= target || wrong || !state.norm.is_finite() || since >= PATIENCE {
                     return (iteration, state.norm <= target);
                 }
             }
@@ -87,21 +84,21 @@ impl Newton {
             carried += row.size * r.dot(r);
         }
         // iterations with kept factors are cheap, and the extrapolation learns the growth from them
-        let share = if self.is_first_guess { tuning::SHARE * extrapolation::SHARE } else { tuning::SHARE };
+        let share = if self.is_first_guess { SHARE * extrapolation::SHARE } else { SHARE };
         let StagedSettings { tolerance, load_tolerance, .. } = self.settings;
         let wanted = share * (load_tolerance * change).min(tolerance * carried.sqrt());
-        let wanted = wanted.min(tuning::SHARE * load_tolerance * rows.deforming(&state.reactions));
-        wanted.max(tuning::ROUNDING * rounding.sqrt())
+        let wanted = wanted.min(SHARE * load_tolerance * rows.deforming(&state.reactions));
+        wanted.max(ROUND_OFF * rounding.sqrt())
     }
 
     /// The Newton direction −J⁻¹ F: with the cached factors if a few refinements make it accurate
     /// enough, else with new ones.
-    fn direction(&mut self, rows: &Rows, state: &Iterate, guess: Option<&Guess>, target: f64) -> Option<Vec<f64>> {
+    fn direction(&mut self, rows: &Rows, state: &Iterate, guess: Option<&[Padded]>, target: f64) -> Option<Vec<f64>> {
         let (mut right, points) = linearise(rows, state, guess);
         right.iter_mut().for_each(|f| *f = -*f);
         let norm = norm2(&right).sqrt();
-        let least = (tuning::SHARE * target / norm)
-            .clamp(tuning::TIGHT, if guess.is_none() { tuning::LOOSE } else { tuning::FAIR });
+        let least =
+            (SHARE * target / norm).clamp(INVISIBLE, if guess.is_none() { tuning::LOOSE } else { tuning::FAIR });
         let exact = operators(rows, &points);
         for fresh in [!self.factor.fits(rows.unknowns), true] {
             if fresh {
@@ -117,15 +114,16 @@ impl Newton {
                 multiply(rows, &exact, &step, &mut left);
                 left.iter_mut().zip(&right).for_each(|(l, r)| *l = r - *l);
                 let share = norm2(&left).sqrt() / norm;
-                if share <= least || fresh && share <= tuning::LOST && share > tuning::REFINED * last {
+                if share <= least || fresh && share <= SHARE && share > 0.5 * last {
                     return Some(step);
                 }
-                if share > tuning::REFINED * last || !share.is_finite() {
+                // the factors are too old
+                if share > 0.5 * last || !share.is_finite() {
                     break;
                 }
                 last = share;
             }
-            if fresh && last <= tuning::LOST {
+            if fresh && last <= SHARE {
                 return Some(step);
             }
         }
@@ -145,15 +143,15 @@ pub(super) fn distance(a: &[f64], b: &[f64]) -> f64 {
 /// F, and for each contact the velocity and reaction at which its operator A is evaluated. With a
 /// guess these are those of the guessed active set, from which F is extrapolated; else those of the
 /// state.
-fn linearise(rows: &Rows, state: &Iterate, guess: Option<&Guess>) -> (Vec<f64>, Vec<(Padded, Padded)>) {
+fn linearise(rows: &Rows, state: &Iterate, guess: Option<&[Padded]>) -> (Vec<f64>, Vec<(Padded, Padded)>) {
     let Some(guess) = guess else {
         let points = state.velocities.iter().copied().zip(state.reactions.iter().copied());
         return (state.gradient.clone(), points.collect());
     };
     let mut gradient: Vec<f64> = state.y.iter().zip(&rows.free).map(|(y, f)| y - f).collect();
     let mut points = Vec::with_capacity(rows.list.len());
-    for (k, (row, u)) in rows.list.iter().zip(&state.velocities).enumerate() {
-        let from = guess.velocity(k, row);
+    for ((row, u), guess) in rows.list.iter().zip(&state.velocities).zip(guess) {
+        let from = guessed_velocity(row, guess);
         let at = correct(row, &from);
         let mut r = at;
         if let Some(a) = operator(row, &from, &at) {
@@ -191,8 +189,7 @@ fn advance(rows: &Rows, state: &mut Iterate, direction: &[f64], whole: bool) {
     let convex = rows.list.iter().all(|row| row.associated);
     let full = step(1.0);
     let start = slope(state);
-    let good =
-        if convex { slope(&full).abs() <= 0.5 * start.abs() } else { full.norm <= tuning::PROGRESS * state.norm };
+    let good = if convex { slope(&full).abs() <= 0.5 * start.abs() } else { full.norm <= PROGRESS * state.norm };
     if whole || good {
         *state = full;
         return;

@@ -28,10 +28,10 @@ use super::graph::Graph;
 use super::rows::Rows;
 use super::solvable::Solvable;
 use super::{SolveReport, SolveStatus, StagedSettings};
+use crate::contact::LocalSolve;
 use crate::saved::{Mismatch, Reader, Saved};
 use crate::solver::tuning::newton as tuning;
 use factor::Factor;
-use guess::Guess;
 use std::sync::Arc;
 
 /// Augmented-Lagrangian semismooth Newton.
@@ -81,16 +81,17 @@ impl Newton {
         iterations: &mut u64,
     ) -> Option<SolveReport> {
         if !cold && !rows.in_space() {
-            let multipliers: Vec<_> = rows.list.iter().map(|row| row.multiplier).collect();
-            let reactions = problem.swept(0);
+            let begun: Vec<_> = rows.list.iter().map(|row| (row.multiplier, row.weights, row.lowered)).collect();
+            let reactions = problem.in_frames();
             self.is_first_guess = true;
             let fits = self.factor.fits(rows.unknowns);
             self.most_made = self.made() + if fits { 0 } else { tuning::MOST_FACTORISATIONS / 2 };
-            let report = self.rounds(problem, rows, Guess::of(reactions.clone()), true, iterations);
+            let report = self.rounds(problem, rows, reactions.clone(), true, iterations);
             if report.is_some_and(|report| report.status == SolveStatus::Converged) {
                 return report;
             }
-            rows.move_multipliers(&multipliers);
+            let list = rows.list.iter_mut().zip(begun);
+            list.for_each(|(row, begun)| (row.multiplier, row.weights, row.lowered) = begun);
             problem.write_back(&reactions);
         }
         let sweeps = match rows.in_space() {
@@ -100,7 +101,9 @@ impl Newton {
         };
         self.is_first_guess = false;
         self.most_made = self.made() + tuning::MOST_FACTORISATIONS;
-        let guess = Guess::of(problem.swept(sweeps));
+        problem.velocities_from_reactions();
+        (0..sweeps).for_each(|_| problem.sweep(LocalSolve::Exact));
+        let guess = problem.in_frames();
         let report = self.rounds(problem, rows, guess, !cold, iterations);
         self.factor.stale |= report.is_none();
         report

@@ -1,9 +1,9 @@
 //! Proximal iterations: a sequence of inner problems, each with the reactions of the last one as
 //! multipliers.
 
-use super::guess::Guess;
 use super::inner::{Iterate, distance};
 use super::{Newton, SolveReport};
+use crate::contact::Padded;
 use crate::solver::extrapolation::margins;
 use crate::solver::rows::{Rows, change};
 use crate::solver::solvable::Solvable;
@@ -18,7 +18,7 @@ impl Newton {
         &mut self,
         problem: &mut impl Solvable,
         rows: &mut Rows,
-        mut guess: Guess,
+        mut guess: Vec<Padded>,
         warm: bool,
         iterations: &mut u64,
     ) -> Option<SolveReport> {
@@ -27,13 +27,13 @@ impl Newton {
         let mut elastic_error: f64 = 0.0;
         self.margins.clear();
         loop {
-            let mut state = Iterate::from_reactions(rows, &guess.reactions);
+            let mut state = Iterate::from_reactions(rows, &guess);
             let (made, solved) = self.inner(rows, &mut state, &guess, warm && self.margins.is_empty());
             *iterations += made.max(1);
             if !solved && !self.is_first_guess && made > 1 && last_error <= self.settings.tolerance {
                 // the last iteration met the residual tolerance, and this one was to measure its
                 // load error: the velocities give it
-                let begun = rows.given_by(&guess.reactions);
+                let begun = rows.given_by(&guess);
                 let load_error = (distance(&begun, &state.y) / distance(&begun, &rows.free)).max(elastic_error);
                 let report = self.report(*iterations, last_error, load_error, last_velocity_error);
                 if report.status == SolveStatus::Converged {
@@ -53,7 +53,7 @@ impl Newton {
             let load_error = shrinking.error(change(rows, &multipliers, &state.reactions)).max(elastic_error);
             let (error, velocity_error) = (problem.residual(), problem.velocity_error());
             rows.move_multipliers(&state.reactions);
-            guess = Guess::of(state.reactions);
+            guess = state.reactions;
             let report = self.report(*iterations, error, load_error, velocity_error);
             if report.status == SolveStatus::Converged {
                 return Some(report);
