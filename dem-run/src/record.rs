@@ -81,8 +81,8 @@ impl<D: Dim> Recorder<D> {
         };
         let (layout, measures) = describe(scene, world, describe_bonds(scene, world, formed), observables, origin);
         let layout = Layout { friction: before.friction, ..layout };
-        let cpu_time = history.observable("cpu_time")?.map_or(vec![], |series| series.value);
-        let cpu_before = kept.steps.checked_sub(1).and_then(|last| cpu_time.get(last)).copied().unwrap_or(0.0);
+        let last = kept.steps.checked_sub(1).map(|last| history.observed_in("cpu_time", last)).transpose()?;
+        let cpu_before = last.flatten().unwrap_or(0.0);
         let writer = Writer::go_on(history.path(), &layout, history, kept, checkpoint, tell)?;
         let mut recorder = Self::new(writer, &layout, measures, cpu_before);
         if cemented.is_some() && formed == Some(history::NOT_FORMED) {

@@ -5,6 +5,7 @@ use crate::check::free_space;
 use crate::error::RunError;
 use crate::history::{Checkpoint, Ending, History, HistoryError, Parameters, RowCounts, refuse_busy};
 use crate::in_dimension;
+use crate::output::replace::followed;
 use crate::output::{number, print_json, print_line};
 use crate::record::{Beginning, Recorder};
 use crate::run::{Execution, Run, RunOptions, RunState, handle_signals, run_in};
@@ -133,11 +134,7 @@ fn resume_in<D: Dim>(
             // killed before its first checkpoint: the run restarts from time zero, without loss
             return run_in::<D>(scene, &anew(options), interrupt);
         }
-        return Err(RunError::Unfit {
-            path: path.clone(),
-            state: "holds no complete state to resume from",
-            remedy: "it is damaged, or of an older version; run the scene again".into(),
-        });
+        return Err(no_state(path));
     };
     let mut state = RunState::<D>::restored(scene, &checkpoint)
         .map_err(|mismatch| RunError::InputOutput(format!("{shown}: {mismatch}; run the scene again")))?;
@@ -195,6 +192,14 @@ fn resume_in<D: Dim>(
     run.conclude(path, outcome, options.json, progress)
 }
 
+fn no_state(path: &Path) -> RunError {
+    RunError::Unfit {
+        path: path.into(),
+        state: "holds no complete state to resume from",
+        remedy: "it is damaged, or of an older version; run the scene again".into(),
+    }
+}
+
 /// Options of a run that restarts from time zero and replaces its history.
 fn anew(options: &ResumeOptions) -> RunOptions {
     RunOptions {
@@ -213,16 +218,17 @@ fn anew(options: &ResumeOptions) -> RunOptions {
 /// uninterrupted run would not have it; the steps before it are kept.
 fn kept(history: &History, scene: &Scene, checkpoint: &Checkpoint) -> Result<RowCounts, RunError> {
     let every = scene.steps_per_frame() as i64;
-    let reached = history.steps().iter().take_while(|step| **step <= checkpoint.step).count();
-    let due = history.steps()[..reached].iter().take_while(|step| **step % every == 0).count();
-    let (all, frames) = (history.complete_at(reached)?, history.complete_at(due)?);
-    Ok(RowCounts { frames: due, contacts: frames.contacts, ..all })
+    let due = history.steps().iter().take_while(|step| **step <= checkpoint.step && **step % every == 0).count();
+    let contacts = history.complete_at(due)?.contacts;
+    let all = history.complete_to(checkpoint.step)?.ok_or_else(|| no_state(history.path()))?;
+    Ok(RowCounts { frames: due, contacts, ..all })
 }
 
 /// Rejects a disk without space for the new history: it is written beside the old one before it
 /// replaces it.
 fn refuse_full_disk(history: &History) -> Result<(), RunError> {
-    let folder = history.path().parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let file = followed(history.path());
+    let folder = file.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let needed = history.length();
     match free_space(folder) {
         Some(free) if free < needed => Err(RunError::Disk { path: history.path().into(), needed, free }),

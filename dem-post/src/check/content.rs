@@ -83,6 +83,7 @@ fn order(c: &mut Checker) -> Vec<i64> {
         grows::<f64>(c, time);
         keeps_time(c, step, time);
     }
+    follow_each_other(c, "observables/step");
     let places: Vec<String> = c.sound.keys().cloned().collect();
     for place in places {
         let observed = place.starts_with("observables/");
@@ -107,6 +108,15 @@ fn keeps_time(c: &mut Checker, step: &str, time: &str) {
         if (at - h * number).abs() > SAME_TIME * (at.abs() + (h * number).abs()) {
             c.wrong(step, Some(k), format!("step {} at {at} s, but most steps take {h} s", steps[k]));
         }
+    }
+}
+
+/// Checks that no step is missing.
+fn follow_each_other(c: &mut Checker, place: &str) {
+    let Some(&[rows, _]) = c.sound.get(place) else { return };
+    let steps = c.rows::<i64>(place, 0..rows).unwrap_or_default();
+    for (k, pair) in steps.windows(2).enumerate().filter(|(_, pair)| pair[1] > pair[0].saturating_add(1)) {
+        c.wrong(place, Some(k + 1), format!("step {} follows step {}: steps are missing", pair[1], pair[0]));
     }
 }
 

@@ -7,9 +7,8 @@
 use std::collections::BTreeMap;
 
 use dem_history::History;
-use hdf5::{File, OpenMode};
 
-use crate::output::{Result, WriteError, progress};
+use crate::output::{Result, progress};
 use checker::{Checker, MANY, Sizes};
 pub use report::Report;
 
@@ -21,12 +20,10 @@ mod schema;
 /// Checks a history; with a bar on a terminal unless `quiet`.
 ///
 /// # Errors
-/// [`crate::output::PostError::Write`] where the file cannot be opened once more. Violations in the
+/// Those of opening the file once more. Violations in the
 /// file are listed in the report.
 pub fn read(history: &History, quiet: bool) -> Result<Report> {
-    let mode = if history.open_ended() { OpenMode::ReadSWMR } else { OpenMode::Read };
-    let file = File::open_as(history.path(), mode)
-        .map_err(|error| WriteError { path: history.path().into(), why: error.to_string() })?;
+    let file = history.reopened()?;
     let report = Report { file: history.path().display().to_string(), frames: history.frames(), ..Report::default() };
     let sizes = Sizes { d: history.dimension(), t: history.frames(), ..Sizes::default() };
     let bar = progress(0, quiet, "{bar:24} {percent} % checked, {eta} left");

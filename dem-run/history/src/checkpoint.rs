@@ -75,8 +75,8 @@ impl Slots {
     }
 }
 
-/// The newest complete checkpoint at or before step `last`, if any.
-pub(super) fn newest(source: &Source, last: i64) -> Result<Option<Checkpoint>> {
+/// The newest complete checkpoint whose step is `recorded`, if any.
+pub(super) fn newest(source: &Source, recorded: impl Fn(i64) -> Result<bool>) -> Result<Option<Checkpoint>> {
     let place = |name: &str| format!("{}/{name}", path::CHECKPOINT);
     if !source.has(path::CHECKPOINT) {
         return Ok(None);
@@ -85,12 +85,13 @@ pub(super) fn newest(source: &Source, last: i64) -> Result<Option<Checkpoint>> {
     let mut rows: Vec<(&[u64], [&str; 2])> = index.chunks_exact(4).zip(SLOTS).collect();
     rows.sort_by_key(|(row, _)| std::cmp::Reverse(row[0]));
     for (row, [reals, counts]) in rows {
-        if row[0] == 0 || row[0] - 1 > last.max(0) as u64 {
+        let Some(step) = row[0].checked_sub(1).and_then(|step| i64::try_from(step).ok()) else { continue };
+        if !recorded(step)? {
             continue;
         }
         let read = || -> Result<Checkpoint> {
             Ok(Checkpoint {
-                step: (row[0] - 1) as i64,
+                step,
                 reals: source.read(&place(reals), 0..row[1] as usize)?.1,
                 counts: source.read(&place(counts), 0..row[2] as usize)?.1,
             })

@@ -7,6 +7,7 @@ use dem_output::replace::replace;
 
 use super::error::{Result, refused};
 use super::lock;
+use super::model::RowCounts;
 use super::reader::History;
 use super::source::Source;
 use super::table::Table;
@@ -59,14 +60,22 @@ pub enum CopyAs {
 /// [`HistoryError::Busy`](super::HistoryError::Busy) while another process writes the history or
 /// the file at `path`, and those of reading and writing; the file at `path` is then unchanged.
 pub fn copy(history: &History, path: &Path, how: CopyAs, tell: &mut dyn FnMut(f64) -> bool) -> Result<u64> {
-    lock::refuse_busy(history.path())?;
     lock::refuse_busy(path)?;
+    // a run that is resumed meanwhile would be lost
+    let _lock = lock::hold_while_read(history.path())?;
     replace(path, refused(path), |part| copy_to(history, part, how, tell))
 }
 
 fn copy_to(history: &History, part: &Path, how: CopyAs, tell: &mut dyn FnMut(f64) -> bool) -> Result<u64> {
-    let (layout, kept) = (history.layout()?, history.complete()?);
+    let (layout, complete) = (history.layout()?, history.complete()?);
     let (checkpoint, ending) = (history.checkpoint()?, history.ending()?);
+    let mut kept = complete;
+    // a run resumes from its checkpoint, also from one beyond the last frame
+    if let Some(state) = &checkpoint
+        && let Some(rows) = history.complete_to(state.step)?
+    {
+        kept = RowCounts { steps: kept.steps.max(rows.steps), events: kept.events.max(rows.events), ..kept };
+    }
     let mut writer = Writer::closed_copy(part, &layout, how == CopyAs::Packed)?;
     let mut comparison = Comparison::default();
     // read twice: for writing and for the comparison
@@ -80,7 +89,7 @@ fn copy_to(history: &History, part: &Path, how: CopyAs, tell: &mut dyn FnMut(f64
     writer.finish()?;
     let copy = History::open(part)?;
     let same = copy.layout()? == layout
-        && copy.complete()? == kept
+        && copy.complete()? == complete
         && copy.checkpoint()? == checkpoint
         && copy.ending()? == ending;
     if !same {

@@ -3,7 +3,7 @@
 //! between readers and writers.
 
 use std::fs::{File, OpenOptions};
-use std::io;
+use std::io::{self, ErrorKind};
 use std::path::Path;
 
 use rustix::fs::{FlockOperation, fcntl_lock};
@@ -19,6 +19,20 @@ pub(super) fn hold(path: &Path) -> io::Result<File> {
         // a file system without locks: the run continues without one
         Ok(()) | Err(rustix::io::Errno::NOLCK | rustix::io::Errno::NOTSUP | rustix::io::Errno::INVAL) => Ok(file),
         Err(error) => Err(error.into()),
+    }
+}
+
+/// Locks a history that is read, so that no run resumes it until the value is dropped; without a
+/// lock where the file may not be written.
+///
+/// # Errors
+/// [`HistoryError::Busy`]; [`HistoryError::Io`] where the file cannot be read.
+pub(super) fn hold_while_read(path: &Path) -> Result<Option<File>> {
+    refuse_busy(path)?;
+    match hold(path) {
+        Ok(file) => Ok(Some(file)),
+        Err(error) if matches!(error.kind(), ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem) => Ok(None),
+        Err(_) => refuse_busy(path).map(|()| None),
     }
 }
 

@@ -78,7 +78,9 @@ pub(super) fn series(source: &Source, name: &str, rows: Range<usize>) -> Result<
         Ok(unit) => unit.read_scalar::<VarLenUnicode>().map_err(while_reading(&source.path, &place))?.to_string(),
         Err(_) => String::new(),
     };
-    let step = source.read(&format!("{}/step", path::OBSERVABLES), rows.clone())?.1;
+    let steps = format!("{}/step", path::OBSERVABLES);
+    let step: Vec<i64> = source.read(&steps, rows.clone())?.1;
+    sound::consecutive(&source.path, &steps, rows.start, &step)?;
     let times = format!("{}/time", path::OBSERVABLES);
     let time = source.read(&times, rows.clone())?.1;
     sound::reals(&source.path, &times, rows.start, 1, &time)?;

@@ -15,7 +15,7 @@ use super::observed::{self, Series};
 use super::rupture::RuptureRow;
 use super::schema::path;
 use super::sound::{self, Surroundings};
-use super::source::Source;
+use super::source::{self, Source};
 use super::wall::{Wall, WallColumn, WallDriveCode, WallKindCode};
 use super::{checkpoint, lock};
 
@@ -92,6 +92,14 @@ impl History {
         Ok(())
     }
 
+    /// The file, opened once more for direct reads.
+    ///
+    /// # Errors
+    /// As [`History::open`].
+    pub fn reopened(&self) -> Result<hdf5::File> {
+        source::open_file(&self.source.path, self.source.open_ended)
+    }
+
     /// Rows that are complete.
     ///
     /// # Errors
@@ -118,16 +126,38 @@ impl History {
         })
     }
 
+    /// Rows up to a step: the frames, and what the file holds of later steps; none if steps are
+    /// missing. A state beyond the last frame is that of a run that was interrupted between two
+    /// frames and resumed.
+    ///
+    /// # Errors
+    /// [`HistoryError::Damaged`].
+    pub fn complete_to(&self, step: i64) -> Result<Option<RowCounts>> {
+        let frames = self.steps.iter().take_while(|of_frame| **of_frame <= step).count();
+        let mut rows = self.complete_at(frames)?;
+        let of_frame = self.steps[..frames].last().copied().unwrap_or(0);
+        let place = format!("{}/step", path::OBSERVABLES);
+        let later: Vec<i64> = self.source.read(&place, rows.steps..self.source.count(&place)?.max(rows.steps))?.1;
+        let follow = later.into_iter().zip(of_frame + 1..=step).take_while(|(found, next)| found == next).count();
+        if of_frame + (follow as i64) < step {
+            return Ok(None);
+        }
+        rows.steps += follow;
+        if self.source.has(path::RUPTURE) {
+            let later = rows.events..self.source.count(path::RUPTURE)?.max(rows.events);
+            let steps = RuptureRow::read(&self.source, path::RUPTURE, later)?.1;
+            rows.events += steps.iter().take_while(|row| (of_frame + 1..=step).contains(&row.step())).count();
+        }
+        Ok(Some(rows))
+    }
+
     /// The newest checkpoint; none in a file of a version without checkpoints, or of a run killed
     /// before its first checkpoint.
     ///
     /// # Errors
     /// [`HistoryError::Damaged`].
     pub fn checkpoint(&self) -> Result<Option<Checkpoint>> {
-        match self.steps.last() {
-            Some(last) => checkpoint::newest(&self.source, *last),
-            None => Ok(None),
-        }
+        checkpoint::newest(&self.source, |step| Ok(self.complete_to(step)?.is_some()))
     }
 
     /// Whether the run ended, and why; [`Ending::Open`] also in a file of a program that did not
@@ -451,6 +481,15 @@ impl History {
     /// [`HistoryError::Damaged`].
     pub fn observable(&self, name: &str) -> Result<Option<Series>> {
         observed::series(&self.source, name, 0..self.observed_steps())
+    }
+
+    /// The value of a scalar observable in one row, after the last frame too; none if it was not
+    /// recorded.
+    ///
+    /// # Errors
+    /// [`HistoryError::Damaged`].
+    pub fn observed_in(&self, name: &str, row: usize) -> Result<Option<f64>> {
+        Ok(observed::series(&self.source, name, row..row + 1)?.and_then(|series| series.value.first().copied()))
     }
 
     /// Whether the time counts breaks: the run loads from break to break (`rupture: next_event`).

@@ -87,6 +87,11 @@ impl From<&Rupture> for RuptureRow {
 }
 
 impl RuptureRow {
+    /// The step of the rupture.
+    pub fn step(&self) -> i64 {
+        self.step
+    }
+
     /// The rows `range` of the dataset, with the shape of one row. Versions 1 and 2 lack the column
     /// `twist`; version 1 also lacks the mode TWIST.
     pub(super) fn read(source: &Source, place: &str, range: Range<usize>) -> Result<(Vec<usize>, Vec<Self>)> {

@@ -122,6 +122,14 @@ pub(super) fn growing<T: PartialOrd + Display>(path: &Path, place: &str, values:
     }
 }
 
+/// Rejects steps that are missing; the first row has index `first`.
+pub(super) fn consecutive(path: &Path, place: &str, first: usize, steps: &[i64]) -> Result<()> {
+    match steps.windows(2).position(|pair| pair[0].checked_add(1) != Some(pair[1])) {
+        Some(k) => Err(row(path, place, first + k + 1, format!("step {} follows step {}", steps[k + 1], steps[k]))),
+        None => Ok(()),
+    }
+}
+
 /// Rejects ruptures of unknown bonds or grains, ruptures out of order or after step `until`, and
 /// implausible numbers.
 pub(super) fn ruptures(

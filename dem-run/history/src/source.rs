@@ -19,6 +19,11 @@ use crate::SCHEMA_VERSION;
 /// Largest compression ratio of deflate: no dataset can be larger than this many file lengths.
 const GREATEST_COMPRESSION: u64 = 1032;
 
+/// How often HDF5 reads metadata whose checksum is wrong, in a file that may be written meanwhile.
+/// It waits 1 ns before the second attempt and doubles the wait each time: 0.1 s in all. With its
+/// default of 100 a damaged file that was never closed is waited for without end.
+const READ_ATTEMPTS: u32 = 27;
+
 /// The file, with its length in bytes and whether it was never closed.
 pub(super) struct Source {
     pub path: PathBuf,
@@ -149,6 +154,9 @@ fn check_superblock(path: &Path) -> Result<(u64, bool)> {
         std::io::ErrorKind::NotFound => HistoryError::Missing { path: path.into() },
         _ => io(error),
     })?;
+    if !metadata.is_dir() && !metadata.is_file() {
+        return Err(io(std::io::Error::new(std::io::ErrorKind::InvalidInput, "it is no regular file")));
+    }
     if metadata.is_dir() {
         return Err(io(std::io::Error::new(std::io::ErrorKind::IsADirectory, "it is a folder: give the .h5 file")));
     }
@@ -179,9 +187,11 @@ pub(super) fn end_of_file(superblock: &[u8]) -> u64 {
     u64::from_le_bytes(superblock[28..36].try_into().unwrap_or_default())
 }
 
-fn open_file(path: &Path, open_ended: bool) -> Result<File> {
+/// Opens a history that may be open-ended: one that is being written, or was never closed.
+pub(super) fn open_file(path: &Path, open_ended: bool) -> Result<File> {
     let mode = if open_ended { OpenMode::ReadSWMR } else { OpenMode::Read };
-    File::open_as(path, mode).map_err(|error| {
+    let opened = File::with_options().with_fapl(|fapl| fapl.metadata_read_attempts(READ_ATTEMPTS)).open_as(path, mode);
+    opened.map_err(|error| {
         let path = path.into();
         if error.contains_minor(hdf5::MinorErrorCode::NotHdf5) {
             return HistoryError::NotHdf5 { path };

@@ -8,6 +8,7 @@ use super::*;
 mod cement;
 mod ending;
 mod plate;
+mod resumed;
 
 /// Three grains, two walls, two bonds, in `dimension` dimensions.
 fn full(dimension: usize) -> Layout {

@@ -249,7 +249,8 @@ impl Writer {
     /// the disk refuses.
     pub fn frame(&mut self, frame: &Frame) -> Result<()> {
         self.check_frame(frame)?;
-        if self.identity.is_some() && identity(&self.path) != self.identity {
+        let is_there = || self.lock.as_ref().is_none_or(|file| self.head.is_of(file));
+        if self.identity.is_some() && (identity(&self.path) != self.identity || !is_there()) {
             return Err(HistoryError::Gone { path: self.path.clone() });
         }
         self.write_frame(frame).map_err(while_writing(&self.path))?;
@@ -396,6 +397,13 @@ impl Head {
         let mut bytes = [0; 48];
         file.read_exact_at(&mut bytes, 0)?;
         Ok(Self(Some(bytes)))
+    }
+
+    /// Whether it is the superblock of this file, which may have grown: another program may have
+    /// emptied or overwritten it.
+    fn is_of(self, file: &std::fs::File) -> bool {
+        let (Some(before), Ok(Self(Some(now)))) = (self.0, Self::of(file)) else { return self.0.is_none() };
+        before[..28] == now[..28] && before[36..44] == now[36..44] && end_of_file(&before) <= end_of_file(&now)
     }
 
     /// Writes the superblock back to a file that ends before the address it names.

@@ -31,6 +31,7 @@ pub fn replace_synced<T, E>(
     failed: impl Fn(&'static str, Error) -> E,
     make: impl FnOnce(&Path) -> std::result::Result<T, E>,
 ) -> std::result::Result<T, E> {
+    let path = &followed(path);
     remove_orphans(folder_of(path), path.file_name());
     let part = partial(path).map_err(|error| failed("create", error))?;
     // HDF5 would not say why a file cannot be created; the operating system does
@@ -52,6 +53,7 @@ pub fn replace_synced<T, E>(
 /// # Errors
 /// Those of the operating system; the old file at `path` then stays.
 pub fn write(path: &Path, content: &[u8]) -> Result<()> {
+    let path = &followed(path);
     let part = partial(path)?;
     fs::write(&part, content).and_then(|()| move_to(&part, path)).inspect_err(|_| {
         let _ = fs::remove_file(&part);
@@ -80,6 +82,18 @@ fn rename(part: &Path, path: &Path) -> Result<()> {
     // not every file system can sync a folder; the file is complete under one of its two names
     let _ = File::open(folder_of(path)).and_then(|folder| folder.sync_all());
     Ok(())
+}
+
+/// The file at `path`; where that is a symbolic link, the file that it names, also one that does not
+/// exist yet.
+#[must_use]
+pub fn followed(path: &Path) -> PathBuf {
+    let named = || fs::read_link(path).map(|to| folder_of(path).join(to));
+    if path.is_symlink() {
+        fs::canonicalize(path).or_else(|_| named()).unwrap_or_else(|_| path.into())
+    } else {
+        path.into()
+    }
 }
 
 fn folder_of(path: &Path) -> &Path {
@@ -142,6 +156,21 @@ mod tests {
         write(&path, b"new").unwrap();
         assert_eq!((fs::read(&path).unwrap(), names(folder.path())), (b"new".to_vec(), vec!["a.csv".into()]));
         assert_eq!(write(folder.path(), b"").unwrap_err().kind(), ErrorKind::IsADirectory);
+    }
+
+    #[test]
+    fn a_link_stays_and_the_file_that_it_names_is_written() {
+        let [here, there] = [(); 2].map(|()| tempfile::tempdir().unwrap());
+        let (link, file) = (here.path().join("a.csv"), there.path().join("b.csv"));
+        std::os::unix::fs::symlink(&file, &link).unwrap();
+        // the first write makes the file
+        for content in [b"old", b"new"] {
+            write(&link, content).unwrap();
+            assert!(link.is_symlink() && fs::read(&file).unwrap() == content);
+        }
+        replace(&link, |_, error| error, |part| fs::write(part, "whole")).unwrap();
+        assert!(link.is_symlink() && fs::read(&file).unwrap() == b"whole");
+        assert_eq!((names(here.path()), names(there.path())), (vec!["a.csv".into()], vec!["b.csv".into()]));
     }
 
     #[test]

@@ -194,6 +194,43 @@ fn a_finished_run_goes_on_to_a_later_end() {
     assert!(summary["solid_fraction"].as_f64().expect("a fraction") > 0.5);
 }
 
+/// A state between two frames, of a run that ended or was interrupted there, is no frame of the
+/// resumed run. One that is killed before its next checkpoint goes on from that state.
+#[test]
+fn a_resumed_run_that_is_killed_loses_nothing() {
+    use std::os::unix::fs::MetadataExt;
+    let here = Folder::new();
+    run(&here, "long.h5", &["--set", "time.end=0.08", "--quiet"]);
+    run(&here, "short.h5", &["--set", "time.end=0.0403", "--quiet"]);
+    let inode = |file: &str| std::fs::metadata(here.path(file)).map_or(0, |file| file.ino());
+    let mut beyond = 0;
+    for (k, wait) in [0, 0, 1, 3, 6, 12].into_iter().enumerate() {
+        let file = format!("{k}.h5");
+        std::fs::copy(here.path("short.h5"), here.path(&file)).expect("copy");
+        let before = inode(&file);
+        let mut command = Command::new(program("dem-run"));
+        command.args(["resume", &file, "--until", "0.08", "--quiet"]).current_dir(here.path(""));
+        let mut child = command.stdout(Stdio::null()).spawn().expect("start");
+        while inode(&file) == before {
+            std::thread::sleep(Duration::from_micros(100));
+        }
+        std::thread::sleep(Duration::from_millis(wait));
+        child.kill().expect("kill");
+        child.wait().expect("end");
+        let history = here.history(&file);
+        let state = history.checkpoint().expect("read").expect("a checkpoint").step;
+        beyond += usize::from(state == 403);
+        drop(history);
+        // a copy keeps it
+        here.dem_post(&["pack", &file, "-o", &format!("packed-{file}"), "--quiet"]).succeeds();
+        for file in [file.clone(), format!("packed-{file}")] {
+            here.dem_run(&["resume", &file, "--until", "0.08", "--quiet"]).succeeds();
+            same(&here.history("long.h5"), &here.history(&file));
+        }
+    }
+    assert!(beyond > 0, "no kill came before the next checkpoint");
+}
+
 /// The new history replaces the old one, in which texts have other places.
 #[test]
 fn the_text_of_the_scene_may_become_longer() {
