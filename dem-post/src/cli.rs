@@ -19,7 +19,7 @@ struct Cli {
     #[arg(long, short, global = true)]
     quiet: bool,
     /// Width of the figures on paper, as in 85mm: charts are laid out for letters of 7 pt.
-    #[arg(long, global = true, value_name = "85mm", value_parser = millimetres)]
+    #[arg(long, global = true, value_name = "85mm", value_parser = millimetres, allow_hyphen_values = true)]
     width: Option<f64>,
     /// Pixels of the PNG figures in an inch.
     #[arg(long, global = true, value_name = "N", default_value_t = 600, value_parser = whole::<u32>(30..=2400))]

@@ -160,7 +160,8 @@ All runs are checked before the first starts. Each run is a separate process wit
 
 Repeating the command continues the sweep: finished runs are kept; runs that were interrupted, killed or could not write
 start again from the beginning; runs that failed for good (no convergence) are repeated only with --retry. Values added
-to the sweep file make new runs. Exit codes 3 and 4: some runs failed, the others are done. More: docs/sweep.md.
+to the sweep file make new runs. Exit codes 2 to 4: some runs failed, or another process makes them; the others are
+done. More: docs/sweep.md.
 
 Example:
   dem-run sweep configs/sweep-cohesion.json --jobs 4";

@@ -2,7 +2,7 @@
 
 use crate::csv_lines::{Lines, Wrong};
 use crate::error::RunError;
-use crate::scene::{LARGEST, shorten};
+use crate::scene::{LARGEST, LEAST, shorten};
 use dem_core::body::Grains;
 use dem_core::bond::{Bond, BondStatus};
 use dem_core::dim::{Dim, Vect};
@@ -124,7 +124,10 @@ fn row<D: Dim>(fields: &[&str], columns: &[usize], grains: &Grains<D>, gap_toler
             Ok(x) if x >= least && x <= LARGEST => Ok(Some(x)),
             _ => {
                 let (name, sign) = (COLUMNS[column], if least > 0.0 { ">" } else { "≥" });
-                Err(format!("{name} is {:?}, it must be a finite number {sign} 0 ({unit})", shorten(text)))
+                Err(format!(
+                    "{name} is {:?}, it must be a finite number {sign} 0 ({unit}), at most {LARGEST:.0e}",
+                    shorten(text)
+                ))
             }
         }
     };
@@ -140,7 +143,7 @@ fn row<D: Dim>(fields: &[&str], columns: &[usize], grains: &Grains<D>, gap_toler
         stiffness: None,
         status: BondStatus::Intact,
     };
-    let strength = value(2, 1.0 / LARGEST, "N")?;
+    let strength = value(2, LEAST, "N")?;
     Ok(Listed { bond, strength, shear: value(3, 0.0, "no unit")?, rolling: value(4, 0.0, "no unit")? })
 }
 
@@ -199,7 +202,7 @@ mod tests {
             ("i,j\n2,3\n", "both fixed"),
             ("i,j\n0,2\n", "more than bonds.gap_tolerance"),
             ("i,j\n0,1\n1,0\n", "line 3: the pair of line 2 again"),
-            ("i,j,strength\n0,1,0\n", "strength is \"0\", it must be a finite number > 0 (N)"),
+            ("i,j,strength\n0,1,0\n", "strength is \"0\", it must be a finite number > 0 (N), at most 1e60"),
             ("i,j,shear\n0,1,-0.1\n", "shear is \"-0.1\", it must be a finite number ≥ 0"),
             ("i,j,rolling\n0,1,nan\n", "rolling is \"nan\""),
             ("i,j\n0\n", "it has 1 value, the header has 2"),

@@ -4,7 +4,7 @@ use crate::csv_lines::{Lines, Wrong};
 use crate::error::RunError;
 use crate::output::replace;
 use crate::prepare::Ball;
-use crate::scene::{BASE, LARGEST, MAX_GRAINS, shorten};
+use crate::scene::{BASE, LARGEST, LEAST, MAX_GRAINS, shorten};
 use dem_core::dim::{Dim, Vect};
 use std::io::{BufRead, Write};
 use std::path::Path;
@@ -130,7 +130,7 @@ fn ball<D: Dim>(fields: &[&str]) -> Result<Ball<D>, String> {
         }
     }
     let radius = numbers[D::N];
-    if wrong.is_empty() && radius < 1.0 / LARGEST {
+    if wrong.is_empty() && radius < LEAST {
         wrong.push(format!("radius is {radius:?}, it must be above zero"));
     }
     if wrong.is_empty() { Ok((D::Vector::from_slice(&numbers[..D::N]), radius)) } else { Err(wrong.join("; ")) }

@@ -174,6 +174,6 @@ def check_applied(h, report):
     against = -(h.observed["wall_force"] * h.wall_direction).sum(2)
     told = np.where(given.kind == "force", given.value, np.where(given.kind == "velocity", against, 0.0))
     scale = np.abs(told) + norm(h.observed["wall_force"]) + np.where(given.kind == "force", given.error, 0.0)
-    # a step in parts has the force of its last part
+    # a step in parts has the mean of the forces of its parts
     off = np.where(h.single[:, None] | (given.kind != "force"), np.abs(applied - told), 0.0)
     report.expect("applied_force", off, tolerances.rounding(scale), of_wall(h, "applied_force (N)"))

@@ -84,8 +84,8 @@ fn rename(part: &Path, path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// The file at `path`; where that is a symbolic link, the file that it names, also one that does not
-/// exist yet.
+/// The file at `path`; where that is a symbolic link, the file that it names, also one that does
+/// not exist yet.
 #[must_use]
 pub fn followed(path: &Path) -> PathBuf {
     let named = || fs::read_link(path).map(|to| folder_of(path).join(to));

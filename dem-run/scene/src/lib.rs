@@ -57,7 +57,7 @@ pub use solver::{GaussSeidel, LocalSolve, Newton, Solver, SolverKind, Start};
 pub use stage::{Stage, StageDrive};
 pub use stop::{Stop, TravelFrom, WallTravel};
 pub use validate::validate;
-pub use validate::{LARGEST, MAX_GRAINS};
+pub use validate::{LARGEST, LEAST, MAX_GRAINS};
 pub use wall::*;
 
 /// Reads the scene in the file `path`, applies the `--set` assignments and validates the result.

@@ -499,7 +499,9 @@ fn plain_value(found: &str) -> String {
 fn plain_type(expected: &str) -> String {
     match expected {
         "f64" => "a number".to_string(),
-        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number, at least 0".to_string(),
+        "u8" | "u16" => "a whole number, at least 0".to_string(),
+        "u32" => format!("a whole number, at least 0 and at most {}", u32::MAX),
+        "u64" | "usize" => format!("a whole number, at least 0 and at most {}", u64::MAX),
         "a boolean" => "true or false".to_string(),
         "a sequence" => "an array [ … ]".to_string(),
         "a map" | "map" => "an object { … }".to_string(),

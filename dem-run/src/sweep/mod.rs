@@ -118,7 +118,7 @@ fn all(store: &Store, plan: &Plan, mut manifest: Manifest, options: &SweepOption
     };
     // completed runs are reported, also after an error
     let written = report::write(store, &mut manifest);
-    let failed = failures(store, &manifest);
+    let failed = failures(store, &manifest).and_then(|()| elsewhere(&manifest));
     let standing = Standing { folder: options.folder.clone(), manifest };
     let printed = print_result(&standing, options.json);
     carried.and(written)?;
@@ -219,6 +219,21 @@ fn failures(store: &Store, manifest: &Manifest) -> Result<(), RunError> {
     };
     let message = format!("{} of {} runs failed; {left}; --retry runs them again", failed.len(), manifest.runs.len());
     Err(RunError::Runs { code, message })
+}
+
+/// The error of a sweep that other processes complete.
+fn elsewhere(manifest: &Manifest) -> Result<(), RunError> {
+    match manifest.runs.iter().filter(|run| run.state != State::Done).count() {
+        0 => Ok(()),
+        count => {
+            let message = format!(
+                "{count} of {} runs are being run by another process; the same command waits for none of them: repeat \
+                 it when that has ended",
+                manifest.runs.len()
+            );
+            Err(RunError::Runs { code: 4, message })
+        }
+    }
 }
 
 /// Preview of a sweep.

@@ -132,7 +132,11 @@ pub(super) fn no_twist_of_disks(report: &mut Report, path: &str, dimension: u8) 
 /// Checks the distribution of strengths at `path`.
 pub(super) fn scatter(report: &mut Report, path: &str, scatter: Scatter) {
     match scatter {
-        Scatter::Weibull { modulus } => report.positive(format!("{path}.weibull.modulus"), modulus, "no unit"),
+        Scatter::Weibull { modulus } => {
+            // below, strengths differ by more than 1e15
+            let allowed = "a finite number, at least 0.1";
+            report.range(format!("{path}.weibull.modulus"), modulus, modulus >= 0.1, allowed);
+        }
         Scatter::Normal { deviation } => {
             let allowed = "a number from 0 to 0.5: above, many drawn strengths would be negative";
             report.range(

@@ -16,7 +16,7 @@ use std::collections::HashMap;
 use super::error::Problem;
 use super::model::{Bonds, Load, Rupture, Scene, Stiffness};
 use super::solver::SolverKind;
-pub use report::{LARGEST, MAX_GRAINS};
+pub use report::{LARGEST, LEAST, MAX_GRAINS};
 use report::{Number, Report};
 
 /// Maximum number of steps, far below the largest integer that a double represents exactly.

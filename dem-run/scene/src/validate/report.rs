@@ -12,6 +12,8 @@ pub const MAX_GRAINS: usize = 100_000_000;
 /// Largest magnitude of a number, and the inverse of the smallest positive one. Products of a few
 /// such numbers, as masses and energies, then neither overflow nor underflow.
 pub const LARGEST: f64 = 1e60;
+/// Smallest positive value of a field.
+pub const LEAST: f64 = 1e-60;
 
 /// The problems found so far.
 pub(crate) struct Report {
@@ -70,10 +72,10 @@ impl Report {
 
     pub(crate) fn positive(&mut self, path: impl Into<String>, value: f64, unit: &str) {
         let allowed = match value > 0.0 {
-            true => format!("a finite number > 0 ({unit}), at least {:.0e}", 1.0 / LARGEST),
+            true => format!("a finite number > 0 ({unit}), at least {LEAST:.0e}"),
             false => format!("a finite number > 0 ({unit})"),
         };
-        self.range(path, value, value >= 1.0 / LARGEST, allowed);
+        self.range(path, value, value >= LEAST, allowed);
     }
 
     pub(crate) fn non_negative(&mut self, path: impl Into<String>, value: f64, unit: &str) {
@@ -131,7 +133,7 @@ impl Report {
         self.vector(path, vector);
         let length = vector.iter().fold(0.0_f64, |length, value| length.hypot(*value));
         // a shorter vector cannot be normalised
-        if vector.len() == self.dimension && !vector.iter().any(|value| value.is_nan()) && length < 1.0 / LARGEST {
+        if vector.len() == self.dimension && !vector.iter().any(|value| value.is_nan()) && length < LEAST {
             self.wrong(path, format!("{vector:?}"), "a vector whose length is not zero");
         }
     }
