@@ -1,5 +1,5 @@
-//! A problem given by its matrix W, as a [`Solvable`]: its rows have no coefficients and no
-//! unknowns, and the methods use W itself ([`Solvable::matrix`]).
+//! A problem given by its matrix W, for the methods of a problem over the bodies: its rows have no
+//! coefficients and no unknowns, and the methods use W itself.
 
 use super::gauss_seidel::iterate;
 use super::local_problems::LocalProblems;

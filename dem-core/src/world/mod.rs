@@ -138,6 +138,7 @@ pub struct World<D: Dim> {
 struct Snapshot<D: Dim> {
     grains: Grains<D>,
     walls: Vec<Wall<D>>,
+    membrane: Option<Membrane<D>>,
     bonds: Bonds,
     stored: Vec<StoredTouch<D>>,
     mid: Midpoint<D>,
@@ -287,6 +288,7 @@ impl<D: Dim> World<D> {
         Snapshot {
             grains: self.grains.clone(),
             walls: self.walls.clone(),
+            membrane: self.membrane.clone(),
             bonds: self.bonds.clone(),
             stored: self.stored.clone(),
             mid: self.mid.clone(),
@@ -300,6 +302,7 @@ impl<D: Dim> World<D> {
     fn restore(&mut self, snapshot: Snapshot<D>) {
         self.grains = snapshot.grains;
         self.walls = snapshot.walls;
+        self.membrane = snapshot.membrane;
         self.bonds = snapshot.bonds;
         self.stored = snapshot.stored;
         self.mid = snapshot.mid;

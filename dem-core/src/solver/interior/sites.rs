@@ -227,8 +227,12 @@ impl Sites {
 
     /// G r of all cones: the change of x with the reactions.
     pub fn change(&self, r: &[f64]) -> Vec<Point> {
-        let of = |site| self.cones_at(site).iter().map(|cone| cone.primal(Site::part(site, r)));
-        self.list.iter().flat_map(of).collect()
+        let mut x = Vec::with_capacity(self.cones.len());
+        for site in &self.list {
+            let own = site.part(r);
+            x.extend(self.cones_at(site).iter().map(|cone| cone.primal(own)));
+        }
+        x
     }
 
     /// Σ Bᵀ z of all contacts.
