@@ -21,7 +21,7 @@ pub enum HistoryError {
         path: PathBuf,
     },
     /// The operating system refused.
-    #[error("cannot {doing} {}: {source}", .path.display())]
+    #[error("cannot {doing} {}: {source}{}", .path.display(), remedy(doing, source))]
     Io {
         /// The file.
         path: PathBuf,
@@ -156,6 +156,17 @@ pub(super) fn damaged(path: &Path, place: &str, why: impl Into<String>) -> Histo
 /// Turns an error of the system call `doing`, as in "create", into [`HistoryError::Io`].
 pub(super) fn refused(path: &Path) -> impl Fn(&'static str, std::io::Error) -> HistoryError + '_ {
     move |doing, source| HistoryError::Io { path: path.into(), doing, source }
+}
+
+/// What to do where the system refused to create a file.
+fn remedy(doing: &str, source: &std::io::Error) -> &'static str {
+    match source.kind() {
+        std::io::ErrorKind::NotFound if doing == "create" => ": create its folder first",
+        std::io::ErrorKind::PermissionDenied | std::io::ErrorKind::ReadOnlyFilesystem if doing == "create" => {
+            ": a new file is made in this folder, so it must be writable; copy the history to one that is"
+        }
+        _ => "",
+    }
 }
 
 /// Turns HDF5's errors while writing into [`HistoryError::Write`].
