@@ -328,7 +328,7 @@ pub struct Wall<D: Dim> {
     /// over its parts.
     pub reaction: D::Vector,
     /// The same before the first rupture in the step (N): the equilibrium whose bonds reached their
-    /// limit. Equals `reaction` where no solve followed a rupture.
+    /// limit. Equals `reaction` where no solve followed a rupture, in a step that is not in parts.
     pub reaction_at_limit: D::Vector,
     /// Force prescribed in the last step (N), the mean over its parts; zero for a wall without a
     /// force drive.

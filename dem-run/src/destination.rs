@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::error::RunError;
 use crate::history::refuse_busy;
+use crate::output::replace::followed;
 use crate::run::RunOptions;
 use crate::scene::Scene;
 
@@ -29,7 +30,7 @@ pub(crate) fn apart(path: &Path, scene: &Scene, options: &RunOptions) -> Result<
             return Err(RunError::Overwrites { option, path: written.clone(), reader: "run" });
         }
     }
-    if options.write_sample.as_ref() == Some(&options.output) {
+    if options.write_sample.as_deref().map(followed) == Some(followed(&options.output)) {
         let message = "-o and --write-sample name the same file: give two different names".into();
         return Err(RunError::InputOutput(message));
     }
@@ -60,7 +61,8 @@ pub(crate) fn writable(path: &Path, option: &str, overwrite: bool) -> Result<(),
         return unfit("exists", format!("--force overwrites it, {option} names another"));
     }
     refuse_busy(path)?;
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let file = followed(path);
+    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let refused =
         |why: String| Err(RunError::File { path: path.into(), doing: "cannot be written", source: why.into() });
     if !folder.is_dir() {

@@ -98,7 +98,7 @@ class Driving:
         """Load (N) of the driven wall `k` in every step: the prescribed force, or its force on the
         grains before a bond broke."""
         at_limit = h.observed.get("wall_force_at_limit", h.observed["wall_force"])
-        # a step in parts has the load of its last part
+        # a step in parts has the mean of the loads of its parts
         given = np.where(h.single, self.value[:, k], h.observed["applied_force"][:, k])
         return np.where(self.kind[:, k] == "force", given, -at_limit[:, k] @ h.wall_direction[k])
 

@@ -183,7 +183,7 @@ def check(h, report):
     m = h.membrane
     report.require("membrane", bool((m.found | ~h.single).all()), "a step without a surface")
     told, where = h.observed["membrane_pressure"], lambda s: f"step {s + 1}: membrane_pressure (Pa)"
-    # a step in parts has the pressure of its last part
+    # a step in parts has the mean of the pressures of its parts
     off = np.where(h.single, np.abs(told - m.pressure), 0.0)
     report.expect("membrane", off, tolerances.rounding(m.pressure + m.steep * h.times[1:]), where)
     off = np.where(m.found, np.abs(h.observed["membrane_area"] - m.area), 0.0)

@@ -278,7 +278,7 @@ def check_limits_of_events(h, report):
     expected = np.where(tension & (h.event_mode == "TENSION"), "TENSION", mode)
     tied = np.zeros(len(e), bool)
     for row, name in enumerate(("SHEAR", "ROLLING", "TWIST")):
-        tied |= (h.event_mode == name) & (ratios[row] >= ratios.max(0) - slack)
+        tied |= (h.event_mode == name) & (ratios[row] >= (1 - eps) * ratios.max(0) - slack)
     off = (
         (expected != h.event_mode) & ~tied & ~(tension & (ratio >= (1 - eps) * n - slack) & (h.event_mode == "TENSION"))
     )

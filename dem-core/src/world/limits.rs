@@ -19,7 +19,7 @@
 //! physical meaning.
 
 use super::World;
-use super::assembly::{Places, TOUCHING};
+use super::assembly::Places;
 use super::motion::Midpoint;
 use super::report::Violation;
 use super::touch::StoredTouch;
@@ -27,10 +27,10 @@ use crate::body::{Drive, Shape, separation};
 use crate::bond::{Bond, BondStatus};
 use crate::contact::{Cone, Law, Local};
 use crate::dim::{Dim, Moments, Vect};
-use crate::problem::residual::{false_motion, wrong_velocity};
+use crate::problem::residual::false_motion;
 use crate::problem::{Contact, ContactProblem, Nodes, Visitor};
+use crate::solver::SolveReport;
 use crate::solver::certificate::{Verdict, verdict};
-use crate::solver::{SolveReport, SolveStatus};
 
 /// Overlap, over the smaller radius, that half a step may add to a pair.
 const DEEP: f64 = 0.5;
@@ -176,30 +176,11 @@ impl<D: Dim> World<D> {
     /// wrong.
     pub(super) fn large_load_error(&self, solve: SolveReport, problem: &ContactProblem<D>) -> Option<f64> {
         let rigid = |bond: &Bond| bond.status == BondStatus::Intact && bond.stiffness.is_none();
-        let error = solve.load_error_beyond_rounding().filter(|error| *error > LOAD_ERROR * self.looseness())?;
         let aim = self.settings.solver.load_tolerance().unwrap_or(0.0);
-        (self.bonds.iter().any(rigid) && false_motion(problem) > aim).then_some(error)
-    }
-
-    /// The report of a solve that missed its velocity error alone, accepted where its false motion
-    /// is nothing: in a step it moves no contact by more than what counts as rest, and it is small
-    /// beside the motion of the bodies relative to each other. Where a sample has come apart, its
-    /// fragments move as wholes, and no contact has to change its velocity.
-    pub(super) fn accepted_as_rest(&self, solve: SolveReport, problem: &ContactProblem<D>) -> SolveReport {
-        let (settings, solver) = (&self.settings, &self.settings.solver);
-        if solve.status != SolveStatus::Failed || solve.residual.is_nan() || solve.residual > solver.accept() {
-            return solve;
-        }
-        let smallest = self.grains.radius.iter().copied().fold(f64::INFINITY, f64::min);
-        let range = |k: usize| {
-            let along = || problem.nodes.all.iter().map(|node| node.velocity[k]);
-            along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min)
-        };
-        let apart = (0..D::N).map(|k| range(k).powi(2)).sum::<f64>().sqrt();
-        let wrong = wrong_velocity(problem);
-        let rests =
-            settings.step * wrong <= TOUCHING * smallest && wrong <= solver.load_tolerance().unwrap_or(0.0) * apart;
-        SolveReport { status: if rests { SolveStatus::Accepted } else { solve.status }, ..solve }
+        let most = aim.max(LOAD_ERROR * self.looseness());
+        let error = solve.load_error_beyond_rounding().filter(|error| *error > most)?;
+        let moves_wrongly = || false_motion(problem) > aim && !self.rests(problem);
+        (self.bonds.iter().any(rigid) && moves_wrongly()).then_some(error)
     }
 
     /// Factor by which the tolerances of the solver loosen these limits.

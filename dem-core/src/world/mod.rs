@@ -15,6 +15,7 @@ mod motion;
 mod observe;
 mod parts;
 mod report;
+mod small_loads;
 mod start;
 mod state;
 mod step;

@@ -114,14 +114,14 @@ impl<D: Dim> World<D> {
     /// finely, if the solver can. Returns also the violation that remains.
     fn solve(&mut self, problem: &mut ContactProblem<D>, limits_apply: bool) -> (SolveReport, Option<Violation>) {
         let solve = self.solver.solve(problem);
-        let solve = self.accepted_as_rest(solve, problem);
+        let solve = self.judged(solve, problem);
         let violation = if limits_apply { self.yielding_of(solve, problem) } else { None };
         let Some(found) = violation.as_ref().filter(|_| solve.status != SolveStatus::Failed) else {
             return (solve, violation);
         };
         match self.solver.solve_finer(problem, solve, self.excess_of(found)) {
             Some(finer) => {
-                let finer = self.accepted_as_rest(finer, problem);
+                let finer = self.judged(finer, problem);
                 (SolveReport { work: solve.work + finer.work, ..finer }, self.yielding_of(finer, problem))
             }
             None => (solve, violation),

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use dem_output::replace::replace;
 
-use super::error::{Result, refused};
+use super::error::{HistoryError, Result, refused};
 use super::lock;
 use super::model::RowCounts;
 use super::reader::History;
@@ -63,6 +63,9 @@ pub fn copy(history: &History, path: &Path, how: CopyAs, tell: &mut dyn FnMut(f6
     lock::refuse_busy(path)?;
     // a run that is resumed meanwhile would be lost
     let _lock = lock::hold_while_read(history.path())?;
+    if !history.source().is_still_there() {
+        return Err(HistoryError::Gone { path: history.path().into() });
+    }
     replace(path, refused(path), |part| copy_to(history, part, how, tell))
 }
 

@@ -96,7 +96,7 @@ pub enum HistoryError {
         path: PathBuf,
     },
     /// Another process writes the file.
-    #[error("{} is being written by process {process}: wait until it ends, or stop it", .path.display())]
+    #[error("{} is in use by process {process}: wait until it ends, or stop it", .path.display())]
     Busy {
         /// The file.
         path: PathBuf,
@@ -163,7 +163,7 @@ fn remedy(doing: &str, source: &std::io::Error) -> &'static str {
     match source.kind() {
         std::io::ErrorKind::NotFound if doing == "create" => ": create its folder first",
         std::io::ErrorKind::PermissionDenied | std::io::ErrorKind::ReadOnlyFilesystem if doing == "create" => {
-            ": a new file is made in this folder, so it must be writable; copy the history to one that is"
+            ": a new file is made in its folder, which must be writable: name another with -o, or copy the history"
         }
         _ => "",
     }

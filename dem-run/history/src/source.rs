@@ -3,6 +3,7 @@
 use std::fs;
 use std::io::Read;
 use std::ops::Range;
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 use hdf5::types::VarLenUnicode;
@@ -31,17 +32,24 @@ pub(super) struct Source {
     pub length: u64,
     pub open_ended: bool,
     texts: Texts,
+    identity: Option<(u64, u64)>,
 }
 
 impl Source {
     /// Opens a file and checks that it is a history that this program can read.
     pub fn open(path: &Path) -> Result<Self> {
+        let identity = identity(path);
         let (length, open_ended) = check_superblock(path)?;
         let texts = Texts::find(path).map_err(|error| refused(path)("read", error))?;
         let texts = texts.map_err(|why| damaged(path, "", why))?;
         let file = open_file(path, open_ended)?;
         check_identity(path, &file)?;
-        Ok(Self { path: path.into(), file, length, open_ended, texts })
+        Ok(Self { path: path.into(), file, length, open_ended, texts, identity })
+    }
+
+    /// Whether the path still names the file that was opened.
+    pub fn is_still_there(&self) -> bool {
+        identity(&self.path) == self.identity
     }
 
     pub fn damaged(&self, place: &str, why: &str) -> HistoryError {
@@ -141,6 +149,11 @@ impl Source {
         let shape = self.dataset(place)?.get_shape().map_err(while_reading(&self.path, place))?;
         Ok(shape.first().copied().unwrap_or(0))
     }
+}
+
+/// Device and inode of the file at `path`.
+pub(super) fn identity(path: &Path) -> Option<(u64, u64)> {
+    fs::metadata(path).ok().map(|file| (file.dev(), file.ino()))
 }
 
 /// Length of the file, and whether it is marked as still being written. Rejects files that are not

@@ -1,6 +1,6 @@
 //! Writing a history during the run.
 
-use std::os::unix::fs::{FileExt, MetadataExt};
+use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
 use hdf5::{Dataset, File};
@@ -16,7 +16,7 @@ use super::model::{Bonds, Frame, Layout, RowCounts, Rupture};
 use super::reader::History;
 use super::rupture::RuptureRow;
 use super::schema::{chunk_cache, path};
-use super::source::{Source, end_of_file};
+use super::source::{Source, end_of_file, identity};
 use super::table::{Growth, Storage, Table};
 use super::visit::{Bytes, Copy, Share, Visit};
 use super::{dimensions, lock};
@@ -93,7 +93,10 @@ impl Writer {
         checkpoint: &Checkpoint,
         tell: &mut dyn FnMut(f64) -> bool,
     ) -> Result<Self> {
+        // a copy that began now would put the old file back
+        let mut source = None;
         Self::begin(path, layout, |writer| {
+            source = lock::hold_while_read(history.path())?;
             let mut share = Share::of(writer.bytes(kept)?, tell);
             writer.take_over(history.source(), kept, &mut share)?;
             writer.checkpoint(checkpoint)
@@ -451,9 +454,4 @@ fn check_bonds(bonds: &Bonds) -> Result<()> {
         check_length("bonds/twist", twist.len(), bonds.len())?;
     }
     Ok(())
-}
-
-/// Device and inode of the file at `path`.
-fn identity(path: &Path) -> Option<(u64, u64)> {
-    std::fs::metadata(path).ok().map(|file| (file.dev(), file.ino()))
 }

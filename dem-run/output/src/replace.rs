@@ -84,16 +84,22 @@ fn rename(part: &Path, path: &Path) -> Result<()> {
     Ok(())
 }
 
+/// Most links that are followed from one to the next, as in Linux.
+const MOST_LINKS: usize = 40;
+
 /// The file at `path`; where that is a symbolic link, the file that it names, also one that does
 /// not exist yet.
 #[must_use]
 pub fn followed(path: &Path) -> PathBuf {
-    let named = || fs::read_link(path).map(|to| folder_of(path).join(to));
-    if path.is_symlink() {
-        fs::canonicalize(path).or_else(|_| named()).unwrap_or_else(|_| path.into())
-    } else {
-        path.into()
+    if !path.is_symlink() {
+        return path.into();
     }
+    let mut named = path.to_path_buf();
+    for _ in 0..MOST_LINKS {
+        let Ok(to) = fs::read_link(&named) else { break };
+        named = folder_of(&named).join(to);
+    }
+    fs::canonicalize(&named).unwrap_or(named)
 }
 
 fn folder_of(path: &Path) -> &Path {

@@ -99,7 +99,7 @@ pub enum Scatter {
     /// Weibull: a share exp(−(s/s₀)^m) of the bonds is stronger than s, with the given strength
     /// as s₀.
     Weibull {
-        /// Modulus m: the larger it is, the smaller the scatter.
+        /// Modulus m, at least 0.1: the larger it is, the smaller the scatter.
         modulus: f64,
     },
     /// Normal with the given strength as mean; values below zero are drawn again, so with a large

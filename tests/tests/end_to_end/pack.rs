@@ -47,8 +47,8 @@ fn the_file_of_a_killed_run_is_made_whole() {
     let here = Folder::new();
     let endless = Endless::start(&here, "a.h5", 3);
     // not while it is being written
-    here.dem_post(&["pack", "a.h5"]).fails(4, &["being written by process"]);
-    here.dem_post(&["info", "a.h5", "--repair"]).fails(4, &["being written by process"]);
+    here.dem_post(&["pack", "a.h5"]).fails(4, &["in use by process"]);
+    here.dem_post(&["info", "a.h5", "--repair"]).fails(4, &["in use by process"]);
     drop(endless);
     let frames = here.history("a.h5").frames();
     assert!(here.history("a.h5").open_ended());

@@ -211,7 +211,7 @@ fn a_resumed_run_that_is_killed_loses_nothing() {
         let mut command = Command::new(program("dem-run"));
         command.args(["resume", &file, "--until", "0.08", "--quiet"]).current_dir(here.path(""));
         let mut child = command.stdout(Stdio::null()).spawn().expect("start");
-        while inode(&file) == before {
+        while inode(&file) == before && child.try_wait().expect("status").is_none() {
             std::thread::sleep(Duration::from_micros(100));
         }
         std::thread::sleep(Duration::from_millis(wait));
@@ -324,7 +324,7 @@ fn files_that_cannot_go_on_are_left_as_they_are() {
 fn a_history_that_is_being_written_is_refused() {
     let here = Folder::new();
     let endless = Endless::start(&here, "a.h5", 0);
-    let words = ["a.h5", "being written by process", &endless.id().to_string()];
+    let words = ["a.h5", "in use by process", &endless.id().to_string()];
     here.dem_run(&["resume", "a.h5"]).fails(4, &words);
     // nor does another run take its place
     let scene = config("two-grains.json");

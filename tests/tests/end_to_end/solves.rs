@@ -171,3 +171,32 @@ fn a_specimen_that_has_parted_moves_on() {
     assert_eq!((&summary["ending"], &summary["steps"]), (&json!("time"), &json!(50)), "{summary}");
     assert!(number(&summary["worst_residual"]) <= 1e-8);
 }
+
+/// Bonded disks between rough walls, pressed and then released: friction keeps reactions in them,
+/// beside which nothing acts. Load and velocity errors were relative to that nothing.
+#[test]
+fn a_sample_that_is_unloaded_rests() {
+    let here = Folder::new();
+    let plane = |x: i32, y: i32| json!({ "shape": { "plane": { "normal": [x, y], "place": "seated" } } });
+    for (name, last) in [("zero", 0.0), ("lifted", -20.0)] {
+        let mut top = plane(0, -1);
+        top["mass"] = json!("sample");
+        top["force"] = json!({ "table": [[0, 0], [0.003, 20], [0.005, 0], [0.007, last]] });
+        let scene = json!({
+            "dimension": 2, "thickness": 1,
+            "sample": { "lattice": { "square": { "columns": 4, "rows": 1, "diameter": 0.003 } } },
+            "materials": { "density": 2500, "friction": { "grain_grain": 0.3, "grain_wall": 0.3 } },
+            "bonds": { "strength": 100, "gap_tolerance": 0.01 },
+            "walls": { "bottom": plane(0, 1), "left": plane(1, 0), "right": plane(-1, 0), "top": top },
+            "time": { "step": 1e-4, "end": 0.01 }, "output": { "every_steps": 1 }
+        });
+        here.write(&format!("{name}.json"), scene.to_string());
+        let summary = run(&here, &format!("{name}.json"), &[]);
+        assert_eq!((&summary["ending"], &summary["steps"]), (&json!("time"), &json!(100)), "{summary}");
+        assert!(
+            number(&summary["worst_residual"]) <= 1e-8 && number(&summary["worst_load_error"]) <= 1e-5,
+            "{summary}"
+        );
+        assert_eq!((&summary["missed_tolerance"], &summary["rejected"]), (&json!(0), &json!(0)), "{summary}");
+    }
+}

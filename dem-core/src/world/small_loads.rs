@@ -1,0 +1,87 @@
+//! Errors of solves where next to nothing acts: they are relative to loads and velocities that
+//! vanish, beside reactions that friction has locked in.
+
+use super::World;
+use super::assembly::TOUCHING;
+use crate::bond::BondStatus;
+use crate::dim::{Dim, Vect};
+use crate::problem::ContactProblem;
+use crate::problem::residual::wrong_velocity;
+use crate::solver::{SolveReport, SolveStatus};
+
+/// Share of what the weakest bond bears, below which impulses on bodies count as that large.
+const SMALL: f64 = 1e-3;
+
+impl<D: Dim> World<D> {
+    /// The report of a solve with its errors relative to loads that matter, and accepted where its
+    /// false motion is nothing.
+    pub(super) fn judged(&self, solve: SolveReport, problem: &ContactProblem<D>) -> SolveReport {
+        self.accepted_as_rest(self.beside_strengths(solve, problem), problem)
+    }
+
+    /// Where all forces are given, the load error relative to the impulses on the bodies or, if
+    /// larger, to a thousandth of what the weakest bond bears in a step of the scene; and the
+    /// status by such a velocity error. Where walls drive the sample, reactions grow without loads.
+    fn beside_strengths(&self, solve: SolveReport, problem: &ContactProblem<D>) -> SolveReport {
+        let solver = &self.settings.solver;
+        let (Some(aim), Some(load_error)) = (solver.load_tolerance(), solve.load_error) else { return solve };
+        let missed = solve.status != SolveStatus::Converged;
+        if !missed || solve.residual.is_nan() || solve.residual > solver.accept() || is_driven(problem) {
+            return solve;
+        }
+        let intact = self.bonds.iter().filter(|bond| bond.status == BondStatus::Intact);
+        let weakest = intact.map(|bond| bond.strength).fold(f64::INFINITY, f64::min);
+        let floor = SMALL * self.settings.step * weakest;
+        if !floor.is_finite() {
+            return solve;
+        }
+        let (mut net, mut heaviest) = (0.0f64, 0.0f64);
+        for (node, (velocity, spin)) in problem.nodes.all.iter().zip(problem.free.iter()) {
+            if node.inverse_mass > 0.0 {
+                let taken = (node.velocity - *velocity).norm() / node.inverse_mass;
+                let inertia = (node.inverse_mass * node.inverse_inertia).sqrt();
+                let turned = if inertia > 0.0 { (node.spin - *spin).norm() / inertia } else { 0.0 };
+                net = net.max(taken.hypot(turned));
+                heaviest = heaviest.max(1.0 / node.inverse_mass);
+            }
+        }
+        let load_error = load_error * (net / floor).min(1.0);
+        let status = if heaviest * wrong_velocity(problem) > aim * floor {
+            solve.status
+        } else if solve.residual <= solver.tolerance() && load_error <= aim {
+            SolveStatus::Converged
+        } else {
+            SolveStatus::Accepted
+        };
+        SolveReport { status, load_error: Some(load_error), ..solve }
+    }
+
+    /// The report of a solve that missed its velocity error alone, accepted where the bodies rest.
+    fn accepted_as_rest(&self, solve: SolveReport, problem: &ContactProblem<D>) -> SolveReport {
+        let missed = solve.status == SolveStatus::Failed && solve.residual <= self.settings.solver.accept();
+        let status = if missed && self.rests(problem) { SolveStatus::Accepted } else { solve.status };
+        SolveReport { status, ..solve }
+    }
+
+    /// Whether the false motion of a solution is nothing: in a step it moves no contact by more
+    /// than what counts as rest, and it is small beside the motion of the bodies relative to each
+    /// other. Where a sample has come apart, its fragments move as wholes, and no contact has to
+    /// change its velocity.
+    pub(super) fn rests(&self, problem: &ContactProblem<D>) -> bool {
+        let smallest = self.grains.radius.iter().copied().fold(f64::INFINITY, f64::min);
+        let range = |k: usize| {
+            let along = || problem.nodes.all.iter().map(|node| node.velocity[k]);
+            along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min)
+        };
+        let apart = (0..D::N).map(|k| range(k).powi(2)).sum::<f64>().sqrt();
+        let (wrong, aim) = (wrong_velocity(problem), self.settings.solver.load_tolerance().unwrap_or(0.0));
+        self.settings.step * wrong <= TOUCHING * smallest && wrong <= aim * apart
+    }
+}
+
+/// Whether a body moves at a given velocity.
+fn is_driven<D: Dim>(problem: &ContactProblem<D>) -> bool {
+    let given = problem.nodes.all.iter().zip(problem.free.iter()).filter(|(node, _)| node.inverse_mass == 0.0);
+    let moves = |(velocity, spin): &(D::Vector, D::Spin)| velocity.norm() > 0.0 || spin.norm() > 0.0;
+    given.map(|(_, free)| free).any(moves) || problem.nodes.slides.iter().any(|slide| slide.norm() > 0.0)
+}
