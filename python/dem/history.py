@@ -222,6 +222,9 @@ class History:
         """What is observed at every step: dimension time, and those of the value."""
         group = self._file["observables"]
         time, step = (self._rows(group[name], "steps") for name in ("time", "step"))
+        gaps = np.flatnonzero(np.diff(step) != 1)
+        if len(gaps):
+            raise ValueError(f"{self.path} is damaged: step {step[gaps[0] + 1]} follows step {step[gaps[0]]}")
         variables = {}
         for name in group:
             if name in ("time", "step"):
