@@ -4,12 +4,13 @@
 use super::World;
 use super::assembly::TOUCHING;
 use crate::bond::BondStatus;
+use crate::contact::Law;
 use crate::dim::{Dim, Vect};
-use crate::problem::ContactProblem;
 use crate::problem::residual::wrong_velocity;
+use crate::problem::{Contact, ContactProblem, Nodes, Visitor};
 use crate::solver::{SolveReport, SolveStatus};
 
-/// Share of what the weakest bond bears, below which impulses on bodies count as that large.
+/// Share of the largest reaction, below which impulses on bodies count as that large.
 const SMALL: f64 = 1e-3;
 
 impl<D: Dim> World<D> {
@@ -20,8 +21,9 @@ impl<D: Dim> World<D> {
     }
 
     /// Where all forces are given, the load error relative to the impulses on the bodies or, if
-    /// larger, to a thousandth of what the weakest bond bears in a step of the scene; and the
-    /// status by such a velocity error. Where walls drive the sample, reactions grow without loads.
+    /// larger, to a thousandth of the largest reaction, but no more than of what the weakest bond
+    /// bears in a step of the scene; and the status by such a velocity error. Where walls drive the
+    /// sample, reactions grow without loads.
     fn beside_strengths(&self, solve: SolveReport, problem: &ContactProblem<D>) -> SolveReport {
         let solver = &self.settings.solver;
         let (Some(aim), Some(load_error)) = (solver.load_tolerance(), solve.load_error) else { return solve };
@@ -31,8 +33,10 @@ impl<D: Dim> World<D> {
         }
         let intact = self.bonds.iter().filter(|bond| bond.status == BondStatus::Intact);
         let weakest = intact.map(|bond| bond.strength).fold(f64::INFINITY, f64::min);
-        let floor = SMALL * self.settings.step * weakest;
-        if !floor.is_finite() {
+        let mut largest = Largest(0.0);
+        problem.visit(&mut largest);
+        let floor = SMALL * largest.0.sqrt().min(self.settings.step * weakest);
+        if weakest.is_infinite() || floor == 0.0 {
             return solve;
         }
         let (mut net, mut heaviest) = (0.0f64, 0.0f64);
@@ -76,6 +80,15 @@ impl<D: Dim> World<D> {
         let apart = (0..D::N).map(|k| range(k).powi(2)).sum::<f64>().sqrt();
         let (wrong, aim) = (wrong_velocity(problem), self.settings.solver.load_tolerance().unwrap_or(0.0));
         self.settings.step * wrong <= TOUCHING * smallest && wrong <= aim * apart
+    }
+}
+
+/// The square of the largest reaction.
+struct Largest(f64);
+
+impl<D: Dim> Visitor<D> for Largest {
+    fn visit<L: Law>(&mut self, _: &Nodes<D>, c: &Contact<D, L>) {
+        self.0 = self.0.max(c.r.dot(&c.r));
     }
 }
 
