@@ -45,7 +45,7 @@ impl<D: Dim> World<D> {
                 let taken = (node.velocity - *velocity).norm() / node.inverse_mass;
                 let inertia = (node.inverse_mass * node.inverse_inertia).sqrt();
                 let turned = if inertia > 0.0 { (node.spin - *spin).norm() / inertia } else { 0.0 };
-                net = net.max(taken.hypot(turned));
+                net = net.hypot(taken.hypot(turned));
                 heaviest = heaviest.max(1.0 / node.inverse_mass);
             }
         }
