@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::error::RunError;
 use crate::history::refuse_busy;
-use crate::output::replace::followed;
+use crate::output::replace::{folder, followed};
 use crate::run::RunOptions;
 use crate::scene::Scene;
 
@@ -61,14 +61,13 @@ pub(crate) fn writable(path: &Path, option: &str, overwrite: bool) -> Result<(),
         return unfit("exists", format!("--force overwrites it, {option} names another"));
     }
     refuse_busy(path)?;
-    let file = followed(path);
-    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = folder(path);
     let refused =
         |why: String| Err(RunError::File { path: path.into(), doing: "cannot be written", source: why.into() });
     if !folder.is_dir() {
         return refused(format!("there is no folder {}; create it first", folder.display()));
     }
-    match tempfile::tempfile_in(folder) {
+    match tempfile::tempfile_in(&folder) {
         Ok(_) => Ok(()),
         Err(why) => refused(format!("no file can be created in {}: {why}", folder.display())),
     }

@@ -403,7 +403,7 @@ fn observables<D: Dim>(scene: &Scene, world: &World<D>) -> Vec<(Observable, Meas
     add("solver_rejected", "", scalar, |_, r, out| out.push(f64::from(r.rejected)));
     add("substeps", "", scalar, |_, r, out| out.push(f64::from(r.substeps)));
     add("penetration", "m", scalar, |_, r, out| out.push(r.penetration));
-    add("stress", "Pa", &[d, d], |w, r, out| out.extend(r.stress.clone().unwrap_or_else(|| w.stress())));
+    add("stress", "Pa", &[d, d], |w, r, out| out.extend(r.stress(w)));
     add("strain", "", &[d, d], |w, _, out| out.extend(w.strain()));
     list.push((Observable::route(), |_, r, out| out.push(solver_route(r.route).number())));
     list.extend(of_bonds_and_walls(scene, world));

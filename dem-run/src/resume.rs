@@ -5,7 +5,7 @@ use crate::check::free_space;
 use crate::error::RunError;
 use crate::history::{Checkpoint, Ending, History, HistoryError, Parameters, RowCounts, refuse_busy};
 use crate::in_dimension;
-use crate::output::replace::followed;
+use crate::output::replace::folder;
 use crate::output::{number, print_json, print_line};
 use crate::record::{Beginning, Recorder};
 use crate::run::{Execution, Run, RunOptions, RunState, handle_signals, run_in};
@@ -227,10 +227,8 @@ fn kept(history: &History, scene: &Scene, checkpoint: &Checkpoint) -> Result<Row
 /// Rejects a disk without space for the new history: it is written beside the old one before it
 /// replaces it.
 fn refuse_full_disk(history: &History) -> Result<(), RunError> {
-    let file = followed(history.path());
-    let folder = file.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let needed = history.length();
-    match free_space(folder) {
+    match free_space(&folder(history.path())) {
         Some(free) if free < needed => Err(RunError::Disk { path: history.path().into(), needed, free }),
         _ => Ok(()),
     }

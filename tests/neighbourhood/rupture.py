@@ -278,7 +278,11 @@ def check_limits_of_events(h, report):
     expected = np.where(tension & (h.event_mode == "TENSION"), "TENSION", mode)
     tied = np.zeros(len(e), bool)
     for row, name in enumerate(("SHEAR", "ROLLING", "TWIST")):
-        tied |= (h.event_mode == name) & (ratios[row] >= (1 - eps) * ratios.max(0) - slack)
+        nearly = (1 - eps) * ratios.max(0)
+        # the first of those that are nearly equal
+        earlier = (ratios[:row] >= nearly + slack).any(0) & (not mixed)
+        tied |= (h.event_mode == name) & (ratios[row] >= nearly - slack) & ~earlier
+        expected = np.where((h.event_mode == name) & earlier, "an earlier one", expected)
     off = (
         (expected != h.event_mode) & ~tied & ~(tension & (ratio >= (1 - eps) * n - slack) & (h.event_mode == "TENSION"))
     )

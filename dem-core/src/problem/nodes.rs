@@ -17,6 +17,16 @@ pub struct Node<D: Dim> {
     pub inverse_inertia: f64,
 }
 
+impl<D: Dim> Node<D> {
+    /// Norm of the impulse that gives the body this velocity and spin (N s); the spin counts by the
+    /// radius of gyration. Zero if impulses do not move it.
+    pub fn impulse(&self, velocity: &D::Vector, spin: &D::Spin) -> f64 {
+        let over = |size: f64, inverse: f64| if inverse > 0.0 { size / inverse } else { 0.0 };
+        let turning = over(spin.norm(), (self.inverse_mass * self.inverse_inertia).sqrt());
+        over(velocity.norm(), self.inverse_mass).hypot(turning)
+    }
+}
+
 /// Node velocities: grains first, then walls.
 #[derive(Clone, Debug)]
 pub struct Nodes<D: Dim> {

@@ -21,7 +21,8 @@ pub(super) const STIFF: f64 = 1e8;
 /// in plain double precision round-off decides; with 1e9 and twice the precision loads agree to
 /// 1e-3 (decision 35).
 pub(super) const KAPPA: f64 = 1e9;
-/// Share of a tolerance allowed for one of the errors of a solve.
+/// Share of a tolerance allowed for one of the errors of a solve; also the relative residual above
+/// which a linear solve with new factors has failed.
 pub(super) const SHARE: f64 = 0.1;
 /// An iteration makes progress if it brings its error below this share of the error at the last
 /// progress. A method ends, or changes, after `PATIENCE` iterations without progress. (Two steps

@@ -4,12 +4,11 @@
 //! the reactions of the last event, without those of the bonds that broke in it, and finds the
 //! equilibrium r(τ) of the bodies at rest, with bonds that cannot break. While τ grows it starts
 //! anew from the reactions after the release, and from those where a load function turns: dry
-//! contacts keep what they bear. At the τ of the last event
-//! the broken bonds have released their forces to the others. If no other bond exceeds its strength
-//! there, τ grows until the first one reaches it; else τ decreases until the last one meets it: the
-//! load of the next break. While no contact changes its status r(τ) is affine in the loads; where
-//! the excess is affine, too (2D, one bond governs), a secant finds that load with the third
-//! equilibrium.
+//! contacts keep what they bear. At the τ of the last event the broken bonds have released their
+//! forces to the others. If no other bond exceeds its strength there, τ grows until the first one
+//! reaches it; else τ decreases until the last one meets it: the load of the next break. While no
+//! contact changes its status r(τ) is affine in the loads; where the excess is affine, too (2D, one
+//! bond governs), a secant finds that load with the third equilibrium.
 
 use super::World;
 use super::assembly::{CLOSED, Places, over_arm, write_reactions};
@@ -18,7 +17,7 @@ use super::report::{Solves, StepError, StepReport};
 use super::touch::{Break, StoredTouch};
 use crate::bond::{BondStatus, LIMIT, failure, required_strength};
 use crate::dim::{Dim, Vect};
-use crate::problem::{ContactProblem, Kind, Nodes};
+use crate::problem::{ContactProblem, Kind, Node};
 
 /// The bodies at rest under the loads of one time, with bonds that cannot break.
 struct Equilibrium<D: Dim> {
@@ -229,9 +228,8 @@ impl<D: Dim> World<D> {
 
     /// The error of bodies that do not stay at rest.
     fn unbalanced(&self, found: &Equilibrium<D>) -> StepError {
-        let momentum = |k: &usize| node_impulse(&found.problem.nodes, *k);
-        let bodies = 0..found.problem.nodes.all.len();
-        let fastest = bodies.max_by(|a, b| momentum(a).total_cmp(&momentum(b)));
+        let nodes = &found.problem.nodes.all;
+        let fastest = (0..nodes.len()).max_by(|a, b| momentum(&nodes[*a]).total_cmp(&momentum(&nodes[*b])));
         StepError::Unbalanced { time: self.time, load_time: found.at, body: fastest.unwrap_or(0) as u32 }
     }
 }
@@ -239,21 +237,12 @@ impl<D: Dim> World<D> {
 /// Norm of the impulses that contacts leave to the bodies of a problem (N s): zero if all stay at
 /// rest.
 fn unbalanced_impulse<D: Dim>(problem: &ContactProblem<D>) -> f64 {
-    (0..problem.nodes.all.len()).map(|k| node_impulse(&problem.nodes, k).powi(2)).sum::<f64>().sqrt()
+    problem.nodes.all.iter().map(|node| momentum(node).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Momentum of a body after the step (N s); its spin counts by the radius of gyration.
-fn node_impulse<D: Dim>(nodes: &Nodes<D>, k: usize) -> f64 {
-    let node = &nodes.all[k];
-    if node.inverse_mass == 0.0 {
-        return 0.0;
-    }
-    let spin = if node.inverse_inertia > 0.0 {
-        node.spin.norm() / (node.inverse_mass * node.inverse_inertia).sqrt()
-    } else {
-        0.0
-    };
-    (node.velocity.norm() / node.inverse_mass).hypot(spin)
+/// Momentum of a body after the step (N s).
+fn momentum<D: Dim>(node: &Node<D>) -> f64 {
+    node.impulse(&node.velocity, &node.spin)
 }
 
 /// The first of the `knots` strictly between two times, on the way from one to the other; else the

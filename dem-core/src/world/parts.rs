@@ -33,7 +33,7 @@ impl<D: Dim> World<D> {
         match self.advance(0.5 * h, halvings + refused, 2 * parts, &mut watch_second) {
             Ok(second) => {
                 let stress = forces.averaged(self, [&first, &second]);
-                Ok(StepReport { stress: Some(stress), ..first.followed_by(second, refused) })
+                Ok(StepReport { mean_stress: Some(stress), ..first.followed_by(second, refused) })
             }
             Err(error) => {
                 // after the first half the world is in neither the old state nor the new one
@@ -58,7 +58,7 @@ impl<D: Dim> Forces<D> {
         Self {
             walls: world.walls.iter().map(|w| ([w.reaction, w.reaction_at_limit], w.applied)).collect(),
             pressure: world.membrane.as_ref().map_or(0.0, |membrane| membrane.applied),
-            stress: report.stress.clone().unwrap_or_else(|| world.stress()),
+            stress: report.stress(world),
         }
     }
 

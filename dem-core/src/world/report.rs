@@ -1,6 +1,6 @@
 //! The report of a step, and the error of a step that could not be made.
 
-use super::{Break, Counts};
+use super::{Break, Counts, World};
 use crate::dim::Dim;
 use crate::solver::certificate::Verdict;
 use crate::solver::{Route, SolveReport, SolveStatus, Work};
@@ -48,12 +48,17 @@ pub struct StepReport<D: Dim> {
     pub rejected: u32,
     /// Number of parts of the step: 1, or more if a solve was refused or a body was too fast.
     pub substeps: u32,
-    /// Mean stress over the parts of a step in parts (Pa), see
-    /// [`World::stress`](super::World::stress).
-    pub stress: Option<Vec<f64>>,
+    /// Mean stress over the parts of a step in parts (Pa).
+    pub mean_stress: Option<Vec<f64>>,
 }
 
 impl<D: Dim> StepReport<D> {
+    /// Mean stress in the step that the `world` has just made (Pa): [`World::stress`], or its mean
+    /// over the parts.
+    pub fn stress(&self, world: &World<D>) -> Vec<f64> {
+        self.mean_stress.clone().unwrap_or_else(|| world.stress())
+    }
+
     /// The report of two half steps as that of one step; `refused` solves caused the halving.
     pub(super) fn followed_by(self, second: Self, refused: u32) -> Self {
         let mut breaks = self.breaks;
@@ -376,7 +381,7 @@ mod tests {
             bond_elongation: 0.0,
             rejected: 0,
             substeps: 1,
-            stress: None,
+            mean_stress: None,
         }
     }
 

@@ -39,16 +39,11 @@ impl<D: Dim> World<D> {
         if weakest.is_infinite() || floor == 0.0 {
             return solve;
         }
-        let (mut net, mut heaviest) = (0.0f64, 0.0f64);
-        for (node, (velocity, spin)) in problem.nodes.all.iter().zip(problem.free.iter()) {
-            if node.inverse_mass > 0.0 {
-                let taken = (node.velocity - *velocity).norm() / node.inverse_mass;
-                let inertia = (node.inverse_mass * node.inverse_inertia).sqrt();
-                let turned = if inertia > 0.0 { (node.spin - *spin).norm() / inertia } else { 0.0 };
-                net = net.hypot(taken.hypot(turned));
-                heaviest = heaviest.max(1.0 / node.inverse_mass);
-            }
-        }
+        let nodes = || problem.nodes.all.iter().zip(problem.free.iter());
+        let taken = nodes().map(|(node, (v, w))| node.impulse(&(node.velocity - *v), &(node.spin - *w)));
+        let net = taken.fold(0.0, f64::hypot);
+        let moving = nodes().map(|(node, _)| node.inverse_mass).filter(|inverse| *inverse > 0.0);
+        let heaviest = moving.map(f64::recip).fold(0.0, f64::max);
         let load_error = load_error * (net / floor).min(1.0);
         let status = if heaviest * wrong_velocity(problem) > aim * floor {
             solve.status

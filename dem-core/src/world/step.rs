@@ -541,7 +541,7 @@ impl<D: Dim> World<D> {
             bond_elongation,
             rejected: 0,
             substeps: 1,
-            stress: None,
+            mean_stress: None,
         }
     }
 }

@@ -299,7 +299,7 @@ fn the_forces_of_a_step_in_parts_are_those_of_the_step() {
             assert!((reaction[0] + push).abs() <= 1e-12 * push.abs(), "{} N for {push} N", reaction[0]);
             assert_eq!(w.walls[0].reaction_at_limit, reaction);
             // the branch of a contact with a wall ends at the wall
-            let stress = report.stress.unwrap_or_else(|| w.stress());
+            let stress = report.stress(&w);
             assert!(push == 0.0 || stress[0] > 0.0, "{stress:?} Pa for {push} N");
             parts = parts.max(report.substeps);
             work += push * speed * h;

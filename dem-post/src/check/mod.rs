@@ -20,8 +20,7 @@ mod schema;
 /// Checks a history; with a bar on a terminal unless `quiet`.
 ///
 /// # Errors
-/// Those of opening the file once more. Violations in the
-/// file are listed in the report.
+/// Those of opening the file once more. Violations in the file are listed in the report.
 pub fn read(history: &History, quiet: bool) -> Result<Report> {
     let file = history.reopened()?;
     let report = Report { file: history.path().display().to_string(), frames: history.frames(), ..Report::default() };

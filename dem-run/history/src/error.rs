@@ -1,5 +1,6 @@
 //! The errors of a history, each with its remedy.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// An error of reading or writing a history. Its message names the file, what is wrong and what to
@@ -161,8 +162,8 @@ pub(super) fn refused(path: &Path) -> impl Fn(&'static str, std::io::Error) -> H
 /// What to do where the system refused to create a file.
 fn remedy(doing: &str, source: &std::io::Error) -> &'static str {
     match source.kind() {
-        std::io::ErrorKind::NotFound if doing == "create" => ": create its folder first",
-        std::io::ErrorKind::PermissionDenied | std::io::ErrorKind::ReadOnlyFilesystem if doing == "create" => {
+        ErrorKind::NotFound if doing == "create" => ": create its folder first",
+        ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem if doing == "create" => {
             ": a new file is made in its folder, which must be writable: name another with -o, or copy the history"
         }
         _ => "",

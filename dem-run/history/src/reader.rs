@@ -136,13 +136,19 @@ impl History {
         let frames = self.steps.iter().take_while(|of_frame| **of_frame <= step).count();
         let mut rows = self.complete_at(frames)?;
         let of_frame = self.steps[..frames].last().copied().unwrap_or(0);
+        if of_frame >= step {
+            return Ok(Some(rows));
+        }
         let place = format!("{}/step", path::OBSERVABLES);
-        let later: Vec<i64> = self.source.read(&place, rows.steps..self.source.count(&place)?.max(rows.steps))?.1;
-        let follow = later.into_iter().zip(of_frame + 1..=step).take_while(|(found, next)| found == next).count();
-        if of_frame + (follow as i64) < step {
+        let end = rows.steps.saturating_add((step - of_frame) as usize);
+        if self.source.count(&place)? < end {
             return Ok(None);
         }
-        rows.steps += follow;
+        let later: Vec<i64> = self.source.read(&place, rows.steps..end)?.1;
+        if !later.into_iter().eq(of_frame + 1..=step) {
+            return Ok(None);
+        }
+        rows.steps = end;
         if self.source.has(path::RUPTURE) {
             let later = rows.events..self.source.count(path::RUPTURE)?.max(rows.events);
             let steps = RuptureRow::read(&self.source, path::RUPTURE, later)?.1;

@@ -102,6 +102,12 @@ pub fn followed(path: &Path) -> PathBuf {
     fs::canonicalize(&named).unwrap_or(named)
 }
 
+/// The folder of the file that is written where `path` is: that of the file which a link names.
+#[must_use]
+pub fn folder(path: &Path) -> PathBuf {
+    folder_of(&followed(path)).into()
+}
+
 fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }

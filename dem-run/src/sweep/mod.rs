@@ -118,7 +118,7 @@ fn all(store: &Store, plan: &Plan, mut manifest: Manifest, options: &SweepOption
     };
     // completed runs are reported, also after an error
     let written = report::write(store, &mut manifest);
-    let failed = failures(store, &manifest, elsewhere(&manifest));
+    let failed = failures(store, &manifest);
     let standing = Standing { folder: options.folder.clone(), manifest };
     let printed = print_result(&standing, options.json);
     carried.and(written)?;
@@ -206,36 +206,29 @@ fn exit_code(code: Option<i32>) -> u8 {
     }
 }
 
-/// The common error of all failed runs, with the largest of their exit codes; else `others`.
-fn failures(store: &Store, manifest: &Manifest, others: Result<(), RunError>) -> Result<(), RunError> {
+/// The common error of all failed runs, with the largest of their exit codes, and of those that
+/// other processes make.
+fn failures(store: &Store, manifest: &Manifest) -> Result<(), RunError> {
+    let runs = manifest.runs.len();
+    let elsewhere = manifest.runs.iter().filter(|run| run.state == State::Running).count();
+    let others = format!(
+        "{elsewhere} of {runs} runs are being run by another process, for which this command does not wait: repeat it \
+         when that has ended"
+    );
     let failed: Vec<_> = manifest.runs.iter().filter(|run| run.state == State::Failed).collect();
     let code = failed.iter().map(|run| exit_code(store.outcome(&run.id).and_then(|outcome| outcome.exit_code))).max();
-    let Some(code) = code else { return others };
+    let Some(code) = code else {
+        return if elsewhere == 0 { Ok(()) } else { Err(RunError::Runs { code: 4, message: others }) };
+    };
     let left = failed.iter().filter(|run| store.path(&run.id, ".failed.h5").is_file()).count();
     let left = match left {
         0 => "none had started its history; see runs/NNNN.log".to_string(),
         all if all == failed.len() => "their histories up to the failure are runs/NNNN.failed.h5".to_string(),
         some => format!("the histories of {some} of them up to the failure are runs/NNNN.failed.h5"),
     };
-    let others = others.err().map_or(String::new(), |others| format!("\n{others}"));
-    let message =
-        format!("{} of {} runs failed; {left}; --retry runs them again{others}", failed.len(), manifest.runs.len());
+    let others = if elsewhere == 0 { String::new() } else { format!("\n{others}") };
+    let message = format!("{} of {runs} runs failed; {left}; --retry runs them again{others}", failed.len());
     Err(RunError::Runs { code, message })
-}
-
-/// The error of a sweep that other processes complete.
-fn elsewhere(manifest: &Manifest) -> Result<(), RunError> {
-    match manifest.runs.iter().filter(|run| run.state == State::Running).count() {
-        0 => Ok(()),
-        count => {
-            let message = format!(
-                "{count} of {} runs are being run by another process, for which this command does not wait: repeat it \
-                 when that has ended",
-                manifest.runs.len()
-            );
-            Err(RunError::Runs { code: 4, message })
-        }
-    }
 }
 
 /// Preview of a sweep.
