@@ -492,29 +492,6 @@ fn a_copy_that_is_ended_leaves_everything_as_it_was() {
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
-#[test]
-fn of_two_checkpoints_the_newest_whole_one_counts() {
-    let (_folder, path) = folder();
-    let layout = full(2);
-    let mut writer = write(&path, &layout, 4);
-    let checkpoint = |step| Checkpoint { step, reals: numbers(50, step as f64), counts: vec![step as u64; 9] };
-    for step in [0, 10, 20, 30] {
-        writer.checkpoint(&checkpoint(step)).unwrap();
-    }
-    writer.finish().unwrap();
-    let newest = || History::open(&path).unwrap().checkpoint().unwrap();
-    assert_eq!(newest(), Some(checkpoint(30)));
-    // a checkpoint that was being written when the run was killed
-    let file = hdf5::File::open_rw(&path).unwrap();
-    file.dataset("checkpoint/reals_1").unwrap().write_slice(&[7.5], 3..4).unwrap();
-    drop(file);
-    assert_eq!(newest(), Some(checkpoint(20)));
-    let file = hdf5::File::open_rw(&path).unwrap();
-    file.dataset("checkpoint/counts_0").unwrap().write_slice(&[1u64], 8..9).unwrap();
-    drop(file);
-    assert_eq!(newest(), None);
-}
-
 /// A minimal history of the solver's observables: these routes (as numbers) and load errors.
 fn solved(path: &Path, observables: Vec<Observable>, rows: &[&[f64]]) -> Writer {
     let layout = Layout { observables, ..bare() };

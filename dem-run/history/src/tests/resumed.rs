@@ -1,4 +1,4 @@
-//! Files of runs that were resumed, or that another program overwrote meanwhile.
+//! States from which runs resume, and files that another program overwrote meanwhile.
 
 use super::*;
 
@@ -51,4 +51,27 @@ fn a_state_beyond_the_last_frame_has_its_rows() {
     let copied = History::open(&copied).unwrap();
     assert_eq!((copied.complete().unwrap(), copied.checkpoint().unwrap()), (complete, Some(state(14))));
     assert_eq!(copied.complete_to(14).unwrap(), history.complete_to(14).unwrap());
+}
+
+#[test]
+fn of_two_checkpoints_the_newest_whole_one_counts() {
+    let (_folder, path) = folder();
+    let layout = full(2);
+    let mut writer = write(&path, &layout, 4);
+    let checkpoint = |step| Checkpoint { step, reals: numbers(50, step as f64), counts: vec![step as u64; 9] };
+    for step in [0, 10, 20, 30] {
+        writer.checkpoint(&checkpoint(step)).unwrap();
+    }
+    writer.finish().unwrap();
+    let newest = || History::open(&path).unwrap().checkpoint().unwrap();
+    assert_eq!(newest(), Some(checkpoint(30)));
+    // a checkpoint that was being written when the run was killed
+    let file = hdf5::File::open_rw(&path).unwrap();
+    file.dataset("checkpoint/reals_1").unwrap().write_slice(&[7.5], 3..4).unwrap();
+    drop(file);
+    assert_eq!(newest(), Some(checkpoint(20)));
+    let file = hdf5::File::open_rw(&path).unwrap();
+    file.dataset("checkpoint/counts_0").unwrap().write_slice(&[1u64], 8..9).unwrap();
+    drop(file);
+    assert_eq!(newest(), None);
 }
